@@ -1,0 +1,1 @@
+"""Human-like agents that see, hear and feel in one world, and learn."""
