@@ -1,0 +1,170 @@
+"""A pinhole camera that sees a `Scene`: colours, depths and who is where."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+
+from veca_marl.sim.pose import Floats, Pose
+from veca_marl.sim.raster import NOTHING, Depths, Lens, Surfaces, draw_geoms
+from veca_marl.sim.scene import Bools, Scene
+from veca_marl.sim.shading import Images, glaze, name_objects, shade
+
+
+class Views(NamedTuple):
+    """What a camera saw from V poses.
+
+    Attributes:
+        rgb: ``(V, H, W, 3)`` uint8.
+        depth: ``(V, H, W)`` float32 metres along the optical axis to what is not transparent; the
+            camera's `far_m` where there is nothing.
+        ids: ``(V, H, W)`` int16 id of the object seen, through transparent ones; -1 for the sky.
+        glass_ids: ``(V, H, W)`` int16 id of the nearest transparent object in front, or -1.
+    """
+
+    rgb: Images
+    depth: Depths
+    ids: Surfaces
+    glass_ids: Surfaces
+
+
+@dataclass(frozen=True)
+class Camera:
+    """A pinhole camera looking along the x axis of its pose, with the z axis up.
+
+    Attributes:
+        width: Pixels.
+        height: Pixels.
+        fov_deg: Vertical field of view, as in OpenGL and PyBullet; pixels are square.
+        near_m: Nothing nearer is drawn.
+        far_m: Nothing farther is drawn.
+
+    Raises:
+        ValueError: If a number is not possible.
+    """
+
+    width: int = 84
+    height: int = 84
+    fov_deg: float = 60.0
+    near_m: float = 0.01
+    far_m: float = 100.0
+    lens: Lens = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        if self.width < 1 or self.height < 1:
+            raise ValueError(f"a camera of {self.width}x{self.height} pixels: want at least 1x1")
+        if not 0.0 < self.fov_deg < 170.0:
+            raise ValueError(f"fov_deg {self.fov_deg}: want degrees between 0 and 170")
+        if not 0.0 < self.near_m < self.far_m < np.inf:
+            raise ValueError(f"near_m {self.near_m}, far_m {self.far_m}: want 0 < near < far")
+        object.__setattr__(self, "lens", self._lens())
+
+    def _lens(self) -> Lens:
+        tan_y = math.tan(math.radians(self.fov_deg) / 2.0)
+        tan_x = tan_y * self.width / self.height
+        columns = ((np.arange(self.width) + 0.5) / self.width * 2.0 - 1.0) * tan_x
+        rows = (1.0 - (np.arange(self.height) + 0.5) / self.height * 2.0) * tan_y
+        return Lens(
+            columns.astype(np.float32),
+            rows.astype(np.float32),
+            np.float32(tan_x),
+            np.float32(tan_y),
+            np.float32(self.near_m),
+            np.float32(self.far_m),
+        )
+
+    @property
+    def degrees_per_pixel(self) -> float:
+        """Angle that one pixel covers at the centre of the picture."""
+        return math.degrees(2.0 * float(self.lens.tan_y) / self.height)
+
+    def project(self, pose: Pose, points: Floats) -> Floats:
+        """Return where world points fall in the picture.
+
+        Args:
+            pose: Of the camera.
+            points: ``(N, 3)`` metres, world frame.
+
+        Returns:
+            ``(N, 3)``: column and row in pixels (0.5 is the middle of the first one) and depth in
+            metres; column and row mean nothing where the depth is not positive.
+        """
+        forward, left, up = ((points - pose.position) @ pose.rotation).T
+        tan_x, tan_y = float(self.lens.tan_x), float(self.lens.tan_y)
+        column = (1.0 - left / forward / tan_x) * self.width / 2.0
+        row = (1.0 - up / forward / tan_y) * self.height / 2.0
+        return np.stack([column, row, forward], axis=1)
+
+    def render(self, scene: Scene, poses: Sequence[Pose], hidden: Bools | None = None) -> Views:
+        """Return what the camera sees of a scene from some poses, as of `Scene.update`.
+
+        Args:
+            scene: The world.
+            poses: One per view: x axis forward, y left, z up.
+            hidden: ``(G,)`` primitives to leave out, as from `Scene.hidden`.
+        """
+        views = self._blank(len(poses))
+        opaque, glass = _drawn(scene, hidden)
+        for v, pose in enumerate(poses):
+            view = view_axes(pose)
+            rgb, depth, ids, glass_ids = (array[v] for array in views)
+            draw_geoms(scene.geoms, opaque, view, self.lens, True, depth, ids)
+            shade(scene.geoms, view, self.lens, depth, ids, rgb)
+            if glass.any():
+                glass_depth = depth.copy()
+                draw_geoms(scene.geoms, glass, view, self.lens, True, glass_depth, glass_ids)
+                glaze(scene.geoms, view, self.lens, glass_depth, glass_ids, rgb)
+                name_objects(scene.geoms.objects, glass_ids)
+            name_objects(scene.geoms.objects, ids)
+        return views
+
+    def _blank(self, count: int) -> Views:
+        """Buffers in which nothing is seen yet."""
+        size = (count, self.height, self.width)
+        return Views(
+            np.empty((*size, 3), np.uint8),
+            np.full(size, self.lens.far, np.float32),
+            np.full(size, NOTHING, np.int16),
+            np.full(size, NOTHING, np.int16),
+        )
+
+
+def view_axes(pose: Pose) -> Floats:
+    """Return ``(4, 3)``: position, right, up and forward axes of an eye, as the renderer wants."""
+    forward, left, up = pose.rotation.T
+    return np.stack([pose.position, -left, up, forward])
+
+
+def look_at(position: Floats, target: Floats) -> Pose:
+    """Return the pose of a camera at `position` that looks at `target` with a level horizon.
+
+    Raises:
+        ValueError: If the target is the position, or straight above or below it.
+    """
+    way = np.asarray(target, np.float64) - position
+    left = np.array([-way[1], way[0], 0.0])
+    if not np.linalg.norm(left) > 1e-9:
+        raise ValueError(f"cannot look level from {position} at {target}")
+    forward, left = way / np.linalg.norm(way), left / np.linalg.norm(left)
+    return Pose(
+        np.asarray(position, np.float64), np.stack([forward, left, np.cross(forward, left)], 1)
+    )
+
+
+def seen_fraction(views: Views, object_id: int) -> float:
+    """Return the share of all pixels that show an object, be it through glass or as glass."""
+    return float(np.mean((views.ids == object_id) | (views.glass_ids == object_id)))
+
+
+def _drawn(scene: Scene, hidden: Bools | None) -> tuple[Bools, Bools]:
+    """Masks of the primitives to draw: those that hide things and those that do not."""
+    transparent = scene.geoms.transparent
+    if hidden is None:
+        return ~transparent, transparent
+    if hidden.shape != transparent.shape:
+        raise ValueError(f"hidden has shape {hidden.shape}; the scene has {len(transparent)} geoms")
+    return ~transparent & ~hidden, transparent & ~hidden

@@ -1,0 +1,62 @@
+"""Rotations: quaternions (x, y, z, w) as in PyBullet, and matrices whose columns are the axes."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from veca_marl.sim.pose import Floats
+
+
+@njit(cache=True)
+def quaternions_to_matrices(quaternions: Floats, out: Floats) -> None:
+    """Write the rotation matrices of unit quaternions.
+
+    Source: Shoemake, "Animating rotation with quaternion curves", SIGGRAPH 1985.
+
+    Args:
+        quaternions: ``(N, 4)`` unit quaternions (x, y, z, w).
+        out: ``(N, 3, 3)``, written in place.
+    """
+    for n in range(quaternions.shape[0]):
+        x, y, z, w = quaternions[n, 0], quaternions[n, 1], quaternions[n, 2], quaternions[n, 3]
+        out[n, 0, 0] = 1.0 - 2.0 * (y * y + z * z)
+        out[n, 0, 1] = 2.0 * (x * y - z * w)
+        out[n, 0, 2] = 2.0 * (x * z + y * w)
+        out[n, 1, 0] = 2.0 * (x * y + z * w)
+        out[n, 1, 1] = 1.0 - 2.0 * (x * x + z * z)
+        out[n, 1, 2] = 2.0 * (y * z - x * w)
+        out[n, 2, 0] = 2.0 * (x * z - y * w)
+        out[n, 2, 1] = 2.0 * (y * z + x * w)
+        out[n, 2, 2] = 1.0 - 2.0 * (x * x + y * y)
+
+
+def quaternion_from_yaw(yaw_rad: float) -> tuple[float, float, float, float]:
+    """Return the quaternion of a turn about the world's vertical, positive to the left."""
+    return (0.0, 0.0, math.sin(0.5 * yaw_rad), math.cos(0.5 * yaw_rad))
+
+
+def matrix_to_quaternion(rotation: NDArray[Any]) -> Floats:
+    """Return the unit quaternion ``(4,)`` with ``w >= 0`` of a ``(3, 3)`` rotation matrix.
+
+    Solves for the greatest of the four components first, so no sign or scale is lost near half
+    turns. Source: Shepperd, "Quaternion from rotation matrix", J. Guidance and Control 1978.
+    """
+    r = np.asarray(rotation, dtype=np.float64)
+    diagonal = np.array([r[0, 0], r[1, 1], r[2, 2], r[0, 0] + r[1, 1] + r[2, 2]])
+    largest = int(np.argmax(diagonal))
+    if largest == 3:
+        q = np.array([r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1], 1.0 + diagonal[3]])
+    else:
+        i, j, k = largest, (largest + 1) % 3, (largest + 2) % 3
+        q = np.empty(4)
+        q[i] = 1.0 + 2.0 * r[i, i] - diagonal[3]
+        q[j] = r[j, i] + r[i, j]
+        q[k] = r[k, i] + r[i, k]
+        q[3] = r[k, j] - r[j, k]
+    q /= np.linalg.norm(q)
+    return -q if q[3] < 0.0 else q
