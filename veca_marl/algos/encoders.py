@@ -1,0 +1,107 @@
+"""One encoder per sense, chosen from what its array looks like."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import torch
+from torch import Tensor, nn
+
+from veca_marl.algos.specs import ArrayLayout
+
+_KERNELS = (8, 4, 3)  # Mnih et al. 2015, "Human-level control ...", with a half of their channels
+_STRIDES = (4, 2, 1)
+
+
+def orthogonal(layer: nn.Linear | nn.Conv2d, gain: float = math.sqrt(2.0)) -> nn.Module:
+    """Initialise `layer` as PPO implementations do.
+
+    Source: Huang et al. 2022, "The 37 implementation details of PPO", detail 2.
+    """
+    nn.init.orthogonal_(layer.weight, gain)
+    nn.init.zeros_(layer.bias)
+    return layer
+
+
+class ImageEncoder(nn.Module):
+    """``uint8 (N, ..., channels, height, width)`` to ``float (N, features)``.
+
+    All leading dimensions (eyes, colours) are stacked as channels. Kernels larger than what is
+    left of a small image shrink to it, so that any image size is accepted.
+
+    Args:
+        shape: Shape of one observation: at least channels, height, width.
+        channels: Output channels of the three convolutions.
+
+    Attributes:
+        features: Length of the output.
+    """
+
+    def __init__(self, shape: Sequence[int], channels: Sequence[int] = (16, 32, 32)) -> None:
+        super().__init__()
+        *stack, height, width = shape
+        size_in = math.prod(stack)
+        layers: list[nn.Module] = []
+        for size_out, kernel, stride in zip(channels, _KERNELS, _STRIDES, strict=True):
+            window = (min(kernel, height), min(kernel, width))
+            layers += [orthogonal(nn.Conv2d(size_in, size_out, window, stride)), nn.ReLU()]
+            height, width = (
+                (n - k) // stride + 1 for n, k in zip((height, width), window, strict=True)
+            )
+            size_in = size_out
+        self.layers = nn.Sequential(*layers, nn.Flatten())
+        self.features = size_in * height * width
+
+    def forward(self, image: Tensor) -> Tensor:
+        """Encode `image`; bytes become floats in [0, 1] here, on the network's device."""
+        pixels = image.flatten(1, -3).float().mul_(1.0 / 255.0)
+        return self.layers(pixels)
+
+
+class VectorEncoder(nn.Module):
+    """``float (N, ...)`` to ``float (N, features)``: an affine map to [-1, 1], then an MLP.
+
+    The map is fixed: bounds known from the spec are used, unbounded arrays pass as they are. It
+    keeps absolute level, which a normalisation by running statistics would blur (loudness is a
+    cue for distance).
+
+    Args:
+        layout: Layout of one observation.
+        features: Length of the output.
+    """
+
+    def __init__(self, layout: ArrayLayout, features: int = 64) -> None:
+        super().__init__()
+        bounded = math.isfinite(layout.low) and math.isfinite(layout.high)
+        self.centre = (layout.low + layout.high) / 2 if bounded else 0.0
+        self.scale = 2.0 / (layout.high - layout.low) if bounded else 1.0
+        self.layers = nn.Sequential(
+            orthogonal(nn.Linear(math.prod(layout.shape), features)),
+            nn.ReLU(),
+            orthogonal(nn.Linear(features, features)),
+            nn.ReLU(),
+        )
+        self.features = features
+
+    def forward(self, vector: Tensor) -> Tensor:
+        """Encode `vector`."""
+        return self.layers((vector.flatten(1).to(torch.float32) - self.centre) * self.scale)
+
+
+def make_encoder(
+    name: str, layout: ArrayLayout, channels: Sequence[int], features: int
+) -> ImageEncoder | VectorEncoder:
+    """Return the encoder that fits `layout`: bytes of rank 3 or more are images, floats vectors.
+
+    Raises:
+        ValueError: If nothing fits.
+    """
+    if layout.dtype == "uint8" and len(layout.shape) >= 3:
+        return ImageEncoder(layout.shape, channels)
+    if layout.dtype.startswith("float"):
+        return VectorEncoder(layout, features)
+    raise ValueError(
+        f"{name}: no encoder for {layout.dtype}{layout.shape}; "
+        "choices: uint8 (..., channels, height, width) images, float vectors"
+    )

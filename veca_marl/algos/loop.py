@@ -1,0 +1,217 @@
+"""Collect, learn, evaluate, keep: in stages, each of which depends on (seed, stage) alone.
+
+A stage ends with an evaluation and a checkpoint, and the next one starts new episodes and new
+random streams from (seed, stage). A checkpoint therefore holds only what was learnt: a run resumed
+from it, after Ctrl-C, a crash or a power cut, continues as if it had never stopped, bit for bit.
+What an interrupted stage had learnt is learnt again.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from torchrl.envs import EnvBase
+from tqdm import tqdm
+
+from veca_marl.algos.checkpoint import Checkpoints, Identity, load_checkpoint
+from veca_marl.algos.collect import CollectCfg, Experience
+from veca_marl.algos.evaluation import (
+    EvalCfg,
+    Exploration,
+    Scores,
+    comparison_line,
+    evaluate,
+    interval,
+    random_policy,
+)
+from veca_marl.algos.metrics import Reporter, Stopwatch, TrainingEpisodes
+from veca_marl.algos.ppo import PPO
+from veca_marl.algos.specs import EnvFactory
+
+_EVALUATION_STAGE = 2**31 - 1  # in place of a stage number: starts no training stage ever uses
+
+
+@dataclass
+class Budget:
+    """How long to train.
+
+    Attributes:
+        total_frames: Frames of experience (rounded up to whole batches).
+        max_minutes: Also stop after the stage in which this time runs out; None for no limit.
+    """
+
+    total_frames: int
+    max_minutes: float | None = None
+
+
+@dataclass
+class Progress:
+    """Where a run stands; stored in its checkpoints.
+
+    Attributes:
+        stage: Finished stages.
+        iteration: Finished batches.
+        frames: Frames learnt from.
+        best_return: Best mean return of the evaluations, over all teams.
+    """
+
+    stage: int = 0
+    iteration: int = 0
+    frames: int = 0
+    best_return: float = -math.inf
+
+
+@dataclass
+class Trainer:
+    """Trains an algorithm.
+
+    Attributes:
+        make_env: Makes the worlds.
+        algorithm: Learns.
+        collect: How experience is gathered.
+        evaluation: When and how the policy is evaluated.
+        budget: How long.
+        checkpoints: Where states are kept.
+        reporters: Where numbers go.
+        seed: Everything random follows from it.
+        progress_bar: Whether to show one.
+    """
+
+    make_env: EnvFactory
+    algorithm: PPO
+    collect: CollectCfg
+    evaluation: EvalCfg
+    budget: Budget
+    checkpoints: Checkpoints
+    reporters: Sequence[Reporter]
+    seed: int
+    progress_bar: bool = True
+    progress: Progress = field(default_factory=Progress)
+    watch: Stopwatch = field(default_factory=Stopwatch)
+
+    def resume(self, path: Path) -> None:
+        """Take up learning and progress from the checkpoint at `path`."""
+        state = load_checkpoint(path, self.checkpoints.identity, self.algorithm.device)
+        self.algorithm.load_state_dict(state["algorithm"])
+        self.progress = Progress(**state["progress"])
+
+    def run(self) -> list[str]:
+        """Train until the budget is spent; return how each team compares with random play."""
+        with self.watch.measure("build"):
+            eval_env = self.make_env(self.evaluation.worlds, 0)
+            baseline = self._play(eval_env, random_policy(eval_env), Exploration.stochastic)
+            experience = Experience(self.make_env, self.algorithm.policy, self.collect)
+        self._report_scores("random", baseline)
+        if self.progress.frames == 0:
+            self._save(best=False)  # an interruption at any time finds something to resume from
+        scores: dict[str, Scores] | None = None
+        bar = tqdm(
+            total=self._iterations() * self.collect.frames,
+            initial=self.progress.frames,
+            unit=" frames",
+            disable=not self.progress_bar,
+        )
+        try:
+            with bar:
+                while self.progress.iteration < self._iterations() and not self._out_of_time():
+                    self._run_stage(experience, bar)
+                    scores = self._end_stage(eval_env)
+        finally:
+            experience.close()
+        scores = scores or self._play(eval_env)
+        eval_env.close()
+        return [comparison_line(team, scores[team], baseline[team]) for team in scores]
+
+    def _run_stage(self, experience: Experience, bar: tqdm[Any]) -> None:
+        with self.watch.measure("collect"):
+            experience.restart(_seed(self.seed, self.progress.stage))
+        episodes = TrainingEpisodes()
+        per_stage = math.ceil(self.evaluation.every_frames / self.collect.frames)
+        until = min(self.progress.iteration + per_stage, self._iterations())
+        while self.progress.iteration < until:
+            row = self._iterate(experience, episodes)
+            bar.update(self.collect.frames)
+            shown = {k: f"{v:.3g}" for k, v in row.items() if k.endswith("reward_per_step")}
+            bar.set_postfix(shown)
+
+    def _iterate(self, experience: Experience, episodes: TrainingEpisodes) -> dict[str, float]:
+        before = self.watch.elapsed_s
+        with self.watch.measure("collect"):
+            batch = experience.collect()
+        with self.watch.measure("advantage"):
+            rows = self.algorithm.prepare(batch)
+        with self.watch.measure("update"):
+            measured = self.algorithm.learn(rows)
+        with self.watch.measure("transfer"):
+            experience.update_policy()
+        self.progress.iteration += 1
+        self.progress.frames += self.collect.frames
+        row: dict[str, float] = {"iteration": self.progress.iteration}
+        for team, measures in measured.items():
+            both = episodes.add(batch, team) | measures
+            row |= {f"{team}/{name}": value for name, value in both.items()}
+        row["frames_per_s"] = self.collect.frames / (self.watch.elapsed_s - before)
+        for reporter in self.reporters:
+            reporter.write("metrics", self.progress.frames, row)
+        return row
+
+    def _end_stage(self, eval_env: EnvBase) -> dict[str, Scores]:
+        with self.watch.measure("evaluate"):
+            scores = self._play(eval_env)
+        self._report_scores("policy", scores)
+        mean = float(np.mean([s.returns.mean() for s in scores.values()]))
+        best = mean > self.progress.best_return
+        self.progress.best_return = max(mean, self.progress.best_return)
+        self.progress.stage += 1
+        with self.watch.measure("checkpoint"):
+            self._save(best)
+        return scores
+
+    def _save(self, best: bool) -> None:
+        state = {"algorithm": self.algorithm.state_dict(), "progress": asdict(self.progress)}
+        self.checkpoints.save(state, self.progress.frames, best)
+
+    def _play(
+        self, env: EnvBase, policy: Any = None, exploration: Exploration | None = None
+    ) -> dict[str, Scores]:
+        return evaluate(
+            env,
+            policy or self.algorithm.policy,
+            self.evaluation.episodes,
+            _seed(self.seed, _EVALUATION_STAGE),
+            exploration or self.evaluation.exploration,
+        )
+
+    def _report_scores(self, who: str, scores: dict[str, Scores]) -> None:
+        for team, score in scores.items():
+            low, high = interval(score.returns)
+            row = {
+                "player": who,
+                "team": team,
+                "episodes": len(score.returns),
+                "return": float(score.returns.mean()),
+                "return_low": low,
+                "return_high": high,
+                "length": float(score.lengths.mean()),
+                **{name: float(values.mean()) for name, values in score.terms.items()},
+            }
+            for reporter in self.reporters:
+                reporter.write("evaluations", self.progress.frames, row)
+
+    def _iterations(self) -> int:
+        return math.ceil(self.budget.total_frames / self.collect.frames)
+
+    def _out_of_time(self) -> bool:
+        limit = self.budget.max_minutes
+        return limit is not None and self.watch.elapsed_s > 60.0 * limit
+
+
+def _seed(seed: int, stage: int) -> int:
+    """Return an independent 31-bit seed for each pair."""
+    return int(np.random.SeedSequence([seed, stage]).generate_state(1)[0] >> 1)
