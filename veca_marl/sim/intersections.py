@@ -17,15 +17,15 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from veca_marl.sim.screen_bounds import Vector
+from veca_marl.sim.screen_bounds import Vector, single
 
 Depths = NDArray[np.float32]
 Surfaces = NDArray[np.int16]
 
 # stands in for a zero divisor: steep enough to miss or to span, small enough not to overflow
-_TINY = np.float32(1e-12)
-_0 = np.float32(0.0)
-_1 = np.float32(1.0)
+_TINY = single(1e-12)
+_0 = single(0.0)
+_1 = single(1.0)
 
 # free to fuse and reorder, but not to assume that infinities and nans do not happen
 _FAST = {"contract", "nsz", "reassoc"}
@@ -33,12 +33,12 @@ _FAST = {"contract", "nsz", "reassoc"}
 
 @njit(cache=True, error_model="numpy", fastmath=_FAST)
 def sphere_row(
-    radius: np.float32,
+    radius: float,
     eye: Vector,
     start: Vector,
     right: Vector,
     columns: Depths,
-    near: np.float32,
+    near: float,
     surface: np.int16,
     depth: Depths,
     surfaces: Surfaces,
@@ -71,7 +71,7 @@ def box_row(
     start: Vector,
     right: Vector,
     columns: Depths,
-    near: np.float32,
+    near: float,
     surface: np.int16,
     depth: Depths,
     surfaces: Surfaces,
@@ -96,13 +96,13 @@ def box_row(
 
 @njit(cache=True, error_model="numpy", fastmath=_FAST)
 def cylinder_row(
-    radius: np.float32,
-    half_length: np.float32,
+    radius: float,
+    half_length: float,
     eye: Vector,
     start: Vector,
     right: Vector,
     columns: Depths,
-    near: np.float32,
+    near: float,
     surface: np.int16,
     depth: Depths,
     surfaces: Surfaces,
@@ -130,13 +130,13 @@ def cylinder_row(
 
 @njit(cache=True, error_model="numpy", fastmath=_FAST)
 def capsule_row(
-    radius: np.float32,
-    half_length: np.float32,
+    radius: float,
+    half_length: float,
     eye: Vector,
     start: Vector,
     right: Vector,
     columns: Depths,
-    near: np.float32,
+    near: float,
     surface: np.int16,
     depth: Depths,
     surfaces: Surfaces,

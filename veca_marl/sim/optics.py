@@ -12,6 +12,7 @@ import numpy as np
 from veca_marl.sim.pose import Floats, Pose
 from veca_marl.sim.raster import NOTHING, Depths, Lens, Surfaces, draw_geoms
 from veca_marl.sim.scene import Bools, Scene
+from veca_marl.sim.screen_bounds import single
 from veca_marl.sim.shading import Images, glaze, name_objects, shade
 
 
@@ -71,16 +72,16 @@ class Camera:
         return Lens(
             columns.astype(np.float32),
             rows.astype(np.float32),
-            np.float32(tan_x),
-            np.float32(tan_y),
-            np.float32(self.near_m),
-            np.float32(self.far_m),
+            single(tan_x),
+            single(tan_y),
+            single(self.near_m),
+            single(self.far_m),
         )
 
     @property
     def degrees_per_pixel(self) -> float:
         """Angle that one pixel covers at the centre of the picture."""
-        return math.degrees(2.0 * float(self.lens.tan_y) / self.height)
+        return math.degrees(2.0 * self.lens.tan_y / self.height)
 
     def project(self, pose: Pose, points: Floats) -> Floats:
         """Return where world points fall in the picture.
@@ -94,7 +95,7 @@ class Camera:
             metres; column and row mean nothing where the depth is not positive.
         """
         forward, left, up = ((points - pose.position) @ pose.rotation).T
-        tan_x, tan_y = float(self.lens.tan_x), float(self.lens.tan_y)
+        tan_x, tan_y = self.lens.tan_x, self.lens.tan_y
         column = (1.0 - left / forward / tan_x) * self.width / 2.0
         row = (1.0 - up / forward / tan_y) * self.height / 2.0
         return np.stack([column, row, forward], axis=1)

@@ -23,7 +23,13 @@ from numpy.typing import NDArray
 from veca_marl.sim.intersections import box_row, capsule_row, cylinder_row, sphere_row
 from veca_marl.sim.pose import Floats
 from veca_marl.sim.scene import Bools, GeomTable, Shape
-from veca_marl.sim.screen_bounds import Vector, box_intervals, disc_interval, rod_interval
+from veca_marl.sim.screen_bounds import (
+    Vector,
+    box_intervals,
+    disc_interval,
+    rod_interval,
+    single,
+)
 
 Depths: TypeAlias = NDArray[np.float32]
 Surfaces: TypeAlias = NDArray[np.int16]
@@ -33,13 +39,12 @@ Rectangle: TypeAlias = tuple[int, int, int, int]
 NOTHING = -1
 
 _SPHERE, _BOX, _CYLINDER = int(Shape.SPHERE), int(Shape.BOX), int(Shape.CYLINDER)
-# a numpy scalar keeps the loops in single precision, which doubles the width of the vectors
-_HALF = np.float32(0.5)
-_f4 = np.float32
+# a single keeps the loops in single precision, which doubles the width of the vectors
+_HALF = single(0.5)
 
 
 class Lens(NamedTuple):
-    """The numbers of a pinhole camera that the loops need.
+    """The numbers of a pinhole camera that the loops need, its scalars in single precision.
 
     Attributes:
         columns: ``(W,)`` float32 slope to the right of each column's centre.
@@ -52,10 +57,10 @@ class Lens(NamedTuple):
 
     columns: NDArray[np.float32]
     rows: NDArray[np.float32]
-    tan_x: np.float32
-    tan_y: np.float32
-    near: np.float32
-    far: np.float32
+    tan_x: float
+    tan_y: float
+    near: float
+    far: float
 
 
 @njit(cache=True, error_model="numpy")
@@ -110,9 +115,9 @@ def _local_ray(position: Floats, rotation: Floats, view: Floats) -> Ray:
 def _into(rotation: Floats, x: float, y: float, z: float) -> Vector:
     """World vector to local axes, in single precision from here on."""
     return (
-        _f4(rotation[0, 0] * x + rotation[1, 0] * y + rotation[2, 0] * z),
-        _f4(rotation[0, 1] * x + rotation[1, 1] * y + rotation[2, 1] * z),
-        _f4(rotation[0, 2] * x + rotation[1, 2] * y + rotation[2, 2] * z),
+        single(rotation[0, 0] * x + rotation[1, 0] * y + rotation[2, 0] * z),
+        single(rotation[0, 1] * x + rotation[1, 1] * y + rotation[2, 1] * z),
+        single(rotation[0, 2] * x + rotation[1, 2] * y + rotation[2, 2] * z),
     )
 
 

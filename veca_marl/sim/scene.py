@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from enum import IntEnum
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
@@ -156,7 +156,7 @@ class Scene:
             raise ValueError(f"object {name!r} has no frame")
         first_row, first_geom = len(self._positions), len(self.geoms.shapes)
         added = _table(frames, len(self.objects), first_row)
-        self.geoms = GeomTable(*map(np.concatenate, zip(self.geoms, added, strict=True)))
+        self.geoms = _joined(self.geoms, added)
         self._positions = np.concatenate((self._positions, np.zeros((len(frames), 3))))
         self._rotations = np.concatenate((self._rotations, np.tile(np.eye(3), (len(frames), 1, 1))))
         item = SceneObject(
@@ -275,6 +275,14 @@ def _table(frames: Sequence[Sequence[Geom]], object_id: int, first_row: int) -> 
         positions=offsets.copy(),
         rotations=turns.copy(),
     )
+
+
+def _joined(table: GeomTable, more: GeomTable) -> GeomTable:
+    """Put the rows of one table below those of another."""
+    above: tuple[NDArray[Any], ...] = table
+    below: tuple[NDArray[Any], ...] = more
+    columns: list[Any] = [np.concatenate(pair) for pair in zip(above, below, strict=True)]
+    return GeomTable(*columns)
 
 
 @njit(cache=True)

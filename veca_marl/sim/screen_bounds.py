@@ -7,13 +7,17 @@ Screen positions are slopes: a point at (right, up, forward) metres of the eye h
 from __future__ import annotations
 
 import math
-from typing import TypeAlias
+from collections.abc import Callable
+from typing import TypeAlias, cast
 
 import numpy as np
 from numba import njit
 
 Vector: TypeAlias = tuple[float, float, float]
 Interval: TypeAlias = tuple[float, float]
+
+# a number in single precision; to the type checker a float like any other
+single = cast(Callable[[float], float], np.float32)
 
 _EDGES_PER_AXIS = 4
 # a tangent beyond this angle from the optical axis (89 degrees) lies outside every picture

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veca_marl.sim.bodies.base import Body
-from veca_marl.sim.filters import Filter, Look, chosen_filters
+from veca_marl.sim.filters import Blur, Defocus, Filter, Grey, Look
+from veca_marl.sim.infant_vision import InfantVision
 from veca_marl.sim.optics import Camera, Views, seen_fraction
 from veca_marl.sim.scene import Bools, Scene
 from veca_marl.sim.senses.base import Sense
@@ -58,7 +59,23 @@ class VisionCfg:
         Camera(self.width, self.height, self.fov_deg)
         if not isinstance(self.eyes, Eyes):
             raise ValueError(f"eyes {self.eyes!r}: want one of {[eyes.name for eyes in Eyes]}")
-        chosen_filters(self.grey, self.blur_deg, self.infant_age_months, self.defocus)
+        if self.blur_deg < 0.0:
+            raise ValueError(f"blur_deg {self.blur_deg}: want 0 (none) or a positive angle")
+        chosen_filters(self)
+
+
+def chosen_filters(cfg: VisionCfg) -> list[Filter]:
+    """Return the filters a configuration asks for, in the order light meets them."""
+    filters: list[Filter] = []
+    if cfg.defocus:
+        filters.append(Defocus())
+    if cfg.blur_deg:
+        filters.append(Blur(cfg.blur_deg))
+    if cfg.infant_age_months is not None:
+        filters.append(InfantVision(cfg.infant_age_months))
+    if cfg.grey:
+        filters.append(Grey())
+    return filters
 
 
 class VisionSense(Sense):
@@ -74,9 +91,7 @@ class VisionSense(Sense):
 
     def __init__(self, cfg: VisionCfg, body: Body, scene: Scene) -> None:
         self.camera = Camera(cfg.width, cfg.height, cfg.fov_deg)
-        self.filters: list[Filter] = chosen_filters(
-            cfg.grey, cfg.blur_deg, cfg.infant_age_months, cfg.defocus
-        )
+        self.filters = chosen_filters(cfg)
         self.specs = _specs(cfg, self.camera)
         self._mounts = ("eye_left", "eye_right")[: 1 if cfg.eyes is Eyes.MONOCULAR else 2]
         self._body = body
@@ -95,7 +110,7 @@ class VisionSense(Sense):
         look = Look(self.camera, views.depth, self._body.focal_distance_m)
         for apply in self.filters:
             rgb = apply(rgb, look)
-        everything = {
+        everything: dict[str, NDArray[Any]] = {
             "vision": np.moveaxis(rgb, -1, 1),
             "depth": views.depth,
             "segmentation": views.ids,
