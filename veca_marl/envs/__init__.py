@@ -1,0 +1,1 @@
+"""Games in worlds, as TorchRL environments."""

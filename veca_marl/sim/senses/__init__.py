@@ -1,0 +1,48 @@
+"""The senses: which there are, how each is graded, and how a body gets them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from veca_marl.sim.bodies.base import Body
+from veca_marl.sim.senses.audio import AudioCfg, AudioSense
+from veca_marl.sim.senses.base import Sense
+from veca_marl.sim.senses.vision import VisionCfg, VisionSense
+from veca_marl.sim.world import World
+
+
+@dataclass
+class SensesCfg:
+    """How each sense is graded. The task says which senses there are, this says how good.
+
+    Quality changes what an observation contains, never its shape; a sense that is not `present`
+    is left out of the observation.
+    """
+
+    vision: VisionCfg = field(default_factory=VisionCfg)
+    audio: AudioCfg = field(default_factory=AudioCfg)
+
+
+def give_senses(
+    body: Body, names: Sequence[str], cfg: SensesCfg, world: World
+) -> dict[str, Sense]:
+    """Give a body the senses a task asks for.
+
+    Args:
+        body: Who gets them.
+        names: The task's senses, such as `("vision", "audio")`.
+        cfg: Their grades; those not present are left out.
+        world: Where the body is.
+
+    Raises:
+        ValueError: If there is no sense of a name.
+    """
+    makers = {
+        "vision": lambda: VisionSense(cfg.vision, body, world.scene),
+        "audio": lambda: AudioSense(cfg.audio, body, world.sound),
+    }
+    unknown = sorted(set(names) - set(makers))
+    if unknown:
+        raise ValueError(f"unknown senses {unknown}; there are {sorted(makers)}")
+    return {name: makers[name]() for name in names if getattr(cfg, name).present}

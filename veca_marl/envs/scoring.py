@@ -1,0 +1,18 @@
+"""The words rewards are written in."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from veca_marl.sim.pose import Floats
+
+
+def cosine(a: Floats, b: Floats) -> float:
+    """Return the cosine of the angle between two vectors; 0 if one of them has no length."""
+    length = float(np.linalg.norm(a) * np.linalg.norm(b))
+    return float(a @ b) / length if length > 1e-9 else 0.0
+
+
+def flat(vector: Floats) -> Floats:
+    """Return the horizontal part of a vector ``(3,)``."""
+    return np.array([vector[0], vector[1], 0.0])

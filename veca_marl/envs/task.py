@@ -1,0 +1,133 @@
+"""What a task is: who plays, what lies on the floor, how it starts, what pays, when it ends."""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, field
+from typing import Any, ClassVar, NamedTuple, get_type_hints
+
+import numpy as np
+from numpy.typing import NDArray
+
+from veca_marl.sim.bodies.walker import Walker
+from veca_marl.sim.world import World
+
+
+class Team(NamedTuple):
+    """Players that share specs and a policy: one team is one TorchRL group."""
+
+    name: str
+    size: int = 1
+
+
+class Player(NamedTuple):
+    """One body on one team."""
+
+    name: str
+    team: str
+    body: Walker
+
+
+def terms(**weights: float) -> Any:
+    """Declare the reward terms of a task and what each is worth."""
+    return field(default_factory=lambda: dict(weights))
+
+
+@dataclass
+class TaskCfg:
+    """What every task can be told from the command line.
+
+    Attributes:
+        name: The task's class name.
+        max_seconds: Episodes are truncated after so many simulated seconds.
+        weights: What each reward term is worth, by name.
+    """
+
+    name: str = ""
+    max_seconds: float = 20.0
+    weights: dict[str, float] = terms()
+
+    def __post_init__(self) -> None:
+        """An episode needs a length, a weight needs a value."""
+        if not (math.isfinite(self.max_seconds) and self.max_seconds > 0):
+            raise ValueError(f"task.max_seconds={self.max_seconds} must be a positive number")
+        bad = {name: value for name, value in self.weights.items() if not math.isfinite(value)}
+        if bad:
+            raise ValueError(f"task.weights: {bad} must be finite numbers")
+
+
+class Task(ABC):
+    """The rules of one game.
+
+    A task never touches torch and never looks up a link: it asks the bodies and the props.
+    """
+
+    teams: ClassVar[tuple[Team, ...]] = (Team("agents"),)
+    senses: ClassVar[tuple[str, ...]] = ()
+    cfg: TaskCfg
+
+    def __init__(self, cfg: TaskCfg, world: World, players: list[Player]) -> None:
+        """Take the players into the world and build the rest."""
+        known = set(type(self).cfg_type()().weights)
+        if set(cfg.weights) != known:
+            raise ValueError(
+                f"task.weights has the terms {sorted(cfg.weights)}; "
+                f"{type(self).__name__} pays {sorted(known)}"
+            )
+        self.cfg, self.world, self.players = cfg, world, players
+        self.build()
+
+    @abstractmethod
+    def build(self) -> None:
+        """Put the things of this task into the world. Called once."""
+
+    @abstractmethod
+    def reset(self, rng: np.random.Generator) -> None:
+        """Put everything in its starting place. Called at every episode."""
+
+    def before_step(self, rng: np.random.Generator) -> None:  # noqa: B027  not every task acts
+        """Change the world, after the players chose and before the physics moves."""
+
+    def after_step(self, rng: np.random.Generator) -> None:  # noqa: B027  not every task counts
+        """Keep the score, after the physics moved and before anyone is paid."""
+
+    @abstractmethod
+    def reward(self, player: Player) -> dict[str, float]:
+        """Return the terms of one player, unweighted, named as in `cfg.weights`."""
+
+    def terminated(self) -> bool:
+        """Say whether the game is over for everyone."""
+        return False
+
+    @abstractmethod
+    def expert(self, player: Player, observation: dict[str, NDArray[Any]]) -> tuple[float, float]:
+        """Play by hand-written rules: return (forward, turn), each in [-1, 1].
+
+        The docstring says whether it uses the observation alone or privileged state.
+        """
+
+    @classmethod
+    def cfg_type(cls) -> type[TaskCfg]:
+        """Return the class this task declares for `cfg`."""
+        hint: type[TaskCfg] = get_type_hints(cls)["cfg"]
+        return hint
+
+
+TASKS: dict[str, type[Task]] = {}
+
+
+def register(task: type[Task]) -> type[Task]:
+    """Make a task known by its class name."""
+    if task.__name__ in TASKS:
+        raise ValueError(f"two tasks are called {task.__name__}")
+    TASKS[task.__name__] = task
+    return task
+
+
+def find_task(name: str) -> type[Task]:
+    """Return a task by name; raise `ValueError` with the names that exist."""
+    try:
+        return TASKS[name]
+    except KeyError:
+        raise ValueError(f"unknown task {name!r}; there are {sorted(TASKS)}") from None

@@ -1,0 +1,121 @@
+"""The walking body against things: light ones are pushed by physics, heavy ones stop the walker.
+
+The paper's collision rule of the animation-based agent: against a light object the agent is
+kinematic and pushes it; against a heavy one the object is kinematic and pushes the agent out.
+The body is a capsule without mass that is moved by hand. Its velocity is told to Bullet, so light
+things are pushed correctly; contacts with heavy and fixed things are switched off in Bullet and
+solved here, by moving the capsule out of them along the horizontal.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pybullet
+
+from veca_marl.sim.pose import Floats
+from veca_marl.sim.props import Prop
+
+_ROUNDS = 3  # two walls of a corner and one to spare
+_SIGHT_M = 0.15  # nothing further away is reached within one agent step
+
+
+class Pusher:
+    """The capsule of a walking body and what it knows of the obstacles around it."""
+
+    def __init__(self, client: int, radius_m: float, height_m: float, push_limit_kg: float) -> None:
+        self.radius_m = radius_m
+        self.centre_height_m = height_m / 2 + 0.005  # a hair above the floor
+        self._client = client
+        self._push_limit_kg = push_limit_kg
+        shape = pybullet.createCollisionShape(
+            pybullet.GEOM_CAPSULE,
+            radius=radius_m,
+            height=height_m - 2 * radius_m,
+            physicsClientId=client,
+        )
+        self.body_id: int = pybullet.createMultiBody(0, shape, physicsClientId=client)
+        pybullet.changeDynamics(
+            self.body_id, -1, lateralFriction=0.2, restitution=0.0, physicsClientId=client
+        )
+        self._obstacles: list[Prop] = []
+        self._known = 0
+        self._near: list[Prop] = []
+
+    def look_round(self, props: dict[str, Prop], position: Floats) -> None:
+        """Note which obstacles can be met within this agent step.
+
+        Args:
+            props: All props of the world.
+            position: ``(3,)`` metres; only the horizontal part counts.
+        """
+        if len(props) != self._known:
+            self._meet(props)
+        x, y, reach = position[0], position[1], self.radius_m + _SIGHT_M
+        self._near = []
+        for prop in self._obstacles:
+            low, high = pybullet.getAABB(prop.body_id, physicsClientId=self._client)
+            if low[0] - reach < x < high[0] + reach and low[1] - reach < y < high[1] + reach:
+                self._near.append(prop)
+
+    def move(self, x: float, y: float) -> tuple[float, float]:
+        """Put the capsule at a wished place; return where obstacles let it stand, metres."""
+        self._put(x, y)
+        for _ in range(_ROUNDS):
+            out_x, out_y = self._way_out()
+            if out_x == 0.0 and out_y == 0.0:
+                break
+            x, y = x + out_x, y + out_y
+            self._put(x, y)
+        return x, y
+
+    def tell_velocity(self, vx: float, vy: float, turn_radps: float) -> None:
+        """Tell Bullet how the capsule moves, so that it pushes light things correctly."""
+        pybullet.resetBaseVelocity(
+            self.body_id, (vx, vy, 0.0), (0.0, 0.0, turn_radps), physicsClientId=self._client
+        )
+
+    def _put(self, x: float, y: float) -> None:
+        pybullet.resetBasePositionAndOrientation(
+            self.body_id,
+            (x, y, self.centre_height_m),
+            (0.0, 0.0, 0.0, 1.0),
+            physicsClientId=self._client,
+        )
+
+    def _way_out(self) -> tuple[float, float]:
+        """Return the horizontal displacement out of everything the capsule is stuck in."""
+        out_x = out_y = 0.0
+        for prop in self._near:
+            for contact in pybullet.getClosestPoints(
+                self.body_id, prop.body_id, 0.0, physicsClientId=self._client
+            ):
+                normal, depth = contact[7], -contact[8]
+                length = math.hypot(normal[0], normal[1])
+                if depth > 1e-6 and length > 0.1:
+                    # several points of one face tell the same way out: the greatest counts
+                    way_x, way_y = normal[0] / length * depth, normal[1] / length * depth
+                    out_x = _farther(out_x, way_x)
+                    out_y = _farther(out_y, way_y)
+        return out_x, out_y
+
+    def _meet(self, props: dict[str, Prop]) -> None:
+        """Switch Bullet's contacts off for all that cannot be pushed."""
+        self._known = len(props)
+        self._obstacles = [
+            prop for prop in props.values() if prop.fixed or prop.cfg.mass_kg > self._push_limit_kg
+        ]
+        for prop in self._obstacles:
+            pybullet.setCollisionFilterPair(
+                self.body_id, prop.body_id, -1, -1, 0, physicsClientId=self._client
+            )
+
+
+def _farther(a: float, b: float) -> float:
+    return a if abs(a) >= abs(b) else b
+
+
+def horizontal_distance(a: Floats, b: Floats) -> float:
+    """Return the distance of two points on the floor plan, metres."""
+    return float(np.hypot(a[0] - b[0], a[1] - b[1]))

@@ -1,0 +1,86 @@
+"""Playgrounds as data: rooms that sound, walls and props that stand in them.
+
+The paper's four playgrounds (section "Playgrounds") differ in furniture and structure and set the
+difficulty of the same task. Each is a file in `conf/playground/`.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from veca_marl.sim.pose import Floats
+from veca_marl.sim.props import PropCfg
+
+
+@dataclass
+class RoomCfg:
+    """A box of air between walls: an acoustic room and a place to start from.
+
+    Attributes:
+        name: Unique in its playground.
+        lower_m: The lower corner, metres.
+        size_m: Extent along x, y and z, metres.
+        reflection: Pressure reflection coefficient beta of its walls in [0, 1)
+            (Allen & Berkley 1979); 0 is a room without echo.
+    """
+
+    name: str = "room"
+    lower_m: tuple[float, float, float] = (-3.0, -3.0, 0.0)
+    size_m: tuple[float, float, float] = (6.0, 6.0, 2.6)
+    reflection: float = 0.5
+
+    def __post_init__(self) -> None:
+        """Refuse rooms in which nobody could stand or sound could not die."""
+        if not all(math.isfinite(size) and size > 0 for size in self.size_m):
+            raise ValueError(f"room {self.name!r}: size_m={tuple(self.size_m)} must be positive")
+        if not 0.0 <= self.reflection < 1.0:
+            raise ValueError(f"room {self.name!r}: reflection={self.reflection} is not in [0, 1)")
+
+    def contains(self, position: Floats, margin_m: float = 0.0) -> bool:
+        """Say whether a point is inside, at least `margin_m` from walls, floor and ceiling."""
+        low = np.asarray(self.lower_m) + margin_m
+        high = np.asarray(self.lower_m) + np.asarray(self.size_m) - margin_m
+        return bool(np.all(position >= low) and np.all(position <= high))
+
+    def sample_floor(self, rng: np.random.Generator, margin_m: float) -> Floats:
+        """Draw a point of the floor, ``(3,)`` metres, at least `margin_m` from the walls."""
+        low, size = np.asarray(self.lower_m), np.asarray(self.size_m)
+        point = rng.uniform(low[:2] + margin_m, low[:2] + size[:2] - margin_m)
+        return np.array([point[0], point[1], low[2]])
+
+
+@dataclass
+class PlaygroundCfg:
+    """A place to play in.
+
+    Attributes:
+        name: As on the command line.
+        rooms: Boxes of air; the first is where single-room tasks play.
+        props: Walls, furniture and toys.
+        floor_size_m: Extent of the drawn floor along x and y, centred on the origin.
+        floor_colour: Red, green, blue in [0, 1].
+        floor_checker_m: Edge of the floor's checker pattern.
+        image_order: Greatest number of reflections of a sound; 0 is the direct sound alone.
+    """
+
+    name: str = ""
+    rooms: list[RoomCfg] = field(default_factory=lambda: [RoomCfg()])
+    props: list[PropCfg] = field(default_factory=list)
+    floor_size_m: tuple[float, float] = (6.0, 6.0)
+    floor_colour: tuple[float, float, float] = (0.75, 0.65, 0.5)
+    floor_checker_m: float = 0.5
+    image_order: int = 1
+
+    def __post_init__(self) -> None:
+        """Names are looked up, so they must be unique, and there must be a room to play in."""
+        if not self.rooms:
+            raise ValueError(f"playground {self.name!r} has no room")
+        names = [prop.name for prop in self.props]
+        twice = sorted({name for name in names if names.count(name) > 1})
+        if twice:
+            raise ValueError(f"playground {self.name!r}: props share the names {twice}")
+        if self.image_order < 0:
+            raise ValueError(f"playground {self.name!r}: image_order={self.image_order} is negative")

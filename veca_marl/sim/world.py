@@ -1,0 +1,204 @@
+"""One world: a PyBullet client, its clock, its named props, its sound and whoever moves in it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+import pybullet
+
+from veca_marl.sim.acoustics import Room
+from veca_marl.sim.playground import PlaygroundCfg
+from veca_marl.sim.props import Prop, PropCfg
+from veca_marl.sim.scene import Geom, Scene, Shape
+from veca_marl.sim.soundfield import SoundField
+from veca_marl.sim.sounds import make_sound
+
+GRAVITY_MPS2 = 9.81
+_FLOOR_THICKNESS_M = 0.1
+
+
+@dataclass
+class ClockCfg:
+    """The constant clock: physics, sound and animation advance by it, wall time has no influence.
+
+    The paper's VECATime. 25 Hz divides the sampling rate of the ears (22 050 Hz) evenly.
+
+    Attributes:
+        control_rate_hz: Agent steps per second.
+        substeps: Physics steps per agent step.
+        solver_iterations: Iterations of Bullet's constraint solver per physics step.
+    """
+
+    control_rate_hz: int = 25
+    substeps: int = 5
+    solver_iterations: int = 10
+
+    def __post_init__(self) -> None:
+        """Only rates that give whole blocks of samples keep sound and physics together."""
+        if self.control_rate_hz <= 0 or 22050 % self.control_rate_hz:
+            raise ValueError(
+                f"control_rate_hz={self.control_rate_hz} must divide 22050: 10, 15, 18, 21, 25, 30..."
+            )
+        if self.substeps < 1 or self.solver_iterations < 1:
+            raise ValueError("substeps and solver_iterations must be at least 1")
+
+    @property
+    def step_s(self) -> float:
+        """Duration of an agent step."""
+        return 1.0 / self.control_rate_hz
+
+    @property
+    def substep_s(self) -> float:
+        """Duration of a physics step."""
+        return self.step_s / self.substeps
+
+
+class Mover(Protocol):
+    """Whoever moves in a world by its own will."""
+
+    def before_step(self) -> None:
+        """Look round once per agent step, before the first substep."""
+
+    def before_substep(self, substep_s: float) -> None:
+        """Move or apply forces, just before the physics."""
+
+    def mirror(self) -> None:
+        """Write the drawn frames and the sound positions, once per agent step."""
+
+
+class World:
+    """Named things under one clock.
+
+    Build it once: `add_prop`, `attach`, then `freeze`; afterwards `reset` restores the built state
+    and the caller adds the random part with `Prop.place` and `refresh`.
+    """
+
+    def __init__(self, playground: PlaygroundCfg, clock: ClockCfg | None = None) -> None:
+        self.playground = playground
+        self.clock = clock or ClockCfg()
+        self.scene = Scene()
+        room = playground.rooms[0]
+        self.sound = SoundField(
+            Room(np.array(room.lower_m), np.array(room.size_m), room.reflection),
+            step_samples=22050 // self.clock.control_rate_hz,
+            image_order=playground.image_order,
+        )
+        self.client: int = pybullet.connect(pybullet.DIRECT)
+        self.props: dict[str, Prop] = {}
+        self.movers: list[Mover] = []
+        self.after_substep: list[Callable[[], None]] = []
+        self._state: int | None = None
+        self._moving: list[Prop] = []
+        self._prepare_physics()
+        self._lay_floor()
+        for prop in playground.props:
+            self.add_prop(prop)
+
+    def add_prop(self, cfg: PropCfg) -> Prop:
+        """Put a new prop into the world; raise `ValueError` if the name is taken."""
+        self._refuse_if_frozen(f"add the prop {cfg.name!r}")
+        if cfg.name in self.props or cfg.name == "floor":
+            taken = ["floor", *self.props]
+            raise ValueError(f"the name {cfg.name!r} is taken; there are {taken}")
+        sound = None if cfg.sound is None else make_sound(cfg.sound)
+        source = None if sound is None else self.sound.add_source(cfg.name, sound)
+        prop = Prop(cfg, self.client, self.scene, source)
+        self.props[cfg.name] = prop
+        if not prop.fixed:
+            self._moving.append(prop)
+        return prop
+
+    def prop(self, name: str) -> Prop:
+        """Return a prop; raise `KeyError` with the names that exist."""
+        try:
+            return self.props[name]
+        except KeyError:
+            raise KeyError(f"no prop {name!r}; there are {sorted(self.props)}") from None
+
+    def attach(self, mover: Mover) -> None:
+        """Let somebody move in this world."""
+        self._refuse_if_frozen("attach a body")
+        self.movers.append(mover)
+
+    def freeze(self) -> None:
+        """Remember the built state: `reset` comes back to it."""
+        self._refuse_if_frozen("freeze it again")
+        self._state = pybullet.saveState(physicsClientId=self.client)
+
+    def reset(self, rng: np.random.Generator) -> None:
+        """Restore the built state, bit by bit, and start all sounds anew.
+
+        Args:
+            rng: Source of the sounds' phases and noises.
+        """
+        if self._state is None:
+            raise RuntimeError("freeze() the world before its first reset()")
+        pybullet.restoreState(self._state, physicsClientId=self.client)
+        self.sound.reset(rng)
+        for prop in self._moving:
+            prop.mirror()
+
+    def refresh(self) -> None:
+        """Show what was placed by hand: draw it, and let its sound spread for one step."""
+        self._mirror()
+        self.sound.advance()
+
+    def step(self) -> None:
+        """Advance by one agent step."""
+        for mover in self.movers:
+            mover.before_step()
+        for _ in range(self.clock.substeps):
+            for mover in self.movers:
+                mover.before_substep(self.clock.substep_s)
+            pybullet.stepSimulation(physicsClientId=self.client)
+            for notify in self.after_substep:
+                notify()
+        self._mirror()
+        self.sound.advance()
+
+    def close(self) -> None:
+        """Give the PyBullet client back. Closing twice is harmless."""
+        if self.client >= 0:
+            pybullet.disconnect(physicsClientId=self.client)
+            self.client = -1
+
+    def _mirror(self) -> None:
+        for prop in self._moving:
+            prop.mirror()
+        for mover in self.movers:
+            mover.mirror()
+        self.scene.update()
+
+    def _refuse_if_frozen(self, what: str) -> None:
+        if self._state is not None:
+            raise RuntimeError(f"the world is frozen: too late to {what}")
+
+    def _prepare_physics(self) -> None:
+        pybullet.setGravity(0.0, 0.0, -GRAVITY_MPS2, physicsClientId=self.client)
+        pybullet.setPhysicsEngineParameter(
+            fixedTimeStep=self.clock.substep_s,
+            numSolverIterations=self.clock.solver_iterations,
+            # without it a restored world drifts away from a fresh one
+            deterministicOverlappingPairs=1,
+            physicsClientId=self.client,
+        )
+
+    def _lay_floor(self) -> None:
+        look = self.playground
+        half = (look.floor_size_m[0] / 2, look.floor_size_m[1] / 2, _FLOOR_THICKNESS_M / 2)
+        geom = Geom(
+            Shape.BOX,
+            half,
+            colour=tuple(look.floor_colour),
+            offset=(0.0, 0.0, -half[2]),
+            checker_m=look.floor_checker_m,
+        )
+        self.scene.add_object("floor", [[geom]])
+        plane = pybullet.createCollisionShape(pybullet.GEOM_PLANE, physicsClientId=self.client)
+        self.floor_id: int = pybullet.createMultiBody(0, plane, physicsClientId=self.client)
+        pybullet.changeDynamics(
+            self.floor_id, -1, lateralFriction=0.6, restitution=0.3, physicsClientId=self.client
+        )
