@@ -48,8 +48,8 @@ def condition(
     """
     responses = _window(_resample(measured, sample_rate_hz), sample_rate_hz)
     n_fft = max(1024, 1 << (responses.shape[-1] - 1).bit_length())
-    magnitude: Floats = np.abs(np.fft.rfft(responses, n_fft))
-    frequency: Floats = np.fft.rfftfreq(n_fft, 1.0 / sample_rate_hz)
+    magnitude = np.abs(np.fft.rfft(responses, n_fft)).astype(np.float64)
+    frequency = np.fft.rfftfreq(n_fft, 1.0 / sample_rate_hz).astype(np.float64)
     incidence = ear_incidence(measured.directions)
     arrival_s, radius_m = _arrivals(measured, responses, magnitude, incidence, sample_rate_hz)
     equalised = magnitude / _diffuse_field(magnitude, frequency, measured.directions)

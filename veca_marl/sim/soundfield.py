@@ -16,7 +16,7 @@ from veca_marl.sim.pose import Pose
 from veca_marl.sim.propagation import Path, StreamFormat, Surroundings
 from veca_marl.sim.sound_source import Source
 from veca_marl.sim.sounds import Sound
-from veca_marl.sim.spatialisation import LEAD_S, Spatialisation
+from veca_marl.sim.spatialisation import Spatialisation, lead_samples
 
 __all__ = ["Listener", "SoundField", "Source"]
 
@@ -60,7 +60,7 @@ class SoundField:
         self.step_samples = step_samples
         self.sample_rate_hz = sample_rate_hz
         self.clock = 0
-        self.latency_samples = HALF_WIDTH + KERNEL_LATENCY + LEAD_S * sample_rate_hz
+        self.latency_samples = HALF_WIDTH + KERNEL_LATENCY + lead_samples(sample_rate_hz)
         self._surroundings = Surroundings(room, image_order)
         self._listeners: list[Listener] = []
         if room is not None:

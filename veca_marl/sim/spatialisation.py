@@ -18,11 +18,8 @@ from veca_marl.sim.fractional_delay import KERNEL_TAPS, fractional_kernel, kerne
 from veca_marl.sim.hrtf import HeadTable
 from veca_marl.sim.pose import Floats
 
-LEAD_S = 0.5e-3
-"""Room before the filter's origin for the near ear, which hears before the head's centre would."""
-
-REACH_S = 1.0e-3
-"""Room after the last reflection for the far ear, which hears after the head's centre would."""
+_LEAD_S = 0.5e-3
+_REACH_S = 1.0e-3
 
 
 class Spatialisation(Protocol):
@@ -73,7 +70,8 @@ class HeadRelated:
         _head_related_filters(
             arrivals,
             gains,
-            sample_rate_hz,
+            sample_rate_hz / SPEED_OF_SOUND_MPS,
+            lead_samples(sample_rate_hz),
             table.filters,
             table.arrival_samples,
             kernel_bank(),
@@ -100,7 +98,7 @@ class TwoEars:
         self, arrivals: Floats, gains: Floats, sample_rate_hz: float, out: NDArray[np.float32]
     ) -> None:
         """See `Spatialisation`."""
-        _bare_filters(arrivals, gains, sample_rate_hz, self.ears, kernel_bank(), out)
+        _write_bare(arrivals, gains, sample_rate_hz, self.ears, out)
 
 
 class OneEar:
@@ -116,7 +114,7 @@ class OneEar:
         self, arrivals: Floats, gains: Floats, sample_rate_hz: float, out: NDArray[np.float32]
     ) -> None:
         """See `Spatialisation`."""
-        _bare_filters(arrivals, gains, sample_rate_hz, self.ears, kernel_bank(), out)
+        _write_bare(arrivals, gains, sample_rate_hz, self.ears, out)
 
 
 def filter_length(spatialisation: Spatialisation, sample_rate_hz: float, spread_m: float) -> int:
@@ -127,8 +125,27 @@ def filter_length(spatialisation: Spatialisation, sample_rate_hz: float, spread_
         sample_rate_hz: Sampling rate.
         spread_m: How much further than the direct sound the last reflection may travel.
     """
-    longest_s = LEAD_S + spread_m / SPEED_OF_SOUND_MPS + REACH_S
-    return int(np.ceil(longest_s * sample_rate_hz)) + spatialisation.n_taps + KERNEL_TAPS
+    # the far ear hears later than the head's centre would
+    longest_s = spread_m / SPEED_OF_SOUND_MPS + _REACH_S
+    longest = lead_samples(sample_rate_hz) + int(np.ceil(longest_s * sample_rate_hz))
+    return longest + spatialisation.n_taps + KERNEL_TAPS
+
+
+def lead_samples(sample_rate_hz: float) -> int:
+    """Return by how much filters are delayed: the near ear hears before the head's centre would."""
+    return int(np.ceil(_LEAD_S * sample_rate_hz))
+
+
+def _write_bare(
+    arrivals: Floats,
+    gains: Floats,
+    sample_rate_hz: float,
+    ears: Floats,
+    out: NDArray[np.float32],
+) -> None:
+    samples_per_metre = sample_rate_hz / SPEED_OF_SOUND_MPS
+    lead = lead_samples(sample_rate_hz)
+    _bare_filters(arrivals, gains, samples_per_metre, lead, ears, kernel_bank(), out)
 
 
 @njit(cache=True)
@@ -148,12 +165,12 @@ def _split(position: float, last: int) -> tuple[int, float]:
 def _bare_filters(
     arrivals: Floats,
     gains: Floats,
-    sample_rate_hz: float,
+    samples_per_metre: float,
+    lead: int,
     ears: Floats,
     bank: NDArray[np.float32],
     out: NDArray[np.float32],
 ) -> None:
-    samples_per_metre = sample_rate_hz / SPEED_OF_SOUND_MPS
     kernel = np.empty(KERNEL_TAPS, np.float32)
     direct = _length(arrivals[0])
     out[:] = 0.0
@@ -161,7 +178,7 @@ def _bare_filters(
     for k in range(arrivals.shape[0]):
         for ear in range(ears.shape[0]):
             distance = _length(arrivals[k] - ears[ear])
-            position = (distance - direct) * samples_per_metre + LEAD_S * sample_rate_hz
+            position = lead + (distance - direct) * samples_per_metre
             whole, fraction = _split(position, last)
             fractional_kernel(bank, fraction, kernel)
             amplitude = np.float32(gains[k] / max(distance, NEAR_FIELD_M))
@@ -187,14 +204,14 @@ def _grid_cell(
 def _head_related_filters(
     arrivals: Floats,
     gains: Floats,
-    sample_rate_hz: float,
+    samples_per_metre: float,
+    lead: int,
     filters: NDArray[np.float32],
     arrival_samples: Floats,
     bank: NDArray[np.float32],
     out: NDArray[np.float32],
 ) -> None:
     n_azimuths, n_elevations, n_ears, n_taps = filters.shape
-    samples_per_metre = sample_rate_hz / SPEED_OF_SOUND_MPS
     kernel = np.empty(KERNEL_TAPS, np.float32)
     blended = np.empty(n_taps, np.float32)
     direct = _length(arrivals[0])
@@ -213,7 +230,7 @@ def _head_related_filters(
                 + w01 * arrival_samples[a0, e0 + 1, ear]
                 + w11 * arrival_samples[a1, e0 + 1, ear]
             )
-            position = (distance - direct) * samples_per_metre + LEAD_S * sample_rate_hz
+            position = lead + (distance - direct) * samples_per_metre
             whole, fraction = _split(position + interaural, last)
             fractional_kernel(bank, fraction, kernel)
             c00, c10 = np.float32(amplitude * w00), np.float32(amplitude * w10)
