@@ -15,11 +15,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import torch
 from torchrl.envs import EnvBase
 from tqdm import tqdm
 
-from veca_marl.algos.checkpoint import Checkpoints, Identity, load_checkpoint
+from veca_marl.algos.checkpoint import Checkpoints, load_checkpoint
 from veca_marl.algos.collect import CollectCfg, Experience
 from veca_marl.algos.evaluation import (
     EvalCfg,
@@ -94,12 +93,14 @@ class Trainer:
     progress_bar: bool = True
     progress: Progress = field(default_factory=Progress)
     watch: Stopwatch = field(default_factory=Stopwatch)
+    _resumed_frames: int = 0
 
     def resume(self, path: Path) -> None:
         """Take up learning and progress from the checkpoint at `path`."""
         state = load_checkpoint(path, self.checkpoints.identity, self.algorithm.device)
         self.algorithm.load_state_dict(state["algorithm"])
         self.progress = Progress(**state["progress"])
+        self._resumed_frames = self.progress.frames
 
     def run(self) -> list[str]:
         """Train until the budget is spent; return how each team compares with random play."""
@@ -127,6 +128,10 @@ class Trainer:
         scores = scores or self._play(eval_env)
         eval_env.close()
         return [comparison_line(team, scores[team], baseline[team]) for team in scores]
+
+    def timing(self) -> str:
+        """Return a table of where the time went."""
+        return self.watch.table(self.progress.frames - self._resumed_frames)
 
     def _run_stage(self, experience: Experience, bar: tqdm[Any]) -> None:
         with self.watch.measure("collect"):

@@ -1,0 +1,79 @@
+"""Errors of the configuration, said in one line that lists the choices."""
+
+from __future__ import annotations
+
+import difflib
+import re
+from collections.abc import Iterator
+from dataclasses import fields, is_dataclass
+from typing import Any
+
+from hydra.errors import ConfigCompositionException, MissingConfigException
+from omegaconf import DictConfig
+from omegaconf.errors import ConfigKeyError, OmegaConfBaseException
+
+
+class ConfigError(ValueError):
+    """A configuration that cannot be; its message is one line."""
+
+
+def one_line(error: BaseException) -> str:
+    """Return what is wrong and what the choices are, without a line break."""
+    chain = list(_chain(error))
+    for cause in chain:
+        if isinstance(cause, MissingConfigException) and cause.missing_cfg_file:
+            return _unknown_preset(cause)
+    for cause in chain:
+        if isinstance(cause, OmegaConfBaseException):
+            return _wrong_value(cause)
+    if isinstance(error, ConfigCompositionException):
+        return _wrong_override(str(error))
+    return _flat(str(error))
+
+
+def _chain(error: BaseException | None) -> Iterator[BaseException]:
+    while error is not None:
+        yield error
+        error = error.__cause__
+
+
+def _unknown_preset(error: MissingConfigException) -> str:
+    group, _, name = str(error.missing_cfg_file).rpartition("/")
+    options = sorted(error.options or ())
+    return f"unknown {group} {name!r}{_nearest(name, options)}; choices: {', '.join(options)}"
+
+
+def _wrong_value(error: OmegaConfBaseException) -> str:
+    names = _keys(error)
+    if isinstance(error, (ConfigKeyError, AttributeError)) and names:
+        key = str(error.full_key or error.key)
+        near = _nearest(key.rpartition(".")[2], names)
+        return f"unknown key {key!r}{near}; choices: {', '.join(names)}"
+    key = f"{error.full_key}: " if error.full_key else ""
+    return key + _flat(str(error).partition("\n")[0])
+
+
+def _keys(error: OmegaConfBaseException) -> list[str]:
+    """Return the keys of the node that an error is about."""
+    owner: Any = error.object_type
+    if is_dataclass(owner):
+        return sorted(f.name for f in fields(owner))
+    parent = error.parent_node
+    return sorted(map(str, parent.keys())) if isinstance(parent, DictConfig) else []
+
+
+def _wrong_override(message: str) -> str:
+    hint = re.search(r"use \+?\+?(\S+=\S+)", message)
+    group = re.search(r"Could not override '([^'@]+)'", message)
+    if hint and group:
+        return f"{group.group(1)} has no default to replace: write +{hint.group(1).lstrip('+')}"
+    return _flat(message)
+
+
+def _nearest(name: str, choices: list[str]) -> str:
+    near = difflib.get_close_matches(name, choices, n=1)
+    return f" (did you mean {near[0]}?)" if near else ""
+
+
+def _flat(message: str) -> str:
+    return " ".join(message.split())

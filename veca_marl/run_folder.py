@@ -1,0 +1,98 @@
+"""The folder of a run: what is in it, and that no run writes into another's."""
+
+from __future__ import annotations
+
+import json
+import platform
+import subprocess
+import sys
+from dataclasses import dataclass
+from importlib.metadata import version
+from pathlib import Path
+
+from omegaconf import DictConfig, OmegaConf
+
+from veca_marl.config_errors import ConfigError
+
+_PACKAGES = ("veca_marl", "torch", "torchrl", "tensordict", "pybullet", "numpy", "numba")
+
+
+@dataclass(frozen=True)
+class RunFolder:
+    """Where things are in the folder of a run.
+
+    Attributes:
+        path: The folder.
+    """
+
+    path: Path
+
+    @property
+    def config(self) -> Path:
+        """The resolved configuration."""
+        return self.path / "config.yaml"
+
+    @property
+    def checkpoints(self) -> Path:
+        """The folder of the checkpoints."""
+        return self.path / "checkpoints"
+
+    @property
+    def video(self) -> Path:
+        """An episode of the trained policy."""
+        return self.path / "videos" / "final.mp4"
+
+    def write(self, name: str, text: str) -> None:
+        """Write a small text file."""
+        (self.path / name).write_text(text + "\n")
+
+
+def start_run(path: Path, node: DictConfig) -> RunFolder:
+    """Claim `path` for a new run and write down what it is.
+
+    Raises:
+        ConfigError: If there is a run in it already.
+    """
+    folder = RunFolder(path)
+    if folder.config.exists():
+        raise ConfigError(f"{path} holds a run already; continue it with resume={path}")
+    path.mkdir(parents=True, exist_ok=True)
+    folder.write("provenance.json", json.dumps(_provenance(), indent=2))
+    folder.config.write_text(OmegaConf.to_yaml(node, resolve=True))
+    return folder
+
+
+def open_run(path: Path) -> RunFolder:
+    """Return the folder of an earlier run.
+
+    Raises:
+        ConfigError: If there is no run in `path`.
+    """
+    folder = RunFolder(path)
+    if not folder.config.is_file():
+        raise ConfigError(f"resume={path}: there is no run in it (no config.yaml)")
+    return folder
+
+
+def _provenance() -> dict[str, object]:
+    return {
+        "command": sys.argv,
+        "commit": _git_commit(),
+        "python": platform.python_version(),
+        "packages": {name: version(name) for name in _PACKAGES},
+    }
+
+
+def _git_commit() -> str | None:
+    """Return the commit of this checkout, marked if changed; None where there is none."""
+    try:
+        described = subprocess.run(
+            ["git", "describe", "--always", "--abbrev=40", "--dirty", "--exclude", "*"],
+            cwd=Path(__file__).parent,
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+    except (OSError, subprocess.CalledProcessError):
+        return None
+    return described.stdout.strip()

@@ -1,0 +1,170 @@
+"""Train on a task: ``python -m veca_marl.train +task=KickTheBall``.
+
+The Hydra entry: configuration -> environments -> algorithm -> loop.
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+import sys
+from functools import partial
+from pathlib import Path
+
+import hydra
+import torch
+from hydra.core.hydra_config import HydraConfig
+from hydra.errors import HydraException
+from omegaconf import DictConfig, OmegaConf
+from omegaconf.errors import OmegaConfBaseException
+
+from veca_marl.algos.checkpoint import CheckpointError, Checkpoints, Identity
+from veca_marl.algos.loop import Budget, Trainer
+from veca_marl.algos.metrics import CsvReporter, Reporter, TensorBoardReporter
+from veca_marl.algos.ppo import PPO
+from veca_marl.algos.specs import TeamSpec, team_specs
+from veca_marl.config import CONF, Config, compose_node, to_config
+from veca_marl.config_errors import ConfigError, one_line
+from veca_marl.envs.env import VecaEnv
+from veca_marl.envs.game import GameCfg
+from veca_marl.recording import record_episode
+from veca_marl.run_folder import RunFolder, open_run, start_run
+
+RESUMABLE = ("resume", "total_frames", "max_minutes", "device", "threads")
+
+
+def make_env(game: GameCfg, worlds: int, seed: int) -> VecaEnv:
+    """Return `worlds` games in one environment; bound to its game it is an `EnvFactory`."""
+    return VecaEnv(game, worlds, seed)
+
+
+def train(cfg: Config, folder: RunFolder) -> list[str]:
+    """Train as configured, into `folder`; return how each team compares with random play."""
+    device = find_device(cfg.device)
+    if cfg.threads is not None:
+        torch.set_num_threads(cfg.threads)
+    torch.manual_seed(cfg.seed)
+    specs = read_specs(cfg.game)
+    checkpoints = Checkpoints(
+        folder.checkpoints, Identity(cfg.task.name, specs), cfg.log.keep_checkpoints
+    )
+    trainer = Trainer(
+        make_env=partial(make_env, cfg.game),
+        algorithm=PPO(specs, cfg.algo, device),
+        collect=cfg.collect,
+        evaluation=cfg.eval,
+        budget=Budget(cfg.total_frames, cfg.max_minutes),
+        checkpoints=checkpoints,
+        reporters=[],
+        seed=cfg.seed,
+        progress_bar=cfg.log.progress_bar,
+    )
+    if cfg.resume is not None:
+        trainer.resume(checkpoints.latest())
+    trainer.reporters = make_reporters(cfg, folder, trainer.progress.frames)
+    lines = trainer.run()
+    if cfg.log.video:
+        with trainer.watch.measure("video"):
+            record_episode(folder.video, cfg.game, trainer.algorithm.policy, cfg.seed)
+    for reporter in trainer.reporters:
+        reporter.close()
+    folder.write("comparison.txt", "\n".join(lines))
+    folder.write("timing.txt", trainer.timing())
+    print(trainer.timing(), *lines, f"run folder: {folder.path}", sep="\n")  # noqa: T201
+    return lines
+
+
+def read_specs(game: GameCfg) -> dict[str, TeamSpec]:
+    """Build one world to see what its teams perceive and do.
+
+    Raises:
+        ConfigError: If no world can be made from `game`.
+    """
+    try:
+        env = make_env(game, 1, 0)
+    except ValueError as error:
+        raise ConfigError(one_line(error)) from error
+    specs = team_specs(env)
+    env.close()
+    return specs
+
+
+def find_device(name: str) -> torch.device:
+    """Return the device called `name`.
+
+    Raises:
+        ConfigError: If there is none.
+    """
+    found = [f"cuda:{i}" for i in range(torch.cuda.device_count())]
+    choices = ["cpu", *(["cuda"] if found else []), *found]
+    if name not in choices:
+        raise ConfigError(f"device={name} is not on this machine; choices: {', '.join(choices)}")
+    return torch.device(name)
+
+
+def make_reporters(cfg: Config, folder: RunFolder, resumed_frames: int) -> list[Reporter]:
+    """Return what writes the numbers down, rid of rows that will be written again."""
+    reporters: list[Reporter] = [CsvReporter(folder.path, resumed_frames)]
+    if cfg.log.tensorboard:
+        reporters.append(TensorBoardReporter(folder.path, resumed_frames))
+    return reporters
+
+
+def stored_config(folder: RunFolder, asked: DictConfig, overrides: list[str]) -> Config:
+    """Return the configuration of an earlier run, with the changes a resumption may make.
+
+    Args:
+        folder: The earlier run.
+        asked: The configuration composed from this command line.
+        overrides: What this command line says.
+
+    Raises:
+        ConfigError: If anything else is to change, or it is a run of another task.
+    """
+    stored = OmegaConf.load(folder.config)
+    task = stored.task.name
+    names = {text.partition("=")[0]: text.partition("=")[2] for text in overrides}
+    if names.pop("+task", task) != task:
+        raise ConfigError(f"{folder.path} is a run of {task}, not of {asked.task.name}")
+    changed = sorted(set(names) - set(RESUMABLE))
+    if changed:
+        raise ConfigError(
+            f"a resumed run stays as it was: cannot change {', '.join(changed)}; "
+            f"choices: {', '.join(RESUMABLE)}"
+        )
+    node = OmegaConf.merge(compose_node([f"+task={task}"]), stored)
+    for name in names:
+        node[name] = asked[name]
+    return to_config(node)
+
+
+@hydra.main(version_base="1.3", config_path=str(CONF), config_name="config")
+def run(node: DictConfig) -> None:
+    """Train in the folder that Hydra made."""
+    if node.resume is not None:
+        folder = open_run(Path(node.resume))
+        cfg = stored_config(folder, node, list(HydraConfig.get().overrides.task))
+    else:
+        cfg = to_config(node)
+        folder = start_run(Path(HydraConfig.get().runtime.output_dir), node)
+    try:
+        train(cfg, folder)
+    except KeyboardInterrupt:
+        raise SystemExit(
+            f"interrupted; continue with: python -m veca_marl.train resume={folder.path}"
+        ) from None
+
+
+def main() -> None:
+    """Run the command line; what is wrong with it is said in one line, with exit status 2."""
+    os.environ["HYDRA_FULL_ERROR"] = "1"  # exceptions come here instead of being printed
+    logging.getLogger("torchrl").setLevel(logging.WARNING)
+    try:
+        run()
+    except (ConfigError, CheckpointError, HydraException, OmegaConfBaseException) as error:
+        print(f"error: {one_line(error)}", file=sys.stderr)  # noqa: T201
+        raise SystemExit(2) from None
+
+
+if __name__ == "__main__":
+    main()
