@@ -2,12 +2,13 @@
 
 What is measured and what is ours:
 
-- *Acuity*: mean monocular grating acuity on the Teller Acuity Cards, Mayer, Beiser, Warner, Pratt,
-  Raye & Lang, "Monocular acuity norms for the Teller Acuity Cards between ages one month and four
-  years", Investigative Ophthalmology & Visual Science 36 (1995) 671-685. The means at 9 and 12
-  months (6.79 and 6.42) are pooled, as acuity does not fall with age. Between the ages, octaves
-  are interpolated linearly; the value at birth, 0.69, is Brown & Yamamoto's (Am. J. Ophthalmology
-  1986, acuity cards, term newborns); over four years that of four years is held.
+- *Acuity*: mean monocular grating acuity on the Teller Acuity Cards, table 2 of Mayer, Beiser,
+  Warner, Pratt, Raye & Lang, "Monocular acuity norms for the Teller Acuity Cards between ages one
+  month and four years", Investigative Ophthalmology & Visual Science 36 (1995) 671-685 (read in the
+  transcription of the Gilmore lab's visual-acuity repository). Its means at 9 and 12 months, 6.79
+  and 6.42 of 30 and 40 infants, are pooled, as acuity does not fall with age. The value at birth,
+  0.69, is Brown & Yamamoto's for term newborns (Am. J. Ophthalmology 1986, also acuity cards).
+  Between the ages octaves are interpolated linearly; beyond four years the last value is held.
 - *Blur*: that a grating at the acuity limit keeps 10 % of its contrast is a convention of ours, in
   the manner of resolution criteria for lenses; the limit itself is where infants stop responding.
 - *Colour*: the order of events is measured: newborns tell few and only large saturated colours
@@ -32,8 +33,8 @@ from numpy.typing import NDArray
 from veca_marl.sim.filters import Blur, Look
 from veca_marl.sim.shading import Images
 
-_ACUITY_AGES_MONTHS = (0.0, 1.0, 2.5, 4.0, 6.0, 9.0, 12.0, 18.0, 24.0, 30.0, 36.0, 48.0)
-_ACUITY_CPD = (0.69, 0.94, 2.16, 2.68, 5.65, 6.60, 6.60, 8.59, 9.57, 11.52, 21.81, 24.81)
+_ACUITY_AGES_MONTHS = (0.0, 1.0, 1.5, 2.5, 4.0, 6.0, 9.0, 12.0, 18.0, 24.0, 30.0, 36.0, 48.0)
+_ACUITY_CPD = (0.69, 0.94, 1.11, 2.16, 2.68, 5.65, 6.58, 6.58, 8.59, 9.57, 11.52, 21.81, 24.81)
 
 _GAIN_AGES_MONTHS = (0.0, 1.0, 2.0, 3.0, 4.0, 6.0, 12.0, 24.0)
 _RED_GREEN_GAINS = (0.10, 0.25, 0.45, 0.60, 0.70, 0.80, 0.90, 1.00)

@@ -13,7 +13,14 @@ from veca_marl.sim.pose import Floats, Pose
 from veca_marl.sim.raster import NOTHING, Depths, Lens, Surfaces, draw_geoms
 from veca_marl.sim.scene import Bools, Scene
 from veca_marl.sim.screen_bounds import single
-from veca_marl.sim.shading import Images, glaze, name_objects, shade
+from veca_marl.sim.shading import (
+    GLASS_OPACITY,
+    Images,
+    illuminate,
+    name_objects,
+    paint,
+    paint_sky,
+)
 
 
 class Views(NamedTuple):
@@ -109,18 +116,23 @@ class Camera:
             hidden: ``(G,)`` primitives to leave out, as from `Scene.hidden`.
         """
         views = self._blank(len(poses))
+        lights = np.empty((self.height, self.width), np.float32)
         opaque, glass = _drawn(scene, hidden)
+        geoms, lens, objects = scene.geoms, self.lens, scene.geoms.objects
         for v, pose in enumerate(poses):
             view = view_axes(pose)
             rgb, depth, ids, glass_ids = (array[v] for array in views)
-            draw_geoms(scene.geoms, opaque, view, self.lens, True, depth, ids)
-            shade(scene.geoms, view, self.lens, depth, ids, rgb)
+            draw_geoms(geoms, opaque, view, lens, True, depth, ids)
+            illuminate(geoms, view, lens, depth, ids, lights)
+            paint_sky(lens, rgb)
+            paint(geoms, ids, lights, 1.0, rgb)
+            name_objects(objects, ids)
             if glass.any():
                 glass_depth = depth.copy()
-                draw_geoms(scene.geoms, glass, view, self.lens, True, glass_depth, glass_ids)
-                glaze(scene.geoms, view, self.lens, glass_depth, glass_ids, rgb)
-                name_objects(scene.geoms.objects, glass_ids)
-            name_objects(scene.geoms.objects, ids)
+                draw_geoms(geoms, glass, view, lens, True, glass_depth, glass_ids)
+                illuminate(geoms, view, lens, glass_depth, glass_ids, lights)
+                paint(geoms, glass_ids, lights, GLASS_OPACITY, rgb)
+                name_objects(objects, glass_ids)
         return views
 
     def _blank(self, count: int) -> Views:

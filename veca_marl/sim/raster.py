@@ -88,7 +88,7 @@ def draw_geoms(
     for g in range(geoms.shapes.shape[0]):
         if not drawn[g]:
             continue
-        ray = _local_ray(geoms.positions[g], geoms.rotations[g], view)
+        ray = local_ray(geoms.positions[g], geoms.rotations[g], view)
         rectangle = (0, lens.columns.shape[0], 0, lens.rows.shape[0])
         if bounded:
             rectangle = _rectangle(geoms.shapes[g], geoms.sizes[g], ray, lens)
@@ -99,20 +99,20 @@ def draw_geoms(
 
 
 @njit(cache=True, error_model="numpy")
-def _local_ray(position: Floats, rotation: Floats, view: Floats) -> Ray:
+def local_ray(position: Floats, rotation: Floats, view: Floats) -> Ray:
     """Eye position and right, up and forward axes in a primitive's own axes."""
     return (
-        _into(
+        into_local(
             rotation, view[0, 0] - position[0], view[0, 1] - position[1], view[0, 2] - position[2]
         ),
-        _into(rotation, view[1, 0], view[1, 1], view[1, 2]),
-        _into(rotation, view[2, 0], view[2, 1], view[2, 2]),
-        _into(rotation, view[3, 0], view[3, 1], view[3, 2]),
+        into_local(rotation, view[1, 0], view[1, 1], view[1, 2]),
+        into_local(rotation, view[2, 0], view[2, 1], view[2, 2]),
+        into_local(rotation, view[3, 0], view[3, 1], view[3, 2]),
     )
 
 
 @njit(cache=True, error_model="numpy")
-def _into(rotation: Floats, x: float, y: float, z: float) -> Vector:
+def into_local(rotation: Floats, x: float, y: float, z: float) -> Vector:
     """World vector to local axes, in single precision from here on."""
     return (
         single(rotation[0, 0] * x + rotation[1, 0] * y + rotation[2, 0] * z),

@@ -75,10 +75,17 @@ class Geom:
         offset, rotation = np.asarray(self.offset, float), np.asarray(self.rotation, float)
         if offset.shape != (3,) or not np.isfinite(offset).all():
             raise ValueError(f"offset {self.offset}: want three finite metres")
-        if rotation.shape != (3, 3) or not np.allclose(rotation @ rotation.T, np.eye(3), atol=1e-6):
-            raise ValueError(f"rotation {self.rotation}: want an orthonormal 3x3 matrix")
+        if not _is_rotation(rotation):
+            raise ValueError(f"rotation {self.rotation}: want an orthonormal right-handed matrix")
         if not 0.0 <= self.checker_m < np.inf:
             raise ValueError(f"checker_m {self.checker_m}: want 0 (plain) or an edge in metres")
+
+
+def _is_rotation(matrix: NDArray[np.float64]) -> bool:
+    """Whether a matrix is 3x3, orthonormal and right-handed."""
+    if matrix.shape != (3, 3) or not np.allclose(matrix @ matrix.T, np.eye(3), atol=1e-6):
+        return False
+    return bool(np.linalg.det(matrix) > 0.0)
 
 
 class GeomTable(NamedTuple):

@@ -34,16 +34,27 @@ def disc_interval(across: float, forward: float, radius: float, limit: float) ->
         radius: Metres.
         limit: Slope of the picture's edge.
     """
-    squared = across * across + forward * forward
-    if squared <= radius * radius:
+    squared = across * across + forward * forward - radius * radius
+    if squared <= 0.0:
         return -limit, limit
-    middle = math.atan2(across, forward)
-    half = math.asin(radius / math.sqrt(squared))
-    if middle + half < -_GRAZING_RAD or middle - half > _GRAZING_RAD:
+    steep = forward * forward - radius * radius
+    if forward > 0.0 and steep > 0.0:
+        # the slopes s of the tangents: |across - s forward| = radius sqrt(1 + s^2)
+        middle, half = across * forward, radius * math.sqrt(squared)
+        return (middle - half) / steep, (middle + half) / steep
+    if forward <= -radius:
         return limit, -limit
-    low = -limit if middle - half < -_GRAZING_RAD else math.tan(middle - half)
-    high = limit if middle + half > _GRAZING_RAD else math.tan(middle + half)
-    return low, high
+    # the disc reaches through the plane of the eye: one tangent only bounds what is ahead
+    edge = _forward_tangent(abs(across), forward, radius)
+    return (edge, limit) if across > 0.0 else (-limit, -edge)
+
+
+@njit(cache=True, error_model="numpy")
+def _forward_tangent(across: float, forward: float, radius: float) -> float:
+    """Slope of the tangent, on the side of the optical axis, to a disc beside the eye."""
+    angle = math.atan2(across, forward)
+    angle -= math.asin(radius / math.sqrt(across * across + forward * forward))
+    return math.tan(angle) if angle < _GRAZING_RAD else math.inf
 
 
 @njit(cache=True, error_model="numpy")

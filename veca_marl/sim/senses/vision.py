@@ -155,6 +155,4 @@ def _specs(cfg: VisionCfg, camera: Camera) -> dict[str, ArraySpec]:
 
 def _two(images: NDArray[Any]) -> NDArray[Any]:
     """One image per eye, contiguous: a closed eye's place is filled by the open one's."""
-    if len(images) == 2:
-        return np.ascontiguousarray(images)
-    return np.concatenate((images, images))
+    return np.ascontiguousarray(images if len(images) == 2 else images.repeat(2, axis=0))
