@@ -1,0 +1,7 @@
+"""Run the bench as a module."""
+
+import sys
+
+from veca_marl.bench.command import main
+
+sys.exit(main())

@@ -1,0 +1,107 @@
+"""The command line of the bench."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import sys
+from collections.abc import Sequence
+from contextlib import nullcontext
+from dataclasses import asdict, replace
+from pathlib import Path
+
+import torch
+
+from veca_marl.bench.free_play import free_play
+from veca_marl.bench.references import EyeCost, measure_ears, measure_eye
+from veca_marl.bench.report import machine, references_table, rollouts_table
+from veca_marl.bench.rollouts import Rollouts, measure_rollouts
+from veca_marl.config import compose
+from veca_marl.config_errors import ConfigError
+from veca_marl.envs.game import GameCfg
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Measure, print a table, and write JSON if asked to; return the exit status."""
+    asked = _parser().parse_args(arguments)
+    torch.set_num_threads(1)
+    try:
+        game = compose(_overrides(asked)).game
+    except ConfigError as error:
+        print(error, file=sys.stderr)  # noqa: T201
+        return 2
+    print(f"processor time of one thread; {_load()}\n")  # noqa: T201
+    runs = []
+    for agents in asked.agents:
+        for worlds in asked.worlds:
+            runs.append(_measure(game, agents, worlds, asked.steps, asked.repeats))
+            print(rollouts_table(runs[-1]), end="\n\n")  # noqa: T201
+    eye = ears_ms = None
+    if not asked.skip_references:
+        eye = measure_eye(game.playground, asked.repeats)
+        ears_ms = measure_ears(game.playground, asked.steps)
+        print(references_table(eye, ears_ms))  # noqa: T201
+    if asked.json is not None:
+        asked.json.write_text(_as_json(runs, eye, ears_ms))
+    return 0
+
+
+def _measure(game: GameCfg, agents: int, worlds: int, steps: int, repeats: int) -> Rollouts:
+    task = nullcontext(game.task) if agents == 1 else free_play(agents, game.task)
+    with task as task_cfg:
+        return measure_rollouts(replace(game, task=task_cfg), worlds, steps, repeats)
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="python -m veca_marl.bench",
+        description="Agent steps per second, and the milliseconds of each part of a step.",
+    )
+    parser.add_argument("--task", default="KickTheBall", help="which game is played")
+    parser.add_argument("--worlds", type=_counts, default=[1, 4], help="such as 1,4")
+    parser.add_argument(
+        "--agents",
+        type=_counts,
+        default=[1],
+        help="such as 1,4; 1 plays the task, more play freely in its playground, with its senses",
+    )
+    parser.add_argument("--playground", help="where; the task's own if nothing is said")
+    parser.add_argument(
+        "--senses", nargs="*", default=[], metavar="SENSE=PRESET", help="such as audio=mono"
+    )
+    parser.add_argument("--steps", type=_count, default=300, help="steps of each rollout")
+    parser.add_argument("--repeats", type=_count, default=5, help="rollouts; medians count")
+    parser.add_argument("--skip-references", action="store_true", help="measure rollouts alone")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="also write the numbers here")
+    return parser
+
+
+def _count(text: str) -> int:
+    if not text.isdecimal() or int(text) < 1:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number from 1 on")
+    return int(text)
+
+
+def _counts(text: str) -> list[int]:
+    return [_count(part) for part in text.split(",")]
+
+
+def _overrides(asked: argparse.Namespace) -> list[str]:
+    playground = [] if asked.playground is None else [f"playground={asked.playground}"]
+    return [f"+task={asked.task}", *playground, *(f"senses/{sense}" for sense in asked.senses)]
+
+
+def _load() -> str:
+    load, cores = os.getloadavg()[0], os.cpu_count()
+    return f"{cores} cores, load {load:.1f}"
+
+
+def _as_json(runs: list[Rollouts], eye: EyeCost | None, ears_ms: float | None) -> str:
+    references = {"eye": eye and asdict(eye), "ears_ms": ears_ms}
+    content = {
+        "machine": machine(),
+        "rollouts": [asdict(run) for run in runs],
+        "references": references,
+    }
+    return json.dumps(content, indent=2) + "\n"

@@ -1,0 +1,164 @@
+"""Costs beside references in the same run: ratios hold on a busy machine, milliseconds do not."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from statistics import median
+
+import numpy as np
+import pybullet
+
+from veca_marl.sim.bodies.walker import Walker, WalkerCfg
+from veca_marl.sim.optics import Camera
+from veca_marl.sim.playground import PlaygroundCfg
+from veca_marl.sim.pose import Pose
+from veca_marl.sim.props import PropCfg, PropShape
+from veca_marl.sim.rotations import matrix_to_quaternion
+from veca_marl.sim.scene import Bools, Scene, Shape
+from veca_marl.sim.senses.audio import AudioCfg, AudioSense
+from veca_marl.sim.sounds import SoundCfg, SoundKind, make_sound
+from veca_marl.sim.world import World
+
+N_LOOSE_PROPS = 20
+VIEWS = 8
+
+
+@dataclass
+class EyeCost:
+    """One eye view beside PyBullet's TinyRenderer on the same scene.
+
+    Attributes:
+        primitives: What there is to draw.
+        ours_ms: One 84x84 view, colours, depth and segmentation.
+        tiny_ms: The same by TinyRenderer without shadows.
+        times_as_fast: Median of the ratios of neighbouring measurements.
+    """
+
+    primitives: int
+    ours_ms: float
+    tiny_ms: float
+    times_as_fast: float
+
+
+def measure_eye(playground: PlaygroundCfg, repeats: int) -> EyeCost:
+    """Render the playground with 20 more props and 2 walkers, from one's left eye all round."""
+    world = World(playground)
+    props = [world.add_prop(cfg) for cfg in _loose_props()]
+    watcher, other = (Walker(name, WalkerCfg(), world, i) for i, name in enumerate("ab"))
+    rng = np.random.default_rng(0)
+    room = playground.rooms[0]
+    for prop in props:
+        prop.place(room.sample_floor(rng, margin_m=0.8) + np.array([0.0, 0.0, 0.15]))
+    other.place((1.0, 0.6, 0.0), yaw_rad=math.pi)
+    watcher.place((-1.0, 0.0, 0.0))
+    world.scene.update()
+    hidden = world.scene.hidden(watcher.object_id, watcher.own_head_frames)
+    eye, camera = watcher.mount("eye_left"), Camera()
+    poses = [_turned(eye, 2.0 * math.pi * view / VIEWS) for view in range(VIEWS)]
+    client = _as_visual_shapes(world.scene, hidden)
+    ours, tiny = [], []
+    for _ in range(repeats + 1):
+        ours.append(_ms(lambda: camera.render(world.scene, poses, hidden)) / VIEWS)
+        tiny.append(_ms(lambda: _tiny_views(client, camera, poses)) / VIEWS)
+    pybullet.disconnect(client)
+    world.close()
+    ours, tiny = ours[1:], tiny[1:]
+    ratio = median(theirs / mine for mine, theirs in zip(ours, tiny, strict=True))
+    return EyeCost(int((~hidden).sum()), median(ours), median(tiny), ratio)
+
+
+def measure_ears(playground: PlaygroundCfg, steps: int) -> float:
+    """Return milliseconds per step of one listener and one source, both moving, with HRTF.
+
+    Emission, the way through the room, the head and the observed spectrum are in it.
+    """
+    world = World(playground)
+    buzz = SoundCfg(kind=SoundKind.buzz, level=0.1)
+    source = world.sound.add_source("buzz", make_sound(buzz))
+    walker = Walker("listener", WalkerCfg(), world)
+    ears = AudioSense(AudioCfg(), walker, world.sound)
+    world.sound.reset(np.random.default_rng(0))
+    costs = []
+    for step in range(steps):
+        angle = 0.05 * step
+        source.position = (2.0 * math.cos(angle), 2.0 * math.sin(angle), 0.15)
+        walker.yaw_rad = -0.5 * angle
+        walker.mirror()
+        costs.append(_ms(lambda: (world.sound.advance(), ears.read())))
+    world.close()
+    return median(costs)
+
+
+def _loose_props() -> list[PropCfg]:
+    looks = [
+        (PropShape.sphere, [0.12]),
+        (PropShape.box, [0.2, 0.25, 0.3]),
+        (PropShape.cylinder, [0.1, 0.3]),
+        (PropShape.capsule, [0.08, 0.2]),
+    ]
+    return [
+        PropCfg(f"loose_{i}", *looks[i % len(looks)], mass_kg=0.5) for i in range(N_LOOSE_PROPS)
+    ]
+
+
+def _turned(pose: Pose, yaw_rad: float) -> Pose:
+    c, s = math.cos(yaw_rad), math.sin(yaw_rad)
+    about_z = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    return pose._replace(rotation=about_z @ pose.rotation)
+
+
+def _as_visual_shapes(scene: Scene, hidden: Bools) -> int:
+    """Return a PyBullet client that shows the same primitives at the same places."""
+    client: int = pybullet.connect(pybullet.DIRECT)
+    geoms = scene.geoms
+    for g in np.flatnonzero(~hidden):
+        shape = _visual_shape(client, Shape(geoms.shapes[g]), geoms.sizes[g], geoms.colours[g])
+        pybullet.createMultiBody(
+            0.0,
+            -1,
+            shape,
+            basePosition=geoms.positions[g].tolist(),
+            baseOrientation=matrix_to_quaternion(geoms.rotations[g]).tolist(),
+            physicsClientId=client,
+        )
+    return client
+
+
+def _visual_shape(client: int, shape: Shape, size: Sequence[float], colour: Sequence[float]) -> int:
+    first, second, third = (float(value) for value in size)
+    words = {
+        Shape.SPHERE: {"shapeType": pybullet.GEOM_SPHERE, "radius": first},
+        Shape.BOX: {"shapeType": pybullet.GEOM_BOX, "halfExtents": [first, second, third]},
+        Shape.CYLINDER: {"shapeType": pybullet.GEOM_CYLINDER, "radius": first, "length": second},
+        Shape.CAPSULE: {"shapeType": pybullet.GEOM_CAPSULE, "radius": first, "length": second},
+    }
+    rgba = [*(float(value) for value in colour), 1.0]
+    made = pybullet.createVisualShape(**words[shape], rgbaColor=rgba, physicsClientId=client)
+    return int(made)
+
+
+def _tiny_views(client: int, camera: Camera, poses: Sequence[Pose]) -> None:
+    lens = pybullet.computeProjectionMatrixFOV(
+        camera.fov_deg, camera.width / camera.height, camera.near_m, camera.far_m
+    )
+    for pose in poses:
+        forward, up = pose.rotation[:, 0], pose.rotation[:, 2]
+        view = pybullet.computeViewMatrix(pose.position, pose.position + forward, up)
+        pybullet.getCameraImage(
+            camera.width,
+            camera.height,
+            view,
+            lens,
+            shadow=0,
+            renderer=pybullet.ER_TINY_RENDERER,
+            physicsClientId=client,
+        )
+
+
+def _ms(call: Callable[[], object]) -> float:
+    start = time.thread_time()
+    call()
+    return 1e3 * (time.thread_time() - start)
