@@ -55,7 +55,8 @@ def read_delayed(
     """Read the newest ``len(out)`` samples of a source through a delay that changes linearly.
 
     A delay that shrinks or grows along the step is the Doppler effect itself, so nothing else has
-    to model it. The delay is a float64: a float32 index is too coarse some seconds into a ring.
+    to model it. The way counts as it is when the sound is heard: exact for a moving listener, and
+    for a moving source up to (v / c)^2, 0.1 % of the pitch at 10 m/s.
 
     Args:
         history: What the source emitted, newest sample last. Samples before it count as silence.

@@ -21,6 +21,7 @@ from veca_marl.sim.spec import ArraySpec
 WINDOW_SAMPLES = 1024
 N_BINS = 250
 MAGNITUDE_FLOOR = 1e-8
+SILENCE = -8.0
 
 
 class AudioQuality(Enum):
@@ -95,7 +96,7 @@ class AudioSense(Sense):
         self._noise_power = _noise_power(cfg.noise_floor_db, self._window)
         self._recent = np.zeros((2, max(WINDOW_SAMPLES, field.step_samples)), np.float32)
         self._step_samples = field.step_samples
-        self.specs = {"audio": ArraySpec((2, N_BINS), np.float32, low=np.log10(MAGNITUDE_FLOOR))}
+        self.specs = {"audio": ArraySpec((2, N_BINS), np.float32, low=SILENCE)}
         if cfg.waveform:
             self.specs["waveform"] = ArraySpec((2, field.step_samples), np.float32)
 
@@ -134,7 +135,9 @@ def log_spectrum(samples: NDArray[np.float32], noise_power: float = 0.0) -> NDAr
     magnitude = np.abs(scipy.fft.rfft(samples)[..., :N_BINS])
     if noise_power > 0.0:
         magnitude = np.sqrt(magnitude**2 + np.float32(noise_power))
-    observation: NDArray[np.float32] = np.log10(magnitude + np.float32(MAGNITUDE_FLOOR))
+    spectrum = np.log10(magnitude + np.float32(MAGNITUDE_FLOOR))
+    # the logarithm of a float32 may round to just below what the spec promises
+    observation: NDArray[np.float32] = np.maximum(spectrum, np.float32(SILENCE))
     return observation
 
 
