@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from veca_marl.sim.contact_shadows import darken_contacts
 from veca_marl.sim.pose import Floats, Pose
 from veca_marl.sim.raster import NOTHING, Depths, Lens, Surfaces, draw_geoms
 from veca_marl.sim.scene import Bools, Scene
@@ -124,6 +125,7 @@ class Camera:
             rgb, depth, ids, glass_ids = (array[v] for array in views)
             draw_geoms(geoms, opaque, view, lens, True, depth, ids)
             illuminate(geoms, view, lens, depth, ids, lights)
+            darken_contacts(geoms, opaque, view, lens, depth, ids, lights)
             paint_sky(lens, rgb)
             paint(geoms, ids, lights, 1.0, rgb)
             name_objects(objects, ids)

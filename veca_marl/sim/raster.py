@@ -24,6 +24,7 @@ from veca_marl.sim.intersections import box_row, capsule_row, cylinder_row, sphe
 from veca_marl.sim.pose import Floats
 from veca_marl.sim.scene import Bools, GeomTable, Shape
 from veca_marl.sim.screen_bounds import (
+    Interval,
     Vector,
     box_intervals,
     disc_interval,
@@ -131,7 +132,7 @@ def _rectangle(shape: int, size: NDArray[np.float32], ray: Ray, lens: Lens) -> R
         -(eye[0] * forward[0] + eye[1] * forward[1] + eye[2] * forward[2]),
     )
     tan_x, tan_y, near = lens.tan_x, lens.tan_y, lens.near
-    reach = _reach(shape, size)
+    reach = bounding_radius(shape, size)
     if centre[2] + reach < near or centre[2] - reach > lens.far:
         return 0, 0, 0, 0
     if shape == _BOX:
@@ -146,23 +147,29 @@ def _rectangle(shape: int, size: NDArray[np.float32], ray: Ray, lens: Lens) -> R
             centre[0], centre[2], right[2], forward[2], half_length, size[0], tan_x
         )
         upward = rod_interval(centre[1], centre[2], up[2], forward[2], half_length, size[0], tan_y)
-    left, top = max(across[0], -tan_x), min(upward[1], tan_y)
-    end, bottom = min(across[1], tan_x), max(upward[0], -tan_y)
-    if left >= end or bottom >= top:
+    return pixel_rectangle(across, upward, lens)
+
+
+@njit(cache=True, error_model="numpy")
+def pixel_rectangle(across: Interval, upward: Interval, lens: Lens) -> Rectangle:
+    """Pixels whose centres may lie between some slopes; empty if they are outside the picture."""
+    left, right = max(across[0], -lens.tan_x), min(across[1], lens.tan_x)
+    bottom, top = max(upward[0], -lens.tan_y), min(upward[1], lens.tan_y)
+    if left >= right or bottom >= top:
         return 0, 0, 0, 0
-    # half a pixel of margin on either side absorbs the rounding
     width, height = lens.columns.shape[0], lens.rows.shape[0]
-    per_x, per_y = width / (2.0 * tan_x), height / (2.0 * tan_y)
+    per_x, per_y = width / (2.0 * lens.tan_x), height / (2.0 * lens.tan_y)
+    # a pixel of margin absorbs the rounding
     return (
-        max(math.floor((left + tan_x) * per_x - 1.0), 0),
-        min(math.ceil((end + tan_x) * per_x + 1.0), width),
-        max(math.floor((tan_y - top) * per_y - 1.0), 0),
-        min(math.ceil((tan_y - bottom) * per_y + 1.0), height),
+        max(math.floor((left + lens.tan_x) * per_x - 1.0), 0),
+        min(math.ceil((right + lens.tan_x) * per_x + 1.0), width),
+        max(math.floor((lens.tan_y - top) * per_y - 1.0), 0),
+        min(math.ceil((lens.tan_y - bottom) * per_y + 1.0), height),
     )
 
 
 @njit(cache=True, error_model="numpy")
-def _reach(shape: int, size: NDArray[np.float32]) -> float:
+def bounding_radius(shape: int, size: NDArray[np.float32]) -> float:
     """Radius of a sphere about the centre that holds the primitive."""
     if shape == _SPHERE:
         return float(size[0])

@@ -1,0 +1,133 @@
+"""Soft shadows where things come near the floor: what shows that they stand on it.
+
+A floor point is darkened by its distance to the things around it, as in ambient occlusion by
+distance fields (Evans, "Fast approximations for global illumination on dynamic scenes", SIGGRAPH
+2006 course). The distances to the primitives are exact. The floor is whatever is seen in the plane
+z = 0; what is larger than a piece of furniture casts no shadow.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from veca_marl.sim.pose import Floats
+from veca_marl.sim.raster import (
+    NOTHING,
+    Depths,
+    Lens,
+    Rectangle,
+    Surfaces,
+    bounding_radius,
+    into_local,
+    pixel_rectangle,
+)
+from veca_marl.sim.scene import Bools, GeomTable, Shape
+from veca_marl.sim.screen_bounds import Vector, box_intervals, single
+
+REACH_M = 0.12  # a thing farther than this from a floor point does not darken it
+DARKNESS = 0.5  # share of the light that a thing touching the point takes away
+LARGEST_M = 1.0  # bounding radius of the largest thing that casts a shadow
+_FLOOR_TOLERANCE_M = 0.01
+
+_SPHERE, _BOX, _CYLINDER = int(Shape.SPHERE), int(Shape.BOX), int(Shape.CYLINDER)
+
+
+@njit(cache=True, error_model="numpy", fastmath=True)
+def darken_contacts(
+    geoms: GeomTable,
+    casting: Bools,
+    view: Floats,
+    lens: Lens,
+    depth: Depths,
+    surfaces: Surfaces,
+    lights: NDArray[np.float32],
+) -> None:
+    """Darken the floor around what is near it.
+
+    Args:
+        geoms: The scene's primitives.
+        casting: ``(G,)`` which of them cast shadows.
+        view: ``(4, 3)`` position, right, up and forward axes of the eye in the world.
+        lens: The camera's numbers.
+        depth: ``(H, W)`` metres.
+        surfaces: ``(H, W)`` rows of the primitives seen.
+        lights: ``(H, W)`` brightness of each pixel, scaled.
+    """
+    for g in range(geoms.shapes.shape[0]):
+        radius = bounding_radius(geoms.shapes[g], geoms.sizes[g])
+        reach, height = radius + REACH_M, geoms.positions[g, 2]
+        if not casting[g] or radius > LARGEST_M or abs(height) >= reach:
+            continue
+        around = math.sqrt(reach * reach - height * height)
+        rectangle = _floor_rectangle(geoms.positions[g], around, view, lens)
+        _darken(geoms, g, rectangle, view, lens, depth, surfaces, lights)
+
+
+@njit(cache=True, error_model="numpy", fastmath=True)
+def _floor_rectangle(position: Floats, around: float, view: Floats, lens: Lens) -> Rectangle:
+    """Pixels that may show a square of the floor below a point."""
+    ex, ey, ez = position[0] - view[0, 0], position[1] - view[0, 1], -view[0, 2]
+    right = (view[1, 0], view[1, 1], view[1, 2])
+    up = (view[2, 0], view[2, 1], view[2, 2])
+    forward = (view[3, 0], view[3, 1], view[3, 2])
+    centre = (
+        ex * right[0] + ey * right[1] + ez * right[2],
+        ex * up[0] + ey * up[1] + ez * up[2],
+        ex * forward[0] + ey * forward[1] + ez * forward[2],
+    )
+    half = (around, around, _FLOOR_TOLERANCE_M)
+    across, upward = box_intervals(centre, half, right, up, forward, lens.near)
+    return pixel_rectangle(across, upward, lens)
+
+
+@njit(cache=True, error_model="numpy", fastmath=True)
+def _darken(
+    geoms: GeomTable,
+    g: int,
+    rectangle: Rectangle,
+    view: Floats,
+    lens: Lens,
+    depth: Depths,
+    surfaces: Surfaces,
+    lights: NDArray[np.float32],
+) -> None:
+    """Darken the floor pixels of a rectangle by their distance to one primitive."""
+    position, rotation = geoms.positions[g], geoms.rotations[g]
+    first, end, top, bottom = rectangle
+    for j in range(top, bottom):
+        y = lens.rows[j]
+        for i in range(first, end):
+            seen = surfaces[j, i]
+            if seen in (NOTHING, g):
+                continue
+            x, t = lens.columns[i], depth[j, i]
+            px = view[0, 0] + t * (view[3, 0] + x * view[1, 0] + y * view[2, 0])
+            py = view[0, 1] + t * (view[3, 1] + x * view[1, 1] + y * view[2, 1])
+            pz = view[0, 2] + t * (view[3, 2] + x * view[1, 2] + y * view[2, 2])
+            if abs(pz) > _FLOOR_TOLERANCE_M:
+                continue
+            local = into_local(rotation, px - position[0], py - position[1], pz - position[2])
+            gap = max(distance_to(geoms.shapes[g], geoms.sizes[g], local), 0.0)
+            nearness = max(1.0 - gap / REACH_M, 0.0)
+            lights[j, i] *= single(1.0 - DARKNESS * nearness * nearness)
+
+
+@njit(cache=True, error_model="numpy", fastmath=True)
+def distance_to(shape: int, size: NDArray[np.float32], point: Vector) -> float:
+    """Metres from a point in a primitive's own axes to its surface; not positive within it."""
+    x, y, z = abs(point[0]), abs(point[1]), abs(point[2])
+    if shape == _SPHERE:
+        return math.sqrt(x * x + y * y + z * z) - float(size[0])
+    if shape == _BOX:
+        x, y, z = x - size[0], y - size[1], z - size[2]
+    elif shape == _CYLINDER:
+        x, y, z = math.sqrt(x * x + y * y) - size[0], 0.0, z - 0.5 * size[1]
+    else:
+        z = max(z - 0.5 * size[1], 0.0)
+        return math.sqrt(x * x + y * y + z * z) - float(size[0])
+    x, y, z = max(x, 0.0), max(y, 0.0), max(z, 0.0)
+    return math.sqrt(x * x + y * y + z * z)
