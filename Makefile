@@ -1,0 +1,52 @@
+# Every word a developer needs. `make train` and `make test` work on a machine with Python 3.11 alone.
+PYTHON ?= $(shell command -v python3.11 || command -v python3)
+VENV   := .venv
+BIN    := $(VENV)/bin
+ARGS   ?=
+
+.PHONY: help train test test-all lint types format bench docs clean
+
+help:
+	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/'
+
+$(VENV)/bin/python:
+	scripts/make_venv.sh "$(PYTHON)" $(VENV)
+
+$(VENV)/installed: $(VENV)/bin/python pyproject.toml
+	$(BIN)/pip install --quiet --editable .
+	@touch $@
+
+$(VENV)/installed-test: $(VENV)/bin/python pyproject.toml
+	$(BIN)/pip install --quiet --editable '.[test]'
+	@touch $@ $(VENV)/installed
+
+train: $(VENV)/installed ## train PPO on KickTheBall; more with ARGS="senses/audio=mono seed=1"
+	$(BIN)/python -m veca_marl.train +task=KickTheBall $(ARGS)
+
+lint: $(VENV)/installed-test ## style, formatting and the arrows between the rooms
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/lint-imports
+
+types: $(VENV)/installed-test ## mypy --strict on the simulator and the tasks
+	$(BIN)/mypy
+
+test: lint types ## lint, types, layer contracts and the quick tests
+	$(BIN)/pytest -m "not slow" $(ARGS)
+
+test-all: lint types ## everything, the slow tests too
+	$(BIN)/pytest $(ARGS)
+
+format: $(VENV)/installed-test ## let ruff mend what it can
+	$(BIN)/ruff format .
+	$(BIN)/ruff check --fix .
+
+bench: $(VENV)/installed ## agent-steps per second and where the time goes
+	$(BIN)/python -m veca_marl.bench --task KickTheBall $(ARGS)
+
+docs: $(VENV)/installed-test ## rewrite the task pages and the pictures
+	$(BIN)/python scripts/make_docs.py
+
+clean: ## forget the virtual environment and all caches; runs stay
+	rm -rf $(VENV) .pytest_cache .mypy_cache .ruff_cache build *.egg-info
+	find . -name __pycache__ -type d -exec rm -rf {} +
