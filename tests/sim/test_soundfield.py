@@ -1,5 +1,10 @@
 """Laws of the streaming engine, each against an independent computation or a known limit."""
 
+import os
+import subprocess
+import sys
+from pathlib import Path
+
 import numpy as np
 import pytest
 import scipy.signal
@@ -114,6 +119,32 @@ def test_same_seed_same_bytes_in_a_fresh_and_in_a_used_field():
     first = episode(7)
     assert episode(8) != first
     assert episode(7) == first
+
+
+IN_ANOTHER_PROCESS = """
+import hashlib
+from listening import *
+sounds = [noise(5 * STEP, seed) for seed in (0, 1)]
+place = lambda i: (SOURCES + 0.05 * i, Pose(HEAD.position, yaw(0.1 * i)))
+heard = render(sounds, place, room=room(), order=2, n_steps=5)
+print(hashlib.sha256(heard.tobytes()).hexdigest())
+"""
+
+
+@pytest.mark.slow
+def test_same_bytes_in_another_process():
+    digests = {
+        subprocess.run(
+            [sys.executable, "-c", IN_ANOTHER_PROCESS],
+            cwd=Path(__file__).parent,
+            env={**os.environ, "PYTHONHASHSEED": seed, "OMP_NUM_THREADS": threads},
+            capture_output=True,
+            check=True,
+            text=True,
+        ).stdout.split()[-1]
+        for seed, threads in (("1", "1"), ("2", "2"))
+    }
+    assert len(digests) == 1
 
 
 @pytest.mark.parametrize("quality", QUALITIES)

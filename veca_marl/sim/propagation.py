@@ -127,6 +127,7 @@ class Path:
     def advance(self, head: Pose) -> bool:
         """Take in one step of sound; return whether there is anything to be heard."""
         if not self.source.audible and self._quiet_samples >= self.block.size:
+            # a sound that sets in has come from nowhere: it begins where its source is by then
             self._forget_place()
             return False
         self._place(head)
