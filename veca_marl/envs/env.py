@@ -12,8 +12,9 @@ from torchrl.data import Composite, Unbounded
 from torchrl.envs import EnvBase
 
 from veca_marl.envs.game import Game, GameCfg, Outcome
-from veca_marl.envs.spectator import Spectator
+from veca_marl.envs.layout import Arrays, Layout
 from veca_marl.envs.specs import done_spec, observation_spec, to_torchrl
+from veca_marl.envs.spectator import Spectator
 
 
 class VecaEnv(EnvBase):
@@ -46,7 +47,7 @@ class VecaEnv(EnvBase):
         self.group_map = {
             team: [player.name for player in self.games[0].team(team)] for team in self._teams
         }
-        self._term_names = tuple(self.games[0].weights)
+        self._players = [{team: game.team(team) for team in self._teams} for game in self.games]
         self._make_specs()
         self.spectator = Spectator(self.games[0])
         self.set_seed(seed)
@@ -55,17 +56,15 @@ class VecaEnv(EnvBase):
         worlds = self.batch_size[0]
         observed, action, reward = (Composite(shape=(worlds,)) for _ in range(3))
         done = Composite(done_spec((worlds,)), shape=(worlds,))
-        self._sense_specs = {}
         for team in self._teams:
-            players = self.games[0].team(team)
+            players = self._players[0][team]
             batch = (worlds, len(players))
             specs = {
                 name: spec
                 for sense in self.games[0].senses[players[0].name].values()
                 for name, spec in sense.specs.items()
             }
-            self._sense_specs[team] = specs
-            observed[team] = observation_spec(specs, self._term_names, *batch)
+            observed[team] = observation_spec(specs, tuple(self.games[0].weights), *batch)
             action[team] = Composite(
                 action=to_torchrl(players[0].body.action_spec, batch), shape=batch
             )
@@ -73,27 +72,29 @@ class VecaEnv(EnvBase):
             done[team] = Composite(done_spec(batch), shape=batch)
         self.observation_spec, self.action_spec = observed, action
         self.reward_spec, self.done_spec = reward, done
+        self._action_shapes = {team: action[team, "action"].shape for team in self._teams}
+        self._start = Layout(observed)
+        self._next = Layout(observed.clone().update(reward).update(done))
 
     def _set_seed(self, seed: int | None) -> None:
         worlds = self.batch_size[0]
         self._rngs = [
-            np.random.default_rng(None if seed is None else [seed, world]) for world in range(worlds)
+            np.random.default_rng(None if seed is None else [seed, world])
+            for world in range(worlds)
         ]
 
     def _reset(self, tensordict: TensorDictBase | None = None, **_: Any) -> TensorDict:
         wanted = None if tensordict is None else tensordict.get("_reset", None)
         mask = np.ones(len(self.games), bool) if wanted is None else wanted.numpy().ravel()
-        buffers = self._new_arrays()
+        arrays = self._start.new()
         for world in np.flatnonzero(mask):
             self.games[world].reset(self._rngs[world])
-            self._observe(world, buffers, None)
-        return self._as_tensordict(buffers)
+            self._observe(world, arrays)
+        return self._start.tensordict(arrays)
 
     def _step(self, tensordict: TensorDictBase) -> TensorDict:
-        actions = {team: self._action_rows(team, tensordict) for team in self._teams}
-        buffers = self._new_arrays()
-        worlds = len(self.games)
-        terminated, truncated = np.zeros((worlds, 1), bool), np.zeros((worlds, 1), bool)
+        actions = {team: self._actions(team, tensordict) for team in self._teams}
+        arrays = self._next.new()
         for world, game in enumerate(self.games):
             rows = {
                 name: actions[team][world, index]
@@ -101,12 +102,27 @@ class VecaEnv(EnvBase):
                 for index, name in enumerate(names)
             }
             outcome = self._play(world, game, rows)
-            self._observe(world, buffers, outcome)
-            terminated[world], truncated[world] = outcome.terminated, outcome.truncated
-        stepped = self._as_tensordict(buffers)
-        self._add_rewards(stepped, buffers)
-        self._add_dones(stepped, torch.from_numpy(terminated), torch.from_numpy(truncated))
-        return stepped
+            self._observe(world, arrays)
+            self._score(world, arrays, outcome)
+        return self._next.tensordict(arrays)
+
+    def _step_proc_data(self, next_tensordict_out: TensorDictBase) -> TensorDictBase:
+        """Leave out TorchRL's completion of flags and shapes: `_step` returns all of them.
+
+        It would cost as much as the whole of `_step` around the games.
+        """
+        if self.run_type_checks:
+            return super()._step_proc_data(next_tensordict_out)
+        return next_tensordict_out
+
+    def _actions(self, team: str, tensordict: TensorDictBase) -> NDArray[Any]:
+        action = tensordict.get((team, "action"))
+        expected = self._action_shapes[team]
+        if action.shape != expected:
+            raise ValueError(
+                f"action of {team}: shape {tuple(action.shape)}, not {tuple(expected)}"
+            )
+        return action.numpy(force=True)
 
     def _play(self, world: int, game: Game, rows: dict[str, NDArray[Any]]) -> Outcome:
         try:
@@ -114,81 +130,35 @@ class VecaEnv(EnvBase):
         except ValueError as error:
             raise ValueError(f"world {world}, {error}") from None
 
-    def _action_rows(self, team: str, tensordict: TensorDictBase) -> NDArray[Any]:
-        action = tensordict.get((team, "action"))
-        expected = self.full_action_spec[team, "action"].shape
-        if action.shape != expected:
-            raise ValueError(f"action of {team}: shape {tuple(action.shape)}, not {tuple(expected)}")
-        return action.detach().cpu().numpy()
-
-    def _new_arrays(self) -> dict[str, dict[str, NDArray[Any]]]:
-        """New arrays for one step: whoever stores a step must not see it change."""
-        worlds = len(self.games)
-        return {
-            team: {
-                **{
-                    name: np.zeros((worlds, len(self.group_map[team]), *spec.shape), spec.dtype)
-                    for name, spec in self._sense_specs[team].items()
-                },
-                "terms": np.zeros(
-                    (len(self._term_names), worlds, len(self.group_map[team]), 1), np.float32
-                ),
-            }
-            for team in self._teams
-        }
-
-    def _observe(
-        self, world: int, buffers: dict[str, dict[str, NDArray[Any]]], outcome: Outcome | None
-    ) -> None:
+    def _observe(self, world: int, arrays: Arrays) -> None:
+        """Let all players of a world perceive."""
         game = self.games[world]
-        for team in self._teams:
-            for index, player in enumerate(game.team(team)):
+        for team, players in self._players[world].items():
+            senses = arrays[team]["observation"]
+            for index, player in enumerate(players):
                 for name, value in game.observe(player).items():
-                    buffers[team][name][world, index] = value
-                if outcome is not None:
-                    terms = outcome.terms[player.name]
-                    values = [terms[name] for name in self._term_names]
-                    buffers[team]["terms"][:, world, index, 0] = values
+                    senses[name][world, index] = value
 
-    def _as_tensordict(self, buffers: dict[str, dict[str, NDArray[Any]]]) -> TensorDict:
-        worlds = len(self.games)
-        teams = {}
-        for team in self._teams:
-            batch = (worlds, len(self.group_map[team]))
-            senses = {
-                name: torch.from_numpy(buffers[team][name]) for name in self._sense_specs[team]
-            }
-            terms = torch.from_numpy(buffers[team]["terms"])
-            named = dict(zip(self._term_names, terms, strict=True))
-            teams[team] = TensorDict(
-                {"observation": TensorDict(senses, batch), "terms": TensorDict(named, batch)}, batch
-            )
-        return TensorDict(teams, (worlds,))
-
-    def _add_rewards(
-        self, stepped: TensorDict, buffers: dict[str, dict[str, NDArray[Any]]]
-    ) -> None:
-        weights = np.array([self.games[0].weights[name] for name in self._term_names], np.float32)
-        for team in self._teams:
-            reward = np.tensordot(weights, buffers[team]["terms"], axes=1)
-            stepped[team].set("reward", torch.from_numpy(reward))
-
-    def _add_dones(
-        self, stepped: TensorDict, terminated: torch.Tensor, truncated: torch.Tensor
-    ) -> None:
-        flags = {
-            "terminated": terminated,
-            "truncated": truncated,
-            "done": terminated | truncated,
-        }
-        for key, flag in flags.items():
-            stepped.set(key, flag)
-            for team in self._teams:
-                per_player = flag.unsqueeze(1).repeat(1, len(self.group_map[team]), 1)
-                stepped[team].set(key, per_player)
+    def _score(self, world: int, arrays: Arrays, outcome: Outcome) -> None:
+        """Pay all players of a world, and say whether their game is over."""
+        game = self.games[world]
+        _flag(world, arrays, outcome)
+        for team, players in self._players[world].items():
+            _flag(world, arrays[team], outcome)
+            for index, player in enumerate(players):
+                terms = outcome.terms[player.name]
+                arrays[team]["reward"][world, index] = game.pay(terms)
+                for name, value in terms.items():
+                    arrays[team]["terms"][name][world, index] = value
 
     def close(self, *, raise_if_closed: bool = True) -> None:
         """Close all worlds."""
         for game in self.games:
             game.close()
         super().close(raise_if_closed=raise_if_closed)
+
+
+def _flag(world: int, arrays: Arrays, outcome: Outcome) -> None:
+    arrays["terminated"][world] = outcome.terminated
+    arrays["truncated"][world] = outcome.truncated
+    arrays["done"][world] = outcome.terminated or outcome.truncated
