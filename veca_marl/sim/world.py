@@ -126,6 +126,9 @@ class World:
     def freeze(self) -> None:
         """Remember the built state: `reset` comes back to it."""
         self._refuse_if_frozen("freeze it again")
+        # Bullet forgets the contacts of the last episode only if the saved state holds contacts:
+        # without them, what touches at the start moves otherwise than in a fresh world
+        pybullet.performCollisionDetection(physicsClientId=self.client)
         self._state = pybullet.saveState(physicsClientId=self.client)
 
     def reset(self, rng: np.random.Generator) -> None:

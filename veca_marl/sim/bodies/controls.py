@@ -31,6 +31,10 @@ class WalkControl(Protocol):
         """Return (forward, turn), each in [-1, 1]; raise `ValueError` for an impossible row."""
         ...
 
+    def encode(self, forward: float, turn: float) -> NDArray[Any]:
+        """Return the row that comes nearest to a wish, such as an expert's."""
+        ...
+
 
 class ContinuousWalk:
     """A row ``(2,)``: forward and turning velocity in [-1, 1], left positive."""
@@ -39,11 +43,17 @@ class ContinuousWalk:
 
     def decode(self, row: NDArray[Any]) -> tuple[float, float]:
         """Return the row itself, checked."""
-        forward, turn = row
+        if np.shape(row) != self.spec.shape:
+            raise ValueError(f"action {row!r} must be the two numbers (forward, turn)")
+        forward, turn = float(row[0]), float(row[1])
         # written so that a NaN fails as well
         if not (-1.0 <= forward <= 1.0 and -1.0 <= turn <= 1.0):
             raise ValueError(f"action {row!r} must be (forward, turn), each in [-1, 1]")
-        return float(forward), float(turn)
+        return forward, turn
+
+    def encode(self, forward: float, turn: float) -> NDArray[Any]:
+        """Return the wish itself, cut to the range."""
+        return np.clip(np.array([forward, turn], np.float32), self.spec.low, self.spec.high)
 
 
 class DiscreteWalk:
@@ -54,11 +64,15 @@ class DiscreteWalk:
 
     def decode(self, row: NDArray[Any]) -> tuple[float, float]:
         """Look the move up."""
-        index = int(row)
-        if not 0 <= index < len(MOVES):
-            choices = dict(enumerate(MOVES))
-            raise ValueError(f"action {index} is not one of the moves {choices}")
-        return self._moves[index]
+        choice = np.asarray(row)
+        if choice.shape != () or choice.dtype.kind not in "iu" or not 0 <= choice < len(MOVES):
+            raise ValueError(f"action {row!r} is not one of the moves {dict(enumerate(MOVES))}")
+        return self._moves[int(choice)]
+
+    def encode(self, forward: float, turn: float) -> NDArray[Any]:
+        """Return the index of the move with the nearest shares."""
+        away = np.array(self._moves) - (forward, turn)
+        return np.asarray(np.argmin((away**2).sum(axis=1)), self.spec.dtype)
 
 
 class ActionKind(Enum):

@@ -1,0 +1,97 @@
+"""Rollouts that the laws compare: by random actions, by the expert, and their digests.
+
+Run as a program it prints the digest of a rollout, so that another process can be asked.
+"""
+
+import hashlib
+import sys
+
+import numpy as np
+import torch
+
+from veca_marl.config import compose
+from veca_marl.envs.env import VecaEnv
+from veca_marl.envs.game import Game
+
+KINDS = {"continuous": "walker", "discrete": "walker_discrete"}
+
+
+def game_cfg(task, kind="continuous", *overrides):
+    return compose([f"+task={task}", f"body={KINDS[kind]}", *overrides]).game
+
+
+def random_row(spec, rng):
+    if spec.shape == ():
+        return np.asarray(rng.integers(int(spec.high) + 1), spec.dtype)
+    return rng.uniform(spec.low, spec.high, spec.shape).astype(spec.dtype)
+
+
+def play(env, steps, seed):
+    """Seed an env, play random actions drawn with numpy, return all steps as one TensorDict."""
+    env.set_seed(seed)
+    rng = np.random.default_rng(seed)
+    state, steps_played = env.reset(), []
+    for _ in range(steps):
+        fill_actions(env, state, rng)
+        played, state = env.step_and_maybe_reset(state)
+        steps_played.append(played.clone())
+    return torch.stack(steps_played, -1)
+
+
+def fill_actions(env, state, rng):
+    for team, names in env.group_map.items():
+        spec = env.games[0].team(team)[0].body.action_spec
+        rows = [[random_row(spec, rng) for _ in names] for _ in env.games]
+        state[team, "action"] = torch.from_numpy(np.array(rows))
+
+
+def digest(rollout):
+    """Return a hash of every byte of a TensorDict."""
+    total = hashlib.sha256()
+    leaves = rollout.items(include_nested=True, leaves_only=True)
+    for key, value in sorted(leaves, key=lambda item: str(item[0])):
+        total.update(str(key).encode())
+        total.update(value.contiguous().numpy().tobytes())
+    return total.hexdigest()
+
+
+def returns(cfg, episodes, choose, seed=0):
+    """Play episodes and return what the players of the first team were paid in each.
+
+    Args:
+        cfg: The game.
+        episodes: How many.
+        choose: ``choose(task, player, observation, rng)`` gives an action row.
+        seed: Of everything random.
+    """
+    game, rng = Game(cfg), np.random.default_rng(seed)
+    paid = []
+    for _ in range(episodes):
+        game.reset(rng)
+        seen = {player.name: game.observe(player) for player in game.players}
+        total, over = 0.0, False
+        while not over:
+            actions = {p.name: choose(game.task, p, seen[p.name], rng) for p in game.players}
+            outcome = game.step(actions, rng)
+            seen = {player.name: game.observe(player) for player in game.players}
+            team = game.team(type(game.task).teams[0].name)
+            total += float(np.mean([game.pay(outcome.terms[p.name]) for p in team]))
+            over = outcome.terminated or outcome.truncated
+        paid.append(total)
+    game.close()
+    return np.array(paid)
+
+
+def by_chance(task, player, observation, rng):
+    return random_row(player.body.action_spec, rng)
+
+
+def by_expert(task, player, observation, rng):
+    forward, turn = task.expert(player, observation)
+    return player.body.control.encode(forward, turn)
+
+
+if __name__ == "__main__":
+    name, n_steps, start = sys.argv[1:]
+    fresh = VecaEnv(game_cfg(name), worlds=2)
+    print(digest(play(fresh, int(n_steps), int(start))))  # noqa: T201  its answer

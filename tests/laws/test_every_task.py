@@ -1,0 +1,253 @@
+"""The properties that every task must have, whatever its rules."""
+
+import subprocess
+import sys
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+from rollouts import KINDS, by_chance, by_expert, digest, game_cfg, play, returns
+from torchrl.collectors import Collector
+from torchrl.envs import SerialEnv, check_env_specs
+
+from veca_marl.envs.env import VecaEnv
+from veca_marl.envs.game import Game
+from veca_marl.envs.task import TASKS
+
+STEPS = 25
+WORLDS = 2
+
+
+@pytest.fixture(scope="module", params=sorted(TASKS))
+def task(request):
+    return request.param
+
+
+@pytest.fixture(scope="module", params=sorted(KINDS))
+def kind(request):
+    return request.param
+
+
+@pytest.fixture(scope="module")
+def cfg(task, kind):
+    return game_cfg(task, kind)
+
+
+@pytest.fixture(scope="module")
+def env(cfg):
+    env = VecaEnv(cfg, WORLDS)
+    yield env
+    env.close()
+
+
+@pytest.fixture(scope="module")
+def rollout(env):
+    return play(env, STEPS, seed=1)
+
+
+def leaves(rollout):
+    return dict(rollout.items(include_nested=True, leaves_only=True))
+
+
+def test_specs_hold(env):
+    check_env_specs(env, break_when_any_done="both")
+
+
+def test_what_is_observed_is_finite_and_in_spec(env, rollout):
+    for spec, seen in (
+        (env.full_observation_spec, rollout),
+        (env.full_observation_spec, rollout["next"]),
+        (env.full_reward_spec, rollout["next"]),
+        (env.full_done_spec, rollout["next"]),
+    ):
+        for key, leaf in spec.items(include_nested=True, leaves_only=True):
+            for step in seen.select(key).unbind(-1):
+                assert step[key].isfinite().all(), key
+                assert leaf.is_in(step[key]), key
+
+
+def test_the_same_seed_gives_the_same_bytes_in_a_used_env(env, rollout):
+    play(env, 10, seed=99)
+    assert digest(play(env, STEPS, seed=1)) == digest(rollout)
+
+
+def test_the_same_seed_gives_the_same_bytes_in_another_process(task, kind, rollout):
+    if kind != "continuous":
+        pytest.skip("a process for each kind of action would cost time and show nothing new")
+    program = Path(__file__).with_name("rollouts.py")
+    asked = [sys.executable, str(program), task, str(STEPS), "1"]
+    answer = subprocess.run(asked, capture_output=True, text=True, check=True)
+    assert answer.stdout.split()[-1] == digest(rollout)
+
+
+def test_another_seed_gives_another_start(env, rollout):
+    other = play(env, 1, seed=2)
+    assert digest(other["next"]) != digest(rollout[:, :1]["next"])
+
+
+def test_the_worlds_of_a_batch_differ(rollout):
+    assert digest(rollout[0]) != digest(rollout[1])
+
+
+def test_successive_steps_share_no_memory(env):
+    state = env.reset()
+    seen = []
+    for _ in range(3):
+        state = env.step(env.rand_action(state))["next"]
+        seen.append(leaves(state))
+    for key in seen[0]:
+        arrays = [step[key].numpy() for step in seen]
+        assert not np.shares_memory(arrays[0], arrays[1]), key
+        assert not np.shares_memory(arrays[1], arrays[2]), key
+
+
+def test_no_sense_is_constant(env, rollout):
+    for team in env.group_map:
+        for name, seen in rollout[team, "observation"].items():
+            for world in seen:
+                changes = (world[1:] != world[:-1]).flatten(1).any(1)
+                assert changes.float().mean() > 0.5, f"{team} {name}"
+
+
+def test_a_reset_after_a_reset_is_clean(cfg):
+    """Two resets are two episodes: what was before leaves no trace but the random stream."""
+    game = Game(cfg)
+    starts = []
+    for used_steps in (0, 30):
+        rng = np.random.default_rng(5)
+        game.reset(np.random.default_rng(used_steps))
+        for _ in range(used_steps):
+            rows = {p.name: by_chance(game.task, p, None, rng) for p in game.players}
+            game.step(rows, rng)
+        game.reset(np.random.default_rng(7))
+        starts.append({p.name: game.observe(p) for p in game.players})
+    for name, senses in starts[0].items():
+        for sense, seen in senses.items():
+            np.testing.assert_array_equal(seen, starts[1][name][sense], err_msg=sense)
+    game.close()
+
+
+def test_the_reward_is_the_weighted_sum_of_the_terms(env, rollout):
+    weights = env.games[0].weights
+    for team in env.group_map:
+        terms = rollout["next", team, "terms"]
+        assert set(terms.keys()) == set(weights)
+        paid = sum(weight * terms[name] for name, weight in weights.items())
+        torch.testing.assert_close(rollout["next", team, "reward"], paid)
+
+
+def test_terms_are_those_of_the_declared_weights(task):
+    assert set(TASKS[task].cfg_type()().weights) == set(game_cfg(task).task.weights)
+
+
+def test_the_docstring_explains_every_term(task):
+    explained = TASKS[task].__doc__.split("Terms:")[1]
+    for term in TASKS[task].cfg_type()().weights:
+        assert f"{term}:" in explained
+
+
+def test_the_time_is_up_after_exactly_max_seconds(task, kind):
+    env = VecaEnv(game_cfg(task, kind, "task.max_seconds=0.4"), 1)
+    rollout = play(env, 25, seed=3)["next"][0]
+    up = [step % 10 == 9 for step in range(25)]
+    assert rollout["truncated"].squeeze().tolist() == up
+    over = rollout["terminated"] | rollout["truncated"]
+    torch.testing.assert_close(rollout["done"], over)
+    env.close()
+
+
+def test_teams_see_the_root_flags(env, rollout):
+    for team in env.group_map:
+        for flag in ("done", "terminated", "truncated"):
+            ours = rollout["next", team, flag]
+            root = rollout["next", flag].unsqueeze(2)
+            torch.testing.assert_close(ours, root.expand_as(ours))
+
+
+def test_a_partial_reset_touches_only_its_worlds(cfg):
+    """Two envs with one history; one of them resets worlds 1 and 3 only."""
+    whole, partly = VecaEnv(cfg, 4), VecaEnv(cfg, 4)
+    masked = torch.tensor([[False], [True], [False], [True]])
+    histories = []
+    for env, wanted in ((whole, None), (partly, masked)):
+        env.set_seed(3)
+        rng_state = play(env, 5, seed=3)["next"][:, -1].clone()
+        if wanted is not None:
+            rng_state["_reset"] = wanted
+            rng_state = env.reset(rng_state)
+        histories.append(rng_state)
+    kept = ~masked.squeeze(1)
+    for team in whole.group_map:
+        for name in histories[0][team, "observation"].keys():  # noqa: SIM118  a TensorDict
+            before, after = (h[team, "observation", name] for h in histories)
+            assert torch.equal(before[kept], after[kept]), name
+            assert not torch.equal(before[~kept], after[~kept]), name
+    # the worlds that went on know nothing of the others' reset
+    for env, state in zip((whole, partly), histories, strict=True):
+        torch.manual_seed(0)
+        state.update(env.rand_action(state))
+        state.update(env.step(state)["next"].clone())
+    for team in whole.group_map:
+        for name in histories[0][team, "observation"].keys():  # noqa: SIM118
+            before, after = (h[team, "observation", name] for h in histories)
+            assert torch.equal(before[kept], after[kept]), name
+    whole.close()
+    partly.close()
+
+
+def test_a_batch_of_worlds_is_single_games_side_by_side(cfg, env, rollout):
+    """World i of an env seeded s is a game alone whose random stream is `[s, i]`."""
+    for world in range(WORLDS):
+        game, rng = Game(cfg), np.random.default_rng([1, world])
+        game.reset(rng)
+        for player in game.players:
+            game.observe(player)
+        for step in rollout[world].unbind(0):
+            actions = {
+                name: step[team, "action"][index].numpy()
+                for team, names in env.group_map.items()
+                for index, name in enumerate(names)
+            }
+            outcome = game.step(actions, rng)
+            for team in env.group_map:
+                for index, player in enumerate(game.team(team)):
+                    for name, seen in game.observe(player).items():
+                        got = step["next", team, "observation", name][index].numpy()
+                        np.testing.assert_array_equal(got, seen)
+                    reward = step["next", team, "reward"][index].item()
+                    assert reward == pytest.approx(game.pay(outcome.terms[player.name]), abs=1e-6)
+        game.close()
+
+
+def test_the_group_map_names_every_player_once(env):
+    names = [name for team in env.group_map.values() for name in team]
+    assert names == [player.name for player in env.games[0].players]
+    assert len(set(names)) == len(names)
+    assert list(env.group_map) == [team.name for team in type(env.games[0].task).teams]
+
+
+def test_the_expert_beats_chance(cfg):
+    expert = returns(cfg, 3, by_expert)
+    chance = returns(cfg, 3, by_chance)
+    assert expert.mean() > chance.mean() + 2.0 * max(chance.std(), 0.1)
+
+
+def test_works_in_a_serial_env(cfg):
+    env = SerialEnv(2, partial(VecaEnv, cfg, 1))
+    check_env_specs(env)
+    env.close()
+
+
+def test_works_in_a_collector(cfg):
+    collector = Collector(
+        partial(VecaEnv, cfg, WORLDS),
+        None,
+        frames_per_batch=WORLDS * 10,
+        total_frames=WORLDS * 20,
+        auto_register_policy_transforms=False,
+    )
+    shapes = [batch.shape for batch in collector]
+    collector.shutdown()
+    assert shapes == [torch.Size([WORLDS, 10])] * 2
