@@ -42,13 +42,19 @@ class RunFolder:
         """An episode of the trained policy."""
         return self.path / "videos" / "final.mp4"
 
+    def begin(self, node: DictConfig) -> None:
+        """Claim the folder: write down what the run is."""
+        self.path.mkdir(parents=True, exist_ok=True)
+        self.write("provenance.json", json.dumps(_provenance(), indent=2))
+        self.config.write_text(OmegaConf.to_yaml(node, resolve=True))
+
     def write(self, name: str, text: str) -> None:
         """Write a small text file."""
         (self.path / name).write_text(text + "\n")
 
 
-def start_run(path: Path, node: DictConfig) -> RunFolder:
-    """Claim `path` for a new run and write down what it is.
+def new_run(path: Path) -> RunFolder:
+    """Return the folder of a run that has not begun.
 
     Raises:
         ConfigError: If there is a run in it already.
@@ -56,9 +62,6 @@ def start_run(path: Path, node: DictConfig) -> RunFolder:
     folder = RunFolder(path)
     if folder.config.exists():
         raise ConfigError(f"{path} holds a run already; continue it with resume={path}")
-    path.mkdir(parents=True, exist_ok=True)
-    folder.write("provenance.json", json.dumps(_provenance(), indent=2))
-    folder.config.write_text(OmegaConf.to_yaml(node, resolve=True))
     return folder
 
 
@@ -72,6 +75,12 @@ def open_run(path: Path) -> RunFolder:
     if not folder.config.is_file():
         raise ConfigError(f"resume={path}: there is no run in it (no config.yaml)")
     return folder
+
+
+def remove_if_empty(path: Path) -> None:
+    """Remove a folder that was made for a run that did not come about."""
+    if path.is_dir() and not any(path.iterdir()):
+        path.rmdir()
 
 
 def _provenance() -> dict[str, object]:

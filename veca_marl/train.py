@@ -5,6 +5,7 @@ The Hydra entry: configuration -> environments -> algorithm -> loop.
 
 from __future__ import annotations
 
+import errno
 import logging
 import os
 import sys
@@ -28,8 +29,10 @@ from veca_marl.config_errors import ConfigError, one_line
 from veca_marl.envs.env import VecaEnv
 from veca_marl.envs.game import GameCfg
 from veca_marl.recording import record_episode
-from veca_marl.run_folder import RunFolder, open_run, start_run
+from veca_marl.run_folder import RunFolder, new_run, open_run, remove_if_empty
 
+_COMMAND = "python -m veca_marl.train"
+_DISK_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 RESUMABLE = ("resume", "total_frames", "max_minutes", "device", "threads")
 
 
@@ -38,15 +41,23 @@ def make_env(game: GameCfg, worlds: int, seed: int) -> VecaEnv:
     return VecaEnv(game, worlds, seed)
 
 
-def train(cfg: Config, folder: RunFolder) -> list[str]:
-    """Train as configured, into `folder`; return how each team compares with random play."""
+def make_trainer(cfg: Config, folder: RunFolder) -> Trainer:
+    """Put together what trains as configured, into `folder`.
+
+    Raises:
+        ConfigError: If the device or the world cannot be.
+        CheckpointError: If the run to continue does not fit.
+    """
     device = find_device(cfg.device)
     if cfg.threads is not None:
         torch.set_num_threads(cfg.threads)
     torch.manual_seed(cfg.seed)
     specs = read_specs(cfg.game)
     checkpoints = Checkpoints(
-        folder.checkpoints, Identity(cfg.task.name, specs), cfg.log.keep_checkpoints
+        folder.checkpoints,
+        Identity(cfg.task.name, specs),
+        OmegaConf.to_container(OmegaConf.structured(cfg), enum_to_str=True),
+        cfg.log.keep_checkpoints,
     )
     trainer = Trainer(
         make_env=partial(make_env, cfg.game),
@@ -61,11 +72,16 @@ def train(cfg: Config, folder: RunFolder) -> list[str]:
     )
     if cfg.resume is not None:
         trainer.resume(checkpoints.latest())
+    return trainer
+
+
+def train(cfg: Config, folder: RunFolder, trainer: Trainer) -> list[str]:
+    """Train, film, sum up; return how each team compares with random play."""
     trainer.reporters = make_reporters(cfg, folder, trainer.progress.frames)
     lines = trainer.run()
     if cfg.log.video:
         with trainer.watch.measure("video"):
-            record_episode(folder.video, cfg.game, trainer.algorithm.policy, cfg.seed)
+            record_episode(folder.video, cfg.game, trainer.player, cfg.seed)
     for reporter in trainer.reporters:
         reporter.close()
     folder.write("comparison.txt", "\n".join(lines))
@@ -141,18 +157,29 @@ def stored_config(folder: RunFolder, asked: DictConfig, overrides: list[str]) ->
 @hydra.main(version_base="1.3", config_path=str(CONF), config_name="config")
 def run(node: DictConfig) -> None:
     """Train in the folder that Hydra made."""
-    if node.resume is not None:
-        folder = open_run(Path(node.resume))
-        cfg = stored_config(folder, node, list(HydraConfig.get().overrides.task))
-    else:
-        cfg = to_config(node)
-        folder = start_run(Path(HydraConfig.get().runtime.output_dir), node)
+    path = Path(HydraConfig.get().runtime.output_dir)
     try:
-        train(cfg, folder)
+        if node.resume is not None:
+            folder = open_run(path)
+            cfg = stored_config(folder, node, list(HydraConfig.get().overrides.task))
+            trainer = make_trainer(cfg, folder)
+        else:
+            folder = new_run(path)
+            cfg = to_config(node)
+            trainer = make_trainer(cfg, folder)
+            folder.begin(node)
+    except ConfigError:
+        remove_if_empty(path)
+        raise
+    try:
+        train(cfg, folder, trainer)
     except KeyboardInterrupt:
-        raise SystemExit(
-            f"interrupted; continue with: python -m veca_marl.train resume={folder.path}"
-        ) from None
+        print(f"\ninterrupted; continue with: {_COMMAND} resume={path}", file=sys.stderr)  # noqa: T201
+        raise SystemExit(130) from None
+    except OSError as error:
+        if error.errno not in _DISK_FULL:
+            raise
+        raise CheckpointError(f"{error}; make room and continue with resume={path}") from error
 
 
 def main() -> None:

@@ -1,0 +1,1 @@
+"""Learning: knows specs and teams, never a task, never the simulator."""

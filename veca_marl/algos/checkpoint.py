@@ -42,11 +42,15 @@ class Checkpoints:
     Args:
         folder: Where they lie; made at the first save.
         identity: What they belong to.
+        config: The run's configuration as plain data, stored beside every state.
         keep_last: How many of the latest stay; the best always stays.
     """
 
-    def __init__(self, folder: Path, identity: Identity, keep_last: int = 3) -> None:
-        self.folder, self.identity, self.keep_last = folder, identity, keep_last
+    def __init__(
+        self, folder: Path, identity: Identity, config: dict[str, Any], keep_last: int = 3
+    ) -> None:
+        self.folder, self.identity, self.config = folder, identity, config
+        self.keep_last = keep_last
 
     def save(self, state: dict[str, Any], frames: int, best: bool) -> Path:
         """Write `state`, then remove what is too old.
@@ -60,7 +64,12 @@ class Checkpoints:
             CheckpointError: If it cannot be written; earlier checkpoints are as they were.
         """
         path = self.folder / f"frames_{frames:012d}.pt"
-        content = {"format": _FORMAT, "identity": self.identity.to_dict(), "state": state}
+        content = {
+            "format": _FORMAT,
+            "identity": self.identity.to_dict(),
+            "config": self.config,
+            "state": state,
+        }
         self._write(content, path)
         if best:
             self._write(content, self.folder / "best.pt")

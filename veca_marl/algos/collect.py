@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import signal
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
-from copy import deepcopy
 from dataclasses import dataclass
 from functools import partial
 
@@ -52,15 +52,12 @@ class Experience:
 
     Args:
         make_env: Makes the worlds.
-        policy: Writes actions. A copy of it on the CPU plays, wherever the original learns; its
-            parameters follow at `update_policy` and not before.
+        policy: Writes actions, on the CPU. New parameters reach the worlds by `update_policy`.
         cfg: How many worlds, where.
     """
 
     def __init__(self, make_env: EnvFactory, policy: TensorDictModuleBase, cfg: CollectCfg) -> None:
         self.cfg = cfg
-        self._source = policy
-        self._policy = deepcopy(policy).to("cpu")
         make = partial(make_env, cfg.worlds, 0)  # seeded by `restart`
         common = {
             "frames_per_batch": cfg.frames,
@@ -68,13 +65,13 @@ class Experience:
             "auto_register_policy_transforms": False,
         }
         if cfg.processes == 0:
-            self._collector = Collector(make, self._policy, **common)
+            self._collector = Collector(make, policy, **common)
         else:
             threads = torch.get_num_threads()
-            with _quiet_workers():
+            with _workers_ignore_interrupts(), _start_method(start_method()):
                 self._collector = MultiSyncCollector(
                     [make] * cfg.processes,
-                    self._policy,
+                    policy,
                     cat_results="stack",
                     num_threads=threads,
                     num_sub_threads=cfg.threads,
@@ -95,10 +92,6 @@ class Experience:
 
     def update_policy(self) -> None:
         """Hand the policy's new parameters to the worlds."""
-        with torch.no_grad():
-            pairs = zip(self._policy.parameters(), self._source.parameters(), strict=True)
-            for mine, learnt in pairs:
-                mine.copy_(learnt)
         self._collector.update_policy_weights_()
 
     def close(self) -> None:
@@ -107,11 +100,30 @@ class Experience:
 
 
 @contextmanager
-def _quiet_workers() -> Iterator[None]:
-    """Fork workers that ignore Ctrl-C: this process hears it and ends them in order."""
+def _workers_ignore_interrupts() -> Iterator[None]:
+    """Let workers made meanwhile ignore Ctrl-C: this process hears it and ends them in order."""
     previous = signal.signal(signal.SIGINT, signal.SIG_IGN)
-    multiprocessing.set_start_method("fork", force=True)
     try:
         yield
     finally:
         signal.signal(signal.SIGINT, previous)
+
+
+@contextmanager
+def _start_method(name: str) -> Iterator[None]:
+    """Make workers by `name`; importing torchrl sets ``spawn`` for the whole program."""
+    previous = multiprocessing.get_start_method()
+    multiprocessing.set_start_method(name, force=True)
+    try:
+        yield
+    finally:
+        multiprocessing.set_start_method(previous, force=True)
+
+
+def start_method() -> str:
+    """Return how workers are made: ``fork`` (0.2 s) where it is safe, else ``spawn`` (5 s).
+
+    A process that has used CUDA must not be forked, and macOS's own libraries forbid it.
+    """
+    safe = sys.platform == "linux" and not torch.cuda.is_initialized()
+    return "fork" if safe else "spawn"

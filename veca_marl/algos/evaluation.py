@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
@@ -22,6 +23,12 @@ class Exploration(Enum):
 
     deterministic = "deterministic"
     stochastic = "stochastic"
+
+
+_TYPES = {
+    Exploration.deterministic: ExplorationType.DETERMINISTIC,
+    Exploration.stochastic: ExplorationType.RANDOM,
+}
 
 
 @dataclass
@@ -74,10 +81,9 @@ def evaluate(
     """
     torch.manual_seed(seed)
     env.set_seed(seed)
-    mode = ExplorationType[exploration.name.replace("stochastic", "random").upper()]
     worlds = env.batch_size[0]
     tally = _Tally(list(env.group_map), worlds, quota=-(-episodes // worlds))
-    with torch.no_grad(), set_exploration_type(mode):
+    with torch.no_grad(), set_exploration_type(_TYPES[exploration]):
         state = env.reset()
         while not tally.complete:
             played, state = env.step_and_maybe_reset(policy(state))
@@ -91,20 +97,35 @@ def random_policy(env: EnvBase) -> Policy:
 
 
 def interval(values: NDArray[np.float64], confidence: float = 0.95) -> tuple[float, float]:
-    """Return the interval of the mean by Student's t; of no width for a single value."""
+    """Return the interval of the mean by Student's t; a single value has no known width."""
     if len(values) < 2:
-        return float(values[0]), float(values[0])
-    half = stats.t.ppf((1 + confidence) / 2, len(values) - 1) * stats.sem(values)
+        return math.nan, math.nan
+    half = stats.t.ppf((1 + confidence) / 2, len(values) - 1) * math.sqrt(_error(values))
     return float(values.mean() - half), float(values.mean() + half)
 
 
-def compare(policy: NDArray[np.float64], baseline: NDArray[np.float64]) -> tuple[float, ...]:
-    """Return the difference of means and its 95 % interval by Welch's t-test."""
-    difference = float(policy.mean() - baseline.mean())
-    if min(len(policy), len(baseline)) < 2 or (np.ptp(policy) == 0 == np.ptp(baseline)):
-        return difference, difference, difference
-    low, high = stats.ttest_ind(policy, baseline, equal_var=False).confidence_interval(0.95)
-    return difference, float(low), float(high)
+def difference(
+    one: NDArray[np.float64], other: NDArray[np.float64], confidence: float = 0.95
+) -> tuple[float, float, float]:
+    """Return the difference of the means and its interval.
+
+    Source: Welch 1947, "The generalization of Student's problem when several different
+    population variances are involved": the variances need not be equal.
+    """
+    mean = float(one.mean() - other.mean())
+    if min(len(one), len(other)) < 2:
+        return mean, math.nan, math.nan
+    errors = np.array([_error(one), _error(other)])
+    if not errors.any():
+        return mean, mean, mean
+    freedom = errors.sum() ** 2 / (errors**2 / [len(one) - 1, len(other) - 1]).sum()
+    half = float(stats.t.ppf((1 + confidence) / 2, freedom) * math.sqrt(errors.sum()))
+    return mean, mean - half, mean + half
+
+
+def _error(values: NDArray[np.float64]) -> float:
+    """Return the squared standard error of the mean."""
+    return float(values.var(ddof=1) / len(values))
 
 
 def comparison_line(team: str, policy: Scores, baseline: Scores) -> str:
@@ -114,10 +135,10 @@ def comparison_line(team: str, policy: Scores, baseline: Scores) -> str:
         for name, scores in (("policy", policy), ("random", baseline))
         for low, high in [interval(scores.returns)]
     ]
-    difference, low, high = compare(policy.returns, baseline.returns)
+    mean, low, high = difference(policy.returns, baseline.returns)
     episodes = f"{len(policy.returns)} and {len(baseline.returns)} episodes"
     return (
-        f"{team}: return of {parts[0]}, {parts[1]}, difference {difference:.3f} "
+        f"{team}: return of {parts[0]}, {parts[1]}, difference {mean:.3f} "
         f"[{low:.3f}, {high:.3f}] (means of {episodes}, 95 % intervals)"
     )
 

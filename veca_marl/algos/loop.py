@@ -80,6 +80,9 @@ class Trainer:
         reporters: Where numbers go.
         seed: Everything random follows from it.
         progress_bar: Whether to show one.
+        progress: Where the run stands.
+        watch: Where the time goes.
+        player: The copy of the policy that plays, on the CPU.
     """
 
     make_env: EnvFactory
@@ -95,10 +98,14 @@ class Trainer:
     watch: Stopwatch = field(default_factory=Stopwatch)
     _resumed_frames: int = 0
 
+    def __post_init__(self) -> None:
+        self.player = self.algorithm.copy_policy()
+
     def resume(self, path: Path) -> None:
         """Take up learning and progress from the checkpoint at `path`."""
         state = load_checkpoint(path, self.checkpoints.identity, self.algorithm.device)
         self.algorithm.load_state_dict(state["algorithm"])
+        self.algorithm.refresh(self.player)
         self.progress = Progress(**state["progress"])
         self._resumed_frames = self.progress.frames
 
@@ -107,9 +114,9 @@ class Trainer:
         with self.watch.measure("build"):
             eval_env = self.make_env(self.evaluation.worlds, 0)
             baseline = self._play(eval_env, random_policy(eval_env), Exploration.stochastic)
-            experience = Experience(self.make_env, self.algorithm.policy, self.collect)
-        self._report_scores("random", baseline)
+            experience = Experience(self.make_env, self.player, self.collect)
         if self.progress.frames == 0:
+            self._report_scores("random", baseline)
             self._save(best=False)  # an interruption at any time finds something to resume from
         scores: dict[str, Scores] | None = None
         bar = tqdm(
@@ -142,8 +149,9 @@ class Trainer:
         while self.progress.iteration < until:
             row = self._iterate(experience, episodes)
             bar.update(self.collect.frames)
-            shown = {k: f"{v:.3g}" for k, v in row.items() if k.endswith("reward_per_step")}
-            bar.set_postfix(shown)
+            finished = {k: v for k, v in row.items() if k.endswith("/return") and v == v}
+            if finished:  # episodes: the bar keeps their last mean returns
+                bar.set_postfix({k: f"{v:.3g}" for k, v in finished.items()})
 
     def _iterate(self, experience: Experience, episodes: TrainingEpisodes) -> dict[str, float]:
         before = self.watch.elapsed_s
@@ -154,6 +162,7 @@ class Trainer:
         with self.watch.measure("update"):
             measured = self.algorithm.learn(rows)
         with self.watch.measure("transfer"):
+            self.algorithm.refresh(self.player)
             experience.update_policy()
         self.progress.iteration += 1
         self.progress.frames += self.collect.frames
@@ -187,7 +196,7 @@ class Trainer:
     ) -> dict[str, Scores]:
         return evaluate(
             env,
-            policy or self.algorithm.policy,
+            policy or self.player,
             self.evaluation.episodes,
             _seed(self.seed, _EVALUATION_STAGE),
             exploration or self.evaluation.exploration,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import math
+import os
 import time
 from collections import defaultdict
 from collections.abc import Iterator, Mapping
@@ -164,7 +165,9 @@ def _drop_rows_after(path: Path, frames: int) -> None:
         reader = csv.DictReader(file)
         columns = reader.fieldnames or []
         kept = [row for row in reader if int(row["frames"]) <= frames]
-    with path.open("w", newline="") as file:
+    temporary = path.with_suffix(".tmp")
+    with temporary.open("w", newline="") as file:
         writer = csv.DictWriter(file, columns)
         writer.writeheader()
         writer.writerows(kept)
+    os.replace(temporary, path)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
+from copy import deepcopy
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -185,7 +186,7 @@ class PPO:
         device: Where networks live and learn.
 
     Attributes:
-        policy: Writes the actions of all teams.
+        policy: Writes the actions of all teams; changes with every gradient step.
     """
 
     def __init__(self, specs: dict[str, TeamSpec], cfg: PPOCfg, device: torch.device) -> None:
@@ -193,6 +194,16 @@ class PPO:
         self.learners = {t: TeamLearner(t, s, cfg, device) for t, s in specs.items()}
         self.policy = TensorDictSequential(*(x.network.actor for x in self.learners.values()))
         self._memory: TensorDictReplayBuffer | None = None
+
+    def copy_policy(self) -> TensorDictSequential:
+        """Return a copy of the policy that plays on the CPU and does not change by itself."""
+        return deepcopy(self.policy).to("cpu")
+
+    @torch.no_grad()
+    def refresh(self, player: TensorDictSequential) -> None:
+        """Give a copy of the policy the parameters of now."""
+        for old, new in zip(player.parameters(), self.policy.parameters(), strict=True):
+            old.copy_(new)
 
     def prepare(self, batch: TensorDictBase) -> TensorDict:
         """Turn a batch ``(worlds, steps)`` as collected into rows to learn from, on the device."""
