@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from eye_scenes import cast, clutter, random_pose, small_camera
+from eye_scenes import cast, clutter, random_pose, random_rotations, small_camera
 from tiny_renderer import TinyRenderer
 
 from veca_marl.sim.optics import Camera, look_at, view_axes
@@ -32,6 +32,21 @@ def test_bounding_rectangles_lose_no_pixel(fov_deg):
             bounded, full = (draw(scene, camera, pose, way) for way in (True, False))
             np.testing.assert_array_equal(bounded[1], full[1])
             np.testing.assert_array_equal(bounded[0], full[0])
+
+
+@pytest.mark.parametrize("shape", [Shape.CYLINDER, Shape.CAPSULE])
+def test_bounding_rectangles_hold_rods_that_pass_the_eye(shape):
+    rng = np.random.default_rng(7)
+    camera = small_camera()
+    for _ in range(60):
+        scene = Scene()
+        rods = scene.add_object("rods", [[Geom(shape, (0.05, 4.0))]] * 8)
+        rods.positions[:] = rng.uniform(-1, 1, (8, 3))
+        rods.rotations[:] = random_rotations(8, rng)
+        scene.update()
+        pose = random_pose(rng)
+        bounded, full = (draw(scene, camera, pose, way) for way in (True, False))
+        np.testing.assert_array_equal(bounded[1], full[1])
 
 
 @pytest.mark.parametrize("shape", list(Shape))

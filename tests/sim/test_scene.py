@@ -105,3 +105,8 @@ def test_impossible_objects_are_refused():
         scene.hidden(7, ())
     with pytest.raises(ValueError, match=r"frames \(3,\)"):
         scene.hidden(0, (3,))
+
+
+def test_a_scene_can_be_full():
+    with pytest.raises(ValueError, match=r"40000 primitives.*32767"):
+        Scene().add_object("dust", [[BALL] * 40_000])

@@ -171,7 +171,7 @@ def test_the_own_head_is_hidden_and_another_head_is_not():
     assert sense.read()["depth"][mine].min() > 0.4
 
 
-def test_reading_twice_gives_the_same_bytes_and_no_shared_memory():
+def test_reading_twice_gives_the_same_bytes():
     scene, body = clutter(np.random.default_rng(5)), body_before()
     cfg = VisionCfg(**EVERYTHING)
     one, two = VisionSense(cfg, body, scene), VisionSense(cfg, body, scene)

@@ -29,7 +29,7 @@ from veca_marl.sim.scene import Bools, GeomTable, Shape
 from veca_marl.sim.screen_bounds import Vector, box_intervals, single
 
 REACH_M = 0.12  # a thing farther than this from a floor point does not darken it
-DARKNESS = 0.5  # share of the light that a thing touching the point takes away
+DARKNESS = 0.35  # share of the light that a thing touching the point takes away
 LARGEST_M = 1.0  # bounding radius of the largest thing that casts a shadow
 _FLOOR_TOLERANCE_M = 0.01
 

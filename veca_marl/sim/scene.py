@@ -19,6 +19,8 @@ from veca_marl.sim.pose import Floats
 
 Bools = NDArray[np.bool_]
 
+MOST_GEOMS = int(np.iinfo(np.int16).max)  # a picture stores rows and ids in 16 bits
+
 
 class Shape(IntEnum):
     """The primitives the eyes can draw."""
@@ -155,13 +157,16 @@ class Scene:
             frames: The primitives on each of its frames; a frame may be empty.
 
         Raises:
-            ValueError: If the name is taken or there is no frame.
+            ValueError: If the name is taken, there is no frame, or the scene is full.
         """
         if any(name == known.name for known in self.objects):
             raise ValueError(f"object {name!r} is already in the scene")
         if not frames:
             raise ValueError(f"object {name!r} has no frame")
         first_row, first_geom = len(self._positions), len(self.geoms.shapes)
+        total = first_geom + sum(map(len, frames))
+        if total > MOST_GEOMS:
+            raise ValueError(f"{name!r} makes {total} primitives: a scene holds {MOST_GEOMS}")
         added = _table(frames, len(self.objects), first_row)
         self.geoms = _joined(self.geoms, added)
         self._positions = np.concatenate((self._positions, np.zeros((len(frames), 3))))
