@@ -1,6 +1,10 @@
 """Two eyes on a body."""
 
+import hashlib
 import math
+import pathlib
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -178,6 +182,23 @@ def test_reading_twice_gives_the_same_bytes():
     first = {name: value.copy() for name, value in one.read().items()}
     for name, value in two.read().items():
         assert value.tobytes() == first[name].tobytes() == one.read()[name].tobytes()
+
+
+def digest_of_a_look():
+    """Fingerprint of everything that dimmed eyes read from a cluttered room."""
+    cfg = VisionCfg(**EVERYTHING, blur_deg=0.5, infant_age_months=2.0, defocus=True)
+    scene = clutter(np.random.default_rng(6))
+    read = VisionSense(cfg, body_before(focal_distance_m=0.5), scene).read()
+    return hashlib.sha256(b"".join(read[name].tobytes() for name in sorted(read))).hexdigest()
+
+
+def test_another_process_sees_the_same_bytes():
+    code = "import test_vision; print(test_vision.digest_of_a_look())"
+    here = pathlib.Path(__file__).parent
+    other = subprocess.run(
+        [sys.executable, "-c", code], cwd=here, capture_output=True, text=True, check=True
+    )
+    assert other.stdout.split()[-1] == digest_of_a_look()
 
 
 @pytest.mark.parametrize(

@@ -151,7 +151,7 @@ class Camera:
 def view_axes(pose: Pose) -> Floats:
     """Return ``(4, 3)``: position, right, up and forward axes of an eye, as the renderer wants."""
     forward, left, up = pose.rotation.T
-    return np.stack([pose.position, -left, up, forward])
+    return np.stack([pose.position, -left, up, forward], dtype=np.float64)
 
 
 def look_at(position: Floats, target: Floats) -> Pose:
