@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 import argparse
-import json
 import os
 import sys
 from collections.abc import Sequence
 from contextlib import nullcontext
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 
 import torch
 
 from veca_marl.bench.free_play import free_play
-from veca_marl.bench.references import EyeCost, measure_ears, measure_eye
-from veca_marl.bench.report import machine, references_table, rollouts_table
-from veca_marl.bench.rollouts import Rollouts, measure_rollouts
+from veca_marl.bench.references import measure_references
+from veca_marl.bench.report import as_json, references_table, rollouts_table
+from veca_marl.bench.rollouts import Rollouts, measure_first_world, measure_rollouts
 from veca_marl.config import compose
 from veca_marl.config_errors import ConfigError
 from veca_marl.envs.game import GameCfg
@@ -32,18 +31,19 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(error, file=sys.stderr)  # noqa: T201
         return 2
     print(f"processor time of one thread; {_load()}\n")  # noqa: T201
+    first_world_s = measure_first_world(game)
+    print(f"the first world of this process: {first_world_s:.2f} s\n")  # noqa: T201
     runs = []
     for agents in asked.agents:
         for worlds in asked.worlds:
             runs.append(_measure(game, agents, worlds, asked.steps, asked.repeats))
             print(rollouts_table(runs[-1]), end="\n\n")  # noqa: T201
-    eye = ears_ms = None
+    references = None
     if not asked.skip_references:
-        eye = measure_eye(game.playground, asked.repeats)
-        ears_ms = measure_ears(game.playground, asked.steps)
-        print(references_table(eye, ears_ms))  # noqa: T201
+        references = measure_references(game.playground, asked.steps, asked.repeats)
+        print(references_table(references))  # noqa: T201
     if asked.json is not None:
-        asked.json.write_text(_as_json(runs, eye, ears_ms))
+        asked.json.write_text(as_json(first_world_s, runs, references))
     return 0
 
 
@@ -95,13 +95,3 @@ def _overrides(asked: argparse.Namespace) -> list[str]:
 def _load() -> str:
     load, cores = os.getloadavg()[0], os.cpu_count()
     return f"{cores} cores, load {load:.1f}"
-
-
-def _as_json(runs: list[Rollouts], eye: EyeCost | None, ears_ms: float | None) -> str:
-    references = {"eye": eye and asdict(eye), "ears_ms": ears_ms}
-    content = {
-        "machine": machine(),
-        "rollouts": [asdict(run) for run in runs],
-        "references": references,
-    }
-    return json.dumps(content, indent=2) + "\n"

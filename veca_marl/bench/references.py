@@ -43,6 +43,24 @@ class EyeCost:
     times_as_fast: float
 
 
+@dataclass
+class References:
+    """Costs of single parts.
+
+    Attributes:
+        eye: One eye view beside TinyRenderer.
+        ears_ms: One listener and one source, milliseconds per step.
+    """
+
+    eye: EyeCost
+    ears_ms: float
+
+
+def measure_references(playground: PlaygroundCfg, steps: int, repeats: int) -> References:
+    """Measure eyes and ears in a playground, alone."""
+    return References(measure_eye(playground, repeats), measure_ears(playground, steps))
+
+
 def measure_eye(playground: PlaygroundCfg, repeats: int) -> EyeCost:
     """Render the playground with 20 more props and 2 walkers, from one's left eye all round."""
     world = World(playground)

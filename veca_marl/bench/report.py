@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import json
 import os
 import platform
+from dataclasses import asdict
 from importlib.metadata import version
 
-from veca_marl.bench.references import EyeCost
+from veca_marl.bench.references import References
 from veca_marl.bench.rollouts import Rollouts
 
 
@@ -17,7 +19,7 @@ def rollouts_table(run: Rollouts) -> str:
         f"{run.task} in {run.playground}: {run.worlds} x world, {run.agents} x agent",
         f"  {run.agent_steps_per_s:,.0f} agent-steps/s "
         f"(on the wall clock {run.wall_agent_steps_per_s:,.0f}); "
-        f"a world is built in {run.build_s:.2f} s",
+        f"one more world is built in {run.build_s:.2f} s",
         f"  {'part':<16}{'ms/agent-step':>14}{'share':>8}",
     ]
     for part, ms in sorted(run.ms_per_part.items(), key=lambda item: -item[1]):
@@ -27,13 +29,25 @@ def rollouts_table(run: Rollouts) -> str:
     return "\n".join(lines)
 
 
-def references_table(eye: EyeCost, ears_ms: float) -> str:
+def references_table(references: References) -> str:
     """Return the costs beside references."""
+    eye = references.eye
     return (
         f"one eye view 84x84, {eye.primitives} primitives: {eye.ours_ms:.3f} ms; "
         f"TinyRenderer {eye.tiny_ms:.2f} ms: {eye.times_as_fast:.1f} times as fast\n"
-        f"ears, 1 listener and 1 source, HRTF: {ears_ms:.3f} ms per step"
+        f"ears, 1 listener and 1 source, HRTF: {references.ears_ms:.3f} ms per step"
     )
+
+
+def as_json(first_world_s: float, runs: list[Rollouts], references: References | None) -> str:
+    """Return all numbers for programs."""
+    content = {
+        "machine": machine(),
+        "first_world_s": first_world_s,
+        "rollouts": [asdict(run) for run in runs],
+        "references": None if references is None else asdict(references),
+    }
+    return json.dumps(content, indent=2) + "\n"
 
 
 def machine() -> dict[str, str | int | None]:

@@ -38,7 +38,7 @@ class Rollouts:
         wall_agent_steps_per_s: By the clock on the wall.
         ms_per_part: Milliseconds of processor time per agent step, with the stopwatch.
         other_share: Part of the step that is neither physics nor senses.
-        build_s: Seconds of processor time to build one world, kernels compiled.
+        build_s: Seconds of processor time to build one more world.
     """
 
     task: str
@@ -140,6 +140,19 @@ def _refuse_substeps(name: str, sense: Sense) -> None:
     """The world has kept the bound method, so that a wrapper would not be called."""
     if type(sense).substep is not Sense.substep:
         raise NotImplementedError(f"{name} gathers in substeps: teach the bench to time them")
+
+
+def measure_first_world(game: GameCfg) -> float:
+    """Return seconds of processor time to build a world and reset it, the first of a process.
+
+    Tables and kernels are loaded in it; kernels that are not cached are compiled in it.
+    """
+    start = time.thread_time()
+    env = VecaEnv(game, worlds=1, seed=0)
+    env.reset()
+    seconds = time.thread_time() - start
+    env.close()
+    return seconds
 
 
 def _build_s(game: GameCfg) -> float:

@@ -15,6 +15,7 @@ from veca_marl.envs.game import Game, GameCfg, Outcome
 from veca_marl.envs.layout import Arrays, Layout
 from veca_marl.envs.specs import done_spec, observation_spec, to_torchrl
 from veca_marl.envs.spectator import Spectator
+from veca_marl.sim.compilation import announce_compilation
 
 
 class VecaEnv(EnvBase):
@@ -40,6 +41,7 @@ class VecaEnv(EnvBase):
     def __init__(self, cfg: GameCfg, worlds: int = 1, seed: int = 0) -> None:
         if worlds < 1:
             raise ValueError(f"worlds={worlds}: at least one is needed")
+        announce_compilation()
         super().__init__(device=None, batch_size=torch.Size([worlds]))
         self.cfg = cfg
         self.games = [Game(cfg) for _ in range(worlds)]

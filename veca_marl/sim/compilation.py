@@ -1,0 +1,34 @@
+"""Tell the user why the first run takes seconds longer to start."""
+
+from __future__ import annotations
+
+import sys
+from functools import cache
+
+from numba.core.event import Event, Listener, register
+
+
+class CompilationNotice(Listener):
+    """Writes one line when the first of our kernels is compiled; a cached one is not compiled."""
+
+    def __init__(self) -> None:
+        self._told = False
+
+    def on_start(self, event: Event) -> None:
+        """See `numba.core.event.Listener`."""
+        module: str = event.data["dispatcher"].py_func.__module__
+        if not self._told and module.startswith("veca_marl."):
+            self._told = True
+            print("compiling kernels (once; they are cached) ...", file=sys.stderr)  # noqa: T201
+
+    def on_end(self, event: Event) -> None:
+        """See `numba.core.event.Listener`."""
+
+
+@cache
+def announce_compilation() -> None:
+    """Announce in this process that kernels are compiled, if that happens. Calling twice is fine.
+
+    It listens to numba's compiler, so that compiled kernels cost nothing more.
+    """
+    register("numba:compile", CompilationNotice())  # type: ignore[no-untyped-call]
