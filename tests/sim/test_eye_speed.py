@@ -32,14 +32,14 @@ def crowded_room(rng):
     return scene
 
 
-def median_s(look, repeats):
+def processor_s(look, repeats):
+    """Processor time of one call. Wall time would flatter us on a busy machine: a short call fits
+    between two interruptions, a long one does not."""
     look()
-    times = []
+    start = time.process_time()
     for _ in range(repeats):
-        start = time.perf_counter()
         look()
-        times.append(time.perf_counter() - start)
-    return float(np.median(times))
+    return (time.process_time() - start) / repeats
 
 
 def test_eight_times_as_fast_as_tiny_renderer():
@@ -50,7 +50,7 @@ def test_eight_times_as_fast_as_tiny_renderer():
         for angle in (0.3, 1.8, 3.3, 4.8):
             eye = np.array([2 * np.cos(angle), 2 * np.sin(angle), 0.6])
             pose = look_at(eye, np.array([0.0, 0.0, 0.3]))
-            ours.append(median_s(lambda pose=pose: camera.render(scene, [pose]), 60))
-            tinys.append(median_s(lambda pose=pose: tiny.segment(camera, pose), 12))
+            ours.append(processor_s(lambda pose=pose: camera.render(scene, [pose]), 60))
+            tinys.append(processor_s(lambda pose=pose: tiny.segment(camera, pose), 12))
     ratio = np.mean(tinys) / np.mean(ours)
     assert ratio >= 8.0, f"{1e3 * np.mean(ours):.2f} ms, {1e3 * np.mean(tinys):.2f} ms a view"
