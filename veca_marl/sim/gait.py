@@ -1,8 +1,10 @@
 """How the walking body moves its bones: joint angles from the phase of the stride, a kick, a gaze.
 
-The gait is kinematic: sinusoids with the phase relations of human walking (legs in antiphase, arms
-against legs, the knee bent in swing), not a simulation of forces. Amplitudes are ours, chosen by
-eye within the ranges of motion of the skeleton.
+The gait is kinematic, not a simulation of forces. The feet are led and the legs follow by inverse
+kinematics: a foot that carries the body stays where it is on the floor, the other swings forward,
+and the pelvis rides over them as over an inverted pendulum. Feet land flat and strides are short,
+as in children who have just learnt to walk. The trunk does not sway, so the head's senses are
+steady. Amplitudes are ours, chosen by eye within the ranges of motion of the skeleton.
 """
 
 from __future__ import annotations
@@ -15,26 +17,48 @@ import numpy as np
 from veca_marl.sim.pose import Floats
 from veca_marl.sim.skeleton import Skeleton
 
+_CARRYING = 0.5  # share of the stride in which a foot is on the floor
+
 
 @dataclass(frozen=True)
 class GaitCfg:
     """Numbers of the gait.
 
     Attributes:
-        hip_swing_rad: Amplitude of the thigh at full stride.
-        knee_bend_rad: Greatest extra knee flexion, in mid swing.
-        arm_swing_rad: Amplitude of the upper arm at full stride.
+        step_m: How far a foot on the floor falls back beneath the body at full stride.
+        step_centre_m: Middle of that way, before the hip: thighs bend forward more than back.
         full_stride_mps: Speed from which the stride no longer lengthens, only quickens.
-        stride_m: Distance of two steps at full stride; about 4 x leg length x sin(hip swing).
+        turning_m: A turn of 1 rad/s asks for strides like walking at so many m/s.
+        leg_m: Height of the hips above the ankles in standing.
+        sink_m: How much lower the pelvis is at full stride.
+        bob_m: Amplitude of its rise and fall, twice per stride.
+        lift_m: Height of a foot in mid swing at full stride.
+        toe_rad: How far the toes hang early in the swing, and rise late.
+        arm_swing_rad: Amplitude of the upper arm at full stride.
+        elbow_rad: Flexion of the elbows.
+        settle_s: Time constant with which the stride follows a change of speed.
         kick_s: Duration of a kick.
     """
 
-    hip_swing_rad: float = 0.42
-    knee_bend_rad: float = 0.9
-    arm_swing_rad: float = 0.45
+    step_m: float = 0.2
+    step_centre_m: float = 0.005
     full_stride_mps: float = 0.6
-    stride_m: float = 0.48
+    turning_m: float = 0.15
+    leg_m: float = 0.286
+    sink_m: float = 0.010
+    bob_m: float = 0.008
+    lift_m: float = 0.045
+    toe_rad: float = 0.3
+    arm_swing_rad: float = 0.5
+    elbow_rad: float = 0.5
+    settle_s: float = 0.08
     kick_s: float = 0.36
+
+
+# the kicking leg: share of the kick, flexion of thigh and knee (rad); the strike comes first,
+# because the ball leaves at once, and the leg follows through
+_KICK = np.array([[0.0, 0.5, 0.8], [0.2, 1.1, 0.15], [0.5, 1.0, 0.4], [1.0, 0.45, 0.7]])
+_KICK_TOES_RAD = -0.4
 
 
 class Gait:
@@ -44,6 +68,7 @@ class Gait:
         self.cfg = cfg or GaitCfg()
         joint = skeleton.joint
         self._thigh = (joint("l_thigh", "flexion"), joint("r_thigh", "flexion"))
+        self._twist = (joint("l_thigh", "internal_rotation"), joint("r_thigh", "internal_rotation"))
         self._shank = (joint("l_shank", "flexion"), joint("r_shank", "flexion"))
         self._foot = (joint("l_foot", "dorsiflexion"), joint("r_foot", "dorsiflexion"))
         self._arm = (joint("l_upper_arm", "flexion"), joint("r_upper_arm", "flexion"))
@@ -52,10 +77,12 @@ class Gait:
         self._shake = (joint("neck", "rotation"), joint("head", "rotation"))
         self._low = np.array([j.low_rad for j in skeleton.joints])
         self._high = np.array([j.high_rad for j in skeleton.joints])
+        origins = skeleton.origins
+        self._hip_y_m = tuple(float(origins[skeleton.bone(f"{s}_thigh"), 1]) for s in "lr")
+        self._thigh_m = -float(origins[skeleton.bone("l_shank"), 2])
+        self._shank_m = -float(origins[skeleton.bone("l_foot"), 2])
         self.angles: Floats = np.zeros(len(skeleton.joints))
-        self.phase_rad = 0.0
-        self._kick_left_s = 0.0
-        self._pace_mps = 0.0
+        self.reset()
 
     @property
     def pitch_range_rad(self) -> tuple[float, float]:
@@ -71,7 +98,8 @@ class Gait:
 
     def reset(self) -> None:
         """Stand still."""
-        self.phase_rad = 0.0
+        self.phase = 0.0
+        self._speed_mps = self._turn_radps = 0.0
         self._kick_left_s = 0.0
 
     def kick(self) -> None:
@@ -79,49 +107,92 @@ class Gait:
         self._kick_left_s = self.cfg.kick_s
 
     def advance(self, speed_mps: float, turn_radps: float, step_s: float) -> None:
-        """Move the phase on; turning on the spot steps as well.
+        """Move the stride on; turning on the spot steps as well.
 
         Args:
             speed_mps: Forward speed, negative when walking backward.
-            turn_radps: Turning speed.
+            turn_radps: Turning speed, left is positive.
             step_s: Time step.
         """
-        pace = speed_mps + math.copysign(0.1 * abs(turn_radps), speed_mps or 1.0)
-        stride = self.cfg.stride_m * max(self._stride_share(pace), 0.35)
-        self.phase_rad = (self.phase_rad + 2.0 * math.pi * pace * step_s / stride) % (2.0 * math.pi)
-        self._kick_left_s = max(0.0, self._kick_left_s - step_s)
-        self._pace_mps = pace
+        follow = 1.0 - math.exp(-step_s / self.cfg.settle_s)
+        self._speed_mps += follow * (speed_mps - self._speed_mps)
+        self._turn_radps += follow * (turn_radps - self._turn_radps)
+        self.phase = (self.phase + _CARRYING * step_s / self._carrying_s()) % 1.0
+        if self._kick_left_s > 0.0:
+            self._kick_left_s -= step_s
+            self.phase = 0.5  # the kicking foot is about to land
 
     def pose(self, head_pitch_rad: float, head_yaw_rad: float) -> Floats:
         """Write and return the ``(82,)`` joint angles for this moment."""
-        share = self._stride_share(self._pace_mps) if self.phase_rad else 0.0
-        for side in (0, 1):
-            self._swing_leg(side, share)
-        self._swing_kicking_leg()
-        for nod, shake in zip(self._nod, self._shake, strict=True):
-            self.angles[nod] = head_pitch_rad / 2.0
-            self.angles[shake] = head_yaw_rad / 2.0
+        if self._kick_left_s > 0.0:
+            self._lead_foot(0, self.cfg.step_centre_m, 0.0, 0.0)
+            self._swing_kicking_leg()
+        else:
+            self._step(0)
+            self._step(1)
+        self._turn_neck(self._nod, head_pitch_rad, self.pitch_range_rad)
+        self._turn_neck(self._shake, head_yaw_rad, self.yaw_range_rad)
         np.clip(self.angles, self._low, self._high, out=self.angles)
         return self.angles
 
-    def _stride_share(self, pace_mps: float) -> float:
-        return min(1.0, abs(pace_mps) / self.cfg.full_stride_mps)
+    def _pace_mps(self) -> float:
+        return abs(self._speed_mps) + self.cfg.turning_m * abs(self._turn_radps)
 
-    def _swing_leg(self, side: int, share: float) -> None:
-        phase = self.phase_rad + math.pi * side
-        swing, lift = math.sin(phase), max(0.0, math.cos(phase))
-        thigh = self.cfg.hip_swing_rad * share * swing
-        knee = self.cfg.knee_bend_rad * share * lift + 0.05
-        self.angles[self._thigh[side]] = thigh + 0.3 * knee
+    def _share(self) -> float:
+        """Length of the stride as a share of the full one."""
+        return min(1.0, self._pace_mps() / self.cfg.full_stride_mps)
+
+    def _carrying_s(self) -> float:
+        """How long a foot stays on the floor."""
+        return self.cfg.step_m / max(self._pace_mps(), self.cfg.full_stride_mps)
+
+    def _step(self, side: int) -> None:
+        """Lead one foot along its stride, and swing the arm of the same side against it."""
+        phase = (self.phase + 0.5 * side) % 1.0
+        share, on_floor = self._share(), phase < _CARRYING
+        # from 0.5, where the foot lands, to -0.5, where it lifts off, and back through the air
+        along = 0.5 - phase / _CARRYING
+        lift = toes = 0.0
+        if not on_floor:
+            flight = (phase - _CARRYING) / (1.0 - _CARRYING)
+            along = -0.5 * math.cos(math.pi * flight)
+            lift = self.cfg.lift_m * share * math.sin(math.pi * flight)
+            toes = -self.cfg.toe_rad * share * math.sin(2.0 * math.pi * flight)
+        way_m = self._carrying_s() * (self._speed_mps - self._turn_radps * self._hip_y_m[side])
+        self._lead_foot(side, self.cfg.step_centre_m * share + way_m * along, lift, toes)
+        twist = self._carrying_s() * self._turn_radps * along
+        self.angles[self._twist[side]] = -twist if side == 0 else twist
+        swing = self.cfg.arm_swing_rad * math.copysign(share, self._speed_mps)
+        self.angles[self._arm[side]] = -swing * math.cos(2.0 * math.pi * phase)
+        self.angles[self._elbow[side]] = self.cfg.elbow_rad
+
+    def _lead_foot(self, side: int, ahead_m: float, lift_m: float, toes_rad: float) -> None:
+        """Bend a leg so that its ankle is where it shall be (law of cosines, two bones)."""
+        share = self._share()
+        bob = self.cfg.bob_m * math.cos(4.0 * math.pi * self.phase)
+        down_m = self.cfg.leg_m - share * (self.cfg.sink_m + bob) - lift_m
+        thigh_m, shank_m = self._thigh_m, self._shank_m
+        reach = min(math.hypot(ahead_m, down_m), thigh_m + shank_m)
+        hip = (thigh_m**2 + reach**2 - shank_m**2) / (2.0 * thigh_m * reach)
+        inside = (thigh_m**2 + shank_m**2 - reach**2) / (2.0 * thigh_m * shank_m)
+        thigh = math.atan2(ahead_m, down_m) + math.acos(min(hip, 1.0))
+        knee = math.pi - math.acos(max(inside, -1.0))
+        self.angles[self._thigh[side]] = thigh
         self.angles[self._shank[side]] = knee
-        self.angles[self._foot[side]] = 0.7 * knee - thigh if lift == 0.0 else 0.3 * knee
-        self.angles[self._arm[side]] = -self.cfg.arm_swing_rad * share * swing
-        self.angles[self._elbow[side]] = 0.35
+        self.angles[self._foot[side]] = toes_rad - (thigh - knee)
 
     def _swing_kicking_leg(self) -> None:
-        if self._kick_left_s <= 0.0:
-            return
-        progress = 1.0 - self._kick_left_s / self.cfg.kick_s
-        self.angles[self._thigh[1]] = 1.1 * math.sin(2.0 * math.pi * (progress - 0.25))
-        self.angles[self._shank[1]] = 0.9 * max(0.0, math.cos(2.0 * math.pi * progress))
-        self.angles[self._foot[1]] = -0.4
+        done = 1.0 - self._kick_left_s / self.cfg.kick_s
+        self.angles[self._thigh[1]] = np.interp(done, _KICK[:, 0], _KICK[:, 1])
+        self.angles[self._shank[1]] = np.interp(done, _KICK[:, 0], _KICK[:, 2])
+        self.angles[self._foot[1]] = _KICK_TOES_RAD * (1.0 - done)
+
+    def _turn_neck(
+        self, joints: tuple[int, ...], turn_rad: float, turn_range_rad: tuple[float, float]
+    ) -> None:
+        """Share a turn out so that neck and head reach their stops together."""
+        limits, whole = (
+            (self._high, turn_range_rad[1]) if turn_rad >= 0.0 else (self._low, turn_range_rad[0])
+        )
+        for joint in joints:
+            self.angles[joint] = turn_rad * limits[joint] / whole

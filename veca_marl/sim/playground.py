@@ -33,7 +33,9 @@ class RoomCfg:
     reflection: float = 0.5
 
     def __post_init__(self) -> None:
-        """Refuse rooms in which nobody could stand or sound could not die."""
+        """Refuse rooms without inside, or in which sound could not die."""
+        if not all(math.isfinite(corner) for corner in self.lower_m):
+            raise ValueError(f"room {self.name!r}: lower_m={tuple(self.lower_m)} must be finite")
         if not all(math.isfinite(size) and size > 0 for size in self.size_m):
             raise ValueError(f"room {self.name!r}: size_m={tuple(self.size_m)} must be positive")
         if not 0.0 <= self.reflection < 1.0:
@@ -46,8 +48,17 @@ class RoomCfg:
         return bool(np.all(position >= low) and np.all(position <= high))
 
     def sample_floor(self, rng: np.random.Generator, margin_m: float) -> Floats:
-        """Draw a point of the floor, ``(3,)`` metres, at least `margin_m` from the walls."""
+        """Draw a point of the floor, ``(3,)`` metres, at least `margin_m` from the walls.
+
+        Raises:
+            ValueError: If the room is too small for that margin.
+        """
         low, size = np.asarray(self.lower_m), np.asarray(self.size_m)
+        if not size[:2].min() >= 2.0 * margin_m:
+            raise ValueError(
+                f"room {self.name!r}: size_m={tuple(self.size_m)} leaves no floor {margin_m} m "
+                "away from the walls"
+            )
         point = rng.uniform(low[:2] + margin_m, low[:2] + size[:2] - margin_m)
         return np.array([point[0], point[1], low[2]])
 
@@ -83,4 +94,6 @@ class PlaygroundCfg:
         if twice:
             raise ValueError(f"playground {self.name!r}: props share the names {twice}")
         if self.image_order < 0:
-            raise ValueError(f"playground {self.name!r}: image_order={self.image_order} is negative")
+            raise ValueError(
+                f"playground {self.name!r}: image_order={self.image_order} is negative"
+            )

@@ -9,8 +9,8 @@ from enum import Enum
 from typing import Any
 
 import numpy as np
-import pybullet
 
+from veca_marl.sim.bullet import pybullet
 from veca_marl.sim.pose import Floats
 from veca_marl.sim.rotations import matrix_to_quaternion, quaternion_from_yaw
 from veca_marl.sim.scene import Geom, Scene, Shape
@@ -51,9 +51,11 @@ class PropCfg:
         position_m: Centre of the shape; for walls and goals the middle of the foot line.
         yaw_deg: Turn about z.
         mass_kg: 0 makes it a fixed part of the world.
-        friction: Sliding friction coefficient (Coulomb).
-        rolling_friction: Rolling friction coefficient, metres per metre of radius as in Bullet.
-        restitution: 0 (dead) to 1 (bounces back with equal speed).
+        friction: Sliding friction coefficient (Coulomb) on the floor. Bullet multiplies those of
+            two things that touch; the floor's is 1.
+        rolling_friction: Arm of the rolling resistance on the floor, metres.
+        restitution: 0 (dead) to 1 (bounces back with equal speed) on the floor; multiplied as
+            well, the floor's is 1.
         colour: Red, green, blue in [0, 1].
         checker_m: Edge of a checker pattern; 0 is plain.
         transparent: Seen through, and no hindrance to `is_visible`.
@@ -84,8 +86,17 @@ class PropCfg:
                 f"prop {self.name!r}: size_m={list(self.size_m)} of a {self.shape.value} "
                 f"must be {len(names)} positive lengths: {', '.join(names)}"
             )
-        if not (math.isfinite(self.mass_kg) and self.mass_kg >= 0):
-            raise ValueError(f"prop {self.name!r}: mass_kg={self.mass_kg} is not 0 (fixed) or more")
+        if not all(math.isfinite(value) for value in (*self.position_m, self.yaw_deg)):
+            raise ValueError(
+                f"prop {self.name!r}: position_m={tuple(self.position_m)}, yaw_deg={self.yaw_deg} "
+                "must be finite"
+            )
+        for quantity in ("mass_kg", "friction", "rolling_friction"):
+            value = getattr(self, quantity)
+            if not (math.isfinite(value) and value >= 0):
+                raise ValueError(f"prop {self.name!r}: {quantity}={value} is not 0 or more")
+        if not 0.0 <= self.restitution <= 1.0:
+            raise ValueError(f"prop {self.name!r}: restitution={self.restitution} is not in [0, 1]")
         if not self.name:
             raise ValueError(f"a {self.shape.value} without a name; every prop has one")
 
@@ -111,18 +122,18 @@ def prop_geoms(cfg: PropCfg) -> tuple[Geom, ...]:
             half = tuple(s / 2 for s in size)
             return (Geom(Shape.BOX, half, offset=(0.0, 0.0, half[2]), **look),)
         case PropShape.goal:
-            return _goal_geoms(*size, look)
+            return _goal_geoms(size, look)
 
 
-def _goal_geoms(width: float, height: float, radius: float, look: dict[str, Any]) -> tuple[Geom, ...]:
+def _goal_geoms(size: tuple[float, ...], look: dict[str, Any]) -> tuple[Geom, ...]:
     """Two posts and a bar; the mouth of the goal faces x, its width lies along y."""
+    width, height, radius = size
     posts = [
         Geom(Shape.CYLINDER, (radius, height), offset=(0.0, side * width / 2, height / 2), **look)
         for side in (-1.0, 1.0)
     ]
     along_y = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
-    size = (radius, width)
-    bar = Geom(Shape.CYLINDER, size, offset=(0.0, 0.0, height), rotation=along_y, **look)
+    bar = Geom(Shape.CYLINDER, (radius, width), offset=(0.0, 0.0, height), rotation=along_y, **look)
     return (*posts, bar)
 
 
@@ -140,8 +151,10 @@ def collision_shape(client: int, geoms: tuple[Geom, ...]) -> int:
         radii=[0.0 if g.shape is Shape.BOX else g.size[0] for g in geoms],
         halfExtents=boxes,
         lengths=[g.size[1] if g.shape in (Shape.CYLINDER, Shape.CAPSULE) else 0.0 for g in geoms],
-        collisionFramePositions=[list(g.offset) for g in geoms],
-        collisionFrameOrientations=[matrix_to_quaternion(g.rotation).tolist() for g in geoms],
+        collisionFramePositions=[np.asarray(g.offset).tolist() for g in geoms],
+        collisionFrameOrientations=[
+            matrix_to_quaternion(np.asarray(g.rotation)).tolist() for g in geoms
+        ],
         physicsClientId=client,
     )
     return int(shape)
@@ -200,14 +213,20 @@ class Prop:
         return size[0] / 2 if self.cfg.shape is PropShape.goal else size[0]
 
     @property
+    def lowest_m(self) -> float:
+        """Height of its lowest point."""
+        low, _ = pybullet.getAABB(self.body_id, physicsClientId=self._client)
+        return float(low[2])
+
+    @property
     def position(self) -> Floats:
         """``(3,)`` metres, world frame."""
-        return self._scene.positions[self._row].copy()
+        return np.array(self._scene.positions[self._row])
 
     @property
     def rotation(self) -> Floats:
         """``(3, 3)`` rotation to the world frame."""
-        return self._scene.rotations[self._row].copy()
+        return np.array(self._scene.rotations[self._row])
 
     @property
     def velocity(self) -> Floats:
@@ -229,8 +248,11 @@ class Prop:
             yaw_rad: Turn about z; other turns are undone.
             velocity: ``(3,)`` m/s.
             angular_velocity: ``(3,)`` rad/s.
+
+        Raises:
+            ValueError: If a number is not finite.
         """
-        x, y, z = (float(value) for value in position)
+        x, y, z = _three_finite(self.name, "position", position)
         turn = quaternion_from_yaw(yaw_rad)
         pybullet.resetBasePositionAndOrientation(
             self.body_id, (x, y, z), turn, physicsClientId=self._client
@@ -249,8 +271,8 @@ class Prop:
         if not self.fixed:
             pybullet.resetBaseVelocity(
                 self.body_id,
-                [float(v) for v in velocity],
-                [float(v) for v in angular_velocity],
+                _three_finite(self.name, "velocity", velocity),
+                _three_finite(self.name, "angular velocity", angular_velocity),
                 physicsClientId=self._client,
             )
 
@@ -264,3 +286,10 @@ class Prop:
         self._scene.rotations[self._row] = np.reshape(matrix, (3, 3))
         if self.sound is not None:
             self.sound.position = self._scene.positions[self._row]
+
+
+def _three_finite(name: str, what: str, vector: Sequence[float] | Floats) -> list[float]:
+    numbers = [float(value) for value in vector]
+    if len(numbers) != 3 or not all(math.isfinite(number) for number in numbers):
+        raise ValueError(f"prop {name!r}: {what} {numbers} must be three finite numbers")
+    return numbers

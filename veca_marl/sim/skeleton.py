@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import csv
 import functools
+import itertools
 import math
 import re
 from dataclasses import dataclass
@@ -203,6 +204,43 @@ def load_skeleton() -> Skeleton:
         joint_axes=np.array([joint.axis for joint in joints]),
         joint_slices=np.array([(b.first_joint, b.first_joint + b.joint_count) for b in bones]),
     )
+
+
+class Soles:
+    """The undersides of both feet: corners of boxes and cap centres of capsules on the bones.
+
+    The rigid bones stand on the floor; their flexible skin is pressed flat beneath them.
+    """
+
+    def __init__(self, skeleton: Skeleton) -> None:
+        points: list[tuple[int, tuple[float, ...], float]] = []
+        for name in ("l_foot", "r_foot"):
+            frame = skeleton.bone(name)
+            for part in skeleton.bones[frame].colliders:
+                points += [(frame, *point) for point in _extremes(part)]
+        self._frames = np.array([frame for frame, _, _ in points])
+        self._offsets = np.array([offset for _, offset, _ in points])
+        self._radii = np.array([radius for _, _, radius in points])
+
+    def lowest_m(self, positions: Floats, rotations: Floats) -> float:
+        """Return the height of the lowest point of the soles.
+
+        Args:
+            positions: ``(47, 3)`` bone origins, metres.
+            rotations: ``(47, 3, 3)`` bone rotations.
+        """
+        up = rotations[self._frames, 2]
+        heights = positions[self._frames, 2] + (up * self._offsets).sum(axis=1) - self._radii
+        return float(heights.min())
+
+
+def _extremes(part: BoneCapsule | BoneBox) -> list[tuple[tuple[float, ...], float]]:
+    """Return points and the radius of the ball round each, which together span a primitive."""
+    if isinstance(part, BoneCapsule):
+        return [(part.start, part.radius), (part.end, part.radius)]
+    signs = itertools.product((-1.0, 1.0), repeat=3)
+    corners = (np.array(part.centre) + np.array(sign) * part.half for sign in signs)
+    return [(tuple(corner), 0.0) for corner in corners]
 
 
 @njit(cache=True)

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-import pybullet
 
 from veca_marl.sim.acoustics import Room
+from veca_marl.sim.bullet import pybullet
 from veca_marl.sim.playground import PlaygroundCfg
 from veca_marl.sim.props import Prop, PropCfg
 from veca_marl.sim.scene import Geom, Scene, Shape
@@ -40,7 +40,7 @@ class ClockCfg:
         """Only rates that give whole blocks of samples keep sound and physics together."""
         if self.control_rate_hz <= 0 or 22050 % self.control_rate_hz:
             raise ValueError(
-                f"control_rate_hz={self.control_rate_hz} must divide 22050: 10, 15, 18, 21, 25, 30..."
+                f"control_rate_hz={self.control_rate_hz} must divide 22050: 10, 15, 18, 21, 25, 30"
             )
         if self.substeps < 1 or self.solver_iterations < 1:
             raise ValueError("substeps and solver_iterations must be at least 1")
@@ -58,6 +58,9 @@ class ClockCfg:
 
 class Mover(Protocol):
     """Whoever moves in a world by its own will."""
+
+    def reset(self) -> None:
+        """Be as when it was made: the physics was just restored."""
 
     def before_step(self) -> None:
         """Look round once per agent step, before the first substep."""
@@ -141,8 +144,10 @@ class World:
             raise RuntimeError("freeze() the world before its first reset()")
         pybullet.restoreState(self._state, physicsClientId=self.client)
         self.sound.reset(rng)
-        for prop in self._moving:
+        for prop in self.props.values():
             prop.mirror()
+        for mover in self.movers:
+            mover.reset()
 
     def refresh(self) -> None:
         """Show what was placed by hand: draw it, and let its sound spread for one step."""
@@ -195,7 +200,7 @@ class World:
         geom = Geom(
             Shape.BOX,
             half,
-            colour=tuple(look.floor_colour),
+            colour=look.floor_colour,
             offset=(0.0, 0.0, -half[2]),
             checker_m=look.floor_checker_m,
         )
@@ -203,5 +208,5 @@ class World:
         plane = pybullet.createCollisionShape(pybullet.GEOM_PLANE, physicsClientId=self.client)
         self.floor_id: int = pybullet.createMultiBody(0, plane, physicsClientId=self.client)
         pybullet.changeDynamics(
-            self.floor_id, -1, lateralFriction=0.6, restitution=0.3, physicsClientId=self.client
+            self.floor_id, -1, lateralFriction=1.0, restitution=1.0, physicsClientId=self.client
         )

@@ -40,6 +40,15 @@ class KickTheBallCfg(TaskCfg):
     loudness: float = 0.1
     weights: dict[str, float] = terms(kick=1.0, approach=0.01)
 
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        slow, fast = self.speed_mps
+        if not 0.0 < slow <= fast < math.inf:
+            raise ValueError(f"task.speed_mps={self.speed_mps} must be (least, greatest), above 0")
+        for name in ("life_s", "rest_s"):
+            if not getattr(self, name) > 0.0:
+                raise ValueError(f"task.{name}={getattr(self, name)} must be positive")
+
 
 @register
 class KickTheBall(Task):
@@ -62,6 +71,8 @@ class KickTheBall(Task):
     def build(self) -> None:
         buzz = SoundCfg(kind=SoundKind.buzz, level=self.cfg.loudness)
         self.room = self.world.playground.rooms[0]
+        self._kicked = self._scored = False
+        self._left_s = 0.0
         self.ball = self.world.add_prop(
             PropCfg(
                 name="ball",

@@ -1,0 +1,1 @@
+"""Bodies: what moves in a world by its own will."""

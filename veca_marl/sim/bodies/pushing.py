@@ -12,13 +12,13 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import pybullet
 
+from veca_marl.sim.bullet import pybullet
 from veca_marl.sim.pose import Floats
 from veca_marl.sim.props import Prop
 
 _ROUNDS = 3  # two walls of a corner and one to spare
-_SIGHT_M = 0.15  # nothing further away is reached within one agent step
+_SIGHT_M = 0.15  # how far another body or a heavy thing may shove it within one agent step
 
 
 class Pusher:
@@ -43,16 +43,17 @@ class Pusher:
         self._known = 0
         self._near: list[Prop] = []
 
-    def look_round(self, props: dict[str, Prop], position: Floats) -> None:
+    def look_round(self, props: dict[str, Prop], position: Floats, way_m: float) -> None:
         """Note which obstacles can be met within this agent step.
 
         Args:
             props: All props of the world.
             position: ``(3,)`` metres; only the horizontal part counts.
+            way_m: How far it wants to go.
         """
         if len(props) != self._known:
             self._meet(props)
-        x, y, reach = position[0], position[1], self.radius_m + _SIGHT_M
+        x, y, reach = position[0], position[1], self.radius_m + _SIGHT_M + way_m
         self._near = []
         for prop in self._obstacles:
             low, high = pybullet.getAABB(prop.body_id, physicsClientId=self._client)

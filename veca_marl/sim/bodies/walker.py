@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,11 +18,18 @@ from veca_marl.sim.bodies.looks import SHIRTS, bone_geoms
 from veca_marl.sim.bodies.mounts import EYES, gaze, organ_pose
 from veca_marl.sim.bodies.pushing import Pusher, horizontal_distance
 from veca_marl.sim.gait import Gait
+from veca_marl.sim.optics import Camera, seen_fraction
 from veca_marl.sim.pose import Floats, Pose
 from veca_marl.sim.props import Prop
-from veca_marl.sim.skeleton import forward_kinematics, load_skeleton
+from veca_marl.sim.skeleton import Soles, forward_kinematics, load_skeleton
 from veca_marl.sim.sounds import Voice
 from veca_marl.sim.world import World
+
+
+class Visible(Protocol):
+    """What eyes can look for: a prop or a body."""
+
+    object_id: int
 
 
 @dataclass
@@ -38,6 +45,7 @@ class WalkerCfg:
         push_limit_kg: Things up to this mass are pushed, heavier ones stop the walker.
         kick_reach_m: From the capsule's surface to the kicked thing's.
         kick_angle_deg: A thing farther than this to the side is not in reach of the foot.
+        kick_height_m: Nor is one whose lowest point is higher than this.
         kick_speed_mps: Speed of a kicked light thing.
         kick_impulse_ns: The most a kick can give: heavy things fly slower.
         head_pitch_deg: How far the head hangs at the start of an episode, down is positive.
@@ -52,6 +60,7 @@ class WalkerCfg:
     push_limit_kg: float = 5.0
     kick_reach_m: float = 0.15
     kick_angle_deg: float = 60.0
+    kick_height_m: float = 0.25
     kick_speed_mps: float = 3.0
     kick_impulse_ns: float = 3.0
     head_pitch_deg: float = 12.0
@@ -82,24 +91,20 @@ class Walker:
         self.object_id = drawn.id
         self._drawn = drawn
         self._head = self._skeleton.bone("head")
-        self._feet = [self._skeleton.bone(f"{side}_foot") for side in "lr"]
+        self._soles = Soles(self._skeleton)
         self.own_head_frames = (self._skeleton.bone("neck"), self._head)
-        self._sole_m = -min(
-            part.centre[2] - part.half[2]
-            for part in self._skeleton.bones[self._feet[0]].colliders
-            if hasattr(part, "half")
-        )
         self._voice = Voice(world.sound.sample_rate_hz)
         self._mouth = world.sound.add_source(f"{name}.voice", self._voice)
+        self.camera = Camera()
         world.attach(self)
-        self.place((0.0, 0.0, 0.0))
+        self.reset()
 
     # ---- where it is
 
     @property
     def position(self) -> Floats:
         """``(3,)`` metres: the pelvis in the world frame."""
-        return self._drawn.positions[0].copy()
+        return np.array(self._drawn.positions[0])
 
     @property
     def velocity(self) -> Floats:
@@ -130,8 +135,16 @@ class Walker:
         return organ
 
     def place(self, position: Floats | tuple[float, float, float], yaw_rad: float = 0.0) -> None:
-        """Start anew: stand at a place of the floor, facing `yaw_rad`, looking ahead."""
+        """Start anew: stand at a place of the floor, facing `yaw_rad`, looking ahead.
+
+        In a place that is taken by a wall or by something heavy it is pushed out to the side.
+
+        Raises:
+            ValueError: If a number is not finite.
+        """
         self._ground = np.array([float(position[0]), float(position[1])])
+        if not (np.isfinite(self._ground).all() and math.isfinite(yaw_rad)):
+            raise ValueError(f"{self.name}: cannot stand at {position!r}, facing {yaw_rad!r} rad")
         self.yaw_rad = float(yaw_rad)
         self._speed_mps = self._turn_radps = 0.0
         self._velocity = np.zeros(3)
@@ -140,7 +153,8 @@ class Walker:
         self._gaze_point: Floats | None = None
         self.focal_distance_m = math.inf
         self._gait.reset()
-        self._pusher.move(self._ground[0], self._ground[1])
+        self._pusher.look_round(self._world.props, self._ground, 0.0)
+        self._ground[:] = self._pusher.move(self._ground[0], self._ground[1])
         self._pusher.tell_velocity(0.0, 0.0, 0.0)
         self._step_start = self._ground.copy()
         self._pose_bones()
@@ -151,9 +165,7 @@ class Walker:
     def act(self, action: NDArray[Any]) -> None:
         """Walk as an action row says; it holds until the next call."""
         forward, turn = self.control.decode(action)
-        self.walk(
-            forward * self.cfg.walk_speed_mps, turn * math.radians(self.cfg.turn_speed_degps)
-        )
+        self.walk(forward * self.cfg.walk_speed_mps, turn * math.radians(self.cfg.turn_speed_degps))
 
     def walk(self, walk_speed_mps: float, turn_speed_radps: float) -> None:
         """Walk forward (backward when negative) and turn (left when positive) until told anew."""
@@ -172,6 +184,7 @@ class Walker:
             light
             and gap <= self.cfg.kick_reach_m
             and aside <= math.radians(self.cfg.kick_angle_deg)
+            and prop.lowest_m <= self.cfg.kick_height_m
         )
 
     def kick(self, prop: Prop) -> bool:
@@ -188,11 +201,13 @@ class Walker:
 
     def rotate_up_down_head(self, deg: float) -> None:
         """Turn the head down (up when negative) by so many degrees, as far as the neck allows."""
+        _check_degrees(deg)
         low, high = self._gait.pitch_range_rad
         self._head_pitch_rad = min(max(self._head_pitch_rad + math.radians(deg), low), high)
 
     def rotate_left_right_head(self, deg: float) -> None:
         """Turn the head right (left when negative) by so many degrees, as the neck allows."""
+        _check_degrees(deg)
         low, high = self._gait.yaw_range_rad
         self._head_yaw_rad = min(max(self._head_yaw_rad - math.radians(deg), low), high)
 
@@ -217,12 +232,32 @@ class Walker:
         """Say something: samples at 22 050 Hz, heard by everyone, the speaker included."""
         self._voice.say(waveform)
 
+    def is_visible(self, thing: Visible, eye: str = "eye_left") -> bool:
+        """Say whether an eye sees a thing, also through glass (the paper's `isVisible`).
+
+        Args:
+            thing: A prop or a body.
+            eye: ``eye_left`` or ``eye_right``; it sees through `camera`, by default as sharply as
+                the vision sense does.
+        """
+        if eye not in EYES:
+            raise ValueError(f"no eye {eye!r}; there are {list(EYES)}")
+        scene = self._world.scene
+        own_head = scene.hidden(self.object_id, self.own_head_frames)
+        views = self.camera.render(scene, [self.mount(eye)], own_head)
+        return seen_fraction(views, thing.object_id) > 0.0
+
     # ---- the world moves it
+
+    def reset(self) -> None:
+        """Stand where it was built, say nothing. The task usually puts it elsewhere."""
+        self.place((0.0, 0.0, 0.0))
 
     def before_step(self) -> None:
         """Note what it could bump into during this agent step."""
         self._step_start = self._ground.copy()
-        self._pusher.look_round(self._world.props, self._step_start)
+        way_m = abs(self._speed_mps) * self._world.clock.step_s
+        self._pusher.look_round(self._world.props, self._step_start, way_m)
 
     def before_substep(self, substep_s: float) -> None:
         """Walk on by one physics step, as far as obstacles and other walkers allow."""
@@ -265,5 +300,9 @@ class Walker:
         rotations[0] = ((c, -s, 0.0), (s, c, 0.0), (0.0, 0.0, 1.0))
         angles = self._gait.pose(self._head_pitch_rad, self._head_yaw_rad)
         forward_kinematics(self._skeleton, angles, positions, rotations)
-        left, right = self._feet
-        positions[:, 2] += self._sole_m - min(positions[left, 2], positions[right, 2])
+        positions[:, 2] -= self._soles.lowest_m(positions, rotations)
+
+
+def _check_degrees(deg: float) -> None:
+    if not math.isfinite(deg):
+        raise ValueError(f"cannot turn the head by {deg} degrees")

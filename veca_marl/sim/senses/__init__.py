@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 from veca_marl.sim.bodies.base import Body
@@ -38,7 +38,7 @@ def give_senses(
     Raises:
         ValueError: If there is no sense of a name.
     """
-    makers = {
+    makers: dict[str, Callable[[], Sense]] = {
         "vision": lambda: VisionSense(cfg.vision, body, world.scene),
         "audio": lambda: AudioSense(cfg.audio, body, world.sound),
     }
