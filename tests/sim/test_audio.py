@@ -133,6 +133,22 @@ def test_stereo_hears_at_the_bodys_own_ears():
     assert level[0] / level[1] == pytest.approx(distance[1] / distance[0], rel=0.01)
 
 
+def test_it_does_not_matter_how_the_head_was_turned_at_birth():
+    heard = []
+    for at_birth in (0.0, 2.0):
+        body = Dummy()
+        body.rotation = yaw(at_birth)
+        field = SoundField(None, STEP, RATE)
+        field.add_source("noise", Noise(0.1, RATE)).position = (0.4, 0.5, 0.0)
+        sense = AudioSense(AudioCfg(quality=AudioQuality.stereo), body, field)
+        body.rotation = yaw(0.5)
+        field.reset(np.random.default_rng(0))
+        sense.reset()
+        field.advance()
+        heard.append(sense.read()["audio"])
+    assert np.allclose(heard[0], heard[1], atol=1e-3)
+
+
 def test_louder_ear_is_the_near_one():
     for quality in (AudioQuality.hrtf, AudioQuality.stereo):
         scene = Scene(buzz_at(150.0), quality=quality)

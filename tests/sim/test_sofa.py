@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import scipy.signal
 
 from veca_marl.sim import sofa
 from veca_marl.sim.acoustics import SPEED_OF_SOUND_MPS
@@ -101,6 +102,21 @@ def test_polarity_does_not_matter(fields, head, tmp_path):
     found = condition(read_sofa(write(tmp_path / "inverted.sofa", inverted)), 22_050)
     assert np.allclose(found.filters, head.filters, atol=1e-6)
     assert np.allclose(found.arrival_s, head.arrival_s, atol=1e-9)
+
+
+def test_the_loudspeaker_is_taken_out(fields, head, tmp_path):
+    """One that is mute below 150 Hz and dull above 3 kHz; the head behind it is the same."""
+    mute = scipy.signal.butter(2, 150.0, "highpass", fs=FILE_RATE, output="sos")
+    dull = scipy.signal.butter(1, 3000.0, "lowpass", fs=FILE_RATE, output="sos")
+    coloured = scipy.signal.sosfilt(np.concatenate([mute, dull]), fields["Data.IR"])
+    path = write(tmp_path / "coloured.sofa", {**fields, "Data.IR": coloured})
+    found = condition(read_sofa(path), 22_050)
+    hertz = np.fft.rfftfreq(1024, 1.0 / 22_050)
+    heard = (hertz > 40.0) & (hertz < 8000.0)
+    ratio = np.abs(np.fft.rfft(found.filters, 1024) / np.fft.rfft(head.filters, 1024))
+    assert np.abs(20.0 * np.log10(ratio[..., heard])).max() < 2.0
+    low = np.abs(np.fft.rfft(found.filters, 1024))[..., (hertz > 20.0) & (hertz < 120.0)]
+    assert np.abs(20.0 * np.log10(low)).max() < 1.5
 
 
 def test_delays_may_stand_in_their_own_field(head, tmp_path):

@@ -159,6 +159,18 @@ def test_silence_returns_exactly_after_a_sound():
     assert not heard[:, -3 * STEP :].any()
 
 
+def test_the_last_echo_is_heard_to_its_end():
+    """From one end of a corridor to the other, and there and back again."""
+    sound = np.concatenate([noise(300), np.zeros(3700, np.float32)])
+    corridor = acoustics.Room((0.0, 0.0, 0.0), (8.0, 1.0, 1.0), 1.0)
+    head = Pose(np.array([7.9, 0.5, 0.5]), yaw(0.3))
+    scene = {"quality": "mono", "room": corridor, "order": 2}
+    source = [(0.1, 0.5, 0.5)]
+    once = render_still([sound], source, head, step=4000, **scene)
+    assert np.abs(once[:, 1550:1850]).max() > 0.01
+    assert ratio_db(once, render_still([sound], source, head, step=50, **scene)) > 110.0
+
+
 def test_silent_sources_do_not_change_a_byte():
     sound = noise(4 * STEP)
     silent = [np.zeros_like(sound)] * 3
@@ -284,6 +296,19 @@ def test_sources_at_the_ear_and_outside_the_room_stay_finite():
             heard = render_still([sound], [position], quality=quality, **IN_ROOM)
             assert np.isfinite(heard).all()
             assert np.abs(heard).max() < 50.0
+
+
+@pytest.mark.parametrize("quality", QUALITIES)
+def test_what_is_outside_the_room_is_heard_as_just_inside(quality):
+    sound, outside = noise(4 * STEP), np.array([9.0, -0.5, 1.2])
+    inside = room().clamp(outside)
+    heard = [
+        render_still([sound], [place], quality=quality, **IN_ROOM) for place in (outside, inside)
+    ]
+    assert heard[0].tobytes() == heard[1].tobytes()
+    heads = [Pose(place, HEAD.rotation) for place in (outside, inside)]
+    heard = [render_still([sound], SOURCES[:1], head, quality=quality, **IN_ROOM) for head in heads]
+    assert heard[0].tobytes() == heard[1].tobytes()
 
 
 def test_further_than_the_reach_is_late_only_by_the_reach():

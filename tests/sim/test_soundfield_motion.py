@@ -8,7 +8,7 @@ from listening import RATE, STEP, STILL, noise, ratio_db, render, spatialisation
 from veca_marl.sim import acoustics
 from veca_marl.sim.pose import Pose
 from veca_marl.sim.soundfield import SoundField
-from veca_marl.sim.sounds import Clip
+from veca_marl.sim.sounds import Clip, Voice
 
 LATENCY = SoundField().latency_samples
 
@@ -60,6 +60,32 @@ def test_moving_and_turning_does_not_click():
     high_pass = scipy.signal.butter(8, 2000.0, "highpass", fs=RATE, output="sos")
     clicks = scipy.signal.sosfilt(high_pass, heard, axis=1)[:, 500:]
     assert 20 * np.log10(np.abs(clicks).max() / np.abs(heard).max()) < -70.0
+
+
+def test_what_moved_in_silence_begins_anew_where_it_is():
+    """Otherwise its first word would sweep along the way it went unheard."""
+    voice, word = Voice(RATE), noise(3 * STEP)
+    field = SoundField(None, STEP, RATE)
+    mouth = field.add_source("mouth", voice)
+    listener = field.add_listener(spatialisation("mono"))
+
+    def hear(n_steps):
+        heard = []
+        for _ in range(n_steps):
+            field.advance()
+            heard.append(listener.render(STILL))
+        return np.concatenate(heard, axis=1)
+
+    field.reset(np.random.default_rng(0))
+    mouth.position = (1.0, 0.0, 0.0)
+    voice.say(word)
+    assert not hear(20)[:, -STEP:].any()
+    mouth.position = (2.5, 0.0, 0.0)
+    voice.say(word)
+    moved = hear(4)
+    field.reset(np.random.default_rng(0))
+    voice.say(word)
+    assert ratio_db(hear(4), moved) > 110.0
 
 
 @pytest.mark.parametrize("how", ["teleport", "too fast to fly"])
