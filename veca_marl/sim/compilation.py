@@ -3,15 +3,21 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable
 from functools import cache
 
 from numba.core.event import Event, Listener, register
 
 
 class CompilationNotice(Listener):
-    """Writes one line when the first of our kernels is compiled; a cached one is not compiled."""
+    """Says so when the first of our kernels is compiled; a cached one is not compiled.
 
-    def __init__(self) -> None:
+    Args:
+        tell: Takes the line.
+    """
+
+    def __init__(self, tell: Callable[[str], object]) -> None:
+        self._tell = tell
         self._told = False
 
     def on_start(self, event: Event) -> None:
@@ -19,7 +25,7 @@ class CompilationNotice(Listener):
         module: str = event.data["dispatcher"].py_func.__module__
         if not self._told and module.startswith("veca_marl."):
             self._told = True
-            print("compiling kernels (once; they are cached) ...", file=sys.stderr)  # noqa: T201
+            self._tell("compiling kernels (once; they are cached) ...")
 
     def on_end(self, event: Event) -> None:
         """See `numba.core.event.Listener`."""
@@ -31,4 +37,8 @@ def announce_compilation() -> None:
 
     It listens to numba's compiler, so that compiled kernels cost nothing more.
     """
-    register("numba:compile", CompilationNotice())  # type: ignore[no-untyped-call]
+    register("numba:compile", CompilationNotice(_to_stderr))  # type: ignore[no-untyped-call]
+
+
+def _to_stderr(line: str) -> None:
+    print(line, file=sys.stderr)  # noqa: T201
