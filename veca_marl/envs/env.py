@@ -95,15 +95,10 @@ class VecaEnv(EnvBase):
         return self._start.tensordict(arrays)
 
     def _step(self, tensordict: TensorDictBase) -> TensorDict:
-        actions = {team: self._actions(team, tensordict) for team in self._teams}
+        self._command({team: self._actions(team, tensordict) for team in self._teams})
         arrays = self._next.new()
         for world, game in enumerate(self.games):
-            rows = {
-                name: actions[team][world, index]
-                for team, names in self.group_map.items()
-                for index, name in enumerate(names)
-            }
-            outcome = self._play(world, game, rows)
+            outcome = game.advance(self._rngs[world])
             self._observe(world, arrays)
             self._score(world, arrays, outcome)
         return self._next.tensordict(arrays)
@@ -126,11 +121,18 @@ class VecaEnv(EnvBase):
             )
         return action.numpy(force=True)
 
-    def _play(self, world: int, game: Game, rows: dict[str, NDArray[Any]]) -> Outcome:
-        try:
-            return game.step(rows, self._rngs[world])
-        except ValueError as error:
-            raise ValueError(f"world {world}, {error}") from None
+    def _command(self, actions: dict[str, NDArray[Any]]) -> None:
+        """Hand the actions out in all worlds before any of them moves."""
+        for world, game in enumerate(self.games):
+            rows = {
+                name: actions[team][world, index]
+                for team, names in self.group_map.items()
+                for index, name in enumerate(names)
+            }
+            try:
+                game.command(rows)
+            except ValueError as error:
+                raise ValueError(f"world {world}, {error}") from None
 
     def _observe(self, world: int, arrays: Arrays) -> None:
         """Let all players of a world perceive."""

@@ -105,20 +105,34 @@ class Game:
         self.world.refresh()
 
     def step(self, actions: dict[str, NDArray[Any]], rng: np.random.Generator) -> Outcome:
-        """Play one agent step.
+        """Play one agent step: `command`, then `advance`."""
+        self.command(actions)
+        return self.advance(rng)
+
+    def command(self, actions: dict[str, NDArray[Any]]) -> None:
+        """Tell all players what to do, before anything moves.
 
         Args:
             actions: One action row per player, by player name, as its body's `action_spec` says.
-            rng: The game's source of randomness.
 
         Raises:
-            ValueError: If an action is not finite or out of range; nothing has moved then.
+            ValueError: If an action is impossible, or the players are others.
         """
+        names = [player.name for player in self.players]
+        if set(actions) != set(names):
+            raise ValueError(f"actions for {sorted(actions)}; the players are {names}")
         for player in self.players:
             try:
                 player.body.act(actions[player.name])
             except ValueError as error:
                 raise ValueError(f"{player.name}: {error}") from None
+
+    def advance(self, rng: np.random.Generator) -> Outcome:
+        """Let one agent step pass, with the players doing what they were told last.
+
+        Args:
+            rng: The game's source of randomness.
+        """
         self.task.before_step(rng)
         self.world.step()
         self.task.after_step(rng)

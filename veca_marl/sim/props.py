@@ -53,7 +53,7 @@ class PropCfg:
         mass_kg: 0 makes it a fixed part of the world.
         friction: Sliding friction coefficient (Coulomb) on the floor. Bullet multiplies those of
             two things that touch; the floor's is 1.
-        rolling_friction: Arm of the rolling resistance on the floor, metres.
+        rolling_friction: Arm of the resistance to rolling and to spinning on the floor, metres.
         restitution: 0 (dead) to 1 (bounces back with equal speed) on the floor; multiplied as
             well, the floor's is 1.
         colour: Red, green, blue in [0, 1].
@@ -187,9 +187,10 @@ class Prop:
             -1,
             lateralFriction=cfg.friction,
             rollingFriction=cfg.rolling_friction,
+            spinningFriction=cfg.rolling_friction,
             restitution=cfg.restitution,
             linearDamping=0.0,
-            angularDamping=0.05,
+            angularDamping=0.0,  # only friction slows things down
             physicsClientId=client,
         )
         self.place(cfg.position_m, math.radians(cfg.yaw_deg))

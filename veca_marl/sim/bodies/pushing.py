@@ -26,13 +26,16 @@ class Pusher:
 
     def __init__(self, client: int, radius_m: float, height_m: float, push_limit_kg: float) -> None:
         self.radius_m = radius_m
-        self.centre_height_m = height_m / 2 + 0.005  # a hair above the floor
+        # the lower cap is beneath the floor, which it does not meet: round feet would press what
+        # they push into the ground
+        length_m = height_m - radius_m
+        self.centre_height_m = length_m / 2
         self._client = client
         self._push_limit_kg = push_limit_kg
         shape = pybullet.createCollisionShape(
             pybullet.GEOM_CAPSULE,
             radius=radius_m,
-            height=height_m - 2 * radius_m,
+            height=length_m,
             physicsClientId=client,
         )
         self.body_id: int = pybullet.createMultiBody(0, shape, physicsClientId=client)
