@@ -36,7 +36,7 @@ _FLOOR_TOLERANCE_M = 0.01
 _SPHERE, _BOX, _CYLINDER = int(Shape.SPHERE), int(Shape.BOX), int(Shape.CYLINDER)
 
 
-@njit(cache=True, error_model="numpy", fastmath=True)
+@njit(cache=True, error_model="numpy")
 def darken_contacts(
     geoms: GeomTable,
     casting: Bools,
@@ -67,7 +67,7 @@ def darken_contacts(
         _darken(geoms, g, rectangle, view, lens, depth, surfaces, lights)
 
 
-@njit(cache=True, error_model="numpy", fastmath=True)
+@njit(cache=True, error_model="numpy")
 def _floor_rectangle(position: Floats, around: float, view: Floats, lens: Lens) -> Rectangle:
     """Pixels that may show a square of the floor below a point."""
     ex, ey, ez = position[0] - view[0, 0], position[1] - view[0, 1], -view[0, 2]
@@ -84,7 +84,7 @@ def _floor_rectangle(position: Floats, around: float, view: Floats, lens: Lens) 
     return pixel_rectangle(across, upward, lens)
 
 
-@njit(cache=True, error_model="numpy", fastmath=True)
+@njit(cache=True, error_model="numpy")
 def _darken(
     geoms: GeomTable,
     g: int,
@@ -116,7 +116,7 @@ def _darken(
             lights[j, i] *= single(1.0 - DARKNESS * nearness * nearness)
 
 
-@njit(cache=True, error_model="numpy", fastmath=True)
+@njit(cache=True, error_model="numpy")
 def distance_to(shape: int, size: NDArray[np.float32], point: Vector) -> float:
     """Metres from a point in a primitive's own axes to its surface; not positive within it."""
     x, y, z = abs(point[0]), abs(point[1]), abs(point[2])

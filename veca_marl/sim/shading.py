@@ -37,7 +37,7 @@ _AMBIENT, _DIRECT, _BOUNCE = single(AMBIENT), single(1.0 - AMBIENT), single(BOUN
 _TILE_SHIFT = 0.01
 
 
-@njit(cache=True, error_model="numpy", fastmath=True)
+@njit(cache=True, error_model="numpy")
 def paint_sky(lens: Lens, rgb: Images) -> None:
     """Fill a picture ``(H, W, 3)`` with a sky that is lighter towards the top."""
     for j in range(rgb.shape[0]):
@@ -48,7 +48,7 @@ def paint_sky(lens: Lens, rgb: Images) -> None:
                 rgb[j, i, c] = value
 
 
-@njit(cache=True, error_model="numpy", fastmath=True)
+@njit(cache=True, error_model="numpy")
 def paint(
     geoms: GeomTable, surfaces: Surfaces, lights: Lights, opacity: float, rgb: Images
 ) -> None:
@@ -73,7 +73,7 @@ def paint(
                 rgb[j, i, c] = np.uint8(min(mixed, _255) + _HALF)
 
 
-@njit(cache=True, error_model="numpy", fastmath=True)
+@njit(cache=True, error_model="numpy")
 def illuminate(
     geoms: GeomTable, view: Floats, lens: Lens, depth: Depths, surfaces: Surfaces, lights: Lights
 ) -> None:
@@ -102,7 +102,7 @@ def illuminate(
                 _tile_run(view, lens.rows[j], columns, run, geoms.checkers[g], lights[j, first:end])
 
 
-@njit(cache=True, error_model="numpy", fastmath=True)
+@njit(cache=True, error_model="numpy")
 def _light_run(
     geoms: GeomTable,
     g: int,
@@ -129,7 +129,7 @@ def _light_run(
         lights[i] = _AMBIENT + _DIRECT * max(facing, _0) + _BOUNCE * max(-facing, _0)
 
 
-@njit(cache=True, error_model="numpy", fastmath=True)
+@njit(cache=True, error_model="numpy")
 def _local_normal(shape: int, size: Lights, point: Vector) -> Vector:
     """Outward unit normal in a primitive's own axes."""
     x, y, z = point
@@ -156,7 +156,7 @@ def _local_normal(shape: int, size: Lights, point: Vector) -> Vector:
     return x / radius, y / radius, (z - along) / radius
 
 
-@njit(cache=True, error_model="numpy", fastmath=True)
+@njit(cache=True, error_model="numpy")
 def _tile_run(
     view: Floats, y: float, columns: Depths, depth: Depths, edge_m: float, lights: Lights
 ) -> None:
