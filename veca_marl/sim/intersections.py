@@ -8,7 +8,7 @@ Quadrics are solved with the discriminant ``a r^2 - |eye x ray|^2`` instead of `
 are equal, but the second is the small difference of two large numbers, and a finger seen from
 across a room drowns in its rounding. Boxes use the slab test (Kay & Kajiya, SIGGRAPH 1986).
 
-No `fastmath` here, in `shading` or in `contact_shadows`: it lets every optimisation round in its own
+No `fastmath` here, in `shading` or in `contact_shadows`: it lets each optimisation round in its own
 way, and a kernel fresh from the compiler then differs in the last bit from itself out of the cache.
 Same seed, same bytes costs about a twentieth of the time.
 """
