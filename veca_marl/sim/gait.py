@@ -33,7 +33,7 @@ class GaitCfg:
         sink_m: How much lower the pelvis is at full stride.
         bob_m: Amplitude of its rise and fall, twice per stride.
         lift_m: Height of a foot in mid swing at full stride.
-        toe_rad: How far the toes hang early in the swing, and rise late.
+        toe_rad: How far the toes hang in mid swing.
         arm_swing_rad: Amplitude of the upper arm at full stride.
         elbow_rad: Flexion of the elbows.
         settle_s: Time constant with which the stride follows a change of speed.
@@ -48,7 +48,7 @@ class GaitCfg:
     sink_m: float = 0.010
     bob_m: float = 0.008
     lift_m: float = 0.045
-    toe_rad: float = 0.3
+    toe_rad: float = 0.35
     arm_swing_rad: float = 0.5
     elbow_rad: float = 0.5
     settle_s: float = 0.08
@@ -156,8 +156,8 @@ class Gait:
         if not on_floor:
             flight = (phase - _CARRYING) / (1.0 - _CARRYING)
             along = -0.5 * math.cos(math.pi * flight)
-            lift = self.cfg.lift_m * share * math.sin(math.pi * flight)
-            toes = -self.cfg.toe_rad * share * math.sin(2.0 * math.pi * flight)
+            height = share * math.sin(math.pi * flight)
+            lift, toes = self.cfg.lift_m * height, -self.cfg.toe_rad * height
         way_m = self._carrying_s() * (self._speed_mps - self._turn_radps * self._hip_y_m[side])
         self._lead_foot(side, self.cfg.step_centre_m * share + way_m * along, lift, toes)
         twist = self._carrying_s() * self._turn_radps * along
