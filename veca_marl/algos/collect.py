@@ -96,7 +96,9 @@ class Experience:
 
     def close(self) -> None:
         """End the worker processes and close the worlds."""
+        threads = torch.get_num_threads()
         self._collector.shutdown()
+        torch.set_num_threads(threads)  # torchrl adds one for each worker that ended
 
 
 @contextmanager

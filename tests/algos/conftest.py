@@ -1,0 +1,28 @@
+"""Small networks on a busy machine: threads that wait for each other cost more than they give."""
+
+import logging
+
+import pytest
+import torch
+from fake_env import FakeEnv
+
+from veca_marl.algos.networks import NetworkCfg
+from veca_marl.algos.ppo import PPO, PPOCfg
+from veca_marl.algos.specs import team_specs
+
+SMALL = NetworkCfg(channels=[4, 8, 8], vector_features=16, trunk_features=32)
+
+
+@pytest.fixture(autouse=True, scope="session")
+def one_thread():
+    torch.set_num_threads(1)
+    logging.getLogger("torchrl").setLevel(logging.WARNING)
+
+
+@pytest.fixture
+def make_ppo():
+    def make(seed=0, network=SMALL, **env):
+        torch.manual_seed(seed)
+        return PPO(team_specs(FakeEnv(1, **env)), PPOCfg(network=network), torch.device("cpu"))
+
+    return make

@@ -1,0 +1,93 @@
+"""The loss that TorchRL computes for us against the formulas written by hand."""
+
+import pytest
+import torch
+from fake_env import FakeEnv
+from torch.distributions import Categorical, Normal, kl_divergence
+from torchrl.envs import ExplorationType, set_exploration_type
+
+
+def perturb(ppo, scale=0.05):
+    """Move the policy off the one that acted, so that ratios and divergences are not trivial."""
+    torch.manual_seed(1)
+    with torch.no_grad():
+        for p in ppo.policy.parameters():
+            p.add_(scale * torch.randn_like(p))
+
+
+def minibatch(ppo, agents, **env):
+    with torch.no_grad(), set_exploration_type(ExplorationType.RANDOM):
+        batch = FakeEnv(8, agents=agents, **env).rollout(
+            16, ppo.policy, break_when_any_done=False, auto_cast_to_device=False
+        )
+    return ppo.prepare(batch)
+
+
+@pytest.mark.parametrize("discrete", [False, True])
+@pytest.mark.parametrize("agents", [1, 2])
+def test_loss_equals_the_formula(make_ppo, discrete, agents):
+    ppo = make_ppo(discrete=discrete, agents=agents)
+    rows = minibatch(ppo, agents, discrete=discrete)
+    perturb(ppo, scale=0.2)
+    learner = ppo.learners["agents"]
+    out = learner.loss(rows)
+
+    team = rows["agents"]
+    with torch.no_grad():
+        features = learner.network.trunk(rows.clone())["agents", "features"]
+        value = learner.network.critic.module(features)
+        new = learner.network.actor.get_dist(rows.clone())
+    advantage = team["advantage"]
+    advantage = (advantage - advantage.mean(0)) / advantage.std(0)  # each agent by itself
+    ratio = (new.log_prob(team["action"]) - team["action_log_prob"]).exp().unsqueeze(-1)
+    clipped = ratio.clamp(0.8, 1.2)
+    objective = -torch.minimum(ratio * advantage, clipped * advantage).mean()
+    torch.testing.assert_close(out["loss_objective"], objective, rtol=1e-4, atol=1e-5)
+    critic = 0.5 * ((team["value_target"] - value) ** 2).mean()
+    torch.testing.assert_close(out["loss_critic"].detach(), critic, rtol=1e-4, atol=1e-5)
+    outside = ((ratio < 0.8) | (ratio > 1.2)).float().mean()
+    torch.testing.assert_close(out["clip_fraction"], outside, rtol=0.0, atol=0.02)
+    assert outside > 0.02, "the test must see clipped ratios"
+    if discrete:
+        entropy = new.entropy().mean()
+        torch.testing.assert_close(out["entropy"], entropy, rtol=1e-4, atol=1e-5)
+        torch.testing.assert_close(out["loss_entropy"].detach(), -0.03 * entropy)
+
+
+@pytest.mark.parametrize("discrete", [False, True])
+def test_reported_divergence_is_exact(make_ppo, discrete):
+    """Pins the private hook of TorchRL that `ExactKLPPOLoss` overrides."""
+    ppo = make_ppo(discrete=discrete)
+    rows = minibatch(ppo, 1, discrete=discrete)
+    learner = ppo.learners["agents"]
+    assert learner.loss(rows)["kl_approx"] == pytest.approx(0.0, abs=1e-6)
+    perturb(ppo)
+    reported = learner.loss(rows)["kl_approx"]
+
+    team = rows["agents"]
+    with torch.no_grad():
+        now = learner.network.actor.get_dist_params(rows.clone())["agents"]
+    if discrete:
+        exact = kl_divergence(Categorical(logits=team["logits"]), Categorical(logits=now["logits"]))
+    else:  # the tanh is the same bijection on both sides and drops out
+        old, new = Normal(team["loc"], team["scale"]), Normal(now["loc"], now["scale"])
+        exact = kl_divergence(old, new).sum(-1)
+    assert reported > 1e-4
+    torch.testing.assert_close(reported, exact.mean(), rtol=1e-4, atol=1e-6)
+
+
+def test_value_head_alone_as_critic_gives_the_gradient_of_the_whole(make_ppo):
+    """The features the critic reads are those of this forward pass, with their gradient."""
+    ppo = make_ppo()
+    rows = minibatch(ppo, 1)
+    learner = ppo.learners["agents"]
+    first_layer = learner.network.trunk.module.encoders["vision"].layers[0].weight
+
+    learner.loss(rows)["loss_critic"].backward()
+    shared = first_layer.grad.clone()
+    first_layer.grad = None
+    features = learner.network.trunk(rows.clone())["agents", "features"]
+    error = rows["agents", "value_target"] - learner.network.critic.module(features)
+    (0.5 * error.square().mean()).backward()
+    torch.testing.assert_close(shared, first_layer.grad)
+    assert shared.abs().max() > 0
