@@ -4,8 +4,8 @@ import math
 import pytest
 import torch
 from fake_env import FakeEnv
-from tensordict import TensorDict
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
+from tensordict import TensorDict
 
 from veca_marl.algos.metrics import (
     CsvReporter,

@@ -1,0 +1,143 @@
+import subprocess
+import sys
+from itertools import chain
+
+import pytest
+import yaml
+from omegaconf import OmegaConf
+
+from veca_marl.config import CONF, Config, compose, compose_node
+from veca_marl.config_errors import ConfigError
+from veca_marl.envs.task import TASKS
+from veca_marl.sim.senses import SensesCfg
+from veca_marl.sim.senses.audio import AudioQuality
+
+KICK = "+task=KickTheBall"
+GROUPS = ["algo", "body", "collect", "log", "playground", "senses/audio", "senses/vision"]
+PRESETS = [(g, path.stem) for g in GROUPS for path in sorted((CONF / g).glob("*.yaml"))]
+EXPERIMENTS = sorted(path.stem for path in (CONF / "experiment").glob("*.yaml"))
+
+
+@pytest.mark.parametrize("task", sorted(TASKS))
+def test_every_task_composes_to_its_own_type(task):
+    cfg = compose([f"+task={task}"])
+    assert type(cfg.task) is TASKS[task].cfg_type()
+    assert cfg.task.name == task
+
+
+def test_every_task_has_a_file_and_every_file_a_task():
+    assert {path.stem for path in (CONF / "task").glob("*.yaml")} == set(TASKS)
+
+
+@pytest.mark.parametrize(("group", "preset"), PRESETS)
+def test_every_preset_composes(group, preset):
+    assert isinstance(compose([KICK, f"{group}={preset}"]), Config)
+
+
+@pytest.mark.parametrize("name", EXPERIMENTS)
+def test_every_experiment_composes(name):
+    assert isinstance(compose([f"+experiment={name}"]), Config)
+
+
+def test_experiments_may_take_another_seed_and_sense():
+    cfg = compose(["+experiment=audio_ablation", "senses/audio=mono", "seed=4"])
+    assert (cfg.senses.audio.quality, cfg.seed) == (AudioQuality.mono, 4)
+
+
+def test_no_file_is_forgotten():
+    files = {path.relative_to(CONF).as_posix() for path in CONF.rglob("*.yaml")}
+    tested = {f"{g}/{p}.yaml" for g, p in PRESETS} | {f"experiment/{n}.yaml" for n in EXPERIMENTS}
+    assert files - tested - {f"task/{name}.yaml" for name in TASKS} == {"config.yaml"}
+
+
+@pytest.mark.parametrize("path", sorted(CONF.rglob("*.yaml")), ids=lambda p: p.stem)
+def test_no_preset_is_called_what_yaml_reads_as_a_boolean(path):
+    assert isinstance(yaml.safe_load(path.stem), str)
+
+
+def test_files_hold_only_what_differs_from_the_dataclasses():
+    for sense in ("audio", "vision"):
+        default = OmegaConf.structured(SensesCfg())[sense]
+        for path in (CONF / "senses" / sense).glob("*.yaml"):
+            for key, value in (OmegaConf.load(path) or {}).items():
+                merged = OmegaConf.merge({"x": default}, {"x": {key: value}})
+                assert merged.x[key] != default[key], f"{path} restates {key}"
+
+
+@pytest.mark.parametrize(
+    ("overrides", "message"),
+    [
+        ([], r"no task: add \+task=NAME; choices: .*KickTheBall"),
+        (["task=KickTheBall"], r"task has no default to replace: write \+task=KickTheBall"),
+        (
+            ["+task=KickTheBal"],
+            r"unknown task 'KickTheBal' \(did you mean KickTheBall\?\); choices",
+        ),
+        ([KICK, "seed=abc"], r"seed: Value 'abc' of type 'str' could not be converted to Integer"),
+        ([KICK, "task.life_s=x"], r"task.life_s: Value 'x' .* could not be converted to Float"),
+        ([KICK, "sede=1"], r"unknown key 'sede' \(did you mean seed\?\); choices: .*playground"),
+        ([KICK, "+sede=1"], r"unknown key 'sede'; choices: .*playground"),
+        ([KICK, "+algo.clipp=1"], r"unknown key 'algo.clipp'; choices: clip, .*gamma"),
+        ([KICK, "task.kick_reech=1"], r"unknown key 'task.kick_reech'.*; choices: life_s"),
+        ([KICK, "task.weights.kik=1"], r"unknown key 'task.weights.kik' .*choices: approach, kick"),
+        (
+            [KICK, "senses/audio=off"],
+            r"unknown senses/audio 'off'; choices: deaf, hrtf, mono, ster",
+        ),
+        ([KICK, "playground=hose"], r"unknown playground 'hose'.*; choices: .*single_room"),
+        ([KICK, "senses.audio.quality=loud"], r"'loud', expected one of \[hrtf, stereo, mono\]"),
+        ([KICK, "algo.clip=-1"], r"algo.clip must be positive, got -1.0"),
+        ([KICK, "task.name=Nim"], r"unknown task 'Nim'; there are \['KickTheBall'"),
+        ([KICK, "total_frames=0"], r"total_frames must be at least 1, got 0"),
+        ([KICK, "see d=1"], r"see d=1"),
+    ],
+)
+def test_what_is_wrong_is_said_in_one_line(overrides, message):
+    with pytest.raises(ConfigError, match=message) as caught:
+        compose(overrides)
+    assert "\n" not in str(caught.value)
+
+
+def test_compose_forgets_the_last_call():
+    assert compose([KICK, "seed=5"]).seed == 5
+    assert compose([KICK]).seed == 0
+    with pytest.raises(ConfigError):
+        compose([KICK, "seed=x"])
+    assert compose([KICK]) == compose([KICK])
+
+
+def test_node_and_dataclasses_agree():
+    assert (
+        compose_node([KICK, "algo.clip=0.3"]).algo.clip
+        == compose([KICK, "algo.clip=0.3"]).algo.clip
+    )
+
+
+def test_compose_works_inside_a_running_hydra_application(tmp_path):
+    app = tmp_path / "app.py"
+    app.write_text(
+        "import hydra\n"
+        "from hydra.core.hydra_config import HydraConfig\n"
+        "from veca_marl.config import compose\n"
+        "@hydra.main(version_base='1.3', config_path=None)\n"
+        "def main(cfg):\n"
+        "    inner = compose(['+task=KickTheBall', 'seed=3'])\n"
+        "    print(inner.seed, cfg.x, HydraConfig.get().job.name)\n"
+        "main()\n"
+    )
+    done = subprocess.run(
+        [sys.executable, str(app), "+x=7", f"hydra.run.dir={tmp_path}"],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert done.stdout.split()[-3:] == ["3", "7", "app"]
+
+
+def test_configuration_survives_the_file_of_a_run(tmp_path):
+    node = compose_node([KICK, "senses/audio=stereo", "playground=simple", "seed=9"])
+    (tmp_path / "config.yaml").write_text(OmegaConf.to_yaml(node, resolve=True))
+    merged = OmegaConf.merge(compose_node([KICK]), OmegaConf.load(tmp_path / "config.yaml"))
+    again = OmegaConf.to_object(merged)
+    assert again == compose([KICK, "senses/audio=stereo", "playground=simple", "seed=9"])
+    assert list(chain(again.playground.props)), "lists must come back typed"

@@ -1,0 +1,128 @@
+"""The command line itself, as a user runs it."""
+
+import csv
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+import torch
+import yaml
+
+SMOKE = ["+experiment=smoke", "log=silent", "device=cpu", "threads=1"]
+
+
+def command(*arguments):
+    return [sys.executable, "-m", "veca_marl.train", *arguments]
+
+
+def train(folder, *arguments):
+    return subprocess.run(command(*arguments), cwd=folder, capture_output=True, text=True)
+
+
+def networks(run):
+    last = sorted(run.glob("checkpoints/frames_*.pt"))[-1]
+    return torch.load(last, weights_only=True)["state"]["algorithm"]["agents"]["network"]
+
+
+def rows(path):
+    with path.open() as file:
+        return list(csv.DictReader(file))
+
+
+@pytest.fixture(scope="module")
+def smoke(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("train")
+    done = train(folder, *SMOKE, "log.video=true", "log.tensorboard=true", "hydra.run.dir=run")
+    assert done.returncode == 0, done.stderr
+    return folder / "run", done.stdout
+
+
+@pytest.mark.slow
+def test_smoke_run_leaves_everything(smoke):
+    run, printed = smoke
+    files = {path.relative_to(run).as_posix() for path in run.rglob("*") if path.is_file()}
+    assert {
+        "config.yaml", "provenance.json", "metrics.csv", "evaluations.csv", "comparison.txt",
+        "timing.txt", "videos/final.mp4", "checkpoints/best.pt",
+        "checkpoints/frames_000000000256.pt",
+    } <= files  # fmt: skip
+    assert any(name.startswith("tensorboard/events") for name in files)
+    assert yaml.safe_load((run / "config.yaml").read_text())["task"]["name"] == "KickTheBall"
+    assert len(rows(run / "metrics.csv")) == 4
+    line = (run / "comparison.txt").read_text().strip()
+    assert line.startswith("agents: return of policy")
+    assert line in printed
+    assert "ms/frame" in printed
+
+
+@pytest.mark.slow
+def test_interrupted_and_resumed_equals_uninterrupted(smoke, tmp_path):
+    """Ctrl-C in the second stage of the real task, then the command that it prints."""
+    whole, _ = smoke
+    arguments = [*SMOKE, "total_frames=25600", "hydra.run.dir=run"]
+    running = subprocess.Popen(command(*arguments), cwd=tmp_path, stderr=subprocess.PIPE, text=True)
+    run = tmp_path / "run"
+    deadline = time.monotonic() + 300
+    while not list(run.glob("checkpoints/frames_*128.pt")) and time.monotonic() < deadline:
+        time.sleep(0.05)
+    running.send_signal(signal.SIGINT)
+    _, errors = running.communicate(timeout=120)
+    assert running.returncode == 130, errors
+    assert "interrupted; continue with: python -m veca_marl.train resume=" in errors
+    assert "Traceback" not in errors
+    for late in [p for p in run.glob("checkpoints/frames_*.pt") if int(p.stem[7:]) > 128]:
+        late.unlink()  # a fast machine may have come further
+
+    done = train(tmp_path, f"resume={run}", "total_frames=256")
+    assert done.returncode == 0, done.stderr
+    mine, other = networks(whole), networks(run)
+    assert mine.keys() == other.keys()
+    assert all(torch.equal(mine[name], other[name]) for name in mine)
+
+    def numbers(folder):
+        table = rows(folder / "metrics.csv")
+        return [{k: v for k, v in row.items() if k != "frames_per_s"} for row in table]
+
+    assert numbers(whole) == numbers(run)
+
+
+@pytest.mark.slow
+def test_an_existing_run_is_neither_overwritten_nor_changed(smoke):
+    run, _ = smoke
+    before = {path: path.read_bytes() for path in run.rglob("*") if path.is_file()}
+    for arguments, message in (
+        ([*SMOKE, f"hydra.run.dir={run}"], "holds a run already; continue it with resume="),
+        ([f"resume={run}", "senses/audio=mono"], "cannot change senses/audio; choices: resume"),
+        ([f"resume={run}", "seed=3"], "cannot change seed; choices: resume, total_frames"),
+    ):
+        done = train(run.parent, *arguments)
+        assert done.returncode == 2
+        assert message in done.stderr
+    assert {path: path.read_bytes() for path in run.rglob("*") if path.is_file()} == before
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ([], "error: no task: add +task=NAME; choices: KickTheBall"),
+        (["task=KickTheBall"], "error: task has no default to replace: write +task=KickTheBall"),
+        (["+task=KickTheBal"], "error: unknown task 'KickTheBal' (did you mean KickTheBall?)"),
+        (["+task=KickTheBall", "sede=1"], "error: unknown key 'sede' (did you mean seed?)"),
+        (["+task=KickTheBall", "algo.clip=-1"], "error: algo.clip must be positive, got -1.0"),
+        (
+            ["+task=KickTheBall", "device=tpu"],
+            "error: device=tpu is not on this machine; choices: cpu",
+        ),
+        (["resume=nowhere"], "error: resume=nowhere: there is no run in it (no config.yaml)"),
+    ],
+)
+def test_a_wrong_command_ends_in_one_line_and_leaves_nothing(tmp_path, arguments, message):
+    done = train(tmp_path, *arguments)
+    assert done.returncode == 2
+    (line,) = done.stderr.strip().splitlines()
+    assert line.startswith(message)
+    assert not [path for path in tmp_path.rglob("*") if path.is_file()]
+    assert not list(tmp_path.glob("runs/*/*"))
