@@ -74,7 +74,7 @@ def _grid_cell(
     return near, far, low, azimuth - below, elevation - low
 
 
-@njit(cache=True, fastmath={"contract"})
+@njit(cache=True)
 def head_related_filters(
     arrivals: Floats,
     gains: Floats,

@@ -44,7 +44,7 @@ def fractional_kernel(bank: NDArray[np.float32], fraction: float, out: NDArray[n
         out[tap] = bank[row, tap] + weight * (bank[row + 1, tap] - bank[row, tap])
 
 
-@njit(cache=True, fastmath={"reassoc", "contract"})
+@njit(cache=True)
 def read_delayed(
     history: NDArray[np.float32],
     delay_before: float,
