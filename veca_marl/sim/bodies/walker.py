@@ -67,10 +67,15 @@ class WalkerCfg:
     eye_range_deg: float = 50.0
 
     def __post_init__(self) -> None:
-        """All are magnitudes."""
+        """All are magnitudes, and a capsule is higher than wide."""
         for name, value in vars(self).items():
             if isinstance(value, (int, float)) and not (math.isfinite(value) and value >= 0):
                 raise ValueError(f"body.{name}={value} must be a finite number, 0 or more")
+        if not 0.0 < 2.0 * self.radius_m <= self.height_m:
+            raise ValueError(
+                f"body.radius_m={self.radius_m}, body.height_m={self.height_m}: "
+                "the radius must be positive and at most half the height"
+            )
 
 
 class Walker:
@@ -282,13 +287,20 @@ class Walker:
 
     def _make_room(self, x: float, y: float) -> tuple[float, float]:
         """Step back from other walkers; each of two gives way by half."""
+        aside = -1.0
         for other in self._world.movers:
+            if other is self:
+                aside = 1.0
             if other is self or not isinstance(other, Walker):
                 continue
             dx, dy = x - other._ground[0], y - other._ground[1]
-            distance = max(math.hypot(dx, dy), 1e-9)
+            distance = math.hypot(dx, dy)
             overlap = self.radius_m + other.radius_m - distance
             if overlap > 0.0:
+                if (
+                    distance < 1e-9
+                ):  # on one spot: those who came first go one way, others the other
+                    dx, dy, distance = aside, 0.0, 1.0
                 x, y = x + dx / distance * overlap / 2, y + dy / distance * overlap / 2
         return x, y
 
