@@ -157,6 +157,14 @@ def test_impossible_counts_are_refused(worlds):
         main([*QUICK, "--worlds", worlds])
 
 
+def test_a_file_that_cannot_be_written_is_refused_before_measuring(tmp_path, capsys):
+    with pytest.raises(SystemExit):
+        main([*QUICK, "--json", str(tmp_path / "nowhere" / "bench.json")])
+    captured = capsys.readouterr()
+    assert "nowhere" in captured.err
+    assert captured.out == ""
+
+
 def test_free_play_has_as_many_players_as_asked_for_and_is_forgotten():
     before = dict(TASKS)
     game = compose(["+task=KickTheBall", "senses/vision=blind"]).game

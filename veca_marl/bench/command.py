@@ -73,7 +73,9 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--steps", type=_count, default=300, help="steps of each rollout")
     parser.add_argument("--repeats", type=_count, default=5, help="rollouts; medians count")
     parser.add_argument("--skip-references", action="store_true", help="measure rollouts alone")
-    parser.add_argument("--json", type=Path, metavar="FILE", help="also write the numbers here")
+    parser.add_argument(
+        "--json", type=_new_file, metavar="FILE", help="also write the numbers here"
+    )
     return parser
 
 
@@ -85,6 +87,14 @@ def _count(text: str) -> int:
 
 def _counts(text: str) -> list[int]:
     return [_count(part) for part in text.split(",")]
+
+
+def _new_file(text: str) -> Path:
+    """Refuse before measuring what could not be written after it."""
+    path = Path(text)
+    if path.is_dir() or not path.absolute().parent.is_dir():
+        raise argparse.ArgumentTypeError(f"{text!r} is not a file in a folder that exists")
+    return path
 
 
 def _overrides(asked: argparse.Namespace) -> list[str]:

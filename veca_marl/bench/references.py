@@ -108,13 +108,18 @@ def measure_ears(playground: PlaygroundCfg, steps: int) -> float:
     walker = Walker("listener", WalkerCfg(), world)
     ears = AudioSense(AudioCfg(), walker, world.sound)
     world.sound.reset(np.random.default_rng(0))
+
+    def hear() -> None:
+        world.sound.advance()
+        ears.read()
+
     costs = []
     for step in range(steps):
         angle = 0.05 * step
         source.position = (2.0 * math.cos(angle), 2.0 * math.sin(angle), 0.15)
         walker.yaw_rad = -0.5 * angle
         walker.mirror()
-        costs.append(_ms(lambda: (world.sound.advance(), ears.read())))
+        costs.append(_ms(hear))
     world.close()
     return median(costs)
 
