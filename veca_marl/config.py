@@ -192,7 +192,7 @@ def _run_folder(resume: str | None, task: str | None, now: str) -> str:
     if resume is not None:
         return resume
     if task is None:
-        raise ValueError(no_task())
+        raise ConfigError(no_task())
     return f"runs/{task}/{now}"
 
 

@@ -49,8 +49,11 @@ def _wrong_value(error: OmegaConfBaseException) -> str:
         key = str(error.full_key or error.key)
         near = _nearest(key.rpartition(".")[2], names)
         return f"unknown key {key!r}{near}; choices: {', '.join(names)}"
-    key = f"{error.full_key}: " if error.full_key else ""
-    return key + _flat(str(error).partition("\n")[0])
+    message = _flat(str(error).partition("\n")[0])
+    _, resolver, said = message.partition(" raised while resolving interpolation: ")
+    if resolver:
+        return said
+    return f"{error.full_key}: {message}" if error.full_key else message
 
 
 def _keys(error: OmegaConfBaseException) -> list[str]:

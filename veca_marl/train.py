@@ -11,6 +11,7 @@ import os
 import sys
 from functools import partial
 from pathlib import Path
+from typing import NoReturn
 
 import hydra
 import torch
@@ -159,27 +160,40 @@ def run(node: DictConfig) -> None:
     """Train in the folder that Hydra made."""
     path = Path(HydraConfig.get().runtime.output_dir)
     try:
-        if node.resume is not None:
-            folder = open_run(path)
-            cfg = stored_config(folder, node, list(HydraConfig.get().overrides.task))
-            trainer = make_trainer(cfg, folder)
-        else:
-            folder = new_run(path)
-            cfg = to_config(node)
-            trainer = make_trainer(cfg, folder)
-            folder.begin(node)
-    except ConfigError:
+        cfg, folder, trainer = set_up(node, path)
+    except (ConfigError, CheckpointError) as error:
         remove_if_empty(path)
-        raise
+        give_up(error)
     try:
         train(cfg, folder, trainer)
     except KeyboardInterrupt:
         print(f"\ninterrupted; continue with: {_COMMAND} resume={path}", file=sys.stderr)  # noqa: T201
         raise SystemExit(130) from None
+    except CheckpointError as error:
+        give_up(error)
     except OSError as error:
         if error.errno not in _DISK_FULL:
             raise
-        raise CheckpointError(f"{error}; make room and continue with resume={path}") from error
+        give_up(ConfigError(f"{error}; make room and continue with resume={path}"))
+
+
+def set_up(node: DictConfig, path: Path) -> tuple[Config, RunFolder, Trainer]:
+    """Make ready to start or to continue the run in `path`; claim it last."""
+    if node.resume is not None:
+        folder = open_run(path)
+        cfg = stored_config(folder, node, list(HydraConfig.get().overrides.task))
+        return cfg, folder, make_trainer(cfg, folder)
+    folder = new_run(path)
+    cfg = to_config(node)
+    trainer = make_trainer(cfg, folder)
+    folder.begin(node)
+    return cfg, folder, trainer
+
+
+def give_up(error: Exception) -> NoReturn:
+    """Say in one line what is wrong and end with status 2."""
+    print(f"error: {one_line(error)}", file=sys.stderr)  # noqa: T201
+    raise SystemExit(2)
 
 
 def main() -> None:
@@ -188,9 +202,8 @@ def main() -> None:
     logging.getLogger("torchrl").setLevel(logging.WARNING)
     try:
         run()
-    except (ConfigError, CheckpointError, HydraException, OmegaConfBaseException) as error:
-        print(f"error: {one_line(error)}", file=sys.stderr)  # noqa: T201
-        raise SystemExit(2) from None
+    except (HydraException, OmegaConfBaseException) as error:
+        give_up(error)
 
 
 if __name__ == "__main__":

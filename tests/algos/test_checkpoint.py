@@ -1,4 +1,5 @@
 import resource
+import signal
 from dataclasses import replace
 
 import pytest
@@ -111,3 +112,19 @@ def test_a_truncated_file_is_named(checkpoints, identity):
 def test_a_folder_without_checkpoints_is_named(checkpoints):
     with pytest.raises(CheckpointError, match="no checkpoint in"):
         checkpoints.latest()
+
+
+def test_an_interruption_waits_until_the_file_is_whole(checkpoints, identity, monkeypatch):
+    save = torch.save
+
+    def interrupted_save(*arguments):
+        signal.raise_signal(signal.SIGINT)
+        save(*arguments)
+
+    monkeypatch.setattr(torch, "save", interrupted_save)
+    with pytest.raises(KeyboardInterrupt):
+        checkpoints.save({"n": 1}, 10, best=True)
+    for path in (checkpoints.latest(), checkpoints.folder / "best.pt"):
+        assert load_checkpoint(path, identity, CPU) == {"n": 1}
+    with pytest.raises(KeyboardInterrupt):  # and is heard at once again
+        signal.raise_signal(signal.SIGINT)

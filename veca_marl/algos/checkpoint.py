@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+import io
 import os
 import pickle
+import signal
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -70,9 +75,12 @@ class Checkpoints:
             "config": self.config,
             "state": state,
         }
-        self._write(content, path)
-        if best:
-            self._write(content, self.folder / "best.pt")
+        with _interrupts_wait():
+            file = io.BytesIO()
+            torch.save(content, file)
+            self._write(file.getbuffer(), path)
+            if best:
+                self._write(file.getbuffer(), self.folder / "best.pt")
         for old in self._files()[: -self.keep_last]:
             old.unlink()
         return path
@@ -91,22 +99,38 @@ class Checkpoints:
     def _files(self) -> list[Path]:
         return sorted(self.folder.glob("frames_*.pt"))
 
-    def _write(self, content: dict[str, Any], path: Path) -> None:
+    def _write(self, content: memoryview, path: Path) -> None:
         temporary = path.with_suffix(".tmp")
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
             with temporary.open("wb") as file:
-                torch.save(content, file)
+                file.write(content)
                 file.flush()
                 os.fsync(file.fileno())
             os.replace(temporary, path)
-        except (OSError, RuntimeError) as error:  # torch reports a full disk as RuntimeError
+        except OSError as error:
             temporary.unlink(missing_ok=True)
             kept = self._files()
             raise CheckpointError(
                 f"cannot write {path}: {error}; "
                 f"the last intact checkpoint is {kept[-1] if kept else 'none'}"
             ) from error
+
+
+@contextmanager
+def _interrupts_wait() -> Iterator[None]:
+    """Let Ctrl-C wait until the block is done; torch would make an error of its own of it."""
+    if threading.current_thread() is not threading.main_thread():
+        yield  # only the main thread hears it
+        return
+    heard: list[int] = []
+    previous = signal.signal(signal.SIGINT, lambda number, _: heard.append(number))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, previous)
+    if heard:
+        signal.raise_signal(heard[0])
 
 
 def load_checkpoint(path: Path, identity: Identity, device: torch.device) -> dict[str, Any]:
