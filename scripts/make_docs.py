@@ -17,7 +17,7 @@ from veca_marl.api import make
 from veca_marl.envs.task import TASKS, Task
 
 mpl.use("Agg")
-import matplotlib.pyplot as plt  # noqa: E402  after the choice of a backend without a screen
+import matplotlib.pyplot as plt
 
 DOCS = Path(__file__).resolve().parent.parent / "docs"
 BIN_HZ = 22050 / 1024
