@@ -144,6 +144,11 @@ def test_impossible_numbers_are_refused(field, wrong):
         of(PropShape.sphere, **{field: wrong})
 
 
+def test_an_unknown_shape_is_answered_with_those_there_are():
+    with pytest.raises(ValueError, match=r"'thing': shape='torus'.*'sphere'"):
+        PropCfg(name="thing", shape="torus", size_m=[1.0])
+
+
 def test_a_prop_needs_a_name():
     with pytest.raises(ValueError, match="without a name"):
         PropCfg(shape=PropShape.sphere, size_m=[0.1])

@@ -321,6 +321,11 @@ def test_impossible_bodies_are_refused(number, wrong):
         WalkerCfg(**{number: wrong})
 
 
+def test_an_unknown_kind_of_action_is_answered_with_those_there_are():
+    with pytest.raises(ValueError, match=r"body\.action='fly'.*'continuous', 'discrete'"):
+        WalkerCfg(action="fly")
+
+
 def test_a_capsule_must_be_higher_than_wide():
     with pytest.raises(ValueError, match="height_m"):
         WalkerCfg(radius_m=0.5, height_m=0.6)

@@ -78,6 +78,9 @@ class PropCfg:
 
     def __post_init__(self) -> None:
         """Check what physics could not explain later."""
+        if not isinstance(self.shape, PropShape):
+            shapes = [shape.name for shape in PropShape]
+            raise ValueError(f"prop {self.name!r}: shape={self.shape!r}; there are {shapes}")
         names = SIZE_NAMES[self.shape]
         if len(self.size_m) != len(names) or not all(
             math.isfinite(size) and size > 0 for size in self.size_m

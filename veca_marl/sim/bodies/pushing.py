@@ -18,7 +18,7 @@ from veca_marl.sim.pose import Floats
 from veca_marl.sim.props import Prop
 
 _ROUNDS = 3  # two walls of a corner and one to spare
-_SIGHT_M = 0.15  # how far another body or a heavy thing may shove it within one agent step
+_SIGHT_M = 0.06  # how far another body or a heavy thing may shove it within one agent step
 
 
 class Pusher:

@@ -68,6 +68,10 @@ class WalkerCfg:
 
     def __post_init__(self) -> None:
         """All are magnitudes, and a capsule is higher than wide."""
+        if not isinstance(self.action, ActionKind):
+            raise ValueError(
+                f"body.action={self.action!r}; there are {[k.name for k in ActionKind]}"
+            )
         for name, value in vars(self).items():
             if isinstance(value, (int, float)) and not (math.isfinite(value) and value >= 0):
                 raise ValueError(f"body.{name}={value} must be a finite number, 0 or more")

@@ -1,0 +1,30 @@
+"""The words of rewards."""
+
+import numpy as np
+import pytest
+
+from veca_marl.envs.scoring import cosine, flat
+
+EAST, NORTH = np.array([1.0, 0.0, 0.0]), np.array([0.0, 2.0, 0.0])
+
+
+@pytest.mark.parametrize(
+    ("a", "b", "expected"),
+    [
+        (EAST, 3.0 * EAST, 1.0),
+        (EAST, -EAST, -1.0),
+        (EAST, NORTH, 0.0),
+        (EAST, 2.0 * EAST + NORTH, np.sqrt(0.5)),
+        (EAST, np.zeros(3), 0.0),
+        (np.zeros(3), np.zeros(3), 0.0),
+    ],
+)
+def test_cosine(a, b, expected):
+    assert cosine(a, b) == pytest.approx(expected)
+    assert cosine(b, a) == pytest.approx(expected)
+
+
+def test_flat_drops_the_height_and_leaves_its_argument():
+    vector = np.array([1.0, 2.0, 3.0])
+    np.testing.assert_array_equal(flat(vector), (1.0, 2.0, 0.0))
+    np.testing.assert_array_equal(vector, (1.0, 2.0, 3.0))
