@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, fields, is_dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import hydra
 from hydra.core.config_store import ConfigStore
@@ -137,9 +137,10 @@ def compose_node(overrides: Sequence[str]) -> DictConfig:
     """Return what `compose` returns, still typed and changeable by name."""
     try:
         with _own_hydra():
-            return hydra.compose("config", overrides=list(overrides))
+            node: DictConfig = hydra.compose("config", overrides=list(overrides))
     except (HydraException, OmegaConfBaseException) as error:
         raise ConfigError(one_line(error)) from error
+    return node
 
 
 def to_config(node: DictConfig) -> Config:
@@ -151,7 +152,7 @@ def to_config(node: DictConfig) -> Config:
     if OmegaConf.is_missing(node, "task"):
         raise ConfigError(no_task())
     try:
-        config: Any = OmegaConf.to_object(node)
+        config = cast(Config, OmegaConf.to_object(node))
         find_task(config.task.name)
         _refuse_extra(config, "")
     except (OmegaConfBaseException, ValueError) as error:

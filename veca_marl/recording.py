@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import torch
@@ -32,7 +33,7 @@ def record_episode(path: Path, game: GameCfg, policy: Policy, seed: int) -> None
     """
     env = VecaEnv(_with_waveform(game), worlds=1, seed=seed)
     frames: list[NDArray[np.uint8]] = []
-    sound: list[NDArray[np.float32]] = []
+    sound: list[NDArray[Any]] = []
     with torch.no_grad(), set_exploration_type(ExplorationType.DETERMINISTIC):
         state, done = env.reset(), False
         while not done:
@@ -52,6 +53,6 @@ def _with_waveform(game: GameCfg) -> GameCfg:
     return replace(game, senses=replace(game.senses, audio=audio))
 
 
-def _first_player(step: TensorDictBase, env: VecaEnv) -> dict[str, NDArray[np.generic]]:
+def _first_player(step: TensorDictBase, env: VecaEnv) -> dict[str, NDArray[Any]]:
     team = next(iter(env.group_map))
     return {name: array[0, 0].numpy() for name, array in step[team, "observation"].items()}

@@ -8,10 +8,11 @@ from __future__ import annotations
 import errno
 import logging
 import os
+import signal
 import sys
 from functools import partial
 from pathlib import Path
-from typing import NoReturn
+from typing import Any, NoReturn, cast
 
 import hydra
 import torch
@@ -57,7 +58,7 @@ def make_trainer(cfg: Config, folder: RunFolder) -> Trainer:
     checkpoints = Checkpoints(
         folder.checkpoints,
         Identity(cfg.task.name, specs),
-        OmegaConf.to_container(OmegaConf.structured(cfg), enum_to_str=True),
+        cast(dict[str, Any], OmegaConf.to_container(OmegaConf.structured(cfg), enum_to_str=True)),
         cfg.log.keep_checkpoints,
     )
     trainer = Trainer(
@@ -149,7 +150,7 @@ def stored_config(folder: RunFolder, asked: DictConfig, overrides: list[str]) ->
             f"a resumed run stays as it was: cannot change {', '.join(changed)}; "
             f"choices: {', '.join(RESUMABLE)}"
         )
-    node = OmegaConf.merge(compose_node([f"+task={task}"]), stored)
+    node = cast(DictConfig, OmegaConf.merge(compose_node([f"+task={task}"]), stored))
     for name in names:
         node[name] = asked[name]
     return to_config(node)
@@ -200,6 +201,7 @@ def main() -> None:
     """Run the command line; what is wrong with it is said in one line, with exit status 2."""
     os.environ["HYDRA_FULL_ERROR"] = "1"  # exceptions come here instead of being printed
     logging.getLogger("torchrl").setLevel(logging.WARNING)
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # schedulers stop runs by it
     try:
         run()
     except (HydraException, OmegaConfBaseException) as error:

@@ -76,6 +76,7 @@ def _add_pictures(
     container: av.container.OutputContainer, shape: tuple[int, ...], fps: int
 ) -> av.VideoStream:
     stream = container.add_stream(_codec(), rate=fps)
+    assert isinstance(stream, av.VideoStream)
     stream.height, stream.width = shape[:2]
     stream.pix_fmt = "yuv420p"
     stream.bit_rate = 2_000_000
@@ -94,6 +95,7 @@ def _codec() -> str:
 
 def _add_sound(container: av.container.OutputContainer, sample_rate_hz: int) -> av.AudioStream:
     stream = container.add_stream("aac", rate=sample_rate_hz)
+    assert isinstance(stream, av.AudioStream)
     stream.layout = "stereo"
     stream.bit_rate = 128_000
     return stream

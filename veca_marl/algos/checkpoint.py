@@ -146,7 +146,8 @@ def load_checkpoint(path: Path, identity: Identity, device: torch.device) -> dic
     if not isinstance(content, dict) or content.get("format") != _FORMAT:
         raise CheckpointError(f"{path} is not a checkpoint of this version (format {_FORMAT})")
     _check_identity(path, content["identity"], identity.to_dict())
-    return content["state"]
+    state: dict[str, Any] = content["state"]
+    return state
 
 
 def _check_identity(path: Path, stored: dict[str, Any], wanted: dict[str, Any]) -> None:

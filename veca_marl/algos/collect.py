@@ -104,11 +104,13 @@ class Experience:
 @contextmanager
 def _workers_ignore_interrupts() -> Iterator[None]:
     """Let workers made meanwhile ignore Ctrl-C: this process hears it and ends them in order."""
-    previous = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    inherited = {signal.SIGINT: signal.SIG_IGN, signal.SIGTERM: signal.SIG_DFL}
+    previous = {number: signal.signal(number, action) for number, action in inherited.items()}
     try:
         yield
     finally:
-        signal.signal(signal.SIGINT, previous)
+        for number, action in previous.items():
+            signal.signal(number, action)
 
 
 @contextmanager

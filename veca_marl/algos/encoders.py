@@ -65,7 +65,8 @@ class ImageEncoder(nn.Module):
         return torch.cat([self._encode(part) for part in pixels.split(block)])
 
     def _encode(self, pixels: Tensor) -> Tensor:
-        return self.layers(pixels.float().mul_(1.0 / 255.0))
+        features: Tensor = self.layers(pixels.float().mul_(1.0 / 255.0))
+        return features
 
 
 class VectorEncoder(nn.Module):
@@ -95,7 +96,9 @@ class VectorEncoder(nn.Module):
 
     def forward(self, vector: Tensor) -> Tensor:
         """Encode `vector`."""
-        return self.layers((vector.flatten(1).to(torch.float32) - self.centre) * self.scale)
+        scaled = (vector.flatten(1).to(torch.float32) - self.centre) * self.scale
+        features: Tensor = self.layers(scaled)
+        return features
 
 
 def make_encoder(

@@ -46,7 +46,7 @@ class EvalCfg:
     """
 
     every_frames: int = 20480
-    episodes: int = 16
+    episodes: int = 8
     worlds: int = 4
     exploration: Exploration = Exploration.deterministic
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from contextlib import closing
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
@@ -111,30 +112,33 @@ class Trainer:
 
     def run(self) -> list[str]:
         """Train until the budget is spent; return how each team compares with random play."""
+        fresh = self.progress.frames == 0
+        if fresh:
+            self._save(best=False)  # an interruption at any time finds something to resume from
         with self.watch.measure("build"):
             eval_env = self.make_env(self.evaluation.worlds, 0)
-            baseline = self._play(eval_env, random_policy(eval_env), Exploration.stochastic)
             experience = Experience(self.make_env, self.player, self.collect)
-        if self.progress.frames == 0:
-            self._report_scores("random", baseline)
-            self._save(best=False)  # an interruption at any time finds something to resume from
-        scores: dict[str, Scores] | None = None
-        bar = tqdm(
+        with closing(eval_env), closing(experience):
+            with self.watch.measure("evaluate"):
+                baseline = self._play(eval_env, random_policy(eval_env), Exploration.stochastic)
+            if fresh:
+                self._report_scores("random", baseline)
+            scores = self._train(experience, eval_env) or self._play(eval_env)
+        return [comparison_line(team, scores[team], baseline[team]) for team in scores]
+
+    def _train(self, experience: Experience, eval_env: EnvBase) -> dict[str, Scores] | None:
+        """Go through all stages and return the scores of the last, if there was one."""
+        scores = None
+        with tqdm(
             total=self._iterations() * self.collect.frames,
             initial=self.progress.frames,
             unit=" frames",
             disable=not self.progress_bar,
-        )
-        try:
-            with bar:
-                while self.progress.iteration < self._iterations() and not self._out_of_time():
-                    self._run_stage(experience, bar)
-                    scores = self._end_stage(eval_env)
-        finally:
-            experience.close()
-        scores = scores or self._play(eval_env)
-        eval_env.close()
-        return [comparison_line(team, scores[team], baseline[team]) for team in scores]
+        ) as bar:
+            while self.progress.iteration < self._iterations() and not self._out_of_time():
+                self._run_stage(experience, bar)
+                scores = self._end_stage(eval_env)
+        return scores
 
     def timing(self) -> str:
         """Return a table of where the time went."""
@@ -205,7 +209,7 @@ class Trainer:
     def _report_scores(self, who: str, scores: dict[str, Scores]) -> None:
         for team, score in scores.items():
             low, high = interval(score.returns)
-            row = {
+            row: dict[str, float | int | str] = {
                 "player": who,
                 "team": team,
                 "episodes": len(score.returns),

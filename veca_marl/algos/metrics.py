@@ -39,7 +39,8 @@ class CsvReporter:
 
     Args:
         folder: Where the files lie.
-        resumed_frames: Rows of later frames, which a resumed run will write again, are dropped.
+        resumed_frames: Rows of later frames, which a resumed run will write again, are dropped;
+            all of them at 0.
     """
 
     def __init__(self, folder: Path, resumed_frames: int = 0) -> None:
@@ -164,7 +165,7 @@ def _drop_rows_after(path: Path, frames: int) -> None:
     with path.open(newline="") as file:
         reader = csv.DictReader(file)
         columns = reader.fieldnames or []
-        kept = [row for row in reader if int(row["frames"]) <= frames]
+        kept = [row for row in reader if frames and int(row["frames"]) <= frames]
     temporary = path.with_suffix(".tmp")
     with temporary.open("w", newline="") as file:
         writer = csv.DictWriter(file, columns)

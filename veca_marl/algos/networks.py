@@ -61,13 +61,12 @@ class Trunk(nn.Module):
     def __init__(self, observations: dict[str, ArrayLayout], cfg: NetworkCfg) -> None:
         super().__init__()
         self.ranks = {name: len(layout.shape) for name, layout in observations.items()}
-        self.encoders = nn.ModuleDict(
-            {
-                name: make_encoder(name, layout, cfg.channels, cfg.vector_features)
-                for name, layout in observations.items()
-            }
-        )
-        joined = sum(int(encoder.features) for encoder in self.encoders.values())
+        encoders = {
+            name: make_encoder(name, layout, cfg.channels, cfg.vector_features)
+            for name, layout in observations.items()
+        }
+        self.encoders = nn.ModuleDict(encoders)
+        joined = sum(encoder.features for encoder in encoders.values())
         self.join = nn.Sequential(orthogonal(nn.Linear(joined, cfg.trunk_features)), nn.ReLU())
         self.precision = cfg.precision
 
@@ -81,7 +80,7 @@ class Trunk(nn.Module):
                 for encoder, array in zip(self.encoders.values(), observations, strict=True)
             ]
             features = self.join(torch.cat(parts, dim=-1))
-        return features.float().unflatten(0, leading)
+        return features.float().reshape(*leading, -1)
 
     def _arithmetic(self, device: torch.device) -> AbstractContextManager[object]:
         if self.precision is Precision.float32:
