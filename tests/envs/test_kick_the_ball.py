@@ -90,6 +90,17 @@ def test_a_ball_nobody_kicks_is_replaced(game):
     assert np.argmax(jumps) == pytest.approx(6.0 / 0.04 - 1, abs=2)
 
 
+def test_a_kicked_ball_that_comes_back_does_not_count_again(game):
+    game.reset(np.random.default_rng(1))
+    game.players[0].body.place((0.0, 0.0, 0.0))
+    kicks = 0.0
+    for _ in range(9):  # 0.36 s: the next ball comes after 0.4 s
+        game.task.ball.place((0.36, 0.0, 0.15))
+        outcome = game.step({"agents": np.zeros(2, np.float32)}, np.random.default_rng(0))
+        kicks += outcome.terms["agents"]["kick"]
+    assert kicks == 1.0
+
+
 def test_a_kick_counts_once_and_brings_the_next_ball(game):
     game.reset(np.random.default_rng(1))
     body, ball = game.players[0].body, game.task.ball

@@ -63,6 +63,19 @@ def test_a_foot_that_carries_stays_where_it_is(speed):
     assert np.mean(slid < 0.1 * abs(speed)) > 0.6
 
 
+@pytest.mark.parametrize(("speed", "turn"), [(0.8, 0.8), (0.5, -1.0), (0.0, 1.5)])
+def test_on_a_curve_the_outer_foot_goes_further(speed, turn):
+    """Each foot keeps to its own circle, so the ankle that carries hardly slides."""
+    world = empty_world()
+    walker = walker_in(world)
+    walker.walk(speed, turn)
+    let_pass(world, 1.0)
+    feet = [SKELETON.bone("l_foot"), SKELETON.bone("r_foot")]
+    places = np.array([p[feet, :2].copy() for p, _ in steps_of(walker, world, 50)])
+    slid = np.linalg.norm(np.diff(places, axis=0), axis=2).min(axis=1) / 0.04
+    assert np.median(slid) < 0.3 * abs(turn) * 0.045
+
+
 def test_both_feet_walk():
     world = empty_world()
     walker = walker_in(world)

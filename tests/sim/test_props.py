@@ -82,6 +82,20 @@ def test_a_prop_rests_on_the_floor(shape):
     assert world.prop("thing").lowest_m == pytest.approx(0.0, abs=0.025)  # Bullet's AABB margin
 
 
+def test_a_goal_has_two_posts_on_the_floor_and_a_bar_over_them():
+    world = empty_world(of(PropShape.goal))
+    world.refresh()
+    table, rows = world.scene.geoms, world.scene.find("thing").geoms
+    left, right, bar = range(rows.start, rows.stop)
+    for post, y in ((left, -0.6), (right, 0.6)):
+        np.testing.assert_allclose(table.positions[post], (0.0, y, 0.4), atol=1e-6)
+        assert table.sizes[post][1] == pytest.approx(0.8)
+        np.testing.assert_allclose(table.rotations[post][:, 2], (0.0, 0.0, 1.0), atol=1e-6)
+    np.testing.assert_allclose(table.positions[bar], (0.0, 0.0, 0.8), atol=1e-6)
+    np.testing.assert_allclose(np.abs(table.rotations[bar][:, 2]), (0.0, 1.0, 0.0), atol=1e-6)
+    assert table.sizes[bar][1] == pytest.approx(1.2)
+
+
 def test_a_fixed_prop_stays():
     world = empty_world(box(mass_kg=0.0, position=(0.0, 0.0, 2.0)))
     world.prop("box").push((5.0, 0.0, 0.0))

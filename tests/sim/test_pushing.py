@@ -56,6 +56,26 @@ def test_a_corner_holds_it(yaw_deg):
     assert walker.position[:2] == pytest.approx([0.95 - RADIUS_M] * 2, abs=SLACK_M)
 
 
+@pytest.mark.parametrize("half_angle_deg", [20.0, 30.0, 40.0])
+def test_an_acute_corner_holds_it(half_angle_deg):
+    """Out of one wall is into the other: it takes several rounds to find the place."""
+    tip = np.array([1.0, 0.0])
+    walls = []
+    for name, side in (("left", 1.0), ("right", -1.0)):
+        yaw = math.radians(side * (180.0 - half_angle_deg))
+        along = np.array([math.cos(yaw), math.sin(yaw)])
+        middle = tip + 1.5 * along
+        walls.append(wall(name, 3.0, 0.1, (middle[0], middle[1], 0.0), yaw_deg=math.degrees(yaw)))
+    world = empty_world(*walls)
+    walker = walker_in(world, place=(-1.5, 0.0, 0.0))
+    walker.walk(1.0, 0.0)
+    let_pass(world, 5.0)
+    way_in_m = (RADIUS_M + 0.05) / math.sin(math.radians(half_angle_deg))
+    slack_m = SLACK_M / math.sin(math.radians(half_angle_deg))
+    assert walker.position[0] == pytest.approx(tip[0] - way_in_m, abs=slack_m)
+    assert abs(walker.position[1]) < SLACK_M
+
+
 def test_nobody_gets_out_of_a_room_by_running_at_its_walls():
     walls = [
         wall("east", position=(1.0, 0.0, 0.0)),

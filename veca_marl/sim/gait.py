@@ -68,9 +68,11 @@ class Gait:
         self.cfg = cfg or GaitCfg()
         joint = skeleton.joint
         self._thigh = (joint("l_thigh", "flexion"), joint("r_thigh", "flexion"))
+        self._abduct = (joint("l_thigh", "abduction"), joint("r_thigh", "abduction"))
         self._twist = (joint("l_thigh", "internal_rotation"), joint("r_thigh", "internal_rotation"))
         self._shank = (joint("l_shank", "flexion"), joint("r_shank", "flexion"))
         self._foot = (joint("l_foot", "dorsiflexion"), joint("r_foot", "dorsiflexion"))
+        self._ankle_roll = (joint("l_foot", "inversion"), joint("r_foot", "inversion"))
         self._arm = (joint("l_upper_arm", "flexion"), joint("r_upper_arm", "flexion"))
         self._elbow = (joint("l_forearm", "flexion"), joint("r_forearm", "flexion"))
         self._nod = (joint("neck", "flexion"), joint("head", "flexion"))
@@ -125,7 +127,7 @@ class Gait:
     def pose(self, head_pitch_rad: float, head_yaw_rad: float) -> Floats:
         """Write and return the ``(82,)`` joint angles for this moment."""
         if self._kick_left_s > 0.0:
-            self._lead_foot(0, self.cfg.step_centre_m, 0.0, 0.0)
+            self._lead_foot(0, (self.cfg.step_centre_m, 0.0), 0.0, 0.0, 0.0)
             self._swing_kicking_leg()
         else:
             self._step(0)
@@ -158,28 +160,56 @@ class Gait:
             along = -0.5 * math.cos(math.pi * flight)
             height = share * math.sin(math.pi * flight)
             lift, toes = self.cfg.lift_m * height, -self.cfg.toe_rad * height
-        way_m = self._carrying_s() * (self._speed_mps - self._turn_radps * self._hip_y_m[side])
-        self._lead_foot(side, self.cfg.step_centre_m * share + way_m * along, lift, toes)
-        twist = self._carrying_s() * self._turn_radps * along
-        self.angles[self._twist[side]] = -twist if side == 0 else twist
+        place, yaw = self._foothold(side, -along * self._carrying_s())
+        self._lead_foot(side, place, yaw, lift, toes)
         swing = self.cfg.arm_swing_rad * math.copysign(share, self._speed_mps)
         self.angles[self._arm[side]] = -swing * math.cos(2.0 * math.pi * phase)
         self.angles[self._elbow[side]] = self.cfg.elbow_rad
 
-    def _lead_foot(self, side: int, ahead_m: float, lift_m: float, toes_rad: float) -> None:
-        """Bend a leg so that its ankle is where it shall be (law of cosines, two bones)."""
+    def _foothold(self, side: int, time_s: float) -> tuple[tuple[float, float], float]:
+        """Return where a foot on the floor is below its hip as the body moves along its arc.
+
+        Args:
+            side: 0 is left, 1 is right.
+            time_s: Since the foot was straight beneath the hip.
+
+        Returns:
+            Forward and left of the hip, metres, and the yaw of the foot against the pelvis.
+        """
+        turned, hip_y_m = self._turn_radps * time_s, self._hip_y_m[side]
+        way_m = self._speed_mps * time_s
+        x = self.cfg.step_centre_m * self._share() - way_m * math.cos(turned / 2.0)
+        y = hip_y_m - way_m * math.sin(turned / 2.0)
+        c, s = math.cos(turned), math.sin(turned)
+        return (c * x + s * y, c * y - s * x - hip_y_m), -turned
+
+    def _lead_foot(
+        self, side: int, place: tuple[float, float], yaw: float, lift_m: float, toes: float
+    ) -> None:
+        """Bend a leg so that its ankle is where it shall be and the foot points where it shall.
+
+        The law of cosines gives the knee. The hip turns about y, then x, then z, so with the turn
+        about z given the other two follow one after the other.
+        """
         share = self._share()
         bob = self.cfg.bob_m * math.cos(4.0 * math.pi * self.phase)
         down_m = self.cfg.leg_m - share * (self.cfg.sink_m + bob) - lift_m
         thigh_m, shank_m = self._thigh_m, self._shank_m
-        reach = min(math.hypot(ahead_m, down_m), thigh_m + shank_m)
-        hip = (thigh_m**2 + reach**2 - shank_m**2) / (2.0 * thigh_m * reach)
+        reach = min(math.hypot(*place, down_m), thigh_m + shank_m)
         inside = (thigh_m**2 + shank_m**2 - reach**2) / (2.0 * thigh_m * shank_m)
-        thigh = math.atan2(ahead_m, down_m) + math.acos(min(hip, 1.0))
         knee = math.pi - math.acos(max(inside, -1.0))
+        back, below = shank_m * math.sin(knee), thigh_m + shank_m * math.cos(knee)
+        aside = -back * math.sin(yaw)
+        roll = math.asin(place[1] / math.hypot(aside, below)) - math.atan2(aside, below)
+        below = below * math.cos(roll) - aside * math.sin(roll)
+        thigh = math.atan2(place[0], down_m) + math.atan2(back * math.cos(yaw), below)
+        outward = 1.0 if side == 0 else -1.0
         self.angles[self._thigh[side]] = thigh
+        self.angles[self._abduct[side]] = outward * roll
+        self.angles[self._twist[side]] = -outward * yaw
         self.angles[self._shank[side]] = knee
-        self.angles[self._foot[side]] = toes_rad - (thigh - knee)
+        self.angles[self._foot[side]] = toes - (thigh - knee)
+        self.angles[self._ankle_roll[side]] = outward * roll
 
     def _swing_kicking_leg(self) -> None:
         done = 1.0 - self._kick_left_s / self.cfg.kick_s
