@@ -10,6 +10,9 @@ import pytest
 import torch
 import yaml
 
+from veca_marl.config_errors import ConfigError
+from veca_marl.train import find_device
+
 SMOKE = ["+experiment=smoke", "log=silent", "device=cpu", "threads=1"]
 
 
@@ -29,6 +32,17 @@ def networks(run):
 def rows(path):
     with path.open() as file:
         return list(csv.DictReader(file))
+
+
+def test_devices_that_are_here_are_found_and_others_refused(monkeypatch):
+    assert find_device("cpu") == torch.device("cpu")
+    monkeypatch.setattr(torch.cuda, "device_count", lambda: 0)
+    with pytest.raises(ConfigError, match=r"device=cuda is not on this machine; choices: cpu$"):
+        find_device("cuda")
+    monkeypatch.setattr(torch.cuda, "device_count", lambda: 2)
+    assert find_device("cuda:1") == torch.device("cuda:1")
+    with pytest.raises(ConfigError, match="choices: cpu, cuda, cuda:0, cuda:1"):
+        find_device("cuda:2")
 
 
 @pytest.fixture(scope="module")

@@ -1,0 +1,62 @@
+"""A film of a real episode: pictures of the eyes, sound of the ears."""
+
+import av
+import numpy as np
+import pytest
+from torchrl.envs.utils import RandomPolicy
+
+from veca_marl.algos.evaluation import random_policy
+from veca_marl.config import compose
+from veca_marl.envs.env import VecaEnv
+from veca_marl.recording import record_episode
+
+
+def record(path, *overrides):
+    game = compose(["+task=KickTheBall", "task.max_seconds=1.0", *overrides]).game
+    env = VecaEnv(game, 1, 0)
+    policy = random_policy(env)
+    env.close()
+    assert isinstance(policy, RandomPolicy)
+    record_episode(path, game, policy, seed=1)
+    with av.open(str(path)) as container:
+        pictures = [f.to_ndarray(format="rgb24") for f in container.decode(video=0)]
+    with av.open(str(path)) as container:
+        if not container.streams.audio:
+            return game, pictures, None
+        return (
+            game,
+            pictures,
+            np.concatenate([f.to_ndarray() for f in container.decode(audio=0)], axis=1),
+        )
+
+
+def difference_of_ears(sound):
+    """Return it as a share of the sound's level, after the codec has settled."""
+    settled = sound[:, 22_050 // 4 :]
+    return (settled[0] - settled[1]).std() / settled.std()
+
+
+def test_film_has_a_frame_a_step_and_what_the_ears_received(tmp_path):
+    game, pictures, sound = record(tmp_path / "film.mp4")
+    assert len(pictures) == 25
+    assert pictures[0].std() > 10, "something is to be seen"
+    assert sound.shape[1] / 22_050 == pytest.approx(1.0, abs=0.15)
+    assert sound.std() > 0.01, "the ball buzzes"
+    assert difference_of_ears(sound) > 0.2, "two ears, two sounds"
+    assert not game.senses.audio.waveform, "the configuration of the run is left alone"
+
+
+def test_one_sound_for_both_ears_when_mono_and_none_when_deaf(tmp_path):
+    _, _, mono = record(tmp_path / "mono.mp4", "senses/audio=mono")
+    assert difference_of_ears(mono) < 0.05
+    _, _, stereo = record(tmp_path / "stereo.mp4", "senses/audio=stereo")
+    assert difference_of_ears(stereo) > 0.2
+    _, pictures, silence = record(tmp_path / "deaf.mp4", "senses/audio=deaf")
+    assert silence is None
+    assert len(pictures) == 25
+
+
+def test_who_is_blind_is_filmed_in_the_room(tmp_path):
+    _, seeing, _ = record(tmp_path / "seeing.mp4")
+    _, blind, _ = record(tmp_path / "blind.mp4", "senses/vision=blind")
+    assert blind[0].shape[1] < seeing[0].shape[1]
