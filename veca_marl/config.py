@@ -100,6 +100,11 @@ class Config:
             raise ValueError(f"seed must be 0 or more, got {self.seed}")
         if self.max_minutes is not None and not self.max_minutes > 0:
             raise ValueError(f"max_minutes must be positive, got {self.max_minutes}")
+        if self.collect.frames < self.algo.minibatches:
+            raise ValueError(
+                f"collect: a batch of {self.collect.frames} frames cannot be split into "
+                f"algo.minibatches={self.algo.minibatches}"
+            )
         if self.threads is not None and self.threads < 1:
             raise ValueError(f"threads must be at least 1, got {self.threads}")
 

@@ -124,7 +124,7 @@ class TeamLearner:
         following[:, :-1] = value[:, 1:]
         cut = batch["next", "done"].squeeze(-1).clone()
         cut[:, -1] = True
-        last = batch["next"][cut].select((team, "observation")).to(device)
+        last = batch["next"].select((team, "observation"))[cut].to(device)
         following[cut.to(device)] = self.network.critic(self.network.trunk(last))[
             team, "state_value"
         ]
