@@ -24,9 +24,7 @@ class SensesCfg:
     audio: AudioCfg = field(default_factory=AudioCfg)
 
 
-def give_senses(
-    body: Body, names: Sequence[str], cfg: SensesCfg, world: World
-) -> dict[str, Sense]:
+def give_senses(body: Body, names: Sequence[str], cfg: SensesCfg, world: World) -> dict[str, Sense]:
     """Give a body the senses a task asks for.
 
     Args:
