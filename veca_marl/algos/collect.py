@@ -31,7 +31,7 @@ class CollectCfg:
 
     processes: int = 2
     worlds: int = 4
-    steps: int = 256
+    steps: int = 128
     threads: int = 1
 
     def __post_init__(self) -> None:
