@@ -89,7 +89,7 @@ def test_files_hold_only_what_differs_from_the_dataclasses():
         ([KICK, "algo.clip=-1"], r"algo.clip must be positive, got -1.0"),
         ([KICK, "task.name=Nim"], r"unknown task 'Nim'; there are \['KickTheBall'"),
         ([KICK, "total_frames=0"], r"total_frames must be at least 1, got 0"),
-        ([KICK, "algo.minibatches=9999"], r"a batch of 2048 frames cannot be split"),
+        ([KICK, "algo.minibatches=9999"], r"a batch of \d+ frames cannot be split"),
         ([KICK, "see d=1"], r"see d=1"),
     ],
 )
