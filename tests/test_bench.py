@@ -4,7 +4,6 @@ import json
 from itertools import count
 
 import numpy as np
-import pybullet
 import pytest
 import torch
 
@@ -17,6 +16,7 @@ from veca_marl.config import compose
 from veca_marl.envs.env import VecaEnv
 from veca_marl.envs.game import GameCfg
 from veca_marl.envs.task import TASKS
+from veca_marl.sim.bullet import pybullet
 from veca_marl.sim.optics import Camera
 
 QUICK = ["--steps", "3", "--repeats", "1"]

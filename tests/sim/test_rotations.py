@@ -1,9 +1,9 @@
 import math
 
 import numpy as np
-import pybullet
 import pytest
 
+from veca_marl.sim.bullet import pybullet
 from veca_marl.sim.rotations import (
     matrix_to_quaternion,
     quaternion_from_yaw,

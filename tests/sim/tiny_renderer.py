@@ -1,8 +1,8 @@
 """PyBullet's software renderer on a scene of ours."""
 
 import numpy as np
-import pybullet
 
+from veca_marl.sim.bullet import pybullet
 from veca_marl.sim.rotations import matrix_to_quaternion
 from veca_marl.sim.scene import Shape
 

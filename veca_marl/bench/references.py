@@ -10,10 +10,10 @@ from statistics import median
 from typing import Any
 
 import numpy as np
-import pybullet
 from numpy.typing import NDArray
 
 from veca_marl.sim.bodies.walker import Walker, WalkerCfg
+from veca_marl.sim.bullet import pybullet
 from veca_marl.sim.optics import Camera
 from veca_marl.sim.playground import PlaygroundCfg
 from veca_marl.sim.pose import Pose

@@ -21,8 +21,8 @@ from veca_marl.sim.spec import ArraySpec
 class Eyes(Enum):
     """How many eyes are open. The observation's shape does not depend on it."""
 
-    BINOCULAR = "binocular"
-    MONOCULAR = "monocular"
+    binocular = "binocular"
+    monocular = "monocular"
 
 
 @dataclass
@@ -47,7 +47,7 @@ class VisionCfg:
     width: int = 84
     height: int = 84
     fov_deg: float = 60.0
-    eyes: Eyes = Eyes.BINOCULAR
+    eyes: Eyes = Eyes.binocular
     grey: bool = False
     blur_deg: float = 0.0
     infant_age_months: float | None = None
@@ -93,7 +93,7 @@ class VisionSense(Sense):
         self.camera = Camera(cfg.width, cfg.height, cfg.fov_deg)
         self.filters = chosen_filters(cfg)
         self.specs = _specs(cfg, self.camera)
-        self._mounts = ("eye_left", "eye_right")[: 1 if cfg.eyes is Eyes.MONOCULAR else 2]
+        self._mounts = ("eye_left", "eye_right")[: 1 if cfg.eyes is Eyes.monocular else 2]
         self._body = body
         self._scene = scene
         self._hidden: Bools = np.zeros(0, np.bool_)
