@@ -23,7 +23,7 @@ from veca_marl.envs.game import GameCfg
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Measure, print a table, and write JSON if asked to; return the exit status."""
-    asked = _parser().parse_args(arguments)
+    asked = argument_parser().parse_args(arguments)
     torch.set_num_threads(1)
     try:
         game = compose(_overrides(asked)).game
@@ -53,7 +53,8 @@ def _measure(game: GameCfg, agents: int, worlds: int, steps: int, repeats: int) 
         return measure_rollouts(replace(game, task=task_cfg), worlds, steps, repeats)
 
 
-def _parser() -> argparse.ArgumentParser:
+def argument_parser() -> argparse.ArgumentParser:
+    """Return what understands the command line of the bench."""
     parser = argparse.ArgumentParser(
         prog="python -m veca_marl.bench",
         description="Agent steps per second, and the milliseconds of each part of a step.",
