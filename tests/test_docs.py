@@ -5,7 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from veca_marl.envs.task import TASKS
+from veca_marl.api import list_tasks
+from veca_marl.envs.task import find_task
 
 ROOT = Path(__file__).resolve().parent.parent
 
@@ -17,7 +18,7 @@ def load_script():
     return module
 
 
-@pytest.mark.parametrize("name", sorted(TASKS))
+@pytest.mark.parametrize("name", list_tasks())
 def test_the_page_of_a_task_is_that_of_its_docstring(name):
     page = (ROOT / "docs" / "tasks" / f"{name}.md").read_text(encoding="utf-8")
-    assert page == load_script().task_page(TASKS[name]), "run make docs"
+    assert page == load_script().task_page(find_task(name)), "run make docs"
