@@ -9,6 +9,7 @@ from torch import multiprocessing
 from torchrl.collectors import MultiSyncCollector
 from torchrl.envs import ParallelEnv, check_env_specs
 
+from veca_marl.api import make
 from veca_marl.config import compose
 from veca_marl.envs.env import VecaEnv
 
@@ -181,3 +182,8 @@ def test_it_works_in_a_collector_of_several_processes():
     batches = collected(0)
     assert [batch.shape[:3] for batch in batches] == [(2, 2, 10)] * 2
     assert not torch.equal(batches[0][0], batches[0][1])  # the processes play different games
+
+
+def test_an_agent_without_any_sense_is_refused():
+    with pytest.raises(ValueError, match=r"at least one of \['vision', 'audio'\]"):
+        make("KickTheBall", senses={"vision": "blind", "audio": "deaf"})

@@ -34,7 +34,7 @@ def give_senses(body: Body, names: Sequence[str], cfg: SensesCfg, world: World) 
         world: Where the body is.
 
     Raises:
-        ValueError: If there is no sense of a name.
+        ValueError: If there is no sense of a name, or all are absent.
     """
     makers: dict[str, Callable[[], Sense]] = {
         "vision": lambda: VisionSense(cfg.vision, body, world.scene),
@@ -43,4 +43,7 @@ def give_senses(body: Body, names: Sequence[str], cfg: SensesCfg, world: World) 
     unknown = sorted(set(names) - set(makers))
     if unknown:
         raise ValueError(f"unknown senses {unknown}; there are {sorted(makers)}")
-    return {name: makers[name]() for name in names if getattr(cfg, name).present}
+    given = {name: makers[name]() for name in names if getattr(cfg, name).present}
+    if names and not given:
+        raise ValueError(f"no sense is left: at least one of {list(names)} must be present")
+    return given
