@@ -24,6 +24,8 @@ from veca_marl.algos.ppo import PPOCfg
 from veca_marl.config_errors import ConfigError, one_line
 from veca_marl.envs.game import GameCfg
 from veca_marl.envs.task import TASKS, TaskCfg, find_task
+from veca_marl.sim.bodies.base import BodyCfg
+from veca_marl.sim.bodies.humanoid import HumanoidCfg
 from veca_marl.sim.bodies.walker import WalkerCfg
 from veca_marl.sim.playground import PlaygroundCfg
 from veca_marl.sim.senses import SensesCfg
@@ -79,7 +81,7 @@ class Config:
 
     task: TaskCfg = MISSING
     playground: PlaygroundCfg = field(default_factory=PlaygroundCfg)
-    body: WalkerCfg = field(default_factory=WalkerCfg)
+    body: BodyCfg = MISSING
     senses: SensesCfg = field(default_factory=SensesCfg)
     clock: ClockCfg = field(default_factory=ClockCfg)
     algo: PPOCfg = MISSING
@@ -119,6 +121,8 @@ def register_schemas() -> None:
     store = ConfigStore.instance()
     store.store(name="schema", node=Config)
     store.store(group="schema/algo", name="ppo", node=PPOCfg)
+    store.store(group="schema/body", name="walker", node=WalkerCfg)
+    store.store(group="schema/body", name="humanoid", node=HumanoidCfg)
     for name, task in TASKS.items():
         store.store(group="schema/task", name=name, node=task.cfg_type())
     OmegaConf.register_new_resolver("run_folder", _run_folder, replace=True)

@@ -87,8 +87,7 @@ def by_chance(task, player, observation, rng):
 
 
 def by_expert(task, player, observation, rng):
-    forward, turn = task.expert(player, observation)
-    return player.body.control.encode(forward, turn)
+    return player.body.encode(task.expert(player, observation))
 
 
 if __name__ == "__main__":

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import logging
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -13,11 +14,15 @@ from numpy.typing import NDArray
 
 import veca_marl.envs.tasks  # noqa: F401  registers the tasks
 from veca_marl.envs.task import Player, TaskCfg, Team, find_task
-from veca_marl.sim.bodies.walker import Walker, WalkerCfg
+from veca_marl.sim.bodies.base import BodyCfg
+from veca_marl.sim.bodies.family import make_body
+from veca_marl.sim.bodies.walker import WalkerCfg
 from veca_marl.sim.playground import PlaygroundCfg
 from veca_marl.sim.senses import SensesCfg, give_senses
 from veca_marl.sim.senses.base import Sense
 from veca_marl.sim.world import ClockCfg, World
+
+_LOG = logging.getLogger(__name__)
 
 Observation = dict[str, NDArray[Any]]
 
@@ -36,7 +41,7 @@ class GameCfg:
 
     task: TaskCfg = field(default_factory=TaskCfg)
     playground: PlaygroundCfg = field(default_factory=PlaygroundCfg)
-    body: WalkerCfg = field(default_factory=WalkerCfg)
+    body: BodyCfg = field(default_factory=WalkerCfg)
     senses: SensesCfg = field(default_factory=SensesCfg)
     clock: ClockCfg = field(default_factory=ClockCfg)
 
@@ -47,7 +52,7 @@ class Outcome(NamedTuple):
     Attributes:
         terms: Unweighted reward terms by player and name.
         terminated: The game is over by its rules.
-        truncated: The time is up.
+        truncated: The time is up, or the simulation of a body made no sense any more.
     """
 
     terms: dict[str, dict[str, float]]
@@ -70,7 +75,7 @@ class Game:
         self.cfg = cfg
         self.world = World(cfg.playground, cfg.clock)
         self.players = [
-            Player(name, team.name, Walker(name, cfg.body, self.world, shirt))
+            Player(name, team.name, make_body(name, cfg.body, self.world, shirt))
             for shirt, team in enumerate(task_type.teams)
             for name in player_names(team)
         ]
@@ -138,7 +143,21 @@ class Game:
         self.task.after_step(rng)
         self.steps += 1
         terms = {player.name: self.task.reward(player) for player in self.players}
-        return Outcome(terms, self.task.terminated(), self.steps >= self.max_steps)
+        truncated = self.steps >= self.max_steps or self._fell_apart()
+        return Outcome(terms, self.task.terminated(), truncated)
+
+    def _fell_apart(self) -> bool:
+        """Log which body's simulation has gone non-finite; say whether one has."""
+        broken = [player.name for player in self.players if not player.body.is_finite]
+        if broken:
+            _LOG.warning(
+                "step %d of %s: the simulation of %s is not finite any more; "
+                "the episode is truncated, the next reset mends it",
+                self.steps,
+                self.cfg.task.name,
+                ", ".join(broken),
+            )
+        return bool(broken)
 
     def observe(self, player: Player) -> Observation:
         """Read all senses of a player. Call it once per step: reading the ears advances them."""

@@ -28,8 +28,8 @@ class ExpertPolicy(nn.Module):
             seen = tensordict[team, "observation"]
             rows = [
                 [
-                    player.body.control.encode(
-                        *game.task.expert(
+                    player.body.encode(
+                        game.task.expert(
                             player,
                             {name: array.numpy() for name, array in seen[world, index].items()},
                         )

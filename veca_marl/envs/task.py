@@ -10,6 +10,7 @@ from typing import Any, ClassVar, NamedTuple, get_type_hints
 import numpy as np
 from numpy.typing import NDArray
 
+from veca_marl.sim.bodies.base import Body
 from veca_marl.sim.bodies.walker import Walker
 from veca_marl.sim.world import World
 
@@ -26,7 +27,20 @@ class Player(NamedTuple):
 
     name: str
     team: str
-    body: Walker
+    body: Body
+
+
+def walker(player: Player) -> Walker:
+    """Return a player's body where a task needs one that walks and kicks.
+
+    Raises:
+        ValueError: If it is moved by its joints.
+    """
+    if not isinstance(player.body, Walker):
+        raise ValueError(
+            f"{player.name}: this task needs a body that walks and kicks; choose body=walker"
+        )
+    return player.body
 
 
 def terms(**weights: float) -> Any:
@@ -101,10 +115,12 @@ class Task(ABC):
         return False
 
     @abstractmethod
-    def expert(self, player: Player, observation: dict[str, NDArray[Any]]) -> tuple[float, float]:
-        """Play by hand-written rules: return (forward, turn), each in [-1, 1].
+    def expert(self, player: Player, observation: dict[str, NDArray[Any]]) -> Any:
+        """Play by hand-written rules: return a wish that `Body.encode` turns into an action row.
 
-        The docstring says whether it uses the observation alone or privileged state.
+        For a walking body that is (forward, turn), each in [-1, 1]; for a joint-level body a number
+        in [-1, 1] for each commanded joint. The docstring says whether it uses the observation
+        alone or privileged state.
         """
 
     @classmethod

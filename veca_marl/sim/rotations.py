@@ -40,6 +40,14 @@ def quaternion_from_yaw(yaw_rad: float) -> tuple[float, float, float, float]:
     return (0.0, 0.0, math.sin(0.5 * yaw_rad), math.cos(0.5 * yaw_rad))
 
 
+def heading_rad(rotation: Floats) -> float:
+    """Return the turn about the vertical that is in a rotation ``(3, 3)`` (swing and twist).
+
+    Defined for all attitudes but exactly upside down.
+    """
+    return math.atan2(rotation[1, 0] - rotation[0, 1], rotation[0, 0] + rotation[1, 1])
+
+
 def matrix_to_quaternion(rotation: NDArray[Any]) -> Floats:
     """Return the unit quaternion ``(4,)`` with ``w >= 0`` of a ``(3, 3)`` rotation matrix.
 

@@ -11,6 +11,7 @@ import functools
 import itertools
 import math
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib.resources import files
 
@@ -53,6 +54,7 @@ class Bone:
         rest_rotation: ``(3, 3)`` orientation in the parent's frame at zero angles.
         mass_kg: Mass of the segment.
         skin_thickness_m: Flexible skin over the bone (``d_max`` of the tactile sense).
+        skin_force_n: Force on one contact point that presses the skin down to the bone.
         colliders: The rigid bone as primitives in its own frame.
         first_joint: Index of its first degree of freedom.
         joint_count: Number of its degrees of freedom, 0 to 3.
@@ -64,6 +66,7 @@ class Bone:
     rest_rotation: Floats
     mass_kg: float
     skin_thickness_m: float
+    skin_force_n: float
     colliders: tuple[BoneCapsule | BoneBox, ...]
     first_joint: int
     joint_count: int
@@ -181,6 +184,7 @@ def _bones(joints: tuple[Joint, ...]) -> tuple[Bone, ...]:
                 rest_rotation=_rotation(*angles),
                 mass_kg=float(row["mass_kg"]),
                 skin_thickness_m=float(row["d_max_mm"]) / 1000.0,
+                skin_force_n=float(row["skin_force_to_bone_N"]),
                 colliders=_colliders(row["bone_colliders"]),
                 first_joint=own[0] if own else 0,
                 joint_count=len(own),
@@ -206,24 +210,28 @@ def load_skeleton() -> Skeleton:
     )
 
 
-class Soles:
-    """The undersides of both feet: corners of boxes and cap centres of capsules on the bones.
+class Underside:
+    """The lowest point of some bones: corners of boxes and cap centres of capsules.
 
-    The rigid bones stand on the floor; their flexible skin is pressed flat beneath them.
+    Args:
+        skeleton: The table.
+        bones: Which bones count.
+        skin: Whether with the flexible skin or the rigid bones alone.
     """
 
-    def __init__(self, skeleton: Skeleton) -> None:
+    def __init__(self, skeleton: Skeleton, bones: Sequence[str], skin: bool) -> None:
         points: list[tuple[int, tuple[float, ...], float]] = []
-        for name in ("l_foot", "r_foot"):
+        for name in bones:
             frame = skeleton.bone(name)
+            grown = skeleton.bones[frame].skin_thickness_m if skin else 0.0
             for part in skeleton.bones[frame].colliders:
-                points += [(frame, *point) for point in _extremes(part)]
+                points += [(frame, at, radius + grown) for at, radius in _extremes(part)]
         self._frames = np.array([frame for frame, _, _ in points])
         self._offsets = np.array([offset for _, offset, _ in points])
         self._radii = np.array([radius for _, _, radius in points])
 
     def lowest_m(self, positions: Floats, rotations: Floats) -> float:
-        """Return the height of the lowest point of the soles.
+        """Return the height of the lowest point.
 
         Args:
             positions: ``(47, 3)`` bone origins, metres.
@@ -232,6 +240,16 @@ class Soles:
         up = rotations[self._frames, 2]
         heights = positions[self._frames, 2] + (up * self._offsets).sum(axis=1) - self._radii
         return float(heights.min())
+
+
+class Soles(Underside):
+    """The undersides of both feet.
+
+    The rigid bones stand on the floor; their flexible skin is pressed flat beneath them.
+    """
+
+    def __init__(self, skeleton: Skeleton) -> None:
+        super().__init__(skeleton, ("l_foot", "r_foot"), skin=False)
 
 
 def _extremes(part: BoneCapsule | BoneBox) -> list[tuple[tuple[float, ...], float]]:
@@ -244,7 +262,7 @@ def _extremes(part: BoneCapsule | BoneBox) -> list[tuple[tuple[float, ...], floa
 
 
 @njit(cache=True)
-def _turn(rotation: Floats, axis: Floats, angle: float, out: Floats) -> None:
+def turn(rotation: Floats, axis: Floats, angle: float, out: Floats) -> None:
     """Write rotation @ Rodrigues(axis, angle) to out, which may be `rotation` itself."""
     c, s = math.cos(angle), math.sin(angle)
     x, y, z = axis[0], axis[1], axis[2]
@@ -284,7 +302,7 @@ def _kinematics(
                     value += up[i, k] * rest_rotations[bone, k, j]
                 rotations[bone, i, j] = value
         for joint in range(joint_slices[bone, 0], joint_slices[bone, 1]):
-            _turn(rotations[bone], joint_axes[joint], angles[joint], rotations[bone])
+            turn(rotations[bone], joint_axes[joint], angles[joint], rotations[bone])
 
 
 def forward_kinematics(

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veca_marl.envs.scoring import cosine, flat
-from veca_marl.envs.task import Player, Task, TaskCfg, register, terms
+from veca_marl.envs.task import Player, Task, TaskCfg, register, terms, walker
 from veca_marl.sim.props import PropCfg, PropShape
 from veca_marl.sim.sounds import SoundCfg, SoundKind
 
@@ -70,6 +70,7 @@ class KickTheBall(Task):
 
     def build(self) -> None:
         buzz = SoundCfg(kind=SoundKind.buzz, level=self.cfg.loudness)
+        self.kicker = walker(self.players[0])
         self.room = self.world.playground.rooms[0]
         self._kicked = self._scored = False
         self._left_s = 0.0
@@ -95,7 +96,7 @@ class KickTheBall(Task):
             self._launch(rng)
 
     def after_step(self, rng: np.random.Generator) -> None:
-        self._scored = not self._kicked and self.players[0].body.kick(self.ball)
+        self._scored = not self._kicked and self.kicker.kick(self.ball)
         if self._scored:
             self._kicked, self._left_s = True, self.cfg.rest_s
 

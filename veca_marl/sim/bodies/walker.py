@@ -8,32 +8,24 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from veca_marl.sim.bodies.base import BodyCfg
 from veca_marl.sim.bodies.controls import WALK_CONTROLS, ActionKind
-from veca_marl.sim.bodies.looks import SHIRTS, bone_geoms
-from veca_marl.sim.bodies.mounts import EYES, gaze, organ_pose
+from veca_marl.sim.bodies.figure import Figure
 from veca_marl.sim.bodies.pushing import Pusher, horizontal_distance
 from veca_marl.sim.gait import Gait
-from veca_marl.sim.optics import Camera, seen_fraction
-from veca_marl.sim.pose import Floats, Pose
+from veca_marl.sim.pose import Floats
 from veca_marl.sim.props import Prop
-from veca_marl.sim.skeleton import Soles, forward_kinematics, load_skeleton
-from veca_marl.sim.sounds import Voice
+from veca_marl.sim.skeleton import Soles, forward_kinematics
 from veca_marl.sim.world import World
 
 
-class Visible(Protocol):
-    """What eyes can look for: a prop or a body."""
-
-    object_id: int
-
-
 @dataclass
-class WalkerCfg:
+class WalkerCfg(BodyCfg):
     """Numbers of the walking body. The paper leaves them open; these are ours.
 
     Attributes:
@@ -49,7 +41,6 @@ class WalkerCfg:
         kick_speed_mps: Speed of a kicked light thing.
         kick_impulse_ns: The most a kick can give: heavy things fly slower.
         head_pitch_deg: How far the head hangs at the start of an episode, down is positive.
-        eye_range_deg: How far the eyes turn in the head.
     """
 
     action: ActionKind = ActionKind.continuous
@@ -64,7 +55,6 @@ class WalkerCfg:
     kick_speed_mps: float = 3.0
     kick_impulse_ns: float = 3.0
     head_pitch_deg: float = 12.0
-    eye_range_deg: float = 50.0
 
     def __post_init__(self) -> None:
         """All are magnitudes, and a capsule is higher than wide."""
@@ -72,9 +62,7 @@ class WalkerCfg:
             raise ValueError(
                 f"body.action={self.action!r}; there are {[k.name for k in ActionKind]}"
             )
-        for name, value in vars(self).items():
-            if isinstance(value, (int, float)) and not (math.isfinite(value) and value >= 0):
-                raise ValueError(f"body.{name}={value} must be a finite number, 0 or more")
+        super().__post_init__()
         if not 0.0 < 2.0 * self.radius_m <= self.height_m:
             raise ValueError(
                 f"body.radius_m={self.radius_m}, body.height_m={self.height_m}: "
@@ -82,38 +70,21 @@ class WalkerCfg:
             )
 
 
-class Walker:
+class Walker(Figure):
     """A body that walks where it is told. See `Body` for what every body offers."""
 
     def __init__(self, name: str, cfg: WalkerCfg, world: World, shirt: int = 0) -> None:
-        self.name = name
+        super().__init__(name, cfg.eye_range_deg, world, shirt)
         self.cfg = cfg
         self.control = WALK_CONTROLS[cfg.action]
         self.action_spec = self.control.spec
-        self._world = world
-        self._skeleton = load_skeleton()
         self._gait = Gait(self._skeleton)
         self._pusher = Pusher(world.client, cfg.radius_m, cfg.height_m, cfg.push_limit_kg)
-        drawn = world.scene.add_object(
-            name, bone_geoms(self._skeleton, SHIRTS[shirt % len(SHIRTS)])
-        )
-        self.object_id = drawn.id
-        self._drawn = drawn
-        self._head = self._skeleton.bone("head")
         self._soles = Soles(self._skeleton)
-        self.own_head_frames = (self._skeleton.bone("neck"), self._head)
-        self._voice = Voice(world.sound.sample_rate_hz)
-        self._mouth = world.sound.add_source(f"{name}.voice", self._voice)
-        self.camera = Camera()
         world.attach(self)
         self.reset()
 
     # ---- where it is
-
-    @property
-    def position(self) -> Floats:
-        """``(3,)`` metres: the pelvis in the world frame."""
-        return np.array(self._drawn.positions[0])
 
     @property
     def velocity(self) -> Floats:
@@ -130,19 +101,6 @@ class Walker:
         """Radius of the capsule that stands for it in the physics."""
         return self.cfg.radius_m
 
-    def bone(self, name: str) -> Pose:
-        """Return the pose of a bone by name, such as `l_hand`."""
-        index = self._skeleton.bone(name)
-        return Pose(self._drawn.positions[index].copy(), self._drawn.rotations[index].copy())
-
-    def mount(self, name: str) -> Pose:
-        """Return where a sense organ is; eyes include where they are turned to."""
-        head = Pose(self._drawn.positions[self._head], self._drawn.rotations[self._head])
-        organ = organ_pose(name, head)
-        if name in EYES and self._gaze_point is not None:
-            return gaze(organ, self._gaze_point, math.radians(self.cfg.eye_range_deg))
-        return organ
-
     def place(self, position: Floats | tuple[float, float, float], yaw_rad: float = 0.0) -> None:
         """Start anew: stand at a place of the floor, facing `yaw_rad`, looking ahead.
 
@@ -157,10 +115,11 @@ class Walker:
         self.yaw_rad = float(yaw_rad)
         self._speed_mps = self._turn_radps = 0.0
         self._velocity = np.zeros(3)
+        for motion in (self._speeds, self._pelvis_velocity, self._pelvis_spin):
+            motion[:] = 0.0
         self._head_pitch_rad = math.radians(self.cfg.head_pitch_deg)
         self._head_yaw_rad = 0.0
-        self._gaze_point: Floats | None = None
-        self.focal_distance_m = math.inf
+        self._relax_eyes()
         self._gait.reset()
         self._pusher.look_round(self._world.props, self._ground, 0.0)
         self._ground[:] = self._pusher.move(self._ground[0], self._ground[1])
@@ -175,6 +134,16 @@ class Walker:
         """Walk as an action row says; it holds until the next call."""
         forward, turn = self.control.decode(action)
         self.walk(forward * self.cfg.walk_speed_mps, turn * math.radians(self.cfg.turn_speed_degps))
+
+    def encode(self, wish: Any) -> NDArray[Any]:
+        """Return the row nearest to a wish ``(forward, turn)``, each in [-1, 1]."""
+        forward, turn = wish
+        return self.control.encode(forward, turn)
+
+    @property
+    def is_finite(self) -> bool:
+        """It is moved by hand and stays finite."""
+        return True
 
     def walk(self, walk_speed_mps: float, turn_speed_radps: float) -> None:
         """Walk forward (backward when negative) and turn (left when positive) until told anew."""
@@ -220,42 +189,6 @@ class Walker:
         low, high = self._gait.yaw_range_rad
         self._head_yaw_rad = min(max(self._head_yaw_rad - math.radians(deg), low), high)
 
-    def look_toward_point(self, point: Floats | tuple[float, float, float]) -> None:
-        """Turn the eyes, not the head, to a point and keep them there until `release_look`."""
-        target = np.array(point, dtype=np.float64)
-        if target.shape != (3,) or not np.isfinite(target).all():
-            raise ValueError(f"cannot look toward {point!r}: three finite metres are needed")
-        self._gaze_point = target
-
-    def release_look(self) -> None:
-        """Let the eyes look straight ahead again."""
-        self._gaze_point = None
-
-    def adjust_focal_length(self, focal_distance_m: float) -> None:
-        """Adjust the lenses to a distance in metres; ``inf`` is relaxed."""
-        if not focal_distance_m > 0:
-            raise ValueError(f"focal distance {focal_distance_m} must be positive metres or inf")
-        self.focal_distance_m = float(focal_distance_m)
-
-    def make_sound(self, waveform: NDArray[np.float32]) -> None:
-        """Say something: samples at 22 050 Hz, heard by everyone, the speaker included."""
-        self._voice.say(waveform)
-
-    def is_visible(self, thing: Visible, eye: str = "eye_left") -> bool:
-        """Say whether an eye sees a thing, also through glass (the paper's `isVisible`).
-
-        Args:
-            thing: A prop or a body.
-            eye: ``eye_left`` or ``eye_right``; it sees through `camera`, by default as sharply as
-                the vision sense does.
-        """
-        if eye not in EYES:
-            raise ValueError(f"no eye {eye!r}; there are {list(EYES)}")
-        scene = self._world.scene
-        own_head = scene.hidden(self.object_id, self.own_head_frames)
-        views = self.camera.render(scene, [self.mount(eye)], own_head)
-        return seen_fraction(views, thing.object_id) > 0.0
-
     # ---- the world moves it
 
     def reset(self) -> None:
@@ -286,7 +219,11 @@ class Walker:
         self._velocity[:2] = (self._ground - self._step_start) / step_s
         speed = float(self._velocity @ self.forward)
         self._gait.advance(speed, self._turn_radps, step_s)
+        before = self._angles.copy()
         self._pose_bones()
+        self._speeds[:] = (self._angles - before) / step_s
+        self._pelvis_velocity[:] = self._velocity
+        self._pelvis_spin[2] = self._turn_radps
         self._mouth.position = self.mount("mouth").position
 
     def _make_room(self, x: float, y: float) -> tuple[float, float]:
@@ -315,6 +252,7 @@ class Walker:
         positions[0] = self._ground[0], self._ground[1], 0.0
         rotations[0] = ((c, -s, 0.0), (s, c, 0.0), (0.0, 0.0, 1.0))
         angles = self._gait.pose(self._head_pitch_rad, self._head_yaw_rad)
+        self._angles[:] = angles
         forward_kinematics(self._skeleton, angles, positions, rotations)
         positions[:, 2] -= self._soles.lowest_m(positions, rotations)
 

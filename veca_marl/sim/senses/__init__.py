@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from veca_marl.sim.bodies.base import Body
 from veca_marl.sim.senses.audio import AudioCfg, AudioSense
 from veca_marl.sim.senses.base import Sense
+from veca_marl.sim.senses.proprioception import ProprioceptionCfg, ProprioceptionSense
 from veca_marl.sim.senses.vision import VisionCfg, VisionSense
 from veca_marl.sim.world import World
 
@@ -22,6 +23,7 @@ class SensesCfg:
 
     vision: VisionCfg = field(default_factory=VisionCfg)
     audio: AudioCfg = field(default_factory=AudioCfg)
+    proprioception: ProprioceptionCfg = field(default_factory=ProprioceptionCfg)
 
 
 def give_senses(body: Body, names: Sequence[str], cfg: SensesCfg, world: World) -> dict[str, Sense]:
@@ -39,6 +41,7 @@ def give_senses(body: Body, names: Sequence[str], cfg: SensesCfg, world: World) 
     makers: dict[str, Callable[[], Sense]] = {
         "vision": lambda: VisionSense(cfg.vision, body, world.scene),
         "audio": lambda: AudioSense(cfg.audio, body, world.sound),
+        "proprioception": lambda: ProprioceptionSense(cfg.proprioception, body, world),
     }
     unknown = sorted(set(names) - set(makers))
     if unknown:

@@ -1,0 +1,86 @@
+"""Action rows of the joint-level body: normalised torques, or angles to go to."""
+
+from __future__ import annotations
+
+from enum import Enum
+from typing import Protocol
+
+import numpy as np
+
+from veca_marl.sim.pose import Floats
+from veca_marl.sim.skeleton import Skeleton
+from veca_marl.sim.skin_springs import is_finger
+
+
+class JointControl(Protocol):
+    """Turns a wish in [-1, 1] for every joint into its motor's torque, at every physics step."""
+
+    def shares(self, wishes: Floats, angles: Floats, low: Floats, high: Floats) -> Floats:
+        """Return torques as shares of each joint's strength.
+
+        Args:
+            wishes: ``(n,)`` in [-1, 1].
+            angles: ``(n,)`` rad, now.
+            low: ``(n,)`` rad, the lower stops.
+            high: ``(n,)`` rad, the upper stops.
+        """
+        ...
+
+
+class NormalisedTorque:
+    """A wish is a share of the joint's strength (the paper's `apply_torque`)."""
+
+    def shares(self, wishes: Floats, angles: Floats, low: Floats, high: Floats) -> Floats:
+        """See `JointControl`."""
+        return wishes
+
+
+class PositionTarget:
+    """A wish is an angle: -1 and 1 are the stops, 0 is the neutral standing angle.
+
+    A spring pulls the joint there, with full strength from `reach_rad` away; the joint's own
+    damping brakes it, so no further damping can make the explicit integration unstable.
+    """
+
+    reach_rad = 0.25
+
+    def shares(self, wishes: Floats, angles: Floats, low: Floats, high: Floats) -> Floats:
+        """See `JointControl`."""
+        targets = np.where(wishes >= 0.0, wishes * high, -wishes * low)
+        return np.clip((targets - angles) / self.reach_rad, -1.0, 1.0)
+
+    @staticmethod
+    def wishes(angles: Floats, low: Floats, high: Floats) -> Floats:
+        """Return the row that asks for angles, as an expert needs it."""
+        ranges = np.where(angles >= 0.0, high, -low)
+        shares = np.divide(angles, ranges, out=np.zeros(len(angles)), where=ranges > 0.0)
+        return np.clip(shares, -1.0, 1.0)
+
+
+class JointActionKind(Enum):
+    """How the joints are commanded."""
+
+    torque = "torque"
+    position = "position"
+
+
+JOINT_CONTROLS: dict[JointActionKind, JointControl] = {
+    JointActionKind.torque: NormalisedTorque(),
+    JointActionKind.position: PositionTarget(),
+}
+
+
+class JointChoice(Enum):
+    """Which joints an action row moves; the others are left without torque or at 0."""
+
+    all = "all"
+    limbs = "limbs"
+
+
+def chosen_joints(skeleton: Skeleton, choice: JointChoice) -> list[int]:
+    """Return the joints of a choice: all 82, or the 40 that are not in fingers."""
+    joints = range(len(skeleton.joints))
+    if choice is JointChoice.all:
+        return list(joints)
+    bones = {bone.name: bone for bone in skeleton.bones}
+    return [i for i in joints if not is_finger(bones[skeleton.joints[i].bone])]

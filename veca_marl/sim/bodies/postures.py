@@ -1,0 +1,107 @@
+"""How a joint-level body may start: the pelvis's attitude and the angles of its joints.
+
+The angles are ours, chosen by eye: positions in which a child can be laid down or set.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from veca_marl.sim.pose import Floats
+from veca_marl.sim.skeleton import Skeleton
+
+
+@dataclass(frozen=True)
+class Posture:
+    """An attitude of the pelvis and the joints that are not at zero.
+
+    Attributes:
+        pitch_deg: Of the pelvis; 0 is upright, 90 on the belly, -90 on the back.
+        joints_deg: Angles by joint name (`chest.flexion`); a name without side (`thigh.flexion`)
+            means both sides.
+    """
+
+    pitch_deg: float = 0.0
+    joints_deg: Mapping[str, float] = field(default_factory=dict)
+
+
+STANDING = Posture()
+ON_BACK = Posture(-90.0, {"upper_arm.abduction": 30.0, "forearm.flexion": 20.0})
+ON_BELLY = Posture(
+    90.0, {"upper_arm.abduction": 50.0, "forearm.flexion": 20.0, "foot.dorsiflexion": -55.0}
+)
+SITTING = Posture(
+    5.0,
+    {
+        "thigh.flexion": 95.0,
+        "thigh.abduction": 30.0,
+        "shank.flexion": 15.0,
+        "spine.flexion": 12.0,
+        "upper_arm.flexion": 20.0,
+        "forearm.flexion": 20.0,
+    },
+)
+ON_ALL_FOURS = Posture(
+    85.0,
+    {
+        "thigh.flexion": 90.0,
+        "shank.flexion": 95.0,
+        "foot.dorsiflexion": -50.0,
+        "upper_arm.flexion": 85.0,
+        "hand.flexion": -75.0,
+        "neck.flexion": -40.0,
+    },
+)
+POSTURES: dict[str, Posture] = {
+    "standing": STANDING,
+    "on_back": ON_BACK,
+    "on_belly": ON_BELLY,
+    "sitting": SITTING,
+    "on_all_fours": ON_ALL_FOURS,
+}
+
+
+def posture_angles(skeleton: Skeleton, posture: Posture) -> Floats:
+    """Return the ``(82,)`` joint angles of a posture, rad.
+
+    Raises:
+        ValueError: If a joint is unknown, or cannot be at its angle.
+    """
+    angles = np.zeros(len(skeleton.joints))
+    for name, degrees in posture.joints_deg.items():
+        for joint in _joints(skeleton, name):
+            angles[joint] = math.radians(degrees)
+    check_angles(skeleton, angles)
+    return angles
+
+
+def check_angles(skeleton: Skeleton, angles: Floats) -> None:
+    """Raise `ValueError` naming the first joint that cannot be at its angle."""
+    for joint, angle in zip(skeleton.joints, angles, strict=True):
+        # written so that a NaN fails as well
+        if not joint.low_rad <= angle <= joint.high_rad:
+            low, high = math.degrees(joint.low_rad), math.degrees(joint.high_rad)
+            raise ValueError(
+                f"{joint.bone}.{joint.label} cannot be at {math.degrees(angle):.6g} degrees: "
+                f"it moves from {low:.6g} to {high:.6g}"
+            )
+
+
+def pelvis_rotation(posture: Posture, yaw_rad: float) -> Floats:
+    """Return the pelvis's frame ``(3, 3)`` in the world: pitched, then turned by `yaw_rad`."""
+    pitch = math.radians(posture.pitch_deg)
+    cp, sp, cy, sy = math.cos(pitch), math.sin(pitch), math.cos(yaw_rad), math.sin(yaw_rad)
+    return np.array([[cy * cp, -sy, cy * sp], [sy * cp, cy, sy * sp], [-sp, 0.0, cp]])
+
+
+def _joints(skeleton: Skeleton, name: str) -> list[int]:
+    """Return the joint of a name, or the two of a name without side."""
+    names = [f"{joint.bone}.{joint.label}" for joint in skeleton.joints]
+    found = [names.index(n) for n in (name, f"l_{name}", f"r_{name}") if n in names]
+    if not found:
+        raise ValueError(f"no joint {name!r}; there are {names}")
+    return found
