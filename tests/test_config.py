@@ -9,11 +9,15 @@ from omegaconf import OmegaConf
 from veca_marl.config import CONF, Config, compose, compose_node
 from veca_marl.config_errors import ConfigError
 from veca_marl.envs.task import TASKS
+from veca_marl.sim.bodies.humanoid import Detail, HumanoidCfg
+from veca_marl.sim.bodies.joint_controls import JointActionKind as Act
+from veca_marl.sim.bodies.walker import WalkerCfg
 from veca_marl.sim.senses import SensesCfg
 from veca_marl.sim.senses.audio import AudioQuality
 
 KICK = "+task=KickTheBall"
 GROUPS = ["algo", "body", "collect", "log", "playground", "senses/audio", "senses/vision"]
+GROUPS += ["senses/proprioception"]
 PRESETS = [(g, path.stem) for g in GROUPS for path in sorted((CONF / g).glob("*.yaml"))]
 EXPERIMENTS = sorted(path.stem for path in (CONF / "experiment").glob("*.yaml"))
 
@@ -56,7 +60,7 @@ def test_no_preset_is_called_what_yaml_reads_as_a_boolean(path):
 
 
 def test_files_hold_only_what_differs_from_the_dataclasses():
-    for sense in ("audio", "vision"):
+    for sense in ("audio", "vision", "proprioception"):
         default = OmegaConf.structured(SensesCfg())[sense]
         for path in (CONF / "senses" / sense).glob("*.yaml"):
             for key, value in (OmegaConf.load(path) or {}).items():
@@ -142,3 +146,23 @@ def test_configuration_survives_the_file_of_a_run(tmp_path):
     again = OmegaConf.to_object(merged)
     assert again == compose([KICK, "senses/audio=stereo", "playground=simple", "seed=9"])
     assert list(chain(again.playground.props)), "lists must come back typed"
+
+
+@pytest.mark.parametrize(
+    ("preset", "kind", "different"),
+    [
+        ("walker", WalkerCfg, {}),
+        ("full", HumanoidCfg, {}),
+        ("mitten_position", HumanoidCfg, {"detail": Detail.mitten, "action": Act.position}),
+    ],
+)
+def test_a_body_composes_to_its_own_type(preset, kind, different):
+    assert compose([KICK, f"body={preset}"]).body == kind(**different)
+
+
+def test_a_body_takes_its_own_numbers_alone():
+    assert compose([KICK, "body=mitten", "body.strength=0.5"]).body.strength == 0.5
+    with pytest.raises(ConfigError, match="walk_speed_mps"):
+        compose([KICK, "body=mitten", "body.walk_speed_mps=0.5"])
+    with pytest.raises(ConfigError, match=r"body\.detail|Detail"):
+        compose([KICK, "body=full", "body.detail=stick"])

@@ -6,7 +6,7 @@ import argparse
 import os
 import sys
 from collections.abc import Sequence
-from contextlib import nullcontext
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
 from pathlib import Path
 
@@ -19,6 +19,8 @@ from veca_marl.bench.rollouts import Rollouts, measure_first_world, measure_roll
 from veca_marl.config import compose
 from veca_marl.config_errors import ConfigError
 from veca_marl.envs.game import GameCfg
+from veca_marl.envs.task import TaskCfg, find_task
+from veca_marl.sim.bodies.humanoid import HumanoidCfg
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -31,12 +33,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(error, file=sys.stderr)  # noqa: T201
         return 2
     print(f"processor time of one thread; {_load()}\n")  # noqa: T201
-    first_world_s = measure_first_world(game)
+    with _played(game, 1, asked.things) as task:
+        first_world_s = measure_first_world(replace(game, task=task))
     print(f"the first world of this process: {first_world_s:.2f} s\n")  # noqa: T201
     runs = []
     for agents in asked.agents:
         for worlds in asked.worlds:
-            runs.append(_measure(game, agents, worlds, asked.steps, asked.repeats))
+            runs.append(_measure(game, agents, worlds, asked))
             print(rollouts_table(runs[-1]), end="\n\n")  # noqa: T201
     references = None
     if not asked.skip_references:
@@ -47,10 +50,19 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return 0
 
 
-def _measure(game: GameCfg, agents: int, worlds: int, steps: int, repeats: int) -> Rollouts:
-    task = nullcontext(game.task) if agents == 1 else free_play(agents, game.task)
-    with task as task_cfg:
-        return measure_rollouts(replace(game, task=task_cfg), worlds, steps, repeats)
+def _measure(game: GameCfg, agents: int, worlds: int, asked: argparse.Namespace) -> Rollouts:
+    with _played(game, agents, asked.things) as task:
+        return measure_rollouts(replace(game, task=task), worlds, asked.steps, asked.repeats)
+
+
+def _played(game: GameCfg, agents: int, things: int) -> AbstractContextManager[TaskCfg]:
+    """Return the task itself for one walker, free play for more, fuller rooms and other bodies."""
+    if isinstance(game.body, HumanoidCfg):
+        senses = (*find_task(game.task.name).senses, "proprioception")
+        return free_play(agents, game.task, senses, things)
+    if agents > 1 or things:
+        return free_play(agents, game.task, things=things)
+    return nullcontext(game.task)
 
 
 def argument_parser() -> argparse.ArgumentParser:
@@ -67,6 +79,10 @@ def argument_parser() -> argparse.ArgumentParser:
         default=[1],
         help="such as 1,4; 1 plays the task, more play freely in its playground, with its senses",
     )
+    parser.add_argument(
+        "--body", default="walker", help="what they are; bodies with joints play freely"
+    )
+    parser.add_argument("--things", type=int, default=0, help="loose things in free play")
     parser.add_argument("--playground", help="where; the task's own if nothing is said")
     parser.add_argument(
         "--senses", nargs="*", default=[], metavar="SENSE=PRESET", help="such as audio=mono"
@@ -100,7 +116,13 @@ def _new_file(text: str) -> Path:
 
 def _overrides(asked: argparse.Namespace) -> list[str]:
     playground = [] if asked.playground is None else [f"playground={asked.playground}"]
-    return [f"+task={asked.task}", *playground, *(f"senses/{sense}" for sense in asked.senses)]
+    body = f"body={asked.body}"
+    return [
+        f"+task={asked.task}",
+        body,
+        *playground,
+        *(f"senses/{sense}" for sense in asked.senses),
+    ]
 
 
 def _load() -> str:

@@ -13,14 +13,20 @@ from numpy.typing import NDArray
 
 from veca_marl.envs.scoring import cosine, flat
 from veca_marl.envs.task import TASKS, Player, Task, TaskCfg, Team, find_task, terms
+from veca_marl.sim.bodies.humanoid import Humanoid
 from veca_marl.sim.props import PropCfg, PropShape
 from veca_marl.sim.sounds import SoundCfg, SoundKind
 
 
 @dataclass
 class FreePlayCfg(TaskCfg):
-    """Nothing but the one term."""
+    """How full the room is.
 
+    Attributes:
+        things: Loose balls and boxes beside the buzzing ball.
+    """
+
+    things: int = 0
     weights: dict[str, float] = terms(approach=1.0)
 
 
@@ -39,39 +45,51 @@ class FreePlay(Task):
         buzz = SoundCfg(kind=SoundKind.buzz, level=0.1)
         ball = PropCfg(name="ball", shape=PropShape.sphere, size_m=[0.15], mass_kg=0.3, sound=buzz)
         self.ball = self.world.add_prop(ball)
+        self.things = [self.world.add_prop(_thing(i)) for i in range(self.cfg.things)]
 
     def reset(self, rng: np.random.Generator) -> None:
         """See `Task`."""
         for player in self.players:
             start = self.room.sample_floor(rng, margin_m=1.0)
             player.body.place(start, yaw_rad=rng.uniform(-math.pi, math.pi))
-        self.ball.place(self.room.sample_floor(rng, margin_m=1.0) + np.array([0.0, 0.0, 0.15]))
+        for thing in [self.ball, *self.things]:
+            thing.place(self.room.sample_floor(rng, margin_m=1.0) + np.array([0.0, 0.0, 0.15]))
 
     def reward(self, player: Player) -> dict[str, float]:
         """See `Task`."""
         way = flat(self.ball.position - player.body.position)
         return {"approach": cosine(player.body.velocity, way)}
 
-    def expert(self, player: Player, observation: dict[str, NDArray[Any]]) -> tuple[float, float]:
-        """Walk on."""
-        return 1.0, 0.0
+    def expert(self, player: Player, observation: dict[str, NDArray[Any]]) -> Any:
+        """Walk on, or rest all joints."""
+        spec = player.body.action_spec
+        return np.zeros(spec.shape) if isinstance(player.body, Humanoid) else (1.0, 0.0)
+
+
+def _thing(number: int) -> PropCfg:
+    shape, size = (PropShape.sphere, [0.06]) if number % 2 else (PropShape.box, [0.1, 0.1, 0.1])
+    return PropCfg(name=f"thing_{number}", shape=shape, size_m=size, mass_kg=0.2)
 
 
 @contextmanager
-def free_play(players: int, like: TaskCfg) -> Iterator[TaskCfg]:
+def free_play(
+    players: int, like: TaskCfg, senses: tuple[str, ...] | None = None, things: int = 0
+) -> Iterator[TaskCfg]:
     """Make a free-play task known for a while.
 
     Args:
         players: How many play.
-        like: The task whose senses they have.
+        like: The task whose senses they have, if nothing else is said.
+        senses: Their senses.
+        things: How many loose things lie about.
     """
     name = f"FreePlay{players}"
     members = {
         "teams": (Team("agents", players),),
-        "senses": find_task(like.name).senses,
+        "senses": find_task(like.name).senses if senses is None else senses,
     }
     TASKS[name] = type(name, (FreePlay,), members)
     try:
-        yield FreePlayCfg(name=name)
+        yield FreePlayCfg(name=name, things=things)
     finally:
         del TASKS[name]

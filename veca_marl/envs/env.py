@@ -90,7 +90,9 @@ class VecaEnv(EnvBase):
         mask = np.ones(len(self.games), bool) if wanted is None else wanted.numpy().ravel()
         arrays = self._start.new()
         for world in np.flatnonzero(mask):
-            self.games[world].reset(self._rngs[world])
+            game = self.games[world]
+            game.reset(self._rngs[world])
+            self._players[world] = {team: game.team(team) for team in self._teams}
             self._observe(world, arrays)
         return self._start.tensordict(arrays)
 

@@ -71,8 +71,12 @@ class Game:
     """
 
     def __init__(self, cfg: GameCfg) -> None:
-        task_type = find_task(cfg.task.name)
         self.cfg = cfg
+        self.max_steps = round(cfg.task.max_seconds / cfg.clock.step_s)
+        self._build()
+
+    def _build(self) -> None:
+        cfg, task_type = self.cfg, find_task(self.cfg.task.name)
         self.world = World(cfg.playground, cfg.clock)
         self.players = [
             Player(name, team.name, make_body(name, cfg.body, self.world, shirt))
@@ -87,7 +91,6 @@ class Game:
         }
         for senses in self.senses.values():
             self.world.after_substep.extend(sense.substep for sense in senses.values())
-        self.max_steps = round(cfg.task.max_seconds / cfg.clock.step_s)
         self.steps = 0
 
     @property
@@ -100,7 +103,10 @@ class Game:
         return [player for player in self.players if player.team == name]
 
     def reset(self, rng: np.random.Generator) -> None:
-        """Begin an episode."""
+        """Begin an episode; in a new world with new players if the old one fell apart."""
+        if self._broken():
+            self.world.close()
+            self._build()
         self.steps = 0
         self.world.reset(rng)
         self.task.reset(rng)
@@ -148,16 +154,19 @@ class Game:
 
     def _fell_apart(self) -> bool:
         """Log which body's simulation has gone non-finite; say whether one has."""
-        broken = [player.name for player in self.players if not player.body.is_finite]
+        broken = self._broken()
         if broken:
             _LOG.warning(
                 "step %d of %s: the simulation of %s is not finite any more; "
-                "the episode is truncated, the next reset mends it",
+                "the episode is truncated, the next one has a new world",
                 self.steps,
                 self.cfg.task.name,
                 ", ".join(broken),
             )
         return bool(broken)
+
+    def _broken(self) -> list[str]:
+        return [player.name for player in self.players if not player.body.is_finite]
 
     def observe(self, player: Player) -> Observation:
         """Read all senses of a player. Call it once per step: reading the ears advances them."""

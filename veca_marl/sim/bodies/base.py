@@ -86,7 +86,7 @@ class Body(Protocol):
 
     @property
     def is_finite(self) -> bool:
-        """Whether the simulation of this body still makes sense; a reset mends it."""
+        """Whether the simulation of this body makes sense; if not, build the world anew."""
         ...
 
     # ---- the paper's physical API

@@ -122,7 +122,11 @@ class Humanoid(Figure):
 
     @property
     def is_finite(self) -> bool:
-        """Whether all its numbers are finite. If not, it stays as it last was until a reset."""
+        """Whether all its numbers have been finite.
+
+        If not, it stays as it last was: Bullet's collision detection does not recover from such
+        numbers, whatever is restored, so the world must be built anew.
+        """
         return self._finite
 
     def place(
@@ -202,7 +206,6 @@ class Humanoid(Figure):
 
     def reset(self) -> None:
         """Be as the restored physics says, relaxed and silent."""
-        self._finite = True
         self._start_anew()
 
     def before_step(self) -> None:
@@ -230,7 +233,7 @@ class Humanoid(Figure):
     def _start_anew(self) -> None:
         self._relax_eyes()
         self._wishes[:] = self._shares[:] = 0.0
-        self._finite = self.articulation.read()
+        self._finite = self._finite and self.articulation.read()
         self._pose_bones()
         self._mouth.teleport(self.mount("mouth").position)
 

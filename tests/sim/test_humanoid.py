@@ -1,0 +1,316 @@
+"""The joint-level body: how it is placed, commanded, read, and what its hands carry."""
+
+import math
+
+import numpy as np
+import pytest
+from heaps import thrash, weightless
+from walking import empty_world, let_pass
+
+from veca_marl.sim.bodies.base import MOUNTS, Body, BodyCfg
+from veca_marl.sim.bodies.family import make_body
+from veca_marl.sim.bodies.humanoid import (
+    Detail,
+    Humanoid,
+    HumanoidCfg,
+    JointActionKind,
+    JointChoice,
+)
+from veca_marl.sim.bodies.joint_controls import PositionTarget
+from veca_marl.sim.bodies.postures import ON_BACK, POSTURES, Posture, posture_angles
+from veca_marl.sim.bullet import pybullet
+from veca_marl.sim.skeleton import Underside, load_skeleton
+from veca_marl.sim.skin_springs import skin_spring
+
+SKELETON = load_skeleton()
+ALL = [bone.name for bone in SKELETON.bones]
+
+
+@pytest.fixture
+def make():
+    worlds = []
+
+    def humanoid(*props, **cfg):
+        world = empty_world(*props)
+        worlds.append(world)
+        body = Humanoid("child", HumanoidCfg(**cfg), world)
+        world.freeze()
+        world.reset(np.random.default_rng(0))
+        return world, body
+
+    yield humanoid
+    for world in worlds:
+        world.close()
+
+
+# ---- names and counts
+
+
+@pytest.mark.parametrize("detail", Detail)
+def test_both_details_speak_of_47_bones_and_82_joints(make, detail):
+    _, body = make(detail=detail)
+    assert len(body.bone_names) == len(set(body.bone_names)) == 47
+    assert len(body.joint_names) == len(set(body.joint_names)) == 82
+    assert body.velocities().shape == body.angular_velocities().shape == (47, 3)
+    for read in (body.joint_angles, body.joint_velocities, body.joint_torques):
+        assert read().shape == (82,)
+    assert len(body.articulation.moving) == {Detail.full: 82, Detail.mitten: 40}[detail]
+    for mount in MOUNTS:
+        assert np.isfinite(body.mount(mount).position).all()
+
+
+def test_it_is_made_by_its_configuration():
+    world = empty_world()
+    body: Body = make_body("child", HumanoidCfg(), world)
+    assert isinstance(body, Humanoid)
+    with pytest.raises(ValueError, match="BodyCfg is no body"):
+        make_body("nobody", BodyCfg(), world)
+    world.close()
+
+
+# ---- where it is
+
+
+@pytest.mark.parametrize("name", sorted(POSTURES))
+@pytest.mark.parametrize("height_m", [0.0, 0.4])
+def test_its_lowest_point_is_where_it_is_placed(make, name, height_m):
+    world, body = make()
+    body.place((1.0, -2.0, height_m), 0.8, POSTURES[name])
+    world.refresh()
+    lowest = Underside(SKELETON, ALL, skin=True).lowest_m(
+        body.bone_positions(), body.bone_rotations()
+    )
+    assert lowest == pytest.approx(height_m, abs=1e-9)
+    np.testing.assert_allclose(body.position[:2], (1.0, -2.0), atol=1e-9)
+    expected = posture_angles(SKELETON, POSTURES[name])
+    np.testing.assert_allclose(body.joint_angles(), expected, atol=1e-12)
+    np.testing.assert_allclose(body.forward, (math.cos(0.8), math.sin(0.8), 0.0), atol=1e-9)
+
+
+def test_velocities_are_those_that_bullet_has(make):
+    world, body = make()
+    client, body_id = world.client, body.articulation.body_id
+    for _ in thrash(world, [body], 1.0):
+        pass
+    velocities, spins = body.velocities(), body.angular_velocities()
+    assert np.abs(spins).max() > 5.0
+    for link in range(pybullet.getNumJoints(body_id, physicsClientId=client)):
+        name = pybullet.getJointInfo(body_id, link, physicsClientId=client)[12].decode()
+        if name not in body.bone_names:
+            continue
+        state = pybullet.getLinkState(body_id, link, 1, 1, physicsClientId=client)
+        bone = body.bone_names.index(name)
+        lever = np.subtract(state[0], state[4])  # Bullet's is that of the centre of mass
+        np.testing.assert_allclose(spins[bone], state[7], atol=1e-6)
+        np.testing.assert_allclose(
+            velocities[bone] + np.cross(spins[bone], lever), state[6], atol=1e-3
+        )
+
+
+def test_fingers_of_a_mitten_are_straight_and_follow_the_hand(make):
+    world, body = make(detail=Detail.mitten)
+    for _ in thrash(world, [body], 1.0):
+        pass
+    hand, finger = body.bone("l_hand"), body.bone("l_index_distal")
+    local = hand.rotation.T @ (finger.position - hand.position)
+    full_world, full = make()
+    full_world.refresh()
+    hand, finger = full.bone("l_hand"), full.bone("l_index_distal")
+    np.testing.assert_allclose(
+        local, hand.rotation.T @ (finger.position - hand.position), atol=1e-9
+    )
+    fingers = np.setdiff1d(np.arange(82), body.articulation.moving)
+    assert not body.joint_angles()[fingers].any()
+    assert not body.joint_torques()[fingers].any()
+
+
+# ---- what it is told
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_positive_torque_turns_a_joint_to_its_positive_side(make, sign):
+    world, body = make()
+    weightless(world)
+    body.place((0.0, 0.0, 2.0))
+    for name in ("l_forearm.flexion", "r_upper_arm.abduction", "head.rotation"):
+        body.place((0.0, 0.0, 2.0), 0.0, _middle())
+        before = body.joint_angles()
+        torques = np.zeros(82)
+        torques[body.joint_names.index(name)] = 0.1 * sign
+        body.apply_torque(torques)
+        let_pass(world, 0.12)
+        moved = (body.joint_angles() - before)[body.joint_names.index(name)]
+        assert moved * sign > 0.01, name
+
+
+def _middle():
+    return np.array([(joint.low_rad + joint.high_rad) / 2 for joint in SKELETON.joints])
+
+
+def test_torques_hold_until_the_next_and_rest_after_a_reset(make):
+    world, body = make()
+    row = np.random.default_rng(0).uniform(-1, 1, 82)
+    body.act(row)
+    let_pass(world, 0.2)
+    np.testing.assert_array_equal(body.joint_torques(), row)
+    world.reset(np.random.default_rng(0))
+    world.step()
+    assert not body.joint_torques().any()
+
+
+def test_joints_go_to_commanded_angles(make):
+    world, body = make(action=JointActionKind.position)
+    weightless(world)
+    body.place((0.0, 0.0, 2.0))
+    bent = {"upper_arm.abduction": 60.0, "forearm.flexion": 50.0, "thigh.flexion": 30.0}
+    bent |= {"head.rotation": -30.0, "spine.lateral": 10.0, "l_index_middle.flexion": 40.0}
+    wanted = posture_angles(SKELETON, Posture(0.0, bent))
+    body.act(body.encode(PositionTarget.wishes(wanted, body._low, body._high)))
+    let_pass(world, 2.0)
+    np.testing.assert_allclose(body.joint_angles(), wanted, atol=math.radians(2.0))
+
+
+def test_commanded_angles_keep_a_child_sitting(make):
+    world, body = make(action=JointActionKind.position, detail=Detail.mitten)
+    body.place((0.0, 0.0, 0.0), 0.0, POSTURES["sitting"])
+    wanted = posture_angles(SKELETON, POSTURES["sitting"])
+    body.act(body.encode(PositionTarget.wishes(wanted, body._low, body._high)))
+    head_m = body.bone("head").position[2]
+    let_pass(world, 4.0)
+    assert body.bone("head").position[2] > 0.85 * head_m
+
+
+def test_wishes_and_targets_are_inverse(make):
+    _, body = make(action=JointActionKind.position)
+    angles = np.random.default_rng(0).uniform(body._low, body._high)
+    wishes = PositionTarget.wishes(angles, body._low, body._high)
+    shares = PositionTarget().shares(wishes, angles, body._low, body._high)
+    np.testing.assert_allclose(shares, 0.0, atol=1e-9)
+
+
+def test_limbs_alone_may_be_commanded(make):
+    world, body = make(joints=JointChoice.limbs)
+    assert body.action_spec.shape == (40,)
+    body.act(np.full(40, 0.5))
+    world.step()
+    fingers = [i for i, name in enumerate(body.joint_names) if "thumb" in name or "index" in name]
+    assert not body.joint_torques()[fingers].any()
+    assert (body.joint_torques() != 0.0).sum() == 40
+
+
+@pytest.mark.parametrize(
+    ("row", "message"),
+    [
+        (np.zeros(81), r"shape \(81,\), not \(82,\)"),
+        (np.full(82, np.nan), r"spine.flexion is nan, not in \[-1, 1\]"),
+        (np.full(82, np.inf), r"spine.flexion is inf"),
+        (np.full(82, 1.01), r"spine.flexion is 1.01"),
+    ],
+)
+def test_impossible_actions_are_refused(make, row, message):
+    _, body = make()
+    with pytest.raises(ValueError, match=message):
+        body.act(row)
+    with pytest.raises(ValueError, match=message):
+        body.apply_torque(row)
+
+
+def test_apply_torque_is_for_bodies_driven_by_torque(make):
+    _, body = make(action=JointActionKind.position)
+    with pytest.raises(ValueError, match=r"needs body.action=torque"):
+        body.apply_torque(np.zeros(82))
+
+
+@pytest.mark.parametrize(
+    ("position", "posture", "message"),
+    [
+        ((0.0, 0.0, math.nan), ON_BACK, "cannot be at"),
+        ((0.0, 0.0), ON_BACK, "cannot be at"),
+        ((0.0, 0.0, 0.0), Posture(0.0, {"knee.flexion": 5.0}), "no joint 'knee.flexion'"),
+        ((0.0, 0.0, 0.0), Posture(0.0, {"l_shank.flexion": -5.0}), "it moves from 0 to 148"),
+        ((0.0, 0.0, 0.0), np.full(82, np.nan), "cannot be at nan degrees"),
+        ((0.0, 0.0, 0.0), np.zeros(40), r"angles \(40,\), not \(82,\)"),
+    ],
+)
+def test_impossible_places_are_refused(make, position, posture, message):
+    _, body = make()
+    with pytest.raises(ValueError, match=message):
+        body.place(position, 0.0, posture)
+
+
+@pytest.mark.parametrize(
+    ("numbers", "message"),
+    [
+        ({"detail": "stick"}, r"body.detail='stick'; there are \['full', 'mitten'\]"),
+        ({"action": "muscles"}, r"body.action='muscles'; there are \['torque', 'position'\]"),
+        ({"joints": "some"}, r"body.joints='some'"),
+        ({"strength": 0.0}, r"body.strength=0.0"),
+        ({"strength": 2.0}, r"body.strength=2.0"),
+        ({"friction": math.nan}, r"body.friction=nan"),
+        ({"eye_range_deg": -1.0}, r"body.eye_range_deg=-1.0"),
+    ],
+)
+def test_impossible_numbers_are_refused(numbers, message):
+    with pytest.raises(ValueError, match=message):
+        HumanoidCfg(**numbers)
+
+
+# ---- physics
+
+
+def test_a_fall_is_free_until_the_floor(make):
+    world, body = make()
+    body.place((0.0, 0.0, 1.0))
+    start = body.position[2]
+    let_pass(world, 0.2)
+    assert body.velocity[2] == pytest.approx(-9.81 * 0.2, rel=0.01)
+    assert body.position[2] - start == pytest.approx(-0.5 * 9.81 * 0.2**2, rel=0.06)
+
+
+def test_fingers_and_palms_and_soles_are_softer_than_bones(make):
+    world, body = make()
+    client, body_id = world.client, body.articulation.body_id
+    stiff = {}
+    for link in range(pybullet.getNumJoints(body_id, physicsClientId=client)):
+        name = pybullet.getJointInfo(body_id, link, physicsClientId=client)[12].decode()
+        stiff[name] = pybullet.getDynamicsInfo(body_id, link, physicsClientId=client)[9]
+    for name in ("l_hand__skin", "r_foot__skin", "l_index_distal"):
+        bone = SKELETON.bones[SKELETON.bone(name.removesuffix("__skin"))]
+        assert stiff[name] == pytest.approx(skin_spring(bone).stiffness_npm)
+    assert stiff["l_hand"] == stiff["chest"] < 0.0, "Bullet's word for rigid"
+
+
+def test_many_resets_leave_no_trace(make):
+    world, body = make(detail=Detail.mitten)
+
+    def film():
+        world.reset(np.random.default_rng(0))
+        body.place((0.0, 0.0, 0.0), 0.3, ON_BACK)
+        return [body.bone_positions() for _ in thrash(world, [body], 0.4)]
+
+    first = film()
+    for _ in range(200):
+        world.reset(np.random.default_rng(0))
+    np.testing.assert_array_equal(film(), first)
+
+
+@pytest.mark.parametrize("what", ["base", "joint"])
+def test_a_simulation_that_breaks_is_told_and_shows_no_nan(make, what):
+    world, body = make()
+    world.step()
+    nan = math.nan
+    if what == "base":
+        pybullet.resetBaseVelocity(
+            body.articulation.body_id, (nan,) * 3, (0, 0, 0), physicsClientId=world.client
+        )
+    else:
+        pybullet.resetJointStatesMultiDof(
+            body.articulation.body_id, [3], [[nan]], [[0.0]], physicsClientId=world.client
+        )
+    assert body.is_finite
+    world.step()
+    assert not body.is_finite
+    for seen in (body.bone_positions(), body.velocities(), body.joint_angles(), body.position):
+        assert np.isfinite(seen).all()
+    world.reset(np.random.default_rng(0))
+    assert not body.is_finite, "Bullet's collisions are lost for good"

@@ -1,0 +1,158 @@
+"""The URDF of the body: counts, order, masses, limits; and Bullet reads it as we mean it."""
+
+import xml.etree.ElementTree as ET
+
+import numpy as np
+import pytest
+from walking import empty_world
+
+from veca_marl.sim.bodies.humanoid import Detail, Humanoid, HumanoidCfg
+from veca_marl.sim.bullet import pybullet
+from veca_marl.sim.inertia import Inertia, bone_inertia, joined
+from veca_marl.sim.pose import Pose
+from veca_marl.sim.skeleton import load_skeleton
+from veca_marl.sim.skin_springs import SkinLayer, skin_layer, skin_spring
+from veca_marl.sim.urdf import Build, body_urdf
+
+SKELETON = load_skeleton()
+LOW = np.array([joint.low_rad for joint in SKELETON.joints])
+HIGH = np.array([joint.high_rad for joint in SKELETON.joints])
+
+
+@pytest.fixture(scope="module")
+def robots():
+    return {
+        fingers: ET.fromstring(body_urdf(SKELETON, Build(fingers))) for fingers in (True, False)
+    }
+
+
+@pytest.fixture(params=Detail)
+def humanoid(request):
+    world = empty_world()
+    yield Humanoid("child", HumanoidCfg(detail=request.param), world)
+    world.close()
+
+
+def names(robot, tag, kind=None):
+    return [e.get("name") for e in robot.iter(tag) if kind in (None, e.get("type"))]
+
+
+def test_47_bones_36_light_links_4_skins_and_82_hinges(robots):
+    links = names(robots[True], "link")
+    assert len(links) == len(set(links)) == 47 + 36 + 4
+    assert set(links) >= {bone.name for bone in SKELETON.bones}
+    assert sorted(names(robots[True], "joint", "revolute")) == sorted(
+        f"{joint.bone}.{joint.label}" for joint in SKELETON.joints
+    )
+
+
+def test_the_mitten_has_40_hinges_and_no_finger(robots):
+    assert len(names(robots[False], "joint", "revolute")) == 40
+    assert not [name for name in names(robots[False], "link") if "thumb" in name]
+
+
+@pytest.mark.parametrize("fingers", [True, False])
+def test_parents_are_written_before_their_children(robots, fingers):
+    known = names(robots[fingers], "link")
+    for joint in robots[fingers].findall("joint"):
+        parent, child = (joint.find(end).get("link") for end in ("parent", "child"))
+        assert known.index(parent) < known.index(child)
+
+
+@pytest.mark.parametrize("fingers", [True, False])
+def test_ten_kilograms_and_no_impossible_inertia(robots, fingers):
+    masses = [float(mass.get("value")) for mass in robots[fingers].iter("mass")]
+    assert sum(masses) == pytest.approx(10.0, abs=1e-9)
+    assert min(masses) > 0.0
+    for inertia in robots[fingers].iter("inertia"):
+        x, y, z = sorted(float(inertia.get(key)) for key in ("ixx", "iyy", "izz"))
+        assert 0.0 < x <= y <= z < x + y
+
+
+def test_bullet_reads_the_table(humanoid):
+    client, body = humanoid._world.client, humanoid.articulation
+    for joint in range(pybullet.getNumJoints(body.body_id, physicsClientId=client)):
+        info = pybullet.getJointInfo(body.body_id, joint, physicsClientId=client)
+        if info[2] != pybullet.JOINT_REVOLUTE:
+            continue
+        ours = SKELETON.joints[humanoid.joint_names.index(info[1].decode())]
+        assert (info[8], info[9], info[10]) == (ours.low_rad, ours.high_rad, ours.torque_nm)
+        assert info[16] < joint
+
+
+def test_bones_are_where_bullet_has_them(humanoid):
+    client, body = humanoid._world.client, humanoid.articulation.body_id
+    count = pybullet.getNumJoints(body, physicsClientId=client)
+    links = {
+        pybullet.getJointInfo(body, link, physicsClientId=client)[12].decode(): link
+        for link in range(count)
+    }
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        humanoid.place(rng.uniform(0.0, 2.0, 3), rng.uniform(-3.0, 3.0), rng.uniform(LOW, HIGH))
+        for name, link in links.items():
+            if name in humanoid.bone_names:
+                state = pybullet.getLinkState(
+                    body, link, computeForwardKinematics=1, physicsClientId=client
+                )
+                turn = np.reshape(pybullet.getMatrixFromQuaternion(state[5]), (3, 3))
+                bone = humanoid.bone(name)
+                np.testing.assert_allclose(bone.position, state[4], atol=1e-6)
+                np.testing.assert_allclose(bone.rotation, turn, atol=5e-6)
+
+
+def test_what_is_joined_weighs_as_points_do():
+    """The inertia of parts from the theorem equals that of many points from the definition."""
+    rng = np.random.default_rng(0)
+    parts, points, masses = [], [], []
+    for mass in (0.5, 2.0):
+        local, shares = rng.normal(size=(40, 3)), np.full(40, mass / 40)
+        turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+        place = rng.normal(size=3)
+        parts.append((Pose(place, turn), _of_points(local, shares)))
+        points.append(place + local @ turn.T)
+        masses.append(shares)
+    expected = _of_points(np.concatenate(points), np.concatenate(masses))
+    whole = joined(parts)
+    assert whole.mass_kg == pytest.approx(2.5)
+    np.testing.assert_allclose(whole.centre, expected.centre, atol=1e-12)
+    np.testing.assert_allclose(whole.matrix, expected.matrix, atol=1e-12)
+
+
+def _of_points(points, masses):
+    centre = masses @ points / masses.sum()
+    away = points - centre
+    matrix = sum(
+        m * (a @ a * np.eye(3) - np.outer(a, a)) for m, a in zip(masses, away, strict=True)
+    )
+    return Inertia(masses.sum(), centre, matrix)
+
+
+def test_a_capsule_weighs_as_sand_in_its_shape():
+    bone = SKELETON.bones[SKELETON.bone("l_thigh")]
+    part, radius = bone.colliders[0], bone.colliders[0].radius + bone.skin_thickness_m
+    rng = np.random.default_rng(0)
+    low, high = np.minimum(part.start, part.end) - radius, np.maximum(part.start, part.end) + radius
+    sand = rng.uniform(low, high, (400_000, 3))
+    nearest = np.clip(sand[:, 2], part.end[2], part.start[2])
+    sand = sand[np.hypot(np.hypot(sand[:, 0], sand[:, 1]), sand[:, 2] - nearest) < radius]
+    expected = bone.mass_kg * np.cov(sand.T)
+    expected = np.trace(expected) * np.eye(3) - expected
+    np.testing.assert_allclose(bone_inertia(bone).matrix, expected, atol=0.01 * expected.max())
+
+
+def test_only_hands_feet_and_fingers_are_soft(robots):
+    soft = {
+        link.get("name").removesuffix("__skin")
+        for link in robots[True].findall("link")
+        if link.find("contact/stiffness") is not None
+    }
+    assert soft == {b.name for b in SKELETON.bones if skin_layer(b) is not SkinLayer.BONE}
+    assert len(soft) == 4 + 30
+
+
+def test_the_spring_reaches_the_bone_under_the_force_of_the_table():
+    for bone in SKELETON.bones:
+        spring = skin_spring(bone)
+        assert spring.stiffness_npm * spring.thickness_m == pytest.approx(bone.skin_force_n)
+        assert spring.damping_nspm > 0.0
