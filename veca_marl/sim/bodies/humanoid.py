@@ -33,6 +33,9 @@ from veca_marl.sim.spec import ArraySpec
 from veca_marl.sim.urdf import Build
 from veca_marl.sim.world import World
 
+_WAITING_ROOM_M = 100.0
+_ARMS_OUT = Posture(0.0, {"upper_arm.abduction": 30.0})
+
 
 class Detail(Enum):
     """Level of detail: with all fingers, or with straight fingers that are one with the hand."""
@@ -101,7 +104,9 @@ class Humanoid(Figure):
         self._finite = True
         world.attach(self)
         world.after_substep.append(self._after_substep)
-        self.place((0.0, 0.0, 0.0))
+        # Bullet mixes up the contacts of saved states in which bodies meet, or parts of one body:
+        # until the first reset each waits far outside by itself, arms off the thighs
+        self.place((_WAITING_ROOM_M, 3.0 * len(world.movers), 0.0), 0.0, _ARMS_OUT)
 
     # ---- where it is
 
@@ -205,8 +210,8 @@ class Humanoid(Figure):
     # ---- the world moves it
 
     def reset(self) -> None:
-        """Be as the restored physics says, relaxed and silent."""
-        self._start_anew()
+        """Stand at the origin, relaxed and silent. The task usually puts it elsewhere."""
+        self.place((0.0, 0.0, 0.0))
 
     def before_step(self) -> None:
         """Nothing to look for: physics finds what it meets."""
