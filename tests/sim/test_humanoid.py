@@ -1,6 +1,7 @@
 """The joint-level body: how it is placed, commanded, read, and what its hands carry."""
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -278,6 +279,43 @@ def test_fingers_and_palms_and_soles_are_softer_than_bones(make):
         bone = SKELETON.bones[SKELETON.bone(name.removesuffix("__skin"))]
         assert stiff[name] == pytest.approx(skin_spring(bone).stiffness_npm)
     assert stiff["l_hand"] == stiff["chest"] < 0.0, "Bullet's word for rigid"
+
+
+def test_skin_that_carries_weight_is_pressed_in_by_it(make):
+    """Hooke, at every point in which a sitting child's hands and feet rest on the floor."""
+    world, body = make(action=JointActionKind.position)
+    body.place((0.0, 0.0, 0.0), 0.0, POSTURES["sitting"])
+    wanted = posture_angles(SKELETON, POSTURES["sitting"])
+    body.act(body.encode(PositionTarget.wishes(wanted, body._low, body._high)))
+    let_pass(world, 6.0)
+    client, body_id = world.client, body.articulation.body_id
+    pressed = 0
+    for point in pybullet.getContactPoints(body_id, world.floor_id, physicsClientId=client):
+        stiffness = pybullet.getDynamicsInfo(body_id, point[3], physicsClientId=client)[9]
+        if stiffness > 0.0 and point[9] > 0.5:
+            assert point[9] == pytest.approx(-stiffness * point[8], rel=0.04)
+            pressed += 1
+    assert pressed >= 2
+
+
+@pytest.mark.slow
+def test_ten_thousand_resets_take_no_memory(make):
+    world, body = make(detail=Detail.mitten)
+
+    def resident_kb():
+        return int(Path("/proc/self/statm").read_text().split()[1]) * 4
+
+    def reset(times):
+        for _ in range(times):
+            world.reset(np.random.default_rng(0))
+            body.place((0.0, 0.0, 0.0), 0.1, ON_BACK)
+
+    if not Path("/proc/self/statm").exists():
+        pytest.skip("memory is read from /proc")
+    reset(500)
+    before = resident_kb()
+    reset(10_000)
+    assert resident_kb() - before < 1000
 
 
 def test_many_resets_leave_no_trace(make):

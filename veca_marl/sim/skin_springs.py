@@ -2,8 +2,10 @@
 
 Skin carries weight on hands and feet, so that what lies on them is felt by how deep it sinks in.
 There the compliant layer is a collider of its own over the rigid bone; the bone stops what presses
-through. Fingers are too weak to press through their skin (at most 1.4 N at the tip, against 1.5 to
-2 N), so a finger has the compliant collider alone. Elsewhere the bone is all the physics knows.
+through. A finger has the compliant collider alone, which saves 30 links: by its own strength it
+cannot press through its skin (at most 1.4 N at the tip, against 1.5 to 2 N). The weight of an arm
+on a fingertip can, and sinks it several millimetres into what it lies on. Elsewhere the bone is all
+the physics knows.
 Touch reads depths from geometry and needs none of this; it is only felt more finely where skin
 yields.
 """
