@@ -51,6 +51,7 @@ class Bone:
         parent: Index of the parent bone; -1 for the pelvis.
         origin: Joint position in the parent's frame, metres.
         rest_rotation: ``(3, 3)`` orientation in the parent's frame at zero angles.
+        tip: Far end of the segment in its own frame, metres.
         mass_kg: Mass of the segment.
         skin_thickness_m: Flexible skin over the bone (``d_max`` of the tactile sense).
         colliders: The rigid bone as primitives in its own frame.
@@ -62,6 +63,7 @@ class Bone:
     parent: int
     origin: tuple[float, float, float]
     rest_rotation: Floats
+    tip: tuple[float, float, float]
     mass_kg: float
     skin_thickness_m: float
     colliders: tuple[BoneCapsule | BoneBox, ...]
@@ -179,6 +181,7 @@ def _bones(joints: tuple[Joint, ...]) -> tuple[Bone, ...]:
                 parent=names[row["parent"]],
                 origin=(float(row["origin_x"]), float(row["origin_y"]), float(row["origin_z"])),
                 rest_rotation=_rotation(*angles),
+                tip=(float(row["tip_x"]), float(row["tip_y"]), float(row["tip_z"])),
                 mass_kg=float(row["mass_kg"]),
                 skin_thickness_m=float(row["d_max_mm"]) / 1000.0,
                 colliders=_colliders(row["bone_colliders"]),

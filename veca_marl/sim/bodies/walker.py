@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veca_marl.sim.bodies.controls import WALK_CONTROLS, ActionKind
-from veca_marl.sim.bodies.looks import SHIRTS, bone_geoms
+from veca_marl.sim.bodies.looks import SHIRTS, bone_geoms, dressed_skin
 from veca_marl.sim.bodies.mounts import EYES, gaze, organ_pose
 from veca_marl.sim.bodies.pushing import Pusher, horizontal_distance
 from veca_marl.sim.gait import Gait
@@ -94,8 +94,9 @@ class Walker:
         self._skeleton = load_skeleton()
         self._gait = Gait(self._skeleton)
         self._pusher = Pusher(world.client, cfg.radius_m, cfg.height_m, cfg.push_limit_kg)
+        colour = SHIRTS[shirt % len(SHIRTS)]
         drawn = world.scene.add_object(
-            name, bone_geoms(self._skeleton, SHIRTS[shirt % len(SHIRTS)])
+            name, bone_geoms(self._skeleton, colour), dressed_skin(self._skeleton, colour)
         )
         self.object_id = drawn.id
         self._drawn = drawn
