@@ -46,7 +46,8 @@ def test_make_train_makes_an_environment_installs_and_trains():
 
 
 @pytest.mark.parametrize(
-    "part", ["make_venv.sh", "'.[test]'", "ruff check", "ruff format --check", "mypy", "lint-imports"]
+    "part",
+    ["make_venv.sh", "'.[test]'", "ruff check", "ruff format --check", "mypy", "lint-imports"],
 )
 def test_make_test_checks_everything(part):
     lines = dry_run("test")

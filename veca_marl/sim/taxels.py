@@ -9,6 +9,7 @@ touch on a hollow of the mesh would read nothing, and one on a bulge too much.
 from __future__ import annotations
 
 import functools
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -31,6 +32,7 @@ BARYCENTRIC = np.array(
         (5 / 12, 1 / 6, 5 / 12),
     ]
 )
+PATCH_TRIANGLES = 4
 TAXELS_PER_TRIANGLE = len(BARYCENTRIC)
 _ITERATIONS, _RELAXATION = 12, 0.7
 # the mesh bulges over hollows between bones: no shift beyond these (metres) reaches the right one
@@ -45,15 +47,20 @@ class TaxelTable(NamedTuple):
         first_triangle: ``(48,)`` triangles of bone b are first[b] to first[b + 1].
         depths: ``(T, 6)`` metres from the mesh, against the normal, to the point that senses.
         thickness: ``(47,)`` metres of skin on each bone, d_max.
-        vertices: The vertices of the triangles of each bone, one bone after the other.
-        first_vertex: ``(48,)`` the vertices of bone b are `vertices`[first[b] : first[b + 1]].
-        margins: ``(47,)`` metres, how far from its triangle a taxel of a bone senses at most.
+        first_patch: ``(48,)`` patches of bone b are first[b] to first[b + 1]. A patch is a few
+            triangles beside each other, which are looked at together.
+        patches: ``(P + 1,)`` triangles of patch p are patches[p] to patches[p + 1].
+        vertices: The vertices of the triangles of each patch, one patch after the other.
+        first_vertex: ``(P + 1,)`` those of patch p are `vertices`[first[p] : first[p + 1]].
+        margins: ``(T,)`` metres, how far from a triangle its taxels sense at most.
     """
 
     triangles: Indices
     first_triangle: Indices
     depths: Floats
     thickness: Floats
+    first_patch: Indices
+    patches: Indices
     vertices: Indices
     first_vertex: Indices
     margins: Floats
@@ -64,16 +71,21 @@ def load_taxels() -> TaxelTable:
     """Return the taxels of the skin (once per process; the result is read-only)."""
     skeleton, mesh = load_skeleton(), load_skin()
     count = len(skeleton.bones)
-    own = [np.unique(mesh.triangles[mesh.owners == bone]) for bone in range(count)]
+    first_triangle = np.searchsorted(mesh.owners, np.arange(count + 1))
+    starts = [np.arange(*ends, PATCH_TRIANGLES) for ends in pairwise(first_triangle)]
+    patches = np.append(np.concatenate(starts), first_triangle[-1])
+    own = [np.unique(mesh.triangles[first:end]) for first, end in pairwise(patches)]
     depths = _depths(mesh)
     return TaxelTable(
         triangles=np.ascontiguousarray(mesh.triangles),
-        first_triangle=np.searchsorted(mesh.owners, np.arange(count + 1)),
+        first_triangle=first_triangle,
         depths=depths,
         thickness=np.array([bone.skin_thickness_m for bone in skeleton.bones]),
+        first_patch=np.cumsum([0, *map(len, starts)]),
+        patches=patches,
         vertices=np.concatenate(own),
         first_vertex=np.cumsum([0, *map(len, own)]),
-        margins=np.array([np.abs(depths[mesh.owners == bone]).max() for bone in range(count)]),
+        margins=np.abs(depths).max(axis=1),
     )
 
 

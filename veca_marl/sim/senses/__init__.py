@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from veca_marl.sim.bodies.base import Body
 from veca_marl.sim.senses.audio import AudioCfg, AudioSense
 from veca_marl.sim.senses.base import Sense
+from veca_marl.sim.senses.touch import TouchCfg, TouchSense
 from veca_marl.sim.senses.vision import VisionCfg, VisionSense
 from veca_marl.sim.world import World
 
@@ -22,6 +23,7 @@ class SensesCfg:
 
     vision: VisionCfg = field(default_factory=VisionCfg)
     audio: AudioCfg = field(default_factory=AudioCfg)
+    touch: TouchCfg = field(default_factory=TouchCfg)
 
 
 def give_senses(body: Body, names: Sequence[str], cfg: SensesCfg, world: World) -> dict[str, Sense]:
@@ -39,6 +41,7 @@ def give_senses(body: Body, names: Sequence[str], cfg: SensesCfg, world: World) 
     makers: dict[str, Callable[[], Sense]] = {
         "vision": lambda: VisionSense(cfg.vision, body, world.scene),
         "audio": lambda: AudioSense(cfg.audio, body, world.sound),
+        "touch": lambda: TouchSense(cfg.touch, body, world.scene),
     }
     unknown = sorted(set(names) - set(makers))
     if unknown:
