@@ -13,7 +13,8 @@ from veca_marl.sim.senses import SensesCfg
 from veca_marl.sim.senses.audio import AudioQuality
 
 KICK = "+task=KickTheBall"
-GROUPS = ["algo", "body", "collect", "log", "playground", "senses/audio", "senses/vision"]
+GROUPS = ["algo", "body", "collect", "log", "playground"]
+GROUPS += [f"senses/{sense}" for sense in ("audio", "touch", "vision")]
 PRESETS = [(g, path.stem) for g in GROUPS for path in sorted((CONF / g).glob("*.yaml"))]
 EXPERIMENTS = sorted(path.stem for path in (CONF / "experiment").glob("*.yaml"))
 
@@ -56,7 +57,7 @@ def test_no_preset_is_called_what_yaml_reads_as_a_boolean(path):
 
 
 def test_files_hold_only_what_differs_from_the_dataclasses():
-    for sense in ("audio", "vision"):
+    for sense in ("audio", "touch", "vision"):
         default = OmegaConf.structured(SensesCfg())[sense]
         for path in (CONF / "senses" / sense).glob("*.yaml"):
             for key, value in (OmegaConf.load(path) or {}).items():

@@ -169,7 +169,7 @@ def test_two_bodies_press_each_other_as_springs_in_series():
     pose(other, SPREAD, rotation=half_turn)
     index, middle = stage.bone("l_forearm"), np.array([0.0, 0.0, -0.0475])
     there = other.positions[index] + other.rotations[index] @ middle
-    here = stage.at("l_forearm", middle + (apart, 0.0, 0.0))
+    here = stage.at("l_forearm", middle + np.array([apart, 0.0, 0.0]))
     pose(other, SPREAD, here - there, half_turn)
     assert of_bone(stage.read(), "l_forearm").max() == pytest.approx(0.5, abs=0.05)
 
