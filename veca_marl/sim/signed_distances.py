@@ -42,6 +42,24 @@ def signed_distance(shape: int, size: Vector, x: float, y: float, z: float) -> S
 
 
 @njit(cache=True, error_model="numpy", inline="always")
+def distance(shape: int, size: Vector, x: float, y: float, z: float) -> float:
+    """Return the signed distance alone, without its gradient."""
+    if shape == _BOX:
+        a, b, c = abs(x) - size[0], abs(y) - size[1], abs(z) - size[2]
+        within = min(max(a, b, c), 0.0)
+        a, b, c = max(a, 0.0), max(b, 0.0), max(c, 0.0)
+        return math.sqrt(a * a + b * b + c * c) + within
+    if shape == _CYLINDER:
+        side, end = math.sqrt(x * x + y * y) - size[0], abs(z) - 0.5 * size[1]
+        within = min(max(side, end), 0.0)
+        side, end = max(side, 0.0), max(end, 0.0)
+        return math.sqrt(side * side + end * end) + within
+    if shape != _SPHERE:
+        z = max(abs(z) - 0.5 * size[1], 0.0)
+    return math.sqrt(x * x + y * y + z * z) - size[0]
+
+
+@njit(cache=True, error_model="numpy", inline="always")
 def is_within(shape: int, size: Vector, x: float, y: float, z: float) -> bool:
     """Return whether a point lies in a `Shape`: much cheaper than how deep it does."""
     if shape == _BOX:

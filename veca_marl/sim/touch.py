@@ -13,6 +13,7 @@ includes its skin, and d_max is the sum of both.
 from __future__ import annotations
 
 import math
+from typing import TypeAlias
 
 import numpy as np
 from numba import njit
@@ -21,9 +22,12 @@ from veca_marl.sim.pose import Floats
 from veca_marl.sim.raster import bounding_radius
 from veca_marl.sim.scene import Bools, GeomTable
 from veca_marl.sim.screen_bounds import Vector
-from veca_marl.sim.signed_distances import Slope, is_within, signed_distance
+from veca_marl.sim.signed_distances import Slope, distance, is_within, signed_distance
 from veca_marl.sim.skeleton import Skeleton
 from veca_marl.sim.taxels import TaxelTable
+
+# shape, size, position and the three axes of a primitive in the world
+Thing: TypeAlias = tuple[int, Vector, Vector, Vector, Vector, Vector]
 
 
 def neighbours(skeleton: Skeleton) -> Bools:
@@ -66,36 +70,46 @@ def press(
         for g in range(near.shape[1]):
             if not near[bone, g]:
                 continue
+            thing = _thing(geoms, g)
+            thickness = taxels.thickness[bone] + geoms.skins[g]
             for patch in range(taxels.first_patch[bone], taxels.first_patch[bone + 1]):
-                if _gap(balls, patch, geoms, g) > balls[patch, 3]:
+                x, y, z = _local(thing, balls, patch)
+                if distance(thing[0], thing[1], x, y, z) > balls[patch, 3]:
                     continue
-                _into_axes(taxels, vertices, geoms, patch, g, local)
+                for i in range(taxels.first_vertex[patch], taxels.first_vertex[patch + 1]):
+                    v = taxels.vertices[i]
+                    x, y, z = _local(thing, vertices, v)
+                    local[v, 0], local[v, 1], local[v, 2] = x, y, z
+                    local[v, 3] = distance(thing[0], thing[1], x, y, z)
                 for t in range(taxels.patches[patch], taxels.patches[patch + 1]):
                     if _within_reach(taxels, t, local):
-                        _press_triangle(taxels, geoms, bone, g, t, barycentric, local, readings)
+                        _press_triangle(taxels, thing, thickness, t, barycentric, local, readings)
 
 
 @njit(cache=True, error_model="numpy", inline="always")
-def _size(geoms: GeomTable, g: int) -> Vector:
-    return float(geoms.sizes[g, 0]), float(geoms.sizes[g, 1]), float(geoms.sizes[g, 2])
+def _thing(geoms: GeomTable, g: int) -> Thing:
+    """One primitive, read once for all the points that are held against it."""
+    r, p, s = geoms.rotations, geoms.positions, geoms.sizes
+    return (
+        geoms.shapes[g],
+        (float(s[g, 0]), float(s[g, 1]), float(s[g, 2])),
+        (p[g, 0], p[g, 1], p[g, 2]),
+        (r[g, 0, 0], r[g, 1, 0], r[g, 2, 0]),
+        (r[g, 0, 1], r[g, 1, 1], r[g, 2, 1]),
+        (r[g, 0, 2], r[g, 1, 2], r[g, 2, 2]),
+    )
 
 
 @njit(cache=True, error_model="numpy", inline="always")
-def _into_axes(
-    taxels: TaxelTable, vertices: Floats, geoms: GeomTable, patch: int, g: int, local: Floats
-) -> None:
-    """Carry the vertices of a patch into the axes of a primitive, with their distance to it."""
-    shape, size = geoms.shapes[g], _size(geoms, g)
-    r = geoms.rotations[g]
-    px, py, pz = geoms.positions[g, 0], geoms.positions[g, 1], geoms.positions[g, 2]
-    for i in range(taxels.first_vertex[patch], taxels.first_vertex[patch + 1]):
-        v = taxels.vertices[i]
-        dx, dy, dz = vertices[v, 0] - px, vertices[v, 1] - py, vertices[v, 2] - pz
-        x = r[0, 0] * dx + r[1, 0] * dy + r[2, 0] * dz
-        y = r[0, 1] * dx + r[1, 1] * dy + r[2, 1] * dz
-        z = r[0, 2] * dx + r[1, 2] * dy + r[2, 2] * dz
-        slope: Slope = signed_distance(shape, size, x, y, z)
-        local[v, 0], local[v, 1], local[v, 2], local[v, 3] = x, y, z, slope[0]
+def _local(thing: Thing, points: Floats, row: int) -> Vector:
+    """A point of the world in the axes of a primitive."""
+    _, _, origin, along_x, along_y, along_z = thing
+    x, y, z = points[row, 0] - origin[0], points[row, 1] - origin[1], points[row, 2] - origin[2]
+    return (
+        along_x[0] * x + along_x[1] * y + along_x[2] * z,
+        along_y[0] * x + along_y[1] * y + along_y[2] * z,
+        along_z[0] * x + along_z[1] * y + along_z[2] * z,
+    )
 
 
 @njit(cache=True, error_model="numpy", inline="always")
@@ -123,9 +137,8 @@ def _squared(points: Floats, a: int, b: int) -> float:
 @njit(cache=True, error_model="numpy", inline="always")
 def _press_triangle(
     taxels: TaxelTable,
-    geoms: GeomTable,
-    bone: int,
-    g: int,
+    thing: Thing,
+    thickness: float,
     t: int,
     barycentric: Floats,
     local: Floats,
@@ -137,8 +150,7 @@ def _press_triangle(
     bx, by, bz = local[j, 0], local[j, 1], local[j, 2]
     cx, cy, cz = local[k, 0], local[k, 1], local[k, 2]
     nx, ny, nz = _normal(bx - ax, by - ay, bz - az, cx - ax, cy - ay, cz - az)
-    shape, size = geoms.shapes[g], _size(geoms, g)
-    thickness = taxels.thickness[bone] + geoms.skins[g]
+    shape, size = thing[0], thing[1]
     for n in range(barycentric.shape[0]):
         u, v, w = barycentric[n, 0], barycentric[n, 1], barycentric[n, 2]
         down = taxels.depths[t, n]
@@ -229,9 +241,11 @@ def find_near(geoms: GeomTable, deaf: Bools, bones: Floats, near: Bools) -> None
         reach = bounding_radius(geoms.shapes[g], geoms.sizes[g])
         if not _meet(bones, whole, geoms.positions, g, reach):
             continue
+        thing = _thing(geoms, g)
         for bone in range(whole):
             if not deaf[bone, g] and _meet(bones, bone, geoms.positions, g, reach):
-                near[bone, g] = _gap(bones, bone, geoms, g) < bones[bone, 3]
+                x, y, z = _local(thing, bones, bone)
+                near[bone, g] = distance(thing[0], thing[1], x, y, z) < bones[bone, 3]
 
 
 @njit(cache=True, error_model="numpy", inline="always")
@@ -240,20 +254,3 @@ def _meet(balls: Floats, ball: int, positions: Floats, g: int, reach: float) -> 
     x, y = balls[ball, 0] - positions[g, 0], balls[ball, 1] - positions[g, 1]
     z, both = balls[ball, 2] - positions[g, 2], reach + balls[ball, 3]
     return bool(x * x + y * y + z * z < both * both)
-
-
-@njit(cache=True, error_model="numpy", inline="always")
-def _gap(balls: Floats, ball: int, geoms: GeomTable, g: int) -> float:
-    """Metres from the centre of a ball to a primitive."""
-    r = geoms.rotations[g]
-    dx = balls[ball, 0] - geoms.positions[g, 0]
-    dy = balls[ball, 1] - geoms.positions[g, 1]
-    dz = balls[ball, 2] - geoms.positions[g, 2]
-    slope: Slope = signed_distance(
-        geoms.shapes[g],
-        _size(geoms, g),
-        r[0, 0] * dx + r[1, 0] * dy + r[2, 0] * dz,
-        r[0, 1] * dx + r[1, 1] * dy + r[2, 1] * dz,
-        r[0, 2] * dx + r[1, 2] * dy + r[2, 2] * dz,
-    )
-    return slope[0]

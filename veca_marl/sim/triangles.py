@@ -64,7 +64,7 @@ def draw_triangles(
     for t in range(triangles.shape[0]):
         if not drawn[t]:
             continue
-        a, b, c = seen[triangles[t, 0]], seen[triangles[t, 1]], seen[triangles[t, 2]]
+        a, b, c = _at(seen, triangles[t, 0]), _at(seen, triangles[t, 1]), _at(seen, triangles[t, 2])
         farthest = max(a[2], b[2], c[2])
         nearest = min(a[2], b[2], c[2])
         if farthest <= lens.near or nearest > lens.far:
@@ -80,8 +80,13 @@ def draw_triangles(
             _fill(edges, volume, rectangle, lens, name, depth, surfaces)
 
 
-@njit(cache=True, error_model="numpy")
-def _cross(a: Floats, b: Floats) -> Vector:
+@njit(cache=True, error_model="numpy", inline="always")
+def _at(seen: Floats, vertex: int) -> Vector:
+    return seen[vertex, 0], seen[vertex, 1], seen[vertex, 2]
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def _cross(a: Vector, b: Vector) -> Vector:
     return (
         a[1] * b[2] - a[2] * b[1],
         a[2] * b[0] - a[0] * b[2],
@@ -89,8 +94,8 @@ def _cross(a: Floats, b: Floats) -> Vector:
     )
 
 
-@njit(cache=True, error_model="numpy")
-def _rectangle(a: Floats, b: Floats, c: Floats, nearest: float, lens: Lens) -> Rectangle:
+@njit(cache=True, error_model="numpy", inline="always")
+def _rectangle(a: Vector, b: Vector, c: Vector, nearest: float, lens: Lens) -> Rectangle:
     """Pixels that a triangle may cover; all of them if it reaches behind the near plane."""
     if nearest <= lens.near:
         return 0, lens.columns.shape[0], 0, lens.rows.shape[0]
@@ -101,7 +106,7 @@ def _rectangle(a: Floats, b: Floats, c: Floats, nearest: float, lens: Lens) -> R
     return pixel_rectangle(across, upward, lens)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", inline="always")
 def _fill(
     edges: tuple[Vector, Vector, Vector],
     volume: float,
@@ -157,11 +162,11 @@ def illuminate_triangles(
                 lights[j, i] = _light(meshes, seen, t, lens.columns[i], lens.rows[j])
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", inline="always")
 def _light(meshes: MeshTable, seen: Floats, t: int, x: float, y: float) -> float:
     """Brightness of a triangle where the ray of slopes (x, y) meets it."""
     i, j, k = meshes.triangles[t, 0], meshes.triangles[t, 1], meshes.triangles[t, 2]
-    a, b, c = seen[i], seen[j], seen[k]
+    a, b, c = _at(seen, i), _at(seen, j), _at(seen, k)
     u, v, w = _edge(b, c, x, y), _edge(c, a, x, y), _edge(a, b, x, y)
     squared, facing = 0.0, 0.0
     for axis in range(3):
@@ -174,7 +179,7 @@ def _light(meshes: MeshTable, seen: Floats, t: int, x: float, y: float) -> float
     return single(AMBIENT + (1.0 - AMBIENT) * max(facing, 0.0) + BOUNCE * max(-facing, 0.0))
 
 
-@njit(cache=True, error_model="numpy")
-def _edge(a: Floats, b: Floats, x: float, y: float) -> float:
+@njit(cache=True, error_model="numpy", inline="always")
+def _edge(a: Vector, b: Vector, x: float, y: float) -> float:
     normal = _cross(a, b)
     return normal[0] * x + normal[1] * y + normal[2]
