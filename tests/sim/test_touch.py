@@ -192,6 +192,18 @@ def test_a_hand_feels_the_own_leg_but_no_bone_feels_its_neighbours():
     np.testing.assert_array_equal(together, together.T)
 
 
+def test_a_time_step_does_not_enter():
+    """The reading is a function of where things are: read twice, or after a detour, it is equal."""
+    stage = Stage()
+    ball = press_forearm(stage, 0.003)
+    first = stage.read()
+    place = ball.positions[0].copy()
+    ball.positions[0] += (0.0, 0.0, 0.3)
+    assert not stage.read().any()
+    ball.positions[0] = place
+    np.testing.assert_array_equal(stage.read(), first)
+
+
 def test_what_is_far_costs_next_to_nothing():
     costs = []
     for count in (0, 300):
