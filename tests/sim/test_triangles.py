@@ -121,7 +121,7 @@ def test_light_is_that_of_a_ball_where_the_skin_is_round():
     np.testing.assert_allclose(ours, theirs, rtol=0.12)
 
 
-def test_a_skinned_body_costs_less_than_its_bones_would():
+def test_a_skin_costs_less_than_twice_what_the_bones_would():
     costs = {}
     for name in ("skin", "bones"):
         scene = Scene()
