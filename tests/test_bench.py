@@ -181,10 +181,10 @@ def test_tiny_renderer_draws_the_scene_that_we_draw():
     world, watcher = busy_room(compose(["+task=KickTheBall"]).game.playground)
     hidden = world.scene.hidden(watcher.object_id, watcher.own_head_frames)
     eye, camera = watcher.mount("eye_left"), Camera()
-    client = as_visual_shapes(world.scene, hidden)
+    client, objects_of = as_visual_shapes(world.scene, hidden)
     _, bodies = tiny_view(client, camera, eye)
     pybullet.disconnect(client)
-    objects = np.append(world.scene.geoms.objects[~hidden], -1)  # -1, the sky, is the last one
+    objects = np.array([*objects_of, -1])  # -1, the sky, is the last one
     theirs = objects[np.reshape(bodies, (camera.height, camera.width))]
     ours = camera.render(world.scene, [eye], hidden).ids[0]
     world.close()

@@ -16,8 +16,8 @@ from veca_marl.sim.senses import SensesCfg
 from veca_marl.sim.senses.audio import AudioQuality
 
 KICK = "+task=KickTheBall"
-GROUPS = ["algo", "body", "collect", "log", "playground", "senses/audio", "senses/vision"]
-GROUPS += ["senses/proprioception"]
+SENSES = ("audio", "proprioception", "touch", "vision")
+GROUPS = ["algo", "body", "collect", "log", "playground", *(f"senses/{name}" for name in SENSES)]
 PRESETS = [(g, path.stem) for g in GROUPS for path in sorted((CONF / g).glob("*.yaml"))]
 EXPERIMENTS = sorted(path.stem for path in (CONF / "experiment").glob("*.yaml"))
 
@@ -60,7 +60,7 @@ def test_no_preset_is_called_what_yaml_reads_as_a_boolean(path):
 
 
 def test_files_hold_only_what_differs_from_the_dataclasses():
-    for sense in ("audio", "vision", "proprioception"):
+    for sense in SENSES:
         default = OmegaConf.structured(SensesCfg())[sense]
         for path in (CONF / "senses" / sense).glob("*.yaml"):
             for key, value in (OmegaConf.load(path) or {}).items():

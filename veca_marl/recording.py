@@ -1,4 +1,4 @@
-"""A film of one episode: what the player sees, beside the room, with what it hears."""
+"""A film of one episode: what the player sees and feels, beside the room, with what it hears."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def record_episode(path: Path, game: GameCfg, policy: Policy, seed: int) -> None
         while not done:
             played, state = env.step_and_maybe_reset(policy(state))
             seen = _first_player(played["next"], env)
-            frames.append(env.spectator.frame({k: v for k, v in seen.items() if k == "vision"}))
+            frames.append(env.spectator.frame(seen))
             if "waveform" in seen:
                 sound.append(seen["waveform"])
             done = bool(played["next", "done"].all())

@@ -6,6 +6,7 @@ import pytest
 from veca_marl.config import compose
 from veca_marl.envs.game import Game
 from veca_marl.envs.spectator import FRAME_HEIGHT, ROOM_WIDTH, Spectator, eye_images
+from veca_marl.sim.taxels import taxels_of
 
 
 @pytest.fixture
@@ -32,6 +33,18 @@ def test_a_frame_is_both_eyes_and_the_room(game):
     assert frame.shape == (FRAME_HEIGHT, 2 * FRAME_HEIGHT + ROOM_WIDTH, 3)
     assert frame.dtype == np.uint8
     assert frame.shape[1] % 2 == 0  # video codecs want it
+
+
+def test_who_feels_shows_its_skin(game):
+    spectator, touch = Spectator(game), np.zeros(9888, np.float32)
+    pale = spectator.frame({"touch": touch})
+    assert pale.shape == (FRAME_HEIGHT, pale.shape[1], 3)
+    assert pale.shape[1] > ROOM_WIDTH
+    assert pale.shape[1] % 2 == 0
+    touch[taxels_of("chest")] = 1.0
+    touched = spectator.frame({"touch": touch})
+    assert (touched[..., 0].astype(int) - pale[..., 0] != 0).sum() > 100
+    np.testing.assert_array_equal(touched[:, -ROOM_WIDTH:], pale[:, -ROOM_WIDTH:])
 
 
 def test_the_blind_show_the_room_alone(game):

@@ -14,7 +14,7 @@ from veca_marl.envs.game import Game, GameCfg
 from veca_marl.sim.bodies.base import MOUNTS
 
 BODIES = sorted(path.stem for path in (CONF / "body").glob("*.yaml"))
-SENSES = ("vision", "audio", "proprioception")
+SENSES = ("vision", "audio", "touch", "proprioception")
 STEPS = 12
 
 

@@ -58,7 +58,7 @@ def _measure(game: GameCfg, agents: int, worlds: int, asked: argparse.Namespace)
 def _played(game: GameCfg, agents: int, things: int) -> AbstractContextManager[TaskCfg]:
     """Return the task itself for one walker, free play for more, fuller rooms and other bodies."""
     if isinstance(game.body, HumanoidCfg):
-        senses = (*find_task(game.task.name).senses, "proprioception")
+        senses = (*find_task(game.task.name).senses, "touch", "proprioception")
         return free_play(agents, game.task, senses, things)
     if agents > 1 or things:
         return free_play(agents, game.task, things=things)

@@ -69,7 +69,7 @@ def measure_eye(playground: PlaygroundCfg, repeats: int) -> EyeCost:
     hidden = world.scene.hidden(watcher.object_id, watcher.own_head_frames)
     eye, camera = watcher.mount("eye_left"), Camera()
     poses = [_turned(eye, 2.0 * math.pi * view / VIEWS) for view in range(VIEWS)]
-    client = as_visual_shapes(world.scene, hidden)
+    client, bodies = as_visual_shapes(world.scene, hidden)
     costs = []
     for _ in range(repeats + 1):
         ours = _ms(lambda: camera.render(world.scene, poses, hidden))
@@ -79,7 +79,7 @@ def measure_eye(playground: PlaygroundCfg, repeats: int) -> EyeCost:
     world.close()
     ours_ms, tiny_ms = zip(*costs[1:], strict=True)  # the first compiles and fills caches
     ratio = median(tiny / ours for ours, tiny in costs[1:])
-    return EyeCost(int((~hidden).sum()), median(ours_ms), median(tiny_ms), ratio)
+    return EyeCost(len(bodies), median(ours_ms), median(tiny_ms), ratio)
 
 
 def busy_room(playground: PlaygroundCfg) -> tuple[World, Walker]:
@@ -142,11 +142,15 @@ def _turned(pose: Pose, yaw_rad: float) -> Pose:
     return pose._replace(rotation=about_z @ pose.rotation)
 
 
-def as_visual_shapes(scene: Scene, hidden: Bools) -> int:
-    """Return a PyBullet client with a body for each primitive not hidden, in their order."""
+def as_visual_shapes(scene: Scene, hidden: Bools) -> tuple[int, list[int]]:
+    """Show a PyBullet client the surfaces of a scene that are not hidden.
+
+    Returns:
+        The client, and the id of the scene's object for each of the client's bodies in turn.
+    """
     client: int = pybullet.connect(pybullet.DIRECT)
-    geoms = scene.geoms
-    for g in np.flatnonzero(~hidden):
+    geoms, objects = scene.geoms, []
+    for g in np.flatnonzero(~hidden[: len(geoms.shapes)] & geoms.visible):
         shape = _visual_shape(client, Shape(geoms.shapes[g]), geoms.sizes[g], geoms.colours[g])
         pybullet.createMultiBody(
             0.0,
@@ -156,7 +160,28 @@ def as_visual_shapes(scene: Scene, hidden: Bools) -> int:
             baseOrientation=matrix_to_quaternion(geoms.rotations[g]).tolist(),
             physicsClientId=client,
         )
-    return client
+        objects.append(int(geoms.objects[g]))
+    for item in scene.objects:
+        triangles = np.arange(len(geoms.shapes), len(hidden))[item.triangles]
+        corners = scene.meshes.triangles[item.triangles][~hidden[triangles]]
+        if len(corners):
+            mesh = _visual_mesh(client, scene, corners)
+            pybullet.createMultiBody(0.0, -1, mesh, physicsClientId=client)
+            objects.append(item.id)
+    return client, objects
+
+
+def _visual_mesh(client: int, scene: Scene, triangles: NDArray[np.int64]) -> int:
+    """Give PyBullet some triangles of a scene, where they are now."""
+    corners = triangles.ravel()
+    made = pybullet.createVisualShape(
+        pybullet.GEOM_MESH,
+        vertices=scene.meshes.vertices[corners].tolist(),
+        normals=scene.meshes.normals[corners].tolist(),
+        indices=list(range(len(corners))),
+        physicsClientId=client,
+    )
+    return int(made)
 
 
 def _visual_shape(client: int, shape: Shape, size: Sequence[float], colour: Sequence[float]) -> int:

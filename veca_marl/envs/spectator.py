@@ -1,4 +1,4 @@
-"""What a person watching a game sees and hears: the player's eyes beside a view of the room."""
+"""What a person watching a game sees: the player's eyes and skin beside a view of the room."""
 
 from __future__ import annotations
 
@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 
 from veca_marl.envs.game import Game, Observation
 from veca_marl.sim.optics import Camera, look_at
+from veca_marl.sim.taxels import TAXELS_PER_TRIANGLE
+from veca_marl.sim.touch_picture import picture_of_touch
 
 FRAME_HEIGHT = 252
 ROOM_WIDTH = 336
@@ -39,18 +41,28 @@ class Spectator:
         return self._camera.render(self._game.world.scene, [pose]).rgb[0].copy()
 
     def frame(self, observation: Observation) -> NDArray[np.uint8]:
-        """Return one video frame: left eye, right eye, room.
+        """Return one video frame: left eye, right eye, touched skin, room.
 
         Args:
-            observation: What the player observes now, as from `Game.observe`; without `vision`
-                the room is shown alone.
+            observation: What the first player observes now, as from `Game.observe`; a sense that
+                is not in it is not shown.
 
         Returns:
             ``(252, width, 3)`` uint8, even width.
         """
-        if "vision" not in observation:
-            return self.room()
-        return np.concatenate([*eye_images(observation["vision"]), self.room()], axis=1)
+        pictures = [self.room()]
+        if "touch" in observation:
+            pictures.insert(0, self._skin(observation["touch"]))
+        if "vision" in observation:
+            pictures[:0] = eye_images(observation["vision"])
+        return np.concatenate(pictures, axis=1)
+
+    def _skin(self, touch: NDArray[Any]) -> NDArray[np.uint8]:
+        """Return the first player's body, coloured where it feels something."""
+        scene = self._game.world.scene
+        body = scene.objects[self._game.players[0].body.object_id]
+        readings = touch.reshape(-1, TAXELS_PER_TRIANGLE).astype(np.float64)
+        return picture_of_touch(scene, body, readings, FRAME_HEIGHT)
 
 
 def eye_images(vision: NDArray[Any]) -> list[NDArray[np.uint8]]:

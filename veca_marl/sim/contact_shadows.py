@@ -54,7 +54,7 @@ def darken_contacts(
         view: ``(4, 3)`` position, right, up and forward axes of the eye in the world.
         lens: The camera's numbers.
         depth: ``(H, W)`` metres.
-        surfaces: ``(H, W)`` rows of the primitives seen.
+        surfaces: ``(H, W)`` rows of the surfaces seen.
         lights: ``(H, W)`` brightness of each pixel, scaled.
     """
     for g in range(geoms.shapes.shape[0]):

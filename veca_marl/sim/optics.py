@@ -17,11 +17,13 @@ from veca_marl.sim.screen_bounds import single
 from veca_marl.sim.shading import (
     GLASS_OPACITY,
     Images,
+    Lights,
     illuminate,
     name_objects,
     paint,
     paint_sky,
 )
+from veca_marl.sim.triangles import draw_triangles, illuminate_triangles, to_eye
 
 
 class Views(NamedTuple):
@@ -114,28 +116,47 @@ class Camera:
         Args:
             scene: The world.
             poses: One per view: x axis forward, y left, z up.
-            hidden: ``(G,)`` primitives to leave out, as from `Scene.hidden`.
+            hidden: ``(S,)`` surfaces to leave out, as from `Scene.hidden`.
         """
         views = self._blank(len(poses))
         lights = np.empty((self.height, self.width), np.float32)
-        opaque, glass = _drawn(scene, hidden)
-        geoms, lens, objects = scene.geoms, self.lens, scene.geoms.objects
+        drawn = _drawn(scene, hidden)
+        geoms, lens, (colours, objects, _) = scene.geoms, self.lens, scene.surfaces
         for v, pose in enumerate(poses):
             view = view_axes(pose)
             rgb, depth, ids, glass_ids = (array[v] for array in views)
-            draw_geoms(geoms, opaque, view, lens, True, depth, ids)
+            draw_geoms(geoms, drawn.opaque, view, lens, True, depth, ids)
+            self._draw_skins(scene, drawn.triangles, view, depth, ids, lights)
             illuminate(geoms, view, lens, depth, ids, lights)
-            darken_contacts(geoms, opaque, view, lens, depth, ids, lights)
+            darken_contacts(geoms, drawn.casting, view, lens, depth, ids, lights)
             paint_sky(lens, rgb)
-            paint(geoms, ids, lights, 1.0, rgb)
+            paint(colours, ids, lights, 1.0, rgb)
             name_objects(objects, ids)
-            if glass.any():
+            if drawn.glass.any():
                 glass_depth = depth.copy()
-                draw_geoms(geoms, glass, view, lens, True, glass_depth, glass_ids)
+                draw_geoms(geoms, drawn.glass, view, lens, True, glass_depth, glass_ids)
                 illuminate(geoms, view, lens, glass_depth, glass_ids, lights)
-                paint(geoms, glass_ids, lights, GLASS_OPACITY, rgb)
+                paint(colours, glass_ids, lights, GLASS_OPACITY, rgb)
                 name_objects(objects, glass_ids)
         return views
+
+    def _draw_skins(
+        self,
+        scene: Scene,
+        drawn: Bools,
+        view: Floats,
+        depth: Depths,
+        surfaces: Surfaces,
+        lights: Lights,
+    ) -> None:
+        """Draw and light the triangles of one view."""
+        meshes, first = scene.meshes, len(scene.geoms.shapes)
+        if not len(meshes.triangles):
+            return
+        seen = np.empty_like(meshes.vertices)
+        to_eye(meshes.vertices, view, seen)
+        draw_triangles(meshes.triangles, seen, drawn, self.lens, first, depth, surfaces)
+        illuminate_triangles(meshes, seen, self.lens, first, surfaces, lights)
 
     def _blank(self, count: int) -> Views:
         """Buffers in which nothing is seen yet."""
@@ -175,11 +196,29 @@ def seen_fraction(views: Views, object_id: int) -> float:
     return float(np.mean((views.ids == object_id) | (views.glass_ids == object_id)))
 
 
-def _drawn(scene: Scene, hidden: Bools | None) -> tuple[Bools, Bools]:
-    """Masks of the primitives to draw: those that hide things and those that do not."""
-    transparent = scene.geoms.transparent
-    if hidden is None:
-        return ~transparent, transparent
-    if hidden.shape != transparent.shape:
-        raise ValueError(f"hidden has shape {hidden.shape}; the scene has {len(transparent)} geoms")
-    return ~transparent & ~hidden, transparent & ~hidden
+class _Drawn(NamedTuple):
+    """Masks of what is drawn and how.
+
+    Attributes:
+        opaque: ``(G,)`` primitives that hide what is behind them.
+        glass: ``(G,)`` primitives that do not.
+        casting: ``(G,)`` primitives that cast shadows: bones do so for the skin on them.
+        triangles: ``(T,)`` triangles.
+    """
+
+    opaque: Bools
+    glass: Bools
+    casting: Bools
+    triangles: Bools
+
+
+def _drawn(scene: Scene, hidden: Bools | None) -> _Drawn:
+    """Sort out what is drawn and how."""
+    geoms, count = scene.geoms, len(scene.surfaces.objects)
+    shown = np.ones(count, np.bool_) if hidden is None else ~hidden
+    if shown.shape != (count,):
+        raise ValueError(f"hidden has shape {shown.shape}; the scene has {count} surfaces")
+    first = len(geoms.shapes)
+    casting = ~geoms.transparent & shown[:first]
+    glass = geoms.transparent & geoms.visible & shown[:first]
+    return _Drawn(casting & geoms.visible, glass, casting, shown[first:])

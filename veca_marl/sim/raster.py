@@ -7,8 +7,8 @@ compiler turns them into vector instructions.
 
 A ray is ``forward + x * right + y * up`` with slopes x and y, so the parameter of a hit is its
 distance along the optical axis. Primitives are seen from outside only; an eye within one sees out.
-Anything else that fills the same two buffers, skinned triangles for one, can be drawn before or
-after: a surface is an integer, and only `shading` asks what it stands for.
+Anything else that fills the same two buffers, such as `triangles`, can be drawn before or after: a
+surface is an integer, and only `shading` asks what it stands for.
 """
 
 from __future__ import annotations

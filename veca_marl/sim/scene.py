@@ -1,7 +1,7 @@
-"""The world as eyes see it: named objects made of geometric primitives on moving frames.
+"""The world as eyes and skin meet it: objects made of primitives, and skins, on moving frames.
 
 The owner of an object (the world for props, a body for its bones) writes the poses of its frames
-into the scene's tables; `Scene.update` then carries every primitive to its place in the world.
+into the scene's tables; `Scene.update` then carries every primitive and every mesh to its place.
 """
 
 from __future__ import annotations
@@ -15,11 +15,13 @@ import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
+from veca_marl.sim.meshes import Mesh, empty_meshes, with_mesh
 from veca_marl.sim.pose import Floats
+from veca_marl.sim.skinning import skin
 
 Bools = NDArray[np.bool_]
 
-MOST_GEOMS = int(np.iinfo(np.int16).max)  # a picture stores rows and ids in 16 bits
+MOST_SURFACES = int(np.iinfo(np.int16).max)  # a picture stores rows and ids in 16 bits
 
 
 class Shape(IntEnum):
@@ -53,6 +55,9 @@ class Geom:
         rotation: ``(3, 3)`` from the primitive's axes to the frame's.
         checker_m: Edge of the checker pattern on its surface; 0 for a plain colour.
         transparent: Tints what lies behind it and hides nothing.
+        visible: Whether eyes see it; bones under a skin only cast shadows.
+        tangible: Whether it can be touched.
+        skin_m: Thickness of the flexible skin that makes its outer layer; 0 for rigid things.
 
     Raises:
         ValueError: If a number is not possible.
@@ -65,6 +70,9 @@ class Geom:
     rotation: ArrayLike = field(default_factory=lambda: np.eye(3))
     checker_m: float = 0.0
     transparent: bool = False
+    visible: bool = True
+    tangible: bool = True
+    skin_m: float = 0.0
 
     def __post_init__(self) -> None:
         words = _SIZE_WORDS[Shape(self.shape)]
@@ -81,6 +89,8 @@ class Geom:
             raise ValueError(f"rotation {self.rotation}: want an orthonormal right-handed matrix")
         if not 0.0 <= self.checker_m < np.inf:
             raise ValueError(f"checker_m {self.checker_m}: want 0 (plain) or an edge in metres")
+        if not 0.0 <= self.skin_m < np.inf:
+            raise ValueError(f"skin_m {self.skin_m}: want 0 (rigid) or a thickness in metres")
 
 
 def _is_rotation(matrix: NDArray[np.float64]) -> bool:
@@ -99,6 +109,9 @@ class GeomTable(NamedTuple):
         colours: ``(G, 3)`` float32 in [0, 1].
         checkers: ``(G,)`` float32 metres.
         transparent: ``(G,)`` bool.
+        visible: ``(G,)`` bool.
+        tangible: ``(G,)`` bool.
+        skins: ``(G,)`` metres.
         objects: ``(G,)`` int16 id of the object it belongs to.
         frames: ``(G,)`` int64 row in the frame table.
         offsets: ``(G, 3)`` metres, in the frame.
@@ -112,12 +125,29 @@ class GeomTable(NamedTuple):
     colours: NDArray[np.float32]
     checkers: NDArray[np.float32]
     transparent: Bools
+    visible: Bools
+    tangible: Bools
+    skins: Floats
     objects: NDArray[np.int16]
     frames: NDArray[np.int64]
     offsets: Floats
     turns: Floats
     positions: Floats
     rotations: Floats
+
+
+class SurfaceTable(NamedTuple):
+    """Everything a pixel can show: first the rows of primitives, then those of triangles.
+
+    Attributes:
+        colours: ``(S, 3)`` float32; the rows of primitives are also `GeomTable.colours`.
+        objects: ``(S,)`` int16 id of the object.
+        frames: ``(S,)`` int64 row in the frame table.
+    """
+
+    colours: NDArray[np.float32]
+    objects: NDArray[np.int16]
+    frames: NDArray[np.int64]
 
 
 class Scene:
@@ -129,12 +159,16 @@ class Scene:
     Attributes:
         objects: The objects in order of their ids.
         geoms: The table of primitives; replaced by `add_object`.
+        meshes: The table of skins; likewise.
+        surfaces: What pixels can show; likewise.
         version: Counts the changes, so that what was seen of an older state can be told.
     """
 
     def __init__(self) -> None:
         self.objects: list[SceneObject] = []
         self.geoms = _table([], 0, 0)
+        self.meshes = empty_meshes()
+        self.surfaces = SurfaceTable(self.geoms.colours, self.geoms.objects, self.geoms.frames)
         self.version = 0
         self._positions = np.zeros((0, 3))
         self._rotations = np.zeros((0, 3, 3))
@@ -149,12 +183,15 @@ class Scene:
         """``(F, 3, 3)``: each frame's axes to the world's. The owners write into it."""
         return self._rotations
 
-    def add_object(self, name: str, frames: Sequence[Sequence[Geom]]) -> SceneObject:
+    def add_object(
+        self, name: str, frames: Sequence[Sequence[Geom]], mesh: Mesh | None = None
+    ) -> SceneObject:
         """Add an object whose frames start at the world's origin.
 
         Args:
             name: Unique in the scene.
             frames: The primitives on each of its frames; a frame may be empty.
+            mesh: A skin over those frames.
 
         Raises:
             ValueError: If the name is taken, there is no frame, or the scene is full.
@@ -164,11 +201,14 @@ class Scene:
         if not frames:
             raise ValueError(f"object {name!r} has no frame")
         first_row, first_geom = len(self._positions), len(self.geoms.shapes)
-        total = first_geom + sum(map(len, frames))
-        if total > MOST_GEOMS:
-            raise ValueError(f"{name!r} makes {total} primitives: a scene holds {MOST_GEOMS}")
-        added = _table(frames, len(self.objects), first_row)
-        self.geoms = _joined(self.geoms, added)
+        first_vertex, first_triangle = len(self.meshes.vertices), len(self.meshes.triangles)
+        total = len(self.surfaces.objects) + sum(map(len, frames))
+        total += 0 if mesh is None else len(mesh.triangles)
+        if total > MOST_SURFACES:
+            raise ValueError(
+                f"{name!r} makes {total} primitives and triangles: a scene holds {MOST_SURFACES}"
+            )
+        self._add_surfaces(_table(frames, len(self.objects), first_row), mesh)
         self._positions = np.concatenate((self._positions, np.zeros((len(frames), 3))))
         self._rotations = np.concatenate((self._rotations, np.tile(np.eye(3), (len(frames), 1, 1))))
         item = SceneObject(
@@ -176,11 +216,32 @@ class Scene:
             name=name,
             rows=slice(first_row, len(self._positions)),
             geoms=slice(first_geom, len(self.geoms.shapes)),
+            vertices=slice(first_vertex, len(self.meshes.vertices)),
+            triangles=slice(first_triangle, len(self.meshes.triangles)),
             scene=self,
         )
         self.objects.append(item)
         self.version += 1
         return item
+
+    def _add_surfaces(self, added: GeomTable, mesh: Mesh | None) -> None:
+        """Put primitives below the primitives and triangles below the triangles."""
+        count, first_row = len(self.geoms.shapes), len(self._positions)
+        self.geoms = _joined(self.geoms, added)
+        old: tuple[NDArray[Any], ...] = self.surfaces
+        new: tuple[NDArray[Any], ...] = (added.colours, added.objects, added.frames)
+        skins: tuple[NDArray[Any], ...] = tuple(column[:0] for column in old)
+        if mesh is not None:
+            ids = np.full(len(mesh.owners), len(self.objects), np.int16)
+            skins = (mesh.colours, ids, mesh.owners + first_row)
+            self.meshes = with_mesh(self.meshes, mesh, first_row)
+        columns: list[Any] = [
+            np.concatenate((rows[:count], geoms, rows[count:], triangles))
+            for rows, geoms, triangles in zip(old, new, skins, strict=True)
+        ]
+        self.surfaces = SurfaceTable(*columns)
+        # one memory: who paints a primitive paints the surface
+        self.geoms = self.geoms._replace(colours=self.surfaces.colours[: len(self.geoms.shapes)])
 
     def find(self, name: str) -> SceneObject:
         """Return the object called `name`.
@@ -196,7 +257,7 @@ class Scene:
         )
 
     def update(self) -> None:
-        """Carry every primitive to where its frame is now. The world calls it once per step."""
+        """Carry everything to where its frames are now. The world calls it once per step."""
         g = self.geoms
         _compose(
             self._positions,
@@ -207,10 +268,12 @@ class Scene:
             g.positions,
             g.rotations,
         )
+        if len(self.meshes.vertices):
+            skin(self.meshes, self._positions, self._rotations)
         self.version += 1
 
     def hidden(self, object_id: int, frames: Sequence[int]) -> Bools:
-        """Return a mask ``(G,)`` that is true for the primitives on some frames of an object.
+        """Return a mask ``(S,)`` that is true for the surfaces on some frames of an object.
 
         Args:
             object_id: Which object.
@@ -225,7 +288,7 @@ class Scene:
         count = rows.stop - rows.start
         if not all(0 <= frame < count for frame in frames):
             raise ValueError(f"frames {tuple(frames)}: object {object_id} has 0..{count - 1}")
-        return np.isin(self.geoms.frames, [rows.start + frame for frame in frames])
+        return np.isin(self.surfaces.frames, [rows.start + frame for frame in frames])
 
 
 @dataclass(frozen=True, eq=False)
@@ -237,6 +300,8 @@ class SceneObject:
         name: Unique in the scene.
         rows: Its rows in the frame table.
         geoms: Its rows in the table of primitives.
+        vertices: Its rows in the table of skins; none if it has no skin.
+        triangles: Likewise.
         scene: The scene it is in.
     """
 
@@ -244,6 +309,8 @@ class SceneObject:
     name: str
     rows: slice
     geoms: slice
+    vertices: slice
+    triangles: slice
     scene: Scene = field(repr=False)
 
     @property
@@ -280,6 +347,9 @@ def _table(frames: Sequence[Sequence[Geom]], object_id: int, first_row: int) -> 
         colours=np.array([geom.colour for geom in geoms], np.float32).reshape(n, 3),
         checkers=np.array([geom.checker_m for geom in geoms], np.float32),
         transparent=np.array([geom.transparent for geom in geoms], np.bool_),
+        visible=np.array([geom.visible for geom in geoms], np.bool_),
+        tangible=np.array([geom.tangible for geom in geoms], np.bool_),
+        skins=np.array([geom.skin_m for geom in geoms], np.float64),
         objects=np.full(n, object_id, np.int16),
         frames=np.array(rows, np.int64),
         offsets=offsets,

@@ -49,14 +49,12 @@ def paint_sky(lens: Lens, rgb: Images) -> None:
 
 
 @njit(cache=True, error_model="numpy")
-def paint(
-    geoms: GeomTable, surfaces: Surfaces, lights: Lights, opacity: float, rgb: Images
-) -> None:
+def paint(colours: Lights, surfaces: Surfaces, lights: Lights, opacity: float, rgb: Images) -> None:
     """Lay the lit colours of the surfaces over a picture.
 
     Args:
-        geoms: The scene's primitives.
-        surfaces: ``(H, W)`` rows of the primitives seen; where `NOTHING`, the picture stays.
+        colours: ``(S, 3)`` of the scene's surfaces, in [0, 1].
+        surfaces: ``(H, W)`` rows of the surfaces seen; where `NOTHING`, the picture stays.
         lights: ``(H, W)`` brightness of each pixel, as from `illuminate`.
         opacity: Weight of the new colours, in [0, 1].
         rgb: ``(H, W, 3)``, updated.
@@ -69,7 +67,7 @@ def paint(
             scale = single(opacity) * _255 * lights[j, i]
             for c in range(3):
                 behind = single(1.0 - opacity) * single(rgb[j, i, c])
-                mixed = scale * geoms.colours[g, c] + behind
+                mixed = scale * colours[g, c] + behind
                 rgb[j, i, c] = np.uint8(min(mixed, _255) + _HALF)
 
 
@@ -84,8 +82,8 @@ def illuminate(
         view: ``(4, 3)`` position, right, up and forward axes of the eye in the world.
         lens: The camera's numbers.
         depth: ``(H, W)`` metres.
-        surfaces: ``(H, W)`` rows of the primitives seen, `NOTHING` for none.
-        lights: ``(H, W)``, written where something is seen.
+        surfaces: ``(H, W)`` rows of the surfaces seen, `NOTHING` for none.
+        lights: ``(H, W)``, written where a primitive is seen.
     """
     width = surfaces.shape[1]
     for j in range(surfaces.shape[0]):
@@ -94,7 +92,7 @@ def illuminate(
             first, g = end, surfaces[j, end]
             while end < width and surfaces[j, end] == g:
                 end += 1
-            if g == NOTHING:
+            if g == NOTHING or g >= geoms.shapes.shape[0]:
                 continue
             columns, run = lens.columns[first:end], depth[j, first:end]
             _light_run(geoms, g, view, lens.rows[j], columns, run, lights[j, first:end])
@@ -174,7 +172,7 @@ def _tile_run(
 
 @njit(cache=True, error_model="numpy")
 def name_objects(objects: Surfaces, surfaces: Surfaces) -> None:
-    """Turn rows of primitives into object ids, in place; `NOTHING` stays."""
+    """Turn rows of surfaces into object ids, in place; `NOTHING` stays."""
     for j in range(surfaces.shape[0]):
         for i in range(surfaces.shape[1]):
             if surfaces[j, i] != NOTHING:

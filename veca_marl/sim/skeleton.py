@@ -52,6 +52,7 @@ class Bone:
         parent: Index of the parent bone; -1 for the pelvis.
         origin: Joint position in the parent's frame, metres.
         rest_rotation: ``(3, 3)`` orientation in the parent's frame at zero angles.
+        tip: Far end of the segment in its own frame, metres.
         mass_kg: Mass of the segment.
         skin_thickness_m: Flexible skin over the bone (``d_max`` of the tactile sense).
         skin_force_n: Force on one contact point that presses the skin down to the bone.
@@ -64,6 +65,7 @@ class Bone:
     parent: int
     origin: tuple[float, float, float]
     rest_rotation: Floats
+    tip: tuple[float, float, float]
     mass_kg: float
     skin_thickness_m: float
     skin_force_n: float
@@ -182,6 +184,7 @@ def _bones(joints: tuple[Joint, ...]) -> tuple[Bone, ...]:
                 parent=names[row["parent"]],
                 origin=(float(row["origin_x"]), float(row["origin_y"]), float(row["origin_z"])),
                 rest_rotation=_rotation(*angles),
+                tip=(float(row["tip_x"]), float(row["tip_y"]), float(row["tip_z"])),
                 mass_kg=float(row["mass_kg"]),
                 skin_thickness_m=float(row["d_max_mm"]) / 1000.0,
                 skin_force_n=float(row["skin_force_to_bone_N"]),

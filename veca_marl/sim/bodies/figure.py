@@ -11,7 +11,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from veca_marl.sim.bodies.looks import SHIRTS, bone_geoms
+from veca_marl.sim.bodies.looks import SHIRTS, bone_geoms, dressed_skin
 from veca_marl.sim.bodies.mounts import EYES, gaze, organ_pose
 from veca_marl.sim.bone_motion import bone_motion
 from veca_marl.sim.optics import Camera, seen_fraction
@@ -41,8 +41,9 @@ class Figure:
         self.name = name
         self._world = world
         self._skeleton = load_skeleton()
+        colour = SHIRTS[shirt % len(SHIRTS)]
         self._drawn = world.scene.add_object(
-            name, bone_geoms(self._skeleton, SHIRTS[shirt % len(SHIRTS)])
+            name, bone_geoms(self._skeleton, colour), dressed_skin(self._skeleton, colour)
         )
         self.object_id = self._drawn.id
         self._head = self._skeleton.bone("head")

@@ -9,6 +9,7 @@ from veca_marl.sim.bodies.base import Body
 from veca_marl.sim.senses.audio import AudioCfg, AudioSense
 from veca_marl.sim.senses.base import Sense
 from veca_marl.sim.senses.proprioception import ProprioceptionCfg, ProprioceptionSense
+from veca_marl.sim.senses.touch import TouchCfg, TouchSense
 from veca_marl.sim.senses.vision import VisionCfg, VisionSense
 from veca_marl.sim.world import World
 
@@ -24,6 +25,7 @@ class SensesCfg:
     vision: VisionCfg = field(default_factory=VisionCfg)
     audio: AudioCfg = field(default_factory=AudioCfg)
     proprioception: ProprioceptionCfg = field(default_factory=ProprioceptionCfg)
+    touch: TouchCfg = field(default_factory=TouchCfg)
 
 
 def give_senses(body: Body, names: Sequence[str], cfg: SensesCfg, world: World) -> dict[str, Sense]:
@@ -42,6 +44,7 @@ def give_senses(body: Body, names: Sequence[str], cfg: SensesCfg, world: World) 
         "vision": lambda: VisionSense(cfg.vision, body, world.scene),
         "audio": lambda: AudioSense(cfg.audio, body, world.sound),
         "proprioception": lambda: ProprioceptionSense(cfg.proprioception, body, world),
+        "touch": lambda: TouchSense(cfg.touch, body, world.scene),
     }
     unknown = sorted(set(names) - set(makers))
     if unknown:

@@ -136,8 +136,8 @@ class VisionSense(Sense):
         return self.seen_fraction(object_id) > 0.0
 
     def _own_head(self) -> Bools:
-        """Mask of the primitives that would fill the eyes; renewed when the scene has grown."""
-        if len(self._hidden) != len(self._scene.geoms.shapes):
+        """Mask of the surfaces that would fill the eyes; renewed when the scene has grown."""
+        if len(self._hidden) != len(self._scene.surfaces.objects):
             self._hidden = self._scene.hidden(self._body.object_id, self._body.own_head_frames)
         return self._hidden
 
