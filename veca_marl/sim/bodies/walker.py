@@ -38,7 +38,8 @@ class WalkerCfg:
 
     Attributes:
         action: Continuous velocities or discrete moves.
-        walk_speed_mps: Speed of a full forward or backward action.
+        walk_speed_mps: Speed of a full forward action.
+        backward_share: A full backward action goes at this share of the forward speed.
         turn_speed_degps: Turning speed of a full turn action.
         radius_m: Radius of the capsule in the physics.
         height_m: Height of the capsule.
@@ -54,6 +55,7 @@ class WalkerCfg:
 
     action: ActionKind = ActionKind.continuous
     walk_speed_mps: float = 1.0
+    backward_share: float = 0.3
     turn_speed_degps: float = 120.0
     radius_m: float = 0.11
     height_m: float = 0.72
@@ -174,7 +176,8 @@ class Walker:
     def act(self, action: NDArray[Any]) -> None:
         """Walk as an action row says; it holds until the next call."""
         forward, turn = self.control.decode(action)
-        self.walk(forward * self.cfg.walk_speed_mps, turn * math.radians(self.cfg.turn_speed_degps))
+        top_mps = self.cfg.walk_speed_mps * (self.cfg.backward_share if forward < 0.0 else 1.0)
+        self.walk(forward * top_mps, turn * math.radians(self.cfg.turn_speed_degps))
 
     def walk(self, walk_speed_mps: float, turn_speed_radps: float) -> None:
         """Walk forward (backward when negative) and turn (left when positive) until told anew."""
