@@ -1,6 +1,6 @@
 import resource
-from contextlib import contextmanager
 import signal
+from contextlib import contextmanager
 from dataclasses import replace
 
 import pytest
