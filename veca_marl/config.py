@@ -91,7 +91,7 @@ class Config:
     seed: int = 0
     device: str = "cpu"
     threads: int | None = None
-    total_frames: int = 163_840
+    total_frames: int = 122_880
     max_minutes: float | None = None
     resume: str | None = None
 

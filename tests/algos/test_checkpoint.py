@@ -1,5 +1,6 @@
 import resource
 import signal
+from contextlib import contextmanager
 from dataclasses import replace
 
 import pytest
@@ -71,20 +72,25 @@ def test_other_specs_are_refused_naming_what_differs(checkpoints, other, message
         load_checkpoint(path, Identity("Toy", specs), CPU)
 
 
-@pytest.fixture
+@contextmanager
 def full_disk():
-    """No file may grow over 2 kB: writes fail as they do on a full disk."""
+    """No file may grow over 2 kB: writes fail as they do on a full disk.
+
+    Not a fixture: pytest's own report, where it goes to a file, must not be written under it.
+    """
     limits = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (2048, limits[1]))
-    yield
-    resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
 
 
-def test_full_disk_leaves_the_old_checkpoint_intact(checkpoints, identity, request):
+def test_full_disk_leaves_the_old_checkpoint_intact(checkpoints, identity):
     path = checkpoints.save({"w": torch.zeros(3)}, 10, best=True)
     before = path.read_bytes()
-    request.getfixturevalue("full_disk")
-    with pytest.raises(CheckpointError, match=r"cannot write .*000020.pt: .* intact .*000010.pt"):
+    refused = r"cannot write .*000020.pt: .* intact .*000010.pt"
+    with pytest.raises(CheckpointError, match=refused), full_disk():
         checkpoints.save({"w": torch.zeros(100_000)}, 20, best=True)
     assert path.read_bytes() == before
     assert names(checkpoints) == ["best.pt", "frames_000000000010.pt"]

@@ -127,6 +127,18 @@ def test_approach_is_the_cosine_of_the_way_to_the_ball(game, bearing_deg, expect
     assert outcome.terms["agents"]["approach"] == pytest.approx(expected, abs=0.03)
 
 
+@pytest.mark.parametrize(("facing", "forward"), [(0.0, 0.3), (math.pi, -1.0)])
+def test_creeping_up_to_the_ball_is_no_approach(game, facing, forward):
+    """Else following the ball for ever, slowly or backward, pays more than kicking it."""
+    game.reset(np.random.default_rng(1))
+    game.players[0].body.place((0.0, 0.0, 0.0), facing)
+    game.task.ball.place((2.0, 0.0, 0.15))
+    creep = {"agents": np.array([forward, 0.0], np.float32)}
+    outcome = game.step(creep, np.random.default_rng(0))
+    assert game.players[0].body.velocity[0] > 0.1
+    assert outcome.terms["agents"]["approach"] == 0.0
+
+
 def test_standing_still_is_no_approach(game):
     game.reset(np.random.default_rng(1))
     game.players[0].body.place((2.0, 0.0, 0.0), 0.0)

@@ -67,6 +67,14 @@ def test_full_actions_are_the_configured_speeds():
     assert bearing_deg(walker.bone("pelvis")) == pytest.approx(-50.0 * 0.04)
 
 
+def test_backward_is_slower():
+    world = empty_world()
+    walker = walker_in(world, walk_speed_mps=0.8, backward_share=0.25)
+    walker.act(np.array([-1.0, 0.0], np.float32))
+    let_pass(world, 0.04)
+    np.testing.assert_allclose(walker.velocity, (-0.2, 0.0, 0.0), atol=1e-6)
+
+
 def test_an_action_holds_until_the_next():
     world = empty_world()
     walker = walker_in(world)

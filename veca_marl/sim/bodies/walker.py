@@ -30,7 +30,8 @@ class WalkerCfg(BodyCfg):
 
     Attributes:
         action: Continuous velocities or discrete moves.
-        walk_speed_mps: Speed of a full forward or backward action.
+        walk_speed_mps: Speed of a full forward action.
+        backward_share: A full backward action goes at this share of the forward speed.
         turn_speed_degps: Turning speed of a full turn action.
         radius_m: Radius of the capsule in the physics.
         height_m: Height of the capsule.
@@ -45,6 +46,7 @@ class WalkerCfg(BodyCfg):
 
     action: ActionKind = ActionKind.continuous
     walk_speed_mps: float = 1.0
+    backward_share: float = 0.3
     turn_speed_degps: float = 120.0
     radius_m: float = 0.11
     height_m: float = 0.72
@@ -133,7 +135,8 @@ class Walker(Figure):
     def act(self, action: NDArray[Any]) -> None:
         """Walk as an action row says; it holds until the next call."""
         forward, turn = self.control.decode(action)
-        self.walk(forward * self.cfg.walk_speed_mps, turn * math.radians(self.cfg.turn_speed_degps))
+        top_mps = self.cfg.walk_speed_mps * (self.cfg.backward_share if forward < 0.0 else 1.0)
+        self.walk(forward * top_mps, turn * math.radians(self.cfg.turn_speed_degps))
 
     def encode(self, wish: Any) -> NDArray[Any]:
         """Return the row nearest to a wish ``(forward, turn)``, each in [-1, 1]."""
