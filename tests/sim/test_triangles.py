@@ -144,6 +144,9 @@ def test_the_own_shoulders_behind_the_eye_cost_next_to_nothing():
     skeleton = load_skeleton()
     scene = Scene()
     body = add_body(scene)
+    angles = np.zeros(82)
+    angles[skeleton.joint("head", "flexion")] = 0.2  # it looks down, past its own trunk and legs
+    pose(body, angles)
     scene.update()
     head = skeleton.bone("head")
     hidden = scene.hidden(body.id, (skeleton.bone("neck"), head))
