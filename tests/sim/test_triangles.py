@@ -137,3 +137,27 @@ def test_a_skin_costs_less_than_twice_what_the_bones_would():
             Camera().render(scene, eye, hidden)
         costs[name] = time.process_time() - start
     assert costs["skin"] < 2.0 * costs["bones"]
+
+
+def test_the_own_shoulders_behind_the_eye_cost_next_to_nothing():
+    """Triangles that reach through the plane of the eye are most often out of its sight."""
+    skeleton = load_skeleton()
+    scene = Scene()
+    body = add_body(scene)
+    angles = np.zeros(82)
+    angles[skeleton.joint("head", "flexion")] = 0.2  # it looks down, past its own trunk and legs
+    pose(body, angles)
+    scene.update()
+    head = skeleton.bone("head")
+    hidden = scene.hidden(body.id, (skeleton.bone("neck"), head))
+    place = body.positions[head] + body.rotations[head] @ (0.078, 0.0225, 0.075)
+    own = Pose(place, body.rotations[head])
+    other = look_at(place + np.array([1.5, 0.0, 0.0]), place)  # sees the whole body
+    costs = []
+    for eye in (own, other):
+        Camera().render(scene, [eye], hidden)
+        start = time.process_time()
+        for _ in range(100):
+            Camera().render(scene, [eye], hidden)
+        costs.append(time.process_time() - start)
+    assert costs[0] < 1.5 * costs[1]

@@ -94,16 +94,40 @@ def _cross(a: Vector, b: Vector) -> Vector:
     )
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@njit(cache=True, error_model="numpy")
 def _rectangle(a: Vector, b: Vector, c: Vector, nearest: float, lens: Lens) -> Rectangle:
-    """Pixels that a triangle may cover; all of them if it reaches behind the near plane."""
+    """Pixels that a triangle may cover."""
     if nearest <= lens.near:
-        return 0, lens.columns.shape[0], 0, lens.rows.shape[0]
+        return _cut_rectangle(a, b, c, lens)
     xa, xb, xc = a[0] / a[2], b[0] / b[2], c[0] / c[2]
     ya, yb, yc = a[1] / a[2], b[1] / b[2], c[1] / c[2]
     across = (min(xa, xb, xc), max(xa, xb, xc))
     upward = (min(ya, yb, yc), max(ya, yb, yc))
     return pixel_rectangle(across, upward, lens)
+
+
+@njit(cache=True, error_model="numpy")
+def _cut_rectangle(a: Vector, b: Vector, c: Vector, lens: Lens) -> Rectangle:
+    """Pixels that a triangle which reaches behind the near plane may cover: most often none.
+
+    The limbs of the eye's own body are such triangles.
+    """
+    low_x, high_x, low_y, high_y = np.inf, -np.inf, np.inf, -np.inf
+    near = lens.near
+    for side in range(3):
+        start = a if side == 0 else (b if side == 1 else c)
+        end = b if side == 0 else (c if side == 1 else a)
+        if start[2] > near:
+            x, y = start[0] / start[2], start[1] / start[2]
+            low_x, high_x = min(low_x, x), max(high_x, x)
+            low_y, high_y = min(low_y, y), max(high_y, y)
+        if (start[2] > near) != (end[2] > near):
+            cut = (near - start[2]) / (end[2] - start[2])
+            x = (start[0] + cut * (end[0] - start[0])) / near
+            y = (start[1] + cut * (end[1] - start[1])) / near
+            low_x, high_x = min(low_x, x), max(high_x, x)
+            low_y, high_y = min(low_y, y), max(high_y, y)
+    return pixel_rectangle((low_x, high_x), (low_y, high_y), lens)
 
 
 @njit(cache=True, error_model="numpy", inline="always")
