@@ -49,8 +49,8 @@ class HumanoidCfg(BodyCfg):
     """Numbers of the joint-level body.
 
     Attributes:
-        detail: `full` moves 82 joints, `mitten` 40 at a little over half the cost. Actions, senses and
-            names are the same: the mitten ignores what is asked of its fingers.
+        detail: `full` moves 82 joints, `mitten` 40 at a little over half the cost. Actions, senses
+            and names are the same: the mitten ignores what is asked of its fingers.
         action: Normalised torques or angles to go to.
         joints: Which joints an action row moves: all 82, or the 40 of the limbs without fingers.
         strength: Share of the torques in the table of joints.
