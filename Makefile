@@ -3,6 +3,7 @@ PYTHON ?= $(shell command -v python3.11 || command -v python3)
 VENV   := .venv
 BIN    := $(VENV)/bin
 ARGS   ?=
+CORES  ?= 2
 
 .PHONY: help train test test-all lint types format bench docs clean
 
@@ -32,10 +33,10 @@ types: $(VENV)/installed-test ## mypy --strict on the simulator and the tasks
 	$(BIN)/mypy
 
 test: lint types ## lint, types, layer contracts and the quick tests
-	$(BIN)/pytest -m "not slow" $(ARGS)
+	$(BIN)/pytest -n $(CORES) -m "not slow" $(ARGS)
 
 test-all: lint types ## everything, the slow tests too
-	$(BIN)/pytest $(ARGS)
+	$(BIN)/pytest -n $(CORES) $(ARGS)
 
 format: $(VENV)/installed-test ## let ruff mend what it can
 	$(BIN)/ruff format .
