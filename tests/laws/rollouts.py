@@ -12,12 +12,19 @@ import torch
 from veca_marl.config import compose
 from veca_marl.envs.env import VecaEnv
 from veca_marl.envs.game import Game
+from veca_marl.sim.bodies.walker import WalkerCfg
 
-KINDS = {"continuous": "walker", "discrete": "walker_discrete"}
+# the ways to act in a task: its own body's, and another
+KINDS = ("own", "other")
 
 
-def game_cfg(task, kind="continuous", *overrides):
-    return compose([f"+task={task}", f"body={KINDS[kind]}", *overrides]).game
+def game_cfg(task, kind="own", *overrides):
+    """Return what is played: with the task's own body, or one that is commanded otherwise."""
+    own = compose([f"+task={task}", *overrides])
+    if kind == "own":
+        return own.game
+    other = "walker_discrete" if isinstance(own.game.body, WalkerCfg) else "mitten_position"
+    return compose([f"+task={task}", f"body={other}", *overrides]).game
 
 
 def random_row(spec, rng):

@@ -74,7 +74,7 @@ def test_the_same_seed_gives_the_same_bytes_in_a_used_env(env, rollout):
 
 
 def test_the_same_seed_gives_the_same_bytes_in_another_process(task, kind, rollout):
-    if kind != "continuous":
+    if kind != "own":
         pytest.skip("a process for each kind of action would cost time and show nothing new")
     program = Path(__file__).with_name("rollouts.py")
     asked = [sys.executable, str(program), task, str(STEPS), "1"]

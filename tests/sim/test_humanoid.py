@@ -166,7 +166,7 @@ def test_joints_go_to_commanded_angles(make):
     bent = {"upper_arm.abduction": 60.0, "forearm.flexion": 50.0, "thigh.flexion": 30.0}
     bent |= {"head.rotation": -30.0, "spine.lateral": 10.0, "l_index_middle.flexion": 40.0}
     wanted = posture_angles(SKELETON, Posture(0.0, bent))
-    body.act(body.encode(PositionTarget.wishes(wanted, body._low, body._high)))
+    body.act(body.encode(wanted))
     let_pass(world, 2.0)
     np.testing.assert_allclose(body.joint_angles(), wanted, atol=math.radians(2.0))
 
@@ -175,7 +175,7 @@ def test_commanded_angles_keep_a_child_sitting(make):
     world, body = make(action=JointActionKind.position, detail=Detail.mitten)
     body.place((0.0, 0.0, 0.0), 0.0, POSTURES["sitting"])
     wanted = posture_angles(SKELETON, POSTURES["sitting"])
-    body.act(body.encode(PositionTarget.wishes(wanted, body._low, body._high)))
+    body.act(body.encode(wanted))
     head_m = body.bone("head").position[2]
     let_pass(world, 4.0)
     assert body.bone("head").position[2] > 0.85 * head_m
@@ -184,8 +184,9 @@ def test_commanded_angles_keep_a_child_sitting(make):
 def test_wishes_and_targets_are_inverse(make):
     _, body = make(action=JointActionKind.position)
     angles = np.random.default_rng(0).uniform(body._low, body._high)
-    wishes = PositionTarget.wishes(angles, body._low, body._high)
-    shares = PositionTarget().shares(wishes, angles, body._low, body._high)
+    control = PositionTarget()
+    wishes = control.wishes(angles, angles, body._low, body._high)
+    shares = control.shares(wishes, angles, body._low, body._high)
     np.testing.assert_allclose(shares, 0.0, atol=1e-9)
 
 
@@ -286,7 +287,7 @@ def test_skin_that_carries_weight_is_pressed_in_by_it(make):
     world, body = make(action=JointActionKind.position)
     body.place((0.0, 0.0, 0.0), 0.0, POSTURES["sitting"])
     wanted = posture_angles(SKELETON, POSTURES["sitting"])
-    body.act(body.encode(PositionTarget.wishes(wanted, body._low, body._high)))
+    body.act(body.encode(wanted))
     let_pass(world, 6.0)
     client, body_id = world.client, body.articulation.body_id
     pressed = 0

@@ -62,8 +62,8 @@ class FreePlay(Task):
 
     def expert(self, player: Player, observation: dict[str, NDArray[Any]]) -> Any:
         """Walk on, or rest all joints."""
-        spec = player.body.action_spec
-        return np.zeros(spec.shape) if isinstance(player.body, Humanoid) else (1.0, 0.0)
+        body = player.body
+        return body.joint_angles() if isinstance(body, Humanoid) else (1.0, 0.0)
 
 
 def _thing(number: int) -> PropCfg:

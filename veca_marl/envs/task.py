@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veca_marl.sim.bodies.base import Body
+from veca_marl.sim.bodies.humanoid import Humanoid
 from veca_marl.sim.bodies.walker import Walker
 from veca_marl.sim.world import World
 
@@ -39,6 +40,20 @@ def walker(player: Player) -> Walker:
     if not isinstance(player.body, Walker):
         raise ValueError(
             f"{player.name}: this task needs a body that walks and kicks; choose body=walker"
+        )
+    return player.body
+
+
+def humanoid(player: Player) -> Humanoid:
+    """Return a player's body where a task needs one that is moved by its joints.
+
+    Raises:
+        ValueError: If it is not.
+    """
+    if not isinstance(player.body, Humanoid):
+        raise ValueError(
+            f"{player.name}: this task needs a body with joints; choose body=full, mitten, "
+            "full_limbs or mitten_limbs"
         )
     return player.body
 
@@ -118,9 +133,9 @@ class Task(ABC):
     def expert(self, player: Player, observation: dict[str, NDArray[Any]]) -> Any:
         """Play by hand-written rules: return a wish that `Body.encode` turns into an action row.
 
-        For a walking body that is (forward, turn), each in [-1, 1]; for a joint-level body a number
-        in [-1, 1] for each commanded joint. The docstring says whether it uses the observation
-        alone or privileged state.
+        For a walking body that is (forward, turn), each in [-1, 1]; for a joint-level body the 82
+        joint angles (rad) it wants to come to, whether it is driven by torques or by angles. The
+        docstring says whether it uses the observation alone or privileged state.
         """
 
     @classmethod

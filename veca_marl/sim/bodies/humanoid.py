@@ -203,9 +203,18 @@ class Humanoid(Figure):
         self.act(normalised)
 
     def encode(self, wish: Any) -> NDArray[Any]:
-        """Return the row nearest to a wish ``(n,)``: cut to the range."""
-        row: NDArray[Any] = np.clip(np.asarray(wish), -1.0, 1.0).astype(np.float32)
-        return row
+        """Return the row that takes the joints nearest to the ``(82,)`` angles (rad) of a wish.
+
+        It asks a position-controlled body for these angles; to a torque-controlled one it gives
+        the torques that the position control would give now.
+        """
+        angles = np.clip(np.asarray(wish, np.float64), self._low, self._high)
+        row = self._control.wishes(angles, self._angles, self._low, self._high)
+        return row[self._chosen].astype(np.float32)
+
+    def angles_of(self, posture: Posture) -> Floats:
+        """Return the ``(82,)`` joint angles of a posture, rad: what `encode` takes."""
+        return posture_angles(self._skeleton, posture)
 
     # ---- the world moves it
 

@@ -26,6 +26,20 @@ class JointControl(Protocol):
         """
         ...
 
+    def wishes(self, targets: Floats, angles: Floats, low: Floats, high: Floats) -> Floats:
+        """Return the wishes that take the joints to target angles ``(n,)``, as an expert's."""
+        ...
+
+
+# From so far away a joint is pulled to its target with full strength. The joint's own damping
+# brakes it: no further damping can make the explicit integration unstable.
+_REACH_RAD = 0.25
+
+
+def _pull(targets: Floats, angles: Floats) -> Floats:
+    """Return the shares of a spring that ends at full strength."""
+    return np.clip((targets - angles) / _REACH_RAD, -1.0, 1.0)
+
 
 class NormalisedTorque:
     """A wish is a share of the joint's strength (the paper's `apply_torque`)."""
@@ -34,26 +48,22 @@ class NormalisedTorque:
         """See `JointControl`."""
         return wishes
 
+    def wishes(self, targets: Floats, angles: Floats, low: Floats, high: Floats) -> Floats:
+        """See `JointControl`: what a spring to the targets would give now."""
+        return _pull(targets, angles)
+
 
 class PositionTarget:
-    """A wish is an angle: -1 and 1 are the stops, 0 is the neutral standing angle.
-
-    A spring pulls the joint there, with full strength from `reach_rad` away; the joint's own
-    damping brakes it, so no further damping can make the explicit integration unstable.
-    """
-
-    reach_rad = 0.25
+    """A wish is an angle: -1 and 1 are the stops, 0 is the neutral standing angle."""
 
     def shares(self, wishes: Floats, angles: Floats, low: Floats, high: Floats) -> Floats:
         """See `JointControl`."""
-        targets = np.where(wishes >= 0.0, wishes * high, -wishes * low)
-        return np.clip((targets - angles) / self.reach_rad, -1.0, 1.0)
+        return _pull(np.where(wishes >= 0.0, wishes * high, -wishes * low), angles)
 
-    @staticmethod
-    def wishes(angles: Floats, low: Floats, high: Floats) -> Floats:
-        """Return the row that asks for angles, as an expert needs it."""
-        ranges = np.where(angles >= 0.0, high, -low)
-        shares = np.divide(angles, ranges, out=np.zeros(len(angles)), where=ranges > 0.0)
+    def wishes(self, targets: Floats, angles: Floats, low: Floats, high: Floats) -> Floats:
+        """See `JointControl`: the targets as shares of the way to the stops."""
+        ranges = np.where(targets >= 0.0, high, -low)
+        shares = np.divide(targets, ranges, out=np.zeros(len(targets)), where=ranges > 0.0)
         return np.clip(shares, -1.0, 1.0)
 
 
