@@ -209,8 +209,9 @@ class Humanoid(Figure):
         the torques that the position control would give now.
         """
         angles = np.clip(np.asarray(wish, np.float64), self._low, self._high)
-        row = self._control.wishes(angles, self._angles, self._low, self._high)
-        return row[self._chosen].astype(np.float32)
+        wishes = self._control.wishes(angles, self._angles, self._low, self._high)
+        row: NDArray[Any] = wishes[self._chosen].astype(np.float32)
+        return row
 
     def angles_of(self, posture: Posture) -> Floats:
         """Return the ``(82,)`` joint angles of a posture, rad: what `encode` takes."""
