@@ -20,3 +20,13 @@ class Pose(NamedTuple):
 
     position: Floats
     rotation: Floats
+
+    @property
+    def forward(self) -> Floats:
+        """``(3,)`` unit vector in the world frame: the local x axis, the front of a bone."""
+        return np.array(self.rotation[:, 0])
+
+    @property
+    def up(self) -> Floats:
+        """``(3,)`` unit vector in the world frame: the local z axis."""
+        return np.array(self.rotation[:, 2])

@@ -1,5 +1,6 @@
 """The tasks. Importing this package registers them all."""
 
 from veca_marl.envs.tasks.kick_the_ball import KickTheBall
+from veca_marl.envs.tasks.turn_baby import TurnBaby
 
-__all__ = ["KickTheBall"]
+__all__ = ["KickTheBall", "TurnBaby"]

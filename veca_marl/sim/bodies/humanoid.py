@@ -25,6 +25,7 @@ from veca_marl.sim.bodies.postures import (
     check_angles,
     pelvis_rotation,
     posture_angles,
+    varied,
 )
 from veca_marl.sim.pose import Floats, Pose
 from veca_marl.sim.rotations import heading_rad
@@ -216,6 +217,10 @@ class Humanoid(Figure):
     def angles_of(self, posture: Posture) -> Floats:
         """Return the ``(82,)`` joint angles of a posture, rad: what `encode` takes."""
         return posture_angles(self._skeleton, posture)
+
+    def vary(self, posture: Posture, spread_deg: float, rng: np.random.Generator) -> Posture:
+        """Return a posture with every joint a little elsewhere, see `postures.varied`."""
+        return varied(self._skeleton, posture, spread_deg, rng)
 
     # ---- the world moves it
 

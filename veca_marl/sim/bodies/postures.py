@@ -79,6 +79,26 @@ def posture_angles(skeleton: Skeleton, posture: Posture) -> Floats:
     return angles
 
 
+def varied(
+    skeleton: Skeleton, posture: Posture, spread_deg: float, rng: np.random.Generator
+) -> Posture:
+    """Return a posture with every joint a little elsewhere.
+
+    Args:
+        skeleton: Whose joints.
+        posture: What it resembles.
+        spread_deg: Standard deviation of each joint; what would pass a stop stays on it.
+        rng: Source of the deviations.
+    """
+    angles = posture_angles(skeleton, posture)
+    angles += rng.normal(0.0, math.radians(spread_deg), len(angles))
+    low = [joint.low_rad for joint in skeleton.joints]
+    high = [joint.high_rad for joint in skeleton.joints]
+    names = [f"{joint.bone}.{joint.label}" for joint in skeleton.joints]
+    degrees = np.degrees(np.clip(angles, low, high))
+    return Posture(posture.pitch_deg, dict(zip(names, degrees.tolist(), strict=True)))
+
+
 def check_angles(skeleton: Skeleton, angles: Floats) -> None:
     """Raise `ValueError` naming the first joint that cannot be at its angle."""
     for joint, angle in zip(skeleton.joints, angles, strict=True):

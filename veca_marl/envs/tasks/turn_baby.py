@@ -1,0 +1,75 @@
+"""TurnBaby: lie on the back, turn over to the belly."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from veca_marl.envs.experts.turn_over import TurnOver
+from veca_marl.envs.task import Player, Task, TaskCfg, humanoid, register, terms
+from veca_marl.sim.bodies.postures import ON_BACK
+
+
+@dataclass
+class TurnBabyCfg(TaskCfg):
+    """How the child lies at the start, and what lying on the belly is worth.
+
+    Attributes:
+        spread_deg: Standard deviation of every joint from the posture `on_back` at the start.
+    """
+
+    max_seconds: float = 8.0
+    spread_deg: float = 10.0
+    weights: dict[str, float] = terms(torso=0.025, hip=0.025)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        check_spread(self.spread_deg)
+
+
+def check_spread(spread_deg: float) -> None:
+    """Refuse a spread of the starting joints that would not resemble the posture any more."""
+    if not 0.0 <= spread_deg <= 30.0:
+        raise ValueError(f"task.spread_deg={spread_deg} must be in [0, 30]")
+
+
+@register
+class TurnBaby(Task):
+    """A child lies on its back, with its joints a little anywhere; it shall turn to its belly.
+
+    The paper rewards "the orientation of its torso and hip" and says no more. Ours: the episode
+    begins anywhere in the room, lasts 8 s and never ends early; with the default weights it is
+    worth -10 to who stays on the back and +10 to who lay on the belly all the time.
+
+    Terms:
+        torso: cosine of the angle between the front of the chest and straight down, in [-1, 1].
+        hip: the same of the pelvis.
+    """
+
+    senses = ("proprioception", "touch")
+    cfg: TurnBabyCfg
+
+    def build(self) -> None:
+        self.body = humanoid(self.players[0])
+        self.room = self.world.playground.rooms[0]
+        self._expert = TurnOver(self.body, self.world.clock.step_s)
+
+    def reset(self, rng: np.random.Generator) -> None:
+        start = self.room.sample_floor(rng, margin_m=1.0)
+        posture = self.body.vary(ON_BACK, self.cfg.spread_deg, rng)
+        self.body.place(start, rng.uniform(-math.pi, math.pi), posture)
+        self._expert.reset()
+
+    def reward(self, player: Player) -> dict[str, float]:
+        return {
+            "torso": -float(self.body.bone("chest").forward[2]),
+            "hip": -float(self.body.bone("pelvis").forward[2]),
+        }
+
+    def expert(self, player: Player, observation: dict[str, NDArray[Any]]) -> Any:
+        """Swing one leg and one arm across, then stretch. Uses the true attitude of the trunk."""
+        return self._expert.wish()
