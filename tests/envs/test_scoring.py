@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from veca_marl.envs.scoring import cosine, flat
+from veca_marl.envs.scoring import cosine, flat, share
 
 EAST, NORTH = np.array([1.0, 0.0, 0.0]), np.array([0.0, 2.0, 0.0])
 
@@ -28,3 +28,8 @@ def test_flat_drops_the_height_and_leaves_its_argument():
     vector = np.array([1.0, 2.0, 3.0])
     np.testing.assert_array_equal(flat(vector), (1.0, 2.0, 0.0))
     np.testing.assert_array_equal(vector, (1.0, 2.0, 3.0))
+
+
+@pytest.mark.parametrize(("value", "expected"), [(-1.0, 0.0), (0.5, 0.25), (2.0, 1.0), (3.0, 1.0)])
+def test_a_share_is_never_more_than_all(value, expected):
+    assert share(value, 2.0) == expected

@@ -16,3 +16,8 @@ def cosine(a: Floats, b: Floats) -> float:
 def flat(vector: Floats) -> Floats:
     """Return the horizontal part of a vector ``(3,)``."""
     return np.array([vector[0], vector[1], 0.0])
+
+
+def share(value: float, whole: float) -> float:
+    """Return how much of a whole is there, in [0, 1]: more than all is no better."""
+    return float(min(max(value / whole, 0.0), 1.0))

@@ -7,8 +7,8 @@ from veca_marl.sim.bodies.humanoid import Humanoid
 from veca_marl.sim.bodies.postures import ON_BACK, Posture
 from veca_marl.sim.pose import Floats
 
-# The poses were drawn by hand, then improved by a random search over the angles (returns of
-# TurnBaby with torques and with position targets).
+# Drawn by hand, then improved by a random search over the angles for the returns of TurnBaby, with
+# torques and with position targets.
 _POSES = {
     # legs up and crossed, trunk bent: the weight goes over the left side
     "swing": Posture(
@@ -81,7 +81,7 @@ class TurnOver:
 
     def __init__(self, body: Humanoid, step_s: float) -> None:
         self._body, self._step_s = body, step_s
-        self._way = KeyPoses(body, _POSES, _SPEED_RADPS, step_s)
+        self._way = KeyPoses(body, _POSES, step_s)
         self.reset()
 
     def reset(self) -> None:
@@ -94,7 +94,7 @@ class TurnOver:
         chosen = self._next()
         self._since_s = self._since_s + self._step_s if chosen == self._pose else 0.0
         self._pose = chosen
-        return self._way.toward(chosen)
+        return self._way.toward(chosen, _SPEED_RADPS)
 
     def _next(self) -> str:
         down = -self._body.bone("chest").forward[2] - self._body.bone("pelvis").forward[2]

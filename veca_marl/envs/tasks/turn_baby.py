@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veca_marl.envs.experts.turn_over import TurnOver
-from veca_marl.envs.task import Player, Task, TaskCfg, humanoid, register, terms
+from veca_marl.envs.task import Player, Task, TaskCfg, check_spread, humanoid, register, terms
 from veca_marl.sim.bodies.postures import ON_BACK
 
 
@@ -29,12 +29,6 @@ class TurnBabyCfg(TaskCfg):
     def __post_init__(self) -> None:
         super().__post_init__()
         check_spread(self.spread_deg)
-
-
-def check_spread(spread_deg: float) -> None:
-    """Refuse a spread of the starting joints that would not resemble the posture any more."""
-    if not 0.0 <= spread_deg <= 30.0:
-        raise ValueError(f"task.spread_deg={spread_deg} must be in [0, 30]")
 
 
 @register
