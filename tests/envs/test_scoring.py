@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from veca_marl.envs.scoring import cosine, flat, share
+from veca_marl.envs.scoring import along, cosine, flat, share
 
 EAST, NORTH = np.array([1.0, 0.0, 0.0]), np.array([0.0, 2.0, 0.0])
 
@@ -33,3 +33,11 @@ def test_flat_drops_the_height_and_leaves_its_argument():
 @pytest.mark.parametrize(("value", "expected"), [(-1.0, 0.0), (0.5, 0.25), (2.0, 1.0), (3.0, 1.0)])
 def test_a_share_is_never_more_than_all(value, expected):
     assert share(value, 2.0) == expected
+
+
+@pytest.mark.parametrize(
+    ("way", "expected"),
+    [(0.1 * EAST, 0.5), (-0.1 * EAST, -0.5), (EAST, 2.0), (-EAST, -2.0), (NORTH, 0.0)],
+)
+def test_speed_along_a_direction_is_cut_at_the_top(way, expected):
+    assert along(way, EAST, time_s=0.2, top_mps=2.0) == pytest.approx(expected)

@@ -97,3 +97,19 @@ def test_impossible_playgrounds_are_refused():
 def test_an_impossible_room_on_the_command_line_is_one_line():
     with pytest.raises(ValueError, match="image_order"):
         compose(["+task=KickTheBall", "playground.image_order=-1"])
+
+
+def test_a_start_has_the_middle_ahead():
+    room = RoomCfg(lower_m=(1.0, 2.0, 0.0), size_m=(4.0, 6.0, 2.0))
+    rng = np.random.default_rng(0)
+    starts = [room.sample_start(rng, margin_m=0.5) for _ in range(20)]
+    for point, heading in starts:
+        ahead = 1.5 * np.array([math.cos(heading), math.sin(heading), 0.0])
+        np.testing.assert_allclose(point + ahead, (3.0, 5.0, 0.0), atol=1e-12)
+        assert room.contains(point + np.array([0.0, 0.0, 1.0]), margin_m=0.5 - 1e-9)
+    assert np.ptp([heading for _, heading in starts]) > 3.0
+
+
+def test_a_start_needs_a_room_of_some_size():
+    with pytest.raises(ValueError, match="leaves no floor"):
+        RoomCfg(size_m=(1.0, 1.0, 1.0)).sample_start(np.random.default_rng(0), margin_m=0.6)

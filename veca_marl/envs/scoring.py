@@ -21,3 +21,17 @@ def flat(vector: Floats) -> Floats:
 def share(value: float, whole: float) -> float:
     """Return how much of a whole is there, in [0, 1]: more than all is no better."""
     return float(min(max(value / whole, 0.0), 1.0))
+
+
+def along(way: Floats, direction: Floats, time_s: float, top_mps: float) -> float:
+    """Return the mean speed along a direction, m/s, at most `top_mps` either way.
+
+    Of the way covered, not of a velocity at one moment: a trembling body has that for nothing.
+
+    Args:
+        way: ``(3,)`` metres covered.
+        direction: ``(3,)`` of unit length; a shorter one counts less.
+        time_s: In this time.
+        top_mps: To be faster is no better.
+    """
+    return float(min(max(way @ direction / time_s, -top_mps), top_mps))

@@ -62,6 +62,28 @@ class RoomCfg:
         point = rng.uniform(low[:2] + margin_m, low[:2] + size[:2] - margin_m)
         return np.array([point[0], point[1], low[2]])
 
+    def sample_start(self, rng: np.random.Generator, margin_m: float) -> tuple[Floats, float]:
+        """Draw a place to run from: near the edge of the floor, the room's middle ahead.
+
+        Returns:
+            The point ``(3,)`` metres, on a circle that comes as near as `margin_m` to the walls,
+            and the heading (rad) to the middle.
+
+        Raises:
+            ValueError: If the room is too small for that margin.
+        """
+        low, size = np.asarray(self.lower_m), np.asarray(self.size_m)
+        radius = size[:2].min() / 2.0 - margin_m
+        if radius < 0.0:
+            raise ValueError(
+                f"room {self.name!r}: size_m={tuple(self.size_m)} leaves no floor {margin_m} m "
+                "away from the walls"
+            )
+        heading = rng.uniform(-math.pi, math.pi)
+        back = np.array([math.cos(heading), math.sin(heading)]) * radius
+        x, y = low[:2] + size[:2] / 2.0 - back
+        return np.array([x, y, low[2]]), heading
+
 
 @dataclass
 class PlaygroundCfg:
