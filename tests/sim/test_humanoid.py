@@ -181,6 +181,20 @@ def test_commanded_angles_keep_a_child_sitting(make):
     assert body.bone("head").position[2] > 0.85 * head_m
 
 
+@pytest.mark.parametrize("detail", Detail)
+def test_torques_of_a_wish_keep_a_child_sitting_still(make, detail):
+    """Given once per agent step, they must not shake it."""
+    world, body = make(action=JointActionKind.torque, detail=detail)
+    body.place((0.0, 0.0, 0.0), 0.0, POSTURES["sitting"])
+    wanted = body.angles_of(POSTURES["sitting"])
+    head_m = body.bone("head").position[2]
+    for _ in range(150):
+        body.act(body.encode(wanted))
+        world.step()
+    assert body.bone("head").position[2] > 0.85 * head_m
+    assert np.abs(body.velocities()).max() < 0.1
+
+
 def test_wishes_and_targets_are_inverse(make):
     _, body = make(action=JointActionKind.position)
     angles = np.random.default_rng(0).uniform(body._low, body._high)

@@ -13,8 +13,10 @@ from numpy.typing import NDArray
 from veca_marl.sim.bodies.articulation import Articulation, damping_number
 from veca_marl.sim.bodies.base import BodyCfg
 from veca_marl.sim.bodies.figure import Figure
+from veca_marl.sim.bodies.foresight import foreseen_angles
 from veca_marl.sim.bodies.joint_controls import (
     JOINT_CONTROLS,
+    REACH_RAD,
     JointActionKind,
     JointChoice,
     chosen_joints,
@@ -206,10 +208,14 @@ class Humanoid(Figure):
         """Return the row that takes the joints nearest to the ``(82,)`` angles (rad) of a wish.
 
         It asks a position-controlled body for these angles; to a torque-controlled one it gives
-        the torques that the position control would give now.
+        the torques that the position control would give at the end of the agent step: those that
+        it would give now shake the body, for they hold for the whole step.
         """
         angles = np.clip(np.asarray(wish, np.float64), self._low, self._high)
-        wishes = self._control.wishes(angles, self._angles, self._low, self._high)
+        stiffness = self.articulation.strengths_nm / REACH_RAD
+        step_s = self._world.clock.step_s
+        foreseen = foreseen_angles(self.articulation, angles, stiffness, step_s)
+        wishes = self._control.wishes(angles, foreseen, self._low, self._high)
         row: NDArray[Any] = wishes[self._chosen].astype(np.float32)
         return row
 
