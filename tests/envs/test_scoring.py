@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from veca_marl.envs.scoring import cosine, flat
+from veca_marl.envs.scoring import angle_between_rad, cosine, flat
+from veca_marl.sim.rotations import turn_about_vertical
 
 EAST, NORTH = np.array([1.0, 0.0, 0.0]), np.array([0.0, 2.0, 0.0])
 
@@ -28,3 +29,12 @@ def test_flat_drops_the_height_and_leaves_its_argument():
     vector = np.array([1.0, 2.0, 3.0])
     np.testing.assert_array_equal(flat(vector), (1.0, 2.0, 0.0))
     np.testing.assert_array_equal(vector, (1.0, 2.0, 3.0))
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.3, -1.2, np.pi])
+def test_the_angle_between_orientations(angle):
+    # a common turn of both changes nothing
+    tilt = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
+    turned = turn_about_vertical(angle)
+    assert angle_between_rad(np.eye(3), turned) == pytest.approx(abs(angle), abs=1e-7)
+    assert angle_between_rad(tilt, tilt @ turned) == pytest.approx(abs(angle), abs=1e-7)

@@ -367,3 +367,18 @@ def test_a_simulation_that_breaks_is_told_and_shows_no_nan(make, what):
         assert np.isfinite(seen).all()
     world.reset(np.random.default_rng(0))
     assert not body.is_finite, "Bullet's collisions are lost for good"
+
+
+# ---- palms
+
+
+def test_palms_are_on_the_inside_of_both_hands(make):
+    _, body = make()
+    body.place((0.0, 0.0, 0.0))
+    left, right = body.palms()
+    for palm, side in ((left, "l"), (right, "r")):
+        wrist = body.bone(f"{side}_hand").position
+        assert 0.0 < wrist[2] - palm[2] < 0.05
+    # a standing body's palms face its thighs
+    assert 0.0 < body.bone("l_hand").position[1] - left[1] < 0.02
+    assert 0.0 < right[1] - body.bone("r_hand").position[1] < 0.02

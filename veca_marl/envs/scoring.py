@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from veca_marl.sim.pose import Floats
@@ -16,3 +18,9 @@ def cosine(a: Floats, b: Floats) -> float:
 def flat(vector: Floats) -> Floats:
     """Return the horizontal part of a vector ``(3,)``."""
     return np.array([vector[0], vector[1], 0.0])
+
+
+def angle_between_rad(a: Floats, b: Floats) -> float:
+    """Return the angle of the turn that takes one orientation ``(3, 3)`` to another, in [0, pi]."""
+    cosine_of_turn = (float(np.vdot(a, b)) - 1.0) / 2.0
+    return math.acos(min(max(cosine_of_turn, -1.0), 1.0))

@@ -1,5 +1,8 @@
 """The tasks. Importing this package registers them all."""
 
+from veca_marl.envs.tasks.grab_object import GrabObject
 from veca_marl.envs.tasks.kick_the_ball import KickTheBall
+from veca_marl.envs.tasks.move_to_target import MoveToTarget
+from veca_marl.envs.tasks.rotate_cube import RotateCube
 
-__all__ = ["KickTheBall"]
+__all__ = ["GrabObject", "KickTheBall", "MoveToTarget", "RotateCube"]
