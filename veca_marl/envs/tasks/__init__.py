@@ -1,5 +1,6 @@
 """The tasks. Importing this package registers them all."""
 
 from veca_marl.envs.tasks.kick_the_ball import KickTheBall
+from veca_marl.envs.tasks.pile_up_block import PileUpBlock
 
-__all__ = ["KickTheBall"]
+__all__ = ["KickTheBall", "PileUpBlock"]

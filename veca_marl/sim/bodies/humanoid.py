@@ -212,12 +212,18 @@ class Humanoid(Figure):
         it would give now shake the body, for they hold for the whole step.
         """
         angles = np.clip(np.asarray(wish, np.float64), self._low, self._high)
-        stiffness = self.articulation.strengths_nm / REACH_RAD
-        step_s = self._world.clock.step_s
-        foreseen = foreseen_angles(self.articulation, angles, stiffness, step_s)
-        wishes = self._control.wishes(angles, foreseen, self._low, self._high)
+        wishes = self._control.wishes(angles, self.foresee(angles), self._low, self._high)
         row: NDArray[Any] = wishes[self._chosen].astype(np.float32)
         return row
+
+    def foresee(self, targets: Floats) -> Floats:
+        """Return the ``(82,)`` angles (rad) one agent step after springs begin to pull to targets.
+
+        The springs are those of the position control; contacts and weight are left out.
+        """
+        stiffness = self.articulation.strengths_nm / REACH_RAD
+        step_s = self._world.clock.step_s
+        return foreseen_angles(self.articulation, targets, stiffness, step_s)
 
     def angles_of(self, posture: Posture) -> Floats:
         """Return the ``(82,)`` joint angles of a posture, rad: what `encode` takes."""
