@@ -248,6 +248,11 @@ class Prop:
         linear, _ = pybullet.getBaseVelocity(self.body_id, physicsClientId=self._client)
         return np.array(linear)
 
+    def touches(self, body_id: int) -> bool:
+        """Say whether it met something, by PyBullet's id, in the last physics step."""
+        points = pybullet.getContactPoints(self.body_id, body_id, physicsClientId=self._client)
+        return bool(points)
+
     def place(
         self,
         position: Sequence[float] | Floats,
