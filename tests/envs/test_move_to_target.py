@@ -69,7 +69,7 @@ def test_a_toy_out_of_reach_is_not_paid_for(game):
     game.reset(rng)
     start = game.task.distance_m
     game.task.toy.place((1.0, 1.0, 0.035))
-    assert limp(game, rng)["progress"] == pytest.approx(start - 0.2)
+    assert limp(game, rng)["progress"] == pytest.approx(start - 0.15)
     game.task.toy.place((2.0, 2.0, 0.035))
     assert limp(game, rng)["progress"] == 0.0
 

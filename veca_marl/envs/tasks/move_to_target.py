@@ -31,10 +31,10 @@ class MoveToTargetCfg(ToyCfg):
         there_m: The task is solved while the toy's centre is so close to the mark.
     """
 
-    max_seconds: float = 8.0
+    max_seconds: float = 10.0
     aside_m: float = 0.0
     way_m: tuple[float, float] = (0.08, 0.12)
-    far_m: float = 0.2
+    far_m: float = 0.15
     there_m: float = 0.05
     weights: dict[str, float] = terms(progress=10.0)
 
@@ -56,12 +56,12 @@ class MoveToTarget(Task):
 
     The mark is a disc on the floor that is seen and not felt. The paper gives the senses (as in
     GrabObject: only the hands feel, the eyes look at the object), the joint-level action and the
-    reward; the numbers are ours. The child is free: it may topple. An episode lasts 8 s and never
+    reward; the numbers are ours. The child is free: it may topple. An episode lasts 10 s and never
     ends early. It is solved (`solved`) while the toy is within 5 cm of the mark.
 
     Terms:
         progress: how much nearer to the mark the toy came in this step, in metres along the floor.
-            Farther away than 0.2 m nothing changes: a toy kicked across the room is no worse than
+            Farther away than 0.15 m nothing changes: a toy kicked across the room is no worse than
             one that is out of reach.
     """
 
