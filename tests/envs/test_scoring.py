@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from veca_marl.envs.scoring import along, cosine, flat, share
+from veca_marl.envs.scoring import along, angle_between_rad, cosine, flat, share
+from veca_marl.sim.rotations import turn_about_vertical
 
 EAST, NORTH = np.array([1.0, 0.0, 0.0]), np.array([0.0, 2.0, 0.0])
 
@@ -41,3 +42,12 @@ def test_a_share_is_never_more_than_all(value, expected):
 )
 def test_speed_along_a_direction_is_cut_at_the_top(way, expected):
     assert along(way, EAST, time_s=0.2, top_mps=2.0) == pytest.approx(expected)
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.3, -1.2, np.pi])
+def test_the_angle_between_orientations(angle):
+    # a common turn of both changes nothing
+    tilt = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
+    turned = turn_about_vertical(angle)
+    assert angle_between_rad(np.eye(3), turned) == pytest.approx(abs(angle), abs=1e-7)
+    assert angle_between_rad(tilt, tilt @ turned) == pytest.approx(abs(angle), abs=1e-7)

@@ -181,6 +181,20 @@ def test_commanded_angles_keep_a_child_sitting(make):
     assert body.bone("head").position[2] > 0.85 * head_m
 
 
+@pytest.mark.parametrize("detail", Detail)
+def test_torques_of_a_wish_keep_a_child_sitting_still(make, detail):
+    """Given once per agent step, they must not shake it."""
+    world, body = make(action=JointActionKind.torque, detail=detail)
+    body.place((0.0, 0.0, 0.0), 0.0, POSTURES["sitting"])
+    wanted = body.angles_of(POSTURES["sitting"])
+    head_m = body.bone("head").position[2]
+    for _ in range(150):
+        body.act(body.encode(wanted))
+        world.step()
+    assert body.bone("head").position[2] > 0.85 * head_m
+    assert np.abs(body.velocities()).max() < 0.1
+
+
 def test_wishes_and_targets_are_inverse(make):
     _, body = make(action=JointActionKind.position)
     angles = np.random.default_rng(0).uniform(body._low, body._high)
@@ -353,3 +367,18 @@ def test_a_simulation_that_breaks_is_told_and_shows_no_nan(make, what):
         assert np.isfinite(seen).all()
     world.reset(np.random.default_rng(0))
     assert not body.is_finite, "Bullet's collisions are lost for good"
+
+
+# ---- palms
+
+
+def test_palms_are_on_the_inside_of_both_hands(make):
+    _, body = make()
+    body.place((0.0, 0.0, 0.0))
+    left, right = body.palms()
+    for palm, side in ((left, "l"), (right, "r")):
+        wrist = body.bone(f"{side}_hand").position
+        assert 0.0 < wrist[2] - palm[2] < 0.05
+    # a standing body's palms face its thighs
+    assert 0.0 < body.bone("l_hand").position[1] - left[1] < 0.02
+    assert 0.0 < right[1] - body.bone("r_hand").position[1] < 0.02

@@ -182,3 +182,19 @@ def test_radius_is_that_of_the_cylinder_round_it():
     assert world.prop("thing").radius_m == pytest.approx(math.hypot(0.2, 0.4) / 2)
     assert world.prop("ball").radius_m == 0.07
     assert world.prop("wall").radius_m == pytest.approx(math.hypot(3.0, 0.1) / 2)
+
+
+def test_what_is_not_tangible_is_only_seen():
+    mark = PropCfg(name="mark", shape=PropShape.cylinder, size_m=[0.1, 0.05], tangible=False)
+    world = empty_world(mark, ball(position=(0.0, 0.0, 0.3), restitution=0.0))
+    let_pass(world, 1.0)
+    resting = world.prop("ball")
+    assert resting.position[2] == pytest.approx(resting.cfg.size_m[0], abs=0.002)
+    own = world.scene.geoms.objects == world.prop("mark").object_id
+    assert not world.scene.geoms.tangible[own].any()
+    assert world.scene.geoms.visible[own].all()
+
+
+def test_what_is_not_tangible_must_be_fixed():
+    with pytest.raises(ValueError, match="mass_kg"):
+        PropCfg(name="mark", size_m=[1.0, 1.0, 1.0], mass_kg=1.0, tangible=False)

@@ -8,6 +8,7 @@ from veca_marl.sim.rotations import (
     matrix_to_quaternion,
     quaternion_from_yaw,
     quaternions_to_matrices,
+    turn_about_vertical,
 )
 
 
@@ -43,3 +44,9 @@ def test_there_and_back():
 def test_yaw_turns_forward_to_the_left():
     (matrix,) = matrices(np.array([quaternion_from_yaw(math.pi / 2)]))
     np.testing.assert_allclose(matrix @ (1, 0, 0), (0, 1, 0), atol=1e-12)
+
+
+@pytest.mark.parametrize("yaw", [0.0, 0.7, -2.0])
+def test_a_turn_about_the_vertical_is_that_of_its_quaternion(yaw):
+    expected = matrices(np.array([quaternion_from_yaw(yaw)]))[0]
+    np.testing.assert_allclose(turn_about_vertical(yaw), expected, atol=1e-12)

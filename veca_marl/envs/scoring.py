@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from veca_marl.sim.pose import Floats
@@ -35,3 +37,9 @@ def along(way: Floats, direction: Floats, time_s: float, top_mps: float) -> floa
         top_mps: To be faster is no better.
     """
     return float(min(max(way @ direction / time_s, -top_mps), top_mps))
+
+
+def angle_between_rad(a: Floats, b: Floats) -> float:
+    """Return the angle of the turn that takes one orientation ``(3, 3)`` to another, in [0, pi]."""
+    cosine_of_turn = (float(np.vdot(a, b)) - 1.0) / 2.0
+    return math.acos(min(max(cosine_of_turn, -1.0), 1.0))

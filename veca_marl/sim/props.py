@@ -59,6 +59,7 @@ class PropCfg:
         colour: Red, green, blue in [0, 1].
         checker_m: Edge of a checker pattern; 0 is plain.
         transparent: Seen through, and no hindrance to `is_visible`.
+        tangible: Whether things and skins meet it; a mark on the floor is only seen.
         sound: What it emits; None is a silent thing.
     """
 
@@ -74,6 +75,7 @@ class PropCfg:
     colour: tuple[float, float, float] = (0.7, 0.7, 0.7)
     checker_m: float = 0.0
     transparent: bool = False
+    tangible: bool = True
     sound: SoundCfg | None = None
 
     def __post_init__(self) -> None:
@@ -100,6 +102,11 @@ class PropCfg:
                 raise ValueError(f"prop {self.name!r}: {quantity}={value} is not 0 or more")
         if not 0.0 <= self.restitution <= 1.0:
             raise ValueError(f"prop {self.name!r}: restitution={self.restitution} is not in [0, 1]")
+        if not self.tangible and self.mass_kg > 0.0:
+            raise ValueError(
+                f"prop {self.name!r}: mass_kg={self.mass_kg}, but what is not tangible would fall "
+                "through the floor: it must be fixed (mass_kg=0)"
+            )
         if not self.name:
             raise ValueError(f"a {self.shape.value} without a name; every prop has one")
 
@@ -111,6 +118,7 @@ def prop_geoms(cfg: PropCfg) -> tuple[Geom, ...]:
         "colour": tuple(cfg.colour),
         "checker_m": cfg.checker_m,
         "transparent": cfg.transparent,
+        "tangible": cfg.tangible,
     }
     match cfg.shape:
         case PropShape.sphere:
@@ -196,6 +204,8 @@ class Prop:
             angularDamping=0.0,  # only friction slows things down
             physicsClientId=client,
         )
+        if not cfg.tangible:
+            pybullet.setCollisionFilterGroupMask(self.body_id, -1, 0, 0, physicsClientId=client)
         self.place(cfg.position_m, math.radians(cfg.yaw_deg))
 
     @property
@@ -237,6 +247,11 @@ class Prop:
         """``(3,)`` m/s, world frame."""
         linear, _ = pybullet.getBaseVelocity(self.body_id, physicsClientId=self._client)
         return np.array(linear)
+
+    def touches(self, body_id: int) -> bool:
+        """Say whether it met something, by PyBullet's id, in the last physics step."""
+        points = pybullet.getContactPoints(self.body_id, body_id, physicsClientId=self._client)
+        return bool(points)
 
     def place(
         self,

@@ -40,6 +40,12 @@ def quaternion_from_yaw(yaw_rad: float) -> tuple[float, float, float, float]:
     return (0.0, 0.0, math.sin(0.5 * yaw_rad), math.cos(0.5 * yaw_rad))
 
 
+def turn_about_vertical(yaw_rad: float) -> Floats:
+    """Return the matrix ``(3, 3)`` of a turn about the world's vertical, positive to the left."""
+    c, s = math.cos(yaw_rad), math.sin(yaw_rad)
+    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+
+
 def heading_rad(rotation: Floats) -> float:
     """Return the turn about the vertical that is in a rotation ``(3, 3)`` (swing and twist).
 

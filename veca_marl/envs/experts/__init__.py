@@ -1,1 +1,1 @@
-"""Hand-written players of the joint-level tasks: more than a task file should hold."""
+"""Hand-written players of joint-level tasks, and the tools they share: no torch in them."""

@@ -1,8 +1,21 @@
 """The tasks. Importing this package registers them all."""
 
 from veca_marl.envs.tasks.crawl_baby import CrawlBaby
+from veca_marl.envs.tasks.grab_object import GrabObject
 from veca_marl.envs.tasks.kick_the_ball import KickTheBall
+from veca_marl.envs.tasks.move_to_target import MoveToTarget
+from veca_marl.envs.tasks.pile_up_block import PileUpBlock
+from veca_marl.envs.tasks.rotate_cube import RotateCube
 from veca_marl.envs.tasks.sit_baby import SitBaby
 from veca_marl.envs.tasks.turn_baby import TurnBaby
 
-__all__ = ["CrawlBaby", "KickTheBall", "SitBaby", "TurnBaby"]
+__all__ = [
+    "CrawlBaby",
+    "GrabObject",
+    "KickTheBall",
+    "MoveToTarget",
+    "PileUpBlock",
+    "RotateCube",
+    "SitBaby",
+    "TurnBaby",
+]

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veca_marl.sim.bodies.looks import SHIRTS, bone_geoms, dressed_skin
-from veca_marl.sim.bodies.mounts import EYES, gaze, organ_pose
+from veca_marl.sim.bodies.mounts import EYES, gaze, organ_pose, palm_of
 from veca_marl.sim.bone_motion import bone_motion
 from veca_marl.sim.optics import Camera, seen_fraction
 from veca_marl.sim.pose import Floats, Pose
@@ -48,6 +48,8 @@ class Figure:
         self.object_id = self._drawn.id
         self._head = self._skeleton.bone("head")
         self.own_head_frames: tuple[int, ...] = (self._skeleton.bone("neck"), self._head)
+        self._hands = [self._skeleton.bone(f"{side}_hand") for side in ("l", "r")]
+        self._palms = np.array([palm_of(self._skeleton.bones[hand]) for hand in self._hands])
         self._voice = Voice(world.sound.sample_rate_hz)
         self._mouth = world.sound.add_source(f"{name}.voice", self._voice)
         self._eye_range_rad = math.radians(eye_range_deg)
@@ -71,6 +73,14 @@ class Figure:
         """Return the pose of a bone by name, such as `l_hand`."""
         index = self._skeleton.bone(name)
         return Pose(self._drawn.positions[index].copy(), self._drawn.rotations[index].copy())
+
+    def palms(self) -> Floats:
+        """Return the middles of the palms, left first, ``(2, 3)`` metres in the world frame."""
+        positions, rotations = self._frames()
+        centres: Floats = positions[self._hands] + np.einsum(
+            "hij,hj->hi", rotations[self._hands], self._palms
+        )
+        return centres
 
     def bone_positions(self) -> Floats:
         """Return the origins of all bones, ``(47, 3)`` metres in the world frame."""

@@ -13,8 +13,10 @@ from numpy.typing import NDArray
 from veca_marl.sim.bodies.articulation import Articulation, damping_number
 from veca_marl.sim.bodies.base import BodyCfg
 from veca_marl.sim.bodies.figure import Figure
+from veca_marl.sim.bodies.foresight import foreseen_angles
 from veca_marl.sim.bodies.joint_controls import (
     JOINT_CONTROLS,
+    REACH_RAD,
     JointActionKind,
     JointChoice,
     chosen_joints,
@@ -207,12 +209,22 @@ class Humanoid(Figure):
         """Return the row that takes the joints nearest to the ``(82,)`` angles (rad) of a wish.
 
         It asks a position-controlled body for these angles; to a torque-controlled one it gives
-        the torques that the position control would give now.
+        the torques that the position control would give at the end of the agent step: those that
+        it would give now shake the body, for they hold for the whole step.
         """
         angles = np.clip(np.asarray(wish, np.float64), self._low, self._high)
-        wishes = self._control.wishes(angles, self._angles, self._low, self._high)
+        wishes = self._control.wishes(angles, self.foresee(angles), self._low, self._high)
         row: NDArray[Any] = wishes[self._chosen].astype(np.float32)
         return row
+
+    def foresee(self, targets: Floats) -> Floats:
+        """Return the ``(82,)`` angles (rad) one agent step after springs begin to pull to targets.
+
+        The springs are those of the position control; contacts and weight are left out.
+        """
+        stiffness = self.articulation.strengths_nm / REACH_RAD
+        step_s = self._world.clock.step_s
+        return foreseen_angles(self.articulation, targets, stiffness, step_s)
 
     def angles_of(self, posture: Posture) -> Floats:
         """Return the ``(82,)`` joint angles of a posture, rad: what `encode` takes."""

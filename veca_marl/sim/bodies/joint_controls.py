@@ -27,18 +27,25 @@ class JointControl(Protocol):
         ...
 
     def wishes(self, targets: Floats, angles: Floats, low: Floats, high: Floats) -> Floats:
-        """Return the wishes that take the joints to target angles ``(n,)``, as an expert's."""
+        """Return the wishes that take the joints to target angles, as an expert's.
+
+        Args:
+            targets: ``(n,)`` rad.
+            angles: ``(n,)`` rad, where the joints will be at the end of the agent step.
+            low: ``(n,)`` rad, the lower stops.
+            high: ``(n,)`` rad, the upper stops.
+        """
         ...
 
 
 # From so far away a joint is pulled to its target with full strength. The joint's own damping
 # brakes it: no further damping can make the explicit integration unstable.
-_REACH_RAD = 0.25
+REACH_RAD = 0.25
 
 
 def _pull(targets: Floats, angles: Floats) -> Floats:
     """Return the shares of a spring that ends at full strength."""
-    return np.clip((targets - angles) / _REACH_RAD, -1.0, 1.0)
+    return np.clip((targets - angles) / REACH_RAD, -1.0, 1.0)
 
 
 class NormalisedTorque:
@@ -49,7 +56,7 @@ class NormalisedTorque:
         return wishes
 
     def wishes(self, targets: Floats, angles: Floats, low: Floats, high: Floats) -> Floats:
-        """See `JointControl`: what a spring to the targets would give now."""
+        """See `JointControl`: what a spring to the targets would give there."""
         return _pull(targets, angles)
 
 

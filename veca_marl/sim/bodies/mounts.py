@@ -13,6 +13,7 @@ import math
 import numpy as np
 
 from veca_marl.sim.pose import Floats, Pose
+from veca_marl.sim.skeleton import Bone, BoneBox
 
 ORGANS_M: dict[str, tuple[float, float, float]] = {
     "head": (0.010, 0.0, 0.066),
@@ -51,3 +52,18 @@ def gaze(eye: Pose, point: Floats, range_rad: float) -> Pose:
     cy, sy, cp, sp = math.cos(yaw), math.sin(yaw), math.cos(pitch), math.sin(pitch)
     turn = np.array([[cy * cp, -sy, -cy * sp], [sy * cp, cy, -sy * sp], [sp, 0.0, cp]])
     return Pose(eye.position, eye.rotation @ turn)
+
+
+def palm_of(hand: Bone) -> Floats:
+    """Return the middle of the palm's skin in the frame of a hand, ``(3,)`` metres.
+
+    Raises:
+        ValueError: If the bone has no box, which is what a hand is made of.
+    """
+    for part in hand.colliders:
+        if isinstance(part, BoneBox):
+            # palms face inward, the thighs of a standing body: -y on the left, +y on the right
+            inward = -1.0 if hand.name.startswith("l_") else 1.0
+            x, y, z = part.centre
+            return np.array([x, y + inward * (part.half[1] + hand.skin_thickness_m), z])
+    raise ValueError(f"{hand.name} is no hand: it is not made of a box")

@@ -45,6 +45,34 @@ SITTING = Posture(
         "forearm.flexion": 20.0,
     },
 )
+_REACHING = {
+    "thigh.flexion": 95.0,
+    "thigh.abduction": 45.0,
+    "shank.flexion": 15.0,
+    "neck.flexion": -30.0,
+    "upper_arm.flexion": 30.0,
+    "upper_arm.abduction": 35.0,
+    "forearm.flexion": 95.0,
+    # thumbs in the plane of the hand, out of the way of what the palms take
+    "thumb_metacarpal.flexion": -20.0,
+    "thumb_proximal.flexion": -10.0,
+    "thumb_distal.flexion": -15.0,
+}
+# legs apart, hands over the floor between them: holds while the hands work
+REACHING = Posture(5.0, {**_REACHING, "spine.flexion": 25.0, "chest.flexion": 20.0})
+REACHING_DOWN = Posture(5.0, {**_REACHING, "spine.flexion": 35.0, "chest.flexion": 25.0})
+# on the back, the right arm out to the side, palm up: whatever lies on it stays there
+OFFERING = Posture(
+    -90.0,
+    {
+        "l_upper_arm.abduction": 30.0,
+        "r_upper_arm.abduction": 90.0,
+        "r_forearm.pronation": -85.0,
+        "r_thumb_metacarpal.flexion": -20.0,
+        "r_thumb_proximal.flexion": -10.0,
+        "r_thumb_distal.flexion": -15.0,
+    },
+)
 ON_ALL_FOURS = Posture(
     85.0,
     {
@@ -62,6 +90,9 @@ POSTURES: dict[str, Posture] = {
     "on_belly": ON_BELLY,
     "sitting": SITTING,
     "on_all_fours": ON_ALL_FOURS,
+    "offering": OFFERING,
+    "reaching": REACHING,
+    "reaching_down": REACHING_DOWN,
 }
 
 
