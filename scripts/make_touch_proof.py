@@ -1,4 +1,4 @@
-"""Draw why touch is read from geometry: peaks of touch and of the solver's force over the time step.
+"""Draw why touch is read from geometry: peaks of touch and of the solver's force over the step.
 
 A ball of 0.2 kg falls 2 cm onto the palm, where skin gives way, and onto the forearm, where physics
 knows the rigid bone alone. Writes ``docs/images/touch_time_step.png`` and prints the numbers.
