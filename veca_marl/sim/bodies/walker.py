@@ -14,11 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veca_marl.sim.bodies.base import BodyCfg
-from veca_marl.sim.bodies.controls import WALK_CONTROLS, ActionKind
+from veca_marl.sim.bodies.controls import ActionKind
 from veca_marl.sim.bodies.crowd import crowd_of
 from veca_marl.sim.bodies.figure import Figure
 from veca_marl.sim.bodies.humanoid import Humanoid
 from veca_marl.sim.bodies.pushing import Pusher, horizontal_distance
+from veca_marl.sim.bodies.voice_controls import VoiceKind, action_control
+from veca_marl.sim.calls import Call
 from veca_marl.sim.gait import Gait
 from veca_marl.sim.pose import Floats
 from veca_marl.sim.props import Prop
@@ -32,6 +34,7 @@ class WalkerCfg(BodyCfg):
 
     Attributes:
         action: Continuous velocities or discrete moves.
+        voice: Whether an action row also holds a call, see `voice_controls`.
         walk_speed_mps: Speed of a full forward action.
         backward_share: A full backward action goes at this share of the forward speed.
         turn_speed_degps: Turning speed of a full turn action.
@@ -47,6 +50,7 @@ class WalkerCfg(BodyCfg):
     """
 
     action: ActionKind = ActionKind.continuous
+    voice: VoiceKind = VoiceKind.silent
     walk_speed_mps: float = 1.0
     backward_share: float = 0.3
     turn_speed_degps: float = 120.0
@@ -62,10 +66,10 @@ class WalkerCfg(BodyCfg):
 
     def __post_init__(self) -> None:
         """All are magnitudes, and a capsule is higher than wide."""
-        if not isinstance(self.action, ActionKind):
-            raise ValueError(
-                f"body.action={self.action!r}; there are {[k.name for k in ActionKind]}"
-            )
+        for name, kind in (("action", ActionKind), ("voice", VoiceKind)):
+            if not isinstance(getattr(self, name), kind):
+                choices = [choice.name for choice in kind]
+                raise ValueError(f"body.{name}={getattr(self, name)!r}; there are {choices}")
         super().__post_init__()
         if not 0.0 < 2.0 * self.radius_m <= self.height_m:
             raise ValueError(
@@ -80,7 +84,7 @@ class Walker(Figure):
     def __init__(self, name: str, cfg: WalkerCfg, world: World, shirt: int = 0) -> None:
         super().__init__(name, cfg.eye_range_deg, world, shirt)
         self.cfg = cfg
-        self.control = WALK_CONTROLS[cfg.action]
+        self.control = action_control(cfg.action, cfg.voice)
         self.action_spec = self.control.spec
         self._gait = Gait(self._skeleton)
         self._pusher = Pusher(world.client, cfg.radius_m, cfg.height_m, cfg.push_limit_kg)
@@ -135,15 +139,22 @@ class Walker(Figure):
     # ---- what it can do (the paper's animation-based API)
 
     def act(self, action: NDArray[Any]) -> None:
-        """Walk as an action row says; it holds until the next call."""
-        forward, turn = self.control.decode(action)
+        """Walk and call as an action row says; walking holds until the next row.
+
+        A call that has begun is called to its end: until then others go unsaid.
+        """
+        forward, turn, call = self.control.decode(action)
         top_mps = self.cfg.walk_speed_mps * (self.cfg.backward_share if forward < 0.0 else 1.0)
         self.walk(forward * top_mps, turn * math.radians(self.cfg.turn_speed_degps))
+        self.call(call)
 
     def encode(self, wish: Any) -> NDArray[Any]:
-        """Return the row nearest to a wish ``(forward, turn)``, each in [-1, 1]."""
-        forward, turn = wish
-        return self.control.encode(forward, turn)
+        """Return the row nearest to a wish ``(forward, turn)``, each in [-1, 1].
+
+        A third element is the `Call`; without it there is none.
+        """
+        forward, turn, *call = wish
+        return self.control.encode(forward, turn, Call(call[0]) if call else Call.none)
 
     @property
     def is_finite(self) -> bool:
