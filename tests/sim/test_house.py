@@ -8,8 +8,11 @@ from listening import render as render_field
 
 from veca_marl.config import compose
 from veca_marl.sim.acoustics import Room
+from veca_marl.sim.bodies.walker import Walker, WalkerCfg
+from veca_marl.sim.calls import Call
 from veca_marl.sim.house import House
 from veca_marl.sim.pose import Pose
+from veca_marl.sim.senses.audio import AudioCfg, AudioSense
 from veca_marl.sim.soundfield import SoundField
 from veca_marl.sim.sounds import Clip
 from veca_marl.sim.world import World
@@ -158,3 +161,38 @@ def test_two_rooms_have_a_door_that_sound_goes_through():
     assert between == [1, 0]
     assert [world.house.room_of(np.array([x, 0.0, 1.0])) for x in (0.0, 5.0)] == [0, 1]
     world.close()
+
+
+def test_a_wall_that_goes_up_is_heard_though_nobody_moves():
+    rooms = house()
+    field = SoundField(rooms, STEP, RATE)
+    field.add_source("noise", Clip(NOISE)).position = (1.0, 0.5, 1.0)
+    listener = field.add_listener(spatialisation("mono"))
+    field.reset(np.random.default_rng(0))
+    levels = []
+    for step in range(10):
+        if step == 5:
+            rooms.add_wall(*BETWEEN)
+        field.advance()
+        levels.append(10.0 * np.log10(np.mean(listener.render(pose(5.0, 0.0, 1.0)) ** 2) + 1e-12))
+    assert levels[4] - levels[8] == pytest.approx(LOSS_DB, abs=2.0)
+
+
+def test_a_walker_in_the_next_room_hears_a_voice_through_the_door_or_through_the_wall():
+    world = World(compose(["+task=KickTheBall", "playground=two_rooms"]).playground)
+    speaker, friend = (Walker(name, WalkerCfg(), world) for name in ("speaker", "friend"))
+    ears = AudioSense(AudioCfg(waveform=True), friend, world.sound)
+    world.freeze()
+    loudest = []
+    for y in (-1.0, 1.7):
+        world.reset(np.random.default_rng(0))
+        ears.reset()
+        speaker.place((1.0, y, 0.0))
+        friend.place((5.0, y, 0.0), np.pi)
+        speaker.call(Call.high)
+        for _ in range(8):
+            world.step()
+            loudest.append(np.abs(ears.read()["waveform"]).max())
+    world.close()
+    wall, door = max(loudest[:8]), max(loudest[8:])
+    assert 20.0 * np.log10(door / wall) == pytest.approx(30.0, abs=1.0)

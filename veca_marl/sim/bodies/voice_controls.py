@@ -3,7 +3,7 @@
 Policy heads know one continuous or one categorical row per agent, so a call is part of that row:
 
 - continuous: one more number. Five equal bands of [-1, 1] are the five calls, silence in the
-  middle, so that a policy that has learnt nothing yet (mean 0) is mostly silent;
+  middle, so that a row of zeros is silent; a policy that explores widely calls most of the time;
 - discrete: the product of moves and calls. The silent ones come first, so that what was chosen
   without a voice is chosen with the same numbers.
 
