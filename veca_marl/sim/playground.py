@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from veca_marl.sim.house import TRANSMISSION_LOSS_DB
 from veca_marl.sim.pose import Floats
 from veca_marl.sim.props import PropCfg
 
@@ -91,21 +92,26 @@ class PlaygroundCfg:
 
     Attributes:
         name: As on the command line.
-        rooms: Boxes of air; the first is where single-room tasks play.
+        rooms: Boxes of air; the first is where single-room tasks play. Fixed props of shape `wall`
+            between them take sound away.
         props: Walls, furniture and toys.
-        floor_size_m: Extent of the drawn floor along x and y, centred on the origin.
+        floor_size_m: Extent of the drawn floor along x and y.
+        floor_centre_m: Its middle.
         floor_colour: Red, green, blue in [0, 1].
         floor_checker_m: Edge of the floor's checker pattern.
         image_order: Greatest number of reflections of a sound; 0 is the direct sound alone.
+        transmission_loss_db: What each wall takes from a sound of another room; see `sim.house`.
     """
 
     name: str = ""
     rooms: list[RoomCfg] = field(default_factory=lambda: [RoomCfg()])
     props: list[PropCfg] = field(default_factory=list)
     floor_size_m: tuple[float, float] = (6.0, 6.0)
+    floor_centre_m: tuple[float, float] = (0.0, 0.0)
     floor_colour: tuple[float, float, float] = (0.75, 0.65, 0.5)
     floor_checker_m: float = 0.5
     image_order: int = 1
+    transmission_loss_db: float = TRANSMISSION_LOSS_DB
 
     def __post_init__(self) -> None:
         """Names are looked up, so they must be unique, and there must be a room to play in."""
@@ -118,4 +124,10 @@ class PlaygroundCfg:
         if self.image_order < 0:
             raise ValueError(
                 f"playground {self.name!r}: image_order={self.image_order} is negative"
+            )
+        loss_db = self.transmission_loss_db
+        if not (math.isfinite(loss_db) and loss_db >= 0.0):
+            raise ValueError(
+                f"playground {self.name!r}: transmission_loss_db={loss_db} must be finite, "
+                "0 or more"
             )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 import scipy.fft
@@ -23,13 +24,34 @@ from veca_marl.sim.spatialisation import Spatialisation, filter_length
 MAX_SPEED_MPS = 50.0
 """What changes its distance faster was put elsewhere: it is cross-faded, not heard as a chirp."""
 
+_NOWHERE: Floats = np.zeros((0, 3))
 
-class Surroundings:
-    """Where sound travels: the room, or the free field without reflections.
+
+class Surroundings(Protocol):
+    """Where sound travels.
+
+    Attributes:
+        spread_m: Upper bound of how much further than the direct sound any image travels.
+    """
+
+    spread_m: float
+
+    def arrivals(self, source: Floats, head: Pose) -> tuple[Floats, Floats]:
+        """Say from where a source arrives at a head.
+
+        Returns:
+            ``(K, 3)`` metres from the head to the source and its images, in the head frame, and
+            ``(K,)`` what walls leave of each. K may change from step to step.
+        """
+        ...
+
+
+class OneRoom:
+    """One room, or the free field without reflections.
 
     Attributes:
         gains: ``(K,)`` what the walls leave of the direct sound (1) and of each image.
-        spread_m: Upper bound of how much further than the direct sound any image travels.
+        spread_m: See `Surroundings`.
     """
 
     def __init__(self, room: Room | None, image_order: int) -> None:
@@ -42,14 +64,14 @@ class Surroundings:
         detours = 2 * ((np.abs(self._lattice) + 1) // 2) * self._size
         self.spread_m = float(np.linalg.norm(detours, axis=1).max())
 
-    def arrivals(self, source: Floats, head: Pose) -> Floats:
-        """Return ``(K, 3)`` metres from the head to the source and its images, head frame."""
+    def arrivals(self, source: Floats, head: Pose) -> tuple[Floats, Floats]:
+        """See `Surroundings`."""
         position = head.position
         if self.room is not None:
             source, position = self.room.clamp(source), self.room.clamp(position)
         images = image_sources(source, self._lower, self._size, self._lattice)
         vectors: Floats = (images - position) @ head.rotation
-        return vectors
+        return vectors, self.gains
 
 
 @dataclass(frozen=True)
@@ -113,7 +135,7 @@ class Path:
         self._forget_place()
 
     def _forget_place(self) -> None:
-        self._arrivals: Floats | None = None
+        self._arrivals = self._gains = _NOWHERE
         self._delay = 0.0
         self._jumps = self.source.jumps
         self.response: NDArray[np.complex64] | None = None
@@ -134,10 +156,10 @@ class Path:
         return True
 
     def _place(self, head: Pose) -> None:
-        arrivals = self._surroundings.arrivals(self.source.position, head)
+        arrivals, gains = self._surroundings.arrivals(self.source.position, head)
         before = self._delay
-        if self._arrivals is None or not np.array_equal(arrivals, self._arrivals):
-            self._write_response(arrivals)
+        if not (np.array_equal(arrivals, self._arrivals) and np.array_equal(gains, self._gains)):
+            self._write_response(arrivals, gains)
         else:
             self.response_before = self.response
         known = self.response_before is not None
@@ -147,16 +169,14 @@ class Path:
         self._jumps = self.source.jumps
         self._append(before if known else self._delay, jumped and known)
 
-    def _write_response(self, arrivals: Floats) -> None:
+    def _write_response(self, arrivals: Floats, gains: Floats) -> None:
         stream = self._stream
-        self._spatialisation.write_filters(
-            arrivals, self._surroundings.gains, stream.sample_rate_hz, self._filters
-        )
+        self._spatialisation.write_filters(arrivals, gains, stream.sample_rate_hz, self._filters)
         self.response_before = self.response
         self.response = scipy.fft.rfft(self._filters)
         direct = np.sqrt(arrivals[0] @ arrivals[0]) * stream.sample_rate_hz / SPEED_OF_SOUND_MPS
         self._delay = min(float(direct), float(self._longest_delay))
-        self._arrivals = arrivals
+        self._arrivals, self._gains = arrivals, gains
 
     def _append(self, delay_before: float, jumped: bool) -> None:
         """Append the delayed sound of this step to the block."""

@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 
 from veca_marl.sim.acoustics import SPEED_OF_SOUND_MPS, Room
 from veca_marl.sim.fractional_delay import HALF_WIDTH, KERNEL_LATENCY, KERNEL_TAPS
+from veca_marl.sim.house import House
 from veca_marl.sim.pose import Pose
-from veca_marl.sim.propagation import Path, StreamFormat, Surroundings
+from veca_marl.sim.propagation import OneRoom, Path, StreamFormat, Surroundings
 from veca_marl.sim.sound_source import Source
 from veca_marl.sim.sounds import Sound
 from veca_marl.sim.spatialisation import Spatialisation, lead_samples
@@ -35,7 +36,7 @@ class SoundField:
 
     def __init__(
         self,
-        room: Room | None = None,
+        room: Room | House | None = None,
         step_samples: int = 882,
         sample_rate_hz: int = 22_050,
         image_order: int = 1,
@@ -44,10 +45,10 @@ class SoundField:
         """Make a field without sources.
 
         Args:
-            room: What reflects; None is the free field.
+            room: What reflects: one room or several; None is the free field.
             step_samples: Samples per control step.
             sample_rate_hz: Sampling rate.
-            image_order: Greatest number of reflections of the image sources.
+            image_order: Greatest number of reflections of the image sources; a house has its own.
             reach_m: Sound from further away is heard as late as from here. A room's diagonal
                 takes its place if that is less.
         """
@@ -61,7 +62,9 @@ class SoundField:
         self.sample_rate_hz = sample_rate_hz
         self.clock = 0
         self.latency_samples = HALF_WIDTH + KERNEL_LATENCY + lead_samples(sample_rate_hz)
-        self._surroundings = Surroundings(room, image_order)
+        self._surroundings: Surroundings = (
+            room if isinstance(room, House) else OneRoom(room, image_order)
+        )
         self._listeners: list[Listener] = []
         if room is not None:
             reach_m = min(reach_m, float(np.linalg.norm(room.size)))

@@ -125,6 +125,11 @@ class Voice:
             filtered = scipy.signal.sosfilt(self._high_pass, samples)
             self._queue.append(filtered.astype(np.float32))
 
+    @property
+    def speaking(self) -> bool:
+        """Whether something is still to be said."""
+        return bool(self._queue)
+
     def hush(self) -> None:
         """Forget what was not said yet."""
         self._queue.clear()

@@ -10,8 +10,9 @@ import numpy as np
 
 from veca_marl.sim.acoustics import Room
 from veca_marl.sim.bullet import pybullet
+from veca_marl.sim.house import House
 from veca_marl.sim.playground import PlaygroundCfg
-from veca_marl.sim.props import Prop, PropCfg
+from veca_marl.sim.props import Prop, PropCfg, PropShape
 from veca_marl.sim.scene import Geom, Scene, Shape
 from veca_marl.sim.soundfield import SoundField
 from veca_marl.sim.sounds import make_sound
@@ -83,12 +84,12 @@ class World:
         self.playground = playground
         self.clock = clock or ClockCfg()
         self.scene = Scene()
-        room = playground.rooms[0]
-        self.sound = SoundField(
-            Room(np.array(room.lower_m), np.array(room.size_m), room.reflection),
-            step_samples=22050 // self.clock.control_rate_hz,
-            image_order=playground.image_order,
+        self.house = House(
+            [Room(room.lower_m, room.size_m, room.reflection) for room in playground.rooms],
+            playground.image_order,
+            playground.transmission_loss_db,
         )
+        self.sound = SoundField(self.house, step_samples=22050 // self.clock.control_rate_hz)
         self.client: int = pybullet.connect(pybullet.DIRECT)
         self.props: dict[str, Prop] = {}
         self.movers: list[Mover] = []
@@ -112,6 +113,10 @@ class World:
         self.props[cfg.name] = prop
         if not prop.fixed:
             self._moving.append(prop)
+        elif cfg.shape is PropShape.wall:
+            half = np.array(cfg.size_m) / 2
+            up = half[2] * prop.rotation[:, 2]
+            self.house.add_wall(prop.position + up, prop.rotation, half)
         return prop
 
     def prop(self, name: str) -> Prop:
@@ -201,7 +206,7 @@ class World:
             Shape.BOX,
             half,
             colour=look.floor_colour,
-            offset=(0.0, 0.0, -half[2]),
+            offset=(*look.floor_centre_m, -half[2]),
             checker_m=look.floor_checker_m,
         )
         self.scene.add_object("floor", [[geom]])

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from veca_marl.sim.bodies.looks import SHIRTS, bone_geoms, dressed_skin
 from veca_marl.sim.bodies.mounts import EYES, gaze, organ_pose, palm_of
 from veca_marl.sim.bone_motion import bone_motion
+from veca_marl.sim.calls import CALLS, Call, call_waveform
 from veca_marl.sim.optics import Camera, seen_fraction
 from veca_marl.sim.pose import Floats, Pose
 from veca_marl.sim.skeleton import load_skeleton
@@ -147,6 +148,11 @@ class Figure:
     def make_sound(self, waveform: NDArray[np.float32]) -> None:
         """Say something: samples at 22 050 Hz, heard by everyone, the speaker included."""
         self._voice.say(waveform)
+
+    def call(self, call: Call) -> None:
+        """Say a call, unless something is still being said."""
+        if call is not Call.none and not self._voice.speaking:
+            self._voice.say(call_waveform(CALLS[call], self._world.sound.sample_rate_hz))
 
     def is_visible(self, thing: Visible, eye: str = "eye_left") -> bool:
         """Say whether an eye sees a thing, also through glass (the paper's `isVisible`).

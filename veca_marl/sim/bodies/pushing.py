@@ -5,11 +5,16 @@ kinematic and pushes it; against a heavy one the object is kinematic and pushes 
 The body is a capsule without mass that is moved by hand. Its velocity is told to Bullet, so light
 things are pushed correctly; contacts with heavy and fixed things are switched off in Bullet and
 solved here, by moving the capsule out of them along the horizontal.
+
+A joint-level body is a thing like others: its whole mass, 10 kg, is above the usual limit, so it is
+heavy. It does not feel the walker and shoves it aside, by standing, walking or falling; only walls
+hold a walker against it. With a limit above its mass it is light: the walker shoves it.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -18,6 +23,7 @@ from veca_marl.sim.pose import Floats
 from veca_marl.sim.props import Prop
 
 _ROUNDS = 3  # two walls of a corner and one to spare
+_LIMBS_M = 1.0  # how far a joint-level body reaches from its pelvis, toes stretched
 _SIGHT_M = 0.06  # how far another body or a heavy thing may shove it within one agent step
 
 
@@ -42,26 +48,31 @@ class Pusher:
         pybullet.changeDynamics(
             self.body_id, -1, lateralFriction=0.2, restitution=0.0, physicsClientId=client
         )
-        self._obstacles: list[Prop] = []
-        self._known = 0
-        self._near: list[Prop] = []
+        # PyBullet's ids and how far each reaches beyond the box round its base
+        self._obstacles: list[tuple[int, float]] = []
+        self._known = (0, 0)
+        self._near: list[int] = []
 
-    def look_round(self, props: dict[str, Prop], position: Floats, way_m: float) -> None:
+    def look_round(
+        self, props: dict[str, Prop], jointed: Sequence[int], position: Floats, way_m: float
+    ) -> None:
         """Note which obstacles can be met within this agent step.
 
         Args:
             props: All props of the world.
-            position: ``(3,)`` metres; only the horizontal part counts.
+            jointed: PyBullet's ids of all joint-level bodies.
+            position: ``(2,)`` or ``(3,)`` metres; only the horizontal part counts.
             way_m: How far it wants to go.
         """
-        if len(props) != self._known:
-            self._meet(props)
-        x, y, reach = position[0], position[1], self.radius_m + _SIGHT_M + way_m
+        if (len(props), len(jointed)) != self._known:
+            self._meet(props, jointed)
+        x, y = position[0], position[1]
         self._near = []
-        for prop in self._obstacles:
-            low, high = pybullet.getAABB(prop.body_id, physicsClientId=self._client)
+        for body_id, beyond_m in self._obstacles:
+            low, high = pybullet.getAABB(body_id, physicsClientId=self._client)
+            reach = self.radius_m + _SIGHT_M + way_m + beyond_m
             if low[0] - reach < x < high[0] + reach and low[1] - reach < y < high[1] + reach:
-                self._near.append(prop)
+                self._near.append(body_id)
 
     def move(self, x: float, y: float) -> tuple[float, float]:
         """Put the capsule at a wished place; return where obstacles let it stand, metres."""
@@ -91,9 +102,9 @@ class Pusher:
     def _way_out(self) -> tuple[float, float]:
         """Return the horizontal displacement out of everything the capsule is stuck in."""
         out_x = out_y = 0.0
-        for prop in self._near:
+        for body_id in self._near:
             for contact in pybullet.getClosestPoints(
-                self.body_id, prop.body_id, 0.0, physicsClientId=self._client
+                self.body_id, body_id, 0.0, physicsClientId=self._client
             ):
                 normal, depth = contact[7], -contact[8]
                 length = math.hypot(normal[0], normal[1])
@@ -104,16 +115,25 @@ class Pusher:
                     out_y = _farther(out_y, way_y)
         return out_x, out_y
 
-    def _meet(self, props: dict[str, Prop]) -> None:
+    def _meet(self, props: dict[str, Prop], jointed: Sequence[int]) -> None:
         """Switch Bullet's contacts off for all that cannot be pushed."""
-        self._known = len(props)
-        self._obstacles = [
-            prop for prop in props.values() if prop.fixed or prop.cfg.mass_kg > self._push_limit_kg
-        ]
-        for prop in self._obstacles:
-            pybullet.setCollisionFilterPair(
-                self.body_id, prop.body_id, -1, -1, 0, physicsClientId=self._client
-            )
+        self._known = len(props), len(jointed)
+        limit_kg = self._push_limit_kg
+        things = [p.body_id for p in props.values() if p.fixed or p.cfg.mass_kg > limit_kg]
+        bodies = [one for one in jointed if _mass_kg(self._client, one) > limit_kg]
+        self._obstacles = [(one, 0.0) for one in things] + [(one, _LIMBS_M) for one in bodies]
+        for body_id, _ in self._obstacles:
+            for link in range(-1, pybullet.getNumJoints(body_id, physicsClientId=self._client)):
+                pybullet.setCollisionFilterPair(
+                    self.body_id, body_id, -1, link, 0, physicsClientId=self._client
+                )
+
+
+def _mass_kg(client: int, body_id: int) -> float:
+    """Return the mass of a body with all its links."""
+    links = range(-1, pybullet.getNumJoints(body_id, physicsClientId=client))
+    masses = [pybullet.getDynamicsInfo(body_id, n, physicsClientId=client)[0] for n in links]
+    return float(sum(masses))
 
 
 def _farther(a: float, b: float) -> float:

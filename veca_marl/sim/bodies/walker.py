@@ -14,9 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veca_marl.sim.bodies.base import BodyCfg
-from veca_marl.sim.bodies.controls import WALK_CONTROLS, ActionKind
+from veca_marl.sim.bodies.controls import ActionKind
+from veca_marl.sim.bodies.crowd import crowd_of
 from veca_marl.sim.bodies.figure import Figure
+from veca_marl.sim.bodies.humanoid import Humanoid
 from veca_marl.sim.bodies.pushing import Pusher, horizontal_distance
+from veca_marl.sim.bodies.voice_controls import VoiceKind, action_control
+from veca_marl.sim.calls import Call
 from veca_marl.sim.gait import Gait
 from veca_marl.sim.pose import Floats
 from veca_marl.sim.props import Prop
@@ -30,6 +34,7 @@ class WalkerCfg(BodyCfg):
 
     Attributes:
         action: Continuous velocities or discrete moves.
+        voice: Whether an action row also holds a call, see `voice_controls`.
         walk_speed_mps: Speed of a full forward action.
         backward_share: A full backward action goes at this share of the forward speed.
         turn_speed_degps: Turning speed of a full turn action.
@@ -45,6 +50,7 @@ class WalkerCfg(BodyCfg):
     """
 
     action: ActionKind = ActionKind.continuous
+    voice: VoiceKind = VoiceKind.silent
     walk_speed_mps: float = 1.0
     backward_share: float = 0.3
     turn_speed_degps: float = 120.0
@@ -60,10 +66,10 @@ class WalkerCfg(BodyCfg):
 
     def __post_init__(self) -> None:
         """All are magnitudes, and a capsule is higher than wide."""
-        if not isinstance(self.action, ActionKind):
-            raise ValueError(
-                f"body.action={self.action!r}; there are {[k.name for k in ActionKind]}"
-            )
+        for name, kind in (("action", ActionKind), ("voice", VoiceKind)):
+            if not isinstance(getattr(self, name), kind):
+                choices = [choice.name for choice in kind]
+                raise ValueError(f"body.{name}={getattr(self, name)!r}; there are {choices}")
         super().__post_init__()
         if not 0.0 < 2.0 * self.radius_m <= self.height_m:
             raise ValueError(
@@ -78,13 +84,13 @@ class Walker(Figure):
     def __init__(self, name: str, cfg: WalkerCfg, world: World, shirt: int = 0) -> None:
         super().__init__(name, cfg.eye_range_deg, world, shirt)
         self.cfg = cfg
-        self.control = WALK_CONTROLS[cfg.action]
+        self.control = action_control(cfg.action, cfg.voice)
         self.action_spec = self.control.spec
         self._gait = Gait(self._skeleton)
         self._pusher = Pusher(world.client, cfg.radius_m, cfg.height_m, cfg.push_limit_kg)
         self._soles = Soles(self._skeleton)
-        world.attach(self)
         self.reset()
+        crowd_of(world).join(self)
 
     # ---- where it is
 
@@ -123,7 +129,7 @@ class Walker(Figure):
         self._head_yaw_rad = 0.0
         self._relax_eyes()
         self._gait.reset()
-        self._pusher.look_round(self._world.props, self._ground, 0.0)
+        self._look_round(0.0)
         self._ground[:] = self._pusher.move(self._ground[0], self._ground[1])
         self._pusher.tell_velocity(0.0, 0.0, 0.0)
         self._step_start = self._ground.copy()
@@ -133,15 +139,22 @@ class Walker(Figure):
     # ---- what it can do (the paper's animation-based API)
 
     def act(self, action: NDArray[Any]) -> None:
-        """Walk as an action row says; it holds until the next call."""
-        forward, turn = self.control.decode(action)
+        """Walk and call as an action row says; walking holds until the next row.
+
+        A call that has begun is called to its end: until then others go unsaid.
+        """
+        forward, turn, call = self.control.decode(action)
         top_mps = self.cfg.walk_speed_mps * (self.cfg.backward_share if forward < 0.0 else 1.0)
         self.walk(forward * top_mps, turn * math.radians(self.cfg.turn_speed_degps))
+        self.call(call)
 
     def encode(self, wish: Any) -> NDArray[Any]:
-        """Return the row nearest to a wish ``(forward, turn)``, each in [-1, 1]."""
-        forward, turn = wish
-        return self.control.encode(forward, turn)
+        """Return the row nearest to a wish ``(forward, turn)``, each in [-1, 1].
+
+        A third element is the `Call`; without it there is none.
+        """
+        forward, turn, *call = wish
+        return self.control.encode(forward, turn, Call(call[0]) if call else Call.none)
 
     @property
     def is_finite(self) -> bool:
@@ -201,20 +214,24 @@ class Walker(Figure):
     def before_step(self) -> None:
         """Note what it could bump into during this agent step."""
         self._step_start = self._ground.copy()
-        way_m = abs(self._speed_mps) * self._world.clock.step_s
-        self._pusher.look_round(self._world.props, self._step_start, way_m)
+        self._look_round(abs(self._speed_mps) * self._world.clock.step_s)
 
-    def before_substep(self, substep_s: float) -> None:
-        """Walk on by one physics step, as far as obstacles and other walkers allow."""
+    def stride(self, substep_s: float) -> tuple[float, float]:
+        """Turn, and say where one physics step would lead; see `Member`."""
         self.yaw_rad += self._turn_radps * substep_s
         reach = self._speed_mps * substep_s
-        old_x, old_y = self._ground
-        x, y = old_x + reach * math.cos(self.yaw_rad), old_y + reach * math.sin(self.yaw_rad)
-        x, y = self._pusher.move(*self._make_room(x, y))
+        x, y = self._ground
+        return x + reach * math.cos(self.yaw_rad), y + reach * math.sin(self.yaw_rad)
+
+    def squeeze(self, x: float, y: float) -> tuple[float, float]:
+        """Return where obstacles let it stand; see `Member`."""
+        return self._pusher.move(x, y)
+
+    def stand(self, x: float, y: float, substep_s: float) -> None:
+        """Be at a place after this physics step; see `Member`."""
+        vx, vy = (x - self._ground[0]) / substep_s, (y - self._ground[1]) / substep_s
         self._ground[:] = x, y
-        self._pusher.tell_velocity(
-            (x - old_x) / substep_s, (y - old_y) / substep_s, self._turn_radps
-        )
+        self._pusher.tell_velocity(vx, vy, self._turn_radps)
 
     def mirror(self) -> None:
         """Take up the gait's pose and let the voice come from the mouth."""
@@ -229,24 +246,11 @@ class Walker(Figure):
         self._pelvis_spin[2] = self._turn_radps
         self._mouth.position = self.mount("mouth").position
 
-    def _make_room(self, x: float, y: float) -> tuple[float, float]:
-        """Step back from other walkers; each of two gives way by half."""
-        aside = -1.0
-        for other in self._world.movers:
-            if other is self:
-                aside = 1.0
-            if other is self or not isinstance(other, Walker):
-                continue
-            dx, dy = x - other._ground[0], y - other._ground[1]
-            distance = math.hypot(dx, dy)
-            overlap = self.radius_m + other.radius_m - distance
-            if overlap > 0.0:
-                if (
-                    distance < 1e-9
-                ):  # on one spot: those who came first go one way, others the other
-                    dx, dy, distance = aside, 0.0, 1.0
-                x, y = x + dx / distance * overlap / 2, y + dy / distance * overlap / 2
-        return x, y
+    def _look_round(self, way_m: float) -> None:
+        """Note which things and joint-level bodies are near."""
+        movers = self._world.movers
+        jointed = [one.articulation.body_id for one in movers if isinstance(one, Humanoid)]
+        self._pusher.look_round(self._world.props, jointed, self._ground, way_m)
 
     def _pose_bones(self) -> None:
         """Stand on the lower foot: forward kinematics, then shift all bones vertically."""
