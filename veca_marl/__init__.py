@@ -17,7 +17,7 @@ __version__ = "0.1.0"
 __all__ = ["__version__", "list_tasks", "make"]
 
 
-if "gymnasium" in sys.modules:  # whoever loaded it finds the ids there; nobody else pays for it
+if sys.modules.get("gymnasium"):  # whoever loaded it finds the ids there; nobody else pays for it
     import_module("veca_marl.gymnasium_ids").register_ids()
 
 

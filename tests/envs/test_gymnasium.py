@@ -1,5 +1,6 @@
 """The Gymnasium door: its ids, and what it refuses."""
 
+import importlib
 import subprocess
 import sys
 
@@ -101,3 +102,10 @@ def test_a_task_of_several_agents_says_which_door_to_take():
 def test_wrong_choices_are_answered_with_those_there_are():
     with pytest.raises(ValueError, match=r"unknown body 'bird'.*choices:.*walker"):
         gymnasium.make(ID, body="bird")
+
+
+def test_without_gymnasium_the_extra_is_named(monkeypatch):
+    monkeypatch.setitem(sys.modules, "gymnasium", None)
+    monkeypatch.delitem(sys.modules, "veca_marl.envs.gymnasium")
+    with pytest.raises(ModuleNotFoundError, match=r"pip install 'veca_marl\[gymnasium\]'"):
+        importlib.import_module("veca_marl.envs.gymnasium")

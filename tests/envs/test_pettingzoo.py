@@ -1,12 +1,19 @@
 """The PettingZoo door with several teams, and what it refuses."""
 
+import importlib
+import sys
+
 import numpy as np
 import pytest
 from duels import STEPS, duel
 from gymnasium import spaces
-from pettingzoo.test import parallel_api_test, parallel_seed_test
+from pettingzoo.test import api_test, parallel_api_test, parallel_seed_test
+from pettingzoo.utils import parallel_to_aec
 
+from veca_marl.bench.free_play import free_play
+from veca_marl.config import compose
 from veca_marl.envs.env import VecaEnv
+from veca_marl.envs.game import GameCfg
 from veca_marl.envs.pettingzoo import VecaParallelEnv, parallel_env
 
 AGENTS = ["red", "blue_0", "blue_1"]
@@ -32,6 +39,12 @@ def still(env):
 def test_a_game_of_two_teams_is_accepted(env, cfg):
     parallel_api_test(env, num_cycles=10)
     parallel_seed_test(lambda: VecaParallelEnv(cfg), num_cycles=10)
+
+
+# it recommends one array as observation and numbers in all names
+@pytest.mark.filterwarnings("ignore::UserWarning:pettingzoo.test.api_test")
+def test_agents_may_also_act_in_turn(env):
+    api_test(parallel_to_aec(env), num_cycles=10)
 
 
 def test_agents_are_the_players_while_an_episode_lasts(env):
@@ -64,13 +77,22 @@ def test_every_agent_has_its_own_pay_and_senses(env, cfg):
     other.close()
 
 
-def test_what_is_returned_stays_as_it_is(env):
-    seen, _ = env.reset(seed=0)
-    kept = {name: senses["audio"].copy() for name, senses in seen.items()}
-    for _ in range(2):
-        env.step(still(env))
-    for name, audio in kept.items():
-        np.testing.assert_array_equal(seen[name]["audio"], audio)
+def test_bodies_of_joints_feel_and_nothing_that_was_returned_changes():
+    game = compose(["+task=KickTheBall", "playground=simple", "body=mitten"]).game
+    with free_play(2, game.task, ("vision", "audio", "touch", "proprioception")) as task:
+        env = VecaParallelEnv(
+            GameCfg(task, game.playground, game.body, game.senses, game.clock), seed=1
+        )
+        seen, _ = env.reset()
+        kept = {(n, s): array.copy() for n in env.agents for s, array in seen[n].items()}
+        assert {sense for _, sense in kept} == {"vision", "audio", "touch", "proprioception"}
+        for _ in range(2):
+            later, *_ = env.step({name: env.action_space(name).sample() for name in env.agents})
+        for (name, sense), array in kept.items():
+            np.testing.assert_array_equal(seen[name][sense], array, err_msg=sense)
+            assert (later[name][sense] != array).any(), sense
+            assert later[name] in env.observation_space(name)
+        env.close()
 
 
 def test_a_seed_begins_the_stream_anew_and_none_goes_on_with_it(env):
@@ -176,3 +198,10 @@ def test_the_space_of_a_stranger(env, space):
 def test_wrong_choices_are_answered_with_those_there_are(task, choices, said):
     with pytest.raises(ValueError, match=said):
         parallel_env(task, **choices)
+
+
+def test_without_pettingzoo_the_extra_is_named(monkeypatch):
+    monkeypatch.setitem(sys.modules, "pettingzoo", None)
+    monkeypatch.delitem(sys.modules, "veca_marl.envs.pettingzoo")
+    with pytest.raises(ModuleNotFoundError, match=r"pip install 'veca_marl\[pettingzoo\]'"):
+        importlib.import_module("veca_marl.envs.pettingzoo")

@@ -8,10 +8,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from veca_marl.api import choose
-from veca_marl.envs.game import GameCfg, Observation
-from veca_marl.envs.seeded_game import SeededGame
-
 try:
     import gymnasium
 except ModuleNotFoundError as error:
@@ -19,6 +15,9 @@ except ModuleNotFoundError as error:
         "this door needs Gymnasium: pip install 'veca_marl[gymnasium]'", name=error.name
     ) from error
 
+from veca_marl.api import choose
+from veca_marl.envs.game import GameCfg, Observation
+from veca_marl.envs.seeded_game import SeededGame
 from veca_marl.envs.spaces import action_space, observation_space
 from veca_marl.gymnasium_ids import register_ids
 
