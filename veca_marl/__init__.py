@@ -6,6 +6,7 @@ simulator (`veca_marl.sim`) can be used without loading torch.
 
 from __future__ import annotations
 
+import sys
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
@@ -14,6 +15,10 @@ if TYPE_CHECKING:
 
 __version__ = "0.1.0"
 __all__ = ["__version__", "list_tasks", "make"]
+
+
+if sys.modules.get("gymnasium"):  # whoever loaded it finds the ids there; nobody else pays for it
+    import_module("veca_marl.gymnasium_ids").register_ids()
 
 
 def __getattr__(name: str) -> Any:

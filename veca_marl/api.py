@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from veca_marl.config import compose
 from veca_marl.envs.env import VecaEnv
+from veca_marl.envs.game import GameCfg
 from veca_marl.envs.task import TASKS
 
 
@@ -42,8 +43,25 @@ def make(
         ConfigError: If there is no such choice; the message lists those there are.
         ValueError: If a number is impossible.
     """
+    cfg = choose(task, playground=playground, body=body, senses=senses, overrides=overrides)
+    return VecaEnv(cfg, worlds=worlds, seed=seed)
+
+
+def choose(
+    task: str,
+    *,
+    playground: str | None = None,
+    body: str | None = None,
+    senses: Mapping[str, str] | None = None,
+    overrides: Sequence[str] = (),
+) -> GameCfg:
+    """Return what `make` plays, for the faces of other libraries. The arguments are the same.
+
+    Raises:
+        ConfigError: If there is no such choice; the message lists those there are.
+    """
     choices = [f"+task={task}"]
     choices += [] if playground is None else [f"playground={playground}"]
     choices += [] if body is None else [f"body={body}"]
     choices += [f"senses/{sense}={preset}" for sense, preset in (senses or {}).items()]
-    return VecaEnv(compose([*choices, *overrides]).game, worlds=worlds, seed=seed)
+    return compose([*choices, *overrides]).game

@@ -11,6 +11,7 @@ from veca_marl.bench.free_play import free_play
 from veca_marl.config import compose
 from veca_marl.envs.env import VecaEnv
 from veca_marl.envs.game import Game, GameCfg
+from veca_marl.envs.pettingzoo import VecaParallelEnv
 from veca_marl.sim.bullet import pybullet
 
 CFG = compose(["+task=KickTheBall", "body=mitten"]).game
@@ -71,6 +72,19 @@ def test_the_next_episode_is_as_in_a_new_world(cfg):
         for player, senses in ours.items():
             for name, seen in senses.items():
                 np.testing.assert_array_equal(seen, theirs[player][name])
+
+
+def test_other_doors_go_on_in_a_sound_world_too(cfg):
+    broken, sound = (VecaParallelEnv(cfg, render_mode="rgb_array") for _ in range(2))
+    broken.reset(seed=0)
+    break_down(broken._played.game)
+    *_, truncations, _ = broken.step({name: np.zeros(82) for name in broken.agents})
+    assert truncations == {"agents_0": True, "agents_1": True}
+    assert broken.agents == []
+    np.testing.assert_equal(broken.reset(seed=1), sound.reset(seed=1))
+    np.testing.assert_array_equal(broken.render(), sound.render())
+    broken.close()
+    sound.close()
 
 
 def test_a_task_for_walkers_says_so():

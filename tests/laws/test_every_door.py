@@ -1,0 +1,123 @@
+"""What every task must be through the doors for other libraries: the same game as `VecaEnv`."""
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+from pettingzoo.test import parallel_api_test, parallel_seed_test
+from rollouts import KINDS, game_cfg, play
+
+from veca_marl.envs.env import VecaEnv
+from veca_marl.envs.gymnasium import VecaGymEnv
+from veca_marl.envs.pettingzoo import VecaParallelEnv
+from veca_marl.envs.task import TASKS
+
+STEPS = 15
+SHORT = "task.max_seconds=0.4"  # an episode ends within the steps, and another begins
+
+
+@pytest.fixture(scope="module", params=sorted(TASKS))
+def task(request):
+    return request.param
+
+
+@pytest.fixture(scope="module", params=sorted(KINDS))
+def kind(request):
+    return request.param
+
+
+@pytest.fixture(scope="module")
+def cfg(task, kind):
+    return game_cfg(task, kind, SHORT)
+
+
+@pytest.fixture(scope="module")
+def is_for_one(task):
+    return sum(team.size for team in TASKS[task].teams) == 1
+
+
+@pytest.fixture(scope="module")
+def steps(cfg):
+    """Steps of the first world of a `VecaEnv` of two: before and after, by player."""
+    env = VecaEnv(cfg, worlds=2)
+    rollout = play(env, STEPS, seed=1)[0]
+    group_map = env.group_map
+    env.close()
+    return [(by_player(step, group_map), by_player(step["next"], group_map)) for step in rollout]
+
+
+def by_player(step, group_map):
+    return {
+        name: step[team][index]
+        for team, names in group_map.items()
+        for index, name in enumerate(names)
+    }
+
+
+def check_senses(observation, row):
+    assert set(observation) == set(row["observation"].keys())
+    for sense, seen in observation.items():
+        expected = row["observation", sense].numpy()
+        np.testing.assert_array_equal(seen, expected, err_msg=sense)
+        assert seen.dtype == expected.dtype, sense
+
+
+def check_score(reward, terminated, truncated, info, row):
+    assert np.float32(reward) == row["reward"].item()
+    assert (terminated, truncated) == (row["terminated"].item(), row["truncated"].item())
+    assert {name: np.float32(value) for name, value in info["terms"].items()} == {
+        name: value.item() for name, value in row["terms"].items()
+    }
+
+
+def test_pettingzoo_accepts_it(cfg):
+    env = VecaParallelEnv(cfg)
+    parallel_api_test(env, num_cycles=STEPS)
+    env.close()
+
+
+def test_pettingzoo_finds_it_reproducible(cfg):
+    parallel_seed_test(lambda: VecaParallelEnv(cfg), num_cycles=STEPS)
+
+
+def test_pettingzoo_plays_the_same_game_as_torchrl(cfg, steps):
+    env = VecaParallelEnv(cfg)
+    observations, _ = env.reset(seed=1)
+    for before, after in steps:
+        if not env.agents:
+            observations, _ = env.reset()
+        assert set(observations) == set(before)
+        for name, row in before.items():
+            check_senses(observations[name], row)
+        actions = {name: row["action"].numpy() for name, row in before.items()}
+        observations, rewards, terminations, truncations, infos = env.step(actions)
+        for name, row in after.items():
+            check_senses(observations[name], row)
+            check_score(rewards[name], terminations[name], truncations[name], infos[name], row)
+    env.close()
+
+
+def test_gymnasium_accepts_it(task, kind, is_for_one):
+    if kind != "own" or not is_for_one:
+        pytest.skip("an id is for the task's own body, and for tasks of one agent")
+    env = gymnasium.make(f"veca_marl/{task}-v0", overrides=[SHORT])
+    check_env(env.unwrapped)
+    env.close()
+
+
+def test_gymnasium_plays_the_same_game_as_torchrl(cfg, is_for_one, steps):
+    if not is_for_one:
+        with pytest.raises(ValueError, match="parallel_env"):
+            VecaGymEnv(cfg)
+        return
+    env = VecaGymEnv(cfg)
+    observation, _ = env.reset(seed=1)
+    for before, after in steps:
+        (row,), (after_row,) = before.values(), after.values()
+        check_senses(observation, row)
+        observation, *score = env.step(row["action"].numpy())
+        check_senses(observation, after_row)
+        check_score(*score, after_row)
+        if score[1] or score[2]:
+            observation, _ = env.reset()
+    env.close()
