@@ -5,6 +5,7 @@ from veca_marl.envs.tasks.grab_object import GrabObject
 from veca_marl.envs.tasks.kick_the_ball import KickTheBall
 from veca_marl.envs.tasks.move_to_target import MoveToTarget
 from veca_marl.envs.tasks.pile_up_block import PileUpBlock
+from veca_marl.envs.tasks.put_down_block import PutDownBlock
 from veca_marl.envs.tasks.rotate_cube import RotateCube
 from veca_marl.envs.tasks.sit_baby import SitBaby
 from veca_marl.envs.tasks.turn_baby import TurnBaby
@@ -15,6 +16,7 @@ __all__ = [
     "KickTheBall",
     "MoveToTarget",
     "PileUpBlock",
+    "PutDownBlock",
     "RotateCube",
     "SitBaby",
     "TurnBaby",
