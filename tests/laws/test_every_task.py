@@ -218,6 +218,10 @@ def test_a_batch_of_worlds_is_single_games_side_by_side(cfg, env, rollout):
                         np.testing.assert_array_equal(got, seen)
                     reward = step["next", team, "reward"][index].item()
                     assert reward == pytest.approx(game.pay(outcome.terms[player.name]), abs=1e-6)
+            if outcome.terminated or outcome.truncated:
+                game.reset(rng)
+                for player in game.players:
+                    game.observe(player)
         game.close()
 
 

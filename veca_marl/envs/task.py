@@ -144,7 +144,8 @@ class Task(ABC):
         """Play by hand-written rules: return a wish that `Body.encode` turns into an action row.
 
         For a walking body that is (forward, turn), each in [-1, 1]; for a joint-level body the 82
-        joint angles (rad) it wants to come to, whether it is driven by torques or by angles. The
+        joint angles (rad) it wants to come to, or `Springs`, whether it is driven by torques or by
+        angles. The
         docstring says whether it uses the observation alone or privileged state.
         """
 

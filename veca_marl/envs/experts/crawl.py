@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from veca_marl.sim.bodies.humanoid import Humanoid
+from veca_marl.sim.bodies.joint_controls import Springs
 from veca_marl.sim.pose import Floats
 
 # Drawn by hand, then improved by a random search for the way covered, with torques and with
@@ -49,12 +50,13 @@ class Crawl:
         """Begin where the joints are."""
         self._time_s, self._start = 0.0, self._body.joint_angles()
 
-    def wish(self) -> Floats:
-        """Return the ``(82,)`` joint angles to go to now."""
+    def wish(self) -> Springs:
+        """Return where springs shall pull the joints now."""
         share = min(1.0, self._time_s / _BEGIN_S)
         phase = 2.0 * math.pi * _FREQUENCY_HZ * self._time_s
         self._time_s += self._step_s
-        return self._start + share * (self._rhythm(phase) - self._start)
+        angles = self._start + share * (self._rhythm(phase) - self._start)
+        return Springs(angles, ahead_s=0.0)
 
     def _rhythm(self, phase: float) -> Floats:
         degrees = np.zeros(len(self._joint))

@@ -8,8 +8,8 @@ from __future__ import annotations
 from veca_marl.envs.experts.key_poses import KeyPoses
 from veca_marl.envs.experts.turn_over import TurnOver
 from veca_marl.sim.bodies.humanoid import Humanoid
+from veca_marl.sim.bodies.joint_controls import Springs
 from veca_marl.sim.bodies.postures import Posture
-from veca_marl.sim.pose import Floats
 
 # Drawn by hand, then improved by a random search, as those of `turn_over`.
 _POSES = {
@@ -87,8 +87,8 @@ class SitUp:
         self._begin("lie")
         self._turn.reset()
 
-    def wish(self) -> Floats:
-        """Return the ``(82,)`` joint angles to go to now."""
+    def wish(self) -> Springs:
+        """Return where springs shall pull the joints now."""
         self._since_s += self._step_s
         if self._stage == "lie":
             if not self._body.bone("chest").forward[2] < -_ON_BELLY:
@@ -97,7 +97,7 @@ class SitUp:
         else:
             wish = self._way.toward(self._stage, _SPEEDS_RADPS[self._stage])
         self._go_on()
-        return wish
+        return Springs(wish, ahead_s=0.0)
 
     def _go_on(self) -> None:
         late = self._since_s >= _PATIENCE_S[self._stage]

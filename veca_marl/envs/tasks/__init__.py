@@ -7,6 +7,7 @@ from veca_marl.envs.tasks.move_to_target import MoveToTarget
 from veca_marl.envs.tasks.pile_up_block import PileUpBlock
 from veca_marl.envs.tasks.put_down_block import PutDownBlock
 from veca_marl.envs.tasks.rotate_cube import RotateCube
+from veca_marl.envs.tasks.run_baby import RunBaby
 from veca_marl.envs.tasks.sit_baby import SitBaby
 from veca_marl.envs.tasks.turn_baby import TurnBaby
 
@@ -18,6 +19,7 @@ __all__ = [
     "PileUpBlock",
     "PutDownBlock",
     "RotateCube",
+    "RunBaby",
     "SitBaby",
     "TurnBaby",
 ]

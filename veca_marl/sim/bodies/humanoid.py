@@ -19,6 +19,7 @@ from veca_marl.sim.bodies.joint_controls import (
     REACH_RAD,
     JointActionKind,
     JointChoice,
+    Springs,
     chosen_joints,
 )
 from veca_marl.sim.bodies.postures import (
@@ -210,21 +211,30 @@ class Humanoid(Figure):
 
         It asks a position-controlled body for these angles; to a torque-controlled one it gives
         the torques that the position control would give at the end of the agent step: those that
-        it would give now shake the body, for they hold for the whole step.
+        it would give now shake the body, for they hold for the whole step. A wish of `Springs`
+        says itself how far ahead.
         """
-        angles = np.clip(np.asarray(wish, np.float64), self._low, self._high)
-        wishes = self._control.wishes(angles, self.foresee(angles), self._low, self._high)
+        calm = self._world.clock.step_s
+        springs = wish if isinstance(wish, Springs) else Springs(np.asarray(wish), calm)
+        targets = np.clip(springs.targets, self._low, self._high)
+        angles = self.foresee(targets, springs.ahead_s)
+        wishes = self._control.wishes(targets, angles, self._low, self._high)
         row: NDArray[Any] = wishes[self._chosen].astype(np.float32)
         return row
 
-    def foresee(self, targets: Floats) -> Floats:
-        """Return the ``(82,)`` angles (rad) one agent step after springs begin to pull to targets.
+    def foresee(self, targets: Floats, ahead_s: float | None = None) -> Floats:
+        """Return the ``(82,)`` angles (rad) a while after springs begin to pull to targets.
 
         The springs are those of the position control; contacts and weight are left out.
+
+        Args:
+            targets: ``(82,)`` rad.
+            ahead_s: How long after; one agent step if nothing is said.
         """
+        if ahead_s is None:
+            ahead_s = self._world.clock.step_s
         stiffness = self.articulation.strengths_nm / REACH_RAD
-        step_s = self._world.clock.step_s
-        return foreseen_angles(self.articulation, targets, stiffness, step_s)
+        return foreseen_angles(self.articulation, targets, stiffness, ahead_s)
 
     def angles_of(self, posture: Posture) -> Floats:
         """Return the ``(82,)`` joint angles of a posture, rad: what `encode` takes."""

@@ -3,13 +3,26 @@
 from __future__ import annotations
 
 from enum import Enum
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
 from veca_marl.sim.pose import Floats
 from veca_marl.sim.skeleton import Skeleton
 from veca_marl.sim.skin_springs import is_finger
+
+
+class Springs(NamedTuple):
+    """A wish of joints in more detail than angles alone.
+
+    Attributes:
+        targets: ``(82,)`` rad, where springs pull the joints to.
+        ahead_s: Their stretch is measured so long ahead. One agent step is calm, see
+            `foresight`; 0 s is as strong as can be, and shakes who keeps still.
+    """
+
+    targets: Floats
+    ahead_s: float
 
 
 class JointControl(Protocol):
