@@ -121,7 +121,7 @@ def test_an_existing_run_is_neither_overwritten_nor_changed(smoke):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ([], "error: no task: add +task=NAME; choices: KickTheBall"),
+        ([], "error: no task: add +task=NAME; choices: CrawlBaby, GrabObject, KickTheBall"),
         (["task=KickTheBall"], "error: task has no default to replace: write +task=KickTheBall"),
         (["+task=KickTheBal"], "error: unknown task 'KickTheBal' (did you mean KickTheBall?)"),
         (["+task=KickTheBall", "sede=1"], "error: unknown key 'sede' (did you mean seed?)"),
