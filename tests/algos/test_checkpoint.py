@@ -120,6 +120,15 @@ def test_a_folder_without_checkpoints_is_named(checkpoints):
         checkpoints.latest()
 
 
+@pytest.fixture
+def ctrl_c():
+    """Let Ctrl-C interrupt, also where a shell made the tests deaf to it, as background jobs are."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.usefixtures("ctrl_c")
 def test_an_interruption_waits_until_the_file_is_whole(checkpoints, identity, monkeypatch):
     save = torch.save
 
