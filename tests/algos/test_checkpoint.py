@@ -122,7 +122,7 @@ def test_a_folder_without_checkpoints_is_named(checkpoints):
 
 @pytest.fixture
 def ctrl_c():
-    """Let Ctrl-C interrupt, also where a shell made the tests deaf to it, as background jobs are."""
+    """Let Ctrl-C interrupt, also in a background job, which a shell makes deaf to it."""
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     yield
     signal.signal(signal.SIGINT, before)
