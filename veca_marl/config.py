@@ -22,8 +22,9 @@ from veca_marl.algos.collect import CollectCfg
 from veca_marl.algos.evaluation import EvalCfg
 from veca_marl.algos.ppo import PPOCfg
 from veca_marl.config_errors import ConfigError, one_line
-from veca_marl.envs.game import GameCfg
+from veca_marl.envs.game_cfg import GameCfg
 from veca_marl.envs.task import TASKS, TaskCfg, find_task
+from veca_marl.envs.team import Script, TeamCfg
 from veca_marl.sim.bodies.base import BodyCfg
 from veca_marl.sim.bodies.humanoid import HumanoidCfg
 from veca_marl.sim.bodies.walker import WalkerCfg
@@ -67,6 +68,10 @@ class Config:
         body: What the players are.
         senses: How well they perceive.
         clock: How time passes.
+        team: What single teams have otherwise: ``+body@team.defender.body=walker_discrete``,
+            ``+senses/vision@team.defender.senses.vision=blind``.
+        opponent: Teams that are not learnt and who plays for them, expert, random or idle:
+            ``opponent.defender=expert``.
         algo: The learning algorithm and its numbers.
         collect: How experience is gathered.
         eval: When and how the policy is evaluated.
@@ -84,6 +89,8 @@ class Config:
     body: BodyCfg = MISSING
     senses: SensesCfg = field(default_factory=SensesCfg)
     clock: ClockCfg = field(default_factory=ClockCfg)
+    team: dict[str, TeamCfg] = field(default_factory=dict)
+    opponent: dict[str, str] = field(default_factory=dict)
     algo: PPOCfg = MISSING
     collect: CollectCfg = field(default_factory=CollectCfg)
     eval: EvalCfg = field(default_factory=EvalCfg)
@@ -96,6 +103,8 @@ class Config:
     resume: str | None = None
 
     def __post_init__(self) -> None:
+        for team, who in self.opponent.items():
+            _script(team, who)
         if self.total_frames < 1:
             raise ValueError(f"total_frames must be at least 1, got {self.total_frames}")
         if self.seed < 0:
@@ -113,13 +122,31 @@ class Config:
     @property
     def game(self) -> GameCfg:
         """What the environments are made from."""
-        return GameCfg(self.task, self.playground, self.body, self.senses, self.clock)
+        return GameCfg(
+            self.task,
+            self.playground,
+            self.body,
+            self.senses,
+            self.clock,
+            self.team,
+            {team: _script(team, who) for team, who in self.opponent.items()},
+        )
+
+
+def _script(team: str, who: str) -> Script:
+    choices = [script.value for script in Script]
+    if who not in choices:
+        raise ValueError(f"opponent.{team}={who}: choices: {', '.join(choices)}")
+    return Script(who)
 
 
 def register_schemas() -> None:
     """Tell Hydra the types behind the YAML files."""
     store = ConfigStore.instance()
-    store.store(name="schema", node=Config)
+    schema = OmegaConf.structured(Config)
+    for by_team in ("team", "opponent"):  # take any key: the game knows its teams
+        OmegaConf.set_struct(schema[by_team], False)
+    store.store(name="schema", node=schema)
     store.store(group="schema/algo", name="ppo", node=PPOCfg)
     store.store(group="schema/body", name="walker", node=WalkerCfg)
     store.store(group="schema/body", name="humanoid", node=HumanoidCfg)

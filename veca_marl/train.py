@@ -29,7 +29,7 @@ from veca_marl.algos.specs import TeamSpec, team_specs
 from veca_marl.config import CONF, Config, compose_node, to_config
 from veca_marl.config_errors import ConfigError, one_line
 from veca_marl.envs.env import VecaEnv
-from veca_marl.envs.game import GameCfg
+from veca_marl.envs.game_cfg import GameCfg
 from veca_marl.recording import record_episode
 from veca_marl.run_folder import RunFolder, new_run, open_run, remove_if_empty
 

@@ -82,7 +82,7 @@ def test_the_expert_gets_ahead(body, way_m):
         while not over:
             row = player.body.encode(game.task.expert(player, {}))
             outcome = game.step({player.name: row}, rng)
-            over = outcome.terminated or outcome.truncated
+            over = outcome.done
         ways.append((player.body.position - start) @ heading)
     assert np.mean(ways) > way_m
     game.close()

@@ -81,9 +81,9 @@ def returns(cfg, episodes, choose, seed=0):
             actions = {p.name: choose(game.task, p, seen[p.name], rng) for p in game.players}
             outcome = game.step(actions, rng)
             seen = {player.name: game.observe(player) for player in game.players}
-            team = game.team(type(game.task).teams[0].name)
+            team = game.team(cfg.teams[0].name)
             total += float(np.mean([game.pay(outcome.terms[p.name]) for p in team]))
-            over = outcome.terminated or outcome.truncated
+            over = outcome.done
         paid.append(total)
     game.close()
     return np.array(paid)

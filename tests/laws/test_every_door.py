@@ -33,7 +33,7 @@ def cfg(task, kind):
 
 @pytest.fixture(scope="module")
 def is_for_one(task):
-    return sum(team.size for team in TASKS[task].teams) == 1
+    return sum(team.size for team in game_cfg(task).teams) == 1
 
 
 @pytest.fixture(scope="module")

@@ -12,7 +12,8 @@ from tensordict import TensorDictBase
 
 from veca_marl.bench.stopwatch import Probes, Stopwatch
 from veca_marl.envs.env import VecaEnv
-from veca_marl.envs.game import Game, GameCfg
+from veca_marl.envs.game import Game
+from veca_marl.envs.game_cfg import GameCfg
 from veca_marl.sim.senses.base import Sense
 
 PHYSICS, SOURCES, TASK, ENV, POLICY, TORCHRL = (

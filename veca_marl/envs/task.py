@@ -17,10 +17,17 @@ from veca_marl.sim.world import World
 
 
 class Team(NamedTuple):
-    """Players that share specs and a policy: one team is one TorchRL group."""
+    """Players that share specs and a policy: one team is one TorchRL group.
+
+    Attributes:
+        name: Unique in its task.
+        size: How many play.
+        senses: What they perceive by; None is what the task names for everyone.
+    """
 
     name: str
     size: int = 1
+    senses: tuple[str, ...] | None = None
 
 
 class Player(NamedTuple):
@@ -100,10 +107,16 @@ class Task(ABC):
     """The rules of one game.
 
     A task never touches torch and never looks up a link: it asks the bodies and the props.
+
+    Attributes:
+        teams: Who plays, see also `teams_of`.
+        senses: What the players perceive by.
+        eliminates: Whether single players may be out while others play on, see `is_out`.
     """
 
     teams: ClassVar[tuple[Team, ...]] = (Team("agents"),)
     senses: ClassVar[tuple[str, ...]] = ()
+    eliminates: ClassVar[bool] = False
     cfg: TaskCfg
 
     def __init__(self, cfg: TaskCfg, world: World, players: list[Player]) -> None:
@@ -139,6 +152,13 @@ class Task(ABC):
         """Say whether the game is over for everyone."""
         return False
 
+    def is_out(self, player: Player) -> bool:
+        """Say whether the game is over for one player, for a task that `eliminates`.
+
+        Who is out stays out until the next episode: it rests, perceives zeros and is paid nothing.
+        """
+        return False
+
     @abstractmethod
     def expert(self, player: Player, observation: dict[str, NDArray[Any]]) -> Any:
         """Play by hand-written rules: return a wish that `Body.encode` turns into an action row.
@@ -148,6 +168,11 @@ class Task(ABC):
         angles. The
         docstring says whether it uses the observation alone or privileged state.
         """
+
+    @classmethod
+    def teams_of(cls, cfg: Any) -> tuple[Team, ...]:
+        """Return who plays; for a task whose numbers of players are in its configuration."""
+        return cls.teams
 
     @classmethod
     def cfg_type(cls) -> type[TaskCfg]:

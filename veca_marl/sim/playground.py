@@ -113,6 +113,11 @@ class PlaygroundCfg:
     image_order: int = 1
     transmission_loss_db: float = TRANSMISSION_LOSS_DB
 
+    @property
+    def floor_m2(self) -> float:
+        """Area of the floors of all rooms."""
+        return sum(room.size_m[0] * room.size_m[1] for room in self.rooms)
+
     def __post_init__(self) -> None:
         """Names are looked up, so they must be unique, and there must be a room to play in."""
         if not self.rooms:

@@ -80,6 +80,10 @@ class Body(Protocol):
         """Return the action row that comes nearest to an expert's wish."""
         ...
 
+    def rest(self) -> None:
+        """Do nothing until the next call: stand, or keep the joints where they are."""
+        ...
+
     def place(self, position: Floats | tuple[float, float, float], yaw_rad: float = 0.0) -> None:
         """Start anew at a place of the floor, facing `yaw_rad`, at rest."""
         ...

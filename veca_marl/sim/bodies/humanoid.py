@@ -206,6 +206,10 @@ class Humanoid(Figure):
             )
         self.act(normalised)
 
+    def rest(self) -> None:
+        """Try to keep all joints where they are."""
+        self.act(self.encode(self.joint_angles()))
+
     def encode(self, wish: Any) -> NDArray[Any]:
         """Return the row that takes the joints nearest to the ``(82,)`` angles (rad) of a wish.
 
