@@ -24,7 +24,9 @@ from omegaconf.errors import OmegaConfBaseException
 from veca_marl.algos.checkpoint import CheckpointError, Checkpoints, Identity
 from veca_marl.algos.loop import Budget, Trainer
 from veca_marl.algos.metrics import CsvReporter, Reporter, TensorBoardReporter
+from veca_marl.algos.opponents import load_actor
 from veca_marl.algos.ppo import PPO
+from veca_marl.algos.self_play import Pool, SelfPlay
 from veca_marl.algos.specs import TeamSpec, team_specs
 from veca_marl.config import CONF, Config, compose_node, to_config
 from veca_marl.config_errors import ConfigError, one_line
@@ -63,7 +65,7 @@ def make_trainer(cfg: Config, folder: RunFolder) -> Trainer:
     )
     trainer = Trainer(
         make_env=partial(make_env, cfg.game),
-        algorithm=PPO(specs, cfg.algo, device),
+        algorithm=make_algorithm(cfg, specs, device),
         collect=cfg.collect,
         evaluation=cfg.eval,
         budget=Budget(cfg.total_frames, cfg.max_minutes),
@@ -72,9 +74,42 @@ def make_trainer(cfg: Config, folder: RunFolder) -> Trainer:
         seed=cfg.seed,
         progress_bar=cfg.log.progress_bar,
     )
+    if cfg.self_play.teams:
+        pool = Pool(folder.path / "pool")
+        trainer.matchmaking = make_self_play(cfg, trainer.algorithm, pool)
     if cfg.resume is not None:
         trainer.resume(checkpoints.latest())
     return trainer
+
+
+def make_algorithm(cfg: Config, specs: dict[str, TeamSpec], device: torch.device) -> PPO:
+    """Return what learns all teams but those with an opponent from another run.
+
+    Raises:
+        ConfigError: If a team does not exist, or nobody learns.
+        CheckpointError: If an opponent cannot be loaded.
+    """
+    frozen = cfg.frozen
+    for key, asked in (("opponent", frozen), ("learner", cfg.learner)):
+        unknown = sorted(set(asked) - set(specs))
+        if unknown:
+            raise ConfigError(f"{key}: no teams {unknown} learn here; there are {sorted(specs)}")
+    if set(frozen) == set(specs):
+        raise ConfigError(f"opponent: nobody learns: all of {sorted(specs)} are opponents")
+    actors = {team: load_actor(path, team, specs[team]) for team, path in frozen.items()}
+    return PPO(specs, cfg.algo, device, cfg.learner, actors)
+
+
+def make_self_play(cfg: Config, algorithm: PPO, pool: Pool) -> SelfPlay:
+    """Return the matchmaking between a team and past selves of another.
+
+    Raises:
+        ConfigError: If a team does not learn.
+    """
+    try:
+        return SelfPlay(cfg.self_play, algorithm, pool, cfg.seed)
+    except ValueError as error:
+        raise ConfigError(one_line(error)) from error
 
 
 def train(cfg: Config, folder: RunFolder, trainer: Trainer) -> list[str]:
