@@ -2,22 +2,15 @@
 
 import numpy as np
 import pytest
+from babies import baby_game
 
-from veca_marl.config import compose
-from veca_marl.envs.game import Game
 from veca_marl.envs.tasks.crawl_baby import CrawlBabyCfg
 from veca_marl.sim.bodies.postures import ON_ALL_FOURS, ON_BACK
 
 
-def game_of(*overrides):
-    game = Game(compose(["+task=CrawlBaby", "senses/touch=numb", *overrides]).game)
-    game.reset(np.random.default_rng(0))
-    return game
-
-
 @pytest.fixture(scope="module")
 def game():
-    game = game_of()
+    game = baby_game("CrawlBaby")
     yield game
     game.close()
 
@@ -84,7 +77,7 @@ def test_the_start_holds_if_the_posture_is_held(game):
 
 @pytest.mark.parametrize("body", ["mitten_limbs", "mitten_position"])
 def test_the_expert_crawls_ahead(body):
-    game, rng = game_of(f"body={body}"), np.random.default_rng(3)
+    game, rng = baby_game("CrawlBaby", f"body={body}"), np.random.default_rng(3)
     ways = [play(game, rng) for _ in range(3)]
     assert np.mean([way for _, way in ways]) > 0.2
     assert np.mean([mean["forward"] for mean, _ in ways]) > 0.04
@@ -93,7 +86,7 @@ def test_the_expert_crawls_ahead(body):
 
 def test_a_walker_is_refused():
     with pytest.raises(ValueError, match="body with joints"):
-        game_of("body=walker")
+        baby_game("CrawlBaby", "body=walker")
 
 
 @pytest.mark.parametrize(

@@ -2,22 +2,15 @@
 
 import numpy as np
 import pytest
+from babies import baby_game
 
-from veca_marl.config import compose
-from veca_marl.envs.game import Game
 from veca_marl.envs.tasks.run_baby import RunBabyCfg
 from veca_marl.sim.bodies.postures import ON_ALL_FOURS, ON_BELLY, STANDING
 
 
-def game_of(*overrides):
-    game = Game(compose(["+task=RunBaby", "senses/touch=numb", *overrides]).game)
-    game.reset(np.random.default_rng(0))
-    return game
-
-
 @pytest.fixture(scope="module")
 def game():
-    game = game_of()
+    game = baby_game("RunBaby")
     yield game
     game.close()
 
@@ -54,7 +47,7 @@ def test_a_fall_ends_the_episode(game, posture, over):
 
 
 def test_a_fall_may_be_allowed():
-    game = game_of("task.fallen_m=0.0")
+    game = baby_game("RunBaby", "task.fallen_m=0.0")
     game.players[0].body.place((0.0, 0.0, 0.0), 0.7, ON_BELLY)
     assert not rest(game).terminated
     game.close()
@@ -74,7 +67,7 @@ def test_it_starts_standing_with_the_room_ahead(game):
 
 @pytest.mark.parametrize(("body", "way_m"), [("mitten_limbs", 0.2), ("mitten_position", 0.05)])
 def test_the_expert_gets_ahead(body, way_m):
-    game, rng = game_of(f"body={body}"), np.random.default_rng(3)
+    game, rng = baby_game("RunBaby", f"body={body}"), np.random.default_rng(3)
     player, ways = game.players[0], []
     for _ in range(6):
         game.reset(rng)
@@ -90,7 +83,7 @@ def test_the_expert_gets_ahead(body, way_m):
 
 def test_a_walker_is_refused():
     with pytest.raises(ValueError, match="body with joints"):
-        game_of("body=walker")
+        baby_game("RunBaby", "body=walker")
 
 
 @pytest.mark.parametrize("wrong", [{"spread_deg": -1.0}, {"top_mps": 0.0}, {"fallen_m": 0.7}])

@@ -2,22 +2,15 @@
 
 import numpy as np
 import pytest
+from babies import baby_game
 
-from veca_marl.config import compose
-from veca_marl.envs.game import Game
 from veca_marl.envs.tasks.sit_baby import SitBabyCfg
 from veca_marl.sim.bodies.postures import ON_BACK, SITTING, STANDING, Posture
 
 
-def game_of(*overrides):
-    game = Game(compose(["+task=SitBaby", "senses/touch=numb", *overrides]).game)
-    game.reset(np.random.default_rng(0))
-    return game
-
-
 @pytest.fixture(scope="module")
 def game():
-    game = game_of()
+    game = baby_game("SitBaby")
     yield game
     game.close()
 
@@ -73,7 +66,7 @@ def test_it_starts_on_the_back_at_rest(game):
 
 @pytest.mark.parametrize("body", ["mitten_limbs", "mitten_position"])
 def test_the_expert_sits_in_the_end(body):
-    game, rng = game_of(f"body={body}"), np.random.default_rng(3)
+    game, rng = baby_game("SitBaby", f"body={body}"), np.random.default_rng(3)
     player, ends = game.players[0], []
     for _ in range(4):
         game.reset(rng)
@@ -88,7 +81,7 @@ def test_the_expert_sits_in_the_end(body):
 
 def test_a_walker_is_refused():
     with pytest.raises(ValueError, match="body with joints"):
-        game_of("body=walker")
+        baby_game("SitBaby", "body=walker")
 
 
 @pytest.mark.parametrize(

@@ -2,22 +2,15 @@
 
 import numpy as np
 import pytest
+from babies import baby_game
 
-from veca_marl.config import compose
-from veca_marl.envs.game import Game
 from veca_marl.envs.tasks.turn_baby import TurnBabyCfg
 from veca_marl.sim.bodies.postures import ON_BACK, ON_BELLY
 
 
-def game_of(*overrides):
-    game = Game(compose(["+task=TurnBaby", "senses/touch=numb", *overrides]).game)
-    game.reset(np.random.default_rng(0))
-    return game
-
-
 @pytest.fixture(scope="module")
 def game():
-    game = game_of()
+    game = baby_game("TurnBaby")
     yield game
     game.close()
 
@@ -59,7 +52,7 @@ def test_it_starts_on_the_back_at_rest_with_joints_anywhere(game):
 
 @pytest.mark.parametrize("body", ["mitten_limbs", "mitten_position"])
 def test_the_expert_lies_on_the_belly_in_the_end(body):
-    game, rng = game_of(f"body={body}"), np.random.default_rng(3)
+    game, rng = baby_game("TurnBaby", f"body={body}"), np.random.default_rng(3)
     player = game.players[0]
     for _ in range(3):
         game.reset(rng)
@@ -74,7 +67,7 @@ def test_the_expert_lies_on_the_belly_in_the_end(body):
 
 def test_a_walker_is_refused():
     with pytest.raises(ValueError, match="body with joints"):
-        game_of("body=walker")
+        baby_game("TurnBaby", "body=walker")
 
 
 @pytest.mark.parametrize("wrong", [-1.0, 31.0, float("nan")])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -32,8 +31,7 @@ class CrawlBabyCfg(TaskCfg):
     def __post_init__(self) -> None:
         super().__post_init__()
         check_spread(self.spread_deg)
-        if not 0.0 < self.top_mps < math.inf:
-            raise ValueError(f"task.top_mps={self.top_mps} must be a positive number")
+        self._check_positive("top_mps")
 
 
 @register

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -35,8 +34,7 @@ class RunBabyCfg(TaskCfg):
     def __post_init__(self) -> None:
         super().__post_init__()
         check_spread(self.spread_deg)
-        if not 0.0 < self.top_mps < math.inf:
-            raise ValueError(f"task.top_mps={self.top_mps} must be a positive number")
+        self._check_positive("top_mps")
         if not 0.0 <= self.fallen_m <= 0.5:
             raise ValueError(f"task.fallen_m={self.fallen_m} must be in [0, 0.5]")
 

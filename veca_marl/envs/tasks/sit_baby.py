@@ -34,9 +34,7 @@ class SitBabyCfg(TaskCfg):
     def __post_init__(self) -> None:
         super().__post_init__()
         check_spread(self.spread_deg)
-        for name in ("torso_m", "head_m"):
-            if not 0.0 < getattr(self, name) < math.inf:
-                raise ValueError(f"task.{name}={getattr(self, name)} must be a positive number")
+        self._check_positive("torso_m", "head_m")
 
 
 @register

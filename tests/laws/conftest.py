@@ -1,0 +1,16 @@
+"""Every law is asked of every task, with each way to act in it."""
+
+import pytest
+from rollouts import KINDS
+
+from veca_marl.envs.task import TASKS
+
+
+@pytest.fixture(scope="module", params=sorted(TASKS))
+def task(request):
+    return request.param
+
+
+@pytest.fixture(scope="module", params=sorted(KINDS))
+def kind(request):
+    return request.param
