@@ -82,7 +82,7 @@ class Soccer(Task):
     def build(self) -> None:
         cfg, room = self.cfg, self.world.playground.rooms[0]
         low, size = np.array(room.lower_m), np.array(room.size_m)
-        self.goal = low + np.array([size[0] - cfg.goal_from_wall_m, size[1] / 2.0, 0.0])
+        self.goal: Floats = low + np.array([size[0] - cfg.goal_from_wall_m, size[1] / 2.0, 0.0])
         longest = cfg.goal_from_wall_m + cfg.ball_from_goal_m[1] + cfg.attacker_from_ball_m[1]
         if longest > size[0] - 0.3 or cfg.aside_m > size[1] / 2.0 - 0.3:
             raise ValueError(
