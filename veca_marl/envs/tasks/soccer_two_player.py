@@ -62,7 +62,8 @@ class SoccerTwoPlayer(Soccer):
             return super().start(player, rng)
         back = rng.uniform(*self.cfg.defender_from_goal_m)
         half_m = min(self.cfg.aside_m, self.cfg.goal_width_m / 2.0)
-        return self.goal + np.array([-back, rng.uniform(-half_m, half_m), 0.0])
+        place: Floats = self.goal + np.array([-back, rng.uniform(-half_m, half_m), 0.0])
+        return place
 
     def expert(self, player: Player, observation: dict[str, NDArray[Any]]) -> Any:
         """Get at the ball, away from the own goal. Knows where the ball is; needs legs to walk."""
