@@ -4,6 +4,7 @@ from veca_marl.envs.tasks.crawl_baby import CrawlBaby
 from veca_marl.envs.tasks.grab_object import GrabObject
 from veca_marl.envs.tasks.kick_the_ball import KickTheBall
 from veca_marl.envs.tasks.move_to_target import MoveToTarget
+from veca_marl.envs.tasks.multi_agent_nav import MultiAgentNav
 from veca_marl.envs.tasks.pile_up_block import PileUpBlock
 from veca_marl.envs.tasks.put_down_block import PutDownBlock
 from veca_marl.envs.tasks.rotate_cube import RotateCube
@@ -16,6 +17,7 @@ __all__ = [
     "GrabObject",
     "KickTheBall",
     "MoveToTarget",
+    "MultiAgentNav",
     "PileUpBlock",
     "PutDownBlock",
     "RotateCube",
