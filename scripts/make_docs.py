@@ -1,4 +1,4 @@
-"""Write what can be derived: one page per task from its docstring, and the pictures.
+"""Write what can be derived: a page per task from its docstring, tables of the body, the pictures.
 
 Run it with ``make docs``; the results are committed, so that they can be read without running it.
 """
@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import dataclasses
 import inspect
+import re
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,9 @@ import numpy as np
 
 from veca_marl.api import make
 from veca_marl.envs.task import TASKS, Task
+from veca_marl.sim.senses.proprioception import ProprioceptionQuality, kept_parts, part_slices
+from veca_marl.sim.skeleton import limit_sources, load_skeleton
+from veca_marl.sim.taxels import taxels_of
 
 mpl.use("Agg")
 import matplotlib.pyplot as plt
@@ -26,7 +30,7 @@ BIN_HZ = 22050 / 1024
 def task_page(task: type[Task]) -> str:
     """Return the Markdown page of a task."""
     cfg_type = task.cfg_type()
-    teams = ", ".join(f"`{team.name}` ({team.size})" for team in task.teams)
+    teams = ", ".join(f"`{team.name}` ({team.size})" for team in task.teams_of(cfg_type()))
     lines = [
         f"# {task.__name__}",
         "",
@@ -59,6 +63,83 @@ def default(field: dataclasses.Field[Any]) -> Any:
     if field.default_factory is not dataclasses.MISSING:
         return field.default_factory()
     return field.default
+
+
+def body_page(page: str) -> str:
+    """Return the page about the body with its tables as the data have them."""
+    tables = {"proprioception": proprioception_table, "bones": bone_table, "joints": joint_table}
+    for name, table in tables.items():
+        region = re.compile(f"(?<=<!-- {name} -->\n).*(?=<!-- /{name} -->)", re.DOTALL)
+        page = region.sub("\n".join(["", *table(), "", ""]), page)
+    return page
+
+
+def proprioception_table() -> list[str]:
+    """Return where each part of proprioception is in its vector, and which qualities have it."""
+    skeleton = load_skeleton()
+    units = {
+        "bone_orientations": "two unit vectors for each bone",
+        "joint_angles": "rad",
+        "joint_velocities": "rad/s",
+        "joint_torques": "share of the joint's strength, [-1, 1]",
+        "head_acceleration": "m/s²",
+        "head_turning": "rad/s",
+    }
+    lines = ["| rows | part | unit | qualities that have it |", "|---|---|---|---|"]
+    for part, rows in part_slices(len(skeleton.bones), len(skeleton.joints)).items():
+        having = [f"`{q.name}`" for q in ProprioceptionQuality if part in kept_parts(q)]
+        place = f"{rows.start} to {rows.stop - 1}"
+        lines.append(f"| {place} | `{part}` | {units[part]} | {', '.join(having)} |")
+    return lines
+
+
+def bone_table() -> list[str]:
+    """Return the bones, left and right in one line."""
+    skeleton = load_skeleton()
+    index = {bone.name: i for i, bone in enumerate(skeleton.bones)}
+    lines = [
+        "| `body.bone_names` | index | parent | mass | skin | taxels |",
+        "|---|---|---|---|---|---|",
+    ]
+    for bone in skeleton.bones:
+        if bone.name.startswith("r_"):
+            continue
+        sides = both_sides(bone.name)
+        parent = skeleton.bones[bone.parent].name if bone.parent >= 0 else ""
+        slices = [taxels_of(side) for side in sides]
+        skin = f"{1000 * bone.skin_thickness_m:g} mm, {bone.skin_force_n:g} N"
+        lines.append(
+            f"| `{bone.name}` | {' / '.join(str(index[side]) for side in sides)} | {parent} "
+            f"| {1000 * bone.mass_kg:g} g | {skin} "
+            f"| {' / '.join(f'{s.start}:{s.stop}' for s in slices)} |"
+        )
+    return lines
+
+
+def joint_table() -> list[str]:
+    """Return the joints, left and right in one line."""
+    joints = load_skeleton().joints
+    names = [f"{joint.bone}.{joint.label}" for joint in joints]
+    lines = [
+        "| `body.joint_names` | index | range | torque | range from |",
+        "|---|---|---|---|---|",
+    ]
+    for name, joint, sources in zip(names, joints, limit_sources(), strict=True):
+        if name.startswith("r_"):
+            continue
+        where = " / ".join(str(names.index(side)) for side in both_sides(name))
+        low, high = np.degrees([joint.low_rad, joint.high_rad])
+        source = " / ".join(dict.fromkeys(sources))
+        lines.append(
+            f"| `{name}` | {where} | {low:.0f}° to {high:.0f}° "
+            f"| {joint.torque_nm:.3g} N m | {source} |"
+        )
+    return lines
+
+
+def both_sides(name: str) -> list[str]:
+    """Return the names on the left and on the right, or the one of the middle."""
+    return [name, f"r_{name[2:]}"] if name.startswith("l_") else [name]
 
 
 def perception_picture(path: Path) -> None:
@@ -102,6 +183,8 @@ def main() -> None:
     (DOCS / "images").mkdir(parents=True, exist_ok=True)
     for name, task in TASKS.items():
         (DOCS / "tasks" / f"{name}.md").write_text(task_page(task), encoding="utf-8")
+    body = DOCS / "body.md"
+    body.write_text(body_page(body.read_text(encoding="utf-8")), encoding="utf-8")
     perception_picture(DOCS / "images" / "perception.png")
 
 

@@ -1,12 +1,14 @@
-"""The task pages say what the docstrings say."""
+"""The pages of tasks and of the body say what the docstrings and the data say."""
 
 import importlib.util
+import re
 from pathlib import Path
 
 import pytest
 
 from veca_marl.api import list_tasks
 from veca_marl.envs.task import find_task
+from veca_marl.sim.skeleton import limit_sources
 
 ROOT = Path(__file__).resolve().parent.parent
 
@@ -22,3 +24,26 @@ def load_script():
 def test_the_page_of_a_task_is_that_of_its_docstring(name):
     page = (ROOT / "docs" / "tasks" / f"{name}.md").read_text(encoding="utf-8")
     assert page == load_script().task_page(find_task(name)), "run make docs"
+
+
+def test_the_tables_of_the_body_are_those_of_the_data():
+    page = (ROOT / "docs" / "body.md").read_text(encoding="utf-8")
+    assert page == load_script().body_page(page), "run make docs"
+    rows = [line for line in page.splitlines() if line.startswith("| `")]
+    bones = [row for row in rows if " mm, " in row]
+    joints = [row for row in rows if " N m " in row]
+    # 5 bones and 12 joints in the middle, 21 and 35 on each side
+    assert (len(bones), len(joints)) == (5 + 21, 12 + 35)
+
+
+def test_every_range_of_motion_names_its_source_and_the_page_explains_it():
+    page = (ROOT / "docs" / "body.md").read_text(encoding="utf-8")
+    sources = {source for both in limit_sources() for source in both}
+    assert sources == set(re.findall(r"\*\*(\w+)\*\*", page.split("come from")[1]))
+
+
+def test_every_preset_of_the_body_is_on_its_page():
+    page = (ROOT / "docs" / "body.md").read_text(encoding="utf-8")
+    presets = {path.stem for path in (ROOT / "veca_marl" / "conf" / "body").glob("*.yaml")}
+    table = page.split("## Which bodies")[1].split("##")[0]
+    assert presets <= set(re.findall(r"`(\w+)`", table))

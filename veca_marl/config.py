@@ -20,7 +20,8 @@ from omegaconf.errors import OmegaConfBaseException
 
 from veca_marl.algos.collect import CollectCfg
 from veca_marl.algos.evaluation import EvalCfg
-from veca_marl.algos.ppo import PPOCfg
+from veca_marl.algos.learner import PPOCfg
+from veca_marl.algos.self_play import SelfPlayCfg
 from veca_marl.config_errors import ConfigError, one_line
 from veca_marl.envs.game_cfg import GameCfg
 from veca_marl.envs.task import TASKS, TaskCfg, find_task
@@ -70,9 +71,11 @@ class Config:
         clock: How time passes.
         team: What single teams have otherwise: ``+body@team.defender.body=walker_discrete``,
             ``+senses/vision@team.defender.senses.vision=blind``.
-        opponent: Teams that are not learnt and who plays for them, expert, random or idle:
-            ``opponent.defender=expert``.
+        opponent: Teams that do not learn and who plays for them: expert, random, idle, or what
+            another run learnt: ``opponent.defender=expert``, ``opponent.defender=runs/...``.
         algo: The learning algorithm and its numbers.
+        learner: The same for single teams: ``+algo@learner.attacker=mappo``.
+        self_play: Which teams learn against past selves.
         collect: How experience is gathered.
         eval: When and how the policy is evaluated.
         log: What is written down.
@@ -92,6 +95,8 @@ class Config:
     team: dict[str, TeamCfg] = field(default_factory=dict)
     opponent: dict[str, str] = field(default_factory=dict)
     algo: PPOCfg = MISSING
+    learner: dict[str, PPOCfg] = field(default_factory=dict)
+    self_play: SelfPlayCfg = field(default_factory=SelfPlayCfg)
     collect: CollectCfg = field(default_factory=CollectCfg)
     eval: EvalCfg = field(default_factory=EvalCfg)
     log: LogCfg = field(default_factory=LogCfg)
@@ -104,17 +109,18 @@ class Config:
 
     def __post_init__(self) -> None:
         for team, who in self.opponent.items():
-            _script(team, who)
+            _check_opponent(team, who)
         if self.total_frames < 1:
             raise ValueError(f"total_frames must be at least 1, got {self.total_frames}")
         if self.seed < 0:
             raise ValueError(f"seed must be 0 or more, got {self.seed}")
         if self.max_minutes is not None and not self.max_minutes > 0:
             raise ValueError(f"max_minutes must be positive, got {self.max_minutes}")
-        if self.collect.frames < self.algo.minibatches:
+        minibatches = max(cfg.minibatches for cfg in (self.algo, *self.learner.values()))
+        if self.collect.frames < minibatches:
             raise ValueError(
                 f"collect: a batch of {self.collect.frames} frames cannot be split into "
-                f"algo.minibatches={self.algo.minibatches}"
+                f"algo.minibatches={minibatches}"
             )
         if self.threads is not None and self.threads < 1:
             raise ValueError(f"threads must be at least 1, got {self.threads}")
@@ -129,22 +135,31 @@ class Config:
             self.senses,
             self.clock,
             self.team,
-            {team: _script(team, who) for team, who in self.opponent.items()},
+            {team: Script(who) for team, who in self.opponent.items() if who in _SCRIPTS},
         )
 
+    @property
+    def frozen(self) -> dict[str, Path]:
+        """Teams that are played by what another run learnt, and where that is."""
+        return {team: Path(who) for team, who in self.opponent.items() if who not in _SCRIPTS}
 
-def _script(team: str, who: str) -> Script:
-    choices = [script.value for script in Script]
-    if who not in choices:
-        raise ValueError(f"opponent.{team}={who}: choices: {', '.join(choices)}")
-    return Script(who)
+
+_SCRIPTS = tuple(script.value for script in Script)
+
+
+def _check_opponent(team: str, who: str) -> None:
+    if who not in _SCRIPTS and not Path(who).exists():
+        raise ValueError(
+            f"opponent.{team}={who}: choices: {', '.join(_SCRIPTS)}, the folder of a run, "
+            "a checkpoint"
+        )
 
 
 def register_schemas() -> None:
     """Tell Hydra the types behind the YAML files."""
     store = ConfigStore.instance()
     schema = OmegaConf.structured(Config)
-    for by_team in ("team", "opponent"):  # take any key: the game knows its teams
+    for by_team in ("team", "opponent", "learner"):  # take any key: the game knows its teams
         OmegaConf.set_struct(schema[by_team], False)
     store.store(name="schema", node=schema)
     store.store(group="schema/algo", name="ppo", node=PPOCfg)

@@ -15,6 +15,7 @@ from veca_marl.envs.env import VecaEnv
 from veca_marl.envs.game import Game
 from veca_marl.envs.scripts import play_script
 from veca_marl.envs.team import Script
+from veca_marl.sim.bodies.voice_controls import VoiceKind
 from veca_marl.sim.bodies.walker import WalkerCfg
 
 # the ways to act in a task: its own body's, and another
@@ -26,8 +27,14 @@ def game_cfg(task, kind="own", *overrides):
     own = compose([f"+task={task}", *overrides])
     if kind == "own":
         return own.game
-    other = "walker_discrete" if isinstance(own.game.body, WalkerCfg) else "mitten_position"
-    return compose([f"+task={task}", f"body={other}", *overrides]).game
+    return compose([f"+task={task}", f"body={other_body(own.game.body)}", *overrides]).game
+
+
+def other_body(own):
+    if not isinstance(own, WalkerCfg):
+        return "mitten_position"
+    # where players call, the house is silent without voices: the ears would be constant
+    return "walker_discrete" if own.voice is VoiceKind.silent else "walker_discrete_voice"
 
 
 def random_row(spec, rng):

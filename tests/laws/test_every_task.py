@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
-from rollouts import KINDS, by_chance, digest, game_cfg, play, returns
+from rollouts import by_chance, digest, game_cfg, play, returns
 from torchrl.collectors import Collector
 from torchrl.envs import SerialEnv, check_env_specs
 
@@ -19,16 +19,6 @@ from veca_marl.envs.team import Script
 
 STEPS = 25
 WORLDS = 2
-
-
-@pytest.fixture(scope="module", params=sorted(TASKS))
-def task(request):
-    return request.param
-
-
-@pytest.fixture(scope="module", params=sorted(KINDS))
-def kind(request):
-    return request.param
 
 
 @pytest.fixture(scope="module")

@@ -86,21 +86,17 @@ class TaskCfg:
 
     def __post_init__(self) -> None:
         """An episode needs a length, a weight needs a value."""
-        if not (math.isfinite(self.max_seconds) and self.max_seconds > 0):
-            raise ValueError(f"task.max_seconds={self.max_seconds} must be a positive number")
+        self._check_positive("max_seconds")
         bad = {name: value for name, value in self.weights.items() if not math.isfinite(value)}
         if bad:
             raise ValueError(f"task.weights: {bad} must be finite numbers")
 
-
-def check_spread(spread_deg: float) -> None:
-    """Refuse a spread of the starting joints that would not resemble the posture any more.
-
-    Raises:
-        ValueError: If it is negative or above 30 degrees.
-    """
-    if not 0.0 <= spread_deg <= 30.0:
-        raise ValueError(f"task.spread_deg={spread_deg} must be in [0, 30]")
+    def _check_positive(self, *names: str) -> None:
+        """Refuse numbers of these names that are zero, negative or not finite."""
+        for name in names:
+            value = getattr(self, name)
+            if not 0.0 < value < math.inf:
+                raise ValueError(f"task.{name}={value} must be a positive number")
 
 
 class Task(ABC):

@@ -171,6 +171,11 @@ def _joints() -> tuple[Joint, ...]:
     )
 
 
+def limit_sources() -> list[tuple[str, str]]:
+    """Return where the lower and the upper limit of each joint come from; see ``docs/body.md``."""
+    return [(row["lo_from"], row["hi_from"]) for row in _rows("dofs.csv")]
+
+
 def _bones(joints: tuple[Joint, ...]) -> tuple[Bone, ...]:
     bones: list[Bone] = []
     names: dict[str, int] = {"": -1}

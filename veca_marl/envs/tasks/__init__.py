@@ -4,6 +4,7 @@ from veca_marl.envs.tasks.crawl_baby import CrawlBaby
 from veca_marl.envs.tasks.grab_object import GrabObject
 from veca_marl.envs.tasks.kick_the_ball import KickTheBall
 from veca_marl.envs.tasks.move_to_target import MoveToTarget
+from veca_marl.envs.tasks.multi_agent_nav import MultiAgentNav
 from veca_marl.envs.tasks.pile_up_block import PileUpBlock
 from veca_marl.envs.tasks.push_out_1v1 import PushOut1v1
 from veca_marl.envs.tasks.push_out_2v2 import PushOut2v2
@@ -20,6 +21,7 @@ __all__ = [
     "GrabObject",
     "KickTheBall",
     "MoveToTarget",
+    "MultiAgentNav",
     "PileUpBlock",
     "PushOut1v1",
     "PushOut2v2",

@@ -87,13 +87,8 @@ class ProprioceptionSense(Sense):
             "head_acceleration": self._head_acceleration,
             "head_turning": self._head_turning,
         }
-        kept = {
-            ProprioceptionQuality.full: "",
-            ProprioceptionQuality.joints: "joint",
-            ProprioceptionQuality.vestibular: "head",
-        }[cfg.quality]
-        self._kept = [name for name in self._measures if name.startswith(kept)]
-        self.parts = _slices(len(body.bone_names), len(body.joint_names))
+        self._kept = kept_parts(cfg.quality)
+        self.parts = part_slices(len(body.bone_names), len(body.joint_names))
         size = self.parts["head_turning"].stop
         self.specs = {"proprioception": ArraySpec((size,), np.float32)}
         self._vector = np.zeros(size, np.float32)
@@ -134,7 +129,18 @@ class ProprioceptionSense(Sense):
         return turned
 
 
-def _slices(bones: int, joints: int) -> dict[str, slice]:
+def kept_parts(quality: ProprioceptionQuality) -> tuple[str, ...]:
+    """Return the parts that a quality leaves; the others read 0."""
+    first_word = {
+        ProprioceptionQuality.full: "",
+        ProprioceptionQuality.joints: "joint",
+        ProprioceptionQuality.vestibular: "head",
+    }[quality]
+    return tuple(part for part in part_slices(0, 0) if part.startswith(first_word))
+
+
+def part_slices(bones: int, joints: int) -> dict[str, slice]:
+    """Return where each part is in the vector of a body with so many bones and joints."""
     sizes = {
         "bone_orientations": 6 * bones,
         "joint_angles": joints,
