@@ -77,6 +77,7 @@ class Pitch:
                 position_m=(float(middle[0]), float(middle[1]), self._cfg.radius_m),
                 mass_kg=self._cfg.mass_kg,
                 restitution=0.7,
+                rolling_friction=0.004,
                 colour=_WHITE,
                 checker_m=self._cfg.radius_m,
             )

@@ -11,14 +11,16 @@ from veca_marl.envs.pitch import Pitch
 from veca_marl.sim.bodies.walker import Walker
 from veca_marl.sim.pose import Floats
 
-_RUN_UP_M = 0.45  # from the ball, before a shot
-_CONTACT_M = 0.25
+_RUN_UP_M = 0.55  # from the ball, before a shot
+_REACH_M = 0.38  # of the foot: there the ball goes off, away from the body
+_LOOK_AHEAD_M = 0.25  # on the line of the shot: where to walk at
+_FOOT_M, _FUNNEL = 0.05, 0.4  # aside of that line: at the kick, and more for each metre before it
 _CLEAR_M = 0.42  # passing the ball at this distance, the foot does not reach it
 _AHEAD_S = 0.25  # the ball is taken where it will be then
 _BODY_M, _BALL_M = 0.13, 0.12
 _ASIDE_RAD = [side * math.radians(deg) for deg in range(0, 180, 15) for side in (1.0, -1.0)]
-_CORNER_SHARE = 0.3  # of the goal's width, from its middle
-_IN_LINE = 0.97  # cosine of the angle at the ball between run-up and shot
+_CORNERS = (0.0, 0.12, -0.12, 0.24, -0.24, 0.33, -0.33)  # shares of the goal's width
+_FREE_M = 0.45  # farther from a keeper no shot is freer
 
 
 def attack(body: Walker, pitch: Pitch, aim: Floats) -> tuple[float, float]:
@@ -38,10 +40,11 @@ def attack(body: Walker, pitch: Pitch, aim: Floats) -> tuple[float, float]:
         pitch.low + _BALL_M,
         pitch.high - _BALL_M,
     )
-    shot, way = _possible(ball, _unit(aim[:2] - ball), pitch), ball - body.position[:2]
-    if _unit(way) @ shot > _IN_LINE:
-        return walk_to(body, ball - _CONTACT_M * shot)
-    return walk_to(body, _round(body.position[:2], ball, ball - _RUN_UP_M * shot))
+    here, shot = body.position[:2], _possible(ball, _unit(aim[:2] - ball), pitch)
+    behind, aside = (ball - here) @ shot, abs(_cross(shot, ball - here))
+    if aside < _FOOT_M + _FUNNEL * (behind - _REACH_M):
+        return walk_to(body, ball - max(behind - _LOOK_AHEAD_M, 0.0) * shot)
+    return walk_to(body, _round(here, ball, ball - _RUN_UP_M * shot))
 
 
 def open_corner(pitch: Pitch, keeper: Floats) -> Floats:
@@ -52,10 +55,15 @@ def open_corner(pitch: Pitch, keeper: Floats) -> Floats:
         keeper: ``(2,)`` or ``(3,)`` metres: who stands in the way.
     """
     goal, ball = pitch.goal[:2], pitch.ball.position[:2]
-    line, way = goal - ball, keeper[:2] - ball
-    to_the_left = line[0] * way[1] - line[1] * way[0] > 0.0
-    corner = _CORNER_SHARE * pitch.goal_width_m * (-1.0 if to_the_left else 1.0)
-    return goal + np.array([0.0, corner])
+    spots = [goal + np.array([0.0, share * pitch.goal_width_m]) for share in _CORNERS]
+    return max(spots, key=lambda spot: min(_gap_m(ball, spot, keeper[:2]), _FREE_M))
+
+
+def _gap_m(start: Floats, end: Floats, other: Floats) -> float:
+    """Return how far a straight way passes another one, metres."""
+    way = end - start
+    share = float((other - start) @ way) / max(float(way @ way), 1e-9)
+    return float(np.hypot(*(start + min(max(share, 0.0), 1.0) * way - other)))
 
 
 def _possible(ball: Floats, shot: Floats, pitch: Pitch) -> Floats:
@@ -81,6 +89,10 @@ def _round(here: Floats, ball: Floats, there: Floats) -> Floats:
         return there
     side = -math.copysign(1.0, aside)
     return ball + side * _CLEAR_M * 1.2 * left
+
+
+def _cross(a: Floats, b: Floats) -> float:
+    return float(a[0] * b[1] - a[1] * b[0])
 
 
 def _unit(way: Floats) -> Floats:

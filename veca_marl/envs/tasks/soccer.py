@@ -18,6 +18,7 @@ from veca_marl.sim.bodies.walker import Walker
 from veca_marl.sim.pose import Floats
 
 ATTACKER, DEFENDER = "attacker", "defender"
+_STRIDE_MPS = 0.1  # who stands does not kick: the ball bounces off
 
 
 @dataclass
@@ -141,12 +142,13 @@ class Soccer(Task):
         self._to_ball_m = horizontal_distance(self.players[0].body.position, self._ball)
 
     def _kick(self) -> None:
-        """Let the nearest of those who can kick the ball; one foot is enough for one step."""
+        """Let the nearest of those who walk at the ball kick it; one foot is enough for a step."""
         near = sorted(self.players, key=lambda p: horizontal_distance(p.body.position, self._ball))
         self._rest_s = {name: s - self.world.clock.step_s for name, s in self._rest_s.items()}
         for player in near:
             body, rested = player.body, self._rest_s[player.name] <= 0.0
-            if rested and isinstance(body, Walker) and body.kick(self.ball):
+            strides = float(body.velocity @ body.forward) > _STRIDE_MPS
+            if rested and strides and isinstance(body, Walker) and body.kick(self.ball):
                 self._rest_s[player.name] = self.cfg.kick_rest_s
                 return
 
