@@ -1,4 +1,4 @@
-"""Games of two teams played blind: how the tests of rings and pitches set them up and watch them."""
+"""Games of two teams played blind: how tests of rings and pitches set them up and watch."""
 
 import numpy as np
 

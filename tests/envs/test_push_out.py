@@ -1,4 +1,4 @@
-"""PushOut1v1 and PushOut2v2: who is out, what that pays, and that no seat is better than the other."""
+"""PushOut1v1 and PushOut2v2: who is out, what that pays, and that no seat is the better one."""
 
 import math
 
