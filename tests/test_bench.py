@@ -14,7 +14,7 @@ from veca_marl.bench.rollouts import measure_rollouts
 from veca_marl.bench.stopwatch import Probes, Stopwatch
 from veca_marl.config import compose
 from veca_marl.envs.env import VecaEnv
-from veca_marl.envs.game import GameCfg
+from veca_marl.envs.game_cfg import GameCfg
 from veca_marl.envs.task import TASKS
 from veca_marl.sim.bullet import pybullet
 from veca_marl.sim.optics import Camera

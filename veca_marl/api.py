@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from veca_marl.config import compose
 from veca_marl.envs.env import VecaEnv
-from veca_marl.envs.game import GameCfg
+from veca_marl.envs.game_cfg import GameCfg
 from veca_marl.envs.task import TASKS
 
 

@@ -20,10 +20,12 @@ from omegaconf.errors import OmegaConfBaseException
 
 from veca_marl.algos.collect import CollectCfg
 from veca_marl.algos.evaluation import EvalCfg
-from veca_marl.algos.ppo import PPOCfg
+from veca_marl.algos.learner import PPOCfg
+from veca_marl.algos.self_play import SelfPlayCfg
 from veca_marl.config_errors import ConfigError, one_line
-from veca_marl.envs.game import GameCfg
+from veca_marl.envs.game_cfg import GameCfg
 from veca_marl.envs.task import TASKS, TaskCfg, find_task
+from veca_marl.envs.team import Script, TeamCfg
 from veca_marl.sim.bodies.base import BodyCfg
 from veca_marl.sim.bodies.humanoid import HumanoidCfg
 from veca_marl.sim.bodies.walker import WalkerCfg
@@ -67,7 +69,13 @@ class Config:
         body: What the players are.
         senses: How well they perceive.
         clock: How time passes.
+        team: What single teams have otherwise: ``+body@team.defender.body=walker_discrete``,
+            ``+senses/vision@team.defender.senses.vision=blind``.
+        opponent: Teams that do not learn and who plays for them: expert, random, idle, or what
+            another run learnt: ``opponent.defender=expert``, ``opponent.defender=runs/...``.
         algo: The learning algorithm and its numbers.
+        learner: The same for single teams: ``+algo@learner.attacker=mappo``.
+        self_play: Which teams learn against past selves.
         collect: How experience is gathered.
         eval: When and how the policy is evaluated.
         log: What is written down.
@@ -84,7 +92,11 @@ class Config:
     body: BodyCfg = MISSING
     senses: SensesCfg = field(default_factory=SensesCfg)
     clock: ClockCfg = field(default_factory=ClockCfg)
+    team: dict[str, TeamCfg] = field(default_factory=dict)
+    opponent: dict[str, str] = field(default_factory=dict)
     algo: PPOCfg = MISSING
+    learner: dict[str, PPOCfg] = field(default_factory=dict)
+    self_play: SelfPlayCfg = field(default_factory=SelfPlayCfg)
     collect: CollectCfg = field(default_factory=CollectCfg)
     eval: EvalCfg = field(default_factory=EvalCfg)
     log: LogCfg = field(default_factory=LogCfg)
@@ -96,16 +108,19 @@ class Config:
     resume: str | None = None
 
     def __post_init__(self) -> None:
+        for team, who in self.opponent.items():
+            _check_opponent(team, who)
         if self.total_frames < 1:
             raise ValueError(f"total_frames must be at least 1, got {self.total_frames}")
         if self.seed < 0:
             raise ValueError(f"seed must be 0 or more, got {self.seed}")
         if self.max_minutes is not None and not self.max_minutes > 0:
             raise ValueError(f"max_minutes must be positive, got {self.max_minutes}")
-        if self.collect.frames < self.algo.minibatches:
+        minibatches = max(cfg.minibatches for cfg in (self.algo, *self.learner.values()))
+        if self.collect.frames < minibatches:
             raise ValueError(
                 f"collect: a batch of {self.collect.frames} frames cannot be split into "
-                f"algo.minibatches={self.algo.minibatches}"
+                f"algo.minibatches={minibatches}"
             )
         if self.threads is not None and self.threads < 1:
             raise ValueError(f"threads must be at least 1, got {self.threads}")
@@ -113,13 +128,59 @@ class Config:
     @property
     def game(self) -> GameCfg:
         """What the environments are made from."""
-        return GameCfg(self.task, self.playground, self.body, self.senses, self.clock)
+        return GameCfg(
+            self.task,
+            self.playground,
+            self.body,
+            self.senses,
+            self.clock,
+            self.team,
+            {team: Script(who) for team, who in self.opponent.items() if who in _SCRIPTS},
+        )
+
+    def check_teams(self) -> None:
+        """Refuse opponents, learners and self-play of teams that are not there to do so.
+
+        Raises:
+            ValueError: If there are any, or if nobody learns.
+        """
+        teams = [team.name for team in self.game.teams]
+        learn = [team for team in teams if team not in self.opponent]
+        for key, asked, choices in (
+            ("opponent", self.opponent, teams),
+            ("learner", self.learner, learn),
+            ("self_play.teams", self.self_play.teams, learn),
+        ):
+            unknown = sorted(set(asked) - set(choices))
+            if unknown:
+                raise ValueError(f"{key}: no {unknown} in {self.task.name}; choices: {choices}")
+        if not learn:
+            raise ValueError(f"opponent: nobody learns: all of {teams} are opponents")
+
+    @property
+    def frozen(self) -> dict[str, Path]:
+        """Teams that are played by what another run learnt, and where that is."""
+        return {team: Path(who) for team, who in self.opponent.items() if who not in _SCRIPTS}
+
+
+_SCRIPTS = tuple(script.value for script in Script)
+
+
+def _check_opponent(team: str, who: str) -> None:
+    if who not in _SCRIPTS and not Path(who).exists():
+        raise ValueError(
+            f"opponent.{team}={who}: choices: {', '.join(_SCRIPTS)}, the folder of a run, "
+            "a checkpoint"
+        )
 
 
 def register_schemas() -> None:
     """Tell Hydra the types behind the YAML files."""
     store = ConfigStore.instance()
-    store.store(name="schema", node=Config)
+    schema = OmegaConf.structured(Config)
+    for by_team in ("team", "opponent", "learner"):  # take any key: the game knows its teams
+        OmegaConf.set_struct(schema[by_team], False)
+    store.store(name="schema", node=schema)
     store.store(group="schema/algo", name="ppo", node=PPOCfg)
     store.store(group="schema/body", name="walker", node=WalkerCfg)
     store.store(group="schema/body", name="humanoid", node=HumanoidCfg)
@@ -164,6 +225,7 @@ def to_config(node: DictConfig) -> Config:
         config = cast(Config, OmegaConf.to_object(node))
         find_task(config.task.name)
         _refuse_extra(config, "")
+        config.check_teams()
     except (OmegaConfBaseException, ValueError) as error:
         raise ConfigError(one_line(error)) from error
     return config

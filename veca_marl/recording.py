@@ -14,7 +14,7 @@ from torchrl.envs import ExplorationType, set_exploration_type
 
 from veca_marl.algos.evaluation import Policy
 from veca_marl.envs.env import VecaEnv
-from veca_marl.envs.game import GameCfg
+from veca_marl.envs.game_cfg import GameCfg
 from veca_marl.video import write_video
 
 SAMPLE_RATE_HZ = 22_050  # of the ears

@@ -6,12 +6,15 @@ import json
 import platform
 import subprocess
 import sys
+from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
+from typing import cast
 
 from omegaconf import DictConfig, OmegaConf
 
+from veca_marl.config import compose_node
 from veca_marl.config_errors import ConfigError
 
 _PACKAGES = ("veca_marl", "torch", "torchrl", "tensordict", "pybullet", "numpy", "numba")
@@ -42,11 +45,29 @@ class RunFolder:
         """An episode of the trained policy."""
         return self.path / "videos" / "final.mp4"
 
-    def begin(self, node: DictConfig) -> None:
+    @property
+    def pool(self) -> Path:
+        """The folder of past selves."""
+        return self.path / "pool"
+
+    @property
+    def provenance(self) -> Path:
+        """How the run came about."""
+        return self.path / "provenance.json"
+
+    def begin(self, node: DictConfig, overrides: Sequence[str]) -> None:
         """Claim the folder: write down what the run is."""
         self.path.mkdir(parents=True, exist_ok=True)
-        self.write("provenance.json", json.dumps(_provenance(), indent=2))
+        self.provenance.write_text(json.dumps(_provenance(overrides), indent=2) + "\n")
         self.config.write_text(OmegaConf.to_yaml(node, resolve=True))
+
+    def typed_config(self) -> DictConfig:
+        """Return the configuration of the run, with the types that its choices have."""
+        overrides = json.loads(self.provenance.read_text())["overrides"]
+        return cast(DictConfig, OmegaConf.merge(compose_node(overrides), self._stored()))
+
+    def _stored(self) -> DictConfig:
+        return cast(DictConfig, OmegaConf.load(self.config))
 
     def write(self, name: str, text: str) -> None:
         """Write a small text file."""
@@ -83,9 +104,10 @@ def remove_if_empty(path: Path) -> None:
         path.rmdir()
 
 
-def _provenance() -> dict[str, object]:
+def _provenance(overrides: Sequence[str]) -> dict[str, object]:
     return {
         "command": sys.argv,
+        "overrides": list(overrides),
         "commit": _git_commit(),
         "python": platform.python_version(),
         "packages": {name: version(name) for name in _PACKAGES},

@@ -10,71 +10,26 @@ import logging
 import os
 import signal
 import sys
-from functools import partial
 from pathlib import Path
-from typing import Any, NoReturn, cast
+from typing import NoReturn
 
 import hydra
-import torch
 from hydra.core.hydra_config import HydraConfig
 from hydra.errors import HydraException
 from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
-from veca_marl.algos.checkpoint import CheckpointError, Checkpoints, Identity
-from veca_marl.algos.loop import Budget, Trainer
-from veca_marl.algos.metrics import CsvReporter, Reporter, TensorBoardReporter
-from veca_marl.algos.ppo import PPO
-from veca_marl.algos.specs import TeamSpec, team_specs
-from veca_marl.config import CONF, Config, compose_node, to_config
+from veca_marl.algos.checkpoint import CheckpointError
+from veca_marl.algos.loop import Trainer
+from veca_marl.assembly import make_reporters, make_trainer
+from veca_marl.config import CONF, Config, to_config
 from veca_marl.config_errors import ConfigError, one_line
-from veca_marl.envs.env import VecaEnv
-from veca_marl.envs.game import GameCfg
 from veca_marl.recording import record_episode
 from veca_marl.run_folder import RunFolder, new_run, open_run, remove_if_empty
 
 _COMMAND = "python -m veca_marl.train"
 _DISK_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 RESUMABLE = ("resume", "total_frames", "max_minutes", "device", "threads")
-
-
-def make_env(game: GameCfg, worlds: int, seed: int) -> VecaEnv:
-    """Return `worlds` games in one environment; bound to its game it is an `EnvFactory`."""
-    return VecaEnv(game, worlds, seed)
-
-
-def make_trainer(cfg: Config, folder: RunFolder) -> Trainer:
-    """Put together what trains as configured, into `folder`.
-
-    Raises:
-        ConfigError: If the device or the world cannot be.
-        CheckpointError: If the run to continue does not fit.
-    """
-    device = find_device(cfg.device)
-    if cfg.threads is not None:
-        torch.set_num_threads(cfg.threads)
-    torch.manual_seed(cfg.seed)
-    specs = read_specs(cfg.game)
-    checkpoints = Checkpoints(
-        folder.checkpoints,
-        Identity(cfg.task.name, specs),
-        cast(dict[str, Any], OmegaConf.to_container(OmegaConf.structured(cfg), enum_to_str=True)),
-        cfg.log.keep_checkpoints,
-    )
-    trainer = Trainer(
-        make_env=partial(make_env, cfg.game),
-        algorithm=PPO(specs, cfg.algo, device),
-        collect=cfg.collect,
-        evaluation=cfg.eval,
-        budget=Budget(cfg.total_frames, cfg.max_minutes),
-        checkpoints=checkpoints,
-        reporters=[],
-        seed=cfg.seed,
-        progress_bar=cfg.log.progress_bar,
-    )
-    if cfg.resume is not None:
-        trainer.resume(checkpoints.latest())
-    return trainer
 
 
 def train(cfg: Config, folder: RunFolder, trainer: Trainer) -> list[str]:
@@ -92,42 +47,6 @@ def train(cfg: Config, folder: RunFolder, trainer: Trainer) -> list[str]:
     return lines
 
 
-def read_specs(game: GameCfg) -> dict[str, TeamSpec]:
-    """Build one world to see what its teams perceive and do.
-
-    Raises:
-        ConfigError: If no world can be made from `game`.
-    """
-    try:
-        env = make_env(game, 1, 0)
-    except ValueError as error:
-        raise ConfigError(one_line(error)) from error
-    specs = team_specs(env)
-    env.close()
-    return specs
-
-
-def find_device(name: str) -> torch.device:
-    """Return the device called `name`.
-
-    Raises:
-        ConfigError: If there is none.
-    """
-    found = [f"cuda:{i}" for i in range(torch.cuda.device_count())]
-    choices = ["cpu", *(["cuda"] if found else []), *found]
-    if name not in choices:
-        raise ConfigError(f"device={name} is not on this machine; choices: {', '.join(choices)}")
-    return torch.device(name)
-
-
-def make_reporters(cfg: Config, folder: RunFolder, resumed_frames: int) -> list[Reporter]:
-    """Return what writes the numbers down, rid of rows that will be written again."""
-    reporters: list[Reporter] = [CsvReporter(folder.path, resumed_frames)]
-    if cfg.log.tensorboard:
-        reporters.append(TensorBoardReporter(folder.path, resumed_frames))
-    return reporters
-
-
 def stored_config(folder: RunFolder, asked: DictConfig, overrides: list[str]) -> Config:
     """Return the configuration of an earlier run, with the changes a resumption may make.
 
@@ -139,8 +58,7 @@ def stored_config(folder: RunFolder, asked: DictConfig, overrides: list[str]) ->
     Raises:
         ConfigError: If anything else is to change, or it is a run of another task.
     """
-    stored = OmegaConf.load(folder.config)
-    task = stored.task.name
+    task = OmegaConf.load(folder.config).task.name
     names = {text.partition("=")[0]: text.partition("=")[2] for text in overrides}
     if names.pop("+task", task) != task:
         raise ConfigError(f"{folder.path} is a run of {task}, not of {asked.task.name}")
@@ -150,7 +68,7 @@ def stored_config(folder: RunFolder, asked: DictConfig, overrides: list[str]) ->
             f"a resumed run stays as it was: cannot change {', '.join(changed)}; "
             f"choices: {', '.join(RESUMABLE)}"
         )
-    node = cast(DictConfig, OmegaConf.merge(compose_node([f"+task={task}"]), stored))
+    node = folder.typed_config()
     for name in names:
         node[name] = asked[name]
     return to_config(node)
@@ -187,7 +105,7 @@ def set_up(node: DictConfig, path: Path) -> tuple[Config, RunFolder, Trainer]:
     folder = new_run(path)
     cfg = to_config(node)
     trainer = make_trainer(cfg, folder)
-    folder.begin(node)
+    folder.begin(node, list(HydraConfig.get().overrides.task))
     return cfg, folder, trainer
 
 

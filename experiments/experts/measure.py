@@ -15,7 +15,8 @@ import numpy as np
 
 import veca_marl
 from veca_marl.config import compose
-from veca_marl.envs.game import Game, GameCfg, Observation
+from veca_marl.envs.game import Game, Observation
+from veca_marl.envs.game_cfg import GameCfg
 from veca_marl.envs.task import Player
 
 HERE = Path(__file__).parent
@@ -43,7 +44,7 @@ def play(cfg: GameCfg, choose: Choice, seed: int) -> float:
         rows = {p.name: choose(game, p, game.observe(p), rng) for p in game.players}
         outcome = game.step(rows, rng)
         paid += float(np.mean([game.pay(terms) for terms in outcome.terms.values()]))
-        over = outcome.terminated or outcome.truncated
+        over = outcome.done
     game.close()
     return paid
 

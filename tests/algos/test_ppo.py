@@ -7,7 +7,7 @@ from fake_env import FakeEnv
 from torchrl.envs import ExplorationType, set_exploration_type
 
 from veca_marl.algos.collect import CollectCfg, Experience
-from veca_marl.algos.ppo import PPOCfg
+from veca_marl.algos.learner import PPOCfg
 
 
 def gae_by_hand(value, following, reward, done, terminated, gamma=0.99, lmbda=0.95):

@@ -31,7 +31,7 @@ def play(game, seed):
         outcome = game.step({player.name: row}, rng)
         for name, value in outcome.terms[player.name].items():
             total[name] = total.get(name, 0.0) + value
-        over = outcome.terminated or outcome.truncated
+        over = outcome.done
     return total, game.task.solved
 
 

@@ -10,7 +10,8 @@ import torch
 from veca_marl.bench.free_play import free_play
 from veca_marl.config import compose
 from veca_marl.envs.env import VecaEnv
-from veca_marl.envs.game import Game, GameCfg
+from veca_marl.envs.game import Game
+from veca_marl.envs.game_cfg import GameCfg
 from veca_marl.envs.pettingzoo import VecaParallelEnv
 from veca_marl.sim.bullet import pybullet
 

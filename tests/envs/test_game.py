@@ -109,7 +109,7 @@ def test_one_impossible_action_stops_everybody(duel):
 def test_everybody_must_be_told(duel):
     actions = still(duel)
     del actions["blue_0"]
-    with pytest.raises(ValueError, match=r"\['blue_1', 'red'\].*'blue_0'"):
+    with pytest.raises(ValueError, match=r"no action for \['blue_0'\]"):
         duel.step(actions, np.random.default_rng(0))
     with pytest.raises(ValueError, match="'green'"):
         duel.step({**still(duel), "green": np.zeros(2)}, np.random.default_rng(0))

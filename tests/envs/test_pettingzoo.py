@@ -13,7 +13,7 @@ from pettingzoo.utils import parallel_to_aec
 from veca_marl.bench.free_play import free_play
 from veca_marl.config import compose
 from veca_marl.envs.env import VecaEnv
-from veca_marl.envs.game import GameCfg
+from veca_marl.envs.game_cfg import GameCfg
 from veca_marl.envs.pettingzoo import VecaParallelEnv, parallel_env
 
 AGENTS = ["red", "blue_0", "blue_1"]

@@ -9,6 +9,7 @@ from veca_marl.envs.game import Game
 from veca_marl.envs.tasks.pile_up_block import PileUpBlockCfg
 
 EDGE = 0.06
+EXPERT_SEEDS = (0, 1, 2, 3)
 AWAY = (1.0, 1.0, EDGE / 2)
 
 
@@ -86,13 +87,15 @@ def test_a_touched_pile_is_not_solved(game):
 
 
 def test_the_expert_piles_up(game):
-    results = [play(game, seed) for seed in EXPERT_SEEDS]
-    assert any(solved for _, solved in results)
-    assert np.mean([total["height"] for total, _ in results]) > 50.0
-    assert sits(game)
-
-
-EXPERT_SEEDS = (0, 1, 2)
+    heights, solved = [], 0
+    for seed in EXPERT_SEEDS:
+        total, piled_up = play(game, seed)
+        heights.append(total["height"])
+        solved += piled_up
+        assert sits(game)
+    assert solved >= len(EXPERT_SEEDS) / 2
+    assert min(heights) > 20.0  # it lifts in every episode, though it may drop the block
+    assert np.mean(heights) > 0.3 * game.max_steps
 
 
 @pytest.mark.parametrize(

@@ -2,34 +2,34 @@
 
 import numpy as np
 import pytest
+from babies import (
+    BODIES,
+    check_limbs_fall_and_none_flies,
+    check_walkers_are_refused,
+    child_game,
+    hold,
+    play,
+    put,
+    starts,
+)
 
 from veca_marl.config import compose
-from veca_marl.envs.game import Game
+from veca_marl.config_errors import ConfigError
 from veca_marl.envs.tasks.sit_baby import SitBabyCfg
 from veca_marl.sim.bodies.postures import ON_BACK, SITTING, STANDING, Posture
 
 
-def game_of(*overrides):
-    game = Game(compose(["+task=SitBaby", "senses/touch=numb", *overrides]).game)
-    game.reset(np.random.default_rng(0))
-    return game
-
-
 @pytest.fixture(scope="module")
 def game():
-    game = game_of()
-    yield game
-    game.close()
+    with child_game("SitBaby") as game:
+        yield game
 
 
 def terms_in(game, posture, seconds=0.04):
     """Return the terms after holding a posture."""
-    game.reset(np.random.default_rng(1))
-    body = game.players[0].body
-    body.place((0.0, 0.0, 0.0), 0.7, posture)
+    angles = put(game, posture).angles_of(posture)
     for _ in range(round(seconds / 0.04)):
-        row = body.encode(body.angles_of(posture))
-        outcome = game.step({"agents": row}, np.random.default_rng(0))
+        outcome = hold(game, angles)
     return outcome.terms["agents"]
 
 
@@ -61,34 +61,24 @@ def test_an_episode_is_worth_ten(game):
 
 
 def test_it_starts_on_the_back_at_rest(game):
-    for seed in range(8):
-        game.reset(np.random.default_rng(seed))
-        body = game.players[0].body
-        rest = {"agents": np.zeros(body.action_spec.shape, np.float32)}
-        for _ in range(12):
-            game.step(rest, np.random.default_rng(0))
-            assert np.linalg.norm(body.velocities(), axis=1).max() < 2.5
+    for body in starts(game, 8):
+        check_limbs_fall_and_none_flies(game)
         assert body.bone("chest").forward[2] > 0.8
 
 
-@pytest.mark.parametrize("body", ["mitten_limbs", "mitten_position"])
+@pytest.mark.parametrize("body", BODIES)
 def test_the_expert_sits_in_the_end(body):
-    game, rng = game_of(f"body={body}"), np.random.default_rng(3)
-    player, ends = game.players[0], []
-    for _ in range(4):
-        game.reset(rng)
-        for _ in range(game.max_steps):
-            row = player.body.encode(game.task.expert(player, {}))
-            outcome = game.step({player.name: row}, rng)
-        ends.append(min(outcome.terms[player.name].values()))
-        assert not outcome.terminated
+    rng, ends = np.random.default_rng(3), []
+    with child_game("SitBaby", f"body={body}") as game:
+        for _ in range(4):
+            last = play(game, rng)[0][-1]
+            ends.append(min(last.terms["agents"].values()))
+            assert not last.terminated
     assert np.median(ends) > 0.8
-    game.close()
 
 
 def test_a_walker_is_refused():
-    with pytest.raises(ValueError, match="body with joints"):
-        game_of("body=walker")
+    check_walkers_are_refused("SitBaby")
 
 
 @pytest.mark.parametrize(
@@ -97,3 +87,27 @@ def test_a_walker_is_refused():
 def test_impossible_numbers_are_refused(wrong):
     with pytest.raises(ValueError, match=next(iter(wrong))):
         SitBabyCfg(**wrong)
+
+
+def test_episodes_begin_in_the_postures_that_are_asked_for():
+    """Lying, a chest is low and looks up or down; on all fours it is higher, sitting upright."""
+
+    def chests(**shares):
+        asked = ",".join(f"{name}:{share}" for name, share in shares.items())
+        with child_game("SitBaby", f"task.starts={{{asked}}}") as game:
+            for seed in range(12):
+                game.reset(np.random.default_rng(seed))
+                chest = game.task.body.bone("chest")
+                yield chest.position[2], chest.forward[2]
+
+    assert all(forward > 0.7 for _, forward in chests())
+    assert all(forward < -0.7 for _, forward in chests(on_back=0, on_belly=1))
+    heights = [height for height, _ in chests(on_belly=1, sitting=2)]
+    assert min(heights) < 0.1
+    assert max(heights) > 0.2
+
+
+@pytest.mark.parametrize("starts", ["{on_back:0}", "{on_back:-1,sitting:2}", "{sitting:inf}"])
+def test_impossible_shares_of_starts_are_refused(starts):
+    with pytest.raises(ConfigError, match=r"task.starts=.* must be shares"):
+        compose(["+task=SitBaby", f"task.starts={starts}"])

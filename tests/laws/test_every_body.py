@@ -10,7 +10,8 @@ from torchrl.envs import check_env_specs
 from veca_marl.bench.free_play import free_play
 from veca_marl.config import CONF, compose
 from veca_marl.envs.env import VecaEnv
-from veca_marl.envs.game import Game, GameCfg
+from veca_marl.envs.game import Game
+from veca_marl.envs.game_cfg import GameCfg
 from veca_marl.sim.bodies.base import MOUNTS
 
 BODIES = sorted(path.stem for path in (CONF / "body").glob("*.yaml"))

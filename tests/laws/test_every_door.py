@@ -5,25 +5,14 @@ import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
 from pettingzoo.test import parallel_api_test, parallel_seed_test
-from rollouts import KINDS, game_cfg, play
+from rollouts import game_cfg, play
 
 from veca_marl.envs.env import VecaEnv
 from veca_marl.envs.gymnasium import VecaGymEnv
 from veca_marl.envs.pettingzoo import VecaParallelEnv
-from veca_marl.envs.task import TASKS
 
 STEPS = 15
 SHORT = "task.max_seconds=0.4"  # an episode ends within the steps, and another begins
-
-
-@pytest.fixture(scope="module", params=sorted(TASKS))
-def task(request):
-    return request.param
-
-
-@pytest.fixture(scope="module", params=sorted(KINDS))
-def kind(request):
-    return request.param
 
 
 @pytest.fixture(scope="module")
@@ -33,7 +22,7 @@ def cfg(task, kind):
 
 @pytest.fixture(scope="module")
 def is_for_one(task):
-    return sum(team.size for team in TASKS[task].teams) == 1
+    return sum(team.size for team in game_cfg(task).teams) == 1
 
 
 @pytest.fixture(scope="module")

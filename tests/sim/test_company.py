@@ -6,7 +6,8 @@ from walking import box, empty_world, walker_in
 
 from veca_marl.bench.free_play import free_play
 from veca_marl.config import compose
-from veca_marl.envs.game import Game, GameCfg
+from veca_marl.envs.game import Game
+from veca_marl.envs.game_cfg import GameCfg
 from veca_marl.sim.bodies.voice_controls import VoiceKind
 from veca_marl.sim.senses import SensesCfg, give_senses
 from veca_marl.sim.skeleton import load_skeleton

@@ -179,12 +179,18 @@ def test_a_ball_pinned_on_a_wall_is_squeezed_aside(aside_m, radius_m, speed):
     assert fastest < (3.0 if aside_m == 0.0 else 4.0)
 
 
-def test_two_walkers_do_not_pass_through_each_other():
+def walk_at_each_other(aside_m):
+    """Return a world, a walker and another who comes along a line so far aside."""
     world = empty_world()
     one = walker_in(world, "one", place=(-1.0, 0.0, 0.0))
-    two = walker_in(world, "two", place=(1.0, 0.01, 0.0), yaw_deg=180.0)
+    two = walker_in(world, "two", place=(1.0, aside_m, 0.0), yaw_deg=180.0)
     one.walk(1.0, 0.0)
     two.walk(1.0, 0.0)
+    return world, one, two
+
+
+def test_two_walkers_do_not_pass_through_each_other():
+    world, one, two = walk_at_each_other(0.01)
     nearest = math.inf
     for _ in range(250):
         world.step()
@@ -193,11 +199,7 @@ def test_two_walkers_do_not_pass_through_each_other():
 
 
 def test_two_walkers_head_on_stop_each_other():
-    world = empty_world()
-    one = walker_in(world, "one", place=(-1.0, 0.0, 0.0))
-    two = walker_in(world, "two", place=(1.0, 0.0, 0.0), yaw_deg=180.0)
-    one.walk(1.0, 0.0)
-    two.walk(1.0, 0.0)
+    world, one, two = walk_at_each_other(0.0)
     let_pass(world, 4.0)
     assert two.position[0] - one.position[0] > 2.0 * RADIUS_M - 0.02
     assert abs(one.position[0] + two.position[0]) < 0.05

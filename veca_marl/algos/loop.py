@@ -32,6 +32,7 @@ from veca_marl.algos.evaluation import (
 )
 from veca_marl.algos.metrics import Reporter, Stopwatch, TrainingEpisodes
 from veca_marl.algos.ppo import PPO
+from veca_marl.algos.self_play import AllLearn, Matchmaking
 from veca_marl.algos.specs import EnvFactory
 
 _EVALUATION_STAGE = 2**31 - 1  # in place of a stage number: starts no training stage ever uses
@@ -81,6 +82,7 @@ class Trainer:
         reporters: Where numbers go.
         seed: Everything random follows from it.
         progress_bar: Whether to show one.
+        matchmaking: Who learns against whom.
         progress: Where the run stands.
         watch: Where the time goes.
         player: The copy of the policy that plays, on the CPU.
@@ -95,6 +97,7 @@ class Trainer:
     reporters: Sequence[Reporter]
     seed: int
     progress_bar: bool = True
+    matchmaking: Matchmaking = field(default_factory=AllLearn)
     progress: Progress = field(default_factory=Progress)
     watch: Stopwatch = field(default_factory=Stopwatch)
     _resumed_frames: int = 0
@@ -145,6 +148,8 @@ class Trainer:
         return self.watch.table(self.progress.frames - self._resumed_frames)
 
     def _run_stage(self, experience: Experience, bar: tqdm[Any]) -> None:
+        self.matchmaking.begin_stage(self.progress.stage, self.progress.frames)
+        self._equip(experience)
         with self.watch.measure("collect"):
             experience.restart(_seed(self.seed, self.progress.stage))
         episodes = TrainingEpisodes()
@@ -166,20 +171,27 @@ class Trainer:
         with self.watch.measure("update"):
             measured = self.algorithm.learn(rows)
         with self.watch.measure("transfer"):
-            self.algorithm.refresh(self.player)
-            experience.update_policy()
+            self._equip(experience)
         self.progress.iteration += 1
         self.progress.frames += self.collect.frames
         row: dict[str, float] = {"iteration": self.progress.iteration}
         for team, measures in measured.items():
             both = episodes.add(batch, team) | measures
             row |= {f"{team}/{name}": value for name, value in both.items()}
+        row |= self.matchmaking.note()
         row["frames_per_s"] = self.collect.frames / (self.watch.elapsed_s - before)
         for reporter in self.reporters:
             reporter.write("metrics", self.progress.frames, row)
         return row
 
+    def _equip(self, experience: Experience) -> None:
+        """Let the worlds be played by what was learnt, and by whom it is to meet."""
+        self.algorithm.refresh(self.player)
+        self.matchmaking.dress(self.player)
+        experience.update_policy()
+
     def _end_stage(self, eval_env: EnvBase) -> dict[str, Scores]:
+        self.algorithm.refresh(self.player)
         with self.watch.measure("evaluate"):
             scores = self._play(eval_env)
         self._report_scores("policy", scores)
@@ -187,6 +199,7 @@ class Trainer:
         best = mean > self.progress.best_return
         self.progress.best_return = max(mean, self.progress.best_return)
         self.progress.stage += 1
+        self.matchmaking.end_stage(self.progress.frames)
         with self.watch.measure("checkpoint"):
             self._save(best)
         return scores

@@ -10,6 +10,9 @@ from torch import Tensor
 from torch.distributions import Distribution, kl_divergence
 from torchrl.objectives import ClipPPOLoss
 
+# where TorchRL's losses look for the rows that count, both to normalise and to average
+VALID = "shifted_valid"
+
 
 class ExactKLPPOLoss(ClipPPOLoss):
     """Clipped PPO whose ``kl_approx`` is the analytic KL(old || new).
@@ -17,7 +20,8 @@ class ExactKLPPOLoss(ClipPPOLoss):
     TorchRL reports the mean of ``log old - log new`` over the sampled actions; its sign
     fluctuates, and a negative value never moves an adaptive learning rate. The batch holds the
     parameters of the distribution that acted, so the divergence itself costs no forward pass
-    (for two tanh-normals it is that of the normals: the tanh drops out).
+    (for two tanh-normals it is that of the normals: the tanh drops out). Rows that do not count
+    (`VALID` is False there) do not enter it.
 
     Overrides the private hook ``_log_weight``; `tests/algos/test_losses.py` pins it.
     """
@@ -30,4 +34,7 @@ class ExactKLPPOLoss(ClipPPOLoss):
         log_weight, new, _, correction = super()._log_weight(tensordict, adv_shape)
         with torch.no_grad():
             divergence = kl_divergence(old, new)
+            valid = tensordict.get(VALID, None)
+            if valid is not None:
+                divergence = divergence[valid.squeeze(-1)]
         return log_weight, new, divergence, correction

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field
 from enum import Enum
@@ -18,7 +19,7 @@ from torch.distributions import Categorical
 from torchrl.modules import TanhNormal
 
 from veca_marl.algos.encoders import make_encoder, orthogonal
-from veca_marl.algos.specs import ActionLayout, ArrayLayout, TeamSpec
+from veca_marl.algos.specs import ArrayLayout, TeamSpec
 
 
 class Precision(Enum):
@@ -26,6 +27,25 @@ class Precision(Enum):
 
     float32 = "float32"
     bfloat16 = "bfloat16"
+
+
+class Critic(Enum):
+    """What the critic of an agent judges by; its actor sees its own observation alone in any case.
+
+    Attributes:
+        own: The agent's observation: independent PPO (de Witt et al. 2020).
+        central: The observations of its whole team: MAPPO (Yu et al. 2022).
+    """
+
+    own = "own"
+    central = "central"
+
+
+class Parameters(Enum):
+    """Whether the agents of a team share one network or have one each."""
+
+    shared = "shared"
+    separate = "separate"
 
 
 @dataclass
@@ -37,12 +57,16 @@ class NetworkCfg:
         vector_features: Width of the encoder of any sense that is not an image.
         trunk_features: Width of the joined layer that both heads read.
         precision: Arithmetic of encoders and trunk.
+        critic: What the critic judges by.
+        parameters: One network for a team, or one for each of its agents.
     """
 
     channels: list[int] = field(default_factory=lambda: [16, 32, 32])
     vector_features: int = 64
     trunk_features: int = 256
     precision: Precision = Precision.float32
+    critic: Critic = Critic.own
+    parameters: Parameters = Parameters.shared
 
     def __post_init__(self) -> None:
         if len(self.channels) != 3:
@@ -54,8 +78,8 @@ class NetworkCfg:
 class Trunk(nn.Module):
     """Observations ``(..., agents, *shape)`` of each sense to features ``(..., agents, F)``.
 
-    Agents of a team are folded into the batch: they share the parameters. A sense that the team
-    does not have leaves no parameters.
+    Agents are folded into the batch: they share the parameters. A sense that the team does not
+    have leaves no parameters.
     """
 
     def __init__(self, observations: dict[str, ArrayLayout], cfg: NetworkCfg) -> None:
@@ -88,6 +112,38 @@ class Trunk(nn.Module):
         return torch.autocast(device.type, dtype=torch.bfloat16)
 
 
+class PerAgent(nn.Module):
+    """A module for each agent: arrays ``(..., agents, *shape)`` to ``(..., agents, F)``.
+
+    Args:
+        make: Makes one; its input keeps an agent dimension, of length one.
+        agents: How many.
+        ranks: The number of dimensions of each array's `shape`.
+    """
+
+    def __init__(self, make: Callable[[], nn.Module], agents: int, ranks: Sequence[int]) -> None:
+        super().__init__()
+        self.agents = nn.ModuleList(make() for _ in range(agents))
+        self._dims = [-rank - 1 for rank in ranks]
+
+    def forward(self, *arrays: Tensor) -> Tensor:
+        """Let each agent's module work on its part."""
+        parts = [
+            module(*(a.narrow(d, i, 1) for a, d in zip(arrays, self._dims, strict=True)))
+            for i, module in enumerate(self.agents)
+        ]
+        return torch.cat(parts, dim=-2)
+
+
+class WithTeam(nn.Module):
+    """Features ``(..., agents, F)`` to ``(..., agents, 2 F)``: each beside the mean of its team."""
+
+    def forward(self, features: Tensor) -> Tensor:
+        """Append the mean over the agents."""
+        mean = features.mean(dim=-2, keepdim=True).expand_as(features)
+        return torch.cat([features, mean], dim=-1)
+
+
 class TeamNetwork(nn.Module):
     """Actor and critic of one team over a shared trunk.
 
@@ -101,28 +157,59 @@ class TeamNetwork(nn.Module):
 
     def __init__(self, team: str, spec: TeamSpec, cfg: NetworkCfg) -> None:
         super().__init__()
+        ranks = [len(layout.shape) for layout in spec.observations.values()]
         self.trunk = TensorDictModule(
-            Trunk(spec.observations, cfg),
+            _of_the_agents(lambda: Trunk(spec.observations, cfg), spec, cfg, ranks),
             in_keys=[(team, "observation", name) for name in spec.observations],
             out_keys=[(team, "features")],
         )
-        head, distribution = _policy_head(team, spec.action, cfg.trunk_features)
+        head, distribution = _policy_head(team, spec, cfg)
         self.actor = ProbabilisticTensorDictSequential(self.trunk, head, distribution)
         self.distribution_keys = list(head.out_keys)
         self.critic = TensorDictModule(
-            orthogonal(nn.Linear(cfg.trunk_features, 1), gain=1.0),
+            _value_head(spec, cfg),
             in_keys=[(team, "features")],
             out_keys=[(team, "state_value")],
         )
 
 
+def _of_the_agents(
+    make: Callable[[], nn.Module], spec: TeamSpec, cfg: NetworkCfg, ranks: Sequence[int] = (1,)
+) -> nn.Module:
+    """Return a module for the whole team, or one for each of its agents."""
+    if cfg.parameters is Parameters.shared:
+        return make()
+    return PerAgent(make, spec.agents, ranks)
+
+
+def _value_head(spec: TeamSpec, cfg: NetworkCfg) -> nn.Module:
+    """Return what turns features ``(..., agents, F)`` into values ``(..., agents, 1)``."""
+    width = cfg.trunk_features
+    if cfg.critic is Critic.own:
+        return _of_the_agents(lambda: orthogonal(nn.Linear(width, 1), gain=1.0), spec, cfg)
+
+    def judge() -> nn.Module:
+        return nn.Sequential(
+            orthogonal(nn.Linear(2 * width, width)),
+            nn.ReLU(),
+            orthogonal(nn.Linear(width, 1), gain=1.0),
+        )
+
+    return nn.Sequential(WithTeam(), _of_the_agents(judge, spec, cfg))
+
+
 def _policy_head(
-    team: str, action: ActionLayout, features: int
+    team: str, spec: TeamSpec, cfg: NetworkCfg
 ) -> tuple[TensorDictModule, ProbabilisticTensorDictModule]:
     """Return the layer that parametrises the distribution, and the distribution."""
+    action = spec.action
     outputs = action.size if action.discrete else 2 * action.size
-    # a small gain: the first policy is nearly the same everywhere (Huang et al. 2022, detail 2)
-    layer: nn.Module = orthogonal(nn.Linear(features, outputs), gain=0.01)
+
+    def linear() -> nn.Module:
+        # a small gain: the first policy is nearly the same everywhere (Huang et al. 2022, detail 2)
+        return orthogonal(nn.Linear(cfg.trunk_features, outputs), gain=0.01)
+
+    layer = _of_the_agents(linear, spec, cfg)
     if not action.discrete:
         layer = nn.Sequential(layer, NormalParamExtractor())
     names = ["logits"] if action.discrete else ["loc", "scale"]

@@ -57,11 +57,13 @@ class TeamSpec:
         agents: Number of agents.
         observations: Sense name to its layout.
         action: The action's layout.
+        masked: Whether ``(team, "mask")`` says which agents still take part.
     """
 
     agents: int
     observations: dict[str, ArrayLayout]
     action: ActionLayout
+    masked: bool = False
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain lists, numbers and strings, comparable after a round trip to disk."""
@@ -86,6 +88,7 @@ def team_specs(env: EnvBase) -> dict[str, TeamSpec]:
                 for name, spec in sorted(env.observation_spec[team, "observation"].items())
             },
             action=_action_layout(team, env.full_action_spec[team, "action"]),
+            masked="mask" in env.observation_spec[team].keys(),  # noqa: SIM118  a spec
         )
         for team, agents in env.group_map.items()
     }

@@ -18,7 +18,7 @@ from veca_marl.bench.report import as_json, references_table, rollouts_table
 from veca_marl.bench.rollouts import Rollouts, measure_first_world, measure_rollouts
 from veca_marl.config import compose
 from veca_marl.config_errors import ConfigError
-from veca_marl.envs.game import GameCfg
+from veca_marl.envs.game_cfg import GameCfg
 from veca_marl.envs.task import TaskCfg, find_task
 from veca_marl.sim.bodies.humanoid import HumanoidCfg
 

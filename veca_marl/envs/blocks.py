@@ -31,10 +31,7 @@ class BlocksCfg(TaskCfg):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        for name in ("edge_m", "mass_kg", "friction"):
-            value = getattr(self, name)
-            if not (math.isfinite(value) and value > 0.0):
-                raise ValueError(f"task.{name}={value} must be a positive number")
+        self._check_positive("edge_m", "mass_kg", "friction")
         if self.edge_m > 0.1:
             raise ValueError(f"task.edge_m={self.edge_m}: a child's hands span at most 0.1 m")
 

@@ -8,10 +8,11 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 from tensordict import TensorDict, TensorDictBase
-from torchrl.data import Composite, Unbounded
+from torchrl.data import Categorical, Composite, Unbounded
 from torchrl.envs import EnvBase
 
-from veca_marl.envs.game import Game, GameCfg, Outcome
+from veca_marl.envs.game import Game, Outcome
+from veca_marl.envs.game_cfg import GameCfg
 from veca_marl.envs.layout import Arrays, Layout
 from veca_marl.envs.specs import done_spec, observation_spec, to_torchrl
 from veca_marl.envs.spectator import Spectator
@@ -28,6 +29,13 @@ class VecaEnv(EnvBase):
         (team, "terms", name)          (W, n, 1) unweighted reward terms of the last step
         (team, "reward")               (W, n, 1) weighted sum of the terms
         (team, "done" | "terminated" | "truncated")  (W, n, 1), and the same at the root (W, 1)
+        (team, "mask")                 (W, n) bool, in tasks that eliminate: False who is out
+
+    The flags at the root say when a game is over for everyone and starts anew. A player can be out
+    before (`Task.is_out`): it stays in the batch with its flags up, its mask down, zeros for
+    observation and reward, and its action is not looked at.
+
+    Teams that follow a script (`GameCfg.script`) are part of the world: they have no keys.
 
     Args:
         cfg: What is played.
@@ -45,7 +53,8 @@ class VecaEnv(EnvBase):
         super().__init__(device=None, batch_size=torch.Size([worlds]))
         self.cfg = cfg
         self.games = [Game(cfg) for _ in range(worlds)]
-        self._teams = [team.name for team in type(self.games[0].task).teams]
+        self._teams = [team.name for team in cfg.teams if team.name not in cfg.script]
+        self._eliminates = type(self.games[0].task).eliminates
         self.group_map = {
             team: [player.name for player in self.games[0].team(team)] for team in self._teams
         }
@@ -67,6 +76,8 @@ class VecaEnv(EnvBase):
                 for name, spec in sense.specs.items()
             }
             observed[team] = observation_spec(specs, tuple(self.games[0].weights), *batch)
+            if self._eliminates:
+                observed[team, "mask"] = Categorical(2, shape=batch, dtype=torch.bool)
             action[team] = Composite(
                 action=to_torchrl(players[0].body.action_spec, batch), shape=batch
             )
@@ -93,15 +104,16 @@ class VecaEnv(EnvBase):
             game = self.games[world]
             game.reset(self._rngs[world])
             self._players[world] = {team: game.team(team) for team in self._teams}
-            self._observe(world, arrays)
+            self._observe(world, arrays, out=frozenset())
         return self._start.tensordict(arrays)
 
     def _step(self, tensordict: TensorDictBase) -> TensorDict:
         self._command({team: self._actions(team, tensordict) for team in self._teams})
         arrays = self._next.new()
         for world, game in enumerate(self.games):
+            out = game.out
             outcome = game.advance(self._rngs[world])
-            self._observe(world, arrays)
+            self._observe(world, arrays, out)
             self._score(world, arrays, outcome)
         return self._next.tensordict(arrays)
 
@@ -136,22 +148,27 @@ class VecaEnv(EnvBase):
             except ValueError as error:
                 raise ValueError(f"world {world}, {error}") from None
 
-    def _observe(self, world: int, arrays: Arrays) -> None:
-        """Let all players of a world perceive."""
+    def _observe(self, world: int, arrays: Arrays, out: frozenset[str]) -> None:
+        """Let all players of a world perceive but those who were out before this step."""
         game = self.games[world]
         for team, players in self._players[world].items():
             senses = arrays[team]["observation"]
             for index, player in enumerate(players):
+                if self._eliminates:
+                    arrays[team]["mask"][world, index] = player.name not in game.out
+                if player.name in out:
+                    continue
                 for name, value in game.observe(player).items():
                     senses[name][world, index] = value
 
     def _score(self, world: int, arrays: Arrays, outcome: Outcome) -> None:
         """Pay all players of a world, and say whether their game is over."""
         game = self.games[world]
-        _flag(world, arrays, outcome)
+        _flag(arrays, world, outcome.terminated, outcome.truncated)
         for team, players in self._players[world].items():
-            _flag(world, arrays[team], outcome)
             for index, player in enumerate(players):
+                over = outcome.terminated_for(player.name)
+                _flag(arrays[team], (world, index), over, outcome.truncated)
                 terms = outcome.terms[player.name]
                 arrays[team]["reward"][world, index] = game.pay(terms)
                 for name, value in terms.items():
@@ -164,7 +181,7 @@ class VecaEnv(EnvBase):
         super().close(raise_if_closed=raise_if_closed)
 
 
-def _flag(world: int, arrays: Arrays, outcome: Outcome) -> None:
-    arrays["terminated"][world] = outcome.terminated
-    arrays["truncated"][world] = outcome.truncated
-    arrays["done"][world] = outcome.terminated or outcome.truncated
+def _flag(arrays: Arrays, index: int | tuple[int, int], terminated: bool, truncated: bool) -> None:
+    arrays["terminated"][index] = terminated
+    arrays["truncated"][index] = truncated
+    arrays["done"][index] = terminated or truncated

@@ -6,44 +6,24 @@
 from __future__ import annotations
 
 import logging
-from dataclasses import dataclass, field
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-import veca_marl.envs.tasks  # noqa: F401  registers the tasks
-from veca_marl.envs.task import Player, TaskCfg, Team, find_task
-from veca_marl.sim.bodies.base import BodyCfg
+from veca_marl.envs.game_cfg import GameCfg
+from veca_marl.envs.scripts import play_script
+from veca_marl.envs.task import Player, Team, find_task
+from veca_marl.envs.team import Script
 from veca_marl.sim.bodies.family import make_body
-from veca_marl.sim.bodies.walker import WalkerCfg
-from veca_marl.sim.playground import PlaygroundCfg
-from veca_marl.sim.senses import SensesCfg, give_senses
+from veca_marl.sim.senses import give_senses
 from veca_marl.sim.senses.base import Sense
-from veca_marl.sim.world import ClockCfg, World
+from veca_marl.sim.world import World
 
 _LOG = logging.getLogger(__name__)
 
 Observation = dict[str, NDArray[Any]]
-
-
-@dataclass
-class GameCfg:
-    """Everything a game is made of.
-
-    Attributes:
-        task: The rules and their numbers.
-        playground: Where it is played.
-        body: What the players are.
-        senses: How well they perceive.
-        clock: How time passes.
-    """
-
-    task: TaskCfg = field(default_factory=TaskCfg)
-    playground: PlaygroundCfg = field(default_factory=PlaygroundCfg)
-    body: BodyCfg = field(default_factory=WalkerCfg)
-    senses: SensesCfg = field(default_factory=SensesCfg)
-    clock: ClockCfg = field(default_factory=ClockCfg)
 
 
 class Outcome(NamedTuple):
@@ -53,11 +33,22 @@ class Outcome(NamedTuple):
         terms: Unweighted reward terms by player and name.
         terminated: The game is over by its rules.
         truncated: The time is up, or the simulation of a body made no sense any more.
+        out: The players for whom it is over, though others may play on.
     """
 
     terms: dict[str, dict[str, float]]
     terminated: bool
     truncated: bool
+    out: frozenset[str] = frozenset()
+
+    @property
+    def done(self) -> bool:
+        """Whether it is over for everyone."""
+        return self.terminated or self.truncated
+
+    def terminated_for(self, player: str) -> bool:
+        """Say whether the game is over by its rules for one player."""
+        return self.terminated or player in self.out
 
 
 class Game:
@@ -67,10 +58,13 @@ class Game:
         world: Where it is played.
         task: The rules.
         players: Everyone, team by team.
+        actors: Those whose actions come from outside; the others follow a script.
         senses: The senses of each player by player name.
+        out: The names of those for whom this episode is over.
     """
 
     def __init__(self, cfg: GameCfg) -> None:
+        cfg.check()
         self.cfg = cfg
         self.max_steps = round(cfg.task.max_seconds / cfg.clock.step_s)
         self._build()
@@ -79,19 +73,27 @@ class Game:
         cfg, task_type = self.cfg, find_task(self.cfg.task.name)
         self.world = World(cfg.playground, cfg.clock)
         self.players = [
-            Player(name, team.name, make_body(name, cfg.body, self.world, shirt))
-            for shirt, team in enumerate(task_type.teams)
+            Player(name, team.name, make_body(name, cfg.body_of(team.name), self.world, shirt))
+            for shirt, team in enumerate(cfg.teams)
             for name in player_names(team)
         ]
+        self.actors = [player for player in self.players if player.team not in cfg.script]
         self.task = task_type(cfg.task, self.world, self.players)
         self.world.freeze()
         self.senses: dict[str, dict[str, Sense]] = {
-            player.name: give_senses(player.body, task_type.senses, cfg.senses, self.world)
-            for player in self.players
+            player.name: give_senses(
+                player.body,
+                task_type.senses if team.senses is None else team.senses,
+                cfg.senses_of(team.name),
+                self.world,
+            )
+            for team in cfg.teams
+            for player in self.team(team.name)
         }
         for senses in self.senses.values():
             self.world.after_substep.extend(sense.substep for sense in senses.values())
         self.steps = 0
+        self.out: frozenset[str] = frozenset()
 
     @property
     def weights(self) -> dict[str, float]:
@@ -108,6 +110,7 @@ class Game:
             self.world.close()
             self._build()
         self.steps = 0
+        self.out = frozenset()
         self.world.reset(rng)
         self.task.reset(rng)
         for senses in self.senses.values():
@@ -115,28 +118,39 @@ class Game:
                 sense.reset()
         self.world.refresh()
 
-    def step(self, actions: dict[str, NDArray[Any]], rng: np.random.Generator) -> Outcome:
+    def step(self, actions: Mapping[str, NDArray[Any]], rng: np.random.Generator) -> Outcome:
         """Play one agent step: `command`, then `advance`."""
         self.command(actions)
         return self.advance(rng)
 
-    def command(self, actions: dict[str, NDArray[Any]]) -> None:
-        """Tell all players what to do, before anything moves.
+    def command(self, actions: Mapping[str, NDArray[Any]]) -> None:
+        """Tell the actors what to do, before anything moves.
 
         Args:
-            actions: One action row per player, by player name, as its body's `action_spec` says.
+            actions: One action row per actor, by player name, as its body's `action_spec` says.
+                Rows of those who are out may be there, and are not looked at.
 
         Raises:
-            ValueError: If an action is impossible, or the players are others.
+            ValueError: If an action is impossible, or the actors are others.
         """
-        names = [player.name for player in self.players]
-        if set(actions) != set(names):
-            raise ValueError(f"actions for {sorted(actions)}; the players are {names}")
-        for player in self.players:
+        self._check_names(actions)
+        for player in self.actors:
+            if player.name in self.out:
+                player.body.rest()
+                continue
             try:
                 player.body.act(actions[player.name])
             except ValueError as error:
                 raise ValueError(f"{player.name}: {error}") from None
+
+    def _check_names(self, actions: Mapping[str, NDArray[Any]]) -> None:
+        names = [player.name for player in self.actors]
+        unknown = sorted(set(actions) - set(names))
+        if unknown:
+            raise ValueError(f"actions for unknown agents {unknown}; there are {names}")
+        missing = sorted(set(names) - set(actions) - self.out)
+        if missing:
+            raise ValueError(f"no action for {missing}; each of {names} needs one")
 
     def advance(self, rng: np.random.Generator) -> Outcome:
         """Let one agent step pass, with the players doing what they were told last.
@@ -144,13 +158,29 @@ class Game:
         Args:
             rng: The game's source of randomness.
         """
+        self._play_scripts(rng)
         self.task.before_step(rng)
         self.world.step()
         self.task.after_step(rng)
         self.steps += 1
-        terms = {player.name: self.task.reward(player) for player in self.players}
+        terms = {player.name: self._terms(player) for player in self.players}
+        if self.task.eliminates:
+            self.out |= {player.name for player in self.players if self.task.is_out(player)}
+        terminated = self.task.terminated() or len(self.out) == len(self.players)
         truncated = self.steps >= self.max_steps or self._fell_apart()
-        return Outcome(terms, self.task.terminated(), truncated)
+        return Outcome(terms, terminated, truncated, self.out)
+
+    def _play_scripts(self, rng: np.random.Generator) -> None:
+        for team, script in self.cfg.script.items():
+            for player in self.team(team):
+                script_now = Script.idle if player.name in self.out else script
+                play_script(script_now, self.task, player, self.observe, rng)
+
+    def _terms(self, player: Player) -> dict[str, float]:
+        """Return what a player earns; nothing if it was out before this step."""
+        if player.name in self.out:
+            return dict.fromkeys(self.weights, 0.0)
+        return self.task.reward(player)
 
     def _fell_apart(self) -> bool:
         """Log which body's simulation has gone non-finite; say whether one has."""

@@ -40,10 +40,7 @@ class ToyCfg(TaskCfg):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        for name in ("edge_m", "mass_kg", "friction", "near_m"):
-            value = getattr(self, name)
-            if not (math.isfinite(value) and value > 0.0):
-                raise ValueError(f"task.{name}={value} must be a positive number")
+        self._check_positive("edge_m", "mass_kg", "friction", "near_m")
         if self.edge_m > _WIDEST_M:
             raise ValueError(f"task.edge_m={self.edge_m}: hands span at most {_WIDEST_M} m")
         near, far = self.ahead_m

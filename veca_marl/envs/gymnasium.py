@@ -16,7 +16,8 @@ except ModuleNotFoundError as error:
     ) from error
 
 from veca_marl.api import choose
-from veca_marl.envs.game import GameCfg, Observation
+from veca_marl.envs.game import Observation
+from veca_marl.envs.game_cfg import GameCfg
 from veca_marl.envs.seeded_game import SeededGame
 from veca_marl.envs.spaces import action_space, observation_space
 from veca_marl.gymnasium_ids import register_ids
@@ -40,10 +41,10 @@ class VecaGymEnv(gymnasium.Env[Observation, Any]):
     def __init__(self, cfg: GameCfg, seed: int = 0, render_mode: str | None = None) -> None:
         self._played = SeededGame(cfg, seed, render_mode)
         game = self._played.game
-        if len(game.players) != 1:
+        if len(game.actors) != 1:
             self._played.close()
             raise ValueError(_too_many(cfg.task.name, self._played.names))
-        (player,) = game.players
+        (player,) = game.actors
         self._agent = player.name
         self.metadata = self._played.metadata
         self.render_mode = render_mode
@@ -78,7 +79,7 @@ class VecaGymEnv(gymnasium.Env[Observation, Any]):
         return (
             step.observations[self._agent],
             step.rewards[self._agent],
-            step.terminated,
+            step.terminated[self._agent],
             step.truncated,
             {"terms": dict(step.terms[self._agent])},
         )

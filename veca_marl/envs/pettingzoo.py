@@ -16,7 +16,8 @@ except ModuleNotFoundError as error:
     ) from error
 
 from veca_marl.api import choose
-from veca_marl.envs.game import GameCfg, Observation
+from veca_marl.envs.game import Observation
+from veca_marl.envs.game_cfg import GameCfg
 from veca_marl.envs.seeded_game import SeededGame
 from veca_marl.envs.spaces import Space, action_space, observation_space
 
@@ -24,7 +25,7 @@ Infos = dict[str, dict[str, Any]]
 
 
 class VecaParallelEnv(ParallelEnv[str, Observation, Any]):
-    """One game; the agents are its players, and all of them play until it is over for all.
+    """One game; the agents are its players. Who is out is no longer in `agents`.
 
     Observations are dicts with one array per sense, `infos[agent]["terms"]` the unweighted reward
     terms by name. The same seed gives the same bytes as the first world of a `VecaEnv`.
@@ -42,8 +43,8 @@ class VecaParallelEnv(ParallelEnv[str, Observation, Any]):
         self.render_mode = render_mode
         self.possible_agents = list(self._played.names)
         self.agents: list[str] = []
-        self.observation_spaces = {p.name: observation_space(game, p) for p in game.players}
-        self.action_spaces = {p.name: action_space(p) for p in game.players}
+        self.observation_spaces = {p.name: observation_space(game, p) for p in game.actors}
+        self.action_spaces = {p.name: action_space(p) for p in game.actors}
 
     def observation_space(self, agent: str) -> Space:
         """Return what an agent perceives: a `Dict` with one space per sense."""
@@ -77,7 +78,7 @@ class VecaParallelEnv(ParallelEnv[str, Observation, Any]):
     def step(
         self, actions: Mapping[str, Any]
     ) -> tuple[dict[str, Observation], dict[str, float], dict[str, bool], dict[str, bool], Infos]:
-        """Play one step; when the episode is over, `agents` is empty.
+        """Play one step of those in `agents`; when the episode is over, `agents` is empty.
 
         Raises:
             RuntimeError: If no episode is running.
@@ -85,12 +86,11 @@ class VecaParallelEnv(ParallelEnv[str, Observation, Any]):
         """
         step = self._played.step(actions)
         names = self.agents
-        if step.terminated or step.truncated:
-            self.agents = []
+        self.agents = [] if step.done else self._played.playing
         return (
             step.observations,
             step.rewards,
-            dict.fromkeys(names, step.terminated),
+            step.terminated,
             dict.fromkeys(names, step.truncated),
             {name: {"terms": dict(step.terms[name])} for name in names},
         )

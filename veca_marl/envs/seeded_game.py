@@ -5,13 +5,14 @@ It draws, observes and pays in the order of `VecaEnv`, so that the same seed giv
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from veca_marl.envs.game import Game, GameCfg, Observation
+from veca_marl.envs.game import Game, Observation
+from veca_marl.envs.game_cfg import GameCfg
 from veca_marl.envs.spectator import Spectator
 from veca_marl.sim.compilation import announce_compilation
 
@@ -25,15 +26,17 @@ class Step(NamedTuple):
         observations: What they perceive now.
         rewards: Weighted sums of the terms.
         terms: Unweighted reward terms by name.
-        terminated: The game is over by its rules.
+        terminated: For whom the game is over by its rules.
         truncated: The time is up.
+        done: It is over for everyone.
     """
 
     observations: dict[str, Observation]
     rewards: dict[str, float]
     terms: dict[str, dict[str, float]]
-    terminated: bool
+    terminated: dict[str, bool]
     truncated: bool
+    done: bool
 
 
 class SeededGame:
@@ -41,7 +44,7 @@ class SeededGame:
 
     Attributes:
         game: What is played.
-        names: The players, team by team.
+        names: The players whose actions come from outside, team by team.
         rng: Where its randomness comes from.
         metadata: What Gymnasium and PettingZoo want to know about pictures.
 
@@ -60,7 +63,7 @@ class SeededGame:
         announce_compilation()
         self._seed(seed)
         self.game = Game(cfg)
-        self.names = [player.name for player in self.game.players]
+        self.names = [player.name for player in self.game.actors]
         self.metadata: dict[str, Any] = {
             "name": cfg.task.name,
             "render_modes": list(RENDER_MODES),
@@ -86,42 +89,48 @@ class SeededGame:
             self._seed(seed)
         self.game.reset(self.rng)
         self._running = True
-        return self._observe()
+        return self._observe(self.names)
 
     def step(self, actions: Mapping[str, Any]) -> Step:
         """Play one step.
 
         Args:
-            actions: What each player does, by name.
+            actions: What each player does, by name; who is out needs none.
+
+        Returns:
+            What it gave to each player who took part in it.
 
         Raises:
             RuntimeError: If no episode is running.
             ValueError: If an action is missing, impossible, or for a player who is not there.
         """
-        self._check(actions)
-        rows: dict[str, NDArray[Any]] = {name: np.asarray(actions[name]) for name in self.names}
-        outcome = self.game.step(rows, self.rng)
-        self._running = not (outcome.terminated or outcome.truncated)
-        rewards = {name: float(self.game.pay(outcome.terms[name])) for name in self.names}
-        return Step(self._observe(), rewards, outcome.terms, outcome.terminated, outcome.truncated)
-
-    def _check(self, actions: Mapping[str, Any]) -> None:
         if not self._running:
             raise RuntimeError("no episode is running: call reset() before step()")
-        unknown = sorted(set(actions) - set(self.names))
-        if unknown:
-            raise ValueError(f"actions for unknown agents {unknown}; there are {self.names}")
-        missing = [name for name in self.names if name not in actions]
-        if missing:
-            raise ValueError(f"no action for {missing}; each of {self.names} needs one")
+        names = self.playing
+        rows: dict[str, NDArray[Any]] = {name: np.asarray(row) for name, row in actions.items()}
+        outcome = self.game.step(rows, self.rng)
+        self._running = not outcome.done
+        return Step(
+            self._observe(names),
+            {name: float(self.game.pay(outcome.terms[name])) for name in names},
+            {name: outcome.terms[name] for name in names},
+            {name: outcome.terminated_for(name) for name in names},
+            outcome.truncated,
+            outcome.done,
+        )
 
-    def _observe(self) -> dict[str, Observation]:
-        """Let all players perceive, into arrays of their own."""
-        self._seen = {
-            player.name: {name: np.array(seen) for name, seen in self.game.observe(player).items()}
-            for player in self.game.players
-        }
-        return {name: dict(senses) for name, senses in self._seen.items()}
+    @property
+    def playing(self) -> list[str]:
+        """Those of `names` who are not out."""
+        return [name for name in self.names if name not in self.game.out]
+
+    def _observe(self, names: Sequence[str]) -> dict[str, Observation]:
+        """Let players perceive, into arrays of their own."""
+        for player in self.game.actors:
+            if player.name in names:
+                seen = self.game.observe(player)
+                self._seen[player.name] = {name: np.array(array) for name, array in seen.items()}
+        return {name: dict(self._seen[name]) for name in names}
 
     def render(self) -> NDArray[np.uint8]:
         """Return what the first player perceives beside the room, ``(252, width, 3)`` uint8.

@@ -44,7 +44,7 @@ class Spectator:
         """Return one video frame: left eye, right eye, touched skin, room.
 
         Args:
-            observation: What the first player observes now, as from `Game.observe`; a sense that
+            observation: What the first actor observes now, as from `Game.observe`; a sense that
                 is not in it is not shown.
 
         Returns:
@@ -60,7 +60,7 @@ class Spectator:
     def _skin(self, touch: NDArray[Any]) -> NDArray[np.uint8]:
         """Return the first player's body, coloured where it feels something."""
         scene = self._game.world.scene
-        body = scene.objects[self._game.players[0].body.object_id]
+        body = scene.objects[self._game.actors[0].body.object_id]
         readings = touch.reshape(-1, TAXELS_PER_TRIANGLE).astype(np.float64)
         return picture_of_touch(scene, body, readings, FRAME_HEIGHT)
 

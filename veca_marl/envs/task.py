@@ -17,10 +17,17 @@ from veca_marl.sim.world import World
 
 
 class Team(NamedTuple):
-    """Players that share specs and a policy: one team is one TorchRL group."""
+    """Players that share specs and a policy: one team is one TorchRL group.
+
+    Attributes:
+        name: Unique in its task.
+        size: How many play.
+        senses: What they perceive by; None is what the task names for everyone.
+    """
 
     name: str
     size: int = 1
+    senses: tuple[str, ...] | None = None
 
 
 class Player(NamedTuple):
@@ -79,31 +86,33 @@ class TaskCfg:
 
     def __post_init__(self) -> None:
         """An episode needs a length, a weight needs a value."""
-        if not (math.isfinite(self.max_seconds) and self.max_seconds > 0):
-            raise ValueError(f"task.max_seconds={self.max_seconds} must be a positive number")
+        self._check_positive("max_seconds")
         bad = {name: value for name, value in self.weights.items() if not math.isfinite(value)}
         if bad:
             raise ValueError(f"task.weights: {bad} must be finite numbers")
 
-
-def check_spread(spread_deg: float) -> None:
-    """Refuse a spread of the starting joints that would not resemble the posture any more.
-
-    Raises:
-        ValueError: If it is negative or above 30 degrees.
-    """
-    if not 0.0 <= spread_deg <= 30.0:
-        raise ValueError(f"task.spread_deg={spread_deg} must be in [0, 30]")
+    def _check_positive(self, *names: str) -> None:
+        """Refuse numbers of these names that are zero, negative or not finite."""
+        for name in names:
+            value = getattr(self, name)
+            if not 0.0 < value < math.inf:
+                raise ValueError(f"task.{name}={value} must be a positive number")
 
 
 class Task(ABC):
     """The rules of one game.
 
     A task never touches torch and never looks up a link: it asks the bodies and the props.
+
+    Attributes:
+        teams: Who plays, see also `teams_of`.
+        senses: What the players perceive by.
+        eliminates: Whether single players may be out while others play on, see `is_out`.
     """
 
     teams: ClassVar[tuple[Team, ...]] = (Team("agents"),)
     senses: ClassVar[tuple[str, ...]] = ()
+    eliminates: ClassVar[bool] = False
     cfg: TaskCfg
 
     def __init__(self, cfg: TaskCfg, world: World, players: list[Player]) -> None:
@@ -139,6 +148,13 @@ class Task(ABC):
         """Say whether the game is over for everyone."""
         return False
 
+    def is_out(self, player: Player) -> bool:
+        """Say whether the game is over for one player, for a task that `eliminates`.
+
+        Who is out stays out until the next episode: it rests, perceives zeros and is paid nothing.
+        """
+        return False
+
     @abstractmethod
     def expert(self, player: Player, observation: dict[str, NDArray[Any]]) -> Any:
         """Play by hand-written rules: return a wish that `Body.encode` turns into an action row.
@@ -148,6 +164,11 @@ class Task(ABC):
         angles. The
         docstring says whether it uses the observation alone or privileged state.
         """
+
+    @classmethod
+    def teams_of(cls, cfg: Any) -> tuple[Team, ...]:
+        """Return who plays; for a task whose numbers of players are in its configuration."""
+        return cls.teams
 
     @classmethod
     def cfg_type(cls) -> type[TaskCfg]:

@@ -105,7 +105,7 @@ class Carrier:
         """
         edge = block.cfg.size_m[0]
         wide, tight = edge + 2 * self._clear_m, edge - 2 * self._squeeze_m
-        yaw = _quarter_yaw(block)
+        yaw = quarter_yaw(block)
         start = self._hands.palms().points.mean(axis=0)
         above = above_m * _UP
         high = start * (1, 1, 0) + (block.position + above) * (0, 0, 1)
@@ -169,7 +169,7 @@ def _palms(grip: Grip) -> Palms:
     )
 
 
-def _quarter_yaw(block: Prop) -> float:
-    """Return a block's turn about the vertical, up to quarter turns: in [-pi/4, pi/4]."""
-    yaw = math.atan2(block.rotation[1, 0], block.rotation[0, 0])
+def quarter_yaw(cube: Prop) -> float:
+    """Return a cube's turn about the vertical up to quarter turns, in [-pi/4, pi/4), rad."""
+    yaw = math.atan2(cube.rotation[1, 0], cube.rotation[0, 0])
     return (yaw + math.pi / 4) % (math.pi / 2) - math.pi / 4

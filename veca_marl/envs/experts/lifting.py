@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 
 import numpy as np
 
-from veca_marl.envs.experts.carrying import Carrier, Grip
+from veca_marl.envs.experts.carrying import Carrier, Grip, quarter_yaw
 from veca_marl.sim.bodies.humanoid import Humanoid
 from veca_marl.sim.pose import Floats
 from veca_marl.sim.props import Prop
@@ -53,9 +52,3 @@ def lift(child: Humanoid, carrier: Carrier, toy: Prop, height_m: float) -> Itera
 def slip_m(child: Humanoid, toy: Prop) -> float:
     """Return how far a toy is from the middle between the palms."""
     return float(np.linalg.norm(child.palms().mean(axis=0) - toy.position))
-
-
-def quarter_yaw(cube: Prop) -> float:
-    """Return a cube's turn about the vertical up to quarter turns, in [-pi/4, pi/4], rad."""
-    yaw = math.atan2(cube.rotation[1, 0], cube.rotation[0, 0])
-    return (yaw + math.pi / 4) % (math.pi / 2) - math.pi / 4

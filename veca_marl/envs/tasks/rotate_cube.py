@@ -48,10 +48,7 @@ class RotateCubeCfg(TaskCfg):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        for name in ("edge_m", "mass_kg", "friction"):
-            value = getattr(self, name)
-            if not (math.isfinite(value) and value > 0.0):
-                raise ValueError(f"task.{name}={value} must be a positive number")
+        self._check_positive("edge_m", "mass_kg", "friction")
         if not self.edge_m < self.lost_m < math.inf:
             raise ValueError(f"task.lost_m={self.lost_m} must be above task.edge_m={self.edge_m}")
         if not 0.0 <= self.start_deg <= 45.0:

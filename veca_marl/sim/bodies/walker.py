@@ -148,6 +148,10 @@ class Walker(Figure):
         self.walk(forward * top_mps, turn * math.radians(self.cfg.turn_speed_degps))
         self.call(call)
 
+    def rest(self) -> None:
+        """Stand where it is."""
+        self.walk(0.0, 0.0)
+
     def encode(self, wish: Any) -> NDArray[Any]:
         """Return the row nearest to a wish ``(forward, turn)``, each in [-1, 1].
 

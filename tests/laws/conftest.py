@@ -1,0 +1,16 @@
+"""What the laws of every task are asked of: each task, in each way to act."""
+
+import pytest
+from rollouts import KINDS
+
+from veca_marl.envs.task import TASKS
+
+
+@pytest.fixture(scope="module", params=sorted(TASKS))
+def task(request):
+    return request.param
+
+
+@pytest.fixture(scope="module", params=sorted(KINDS))
+def kind(request):
+    return request.param
