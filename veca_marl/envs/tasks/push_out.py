@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veca_marl.envs.contests import line_up, nearest, on_floor, opponents, paint_disc
-from veca_marl.envs.experts.walking import walk_to
+from veca_marl.envs.experts.wrestling import wrestle
 from veca_marl.envs.task import Player, Task, TaskCfg, terms, walker
 from veca_marl.sim.pose import Floats
 
@@ -96,10 +96,10 @@ class PushOut(Task):
         return any(all(p.name not in left for p in self._team(team)) for team in self._teams)
 
     def expert(self, player: Player, observation: dict[str, NDArray[Any]]) -> Any:
-        """Walk at the nearest opponent. Knows where everyone is; needs a body that walks."""
+        """Push the nearest opponent from the middle. Knows where all are; needs legs to walk."""
         body = walker(player)
         _, theirs = self._sides(player)
-        return walk_to(body, nearest(body, theirs).position)
+        return wrestle(body, nearest(body, theirs), self.middle, self.cfg.radius_m)
 
     # ---- who is where
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from veca_marl.envs.experts.soccer import attack
+from veca_marl.envs.experts.soccer import attack, open_corner
 from veca_marl.envs.task import Player, Team, register, walker
 from veca_marl.envs.tasks.soccer import ATTACKER, DEFENDER, Soccer, SoccerCfg
 from veca_marl.sim.pose import Floats
@@ -62,12 +62,12 @@ class SoccerTwoPlayer(Soccer):
             return super().start(player, rng)
         back = rng.uniform(*self.cfg.defender_from_goal_m)
         half_m = min(self.cfg.aside_m, self.cfg.goal_width_m / 2.0)
-        place: Floats = self.goal + np.array([-back, rng.uniform(-half_m, half_m), 0.0])
-        return place
+        return np.array([self.goal[0] - back, self.goal[1] + rng.uniform(-half_m, half_m), 0.0])
 
     def expert(self, player: Player, observation: dict[str, NDArray[Any]]) -> Any:
         """Get at the ball, away from the own goal. Knows where the ball is; needs legs to walk."""
         body = walker(player)
         if player.team == ATTACKER:
-            return attack(body, self.ball, self.goal)
-        return attack(body, self.ball, 2.0 * self.ball.position - self.goal)
+            keeper = self.players[1].body.position
+            return attack(body, self.pitch, open_corner(self.pitch, keeper))
+        return attack(body, self.pitch, 2.0 * self.ball.position - self.goal)
