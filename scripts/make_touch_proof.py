@@ -1,11 +1,14 @@
 """Draw why touch is read from geometry: peaks of touch and of the solver's force over the step.
 
 A ball of 0.2 kg falls 2 cm onto the palm, where skin gives way, and onto the forearm, where physics
-knows the rigid bone alone. Writes ``docs/images/touch_time_step.png`` and prints the numbers.
+knows the rigid bone alone. Writes ``docs/images/touch_time_step.png`` and prints the table of
+``docs/touch.md``.
 """
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,10 +16,11 @@ import matplotlib as mpl
 import numpy as np
 
 from veca_marl.sim.bodies.humanoid import Humanoid, HumanoidCfg
+from veca_marl.sim.bodies.postures import Posture
 from veca_marl.sim.bullet import pybullet
 from veca_marl.sim.playground import PlaygroundCfg, RoomCfg
 from veca_marl.sim.pose import Floats
-from veca_marl.sim.props import PropCfg, PropShape
+from veca_marl.sim.props import Prop, PropCfg, PropShape
 from veca_marl.sim.senses.touch import TouchCfg, TouchSense
 from veca_marl.sim.skeleton import load_skeleton
 from veca_marl.sim.taxels import load_taxels
@@ -27,13 +31,20 @@ import matplotlib.pyplot as plt
 
 PICTURE = Path(__file__).resolve().parent.parent / "docs/images/touch_time_step.png"
 SUBSTEPS = (5, 10, 20, 40)
-RADIUS_M = 0.05
 _CLAMP_N = 1e5
+_WAITING_M = 20.0
+# flat hands: a thumb in the way pushes the ball aside
+_POSTURE: dict[str, float] = {
+    "upper_arm.abduction": 45.0,
+    "thumb_metacarpal.flexion": -20.0,
+    "thumb_metacarpal.abduction": -10.0,
+    **{f"{finger}_proximal.flexion": -40.0 for finger in ("index", "middle", "ring", "little")},
+}
 
 
 @dataclass(frozen=True)
 class Spot:
-    """A place on the left arm: a point of the bone in its frame and the way out of the skin."""
+    """A place on an arm: a point of the bone in its frame and the way out of the skin."""
 
     bone: str
     point_m: tuple[float, float, float]
@@ -42,7 +53,16 @@ class Spot:
 
 # on the surface of the box and of the capsule that are these bones in the table of bones
 PALM = Spot("l_hand", (0.0, -0.006, -0.0265), (0.0, -1.0, 0.0))
+RIGHT_PALM = Spot("r_hand", (0.0, 0.006, -0.0265), (0.0, 1.0, 0.0))
 FOREARM = Spot("l_forearm", (0.0135, 0.0, -0.0475), (1.0, 0.0, 0.0))
+
+
+@dataclass(frozen=True)
+class Ball:
+    """What falls onto the skin."""
+
+    mass_kg: float = 0.2
+    radius_m: float = 0.05
 
 
 @dataclass(frozen=True)
@@ -52,105 +72,173 @@ class Press:
     Attributes:
         touch: ``(n,)`` the largest reading on the bone.
         force_n: ``(n,)`` normal forces between ball and body.
+        readings: ``(1648, 6)`` all taxels, at the end.
     """
 
     touch: Floats
     force_n: Floats
+    readings: Floats
 
 
-def press(spot: Spot, mass_kg: float, substeps: int, fall_m: float, seconds: float) -> Press:
-    """Let a ball fall onto an arm held in a vice.
+class Vice:
+    """A body whose arms are held by bones, and balls that press them.
 
-    Nothing has weight but the ball, and it moves along the normal only: so it meets the same skin
-    whatever the time step.
+    Nothing has weight but the balls, and they move on a rail along the normal: so they meet the
+    same skin whatever the time step.
+
+    Args:
+        clock: The time step is in it.
+        balls: What will be pressed, one after the other or together.
     """
-    room = RoomCfg(lower_m=(-5.0, -5.0, 0.0), size_m=(10.0, 10.0, 5.0))
-    ball_cfg = PropCfg("ball", PropShape.sphere, [RADIUS_M], mass_kg=mass_kg, restitution=0.0)
-    playground = PlaygroundCfg(name="vice", rooms=[room], props=[ball_cfg], image_order=0)
-    world = World(playground, ClockCfg(substeps=substeps))
-    body = Humanoid("child", HumanoidCfg(), world)
-    sense = TouchSense(TouchCfg(), body, world.scene)
-    world.freeze()
-    world.reset(np.random.default_rng(0))
-    angles = np.zeros(len(body.joint_names))
-    angles[load_skeleton().joint("l_upper_arm", "abduction")] = 0.8
-    body.place((0.0, 0.0, 1.0), 0.0, angles)
-    pybullet.setGravity(0.0, 0.0, 0.0, physicsClientId=world.client)
-    body_id, client = body.articulation.body_id, world.client
-    _clamp(client, body_id, spot.bone)
-    bone = load_skeleton().bone(spot.bone)
-    drawn = world.scene.objects[body.object_id]
-    rotation = drawn.rotations[bone]
-    out = rotation @ np.array(spot.outward)
-    gap = load_skeleton().bones[bone].skin_thickness_m + RADIUS_M + fall_m
-    ball = world.prop("ball")
-    ball.place(drawn.positions[bone] + rotation @ np.array(spot.point_m) + gap * out)
-    first = load_taxels().first_triangle
-    touch, force = [], []
 
-    def weigh() -> None:
-        velocity, _ = pybullet.getBaseVelocity(ball.body_id, physicsClientId=client)
-        along = (np.dot(velocity, out) - GRAVITY_MPS2 * world.clock.substep_s) * out
-        pybullet.resetBaseVelocity(ball.body_id, along, (0.0, 0.0, 0.0), physicsClientId=client)
+    def __init__(self, clock: ClockCfg, *balls: Ball) -> None:
+        room = RoomCfg(lower_m=(-50.0, -5.0, 0.0), size_m=(100.0, 10.0, 5.0))
+        playground = PlaygroundCfg(name="vice", rooms=[room], props=[], image_order=0)
+        self.world = World(playground, clock)
+        self._body = Humanoid("child", HumanoidCfg(), self.world)
+        self._props = {ball: self.world.add_prop(_prop(ball)) for ball in balls}
+        self._sense = TouchSense(TouchCfg(), self._body, self.world.scene)
+        self.world.freeze()
 
-    def note() -> None:
-        points = pybullet.getContactPoints(ball.body_id, body_id, physicsClientId=client)
-        force.append(sum(point[9] for point in points))
-        world.refresh()
-        touch.append(sense.update_taxels()[first[bone] : first[bone + 1]].max())
-        weigh()
+    def press(
+        self, seconds: float, fall_m: float, *pressed: tuple[Spot, Ball], watch: bool = True
+    ) -> list[Press]:
+        """Let balls fall onto spots; return what happened at each, unless nobody watches."""
+        world, body = self.world, self._body
+        world.reset(np.random.default_rng(0))
+        body.place((0.0, 0.0, 1.0), 0.0, Posture(0.0, _POSTURE))
+        for i, prop in enumerate(self._props.values()):
+            prop.place((_WAITING_M + i, 0.0, 1.0))
+        pybullet.setGravity(0.0, 0.0, 0.0, physicsClientId=world.client)
+        clamps = [self._clamp(spot.bone) for spot, _ in pressed]
+        falls = [_Fall(self, spot, self._props[ball], ball, fall_m) for spot, ball in pressed]
+        world.after_substep.extend(fall.note if watch else fall.weigh for fall in falls)
+        for _ in range(round(seconds * world.clock.control_rate_hz)):
+            world.step()
+        del world.after_substep[-len(falls) :]
+        for clamp in clamps:
+            pybullet.removeConstraint(clamp, physicsClientId=world.client)
+        readings = self.read().copy()
+        return [Press(np.array(f.touch), np.array(f.force_n), readings) for f in falls]
 
-    world.after_substep.append(note)
-    weigh()
-    for _ in range(round(seconds * world.clock.control_rate_hz)):
-        world.step()
-    world.close()
-    return Press(np.array(touch), np.array(force))
+    def read(self) -> Floats:
+        """Return what all taxels read now."""
+        self.world.refresh()
+        return self._sense.update_taxels()
+
+    def pose(self, spot: Spot) -> tuple[Floats, Floats]:
+        """Return where a spot is and the way out of its skin, world frame."""
+        bone = self._body.bone(spot.bone)
+        out = bone.rotation @ np.array(spot.outward)
+        return bone.position + bone.rotation @ np.array(spot.point_m), out
+
+    def force_n(self, prop: Prop) -> float:
+        """Return the normal forces between a ball and the body."""
+        points = pybullet.getContactPoints(
+            prop.body_id, self._body.articulation.body_id, physicsClientId=self.world.client
+        )
+        return math.fsum(point[9] for point in points)
+
+    def _clamp(self, bone: str) -> int:
+        """Hold a bone where it is."""
+        client, body_id = self.world.client, self._body.articulation.body_id
+        names = [
+            pybullet.getJointInfo(body_id, link, physicsClientId=client)[12].decode()
+            for link in range(pybullet.getNumJoints(body_id, physicsClientId=client))
+        ]
+        link = names.index(bone)
+        state = pybullet.getLinkState(body_id, link, 0, 1, physicsClientId=client)
+        ends = ((0.0, 0.0, 0.0), state[0], (0.0, 0.0, 0.0, 1.0), state[1])
+        clamp = pybullet.createConstraint(
+            body_id, link, -1, -1, pybullet.JOINT_FIXED, (0, 0, 0), *ends, physicsClientId=client
+        )
+        pybullet.changeConstraint(clamp, maxForce=_CLAMP_N, physicsClientId=client)
+        return int(clamp)
 
 
-def _clamp(client: int, body_id: int, bone: str) -> None:
-    """Hold a bone where it is."""
-    names = [
-        pybullet.getJointInfo(body_id, link, physicsClientId=client)[12].decode()
-        for link in range(pybullet.getNumJoints(body_id, physicsClientId=client))
-    ]
-    link = names.index(bone)
-    state = pybullet.getLinkState(body_id, link, 0, 1, physicsClientId=client)
-    vice = pybullet.createConstraint(
-        body_id,
-        link,
-        -1,
-        -1,
-        pybullet.JOINT_FIXED,
-        (0.0, 0.0, 0.0),
-        (0.0, 0.0, 0.0),
-        state[0],
-        (0.0, 0.0, 0.0, 1.0),
-        state[1],
-        physicsClientId=client,
+class _Fall:
+    """One ball above one spot."""
+
+    def __init__(self, vice: Vice, spot: Spot, prop: Prop, ball: Ball, fall_m: float) -> None:
+        self._vice, self._prop = vice, prop
+        self.touch: list[float] = []
+        self.force_n: list[float] = []
+        bone = load_skeleton().bone(spot.bone)
+        first = load_taxels().first_triangle
+        self._triangles = slice(first[bone], first[bone + 1])
+        self._point, self._out = vice.pose(spot)
+        skin_m = load_skeleton().bones[bone].skin_thickness_m
+        prop.place(self._point + (skin_m + ball.radius_m + fall_m) * self._out)
+        self.weigh()
+
+    def note(self) -> None:
+        """Look, after every physics step."""
+        self.force_n.append(self._vice.force_n(self._prop))
+        self.touch.append(float(self._vice.read()[self._triangles].max()))
+        self.weigh()
+
+    def weigh(self) -> None:
+        """Pull the ball to the skin, on a rail, with the weight that it has on the floor."""
+        world, body_id = self._vice.world, self._prop.body_id
+        velocity, _ = pybullet.getBaseVelocity(body_id, physicsClientId=world.client)
+        along = np.dot(velocity, self._out) - GRAVITY_MPS2 * world.clock.substep_s
+        centre, turn = pybullet.getBasePositionAndOrientation(body_id, physicsClientId=world.client)
+        on_rail = self._point + np.dot(centre - self._point, self._out) * self._out
+        pybullet.resetBasePositionAndOrientation(
+            body_id, on_rail, turn, physicsClientId=world.client
+        )
+        pybullet.resetBaseVelocity(
+            body_id, along * self._out, (0.0, 0.0, 0.0), physicsClientId=world.client
+        )
+
+
+def _prop(ball: Ball) -> PropCfg:
+    name = f"ball of {ball.mass_kg} kg and {ball.radius_m} m"
+    return PropCfg(name, PropShape.sphere, [ball.radius_m], mass_kg=ball.mass_kg, restitution=0.0)
+
+
+def peaks(
+    spot: Spot, ball: Ball, clocks: Sequence[ClockCfg], fall_m: float = 0.02
+) -> tuple[Floats, Floats]:
+    """Return the peaks of touch and of force (N) of a fall, for each clock."""
+    falls = []
+    for clock in clocks:
+        vice = Vice(clock, ball)
+        falls += vice.press(0.2, fall_m, (spot, ball))
+        vice.world.close()
+    return (
+        np.array([fall.touch.max() for fall in falls]),
+        np.array([fall.force_n.max() for fall in falls]),
     )
-    pybullet.changeConstraint(vice, maxForce=_CLAMP_N, physicsClientId=client)
+
+
+def clocks(contact_share: float) -> list[ClockCfg]:
+    """Return the clocks of all time steps."""
+    return [ClockCfg(substeps=substeps, contact_share=contact_share) for substeps in SUBSTEPS]
 
 
 def draw(path: Path) -> None:
-    """Measure and draw."""
+    """Measure, print and draw."""
     figure, axes = plt.subplots(1, 2, figsize=(8.0, 3.2), layout="constrained")
-    step_ms = [40.0 / substeps for substeps in SUBSTEPS]
-    for spot, name in ((PALM, "palm (skin yields)"), (FOREARM, "forearm (rigid bone)")):
-        falls = [press(spot, 0.2, substeps, fall_m=0.02, seconds=0.2) for substeps in SUBSTEPS]
-        touch = [fall.touch.max() for fall in falls]
-        force = [fall.force_n.max() for fall in falls]
-        for step, felt, pushed in zip(step_ms, touch, force, strict=True):
-            print(f"{spot.bone} {step:.0f} ms: peak touch {felt:.3f}, peak force {pushed:.1f} N")
-        axes[0].plot(step_ms, touch, "o-", label=name)
-        axes[1].plot(step_ms, force, "o-", label=name)
+    step_ms = [1000.0 * clock.substep_s for clock in clocks(0.02)]
+    print("| physics step | " + " | ".join(f"{step:.0f} ms" for step in step_ms) + " |")
+    for name, spot, share, style in (
+        ("palm, seen ahead", PALM, 0.1, "o-"),
+        ("palm, by default", PALM, 0.02, "o:"),
+        ("forearm (rigid)", FOREARM, 0.02, "s-"),
+    ):
+        touch, force = peaks(spot, Ball(), clocks(share))
+        print(f"| {name}: peak T | " + " | ".join(f"{value:.2f}" for value in touch) + " |")
+        print(f"| {name}: peak force | " + " | ".join(f"{value:.0f} N" for value in force) + " |")
+        axes[0].plot(step_ms, touch, style, label=name)
+        axes[1].plot(step_ms, force, style, label=name)
     axes[0].set(ylabel="peak touch T", ylim=(0.0, 1.05))
     axes[1].set(ylabel="peak force of the solver (N)", yscale="log")
     for axis in axes:
         axis.set(xlabel="physics step (ms)", xscale="log")
         axis.set_xticks(step_ms, [f"{step:.0f}" for step in step_ms])
         axis.minorticks_off()
-        axis.legend()
+        axis.legend(fontsize=8)
     figure.savefig(path, dpi=110)
 
 

@@ -13,6 +13,8 @@ from babies import (
     starts,
 )
 
+from veca_marl.config import compose
+from veca_marl.config_errors import ConfigError
 from veca_marl.envs.tasks.sit_baby import SitBabyCfg
 from veca_marl.sim.bodies.postures import ON_BACK, SITTING, STANDING, Posture
 
@@ -85,3 +87,27 @@ def test_a_walker_is_refused():
 def test_impossible_numbers_are_refused(wrong):
     with pytest.raises(ValueError, match=next(iter(wrong))):
         SitBabyCfg(**wrong)
+
+
+def test_episodes_begin_in_the_postures_that_are_asked_for():
+    """Lying, a chest is low and looks up or down; on all fours it is higher, sitting upright."""
+
+    def chests(**shares):
+        asked = ",".join(f"{name}:{share}" for name, share in shares.items())
+        with child_game("SitBaby", f"task.starts={{{asked}}}") as game:
+            for seed in range(12):
+                game.reset(np.random.default_rng(seed))
+                chest = game.task.body.bone("chest")
+                yield chest.position[2], chest.forward[2]
+
+    assert all(forward > 0.7 for _, forward in chests())
+    assert all(forward < -0.7 for _, forward in chests(on_back=0, on_belly=1))
+    heights = [height for height, _ in chests(on_belly=1, sitting=2)]
+    assert min(heights) < 0.1
+    assert max(heights) > 0.2
+
+
+@pytest.mark.parametrize("starts", ["{on_back:0}", "{on_back:-1,sitting:2}", "{sitting:inf}"])
+def test_impossible_shares_of_starts_are_refused(starts):
+    with pytest.raises(ConfigError, match=r"task.starts=.* must be shares"):
+        compose(["+task=SitBaby", f"task.starts={starts}"])

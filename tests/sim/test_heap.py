@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 from heaps import heap, lay, thrash
+from walking import ball, box, empty_world
 
-from veca_marl.sim.bodies.humanoid import Detail
+from veca_marl.sim.bodies.humanoid import Detail, Humanoid, HumanoidCfg
 from veca_marl.sim.bodies.postures import ON_BACK, SITTING, STANDING
 
 
@@ -73,6 +74,31 @@ def test_episodes_of_all_kinds_leave_no_trace(detail):
     for seed, (steps, posture) in enumerate(((20, SITTING), (3, STANDING), (20, ON_BACK)), start=2):
         episode(seed, steps, posture)
         np.testing.assert_array_equal(episode(1, 12, STANDING), first)
+    world.close()
+
+
+def test_a_used_room_full_of_things_is_as_a_fresh_one():
+    """What lies at the start where it lay at the end is what restoring is worst at."""
+    balls = [ball(f"ball_{i}", 0.05, position=(i, 3.0, 0.05)) for i in range(4)]
+    boxes = [box(f"box_{i}", (0.1, 0.1, 0.1), position=(i, -3.0, 0.05)) for i in range(4)]
+    things = balls + boxes
+    world = empty_world(*things)
+    body = Humanoid("child", HumanoidCfg(), world)
+    world.freeze()
+
+    def episode(seed, seconds):
+        rng = np.random.default_rng(seed)
+        world.reset(rng)
+        body.place((0.0, 0.0, 0.0), 0.0, SITTING)
+        for thing in things:
+            world.prop(thing.name).place((*rng.uniform(-0.3, 0.3, 2), rng.uniform(0.1, 0.5)))
+        world.refresh()
+        return [world.scene.positions.copy() for _ in thrash(world, [body], seconds, seed)]
+
+    first = episode(0, 1.0)
+    for seed, seconds in ((1, 0.12), (2, 0.8)):
+        episode(seed, seconds)
+        np.testing.assert_array_equal(episode(0, 1.0), first)
     world.close()
 
 

@@ -195,6 +195,52 @@ def test_torques_of_a_wish_keep_a_child_sitting_still(make, detail):
     assert np.abs(body.velocities()).max() < 0.1
 
 
+def test_increments_of_zero_keep_a_posture(make):
+    world, body = make(action=JointActionKind.increment, detail=Detail.mitten)
+    body.place((0.0, 0.0, 0.0), 0.0, POSTURES["sitting"])
+    head_m = body.bone("head").position[2]
+    for _ in range(100):
+        body.act(np.zeros(82))
+        world.step()
+    assert body.bone("head").position[2] > 0.85 * head_m
+
+
+def test_increments_add_up_to_targets(make):
+    world, body = make(action=JointActionKind.increment)
+    weightless(world)
+    body.place((0.0, 0.0, 2.0))
+    bent = {"forearm.flexion": 50.0, "thigh.flexion": 30.0, "head.rotation": -30.0}
+    wanted = posture_angles(SKELETON, Posture(0.0, bent))
+    rows = []
+    for _ in range(50):
+        rows.append(body.encode(wanted))
+        body.act(rows[-1])
+        world.step()
+    np.testing.assert_allclose(body.joint_angles(), wanted, atol=math.radians(2.0))
+    assert np.abs(rows[0]).max() > 0.0
+    np.testing.assert_allclose(rows[-1], 0.0, atol=1e-6)
+
+
+def test_increments_stop_at_the_stops_and_start_anew(make):
+    world, body = make(action=JointActionKind.increment)
+    weightless(world)
+    for _ in range(3):
+        body.place((0.0, 0.0, 2.0))
+        elbow = body.joint_names.index("l_forearm.flexion")
+        row = np.zeros(82)
+        row[elbow] = 1.0
+        for _ in range(12):
+            body.act(row)
+            world.step()
+        bent = body.joint_angles()[elbow]
+        assert bent > 0.9 * SKELETON.joints[elbow].high_rad
+        body.act(-row)  # what was asked for beyond the stop is not owed
+        world.step()
+        body.act(-row)
+        world.step()
+        assert body.joint_angles()[elbow] < bent - math.radians(5.0)
+
+
 def test_wishes_and_targets_are_inverse(make):
     _, body = make(action=JointActionKind.position)
     angles = np.random.default_rng(0).uniform(body._low, body._high)
@@ -258,7 +304,10 @@ def test_impossible_places_are_refused(make, position, posture, message):
     ("numbers", "message"),
     [
         ({"detail": "stick"}, r"body.detail='stick'; there are \['full', 'mitten'\]"),
-        ({"action": "muscles"}, r"body.action='muscles'; there are \['torque', 'position'\]"),
+        (
+            {"action": "muscles"},
+            r"body.action='muscles'; there are \['torque', 'position', 'increment'\]",
+        ),
         ({"joints": "some"}, r"body.joints='some'"),
         ({"strength": 0.0}, r"body.strength=0.0"),
         ({"strength": 2.0}, r"body.strength=2.0"),

@@ -12,7 +12,7 @@ from veca_marl.sim.inertia import Inertia, bone_inertia, joined
 from veca_marl.sim.pose import Pose
 from veca_marl.sim.skeleton import load_skeleton
 from veca_marl.sim.skin_springs import SkinLayer, skin_layer, skin_spring
-from veca_marl.sim.urdf import Build, body_urdf
+from veca_marl.sim.urdf import Build, body_urdf, bone_of
 
 SKELETON = load_skeleton()
 LOW = np.array([joint.low_rad for joint in SKELETON.joints])
@@ -37,13 +37,29 @@ def names(robot, tag, kind=None):
     return [e.get("name") for e in robot.iter(tag) if kind in (None, e.get("type"))]
 
 
-def test_47_bones_36_light_links_4_skins_and_82_hinges(robots):
+def test_47_bones_36_light_links_4_skins_6_second_shapes_and_82_hinges(robots):
     links = names(robots[True], "link")
-    assert len(links) == len(set(links)) == 47 + 36 + 4
+    assert len(links) == len(set(links)) == 47 + 36 + 4 + 6
+    bones = {bone.name for bone in SKELETON.bones}
+    assert {bone_of(link) for link in links} & bones == bones
     assert set(links) >= {bone.name for bone in SKELETON.bones}
     assert sorted(names(robots[True], "joint", "revolute")) == sorted(
         f"{joint.bone}.{joint.label}" for joint in SKELETON.joints
     )
+
+
+def test_with_fingers_no_link_has_two_shapes_and_most_are_taken_as_they_are(robots):
+    """Bullet wraps a shape up where its frame is not that of the inertia."""
+    alone = 0
+    for link in robots[True].findall("link"):
+        shapes = link.findall("collision")
+        assert len(shapes) <= 1
+        for shape in shapes:
+            alone += shape.find("origin").attrib == link.find("inertial/origin").attrib
+    assert alone >= 45
+    # two capsules in the trunk twice and the toes twice, with their skins
+    parts = [name for name in names(robots[True], "link") if "__part" in name]
+    assert len(parts) == 6
 
 
 def test_the_mitten_has_40_hinges_and_no_finger(robots):
@@ -143,7 +159,7 @@ def test_a_capsule_weighs_as_sand_in_its_shape():
 
 def test_only_hands_feet_and_fingers_are_soft(robots):
     soft = {
-        link.get("name").removesuffix("__skin")
+        bone_of(link.get("name"))
         for link in robots[True].findall("link")
         if link.find("contact/stiffness") is not None
     }

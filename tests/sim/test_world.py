@@ -306,3 +306,32 @@ def test_nothing_leaves_the_room_while_somebody_runs_about():
         assert where[:, 2].min() > -0.01
     assert max(np.linalg.norm(toy.position[:2]) for toy in toys) > 1.0
     assert fastest < 3.5
+
+
+@pytest.mark.parametrize("share", [0.0, -0.1, 1.5, float("nan")])
+def test_an_impossible_contact_share_is_refused(share):
+    with pytest.raises(ValueError, match="contact_share"):
+        ClockCfg(contact_share=share)
+
+
+def test_worlds_that_look_ahead_differently_do_not_disturb_each_other():
+    """Bullet keeps one number for all worlds of a process."""
+
+    def fall(*others):
+        worlds = [empty_world(ball(position=(0.0, 0.0, 0.3)), clock=clock) for clock in others]
+        for world in worlds:
+            world.freeze()
+            world.reset(np.random.default_rng(0))
+        seen = []
+        for _ in range(20):
+            for world in worlds:
+                world.step()
+            seen.append(worlds[0].prop("ball").position)
+        for world in worlds:
+            world.close()
+        return np.array(seen)
+
+    near, far = ClockCfg(), ClockCfg(contact_share=0.5)
+    assert not np.array_equal(fall(near), fall(far)), "it matters"
+    np.testing.assert_array_equal(fall(near, far), fall(near))
+    np.testing.assert_array_equal(fall(far, near), fall(far))

@@ -9,7 +9,7 @@ import numpy as np
 
 from veca_marl.envs.task import TaskCfg
 from veca_marl.sim.bodies.humanoid import Humanoid
-from veca_marl.sim.bodies.postures import Posture
+from veca_marl.sim.bodies.postures import POSTURES, Posture
 from veca_marl.sim.playground import RoomCfg
 
 _FROM_WALLS_M = 1.0
@@ -30,6 +30,15 @@ class StartCfg(TaskCfg):
         super().__post_init__()
         if not 0.0 <= self.spread_deg <= 30.0:
             raise ValueError(f"task.spread_deg={self.spread_deg} must be in [0, 30]")
+
+
+def draw_posture(shares: dict[str, float], rng: np.random.Generator) -> Posture:
+    """Return one of the `POSTURES`, as often as its share of the sum says."""
+    names = [name for name, share in shares.items() if share > 0.0]
+    if len(names) == 1:
+        return POSTURES[names[0]]
+    chances = np.array([shares[name] for name in names])
+    return POSTURES[names[rng.choice(len(names), p=chances / chances.sum())]]
 
 
 def start_anywhere(

@@ -14,7 +14,7 @@ from veca_marl.sim.world import World
 POST_M = 0.04
 _BOARD_M = (0.06, 0.3)  # thickness and height
 _CORNER_M = 0.5  # of the floor, along both walls, behind a board across each corner
-_WHITE, _YELLOW = (0.95, 0.95, 0.95), (0.95, 0.75, 0.1)
+_WHITE, _YELLOW, _ORANGE = (0.95, 0.95, 0.95), (0.95, 0.75, 0.1), (1.0, 0.4, 0.05)
 
 
 class PitchCfg(Protocol):
@@ -78,7 +78,7 @@ class Pitch:
                 mass_kg=self._cfg.mass_kg,
                 restitution=0.7,
                 rolling_friction=0.004,
-                colour=_WHITE,
+                colour=_ORANGE,
                 checker_m=self._cfg.radius_m,
             )
         )

@@ -2,12 +2,21 @@
 
 Every degree of freedom is a hinge. A bone with three of them hangs on two almost massless links
 (`<bone>__0`, `<bone>__1`), which are written before it: Bullet's solver wants parents first.
+
+With fingers no link has more than one shape; further ones have links of their own
+(`<bone>__part1`). Of two shapes in a link Bullet solves the contacts in an order that depends on
+episodes long past, and a single one it takes as it is, where the frame of the link's inertia is
+that of the shape. Otherwise it wraps it up, which costs more, and what comes near is noticed only
+when it is within the bounding box. Without fingers there are up to 16 shapes in a hand, too many
+for links of their own: there all shapes are wrapped up, and their contacts are in a fixed order.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -41,6 +50,12 @@ class Build:
     friction: float = 0.8
 
 
+def bone_of(link: str) -> str:
+    """Return the bone that a link with a shape belongs to; the link itself if it has none."""
+    bone, _, rest = link.partition("__")
+    return link if rest.isdigit() else bone
+
+
 def body_urdf(skeleton: Skeleton, build: Build) -> str:
     """Return the body as a URDF robot.
 
@@ -49,6 +64,21 @@ def body_urdf(skeleton: Skeleton, build: Build) -> str:
     writer = _Writer(skeleton, build)
     parts = [writer.bone(i) for i in range(len(skeleton.bones)) if not writer.is_fixed(i)]
     return '<?xml version="1.0"?>\n<robot name="child">\n' + "\n".join(parts) + "\n</robot>\n"
+
+
+class _Shape(NamedTuple):
+    """A primitive of a link: its place in the link's frame, and its geometry as URDF."""
+
+    pose: Pose
+    geometry: str
+
+
+class _Layer(NamedTuple):
+    """A link with shapes that are all rigid or all soft."""
+
+    link: str
+    shapes: Sequence[_Shape]
+    soft: bool
 
 
 class _Writer:
@@ -63,22 +93,27 @@ class _Writer:
         """Write a bone, with what is fixed to it, and all that hangs it on its parent."""
         bone = self._skeleton.bones[index]
         members = self._members(index)
-        layer, light = skin_layer(bone), _LIGHT_SHARE * bone.mass_kg
-        links = max(bone.joint_count - 1, 0) + (layer is SkinLayer.SKIN_OVER_BONE)
+        layers, light = self._layers(bone, members), _LIGHT_SHARE * bone.mass_kg
+        links = max(bone.joint_count - 1, 0) + len(layers) - 1
         whole = joined([(pose, bone_inertia(part)) for part, pose in members])
         own = whole._replace(mass_kg=whole.mass_kg - links * light)
-        rigid = "".join(_colliders(part, pose, 0.0) for part, pose in members if _is_rigid(part))
-        soft = "".join(
-            _colliders(part, pose, part.skin_thickness_m)
-            for part, pose in members
-            if skin_layer(part) is not SkinLayer.BONE
-        )
-        one_layer = soft if layer is SkinLayer.SKIN else rigid
         text = self._hinges(bone, light)
-        text += self._link(bone.name, own, self._rotor(bone), one_layer, bone, layer)
-        if layer is SkinLayer.SKIN_OVER_BONE:
-            text += self._skin(bone, light, soft)
-        return text
+        text += self._link(layers[0], own, self._rotor(bone), bone)
+        return text + "".join(self._fixed(layer, light, bone) for layer in layers[1:])
+
+    def _layers(self, bone: Bone, members: list[tuple[Bone, Pose]]) -> list[_Layer]:
+        """Return the links of a bone that have shapes; the first is the bone itself."""
+        layer = skin_layer(bone)
+        rigid = [shape for part, pose in members if _is_rigid(part) for shape in _bare(part, pose)]
+        soft = [shape for part, pose in members if _is_soft(part) for shape in _skinned(part, pose)]
+        layers = [_Layer(bone.name, rigid, soft=False)]
+        if layer is SkinLayer.SKIN:
+            layers = [_Layer(bone.name, soft, soft=True)]
+        elif layer is SkinLayer.SKIN_OVER_BONE:
+            layers.append(_Layer(bone.name + SKIN_SUFFIX, soft, soft=True))
+        return (
+            [one for layer in layers for one in _singly(layer)] if self._build.fingers else layers
+        )
 
     def _members(self, index: int) -> list[tuple[Bone, Pose]]:
         """Return a bone and those fixed to it, with their poses in its frame."""
@@ -100,7 +135,8 @@ class _Writer:
             last = step == bone.joint_count - 1
             child = bone.name if last else f"{bone.name}__{step}"
             if not last:
-                text += self._link(child, _speck(light_kg), self._rotor(bone))
+                empty = _Layer(child, (), soft=False)
+                text += self._link(empty, _speck(light_kg), self._rotor(bone))
             joint = self._skeleton.joints[bone.first_joint + step]
             text += (
                 f'<joint name="{joint.bone}.{joint.label}" type="revolute">'
@@ -114,10 +150,11 @@ class _Writer:
             parent, origin = child, _origin(_HERE)
         return text
 
-    def _skin(self, bone: Bone, light_kg: float, shapes: str) -> str:
-        name = bone.name + SKIN_SUFFIX
-        text = self._link(name, _speck(light_kg), 1e-7, shapes, bone, SkinLayer.SKIN)
-        return text + (
+    def _fixed(self, layer: _Layer, light_kg: float, bone: Bone) -> str:
+        """Write a light link that is one with the bone's."""
+        name, centre = layer.link, layer.shapes[0].pose.position
+        speck = _speck(light_kg)._replace(centre=centre if self._build.fingers else np.zeros(3))
+        return self._link(layer, speck, 1e-7, bone) + (
             f'<joint name="{name}" type="fixed"><parent link="{bone.name}"/>'
             f'<child link="{name}"/></joint>\n'
         )
@@ -133,29 +170,33 @@ class _Writer:
     def _torque(self, joint: Joint) -> float:
         return self._build.strength * joint.torque_nm
 
-    def _link(
-        self,
-        name: str,
-        inertia: Inertia,
-        rotor: float,
-        shapes: str = "",
-        bone: Bone | None = None,
-        layer: SkinLayer = SkinLayer.BONE,
-    ) -> str:
+    def _link(self, layer: _Layer, inertia: Inertia, rotor: float, bone: Bone | None = None) -> str:
         spring = ""
-        if bone is not None and layer is SkinLayer.SKIN:
+        if bone is not None and layer.soft:
             skin = skin_spring(bone)
             spring = f'<stiffness value="{skin.stiffness_npm!r}"/>'
             spring += f'<damping value="{skin.damping_nspm!r}"/>'
         friction = f'<lateral_friction value="{self._build.friction!r}"/>'
+        shapes = "".join(
+            f"<collision>{_origin(pose)}<geometry>{geometry}</geometry></collision>"
+            for pose, geometry in layer.shapes
+        )
+        matrix = inertia.matrix + rotor * np.eye(3)
+        axes = _principal_axes(inertia.centre, matrix)
+        if self._build.fingers and layer.link != self._skeleton.bones[0].name:  # the base's is read
+            axes = _of_shape(layer.shapes, axes, matrix)
         return (
-            f'<link name="{name}"><contact>{friction}{spring}</contact>'
-            f"{_inertial(inertia, rotor)}{shapes}</link>\n"
+            f'<link name="{layer.link}"><contact>{friction}{spring}</contact>'
+            f"{_inertial(inertia.mass_kg, axes, matrix)}{shapes}</link>\n"
         )
 
 
 def _is_rigid(bone: Bone) -> bool:
     return skin_layer(bone) is not SkinLayer.SKIN
+
+
+def _is_soft(bone: Bone) -> bool:
+    return skin_layer(bone) is not SkinLayer.BONE
 
 
 def _speck(mass_kg: float) -> Inertia:
@@ -166,35 +207,71 @@ def _rest(bone: Bone) -> Pose:
     return Pose(np.array(bone.origin), bone.rest_rotation)
 
 
-def _inertial(inertia: Inertia, rotor: float) -> str:
-    """Write the inertia along its principal axes: Bullet keeps nothing but a diagonal."""
-    matrix = inertia.matrix + rotor * np.eye(3)
-    axes = np.eye(3)
-    if not np.allclose(matrix, np.diag(np.diag(matrix)), atol=1e-12):
-        _, axes = np.linalg.eigh(matrix)
-        axes[:, 2] *= np.sign(np.linalg.det(axes))
-    x, y, z = np.diag(axes.T @ matrix @ axes)
+def _principal_axes(centre: Floats, matrix: Floats) -> Pose:
+    """Return the frame in which an inertia is diagonal: Bullet keeps nothing else."""
+    if _is_diagonal(matrix):
+        return Pose(centre, np.eye(3))
+    _, axes = np.linalg.eigh(matrix)
+    axes[:, 2] *= np.sign(np.linalg.det(axes))
+    return Pose(centre, axes)
+
+
+def _of_shape(shapes: Sequence[_Shape], axes: Pose, matrix: Floats) -> Pose:
+    """Return the frame of the shape if it serves as principal axes, else those there are."""
+    for frame, _ in shapes:
+        here = np.allclose(frame.position, axes.position, atol=1e-9)
+        if here and _is_diagonal(frame.rotation.T @ matrix @ frame.rotation):
+            return frame
+    return axes
+
+
+def _is_diagonal(matrix: Floats) -> bool:
+    return bool(np.allclose(matrix, np.diag(np.diag(matrix)), atol=1e-12))
+
+
+def _inertial(mass_kg: float, axes: Pose, matrix: Floats) -> str:
+    x, y, z = np.diag(axes.rotation.T @ matrix @ axes.rotation)
     return (
-        f'<inertial>{_origin(Pose(inertia.centre, axes))}<mass value="{inertia.mass_kg!r}"/>'
+        f'<inertial>{_origin(axes)}<mass value="{mass_kg!r}"/>'
         f'<inertia ixx="{x:.9g}" iyy="{y:.9g}" izz="{z:.9g}" ixy="0" ixz="0" iyz="0"/></inertial>'
     )
 
 
-def _colliders(bone: Bone, pose: Pose, skin_m: float) -> str:
-    return "".join(_collider(part, pose, skin_m) for part in bone.colliders)
+def _bare(bone: Bone, pose: Pose) -> list[_Shape]:
+    """Return the rigid primitives of a bone that is at a pose."""
+    return [_shape(part, pose, 0.0) for part in bone.colliders]
 
 
-def _collider(part: BoneCapsule | BoneBox, pose: Pose, skin_m: float) -> str:
+def _skinned(bone: Bone, pose: Pose) -> list[_Shape]:
+    """Return the primitives of a bone with its skin on."""
+    return [_shape(part, pose, bone.skin_thickness_m) for part in bone.colliders]
+
+
+def _shape(part: BoneCapsule | BoneBox, pose: Pose, skin_m: float) -> _Shape:
     if isinstance(part, BoneBox):
         centre, turn = np.array(part.centre), np.eye(3)
-        shape = f'<box size="{_numbers(*(2.0 * (half + skin_m) for half in part.half))}"/>'
+        geometry = f'<box size="{_numbers(*(2.0 * (half + skin_m) for half in part.half))}"/>'
     else:
         start, end = np.array(part.start), np.array(part.end)
         length = float(np.linalg.norm(end - start))
         centre, turn = (start + end) / 2.0, along((end - start) / length)
-        shape = f'<capsule radius="{part.radius + skin_m:.9g}" length="{length:.9g}"/>'
-    place = Pose(pose.position + pose.rotation @ centre, pose.rotation @ turn)
-    return f"<collision>{_origin(place)}<geometry>{shape}</geometry></collision>"
+        geometry = f'<capsule radius="{part.radius + skin_m:.9g}" length="{length:.9g}"/>'
+    return _Shape(Pose(pose.position + pose.rotation @ centre, pose.rotation @ turn), geometry)
+
+
+def _singly(layer: _Layer) -> list[_Layer]:
+    """Give each shape a link of its own."""
+    return [
+        _Layer(f"{layer.link}__part{i}" if i else layer.link, [_unturned(shape)], layer.soft)
+        for i, shape in enumerate(layer.shapes)
+    ]
+
+
+def _unturned(shape: _Shape) -> _Shape:
+    """Turn a shape along its link's z axis into the link's frame: both ends look the same."""
+    if abs(shape.pose.rotation[2, 2]) == 1.0:
+        return shape._replace(pose=Pose(shape.pose.position, np.eye(3)))
+    return shape
 
 
 def along(axis: Floats) -> Floats:

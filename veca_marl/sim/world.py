@@ -31,11 +31,15 @@ class ClockCfg:
         control_rate_hz: Agent steps per second.
         substeps: Physics steps per agent step.
         solver_iterations: Iterations of Bullet's constraint solver per physics step.
+        contact_share: How near, as a share of the size of the smaller of two things, physics looks
+            ahead to their contact. What crosses more in one physics step has sunk in before it is
+            noticed; 0.1 sees a palm-sized thing 5 mm ahead, at twice the price of physics.
     """
 
     control_rate_hz: int = 25
     substeps: int = 5
     solver_iterations: int = 10
+    contact_share: float = 0.02
 
     def __post_init__(self) -> None:
         """Only rates that give whole blocks of samples keep sound and physics together."""
@@ -45,6 +49,8 @@ class ClockCfg:
             )
         if self.substeps < 1 or self.solver_iterations < 1:
             raise ValueError("substeps and solver_iterations must be at least 1")
+        if not 0.0 < self.contact_share <= 1.0:
+            raise ValueError(f"contact_share={self.contact_share} must be above 0 and at most 1")
 
     @property
     def step_s(self) -> float:
@@ -136,6 +142,7 @@ class World:
         self._refuse_if_frozen("freeze it again")
         # Bullet forgets the contacts of the last episode only if the saved state holds contacts:
         # without them, what touches at the start moves otherwise than in a fresh world
+        self._look_ahead()
         pybullet.performCollisionDetection(physicsClientId=self.client)
         self._state = pybullet.saveState(physicsClientId=self.client)
 
@@ -147,6 +154,7 @@ class World:
         """
         if self._state is None:
             raise RuntimeError("freeze() the world before its first reset()")
+        self._look_ahead()
         pybullet.restoreState(self._state, physicsClientId=self.client)
         self.sound.reset(rng)
         for prop in self.props.values():
@@ -161,6 +169,7 @@ class World:
 
     def step(self) -> None:
         """Advance by one agent step."""
+        self._look_ahead()
         for mover in self.movers:
             mover.before_step()
         for _ in range(self.clock.substeps):
@@ -177,6 +186,12 @@ class World:
         if self.client >= 0:
             pybullet.disconnect(physicsClientId=self.client)
             self.client = -1
+
+    def _look_ahead(self) -> None:
+        """Say how near contacts are looked for: Bullet keeps one number for all its worlds."""
+        pybullet.setPhysicsEngineParameter(
+            contactBreakingThreshold=self.clock.contact_share, physicsClientId=self.client
+        )
 
     def _mirror(self) -> None:
         for prop in self._moving:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -9,10 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veca_marl.envs.experts.sit_up import SitUp
-from veca_marl.envs.moving import StartCfg, start_anywhere
+from veca_marl.envs.moving import StartCfg, draw_posture, start_anywhere
 from veca_marl.envs.scoring import share
 from veca_marl.envs.task import Player, Task, humanoid, register, terms
-from veca_marl.sim.bodies.postures import ON_BACK
 
 
 @dataclass
@@ -20,7 +20,9 @@ class SitBabyCfg(StartCfg):
     """How the child lies at the start, and how high who sits is.
 
     Attributes:
-        spread_deg: Standard deviation of every joint from the posture `on_back` at the start.
+        starts: Shares of the postures in which episodes begin. Who learns may begin further on in
+            part of them (a curriculum, see experiments/sitting).
+        spread_deg: Standard deviation of every joint from the posture at the start.
         torso_m: Height of the top of the chest (where the neck begins) of who sits upright.
         head_m: Height of the middle of the head of who sits upright.
     """
@@ -28,11 +30,15 @@ class SitBabyCfg(StartCfg):
     max_seconds: float = 10.0
     torso_m: float = 0.31
     head_m: float = 0.40
+    starts: dict[str, float] = terms(on_back=1.0, on_belly=0.0, on_all_fours=0.0, sitting=0.0)
     weights: dict[str, float] = terms(torso=0.02, head=0.02)
 
     def __post_init__(self) -> None:
         super().__post_init__()
         self._check_positive("torso_m", "head_m")
+        shares = self.starts.values()
+        if not all(0.0 <= share < math.inf for share in shares) or sum(shares) == 0.0:
+            raise ValueError(f"task.starts={self.starts} must be shares: 0 or more, not all 0")
 
 
 @register
@@ -61,7 +67,8 @@ class SitBaby(Task):
         self._expert = SitUp(self.body, self.world.clock.step_s)
 
     def reset(self, rng: np.random.Generator) -> None:
-        start_anywhere(self.body, self.room, ON_BACK, self.cfg.spread_deg, rng)
+        posture = draw_posture(self.cfg.starts, rng)
+        start_anywhere(self.body, self.room, posture, self.cfg.spread_deg, rng)
         self._expert.reset()
 
     def reward(self, player: Player) -> dict[str, float]:

@@ -48,7 +48,7 @@ class SoccerCfg(TaskCfg):
     attacker_from_ball_m: tuple[float, float] = (0.8, 1.6)
     spread_deg: float = 30.0
     kick_rest_s: float = 0.5
-    weights: dict[str, float] = terms(goal=1.0, progress=0.1, approach=0.02)
+    weights: dict[str, float] = terms(goal=5.0, progress=0.5, approach=0.5)
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -112,10 +112,11 @@ class Soccer(Task):
 
     def after_step(self, rng: np.random.Generator) -> None:
         before, to_goal_m, to_ball_m = self._ball, self._to_goal_m, self._to_ball_m
+        attacker = self.players[0].body.position
+        self._approach_m = to_ball_m - horizontal_distance(attacker, before)
         self._note()
         self._scored = self._scored or self.pitch.scores(before, self._ball)
         self._progress_m = to_goal_m - self._to_goal_m
-        self._approach_m = to_ball_m - self._to_ball_m
         self._kick()
 
     def reward(self, player: Player) -> dict[str, float]:

@@ -50,8 +50,9 @@ class SoccerTwoPlayer(Soccer):
         goal: 1 for the attacker, -1 for the defender on the step the ball is in.
         progress: decrease in this step of the ball's distance from the middle of the goal line, m;
             minus that for the defender.
-        approach: decrease in this step of the attacker's distance from the ball, m; minus that for
-            the defender, who is thus paid for standing in the attacker's way.
+        approach: how much nearer the attacker has come in this step to where the ball was, m: a
+            ball that rolls away costs nothing, or kicks would. Minus that for the defender, who is
+            thus paid for standing in the attacker's way.
     """
 
     teams = (Team(ATTACKER), Team(DEFENDER))

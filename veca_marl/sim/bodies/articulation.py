@@ -15,7 +15,7 @@ from veca_marl.sim.bullet import pybullet
 from veca_marl.sim.pose import Floats, Pose
 from veca_marl.sim.rotations import matrix_to_quaternion, quaternions_to_matrices
 from veca_marl.sim.skeleton import Skeleton
-from veca_marl.sim.urdf import SKIN_SUFFIX, Build, body_urdf
+from veca_marl.sim.urdf import Build, body_urdf, bone_of
 
 _TOP_SPEED = 30.0  # rad/s of a joint and m/s of the body: twice what human limbs reach
 _FLAGS = (
@@ -81,7 +81,7 @@ class Articulation:
         """Let joints swing freely, limit their speed and say which links may meet."""
         colliders = [(-1, "pelvis")]
         for info in infos:
-            bone = info[12].decode().removesuffix(SKIN_SUFFIX)
+            bone = bone_of(info[12].decode())
             if bone in bones:
                 colliders.append((info[0], bone))
         allow_self_collision(self._client, self.body_id, colliders)

@@ -55,7 +55,7 @@ class HumanoidCfg(BodyCfg):
     Attributes:
         detail: `full` moves 82 joints, `mitten` 40 at a little over half the cost. Actions, senses
             and names are the same: the mitten ignores what is asked of its fingers.
-        action: Normalised torques or angles to go to.
+        action: Normalised torques, angles to go to, or how far these angles go on.
         joints: Which joints an action row moves: all 82, or the 40 of the limbs without fingers.
         strength: Share of the torques in the table of joints.
         friction: Lateral friction of the skin.
@@ -192,7 +192,7 @@ class Humanoid(Figure):
         if wrong.size:
             joint = self.joint_names[self._chosen[wrong[0]]]
             raise ValueError(f"action of {joint} is {row[wrong[0]]}, not in [-1, 1]")
-        self._wishes[self._chosen] = row
+        self._wishes[self._chosen] = self._control.heed(row, self._wishes[self._chosen])
 
     def apply_torque(self, normalised: Floats) -> None:
         """Drive all 82 joints by shares of their strength in [-1, 1] (the paper's API).
@@ -223,8 +223,8 @@ class Humanoid(Figure):
         targets = np.clip(springs.targets, self._low, self._high)
         angles = self.foresee(targets, springs.ahead_s)
         wishes = self._control.wishes(targets, angles, self._low, self._high)
-        row: NDArray[Any] = wishes[self._chosen].astype(np.float32)
-        return row
+        row = self._control.row(wishes[self._chosen], self._wishes[self._chosen])
+        return row.astype(np.float32)
 
     def foresee(self, targets: Floats, ahead_s: float | None = None) -> Floats:
         """Return the ``(82,)`` angles (rad) a while after springs begin to pull to targets.
@@ -278,8 +278,9 @@ class Humanoid(Figure):
 
     def _start_anew(self) -> None:
         self._relax_eyes()
-        self._wishes[:] = self._shares[:] = 0.0
+        self._shares[:] = 0.0
         self._finite = self._finite and self.articulation.read()
+        self._wishes[:] = self._control.start(self._angles, self._low, self._high)
         self._pose_bones()
         self._mouth.teleport(self.mount("mouth").position)
 
