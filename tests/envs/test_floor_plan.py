@@ -12,7 +12,7 @@ from veca_marl.envs.floor_plan import FloorPlan
 from veca_marl.sim.playground import DoorCfg, PlaygroundCfg, RoomCfg
 from veca_marl.sim.world import World
 
-HOUSES = ("two_rooms", "three_rooms", "four_rooms")
+HOUSES = ("two_rooms", "three_rooms", "four_rooms", "seven_rooms")
 
 
 def plan_of(*doors, rooms=3):
