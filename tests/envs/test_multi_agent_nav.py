@@ -227,6 +227,7 @@ def test_bodies_with_joints_play_but_their_expert_is_not_written():
     game = game_of("body=mitten")
     game.reset(np.random.default_rng(0))
     one, other = game.players
+    game.observe(other)
     one.body.place((0.0, 0.0, 0.5))
     other.body.place((1.5, 0.0, 0.5))
     rest = {p.name: np.zeros(p.body.action_spec.shape, np.float32) for p in game.players}
@@ -239,7 +240,7 @@ def test_bodies_with_joints_play_but_their_expert_is_not_written():
         assert set(outcome.terms[one.name]) == {"reached", "ahead", "aside"}
     assert loud[1] > loud[0] + 3.0
     with pytest.raises(ValueError, match="choose body=walker"):
-        game.task.expert(one, game.observe(one))
+        game.task.expert(one, {})
     game.close()
 
 
@@ -261,9 +262,9 @@ def test_the_same_game_is_played_twice():
     times = []
     for _ in range(2):
         game = game_of(agents=3)
-        times.append([seconds_needed(game, seed) for seed in (5, 6)])
+        times.append(seconds_needed(game, seed=5))
         game.close()
-    assert times[0] == times[1]
+    assert times[0] == times[1] < math.inf
 
 
 def test_muting_is_by_where_they_start():
