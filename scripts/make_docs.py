@@ -30,7 +30,7 @@ BIN_HZ = 22050 / 1024
 def task_page(task: type[Task]) -> str:
     """Return the Markdown page of a task."""
     cfg_type = task.cfg_type()
-    teams = ", ".join(f"`{team.name}` ({team.size})" for team in task.teams)
+    teams = ", ".join(f"`{team.name}` ({team.size})" for team in task.teams_of(cfg_type()))
     lines = [
         f"# {task.__name__}",
         "",

@@ -16,6 +16,7 @@ from veca_marl.sim.senses import SensesCfg
 from veca_marl.sim.senses.audio import AudioQuality
 
 KICK = "+task=KickTheBall"
+PUSH = "+task=PushOut1v1"
 SENSES = ("audio", "proprioception", "touch", "vision")
 GROUPS = ["algo", "body", "collect", "log", "playground", *(f"senses/{name}" for name in SENSES)]
 PRESETS = [(g, path.stem) for g in GROUPS for path in sorted((CONF / g).glob("*.yaml"))]
@@ -95,6 +96,21 @@ def test_files_hold_only_what_differs_from_the_dataclasses():
         ([KICK, "total_frames=0"], r"total_frames must be at least 1, got 0"),
         ([KICK, "algo.minibatches=9999"], r"a batch of \d+ frames cannot be split"),
         ([KICK, "see d=1"], r"see d=1"),
+        (
+            [PUSH, "opponent.green=idle"],
+            r"opponent: no \['green'\] in PushOut1v1; .*\['red', 'blue'\]",
+        ),
+        ([PUSH, "opponent.red=nobody"], r"opponent.red=nobody: choices: expert, random, idle, the"),
+        (
+            [PUSH, "opponent.red=idle", "opponent.blue=idle"],
+            r"nobody learns: all of",
+        ),
+        ([PUSH, "+algo@learner.green=mappo"], r"learner: no \['green'\] in PushOut1v1; choices:"),
+        ([PUSH, "self_play.teams=[red]"], r"self_play.teams=\['red'\]: two teams, or none"),
+        (
+            [PUSH, "self_play.teams=[red,blue]", "opponent.blue=idle"],
+            r"self_play.teams: no \['blue'\] in PushOut1v1; choices: \['red'\]",
+        ),
     ],
 )
 def test_what_is_wrong_is_said_in_one_line(overrides, message):

@@ -68,30 +68,15 @@ def make_algorithm(cfg: Config, specs: dict[str, TeamSpec], device: torch.device
     """Return what learns all teams but those with an opponent from another run.
 
     Raises:
-        ConfigError: If a team does not exist, or nobody learns.
         CheckpointError: If an opponent cannot be loaded.
     """
-    frozen = cfg.frozen
-    for key, asked in (("opponent", frozen), ("learner", cfg.learner)):
-        unknown = sorted(set(asked) - set(specs))
-        if unknown:
-            raise ConfigError(f"{key}: no teams {unknown} learn here; there are {sorted(specs)}")
-    if set(frozen) == set(specs):
-        raise ConfigError(f"opponent: nobody learns: all of {sorted(specs)} are opponents")
-    actors = {team: load_actor(path, team, specs[team]) for team, path in frozen.items()}
+    actors = {team: load_actor(path, team, specs[team]) for team, path in cfg.frozen.items()}
     return PPO(specs, cfg.algo, device, cfg.learner, actors)
 
 
 def make_self_play(cfg: Config, algorithm: PPO, pool: Pool) -> SelfPlay:
-    """Return the matchmaking between a team and past selves of another.
-
-    Raises:
-        ConfigError: If a team does not learn.
-    """
-    try:
-        return SelfPlay(cfg.self_play, algorithm, pool, cfg.seed)
-    except ValueError as error:
-        raise ConfigError(one_line(error)) from error
+    """Return the matchmaking between a team and past selves of another."""
+    return SelfPlay(cfg.self_play, algorithm, pool, cfg.seed)
 
 
 def read_specs(game: GameCfg) -> dict[str, TeamSpec]:

@@ -138,6 +138,25 @@ class Config:
             {team: Script(who) for team, who in self.opponent.items() if who in _SCRIPTS},
         )
 
+    def check_teams(self) -> None:
+        """Refuse opponents, learners and self-play of teams that are not there to do so.
+
+        Raises:
+            ValueError: If there are any, or if nobody learns.
+        """
+        teams = [team.name for team in self.game.teams]
+        learn = [team for team in teams if team not in self.opponent]
+        for key, asked, choices in (
+            ("opponent", self.opponent, teams),
+            ("learner", self.learner, learn),
+            ("self_play.teams", self.self_play.teams, learn),
+        ):
+            unknown = sorted(set(asked) - set(choices))
+            if unknown:
+                raise ValueError(f"{key}: no {unknown} in {self.task.name}; choices: {choices}")
+        if not learn:
+            raise ValueError(f"opponent: nobody learns: all of {teams} are opponents")
+
     @property
     def frozen(self) -> dict[str, Path]:
         """Teams that are played by what another run learnt, and where that is."""
@@ -206,6 +225,7 @@ def to_config(node: DictConfig) -> Config:
         config = cast(Config, OmegaConf.to_object(node))
         find_task(config.task.name)
         _refuse_extra(config, "")
+        config.check_teams()
     except (OmegaConfBaseException, ValueError) as error:
         raise ConfigError(one_line(error)) from error
     return config

@@ -2,7 +2,16 @@
 
 import numpy as np
 import pytest
-from babies import baby_game
+from babies import (
+    BODIES,
+    check_limbs_fall_and_none_flies,
+    check_walkers_are_refused,
+    child_game,
+    hold,
+    play,
+    put,
+    starts,
+)
 
 from veca_marl.envs.tasks.sit_baby import SitBabyCfg
 from veca_marl.sim.bodies.postures import ON_BACK, SITTING, STANDING, Posture
@@ -10,19 +19,15 @@ from veca_marl.sim.bodies.postures import ON_BACK, SITTING, STANDING, Posture
 
 @pytest.fixture(scope="module")
 def game():
-    game = baby_game("SitBaby")
-    yield game
-    game.close()
+    with child_game("SitBaby") as game:
+        yield game
 
 
 def terms_in(game, posture, seconds=0.04):
     """Return the terms after holding a posture."""
-    game.reset(np.random.default_rng(1))
-    body = game.players[0].body
-    body.place((0.0, 0.0, 0.0), 0.7, posture)
+    angles = put(game, posture).angles_of(posture)
     for _ in range(round(seconds / 0.04)):
-        row = body.encode(body.angles_of(posture))
-        outcome = game.step({"agents": row}, np.random.default_rng(0))
+        outcome = hold(game, angles)
     return outcome.terms["agents"]
 
 
@@ -54,34 +59,24 @@ def test_an_episode_is_worth_ten(game):
 
 
 def test_it_starts_on_the_back_at_rest(game):
-    for seed in range(8):
-        game.reset(np.random.default_rng(seed))
-        body = game.players[0].body
-        rest = {"agents": np.zeros(body.action_spec.shape, np.float32)}
-        for _ in range(12):
-            game.step(rest, np.random.default_rng(0))
-            assert np.linalg.norm(body.velocities(), axis=1).max() < 2.5
+    for body in starts(game, 8):
+        check_limbs_fall_and_none_flies(game)
         assert body.bone("chest").forward[2] > 0.8
 
 
-@pytest.mark.parametrize("body", ["mitten_limbs", "mitten_position"])
+@pytest.mark.parametrize("body", BODIES)
 def test_the_expert_sits_in_the_end(body):
-    game, rng = baby_game("SitBaby", f"body={body}"), np.random.default_rng(3)
-    player, ends = game.players[0], []
-    for _ in range(4):
-        game.reset(rng)
-        for _ in range(game.max_steps):
-            row = player.body.encode(game.task.expert(player, {}))
-            outcome = game.step({player.name: row}, rng)
-        ends.append(min(outcome.terms[player.name].values()))
-        assert not outcome.terminated
+    rng, ends = np.random.default_rng(3), []
+    with child_game("SitBaby", f"body={body}") as game:
+        for _ in range(4):
+            last = play(game, rng)[0][-1]
+            ends.append(min(last.terms["agents"].values()))
+            assert not last.terminated
     assert np.median(ends) > 0.8
-    game.close()
 
 
 def test_a_walker_is_refused():
-    with pytest.raises(ValueError, match="body with joints"):
-        baby_game("SitBaby", "body=walker")
+    check_walkers_are_refused("SitBaby")
 
 
 @pytest.mark.parametrize(

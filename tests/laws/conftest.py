@@ -1,4 +1,4 @@
-"""Every law is asked of every task, with each way to act in it."""
+"""What the laws of every task are asked of: each task, in each way to act."""
 
 import pytest
 from rollouts import KINDS

@@ -5,6 +5,7 @@ Run as a program it prints the digest of a rollout, so that another process can 
 
 import hashlib
 import sys
+from dataclasses import replace
 
 import numpy as np
 import torch
@@ -12,6 +13,9 @@ import torch
 from veca_marl.config import compose
 from veca_marl.envs.env import VecaEnv
 from veca_marl.envs.game import Game
+from veca_marl.envs.scripts import play_script
+from veca_marl.envs.team import Script
+from veca_marl.sim.bodies.voice_controls import VoiceKind
 from veca_marl.sim.bodies.walker import WalkerCfg
 
 # the ways to act in a task: its own body's, and another
@@ -23,8 +27,14 @@ def game_cfg(task, kind="own", *overrides):
     own = compose([f"+task={task}", *overrides])
     if kind == "own":
         return own.game
-    other = "walker_discrete" if isinstance(own.game.body, WalkerCfg) else "mitten_position"
-    return compose([f"+task={task}", f"body={other}", *overrides]).game
+    return compose([f"+task={task}", f"body={other_body(own.game.body)}", *overrides]).game
+
+
+def other_body(own):
+    if not isinstance(own, WalkerCfg):
+        return "mitten_position"
+    # where players call, the house is silent without voices: the ears would be constant
+    return "walker_discrete" if own.voice is VoiceKind.silent else "walker_discrete_voice"
 
 
 def random_row(spec, rng):
@@ -62,27 +72,29 @@ def digest(rollout):
     return total.hexdigest()
 
 
-def returns(cfg, episodes, choose, seed=0):
+def returns(cfg, episodes, script, seed=0):
     """Play episodes and return what the players of the first team were paid in each.
+
+    Other teams play at random: a game between two who choose alike does not say who is better.
 
     Args:
         cfg: The game.
         episodes: How many.
-        choose: ``choose(task, player, observation, rng)`` gives an action row.
+        script: Who chooses for the first team.
         seed: Of everything random.
     """
-    game, rng = Game(cfg), np.random.default_rng(seed)
+    others = {team.name: Script.random for team in cfg.teams[1:]}
+    game, rng = Game(replace(cfg, script=others)), np.random.default_rng(seed)
     paid = []
     for _ in range(episodes):
         game.reset(rng)
-        seen = {player.name: game.observe(player) for player in game.players}
         total, over = 0.0, False
         while not over:
-            actions = {p.name: choose(game.task, p, seen[p.name], rng) for p in game.players}
-            outcome = game.step(actions, rng)
-            seen = {player.name: game.observe(player) for player in game.players}
-            team = game.team(cfg.teams[0].name)
-            total += float(np.mean([game.pay(outcome.terms[p.name]) for p in team]))
+            for player in game.actors:
+                now = Script.idle if player.name in game.out else script
+                play_script(now, game.task, player, game.observe, rng)
+            outcome = game.advance(rng)
+            total += float(np.mean([game.pay(outcome.terms[p.name]) for p in game.actors]))
             over = outcome.done
         paid.append(total)
     game.close()
@@ -91,10 +103,6 @@ def returns(cfg, episodes, choose, seed=0):
 
 def by_chance(task, player, observation, rng):
     return random_row(player.body.action_spec, rng)
-
-
-def by_expert(task, player, observation, rng):
-    return player.body.encode(task.expert(player, observation))
 
 
 if __name__ == "__main__":

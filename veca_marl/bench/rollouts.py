@@ -9,6 +9,7 @@ from statistics import median
 
 import torch
 from tensordict import TensorDictBase
+from tensordict.nn import TensorDictModuleBase
 
 from veca_marl.bench.stopwatch import Probes, Stopwatch
 from veca_marl.envs.env import VecaEnv
@@ -92,7 +93,7 @@ def measure_rollouts(game: GameCfg, worlds: int, steps: int, repeats: int) -> Ro
     )
 
 
-class RandomMoves:
+class RandomMoves(TensorDictModuleBase):
     """Drawn beforehand, so that the policy costs next to nothing.
 
     Args:
@@ -101,12 +102,14 @@ class RandomMoves:
     """
 
     def __init__(self, env: VecaEnv, steps: int) -> None:
+        super().__init__()
         torch.manual_seed(0)
         spec = env.full_action_spec
+        self.in_keys, self.out_keys = [], list(env.action_keys)
         self._moves = {key: [spec[key].rand() for _ in range(steps)] for key in env.action_keys}
         self._step = 0
 
-    def __call__(self, tensordict: TensorDictBase) -> TensorDictBase:
+    def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
         """Write each team's next move."""
         for key, moves in self._moves.items():
             tensordict.set(key, moves[self._step % len(moves)])
@@ -119,10 +122,11 @@ def _split(env: VecaEnv, policy: RandomMoves, steps: int) -> dict[str, int]:
     watch = Stopwatch(rest=TORCHRL)
     with Probes(watch) as probes:
         probes.put(ENV, env, "_step", "_reset")
+        probes.put(POLICY, policy, "forward")
         for game in env.games:
             _probe_game(game, probes)
         with watch.running():
-            env.rollout(steps, watch.wrap(POLICY, policy), break_when_any_done=False)
+            env.rollout(steps, policy, break_when_any_done=False)
     return dict(watch.nanoseconds)
 
 

@@ -99,16 +99,6 @@ class TaskCfg:
                 raise ValueError(f"task.{name}={value} must be a positive number")
 
 
-def check_spread(spread_deg: float) -> None:
-    """Refuse a spread of the starting joints that would not resemble the posture any more.
-
-    Raises:
-        ValueError: If it is negative or above 30 degrees.
-    """
-    if not 0.0 <= spread_deg <= 30.0:
-        raise ValueError(f"task.spread_deg={spread_deg} must be in [0, 30]")
-
-
 class Task(ABC):
     """The rules of one game.
 

@@ -15,6 +15,9 @@ from veca_marl.sim.house import TRANSMISSION_LOSS_DB
 from veca_marl.sim.pose import Floats
 from veca_marl.sim.props import PropCfg
 
+THICKEST_WALL_M = 0.5
+"""A door's threshold lies within the wall, so at most so far from either room."""
+
 
 @dataclass
 class RoomCfg:
@@ -47,6 +50,18 @@ class RoomCfg:
         low = np.asarray(self.lower_m) + margin_m
         high = np.asarray(self.lower_m) + np.asarray(self.size_m) - margin_m
         return bool(np.all(position >= low) and np.all(position <= high))
+
+    def away_m(self, point: tuple[float, float]) -> float:
+        """Return how far a point of the floor plan is from the room, metres; 0 inside."""
+        low, size = np.array(self.lower_m[:2]), np.array(self.size_m[:2])
+        out = np.maximum(np.maximum(low - point, point - low - size), 0.0)
+        return float(np.linalg.norm(out))
+
+    @property
+    def middle_m(self) -> Floats:
+        """``(3,)`` metres: the middle of the floor."""
+        x, y = np.array(self.lower_m[:2]) + np.array(self.size_m[:2]) / 2.0
+        return np.array([x, y, self.lower_m[2]])
 
     def sample_floor(self, rng: np.random.Generator, margin_m: float) -> Floats:
         """Draw a point of the floor, ``(3,)`` metres, at least `margin_m` from the walls.
@@ -87,6 +102,34 @@ class RoomCfg:
 
 
 @dataclass
+class DoorCfg:
+    """An opening in the wall between two rooms: known as data, so that nobody has to guess.
+
+    The walls round it are props. An opening is there or not; a door that opens is a prop in one.
+
+    Attributes:
+        name: Unique in its playground.
+        rooms: The names of the two rooms it joins.
+        position_m: The middle of its threshold, x and y, metres.
+        width_m: How wide it is.
+    """
+
+    name: str = "door"
+    rooms: tuple[str, str] = ("", "")
+    position_m: tuple[float, float] = (0.0, 0.0)
+    width_m: float = 1.0
+
+    def __post_init__(self) -> None:
+        """A door is somewhere, and leads somewhere else."""
+        if not all(math.isfinite(value) for value in self.position_m):
+            raise ValueError(f"door {self.name!r}: position_m={tuple(self.position_m)}")
+        if not (math.isfinite(self.width_m) and self.width_m > 0.0):
+            raise ValueError(f"door {self.name!r}: width_m={self.width_m} must be positive")
+        if self.rooms[0] == self.rooms[1]:
+            raise ValueError(f"door {self.name!r}: rooms={tuple(self.rooms)} must be two")
+
+
+@dataclass
 class PlaygroundCfg:
     """A place to play in.
 
@@ -94,6 +137,7 @@ class PlaygroundCfg:
         name: As on the command line.
         rooms: Boxes of air; the first is where single-room tasks play. Fixed props of shape `wall`
             between them take sound away.
+        doors: The openings between rooms.
         props: Walls, furniture and toys.
         floor_size_m: Extent of the drawn floor along x and y.
         floor_centre_m: Its middle.
@@ -105,6 +149,7 @@ class PlaygroundCfg:
 
     name: str = ""
     rooms: list[RoomCfg] = field(default_factory=lambda: [RoomCfg()])
+    doors: list[DoorCfg] = field(default_factory=list)
     props: list[PropCfg] = field(default_factory=list)
     floor_size_m: tuple[float, float] = (6.0, 6.0)
     floor_centre_m: tuple[float, float] = (0.0, 0.0)
@@ -122,10 +167,12 @@ class PlaygroundCfg:
         """Names are looked up, so they must be unique, and there must be a room to play in."""
         if not self.rooms:
             raise ValueError(f"playground {self.name!r} has no room")
-        names = [prop.name for prop in self.props]
-        twice = sorted({name for name in names if names.count(name) > 1})
-        if twice:
-            raise ValueError(f"playground {self.name!r}: props share the names {twice}")
+        for kind, things in (("props", self.props), ("doors", self.doors)):
+            names = [thing.name for thing in things]
+            twice = sorted({name for name in names if names.count(name) > 1})
+            if twice:
+                raise ValueError(f"playground {self.name!r}: {kind} share the names {twice}")
+        self._check_doors()
         if self.image_order < 0:
             raise ValueError(
                 f"playground {self.name!r}: image_order={self.image_order} is negative"
@@ -136,3 +183,24 @@ class PlaygroundCfg:
                 f"playground {self.name!r}: transmission_loss_db={loss_db} must be finite, "
                 "0 or more"
             )
+
+    def _check_doors(self) -> None:
+        """Refuse doors to nowhere."""
+        rooms = {room.name: room for room in self.rooms}
+        if self.doors and len(rooms) < len(self.rooms):
+            names = [room.name for room in self.rooms]
+            raise ValueError(f"playground {self.name!r}: doors need rooms of unique names: {names}")
+        for door in self.doors:
+            unknown = sorted(set(door.rooms) - set(rooms))
+            if unknown:
+                raise ValueError(
+                    f"playground {self.name!r}, door {door.name!r}: no rooms {unknown}; "
+                    f"there are {sorted(rooms)}"
+                )
+            for name in door.rooms:
+                away_m = rooms[name].away_m(door.position_m)
+                if away_m > THICKEST_WALL_M:
+                    raise ValueError(
+                        f"playground {self.name!r}, door {door.name!r}: "
+                        f"position_m={tuple(door.position_m)} is {away_m:.2f} m from {name!r}"
+                    )

@@ -9,13 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veca_marl.envs.experts.crawl import Crawl
+from veca_marl.envs.moving import StartCfg, start_near_edge
 from veca_marl.envs.scoring import along
-from veca_marl.envs.task import Player, Task, TaskCfg, check_spread, humanoid, register, terms
+from veca_marl.envs.task import Player, Task, humanoid, register, terms
 from veca_marl.sim.bodies.postures import ON_ALL_FOURS
 
 
 @dataclass
-class CrawlBabyCfg(TaskCfg):
+class CrawlBabyCfg(StartCfg):
     """How the child starts, and what getting ahead is worth.
 
     Attributes:
@@ -30,7 +31,6 @@ class CrawlBabyCfg(TaskCfg):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        check_spread(self.spread_deg)
         self._check_positive("top_mps")
 
 
@@ -60,9 +60,7 @@ class CrawlBaby(Task):
         self._place, self._way = np.zeros(3), np.zeros(3)
 
     def reset(self, rng: np.random.Generator) -> None:
-        start, heading = self.room.sample_start(rng, margin_m=1.0)
-        posture = self.body.vary(ON_ALL_FOURS, self.cfg.spread_deg, rng)
-        self.body.place(start, heading, posture)
+        start_near_edge(self.body, self.room, ON_ALL_FOURS, self.cfg.spread_deg, rng)
         self._place = self.body.position
         self._expert.reset()
 

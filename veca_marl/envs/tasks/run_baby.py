@@ -9,13 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veca_marl.envs.experts.run import Run
+from veca_marl.envs.moving import StartCfg, start_near_edge
 from veca_marl.envs.scoring import along, flat
-from veca_marl.envs.task import Player, Task, TaskCfg, check_spread, humanoid, register, terms
+from veca_marl.envs.task import Player, Task, humanoid, register, terms
 from veca_marl.sim.bodies.postures import STANDING
 
 
 @dataclass
-class RunBabyCfg(TaskCfg):
+class RunBabyCfg(StartCfg):
     """How the child starts, what getting ahead is worth, and what a fall is.
 
     Attributes:
@@ -33,7 +34,6 @@ class RunBabyCfg(TaskCfg):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        check_spread(self.spread_deg)
         self._check_positive("top_mps")
         if not 0.0 <= self.fallen_m <= 0.5:
             raise ValueError(f"task.fallen_m={self.fallen_m} must be in [0, 0.5]")
@@ -63,9 +63,7 @@ class RunBaby(Task):
         self._expert = Run(self.body, self.world.clock.step_s)
 
     def reset(self, rng: np.random.Generator) -> None:
-        start, heading = self.room.sample_start(rng, margin_m=1.0)
-        posture = self.body.vary(STANDING, self.cfg.spread_deg, rng)
-        self.body.place(start, heading, posture)
+        start_near_edge(self.body, self.room, STANDING, self.cfg.spread_deg, rng)
         self._place = self.body.bone("chest").position
         self._expert.reset()
 

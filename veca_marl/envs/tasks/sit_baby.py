@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,13 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veca_marl.envs.experts.sit_up import SitUp
+from veca_marl.envs.moving import StartCfg, start_anywhere
 from veca_marl.envs.scoring import share
-from veca_marl.envs.task import Player, Task, TaskCfg, check_spread, humanoid, register, terms
+from veca_marl.envs.task import Player, Task, humanoid, register, terms
 from veca_marl.sim.bodies.postures import ON_BACK
 
 
 @dataclass
-class SitBabyCfg(TaskCfg):
+class SitBabyCfg(StartCfg):
     """How the child lies at the start, and how high who sits is.
 
     Attributes:
@@ -26,14 +26,12 @@ class SitBabyCfg(TaskCfg):
     """
 
     max_seconds: float = 10.0
-    spread_deg: float = 10.0
     torso_m: float = 0.31
     head_m: float = 0.40
     weights: dict[str, float] = terms(torso=0.02, head=0.02)
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        check_spread(self.spread_deg)
         self._check_positive("torso_m", "head_m")
 
 
@@ -63,9 +61,7 @@ class SitBaby(Task):
         self._expert = SitUp(self.body, self.world.clock.step_s)
 
     def reset(self, rng: np.random.Generator) -> None:
-        start = self.room.sample_floor(rng, margin_m=1.0)
-        posture = self.body.vary(ON_BACK, self.cfg.spread_deg, rng)
-        self.body.place(start, rng.uniform(-math.pi, math.pi), posture)
+        start_anywhere(self.body, self.room, ON_BACK, self.cfg.spread_deg, rng)
         self._expert.reset()
 
     def reward(self, player: Player) -> dict[str, float]:

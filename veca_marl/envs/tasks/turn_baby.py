@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,12 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veca_marl.envs.experts.turn_over import TurnOver
-from veca_marl.envs.task import Player, Task, TaskCfg, check_spread, humanoid, register, terms
+from veca_marl.envs.moving import StartCfg, face_down, start_anywhere
+from veca_marl.envs.task import Player, Task, humanoid, register, terms
 from veca_marl.sim.bodies.postures import ON_BACK
 
 
 @dataclass
-class TurnBabyCfg(TaskCfg):
+class TurnBabyCfg(StartCfg):
     """How the child lies at the start, and what lying on the belly is worth.
 
     Attributes:
@@ -23,12 +23,7 @@ class TurnBabyCfg(TaskCfg):
     """
 
     max_seconds: float = 8.0
-    spread_deg: float = 10.0
     weights: dict[str, float] = terms(torso=0.025, hip=0.025)
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        check_spread(self.spread_deg)
 
 
 @register
@@ -53,16 +48,11 @@ class TurnBaby(Task):
         self._expert = TurnOver(self.body, self.world.clock.step_s)
 
     def reset(self, rng: np.random.Generator) -> None:
-        start = self.room.sample_floor(rng, margin_m=1.0)
-        posture = self.body.vary(ON_BACK, self.cfg.spread_deg, rng)
-        self.body.place(start, rng.uniform(-math.pi, math.pi), posture)
+        start_anywhere(self.body, self.room, ON_BACK, self.cfg.spread_deg, rng)
         self._expert.reset()
 
     def reward(self, player: Player) -> dict[str, float]:
-        return {
-            "torso": -float(self.body.bone("chest").forward[2]),
-            "hip": -float(self.body.bone("pelvis").forward[2]),
-        }
+        return face_down(self.body)
 
     def expert(self, player: Player, observation: dict[str, NDArray[Any]]) -> Any:
         """Swing one leg and one arm across, then stretch. Uses the true attitude of the trunk."""

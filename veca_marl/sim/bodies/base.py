@@ -14,6 +14,12 @@ from veca_marl.sim.spec import ArraySpec
 MOUNTS = ("head", "eye_left", "eye_right", "ear_left", "ear_right", "mouth")
 
 
+class Visible(Protocol):
+    """What eyes can look for: a prop or a body."""
+
+    object_id: int
+
+
 @dataclass
 class BodyCfg:
     """What every body can be told.
@@ -86,6 +92,10 @@ class Body(Protocol):
 
     def place(self, position: Floats | tuple[float, float, float], yaw_rad: float = 0.0) -> None:
         """Start anew at a place of the floor, facing `yaw_rad`, at rest."""
+        ...
+
+    def is_visible(self, thing: Visible, eye: str = "eye_left") -> bool:
+        """Say whether an eye sees a thing, also through glass."""
         ...
 
     @property

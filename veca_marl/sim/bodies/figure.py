@@ -6,11 +6,12 @@ How the bones come to be where they are is the business of each body.
 from __future__ import annotations
 
 import math
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from veca_marl.sim.bodies.base import Visible
 from veca_marl.sim.bodies.looks import SHIRTS, bone_geoms, dressed_skin
 from veca_marl.sim.bodies.mounts import EYES, gaze, organ_pose, palm_of
 from veca_marl.sim.bone_motion import bone_motion
@@ -20,12 +21,6 @@ from veca_marl.sim.pose import Floats, Pose
 from veca_marl.sim.skeleton import load_skeleton
 from veca_marl.sim.sounds import Voice
 from veca_marl.sim.world import World
-
-
-class Visible(Protocol):
-    """What eyes can look for: a prop or a body."""
-
-    object_id: int
 
 
 class Figure:

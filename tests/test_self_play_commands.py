@@ -1,0 +1,96 @@
+"""Teams at the command line: self-play, cross-play, opponents from elsewhere, other algorithms."""
+
+import csv
+import subprocess
+import sys
+
+import pytest
+import torch
+
+from veca_marl.cross_play import main as cross_play
+from veca_marl.cross_play import spread
+
+TASK = ["+task=PushOut1v1", "task.max_seconds=1", "senses/vision=blind", "senses/touch=numb"]
+SMALL = [
+    "collect=one_process",
+    "collect.worlds=2",
+    "collect.steps=16",
+    "eval.episodes=2",
+    "eval.worlds=2",
+    "log=silent",
+    "threads=1",
+]
+
+
+def train(folder, name, *arguments):
+    run = f"hydra.run.dir={folder / name}"
+    command = [sys.executable, "-m", "veca_marl.train", *TASK, *SMALL, run, *arguments]
+    return subprocess.run(command, cwd=folder, capture_output=True, text=True)
+
+
+def rows(path):
+    with path.open() as file:
+        return list(csv.DictReader(file))
+
+
+def actors(run, team):
+    last = sorted(run.glob("checkpoints/frames_*.pt"))[-1]
+    return torch.load(last, weights_only=True)["state"]["algorithm"][team]["network"]
+
+
+@pytest.fixture(scope="module")
+def played(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("self_play")
+    turns = ["self_play.teams=[red,blue]", "eval.every_frames=32", "total_frames=128"]
+    done = train(folder, "run", *turns, "+algo@learner.blue=mappo", "learner.blue.epochs=1")
+    assert done.returncode == 0, done.stderr
+    return folder
+
+
+def test_both_teams_leave_past_selves(played):
+    kept = sorted(path.name for path in (played / "run" / "pool").iterdir())
+    frames = {"red": (0, 32, 96), "blue": (0, 64, 128)}
+    assert kept == sorted(f"{team}_{n:012d}.pt" for team, ns in frames.items() for n in ns)
+    # blue alone has a critic that judges by the whole team
+    central, own = (actors(played / "run", team) for team in ("blue", "red"))
+    assert central.keys() != own.keys() or any(central[k].shape != own[k].shape for k in own)
+
+
+def test_cross_play_writes_the_matches_the_ratings_and_the_picture(played, capsys):
+    pytest.importorskip("matplotlib", reason="the picture needs the extra [plot]")
+    run = played / "run"
+    assert cross_play([str(run), "--members", "2", "--episodes", "4"]) == 0
+    matches, ratings = rows(run / "cross_play.csv"), rows(run / "elo.csv")
+    assert {(m["red_frames"], m["blue_frames"]) for m in matches} == {
+        (red, blue) for red in ("0", "96") for blue in ("0", "128")
+    }
+    for match in matches:
+        assert int(match["episodes"]) == 4
+        assert int(match["red_wins"]) + int(match["blue_wins"]) <= 4
+    assert len(ratings) == 4
+    assert (run / "cross_play.png").read_bytes().startswith(b"\x89PNG")
+    assert len(capsys.readouterr().out.splitlines()) == 4
+
+
+def test_what_another_run_learnt_is_an_opponent(played, tmp_path, capsys):
+    done = train(tmp_path, "run", f"opponent.blue={played / 'run'}", "total_frames=32")
+    assert done.returncode == 0, done.stderr
+    with (tmp_path / "run" / "metrics.csv").open() as file:
+        columns = next(csv.reader(file))
+    assert "red/policy_loss" in columns
+    assert not [name for name in columns if name.startswith("blue/") and "loss" in name]
+    evaluated = {row["team"] for row in rows(tmp_path / "run" / "evaluations.csv")}
+    assert evaluated == {"red", "blue"}
+    # a run without self-play has no past selves that could meet
+    assert cross_play([str(tmp_path / "run")]) == 2
+    assert "self_play.teams" in capsys.readouterr().err
+
+
+def test_a_folder_that_is_no_run_is_refused(tmp_path, capsys):
+    assert cross_play([str(tmp_path / "nowhere")]) == 2
+    assert "nowhere" in capsys.readouterr().err
+
+
+def test_past_selves_are_chosen_evenly():
+    assert spread([0, 1, 2, 3, 4, 5, 6], 3) == [0, 3, 6]
+    assert spread([0, 5], 6) == [0, 5]

@@ -1,0 +1,195 @@
+"""The pitch: what SoccerOnePlayer and SoccerTwoPlayer have in common."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from veca_marl.envs.contests import line_up
+from veca_marl.envs.experts.soccer import attack
+from veca_marl.envs.task import Player, Task, TaskCfg, terms, walker
+from veca_marl.sim.bodies.pushing import horizontal_distance
+from veca_marl.sim.bodies.walker import Walker
+from veca_marl.sim.pose import Floats
+from veca_marl.sim.props import PropCfg, PropShape
+
+ATTACKER, DEFENDER = "attacker", "defender"
+_POST_M = 0.04
+
+
+@dataclass
+class SoccerCfg(TaskCfg):
+    """The pitch lies along x: the goal's mouth looks back at the attacker.
+
+    Attributes:
+        radius_m: Radius of the ball.
+        mass_kg: Mass of the ball.
+        goal_width_m: Between the axes of the posts.
+        goal_height_m: Of the bar.
+        goal_from_wall_m: How far the goal line is before the end of the room.
+        ball_from_goal_m: Least and greatest distance of the ball from the goal line at the start.
+        aside_m: Ball and players start at most so far to the side of the middle line.
+        attacker_from_ball_m: Least and greatest distance at which the attacker starts behind it.
+        spread_deg: Players face the ball, up to so many degrees aside.
+        kick_rest_s: Who has kicked cannot kick again before.
+    """
+
+    radius_m: float = 0.12
+    mass_kg: float = 0.3
+    goal_width_m: float = 1.4
+    goal_height_m: float = 0.8
+    goal_from_wall_m: float = 0.5
+    ball_from_goal_m: tuple[float, float] = (2.0, 2.8)
+    aside_m: float = 0.8
+    attacker_from_ball_m: tuple[float, float] = (0.8, 1.6)
+    spread_deg: float = 30.0
+    kick_rest_s: float = 0.5
+    weights: dict[str, float] = terms(goal=1.0, progress=0.1, approach=0.02)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for name in ("radius_m", "mass_kg", "goal_from_wall_m", "kick_rest_s"):
+            if not 0.0 < getattr(self, name) < math.inf:
+                raise ValueError(f"task.{name}={getattr(self, name)} must be a positive number")
+        for name in ("goal_width_m", "goal_height_m"):
+            if not 2.0 * (self.radius_m + _POST_M) < getattr(self, name) < math.inf:
+                raise ValueError(
+                    f"task.{name}={getattr(self, name)}: a ball of task.radius_m={self.radius_m} "
+                    "does not fit through"
+                )
+        for name in ("ball_from_goal_m", "attacker_from_ball_m"):
+            near, far = getattr(self, name)
+            if not 0.3 <= near <= far < math.inf:
+                raise ValueError(
+                    f"task.{name}={(near, far)} must be (least, greatest), 0.3 m or more"
+                )
+        if not 0.0 <= self.aside_m < math.inf:
+            raise ValueError(f"task.aside_m={self.aside_m} must be 0 or more")
+        if not 0.0 <= self.spread_deg <= 180.0:
+            raise ValueError(f"task.spread_deg={self.spread_deg} must be in [0, 180]")
+
+
+class Soccer(Task):
+    """The attacker shall put the ball into the goal; there are no rules."""
+
+    senses = ("vision", "touch", "proprioception")
+    cfg: SoccerCfg
+
+    def build(self) -> None:
+        cfg, room = self.cfg, self.world.playground.rooms[0]
+        low, size = np.array(room.lower_m), np.array(room.size_m)
+        self.goal: Floats = low + np.array([size[0] - cfg.goal_from_wall_m, size[1] / 2.0, 0.0])
+        longest = cfg.goal_from_wall_m + cfg.ball_from_goal_m[1] + cfg.attacker_from_ball_m[1]
+        if longest > size[0] - 0.3 or cfg.aside_m > size[1] / 2.0 - 0.3:
+            raise ValueError(
+                f"task: a pitch {longest:.1f} m long, {2.0 * cfg.aside_m:.1f} m wide does not fit "
+                f"into the room {room.name!r} of {size[0]} x {size[1]} m"
+            )
+        self.ball = self.world.add_prop(
+            PropCfg(
+                name="ball",
+                shape=PropShape.sphere,
+                size_m=[cfg.radius_m],
+                position_m=(*(low[:2] + size[:2] / 2.0).tolist(), cfg.radius_m),
+                mass_kg=cfg.mass_kg,
+                colour=(0.95, 0.95, 0.95),
+                checker_m=cfg.radius_m,
+            )
+        )
+        self.world.add_prop(
+            PropCfg(
+                name="goal",
+                shape=PropShape.goal,
+                size_m=[cfg.goal_width_m, cfg.goal_height_m, _POST_M],
+                position_m=tuple(self.goal.tolist()),
+                colour=(0.95, 0.75, 0.1),
+            )
+        )
+        self._rest_s: dict[str, float] = {}
+        self._scored, self._progress_m, self._approach_m = False, 0.0, 0.0
+        self._note()
+
+    def reset(self, rng: np.random.Generator) -> None:
+        cfg = self.cfg
+        back, aside = rng.uniform(*cfg.ball_from_goal_m), rng.uniform(-cfg.aside_m, cfg.aside_m)
+        place = self.goal + np.array([-back, aside, cfg.radius_m])
+        self.ball.place(place, rng.uniform(-math.pi, math.pi))
+        for player in self.players:
+            self._line_up(player, rng)
+        self._rest_s = {player.name: 0.0 for player in self.players}
+        self._scored, self._progress_m, self._approach_m = False, 0.0, 0.0
+        self._note()
+
+    def start(self, player: Player, rng: np.random.Generator) -> Floats:
+        """Return where a player starts, ``(3,)`` metres; the attacker is behind the ball."""
+        back = rng.uniform(*self.cfg.attacker_from_ball_m)
+        aside = rng.uniform(-self.cfg.aside_m, self.cfg.aside_m)
+        return np.array([self.ball.position[0] - back, self.goal[1] + aside, self.goal[2]])
+
+    def after_step(self, rng: np.random.Generator) -> None:
+        before, to_goal_m, to_ball_m = self._ball, self._to_goal_m, self._to_ball_m
+        self._note()
+        self._scored = self._scored or crosses(before, self._ball, self.goal, self.cfg)
+        self._progress_m = to_goal_m - self._to_goal_m
+        self._approach_m = to_ball_m - self._to_ball_m
+        self._kick()
+
+    def reward(self, player: Player) -> dict[str, float]:
+        side = 1.0 if player.team == ATTACKER else -1.0
+        return {
+            "goal": side * self._scored,
+            "progress": side * self._progress_m,
+            "approach": side * self._approach_m,
+        }
+
+    def terminated(self) -> bool:
+        return self._scored
+
+    def expert(self, player: Player, observation: dict[str, NDArray[Any]]) -> Any:
+        """Get behind the ball and walk through it. Knows where the ball is; needs legs to walk."""
+        return attack(walker(player), self.ball, self.goal)
+
+    # ---- the ball
+
+    def _note(self) -> None:
+        """Note where the ball is, and how far that is from the goal and from the attacker."""
+        self._ball = self.ball.position
+        self._to_goal_m = math.dist(self._ball[:2], self.goal[:2])
+        self._to_ball_m = horizontal_distance(self.players[0].body.position, self._ball)
+
+    def _kick(self) -> None:
+        """Let the nearest of those who can kick the ball; one foot is enough for one step."""
+        near = sorted(self.players, key=lambda p: horizontal_distance(p.body.position, self._ball))
+        self._rest_s = {name: s - self.world.clock.step_s for name, s in self._rest_s.items()}
+        for player in near:
+            body, rested = player.body, self._rest_s[player.name] <= 0.0
+            if rested and isinstance(body, Walker) and body.kick(self.ball):
+                self._rest_s[player.name] = self.cfg.kick_rest_s
+                return
+
+    def _line_up(self, player: Player, rng: np.random.Generator) -> None:
+        """Let a player face the ball, more or less."""
+        spot = self.start(player, rng)
+        way = self.ball.position - spot
+        aside = math.radians(rng.uniform(-self.cfg.spread_deg, self.cfg.spread_deg))
+        line_up(player, spot, math.atan2(way[1], way[0]) + aside)
+
+
+def crosses(before: Floats, after: Floats, goal: Floats, cfg: SoccerCfg) -> bool:
+    """Say whether the ball's centre came through the goal's mouth, from the front.
+
+    Args:
+        before: ``(3,)`` metres: where it was.
+        after: ``(3,)`` metres: where it is, one step later; its way is taken as straight.
+        goal: ``(3,)`` metres: the middle of the goal line.
+        cfg: How wide and high the goal is.
+    """
+    if not before[0] < goal[0] <= after[0]:
+        return False
+    share = (goal[0] - before[0]) / (after[0] - before[0])
+    _, aside, height = before + share * (after - before) - goal
+    return bool(abs(aside) < cfg.goal_width_m / 2.0 and height < cfg.goal_height_m)
