@@ -106,25 +106,27 @@ def test_what_the_attacker_gets_the_defender_loses_at_every_step(two):
     assert goals >= 2
 
 
-def test_progress_and_approach_pay_for_places_not_for_the_way(alone):
+def test_progress_pays_for_places_not_for_the_way(alone):
     begin(alone, (0.0, 0.5, 0.12), (0.6, 0.0, 0.0))
-    alone.players[0].body.place((-1.0, 0.0, 0.0))
+    start = math.dist(alone.task.ball.position[:2], alone.task.goal[:2])
+    total = sum(outcome.terms["attacker"]["progress"] for outcome in rest(alone, 1.0))
+    decrease = start - math.dist(alone.task.ball.position[:2], alone.task.goal[:2])
+    assert decrease > 0.2
+    assert total == pytest.approx(decrease, abs=1e-9)
+
+
+def test_approach_pays_for_the_way_to_the_ball_and_a_ball_that_rolls_away_costs_nothing(alone):
+    begin(alone, (0.0, 0.0, 0.12))
+    body = alone.players[0].body
+    body.place((-1.5, 0.0, 0.0))
     alone.task._note()
-    places, terms = [distances(alone)], []
-    for _ in range(20):
-        rows = {"attacker": np.array([1.0, 0.2], np.float32)}
-        terms.append(alone.step(rows, np.random.default_rng(0)).terms["attacker"])
-        places.append(distances(alone))
-    for number, name in enumerate(("progress", "approach")):
-        decrease = places[0][number] - places[-1][number]
-        assert abs(decrease) > 0.05
-        assert sum(term[name] for term in terms) == pytest.approx(decrease, abs=1e-9)
-
-
-def distances(game):
-    """Return how far the ball is from the goal's middle and from the attacker, metres."""
-    ball, body = game.task.ball.position[:2], game.players[0].body.position[:2]
-    return math.dist(ball, game.task.goal[:2]), math.dist(ball, body)
+    rows = {"attacker": np.array([1.0, 0.0], np.float32)}
+    steps = [alone.step(rows, np.random.default_rng(0)) for _ in range(10)]
+    total = sum(outcome.terms["attacker"]["approach"] for outcome in steps)
+    assert total == pytest.approx(body.position[0] + 1.5, abs=1e-6)
+    begin(alone, (0.0, 0.0, 0.12), (1.0, 0.0, 0.0))
+    for outcome in rest(alone, 1.0):
+        assert outcome.terms["attacker"]["approach"] == pytest.approx(0.0, abs=1e-9)
 
 
 def test_when_the_time_is_up_the_defender_has_held():
