@@ -110,7 +110,7 @@ def test_what_was_learnt_plays_again_elsewhere(played, tmp_path, capsys):
 @pytest.mark.parametrize(
     ("override", "message"),
     [
-        ("senses/proprioception=joints", "other specs"),
+        ("senses/vision=monocular", "other specs"),
         ("senses/audio=lout", "unknown senses/audio 'lout'"),
     ],
 )
@@ -120,8 +120,10 @@ def test_what_does_not_fit_is_refused(played, capsys, override, message):
 
 
 def test_a_folder_that_is_no_run_is_refused(tmp_path, capsys):
+    nowhere = tmp_path / "nowhere"
+    nowhere.mkdir()
     for command in (cross_play, evaluate):
-        assert command([str(tmp_path / "nowhere")]) == 2
+        assert command([str(nowhere)]) == 2
         assert "nowhere holds no run" in capsys.readouterr().err
 
 

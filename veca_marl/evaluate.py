@@ -26,6 +26,8 @@ from veca_marl.config_errors import ConfigError, one_line
 from veca_marl.envs.env import VecaEnv
 from veca_marl.run_folder import open_run
 
+_LEARNING = ("self_play", "learner", "algo@learner")
+
 Table = dict[str, dict[str, Scores]]
 
 
@@ -46,7 +48,7 @@ def play_again(
         CheckpointError: If what was learnt does not fit.
     """
     folder = open_run(learnt if learnt.is_dir() else learnt.parent.parent)
-    cfg = compose([*folder.overrides, *overrides])
+    cfg = compose([*_about_the_game(folder.overrides), *overrides])
     env = _worlds(cfg, episodes, seed)
     specs = team_specs(env)
     actors = [load_actor(cfg.frozen.get(team, learnt), team, spec) for team, spec in specs.items()]
@@ -57,6 +59,11 @@ def play_again(
     }
     env.close()
     return table
+
+
+def _about_the_game(overrides: Sequence[str]) -> list[str]:
+    """Leave out how single teams learnt: they may be opponents now, who must not be told."""
+    return [text for text in overrides if not text.lstrip("+~").startswith(_LEARNING)]
 
 
 def _worlds(cfg: Config, episodes: int, seed: int) -> VecaEnv:

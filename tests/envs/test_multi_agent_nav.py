@@ -15,8 +15,8 @@ EARS_ALONE = ("senses/vision=blind", "senses/touch=numb")
 REACH_M = 0.6  # from the middle of the object: its radius and the task's reach
 
 
-def game_of(*overrides, agents=2):
-    overrides = [f"task.agents={agents}", *overrides]
+def game_of(*overrides, agents=2, playground="four_rooms"):
+    overrides = [f"task.agents={agents}", f"playground={playground}", *overrides]
     return Game(compose(["+task=MultiAgentNav", *EARS_ALONE, *overrides]).game)
 
 
@@ -64,7 +64,7 @@ def reached(outcome):
 
 def test_agents_start_in_rooms_of_their_own_and_the_object_in_one_of_these(crowd):
     plan, homes = crowd.task.plan, set()
-    for seed in range(20):
+    for seed in range(40):
         crowd.reset(np.random.default_rng(seed))
         rooms = [plan.room_of(player.body.position) for player in crowd.players]
         assert sorted(rooms) == [0, 1, 2, 3]
@@ -193,10 +193,10 @@ def test_who_has_arrived_earns_nothing_more_for_its_way(game):
 
 
 @pytest.mark.parametrize(
-    ("playground", "agents"), [("two_rooms", 2), ("three_rooms", 3), ("four_rooms", 3)]
+    ("playground", "agents"), [("two_rooms", 2), ("three_rooms", 3), ("seven_rooms", 4)]
 )
 def test_experts_come_together_in_every_house(playground, agents):
-    game = game_of(f"playground={playground}", "task.max_seconds=40", agents=agents)
+    game = game_of("task.max_seconds=40", agents=agents, playground=playground)
     assert [player.team for player in game.players] == ["seekers"] * agents
     assert math.isfinite(seconds_needed(game, seed=1))
     game.close()
@@ -206,7 +206,7 @@ def test_experts_come_together_in_every_house(playground, agents):
 def test_more_agents_than_rooms_are_refused(playground, rooms):
     wrong = rf"task.agents={rooms + 1} .* playground '{playground}' has {rooms}; choose"
     with pytest.raises(ValueError, match=wrong):
-        game_of(f"playground={playground}", agents=rooms + 1)
+        game_of(agents=rooms + 1, playground=playground)
 
 
 @pytest.mark.parametrize(
@@ -227,21 +227,20 @@ def test_bodies_with_joints_play_but_their_expert_is_not_written():
     game = game_of("body=mitten")
     game.reset(np.random.default_rng(0))
     one, other = game.players
+    game.observe(other)
     one.body.place((0.0, 0.0, 0.5))
     other.body.place((1.5, 0.0, 0.5))
-    game.world.refresh()
+    rest = {p.name: np.zeros(p.body.action_spec.shape, np.float32) for p in game.players}
     loud = []
-    for said in (False, True):
-        if said:
-            one.body.make_sound(call_waveform(CALLS[Call.high], 22_050))
-        outcome = game.step(
-            {p.name: np.zeros(p.body.action_spec.shape) for p in game.players}, None
-        )
+    for sounds in ([], [call_waveform(CALLS[Call.high], 22_050)]):
+        for sound in sounds:
+            one.body.make_sound(sound)
+        outcome = game.step(rest, np.random.default_rng(0))
         loud.append(game.observe(other)["audio"].max())
         assert set(outcome.terms[one.name]) == {"reached", "ahead", "aside"}
     assert loud[1] > loud[0] + 3.0
     with pytest.raises(ValueError, match="choose body=walker"):
-        game.task.expert(one, game.observe(one))
+        game.task.expert(one, {})
     game.close()
 
 
@@ -263,9 +262,9 @@ def test_the_same_game_is_played_twice():
     times = []
     for _ in range(2):
         game = game_of(agents=3)
-        times.append([seconds_needed(game, seed) for seed in (5, 6)])
+        times.append(seconds_needed(game, seed=5))
         game.close()
-    assert times[0] == times[1]
+    assert times[0] == times[1] < math.inf
 
 
 def test_muting_is_by_where_they_start():
@@ -287,15 +286,11 @@ def test_muting_is_by_where_they_start():
 
 
 def test_the_experts_solve_it_and_without_the_finders_voice_do_much_worse():
-    """The sound carries it: the same starts, 12 s; all is told in experiments/calling."""
-    solved, seconds = {}, {}
-    for arm in ("task.muted=nobody", "task.muted=finder", "senses/audio=deaf"):
-        game = game_of(arm)
-        times = np.array([seconds_needed(game, seed) for seed in range(12)])
+    """The sound carries it: the same starts; everything is told in experiments/calling."""
+    times = {}
+    for muted in (Muted.nobody, Muted.finder):
+        game = game_of(f"task.muted={muted.value}", playground="seven_rooms")
+        times[muted] = np.array([seconds_needed(game, seed) for seed in range(6)])
         game.close()
-        solved[arm] = np.isfinite(times).sum()
-        seconds[arm] = np.minimum(times, 12.0).mean()
-    assert solved["task.muted=nobody"] == 12
-    for arm in ("task.muted=finder", "senses/audio=deaf"):
-        assert solved[arm] <= 9
-        assert seconds[arm] > 1.25 * seconds["task.muted=nobody"]
+    assert np.isfinite(times[Muted.nobody]).all()
+    assert np.isinf(times[Muted.finder]).sum() >= 3

@@ -53,6 +53,7 @@ class TaxelTable(NamedTuple):
         vertices: The vertices of the triangles of each patch, one patch after the other.
         first_vertex: ``(P + 1,)`` those of patch p are `vertices`[first[p] : first[p + 1]].
         margins: ``(T,)`` metres, how far from a triangle its taxels sense at most.
+        layers: ``(T, 2)`` metres: middle of the depths of a triangle, and half of their range.
     """
 
     triangles: Indices
@@ -64,6 +65,7 @@ class TaxelTable(NamedTuple):
     vertices: Indices
     first_vertex: Indices
     margins: Floats
+    layers: Floats
 
 
 @functools.cache
@@ -76,6 +78,7 @@ def load_taxels() -> TaxelTable:
     patches = np.append(np.concatenate(starts), first_triangle[-1])
     own = [np.unique(mesh.triangles[first:end]) for first, end in pairwise(patches)]
     depths = _depths(mesh)
+    low, high = depths.min(axis=1), depths.max(axis=1)
     return TaxelTable(
         triangles=np.ascontiguousarray(mesh.triangles),
         first_triangle=first_triangle,
@@ -86,6 +89,7 @@ def load_taxels() -> TaxelTable:
         vertices=np.concatenate(own),
         first_vertex=np.cumsum([0, *map(len, own)]),
         margins=np.abs(depths).max(axis=1),
+        layers=np.stack([(high + low) / 2, (high - low) / 2], axis=1),
     )
 
 

@@ -55,6 +55,9 @@ def press(
 ) -> None:
     """Read all taxels.
 
+    All that is done for each triangle is handed numbers, no arrays: to count who holds the arrays
+    of a table takes numba three times as long as to read a triangle.
+
     Args:
         taxels: The taxels of the body.
         vertices: ``(V, 3)`` the vertices of its skin, metres, world frame.
@@ -62,10 +65,12 @@ def press(
         near: ``(B, G)`` which pairs to look at, as from `find_near`.
         balls: ``(P, 4)`` centre and radius of the ball round each patch, as from `bound`.
         barycentric: ``(6, 3)`` where the taxels are on a triangle.
-        local: ``(V, 4)``, scratch.
+        local: ``(V, 3)``, scratch.
         readings: ``(T, 6)`` in [0, 1], written.
     """
     readings[:] = 0.0
+    triangles, depths, layers = taxels.triangles, taxels.depths, taxels.layers
+    first_vertex, patches = taxels.first_vertex, taxels.patches
     for bone in range(near.shape[0]):
         for g in range(near.shape[1]):
             if not near[bone, g]:
@@ -76,14 +81,22 @@ def press(
                 x, y, z = _local(thing, balls, patch)
                 if distance(thing[0], thing[1], x, y, z) > balls[patch, 3]:
                     continue
-                for i in range(taxels.first_vertex[patch], taxels.first_vertex[patch + 1]):
+                for i in range(first_vertex[patch], first_vertex[patch + 1]):
                     v = taxels.vertices[i]
-                    x, y, z = _local(thing, vertices, v)
-                    local[v, 0], local[v, 1], local[v, 2] = x, y, z
-                    local[v, 3] = distance(thing[0], thing[1], x, y, z)
-                for t in range(taxels.patches[patch], taxels.patches[patch + 1]):
-                    if _within_reach(taxels, t, local):
-                        _press_triangle(taxels, thing, thickness, t, barycentric, local, readings)
+                    local[v, 0], local[v, 1], local[v, 2] = _local(thing, vertices, v)
+                for t in range(patches[patch], patches[patch + 1]):
+                    a = _row(local, triangles[t, 0])
+                    b = _row(local, triangles[t, 1])
+                    c = _row(local, triangles[t, 2])
+                    normal = _normal(a, b, c)
+                    if _is_out_of_reach(thing, a, b, c, normal, layers[t, 0], layers[t, 1]):
+                        continue
+                    for n in range(barycentric.shape[0]):
+                        share = _row(barycentric, n)
+                        point = _taxel(a, b, c, share, normal, depths[t, n])
+                        reading = _reading(thing, thickness, point, normal)
+                        if reading > readings[t, n]:
+                            readings[t, n] = reading
 
 
 @njit(cache=True, error_model="numpy", inline="always")
@@ -113,57 +126,49 @@ def _local(thing: Thing, points: Floats, row: int) -> Vector:
 
 
 @njit(cache=True, error_model="numpy", inline="always")
-def _within_reach(taxels: TaxelTable, t: int, local: Floats) -> bool:
-    """Whether a taxel of a triangle may lie in the primitive.
+def _row(points: Floats, row: int) -> Vector:
+    """Three numbers of a row."""
+    return points[row, 0], points[row, 1], points[row, 2]
 
-    No point of a triangle is farther than its longest edge / sqrt(3) from its nearest corner
-    (Jung's theorem), and a distance cannot change faster than the way.
+
+@njit(cache=True, error_model="numpy", inline="always")
+def _is_out_of_reach(
+    thing: Thing, a: Vector, b: Vector, c: Vector, normal: Vector, depth: float, spread: float
+) -> bool:
+    """Whether no taxel of a triangle can lie in a primitive.
+
+    No taxel is farther from the middle than half of the farthest corner, see `BARYCENTRIC`.
     """
-    a, b, c = taxels.triangles[t, 0], taxels.triangles[t, 1], taxels.triangles[t, 2]
-    beyond = min(local[a, 3], local[b, 3], local[c, 3]) - taxels.margins[t]
-    if beyond <= 0.0:
-        return True
-    longest = max(_squared(local, a, b), _squared(local, b, c), _squared(local, c, a))
-    return bool(3.0 * beyond * beyond <= longest)
+    x, y, z = (a[0] + b[0] + c[0]) / 3.0, (a[1] + b[1] + c[1]) / 3.0, (a[2] + b[2] + c[2]) / 3.0
+    farthest = max(
+        _squared_length(a[0] - x, a[1] - y, a[2] - z),
+        _squared_length(b[0] - x, b[1] - y, b[2] - z),
+        _squared_length(c[0] - x, c[1] - y, c[2] - z),
+    )
+    x, y, z = x - depth * normal[0], y - depth * normal[1], z - depth * normal[2]
+    beyond = distance(thing[0], thing[1], x, y, z)
+    return beyond > 0.0 and beyond * beyond > 0.25 * farthest + spread * spread
 
 
 @njit(cache=True, error_model="numpy", inline="always")
-def _squared(points: Floats, a: int, b: int) -> float:
-    x, y = points[a, 0] - points[b, 0], points[a, 1] - points[b, 1]
-    z = points[a, 2] - points[b, 2]
-    return float(x * x + y * y + z * z)
+def _taxel(a: Vector, b: Vector, c: Vector, share: Vector, normal: Vector, depth: float) -> Vector:
+    """Where a taxel senses."""
+    return (
+        share[0] * a[0] + share[1] * b[0] + share[2] * c[0] - depth * normal[0],
+        share[0] * a[1] + share[1] * b[1] + share[2] * c[1] - depth * normal[1],
+        share[0] * a[2] + share[1] * b[2] + share[2] * c[2] - depth * normal[2],
+    )
 
 
 @njit(cache=True, error_model="numpy", inline="always")
-def _press_triangle(
-    taxels: TaxelTable,
-    thing: Thing,
-    thickness: float,
-    t: int,
-    barycentric: Floats,
-    local: Floats,
-    readings: Floats,
-) -> None:
-    """Press one primitive against the taxels of one triangle."""
-    i, j, k = taxels.triangles[t, 0], taxels.triangles[t, 1], taxels.triangles[t, 2]
-    ax, ay, az = local[i, 0], local[i, 1], local[i, 2]
-    bx, by, bz = local[j, 0], local[j, 1], local[j, 2]
-    cx, cy, cz = local[k, 0], local[k, 1], local[k, 2]
-    nx, ny, nz = _normal(bx - ax, by - ay, bz - az, cx - ax, cy - ay, cz - az)
-    shape, size = thing[0], thing[1]
-    for n in range(barycentric.shape[0]):
-        u, v, w = barycentric[n, 0], barycentric[n, 1], barycentric[n, 2]
-        down = taxels.depths[t, n]
-        x = u * ax + v * bx + w * cx - down * nx
-        y = u * ay + v * by + w * cy - down * ny
-        z = u * az + v * bz + w * cz - down * nz
-        if not is_within(shape, size, x, y, z):
-            continue
-        slope: Slope = signed_distance(shape, size, x, y, z)
-        if slope[0] < 0.0:
-            against = -(slope[1] * nx + slope[2] * ny + slope[3] * nz)
-            reading = min(-slope[0] / thickness, 1.0) * min(against, 1.0)
-            readings[t, n] = max(readings[t, n], reading)
+def _reading(thing: Thing, thickness: float, point: Vector, normal: Vector) -> float:
+    """What a taxel reads of a primitive; below 0 if it faces away."""
+    if not is_within(thing[0], thing[1], point[0], point[1], point[2]):
+        return 0.0
+    slope: Slope = signed_distance(thing[0], thing[1], point[0], point[1], point[2])
+    depth = max(-slope[0], 0.0)
+    against = -(slope[1] * normal[0] + slope[2] * normal[1] + slope[3] * normal[2])
+    return min(depth / thickness, 1.0) * min(against, 1.0)
 
 
 @njit(cache=True, error_model="numpy", inline="always")
@@ -172,8 +177,10 @@ def _squared_length(x: float, y: float, z: float) -> float:
 
 
 @njit(cache=True, error_model="numpy", inline="always")
-def _normal(ux: float, uy: float, uz: float, vx: float, vy: float, vz: float) -> Vector:
-    """Unit vector at right angles to two edges."""
+def _normal(a: Vector, b: Vector, c: Vector) -> Vector:
+    """Unit vector at right angles to a triangle."""
+    ux, uy, uz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
+    vx, vy, vz = c[0] - a[0], c[1] - a[1], c[2] - a[2]
     x, y, z = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
     scale = 1.0 / max(math.sqrt(x * x + y * y + z * z), 1e-18)
     return x * scale, y * scale, z * scale

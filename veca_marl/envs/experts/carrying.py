@@ -16,12 +16,10 @@ from veca_marl.sim.pose import Floats
 from veca_marl.sim.props import Prop
 
 _SPEED_M = 0.010  # of the palms' middle, per step
-_CARRYING_M = 0.006
 _CLOSING_M = 0.006  # of their distance, per step
 _DROOP = math.radians(20.0)  # the fingers point down by so much
 _UP = np.array([0.0, 0.0, 1.0])
 _ABOVE = 0.10 * _UP  # the hands come and go so far above a block
-_THUMBS = 0.008 * _UP  # palms are so far above a block's middle: thumbs stay above its top
 _SIDES = np.array([1.0, -1.0])
 _SAG_GAIN, _MOST_SAG_M = 0.03, 0.02
 _NEAR_M = 0.008
@@ -42,7 +40,8 @@ class Grip(NamedTuple):
     yaw_rad: float = 0.0
 
 
-_HOME = Grip(np.array([0.19, 0.0, 0.11]), 0.26)  # of hands at rest; the child sits at the origin
+# hands at rest, beside all that may be piled up; the child sits at the origin
+_HOME = Grip(np.array([0.19, 0.0, 0.11]), 0.40)
 
 
 class Carrier:
@@ -51,6 +50,8 @@ class Carrier:
     Args:
         body: Whose hands.
         squeeze_m: The palms press as if they wanted to come so far into the block, each.
+        carrying_m: How far the block comes in a step.
+        thumbs_m: Palms are so far above a block's middle: thumbs stay above its top.
         clear_m: Open palms are so far away from the block, each.
     """
 
@@ -58,10 +59,13 @@ class Carrier:
         self,
         body: Humanoid,
         squeeze_m: float = 0.02,
+        carrying_m: float = 0.006,
+        thumbs_m: float = 0.008,
         clear_m: float = 0.022,
     ) -> None:
         self._hands, self._seat = TwoHands(body), Seat(body, REACHING, REACHING_DOWN)
         self._squeeze_m, self._clear_m = squeeze_m, clear_m
+        self._carrying_m, self._thumbs = carrying_m, thumbs_m * _UP
         self.reset()
 
     def reset(self) -> None:
@@ -111,8 +115,8 @@ class Carrier:
         high = start * (1, 1, 0) + (block.position + above) * (0, 0, 1)
         yield from self._until(lambda: Grip(high, wide, yaw), 20)
         yield from self._until(lambda: Grip(block.position + above, wide, yaw), 50)
-        yield from self._until(lambda: Grip(block.position + _THUMBS, wide, yaw), 40)
-        yield from self._for(Grip(block.position + _THUMBS, tight, yaw), 16)
+        yield from self._until(lambda: Grip(block.position + self._thumbs, wide, yaw), 40)
+        yield from self._for(Grip(block.position + self._thumbs, tight, yaw), 16)
         lifted = block.position * (1, 1, 0) + over_m * _UP
         for place in (lambda: lifted, lambda: to() * (1, 1, 0) + over_m * _UP, to):
             yield from self._bring(block, place, tight, yaw, 75)
@@ -155,7 +159,7 @@ class Carrier:
             if not self._holds(block) or np.abs(to() - block.position).max() < 0.005:
                 return
             slip = self._hands.palms().points.mean(axis=0) - block.position
-            yield self.move(Grip(to() + slip, gap_m, yaw_rad), _CARRYING_M)
+            yield self.move(Grip(to() + slip, gap_m, yaw_rad), self._carrying_m)
 
 
 def _palms(grip: Grip) -> Palms:

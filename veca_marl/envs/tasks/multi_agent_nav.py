@@ -32,14 +32,12 @@ class MultiAgentNavCfg(TaskCfg):
     """How many seek what, and what finding it is worth.
 
     Attributes:
-        max_seconds: The time is enough for who is called, too short for who must search the house.
         agents: How many seek, at least 2; the playground needs a room for each.
         radius_m: Radius of the object, a ball too heavy to be moved.
         reach_m: Who comes so near to its surface has reached it.
         muted: Whose calls nobody hears; the finder is who starts in the object's room.
     """
 
-    max_seconds: float = 12.0
     agents: int = 2
     radius_m: float = 0.2
     reach_m: float = 0.4
@@ -69,9 +67,10 @@ class MultiAgentNav(Task):
     The paper's table of tasks lists vision, touch and proprioception, but its text has the others
     come "using auditory perception": here they have ears as well.
 
-    `task.agents` of 2 to 4 find rooms in `playground=four_rooms`; `two_rooms` and `three_rooms` are
-    for so many. Bodies without a vocabulary of calls play too: joint-level ones call
-    by `make_sound`, which is not part of their action row.
+    `playground=seven_rooms`, its own, takes up to 7 agents: the ways are short, but who is not
+    called has much to search. `two_rooms`, `three_rooms` and `four_rooms` are for so many. Bodies
+    without a vocabulary of calls play too: joint-level ones call by `make_sound`, which is not part
+    of their action row.
 
     Terms:
         reached: how many agents reached the object for the first time in this step, the same for
@@ -96,7 +95,7 @@ class MultiAgentNav(Task):
             raise ValueError(
                 f"task.agents={len(self.players)} start in rooms of their own, but playground "
                 f"{playground.name!r} has {rooms}; choose task.agents of at most {rooms}, or "
-                "playground=two_rooms, three_rooms, four_rooms"
+                "playground=two_rooms, three_rooms, four_rooms, seven_rooms"
             )
         self.plan = FloorPlan(playground)
         self._furniture = [

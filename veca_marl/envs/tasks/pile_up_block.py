@@ -68,7 +68,7 @@ class PileUpBlock(Task):
     def build(self) -> None:
         self.child = humanoid(self.players[0])
         self.blocks = [add_block(self.world, self.cfg, f"red_{i}", RED) for i in range(2)]
-        self._carrier = Carrier(self.child)
+        self._carrier = Carrier(self.child, squeeze_m=0.025, carrying_m=0.005, thumbs_m=0.005)
         self._script = self._play()
 
     def reset(self, rng: np.random.Generator) -> None:

@@ -76,7 +76,7 @@ class TouchSense(Sense):
         bones = len(self._taxels.thickness)
         self._bones = np.zeros((bones + 1, 4))
         self._patches = np.zeros((len(self._taxels.patches) - 1, 4))
-        self._local = np.zeros((self._object.vertices.stop - self._object.vertices.start, 4))
+        self._local = np.zeros((self._object.vertices.stop - self._object.vertices.start, 3))
         self._deaf: Bools = np.zeros((bones, 0), np.bool_)
         self._near: Bools = np.zeros((bones, 0), np.bool_)
         self._readings = np.zeros((len(self._taxels.triangles), TAXELS_PER_TRIANGLE))
