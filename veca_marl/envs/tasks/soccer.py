@@ -48,7 +48,7 @@ class SoccerCfg(TaskCfg):
     attacker_from_ball_m: tuple[float, float] = (0.8, 1.6)
     spread_deg: float = 30.0
     kick_rest_s: float = 0.5
-    weights: dict[str, float] = terms(goal=5.0, progress=0.5, approach=0.5)
+    weights: dict[str, float] = terms(goal=5.0, progress=0.5, approach=0.1)
 
     def __post_init__(self) -> None:
         super().__post_init__()
