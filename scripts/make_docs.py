@@ -8,6 +8,7 @@ from __future__ import annotations
 import dataclasses
 import inspect
 import re
+from enum import Enum
 from pathlib import Path
 from typing import Any
 
@@ -62,7 +63,7 @@ def default(field: dataclasses.Field[Any]) -> Any:
     """Return what a configuration field is when nothing is said."""
     if field.default_factory is not dataclasses.MISSING:
         return field.default_factory()
-    return field.default
+    return field.default.value if isinstance(field.default, Enum) else field.default
 
 
 def body_page(page: str) -> str:

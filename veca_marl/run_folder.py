@@ -61,10 +61,15 @@ class RunFolder:
         self.provenance.write_text(json.dumps(_provenance(overrides), indent=2) + "\n")
         self.config.write_text(OmegaConf.to_yaml(node, resolve=True))
 
+    @property
+    def overrides(self) -> list[str]:
+        """What the command line of the run said."""
+        overrides: list[str] = json.loads(self.provenance.read_text())["overrides"]
+        return overrides
+
     def typed_config(self) -> DictConfig:
         """Return the configuration of the run, with the types that its choices have."""
-        overrides = json.loads(self.provenance.read_text())["overrides"]
-        return cast(DictConfig, OmegaConf.merge(compose_node(overrides), self._stored()))
+        return cast(DictConfig, OmegaConf.merge(compose_node(self.overrides), self._stored()))
 
     def _stored(self) -> DictConfig:
         return cast(DictConfig, OmegaConf.load(self.config))
@@ -94,7 +99,7 @@ def open_run(path: Path) -> RunFolder:
     """
     folder = RunFolder(path)
     if not folder.config.is_file():
-        raise ConfigError(f"resume={path}: there is no run in it (no config.yaml)")
+        raise ConfigError(f"{path} holds no run (no config.yaml)")
     return folder
 
 

@@ -2,67 +2,87 @@
 
 python experiments/experts/measure.py                       # all tasks, ten episodes each
 python experiments/experts/measure.py TurnBaby SitBaby --episodes 20 --body full
+
+Between two teams the expert plays against chance and against itself, and chance against itself.
+Rows of tasks that are not asked for stay in the table.
 """
 
 from __future__ import annotations
 
 import argparse
 import csv
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 
 import veca_marl
 from veca_marl.config import compose
-from veca_marl.envs.game import Game, Observation
+from veca_marl.envs.game import Game
 from veca_marl.envs.game_cfg import GameCfg
-from veca_marl.envs.task import Player
+from veca_marl.envs.scripts import play_script
+from veca_marl.envs.team import Script
 
 HERE = Path(__file__).parent
-COLUMNS = ["task", "body", "player", "episodes", "return", "interval_95", "least", "greatest"]
-STUDENT_95 = {5: 2.776, 10: 2.262, 20: 2.093}  # two-sided quantile of t by number of episodes
-
-Choice = Callable[[Game, Player, Observation, np.random.Generator], np.ndarray]
-
-
-def by_expert(game: Game, player: Player, seen: Observation, rng: np.random.Generator):
-    return player.body.encode(game.task.expert(player, seen))
-
-
-def by_chance(game: Game, player: Player, seen: Observation, rng: np.random.Generator):
-    spec = player.body.action_spec
-    return rng.uniform(spec.low, spec.high, spec.shape).astype(spec.dtype)
+COLUMNS = [
+    *("task", "body", "player", "opponent"),
+    *("episodes", "return", "interval_95", "least", "greatest", "ended"),
+]
+STUDENT_95 = {5: 2.776, 10: 2.262, 20: 2.093, 40: 2.023}  # two-sided quantile of t by episodes
+ALONE = ((Script.expert, None), (Script.random, None))
+AGAINST = (
+    (Script.expert, Script.random),
+    (Script.expert, Script.expert),
+    (Script.random, Script.random),
+)
 
 
-def play(cfg: GameCfg, choose: Choice, seed: int) -> float:
-    """Return what the players are paid, on average, in one episode."""
+def play(cfg: GameCfg, first: Script, others: Script | None, seed: int) -> tuple[float, bool]:
+    """Return what the first team is paid in one episode, and whether the rules ended it."""
     game, rng = Game(cfg), np.random.default_rng([2026, seed])
     game.reset(rng)
+    ours = game.team(cfg.teams[0].name)
     paid, over = 0.0, False
     while not over:
-        rows = {p.name: choose(game, p, game.observe(p), rng) for p in game.players}
-        outcome = game.step(rows, rng)
-        paid += float(np.mean([game.pay(terms) for terms in outcome.terms.values()]))
+        for player in game.players:
+            script = first if player in ours or others is None else others
+            now = Script.idle if player.name in game.out else script
+            play_script(now, game.task, player, game.observe, rng)
+        outcome = game.advance(rng)
+        paid += float(np.mean([game.pay(outcome.terms[player.name]) for player in ours]))
         over = outcome.done
     game.close()
-    return paid
+    return paid, outcome.terminated
 
 
 def measure(task: str, body: str, episodes: int) -> list[dict[str, object]]:
-    # experts of joint-level tasks use privileged state: their eyes are shut to save time
-    own = [] if task == "KickTheBall" else ["senses/vision=blind"]
+    # the other experts use privileged state: eyes are shut and skins numb to save time
+    own = [] if task == "KickTheBall" else ["senses/vision=blind", "senses/touch=numb"]
     chosen = [] if body == "own" else [f"body={body}"]
     cfg = compose([f"+task={task}", *own, *chosen]).game
     rows: list[dict[str, object]] = []
-    for name, choose in (("expert", by_expert), ("random", by_chance)):
-        paid = np.array([play(cfg, choose, seed) for seed in range(episodes)])
+    for first, others in ALONE if len(cfg.teams) == 1 else AGAINST:
+        played = [play(cfg, first, others, seed) for seed in range(episodes)]
+        paid, ended = (np.array(column, float) for column in zip(*played, strict=True))
         interval = STUDENT_95[episodes] * paid.std(ddof=1) / np.sqrt(episodes)
-        numbers = (paid.mean(), interval, paid.min(), paid.max())
-        values = (task, body, name, episodes, *(round(float(number), 3) for number in numbers))
+        numbers = (paid.mean(), interval, paid.min(), paid.max(), ended.mean())
+        rounded = [round(float(number), 3) for number in numbers]
+        names = (task, body, first.value, others.value if others else "")
+        values = (*names, episodes, *rounded)
         rows.append(dict(zip(COLUMNS, values, strict=True)))
         print(*values)
     return rows
+
+
+def write(path: Path, rows: list[dict[str, object]]) -> None:
+    """Put rows into a table; those of other tasks that it has stay."""
+    asked, kept = {row["task"] for row in rows}, []
+    if path.exists():
+        with path.open(newline="") as table:
+            kept = [row for row in csv.DictReader(table) if row["task"] not in asked]
+    with path.open("w", newline="") as table:
+        writer = csv.DictWriter(table, COLUMNS, restval="", lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(sorted([*kept, *rows], key=lambda row: str(row["task"])))
 
 
 def main() -> None:
@@ -72,11 +92,7 @@ def main() -> None:
     parser.add_argument("--episodes", type=int, default=10, choices=sorted(STUDENT_95))
     asked = parser.parse_args()
     rows = [row for task in asked.tasks for row in measure(task, asked.body, asked.episodes)]
-    path = HERE / ("results.csv" if asked.body == "own" else f"results_{asked.body}.csv")
-    with path.open("w", newline="") as table:
-        writer = csv.DictWriter(table, COLUMNS, lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(rows)
+    write(HERE / ("results.csv" if asked.body == "own" else f"results_{asked.body}.csv"), rows)
 
 
 if __name__ == "__main__":

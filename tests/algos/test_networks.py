@@ -3,7 +3,7 @@ import torch
 from fake_env import FakeEnv
 from torchrl.data import Bounded, Composite
 
-from veca_marl.algos.encoders import ImageEncoder, VectorEncoder, make_encoder
+from veca_marl.algos.encoders import ImageEncoder, Places, Pooling, VectorEncoder, make_encoder
 from veca_marl.algos.networks import NetworkCfg, Precision, TeamNetwork
 from veca_marl.algos.specs import ArrayLayout, team_specs
 
@@ -17,15 +17,17 @@ def network(cfg=None, **env):
 
 
 def test_encoder_is_chosen_by_what_the_array_looks_like():
-    assert isinstance(make_encoder("a", IMAGE, (16, 32, 32), 64), ImageEncoder)
-    assert isinstance(make_encoder("b", SPECTRUM, (16, 32, 32), 64), VectorEncoder)
+    assert isinstance(make_encoder("a", IMAGE, (16, 32, 32), 64, Pooling.flatten), ImageEncoder)
+    assert isinstance(make_encoder("b", SPECTRUM, (16, 32, 32), 64, Pooling.flatten), VectorEncoder)
     # depth is not bytes: it has no colour channels to stack
     assert isinstance(
-        make_encoder("c", ArrayLayout((2, 8, 8), "float32", 0.0, 9.0), (16, 32, 32), 64),
+        make_encoder(
+            "c", ArrayLayout((2, 8, 8), "float32", 0.0, 9.0), (16, 32, 32), 64, Pooling.flatten
+        ),
         VectorEncoder,
     )
     with pytest.raises(ValueError, match=r"touch: no encoder for int64\(3,\); choices: uint8"):
-        make_encoder("touch", ArrayLayout((3,), "int64", 0, 1), (16, 32, 32), 64)
+        make_encoder("touch", ArrayLayout((3,), "int64", 0, 1), (16, 32, 32), 64, Pooling.flatten)
 
 
 @pytest.mark.parametrize("size", [(84, 84), (36, 36), (20, 31), (4, 4), (120, 96)])
@@ -108,3 +110,47 @@ def test_unlearnable_actions_are_refused_with_the_choices():
 def test_impossible_sizes_are_refused(kwargs, message):
     with pytest.raises(ValueError, match=message):
         NetworkCfg(**kwargs)
+
+
+def test_places_are_where_maps_are_lit():
+    maps = torch.zeros(2, 3, 5, 9)
+    maps[0, 0, 0, 8] = maps[0, 1, 4, 4] = 40.0
+    right, down, bright = Places(3)(maps).reshape(2, 3, 3).unbind(1)
+    torch.testing.assert_close(right[0], torch.tensor([1.0, 0.0, 0.0]), atol=1e-5, rtol=0.0)
+    torch.testing.assert_close(down[0], torch.tensor([-1.0, 1.0, 0.0]), atol=1e-5, rtol=0.0)
+    torch.testing.assert_close(bright[0], torch.tensor([40.0, 40.0, 0.0]))
+    torch.testing.assert_close(right[1], torch.zeros(3), atol=1e-6, rtol=0.0)  # dark: the middle
+
+
+@pytest.mark.parametrize("shape", [(3, 84, 84), (2, 3, 21, 40), (1, 8, 6)])
+def test_places_take_any_size(shape):
+    encoder = ImageEncoder(shape, (4, 8, 8), Pooling.places)
+    features = encoder(torch.randint(0, 256, (5, *shape), dtype=torch.uint8))
+    assert features.shape == (5, encoder.features) == (5, 24)
+    features.sum().backward()
+    assert all(p.grad is not None for p in encoder.parameters())
+
+
+def test_places_learn_from_fewer_images_where_a_thing_is():
+    """An orange square of 6 x 6 pixels somewhere in grey noise: its column, from 256 images."""
+    torch.manual_seed(0)
+    columns = torch.randint(0, 58, (512,))
+    images = torch.randint(60, 120, (512, 3, 64, 64), dtype=torch.uint8)
+    for image, left in zip(images, columns, strict=True):
+        image[:, 20:26, left : left + 6] = torch.tensor([250, 110, 20])[:, None, None]
+    wanted = (columns.float() / 29.0 - 1.0)[:, None]
+
+    def error(pooling):
+        torch.manual_seed(1)
+        encoder = ImageEncoder((3, 64, 64), (8, 16, 16), pooling)
+        model = torch.nn.Sequential(encoder, torch.nn.Linear(encoder.features, 1))
+        optimizer = torch.optim.Adam(model.parameters(), 1e-3)
+        for batch in torch.randint(0, 256, (100, 64)):
+            loss = (model(images[batch]) - wanted[batch]).square().mean()
+            optimizer.zero_grad()
+            loss.backward()
+            optimizer.step()
+        with torch.no_grad():
+            return (model(images[256:]) - wanted[256:]).square().mean().sqrt().item()
+
+    assert error(Pooling.places) < 0.6 * error(Pooling.flatten)

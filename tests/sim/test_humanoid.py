@@ -1,11 +1,11 @@
-"""The joint-level body: how it is placed, commanded, read, and what its hands carry."""
+"""The joint-level body: how it is placed, read, and what its hands carry."""
 
 import math
 from pathlib import Path
 
 import numpy as np
 import pytest
-from heaps import thrash, weightless
+from heaps import thrash
 from walking import empty_world, let_pass
 
 from veca_marl.sim.bodies.base import MOUNTS, Body, BodyCfg
@@ -15,9 +15,7 @@ from veca_marl.sim.bodies.humanoid import (
     Humanoid,
     HumanoidCfg,
     JointActionKind,
-    JointChoice,
 )
-from veca_marl.sim.bodies.joint_controls import PositionTarget
 from veca_marl.sim.bodies.postures import ON_BACK, POSTURES, Posture, posture_angles
 from veca_marl.sim.bullet import pybullet
 from veca_marl.sim.skeleton import Underside, load_skeleton
@@ -27,29 +25,12 @@ SKELETON = load_skeleton()
 ALL = [bone.name for bone in SKELETON.bones]
 
 
-@pytest.fixture
-def make():
-    worlds = []
-
-    def humanoid(*props, **cfg):
-        world = empty_world(*props)
-        worlds.append(world)
-        body = Humanoid("child", HumanoidCfg(**cfg), world)
-        world.freeze()
-        world.reset(np.random.default_rng(0))
-        return world, body
-
-    yield humanoid
-    for world in worlds:
-        world.close()
-
-
 # ---- names and counts
 
 
 @pytest.mark.parametrize("detail", Detail)
-def test_both_details_speak_of_47_bones_and_82_joints(make, detail):
-    _, body = make(detail=detail)
+def test_both_details_speak_of_47_bones_and_82_joints(make_child, detail):
+    _, body = make_child(detail=detail)
     assert len(body.bone_names) == len(set(body.bone_names)) == 47
     assert len(body.joint_names) == len(set(body.joint_names)) == 82
     assert body.velocities().shape == body.angular_velocities().shape == (47, 3)
@@ -74,8 +55,8 @@ def test_it_is_made_by_its_configuration():
 
 @pytest.mark.parametrize("name", sorted(POSTURES))
 @pytest.mark.parametrize("height_m", [0.0, 0.4])
-def test_its_lowest_point_is_where_it_is_placed(make, name, height_m):
-    world, body = make()
+def test_its_lowest_point_is_where_it_is_placed(make_child, name, height_m):
+    world, body = make_child()
     body.place((1.0, -2.0, height_m), 0.8, POSTURES[name])
     world.refresh()
     lowest = Underside(SKELETON, ALL, skin=True).lowest_m(
@@ -88,8 +69,8 @@ def test_its_lowest_point_is_where_it_is_placed(make, name, height_m):
     np.testing.assert_allclose(body.forward, (math.cos(0.8), math.sin(0.8), 0.0), atol=1e-9)
 
 
-def test_velocities_are_those_that_bullet_has(make):
-    world, body = make()
+def test_velocities_are_those_that_bullet_has(make_child):
+    world, body = make_child()
     client, body_id = world.client, body.articulation.body_id
     for _ in thrash(world, [body], 1.0):
         pass
@@ -108,13 +89,13 @@ def test_velocities_are_those_that_bullet_has(make):
         )
 
 
-def test_fingers_of_a_mitten_are_straight_and_follow_the_hand(make):
-    world, body = make(detail=Detail.mitten)
+def test_fingers_of_a_mitten_are_straight_and_follow_the_hand(make_child):
+    world, body = make_child(detail=Detail.mitten)
     for _ in thrash(world, [body], 1.0):
         pass
     hand, finger = body.bone("l_hand"), body.bone("l_index_distal")
     local = hand.rotation.T @ (finger.position - hand.position)
-    full_world, full = make()
+    full_world, full = make_child()
     full_world.refresh()
     hand, finger = full.bone("l_hand"), full.bone("l_index_distal")
     np.testing.assert_allclose(
@@ -123,164 +104,6 @@ def test_fingers_of_a_mitten_are_straight_and_follow_the_hand(make):
     fingers = np.setdiff1d(np.arange(82), body.articulation.moving)
     assert not body.joint_angles()[fingers].any()
     assert not body.joint_torques()[fingers].any()
-
-
-# ---- what it is told
-
-
-@pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_a_positive_torque_turns_a_joint_to_its_positive_side(make, sign):
-    world, body = make()
-    weightless(world)
-    body.place((0.0, 0.0, 2.0))
-    for name in ("l_forearm.flexion", "r_upper_arm.abduction", "head.rotation"):
-        body.place((0.0, 0.0, 2.0), 0.0, _middle())
-        before = body.joint_angles()
-        torques = np.zeros(82)
-        torques[body.joint_names.index(name)] = 0.1 * sign
-        body.apply_torque(torques)
-        let_pass(world, 0.12)
-        moved = (body.joint_angles() - before)[body.joint_names.index(name)]
-        assert moved * sign > 0.01, name
-
-
-def _middle():
-    return np.array([(joint.low_rad + joint.high_rad) / 2 for joint in SKELETON.joints])
-
-
-def test_torques_hold_until_the_next_and_rest_after_a_reset(make):
-    world, body = make()
-    row = np.random.default_rng(0).uniform(-1, 1, 82)
-    body.act(row)
-    let_pass(world, 0.2)
-    np.testing.assert_array_equal(body.joint_torques(), row)
-    world.reset(np.random.default_rng(0))
-    world.step()
-    assert not body.joint_torques().any()
-
-
-def test_joints_go_to_commanded_angles(make):
-    world, body = make(action=JointActionKind.position)
-    weightless(world)
-    body.place((0.0, 0.0, 2.0))
-    bent = {"upper_arm.abduction": 60.0, "forearm.flexion": 50.0, "thigh.flexion": 30.0}
-    bent |= {"head.rotation": -30.0, "spine.lateral": 10.0, "l_index_middle.flexion": 40.0}
-    wanted = posture_angles(SKELETON, Posture(0.0, bent))
-    body.act(body.encode(wanted))
-    let_pass(world, 2.0)
-    np.testing.assert_allclose(body.joint_angles(), wanted, atol=math.radians(2.0))
-
-
-def test_commanded_angles_keep_a_child_sitting(make):
-    world, body = make(action=JointActionKind.position, detail=Detail.mitten)
-    body.place((0.0, 0.0, 0.0), 0.0, POSTURES["sitting"])
-    wanted = posture_angles(SKELETON, POSTURES["sitting"])
-    body.act(body.encode(wanted))
-    head_m = body.bone("head").position[2]
-    let_pass(world, 4.0)
-    assert body.bone("head").position[2] > 0.85 * head_m
-
-
-@pytest.mark.parametrize("detail", Detail)
-def test_torques_of_a_wish_keep_a_child_sitting_still(make, detail):
-    """Given once per agent step, they must not shake it."""
-    world, body = make(action=JointActionKind.torque, detail=detail)
-    body.place((0.0, 0.0, 0.0), 0.0, POSTURES["sitting"])
-    wanted = body.angles_of(POSTURES["sitting"])
-    head_m = body.bone("head").position[2]
-    for _ in range(150):
-        body.act(body.encode(wanted))
-        world.step()
-    assert body.bone("head").position[2] > 0.85 * head_m
-    assert np.abs(body.velocities()).max() < 0.1
-
-
-def test_increments_of_zero_keep_a_posture(make):
-    world, body = make(action=JointActionKind.increment, detail=Detail.mitten)
-    body.place((0.0, 0.0, 0.0), 0.0, POSTURES["sitting"])
-    head_m = body.bone("head").position[2]
-    for _ in range(100):
-        body.act(np.zeros(82))
-        world.step()
-    assert body.bone("head").position[2] > 0.85 * head_m
-
-
-def test_increments_add_up_to_targets(make):
-    world, body = make(action=JointActionKind.increment)
-    weightless(world)
-    body.place((0.0, 0.0, 2.0))
-    bent = {"forearm.flexion": 50.0, "thigh.flexion": 30.0, "head.rotation": -30.0}
-    wanted = posture_angles(SKELETON, Posture(0.0, bent))
-    rows = []
-    for _ in range(50):
-        rows.append(body.encode(wanted))
-        body.act(rows[-1])
-        world.step()
-    np.testing.assert_allclose(body.joint_angles(), wanted, atol=math.radians(2.0))
-    assert np.abs(rows[0]).max() > 0.0
-    np.testing.assert_allclose(rows[-1], 0.0, atol=1e-6)
-
-
-def test_increments_stop_at_the_stops_and_start_anew(make):
-    world, body = make(action=JointActionKind.increment)
-    weightless(world)
-    for _ in range(3):
-        body.place((0.0, 0.0, 2.0))
-        elbow = body.joint_names.index("l_forearm.flexion")
-        row = np.zeros(82)
-        row[elbow] = 1.0
-        for _ in range(12):
-            body.act(row)
-            world.step()
-        bent = body.joint_angles()[elbow]
-        assert bent > 0.9 * SKELETON.joints[elbow].high_rad
-        body.act(-row)  # what was asked for beyond the stop is not owed
-        world.step()
-        body.act(-row)
-        world.step()
-        assert body.joint_angles()[elbow] < bent - math.radians(5.0)
-
-
-def test_wishes_and_targets_are_inverse(make):
-    _, body = make(action=JointActionKind.position)
-    angles = np.random.default_rng(0).uniform(body._low, body._high)
-    control = PositionTarget()
-    wishes = control.wishes(angles, angles, body._low, body._high)
-    shares = control.shares(wishes, angles, body._low, body._high)
-    np.testing.assert_allclose(shares, 0.0, atol=1e-9)
-
-
-def test_limbs_alone_may_be_commanded(make):
-    world, body = make(joints=JointChoice.limbs)
-    assert body.action_spec.shape == (40,)
-    body.act(np.full(40, 0.5))
-    world.step()
-    fingers = [i for i, name in enumerate(body.joint_names) if "thumb" in name or "index" in name]
-    assert not body.joint_torques()[fingers].any()
-    assert (body.joint_torques() != 0.0).sum() == 40
-
-
-@pytest.mark.parametrize(
-    ("row", "message"),
-    [
-        (np.zeros(81), r"shape \(81,\), not \(82,\)"),
-        (np.full(82, np.nan), r"spine.flexion is nan, not in \[-1, 1\]"),
-        (np.full(82, np.inf), r"spine.flexion is inf"),
-        (np.full(82, 1.01), r"spine.flexion is 1.01"),
-    ],
-)
-def test_impossible_actions_are_refused(make, row, message):
-    _, body = make()
-    with pytest.raises(ValueError, match=message):
-        body.act(row)
-    with pytest.raises(ValueError, match=message):
-        body.apply_torque(row)
-
-
-def test_apply_torque_is_for_bodies_driven_by_torque(make):
-    _, body = make(action=JointActionKind.position)
-    with pytest.raises(ValueError, match=r"needs body.action=torque"):
-        body.apply_torque(np.zeros(82))
 
 
 @pytest.mark.parametrize(
@@ -294,8 +117,8 @@ def test_apply_torque_is_for_bodies_driven_by_torque(make):
         ((0.0, 0.0, 0.0), np.zeros(40), r"angles \(40,\), not \(82,\)"),
     ],
 )
-def test_impossible_places_are_refused(make, position, posture, message):
-    _, body = make()
+def test_impossible_places_are_refused(make_child, position, posture, message):
+    _, body = make_child()
     with pytest.raises(ValueError, match=message):
         body.place(position, 0.0, posture)
 
@@ -323,8 +146,8 @@ def test_impossible_numbers_are_refused(numbers, message):
 # ---- physics
 
 
-def test_a_fall_is_free_until_the_floor(make):
-    world, body = make()
+def test_a_fall_is_free_until_the_floor(make_child):
+    world, body = make_child()
     body.place((0.0, 0.0, 1.0))
     start = body.position[2]
     let_pass(world, 0.2)
@@ -332,8 +155,8 @@ def test_a_fall_is_free_until_the_floor(make):
     assert body.position[2] - start == pytest.approx(-0.5 * 9.81 * 0.2**2, rel=0.06)
 
 
-def test_fingers_and_palms_and_soles_are_softer_than_bones(make):
-    world, body = make()
+def test_fingers_and_palms_and_soles_are_softer_than_bones(make_child):
+    world, body = make_child()
     client, body_id = world.client, body.articulation.body_id
     stiff = {}
     for link in range(pybullet.getNumJoints(body_id, physicsClientId=client)):
@@ -345,9 +168,9 @@ def test_fingers_and_palms_and_soles_are_softer_than_bones(make):
     assert stiff["l_hand"] == stiff["chest"] < 0.0, "Bullet's word for rigid"
 
 
-def test_skin_that_carries_weight_is_pressed_in_by_it(make):
+def test_skin_that_carries_weight_is_pressed_in_by_it(make_child):
     """Hooke, at every point in which a sitting child's hands and feet rest on the floor."""
-    world, body = make(action=JointActionKind.position)
+    world, body = make_child(action=JointActionKind.position)
     body.place((0.0, 0.0, 0.0), 0.0, POSTURES["sitting"])
     wanted = posture_angles(SKELETON, POSTURES["sitting"])
     body.act(body.encode(wanted))
@@ -363,8 +186,8 @@ def test_skin_that_carries_weight_is_pressed_in_by_it(make):
 
 
 @pytest.mark.slow
-def test_ten_thousand_resets_take_no_memory(make):
-    world, body = make(detail=Detail.mitten)
+def test_ten_thousand_resets_take_no_memory(make_child):
+    world, body = make_child(detail=Detail.mitten)
 
     def resident_kb():
         return int(Path("/proc/self/statm").read_text().split()[1]) * 4
@@ -382,8 +205,8 @@ def test_ten_thousand_resets_take_no_memory(make):
     assert resident_kb() - before < 1000
 
 
-def test_many_resets_leave_no_trace(make):
-    world, body = make(detail=Detail.mitten)
+def test_many_resets_leave_no_trace(make_child):
+    world, body = make_child(detail=Detail.mitten)
 
     def film():
         world.reset(np.random.default_rng(0))
@@ -397,8 +220,8 @@ def test_many_resets_leave_no_trace(make):
 
 
 @pytest.mark.parametrize("what", ["base", "joint"])
-def test_a_simulation_that_breaks_is_told_and_shows_no_nan(make, what):
-    world, body = make()
+def test_a_simulation_that_breaks_is_told_and_shows_no_nan(make_child, what):
+    world, body = make_child()
     world.step()
     nan = math.nan
     if what == "base":
@@ -421,8 +244,8 @@ def test_a_simulation_that_breaks_is_told_and_shows_no_nan(make, what):
 # ---- palms
 
 
-def test_palms_are_on_the_inside_of_both_hands(make):
-    _, body = make()
+def test_palms_are_on_the_inside_of_both_hands(make_child):
+    _, body = make_child()
     body.place((0.0, 0.0, 0.0))
     left, right = body.palms()
     for palm, side in ((left, "l"), (right, "r")):

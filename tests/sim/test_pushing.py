@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 from walking import ball, box, empty_world, let_pass, walker_in, wall
 
+from veca_marl.sim.props import PropCfg, PropShape
+
 RADIUS_M = 0.11
 SLACK_M = 0.004
 
@@ -126,6 +128,20 @@ def test_a_heavy_box_stops_it_and_does_not_move():
         if speed:
             assert walker.position[0] == pytest.approx(0.85 - RADIUS_M, abs=SLACK_M)
     np.testing.assert_array_equal(*places)
+
+
+def test_paint_on_the_floor_is_no_obstacle():
+    mark = PropCfg(
+        name="mark",
+        shape=PropShape.cylinder,
+        size_m=[1.0, 0.004],
+        position_m=(0.0, 0.0, 0.002),
+        tangible=False,
+    )
+    walker = walker_in(empty_world(mark))
+    for x in np.linspace(-1.5, 1.5, 31):
+        walker.place((x, 0.0, 0.0))
+        assert walker.position[0] == pytest.approx(x, abs=1e-9)
 
 
 def test_a_heavy_thing_that_comes_pushes_it_away():

@@ -18,7 +18,7 @@ from torch import Tensor, nn
 from torch.distributions import Categorical
 from torchrl.modules import TanhNormal
 
-from veca_marl.algos.encoders import make_encoder, orthogonal
+from veca_marl.algos.encoders import Pooling, make_encoder, orthogonal
 from veca_marl.algos.specs import ArrayLayout, TeamSpec
 
 
@@ -54,6 +54,7 @@ class NetworkCfg:
 
     Attributes:
         channels: Output channels of the three convolutions of an image encoder.
+        pooling: What becomes of an image's last feature maps.
         vector_features: Width of the encoder of any sense that is not an image.
         trunk_features: Width of the joined layer that both heads read.
         precision: Arithmetic of encoders and trunk.
@@ -62,6 +63,7 @@ class NetworkCfg:
     """
 
     channels: list[int] = field(default_factory=lambda: [16, 32, 32])
+    pooling: Pooling = Pooling.flatten
     vector_features: int = 64
     trunk_features: int = 256
     precision: Precision = Precision.float32
@@ -86,7 +88,7 @@ class Trunk(nn.Module):
         super().__init__()
         self.ranks = {name: len(layout.shape) for name, layout in observations.items()}
         encoders = {
-            name: make_encoder(name, layout, cfg.channels, cfg.vector_features)
+            name: make_encoder(name, layout, cfg.channels, cfg.vector_features, cfg.pooling)
             for name, layout in observations.items()
         }
         self.encoders = nn.ModuleDict(encoders)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pickle
+from enum import Enum
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,7 @@ import torch
 from tensordict.nn import ProbabilisticTensorDictSequential
 
 from veca_marl.algos.checkpoint import CheckpointError
+from veca_marl.algos.encoders import Pooling
 from veca_marl.algos.networks import Critic, NetworkCfg, Parameters, Precision, TeamNetwork
 from veca_marl.algos.specs import TeamSpec
 
@@ -59,5 +61,10 @@ def _read(path: Path) -> dict[str, Any]:
 def _network_cfg(config: dict[str, Any], team: str) -> NetworkCfg:
     """Return the sizes of a team's network from the stored configuration of its run."""
     numbers = config["learner"].get(team, config["algo"])["network"]
-    kinds = {"precision": Precision, "critic": Critic, "parameters": Parameters}
+    kinds: dict[str, type[Enum]] = {
+        "precision": Precision,
+        "critic": Critic,
+        "parameters": Parameters,
+        "pooling": Pooling,
+    }
     return NetworkCfg(**{k: kinds[k][v] if k in kinds else v for k, v in numbers.items()})

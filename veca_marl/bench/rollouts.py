@@ -9,7 +9,6 @@ from statistics import median
 
 import torch
 from tensordict import TensorDictBase
-from tensordict.nn import TensorDictModuleBase
 
 from veca_marl.bench.stopwatch import Probes, Stopwatch
 from veca_marl.envs.env import VecaEnv
@@ -93,7 +92,7 @@ def measure_rollouts(game: GameCfg, worlds: int, steps: int, repeats: int) -> Ro
     )
 
 
-class RandomMoves(TensorDictModuleBase):
+class RandomMoves:
     """Drawn beforehand, so that the policy costs next to nothing.
 
     Args:
@@ -102,14 +101,12 @@ class RandomMoves(TensorDictModuleBase):
     """
 
     def __init__(self, env: VecaEnv, steps: int) -> None:
-        super().__init__()
         torch.manual_seed(0)
         spec = env.full_action_spec
-        self.in_keys, self.out_keys = [], list(env.action_keys)
         self._moves = {key: [spec[key].rand() for _ in range(steps)] for key in env.action_keys}
         self._step = 0
 
-    def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
+    def __call__(self, tensordict: TensorDictBase) -> TensorDictBase:
         """Write each team's next move."""
         for key, moves in self._moves.items():
             tensordict.set(key, moves[self._step % len(moves)])
@@ -122,11 +119,11 @@ def _split(env: VecaEnv, policy: RandomMoves, steps: int) -> dict[str, int]:
     watch = Stopwatch(rest=TORCHRL)
     with Probes(watch) as probes:
         probes.put(ENV, env, "_step", "_reset")
-        probes.put(POLICY, policy, "forward")
         for game in env.games:
             _probe_game(game, probes)
         with watch.running():
-            env.rollout(steps, policy, break_when_any_done=False)
+            moves = watch.wrap(POLICY, policy)
+            env.rollout(steps, moves, break_when_any_done=False, trust_policy=True)
     return dict(watch.nanoseconds)
 
 

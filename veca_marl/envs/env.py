@@ -9,17 +9,17 @@ import torch
 from numpy.typing import NDArray
 from tensordict import TensorDict, TensorDictBase
 from torchrl.data import Categorical, Composite, Unbounded
-from torchrl.envs import EnvBase
 
 from veca_marl.envs.game import Game, Outcome
 from veca_marl.envs.game_cfg import GameCfg
 from veca_marl.envs.layout import Arrays, Layout
+from veca_marl.envs.lean_env import LeanEnv
 from veca_marl.envs.specs import done_spec, observation_spec, to_torchrl
 from veca_marl.envs.spectator import Spectator
 from veca_marl.sim.compilation import announce_compilation
 
 
-class VecaEnv(EnvBase):
+class VecaEnv(LeanEnv):
     """W equal games in one process, `batch_size=[W]`, one TorchRL group per team.
 
     Keys, with n players in a team::
@@ -117,15 +117,6 @@ class VecaEnv(EnvBase):
             self._score(world, arrays, outcome)
         return self._next.tensordict(arrays)
 
-    def _step_proc_data(self, next_tensordict_out: TensorDictBase) -> TensorDictBase:
-        """Leave out TorchRL's completion of flags and shapes: `_step` returns all of them.
-
-        It would cost as much as the whole of `_step` around the games.
-        """
-        if self.run_type_checks:
-            return super()._step_proc_data(next_tensordict_out)
-        return next_tensordict_out
-
     def _actions(self, team: str, tensordict: TensorDictBase) -> NDArray[Any]:
         action = tensordict.get((team, "action"))
         expected = self._action_shapes[team]
@@ -133,7 +124,8 @@ class VecaEnv(EnvBase):
             raise ValueError(
                 f"action of {team}: shape {tuple(action.shape)}, not {tuple(expected)}"
             )
-        return action.numpy(force=True)
+        plain = action.is_cpu and not action.requires_grad
+        return action.numpy() if plain else action.numpy(force=True)
 
     def _command(self, actions: dict[str, NDArray[Any]]) -> None:
         """Hand the actions out in all worlds before any of them moves."""
@@ -182,6 +174,8 @@ class VecaEnv(EnvBase):
 
 
 def _flag(arrays: Arrays, index: int | tuple[int, int], terminated: bool, truncated: bool) -> None:
-    arrays["terminated"][index] = terminated
-    arrays["truncated"][index] = truncated
-    arrays["done"][index] = terminated or truncated
+    """Put the flags up that are up; new arrays have them down."""
+    if terminated or truncated:
+        arrays["terminated"][index] = terminated
+        arrays["truncated"][index] = truncated
+        arrays["done"][index] = True

@@ -145,6 +145,8 @@ class Game:
 
     def _check_names(self, actions: Mapping[str, NDArray[Any]]) -> None:
         names = [player.name for player in self.actors]
+        if list(actions) == names:
+            return
         unknown = sorted(set(actions) - set(names))
         if unknown:
             raise ValueError(f"actions for unknown agents {unknown}; there are {names}")

@@ -67,6 +67,11 @@ class MeshTable(NamedTuple):
         triangles: ``(T, 3)`` rows of vertices.
         vertices: ``(V, 3)`` metres, world frame, as of the last `Scene.update`.
         normals: ``(V, 3)`` outward unit vectors, likewise.
+        first_vertices: ``(M + 1,)`` where each mesh's vertices begin, and where the last one's end.
+        first_triangles: ``(M + 1,)`` likewise.
+        lower: ``(M, 3)`` metres, the corner of a box round each mesh, as of the last
+            `Scene.update`.
+        upper: ``(M, 3)`` its other corner.
     """
 
     frames: Indices
@@ -75,6 +80,10 @@ class MeshTable(NamedTuple):
     triangles: Indices
     vertices: Floats
     normals: Floats
+    first_vertices: Indices
+    first_triangles: Indices
+    lower: Floats
+    upper: Floats
 
 
 def empty_meshes() -> MeshTable:
@@ -84,6 +93,10 @@ def empty_meshes() -> MeshTable:
         np.zeros((0, INFLUENCES)),
         np.zeros((0, INFLUENCES, 3)),
         np.zeros((0, 3), np.int64),
+        np.zeros((0, 3)),
+        np.zeros((0, 3)),
+        np.zeros(1, np.int64),
+        np.zeros(1, np.int64),
         np.zeros((0, 3)),
         np.zeros((0, 3)),
     )
@@ -99,6 +112,10 @@ def with_mesh(table: MeshTable, mesh: Mesh, first_row: int) -> MeshTable:
         mesh.triangles + len(table.vertices),
         np.zeros((count, 3)),
         np.zeros((count, 3)),
+        np.array([len(table.vertices) + count]),
+        np.array([len(table.triangles) + len(mesh.triangles)]),
+        np.zeros((1, 3)),
+        np.zeros((1, 3)),
     )
     columns: list[Any] = [np.concatenate(pair) for pair in zip(table, more, strict=True)]
     return MeshTable(*columns)

@@ -23,7 +23,8 @@ from veca_marl.sim.shading import (
     paint,
     paint_sky,
 )
-from veca_marl.sim.triangles import draw_triangles, illuminate_triangles, to_eye
+from veca_marl.sim.skins_in_view import draw_skins
+from veca_marl.sim.triangles import illuminate_triangles
 
 
 class Views(NamedTuple):
@@ -154,8 +155,7 @@ class Camera:
         if not len(meshes.triangles):
             return
         seen = np.empty_like(meshes.vertices)
-        to_eye(meshes.vertices, view, seen)
-        draw_triangles(meshes.triangles, seen, drawn, self.lens, first, depth, surfaces)
+        draw_skins(meshes, drawn, view, self.lens, True, first, seen, depth, surfaces)
         illuminate_triangles(meshes, seen, self.lens, first, surfaces, lights)
 
     def _blank(self, count: int) -> Views:

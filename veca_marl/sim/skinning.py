@@ -17,15 +17,16 @@ from veca_marl.sim.pose import Floats
 
 @njit(cache=True)
 def skin(meshes: MeshTable, positions: Floats, rotations: Floats) -> None:
-    """Carry all vertices along with their frames, and find the normals.
+    """Carry all vertices along with their frames, find the normals and the boxes round the meshes.
 
     Args:
-        meshes: `vertices` and `normals` are written.
+        meshes: `vertices`, `normals`, `lower` and `upper` are written.
         positions: ``(F, 3)`` the scene's frames, metres.
         rotations: ``(F, 3, 3)`` their axes to the world's.
     """
     blend(meshes.frames, meshes.weights, meshes.offsets, positions, rotations, meshes.vertices)
     _turn_normals(meshes.triangles, meshes.vertices, meshes.normals)
+    _bound(meshes)
 
 
 @njit(cache=True)
@@ -72,3 +73,15 @@ def _turn_normals(triangles: Indices, vertices: Floats, normals: Floats) -> None
         x, y, z = normals[v, 0], normals[v, 1], normals[v, 2]
         scale = 1.0 / max(math.sqrt(x * x + y * y + z * z), 1e-12)
         normals[v, 0], normals[v, 1], normals[v, 2] = x * scale, y * scale, z * scale
+
+
+@njit(cache=True)
+def _bound(meshes: MeshTable) -> None:
+    """Find the box along the world's axes round each mesh."""
+    for m in range(meshes.lower.shape[0]):
+        meshes.lower[m] = math.inf
+        meshes.upper[m] = -math.inf
+        for v in range(meshes.first_vertices[m], meshes.first_vertices[m + 1]):
+            for axis in range(3):
+                meshes.lower[m, axis] = min(meshes.lower[m, axis], meshes.vertices[v, axis])
+                meshes.upper[m, axis] = max(meshes.upper[m, axis], meshes.vertices[v, axis])

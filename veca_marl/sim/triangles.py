@@ -17,10 +17,12 @@ from numpy.typing import NDArray
 
 from veca_marl.sim.meshes import Indices, MeshTable
 from veca_marl.sim.pose import Floats
-from veca_marl.sim.raster import Depths, Lens, Rectangle, Surfaces, pixel_rectangle
+from veca_marl.sim.raster import Depths, Lens, Rectangle, Surfaces
 from veca_marl.sim.scene import Bools
-from veca_marl.sim.screen_bounds import Vector, single
+from veca_marl.sim.screen_bounds import Interval, Vector, single
 from veca_marl.sim.shading import AMBIENT, BOUNCE, SUN
+
+_MARGIN_PX = 0.01  # absorbs the rounding of slopes in single precision
 
 
 @njit(cache=True, error_model="numpy")
@@ -103,7 +105,29 @@ def _rectangle(a: Vector, b: Vector, c: Vector, nearest: float, lens: Lens) -> R
     ya, yb, yc = a[1] / a[2], b[1] / b[2], c[1] / c[2]
     across = (min(xa, xb, xc), max(xa, xb, xc))
     upward = (min(ya, yb, yc), max(ya, yb, yc))
-    return pixel_rectangle(across, upward, lens)
+    return _centres_between(across, upward, lens)
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def _centres_between(across: Interval, upward: Interval, lens: Lens) -> Rectangle:
+    """Pixels whose centres lie between some slopes: none for most triangles of a far body.
+
+    As `pixel_rectangle`, but triangles are many and small, so that a wide margin would cost more
+    than they do.
+    """
+    left, right = max(across[0], -lens.tan_x), min(across[1], lens.tan_x)
+    bottom, top = max(upward[0], -lens.tan_y), min(upward[1], lens.tan_y)
+    if left >= right or bottom >= top:
+        return 0, 0, 0, 0
+    width, height = lens.columns.shape[0], lens.rows.shape[0]
+    per_x, per_y = width / (2.0 * lens.tan_x), height / (2.0 * lens.tan_y)
+    reach = 0.5 + _MARGIN_PX
+    return (
+        max(math.ceil((left + lens.tan_x) * per_x - reach), 0),
+        min(math.floor((right + lens.tan_x) * per_x + reach), width),
+        max(math.ceil((lens.tan_y - top) * per_y - reach), 0),
+        min(math.floor((lens.tan_y - bottom) * per_y + reach), height),
+    )
 
 
 @njit(cache=True, error_model="numpy")
@@ -127,7 +151,7 @@ def _cut_rectangle(a: Vector, b: Vector, c: Vector, lens: Lens) -> Rectangle:
             y = (start[1] + cut * (end[1] - start[1])) / near
             low_x, high_x = min(low_x, x), max(high_x, x)
             low_y, high_y = min(low_y, y), max(high_y, y)
-    return pixel_rectangle((low_x, high_x), (low_y, high_y), lens)
+    return _centres_between((low_x, high_x), (low_y, high_y), lens)
 
 
 @njit(cache=True, error_model="numpy", inline="always")

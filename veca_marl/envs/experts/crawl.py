@@ -8,6 +8,7 @@ import numpy as np
 
 from veca_marl.sim.bodies.humanoid import Humanoid
 from veca_marl.sim.bodies.joint_controls import Springs
+from veca_marl.sim.bodies.postures import ON_ALL_FOURS
 from veca_marl.sim.pose import Floats
 
 # Drawn by hand, then improved by a random search for the way covered, with torques and with
@@ -31,6 +32,7 @@ _TRUNK = {"spine.flexion": 20.7, "neck.flexion": -45.0}
 _BEND = {"spine.lateral": -10.7, "chest.lateral": -10.7, "chest.rotation": -0.7}
 _BEND_LEAD_RAD = -0.01
 _BEGIN_S = 0.4
+_BEFORE_M = 0.1  # a place nearer than that is not worth a stride
 
 
 class Crawl:
@@ -79,3 +81,18 @@ class Crawl:
         forward = max(0.0, math.cos(phase))
         for name, (middle, swing, bend) in limb.items():
             degrees[self._joint[side + name]] = middle + swing * math.sin(phase) + bend * forward
+
+
+def keep_near(body: Humanoid, crawl: Crawl, place: Floats) -> Floats | Springs:
+    """Return the wish of who wants to be at a place: crawl while it lies ahead, else kneel still.
+
+    The gait cannot be steered, so this gets nearer to a place, and rarely to it.
+
+    Args:
+        body: Who crawls.
+        crawl: Its rhythm.
+        place: ``(2,)`` metres.
+    """
+    if (place - body.position[:2]) @ body.forward[:2] > _BEFORE_M:
+        return crawl.wish()
+    return body.angles_of(ON_ALL_FOURS)

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from veca_marl.envs.navigation import FloorPlan
+from veca_marl.envs.floor_plan import FloorPlan
 from veca_marl.sim.bodies.pushing import horizontal_distance
 from veca_marl.sim.bodies.walker import Walker
 from veca_marl.sim.calls import Call

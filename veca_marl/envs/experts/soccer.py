@@ -7,32 +7,74 @@ import math
 import numpy as np
 
 from veca_marl.envs.experts.walking import walk_to
+from veca_marl.envs.pitch import Pitch
 from veca_marl.sim.bodies.walker import Walker
 from veca_marl.sim.pose import Floats
-from veca_marl.sim.props import Prop
 
-_RUN_UP_M = 0.45  # from the ball, before a shot
+_RUN_UP_M = 0.55  # from the ball, before a shot
+_REACH_M = 0.38  # of the foot: there the ball goes off, away from the body
+_LOOK_AHEAD_M = 0.25  # on the line of the shot: where to walk at
+_FOOT_M, _FUNNEL = 0.05, 0.4  # aside of that line: at the kick, and more for each metre before it
 _CLEAR_M = 0.42  # passing the ball at this distance, the foot does not reach it
 _AHEAD_S = 0.25  # the ball is taken where it will be then
-_IN_LINE = 0.97  # cosine of the angle at the ball between run-up and shot
+_BODY_M, _BALL_M = 0.13, 0.12
+_ASIDE_RAD = [side * math.radians(deg) for deg in range(0, 180, 15) for side in (1.0, -1.0)]
+_CORNERS = (0.0, 0.12, -0.12, 0.24, -0.24, 0.33, -0.33)  # shares of the goal's width
+_FREE_M = 0.45  # farther from a keeper no shot is freer
 
 
-def attack(body: Walker, ball: Prop, aim: Floats) -> tuple[float, float]:
+def attack(body: Walker, pitch: Pitch, aim: Floats) -> tuple[float, float]:
     """Return the wish (forward, turn) of who wants the ball to go to a point.
 
     A foot kicks whatever comes into its reach, away from the body: so go round the ball at a
-    distance until it lies between the body and the aim, then walk at it.
+    distance until it lies between the body and the aim, then walk at it. Where walls leave no room
+    for the run-up, the shot goes as near to the aim as it can.
 
     Args:
         body: Who attacks.
-        ball: What.
+        pitch: Where, with what ball.
         aim: ``(2,)`` or ``(3,)`` metres: where it shall go.
     """
-    place = ball.position[:2] + _AHEAD_S * ball.velocity[:2]
-    shot, way = _unit(aim[:2] - place), place - body.position[:2]
-    if _unit(way) @ shot > _IN_LINE:
-        return walk_to(body, place)
-    return walk_to(body, _round(body.position[:2], place, place - _RUN_UP_M * shot))
+    ball = np.clip(
+        pitch.ball.position[:2] + _AHEAD_S * pitch.ball.velocity[:2],
+        pitch.low + _BALL_M,
+        pitch.high - _BALL_M,
+    )
+    here, shot = body.position[:2], _possible(ball, _unit(aim[:2] - ball), pitch)
+    behind, aside = (ball - here) @ shot, abs(_cross(shot, ball - here))
+    if aside < _FOOT_M + _FUNNEL * (behind - _REACH_M):
+        return walk_to(body, ball - max(behind - _LOOK_AHEAD_M, 0.0) * shot)
+    return walk_to(body, _round(here, ball, ball - _RUN_UP_M * shot))
+
+
+def open_corner(pitch: Pitch, keeper: Floats) -> Floats:
+    """Return the point of the goal line to aim at, ``(2,)`` metres: past a keeper.
+
+    Args:
+        pitch: Where.
+        keeper: ``(2,)`` or ``(3,)`` metres: who stands in the way.
+    """
+    goal, ball = pitch.goal[:2], pitch.ball.position[:2]
+    spots = [goal + np.array([0.0, share * pitch.goal_width_m]) for share in _CORNERS]
+    return max(spots, key=lambda spot: min(_gap_m(ball, spot, keeper[:2]), _FREE_M))
+
+
+def _gap_m(start: Floats, end: Floats, other: Floats) -> float:
+    """Return how far a straight way passes another one, metres."""
+    way = end - start
+    share = float((other - start) @ way) / max(float(way @ way), 1e-9)
+    return float(np.hypot(*(start + min(max(share, 0.0), 1.0) * way - other)))
+
+
+def _possible(ball: Floats, shot: Floats, pitch: Pitch) -> Floats:
+    """Return the direction nearest to a shot's for which the pitch has room for the run-up."""
+    for aside_rad in _ASIDE_RAD:
+        c, s = math.cos(aside_rad), math.sin(aside_rad)
+        turned = np.array([c * shot[0] - s * shot[1], s * shot[0] + c * shot[1]])
+        start = ball - _RUN_UP_M * turned
+        if (start > pitch.low + _BODY_M).all() and (start < pitch.high - _BODY_M).all():
+            return turned
+    return shot
 
 
 def _round(here: Floats, ball: Floats, there: Floats) -> Floats:
@@ -47,6 +89,10 @@ def _round(here: Floats, ball: Floats, there: Floats) -> Floats:
         return there
     side = -math.copysign(1.0, aside)
     return ball + side * _CLEAR_M * 1.2 * left
+
+
+def _cross(a: Floats, b: Floats) -> float:
+    return float(a[0] * b[1] - a[1] * b[0])
 
 
 def _unit(way: Floats) -> Floats:

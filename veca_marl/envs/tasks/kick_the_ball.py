@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from veca_marl.envs.scoring import cosine, flat
+from veca_marl.envs.scoring import cosine, flat, norm
 from veca_marl.envs.task import Player, Task, TaskCfg, register, terms, walker
 from veca_marl.sim.props import PropCfg, PropShape
 from veca_marl.sim.sounds import SoundCfg, SoundKind
@@ -106,7 +106,7 @@ class KickTheBall(Task):
 
     def reward(self, player: Player) -> dict[str, float]:
         way, velocity = flat(self.ball.position - player.body.position), player.body.velocity
-        walks = float(np.linalg.norm(velocity)) >= self.cfg.walking_mps
+        walks = norm(velocity) >= self.cfg.walking_mps
         approach = cosine(velocity, way) if walks else 0.0
         return {"kick": float(self._scored), "approach": approach}
 

@@ -4,20 +4,27 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from enum import Enum
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from veca_marl.envs.experts.seeking import Seeker, Wish
-from veca_marl.envs.navigation import FloorPlan, gap_m, way_to
+from veca_marl.envs.floor_plan import FloorPlan
+from veca_marl.envs.navigation import Sight, free_place, gap_m, way_to
 from veca_marl.envs.task import Player, Task, TaskCfg, Team, register, terms, walker
-from veca_marl.sim.playground import RoomCfg
-from veca_marl.sim.pose import Floats
-from veca_marl.sim.props import Prop, PropCfg, PropShape
+from veca_marl.sim.props import PropCfg, PropShape
 
 _PASS_M = 0.2  # who stands at the object leaves so much between itself and the wall
-_TRIES = 1000
+
+
+class Muted(Enum):
+    """Whose voice is not heard: to ask what hearing is worth."""
+
+    nobody = "nobody"
+    finder = "finder"
+    everybody = "everybody"
 
 
 @dataclass
@@ -28,21 +35,23 @@ class MultiAgentNavCfg(TaskCfg):
         agents: How many seek, at least 2; the playground needs a room for each.
         radius_m: Radius of the object, a ball too heavy to be moved.
         reach_m: Who comes so near to its surface has reached it.
+        muted: Whose calls nobody hears; the finder is who starts in the object's room.
     """
 
     agents: int = 2
     radius_m: float = 0.2
     reach_m: float = 0.4
+    muted: Muted = Muted.nobody
     weights: dict[str, float] = terms(reached=1.0, ahead=0.05, aside=0.03)
 
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.agents < 2:
             raise ValueError(f"task.agents={self.agents} must be at least 2")
-        for name in ("radius_m", "reach_m"):
-            value = getattr(self, name)
-            if not (math.isfinite(value) and value > 0.0):
-                raise ValueError(f"task.{name}={value} must be a positive number")
+        if not isinstance(self.muted, Muted):
+            choices = [choice.name for choice in Muted]
+            raise ValueError(f"task.muted={self.muted!r}; there are {choices}")
+        self._check_positive("radius_m", "reach_m")
 
 
 @register
@@ -58,9 +67,10 @@ class MultiAgentNav(Task):
     The paper's table of tasks lists vision, touch and proprioception, but its text has the others
     come "using auditory perception": here they have ears as well.
 
-    `task.agents` of 2 to 4 find rooms in `playground=four_rooms`; `two_rooms` and `three_rooms` are
-    for so many. Bodies without a vocabulary of calls play too: joint-level ones call
-    by `make_sound`, which is not part of their action row.
+    `playground=seven_rooms`, its own, takes up to 7 agents: the ways are short, but who is not
+    called has much to search. `two_rooms`, `three_rooms` and `four_rooms` are for so many. Bodies
+    without a vocabulary of calls play too: joint-level ones call by `make_sound`, which is not part
+    of their action row.
 
     Terms:
         reached: how many agents reached the object for the first time in this step, the same for
@@ -85,9 +95,12 @@ class MultiAgentNav(Task):
             raise ValueError(
                 f"task.agents={len(self.players)} start in rooms of their own, but playground "
                 f"{playground.name!r} has {rooms}; choose task.agents of at most {rooms}, or "
-                "playground=two_rooms, three_rooms, four_rooms"
+                "playground=two_rooms, three_rooms, four_rooms, seven_rooms"
             )
         self.plan = FloorPlan(playground)
+        self._furniture = [
+            prop for prop in self.world.props.values() if prop.cfg.shape is not PropShape.wall
+        ]
         self.target = self.world.add_prop(
             PropCfg(
                 name="target",
@@ -96,30 +109,26 @@ class MultiAgentNav(Task):
                 colour=(0.95, 0.15, 0.1),
             )
         )
-        self._furniture = [
-            prop
-            for prop in self.world.props.values()
-            if prop.cfg.shape is not PropShape.wall and prop is not self.target
-        ]
+        self._sight = Sight(self.world.scene, self.target)
         self._seekers: dict[str, Seeker] = {}
-        self._sights: dict[str, tuple[int, bool]] = {}
-        self._clear()
-
-    def _clear(self) -> None:
-        self._seekers.clear()
-        self._sights.clear()
         self.arrived: set[str] = set()
         self._new = 0
 
     def reset(self, rng: np.random.Generator) -> None:
-        self._clear()
-        rooms = [self.plan.rooms[i] for i in rng.permutation(len(self.plan.rooms))]
-        rooms = rooms[: len(self.players)]
-        place = self._free_place(rooms[rng.integers(len(rooms))], self._furniture, rng)
-        self.target.place((place[0], place[1], place[2] + self.cfg.radius_m))
+        for memory in (self._sight, self._seekers, self.arrived):
+            memory.clear()
+        self._new = 0
+        order = rng.permutation(len(self.plan.rooms))[: len(self.players)]
+        rooms = [self.plan.rooms[index] for index in order]
+        home = rooms[rng.integers(len(rooms))]
+        clear_m = self.cfg.radius_m + self.cfg.reach_m + _PASS_M
+        x, y, floor_m = free_place(home, self._furniture, clear_m, rng)
+        self.target.place((x, y, floor_m + self.cfg.radius_m))
         for room, player in zip(rooms, self.players, strict=True):
-            place = self._free_place(room, [*self._furniture, self.target], rng)
+            place = free_place(room, [*self._furniture, self.target], clear_m, rng)
             player.body.place(place, yaw_rad=rng.uniform(-math.pi, math.pi))
+            if self.cfg.muted is not Muted.nobody:
+                player.body.muted = room is home or self.cfg.muted is Muted.everybody
 
     def after_step(self, rng: np.random.Generator) -> None:
         before = len(self.arrived)
@@ -130,21 +139,12 @@ class MultiAgentNav(Task):
 
     def reward(self, player: Player) -> dict[str, float]:
         ahead = aside = 0.0
-        if player.name not in self.arrived and self.sees(player):
+        if player.name not in self.arrived and self._sight.of(player):
             ahead, aside = way_to(player.body, self.target.position, self.world.clock.step_s)
         return {"reached": float(self._new), "ahead": ahead, "aside": aside}
 
     def terminated(self) -> bool:
         return len(self.arrived) == len(self.players)
-
-    def sees(self, player: Player) -> bool:
-        """Say whether the object is visible to a player's left eye now."""
-        version = self.world.scene.version
-        known, seen = self._sights.get(player.name, (-1, False))
-        if known != version:
-            seen = player.body.is_visible(self.target)
-            self._sights[player.name] = version, seen
-        return seen
 
     def expert(self, player: Player, observation: dict[str, NDArray[Any]]) -> Wish:
         """Look round, go and call; else listen, and go where a call comes from.
@@ -159,14 +159,5 @@ class MultiAgentNav(Task):
         if seeker is None:
             seeker = Seeker(walker(player), self.plan, self.world)
             self._seekers[player.name] = seeker
-        seen = self.target.position if self.sees(player) else None
+        seen = self.target.position if self._sight.of(player) else None
         return seeker.wish(observation.get("audio"), seen)
-
-    def _free_place(self, room: RoomCfg, things: list[Prop], rng: np.random.Generator) -> Floats:
-        """Draw a place of a room's floor, clear of walls and things."""
-        clear_m = self.cfg.radius_m + self.cfg.reach_m + _PASS_M
-        for _ in range(_TRIES):
-            place = room.sample_floor(rng, clear_m)
-            if all(gap_m(place, thing) >= clear_m for thing in things):
-                return place
-        raise ValueError(f"room {room.name!r} leaves no floor {clear_m} m away from everything")

@@ -10,8 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veca_marl.envs.contests import line_up, nearest, on_floor, opponents, paint_disc
-from veca_marl.envs.experts.walking import walk_to
+from veca_marl.envs.experts.crawl import Crawl, keep_near
+from veca_marl.envs.experts.wrestling import wrestle
 from veca_marl.envs.task import Player, Task, TaskCfg, terms, walker
+from veca_marl.sim.bodies.humanoid import Humanoid
 from veca_marl.sim.pose import Floats
 
 _RIM_M = 0.06
@@ -63,6 +65,7 @@ class PushOut(Task):
         self._playing: set[str] = set()
         self._fallen: set[str] = set()
         self._ground: dict[str, float] = {}
+        self._crawls: dict[str, Crawl] = {}
         self._won: dict[str, float] = {}
 
     def reset(self, rng: np.random.Generator) -> None:
@@ -73,6 +76,11 @@ class PushOut(Task):
         self._fallen = set()
         self._ground = {player.name: self._area(player) for player in self.players}
         self._won = dict.fromkeys(self._ground, 0.0)
+        self._crawls = {
+            player.name: Crawl(player.body, self.world.clock.step_s)
+            for player in self.players
+            if isinstance(player.body, Humanoid)
+        }
 
     def after_step(self, rng: np.random.Generator) -> None:
         self._playing -= self._fallen
@@ -96,10 +104,16 @@ class PushOut(Task):
         return any(all(p.name not in left for p in self._team(team)) for team in self._teams)
 
     def expert(self, player: Player, observation: dict[str, NDArray[Any]]) -> Any:
-        """Walk at the nearest opponent. Knows where everyone is; needs a body that walks."""
-        body = walker(player)
+        """Walk round the nearest opponent and push it outwards; knows where all are.
+
+        On hands and knees: crawl while the middle is ahead, then kneel still. That holds the
+        ring against who leaves it by accident, and pushes nobody out.
+        """
+        body = player.body
+        if isinstance(body, Humanoid):
+            return keep_near(body, self._crawls[player.name], self.middle)
         _, theirs = self._sides(player)
-        return walk_to(body, nearest(body, theirs).position)
+        return wrestle(walker(player), nearest(body, theirs), self.middle, self.cfg.radius_m)
 
     # ---- who is where
 

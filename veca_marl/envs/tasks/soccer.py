@@ -11,14 +11,14 @@ from numpy.typing import NDArray
 
 from veca_marl.envs.contests import line_up
 from veca_marl.envs.experts.soccer import attack
+from veca_marl.envs.pitch import POST_M, Pitch
 from veca_marl.envs.task import Player, Task, TaskCfg, terms, walker
 from veca_marl.sim.bodies.pushing import horizontal_distance
 from veca_marl.sim.bodies.walker import Walker
 from veca_marl.sim.pose import Floats
-from veca_marl.sim.props import PropCfg, PropShape
 
 ATTACKER, DEFENDER = "attacker", "defender"
-_POST_M = 0.04
+_STRIDE_MPS = 0.1  # who stands does not kick: the ball bounces off
 
 
 @dataclass
@@ -48,7 +48,7 @@ class SoccerCfg(TaskCfg):
     attacker_from_ball_m: tuple[float, float] = (0.8, 1.6)
     spread_deg: float = 30.0
     kick_rest_s: float = 0.5
-    weights: dict[str, float] = terms(goal=1.0, progress=0.1, approach=0.02)
+    weights: dict[str, float] = terms(goal=5.0, progress=0.5, approach=0.5)
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -56,7 +56,7 @@ class SoccerCfg(TaskCfg):
             if not 0.0 < getattr(self, name) < math.inf:
                 raise ValueError(f"task.{name}={getattr(self, name)} must be a positive number")
         for name in ("goal_width_m", "goal_height_m"):
-            if not 2.0 * (self.radius_m + _POST_M) < getattr(self, name) < math.inf:
+            if not 2.0 * (self.radius_m + POST_M) < getattr(self, name) < math.inf:
                 raise ValueError(
                     f"task.{name}={getattr(self, name)}: a ball of task.radius_m={self.radius_m} "
                     "does not fit through"
@@ -81,34 +81,14 @@ class Soccer(Task):
 
     def build(self) -> None:
         cfg, room = self.cfg, self.world.playground.rooms[0]
-        low, size = np.array(room.lower_m), np.array(room.size_m)
-        self.goal: Floats = low + np.array([size[0] - cfg.goal_from_wall_m, size[1] / 2.0, 0.0])
-        longest = cfg.goal_from_wall_m + cfg.ball_from_goal_m[1] + cfg.attacker_from_ball_m[1]
-        if longest > size[0] - 0.3 or cfg.aside_m > size[1] / 2.0 - 0.3:
+        self.pitch = Pitch(self.world, cfg)
+        self.ball, self.goal = self.pitch.ball, self.pitch.goal
+        length_m, width_m = cfg.ball_from_goal_m[1] + cfg.attacker_from_ball_m[1], 2.0 * cfg.aside_m
+        if not self.pitch.holds(length_m, width_m):
             raise ValueError(
-                f"task: a pitch {longest:.1f} m long, {2.0 * cfg.aside_m:.1f} m wide does not fit "
-                f"into the room {room.name!r} of {size[0]} x {size[1]} m"
+                f"task: {length_m} m of ball_from_goal_m and attacker_from_ball_m, {width_m} m of "
+                f"aside_m do not fit into room {room.name!r} of {room.size_m[:2]} m"
             )
-        self.ball = self.world.add_prop(
-            PropCfg(
-                name="ball",
-                shape=PropShape.sphere,
-                size_m=[cfg.radius_m],
-                position_m=(*(low[:2] + size[:2] / 2.0).tolist(), cfg.radius_m),
-                mass_kg=cfg.mass_kg,
-                colour=(0.95, 0.95, 0.95),
-                checker_m=cfg.radius_m,
-            )
-        )
-        self.world.add_prop(
-            PropCfg(
-                name="goal",
-                shape=PropShape.goal,
-                size_m=[cfg.goal_width_m, cfg.goal_height_m, _POST_M],
-                position_m=tuple(self.goal.tolist()),
-                colour=(0.95, 0.75, 0.1),
-            )
-        )
         self._rest_s: dict[str, float] = {}
         self._scored, self._progress_m, self._approach_m = False, 0.0, 0.0
         self._note()
@@ -132,10 +112,11 @@ class Soccer(Task):
 
     def after_step(self, rng: np.random.Generator) -> None:
         before, to_goal_m, to_ball_m = self._ball, self._to_goal_m, self._to_ball_m
+        attacker = self.players[0].body.position
+        self._approach_m = to_ball_m - horizontal_distance(attacker, before)
         self._note()
-        self._scored = self._scored or crosses(before, self._ball, self.goal, self.cfg)
+        self._scored = self._scored or self.pitch.scores(before, self._ball)
         self._progress_m = to_goal_m - self._to_goal_m
-        self._approach_m = to_ball_m - self._to_ball_m
         self._kick()
 
     def reward(self, player: Player) -> dict[str, float]:
@@ -151,7 +132,7 @@ class Soccer(Task):
 
     def expert(self, player: Player, observation: dict[str, NDArray[Any]]) -> Any:
         """Get behind the ball and walk through it. Knows where the ball is; needs legs to walk."""
-        return attack(walker(player), self.ball, self.goal)
+        return attack(walker(player), self.pitch, self.goal)
 
     # ---- the ball
 
@@ -162,12 +143,13 @@ class Soccer(Task):
         self._to_ball_m = horizontal_distance(self.players[0].body.position, self._ball)
 
     def _kick(self) -> None:
-        """Let the nearest of those who can kick the ball; one foot is enough for one step."""
+        """Let the nearest of those who walk at the ball kick it; one foot is enough for a step."""
         near = sorted(self.players, key=lambda p: horizontal_distance(p.body.position, self._ball))
         self._rest_s = {name: s - self.world.clock.step_s for name, s in self._rest_s.items()}
         for player in near:
             body, rested = player.body, self._rest_s[player.name] <= 0.0
-            if rested and isinstance(body, Walker) and body.kick(self.ball):
+            strides = float(body.velocity @ body.forward) > _STRIDE_MPS
+            if rested and strides and isinstance(body, Walker) and body.kick(self.ball):
                 self._rest_s[player.name] = self.cfg.kick_rest_s
                 return
 
@@ -177,19 +159,3 @@ class Soccer(Task):
         way = self.ball.position - spot
         aside = math.radians(rng.uniform(-self.cfg.spread_deg, self.cfg.spread_deg))
         line_up(player, spot, math.atan2(way[1], way[0]) + aside)
-
-
-def crosses(before: Floats, after: Floats, goal: Floats, cfg: SoccerCfg) -> bool:
-    """Say whether the ball's centre came through the goal's mouth, from the front.
-
-    Args:
-        before: ``(3,)`` metres: where it was.
-        after: ``(3,)`` metres: where it is, one step later; its way is taken as straight.
-        goal: ``(3,)`` metres: the middle of the goal line.
-        cfg: How wide and high the goal is.
-    """
-    if not before[0] < goal[0] <= after[0]:
-        return False
-    share = (goal[0] - before[0]) / (after[0] - before[0])
-    _, aside, height = before + share * (after - before) - goal
-    return bool(abs(aside) < cfg.goal_width_m / 2.0 and height < cfg.goal_height_m)

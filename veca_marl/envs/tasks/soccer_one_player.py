@@ -20,7 +20,8 @@ class SoccerOnePlayer(Soccer):
     Terms:
         goal: 1 on the step the ball is in.
         progress: decrease in this step of the ball's distance from the middle of the goal line, m.
-        approach: decrease in this step of the player's distance from the ball, m.
+        approach: how much nearer the player has come in this step to where the ball was, m: a ball
+            that rolls away costs nothing, or kicks would.
     """
 
     teams = (Team(ATTACKER),)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from veca_marl.envs.experts.soccer import attack
+from veca_marl.envs.experts.soccer import attack, open_corner
 from veca_marl.envs.task import Player, Team, register, walker
 from veca_marl.envs.tasks.soccer import ATTACKER, DEFENDER, Soccer, SoccerCfg
 from veca_marl.sim.pose import Floats
@@ -50,8 +50,9 @@ class SoccerTwoPlayer(Soccer):
         goal: 1 for the attacker, -1 for the defender on the step the ball is in.
         progress: decrease in this step of the ball's distance from the middle of the goal line, m;
             minus that for the defender.
-        approach: decrease in this step of the attacker's distance from the ball, m; minus that for
-            the defender, who is thus paid for standing in the attacker's way.
+        approach: how much nearer the attacker has come in this step to where the ball was, m: a
+            ball that rolls away costs nothing, or kicks would. Minus that for the defender, who is
+            thus paid for standing in the attacker's way.
     """
 
     teams = (Team(ATTACKER), Team(DEFENDER))
@@ -62,12 +63,12 @@ class SoccerTwoPlayer(Soccer):
             return super().start(player, rng)
         back = rng.uniform(*self.cfg.defender_from_goal_m)
         half_m = min(self.cfg.aside_m, self.cfg.goal_width_m / 2.0)
-        place: Floats = self.goal + np.array([-back, rng.uniform(-half_m, half_m), 0.0])
-        return place
+        return np.array([self.goal[0] - back, self.goal[1] + rng.uniform(-half_m, half_m), 0.0])
 
     def expert(self, player: Player, observation: dict[str, NDArray[Any]]) -> Any:
         """Get at the ball, away from the own goal. Knows where the ball is; needs legs to walk."""
         body = walker(player)
         if player.team == ATTACKER:
-            return attack(body, self.ball, self.goal)
-        return attack(body, self.ball, 2.0 * self.ball.position - self.goal)
+            keeper = self.players[1].body.position
+            return attack(body, self.pitch, open_corner(self.pitch, keeper))
+        return attack(body, self.pitch, 2.0 * self.ball.position - self.goal)

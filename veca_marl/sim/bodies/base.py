@@ -46,6 +46,7 @@ class Body(Protocol):
             segmentation images.
         action_spec: The action row that `act` takes.
         focal_distance_m: What the eyes' lenses are adjusted to; ``inf`` when relaxed.
+        muted: Whether nobody hears its voice, itself included. Stays until set anew.
         own_head_frames: Indices of the body's frames (bones) that its own eyes must not see.
         joint_names: The 82 joints, such as `l_forearm.flexion`, in the order of all joint arrays.
         bone_names: The 47 bones, such as `l_forearm`, in the order of all bone arrays.
@@ -55,6 +56,7 @@ class Body(Protocol):
     object_id: int
     action_spec: ArraySpec
     focal_distance_m: float
+    muted: bool
     own_head_frames: tuple[int, ...]
     joint_names: tuple[str, ...]
     bone_names: tuple[str, ...]

@@ -140,6 +140,15 @@ class Figure:
             raise ValueError(f"focal distance {focal_distance_m} must be positive metres or inf")
         self.focal_distance_m = float(focal_distance_m)
 
+    @property
+    def muted(self) -> bool:
+        """Whether nobody hears its voice, itself included. Stays until set anew."""
+        return self._mouth.muted
+
+    @muted.setter
+    def muted(self, muted: bool) -> None:
+        self._mouth.muted = muted
+
     def make_sound(self, waveform: NDArray[np.float32]) -> None:
         """Say something: samples at 22 050 Hz, heard by everyone, the speaker included."""
         self._voice.say(waveform)

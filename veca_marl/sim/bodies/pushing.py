@@ -119,7 +119,8 @@ class Pusher:
         """Switch Bullet's contacts off for all that cannot be pushed."""
         self._known = len(props), len(jointed)
         limit_kg = self._push_limit_kg
-        things = [p.body_id for p in props.values() if p.fixed or p.cfg.mass_kg > limit_kg]
+        solid = [p for p in props.values() if p.cfg.tangible]  # not paint on the floor
+        things = [p.body_id for p in solid if p.fixed or p.cfg.mass_kg > limit_kg]
         bodies = [one for one in jointed if _mass_kg(self._client, one) > limit_kg]
         self._obstacles = [(one, 0.0) for one in things] + [(one, _LIMBS_M) for one in bodies]
         for body_id, _ in self._obstacles:

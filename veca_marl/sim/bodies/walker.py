@@ -173,17 +173,14 @@ class Walker(Figure):
 
     def can_kick(self, prop: Prop) -> bool:
         """Say whether a thing is light enough, near enough and before the feet."""
-        gap = horizontal_distance(self.position, prop.position) - self.radius_m - prop.radius_m
-        way = prop.position - self.position
-        ahead = math.atan2(way[1], way[0]) - self.yaw_rad
-        aside = abs((ahead + math.pi) % (2.0 * math.pi) - math.pi)
+        here, there = self.position, prop.position
+        gap = horizontal_distance(here, there) - self.radius_m - prop.radius_m
         light = not prop.fixed and prop.cfg.mass_kg <= self.cfg.push_limit_kg
-        return (
-            light
-            and gap <= self.cfg.kick_reach_m
-            and aside <= math.radians(self.cfg.kick_angle_deg)
-            and prop.lowest_m <= self.cfg.kick_height_m
-        )
+        if gap > self.cfg.kick_reach_m or not light or prop.lowest_m > self.cfg.kick_height_m:
+            return False
+        ahead = math.atan2(there[1] - here[1], there[0] - here[0]) - self.yaw_rad
+        aside = abs((ahead + math.pi) % (2.0 * math.pi) - math.pi)
+        return aside <= math.radians(self.cfg.kick_angle_deg)
 
     def kick(self, prop: Prop) -> bool:
         """Kick a thing away; return False, and do nothing, if it is out of reach."""

@@ -1,6 +1,7 @@
 """Teams at the command line: self-play, cross-play, opponents from elsewhere, other algorithms."""
 
 import csv
+import json
 import subprocess
 import sys
 
@@ -9,6 +10,7 @@ import torch
 
 from veca_marl.cross_play import main as cross_play
 from veca_marl.cross_play import spread
+from veca_marl.evaluate import main as evaluate
 
 TASK = ["+task=PushOut1v1", "task.max_seconds=1", "senses/vision=blind", "senses/touch=numb"]
 SMALL = [
@@ -86,9 +88,43 @@ def test_what_another_run_learnt_is_an_opponent(played, tmp_path, capsys):
     assert "self_play.teams" in capsys.readouterr().err
 
 
+def test_what_was_learnt_plays_again_elsewhere(played, tmp_path, capsys):
+    table = tmp_path / "table.json"
+    run, more = str(played / "run"), ["--episodes", "4", "--json", str(table)]
+    assert evaluate([run, "opponent.blue=idle", "task.max_seconds=0.4", *more]) == 0
+    rows = json.loads(table.read_text())
+    assert [(row["player"], row["team"]) for row in rows] == [("policy", "red"), ("random", "red")]
+    assert all(row["episodes"] == 4 and row["length"] == 10.0 for row in rows)
+    assert rows[0]["return"] != rows[1]["return"]
+    printed = capsys.readouterr().out.splitlines()
+    assert len(printed) == 3
+    assert f"{rows[0]['return']:.3f}" in printed[1]
+    # a checkpoint may be named instead, and the same seed gives the same episodes
+    best = str(played / "run" / "checkpoints" / "best.pt")
+    again = [evaluate([best, "--episodes", "2", "--seed", "3"]) for _ in range(2)]
+    first, second = capsys.readouterr().out.split("player")[1:]
+    assert again == [0, 0]
+    assert first == second
+
+
+@pytest.mark.parametrize(
+    ("override", "message"),
+    [
+        ("senses/vision=monocular", "other specs"),
+        ("senses/audio=lout", "unknown senses/audio 'lout'"),
+    ],
+)
+def test_what_does_not_fit_is_refused(played, capsys, override, message):
+    assert evaluate([str(played / "run"), override]) == 2
+    assert message in capsys.readouterr().err
+
+
 def test_a_folder_that_is_no_run_is_refused(tmp_path, capsys):
-    assert cross_play([str(tmp_path / "nowhere")]) == 2
-    assert "nowhere" in capsys.readouterr().err
+    nowhere = tmp_path / "nowhere"
+    nowhere.mkdir()
+    for command in (cross_play, evaluate):
+        assert command([str(nowhere)]) == 2
+        assert "nowhere holds no run" in capsys.readouterr().err
 
 
 def test_past_selves_are_chosen_evenly():

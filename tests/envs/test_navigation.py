@@ -1,0 +1,100 @@
+"""What tasks of seeking share: the helper reward, free places, who sees the object."""
+
+import math
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from seeking import BALL_M, ball_at, walker_at, wall_across, world_with
+
+from veca_marl.envs.navigation import Sight, free_place, gap_m, way_to
+from veca_marl.envs.task import Player
+from veca_marl.sim.playground import RoomCfg
+
+STEP_S = 0.04
+AHEAD = np.array([5.0, 0.0, 0.0])
+LEFT, RIGHT = np.array([5.0, 1.0, 0.0]), np.array([5.0, -1.0, 0.0])
+
+
+def mover(velocity, yaw_deg=0.0):
+    yaw = math.radians(yaw_deg)
+    forward = np.array([math.cos(yaw), math.sin(yaw), 0.0])
+    return SimpleNamespace(
+        forward=forward, velocity=np.array([*velocity, 0.0]), position=np.zeros(3)
+    )
+
+
+@pytest.mark.parametrize(
+    ("velocity", "target", "way"),
+    [
+        ((1.0, 0.0), AHEAD, (0.04, 0.0)),
+        ((-1.0, 0.0), AHEAD, (-0.04, 0.0)),
+        ((0.0, 1.0), LEFT, (0.0, 0.04)),
+        ((0.0, 1.0), RIGHT, (0.0, -0.04)),
+        ((0.0, -1.0), RIGHT, (0.0, 0.04)),
+        ((0.0, -1.0), LEFT, (0.0, -0.04)),
+        ((0.5, -2.0), RIGHT, (0.02, 0.08)),
+    ],
+)
+def test_the_way_is_split_by_the_body_and_the_side_of_the_object(velocity, target, way):
+    np.testing.assert_allclose(way_to(mover(velocity), target, STEP_S), way, atol=1e-15)
+
+
+def test_the_way_turns_with_the_body():
+    """A quarter to the left, what was ahead is to the right."""
+    np.testing.assert_allclose(
+        way_to(mover((1.0, 0.0), yaw_deg=90.0), AHEAD, STEP_S), (0.0, 0.04), atol=1e-15
+    )
+
+
+def test_a_gap_is_measured_over_the_floor_to_the_surface():
+    world = world_with(ball_at(3.0, 4.0))
+    thing = world.props["ball"]
+    assert gap_m(np.array([0.0, 0.0, 7.0]), thing) == pytest.approx(5.0 - BALL_M)
+    assert gap_m(np.array([0.0, 0.0]), thing) == pytest.approx(5.0 - BALL_M)
+    world.close()
+
+
+def test_free_places_are_clear_of_things_and_walls():
+    world = world_with(ball_at(0.5, 0.5))
+    thing, room = world.props["ball"], RoomCfg(lower_m=(0.0, 0.0, 0.0), size_m=(2.0, 2.0, 2.0))
+    rng = np.random.default_rng(0)
+    places = np.array([free_place(room, [thing], 0.3, rng) for _ in range(300)])
+    gaps = [gap_m(place, thing) for place in places]
+    assert 0.3 <= min(gaps) < 0.34
+    np.testing.assert_allclose(places.min(axis=0)[:2], 0.3, atol=0.05)
+    np.testing.assert_allclose(places.max(axis=0)[:2], 1.7, atol=0.05)
+    with pytest.raises(ValueError, match=r"leaves no floor 0\.95 m away from everything"):
+        free_place(room, [thing], 0.95, rng)
+    world.close()
+
+
+@pytest.fixture
+def world():
+    """A wall across the way between the origin and a ball; who is called `near` is beyond."""
+    made = world_with(ball_at(3.0, 0.0), wall_across(1.5))
+    yield made
+    made.close()
+
+
+def test_walls_hide_the_object_from_one_and_not_from_another(world):
+    behind = Player("behind", "team", walker_at(world, name="behind"))
+    near = Player("near", "team", walker_at(world, 2.0, name="near"))
+    world.refresh()
+    sight = Sight(world.scene, world.props["ball"])
+    assert [sight.of(player) for player in (behind, near, behind)] == [False, True, False]
+
+
+def test_an_eye_is_asked_once_a_picture(world):
+    asked = []
+    body = SimpleNamespace(is_visible=lambda thing: asked.append(thing) or True)
+    sight, player = Sight(world.scene, world.props["ball"]), Player("one", "team", body)
+    assert sight.of(player)
+    assert sight.of(player)
+    assert len(asked) == 1
+    world.step()
+    assert sight.of(player)
+    assert len(asked) == 2
+    sight.clear()
+    assert sight.of(player)
+    assert len(asked) == 3

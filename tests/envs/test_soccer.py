@@ -1,0 +1,232 @@
+"""SoccerOnePlayer and SoccerTwoPlayer: what is a goal, what it pays, who kicks, who saves."""
+
+import math
+
+import numpy as np
+import pytest
+from contests import episodes, game_of, paid_in_all, rest
+
+GAMES = 15
+
+
+@pytest.fixture(scope="module")
+def alone():
+    game = game_of("SoccerOnePlayer")
+    yield game
+    game.close()
+
+
+@pytest.fixture(scope="module")
+def two():
+    game = game_of("SoccerTwoPlayer")
+    yield game
+    game.close()
+
+
+def begin(game, ball=None, velocity=(0.0, 0.0, 0.0)):
+    """Begin with the players far from the ball, which lies or flies where it is put."""
+    game.reset(np.random.default_rng(0))
+    for number, player in enumerate(game.players):
+        player.body.place((-2.5, 2.0 * number - 1.0, 0.0))
+    if ball is not None:
+        game.task.ball.place(np.array(ball), 0.0)
+        game.task.ball.push(np.array(velocity))
+        game.task._note()
+
+
+def roll_in(game, ball, velocity, seconds=1.5):
+    begin(game, ball, velocity)
+    for _ in range(round(seconds / 0.04)):
+        (outcome,) = rest(game)
+        if outcome.done:
+            break
+    return outcome
+
+
+def test_a_goal_ends_the_game_and_the_sides_are_paid(two):
+    outcome = roll_in(two, (2.0, 0.2, 0.12), (2.0, 0.0, 0.0))
+    assert outcome.terminated
+    assert outcome.terms["attacker"]["goal"] == 1.0
+    assert outcome.terms["defender"]["goal"] == -1.0
+
+
+def test_the_goal_counts_in_the_step_in_which_the_centre_passes_the_line(alone):
+    begin(alone, (2.2, 0.0, 0.12), (1.0, 0.0, 0.0))
+    for _ in range(20):
+        before = alone.task.ball.position[0]
+        (outcome,) = rest(alone)
+        after = alone.task.ball.position[0]
+        assert outcome.terminated == (before < 2.5 <= after)
+        if outcome.terminated:
+            break
+    assert outcome.terminated
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "counts"),
+    [
+        ((2.4, 0.0, 0.1), (2.6, 0.0, 0.1), True),
+        ((2.4, 0.69, 0.1), (2.6, 0.69, 0.1), True),
+        ((2.4, 0.71, 0.1), (2.6, 0.71, 0.1), False),
+        ((2.4, -0.6, 0.1), (2.6, -0.9, 0.1), False),  # beside the post where it passes the line
+        ((2.4, 0.0, 0.79), (2.6, 0.0, 0.79), True),
+        ((2.4, 0.0, 0.85), (2.6, 0.0, 0.85), False),
+        ((2.6, 0.0, 0.1), (2.4, 0.0, 0.1), False),  # from behind
+        ((2.3, 0.0, 0.1), (2.49, 0.0, 0.1), False),
+    ],
+)
+def test_what_counts_is_between_the_posts_under_the_bar_from_the_front(
+    alone, before, after, counts
+):
+    assert alone.task.pitch.scores(np.array(before), np.array(after)) is counts
+
+
+def test_boards_close_the_line_beside_the_goal(alone):
+    outcome = roll_in(alone, (1.8, 1.3, 0.12), (2.0, 0.0, 0.0))
+    assert not outcome.terminated
+    assert alone.task.ball.position[0] < 2.4
+
+
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_a_ball_comes_back_out_of_every_corner(alone, side):
+    for x in (-1.0, 1.0):
+        roll_in(alone, (x * 2.0, side * 2.5, 0.12), (x * 1.5, side * 1.0, 0.0), 2.0)
+        place = np.abs(alone.task.ball.position[:2])
+        assert place.sum() < 3.0 + 3.0 - 0.5
+
+
+def test_what_the_attacker_gets_the_defender_loses_at_every_step(two):
+    goals = 0
+    for outcomes in episodes(two, 4, attacker="expert", defender="random"):
+        for outcome in outcomes:
+            assert paid_in_all(two, outcome) == pytest.approx(0.0, abs=1e-12)
+            for name, paid in outcome.terms["attacker"].items():
+                assert paid == -outcome.terms["defender"][name]
+        goals += outcomes[-1].terminated
+    assert goals >= 2
+
+
+def test_progress_pays_for_places_not_for_the_way(alone):
+    begin(alone, (0.0, 0.5, 0.12), (0.6, 0.0, 0.0))
+    start = math.dist(alone.task.ball.position[:2], alone.task.goal[:2])
+    total = sum(outcome.terms["attacker"]["progress"] for outcome in rest(alone, 1.0))
+    decrease = start - math.dist(alone.task.ball.position[:2], alone.task.goal[:2])
+    assert decrease > 0.2
+    assert total == pytest.approx(decrease, abs=1e-9)
+
+
+def test_approach_pays_for_the_way_to_the_ball_and_a_ball_that_rolls_away_costs_nothing(alone):
+    begin(alone, (0.0, 0.0, 0.12))
+    body = alone.players[0].body
+    body.place((-1.5, 0.0, 0.0))
+    alone.task._note()
+    rows = {"attacker": np.array([1.0, 0.0], np.float32)}
+    steps = [alone.step(rows, np.random.default_rng(0)) for _ in range(10)]
+    total = sum(outcome.terms["attacker"]["approach"] for outcome in steps)
+    assert total == pytest.approx(body.position[0] + 1.5, abs=1e-6)
+    begin(alone, (0.0, 0.0, 0.12), (1.0, 0.0, 0.0))
+    for outcome in rest(alone, 1.0):
+        assert outcome.terms["attacker"]["approach"] == pytest.approx(0.0, abs=1e-9)
+
+
+def test_when_the_time_is_up_the_defender_has_held():
+    game = game_of("SoccerTwoPlayer", "task.max_seconds=0.4")
+    *_, last = rest(game, 0.4)
+    assert last.truncated
+    assert not last.terminated
+    assert last.terms["attacker"]["goal"] == 0.0
+    game.close()
+
+
+def test_they_start_in_their_places(two):
+    asides = []
+    for seed in range(30):
+        two.reset(np.random.default_rng(seed))
+        attacker, defender = (player.body for player in two.players)
+        ball = two.task.ball.position
+        assert 2.0 <= 2.5 - ball[0] <= 2.8
+        assert 0.8 <= ball[0] - attacker.position[0] <= 1.6
+        assert 0.3 <= 2.5 - defender.position[0] <= 0.8
+        for body in (attacker, defender):
+            way = (ball - body.position)[:2]
+            assert body.forward[:2] @ way > np.hypot(*way) * math.cos(math.radians(30.1))
+        asides.append(ball[1])
+    assert max(np.abs(asides)) <= 0.8
+    assert np.ptp(asides) > 0.8
+
+
+def at_the_ball(game, forward):
+    """Let the attacker stand before the ball and walk or not; return how fast the ball gets."""
+    begin(game, (0.0, 0.0, 0.12))
+    game.players[0].body.place((-0.42, 0.0, 0.0))
+    rows = {p.name: np.zeros(2, np.float32) for p in game.players}
+    rows["attacker"][0] = forward
+    fastest = 0.0
+    for _ in range(10):
+        game.step(rows, np.random.default_rng(0))
+        fastest = max(fastest, float(game.task.ball.velocity[0]))
+    return fastest
+
+
+def test_who_walks_at_the_ball_kicks_it_and_who_stands_does_not(two):
+    assert at_the_ball(two, 1.0) > 1.8
+    assert at_the_ball(two, 0.0) == pytest.approx(0.0, abs=0.05)
+
+
+def test_nobody_kicks_twice_in_half_a_second(alone):
+    begin(alone, (0.0, 0.0, 0.12))
+    body, ball, kicks = alone.players[0].body, alone.task.ball, []
+    for step in range(40):
+        ball.place(np.array([0.0, 0.0, 0.12]), 0.0)
+        body.place((-0.36, 0.0, 0.0))
+        alone.step({"attacker": np.array([1.0, 0.0], np.float32)}, np.random.default_rng(0))
+        if ball.velocity[0] > 1.5:
+            kicks.append(step)
+    assert len(kicks) >= 3
+    assert min(np.diff(kicks)) >= 12
+
+
+def test_the_expert_alone_always_scores(alone):
+    for outcomes in episodes(alone, GAMES, attacker="expert"):
+        assert outcomes[-1].terminated
+        assert len(outcomes) < 250
+
+
+def test_a_defender_saves_what_one_who_stands_lets_in(two):
+    scored = {
+        script: sum(
+            outcomes[-1].terminated
+            for outcomes in episodes(two, GAMES, attacker="expert", defender=script)
+        )
+        for script in ("idle", "expert")
+    }
+    assert scored["idle"] >= GAMES - 2
+    assert scored["expert"] <= GAMES // 2
+
+
+@pytest.mark.parametrize("task", ["SoccerOnePlayer", "SoccerTwoPlayer"])
+def test_joint_level_bodies_play_and_their_expert_says_what_it_lacks(task):
+    game = game_of(task, "body=mitten_position", "task.max_seconds=0.4")
+    roles = {player.team: "random" for player in game.players}
+    (outcomes,) = episodes(game, 1, **roles)
+    assert outcomes[-1].truncated
+    with pytest.raises(ValueError, match=r"attacker: .* choose body=walker"):
+        game.task.expert(game.players[0], {})
+    game.close()
+
+
+@pytest.mark.parametrize(
+    ("override", "words"),
+    [
+        ("task.ball_from_goal_m=[2.0,5.0]", "do not fit into room 'room'"),
+        ("task.aside_m=2.9", "do not fit into room"),
+        ("task.ball_from_goal_m=[3.0,2.0]", "least, greatest"),
+        ("task.radius_m=0.7", "does not fit through"),
+        ("task.kick_rest_s=0", "positive"),
+        ("task.spread_deg=200", r"\[0, 180\]"),
+        ("task.defender_from_goal_m=[0.3,1.9]", "0.3 m nearer"),
+    ],
+)
+def test_what_is_impossible_is_refused(override, words):
+    with pytest.raises(ValueError, match=words):
+        game_of("SoccerTwoPlayer", override)
