@@ -163,6 +163,9 @@ class Articulation:
         Bullet notices a limit only once it is passed. At the stop its own constraint is active and
         takes the velocity out with the right reaction on the rest of the body; taking it out here
         would add momentum. Call after `read`.
+
+        As measured, two thirds of what it costs is saved again in the next physics step: probably
+        Bullet brings the boxes round all links up to date here, which it would do there.
         """
         angles = self.angles[self.moving]
         held = np.minimum(np.maximum(angles, self._low), self._high)
