@@ -216,3 +216,18 @@ def test_joint_level_bodies_play_by_the_same_rules(task):
 def test_what_is_impossible_is_refused(override, words):
     with pytest.raises(ValueError, match=words):
         game_of("PushOut1v1", override)
+
+
+@pytest.mark.parametrize("task", ["PushOut1v1", "PushOut2v2"])
+def test_teams_wear_what_they_are_called(task):
+    """Each player sees an opponent before it: how red and how blue are the pixels of its shirt?"""
+    game = game_of(task, "senses/vision=monocular")
+    rest(game)
+    for player in game.players:
+        red, green, blue = game.observe(player)["vision"].astype(int).reshape(3, -1)
+        reds = ((red > 2 * blue) & (red > 2 * green)).sum()
+        blues = ((blue > 2 * red) & (blue > green + 40)).sum()
+        seen, other = (blues, reds) if player.team == "red" else (reds, blues)
+        assert seen > 20, player.name
+        assert other < 20 or task == "PushOut2v2", player.name  # where mates are in view as well
+    game.close()

@@ -73,8 +73,8 @@ class Game:
         cfg, task_type = self.cfg, find_task(self.cfg.task.name)
         self.world = World(cfg.playground, cfg.clock)
         self.players = [
-            Player(name, team.name, make_body(name, cfg.body_of(team.name), self.world, shirt))
-            for shirt, team in enumerate(cfg.teams)
+            self._make_player(name, team, number if team.shirt is None else team.shirt)
+            for number, team in enumerate(cfg.teams)
             for name in player_names(team)
         ]
         self.actors = [player for player in self.players if player.team not in cfg.script]
@@ -94,6 +94,10 @@ class Game:
             self.world.after_substep.extend(sense.substep for sense in senses.values())
         self.steps = 0
         self.out: frozenset[str] = frozenset()
+
+    def _make_player(self, name: str, team: Team, shirt: int) -> Player:
+        body = make_body(name, self.cfg.body_of(team.name), self.world, shirt)
+        return Player(name, team.name, body)
 
     @property
     def weights(self) -> dict[str, float]:

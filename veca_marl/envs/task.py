@@ -23,11 +23,14 @@ class Team(NamedTuple):
         name: Unique in its task.
         size: How many play.
         senses: What they perceive by; None is what the task names for everyone.
+        shirt: Number of their shirts' colour (blue, red, green, yellow); None is the team's own
+            number, from 0 on.
     """
 
     name: str
     size: int = 1
     senses: tuple[str, ...] | None = None
+    shirt: int | None = None
 
 
 class Player(NamedTuple):

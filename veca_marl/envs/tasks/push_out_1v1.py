@@ -26,4 +26,4 @@ class PushOut1v1(PushOut):
             potential: over an episode it pays for the last place alone, not for the way.
     """
 
-    teams = (Team("red"), Team("blue"))
+    teams = (Team("red", shirt=1), Team("blue", shirt=0))

@@ -24,7 +24,7 @@ class PushOut2v2(PushOut):
             on average over those who played until this step, minus that of the others.
     """
 
-    teams = (Team("red", 2), Team("blue", 2))
+    teams = (Team("red", 2, shirt=1), Team("blue", 2, shirt=0))
     eliminates = True
 
     def is_out(self, player: Player) -> bool:
