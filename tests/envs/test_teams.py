@@ -193,17 +193,18 @@ def test_a_team_may_have_another_body_and_other_grades(cfg):
 def test_the_command_line_knows_teams():
     cfg = compose(
         [
-            "+task=KickTheBall",
-            "+body@team.agents.body=walker_discrete",
-            "+senses/audio@team.agents.senses.audio=deaf",
-            "opponent.other=random",
+            "+task=SoccerTwoPlayer",
+            "+body@team.attacker.body=walker_discrete",
+            "+senses/vision@team.attacker.senses.vision=blind",
+            "opponent.defender=random",
         ]
     ).game
-    assert cfg.body_of("agents").action is ActionKind.discrete
-    assert cfg.body_of("somebody").action is ActionKind.continuous
-    assert not cfg.senses_of("agents").audio.present
-    assert cfg.senses_of("agents").vision == cfg.senses.vision
-    assert cfg.script == {"other": Script.random}
+    assert cfg.body_of("attacker").action is ActionKind.discrete
+    assert cfg.body_of("defender").action is ActionKind.continuous
+    assert not cfg.senses_of("attacker").vision.present
+    assert cfg.senses_of("defender").vision.present
+    assert cfg.senses_of("attacker").touch == cfg.senses.touch
+    assert cfg.script == {"defender": Script.random}
 
 
 def test_every_sense_can_differ_by_team():
