@@ -1,7 +1,10 @@
 """What all tests share."""
 
 import hashlib
+import signal
 from pathlib import Path
+
+import pytest
 
 SIM = Path(__file__).resolve().parent.parent / "veca_marl" / "sim"
 
@@ -23,3 +26,11 @@ def pytest_configure(config):
         cached.unlink(missing_ok=True)
     stamp.parent.mkdir(exist_ok=True)
     stamp.write_text(digest)
+
+
+@pytest.fixture
+def ctrl_c():
+    """Let Ctrl-C interrupt, also in a background job, which a shell makes deaf to it."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)

@@ -72,6 +72,7 @@ def test_smoke_run_leaves_everything(smoke):
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("ctrl_c")
 def test_interrupted_and_resumed_equals_uninterrupted(smoke, tmp_path):
     """Ctrl-C in the second stage of the real task, then the command that it prints."""
     whole, _ = smoke

@@ -91,15 +91,19 @@ def new_run(path: Path) -> RunFolder:
     return folder
 
 
-def open_run(path: Path) -> RunFolder:
+def open_run(path: Path, asked_by: str = "") -> RunFolder:
     """Return the folder of an earlier run.
+
+    Args:
+        path: The folder.
+        asked_by: What the error begins with.
 
     Raises:
         ConfigError: If there is no run in `path`.
     """
     folder = RunFolder(path)
     if not folder.config.is_file():
-        raise ConfigError(f"{path} holds no run (no config.yaml)")
+        raise ConfigError(f"{asked_by}{path} holds no run (no config.yaml)")
     return folder
 
 

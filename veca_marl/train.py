@@ -99,7 +99,7 @@ def run(node: DictConfig) -> None:
 def set_up(node: DictConfig, path: Path) -> tuple[Config, RunFolder, Trainer]:
     """Make ready to start or to continue the run in `path`; claim it last."""
     if node.resume is not None:
-        folder = open_run(path)
+        folder = open_run(path, "resume=")
         cfg = stored_config(folder, node, list(HydraConfig.get().overrides.task))
         return cfg, folder, make_trainer(cfg, folder)
     folder = new_run(path)

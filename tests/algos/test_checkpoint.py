@@ -120,14 +120,6 @@ def test_a_folder_without_checkpoints_is_named(checkpoints):
         checkpoints.latest()
 
 
-@pytest.fixture
-def ctrl_c():
-    """Let Ctrl-C interrupt, also in a background job, which a shell makes deaf to it."""
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)
-    yield
-    signal.signal(signal.SIGINT, before)
-
-
 @pytest.mark.usefixtures("ctrl_c")
 def test_an_interruption_waits_until_the_file_is_whole(checkpoints, identity, monkeypatch):
     save = torch.save
