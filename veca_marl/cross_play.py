@@ -100,7 +100,7 @@ def draw_matrix(path: Path, matches: list[Match]) -> None:
         axis.set_ticks(range(len(frames)), [f"{n / 1000:.0f}k" for n in frames])
     axes.set(xlabel=f"{second} after so many frames", ylabel=f"{first} after so many frames")
     figure.colorbar(image, label=f"points of {first} (win 1, draw 1/2)")
-    figure.savefig(path, dpi=120)
+    figure.savefig(path, dpi=120, bbox_inches="tight")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
