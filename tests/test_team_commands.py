@@ -121,7 +121,6 @@ def test_what_does_not_fit_is_refused(played, capsys, override, message):
 
 def test_a_folder_that_is_no_run_is_refused(tmp_path, capsys):
     nowhere = tmp_path / "nowhere"
-    nowhere.mkdir()
     for command in (cross_play, evaluate):
         assert command([str(nowhere)]) == 2
         assert "nowhere holds no run" in capsys.readouterr().err

@@ -47,7 +47,7 @@ def play_again(
         ConfigError: If there is no run, or a choice is impossible.
         CheckpointError: If what was learnt does not fit.
     """
-    folder = open_run(learnt if learnt.is_dir() else learnt.parent.parent)
+    folder = open_run(learnt.parent.parent if learnt.is_file() else learnt)
     cfg = compose([*_about_the_game(folder.overrides), *overrides])
     env = _worlds(cfg, episodes, seed)
     specs = team_specs(env)

@@ -38,7 +38,8 @@ def stand(game, *places):
 def push(game, seconds, *rows):
     """Play constant rows; return the last outcome."""
     for _ in range(round(seconds / 0.04)):
-        actions = {p.name: np.array(row, np.float32) for p, row in zip(game.players, rows)}  # noqa: B905
+        moves = zip(game.players, rows, strict=False)
+        actions = {player.name: np.array(row, np.float32) for player, row in moves}
         outcome = game.step(actions, np.random.default_rng(0))
         if outcome.done:
             break

@@ -15,7 +15,7 @@ from veca_marl.sim.bodies.base import BodyCfg
 from veca_marl.sim.bodies.figure import Figure
 from veca_marl.sim.bodies.foresight import foreseen_angles
 from veca_marl.sim.bodies.joint_controls import (
-    JOINT_CONTROLS,
+    JOINT_ACTIONS,
     REACH_RAD,
     JointActionKind,
     JointChoice,
@@ -95,7 +95,7 @@ class Humanoid(Figure):
         build = Build(cfg.detail is Detail.full, strength=cfg.strength, friction=cfg.friction)
         self.articulation = Articulation(world.client, self._skeleton, build)
         self._refuse_long_steps(world.clock.substep_s)
-        self._control = JOINT_CONTROLS[cfg.action]
+        self._control, self._rows = JOINT_ACTIONS[cfg.action]
         self._chosen = np.array(chosen_joints(self._skeleton, cfg.joints))
         self.action_spec = ArraySpec((len(self._chosen),), np.float32, -1.0, 1.0)
         self._low = np.array([joint.low_rad for joint in self._skeleton.joints])
@@ -192,7 +192,7 @@ class Humanoid(Figure):
         if wrong.size:
             joint = self.joint_names[self._chosen[wrong[0]]]
             raise ValueError(f"action of {joint} is {row[wrong[0]]}, not in [-1, 1]")
-        self._wishes[self._chosen] = self._control.heed(row, self._wishes[self._chosen])
+        self._wishes[self._chosen] = self._rows.heed(row, self._wishes[self._chosen])
 
     def apply_torque(self, normalised: Floats) -> None:
         """Drive all 82 joints by shares of their strength in [-1, 1] (the paper's API).
@@ -223,7 +223,7 @@ class Humanoid(Figure):
         targets = np.clip(springs.targets, self._low, self._high)
         angles = self.foresee(targets, springs.ahead_s)
         wishes = self._control.wishes(targets, angles, self._low, self._high)
-        row = self._control.row(wishes[self._chosen], self._wishes[self._chosen])
+        row = self._rows.towards(wishes[self._chosen], self._wishes[self._chosen])
         return row.astype(np.float32)
 
     def foresee(self, targets: Floats, ahead_s: float | None = None) -> Floats:
@@ -280,7 +280,8 @@ class Humanoid(Figure):
         self._relax_eyes()
         self._shares[:] = 0.0
         self._finite = self._finite and self.articulation.read()
-        self._wishes[:] = self._control.start(self._angles, self._low, self._high)
+        staying = self._control.wishes(self._angles, self._angles, self._low, self._high)
+        self._wishes[:] = self._rows.start(staying)
         self._pose_bones()
         self._mouth.teleport(self.mount("mouth").position)
 

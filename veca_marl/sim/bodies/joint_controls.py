@@ -26,19 +26,7 @@ class Springs(NamedTuple):
 
 
 class JointControl(Protocol):
-    """Turns action rows into a wish in [-1, 1] for every joint, and that into a motor's torque."""
-
-    def start(self, angles: Floats, low: Floats, high: Floats) -> Floats:
-        """Return the ``(n,)`` wishes of who has just been placed; arguments as in `shares`."""
-        ...
-
-    def heed(self, row: Floats, wishes: Floats) -> Floats:
-        """Return the wishes after an action row; both ``(n,)`` in [-1, 1], of the same joints."""
-        ...
-
-    def row(self, wanted: Floats, wishes: Floats) -> Floats:
-        """Return the ``(n,)`` row that comes nearest to the wishes that are wanted."""
-        ...
+    """Turns a wish in [-1, 1] for every joint into its motor's torque, at every physics step."""
 
     def shares(self, wishes: Floats, angles: Floats, low: Floats, high: Floats) -> Floats:
         """Return torques as shares of each joint's strength.
@@ -76,18 +64,6 @@ def _pull(targets: Floats, angles: Floats) -> Floats:
 class NormalisedTorque:
     """A wish is a share of the joint's strength (the paper's `apply_torque`)."""
 
-    def start(self, angles: Floats, low: Floats, high: Floats) -> Floats:
-        """See `JointControl`: relaxed."""
-        return np.zeros(len(angles))
-
-    def heed(self, row: Floats, wishes: Floats) -> Floats:
-        """See `JointControl`."""
-        return row
-
-    def row(self, wanted: Floats, wishes: Floats) -> Floats:
-        """See `JointControl`."""
-        return wanted
-
     def shares(self, wishes: Floats, angles: Floats, low: Floats, high: Floats) -> Floats:
         """See `JointControl`."""
         return wishes
@@ -100,18 +76,6 @@ class NormalisedTorque:
 class PositionTarget:
     """A wish is an angle: -1 and 1 are the stops, 0 is the neutral standing angle."""
 
-    def start(self, angles: Floats, low: Floats, high: Floats) -> Floats:
-        """See `JointControl`: on the way to the neutral angle."""
-        return np.zeros(len(angles))
-
-    def heed(self, row: Floats, wishes: Floats) -> Floats:
-        """See `JointControl`."""
-        return row
-
-    def row(self, wanted: Floats, wishes: Floats) -> Floats:
-        """See `JointControl`."""
-        return wanted
-
     def shares(self, wishes: Floats, angles: Floats, low: Floats, high: Floats) -> Floats:
         """See `JointControl`."""
         return _pull(np.where(wishes >= 0.0, wishes * high, -wishes * low), angles)
@@ -123,42 +87,67 @@ class PositionTarget:
         return np.clip(shares, -1.0, 1.0)
 
 
+class Rows(Protocol):
+    """Turns action rows into the wishes of the joints that they are for."""
+
+    def start(self, staying: Floats) -> Floats:
+        """Return the ``(n,)`` wishes of who has just been placed.
+
+        Args:
+            staying: ``(n,)`` in [-1, 1], the wishes that would keep the posture.
+        """
+        ...
+
+    def heed(self, row: Floats, wishes: Floats) -> Floats:
+        """Return the wishes after an action row; all ``(n,)`` in [-1, 1]."""
+        ...
+
+    def towards(self, wanted: Floats, wishes: Floats) -> Floats:
+        """Return the row that brings the wishes nearest to those wanted; all ``(n,)``."""
+        ...
+
+
+class WholeRows:
+    """A row holds the wishes themselves."""
+
+    def start(self, staying: Floats) -> Floats:
+        """See `Rows`: relaxed, or on the way to the neutral angle."""
+        return np.zeros(len(staying))
+
+    def heed(self, row: Floats, wishes: Floats) -> Floats:
+        """See `Rows`."""
+        return row
+
+    def towards(self, wanted: Floats, wishes: Floats) -> Floats:
+        """See `Rows`."""
+        return wanted
+
+
 # A target goes from the neutral angle to a stop in 7 agent steps, 0.27 s: as fast as a child may
 # want to move, and slow enough that the noise of a policy adds up to movements.
 INCREMENT = 0.15
 
 
-class TargetIncrement:
-    """A row says how far the target angles go on: zeros keep the posture, and stiffly.
+class IncrementRows:
+    """A row says how far the wishes go on: with targets, zeros keep the posture, and stiffly.
 
-    Wishes are those of `PositionTarget`. Independent noise in each row, as policies explore, makes
-    torques and target angles tremble about one place; here it adds up to a random walk, so that
-    postures are explored (the same thought as in temporally correlated noise, Lillicrap et al.
-    2016, "Continuous control with deep reinforcement learning", section 3).
+    Independent noise in each row, as policies explore, makes torques and target angles tremble
+    about one place; here it adds up to a random walk, so that postures are explored (the same
+    thought as in temporally correlated noise, Lillicrap et al. 2016, "Continuous control with deep
+    reinforcement learning", section 3).
     """
 
-    def __init__(self) -> None:
-        self._position = PositionTarget()
-
-    def start(self, angles: Floats, low: Floats, high: Floats) -> Floats:
-        """See `JointControl`: stay so."""
-        return self._position.wishes(angles, angles, low, high)
+    def start(self, staying: Floats) -> Floats:
+        """See `Rows`: stay so."""
+        return staying
 
     def heed(self, row: Floats, wishes: Floats) -> Floats:
-        """See `JointControl`."""
+        """See `Rows`."""
         return np.clip(wishes + INCREMENT * row, -1.0, 1.0)
 
-    def row(self, wanted: Floats, wishes: Floats) -> Floats:
-        """See `JointControl`: as much of the way as one row can."""
+    def towards(self, wanted: Floats, wishes: Floats) -> Floats:
+        """See `Rows`: as much of the way as one row can."""
         return np.clip((wanted - wishes) / INCREMENT, -1.0, 1.0)
-
-    def shares(self, wishes: Floats, angles: Floats, low: Floats, high: Floats) -> Floats:
-        """See `JointControl`."""
-        return self._position.shares(wishes, angles, low, high)
-
-    def wishes(self, targets: Floats, angles: Floats, low: Floats, high: Floats) -> Floats:
-        """See `JointControl`."""
-        return self._position.wishes(targets, angles, low, high)
 
 
 class JointActionKind(Enum):
@@ -169,10 +158,22 @@ class JointActionKind(Enum):
     increment = "increment"
 
 
-JOINT_CONTROLS: dict[JointActionKind, JointControl] = {
-    JointActionKind.torque: NormalisedTorque(),
-    JointActionKind.position: PositionTarget(),
-    JointActionKind.increment: TargetIncrement(),
+class JointAction(NamedTuple):
+    """How action rows move joints.
+
+    Attributes:
+        control: What a wish does to a joint.
+        rows: What a row does to the wishes.
+    """
+
+    control: JointControl
+    rows: Rows
+
+
+JOINT_ACTIONS: dict[JointActionKind, JointAction] = {
+    JointActionKind.torque: JointAction(NormalisedTorque(), WholeRows()),
+    JointActionKind.position: JointAction(PositionTarget(), WholeRows()),
+    JointActionKind.increment: JointAction(PositionTarget(), IncrementRows()),
 }
 
 
