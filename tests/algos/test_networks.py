@@ -1,9 +1,18 @@
+import math
+
 import pytest
 import torch
 from fake_env import FakeEnv
 from torchrl.data import Bounded, Composite
 
-from veca_marl.algos.encoders import ImageEncoder, Places, Pooling, VectorEncoder, make_encoder
+from veca_marl.algos.encoders import (
+    ImageEncoder,
+    Places,
+    Pooling,
+    VectorEncoder,
+    make_encoder,
+    scale_of,
+)
 from veca_marl.algos.networks import NetworkCfg, Precision, TeamNetwork
 from veca_marl.algos.specs import ArrayLayout, team_specs
 
@@ -52,14 +61,17 @@ def test_blocks_of_images_are_encoded_as_all_at_once():
     torch.testing.assert_close(encoder(image), whole, rtol=1e-5, atol=1e-6)
 
 
-def test_bounded_vectors_are_mapped_to_one_and_unbounded_pass():
-    seen = []
-    for low, high in ((-8.0, 3.0), (float("-inf"), float("inf"))):
-        encoder = VectorEncoder(ArrayLayout((3,), "float32", low, high))
-        encoder.layers = torch.nn.Identity()
-        seen.append(encoder(torch.tensor([[-8.0, -2.5, 3.0]])))
-    torch.testing.assert_close(seen[0], torch.tensor([[-1.0, 0.0, 1.0]]))
-    torch.testing.assert_close(seen[1], torch.tensor([[-8.0, -2.5, 3.0]]))
+@pytest.mark.parametrize(
+    ("low", "high", "expected"),
+    [
+        (-8.0, 4.0, [-1.0, 0.0, 1.0]),
+        (-120.0, math.inf, [-8.0, -2.0, 4.0]),
+        (-math.inf, math.inf, [-math.log(9.0), -math.log(3.0), math.log(5.0)]),
+    ],
+)
+def test_bounds_become_one_levels_pass_and_what_has_no_bound_is_compressed(low, high, expected):
+    scale = scale_of(ArrayLayout((3,), "float32", low, high))
+    torch.testing.assert_close(scale(torch.tensor([-8.0, -2.0, 4.0])), torch.tensor(expected))
 
 
 @pytest.mark.parametrize("left_out", ["vision", "audio"])

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from enum import Enum
 
 import torch
 from torch import Tensor, nn
+from torchrl.modules.functional import symlog
 
 from veca_marl.algos.specs import ArrayLayout
 
@@ -118,11 +120,7 @@ class ImageEncoder(nn.Module):
 
 
 class VectorEncoder(nn.Module):
-    """``float (N, ...)`` to ``float (N, features)``: an affine map to [-1, 1], then an MLP.
-
-    The map is fixed: bounds known from the spec are used, unbounded arrays pass as they are. It
-    keeps absolute level, which a normalisation by running statistics would blur (loudness is a
-    cue for distance).
+    """``float (N, ...)`` to ``float (N, features)``: a fixed scale (see `scale_of`), then an MLP.
 
     Args:
         layout: Layout of one observation.
@@ -131,9 +129,7 @@ class VectorEncoder(nn.Module):
 
     def __init__(self, layout: ArrayLayout, features: int = 64) -> None:
         super().__init__()
-        bounded = math.isfinite(layout.low) and math.isfinite(layout.high)
-        self.centre = (layout.low + layout.high) / 2 if bounded else 0.0
-        self.scale = 2.0 / (layout.high - layout.low) if bounded else 1.0
+        self.scale = scale_of(layout)
         self.layers = nn.Sequential(
             orthogonal(nn.Linear(math.prod(layout.shape), features)),
             nn.ReLU(),
@@ -144,9 +140,44 @@ class VectorEncoder(nn.Module):
 
     def forward(self, vector: Tensor) -> Tensor:
         """Encode `vector`."""
-        scaled = (vector.flatten(1).to(torch.float32) - self.centre) * self.scale
-        features: Tensor = self.layers(scaled)
+        features: Tensor = self.layers(self.scale(vector.flatten(1).to(torch.float32)))
         return features
+
+
+Scale = Callable[[Tensor], Tensor]
+
+
+def scale_of(layout: ArrayLayout) -> Scale:
+    """Return what brings an array to numbers of about 1, chosen by its bounds.
+
+    Bounds on both sides become -1 and 1. An array without any is compressed (symlog, Hafner
+    et al. 2023, "Mastering diverse domains through world models"): where angles stand beside
+    accelerations, a network would hear little but the accelerations. Levels,
+    which have a floor and no ceiling, are compressed already and pass as they are. Nothing is
+    normalised by running statistics, which would blur absolute level (loudness is a cue for
+    distance).
+    """
+    low, high = math.isfinite(layout.low), math.isfinite(layout.high)
+    if low and high:
+        return Affine((layout.low + layout.high) / 2, 2.0 / (layout.high - layout.low))
+    return unchanged if low or high else symlog
+
+
+@dataclass(frozen=True)
+class Affine:
+    """What is `centre` becomes 0, and distances from it grow by `factor`."""
+
+    centre: float
+    factor: float
+
+    def __call__(self, vector: Tensor) -> Tensor:
+        """Scale `vector`."""
+        return (vector - self.centre) * self.factor
+
+
+def unchanged(vector: Tensor) -> Tensor:
+    """Return `vector`."""
+    return vector
 
 
 def make_encoder(

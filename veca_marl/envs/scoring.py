@@ -15,6 +15,12 @@ def cosine(a: Floats, b: Floats) -> float:
     return float(a.dot(b)) / length if length > 1e-9 else 0.0
 
 
+def aside_rad(way: Floats, direction: Floats) -> float:
+    """Return the angle in [0, pi] between the horizontal parts of two vectors; 0 without length."""
+    cross = way[0] * direction[1] - way[1] * direction[0]
+    return math.atan2(abs(cross), way[:2].dot(direction[:2]))
+
+
 def norm(vector: Floats) -> float:
     """Return the length of a vector, to the last bit that of `np.linalg.norm`, which is slow."""
     return math.sqrt(vector.dot(vector))

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from veca_marl.envs.contests import line_up
 from veca_marl.envs.experts.soccer import attack
 from veca_marl.envs.pitch import POST_M, Pitch
+from veca_marl.envs.scoring import aside_rad
 from veca_marl.envs.task import Player, Task, TaskCfg, terms, walker
 from veca_marl.sim.bodies.pushing import horizontal_distance
 from veca_marl.sim.bodies.walker import Walker
@@ -48,7 +49,7 @@ class SoccerCfg(TaskCfg):
     attacker_from_ball_m: tuple[float, float] = (0.8, 1.6)
     spread_deg: float = 30.0
     kick_rest_s: float = 0.5
-    weights: dict[str, float] = terms(goal=5.0, progress=0.5, approach=0.1)
+    weights: dict[str, float] = terms(goal=5.0, progress=0.5, approach=0.1, facing=0.1)
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -73,6 +74,16 @@ class SoccerCfg(TaskCfg):
             raise ValueError(f"task.spread_deg={self.spread_deg} must be in [0, 180]")
 
 
+@dataclass(frozen=True)
+class _Situation:
+    """Where the ball is, seen from the goal and from the attacker."""
+
+    ball: Floats
+    to_goal_m: float
+    to_ball_m: float
+    aside_rad: float
+
+
 class Soccer(Task):
     """The attacker shall put the ball into the goal; there are no rules."""
 
@@ -90,8 +101,9 @@ class Soccer(Task):
                 f"aside_m do not fit into room {room.name!r} of {room.size_m[:2]} m"
             )
         self._rest_s: dict[str, float] = {}
-        self._scored, self._progress_m, self._approach_m = False, 0.0, 0.0
-        self._note()
+        self._paid: dict[str, float] = {}
+        self._scored = False
+        self._now = self._look()
 
     def reset(self, rng: np.random.Generator) -> None:
         cfg = self.cfg
@@ -101,8 +113,8 @@ class Soccer(Task):
         for player in self.players:
             self._line_up(player, rng)
         self._rest_s = {player.name: 0.0 for player in self.players}
-        self._scored, self._progress_m, self._approach_m = False, 0.0, 0.0
-        self._note()
+        self._scored = False
+        self._now = self._look()
 
     def start(self, player: Player, rng: np.random.Generator) -> Floats:
         """Return where a player starts, ``(3,)`` metres; the attacker is behind the ball."""
@@ -111,21 +123,20 @@ class Soccer(Task):
         return np.array([self.ball.position[0] - back, self.goal[1] + aside, self.goal[2]])
 
     def after_step(self, rng: np.random.Generator) -> None:
-        before, to_goal_m, to_ball_m = self._ball, self._to_goal_m, self._to_ball_m
-        attacker = self.players[0].body.position
-        self._approach_m = to_ball_m - horizontal_distance(attacker, before)
-        self._note()
-        self._scored = self._scored or self.pitch.scores(before, self._ball)
-        self._progress_m = to_goal_m - self._to_goal_m
+        before, attacker = self._now, self.players[0].body.position
+        self._now = self._look()
+        self._scored = self._scored or self.pitch.scores(before.ball, self._now.ball)
+        self._paid = {
+            "goal": float(self._scored),
+            "progress": before.to_goal_m - self._now.to_goal_m,
+            "approach": before.to_ball_m - horizontal_distance(attacker, before.ball),
+            "facing": before.aside_rad - self._now.aside_rad,
+        }
         self._kick()
 
     def reward(self, player: Player) -> dict[str, float]:
         side = 1.0 if player.team == ATTACKER else -1.0
-        return {
-            "goal": side * self._scored,
-            "progress": side * self._progress_m,
-            "approach": side * self._approach_m,
-        }
+        return {term: side * value for term, value in self._paid.items()}
 
     def terminated(self) -> bool:
         return self._scored
@@ -136,15 +147,20 @@ class Soccer(Task):
 
     # ---- the ball
 
-    def _note(self) -> None:
-        """Note where the ball is, and how far that is from the goal and from the attacker."""
-        self._ball = self.ball.position
-        self._to_goal_m = math.dist(self._ball[:2], self.goal[:2])
-        self._to_ball_m = horizontal_distance(self.players[0].body.position, self._ball)
+    def _look(self) -> _Situation:
+        attacker, ball = self.players[0].body, self.ball.position
+        return _Situation(
+            ball,
+            math.dist(ball[:2], self.goal[:2]),
+            horizontal_distance(attacker.position, ball),
+            aside_rad(ball - attacker.position, attacker.forward),
+        )
 
     def _kick(self) -> None:
         """Let the nearest of those who walk at the ball kick it; one foot is enough for a step."""
-        near = sorted(self.players, key=lambda p: horizontal_distance(p.body.position, self._ball))
+        near = sorted(
+            self.players, key=lambda p: horizontal_distance(p.body.position, self._now.ball)
+        )
         self._rest_s = {name: s - self.world.clock.step_s for name, s in self._rest_s.items()}
         for player in near:
             body, rested = player.body, self._rest_s[player.name] <= 0.0

@@ -22,6 +22,8 @@ class SoccerOnePlayer(Soccer):
         progress: decrease in this step of the ball's distance from the middle of the goal line, m.
         approach: how much nearer the player has come in this step to where the ball was, m: a ball
             that rolls away costs nothing, or kicks would.
+        facing: decrease in this step of the angle between the player's forward direction and the
+            way to the ball, rad: at most pi in an episode, whatever is done.
     """
 
     teams = (Team(ATTACKER),)

@@ -53,6 +53,9 @@ class SoccerTwoPlayer(Soccer):
         approach: how much nearer the attacker has come in this step to where the ball was, m: a
             ball that rolls away costs nothing, or kicks would. Minus that for the defender, who is
             thus paid for standing in the attacker's way.
+        facing: decrease in this step of the angle between the attacker's forward direction and the
+            way to the ball, rad: at most pi in an episode, whatever is done; minus that for the
+            defender.
     """
 
     teams = (Team(ATTACKER), Team(DEFENDER))
