@@ -5,43 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple
 
 import numpy as np
 
-from veca_marl.sim.contact_shadows import darken_contacts
 from veca_marl.sim.pose import Floats, Pose
-from veca_marl.sim.raster import NOTHING, Depths, Lens, Surfaces, draw_geoms
+from veca_marl.sim.raster import Lens
 from veca_marl.sim.scene import Bools, Scene
 from veca_marl.sim.screen_bounds import single
-from veca_marl.sim.shading import (
-    GLASS_OPACITY,
-    Images,
-    Lights,
-    illuminate,
-    name_objects,
-    paint,
-    paint_sky,
-)
-from veca_marl.sim.skins_in_view import draw_skins
-from veca_marl.sim.triangles import illuminate_triangles
-
-
-class Views(NamedTuple):
-    """What a camera saw from V poses.
-
-    Attributes:
-        rgb: ``(V, H, W, 3)`` uint8.
-        depth: ``(V, H, W)`` float32 metres along the optical axis to what is not transparent; the
-            camera's `far_m` where there is nothing.
-        ids: ``(V, H, W)`` int16 id of the object seen, through transparent ones; -1 for the sky.
-        glass_ids: ``(V, H, W)`` int16 id of the nearest transparent object in front, or -1.
-    """
-
-    rgb: Images
-    depth: Depths
-    ids: Surfaces
-    glass_ids: Surfaces
+from veca_marl.sim.views import Drawn, Views, draw_views
 
 
 @dataclass(frozen=True)
@@ -120,59 +91,28 @@ class Camera:
             hidden: ``(S,)`` surfaces to leave out, as from `Scene.hidden`.
         """
         views = self._blank(len(poses))
-        lights = np.empty((self.height, self.width), np.float32)
+        axes = np.array([view_axes(pose) for pose in poses])
         drawn = _drawn(scene, hidden)
-        geoms, lens, (colours, objects, _) = scene.geoms, self.lens, scene.surfaces
-        for v, pose in enumerate(poses):
-            view = view_axes(pose)
-            rgb, depth, ids, glass_ids = (array[v] for array in views)
-            draw_geoms(geoms, drawn.opaque, view, lens, True, depth, ids)
-            self._draw_skins(scene, drawn.triangles, view, depth, ids, lights)
-            illuminate(geoms, view, lens, depth, ids, lights)
-            darken_contacts(geoms, drawn.casting, view, lens, depth, ids, lights)
-            paint_sky(lens, rgb)
-            paint(colours, ids, lights, 1.0, rgb)
-            name_objects(objects, ids)
-            if drawn.glass.any():
-                glass_depth = depth.copy()
-                draw_geoms(geoms, drawn.glass, view, lens, True, glass_depth, glass_ids)
-                illuminate(geoms, view, lens, glass_depth, glass_ids, lights)
-                paint(colours, glass_ids, lights, GLASS_OPACITY, rgb)
-                name_objects(objects, glass_ids)
+        draw_views(scene.geoms, scene.meshes, scene.surfaces, drawn, axes, self.lens, views)
         return views
 
-    def _draw_skins(
-        self,
-        scene: Scene,
-        drawn: Bools,
-        view: Floats,
-        depth: Depths,
-        surfaces: Surfaces,
-        lights: Lights,
-    ) -> None:
-        """Draw and light the triangles of one view."""
-        meshes, first = scene.meshes, len(scene.geoms.shapes)
-        if not len(meshes.triangles):
-            return
-        seen = np.empty_like(meshes.vertices)
-        draw_skins(meshes, drawn, view, self.lens, True, first, seen, depth, surfaces)
-        illuminate_triangles(meshes, seen, self.lens, first, surfaces, lights)
-
     def _blank(self, count: int) -> Views:
-        """Buffers in which nothing is seen yet."""
+        """Buffers for so many views."""
         size = (count, self.height, self.width)
         return Views(
             np.empty((*size, 3), np.uint8),
-            np.full(size, self.lens.far, np.float32),
-            np.full(size, NOTHING, np.int16),
-            np.full(size, NOTHING, np.int16),
+            np.empty(size, np.float32),
+            np.empty(size, np.int16),
+            np.empty(size, np.int16),
         )
 
 
 def view_axes(pose: Pose) -> Floats:
     """Return ``(4, 3)``: position, right, up and forward axes of an eye, as the renderer wants."""
     forward, left, up = pose.rotation.T
-    return np.stack([pose.position, -left, up, forward], dtype=np.float64)
+    axes = np.empty((4, 3))
+    axes[0], axes[1], axes[2], axes[3] = pose.position, -left, up, forward
+    return axes
 
 
 def look_at(position: Floats, target: Floats) -> Pose:
@@ -196,23 +136,7 @@ def seen_fraction(views: Views, object_id: int) -> float:
     return float(np.mean((views.ids == object_id) | (views.glass_ids == object_id)))
 
 
-class _Drawn(NamedTuple):
-    """Masks of what is drawn and how.
-
-    Attributes:
-        opaque: ``(G,)`` primitives that hide what is behind them.
-        glass: ``(G,)`` primitives that do not.
-        casting: ``(G,)`` primitives that cast shadows: bones do so for the skin on them.
-        triangles: ``(T,)`` triangles.
-    """
-
-    opaque: Bools
-    glass: Bools
-    casting: Bools
-    triangles: Bools
-
-
-def _drawn(scene: Scene, hidden: Bools | None) -> _Drawn:
+def _drawn(scene: Scene, hidden: Bools | None) -> Drawn:
     """Sort out what is drawn and how."""
     geoms, count = scene.geoms, len(scene.surfaces.objects)
     shown = np.ones(count, np.bool_) if hidden is None else ~hidden
@@ -221,4 +145,4 @@ def _drawn(scene: Scene, hidden: Bools | None) -> _Drawn:
     first = len(geoms.shapes)
     casting = ~geoms.transparent & shown[:first]
     glass = geoms.transparent & geoms.visible & shown[:first]
-    return _Drawn(casting & geoms.visible, glass, casting, shown[first:])
+    return Drawn(casting & geoms.visible, glass, casting, shown[first:])

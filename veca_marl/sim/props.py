@@ -12,7 +12,11 @@ import numpy as np
 
 from veca_marl.sim.bullet import pybullet
 from veca_marl.sim.pose import Floats
-from veca_marl.sim.rotations import matrix_to_quaternion, quaternion_from_yaw
+from veca_marl.sim.rotations import (
+    matrix_to_quaternion,
+    quaternion_from_yaw,
+    quaternions_to_matrices,
+)
 from veca_marl.sim.scene import Geom, Scene, Shape
 from veca_marl.sim.sound_source import Source
 from veca_marl.sim.sounds import SoundCfg
@@ -297,14 +301,26 @@ class Prop:
 
     def mirror(self) -> None:
         """Copy the pose from the physics into the drawn scene and to the sound source."""
-        position, turn = pybullet.getBasePositionAndOrientation(
-            self.body_id, physicsClientId=self._client
-        )
-        self._scene.positions[self._row] = position
-        matrix = pybullet.getMatrixFromQuaternion(turn)
-        self._scene.rotations[self._row] = np.reshape(matrix, (3, 3))
-        if self.sound is not None:
-            self.sound.position = self._scene.positions[self._row]
+        mirror([self])
+
+
+def mirror(props: Sequence[Prop]) -> None:
+    """Do what `Prop.mirror` does for many props of one world, at a third of the price."""
+    if not props:
+        return
+    client, scene = props[0]._client, props[0]._scene
+    poses = [
+        pybullet.getBasePositionAndOrientation(prop.body_id, physicsClientId=client)
+        for prop in props
+    ]
+    rows = np.array([prop._row for prop in props])
+    matrices = np.empty((len(props), 3, 3))
+    quaternions_to_matrices(np.array([quaternion for _, quaternion in poses]), matrices)
+    scene.positions[rows] = [position for position, _ in poses]
+    scene.rotations[rows] = matrices
+    for prop in props:
+        if prop.sound is not None:
+            prop.sound.position = scene.positions[prop._row]
 
 
 def _three_finite(name: str, what: str, vector: Sequence[float] | Floats) -> list[float]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -14,25 +15,34 @@ from veca_marl.sim.pose import Floats
 
 @njit(cache=True)
 def quaternions_to_matrices(quaternions: Floats, out: Floats) -> None:
-    """Write the rotation matrices of unit quaternions.
+    """Write the rotation matrices of quaternions as Bullet does, to the last bit.
 
-    Source: Shoemake, "Animating rotation with quaternion curves", SIGGRAPH 1985.
+    Source: Shoemake, "Animating rotation with quaternion curves", SIGGRAPH 1985, in the order of
+    operations of Bullet's `btMatrix3x3::setRotation`.
 
     Args:
-        quaternions: ``(N, 4)`` unit quaternions (x, y, z, w).
+        quaternions: ``(N, 4)`` (x, y, z, w), not all 0; length does not matter.
         out: ``(N, 3, 3)``, written in place.
     """
     for n in range(quaternions.shape[0]):
         x, y, z, w = quaternions[n, 0], quaternions[n, 1], quaternions[n, 2], quaternions[n, 3]
-        out[n, 0, 0] = 1.0 - 2.0 * (y * y + z * z)
-        out[n, 0, 1] = 2.0 * (x * y - z * w)
-        out[n, 0, 2] = 2.0 * (x * z + y * w)
-        out[n, 1, 0] = 2.0 * (x * y + z * w)
-        out[n, 1, 1] = 1.0 - 2.0 * (x * x + z * z)
-        out[n, 1, 2] = 2.0 * (y * z - x * w)
-        out[n, 2, 0] = 2.0 * (x * z - y * w)
-        out[n, 2, 1] = 2.0 * (y * z + x * w)
-        out[n, 2, 2] = 1.0 - 2.0 * (x * x + y * y)
+        twice = 2.0 / (x * x + y * y + z * z + w * w)
+        xs, ys, zs = x * twice, y * twice, z * twice
+        out[n, 0, 0] = 1.0 - (y * ys + z * zs)
+        out[n, 0, 1] = x * ys - w * zs
+        out[n, 0, 2] = x * zs + w * ys
+        out[n, 1, 0] = x * ys + w * zs
+        out[n, 1, 1] = 1.0 - (x * xs + z * zs)
+        out[n, 1, 2] = y * zs - w * xs
+        out[n, 2, 0] = x * zs - w * ys
+        out[n, 2, 1] = y * zs + w * xs
+        out[n, 2, 2] = 1.0 - (x * xs + y * ys)
+
+
+def cross(a: Sequence[float] | Floats, b: Sequence[float] | Floats) -> Floats:
+    """Return the cross product of two single vectors, at a fifth of the price of numpy's."""
+    (ax, ay, az), (bx, by, bz) = (v.tolist() if isinstance(v, np.ndarray) else v for v in (a, b))
+    return np.array((ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx))
 
 
 def quaternion_from_yaw(yaw_rad: float) -> tuple[float, float, float, float]:

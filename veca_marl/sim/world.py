@@ -12,7 +12,7 @@ from veca_marl.sim.acoustics import Room
 from veca_marl.sim.bullet import pybullet
 from veca_marl.sim.house import House
 from veca_marl.sim.playground import PlaygroundCfg
-from veca_marl.sim.props import Prop, PropCfg, PropShape
+from veca_marl.sim.props import Prop, PropCfg, PropShape, mirror
 from veca_marl.sim.scene import Geom, Scene, Shape
 from veca_marl.sim.soundfield import SoundField
 from veca_marl.sim.sounds import make_sound
@@ -157,8 +157,7 @@ class World:
         self._look_ahead()
         pybullet.restoreState(self._state, physicsClientId=self.client)
         self.sound.reset(rng)
-        for prop in self.props.values():
-            prop.mirror()
+        mirror(list(self.props.values()))
         for mover in self.movers:
             mover.reset()
 
@@ -194,8 +193,7 @@ class World:
         )
 
     def _mirror(self) -> None:
-        for prop in self._moving:
-            prop.mirror()
+        mirror(self._moving)
         for mover in self.movers:
             mover.mirror()
         self.scene.update()

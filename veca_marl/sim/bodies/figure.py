@@ -18,6 +18,7 @@ from veca_marl.sim.bone_motion import bone_motion
 from veca_marl.sim.calls import CALLS, Call, call_waveform
 from veca_marl.sim.optics import Camera, seen_fraction
 from veca_marl.sim.pose import Floats, Pose
+from veca_marl.sim.rotations import cross
 from veca_marl.sim.skeleton import load_skeleton
 from veca_marl.sim.sounds import Voice
 from veca_marl.sim.world import World
@@ -111,7 +112,7 @@ class Figure:
         velocities, spins = self._bone_motion()
         lever = self.mount("head").position - self._drawn.positions[self._head]
         spin = spins[self._head]
-        return velocities[self._head] + np.cross(spin, lever), spin
+        return velocities[self._head] + cross(spin, lever), spin
 
     def mount(self, name: str) -> Pose:
         """Return where a sense organ is; eyes include where they are turned to."""

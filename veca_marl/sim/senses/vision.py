@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 from veca_marl.sim.bodies.base import Body
 from veca_marl.sim.filters import Blur, Defocus, Filter, Grey, Look
 from veca_marl.sim.infant_vision import InfantVision
-from veca_marl.sim.optics import Camera, Views, seen_fraction
+from veca_marl.sim.optics import Camera, seen_fraction
 from veca_marl.sim.scene import Bools, Scene
 from veca_marl.sim.senses.base import Sense
 from veca_marl.sim.spec import ArraySpec
+from veca_marl.sim.views import Views
 
 
 class Eyes(Enum):
@@ -111,7 +112,7 @@ class VisionSense(Sense):
         for apply in self.filters:
             rgb = apply(rgb, look)
         everything: dict[str, NDArray[Any]] = {
-            "vision": np.moveaxis(rgb, -1, 1),
+            "vision": rgb.transpose(0, 3, 1, 2),
             "depth": views.depth,
             "segmentation": views.ids,
         }
