@@ -11,6 +11,7 @@ from veca_marl.bench.command import main
 from veca_marl.bench.free_play import free_play
 from veca_marl.bench.references import as_visual_shapes, busy_room, measure_ears, tiny_view
 from veca_marl.bench.rollouts import measure_rollouts
+from veca_marl.bench.skin_costs import touched_child
 from veca_marl.bench.stopwatch import Probes, Stopwatch
 from veca_marl.config import compose
 from veca_marl.envs.env import VecaEnv
@@ -18,6 +19,7 @@ from veca_marl.envs.game_cfg import GameCfg
 from veca_marl.envs.task import TASKS
 from veca_marl.sim.bullet import pybullet
 from veca_marl.sim.optics import Camera
+from veca_marl.sim.playground import PlaygroundCfg
 
 QUICK = ["--steps", "3", "--repeats", "1"]
 
@@ -121,7 +123,23 @@ def test_numbers_as_table_and_json(tmp_path, capsys):
     eye = found["references"]["eye"]
     assert eye["times_as_fast"] == pytest.approx(eye["tiny_ms"] / eye["ours_ms"], rel=0.5)
     assert found["references"]["ears_ms"] > 0
+    skin = found["references"]["skin"]
+    assert skin["skinning_ms"] > 0
+    assert skin["touch_ms"]["20"] > skin["touch_ms"]["0"] > 0
     assert found["machine"]["cores"] >= 1
+
+
+@pytest.mark.parametrize("things", [0, 3])
+def test_the_skin_that_is_measured_feels_each_thing_and_nothing_else(things):
+    world, sense = touched_child(PlaygroundCfg(), things)
+    felt = (sense.update_taxels() > 0.0).any(axis=1)
+    vertices = world.scene.meshes.vertices
+    middles = vertices[world.scene.meshes.triangles].mean(axis=1)
+    balls = np.array([world.prop(f"ball_{i}").position for i in range(things)]).reshape(-1, 3)
+    near = np.linalg.norm(middles[:, None] - balls[None], axis=-1) < 0.06
+    assert (felt[:, None] & near).any(axis=0).all()
+    assert not (felt & ~near.any(axis=1)).any()
+    world.close()
 
 
 def test_a_sense_that_is_not_there_costs_nothing(tmp_path):

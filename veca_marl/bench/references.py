@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from statistics import median
 from typing import Any
@@ -12,6 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from veca_marl.bench.skin_costs import SkinCosts, measure_skin
+from veca_marl.bench.stopwatch import thread_ms
 from veca_marl.sim.bodies.walker import Walker, WalkerCfg
 from veca_marl.sim.bullet import pybullet
 from veca_marl.sim.optics import Camera
@@ -52,15 +53,21 @@ class References:
     Attributes:
         eye: One eye view beside TinyRenderer.
         ears_ms: One listener and one source, milliseconds per step.
+        skin: One body's skin.
     """
 
     eye: EyeCost
     ears_ms: float
+    skin: SkinCosts
 
 
 def measure_references(playground: PlaygroundCfg, steps: int, repeats: int) -> References:
-    """Measure eyes and ears in a playground, alone."""
-    return References(measure_eye(playground, repeats), measure_ears(playground, steps))
+    """Measure eyes, ears and skin in a playground, each alone."""
+    return References(
+        measure_eye(playground, repeats),
+        measure_ears(playground, steps),
+        measure_skin(playground, steps),
+    )
 
 
 def measure_eye(playground: PlaygroundCfg, repeats: int) -> EyeCost:
@@ -72,8 +79,8 @@ def measure_eye(playground: PlaygroundCfg, repeats: int) -> EyeCost:
     client, bodies = as_visual_shapes(world.scene, hidden)
     costs = []
     for _ in range(repeats + 1):
-        ours = _ms(lambda: camera.render(world.scene, poses, hidden))
-        tiny = _ms(lambda: [tiny_view(client, camera, pose) for pose in poses])
+        ours = thread_ms(lambda: camera.render(world.scene, poses, hidden))
+        tiny = thread_ms(lambda: [tiny_view(client, camera, pose) for pose in poses])
         costs.append((ours / VIEWS, tiny / VIEWS))
     pybullet.disconnect(client)
     world.close()
@@ -119,7 +126,7 @@ def measure_ears(playground: PlaygroundCfg, steps: int) -> float:
         source.position = (2.0 * math.cos(angle), 2.0 * math.sin(angle), 0.15)
         walker.yaw_rad = -0.5 * angle
         walker.mirror()
-        costs.append(_ms(hear))
+        costs.append(thread_ms(hear))
     world.close()
     return median(costs)
 
@@ -214,9 +221,3 @@ def tiny_view(client: int, camera: Camera, pose: Pose) -> tuple[NDArray[Any], ND
         physicsClientId=client,
     )
     return rgba, segmentation
-
-
-def _ms(call: Callable[[], object]) -> float:
-    start = time.thread_time()
-    call()
-    return 1e3 * (time.thread_time() - start)

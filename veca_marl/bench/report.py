@@ -31,11 +31,14 @@ def rollouts_table(run: Rollouts) -> str:
 
 def references_table(references: References) -> str:
     """Return the costs beside references."""
-    eye = references.eye
+    eye, skin = references.eye, references.skin
+    touch = ", ".join(f"{ms:.3f} ms with {things}" for things, ms in skin.touch_ms.items())
     return (
         f"one eye view 84x84, {eye.primitives} primitives: {eye.ours_ms:.3f} ms; "
         f"TinyRenderer {eye.tiny_ms:.2f} ms: {eye.times_as_fast:.1f} times as fast\n"
-        f"ears, 1 listener and 1 source, HRTF: {references.ears_ms:.3f} ms per step"
+        f"ears, 1 listener and 1 source, HRTF: {references.ears_ms:.3f} ms per step\n"
+        f"touch, one reading of 9888 taxels by the things on the skin: {touch}\n"
+        f"skinning: {skin.skinning_ms:.3f} ms"
     )
 
 

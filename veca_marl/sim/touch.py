@@ -13,7 +13,7 @@ includes its skin, and d_max is the sum of both.
 from __future__ import annotations
 
 import math
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from numba import njit
@@ -40,6 +40,49 @@ def neighbours(skeleton: Skeleton) -> Bools:
     child_of: Bools = parents[:, None] == np.arange(len(parents))[None, :]
     together: Bools = near | child_of | child_of.T
     return together
+
+
+class Workspace(NamedTuple):
+    """What a reading writes on its way; made once.
+
+    Attributes:
+        patches: ``(P, 4)`` centre and radius of a ball round each patch, as from `bound`.
+        bones: ``(B + 1, 4)`` likewise round each bone and, last, the whole body.
+        near: ``(B, G)`` which pairs to look at, as from `find_near`.
+        local: ``(V, 3)`` vertices in the axes of a primitive.
+    """
+
+    patches: Floats
+    bones: Floats
+    near: Bools
+    local: Floats
+
+
+@njit(cache=True, error_model="numpy")
+def feel(
+    taxels: TaxelTable,
+    vertices: Floats,
+    geoms: GeomTable,
+    deaf: Bools,
+    barycentric: Floats,
+    workspace: Workspace,
+    readings: Floats,
+) -> None:
+    """Read all taxels: `bound`, `find_near` and `press` in one call.
+
+    Args:
+        taxels: The taxels of the body.
+        vertices: ``(V, 3)`` the vertices of its skin, metres, world frame.
+        geoms: The scene's primitives.
+        deaf: ``(B, G)`` which bones do not feel which primitives.
+        barycentric: ``(6, 3)`` where the taxels are on a triangle.
+        workspace: Scratch.
+        readings: ``(T, 6)`` in [0, 1], written.
+    """
+    patches, bones, near, local = workspace
+    bound(taxels, vertices, patches, bones)
+    find_near(geoms, deaf, bones, near)
+    press(taxels, vertices, geoms, near, patches, barycentric, local, readings)
 
 
 @njit(cache=True, error_model="numpy")

@@ -17,7 +17,7 @@ from veca_marl.sim.senses.base import Sense
 from veca_marl.sim.skeleton import Skeleton, load_skeleton
 from veca_marl.sim.spec import ArraySpec
 from veca_marl.sim.taxels import BARYCENTRIC, TAXELS_PER_TRIANGLE, load_taxels
-from veca_marl.sim.touch import bound, find_near, neighbours, press
+from veca_marl.sim.touch import Workspace, feel, neighbours
 
 Readings = NDArray[np.float64]
 Grade = Callable[[Readings], Readings]
@@ -74,11 +74,13 @@ class TouchSense(Sense):
         self._taxels = load_taxels()
         self._grade = _grade(cfg, load_skeleton())
         bones = len(self._taxels.thickness)
-        self._bones = np.zeros((bones + 1, 4))
-        self._patches = np.zeros((len(self._taxels.patches) - 1, 4))
-        self._local = np.zeros((self._object.vertices.stop - self._object.vertices.start, 3))
         self._deaf: Bools = np.zeros((bones, 0), np.bool_)
-        self._near: Bools = np.zeros((bones, 0), np.bool_)
+        self._workspace = Workspace(
+            patches=np.zeros((len(self._taxels.patches) - 1, 4)),
+            bones=np.zeros((bones + 1, 4)),
+            near=np.zeros_like(self._deaf),
+            local=np.zeros((self._object.vertices.stop - self._object.vertices.start, 3)),
+        )
         self._readings = np.zeros((len(self._taxels.triangles), TAXELS_PER_TRIANGLE))
         self.specs = {"touch": ArraySpec((self._readings.size,), np.float32, 0.0, 1.0)}
         if self._object.triangles.stop - self._object.triangles.start != len(self._readings):
@@ -98,19 +100,15 @@ class TouchSense(Sense):
         geoms = self._scene.geoms
         if self._deaf.shape[1] != len(geoms.shapes):
             self._deaf = self._what_it_cannot_feel()
-            self._near = np.zeros_like(self._deaf)
+            self._workspace = self._workspace._replace(near=np.zeros_like(self._deaf))
         vertices = self._scene.meshes.vertices[self._object.vertices]
-        taxels = self._taxels
-        bound(taxels, vertices, self._patches, self._bones)
-        find_near(geoms, self._deaf, self._bones, self._near)
-        press(
-            taxels,
+        feel(
+            self._taxels,
             vertices,
             geoms,
-            self._near,
-            self._patches,
+            self._deaf,
             BARYCENTRIC,
-            self._local,
+            self._workspace,
             self._readings,
         )
         return self._readings

@@ -1,0 +1,77 @@
+"""What skin costs: to follow the bones, and to feel so many things."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from statistics import median
+
+import numpy as np
+
+from veca_marl.bench.stopwatch import thread_ms
+from veca_marl.sim.bodies.humanoid import Humanoid, HumanoidCfg
+from veca_marl.sim.bodies.postures import Posture
+from veca_marl.sim.playground import PlaygroundCfg
+from veca_marl.sim.props import PropCfg, PropShape
+from veca_marl.sim.senses.touch import TouchCfg, TouchSense
+from veca_marl.sim.skinning import skin
+from veca_marl.sim.world import World
+
+CONTACTS = (0, 3, 20)
+_ARMS_OUT = Posture(0.0, {"upper_arm.abduction": 30.0})  # a child that does not touch itself
+_RADIUS_M = 0.03
+
+
+@dataclass
+class SkinCosts:
+    """Costs of one body's skin.
+
+    Attributes:
+        skinning_ms: To carry the vertices along with the bones.
+        touch_ms: One reading of all taxels, by the number of things that touch.
+    """
+
+    skinning_ms: float
+    touch_ms: dict[int, float]
+
+
+def measure_skin(playground: PlaygroundCfg, repeats: int) -> SkinCosts:
+    """Measure a `full` body that hangs in the air with small balls all over it."""
+    readings = {contacts: _touch_ms(playground, contacts, repeats) for contacts in CONTACTS}
+    return SkinCosts(_skinning_ms(playground, repeats), readings)
+
+
+def touched_child(playground: PlaygroundCfg, contacts: int) -> tuple[World, TouchSense]:
+    """Return a world with a child in the air, so many things on its skin, and its touch."""
+    world = World(playground)
+    cfgs = [PropCfg(f"ball_{i}", PropShape.sphere, [_RADIUS_M]) for i in range(contacts)]
+    balls = [world.add_prop(cfg) for cfg in cfgs]
+    child = Humanoid("child", HumanoidCfg(), world)
+    child.place((0.0, 0.0, 1.0), posture=_ARMS_OUT)
+    world.scene.update()
+    sense = TouchSense(TouchCfg(), child, world.scene)
+    vertices = world.scene.meshes.vertices
+    for ball, row in zip(balls, np.linspace(0, len(vertices) - 1, contacts), strict=True):
+        ball.place(vertices[int(row)])
+    world.scene.update()
+    return world, sense
+
+
+def _touch_ms(playground: PlaygroundCfg, contacts: int, repeats: int) -> float:
+    world, sense = touched_child(playground, contacts)
+    sense.read()
+    cost = median(thread_ms(sense.read) for _ in range(repeats))
+    world.close()
+    return cost
+
+
+def _skinning_ms(playground: PlaygroundCfg, repeats: int) -> float:
+    world, _ = touched_child(playground, 0)
+    scene = world.scene
+
+    def follow() -> None:
+        skin(scene.meshes, scene.positions, scene.rotations)
+
+    follow()
+    cost = median(thread_ms(follow) for _ in range(repeats))
+    world.close()
+    return cost
