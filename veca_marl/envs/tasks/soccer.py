@@ -49,7 +49,7 @@ class SoccerCfg(TaskCfg):
     attacker_from_ball_m: tuple[float, float] = (0.8, 1.6)
     spread_deg: float = 30.0
     kick_rest_s: float = 0.5
-    weights: dict[str, float] = terms(goal=5.0, progress=0.5, approach=0.1, facing=0.1)
+    weights: dict[str, float] = terms(goal=5.0, progress=0.5, approach=0.1, facing=0.1, aiming=0.1)
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -76,12 +76,21 @@ class SoccerCfg(TaskCfg):
 
 @dataclass(frozen=True)
 class _Situation:
-    """Where the ball is, seen from the goal and from the attacker."""
+    """Where the ball is, seen from the goal and from the attacker.
+
+    Attributes:
+        ball: ``(3,)`` metres.
+        to_goal_m: From the ball to the middle of the goal line.
+        to_ball_m: From the attacker to the ball.
+        aside_rad: From the attacker's forward direction to the way to the ball.
+        astray_rad: From the way to the ball to the way from there to the goal.
+    """
 
     ball: Floats
     to_goal_m: float
     to_ball_m: float
     aside_rad: float
+    astray_rad: float
 
 
 class Soccer(Task):
@@ -131,6 +140,7 @@ class Soccer(Task):
             "progress": before.to_goal_m - self._now.to_goal_m,
             "approach": before.to_ball_m - horizontal_distance(attacker, before.ball),
             "facing": before.aside_rad - self._now.aside_rad,
+            "aiming": before.astray_rad - self._now.astray_rad,
         }
         self._kick()
 
@@ -149,11 +159,13 @@ class Soccer(Task):
 
     def _look(self) -> _Situation:
         attacker, ball = self.players[0].body, self.ball.position
+        way = ball - attacker.position
         return _Situation(
             ball,
             math.dist(ball[:2], self.goal[:2]),
-            horizontal_distance(attacker.position, ball),
-            aside_rad(ball - attacker.position, attacker.forward),
+            math.hypot(way[0], way[1]),
+            aside_rad(way, attacker.forward),
+            aside_rad(way, self.goal - ball),
         )
 
     def _kick(self) -> None:

@@ -24,6 +24,8 @@ class SoccerOnePlayer(Soccer):
             that rolls away costs nothing, or kicks would.
         facing: decrease in this step of the angle between the player's forward direction and the
             way to the ball, rad: at most pi in an episode, whatever is done.
+        aiming: decrease in this step of the angle between the way to the ball and the way from the
+            ball to the goal, rad: at most pi in an episode likewise.
     """
 
     teams = (Team(ATTACKER),)

@@ -56,6 +56,9 @@ class SoccerTwoPlayer(Soccer):
         facing: decrease in this step of the angle between the attacker's forward direction and the
             way to the ball, rad: at most pi in an episode, whatever is done; minus that for the
             defender.
+        aiming: decrease in this step of the angle between the attacker's way to the ball and the
+            way from the ball to the goal, rad: at most pi in an episode; minus that for the
+            defender.
     """
 
     teams = (Team(ATTACKER), Team(DEFENDER))
