@@ -130,23 +130,6 @@ def test_facing_pays_for_the_angle_that_is_made_good_and_no_more(alone):
     assert sum(paid) == pytest.approx(math.radians(100.0) - abs(body.yaw_rad), abs=1e-9)
 
 
-def test_aiming_pays_for_getting_behind_the_ball(alone):
-    begin(alone, (0.0, 0.0, 0.12))
-    body = alone.players[0].body
-    body.place((0.0, -1.0, 0.0), math.pi)
-    alone.task._now = alone.task._look()
-    paid = []
-    for _ in range(25):
-        outcome = alone.step(
-            {"attacker": np.array([1.0, 0.0], np.float32)}, np.random.default_rng(0)
-        )
-        paid.append(outcome.terms["attacker"]["aiming"])
-    assert min(paid[5:]) > 0.0
-    way = np.array([0.0, 0.0]) - body.position[:2]
-    astray = abs(math.atan2(way[1], way[0]))  # the goal lies along x
-    assert sum(paid) == pytest.approx(math.pi / 2 - astray, abs=1e-6)
-
-
 def test_approach_pays_for_the_way_to_the_ball_and_a_ball_that_rolls_away_costs_nothing(alone):
     begin(alone, (0.0, 0.0, 0.12))
     body = alone.players[0].body

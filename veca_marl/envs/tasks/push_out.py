@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veca_marl.envs.contests import line_up, nearest, on_floor, opponents, paint_disc
-from veca_marl.envs.experts.crawl import Crawl, keep_near
+from veca_marl.envs.experts.crawl import Crawl, crawls_of, keep_near
 from veca_marl.envs.experts.wrestling import wrestle
 from veca_marl.envs.task import Player, Task, TaskCfg, terms, walker
 from veca_marl.sim.bodies.humanoid import Humanoid
@@ -76,11 +76,7 @@ class PushOut(Task):
         self._fallen = set()
         self._ground = {player.name: self._area(player) for player in self.players}
         self._won = dict.fromkeys(self._ground, 0.0)
-        self._crawls = {
-            player.name: Crawl(player.body, self.world.clock.step_s)
-            for player in self.players
-            if isinstance(player.body, Humanoid)
-        }
+        self._crawls = crawls_of(self.players, self.world.clock.step_s)
 
     def after_step(self, rng: np.random.Generator) -> None:
         self._playing -= self._fallen

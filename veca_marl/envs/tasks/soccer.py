@@ -10,10 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veca_marl.envs.contests import line_up
+from veca_marl.envs.experts.crawl import Crawl, crawl_to, crawls_of
 from veca_marl.envs.experts.soccer import attack
 from veca_marl.envs.pitch import POST_M, Pitch
 from veca_marl.envs.scoring import aside_rad
 from veca_marl.envs.task import Player, Task, TaskCfg, terms, walker
+from veca_marl.sim.bodies.humanoid import Humanoid
 from veca_marl.sim.bodies.pushing import horizontal_distance
 from veca_marl.sim.bodies.walker import Walker
 from veca_marl.sim.pose import Floats
@@ -49,7 +51,7 @@ class SoccerCfg(TaskCfg):
     attacker_from_ball_m: tuple[float, float] = (0.8, 1.6)
     spread_deg: float = 30.0
     kick_rest_s: float = 0.5
-    weights: dict[str, float] = terms(goal=5.0, progress=0.5, approach=0.1, facing=0.1, aiming=0.1)
+    weights: dict[str, float] = terms(goal=5.0, progress=0.5, approach=0.1, facing=0.0)
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -83,14 +85,12 @@ class _Situation:
         to_goal_m: From the ball to the middle of the goal line.
         to_ball_m: From the attacker to the ball.
         aside_rad: From the attacker's forward direction to the way to the ball.
-        astray_rad: From the way to the ball to the way from there to the goal.
     """
 
     ball: Floats
     to_goal_m: float
     to_ball_m: float
     aside_rad: float
-    astray_rad: float
 
 
 class Soccer(Task):
@@ -110,6 +110,7 @@ class Soccer(Task):
                 f"aside_m do not fit into room {room.name!r} of {room.size_m[:2]} m"
             )
         self._rest_s: dict[str, float] = {}
+        self._crawls: dict[str, Crawl] = {}
         self._paid: dict[str, float] = {}
         self._scored = False
         self._now = self._look()
@@ -122,6 +123,7 @@ class Soccer(Task):
         for player in self.players:
             self._line_up(player, rng)
         self._rest_s = {player.name: 0.0 for player in self.players}
+        self._crawls = crawls_of(self.players, self.world.clock.step_s)
         self._scored = False
         self._now = self._look()
 
@@ -140,7 +142,6 @@ class Soccer(Task):
             "progress": before.to_goal_m - self._now.to_goal_m,
             "approach": before.to_ball_m - horizontal_distance(attacker, before.ball),
             "facing": before.aside_rad - self._now.aside_rad,
-            "aiming": before.astray_rad - self._now.astray_rad,
         }
         self._kick()
 
@@ -152,7 +153,12 @@ class Soccer(Task):
         return self._scored
 
     def expert(self, player: Player, observation: dict[str, NDArray[Any]]) -> Any:
-        """Get behind the ball and walk through it. Knows where the ball is; needs legs to walk."""
+        """Get behind the ball and walk through it; on hands and knees crawl at it and through it.
+
+        It knows where the ball is. Who crawls pushes the ball, and does not get behind it first.
+        """
+        if isinstance(player.body, Humanoid):
+            return crawl_to(player.body, self._crawls[player.name], self.ball.position)
         return attack(walker(player), self.pitch, self.goal)
 
     # ---- the ball
@@ -165,7 +171,6 @@ class Soccer(Task):
             math.dist(ball[:2], self.goal[:2]),
             math.hypot(way[0], way[1]),
             aside_rad(way, attacker.forward),
-            aside_rad(way, self.goal - ball),
         )
 
     def _kick(self) -> None:

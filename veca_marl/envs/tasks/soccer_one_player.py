@@ -23,9 +23,8 @@ class SoccerOnePlayer(Soccer):
         approach: how much nearer the player has come in this step to where the ball was, m: a ball
             that rolls away costs nothing, or kicks would.
         facing: decrease in this step of the angle between the player's forward direction and the
-            way to the ball, rad: at most pi in an episode, whatever is done.
-        aiming: decrease in this step of the angle between the way to the ball and the way from the
-            ball to the goal, rad: at most pi in an episode likewise.
+            way to the ball, rad: at most pi in an episode, whatever is done. A helper for who
+            learns to look for the ball; by default it is worth nothing.
     """
 
     teams = (Team(ATTACKER),)

@@ -8,9 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from veca_marl.envs.experts.crawl import crawl_to, keep_near
 from veca_marl.envs.experts.soccer import attack, open_corner
 from veca_marl.envs.task import Player, Team, register, walker
 from veca_marl.envs.tasks.soccer import ATTACKER, DEFENDER, Soccer, SoccerCfg
+from veca_marl.sim.bodies.humanoid import Humanoid
 from veca_marl.sim.pose import Floats
 
 
@@ -55,10 +57,7 @@ class SoccerTwoPlayer(Soccer):
             thus paid for standing in the attacker's way.
         facing: decrease in this step of the angle between the attacker's forward direction and the
             way to the ball, rad: at most pi in an episode, whatever is done; minus that for the
-            defender.
-        aiming: decrease in this step of the angle between the attacker's way to the ball and the
-            way from the ball to the goal, rad: at most pi in an episode; minus that for the
-            defender.
+            defender. A helper for who learns to look for the ball; by default worth nothing.
     """
 
     teams = (Team(ATTACKER), Team(DEFENDER))
@@ -72,9 +71,20 @@ class SoccerTwoPlayer(Soccer):
         return np.array([self.goal[0] - back, self.goal[1] + rng.uniform(-half_m, half_m), 0.0])
 
     def expert(self, player: Player, observation: dict[str, NDArray[Any]]) -> Any:
-        """Get at the ball, away from the own goal. Knows where the ball is; needs legs to walk."""
+        """Get at the ball, away from the own goal; knows where the ball is.
+
+        On hands and knees the attacker crawls at the ball, and the defender between ball and goal.
+        """
+        if isinstance(player.body, Humanoid):
+            return self._on_knees(player, player.body)
         body = walker(player)
         if player.team == ATTACKER:
             keeper = self.players[1].body.position
             return attack(body, self.pitch, open_corner(self.pitch, keeper))
         return attack(body, self.pitch, 2.0 * self.ball.position - self.goal)
+
+    def _on_knees(self, player: Player, body: Humanoid) -> Any:
+        crawl, ball = self._crawls[player.name], self.ball.position
+        if player.team == ATTACKER:
+            return crawl_to(body, crawl, ball)
+        return keep_near(body, crawl, (ball + self.goal) / 2.0)
