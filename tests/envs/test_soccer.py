@@ -220,14 +220,24 @@ def test_a_defender_saves_what_one_who_stands_lets_in(two):
 
 
 @pytest.mark.parametrize("task", ["SoccerOnePlayer", "SoccerTwoPlayer"])
-def test_joint_level_bodies_play_and_their_expert_says_what_it_lacks(task):
-    game = game_of(task, "body=mitten_position", "task.max_seconds=0.4")
-    roles = {player.team: "random" for player in game.players}
+@pytest.mark.parametrize("body", ["mitten", "mitten_position"])
+def test_joint_level_bodies_play_by_the_same_rules(task, body):
+    game = game_of(task, f"body={body}", "senses/touch=numb", "task.max_seconds=0.4")
+    roles = {player.team: "expert" for player in game.players}
     (outcomes,) = episodes(game, 1, **roles)
     assert outcomes[-1].truncated
-    with pytest.raises(ValueError, match=r"attacker: .* choose body=walker"):
-        game.task.expert(game.players[0], {})
     game.close()
+
+
+def test_on_hands_and_knees_the_expert_gets_to_the_ball_and_pushes_it():
+    game = game_of("SoccerOnePlayer", "body=mitten", "senses/touch=numb", "task.max_seconds=16.0")
+    paid = {"approach": 0.0, "progress": 0.0}
+    for outcomes in episodes(game, 3, attacker="expert"):
+        for term in paid:
+            paid[term] += sum(outcome.terms["attacker"][term] for outcome in outcomes) / 3.0
+    game.close()
+    assert paid["approach"] > 0.4
+    assert paid["progress"] > 0.05
 
 
 @pytest.mark.parametrize(

@@ -34,8 +34,9 @@ _TRUNK = {"spine.flexion": 20.7, "neck.flexion": -45.0}
 _BEND = {"spine.lateral": -10.7, "chest.lateral": -10.7, "chest.rotation": -0.7}
 _BEND_LEAD_RAD = -0.01
 _BEGIN_S = 0.4
-# a trunk twisted to one side turns the child there: 20 degrees a turn of 5 to 20 degrees a second
-# with torques (measured), and a third of the speed is lost
+# a trunk twisted to one side turns the child there: by torques 45 degrees in 6 s in the median, but
+# single tries differ much (mitten, five each way: 23 to 72 to the left, 66 right to 109 left to the
+# right); a third of the speed is lost, and more twist throws it over
 _TWIST_DEG = {"spine.rotation": 20.0, "chest.rotation": 20.0}
 _FULL_TURN_RAD = 0.5  # to the side of the way: worth a full turn
 _BEFORE_M = 0.1  # a place nearer than that is not worth a stride

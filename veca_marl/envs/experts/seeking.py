@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from veca_marl.envs.experts.walking import bearing_rad
 from veca_marl.envs.floor_plan import FloorPlan
 from veca_marl.sim.bodies.pushing import horizontal_distance
 from veca_marl.sim.bodies.walker import Walker
@@ -37,9 +38,7 @@ class Wish(NamedTuple):
 
 def walk_to(walker: Walker, place: Floats) -> Wish:
     """Return how to walk straight to a place ``(2,)``: first turn, then go."""
-    x, y, _ = walker.position
-    aside = math.atan2(place[1] - y, place[0] - x) - walker.yaw_rad
-    aside = (aside + math.pi) % (2.0 * math.pi) - math.pi
+    aside = bearing_rad(walker, place)
     turn = min(max(aside / _FULL_TURN_RAD, -1.0), 1.0)
     return Wish(max(0.0, math.cos(aside)) ** 2, turn)
 
