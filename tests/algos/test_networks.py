@@ -62,15 +62,17 @@ def test_blocks_of_images_are_encoded_as_all_at_once():
 
 
 @pytest.mark.parametrize(
-    ("low", "high", "expected"),
+    ("name", "low", "high", "expected"),
     [
-        (-8.0, 4.0, [-1.0, 0.0, 1.0]),
-        (-120.0, math.inf, [-8.0, -2.0, 4.0]),
-        (-math.inf, math.inf, [-math.log(9.0), -math.log(3.0), math.log(5.0)]),
+        ("touch", -8.0, 4.0, [-1.0, 0.0, 1.0]),
+        ("audio", -math.inf, math.inf, [-8.0, -2.0, 4.0]),
+        ("proprioception", -math.inf, math.inf, [-math.log(9.0), -math.log(3.0), math.log(5.0)]),
     ],
 )
-def test_bounds_become_one_levels_pass_and_what_has_no_bound_is_compressed(low, high, expected):
-    scale = scale_of(ArrayLayout((3,), "float32", low, high))
+def test_bounds_become_one_levels_pass_and_mixed_magnitudes_are_compressed(
+    name, low, high, expected
+):
+    scale = scale_of(name, ArrayLayout((3,), "float32", low, high))
     torch.testing.assert_close(scale(torch.tensor([-8.0, -2.0, 4.0])), torch.tensor(expected))
 
 

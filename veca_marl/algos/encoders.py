@@ -123,13 +123,14 @@ class VectorEncoder(nn.Module):
     """``float (N, ...)`` to ``float (N, features)``: a fixed scale (see `scale_of`), then an MLP.
 
     Args:
+        name: Of the sense.
         layout: Layout of one observation.
         features: Length of the output.
     """
 
-    def __init__(self, layout: ArrayLayout, features: int = 64) -> None:
+    def __init__(self, name: str, layout: ArrayLayout, features: int = 64) -> None:
         super().__init__()
-        self.scale = scale_of(layout)
+        self.scale = scale_of(name, layout)
         self.layers = nn.Sequential(
             orthogonal(nn.Linear(math.prod(layout.shape), features)),
             nn.ReLU(),
@@ -147,20 +148,22 @@ class VectorEncoder(nn.Module):
 Scale = Callable[[Tensor], Tensor]
 
 
-def scale_of(layout: ArrayLayout) -> Scale:
-    """Return what brings an array to numbers of about 1, chosen by its bounds.
+# senses that hold numbers of many magnitudes; their specs cannot say so
+_MIXED = frozenset({"proprioception"})
 
-    Bounds on both sides become -1 and 1. An array without any is compressed (symlog, Hafner
-    et al. 2023, "Mastering diverse domains through world models"): where angles stand beside
-    accelerations, a network would hear little but the accelerations. Levels,
-    which have a floor and no ceiling, are compressed already and pass as they are. Nothing is
-    normalised by running statistics, which would blur absolute level (loudness is a cue for
-    distance).
+
+def scale_of(name: str, layout: ArrayLayout) -> Scale:
+    """Return what brings an array to numbers of about 1.
+
+    Bounds become -1 and 1. An array without bounds passes as it is, if it is in decades already as
+    the ears' spectra are, or is compressed (symlog, Hafner et al. 2023, "Mastering diverse domains
+    through world models"): where angles stand beside accelerations, a network would hear little but
+    the accelerations. Nothing is normalised by running statistics, which would blur absolute level
+    (loudness is a cue for distance).
     """
-    low, high = math.isfinite(layout.low), math.isfinite(layout.high)
-    if low and high:
+    if math.isfinite(layout.low) and math.isfinite(layout.high):
         return Affine((layout.low + layout.high) / 2, 2.0 / (layout.high - layout.low))
-    return unchanged if low or high else symlog
+    return symlog if name in _MIXED else unchanged
 
 
 @dataclass(frozen=True)
@@ -191,7 +194,7 @@ def make_encoder(
     if layout.dtype == "uint8" and len(layout.shape) >= 3:
         return ImageEncoder(layout.shape, channels, pooling)
     if layout.dtype.startswith("float"):
-        return VectorEncoder(layout, features)
+        return VectorEncoder(name, layout, features)
     raise ValueError(
         f"{name}: no encoder for {layout.dtype}{layout.shape}; "
         "choices: uint8 (..., channels, height, width) images, float vectors"
