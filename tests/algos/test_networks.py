@@ -13,7 +13,7 @@ from veca_marl.algos.encoders import (
     make_encoder,
     scale_of,
 )
-from veca_marl.algos.networks import NetworkCfg, Precision, TeamNetwork
+from veca_marl.algos.networks import NetworkCfg, Precision, TeamNetwork, Trunk
 from veca_marl.algos.specs import ArrayLayout, team_specs
 
 IMAGE = ArrayLayout((2, 3, 84, 84), "uint8", 0.0, 255.0)
@@ -62,18 +62,30 @@ def test_blocks_of_images_are_encoded_as_all_at_once():
 
 
 @pytest.mark.parametrize(
-    ("name", "low", "high", "expected"),
+    ("compressed", "low", "high", "expected"),
     [
-        ("touch", -8.0, 4.0, [-1.0, 0.0, 1.0]),
-        ("audio", -math.inf, math.inf, [-8.0, -2.0, 4.0]),
-        ("proprioception", -math.inf, math.inf, [-math.log(9.0), -math.log(3.0), math.log(5.0)]),
+        (True, -8.0, 4.0, [-1.0, 0.0, 1.0]),
+        (False, -math.inf, math.inf, [-8.0, -2.0, 4.0]),
+        (True, -math.inf, math.inf, [-math.log(9.0), -math.log(3.0), math.log(5.0)]),
     ],
 )
-def test_bounds_become_one_levels_pass_and_mixed_magnitudes_are_compressed(
-    name, low, high, expected
+def test_bounds_become_one_and_what_has_none_passes_or_is_compressed(
+    compressed, low, high, expected
 ):
-    scale = scale_of(name, ArrayLayout((3,), "float32", low, high))
+    scale = scale_of(ArrayLayout((3,), "float32", low, high), compressed)
     torch.testing.assert_close(scale(torch.tensor([-8.0, -2.0, 4.0])), torch.tensor(expected))
+
+
+def test_only_the_senses_that_are_named_are_compressed():
+    """Of the senses of a world: spectra are in decades already, and proprioception is not."""
+    layouts = {
+        "audio": ArrayLayout((2, 250), "float32", -math.inf, math.inf),
+        "proprioception": ArrayLayout((534,), "float32", -math.inf, math.inf),
+    }
+    encoders = Trunk(layouts, NetworkCfg()).encoders
+    hundred = torch.tensor([100.0])
+    assert encoders["audio"].scale(hundred) == hundred
+    assert encoders["proprioception"].scale(hundred) == pytest.approx(math.log(101.0))
 
 
 @pytest.mark.parametrize("left_out", ["vision", "audio"])

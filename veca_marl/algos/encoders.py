@@ -123,14 +123,14 @@ class VectorEncoder(nn.Module):
     """``float (N, ...)`` to ``float (N, features)``: a fixed scale (see `scale_of`), then an MLP.
 
     Args:
-        name: Of the sense.
         layout: Layout of one observation.
         features: Length of the output.
+        compressed: See `scale_of`.
     """
 
-    def __init__(self, name: str, layout: ArrayLayout, features: int = 64) -> None:
+    def __init__(self, layout: ArrayLayout, features: int = 64, compressed: bool = False) -> None:
         super().__init__()
-        self.scale = scale_of(name, layout)
+        self.scale = scale_of(layout, compressed)
         self.layers = nn.Sequential(
             orthogonal(nn.Linear(math.prod(layout.shape), features)),
             nn.ReLU(),
@@ -148,22 +148,20 @@ class VectorEncoder(nn.Module):
 Scale = Callable[[Tensor], Tensor]
 
 
-# senses that hold numbers of many magnitudes; their specs cannot say so
-_MIXED = frozenset({"proprioception"})
-
-
-def scale_of(name: str, layout: ArrayLayout) -> Scale:
+def scale_of(layout: ArrayLayout, compressed: bool) -> Scale:
     """Return what brings an array to numbers of about 1.
 
-    Bounds become -1 and 1. An array without bounds passes as it is, if it is in decades already as
-    the ears' spectra are, or is compressed (symlog, Hafner et al. 2023, "Mastering diverse domains
-    through world models"): where angles stand beside accelerations, a network would hear little but
-    the accelerations. Nothing is normalised by running statistics, which would blur absolute level
-    (loudness is a cue for distance).
+    Bounds become -1 and 1; an array without bounds passes as it is, or is compressed (symlog,
+    Hafner et al. 2023, "Mastering diverse domains through world models"). Nothing is normalised by
+    running statistics, which would blur absolute level (loudness is a cue for distance).
+
+    Args:
+        layout: Layout of the array.
+        compressed: Whether to compress what has no bounds.
     """
     if math.isfinite(layout.low) and math.isfinite(layout.high):
         return Affine((layout.low + layout.high) / 2, 2.0 / (layout.high - layout.low))
-    return symlog if name in _MIXED else unchanged
+    return symlog if compressed else unchanged
 
 
 @dataclass(frozen=True)
@@ -184,7 +182,12 @@ def unchanged(vector: Tensor) -> Tensor:
 
 
 def make_encoder(
-    name: str, layout: ArrayLayout, channels: Sequence[int], features: int, pooling: Pooling
+    name: str,
+    layout: ArrayLayout,
+    channels: Sequence[int],
+    features: int,
+    pooling: Pooling,
+    compressed: bool = False,
 ) -> ImageEncoder | VectorEncoder:
     """Return the encoder that fits `layout`: bytes of rank 3 or more are images, floats vectors.
 
@@ -194,7 +197,7 @@ def make_encoder(
     if layout.dtype == "uint8" and len(layout.shape) >= 3:
         return ImageEncoder(layout.shape, channels, pooling)
     if layout.dtype.startswith("float"):
-        return VectorEncoder(name, layout, features)
+        return VectorEncoder(layout, features, compressed)
     raise ValueError(
         f"{name}: no encoder for {layout.dtype}{layout.shape}; "
         "choices: uint8 (..., channels, height, width) images, float vectors"

@@ -56,6 +56,9 @@ class NetworkCfg:
         channels: Output channels of the three convolutions of an image encoder.
         pooling: What becomes of an image's last feature maps.
         vector_features: Width of the encoder of any sense that is not an image.
+        compressed: Senses whose numbers are of many magnitudes: symlog comes before their encoder.
+            Where angles stand beside accelerations, a network would hear little but the
+            accelerations. Names of senses that a team does not have are no matter.
         trunk_features: Width of the joined layer that both heads read.
         precision: Arithmetic of encoders and trunk.
         critic: What the critic judges by.
@@ -65,6 +68,7 @@ class NetworkCfg:
     channels: list[int] = field(default_factory=lambda: [16, 32, 32])
     pooling: Pooling = Pooling.flatten
     vector_features: int = 64
+    compressed: list[str] = field(default_factory=lambda: ["proprioception"])
     trunk_features: int = 256
     precision: Precision = Precision.float32
     critic: Critic = Critic.own
@@ -88,7 +92,14 @@ class Trunk(nn.Module):
         super().__init__()
         self.ranks = {name: len(layout.shape) for name, layout in observations.items()}
         encoders = {
-            name: make_encoder(name, layout, cfg.channels, cfg.vector_features, cfg.pooling)
+            name: make_encoder(
+                name,
+                layout,
+                cfg.channels,
+                cfg.vector_features,
+                cfg.pooling,
+                name in cfg.compressed,
+            )
             for name, layout in observations.items()
         }
         self.encoders = nn.ModuleDict(encoders)

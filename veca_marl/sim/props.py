@@ -305,7 +305,7 @@ class Prop:
 
 
 def mirror(props: Sequence[Prop]) -> None:
-    """Do what `Prop.mirror` does for many props of one world, at a third of the price."""
+    """Do what `Prop.mirror` does for many props of one world, at 0.4 of the price."""
     if not props:
         return
     client, scene = props[0]._client, props[0]._scene

@@ -36,7 +36,7 @@ _BEND_LEAD_RAD = -0.01
 _BEGIN_S = 0.4
 # a trunk twisted to one side turns the child there: by torques 45 degrees in 6 s in the median, but
 # single tries differ much (mitten, five each way: 23 to 72 to the left, 66 right to 109 left to the
-# right); a third of the speed is lost, and more twist throws it over
+# right); a third of the speed is lost, and with 30 degrees and more it turns either way
 _TWIST_DEG = {"spine.rotation": 20.0, "chest.rotation": 20.0}
 _FULL_TURN_RAD = 0.5  # to the side of the way: worth a full turn
 _BEFORE_M = 0.1  # a place nearer than that is not worth a stride
@@ -99,7 +99,7 @@ class Crawl:
 def crawl_to(body: Humanoid, crawl: Crawl, place: Floats) -> Springs:
     """Return the wish of who wants to get to a place, and on through it.
 
-    Steering is weak: who starts with the place 30 degrees aside comes near it, rarely to it.
+    It turns towards it on the whole, not in every stride, so it may miss, see `_TWIST_DEG`.
 
     Args:
         body: Who crawls.
