@@ -9,6 +9,7 @@ z = 0; what is larger than a piece of furniture casts no shadow.
 from __future__ import annotations
 
 import math
+from typing import Any, TypeAlias
 
 import numpy as np
 from numba import njit
@@ -19,14 +20,17 @@ from veca_marl.sim.raster import (
     NOTHING,
     Depths,
     Lens,
+    Ray,
     Rectangle,
     Surfaces,
     bounding_radius,
-    into_local,
     pixel_rectangle,
 )
 from veca_marl.sim.scene import Bools, GeomTable, Shape
 from veca_marl.sim.screen_bounds import Vector, box_intervals, single
+
+# slopes, depths, surfaces and lights of one row
+Pixels: TypeAlias = tuple[Depths, Depths, Surfaces, NDArray[np.float32]]
 
 REACH_M = 0.12  # a thing farther than this from a floor point does not darken it
 DARKNESS = 0.35  # share of the light that a thing touching the point takes away
@@ -34,6 +38,7 @@ LARGEST_M = 1.0  # bounding radius of the largest thing that casts a shadow
 _FLOOR_TOLERANCE_M = 0.01
 
 _SPHERE, _BOX, _CYLINDER = int(Shape.SPHERE), int(Shape.BOX), int(Shape.CYLINDER)
+_CAPSULE = int(Shape.CAPSULE)
 
 
 @njit(cache=True, error_model="numpy")
@@ -96,28 +101,66 @@ def _darken(
     lights: NDArray[np.float32],
 ) -> None:
     """Darken the floor pixels of a rectangle by their distance to one primitive."""
-    position, rotation = geoms.positions[g], geoms.rotations[g]
     first, end, top, bottom = rectangle
+    columns = lens.columns[first:end]
+    shape, size = geoms.shapes[g], _vector(geoms.sizes[g])
+    turn = geoms.rotations[g].T
+    frame = _vector(geoms.positions[g]), _vector(turn[0]), _vector(turn[1]), _vector(turn[2])
+    eye = _vector(view[0]), _vector(view[1]), _vector(view[2]), _vector(view[3])
     for j in range(top, bottom):
-        y = lens.rows[j]
-        for i in range(first, end):
-            seen = surfaces[j, i]
-            if seen in (NOTHING, g):
-                continue
-            x, t = lens.columns[i], depth[j, i]
-            px = view[0, 0] + t * (view[3, 0] + x * view[1, 0] + y * view[2, 0])
-            py = view[0, 1] + t * (view[3, 1] + x * view[1, 1] + y * view[2, 1])
-            pz = view[0, 2] + t * (view[3, 2] + x * view[1, 2] + y * view[2, 2])
-            if abs(pz) > _FLOOR_TOLERANCE_M:
-                continue
-            local = into_local(rotation, px - position[0], py - position[1], pz - position[2])
-            gap = max(distance_to(geoms.shapes[g], geoms.sizes[g], local), 0.0)
-            nearness = max(1.0 - gap / REACH_M, 0.0)
-            lights[j, i] *= single(1.0 - DARKNESS * nearness * nearness)
+        pixels = columns, depth[j, first:end], surfaces[j, first:end], lights[j, first:end]
+        # the shape is a constant in each of these, so that their loops have no branches
+        if shape == _SPHERE:
+            _darken_row(_SPHERE, size, frame, eye, lens.rows[j], g, pixels)
+        elif shape == _BOX:
+            _darken_row(_BOX, size, frame, eye, lens.rows[j], g, pixels)
+        elif shape == _CYLINDER:
+            _darken_row(_CYLINDER, size, frame, eye, lens.rows[j], g, pixels)
+        else:
+            _darken_row(_CAPSULE, size, frame, eye, lens.rows[j], g, pixels)
 
 
-@njit(cache=True, error_model="numpy")
-def distance_to(shape: int, size: NDArray[np.float32], point: Vector) -> float:
+@njit(cache=True, error_model="numpy", inline="always")
+def _vector(array: NDArray[Any]) -> Vector:
+    """Out of an array, so that the compiler knows that loops do not change it."""
+    return array[0], array[1], array[2]
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def _darken_row(
+    shape: int,
+    size: Vector,
+    frame: Ray,
+    eye: Ray,
+    y: float,
+    name: int,
+    pixels: Pixels,
+) -> None:
+    """Darken the floor pixels of a row; the frame is a primitive's position and its three axes."""
+    columns, depth, names, lights = pixels
+    origin, ahead, left, upward = frame
+    position, right, up, forward = eye
+    for i in range(columns.shape[0]):
+        x, t = columns[i], depth[i]
+        px = position[0] + t * (forward[0] + x * right[0] + y * up[0])
+        py = position[1] + t * (forward[1] + x * right[1] + y * up[1])
+        pz = position[2] + t * (forward[2] + x * right[2] + y * up[2])
+        dx, dy, dz = px - origin[0], py - origin[1], pz - origin[2]
+        local = (
+            single(ahead[0] * dx + ahead[1] * dy + ahead[2] * dz),
+            single(left[0] * dx + left[1] * dy + left[2] * dz),
+            single(upward[0] * dx + upward[1] * dy + upward[2] * dz),
+        )
+        gap = distance_to(shape, size, local)
+        gap = gap if gap > 0.0 else 0.0
+        nearness = 1.0 - gap / REACH_M
+        no_floor = abs(pz) > _FLOOR_TOLERANCE_M or names[i] == NOTHING or names[i] == name
+        nearness = 0.0 if no_floor or nearness < 0.0 else nearness
+        lights[i] *= single(1.0 - DARKNESS * nearness * nearness)
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def distance_to(shape: int, size: NDArray[np.float32] | Vector, point: Vector) -> float:
     """Metres from a point in a primitive's own axes to its surface; not positive within it."""
     x, y, z = abs(point[0]), abs(point[1]), abs(point[2])
     if shape == _SPHERE:
