@@ -88,6 +88,45 @@ def test_what_another_run_learnt_is_an_opponent(played, tmp_path, capsys):
     assert "self_play.teams" in capsys.readouterr().err
 
 
+def test_a_team_begins_with_what_another_run_learnt(played, tmp_path):
+    first = [f"warm_start.red={played / 'run'}", "opponent.blue=idle", "algo.learning_rate=1e-6"]
+    done = train(tmp_path, "run", *first, "total_frames=32", "log.keep_checkpoints=9")
+    assert done.returncode == 0, done.stderr
+    started = tmp_path / "run" / "checkpoints" / "frames_000000000000.pt"
+    begun = torch.load(started, weights_only=True)["state"]["algorithm"]["red"]
+    learnt = actors(played / "run", "red")
+    assert begun["network"].keys() == learnt.keys()
+    for name, array in learnt.items():
+        torch.testing.assert_close(begun["network"][name], array, rtol=0.0, atol=0.0)
+    assert not begun["optimizer"]["state"]
+    # resumed, it goes on from its own end, even where the other run is gone
+    config = tmp_path / "run" / "config.yaml"
+    config.write_text(config.read_text().replace(str(played / "run"), str(tmp_path / "gone")))
+    again = [sys.executable, "-m", "veca_marl.train", f"resume={tmp_path / 'run'}"]
+    done = subprocess.run([*again, "total_frames=64"], cwd=tmp_path, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["warm_start.green={run}"], "no ['green'] in PushOut1v1; choices: ['red', 'blue']"),
+        (["warm_start.blue={run}", "opponent.blue=idle"], "no ['blue']"),
+        (["warm_start.red=nowhere"], "nowhere is neither a checkpoint nor the folder of a run"),
+        (
+            ["warm_start.red={run}", "algo.network.vector_features=7"],
+            "another network: vector_features=64 there, 7 here",
+        ),
+        (["warm_start.red={run}", "senses/vision=monocular"], "other specs"),
+    ],
+)
+def test_what_cannot_be_begun_with_is_refused(played, tmp_path, arguments, message):
+    done = train(tmp_path, "run", *(text.format(run=played / "run") for text in arguments))
+    assert done.returncode == 2
+    assert message in done.stderr
+    assert not (tmp_path / "run").exists()
+
+
 def test_what_was_learnt_plays_again_elsewhere(played, tmp_path, capsys):
     table = tmp_path / "table.json"
     run, more = str(played / "run"), ["--episodes", "4", "--json", str(table)]

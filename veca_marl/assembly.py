@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from functools import partial
+from pathlib import Path
 from typing import Any, cast
 
 import torch
 from omegaconf import OmegaConf
 
 from veca_marl.algos.checkpoint import Checkpoints, Identity
+from veca_marl.algos.learnt import load_actor, load_network
 from veca_marl.algos.loop import Budget, Trainer
 from veca_marl.algos.metrics import CsvReporter, Reporter, TensorBoardReporter
-from veca_marl.algos.opponents import load_actor
 from veca_marl.algos.ppo import PPO
 from veca_marl.algos.self_play import Pool, SelfPlay
 from veca_marl.algos.specs import TeamSpec, team_specs
@@ -68,10 +69,15 @@ def make_algorithm(cfg: Config, specs: dict[str, TeamSpec], device: torch.device
     """Return what learns all teams but those with an opponent from another run.
 
     Raises:
-        CheckpointError: If an opponent cannot be loaded.
+        CheckpointError: If an opponent, or what a team begins with, cannot be loaded.
     """
     actors = {team: load_actor(path, team, specs[team]) for team, path in cfg.frozen.items()}
-    return PPO(specs, cfg.algo, device, cfg.learner, actors)
+    algorithm = PPO(specs, cfg.algo, device, cfg.learner, actors)
+    if cfg.resume is None:
+        for team, path in cfg.warm_start.items():
+            network = cfg.learner.get(team, cfg.algo).network
+            algorithm.begin_with(team, load_network(Path(path), team, specs[team], network))
+    return algorithm
 
 
 def make_self_play(cfg: Config, algorithm: PPO, pool: Pool) -> SelfPlay:

@@ -73,6 +73,9 @@ class Config:
             ``+senses/vision@team.defender.senses.vision=blind``.
         opponent: Teams that do not learn and who plays for them: expert, random, idle, or what
             another run learnt: ``opponent.defender=expert``, ``opponent.defender=runs/...``.
+        warm_start: Teams that begin with what another run has learnt, of this task or another one
+            with the same senses and actions, and its folder or a checkpoint of it:
+            ``warm_start.attacker=runs/...``.
         algo: The learning algorithm and its numbers.
         learner: The same for single teams: ``+algo@learner.attacker=mappo``.
         self_play: Which teams learn against past selves.
@@ -94,6 +97,7 @@ class Config:
     clock: ClockCfg = field(default_factory=ClockCfg)
     team: dict[str, TeamCfg] = field(default_factory=dict)
     opponent: dict[str, str] = field(default_factory=dict)
+    warm_start: dict[str, str] = field(default_factory=dict)
     algo: PPOCfg = MISSING
     learner: dict[str, PPOCfg] = field(default_factory=dict)
     self_play: SelfPlayCfg = field(default_factory=SelfPlayCfg)
@@ -139,7 +143,7 @@ class Config:
         )
 
     def check_teams(self) -> None:
-        """Refuse opponents, learners and self-play of teams that are not there to do so.
+        """Refuse what is said of teams that are not there, or not there to learn.
 
         Raises:
             ValueError: If there are any, or if nobody learns.
@@ -149,6 +153,7 @@ class Config:
         for key, asked, choices in (
             ("opponent", self.opponent, teams),
             ("learner", self.learner, learn),
+            ("warm_start", self.warm_start, learn),
             ("self_play.teams", self.self_play.teams, learn),
         ):
             unknown = sorted(set(asked) - set(choices))
@@ -178,7 +183,12 @@ def register_schemas() -> None:
     """Tell Hydra the types behind the YAML files."""
     store = ConfigStore.instance()
     schema = OmegaConf.structured(Config)
-    for by_team in ("team", "opponent", "learner"):  # take any key: the game knows its teams
+    for by_team in (
+        "team",
+        "opponent",
+        "warm_start",
+        "learner",
+    ):  # take any key: the game knows its teams
         OmegaConf.set_struct(schema[by_team], False)
     store.store(name="schema", node=schema)
     store.store(group="schema/algo", name="ppo", node=PPOCfg)

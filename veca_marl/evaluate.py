@@ -18,7 +18,7 @@ from tensordict.nn import TensorDictSequential
 
 from veca_marl.algos.checkpoint import CheckpointError
 from veca_marl.algos.evaluation import Exploration, Scores, evaluate, interval, random_policy
-from veca_marl.algos.opponents import load_actor
+from veca_marl.algos.learnt import load_actor
 from veca_marl.algos.specs import team_specs
 from veca_marl.assembly import make_env
 from veca_marl.config import Config, compose
@@ -26,7 +26,7 @@ from veca_marl.config_errors import ConfigError, one_line
 from veca_marl.envs.env import VecaEnv
 from veca_marl.run_folder import open_run
 
-_LEARNING = ("self_play", "learner", "algo@learner")
+_LEARNING = ("self_play", "warm_start", "learner", "algo@learner")
 
 Table = dict[str, dict[str, Scores]]
 

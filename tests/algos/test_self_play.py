@@ -8,9 +8,9 @@ from test_loop import FRAMES, Interrupt, read
 from veca_marl.algos.checkpoint import CheckpointError, Checkpoints, Identity
 from veca_marl.algos.collect import CollectCfg
 from veca_marl.algos.evaluation import EvalCfg
+from veca_marl.algos.learnt import load_actor
 from veca_marl.algos.loop import Budget, Trainer
 from veca_marl.algos.metrics import CsvReporter
-from veca_marl.algos.opponents import load_actor
 from veca_marl.algos.self_play import Pool, SelfPlay, SelfPlayCfg
 from veca_marl.algos.specs import team_specs
 
@@ -128,6 +128,14 @@ def test_a_frozen_opponent_is_what_another_run_learnt(make, tmp_path):
     for name, array in actor.state_dict().items():
         torch.testing.assert_close(array, learnt[name])
     assert not any(p.requires_grad for p in actor.parameters())
+
+
+def test_what_an_earlier_version_learnt_is_refused(make, tmp_path):
+    make("other", batches=1).run()
+    path = Checkpoints(tmp_path / "other" / "checkpoints", None, {}).latest()
+    torch.save(torch.load(path, weights_only=True) | {"format": 1}, path)
+    with pytest.raises(CheckpointError, match="not a checkpoint of this version"):
+        load_actor(path, "blue", team_specs(make_env(1, 0))["blue"])
 
 
 def test_opponents_that_cannot_be_loaded_are_named(make, tmp_path):

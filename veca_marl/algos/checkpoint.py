@@ -17,7 +17,8 @@ import torch
 
 from veca_marl.algos.specs import TeamSpec
 
-_FORMAT = 1
+# 2: networks compress senses of many magnitudes; the same weights did something else before
+_FORMAT = 2
 
 
 class CheckpointError(RuntimeError):
@@ -143,11 +144,20 @@ def load_checkpoint(path: Path, identity: Identity, device: torch.device) -> dic
         content = torch.load(path, map_location=device, weights_only=True)
     except (OSError, RuntimeError, EOFError, pickle.UnpicklingError) as error:
         raise CheckpointError(f"cannot read the checkpoint {path}: {error}") from error
-    if not isinstance(content, dict) or content.get("format") != _FORMAT:
-        raise CheckpointError(f"{path} is not a checkpoint of this version (format {_FORMAT})")
-    _check_identity(path, content["identity"], identity.to_dict())
+    _check_identity(path, check_format(path, content)["identity"], identity.to_dict())
     state: dict[str, Any] = content["state"]
     return state
+
+
+def check_format(path: Path, content: Any) -> dict[str, Any]:
+    """Return what was read from a file, if it is a checkpoint that means here what it meant then.
+
+    Raises:
+        CheckpointError: If it is not.
+    """
+    if not isinstance(content, dict) or content.get("format") != _FORMAT:
+        raise CheckpointError(f"{path} is not a checkpoint of this version (format {_FORMAT})")
+    return content
 
 
 def _check_identity(path: Path, stored: dict[str, Any], wanted: dict[str, Any]) -> None:

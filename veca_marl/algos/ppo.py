@@ -76,6 +76,10 @@ class PPO:
             for team, learner in self.learners.items()
         }
 
+    def begin_with(self, team: str, network: Mapping[str, Any]) -> None:
+        """Let a team begin with what another run has learnt; its optimiser begins anew."""
+        self.learners[team].network.load_state_dict(network)
+
     def state_dict(self) -> dict[str, Any]:
         """Return the state of every learner by team."""
         return {team: learner.state_dict() for team, learner in self.learners.items()}

@@ -1,8 +1,9 @@
-"""Opponents that were learnt before and do not change: the actor of a team in a checkpoint."""
+"""What a team learnt in another run: to play against, or to begin with."""
 
 from __future__ import annotations
 
 import pickle
+from dataclasses import asdict
 from enum import Enum
 from pathlib import Path
 from typing import Any
@@ -10,7 +11,7 @@ from typing import Any
 import torch
 from tensordict.nn import ProbabilisticTensorDictSequential
 
-from veca_marl.algos.checkpoint import CheckpointError
+from veca_marl.algos.checkpoint import CheckpointError, check_format
 from veca_marl.algos.encoders import Pooling
 from veca_marl.algos.networks import Critic, NetworkCfg, Parameters, Precision, TeamNetwork
 from veca_marl.algos.specs import TeamSpec
@@ -27,6 +28,31 @@ def load_actor(path: Path, team: str, spec: TeamSpec) -> ProbabilisticTensorDict
     Raises:
         CheckpointError: If there is no such checkpoint, or it does not hold this team.
     """
+    network, _ = _load(path, team, spec)
+    return network.actor.requires_grad_(False)
+
+
+def load_network(path: Path, team: str, spec: TeamSpec, cfg: NetworkCfg) -> dict[str, Any]:
+    """Return the state of a team's network, for a learner to begin with.
+
+    Args:
+        path: See `load_actor`.
+        team: See `load_actor`.
+        spec: See `load_actor`.
+        cfg: What the network shall be here.
+
+    Raises:
+        CheckpointError: See `load_actor`; also if the network was another one there.
+    """
+    network, stored = _load(path, team, spec)
+    there, here = asdict(stored), asdict(cfg)
+    other = [f"{k}={there[k]} there, {here[k]} here" for k in here if there[k] != here[k]]
+    if other:
+        raise CheckpointError(f"{path}: team {team!r} has another network: {'; '.join(other)}")
+    return network.state_dict()
+
+
+def _load(path: Path, team: str, spec: TeamSpec) -> tuple[TeamNetwork, NetworkCfg]:
     content = _read(_file(path))
     stored = content["identity"]["specs"]
     learnt = content["state"]["algorithm"]
@@ -34,9 +60,10 @@ def load_actor(path: Path, team: str, spec: TeamSpec) -> ProbabilisticTensorDict
         raise CheckpointError(f"{path} has learnt the teams {sorted(learnt)}, not {team!r}")
     if stored[team] != spec.to_dict():
         raise CheckpointError(f"{path}: team {team!r} has other specs there than here")
-    network = TeamNetwork(team, spec, _network_cfg(content["config"], team))
+    cfg = _network_cfg(content["config"], team)
+    network = TeamNetwork(team, spec, cfg)
     network.load_state_dict(learnt[team]["network"])
-    return network.actor.requires_grad_(False)
+    return network, cfg
 
 
 def _file(path: Path) -> Path:
@@ -53,9 +80,7 @@ def _read(path: Path) -> dict[str, Any]:
         content = torch.load(path, map_location="cpu", weights_only=True)
     except (OSError, RuntimeError, EOFError, pickle.UnpicklingError) as error:
         raise CheckpointError(f"cannot read the checkpoint {path}: {error}") from error
-    if not isinstance(content, dict) or not {"identity", "config", "state"} <= content.keys():
-        raise CheckpointError(f"{path} is not a checkpoint")
-    return content
+    return check_format(path, content)
 
 
 def _network_cfg(config: dict[str, Any], team: str) -> NetworkCfg:

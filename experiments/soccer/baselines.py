@@ -1,0 +1,80 @@
+"""What there is to win on the pitch against a defender that moves at random, without learning.
+
+python experiments/soccer/baselines.py                                   # as in the experiment
+python experiments/soccer/baselines.py 'task.weights={goal: 5.0}'        # Hydra overrides
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from veca_marl.config import compose
+from veca_marl.envs.experts.walking import walk_to
+from veca_marl.envs.game import Game
+from veca_marl.envs.scripts import play_script
+from veca_marl.envs.task import Player
+from veca_marl.envs.team import Script
+
+EPISODES = 48
+Command = tuple[float, float]  # speed ahead and turning rate, as shares of the greatest
+
+
+def stand(game: Game, attacker: Player) -> Command:
+    """Do nothing."""
+    return 0.0, 0.0
+
+
+def straight(game: Game, attacker: Player) -> Command:
+    """Walk on."""
+    return 1.0, 0.0
+
+
+def chase(game: Game, attacker: Player) -> Command:
+    """Walk to the ball wherever it is, and through it."""
+    return walk_to(attacker.body, game.task.ball.position)
+
+
+PLAYS: dict[str, Script | Callable[[Game, Player], Command]] = {
+    "random": Script.random,
+    "stand": stand,
+    "straight": straight,
+    "chase": chase,
+    "expert": Script.expert,
+}
+
+
+def episode(game: Game, play: Script | Callable[[Game, Player], Command], seed: int) -> Any:
+    """Play one episode; return the attacker's return and whether it scored."""
+    rng = np.random.default_rng([2026, seed])
+    game.reset(rng)
+    attacker, defender = game.players
+    paid = 0.0
+    while True:
+        if isinstance(play, Script):
+            play_script(play, game.task, attacker, lambda _: {}, rng)
+        else:
+            attacker.body.act(attacker.body.encode(play(game, attacker)))
+        play_script(Script.random, game.task, defender, lambda _: {}, rng)
+        outcome = game.advance(rng)
+        paid += game.pay(outcome.terms[attacker.name])
+        if outcome.done:
+            return paid, outcome.terminated
+
+
+def main() -> None:
+    """Print a line for each way to play."""
+    overrides = ["+experiment=soccer", "senses/vision=blind", *sys.argv[1:]]
+    game = Game(compose(overrides).game)
+    for name, play in PLAYS.items():
+        paid, scored = np.transpose([episode(game, play, seed) for seed in range(EPISODES)])
+        interval = 1.96 * paid.std(ddof=1) / EPISODES**0.5
+        print(f"{name:9}return {paid.mean():6.2f} +- {interval:.2f}, goals {scored.mean():4.0%}")
+    game.close()
+
+
+if __name__ == "__main__":
+    main()
