@@ -10,6 +10,7 @@ from veca_marl.sim.bodies.humanoid import Detail, Humanoid, HumanoidCfg
 from veca_marl.sim.bullet import pybullet
 from veca_marl.sim.inertia import Inertia, bone_inertia, joined
 from veca_marl.sim.pose import Pose
+from veca_marl.sim.scene import Shape
 from veca_marl.sim.skeleton import load_skeleton
 from veca_marl.sim.skin_springs import SkinLayer, skin_layer, skin_spring
 from veca_marl.sim.urdf import Build, body_urdf, bone_of
@@ -115,6 +116,49 @@ def test_bones_are_where_bullet_has_them(humanoid):
                 bone = humanoid.bone(name)
                 np.testing.assert_allclose(bone.position, state[4], atol=1e-6)
                 np.testing.assert_allclose(bone.rotation, turn, atol=5e-6)
+
+
+def shapes_of_bullet(humanoid):
+    """Centre and rotation of every collision shape, by bone, out of Bullet."""
+    where, client = humanoid.articulation.body_id, humanoid._world.client
+    shapes = {}
+    for link in range(-1, pybullet.getNumJoints(where, physicsClientId=client)):
+        if link < 0:
+            name = humanoid.bone_names[0]
+            frame = pybullet.getBasePositionAndOrientation(where, physicsClientId=client)
+        else:
+            name = bone_of(pybullet.getJointInfo(where, link, physicsClientId=client)[12].decode())
+            frame = pybullet.getLinkState(where, link, 0, 1, physicsClientId=client)[:2]
+        for shape in pybullet.getCollisionShapeData(where, link, physicsClientId=client):
+            place, turn = pybullet.multiplyTransforms(*frame, *shape[5:7])
+            turn = np.reshape(pybullet.getMatrixFromQuaternion(turn), (3, 3))
+            shapes.setdefault(name.partition("__")[0], []).append((np.array(place), turn))
+    return shapes
+
+
+def test_what_things_meet_is_where_it_is_drawn(humanoid):
+    """Centres and axes of all shapes."""
+    scene = humanoid._world.scene
+    rng = np.random.default_rng(0)
+    humanoid.place(rng.uniform(0.0, 2.0, 3), 0.7, rng.uniform(LOW, HIGH))
+    humanoid._world.refresh()
+    drawn, shapes = scene.objects[humanoid.object_id], shapes_of_bullet(humanoid)
+    everything = [shape for those in shapes.values() for shape in those]
+    found = 0
+    for row in range(drawn.rows.start, drawn.rows.stop):
+        if not scene.geoms.tangible[row] or scene.geoms.shapes[row] == int(Shape.SPHERE):
+            continue  # the eyes are only seen
+        bone = humanoid.bone_names[scene.geoms.frames[row] - drawn.rows.start]
+        # fingers of a mitten are shapes of the hand
+        place, axis = scene.geoms.positions[row], scene.geoms.rotations[row][:, 2]
+        near = [
+            turn for at, turn in shapes.get(bone, everything) if np.allclose(at, place, atol=1e-5)
+        ]
+        assert near, bone
+        for turn in near:
+            found += 1
+            assert abs(turn[:, 2] @ axis) == pytest.approx(1.0, abs=1e-5), bone
+    assert found >= 47
 
 
 def test_what_is_joined_weighs_as_points_do():

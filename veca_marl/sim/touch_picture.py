@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from veca_marl.sim.optics import Camera, look_at, view_axes
+from veca_marl.sim.optics import Camera, view_axes
 from veca_marl.sim.pose import Floats, Pose
 from veca_marl.sim.raster import NOTHING
 from veca_marl.sim.scene import Scene, SceneObject
@@ -23,13 +23,13 @@ PALE = (0.86, 0.86, 0.84)
 BACKGROUND = (0.13, 0.14, 0.17)
 # colours at readings of 0, a half and 1
 _SCALE = np.array([(0.98, 0.93, 0.35), (0.98, 0.55, 0.10), (0.85, 0.05, 0.10)])
-_DISTANCE_M, _FOV_DEG = 1.5, 36.0
+_DISTANCE_M, _RAISED_M, _FOV_DEG = 1.5, 0.35, 36.0
 
 
 def picture_of_touch(
     scene: Scene, body: SceneObject, readings: Floats, height: int = 252
 ) -> Images:
-    """Draw a body from the front and from behind, its touched taxels coloured.
+    """Draw a body from its front and from its back, the pelvis upright, its touched taxels coloured.
 
     Args:
         scene: The world, as of its last `update`.
@@ -69,13 +69,18 @@ def save_picture_of_touch(
 
 
 def _viewpoints(body: SceneObject) -> list[Pose]:
-    """Before and behind the pelvis, a little above: where it faces, level with the horizon."""
+    """Before and behind the pelvis, a little towards the head: what lies is seen from below, too."""
     centre = body.positions.mean(axis=0)
-    forward = body.rotations[0, :, 0] * (1.0, 1.0, 0.0)
-    length = float(np.linalg.norm(forward))
-    ahead = forward / length if length > 1e-6 else np.array([1.0, 0.0, 0.0])
-    up = np.array([0.0, 0.0, 0.35])
-    return [look_at(centre + _DISTANCE_M * way + up, centre) for way in (ahead, -ahead)]
+    ahead, _, up = body.rotations[0].T
+    return [_upright(_DISTANCE_M * way + _RAISED_M * up, centre, up) for way in (ahead, -ahead)]
+
+
+def _upright(offset: Floats, centre: Floats, up: Floats) -> Pose:
+    """Return the pose of a camera beside a point, looking at it, with `up` upwards in the picture."""
+    forward = -offset / np.linalg.norm(offset)
+    above = up - up.dot(forward) * forward
+    above /= np.linalg.norm(above)
+    return Pose(centre + offset, np.stack([forward, np.cross(above, forward), above], axis=1))
 
 
 def _portrait(

@@ -27,6 +27,7 @@ from veca_marl.sim.skin_springs import SkinLayer, is_finger, skin_layer, skin_sp
 
 SKIN_SUFFIX = "__skin"
 _LIGHT_SHARE = 0.01  # of its bone's mass, for each link that is not a bone
+_GIMBAL_LOCK = 1e-9
 _HERE = Pose(np.zeros(3), np.eye(3))
 
 
@@ -283,10 +284,16 @@ def along(axis: Floats) -> Floats:
 
 
 def _origin(pose: Pose) -> str:
-    r = pose.rotation
-    pitch = math.asin(min(max(-r[2, 0], -1.0), 1.0))
-    angles = (math.atan2(r[2, 1], r[2, 2]), pitch, math.atan2(r[1, 0], r[0, 0]))
+    angles = _roll_pitch_yaw(pose.rotation)
     return f'<origin xyz="{_numbers(*pose.position)}" rpy="{_numbers(*angles)}"/>'
+
+
+def _roll_pitch_yaw(r: Floats) -> tuple[float, float, float]:
+    """Return a rotation as turns about the fixed axes x, y and z, one after the other, rad."""
+    pitch = math.asin(min(max(-r[2, 0], -1.0), 1.0))
+    if math.hypot(r[2, 1], r[2, 2]) < _GIMBAL_LOCK:  # x stands upright: roll and yaw are one turn
+        return 0.0, pitch, math.atan2(-r[0, 1], r[1, 1])
+    return math.atan2(r[2, 1], r[2, 2]), pitch, math.atan2(r[1, 0], r[0, 0])
 
 
 def _numbers(*values: float) -> str:
