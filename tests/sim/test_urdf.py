@@ -8,12 +8,12 @@ from walking import empty_world
 
 from veca_marl.sim.bodies.humanoid import Detail, Humanoid, HumanoidCfg
 from veca_marl.sim.bullet import pybullet
+from veca_marl.sim.hulls import MARGIN_M
 from veca_marl.sim.inertia import Inertia, bone_inertia, joined
 from veca_marl.sim.pose import Pose
-from veca_marl.sim.scene import Shape
-from veca_marl.sim.skeleton import load_skeleton
+from veca_marl.sim.skeleton import BoneBox, load_skeleton
 from veca_marl.sim.skin_springs import SkinLayer, skin_layer, skin_spring
-from veca_marl.sim.urdf import Build, body_urdf, bone_of
+from veca_marl.sim.urdf import Build, _Writer, body_files, bone_of
 
 SKELETON = load_skeleton()
 LOW = np.array([joint.low_rad for joint in SKELETON.joints])
@@ -23,7 +23,8 @@ HIGH = np.array([joint.high_rad for joint in SKELETON.joints])
 @pytest.fixture(scope="module")
 def robots():
     return {
-        fingers: ET.fromstring(body_urdf(SKELETON, Build(fingers))) for fingers in (True, False)
+        fingers: ET.fromstring(body_files(SKELETON, Build(fingers)).urdf)
+        for fingers in (True, False)
     }
 
 
@@ -119,7 +120,7 @@ def test_bones_are_where_bullet_has_them(humanoid):
 
 
 def shapes_of_bullet(humanoid):
-    """Centre and rotation of every collision shape, by bone, out of Bullet."""
+    """Kind, centre and rotation of every collision shape, by bone, out of Bullet."""
     where, client = humanoid.articulation.body_id, humanoid._world.client
     shapes = {}
     for link in range(-1, pybullet.getNumJoints(where, physicsClientId=client)):
@@ -132,33 +133,77 @@ def shapes_of_bullet(humanoid):
         for shape in pybullet.getCollisionShapeData(where, link, physicsClientId=client):
             place, turn = pybullet.multiplyTransforms(*frame, *shape[5:7])
             turn = np.reshape(pybullet.getMatrixFromQuaternion(turn), (3, 3))
-            shapes.setdefault(name.partition("__")[0], []).append((np.array(place), turn))
+            bone = shapes.setdefault(name.partition("__")[0], [])
+            bone.append((shape[2], np.array(place), turn))
     return shapes
 
 
 def test_what_things_meet_is_where_it_is_drawn(humanoid):
-    """Centres and axes of all shapes."""
+    """Centres and axes of rods and boxes; hulls are in the frames of their bones."""
     scene = humanoid._world.scene
     rng = np.random.default_rng(0)
     humanoid.place(rng.uniform(0.0, 2.0, 3), 0.7, rng.uniform(LOW, HIGH))
     humanoid._world.refresh()
     drawn, shapes = scene.objects[humanoid.object_id], shapes_of_bullet(humanoid)
-    everything = [shape for those in shapes.values() for shape in those]
-    found = 0
     for row in range(drawn.rows.start, drawn.rows.stop):
-        if not scene.geoms.tangible[row] or scene.geoms.shapes[row] == int(Shape.SPHERE):
-            continue  # the eyes are only seen
         bone = humanoid.bone_names[scene.geoms.frames[row] - drawn.rows.start]
-        # fingers of a mitten are shapes of the hand
-        place, axis = scene.geoms.positions[row], scene.geoms.rotations[row][:, 2]
-        near = [
-            turn for at, turn in shapes.get(bone, everything) if np.allclose(at, place, atol=1e-5)
-        ]
-        assert near, bone
-        for turn in near:
+        if not scene.geoms.tangible[row] or bone not in shapes:
+            continue  # eyes are only seen, and fingers of a mitten are in the hulls of its hands
+        centre, axis = scene.geoms.positions[row], scene.geoms.rotations[row][:, 2]
+        found = 0
+        for kind, place, turn in shapes[bone]:
+            if kind == pybullet.GEOM_MESH:
+                frame = humanoid.bone(bone)
+                np.testing.assert_allclose(place, frame.position, atol=1e-5)
+                np.testing.assert_allclose(turn, frame.rotation, atol=1e-5)
+            elif np.allclose(place, centre, atol=1e-5):
+                assert abs(turn[:, 2] @ axis) == pytest.approx(1.0, abs=1e-5), bone
+            else:
+                continue
             found += 1
-            assert abs(turn[:, 2] @ axis) == pytest.approx(1.0, abs=1e-5), bone
-    assert found >= 47
+        assert found, bone
+
+
+def reach(bone, frame, skin_m, ways):
+    """How far the primitives of a bone at a pose stand out along directions ``(n, 3)``, metres."""
+    local = ways @ frame.rotation
+    farthest = []
+    for part in bone.colliders:
+        if isinstance(part, BoneBox):
+            far = local @ np.array(part.centre) + np.abs(local) @ (np.array(part.half) + skin_m)
+        else:
+            ends = np.stack([local @ np.array(end) for end in (part.start, part.end)])
+            far = ends.max(axis=0) + part.radius + skin_m
+        farthest.append(far)
+    return np.max(farthest, axis=0) + ways @ frame.position
+
+
+def test_hulls_of_a_mitten_reach_as_far_as_what_is_in_them():
+    files = body_files(SKELETON, Build(fingers=False))
+    assert {name.removesuffix(".obj") for name in files.hulls} == {
+        "pelvis",
+        "chest",
+        *(f"{side}_{part}" for side in "lr" for part in ("foot", "foot__skin", "hand__skin")),
+    }
+    ways = np.random.default_rng(0).normal(size=(500, 3))
+    ways /= np.linalg.norm(ways, axis=1, keepdims=True)
+    writer = _Writer(SKELETON, Build(fingers=False))
+    for name, content in files.hulls.items():
+        link = name.removesuffix(".obj")
+        index = [bone.name for bone in SKELETON.bones].index(link.partition("__")[0])
+        soft = link.endswith("__skin")
+        expected = np.max(
+            [
+                reach(part, pose, part.skin_thickness_m if soft else 0.0, ways)
+                for part, pose in writer._members(index)
+                if soft or skin_layer(part) is not SkinLayer.SKIN
+            ],
+            axis=0,
+        )
+        points = [line.split()[1:] for line in content.splitlines() if line.startswith("v")]
+        got = (ways @ np.array(points, float).T).max(axis=1) + MARGIN_M
+        # Bullet rounds the corners of boxes by its margin, by 0.73 mm at most
+    np.testing.assert_allclose(got, expected, atol=8e-4, err_msg=link)
 
 
 def test_what_is_joined_weighs_as_points_do():

@@ -29,7 +29,7 @@ _DISTANCE_M, _RAISED_M, _FOV_DEG = 1.5, 0.35, 36.0
 def picture_of_touch(
     scene: Scene, body: SceneObject, readings: Floats, height: int = 252
 ) -> Images:
-    """Draw a body from its front and from its back, the pelvis upright, its touched taxels coloured.
+    """Draw the front and the back of a body, its pelvis upright, its touched taxels coloured.
 
     Args:
         scene: The world, as of its last `update`.
@@ -69,14 +69,14 @@ def save_picture_of_touch(
 
 
 def _viewpoints(body: SceneObject) -> list[Pose]:
-    """Before and behind the pelvis, a little towards the head: what lies is seen from below, too."""
+    """Before and behind the pelvis, a little headwards: who lies is seen from below, too."""
     centre = body.positions.mean(axis=0)
     ahead, _, up = body.rotations[0].T
     return [_upright(_DISTANCE_M * way + _RAISED_M * up, centre, up) for way in (ahead, -ahead)]
 
 
 def _upright(offset: Floats, centre: Floats, up: Floats) -> Pose:
-    """Return the pose of a camera beside a point, looking at it, with `up` upwards in the picture."""
+    """Return the pose of a camera that looks at a point, with `up` upwards in the picture."""
     forward = -offset / np.linalg.norm(offset)
     above = up - up.dot(forward) * forward
     above /= np.linalg.norm(above)

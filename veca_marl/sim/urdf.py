@@ -8,7 +8,7 @@ With fingers no link has more than one shape; further ones have links of their o
 episodes long past, and a single one it takes as it is, where the frame of the link's inertia is
 that of the shape. Otherwise it wraps it up, which costs more, and what comes near is noticed only
 when it is within the bounding box. Without fingers there are up to 16 shapes in a hand, too many
-for links of their own: there all shapes are wrapped up, and their contacts are in a fixed order.
+for links of their own: there the shapes of a link are one, their hull, as in a mitten.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from veca_marl.sim.hulls import along, as_obj, surface_points
 from veca_marl.sim.inertia import Inertia, bone_inertia, joined
 from veca_marl.sim.pose import Floats, Pose
 from veca_marl.sim.skeleton import Bone, BoneBox, BoneCapsule, Joint, Skeleton
@@ -57,21 +58,41 @@ def bone_of(link: str) -> str:
     return link if rest.isdigit() else bone
 
 
-def body_urdf(skeleton: Skeleton, build: Build) -> str:
+class BodyFiles(NamedTuple):
+    """A body as Bullet reads it.
+
+    Attributes:
+        urdf: The robot.
+        hulls: Names of the files it refers to, and what they hold.
+    """
+
+    urdf: str
+    hulls: dict[str, str]
+
+
+def body_files(skeleton: Skeleton, build: Build) -> BodyFiles:
     """Return the body as a URDF robot.
 
     Joints are called `<bone>.<label>` as in the table, links as their bones.
     """
     writer = _Writer(skeleton, build)
     parts = [writer.bone(i) for i in range(len(skeleton.bones)) if not writer.is_fixed(i)]
-    return '<?xml version="1.0"?>\n<robot name="child">\n' + "\n".join(parts) + "\n</robot>\n"
+    text = '<?xml version="1.0"?>\n<robot name="child">\n' + "\n".join(parts) + "\n</robot>\n"
+    return BodyFiles(text, writer.hulls)
 
 
 class _Shape(NamedTuple):
-    """A primitive of a link: its place in the link's frame, and its geometry as URDF."""
+    """A shape of a link.
+
+    Attributes:
+        pose: Its place in the link's frame.
+        geometry: What it is as URDF.
+        points: ``(n, 3)`` its hull, in the link's frame.
+    """
 
     pose: Pose
     geometry: str
+    points: Floats
 
 
 class _Layer(NamedTuple):
@@ -86,6 +107,7 @@ class _Writer:
     def __init__(self, skeleton: Skeleton, build: Build) -> None:
         self._skeleton = skeleton
         self._build = build
+        self.hulls: dict[str, str] = {}
 
     def is_fixed(self, index: int) -> bool:
         return not self._build.fingers and is_finger(self._skeleton.bones[index])
@@ -112,9 +134,18 @@ class _Writer:
             layers = [_Layer(bone.name, soft, soft=True)]
         elif layer is SkinLayer.SKIN_OVER_BONE:
             layers.append(_Layer(bone.name + SKIN_SUFFIX, soft, soft=True))
-        return (
-            [one for layer in layers for one in _singly(layer)] if self._build.fingers else layers
-        )
+        if self._build.fingers:
+            return [one for layer in layers for one in _singly(layer)]
+        return [self._hulled(layer) for layer in layers]
+
+    def _hulled(self, layer: _Layer) -> _Layer:
+        """Make one shape of those of a link."""
+        if len(layer.shapes) < 2:
+            return layer
+        points = np.concatenate([shape.points for shape in layer.shapes])
+        file = f"{layer.link}.obj"
+        self.hulls[file] = as_obj(points)
+        return layer._replace(shapes=[_Shape(_HERE, f'<mesh filename="{file}"/>', points)])
 
     def _members(self, index: int) -> list[tuple[Bone, Pose]]:
         """Return a bone and those fixed to it, with their poses in its frame."""
@@ -154,7 +185,7 @@ class _Writer:
     def _fixed(self, layer: _Layer, light_kg: float, bone: Bone) -> str:
         """Write a light link that is one with the bone's."""
         name, centre = layer.link, layer.shapes[0].pose.position
-        speck = _speck(light_kg)._replace(centre=centre if self._build.fingers else np.zeros(3))
+        speck = _speck(light_kg)._replace(centre=centre)
         return self._link(layer, speck, 1e-7, bone) + (
             f'<joint name="{name}" type="fixed"><parent link="{bone.name}"/>'
             f'<child link="{name}"/></joint>\n'
@@ -179,8 +210,8 @@ class _Writer:
             spring += f'<damping value="{skin.damping_nspm!r}"/>'
         friction = f'<lateral_friction value="{self._build.friction!r}"/>'
         shapes = "".join(
-            f"<collision>{_origin(pose)}<geometry>{geometry}</geometry></collision>"
-            for pose, geometry in layer.shapes
+            f"<collision>{_origin(shape.pose)}<geometry>{shape.geometry}</geometry></collision>"
+            for shape in layer.shapes
         )
         matrix = inertia.matrix + rotor * np.eye(3)
         axes = _principal_axes(inertia.centre, matrix)
@@ -219,7 +250,7 @@ def _principal_axes(centre: Floats, matrix: Floats) -> Pose:
 
 def _of_shape(shapes: Sequence[_Shape], axes: Pose, matrix: Floats) -> Pose:
     """Return the frame of the shape if it serves as principal axes, else those there are."""
-    for frame, _ in shapes:
+    for frame in (shape.pose for shape in shapes):
         here = np.allclose(frame.position, axes.position, atol=1e-9)
         if here and _is_diagonal(frame.rotation.T @ matrix @ frame.rotation):
             return frame
@@ -257,7 +288,8 @@ def _shape(part: BoneCapsule | BoneBox, pose: Pose, skin_m: float) -> _Shape:
         length = float(np.linalg.norm(end - start))
         centre, turn = (start + end) / 2.0, along((end - start) / length)
         geometry = f'<capsule radius="{part.radius + skin_m:.9g}" length="{length:.9g}"/>'
-    return _Shape(Pose(pose.position + pose.rotation @ centre, pose.rotation @ turn), geometry)
+    place = Pose(pose.position + pose.rotation @ centre, pose.rotation @ turn)
+    return _Shape(place, geometry, surface_points(part, pose, skin_m))
 
 
 def _singly(layer: _Layer) -> list[_Layer]:
@@ -273,14 +305,6 @@ def _unturned(shape: _Shape) -> _Shape:
     if abs(shape.pose.rotation[2, 2]) == 1.0:
         return shape._replace(pose=Pose(shape.pose.position, np.eye(3)))
     return shape
-
-
-def along(axis: Floats) -> Floats:
-    """Return a rotation ``(3, 3)`` whose z axis is `axis`, a unit vector."""
-    helper = np.eye(3)[int(np.argmin(np.abs(axis)))]
-    x = np.cross(helper, axis)
-    x /= np.linalg.norm(x)
-    return np.stack([x, np.cross(axis, x), axis], axis=1)
 
 
 def _origin(pose: Pose) -> str:

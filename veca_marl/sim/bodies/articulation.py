@@ -14,7 +14,7 @@ from veca_marl.sim.bullet import pybullet
 from veca_marl.sim.pose import Floats, Pose
 from veca_marl.sim.rotations import cross, matrix_to_quaternion, quaternions_to_matrices
 from veca_marl.sim.skeleton import Skeleton
-from veca_marl.sim.urdf import Build, body_urdf, bone_of
+from veca_marl.sim.urdf import Build, body_files, bone_of
 
 _TOP_SPEED = 30.0  # rad/s of a joint and m/s of the body: twice what human limbs reach
 _FLAGS = (
@@ -193,8 +193,13 @@ class Articulation:
 def _load(client: int, skeleton: Skeleton, build: Build) -> int:
     """Load the body; Bullet reads robots from files only."""
     with tempfile.TemporaryDirectory() as folder:
+        files = body_files(skeleton, build)
         path = Path(folder) / "child.urdf"
-        path.write_text(body_urdf(skeleton, build), encoding="utf-8")
+        path.write_text(files.urdf, encoding="utf-8")
+        for name, content in files.hulls.items():
+            (Path(folder) / name).write_text(content, encoding="utf-8")
+        # else Bullet would keep what it read under names that never come again
+        pybullet.setPhysicsEngineParameter(enableFileCaching=0, physicsClientId=client)
         body_id: int = pybullet.loadURDF(str(path), flags=_FLAGS, physicsClientId=client)
     return body_id
 
