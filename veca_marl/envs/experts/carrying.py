@@ -11,7 +11,7 @@ import numpy as np
 from veca_marl.envs.experts.sitting import Seat
 from veca_marl.envs.experts.two_hands import Palms, TwoHands
 from veca_marl.sim.bodies.humanoid import Humanoid
-from veca_marl.sim.bodies.postures import REACHING, REACHING_DOWN
+from veca_marl.sim.bodies.postures import REACHING, REACHING_DOWN, Posture
 from veca_marl.sim.pose import Floats
 from veca_marl.sim.props import Prop
 
@@ -53,6 +53,8 @@ class Carrier:
         carrying_m: How far the block comes in a step.
         thumbs_m: Palms are so far above a block's middle: thumbs stay above its top.
         clear_m: Open palms are so far away from the block, each.
+        upright: How it sits while the hands are up.
+        bent: How it sits while they are down.
     """
 
     def __init__(
@@ -62,8 +64,10 @@ class Carrier:
         carrying_m: float = 0.006,
         thumbs_m: float = 0.008,
         clear_m: float = 0.022,
+        upright: Posture = REACHING,
+        bent: Posture = REACHING_DOWN,
     ) -> None:
-        self._hands, self._seat = TwoHands(body), Seat(body, REACHING, REACHING_DOWN)
+        self._hands, self._seat = TwoHands(body), Seat(body, upright, bent)
         self._squeeze_m, self._clear_m = squeeze_m, clear_m
         self._carrying_m, self._thumbs = carrying_m, thumbs_m * _UP
         self.reset()

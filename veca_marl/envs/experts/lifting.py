@@ -8,9 +8,12 @@ import numpy as np
 
 from veca_marl.envs.experts.carrying import Carrier, Grip, quarter_yaw
 from veca_marl.sim.bodies.humanoid import Humanoid
+from veca_marl.sim.bodies.postures import reaching
 from veca_marl.sim.pose import Floats
 from veca_marl.sim.props import Prop
 
+# less bent than a child that carries: the spine bears both arms stretched out for seconds
+UPRIGHT, BENT = reaching(15.0, 20.0), reaching(30.0, 20.0)
 _CLEAR_M = 0.022  # open palms are so far away from the toy, each
 _SQUEEZE_M = 0.03  # palms press as if they wanted to come so far into it, each
 _ABOVE = np.array([0.0, 0.0, 0.07])  # the hands come from so far above it

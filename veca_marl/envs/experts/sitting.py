@@ -17,7 +17,7 @@ _LEGS = ("thigh", "shank", "foot")
 _SIDES = ("l", "r")
 _LEANS = ("flexion", "lateral")
 _DAMPING_S = 0.03  # a trunk that sways is sent back by so much of its speed
-_GAIN = 0.05  # share of the remaining sag that is given back per call
+_GAIN = 0.03  # share of the remaining sag that is given back per call
 _NUDGE_RAD = 1e-4
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veca_marl.envs.experts.carrying import Carrier
-from veca_marl.envs.experts.lifting import lift
+from veca_marl.envs.experts.lifting import BENT, UPRIGHT, lift
 from veca_marl.envs.grasping import ToyCfg, add_toy, hand_distances, in_both_hands, lay_down
 from veca_marl.envs.task import Player, Task, humanoid, register, terms
 from veca_marl.sim.bodies.postures import REACHING
@@ -63,7 +63,7 @@ class GrabObject(Task):
     def build(self) -> None:
         self.child = humanoid(self.players[0])
         self.toy = add_toy(self.world, self.cfg)
-        self._carrier = Carrier(self.child)
+        self._carrier = Carrier(self.child, upright=UPRIGHT, bent=BENT)
         self._held_m = self._lifted_m = self._distance_m = self._approached_m = 0.0
         self._script = self._play()
 

@@ -58,9 +58,20 @@ _REACHING = {
     "thumb_proximal.flexion": -10.0,
     "thumb_distal.flexion": -15.0,
 }
-# legs apart, hands over the floor between them: holds while the hands work
-REACHING = Posture(5.0, {**_REACHING, "spine.flexion": 25.0, "chest.flexion": 20.0})
-REACHING_DOWN = Posture(5.0, {**_REACHING, "spine.flexion": 35.0, "chest.flexion": 25.0})
+
+
+def reaching(spine_deg: float, chest_deg: float) -> Posture:
+    """Return a seat that holds while the hands work: legs apart, hands over the floor between them.
+
+    Args:
+        spine_deg: How far the spine is bent forward.
+        chest_deg: How far the chest is.
+    """
+    return Posture(5.0, {**_REACHING, "spine.flexion": spine_deg, "chest.flexion": chest_deg})
+
+
+REACHING = reaching(25.0, 20.0)
+REACHING_DOWN = reaching(35.0, 25.0)
 # on the back, the right arm out to the side, palm up: whatever lies on it stays there
 OFFERING = Posture(
     -90.0,
