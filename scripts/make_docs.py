@@ -17,9 +17,11 @@ import numpy as np
 
 from veca_marl.api import make
 from veca_marl.envs.task import TASKS, Task
+from veca_marl.sim.optics import Camera, look_at
 from veca_marl.sim.senses.proprioception import ProprioceptionQuality, kept_parts, part_slices
 from veca_marl.sim.skeleton import limit_sources, load_skeleton
-from veca_marl.sim.taxels import taxels_of
+from veca_marl.sim.taxels import TAXELS_PER_TRIANGLE, taxels_of
+from veca_marl.sim.touch_picture import picture_of_touch
 
 mpl.use("Agg")
 import matplotlib.pyplot as plt
@@ -178,6 +180,26 @@ def draw_perception(frame: np.ndarray, audio: np.ndarray, path: Path) -> None:
     plt.close(figure)
 
 
+def feeling_picture(path: Path) -> None:
+    """Draw a child that lies on its back, and what its skin feels of the floor and of itself."""
+    env = make("TurnBaby", seed=2)
+    game = env.games[0]
+    player = game.players[0]
+    rng = np.random.default_rng(2)
+    game.reset(rng)
+    for _ in range(50):
+        player.body.rest()
+        game.advance(rng)
+    scene, middle = game.world.scene, player.body.position
+    camera = Camera(480, 360, fov_deg=34.0)
+    beside = look_at(middle + np.array([0.8, 0.9, 0.7]), middle)
+    readings = game.observe(player)["touch"].reshape(-1, TAXELS_PER_TRIANGLE).astype(np.float64)
+    skin = picture_of_touch(scene, scene.objects[player.body.object_id], readings, 360)
+    picture = np.concatenate([camera.render(scene, [beside]).rgb[0], skin], axis=1)
+    plt.imsave(path, picture)
+    env.close()
+
+
 def main() -> None:
     """Write all pages and pictures."""
     (DOCS / "tasks").mkdir(parents=True, exist_ok=True)
@@ -187,6 +209,7 @@ def main() -> None:
     body = DOCS / "body.md"
     body.write_text(body_page(body.read_text(encoding="utf-8")), encoding="utf-8")
     perception_picture(DOCS / "images" / "perception.png")
+    feeling_picture(DOCS / "images" / "touch.png")
 
 
 if __name__ == "__main__":
