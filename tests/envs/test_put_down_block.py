@@ -76,9 +76,10 @@ def test_pushing_the_tower_over_does_not_pay(game):
 def test_the_expert_puts_the_red_block_down(game):
     results = [play(game, seed) for seed in EXPERT_SEEDS]
     assert sum(solved for _, solved in results) >= 2
+    # to sit and look at the tower has twice as much
+    assert np.median([total["height"] for total, _ in results]) < game.max_steps
     for total, solved in results:
         assert solved == (total["blue_fell"] == 0.0)  # who fails throws the tower over
-        assert total["height"] < game.max_steps  # to sit and look at it has twice as much
     assert sits(game)
 
 

@@ -8,7 +8,8 @@ With fingers no link has more than one shape; further ones have links of their o
 episodes long past, and a single one it takes as it is, where the frame of the link's inertia is
 that of the shape. Otherwise it wraps it up, which costs more, and what comes near is noticed only
 when it is within the bounding box. Without fingers there are up to 16 shapes in a hand, too many
-for links of their own: there the shapes of a link are one, their hull, as in a mitten.
+for links of their own: there the shapes of a link are one, their hull, as in a mitten, and the
+thumb is a second one.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ from veca_marl.sim.pose import Floats, Pose
 from veca_marl.sim.skeleton import Bone, BoneBox, BoneCapsule, Joint, Skeleton
 from veca_marl.sim.skin_springs import SkinLayer, is_finger, skin_layer, skin_spring
 
-SKIN_SUFFIX = "__skin"
+SKIN_SUFFIX, THUMB_SUFFIX = "__skin", "__thumb"
 _LIGHT_SHARE = 0.01  # of its bone's mass, for each link that is not a bone
 _GIMBAL_LOCK = 1e-9
 _HERE = Pose(np.zeros(3), np.eye(3))
@@ -128,12 +129,16 @@ class _Writer:
         """Return the links of a bone that have shapes; the first is the bone itself."""
         layer = skin_layer(bone)
         rigid = [shape for part, pose in members if _is_rigid(part) for shape in _bare(part, pose)]
-        soft = [shape for part, pose in members if _is_soft(part) for shape in _skinned(part, pose)]
+        thumbs, others = _thumbs_apart([member for member in members if _is_soft(member[0])])
+        soft = [shape for part, pose in others for shape in _skinned(part, pose)]
+        thumb = [shape for part, pose in thumbs for shape in _skinned(part, pose)]
         layers = [_Layer(bone.name, rigid, soft=False)]
         if layer is SkinLayer.SKIN:
             layers = [_Layer(bone.name, soft, soft=True)]
         elif layer is SkinLayer.SKIN_OVER_BONE:
             layers.append(_Layer(bone.name + SKIN_SUFFIX, soft, soft=True))
+        if thumb:
+            layers.append(_Layer(bone.name + THUMB_SUFFIX, thumb, soft=True))
         if self._build.fingers:
             return [one for layer in layers for one in _singly(layer)]
         return [self._hulled(layer) for layer in layers]
@@ -221,6 +226,22 @@ class _Writer:
             f'<link name="{layer.link}"><contact>{friction}{spring}</contact>'
             f"{_inertial(inertia.mass_kg, axes, matrix)}{shapes}</link>\n"
         )
+
+
+_Members = list[tuple[Bone, Pose]]
+
+
+def _thumbs_apart(members: _Members) -> tuple[_Members, _Members]:
+    """Split what is fixed to a hand: a mitten has a thumb, and no web between it and the palm."""
+    thumbs = [member for member in members if _of_thumb(member[0])]
+    # with fingers a bone of a thumb is a link by itself
+    return (
+        (thumbs, [m for m in members if not _of_thumb(m[0])]) if len(members) > 1 else ([], members)
+    )
+
+
+def _of_thumb(bone: Bone) -> bool:
+    return "_thumb_" in bone.name
 
 
 def _is_rigid(bone: Bone) -> bool:
