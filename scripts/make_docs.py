@@ -16,6 +16,8 @@ import matplotlib as mpl
 import numpy as np
 
 from veca_marl.api import make
+from veca_marl.envs.env import VecaEnv
+from veca_marl.envs.game import Game
 from veca_marl.envs.task import TASKS, Task
 from veca_marl.sim.optics import Camera, look_at
 from veca_marl.sim.senses.proprioception import ProprioceptionQuality, kept_parts, part_slices
@@ -145,13 +147,17 @@ def both_sides(name: str) -> list[str]:
     return [name, f"r_{name[2:]}"] if name.startswith("l_") else [name]
 
 
+def begun(task: str, seed: int) -> tuple[VecaEnv, Game, np.random.Generator]:
+    """Return an environment, its one game at the start of an episode, and what it draws from."""
+    env, rng = make(task, seed=seed), np.random.default_rng(seed)
+    env.games[0].reset(rng)
+    return env, env.games[0], rng
+
+
 def perception_picture(path: Path) -> None:
     """Draw what an agent sees and hears at one moment of KickTheBall."""
-    env = make("KickTheBall", seed=3)
-    game = env.games[0]
+    env, game, rng = begun("KickTheBall", seed=3)
     player = game.players[0]
-    rng = np.random.default_rng(3)
-    game.reset(rng)
     # the ball ahead, to the left, in view of both eyes
     player.body.place((0.6, -0.2, 0.0), yaw_rad=1.95)
     game.task.ball.place((-0.35, 0.95, 0.15), velocity=(0.1, -0.1, 0.0))
@@ -182,11 +188,8 @@ def draw_perception(frame: np.ndarray, audio: np.ndarray, path: Path) -> None:
 
 def feeling_picture(path: Path) -> None:
     """Draw a child that lies on its back, and what its skin feels of the floor and of itself."""
-    env = make("TurnBaby", seed=2)
-    game = env.games[0]
+    env, game, rng = begun("TurnBaby", seed=2)
     player = game.players[0]
-    rng = np.random.default_rng(2)
-    game.reset(rng)
     for _ in range(50):
         player.body.rest()
         game.advance(rng)

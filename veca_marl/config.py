@@ -183,12 +183,9 @@ def register_schemas() -> None:
     """Tell Hydra the types behind the YAML files."""
     store = ConfigStore.instance()
     schema = OmegaConf.structured(Config)
-    for by_team in (
-        "team",
-        "opponent",
-        "warm_start",
-        "learner",
-    ):  # take any key: the game knows its teams
+    # these take any key: the game knows its teams
+    by_teams = ("team", "opponent", "warm_start", "learner")
+    for by_team in by_teams:
         OmegaConf.set_struct(schema[by_team], False)
     store.store(name="schema", node=schema)
     store.store(group="schema/algo", name="ppo", node=PPOCfg)

@@ -117,12 +117,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         folder = open_run(asked.run)
         matches = tournament(folder, asked.members, asked.episodes, asked.draw_margin)
     except (ConfigError, CheckpointError) as error:
-        print(f"error: {one_line(error)}", file=sys.stderr)  # noqa: T201
+        print(f"error: {one_line(error)}", file=sys.stderr)
         return 2
     ratings = rate(matches)
     write_results(folder.path, matches, ratings)
     for rating in sorted(ratings, key=lambda r: -r.elo):
-        print(f"{rating.elo:7.0f}  {rating.team} after {rating.frames} frames")  # noqa: T201
+        print(f"{rating.elo:7.0f}  {rating.team} after {rating.frames} frames")
     draw_matrix(folder.path / "cross_play.png", matches)
     return 0
 

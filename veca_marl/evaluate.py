@@ -124,10 +124,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         table = play_again(asked.run, asked.override, asked.episodes, how, asked.seed)
     except (ConfigError, CheckpointError) as error:
-        print(f"error: {one_line(error)}", file=sys.stderr)  # noqa: T201
+        print(f"error: {one_line(error)}", file=sys.stderr)
         return 2
     rows = summary(table)
-    print(*lines(rows), sep="\n")  # noqa: T201
+    print(*lines(rows), sep="\n")
     if asked.json is not None:
         asked.json.write_text(json.dumps(rows, indent=2) + "\n")
     return 0

@@ -43,7 +43,7 @@ def train(cfg: Config, folder: RunFolder, trainer: Trainer) -> list[str]:
         reporter.close()
     folder.write("comparison.txt", "\n".join(lines))
     folder.write("timing.txt", trainer.timing())
-    print(trainer.timing(), *lines, f"run folder: {folder.path}", sep="\n")  # noqa: T201
+    print(trainer.timing(), *lines, f"run folder: {folder.path}", sep="\n")
     return lines
 
 
@@ -86,7 +86,7 @@ def run(node: DictConfig) -> None:
     try:
         train(cfg, folder, trainer)
     except KeyboardInterrupt:
-        print(f"\ninterrupted; continue with: {_COMMAND} resume={path}", file=sys.stderr)  # noqa: T201
+        print(f"\ninterrupted; continue with: {_COMMAND} resume={path}", file=sys.stderr)
         raise SystemExit(130) from None
     except CheckpointError as error:
         give_up(error)
@@ -111,7 +111,7 @@ def set_up(node: DictConfig, path: Path) -> tuple[Config, RunFolder, Trainer]:
 
 def give_up(error: Exception) -> NoReturn:
     """Say in one line what is wrong and end with status 2."""
-    print(f"error: {one_line(error)}", file=sys.stderr)  # noqa: T201
+    print(f"error: {one_line(error)}", file=sys.stderr)
     raise SystemExit(2)
 
 

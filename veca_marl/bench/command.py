@@ -30,21 +30,21 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         game = compose(_overrides(asked)).game
     except ConfigError as error:
-        print(error, file=sys.stderr)  # noqa: T201
+        print(error, file=sys.stderr)
         return 2
-    print(f"processor time of one thread; {_load()}\n")  # noqa: T201
+    print(f"processor time of one thread; {_load()}\n")
     with _played(game, 1, asked.things) as task:
         first_world_s = measure_first_world(replace(game, task=task))
-    print(f"the first world of this process: {first_world_s:.2f} s\n")  # noqa: T201
+    print(f"the first world of this process: {first_world_s:.2f} s\n")
     runs = []
     for agents in asked.agents:
         for worlds in asked.worlds:
             runs.append(_measure(game, agents, worlds, asked))
-            print(rollouts_table(runs[-1]), end="\n\n")  # noqa: T201
+            print(rollouts_table(runs[-1]), end="\n\n")
     references = None
     if not asked.skip_references:
         references = measure_references(game.playground, asked.steps, asked.repeats)
-        print(references_table(references))  # noqa: T201
+        print(references_table(references))
     if asked.json is not None:
         asked.json.write_text(as_json(first_world_s, runs, references))
     return 0

@@ -41,4 +41,4 @@ def announce_compilation() -> None:
 
 
 def _to_stderr(line: str) -> None:
-    print(line, file=sys.stderr)  # noqa: T201
+    print(line, file=sys.stderr)

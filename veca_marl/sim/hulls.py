@@ -12,6 +12,7 @@ import math
 import numpy as np
 
 from veca_marl.sim.pose import Floats, Pose
+from veca_marl.sim.rotations import rotation_with_z
 from veca_marl.sim.skeleton import BoneBox, BoneCapsule
 
 # Bullet lays a skin of its own round every hull (`gDefaultCollisionMargin` of its importer)
@@ -45,21 +46,13 @@ def as_obj(points: Floats) -> str:
     return "\n".join(rows) + "\n"
 
 
-def along(axis: Floats) -> Floats:
-    """Return a rotation ``(3, 3)`` whose z axis is `axis`, a unit vector."""
-    helper = np.eye(3)[int(np.argmin(np.abs(axis)))]
-    x = np.cross(helper, axis)
-    x /= np.linalg.norm(x)
-    return np.stack([x, np.cross(axis, x), axis], axis=1)
-
-
 def _half_sphere(axis: Floats) -> Floats:
     """Points on the unit half sphere about an axis, the rim included."""
     polar = np.linspace(0.0, math.pi / 2.0, _RINGS)
     around = np.linspace(0.0, 2.0 * math.pi, _AROUND, endpoint=False)
     polar, around = (grid.ravel() for grid in np.meshgrid(polar, around))
     x, y = np.sin(polar) * np.cos(around), np.sin(polar) * np.sin(around)
-    points: Floats = np.stack([x, y, np.cos(polar)], axis=1) @ along(axis).T
+    points: Floats = np.stack([x, y, np.cos(polar)], axis=1) @ rotation_with_z(axis).T
     return np.unique(points.round(12), axis=0)
 
 

@@ -39,6 +39,14 @@ def quaternions_to_matrices(quaternions: Floats, out: Floats) -> None:
         out[n, 2, 2] = 1.0 - (x * xs + y * ys)
 
 
+def rotation_with_z(axis: Floats) -> Floats:
+    """Return a rotation ``(3, 3)`` whose z axis is `axis`, a unit vector."""
+    helper = np.eye(3)[int(np.argmin(np.abs(axis)))]
+    x = np.cross(helper, axis)
+    x /= np.linalg.norm(x)
+    return np.stack([x, np.cross(axis, x), axis], axis=1)
+
+
 def cross(a: Sequence[float] | Floats, b: Sequence[float] | Floats) -> Floats:
     """Return the cross product of two single vectors, at a tenth of the price of numpy's."""
     (ax, ay, az), (bx, by, bz) = (v.tolist() if isinstance(v, np.ndarray) else v for v in (a, b))

@@ -16,7 +16,8 @@ _STAMP = "kernel-sources.txt"
 def forget_stale_kernels(sources: Path) -> None:
     """Delete what numba compiled of a folder's sources, if any of them is not as it was then.
 
-    Where the folder cannot be written, numba does not keep kernels in it, and nothing is done.
+    Where the folder cannot be written, or `NUMBA_CACHE_DIR` is set, numba keeps kernels elsewhere,
+    and those are not looked at.
 
     Args:
         sources: The folder of the sources; its `__pycache__` gets a note of what they were.

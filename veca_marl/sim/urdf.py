@@ -21,9 +21,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from veca_marl.sim.hulls import along, as_obj, surface_points
+from veca_marl.sim.hulls import as_obj, surface_points
 from veca_marl.sim.inertia import Inertia, bone_inertia, joined
 from veca_marl.sim.pose import Floats, Pose
+from veca_marl.sim.rotations import rotation_with_z
 from veca_marl.sim.skeleton import Bone, BoneBox, BoneCapsule, Joint, Skeleton
 from veca_marl.sim.skin_springs import SkinLayer, is_finger, skin_layer, skin_spring
 
@@ -129,9 +130,15 @@ class _Writer:
         """Return the links of a bone that have shapes; the first is the bone itself."""
         layer = skin_layer(bone)
         rigid = [shape for part, pose in members if _is_rigid(part) for shape in _bare(part, pose)]
-        thumbs, others = _thumbs_apart([member for member in members if _is_soft(member[0])])
-        soft = [shape for part, pose in others for shape in _skinned(part, pose)]
-        thumb = [shape for part, pose in thumbs for shape in _skinned(part, pose)]
+        soft, thumb = (
+            [
+                shape
+                for part, pose in members
+                if _is_soft(part) and _is_thumb_on(bone, part) is of_thumb
+                for shape in _skinned(part, pose)
+            ]
+            for of_thumb in (False, True)
+        )
         layers = [_Layer(bone.name, rigid, soft=False)]
         if layer is SkinLayer.SKIN:
             layers = [_Layer(bone.name, soft, soft=True)]
@@ -228,20 +235,9 @@ class _Writer:
         )
 
 
-_Members = list[tuple[Bone, Pose]]
-
-
-def _thumbs_apart(members: _Members) -> tuple[_Members, _Members]:
-    """Split what is fixed to a hand: a mitten has a thumb, and no web between it and the palm."""
-    thumbs = [member for member in members if _of_thumb(member[0])]
-    # with fingers a bone of a thumb is a link by itself
-    return (
-        (thumbs, [m for m in members if not _of_thumb(m[0])]) if len(members) > 1 else ([], members)
-    )
-
-
-def _of_thumb(bone: Bone) -> bool:
-    return "_thumb_" in bone.name
+def _is_thumb_on(hand: Bone, part: Bone) -> bool:
+    """Whether a bone is of a thumb that is fixed to a hand: a mitten has no web beside its palm."""
+    return part is not hand and "_thumb_" in part.name
 
 
 def _is_rigid(bone: Bone) -> bool:
@@ -307,7 +303,7 @@ def _shape(part: BoneCapsule | BoneBox, pose: Pose, skin_m: float) -> _Shape:
     else:
         start, end = np.array(part.start), np.array(part.end)
         length = float(np.linalg.norm(end - start))
-        centre, turn = (start + end) / 2.0, along((end - start) / length)
+        centre, turn = (start + end) / 2.0, rotation_with_z((end - start) / length)
         geometry = f'<capsule radius="{part.radius + skin_m:.9g}" length="{length:.9g}"/>'
     place = Pose(pose.position + pose.rotation @ centre, pose.rotation @ turn)
     return _Shape(place, geometry, surface_points(part, pose, skin_m))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tempfile
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -76,7 +76,7 @@ class Articulation:
         self._turn = np.zeros((1, 3, 3))
         self._prepare(infos, {bone.name for bone in skeleton.bones})
 
-    def _prepare(self, infos: list[tuple], bones: set[str]) -> None:  # type: ignore[type-arg]
+    def _prepare(self, infos: list[tuple[Any, ...]], bones: set[str]) -> None:
         """Let joints swing freely, limit their speed and say which links may meet."""
         colliders = [(-1, "pelvis")]
         for info in infos:
@@ -183,8 +183,8 @@ class Articulation:
             physicsClientId=self._client,
         )
 
-    def _dynamics(self, link: int) -> tuple:  # type: ignore[type-arg]
-        info: tuple = pybullet.getDynamicsInfo(  # type: ignore[type-arg]
+    def _dynamics(self, link: int) -> tuple[Any, ...]:
+        info: tuple[Any, ...] = pybullet.getDynamicsInfo(
             self.body_id, link, physicsClientId=self._client
         )
         return info

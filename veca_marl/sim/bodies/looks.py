@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from veca_marl.sim.bodies.mounts import EYES, ORGANS_M
 from veca_marl.sim.meshes import Mesh
-from veca_marl.sim.pose import Floats
+from veca_marl.sim.rotations import rotation_with_z
 from veca_marl.sim.scene import Geom, Shape
 from veca_marl.sim.skeleton import Bone, BoneBox, BoneCapsule, Skeleton
 from veca_marl.sim.skin_mesh import load_skin
@@ -78,15 +78,7 @@ def _geom(part: BoneCapsule | BoneBox, bone: Bone, colour: tuple[float, float, f
         (part.radius + skin, length),
         colour,
         (start + end) / 2,
-        _along((end - start) / length),
+        rotation_with_z((end - start) / length),
         visible=False,
         skin_m=skin,
     )
-
-
-def _along(axis: Floats) -> Floats:
-    """Return a rotation whose z axis is `axis`."""
-    helper = np.eye(3)[int(np.argmin(np.abs(axis)))]
-    x = np.cross(helper, axis)
-    x /= np.linalg.norm(x)
-    return np.stack([x, np.cross(axis, x), axis], axis=1)
