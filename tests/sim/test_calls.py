@@ -7,7 +7,9 @@ import pytest
 from walking import empty_world, walker_in
 
 from veca_marl.sim.bodies.controls import MOVES, ActionKind
-from veca_marl.sim.bodies.voice_controls import BANDS, VoiceKind, action_control
+from veca_marl.sim.bodies.humanoid import JointActionKind
+from veca_marl.sim.bodies.joint_controls import Springs
+from veca_marl.sim.bodies.voice_controls import BANDS, CallNumber, VoiceKind, action_control
 from veca_marl.sim.calls import CALLS, Call, CallCfg, call_waveform
 from veca_marl.sim.senses.audio import AudioCfg, AudioSense
 
@@ -145,3 +147,48 @@ def test_a_call_is_called_to_its_end_and_not_queued():
         walker.act(np.zeros(3))
         world.step()
     assert not walker._voice.speaking
+
+
+# ---- joint by joint
+
+
+@pytest.mark.parametrize("action", JointActionKind)
+def test_a_joint_level_row_ends_with_the_call_and_moves_the_joints_as_without(make_child, action):
+    wanted = np.zeros(82)
+    wanted[5] = 0.2
+    _, silent = make_child(action=action)
+    _, calling = make_child(action=action, voice=VoiceKind.calls)
+    row = silent.encode(Springs(wanted, ahead_s=0.0, call=Call.rising))
+    for call in Call:
+        longer = calling.encode(Springs(wanted, ahead_s=0.0, call=call))
+        assert (longer.shape, longer.dtype) == (calling.action_spec.shape, np.float32)
+        np.testing.assert_array_equal(longer[:-1], row)
+        assert CallNumber().decode(longer[-1:]) is call
+    assert CallNumber().decode(calling.encode(wanted)[-1:]) is Call.none
+
+
+def test_a_joint_level_body_calls_and_its_torques_alone_are_silent(make_child):
+    world, child = make_child(voice=VoiceKind.calls)
+    ear = AudioSense(AudioCfg(waveform=True), child, world.sound)
+    row = np.zeros(83)
+
+    def heard():
+        world.step()
+        return np.abs(ear.read()["waveform"]).max()
+
+    child.act(row)
+    assert heard() == 0.0
+    child.apply_torque(np.zeros(82))
+    assert heard() == 0.0
+    row[-1] = -1.0
+    child.act(row)
+    assert heard() > 0.0
+
+
+@pytest.mark.parametrize("wrong", [np.nan, 1.01, -7.0])
+def test_an_impossible_call_is_refused_and_moves_nothing(make_child, wrong):
+    _, child = make_child(voice=VoiceKind.calls)
+    before = child._wishes.copy()
+    with pytest.raises(ValueError, match=r"action: the number of the call is .*, not in \[-1, 1\]"):
+        child.act(np.append(np.ones(82), wrong))
+    np.testing.assert_array_equal(child._wishes, before)

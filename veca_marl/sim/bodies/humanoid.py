@@ -30,6 +30,8 @@ from veca_marl.sim.bodies.postures import (
     posture_angles,
     varied,
 )
+from veca_marl.sim.bodies.voice_controls import ROW_ENDS, VoiceKind
+from veca_marl.sim.calls import Call
 from veca_marl.sim.pose import Floats, Pose
 from veca_marl.sim.rotations import heading_rad
 from veca_marl.sim.skeleton import Underside, forward_kinematics
@@ -57,6 +59,7 @@ class HumanoidCfg(BodyCfg):
             and names are the same: the mitten ignores what is asked of its fingers.
         action: Normalised torques, angles to go to, or how far these angles go on.
         joints: Which joints an action row moves: all 82, or the 40 of the limbs without fingers.
+        voice: Whether an action row also holds a call, as its last number, see `voice_controls`.
         strength: Share of the torques in the table of joints.
         friction: Lateral friction of the skin.
     """
@@ -64,6 +67,7 @@ class HumanoidCfg(BodyCfg):
     detail: Detail = Detail.full
     action: JointActionKind = JointActionKind.torque
     joints: JointChoice = JointChoice.all
+    voice: VoiceKind = VoiceKind.silent
     strength: float = 1.0
     friction: float = 0.8
 
@@ -74,6 +78,7 @@ class HumanoidCfg(BodyCfg):
             ("detail", Detail),
             ("action", JointActionKind),
             ("joints", JointChoice),
+            ("voice", VoiceKind),
         ):
             if not isinstance(getattr(self, name), kind):
                 choices = [choice.name for choice in kind]
@@ -97,7 +102,9 @@ class Humanoid(Figure):
         self._refuse_long_steps(world.clock.substep_s)
         self._control, self._rows = JOINT_ACTIONS[cfg.action]
         self._chosen = np.array(chosen_joints(self._skeleton, cfg.joints))
-        self.action_spec = ArraySpec((len(self._chosen),), np.float32, -1.0, 1.0)
+        self._end = ROW_ENDS[cfg.voice]
+        length = len(self._chosen) + self._end.numbers
+        self.action_spec = ArraySpec((length,), np.float32, -1.0, 1.0)
         self._low = np.array([joint.low_rad for joint in self._skeleton.joints])
         self._high = np.array([joint.high_rad for joint in self._skeleton.joints])
         # of what does not move there is neither angle nor torque
@@ -179,7 +186,9 @@ class Humanoid(Figure):
     # ---- what it can do
 
     def act(self, action: NDArray[Any]) -> None:
-        """Drive the joints as an action row says; it holds until the next call.
+        """Drive the joints and call as an action row says; the joints' part holds until the next.
+
+        A call that has begun is called to its end: until then others go unsaid.
 
         Raises:
             ValueError: If the row has another length or a number outside [-1, 1].
@@ -187,12 +196,15 @@ class Humanoid(Figure):
         row = np.asarray(action, np.float64)
         if row.shape != self.action_spec.shape:
             raise ValueError(f"action of shape {row.shape}, not {self.action_spec.shape}")
+        joints, end = np.split(row, [len(self._chosen)])
         # written so that a NaN fails as well
-        wrong = np.flatnonzero(~(np.abs(row) <= 1.0))
+        wrong = np.flatnonzero(~(np.abs(joints) <= 1.0))
         if wrong.size:
             joint = self.joint_names[self._chosen[wrong[0]]]
             raise ValueError(f"action of {joint} is {row[wrong[0]]}, not in [-1, 1]")
-        self._wishes[self._chosen] = self._rows.heed(row, self._wishes[self._chosen])
+        call = self._end.decode(end)
+        self._wishes[self._chosen] = self._rows.heed(joints, self._wishes[self._chosen])
+        self.call(call)
 
     def apply_torque(self, normalised: Floats) -> None:
         """Drive all 82 joints by shares of their strength in [-1, 1] (the paper's API).
@@ -204,7 +216,7 @@ class Humanoid(Figure):
             raise ValueError(
                 f"{self.name}: apply_torque needs body.action=torque and body.joints=all"
             )
-        self.act(normalised)
+        self.act(np.append(normalised, self._end.encode(Call.none)))
 
     def rest(self) -> None:
         """Try to keep all joints where they are."""
@@ -216,7 +228,7 @@ class Humanoid(Figure):
         It asks a position-controlled body for these angles; to a torque-controlled one it gives
         the torques that the position control would give at the end of the agent step: those that
         it would give now shake the body, for they hold for the whole step. A wish of `Springs`
-        says itself how far ahead.
+        says itself how far ahead, and may hold a call.
         """
         calm = self._world.clock.step_s
         springs = wish if isinstance(wish, Springs) else Springs(np.asarray(wish), calm)
@@ -224,7 +236,7 @@ class Humanoid(Figure):
         angles = self.foresee(targets, springs.ahead_s)
         wishes = self._control.wishes(targets, angles, self._low, self._high)
         row = self._rows.towards(wishes[self._chosen], self._wishes[self._chosen])
-        return row.astype(np.float32)
+        return np.append(row, self._end.encode(springs.call)).astype(np.float32)
 
     def foresee(self, targets: Floats, ahead_s: float | None = None) -> Floats:
         """Return the ``(82,)`` angles (rad) a while after springs begin to pull to targets.

@@ -7,6 +7,7 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
+from veca_marl.sim.calls import Call
 from veca_marl.sim.pose import Floats
 from veca_marl.sim.skeleton import Skeleton
 from veca_marl.sim.skin_springs import is_finger
@@ -19,10 +20,12 @@ class Springs(NamedTuple):
         targets: ``(82,)`` rad, where springs pull the joints to.
         ahead_s: Their stretch is measured so long ahead. One agent step is calm, see
             `foresight`; 0 s is as strong as can be, and shakes who keeps still.
+        call: What is called, by a body that has a vocabulary of calls.
     """
 
     targets: Floats
     ahead_s: float
+    call: Call = Call.none
 
 
 class JointControl(Protocol):

@@ -1,9 +1,10 @@
-"""Action rows of walking bodies that also call.
+"""Action rows of bodies that also call.
 
 Policy heads know one continuous or one categorical row per agent, so a call is part of that row:
 
-- continuous: one more number. Five equal bands of [-1, 1] are the five calls, silence in the
-  middle, so that a row of zeros is silent; a policy that explores widely calls most of the time;
+- continuous, walking or joint by joint: one more number. Five equal bands of [-1, 1] are the five
+  calls, silence in the middle, so that a row of zeros is silent; a policy that explores widely
+  calls most of the time;
 - discrete: the product of moves and calls. The silent ones come first, so that what was chosen
   without a voice is chosen with the same numbers.
 
@@ -26,6 +27,7 @@ from veca_marl.sim.bodies.controls import (
     WalkControl,
 )
 from veca_marl.sim.calls import Call
+from veca_marl.sim.pose import Floats
 from veca_marl.sim.spec import ArraySpec
 
 # from the lowest band of the number to the highest
@@ -37,6 +39,62 @@ class VoiceKind(Enum):
 
     silent = "silent"
     calls = "calls"
+
+
+class RowEnd(Protocol):
+    """What comes after the movements in a row of numbers.
+
+    Attributes:
+        numbers: How many.
+    """
+
+    numbers: int
+
+    def decode(self, numbers: NDArray[Any]) -> Call:
+        """Return the call that they say; raise `ValueError` for an impossible one."""
+        ...
+
+    def encode(self, call: Call) -> Floats:
+        """Return the numbers ``(numbers,)`` that say a call."""
+        ...
+
+
+class NoCall:
+    """Nothing: calls are not said."""
+
+    numbers = 0
+
+    def decode(self, numbers: NDArray[Any]) -> Call:
+        """See `RowEnd`."""
+        return Call.none
+
+    def encode(self, call: Call) -> Floats:
+        """See `RowEnd`."""
+        return np.empty(0)
+
+
+class CallNumber:
+    """A number in [-1, 1] whose band of width 0.4 is the call."""
+
+    numbers = 1
+
+    def decode(self, numbers: NDArray[Any]) -> Call:
+        """See `RowEnd`."""
+        number = float(numbers[0])
+        if not -1.0 <= number <= 1.0:
+            raise ValueError(f"action: the number of the call is {number}, not in [-1, 1]")
+        band = int((number + 1.0) / 2.0 * len(BANDS))
+        return BANDS[min(band, len(BANDS) - 1)]
+
+    def encode(self, call: Call) -> Floats:
+        """Return the middle of the call's band."""
+        return np.array([(BANDS.index(call) + 0.5) / len(BANDS) * 2.0 - 1.0])
+
+
+ROW_ENDS: dict[VoiceKind, RowEnd] = {
+    VoiceKind.silent: NoCall(),
+    VoiceKind.calls: CallNumber(),
+}
 
 
 class ActionControl(Protocol):
@@ -70,26 +128,21 @@ class Silent:
 
 
 class ContinuousCalls:
-    """A row ``(3,)``: forward, turn, and a number whose band of width 0.4 is the call."""
+    """A row ``(3,)``: forward, turn, and the number of a call."""
 
     spec = ArraySpec((3,), np.float32, -1.0, 1.0)
-    _walk = ContinuousWalk()
+    _walk, _call = ContinuousWalk(), CallNumber()
 
     def decode(self, row: NDArray[Any]) -> tuple[float, float, Call]:
         """See `ActionControl`."""
         if np.shape(row) != self.spec.shape:
             raise ValueError(f"action {row!r} must be the three numbers (forward, turn, call)")
-        forward, turn = self._walk.decode(row[:2])
-        number = float(row[2])
-        if not -1.0 <= number <= 1.0:
-            raise ValueError(f"action {row!r}: the number of the call must be in [-1, 1]")
-        band = int((number + 1.0) / 2.0 * len(BANDS))
-        return forward, turn, BANDS[min(band, len(BANDS) - 1)]
+        return *self._walk.decode(row[:2]), self._call.decode(row[2:])
 
     def encode(self, forward: float, turn: float, call: Call) -> NDArray[Any]:
         """Return the walk and the middle of the call's band."""
-        number = (BANDS.index(call) + 0.5) / len(BANDS) * 2.0 - 1.0
-        return np.append(self._walk.encode(forward, turn), np.float32(number))
+        walk = self._walk.encode(forward, turn)
+        return np.append(walk, self._call.encode(call)).astype(np.float32)
 
 
 class DiscreteCalls:
