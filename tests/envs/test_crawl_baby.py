@@ -1,7 +1,5 @@
 """CrawlBaby: getting ahead pays, the start holds, the expert crawls."""
 
-import math
-
 import numpy as np
 import pytest
 from babies import (
@@ -15,7 +13,6 @@ from babies import (
     terms_at_rest,
 )
 
-from veca_marl.envs.experts.crawl import Crawl
 from veca_marl.envs.tasks.crawl_baby import CrawlBabyCfg
 from veca_marl.sim.bodies.postures import ON_ALL_FOURS, ON_BACK
 
@@ -69,32 +66,8 @@ def test_the_expert_crawls_ahead(body):
             outcomes, way_m = play(game, rng)
             speeds_mps += [outcome.terms["agents"]["forward"] for outcome in outcomes]
             ways_m.append(way_m)
-    assert np.mean(ways_m) > 0.2
-    assert np.mean(speeds_mps) > 0.04
-
-
-def heading(body):
-    return math.atan2(body.forward[1], body.forward[0])
-
-
-def turned_deg(game, turn, seed):
-    game.reset(np.random.default_rng(seed))
-    body, name = game.players[0].body, game.players[0].name
-    crawl, headings = Crawl(body, 0.04), [heading(body)]
-    for _ in range(150):
-        game.step({name: body.encode(crawl.wish(turn))}, np.random.default_rng(0))
-        headings.append(heading(body))
-    return math.degrees(np.unwrap(headings)[-1] - headings[0])
-
-
-def test_a_twist_of_the_trunk_steers_it():
-    """Single tries differ much, so the middle one of five counts."""
-    with child_game("CrawlBaby", "body=mitten") as game:
-        left, right = (
-            np.median([turned_deg(game, turn, seed) for seed in range(5)]) for turn in (1.0, -1.0)
-        )
-    assert left > 15.0
-    assert right < -15.0
+    assert min(ways_m) > 1.0
+    assert np.mean(speeds_mps) > 0.15
 
 
 def test_a_walker_is_refused():

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from seeking import shipped, walker_at
 
-from veca_marl.envs.experts.seeking import walk_to
+from veca_marl.envs.experts.walking import walk_to
 from veca_marl.envs.floor_plan import FloorPlan
 from veca_marl.sim.playground import DoorCfg, PlaygroundCfg, RoomCfg
 from veca_marl.sim.world import World
@@ -99,8 +99,8 @@ def test_a_walker_comes_from_every_room_to_the_next_and_back(house):
     for begin, end in pairs + [(end, begin) for begin, end in pairs]:
         walker.place(tuple(begin.middle_m), 1.0)
         for _ in range(25 * 20):
-            forward, turn, _ = walk_to(walker, plan.waypoint(walker.position, end.middle_m))
-            walker.act(walker.encode((forward, turn)))
+            way = walk_to(walker, plan.waypoint(walker.position, end.middle_m))
+            walker.act(walker.encode(way))
             world.step()
             if math.dist(walker.position[:2], end.middle_m[:2]) < 0.2:
                 break

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from veca_marl.config import ConfigError, compose
+from veca_marl.envs.contests import line_up
 from veca_marl.envs.game import Game
 from veca_marl.envs.tasks.multi_agent_nav import MultiAgentNavCfg, Muted
 from veca_marl.sim.calls import CALLS, Call, call_waveform
@@ -223,7 +224,7 @@ def test_impossible_numbers_are_refused(wrong, message):
         compose(["+task=MultiAgentNav", wrong])
 
 
-def test_bodies_with_joints_play_but_their_expert_is_not_written():
+def test_bodies_with_joints_play_and_are_heard():
     game = game_of("body=mitten")
     game.reset(np.random.default_rng(0))
     one, other = game.players
@@ -239,8 +240,27 @@ def test_bodies_with_joints_play_but_their_expert_is_not_written():
         loud.append(game.observe(other)["audio"].max())
         assert set(outcome.terms[one.name]) == {"reached", "ahead", "aside"}
     assert loud[1] > loud[0] + 3.0
-    with pytest.raises(ValueError, match="choose body=walker"):
-        game.task.expert(one, {})
+    game.close()
+
+
+def test_a_joint_level_body_crawls_to_the_object_that_it_sees_and_calls():
+    game = game_of("body=mitten_voice", "senses/touch=numb", "task.max_seconds=30")
+    rng = np.random.default_rng(0)
+    game.reset(rng)
+    finder, other = game.players
+    assert finder.body.bone("chest").forward[2] < -0.8
+    room = game.task.plan.rooms[0]
+    line_up(finder, room.middle_m - np.array([0.8, 0.0, 0.0]), 0.0)
+    game.task.target.place(room.middle_m + np.array([0.7, 0.0, 0.2]))
+    game.world.refresh()
+    called = False
+    while finder.name not in game.task.arrived:
+        wish = game.task.expert(finder, game.observe(finder))
+        rest = np.zeros(other.body.action_spec.shape, np.float32)
+        rows = {finder.name: finder.body.encode(wish), other.name: rest}
+        called = called or rows[finder.name][-1] > 0.6
+        assert not game.step(rows, rng).done
+    assert called
     game.close()
 
 

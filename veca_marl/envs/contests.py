@@ -16,6 +16,8 @@ from veca_marl.sim.pose import Floats
 from veca_marl.sim.props import PropCfg, PropShape
 from veca_marl.sim.world import World
 
+_FAR_M = 10.0
+
 Colour = tuple[float, float, float]
 
 
@@ -32,6 +34,17 @@ def line_up(player: Player, place: Floats, heading_rad: float) -> None:
         player.body.place(spot, heading_rad, ON_ALL_FOURS)
     else:
         player.body.place(spot, heading_rad)
+
+
+def look_ahead(players: Sequence[Player]) -> None:
+    """Let the eyes of joint-level bodies look ahead to the horizon, as far as they turn.
+
+    On hands and knees the face is turned to the floor.
+    """
+    for player in players:
+        body = player.body
+        if isinstance(body, Humanoid):
+            body.look_toward_point(body.mount("head").position + _FAR_M * body.forward)
 
 
 def opponents(player: Player, players: Sequence[Player]) -> list[Player]:

@@ -3,131 +3,177 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 
-from veca_marl.envs.task import Player
 from veca_marl.sim.bodies.humanoid import Humanoid
 from veca_marl.sim.bodies.joint_controls import Springs
-from veca_marl.sim.bodies.postures import ON_ALL_FOURS
 from veca_marl.sim.pose import Floats
 
-# Drawn by hand, then improved by a random search for the way covered, with torques and with
-# position targets. Each joint, in degrees: its middle, how far it swings to and fro with its limb,
-# and how much it bends besides while the limb goes forward.
-_FREQUENCY_HZ = 0.84
-_LEAD_RAD = 0.25  # of the hand before the knee of the other side
-_LEG = {
-    "thigh.flexion": (94.0, 22.6, 10.6),
-    "thigh.abduction": (17.6, 0.0, -2.1),
-    "shank.flexion": (109.5, 9.8, 17.5),
-    "foot.dorsiflexion": (-58.0, 0.0, 0.0),
-}
-_ARM = {
-    "upper_arm.flexion": (74.5, 27.0, 13.2),
-    "upper_arm.abduction": (13.4, 0.0, 0.0),
-    "forearm.flexion": (-4.3, 0.0, 37.1),
-    "hand.flexion": (-82.0, 0.0, 0.0),
-}
-_TRUNK = {"spine.flexion": 20.7, "neck.flexion": -45.0}
-_BEND = {"spine.lateral": -10.7, "chest.lateral": -10.7, "chest.rotation": -0.7}
-_BEND_LEAD_RAD = -0.01
-_BEGIN_S = 0.4
-# a trunk twisted to one side turns the child there: by torques 45 degrees in 6 s in the median, but
-# single tries differ much (mitten, five each way: 23 to 72 to the left, 66 right to 109 left to the
-# right); a third of the speed is lost, and with 30 degrees and more it turns either way
-_TWIST_DEG = {"spine.rotation": 20.0, "chest.rotation": 20.0}
-_FULL_TURN_RAD = 0.5  # to the side of the way: worth a full turn
-_BEFORE_M = 0.1  # a place nearer than that is not worth a stride
+_BEGIN_S = 0.4  # until then the rhythm grows out of the posture at the start
+
+
+@dataclass(frozen=True)
+class Swing:
+    """How a joint of a limb moves in a stride, degrees.
+
+    Attributes:
+        middle: About which angle.
+        swing: How far to and fro with its limb.
+        bend: And how much besides while the limb goes forward.
+        sweep: How far to and fro, besides, at a full turn to the limb's own side.
+    """
+
+    middle: float
+    swing: float = 0.0
+    bend: float = 0.0
+    sweep: float = 0.0
+
+
+@dataclass(frozen=True)
+class Limb:
+    """How a limb strides.
+
+    Attributes:
+        joints: Its joints.
+        lead_rad: How far it is ahead of the knee of its own side.
+        shortening: By what share it swings less at a full turn to its own side.
+    """
+
+    joints: Mapping[str, Swing]
+    lead_rad: float
+    shortening: float
+
+
+@dataclass(frozen=True)
+class Rhythm:
+    """How a body crawls.
+
+    Attributes:
+        frequency_hz: Of strides.
+        leg: The left one; the right one is half a stride behind.
+        arm: Likewise.
+        bend_early_rad: Limbs bend so much before they swing forward.
+        trunk: Angles of the trunk, degrees.
+        sway: How far the trunk moves to and fro in a stride, degrees.
+        sway_lead_rad: How far this is ahead of the left knee.
+        twist: What a full turn to the left adds to the trunk, degrees.
+        steering_s: Time constant of a change of the turn.
+        full_turn_rad: So far to the side of the way a full turn is due.
+    """
+
+    frequency_hz: float
+    leg: Limb
+    arm: Limb
+    bend_early_rad: float
+    trunk: Mapping[str, float]
+    sway: Mapping[str, float]
+    sway_lead_rad: float
+    twist: Mapping[str, float]
+    steering_s: float
+    full_turn_rad: float
+
+
+# Found by experiments/crawl/search.py
+CRAWL = Rhythm(
+    frequency_hz=1.67,
+    leg=Limb(
+        {
+            "thigh.flexion": Swing(88.8, 35.8, -20.5, -6.0),
+            "thigh.abduction": Swing(-6.0, -20.9, 39.9, 0.1),
+            "shank.flexion": Swing(113.9, 6.2, 3.7, -14.4),
+            "foot.dorsiflexion": Swing(-49.8, -6.2, -0.4, 20.0),
+        },
+        lead_rad=0.42,
+        shortening=-0.53,
+    ),
+    arm=Limb(
+        {
+            "upper_arm.flexion": Swing(62.6, -31.3, -24.9, 1.0),
+            "upper_arm.abduction": Swing(60.0, -1.2, 23.4, 34.4),
+            "forearm.flexion": Swing(-2.6, -13.3, 59.4, 7.8),
+            "hand.flexion": Swing(-65.6, -3.2, 31.1, -5.1),
+        },
+        lead_rad=2.70,
+        shortening=0.04,
+    ),
+    bend_early_rad=0.82,
+    trunk={
+        "head.flexion": -31.8,
+        "neck.flexion": -66.5,
+        "spine.flexion": 25.2,
+    },
+    sway={
+        "chest.lateral": 25.6,
+        "chest.rotation": 8.7,
+        "spine.lateral": -0.6,
+    },
+    sway_lead_rad=0.36,
+    twist={
+        "chest.lateral": -2.5,
+        "chest.rotation": 25.5,
+        "spine.lateral": -33.0,
+        "spine.rotation": 43.6,
+    },
+    steering_s=0.31,
+    full_turn_rad=0.66,
+)
 
 
 class Crawl:
-    """A rhythm in time; it grows out of the posture at the start.
+    """A rhythm in time.
 
     Args:
-        body: Who crawls.
+        body: Who crawls; it begins where its joints are now.
         step_s: Time between two wishes.
+        rhythm: How it crawls.
     """
 
-    def __init__(self, body: Humanoid, step_s: float) -> None:
-        self._body, self._step_s = body, step_s
+    def __init__(self, body: Humanoid, step_s: float, rhythm: Rhythm = CRAWL) -> None:
+        self._step_s, self._rhythm = step_s, rhythm
         self._joint = {name: index for index, name in enumerate(body.joint_names)}
-        self.reset()
+        self._time_s, self._turn, self._start = 0.0, 0.0, body.joint_angles()
 
-    def reset(self) -> None:
-        """Begin where the joints are."""
-        self._time_s, self._start = 0.0, self._body.joint_angles()
+    def towards(self, aside_rad: float) -> Springs:
+        """Return where springs shall pull the joints now, for who wants to get to a place.
+
+        Args:
+            aside_rad: How far to the left of straight ahead the place is.
+        """
+        return self.wish(min(max(aside_rad / self._rhythm.full_turn_rad, -1.0), 1.0))
 
     def wish(self, turn: float = 0.0) -> Springs:
         """Return where springs shall pull the joints now.
 
         Args:
-            turn: How much to turn while crawling, in [-1, 1], left is positive.
+            turn: How much to turn while crawling, in [-1, 1], left is positive; it is come to
+                little by little.
         """
         share = min(1.0, self._time_s / _BEGIN_S)
-        phase = 2.0 * math.pi * _FREQUENCY_HZ * self._time_s
+        phase = 2.0 * math.pi * self._rhythm.frequency_hz * self._time_s
+        self._turn += (turn - self._turn) * min(1.0, self._step_s / self._rhythm.steering_s)
         self._time_s += self._step_s
-        angles = self._start + share * (self._rhythm(phase, turn) - self._start)
-        return Springs(angles, ahead_s=0.0)
+        angles = self._start + share * (self._angles(phase) - self._start)
+        return Springs(angles, ahead_s=self._step_s)
 
-    def _rhythm(self, phase: float, turn: float) -> Floats:
-        degrees = np.zeros(len(self._joint))
-        for side, shift in (("l_", 0.0), ("r_", math.pi)):
-            self._move(degrees, side, _LEG, phase + shift)
-            self._move(degrees, side, _ARM, phase + shift + math.pi + _LEAD_RAD)
-        for name, angle in _TRUNK.items():
-            degrees[self._joint[name]] = angle
-        for name, angle in _BEND.items():
-            degrees[self._joint[name]] = angle * math.sin(phase + _BEND_LEAD_RAD)
-        for name, angle in _TWIST_DEG.items():
-            degrees[self._joint[name]] += angle * turn
+    def _angles(self, phase: float) -> Floats:
+        rhythm, degrees = self._rhythm, np.zeros(len(self._joint))
+        for side, shift, turn in (("l_", 0.0, self._turn), ("r_", math.pi, -self._turn)):
+            for limb in (rhythm.leg, rhythm.arm):
+                self._stride(degrees, side, limb, phase + shift + limb.lead_rad, turn)
+        sway = math.sin(phase + rhythm.sway_lead_rad)
+        for angles, share in ((rhythm.trunk, 1.0), (rhythm.sway, sway), (rhythm.twist, self._turn)):
+            for name, angle in angles.items():
+                degrees[self._joint[name]] += share * angle
         return np.radians(degrees)
 
-    def _move(
-        self,
-        degrees: Floats,
-        side: str,
-        limb: dict[str, tuple[float, float, float]],
-        phase: float,
-    ) -> None:
-        forward = max(0.0, math.cos(phase))
-        for name, (middle, swing, bend) in limb.items():
-            degrees[self._joint[side + name]] = middle + swing * math.sin(phase) + bend * forward
-
-
-def crawl_to(body: Humanoid, crawl: Crawl, place: Floats) -> Springs:
-    """Return the wish of who wants to get to a place, and on through it.
-
-    It turns towards it on the whole, not in every stride, so it may miss, see `_TWIST_DEG`.
-
-    Args:
-        body: Who crawls.
-        crawl: Its rhythm.
-        place: ``(2,)`` or ``(3,)`` metres; only the horizontal part counts.
-    """
-    way, ahead = place[:2] - body.position[:2], body.forward
-    left = math.atan2(ahead[0] * way[1] - ahead[1] * way[0], ahead[:2] @ way)
-    return crawl.wish(min(max(left / _FULL_TURN_RAD, -1.0), 1.0))
-
-
-def keep_near(body: Humanoid, crawl: Crawl, place: Floats) -> Floats | Springs:
-    """Return the wish of who wants to be at a place: crawl while it lies ahead, else kneel still.
-
-    Args:
-        body: Who crawls.
-        crawl: Its rhythm.
-        place: ``(2,)`` or ``(3,)`` metres; only the horizontal part counts.
-    """
-    if (place[:2] - body.position[:2]) @ body.forward[:2] > _BEFORE_M:
-        return crawl_to(body, crawl, place)
-    return body.angles_of(ON_ALL_FOURS)
-
-
-def crawls_of(players: Sequence[Player], step_s: float) -> dict[str, Crawl]:
-    """Return the rhythm of each player who may crawl, by name."""
-    return {
-        player.name: Crawl(player.body, step_s)
-        for player in players
-        if isinstance(player.body, Humanoid)
-    }
+    def _stride(self, degrees: Floats, side: str, limb: Limb, phase: float, turn: float) -> None:
+        """Set the joints of a limb; `turn` is to its own side."""
+        across = math.sin(phase)
+        forward = max(0.0, math.cos(phase + self._rhythm.bend_early_rad))
+        swung = across * (1.0 - limb.shortening * turn)
+        for name, joint in limb.joints.items():
+            angle = joint.middle + joint.swing * swung + joint.bend * forward
+            degrees[self._joint[side + name]] = angle + joint.sweep * turn * across

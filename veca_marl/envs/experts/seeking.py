@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from veca_marl.envs.experts.walking import bearing_rad
+from veca_marl.envs.experts.legs import Legs
 from veca_marl.envs.floor_plan import FloorPlan
+from veca_marl.sim.bodies.base import Body
 from veca_marl.sim.bodies.pushing import horizontal_distance
-from veca_marl.sim.bodies.walker import Walker
 from veca_marl.sim.calls import Call
 from veca_marl.sim.pose import Floats
 from veca_marl.sim.world import World
@@ -24,50 +24,36 @@ _AT_1_M = 1.7  # log10 of the greatest magnitude of a call at 1 m without a room
 _FARTHEST_M = 20.0
 _BELIEVED_STEPS = 75  # then it listens again
 _NEAR_M = 0.4  # a place so near is reached
-_FULL_TURN_RAD = math.radians(25.0)  # what lies farther aside is turned to as fast as can be
 _ROUND_RAD = math.radians(330.0)  # a turn that shows the whole room to eyes of 60 degrees
-
-
-class Wish(NamedTuple):
-    """What a walker wants, see `Walker.encode`."""
-
-    forward: float
-    turn: float
-    call: Call = Call.none
-
-
-def walk_to(walker: Walker, place: Floats) -> Wish:
-    """Return how to walk straight to a place ``(2,)``: first turn, then go."""
-    aside = bearing_rad(walker, place)
-    turn = min(max(aside / _FULL_TURN_RAD, -1.0), 1.0)
-    return Wish(max(0.0, math.cos(aside)) ** 2, turn)
 
 
 class Seeker:
     """One player of MultiAgentNav.
 
     Args:
-        walker: Its body, whose place and heading it knows.
+        body: Its body, whose place and heading it knows.
+        legs: How it gets about.
         plan: The rooms and doors it knows.
         world: Whose walls it knows.
     """
 
-    def __init__(self, walker: Walker, plan: FloorPlan, world: World) -> None:
-        self._walker, self._plan, self._world = walker, plan, world
+    def __init__(self, body: Body, legs: Legs, plan: FloorPlan, world: World) -> None:
+        self._body, self._legs, self._plan, self._world = body, legs, plan, world
         self._found: Floats | None = None
         self._caller: Floats | None = None
         self._believed_steps = self._facing_steps = 0
         self._spot: Floats | None = None
-        self._turned_rad = 0.0
+        self._turned_rad, self._heading = 0.0, body.forward
         self._searched: set[int] = set()
 
-    def wish(self, audio: NDArray[Any] | None, seen: Floats | None) -> Wish:
+    def wish(self, audio: NDArray[Any] | None, seen: Floats | None) -> Any:
         """Say what to do next.
 
         Args:
             audio: The observation ``(2, 250)``, or None for the deaf.
             seen: ``(3,)`` where the object is seen, or None.
         """
+        turned_rad = self._turned_since()
         if seen is not None:
             self._found = seen
         if self._found is not None:
@@ -75,24 +61,24 @@ class Seeker:
         if self._caller is not None and self._believed_steps > 0:
             self._believed_steps -= 1
             if not self._is_at(self._caller):
-                return self._walk(self._caller)
+                return self._go(self._caller)
         self._caller = None
         if audio is not None and audio.max() > _HEARD:
             return self._listen(audio)
-        return self._search()
+        return self._search(turned_rad)
 
-    def _go_and_call(self, found: Floats) -> Wish:
-        room = self._plan.room_of(self._walker.position)
+    def _go_and_call(self, found: Floats) -> Any:
+        room = self._plan.room_of(self._body.position)
         call = CALL if room == self._plan.room_of(found) else Call.none
-        return self._walk(found)._replace(call=call)
+        return self._go(found, call)
 
-    def _walk(self, goal: Floats) -> Wish:
-        return walk_to(self._walker, self._plan.waypoint(self._walker.position, goal))
+    def _go(self, goal: Floats, call: Call = Call.none) -> Any:
+        return self._legs.to(self._plan.waypoint(self._body.position, goal), call)
 
     def _is_at(self, place: Floats) -> bool:
-        return horizontal_distance(place, self._walker.position) < _NEAR_M
+        return horizontal_distance(place, self._body.position) < _NEAR_M
 
-    def _listen(self, audio: NDArray[Any]) -> Wish:
+    def _listen(self, audio: NDArray[Any]) -> Any:
         """Turn to the louder ear; once both hear the same, believe the caller straight ahead."""
         left, right = loudness(audio)
         turn = min(max((left - right) / _SAME, -1.0), 1.0)
@@ -101,11 +87,11 @@ class Seeker:
             self._caller = self._place_ahead(float(audio.max()))
             self._believed_steps, self._facing_steps = _BELIEVED_STEPS, 0
             self._turned_rad, self._spot = 0.0, None
-        return Wish(0.0, turn)
+        return self._legs.turn(turn)
 
     def _place_ahead(self, level: float) -> Floats:
         """Return from where straight ahead, in a room, a call would be as loud as heard."""
-        ears, ahead = self._walker.mount("head").position, self._walker.forward
+        ears, ahead = self._body.mount("head").position, self._body.forward
         loss = self._world.playground.transmission_loss_db / 20.0
         best, least = ears + _NEAR_M * ahead, math.inf
         for away_m in np.arange(_NEAR_M, _FARTHEST_M, 0.2):
@@ -118,20 +104,25 @@ class Seeker:
                 best, least = place, off
         return best
 
-    def _search(self) -> Wish:
+    def _search(self, turned_rad: float) -> Any:
         """Turn round once in the middle of each room, but first where it starts."""
         if self._spot is not None and not self._is_at(self._spot):
-            return self._walk(self._spot)
-        degrees_per_s = self._walker.cfg.turn_speed_degps
-        self._turned_rad += math.radians(degrees_per_s) * self._world.clock.step_s
+            return self._go(self._spot)
+        self._turned_rad += turned_rad
         if self._turned_rad >= _ROUND_RAD:
             self._turned_rad = 0.0
             self._spot = self._next_spot()
-        return Wish(0.0, 1.0)
+        return self._legs.turn(1.0)
+
+    def _turned_since(self) -> float:
+        """Return how far it has turned since the last wish, rad, left is positive."""
+        before, self._heading = self._heading, self._body.forward
+        across = before[0] * self._heading[1] - before[1] * self._heading[0]
+        return math.atan2(across, float(before @ self._heading))
 
     def _next_spot(self) -> Floats:
         """Return the middle of the nearest room that was not searched; at last begin anew."""
-        here = self._plan.room_of(self._walker.position)
+        here = self._plan.room_of(self._body.position)
         self._searched.add(here)
         rooms = range(len(self._plan.rooms))
         if self._searched.issuperset(rooms):

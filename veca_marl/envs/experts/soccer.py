@@ -1,4 +1,4 @@
-"""Soccer on two legs: get behind the ball and kick it at the goal; stand in its way."""
+"""Soccer: get behind the ball and drive it at the goal; stand in its way."""
 
 from __future__ import annotations
 
@@ -6,16 +6,11 @@ import math
 
 import numpy as np
 
-from veca_marl.envs.experts.walking import walk_to
+from veca_marl.envs.experts.legs import Reach
 from veca_marl.envs.pitch import Pitch
-from veca_marl.sim.bodies.walker import Walker
+from veca_marl.sim.bodies.base import Body
 from veca_marl.sim.pose import Floats
 
-_RUN_UP_M = 0.55  # from the ball, before a shot
-_REACH_M = 0.38  # of the foot: there the ball goes off, away from the body
-_LOOK_AHEAD_M = 0.25  # on the line of the shot: where to walk at
-_FOOT_M, _FUNNEL = 0.05, 0.4  # aside of that line: at the kick, and more for each metre before it
-_CLEAR_M = 0.42  # passing the ball at this distance, the foot does not reach it
 _AHEAD_S = 0.25  # the ball is taken where it will be then
 _BODY_M, _BALL_M = 0.13, 0.12
 _ASIDE_RAD = [side * math.radians(deg) for deg in range(0, 180, 15) for side in (1.0, -1.0)]
@@ -23,15 +18,16 @@ _CORNERS = (0.0, 0.12, -0.12, 0.24, -0.24, 0.33, -0.33)  # shares of the goal's 
 _FREE_M = 0.45  # farther from a keeper no shot is freer
 
 
-def attack(body: Walker, pitch: Pitch, aim: Floats) -> tuple[float, float]:
-    """Return the wish (forward, turn) of who wants the ball to go to a point.
+def attack(body: Body, reach: Reach, pitch: Pitch, aim: Floats) -> Floats:
+    """Return where to go, ``(2,)`` metres, for who wants the ball to go to a point.
 
-    A foot kicks whatever comes into its reach, away from the body: so go round the ball at a
-    distance until it lies between the body and the aim, then walk at it. Where walls leave no room
+    A body drives whatever comes into its reach away from itself: so go round the ball at a
+    distance until it lies between the body and the aim, then go at it. Where walls leave no room
     for the run-up, the shot goes as near to the aim as it can.
 
     Args:
         body: Who attacks.
+        reach: How near it comes to things.
         pitch: Where, with what ball.
         aim: ``(2,)`` or ``(3,)`` metres: where it shall go.
     """
@@ -40,11 +36,11 @@ def attack(body: Walker, pitch: Pitch, aim: Floats) -> tuple[float, float]:
         pitch.low + _BALL_M,
         pitch.high - _BALL_M,
     )
-    here, shot = body.position[:2], _possible(ball, _unit(aim[:2] - ball), pitch)
+    here, shot = body.position[:2], _possible(ball, _unit(aim[:2] - ball), reach.run_up_m, pitch)
     behind, aside = (ball - here) @ shot, abs(_cross(shot, ball - here))
-    if aside < _FOOT_M + _FUNNEL * (behind - _REACH_M):
-        return walk_to(body, ball - max(behind - _LOOK_AHEAD_M, 0.0) * shot)
-    return walk_to(body, _round(here, ball, ball - _RUN_UP_M * shot))
+    if aside < reach.aside_m + reach.funnel * (behind - reach.ball_m):
+        return ball - max(behind - reach.look_ahead_m, 0.0) * shot
+    return _round(here, ball, ball - reach.run_up_m * shot, reach.clear_m)
 
 
 def open_corner(pitch: Pitch, keeper: Floats) -> Floats:
@@ -66,18 +62,18 @@ def _gap_m(start: Floats, end: Floats, other: Floats) -> float:
     return float(np.hypot(*(start + min(max(share, 0.0), 1.0) * way - other)))
 
 
-def _possible(ball: Floats, shot: Floats, pitch: Pitch) -> Floats:
+def _possible(ball: Floats, shot: Floats, run_up_m: float, pitch: Pitch) -> Floats:
     """Return the direction nearest to a shot's for which the pitch has room for the run-up."""
     for aside_rad in _ASIDE_RAD:
         c, s = math.cos(aside_rad), math.sin(aside_rad)
         turned = np.array([c * shot[0] - s * shot[1], s * shot[0] + c * shot[1]])
-        start = ball - _RUN_UP_M * turned
+        start = ball - run_up_m * turned
         if (start > pitch.low + _BODY_M).all() and (start < pitch.high - _BODY_M).all():
             return turned
     return shot
 
 
-def _round(here: Floats, ball: Floats, there: Floats) -> Floats:
+def _round(here: Floats, ball: Floats, there: Floats, clear_m: float) -> Floats:
     """Return where to go first on the way to a point beside the ball without touching it."""
     way = there - here
     length = float(np.hypot(*way))
@@ -85,10 +81,10 @@ def _round(here: Floats, ball: Floats, there: Floats) -> Floats:
     ahead = float((ball - here) @ along)
     left = np.array([-along[1], along[0]])
     aside = float((ball - here) @ left)
-    if not (0.0 < ahead < length + 0.1 and abs(aside) < _CLEAR_M):
+    if not (0.0 < ahead < length + 0.1 and abs(aside) < clear_m):
         return there
     side = -math.copysign(1.0, aside)
-    return ball + side * _CLEAR_M * 1.2 * left
+    return ball + side * clear_m * 1.2 * left
 
 
 def _cross(a: Floats, b: Floats) -> float:

@@ -4,20 +4,19 @@ from __future__ import annotations
 
 import math
 
-from veca_marl.sim.bodies.walker import Walker
+from veca_marl.sim.bodies.base import Body
 from veca_marl.sim.pose import Floats
 
 _FULL_TURN_RAD = 0.25  # to the side of the way: worth a full turn
 
 
-def bearing_rad(body: Walker, point: Floats) -> float:
+def bearing_rad(body: Body, point: Floats) -> float:
     """Return how far to the left of straight ahead a point of the floor plan is, in [-pi, pi]."""
-    way = point[:2] - body.position[:2]
-    ahead = math.atan2(way[1], way[0]) - body.yaw_rad
-    return (ahead + math.pi) % (2.0 * math.pi) - math.pi
+    way, ahead = point[:2] - body.position[:2], body.forward
+    return math.atan2(ahead[0] * way[1] - ahead[1] * way[0], float(ahead[:2] @ way))
 
 
-def walk_to(body: Walker, point: Floats, speed: float = 1.0) -> tuple[float, float]:
+def walk_to(body: Body, point: Floats, speed: float = 1.0) -> tuple[float, float]:
     """Return the wish (forward, turn) that leads to a point: turn to it, walk where it is ahead.
 
     Args:

@@ -10,10 +10,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from veca_marl.envs.experts.seeking import Seeker, Wish
+from veca_marl.envs.contests import line_up, look_ahead
+from veca_marl.envs.experts.legs import legs_of
+from veca_marl.envs.experts.seeking import Seeker
 from veca_marl.envs.floor_plan import FloorPlan
 from veca_marl.envs.navigation import Sight, free_place, gap_m, way_to
-from veca_marl.envs.task import Player, Task, TaskCfg, Team, register, terms, walker
+from veca_marl.envs.task import Player, Task, TaskCfg, Team, register, terms
 from veca_marl.sim.props import PropCfg, PropShape
 
 _PASS_M = 0.2  # who stands at the object leaves so much between itself and the wall
@@ -68,9 +70,9 @@ class MultiAgentNav(Task):
     come "using auditory perception": here they have ears as well.
 
     `playground=seven_rooms`, its own, takes up to 7 agents: the ways are short, but who is not
-    called has much to search. `two_rooms`, `three_rooms` and `four_rooms` are for so many. Bodies
-    without a vocabulary of calls play too: joint-level ones call by `make_sound`, which is not part
-    of their action row.
+    called has much to search. `two_rooms`, `three_rooms` and `four_rooms` are for so many.
+    Joint-level bodies start on hands and knees, look ahead as far as their eyes turn, and
+    need more time; with `body=mitten_voice` or `full_voice` they can call.
 
     Terms:
         reached: how many agents reached the object for the first time in this step, the same for
@@ -126,11 +128,13 @@ class MultiAgentNav(Task):
         self.target.place((x, y, floor_m + self.cfg.radius_m))
         for room, player in zip(rooms, self.players, strict=True):
             place = free_place(room, [*self._furniture, self.target], clear_m, rng)
-            player.body.place(place, yaw_rad=rng.uniform(-math.pi, math.pi))
+            line_up(player, place, rng.uniform(-math.pi, math.pi))
             if self.cfg.muted is not Muted.nobody:
                 player.body.muted = room is home or self.cfg.muted is Muted.everybody
+        look_ahead(self.players)
 
     def after_step(self, rng: np.random.Generator) -> None:
+        look_ahead(self.players)
         before = len(self.arrived)
         for player in self.players:
             if gap_m(player.body.position, self.target) <= self.cfg.reach_m:
@@ -146,10 +150,10 @@ class MultiAgentNav(Task):
     def terminated(self) -> bool:
         return len(self.arrived) == len(self.players)
 
-    def expert(self, player: Player, observation: dict[str, NDArray[Any]]) -> Wish:
+    def expert(self, player: Player, observation: dict[str, NDArray[Any]]) -> Any:
         """Look round, go and call; else listen, and go where a call comes from.
 
-        It needs a body that walks. Who has seen the object (`is_visible`) knows its place, goes
+        Who has seen the object (`is_visible`) knows its place, goes
         there and calls while in its room. Who has not turns to the louder ear and, when both hear
         the same, takes the loudness for the distance: what a caller is worth to it, it has from
         the observation `audio` alone. Who hears nothing turns round once in each room, the nearest
@@ -157,7 +161,8 @@ class MultiAgentNav(Task):
         """
         seeker = self._seekers.get(player.name)
         if seeker is None:
-            seeker = Seeker(walker(player), self.plan, self.world)
+            legs = legs_of(player, self.world.clock.step_s)
+            seeker = Seeker(player.body, legs, self.plan, self.world)
             self._seekers[player.name] = seeker
         seen = self.target.position if self._sight.of(player) else None
         return seeker.wish(observation.get("audio"), seen)

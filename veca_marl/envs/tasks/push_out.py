@@ -9,11 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from veca_marl.envs.contests import line_up, nearest, on_floor, opponents, paint_disc
-from veca_marl.envs.experts.crawl import Crawl, crawls_of, keep_near
+from veca_marl.envs.contests import line_up, look_ahead, nearest, on_floor, opponents, paint_disc
+from veca_marl.envs.experts.legs import Legs, legs_of
 from veca_marl.envs.experts.wrestling import wrestle
-from veca_marl.envs.task import Player, Task, TaskCfg, terms, walker
-from veca_marl.sim.bodies.humanoid import Humanoid
+from veca_marl.envs.task import Player, Task, TaskCfg, terms
 from veca_marl.sim.pose import Floats
 
 _RIM_M = 0.06
@@ -65,20 +64,23 @@ class PushOut(Task):
         self._playing: set[str] = set()
         self._fallen: set[str] = set()
         self._ground: dict[str, float] = {}
-        self._crawls: dict[str, Crawl] = {}
+        self._legs: dict[str, Legs] = {}
         self._won: dict[str, float] = {}
 
     def reset(self, rng: np.random.Generator) -> None:
         side = rng.uniform(-math.pi, math.pi)
         for number, team in enumerate(self._teams):
             self._line_up(team, side + number * math.pi, rng)
+        look_ahead(self.players)
         self._playing = {player.name for player in self.players}
         self._fallen = set()
         self._ground = {player.name: self._area(player) for player in self.players}
         self._won = dict.fromkeys(self._ground, 0.0)
-        self._crawls = crawls_of(self.players, self.world.clock.step_s)
+        step_s = self.world.clock.step_s
+        self._legs = {player.name: legs_of(player, step_s) for player in self.players}
 
     def after_step(self, rng: np.random.Generator) -> None:
+        look_ahead(self.players)
         self._playing -= self._fallen
         now = {player.name: self._area(player) for player in self.players}
         self._won = {name: self._ground[name] - area for name, area in now.items()}
@@ -100,16 +102,11 @@ class PushOut(Task):
         return any(all(p.name not in left for p in self._team(team)) for team in self._teams)
 
     def expert(self, player: Player, observation: dict[str, NDArray[Any]]) -> Any:
-        """Walk round the nearest opponent and push it outwards; knows where all are.
-
-        On hands and knees: crawl while the middle is ahead, then kneel still. That holds the
-        ring against who leaves it by accident, and pushes nobody out.
-        """
-        body = player.body
-        if isinstance(body, Humanoid):
-            return keep_near(body, self._crawls[player.name], self.middle)
+        """Go round the nearest opponent and push it outwards; knows where all are."""
         _, theirs = self._sides(player)
-        return wrestle(walker(player), nearest(body, theirs), self.middle, self.cfg.radius_m)
+        body, legs = player.body, self._legs[player.name]
+        other = nearest(body, theirs)
+        return legs.to(wrestle(body, legs.reach, other, self.middle, self.cfg.radius_m))
 
     # ---- who is where
 

@@ -9,13 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from veca_marl.envs.contests import line_up
-from veca_marl.envs.experts.crawl import Crawl, crawl_to, crawls_of
+from veca_marl.envs.contests import line_up, look_ahead
+from veca_marl.envs.experts.legs import Legs, legs_of
 from veca_marl.envs.experts.soccer import attack
 from veca_marl.envs.pitch import POST_M, Pitch
 from veca_marl.envs.scoring import aside_rad
-from veca_marl.envs.task import Player, Task, TaskCfg, terms, walker
-from veca_marl.sim.bodies.humanoid import Humanoid
+from veca_marl.envs.task import Player, Task, TaskCfg, terms
 from veca_marl.sim.bodies.pushing import horizontal_distance
 from veca_marl.sim.bodies.walker import Walker
 from veca_marl.sim.pose import Floats
@@ -110,7 +109,7 @@ class Soccer(Task):
                 f"aside_m do not fit into room {room.name!r} of {room.size_m[:2]} m"
             )
         self._rest_s: dict[str, float] = {}
-        self._crawls: dict[str, Crawl] = {}
+        self._legs: dict[str, Legs] = {}
         self._paid: dict[str, float] = {}
         self._scored = False
         self._now = self._look()
@@ -122,8 +121,10 @@ class Soccer(Task):
         self.ball.place(place, rng.uniform(-math.pi, math.pi))
         for player in self.players:
             self._line_up(player, rng)
+        look_ahead(self.players)
         self._rest_s = {player.name: 0.0 for player in self.players}
-        self._crawls = crawls_of(self.players, self.world.clock.step_s)
+        step_s = self.world.clock.step_s
+        self._legs = {player.name: legs_of(player, step_s) for player in self.players}
         self._scored = False
         self._now = self._look()
 
@@ -134,6 +135,7 @@ class Soccer(Task):
         return np.array([self.ball.position[0] - back, self.goal[1] + aside, self.goal[2]])
 
     def after_step(self, rng: np.random.Generator) -> None:
+        look_ahead(self.players)
         before, attacker = self._now, self.players[0].body.position
         self._now = self._look()
         self._scored = self._scored or self.pitch.scores(before.ball, self._now.ball)
@@ -153,13 +155,12 @@ class Soccer(Task):
         return self._scored
 
     def expert(self, player: Player, observation: dict[str, NDArray[Any]]) -> Any:
-        """Get behind the ball and walk through it; on hands and knees crawl at it and through it.
+        """Get behind the ball and drive it at the goal; knows where the ball is."""
+        return self._attack(player, self.goal)
 
-        It knows where the ball is. Who crawls pushes the ball, and does not get behind it first.
-        """
-        if isinstance(player.body, Humanoid):
-            return crawl_to(player.body, self._crawls[player.name], self.ball.position)
-        return attack(walker(player), self.pitch, self.goal)
+    def _attack(self, player: Player, aim: Floats) -> Any:
+        legs = self._legs[player.name]
+        return legs.to(attack(player.body, legs.reach, self.pitch, aim))
 
     # ---- the ball
 

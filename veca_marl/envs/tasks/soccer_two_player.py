@@ -8,11 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from veca_marl.envs.experts.crawl import crawl_to, keep_near
-from veca_marl.envs.experts.soccer import attack, open_corner
-from veca_marl.envs.task import Player, Team, register, walker
+from veca_marl.envs.experts.soccer import open_corner
+from veca_marl.envs.task import Player, Team, register
 from veca_marl.envs.tasks.soccer import ATTACKER, DEFENDER, Soccer, SoccerCfg
-from veca_marl.sim.bodies.humanoid import Humanoid
 from veca_marl.sim.pose import Floats
 
 
@@ -71,20 +69,8 @@ class SoccerTwoPlayer(Soccer):
         return np.array([self.goal[0] - back, self.goal[1] + rng.uniform(-half_m, half_m), 0.0])
 
     def expert(self, player: Player, observation: dict[str, NDArray[Any]]) -> Any:
-        """Get at the ball, away from the own goal; knows where the ball is.
-
-        On hands and knees the attacker crawls at the ball, and the defender between ball and goal.
-        """
-        if isinstance(player.body, Humanoid):
-            return self._on_knees(player, player.body)
-        body = walker(player)
+        """Get at the ball, away from the own goal; knows where the ball is."""
         if player.team == ATTACKER:
             keeper = self.players[1].body.position
-            return attack(body, self.pitch, open_corner(self.pitch, keeper))
-        return attack(body, self.pitch, 2.0 * self.ball.position - self.goal)
-
-    def _on_knees(self, player: Player, body: Humanoid) -> Any:
-        crawl, ball = self._crawls[player.name], self.ball.position
-        if player.team == ATTACKER:
-            return crawl_to(body, crawl, ball)
-        return keep_near(body, crawl, (ball + self.goal) / 2.0)
+            return self._attack(player, open_corner(self.pitch, keeper))
+        return self._attack(player, 2.0 * self.ball.position - self.goal)

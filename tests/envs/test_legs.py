@@ -1,0 +1,91 @@
+"""Getting about: every body that experts of games may have comes to places and turns."""
+
+import math
+
+import numpy as np
+import pytest
+from seeking import world_with
+
+from veca_marl.envs.contests import line_up
+from veca_marl.envs.experts.legs import legs_of
+from veca_marl.envs.task import Player
+from veca_marl.sim.bodies.humanoid import Detail, Humanoid, HumanoidCfg, JointActionKind
+from veca_marl.sim.bodies.walker import Walker, WalkerCfg
+from veca_marl.sim.props import PropCfg, PropShape
+
+BODIES = {
+    "walker": (Walker, WalkerCfg()),
+    "mitten": (Humanoid, HumanoidCfg(detail=Detail.mitten)),
+    "mitten_position": (
+        Humanoid,
+        HumanoidCfg(detail=Detail.mitten, action=JointActionKind.position),
+    ),
+    "full": (Humanoid, HumanoidCfg()),
+}
+WALL = PropCfg(name="wall", shape=PropShape.wall, size_m=[0.1, 6.0, 1.5], position_m=(8.0, 0, 0))
+
+
+@pytest.fixture(scope="module", params=BODIES)
+def mover(request):
+    """A body of each kind as a player on a wide floor with a wall far away."""
+    world = world_with(WALL)
+    kind, cfg = BODIES[request.param]
+    player = Player("one", "agents", kind("one", cfg, world))
+    world.freeze()
+    yield world, player
+    world.close()
+
+
+def start(mover, yaw_rad=0.0, place=(0.0, 0.0)):
+    world, player = mover
+    world.reset(np.random.default_rng(0))
+    line_up(player, np.array(place), yaw_rad)
+    return legs_of(player, world.clock.step_s)
+
+
+def let(mover, wish):
+    world, player = mover
+    player.body.act(player.body.encode(wish))
+    world.step()
+    return player.body
+
+
+@pytest.mark.parametrize("aside_deg", [0.0, 60.0, -60.0, 130.0, -130.0, 180.0])
+def test_it_comes_to_places_all_around(mover, aside_deg):
+    place = 1.8 * np.array([math.cos(math.radians(aside_deg)), math.sin(math.radians(aside_deg))])
+    legs = start(mover)
+    for _ in range(25 * 16):
+        body = let(mover, legs.to(place))
+        if math.dist(body.position[:2], place) < 0.3:
+            return
+    pytest.fail(f"it is {math.dist(body.position[:2], place):.1f} m away")
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_it_turns_to_either_side(mover, side):
+    legs = start(mover)
+    turned, before = 0.0, mover[1].body.forward
+    for _ in range(25 * 6):
+        now = let(mover, legs.turn(side)).forward
+        turned += math.atan2(before[0] * now[1] - before[1] * now[0], float(before @ now))
+        before = now
+    assert side * turned > math.pi / 2.0
+
+
+def test_it_stays(mover):
+    legs = start(mover)
+    for _ in range(50):
+        body = let(mover, legs.stay())
+    assert np.hypot(*body.position[:2]) < 0.1
+
+
+def test_a_wall_does_not_hold_it(mover):
+    """It is sent through the wall for a while, then back."""
+    legs = start(mover, place=(7.3, 0.0))
+    for _ in range(25 * 6):
+        let(mover, legs.to(np.array([9.0, 0.0])))
+    for _ in range(25 * 20):
+        body = let(mover, legs.to(np.array([6.0, 0.0])))
+        if math.dist(body.position[:2], (6.0, 0.0)) < 0.3:
+            return
+    pytest.fail(f"it is at {body.position}")

@@ -1,0 +1,168 @@
+"""Getting about on two legs or on hands and knees: what experts of games know of bodies."""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+
+from veca_marl.envs.experts.crawl import Crawl
+from veca_marl.envs.experts.walking import bearing_rad, walk_to
+from veca_marl.envs.task import Player, walker
+from veca_marl.sim.bodies.humanoid import Humanoid
+from veca_marl.sim.bodies.joint_controls import Springs
+from veca_marl.sim.bodies.postures import ON_ALL_FOURS
+from veca_marl.sim.bodies.walker import Walker
+from veca_marl.sim.calls import Call
+from veca_marl.sim.pose import Floats
+
+# who crawls and comes no farther than this in so long a time turns to one side for a while; the
+# next time to the other
+_HELD_M, _HELD_S, _FREE_S = 0.2, 2.0, 2.0
+
+
+@dataclass(frozen=True)
+class Reach:
+    """How near things are, and how well a body keeps to a line; from the pelvis, in metres.
+
+    Attributes:
+        ball_m: There a ball before the body goes off, away from it.
+        run_up_m: From so far a body comes at a ball that shall go straight on.
+        clear_m: A ball passed at this distance stays where it is.
+        other_m: Between two who push each other.
+        turning_m: What it takes to turn.
+        look_ahead_m: Who follows a line goes to where it is so far ahead.
+        aside_m: Whether a body is on the line of a shot: so far aside of it when the ball goes off,
+        funnel: and so much more for each metre before.
+    """
+
+    ball_m: float
+    run_up_m: float
+    clear_m: float
+    other_m: float
+    turning_m: float
+    look_ahead_m: float
+    aside_m: float
+    funnel: float
+
+
+class Legs(Protocol):
+    """How a player gets about. What its methods return is a wish for `Body.encode`.
+
+    Attributes:
+        reach: How near it comes to things.
+    """
+
+    reach: Reach
+
+    def to(self, place: Floats, call: Call = Call.none) -> Any:
+        """Go to a place ``(2,)`` or ``(3,)``, metres, and on through it; call on the way."""
+        ...
+
+    def turn(self, left: float, call: Call = Call.none) -> Any:
+        """Turn where it is, as fast as it can at -1 and 1."""
+        ...
+
+    def stay(self) -> Any:
+        """Stay where it is."""
+        ...
+
+
+class TwoLegs:
+    """Those of a walker.
+
+    Args:
+        body: Whose they are.
+    """
+
+    reach = Reach(
+        ball_m=0.38,
+        run_up_m=0.55,
+        clear_m=0.42,
+        other_m=0.3,
+        turning_m=0.0,
+        look_ahead_m=0.25,
+        aside_m=0.05,
+        funnel=0.4,
+    )
+
+    def __init__(self, body: Walker) -> None:
+        self._body = body
+
+    def to(self, place: Floats, call: Call = Call.none) -> tuple[float, float, Call]:
+        """See `Legs`."""
+        return *walk_to(self._body, place), call
+
+    def turn(self, left: float, call: Call = Call.none) -> tuple[float, float, Call]:
+        """See `Legs`."""
+        return 0.0, left, call
+
+    def stay(self) -> tuple[float, float]:
+        """See `Legs`."""
+        return 0.0, 0.0
+
+
+class HandsAndKnees:
+    """Those of a joint-level body that crawls.
+
+    Args:
+        body: Whose they are; it is on hands and knees now.
+        step_s: Time between two wishes.
+    """
+
+    # found by trying some in the ring and on the pitch
+    reach = Reach(
+        ball_m=0.5,
+        run_up_m=1.1,
+        clear_m=0.6,
+        other_m=0.75,
+        turning_m=0.5,
+        look_ahead_m=0.5,
+        aside_m=0.2,
+        funnel=0.8,
+    )
+
+    def __init__(self, body: Humanoid, step_s: float) -> None:
+        self._body, self._step_s = body, step_s
+        self._crawl = Crawl(body, step_s)
+        self._trail: deque[Floats] = deque(maxlen=round(_HELD_S / step_s))
+        self._free_steps, self._free_side = 0, 1.0
+
+    def to(self, place: Floats, call: Call = Call.none) -> Springs:
+        """See `Legs`; it turns on the way, and where something holds it, first to one side."""
+        if self._is_held() and self._free_steps == 0:
+            self._free_steps, self._free_side = round(_FREE_S / self._step_s), -self._free_side
+        if self._free_steps > 0:
+            self._free_steps -= 1
+            return self.turn(self._free_side, call)
+        aside_rad = bearing_rad(self._body, place)
+        return self._crawl.towards(aside_rad)._replace(call=call)
+
+    def turn(self, left: float, call: Call = Call.none) -> Springs:
+        """Crawl in a narrow circle, the nearest to `Legs.turn` that it can."""
+        return self._crawl.wish(left)._replace(call=call)
+
+    def stay(self) -> Springs:
+        """Kneel on all fours."""
+        return Springs(self._body.angles_of(ON_ALL_FOURS), self._step_s)
+
+    def _is_held(self) -> bool:
+        """Say whether it has hardly got on; asked once a wish."""
+        here = self._body.position[:2]
+        self._trail.append(here)
+        away_m = float(np.hypot(*(here - self._trail[0])))
+        return len(self._trail) == self._trail.maxlen and away_m < _HELD_M
+
+
+def legs_of(player: Player, step_s: float) -> Legs:
+    """Return how a player gets about from now on: on two legs, or on hands and knees.
+
+    Args:
+        player: Who; a joint-level body is on hands and knees now.
+        step_s: Time between two wishes.
+    """
+    if isinstance(player.body, Humanoid):
+        return HandsAndKnees(player.body, step_s)
+    return TwoLegs(walker(player))
