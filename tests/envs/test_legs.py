@@ -11,7 +11,6 @@ from veca_marl.envs.experts.legs import legs_of
 from veca_marl.envs.task import Player
 from veca_marl.sim.bodies.humanoid import Detail, Humanoid, HumanoidCfg, JointActionKind
 from veca_marl.sim.bodies.walker import Walker, WalkerCfg
-from veca_marl.sim.props import PropCfg, PropShape
 
 BODIES = {
     "walker": (Walker, WalkerCfg()),
@@ -22,13 +21,12 @@ BODIES = {
     ),
     "full": (Humanoid, HumanoidCfg()),
 }
-WALL = PropCfg(name="wall", shape=PropShape.wall, size_m=[0.1, 6.0, 1.5], position_m=(8.0, 0, 0))
 
 
 @pytest.fixture(scope="module", params=BODIES)
 def mover(request):
-    """A body of each kind as a player on a wide floor with a wall far away."""
-    world = world_with(WALL)
+    """A body of each kind as a player on a wide floor."""
+    world = world_with()
     kind, cfg = BODIES[request.param]
     player = Player("one", "agents", kind("one", cfg, world))
     world.freeze()
@@ -36,10 +34,10 @@ def mover(request):
     world.close()
 
 
-def start(mover, yaw_rad=0.0, place=(0.0, 0.0)):
+def start(mover):
     world, player = mover
     world.reset(np.random.default_rng(0))
-    line_up(player, np.array(place), yaw_rad)
+    line_up(player, np.zeros(2), 0.0)
     return legs_of(player, world.clock.step_s)
 
 
@@ -77,15 +75,3 @@ def test_it_stays(mover):
     for _ in range(50):
         body = let(mover, legs.stay())
     assert np.hypot(*body.position[:2]) < 0.1
-
-
-def test_a_wall_does_not_hold_it(mover):
-    """It is sent through the wall for a while, then back."""
-    legs = start(mover, place=(7.3, 0.0))
-    for _ in range(25 * 6):
-        let(mover, legs.to(np.array([9.0, 0.0])))
-    for _ in range(25 * 20):
-        body = let(mover, legs.to(np.array([6.0, 0.0])))
-        if math.dist(body.position[:2], (6.0, 0.0)) < 0.3:
-            return
-    pytest.fail(f"it is at {body.position}")

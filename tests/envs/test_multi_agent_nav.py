@@ -252,10 +252,10 @@ def test_a_joint_level_body_crawls_to_the_object_that_it_sees_and_calls():
     room = game.task.plan.rooms[0]
     line_up(finder, room.middle_m - np.array([0.8, 0.0, 0.0]), 0.0)
     game.task.target.place(room.middle_m + np.array([0.7, 0.0, 0.2]))
-    game.world.refresh()
     called = False
     while finder.name not in game.task.arrived:
-        wish = game.task.expert(finder, game.observe(finder))
+        heard, _ = [game.observe(player) for player in game.players]
+        wish = game.task.expert(finder, heard)
         rest = np.zeros(other.body.action_spec.shape, np.float32)
         rows = {finder.name: finder.body.encode(wish), other.name: rest}
         called = called or rows[finder.name][-1] > 0.6

@@ -9,6 +9,7 @@ from seeking import BALL_M, ball_at, walker_at, wall_across, world_with
 
 from veca_marl.envs.navigation import Sight, free_place, gap_m, way_to
 from veca_marl.envs.task import Player
+from veca_marl.sim.optics import Camera, look_at, seen_fraction
 from veca_marl.sim.playground import RoomCfg
 
 STEP_S = 0.04
@@ -98,3 +99,22 @@ def test_an_eye_is_asked_once_a_picture(world):
     sight.clear()
     assert sight.of(player)
     assert len(asked) == 3
+
+
+def test_nobody_sees_through_a_wall_that_its_eye_is_pressed_to():
+    """On hands and knees an eye came within 11 mm of a wall, looking along it, and saw beyond."""
+    world = world_with(wall_across(2.0), ball_at(6.0, 0.0))
+    world.freeze()
+    world.refresh()
+    for away_m in (0.004, 0.011, 0.05):
+        for aside_rad in (0.0, 0.6, 1.1):
+            eye = look_at(
+                np.array([1.95 - away_m, 0.0, 0.3]),
+                np.array([1.95 + math.cos(aside_rad), math.sin(aside_rad), 0.3]),
+            )
+            views = Camera().render(world.scene, [eye])
+            assert seen_fraction(views, world.prop("ball").object_id) == 0.0
+            if aside_rad == 0.0:
+                wall = world.prop("wall").object_id
+                assert seen_fraction(views, wall) == 1.0
+    world.close()

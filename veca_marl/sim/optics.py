@@ -23,7 +23,7 @@ class Camera:
         width: Pixels.
         height: Pixels.
         fov_deg: Vertical field of view, as in OpenGL and PyBullet; pixels are square.
-        near_m: Nothing nearer is drawn.
+        near_m: Nothing nearer is drawn: who presses its face to a wall would see through it.
         far_m: Nothing farther is drawn.
 
     Raises:
@@ -33,7 +33,7 @@ class Camera:
     width: int = 84
     height: int = 84
     fov_deg: float = 60.0
-    near_m: float = 0.01
+    near_m: float = 0.001
     far_m: float = 100.0
     lens: Lens = field(init=False, repr=False, compare=False)
 

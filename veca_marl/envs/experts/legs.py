@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-from collections import deque
 from dataclasses import dataclass
 from typing import Any, Protocol
-
-import numpy as np
 
 from veca_marl.envs.experts.crawl import Crawl
 from veca_marl.envs.experts.walking import bearing_rad, walk_to
@@ -17,10 +14,6 @@ from veca_marl.sim.bodies.postures import ON_ALL_FOURS
 from veca_marl.sim.bodies.walker import Walker
 from veca_marl.sim.calls import Call
 from veca_marl.sim.pose import Floats
-
-# who crawls and comes no farther than this in so long a time turns to one side for a while; the
-# next time to the other
-_HELD_M, _HELD_S, _FREE_S = 0.2, 2.0, 2.0
 
 
 @dataclass(frozen=True)
@@ -127,18 +120,10 @@ class HandsAndKnees:
     def __init__(self, body: Humanoid, step_s: float) -> None:
         self._body, self._step_s = body, step_s
         self._crawl = Crawl(body, step_s)
-        self._trail: deque[Floats] = deque(maxlen=round(_HELD_S / step_s))
-        self._free_steps, self._free_side = 0, 1.0
 
     def to(self, place: Floats, call: Call = Call.none) -> Springs:
-        """See `Legs`; it turns on the way, and where something holds it, first to one side."""
-        if self._is_held() and self._free_steps == 0:
-            self._free_steps, self._free_side = round(_FREE_S / self._step_s), -self._free_side
-        if self._free_steps > 0:
-            self._free_steps -= 1
-            return self.turn(self._free_side, call)
-        aside_rad = bearing_rad(self._body, place)
-        return self._crawl.towards(aside_rad)._replace(call=call)
+        """See `Legs`; it turns on the way, and a wall that it has met holds it."""
+        return self._crawl.towards(bearing_rad(self._body, place))._replace(call=call)
 
     def turn(self, left: float, call: Call = Call.none) -> Springs:
         """Crawl in a narrow circle, the nearest to `Legs.turn` that it can."""
@@ -147,13 +132,6 @@ class HandsAndKnees:
     def stay(self) -> Springs:
         """Kneel on all fours."""
         return Springs(self._body.angles_of(ON_ALL_FOURS), self._step_s)
-
-    def _is_held(self) -> bool:
-        """Say whether it has hardly got on; asked once a wish."""
-        here = self._body.position[:2]
-        self._trail.append(here)
-        away_m = float(np.hypot(*(here - self._trail[0])))
-        return len(self._trail) == self._trail.maxlen and away_m < _HELD_M
 
 
 def legs_of(player: Player, step_s: float) -> Legs:
