@@ -37,6 +37,7 @@ STEPS = {
 }  # of the search, by name; degrees:
 DEGREES = 7.0
 GAZE_DEG = -20.0  # who looks lower does not see where it goes
+FALLEN = 0.5  # cosine of the chest's front with straight down: less is on the side or the back
 Numbers = dict[str, float]
 
 
@@ -100,10 +101,10 @@ class Trial:
             self.body.act(self.body.encode(wish))
             self._game.advance(rng)
             spin += float(np.linalg.norm(self.body.angular_velocities()[chest])) / steps
-            least = min(least, self._face_down())
+            least = min(least, self.face_down())
             lowered += max(0.0, GAZE_DEG - self._gaze_deg()) / steps
         turmoil = (
-            0.02 * spin + 0.15 * max(0.0, 0.8 - least) + 0.2 * max(0.0, 0.7 - self._face_down())
+            0.02 * spin + 0.15 * max(0.0, 0.8 - least) + 0.2 * max(0.0, 0.7 - self.face_down())
         )
         return float((self.body.position[:2] - start) @ way) / WAY_S, turmoil
 
@@ -129,7 +130,8 @@ class Trial:
         """Return how high above the horizon an eye looks."""
         return math.degrees(math.asin(float(self.body.mount("eye_left").rotation[2, 0])))
 
-    def _face_down(self) -> float:
+    def face_down(self) -> float:
+        """Return the cosine of the angle between the front of the chest and straight down."""
         return -float(self.body.bone("chest").forward[2])
 
 
@@ -176,9 +178,13 @@ def measure(rhythm: Rhythm) -> None:
     for body in (*BODIES, "full", "full_position"):
         trial = Trial(body)
         for degrees in (0, 60, -60, 120, -120):
-            ways = [trial.way_mps(rhythm, math.radians(degrees), seed)[0] for seed in range(5)]
+            ways, upright = [], 0
+            for seed in range(5):
+                ways.append(trial.way_mps(rhythm, math.radians(degrees), seed)[0])
+                upright += trial.face_down() > FALLEN
             print(
-                f"{body:16}to {degrees:4} degrees aside: {np.mean(ways):.2f} m/s", np.round(ways, 2)
+                f"{body:16}to {degrees:4} degrees aside: {np.mean(ways):.2f} m/s, {upright} of 5 "
+                f"on their knees at the end; {np.round(ways, 2)}"
             )
         for turn in (1.0, -1.0):
             rounds = [trial.round_rad(rhythm, turn, seed) for seed in range(5)]
