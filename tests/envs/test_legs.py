@@ -38,7 +38,7 @@ def start(mover):
     world, player = mover
     world.reset(np.random.default_rng(0))
     line_up(player, np.zeros(2), 0.0)
-    return legs_of(player, world.clock.step_s)
+    return legs_of([player], world.clock.step_s)[player.name]
 
 
 def let(mover, wish):
@@ -52,11 +52,8 @@ def let(mover, wish):
 def test_it_comes_to_places_all_around(mover, aside_deg):
     place = 1.8 * np.array([math.cos(math.radians(aside_deg)), math.sin(math.radians(aside_deg))])
     legs = start(mover)
-    for _ in range(25 * 16):
-        body = let(mover, legs.to(place))
-        if math.dist(body.position[:2], place) < 0.3:
-            return
-    pytest.fail(f"it is {math.dist(body.position[:2], place):.1f} m away")
+    ways = (let(mover, legs.to(place)).position[:2] for _ in range(25 * 16))
+    assert any(math.dist(here, place) < 0.3 for here in ways)
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
@@ -68,10 +65,3 @@ def test_it_turns_to_either_side(mover, side):
         turned += math.atan2(before[0] * now[1] - before[1] * now[0], float(before @ now))
         before = now
     assert side * turned > math.pi / 2.0
-
-
-def test_it_stays(mover):
-    legs = start(mover)
-    for _ in range(50):
-        body = let(mover, legs.stay())
-    assert np.hypot(*body.position[:2]) < 0.1

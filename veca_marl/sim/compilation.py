@@ -37,7 +37,7 @@ def announce_compilation() -> None:
 
     It listens to numba's compiler, so that compiled kernels cost nothing more.
     """
-    register("numba:compile", CompilationNotice(_to_stderr))  # type: ignore[no-untyped-call]
+    register("numba:compile", CompilationNotice(_to_stderr))
 
 
 def _to_stderr(line: str) -> None:

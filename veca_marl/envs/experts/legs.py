@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -10,7 +11,6 @@ from veca_marl.envs.experts.walking import bearing_rad, walk_to
 from veca_marl.envs.task import Player, walker
 from veca_marl.sim.bodies.humanoid import Humanoid
 from veca_marl.sim.bodies.joint_controls import Springs
-from veca_marl.sim.bodies.postures import ON_ALL_FOURS
 from veca_marl.sim.bodies.walker import Walker
 from veca_marl.sim.calls import Call
 from veca_marl.sim.pose import Floats
@@ -25,7 +25,7 @@ class Reach:
         run_up_m: From so far a body comes at a ball that shall go straight on.
         clear_m: A ball passed at this distance stays where it is.
         other_m: Between two who push each other.
-        turning_m: What it takes to turn.
+        turning_m: Room that it takes to turn round, as a radius.
         look_ahead_m: Who follows a line goes to where it is so far ahead.
         aside_m: Whether a body is on the line of a shot: so far aside of it when the ball goes off,
         funnel: and so much more for each metre before.
@@ -58,10 +58,6 @@ class Legs(Protocol):
         """Turn where it is, as fast as it can at -1 and 1."""
         ...
 
-    def stay(self) -> Any:
-        """Stay where it is."""
-        ...
-
 
 class TwoLegs:
     """Those of a walker.
@@ -92,10 +88,6 @@ class TwoLegs:
         """See `Legs`."""
         return 0.0, left, call
 
-    def stay(self) -> tuple[float, float]:
-        """See `Legs`."""
-        return 0.0, 0.0
-
 
 class HandsAndKnees:
     """Those of a joint-level body that crawls.
@@ -118,8 +110,7 @@ class HandsAndKnees:
     )
 
     def __init__(self, body: Humanoid, step_s: float) -> None:
-        self._body, self._step_s = body, step_s
-        self._crawl = Crawl(body, step_s)
+        self._body, self._crawl = body, Crawl(body, step_s)
 
     def to(self, place: Floats, call: Call = Call.none) -> Springs:
         """See `Legs`; it turns on the way, and a wall that it has met holds it."""
@@ -129,18 +120,18 @@ class HandsAndKnees:
         """Crawl in a narrow circle, the nearest to `Legs.turn` that it can."""
         return self._crawl.wish(left)._replace(call=call)
 
-    def stay(self) -> Springs:
-        """Kneel on all fours."""
-        return Springs(self._body.angles_of(ON_ALL_FOURS), self._step_s)
 
-
-def legs_of(player: Player, step_s: float) -> Legs:
-    """Return how a player gets about from now on: on two legs, or on hands and knees.
+def legs_of(players: Sequence[Player], step_s: float) -> dict[str, Legs]:
+    """Return by name how players get about from now on: on two legs, or on hands and knees.
 
     Args:
-        player: Who; a joint-level body is on hands and knees now.
+        players: Who; joint-level bodies are on hands and knees now.
         step_s: Time between two wishes.
     """
+    return {player.name: _legs_of(player, step_s) for player in players}
+
+
+def _legs_of(player: Player, step_s: float) -> Legs:
     if isinstance(player.body, Humanoid):
         return HandsAndKnees(player.body, step_s)
     return TwoLegs(walker(player))

@@ -19,7 +19,7 @@ def wrestle(body: Body, reach: Reach, other: Body, middle: Floats, radius_m: flo
 
     Face to face two hold each other, so the way goes round the other one, on the side of
     the middle of the ring: who is pushed from there goes outwards. Who touches nobody, or is
-    farther out than the other one, keeps off the rope.
+    farther out than the other one, keeps off the rope, by as much as it takes to turn round.
 
     Args:
         body: Who pushes.

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veca_marl.envs.contests import line_up, look_ahead
-from veca_marl.envs.experts.legs import legs_of
+from veca_marl.envs.experts.legs import Legs, legs_of
 from veca_marl.envs.experts.seeking import Seeker
 from veca_marl.envs.floor_plan import FloorPlan
 from veca_marl.envs.navigation import Sight, free_place, gap_m, way_to
@@ -113,6 +113,7 @@ class MultiAgentNav(Task):
         )
         self._sight = Sight(self.world.scene, self.target)
         self._seekers: dict[str, Seeker] = {}
+        self._legs: dict[str, Legs] = {}
         self.arrived: set[str] = set()
         self._new = 0
 
@@ -131,6 +132,7 @@ class MultiAgentNav(Task):
             line_up(player, place, rng.uniform(-math.pi, math.pi))
             if self.cfg.muted is not Muted.nobody:
                 player.body.muted = room is home or self.cfg.muted is Muted.everybody
+        self._legs = legs_of(self.players, self.world.clock.step_s)
         look_ahead(self.players)
 
     def after_step(self, rng: np.random.Generator) -> None:
@@ -153,16 +155,18 @@ class MultiAgentNav(Task):
     def expert(self, player: Player, observation: dict[str, NDArray[Any]]) -> Any:
         """Look round, go and call; else listen, and go where a call comes from.
 
-        Who has seen the object (`is_visible`) knows its place, goes
-        there and calls while in its room. Who has not turns to the louder ear and, when both hear
-        the same, takes the loudness for the distance: what a caller is worth to it, it has from
-        the observation `audio` alone. Who hears nothing turns round once in each room, the nearest
-        first. Privileged: an agent's own place and heading, and the plan of the house.
+        Who has seen the object (`is_visible`) knows its place, goes there and calls while in its
+        room. Who has not turns to the louder ear and, when both hear the same, takes the loudness
+        for the distance: what a caller is worth to it, it has from the observation `audio` alone.
+        Who hears nothing turns round once in each room, the nearest first. Privileged: an agent's
+        own place and heading, and the plan of the house.
+
+        On hands and knees it comes to an object that it sees and hardly ever through a house: walls
+        hold who crawls into them, and a head that sways does not hear from where it is called.
         """
         seeker = self._seekers.get(player.name)
         if seeker is None:
-            legs = legs_of(player, self.world.clock.step_s)
-            seeker = Seeker(player.body, legs, self.plan, self.world)
+            seeker = Seeker(player.body, self._legs[player.name], self.plan, self.world)
             self._seekers[player.name] = seeker
         seen = self.target.position if self._sight.of(player) else None
         return seeker.wish(observation.get("audio"), seen)

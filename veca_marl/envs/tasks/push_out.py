@@ -76,8 +76,7 @@ class PushOut(Task):
         self._fallen = set()
         self._ground = {player.name: self._area(player) for player in self.players}
         self._won = dict.fromkeys(self._ground, 0.0)
-        step_s = self.world.clock.step_s
-        self._legs = {player.name: legs_of(player, step_s) for player in self.players}
+        self._legs = legs_of(self.players, self.world.clock.step_s)
 
     def after_step(self, rng: np.random.Generator) -> None:
         look_ahead(self.players)

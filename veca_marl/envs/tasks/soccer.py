@@ -123,8 +123,7 @@ class Soccer(Task):
             self._line_up(player, rng)
         look_ahead(self.players)
         self._rest_s = {player.name: 0.0 for player in self.players}
-        step_s = self.world.clock.step_s
-        self._legs = {player.name: legs_of(player, step_s) for player in self.players}
+        self._legs = legs_of(self.players, self.world.clock.step_s)
         self._scored = False
         self._now = self._look()
 
