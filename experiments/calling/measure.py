@@ -11,6 +11,7 @@ from __future__ import annotations
 import argparse
 import csv
 import math
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -21,7 +22,7 @@ from veca_marl.envs.game import Game
 
 HERE = Path(__file__).parent
 COLUMNS = (
-    *("agents", "arm", "episodes", "solved", "solved_low", "solved_high"),
+    *("body", "agents", "arm", "episodes", "solved", "solved_low", "solved_high"),
     *("seconds", "seconds_interval", "longer", "longer_interval"),
 )
 NORMAL_95 = 1.96
@@ -34,6 +35,7 @@ ARMS = {
     "stereo": ["senses/audio=stereo"],
 }
 FOR_MORE = ("voices", "finder muted", "all deaf")  # than two agents
+SECONDS = {"walker_voice": 20, "mitten_voice": 90, "full_voice": 90}  # by body: who crawls is slow
 
 
 def play_once(game: Game, seed: int) -> tuple[bool, float]:
@@ -50,11 +52,12 @@ def play_once(game: Game, seed: int) -> tuple[bool, float]:
             return outcome.terminated, game.steps * game.world.clock.step_s
 
 
-def play(agents: int, arm: str, episodes: int) -> Played:
+def play(body: str, agents: int, arm: str, episodes: int) -> Played:
     """Return for each episode whether it was solved, and its seconds: ``(episodes, 2)``."""
     # the experts ask `is_visible`: eyes and skin are shut to save time
     shut = ["senses/vision=blind", "senses/touch=numb"]
-    game = Game(compose(["+task=MultiAgentNav", f"task.agents={agents}", *shut, *ARMS[arm]]).game)
+    setting = [f"body={body}", f"task.agents={agents}", f"task.max_seconds={SECONDS[body]}"]
+    game = Game(compose(["+task=MultiAgentNav", *setting, *shut, *ARMS[arm]]).game)
     played = np.array([play_once(game, seed) for seed in range(episodes)])
     game.close()
     return played
@@ -73,28 +76,39 @@ def mean(values: Played) -> tuple[float, float]:
     return float(values.mean()), float(NORMAL_95 * values.std(ddof=1) / math.sqrt(len(values)))
 
 
-def row(agents: int, arm: str, played: Played, voices: Played) -> dict[str, object]:
+def row(body: str, agents: int, arm: str, played: Played, voices: Played) -> dict[str, object]:
     solved, seconds = float(played[:, 0].mean()), played[:, 1]
     longer = seconds - voices[:, 1]
     numbers = (solved, *wilson(solved, len(played)), *mean(seconds), *mean(longer))
-    cells = (agents, arm, len(played), *(round(float(number), 3) for number in numbers))
+    cells = (body, agents, arm, len(played), *(round(float(number), 3) for number in numbers))
     return dict(zip(COLUMNS, cells, strict=True))
+
+
+def settings(asked: argparse.Namespace) -> Iterator[tuple[str, int, tuple[str, ...]]]:
+    """Yield body, number of agents and arms."""
+    for body in asked.bodies:
+        for agents in asked.agents:
+            walkers = body == "walker_voice"
+            if walkers or agents == 2:
+                yield body, agents, tuple(ARMS) if walkers and agents == 2 else FOR_MORE
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--bodies", nargs="*", default=list(SECONDS), choices=list(SECONDS))
     parser.add_argument("--agents", type=int, nargs="*", default=[2, 3, 4])
-    parser.add_argument("--arms", nargs="*", choices=list(ARMS))
     parser.add_argument("--episodes", type=int, default=30)
     asked = parser.parse_args()
     with (HERE / "results.csv").open("w", newline="") as file:
         table = csv.DictWriter(file, COLUMNS, lineterminator="\n")
         table.writeheader()
-        for agents in asked.agents:
-            voices = play(agents, "voices", asked.episodes)
-            for arm in asked.arms or (ARMS if agents == 2 else FOR_MORE):
-                played = voices if arm == "voices" else play(agents, arm, asked.episodes)
-                cells = row(agents, arm, played, voices)
+        for body, agents, arms in settings(asked):
+            voices = play(body, agents, "voices", asked.episodes)
+            for arm in arms:
+                played = voices
+                if arm != "voices":
+                    played = play(body, agents, arm, asked.episodes)
+                cells = row(body, agents, arm, played, voices)
                 table.writerow(cells)
                 file.flush()
                 print(*cells.values(), sep="\t", flush=True)

@@ -1,8 +1,9 @@
-"""Search for a rhythm of crawling that gets to places all around, and print it.
+"""Search for a rhythm of crawling that gets to places all around, or straight back, and print it.
 
 pip install cmaes
 python experiments/crawl/search.py --minutes 30        # goes on from the rhythm that there is
-python experiments/crawl/search.py --measure           # what that rhythm does, without a search
+python experiments/crawl/search.py --back --minutes 30
+python experiments/crawl/search.py --measure           # what the rhythms do, without a search
 
 The search is an evolution strategy (SepCMA: Ros and Hansen 2008). A rhythm is tried on two bodies,
 one driven by target angles and one by torques; in each generation all are tried from the same
@@ -14,7 +15,7 @@ from __future__ import annotations
 import argparse
 import math
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import fields, is_dataclass
 from pprint import pprint
 from typing import Any
@@ -22,13 +23,17 @@ from typing import Any
 import numpy as np
 
 from veca_marl.config import compose
-from veca_marl.envs.experts.crawl import CRAWL, Crawl, Rhythm
+from veca_marl.envs.experts.crawl import Crawl
+from veca_marl.envs.experts.rhythms import BACK, CRAWL, Rhythm
 from veca_marl.envs.experts.walking import bearing_rad
 from veca_marl.envs.game import Game
+from veca_marl.sim.bodies.joint_controls import Springs
+from veca_marl.sim.pose import Floats
 
 BODIES = ("mitten_position", "mitten")
 POPULATION = 14
-WAY_S, ROUND_S = 8.0, 5.0
+WAY_S, ROUND_S, BACK_S = 8.0, 5.0, 4.0
+AHEAD_S = 2.0  # who goes back has crawled ahead for so long at most
 STEPS = {
     "_hz": 0.15,
     "_rad": 0.3,
@@ -36,7 +41,6 @@ STEPS = {
     "shortening": 0.25,
 }  # of the search, by name; degrees:
 DEGREES = 7.0
-GAZE_DEG = -20.0  # who looks lower does not see where it goes
 FALLEN = 0.5  # cosine of the chest's front with straight down: less is on the side or the back
 Numbers = dict[str, float]
 
@@ -80,6 +84,7 @@ class Trial:
         shut = ("senses/vision=blind", "senses/audio=deaf", "senses/touch=numb")
         self._game = Game(compose(["+task=CrawlBaby", f"body={body}", *shut]).game)
         self.body = self._game.players[0].body
+        self._chest = self.body.bone_names.index("chest")
         self._step_s = self._game.world.clock.step_s
 
     def way_mps(self, rhythm: Rhythm, aside_rad: float, seed: int) -> tuple[float, float]:
@@ -87,26 +92,35 @@ class Trial:
 
         Returns:
             Speed towards it; what it costs that the trunk was in turmoil or came to lie on its
-            side, or that the eyes looked at the floor.
+            side.
         """
         crawl, rng = self._start(rhythm, seed)
-        ahead, start = self.body.forward[:2], self.body.position[:2]
+        start, ahead = self._line()
         c, s = math.cos(aside_rad), math.sin(aside_rad)
         way = np.array([c * ahead[0] - s * ahead[1], s * ahead[0] + c * ahead[1]])
-        chest = self.body.bone_names.index("chest")
-        spin, least, lowered = 0.0, 1.0, 0.0
+        spin, least = 0.0, 1.0
         steps = round(WAY_S / self._step_s)
         for _ in range(steps):
-            wish = crawl.towards(bearing_rad(self.body, start + 100.0 * way))
-            self.body.act(self.body.encode(wish))
-            self._game.advance(rng)
-            spin += float(np.linalg.norm(self.body.angular_velocities()[chest])) / steps
+            self._step(crawl.towards(bearing_rad(self.body, start + 100.0 * way)), rng)
+            spin += self._spin() / steps
             least = min(least, self.face_down())
-            lowered += max(0.0, GAZE_DEG - self._gaze_deg()) / steps
-        turmoil = (
-            0.02 * spin + 0.15 * max(0.0, 0.8 - least) + 0.2 * max(0.0, 0.7 - self.face_down())
-        )
-        return float((self.body.position[:2] - start) @ way) / WAY_S, turmoil
+        speed = float((self.body.position[:2] - start) @ way) / WAY_S
+        return speed, self._turmoil(spin, least)
+
+    def back_mps(self, rhythm: Rhythm, ahead_s: float, seed: int) -> tuple[float, float]:
+        """Crawl ahead as it is known, then back; return speed back and turmoil."""
+        crawl, rng = self._start(CRAWL, seed)
+        for _ in range(round(ahead_s / self._step_s)):
+            self._step(crawl.wish(), rng)
+        crawl, start, ahead = Crawl(self.body, self._step_s, rhythm), *self._line()
+        spin, least = 0.0, 1.0
+        steps = round(BACK_S / self._step_s)
+        for _ in range(steps):
+            self._step(crawl.wish(), rng)
+            spin += self._spin() / steps
+            least = min(least, self.face_down())
+        speed = float((start - self.body.position[:2]) @ ahead) / BACK_S
+        return speed, self._turmoil(spin, least)
 
     def round_rad(self, rhythm: Rhythm, turn: float, seed: int) -> tuple[float, float]:
         """Turn for some time to one side; return how far, and how far away it came, metres."""
@@ -114,8 +128,7 @@ class Trial:
         before, start = self.body.forward, self.body.position[:2]
         turned, away = 0.0, 0.0
         for _ in range(round(ROUND_S / self._step_s)):
-            self.body.act(self.body.encode(crawl.wish(turn)))
-            self._game.advance(rng)
+            self._step(crawl.wish(turn), rng)
             now = self.body.forward
             turned += math.atan2(before[0] * now[1] - before[1] * now[0], float(before @ now))
             before, away = now, max(away, math.dist(self.body.position[:2], start))
@@ -126,82 +139,119 @@ class Trial:
         self._game.reset(rng)
         return Crawl(self.body, self._step_s, rhythm), rng
 
-    def _gaze_deg(self) -> float:
-        """Return how high above the horizon an eye looks."""
-        return math.degrees(math.asin(float(self.body.mount("eye_left").rotation[2, 0])))
+    def _step(self, wish: Springs, rng: np.random.Generator) -> None:
+        self.body.act(self.body.encode(wish))
+        self._game.advance(rng)
+
+    def _line(self) -> tuple[Floats, Floats]:
+        """Return where it is and whither it faces, ``(2,)`` each."""
+        return self.body.position[:2], self.body.forward[:2]
+
+    def _spin(self) -> float:
+        """Return how fast the chest turns, rad/s."""
+        return float(np.linalg.norm(self.body.angular_velocities()[self._chest]))
+
+    def _turmoil(self, spin: float, least: float) -> float:
+        side = 0.15 * max(0.0, 0.8 - least) + 0.2 * max(0.0, 0.7 - self.face_down())
+        return 0.02 * spin + side
 
     def face_down(self) -> float:
         """Return the cosine of the angle between the front of the chest and straight down."""
         return -float(self.body.bone("chest").forward[2])
 
 
-def score(trials: list[Trial], rhythm: Rhythm, generation: int) -> float:
-    """Return the mean of all tries and, besides, half of the worst: m/s, or worth as much."""
-    rng = np.random.default_rng([7, generation])
+def ahead(trial: Trial, rhythm: Rhythm, side: float, rng: np.random.Generator) -> list[float]:
+    """Return what a rhythm is worth that gets to places and turns: m/s, or worth as much."""
     worth = []
+    for low, high, hand in ((0.0, 60.0, side), (60.0, 150.0, -side)):
+        aside_rad = hand * math.radians(rng.uniform(low, high))
+        speed, turmoil = trial.way_mps(rhythm, aside_rad, int(rng.integers(10**6)))
+        worth.append(speed - turmoil)
+    turned, away = trial.round_rad(rhythm, side, int(rng.integers(10**6)))
+    return [*worth, 0.3 * min(1.0, turned / math.pi) - 0.15 * max(0.0, away - 0.5)]
+
+
+def back(trial: Trial, rhythm: Rhythm, side: float, rng: np.random.Generator) -> list[float]:
+    """Return what a rhythm is worth that leads back."""
+    del side
+    tries = [(float(rng.uniform(0.0, AHEAD_S)), int(rng.integers(10**6))) for _ in range(2)]
+    return [float(np.subtract(*trial.back_mps(rhythm, *one))) for one in tries]
+
+
+Worth = Callable[[Trial, Rhythm, float, np.random.Generator], list[float]]
+
+
+def score(trials: list[Trial], worth: Worth, rhythm: Rhythm, generation: int) -> float:
+    """Return the mean of all tries and, besides, half of the worst."""
+    rng, found = np.random.default_rng([7, generation]), []
     for number, trial in enumerate(trials):
         side = 1.0 if (generation + number) % 2 else -1.0
-        for low, high, hand in ((0.0, 60.0, side), (60.0, 150.0, -side)):
-            aside_rad = hand * math.radians(rng.uniform(low, high))
-            speed, turmoil = trial.way_mps(rhythm, aside_rad, int(rng.integers(10**6)))
-            worth.append(speed - turmoil)
-        turned, away = trial.round_rad(rhythm, side, int(rng.integers(10**6)))
-        worth.append(0.3 * min(1.0, turned / math.pi) - 0.15 * max(0.0, away - 0.5))
-    return float(np.mean(worth) + 0.5 * min(worth))
+        found += worth(trial, rhythm, side, rng)
+    return float(np.mean(found) + 0.5 * min(found))
 
 
-def search(minutes: float) -> Rhythm:
+def search(known: Rhythm, worth: Worth, minutes: float) -> Rhythm:
     from cmaes import SepCMA  # of nobody else's need
 
-    begin = numbers_of(CRAWL)
+    begin = numbers_of(known)
     steps = np.array([step_of(name) for name in begin])
     trials = [Trial(body) for body in BODIES]
     strategy = SepCMA(np.zeros(len(begin)), 0.5, population_size=POPULATION, seed=0)
 
     def rhythm_at(point: Any) -> Rhythm:
         numbers = np.array(list(begin.values())) + steps * point
-        found: Rhythm = rhythm_of(dict(zip(begin, numbers.tolist(), strict=True)), CRAWL)
+        found: Rhythm = rhythm_of(dict(zip(begin, numbers.tolist(), strict=True)), known)
         return found
 
     started = time.monotonic()
     while time.monotonic() - started < 60.0 * minutes:
         generation = strategy.generation
         points = [strategy.ask() for _ in range(POPULATION)]
-        scores = [score(trials, rhythm_at(point), generation) for point in points]
-        strategy.tell([(point, -worth) for point, worth in zip(points, scores, strict=True)])
+        scores = [score(trials, worth, rhythm_at(point), generation) for point in points]
+        strategy.tell([(point, -won) for point, won in zip(points, scores, strict=True)])
         print(generation, f"best {max(scores):.3f} mean {np.mean(scores):.3f}", flush=True)
     return rhythm_at(strategy.mean)
 
 
-def measure(rhythm: Rhythm) -> None:
-    """Print what a rhythm does on bodies, those that it was found on and others."""
+def measure() -> None:
+    """Print what the rhythms do on bodies, those that they were found on and others."""
     for body in (*BODIES, "full", "full_position"):
         trial = Trial(body)
         for degrees in (0, 60, -60, 120, -120):
             ways, upright = [], 0
             for seed in range(5):
-                ways.append(trial.way_mps(rhythm, math.radians(degrees), seed)[0])
+                ways.append(trial.way_mps(CRAWL, math.radians(degrees), seed)[0])
                 upright += trial.face_down() > FALLEN
             print(
                 f"{body:16}to {degrees:4} degrees aside: {np.mean(ways):.2f} m/s, {upright} of 5 "
                 f"on their knees at the end; {np.round(ways, 2)}"
             )
         for turn in (1.0, -1.0):
-            rounds = [trial.round_rad(rhythm, turn, seed) for seed in range(5)]
+            rounds = [trial.round_rad(CRAWL, turn, seed) for seed in range(5)]
             turned, away = np.mean(rounds, axis=0)
             speed = math.degrees(turned) / ROUND_S
             print(f"{body:16}turn {turn:2}: {speed:.0f} degrees/s, {away:.2f} m away at most")
+        ways, upright = [], 0
+        for seed in range(10):
+            ways.append(trial.back_mps(BACK, AHEAD_S * seed / 9, seed)[0])
+            upright += trial.face_down() > FALLEN
+        print(
+            f"{body:16}back: {np.mean(ways):.2f} m/s, {upright} of 10 on their knees at the end; "
+            f"{np.round(ways, 2)}"
+        )
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--minutes", type=float, default=30.0)
+    parser.add_argument("--back", action="store_true", help="search for one that leads back")
     parser.add_argument("--measure", action="store_true")
     asked = parser.parse_args()
     if asked.measure:
-        measure(CRAWL)
+        measure()
     else:
-        pprint(search(asked.minutes))
+        known, worth = (BACK, back) if asked.back else (CRAWL, ahead)
+        pprint(search(known, worth, asked.minutes))
 
 
 if __name__ == "__main__":

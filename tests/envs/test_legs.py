@@ -65,3 +65,31 @@ def test_it_turns_to_either_side(mover, side):
         turned += math.atan2(before[0] * now[1] - before[1] * now[0], float(before @ now))
         before = now
     assert side * turned > math.pi / 2.0
+
+
+def test_it_stays_near_while_it_turns(mover):
+    legs = start(mover)
+    ways = [let(mover, legs.turn(1.0)).position[:2] for _ in range(25 * 15)]
+    assert max(np.linalg.norm(ways, axis=1)) < 1.2
+
+
+def test_it_goes_back(mover):
+    """At once, and after it has gone ahead: at least 0.1 m/s, facing where it did, on its knees."""
+    legs = start(mover)
+    for ahead_s in (0, 1, 2):
+        for _ in range(25 * ahead_s):
+            let(mover, legs.to(np.array([9.0, 0.0])))
+        begin_m = mover[1].body.position[0]
+        for _ in range(25 * 3):
+            body = let(mover, legs.back())
+        assert body.position[0] < begin_m - 0.3
+        assert body.forward[0] > 0.5
+
+
+def test_at_rest_its_head_is_still(mover):
+    legs = start(mover)
+    for _ in range(25):
+        let(mover, legs.to(np.array([9.0, 0.0])))
+    heads = [let(mover, legs.rest()).mount("head").position for _ in range(50)]
+    speeds_mps = np.linalg.norm(np.diff(heads[25:], axis=0), axis=1) * 25
+    assert np.mean(speeds_mps) < 0.05

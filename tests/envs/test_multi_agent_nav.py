@@ -7,7 +7,10 @@ import pytest
 
 from veca_marl.config import ConfigError, compose
 from veca_marl.envs.contests import line_up
+from veca_marl.envs.experts.legs import legs_of
+from veca_marl.envs.experts.travelling import Traveller
 from veca_marl.envs.game import Game
+from veca_marl.envs.navigation import gap_m
 from veca_marl.envs.tasks.multi_agent_nav import MultiAgentNavCfg, Muted
 from veca_marl.sim.calls import CALLS, Call, call_waveform
 
@@ -96,6 +99,18 @@ def test_the_start_is_free_and_at_rest(game):
         np.testing.assert_allclose(after, before, atol=1e-6)
         for place in after[:-1]:
             assert math.dist(place, after[-1]) > REACH_M
+
+
+@pytest.mark.parametrize("agents", [2, 7])
+def test_there_is_always_room_to_start(agents):
+    """A room of 3 x 3 m with furniture holds the object and who starts beside it."""
+    game = game_of(agents=agents, playground="seven_rooms")
+    gaps = []
+    for seed in range(400):
+        game.task.reset(np.random.default_rng(seed))
+        gaps += [gap_m(player.body.position, game.task.target) for player in game.players]
+    assert min(gaps) >= 0.8
+    game.close()
 
 
 # ---- what pays, and when it ends
@@ -251,6 +266,7 @@ def test_a_joint_level_body_crawls_to_the_object_that_it_sees_and_calls():
     assert finder.body.bone("chest").forward[2] < -0.8
     room = game.task.plan.rooms[0]
     line_up(finder, room.middle_m - np.array([0.8, 0.0, 0.0]), 0.0)
+    line_up(other, game.task.plan.rooms[2].middle_m, 0.0)
     game.task.target.place(room.middle_m + np.array([0.7, 0.0, 0.2]))
     called = False
     while finder.name not in game.task.arrived:
@@ -261,6 +277,34 @@ def test_a_joint_level_body_crawls_to_the_object_that_it_sees_and_calls():
         called = called or rows[finder.name][-1] > 0.6
         assert not game.step(rows, rng).done
     assert called
+    game.close()
+
+
+@pytest.mark.parametrize("body", ["mitten_voice", "full_voice"])
+def test_on_hands_and_knees_they_come_together_through_a_house(body):
+    game = game_of(f"body={body}", "task.max_seconds=90", playground="seven_rooms")
+    assert math.isfinite(seconds_needed(game, seed=1))
+    game.close()
+
+
+def test_who_cannot_get_on_goes_back_and_comes_round():
+    """On hands and knees with the head against a wall, the way leads back."""
+    game = game_of("body=mitten_voice", playground="two_rooms")
+    rng = np.random.default_rng(0)
+    game.reset(rng)
+    player, other = game.players
+    low, size = game.task.plan.rooms[0].lower_m, game.task.plan.rooms[0].size_m
+    line_up(player, (low[0] + 0.55, low[1] + size[1] / 2.0), math.pi)
+    goal = np.array([low[0] + 2.0, low[1] + size[1] / 2.0])
+    legs = legs_of([player], STEP_S)[player.name]
+    traveller = Traveller(player.body, legs, game.task.plan, STEP_S)
+    still = np.zeros(other.body.action_spec.shape, np.float32)
+    for _ in range(25 * 25):
+        row = player.body.encode(traveller.to(goal))
+        game.step({player.name: row, other.name: still}, rng)
+        if traveller.is_at(goal):
+            break
+    assert traveller.is_at(goal)
     game.close()
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from seeking import BALL_M, ball_at, walker_at, wall_across, world_with
 
-from veca_marl.envs.navigation import Sight, free_place, gap_m, way_to
+from veca_marl.envs.navigation import Sight, free_pair, free_place, gap_m, way_to
 from veca_marl.envs.task import Player
 from veca_marl.sim.optics import Camera, look_at, seen_fraction
 from veca_marl.sim.playground import RoomCfg
@@ -67,6 +67,22 @@ def test_free_places_are_clear_of_things_and_walls():
     np.testing.assert_allclose(places.max(axis=0)[:2], 1.7, atol=0.05)
     with pytest.raises(ValueError, match=r"leaves no floor 0\.95 m away from everything"):
         free_place(room, [thing], 0.95, rng)
+    world.close()
+
+
+def test_pairs_of_places_are_clear_and_apart_where_a_first_one_could_leave_no_second():
+    """On 1.4 x 1.4 m of floor nothing is 1 m away from the middle, or hardly anything."""
+    world = world_with(ball_at(0.2, 0.2))
+    thing, room = world.props["ball"], RoomCfg(lower_m=(0.0, 0.0, 0.0), size_m=(3.0, 3.0, 2.0))
+    rng = np.random.default_rng(0)
+    pairs = [free_pair(room, [thing], 0.8, 1.0, rng) for _ in range(300)]
+    apart = [math.dist(*pair) for pair in pairs]
+    assert 1.0 <= min(apart) < 1.05
+    for place in np.concatenate(pairs):
+        assert gap_m(place, thing) >= 0.8
+        assert room.contains(place + np.array([0.0, 0.0, 1.0]), 0.8)
+    with pytest.raises(ValueError, match=r"leaves no two places 2\.0 m apart and 0\.8 m away"):
+        free_pair(room, [thing], 0.8, 2.0, rng)
     world.close()
 
 

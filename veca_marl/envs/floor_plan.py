@@ -11,8 +11,21 @@ import numpy as np
 from veca_marl.sim.playground import DoorCfg, PlaygroundCfg, RoomCfg
 from veca_marl.sim.pose import Floats
 
-_BEFORE_DOOR_M = 0.4  # from here the opening is straight ahead
-_RIGHT_M = 0.2  # to the right of the middle: others come the other way
+_CORNER_M = 0.7  # so far from both walls somebody has room in a corner
+
+
+class Passing(NamedTuple):
+    """How somebody goes through doors.
+
+    Attributes:
+        before_m: From so far before it the opening is straight ahead; so far beyond it all is
+            passed.
+        right_m: How far to the right of the middle, if the door is wide enough: others come the
+            other way.
+    """
+
+    before_m: float
+    right_m: float
 
 
 class _Passage(NamedTuple):
@@ -56,12 +69,13 @@ class FloorPlan:
         length, _ = self._routes[one].get(other, (math.inf, None))
         return length
 
-    def waypoint(self, place: Floats, goal: Floats) -> Floats:
+    def waypoint(self, place: Floats, goal: Floats, passing: Passing) -> Floats:
         """Return where to walk straight to, on the way to a goal.
 
         Args:
             place: ``(2,)`` or ``(3,)`` metres, where somebody is.
             goal: Likewise, where it wants to be.
+            passing: How it goes through doors.
 
         Returns:
             ``(2,)`` metres: the goal if it is in the same room; else a point before the next door
@@ -77,7 +91,24 @@ class FloorPlan:
             names = self.rooms[here].name, self.rooms[there].name
             raise ValueError(f"no doors lead from {names[0]!r} to {names[1]!r}")
         _, passage = self._routes[here][there]
-        return _through(passage, place)
+        return _through(passage, place, passing)
+
+    def aside_of(self, place: Floats) -> Floats:
+        """Return where in a room who stays is in nobody's way to a place ``(2,)`` or ``(3,)``.
+
+        Returns:
+            ``(2,)`` metres: of four places near the corners, or halfway there in a small room, the
+            one that is farthest from the place and from all doors.
+        """
+        here = self.room_of(place)
+        room = self.rooms[here]
+        low, size = np.array(room.lower_m[:2]), np.array(room.size_m[:2])
+        inset = np.minimum(_CORNER_M, size / 4.0)
+        keep_off = [place[:2], *(passage.door.position_m for passage in self._passages[here])]
+        corners = [
+            low + np.where([right, far], size - inset, inset) for right in (0, 1) for far in (0, 1)
+        ]
+        return max(corners, key=lambda corner: min(math.dist(corner, off) for off in keep_off))
 
     def _routes_from(self, start: int) -> dict[int, tuple[float, _Passage]]:
         """Return length and first door of the shortest way to every other room (Dijkstra 1959)."""
@@ -115,14 +146,14 @@ def _way_out(room: RoomCfg, other: RoomCfg) -> Floats:
     return out
 
 
-def _through(passage: _Passage, place: Floats) -> Floats:
+def _through(passage: _Passage, place: Floats, passing: Passing) -> Floats:
     """Return where to walk to go through a door, see `FloorPlan.waypoint`."""
     out = passage.out
     right = np.array([out[1], -out[0]])
     middle = np.array(passage.door.position_m)
     half_m = passage.door.width_m / 2.0
-    keep_m = min(_RIGHT_M, half_m / 2.0)
+    keep_m = min(passing.right_m, half_m / 2.0)
     aside_m = float(right @ (np.array([place[0], place[1]]) - middle))
     if abs(aside_m - keep_m) <= half_m / 3.0:
-        return middle + keep_m * right + _BEFORE_DOOR_M * out
-    return middle + keep_m * right - _BEFORE_DOOR_M * out
+        return middle + keep_m * right + passing.before_m * out
+    return middle + keep_m * right - passing.before_m * out

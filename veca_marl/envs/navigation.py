@@ -70,9 +70,42 @@ def free_place(
     """
     for _ in range(_TRIES):
         place = room.sample_floor(rng, clear_m)
-        if all(gap_m(place, thing) >= clear_m for thing in things):
+        if _is_clear(place, things, clear_m):
             return place
     raise ValueError(f"room {room.name!r} leaves no floor {clear_m} m away from everything")
+
+
+def free_pair(
+    room: RoomCfg, things: Sequence[Prop], clear_m: float, apart_m: float, rng: np.random.Generator
+) -> tuple[Floats, Floats]:
+    """Draw two places as `free_place` does, that are apart.
+
+    Both are drawn at once: a first one in the middle of a small room may leave none for a second.
+
+    Args:
+        room: Where.
+        things: What they must not be near to.
+        clear_m: How far they stay from all of them, metres.
+        apart_m: How far they are from each other.
+        rng: Draws them.
+
+    Raises:
+        ValueError: If there are none, or too few to find them by drawing.
+    """
+    for _ in range(_TRIES):
+        one, other = room.sample_floor(rng, clear_m), room.sample_floor(rng, clear_m)
+        if horizontal_distance(one, other) < apart_m:
+            continue
+        if _is_clear(one, things, clear_m) and _is_clear(other, things, clear_m):
+            return one, other
+    raise ValueError(
+        f"room {room.name!r} leaves no two places {apart_m} m apart and {clear_m} m away from "
+        "everything"
+    )
+
+
+def _is_clear(place: Floats, things: Sequence[Prop], clear_m: float) -> bool:
+    return all(gap_m(place, thing) >= clear_m for thing in things)
 
 
 class Sight:

@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
 from veca_marl.envs.experts.crawl import Crawl
+from veca_marl.envs.experts.rhythms import BACK, CRAWL, KNEEL, Rhythm
 from veca_marl.envs.experts.walking import bearing_rad, walk_to
+from veca_marl.envs.floor_plan import Passing
 from veca_marl.envs.task import Player, walker
 from veca_marl.sim.bodies.humanoid import Humanoid
 from veca_marl.sim.bodies.joint_controls import Springs
 from veca_marl.sim.bodies.walker import Walker
 from veca_marl.sim.calls import Call
 from veca_marl.sim.pose import Floats
+
+_CIRCLE_M = 0.35  # who crawls and turns comes back when it is farther than this from where it began
 
 
 @dataclass(frozen=True)
@@ -29,6 +34,7 @@ class Reach:
         look_ahead_m: Who follows a line goes to where it is so far ahead.
         aside_m: Whether a body is on the line of a shot: so far aside of it when the ball goes off,
         funnel: and so much more for each metre before.
+        passing: How it goes through doors.
     """
 
     ball_m: float
@@ -39,6 +45,7 @@ class Reach:
     look_ahead_m: float
     aside_m: float
     funnel: float
+    passing: Passing
 
 
 class Legs(Protocol):
@@ -58,6 +65,14 @@ class Legs(Protocol):
         """Turn where it is, as fast as it can at -1 and 1."""
         ...
 
+    def rest(self, call: Call = Call.none) -> Any:
+        """Stay, and hold the head still."""
+        ...
+
+    def back(self, call: Call = Call.none) -> Any:
+        """Go straight back."""
+        ...
+
 
 class TwoLegs:
     """Those of a walker.
@@ -75,6 +90,7 @@ class TwoLegs:
         look_ahead_m=0.25,
         aside_m=0.05,
         funnel=0.4,
+        passing=Passing(before_m=0.4, right_m=0.2),
     )
 
     def __init__(self, body: Walker) -> None:
@@ -87,6 +103,14 @@ class TwoLegs:
     def turn(self, left: float, call: Call = Call.none) -> tuple[float, float, Call]:
         """See `Legs`."""
         return 0.0, left, call
+
+    def rest(self, call: Call = Call.none) -> tuple[float, float, Call]:
+        """See `Legs`."""
+        return 0.0, 0.0, call
+
+    def back(self, call: Call = Call.none) -> tuple[float, float, Call]:
+        """See `Legs`."""
+        return -1.0, 0.0, call
 
 
 class HandsAndKnees:
@@ -107,18 +131,42 @@ class HandsAndKnees:
         look_ahead_m=0.5,
         aside_m=0.2,
         funnel=0.8,
+        passing=Passing(before_m=0.9, right_m=0.0),
     )
 
     def __init__(self, body: Humanoid, step_s: float) -> None:
-        self._body, self._crawl = body, Crawl(body, step_s)
+        self._body, self._step_s = body, step_s
+        self._crawl = Crawl(body, step_s)
+        self._pivot: Floats | None = None
 
     def to(self, place: Floats, call: Call = Call.none) -> Springs:
-        """See `Legs`; it turns on the way, and a wall that it has met holds it."""
-        return self._crawl.towards(bearing_rad(self._body, place))._replace(call=call)
+        """See `Legs`; it turns on the way, and what it runs into holds it: `back` frees it."""
+        self._pivot = None
+        aside_rad = bearing_rad(self._body, place)
+        return self._in(CRAWL).towards(aside_rad)._replace(call=call)
 
     def turn(self, left: float, call: Call = Call.none) -> Springs:
-        """Crawl in a narrow circle, the nearest to `Legs.turn` that it can."""
-        return self._crawl.wish(left)._replace(call=call)
+        """Crawl round where it began to turn, the nearest to `Legs.turn` that it can."""
+        here = self._body.position[:2]
+        if self._pivot is None:
+            self._pivot = here
+        if math.dist(here, self._pivot) < _CIRCLE_M:
+            return self._in(CRAWL).wish(left)._replace(call=call)
+        inwards_rad = bearing_rad(self._body, self._pivot)
+        return self._in(CRAWL).towards(inwards_rad)._replace(call=call)
+
+    def rest(self, call: Call = Call.none) -> Springs:
+        """See `Legs`."""
+        return self._in(KNEEL).wish()._replace(call=call)
+
+    def back(self, call: Call = Call.none) -> Springs:
+        """See `Legs`."""
+        return self._in(BACK).wish()._replace(call=call)
+
+    def _in(self, rhythm: Rhythm) -> Crawl:
+        if self._crawl.rhythm is not rhythm:
+            self._crawl = Crawl(self._body, self._step_s, rhythm)
+        return self._crawl
 
 
 def legs_of(players: Sequence[Player], step_s: float) -> dict[str, Legs]:

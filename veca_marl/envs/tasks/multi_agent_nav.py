@@ -14,7 +14,7 @@ from veca_marl.envs.contests import line_up, look_ahead
 from veca_marl.envs.experts.legs import Legs, legs_of
 from veca_marl.envs.experts.seeking import Seeker
 from veca_marl.envs.floor_plan import FloorPlan
-from veca_marl.envs.navigation import Sight, free_place, gap_m, way_to
+from veca_marl.envs.navigation import Sight, free_pair, free_place, gap_m, way_to
 from veca_marl.envs.task import Player, Task, TaskCfg, Team, register, terms
 from veca_marl.sim.props import PropCfg, PropShape
 
@@ -71,8 +71,9 @@ class MultiAgentNav(Task):
 
     `playground=seven_rooms`, its own, takes up to 7 agents: the ways are short, but who is not
     called has much to search. `two_rooms`, `three_rooms` and `four_rooms` are for so many.
-    Joint-level bodies start on hands and knees, look ahead as far as their eyes turn, and
-    need more time; with `body=mitten_voice` or `full_voice` they can call.
+    Joint-level bodies start on hands and knees and look ahead as far as their eyes turn; with
+    `body=mitten_voice` or `full_voice` they can call. They need more time: a scripted crawl solves
+    it within `task.max_seconds=90`.
 
     Terms:
         reached: how many agents reached the object for the first time in this step, the same for
@@ -125,10 +126,11 @@ class MultiAgentNav(Task):
         rooms = [self.plan.rooms[index] for index in order]
         home = rooms[rng.integers(len(rooms))]
         clear_m = self.cfg.radius_m + self.cfg.reach_m + _PASS_M
-        x, y, floor_m = free_place(home, self._furniture, clear_m, rng)
+        apart_m = self.cfg.radius_m + clear_m
+        (x, y, floor_m), beside = free_pair(home, self._furniture, clear_m, apart_m, rng)
         self.target.place((x, y, floor_m + self.cfg.radius_m))
         for room, player in zip(rooms, self.players, strict=True):
-            place = free_place(room, [*self._furniture, self.target], clear_m, rng)
+            place = beside if room is home else free_place(room, self._furniture, clear_m, rng)
             line_up(player, place, rng.uniform(-math.pi, math.pi))
             if self.cfg.muted is not Muted.nobody:
                 player.body.muted = room is home or self.cfg.muted is Muted.everybody
@@ -155,18 +157,19 @@ class MultiAgentNav(Task):
     def expert(self, player: Player, observation: dict[str, NDArray[Any]]) -> Any:
         """Look round, go and call; else listen, and go where a call comes from.
 
-        Who has seen the object (`is_visible`) knows its place, goes there and calls while in its
-        room. Who has not turns to the louder ear and, when both hear the same, takes the loudness
-        for the distance: what a caller is worth to it, it has from the observation `audio` alone.
-        Who hears nothing turns round once in each room, the nearest first. Privileged: an agent's
-        own place and heading, and the plan of the house.
+        Who has seen the object (`is_visible`) knows its place, goes there, calls while in its room
+        and, when it has arrived, leaves the others room. Who has not keeps a map of how likely
+        somebody calls from each place of the house: a call is as loud as it is far, 30 dB weaker
+        for each wall, and louder in the ear that it is turned to. What a caller is worth to it,
+        it has from the observation `audio` alone. Who hears nothing turns round once in each room,
+        the nearest first. Who runs into something goes back. Privileged: an agent's own place and
+        heading, and the plan of the house.
 
-        On hands and knees it comes to an object that it sees and hardly ever through a house: walls
-        hold who crawls into them, and a head that sways does not hear from where it is called.
+        On hands and knees it needs up to a minute where a walker needs ten seconds.
         """
         seeker = self._seekers.get(player.name)
         if seeker is None:
             seeker = Seeker(player.body, self._legs[player.name], self.plan, self.world)
             self._seekers[player.name] = seeker
         seen = self.target.position if self._sight.of(player) else None
-        return seeker.wish(observation.get("audio"), seen)
+        return seeker.wish(observation.get("audio"), seen, player.name in self.arrived)
