@@ -38,8 +38,8 @@ class Seeker:
         self._calls = CallMap(world)
         self._every, self._steps = max(1, round(_LISTEN_S / step_s)), 0
         self._found: Floats | None = None
-        self._spot: Floats | None = None
-        self._turned_rad, self._heading = 0.0, body.forward
+        self._spot = body.position
+        self._to_turn_rad, self._heading = _ROUND_RAD, body.forward
         self._searched: set[int] = set()
 
     def wish(self, audio: NDArray[Any] | None, seen: Floats | None, arrived: bool) -> Any:
@@ -56,9 +56,7 @@ class Seeker:
         if self._found is not None:
             return self._go_and_call(self._found, arrived)
         self._listen(audio)
-        if self._calls.heard:
-            return self._come(self._calls.best())
-        return self._search(turned_rad)
+        return self._seek(turned_rad)
 
     def _go_and_call(self, found: Floats, arrived: bool) -> Any:
         call = CALL if self._traveller.room == self._plan.room_of(found) else Call.none
@@ -70,23 +68,23 @@ class Seeker:
 
     def _listen(self, audio: NDArray[Any] | None) -> None:
         if audio is not None and self._steps % self._every == 0:
+            silent = not self._calls.heard
             self._calls.hear(self._body.mount("head"), audio)
+            if silent and self._calls.heard:
+                self._to_turn_rad = 0.0  # it goes at once
         self._steps += 1
 
-    def _come(self, caller: Floats) -> Any:
-        """Go where a call comes from and, when there, look round."""
-        there = self._traveller.is_at(caller)
-        return self._traveller.look_round() if there else self._traveller.to(caller)
-
-    def _search(self, turned_rad: float) -> Any:
-        """Turn round once in the middle of each room, but first where it starts."""
-        if self._spot is not None and not self._traveller.is_at(self._spot):
-            return self._traveller.to(self._spot)
-        self._turned_rad += turned_rad
-        if self._turned_rad >= _ROUND_RAD:
-            self._turned_rad = 0.0
-            self._spot = self._next_spot()
-        return self._traveller.look_round()
+    def _seek(self, turned_rad: float) -> Any:
+        """Look round where a call comes from; in silence, once in each room from here on."""
+        if self._to_turn_rad > 0.0:
+            self._to_turn_rad -= turned_rad
+            if self._to_turn_rad <= 0.0:
+                self._spot = self._next_spot()
+            return self._traveller.look_round()
+        goal = self._calls.best() if self._calls.heard else self._spot
+        if self._traveller.is_at(goal):
+            self._to_turn_rad = _ROUND_RAD
+        return self._traveller.to(goal)
 
     def _turned_since(self) -> float:
         """Return how far it has turned since the last wish, rad, left is positive."""
