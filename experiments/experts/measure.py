@@ -2,6 +2,7 @@
 
 python experiments/experts/measure.py                       # all tasks, ten episodes each
 python experiments/experts/measure.py TurnBaby SitBaby --episodes 20 --body full
+python experiments/experts/measure.py SoccerTwoPlayer --body full --seconds 60
 
 Between two teams the expert plays against chance and against itself, and chance against itself.
 Rows of tasks that are not asked for stay in the table.
@@ -24,7 +25,7 @@ from veca_marl.envs.team import Script
 
 HERE = Path(__file__).parent
 COLUMNS = [
-    *("task", "body", "player", "opponent"),
+    *("task", "body", "seconds", "player", "opponent"),
     *("episodes", "return", "interval_95", "least", "greatest", "ended"),
 ]
 STUDENT_95 = {5: 2.776, 10: 2.262, 20: 2.093, 40: 2.023}  # two-sided quantile of t by episodes
@@ -54,11 +55,12 @@ def play(cfg: GameCfg, first: Script, others: Script | None, seed: int) -> tuple
     return paid, outcome.terminated
 
 
-def measure(task: str, body: str, episodes: int) -> list[dict[str, object]]:
+def measure(task: str, body: str, seconds: float | None, episodes: int) -> list[dict[str, object]]:
     # the other experts use privileged state: eyes are shut and skins numb to save time
     own = [] if task == "KickTheBall" else ["senses/vision=blind", "senses/touch=numb"]
     chosen = [] if body == "own" else [f"body={body}"]
-    cfg = compose([f"+task={task}", *own, *chosen]).game
+    time = [] if seconds is None else [f"task.max_seconds={seconds}"]
+    cfg = compose([f"+task={task}", *own, *chosen, *time]).game
     rows: list[dict[str, object]] = []
     for first, others in ALONE if len(cfg.teams) == 1 else AGAINST:
         played = [play(cfg, first, others, seed) for seed in range(episodes)]
@@ -66,7 +68,7 @@ def measure(task: str, body: str, episodes: int) -> list[dict[str, object]]:
         interval = STUDENT_95[episodes] * paid.std(ddof=1) / np.sqrt(episodes)
         numbers = (paid.mean(), interval, paid.min(), paid.max(), ended.mean())
         rounded = [round(float(number), 3) for number in numbers]
-        names = (task, body, first.value, others.value if others else "")
+        names = (task, body, cfg.task.max_seconds, first.value, others.value if others else "")
         values = (*names, episodes, *rounded)
         rows.append(dict(zip(COLUMNS, values, strict=True)))
         print(*values)
@@ -89,9 +91,14 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("tasks", nargs="*", default=veca_marl.list_tasks())
     parser.add_argument("--body", default="own", help="a preset; the task's own if not said")
+    parser.add_argument("--seconds", type=float, help="of an episode; the task's own if not said")
     parser.add_argument("--episodes", type=int, default=10, choices=sorted(STUDENT_95))
     asked = parser.parse_args()
-    rows = [row for task in asked.tasks for row in measure(task, asked.body, asked.episodes)]
+    rows = [
+        row
+        for task in asked.tasks
+        for row in measure(task, asked.body, asked.seconds, asked.episodes)
+    ]
     write(HERE / ("results.csv" if asked.body == "own" else f"results_{asked.body}.csv"), rows)
 
 

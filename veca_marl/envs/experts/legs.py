@@ -29,8 +29,10 @@ class Reach:
         ball_m: There a ball before the body goes off, away from it.
         run_up_m: From so far a body comes at a ball that shall go straight on.
         clear_m: A ball passed at this distance stays where it is.
+        wall_m: Nearer to a wall no run-up begins.
         other_m: Between two who push each other.
         turning_m: Room that it takes to turn round, as a radius.
+        back_rad: Where it has no room to turn, it goes backwards to what is farther aside.
         look_ahead_m: Who follows a line goes to where it is so far ahead.
         aside_m: Whether a body is on the line of a shot: so far aside of it when the ball goes off,
         funnel: and so much more for each metre before.
@@ -40,8 +42,10 @@ class Reach:
     ball_m: float
     run_up_m: float
     clear_m: float
+    wall_m: float
     other_m: float
     turning_m: float
+    back_rad: float
     look_ahead_m: float
     aside_m: float
     funnel: float
@@ -85,8 +89,10 @@ class TwoLegs:
         ball_m=0.38,
         run_up_m=0.55,
         clear_m=0.42,
+        wall_m=0.13,
         other_m=0.3,
         turning_m=0.0,
+        back_rad=math.pi,
         look_ahead_m=0.25,
         aside_m=0.05,
         funnel=0.4,
@@ -126,8 +132,10 @@ class HandsAndKnees:
         ball_m=0.5,
         run_up_m=1.1,
         clear_m=0.6,
+        wall_m=0.45,
         other_m=0.75,
         turning_m=0.5,
+        back_rad=2.1,
         look_ahead_m=0.5,
         aside_m=0.2,
         funnel=0.8,

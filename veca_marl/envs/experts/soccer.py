@@ -12,7 +12,7 @@ from veca_marl.sim.bodies.base import Body
 from veca_marl.sim.pose import Floats
 
 _AHEAD_S = 0.25  # the ball is taken where it will be then
-_BODY_M, _BALL_M = 0.13, 0.12
+_BALL_M = 0.12
 _ASIDE_RAD = [side * math.radians(deg) for deg in range(0, 180, 15) for side in (1.0, -1.0)]
 _CORNERS = (0.0, 0.12, -0.12, 0.24, -0.24, 0.33, -0.33)  # shares of the goal's width
 _FREE_M = 0.45  # farther from a keeper no shot is freer
@@ -36,7 +36,7 @@ def attack(body: Body, reach: Reach, pitch: Pitch, aim: Floats) -> Floats:
         pitch.low + _BALL_M,
         pitch.high - _BALL_M,
     )
-    here, shot = body.position[:2], _possible(ball, _unit(aim[:2] - ball), reach.run_up_m, pitch)
+    here, shot = body.position[:2], _possible(ball, _unit(aim[:2] - ball), reach, pitch)
     behind, aside = (ball - here) @ shot, abs(_cross(shot, ball - here))
     if aside < reach.aside_m + reach.funnel * (behind - reach.ball_m):
         return ball - max(behind - reach.look_ahead_m, 0.0) * shot
@@ -62,13 +62,13 @@ def _gap_m(start: Floats, end: Floats, other: Floats) -> float:
     return float(np.hypot(*(start + min(max(share, 0.0), 1.0) * way - other)))
 
 
-def _possible(ball: Floats, shot: Floats, run_up_m: float, pitch: Pitch) -> Floats:
+def _possible(ball: Floats, shot: Floats, reach: Reach, pitch: Pitch) -> Floats:
     """Return the direction nearest to a shot's for which the pitch has room for the run-up."""
     for aside_rad in _ASIDE_RAD:
         c, s = math.cos(aside_rad), math.sin(aside_rad)
         turned = np.array([c * shot[0] - s * shot[1], s * shot[0] + c * shot[1]])
-        start = ball - run_up_m * turned
-        if (start > pitch.low + _BODY_M).all() and (start < pitch.high - _BODY_M).all():
+        start = ball - reach.run_up_m * turned
+        if (start > pitch.low + reach.wall_m).all() and (start < pitch.high - reach.wall_m).all():
             return turned
     return shot
 

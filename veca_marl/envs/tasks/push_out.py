@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from veca_marl.envs.contests import line_up, look_ahead, nearest, on_floor, opponents, paint_disc
 from veca_marl.envs.experts.legs import Legs, legs_of
+from veca_marl.envs.experts.walking import bearing_rad
 from veca_marl.envs.experts.wrestling import wrestle
 from veca_marl.envs.task import Player, Task, TaskCfg, terms
 from veca_marl.sim.pose import Floats
@@ -101,11 +102,16 @@ class PushOut(Task):
         return any(all(p.name not in left for p in self._team(team)) for team in self._teams)
 
     def expert(self, player: Player, observation: dict[str, NDArray[Any]]) -> Any:
-        """Go round the nearest opponent and push it outwards; knows where all are."""
+        """Go round the nearest opponent and push it outwards; knows where all are.
+
+        On hands and knees it goes backwards where others turn round: turning takes room.
+        """
         _, theirs = self._sides(player)
         body, legs = player.body, self._legs[player.name]
         other = nearest(body, theirs)
-        return legs.to(wrestle(body, legs.reach, other, self.middle, self.cfg.radius_m))
+        place = wrestle(body, legs.reach, other, self.middle, self.cfg.radius_m)
+        behind = abs(bearing_rad(body, place)) > legs.reach.back_rad
+        return legs.back() if behind else legs.to(place)
 
     # ---- who is where
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veca_marl.envs.contests import line_up, look_ahead
+from veca_marl.envs.experts.backing_off import BacksOff
 from veca_marl.envs.experts.legs import Legs, legs_of
 from veca_marl.envs.experts.soccer import attack
 from veca_marl.envs.pitch import POST_M, Pitch
@@ -123,7 +124,9 @@ class Soccer(Task):
             self._line_up(player, rng)
         look_ahead(self.players)
         self._rest_s = {player.name: 0.0 for player in self.players}
-        self._legs = legs_of(self.players, self.world.clock.step_s)
+        step_s = self.world.clock.step_s
+        legs = legs_of(self.players, step_s)
+        self._legs = {p.name: BacksOff(p.body, legs[p.name], step_s) for p in self.players}
         self._scored = False
         self._now = self._look()
 
