@@ -120,6 +120,14 @@ def test_a_reset_after_a_reset_is_clean(cfg):
     game.close()
 
 
+def test_it_starts_from_every_seed(task):
+    """A start that fails in 1 of 100 episodes stops a run within minutes."""
+    game = Game(game_cfg(task))
+    for seed in range(300):
+        game.task.reset(np.random.default_rng(seed))
+    game.close()
+
+
 def test_the_reward_is_the_weighted_sum_of_the_terms(env, rollout):
     weights = env.games[0].weights
     for team in env.group_map:

@@ -29,6 +29,9 @@ class CallMap:
 
     Args:
         world: Whose house.
+
+    Attributes:
+        heard: Whether anything was.
     """
 
     def __init__(self, world: World) -> None:
