@@ -123,8 +123,12 @@ def test_a_reset_after_a_reset_is_clean(cfg):
 def test_it_starts_from_every_seed(task):
     """A start that fails in 1 of 100 episodes stops a run within minutes."""
     game = Game(game_cfg(task))
+    rooms = game.world.playground.rooms
     for seed in range(300):
         game.task.reset(np.random.default_rng(seed))
+        for player in game.players:
+            x, y = player.body.position[:2]
+            assert min(room.away_m((x, y)) for room in rooms) == 0.0, seed
     game.close()
 
 

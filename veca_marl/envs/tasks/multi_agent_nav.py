@@ -73,7 +73,7 @@ class MultiAgentNav(Task):
     called has much to search. `two_rooms`, `three_rooms` and `four_rooms` are for so many.
     Joint-level bodies start on hands and knees and look ahead as far as their eyes turn; with
     `body=mitten_voice` or `full_voice` they can call. They need more time: a scripted crawl solves
-    it within `task.max_seconds=90`.
+    nearly every game within `task.max_seconds=90`.
 
     Terms:
         reached: how many agents reached the object for the first time in this step, the same for
