@@ -16,14 +16,14 @@ import matplotlib as mpl
 import numpy as np
 
 from veca_marl.api import make
-from veca_marl.envs.env import VecaEnv
-from veca_marl.envs.game import Game
-from veca_marl.envs.task import TASKS, Task
-from veca_marl.sim.optics import Camera, look_at
-from veca_marl.sim.senses.proprioception import ProprioceptionQuality, kept_parts, part_slices
-from veca_marl.sim.skeleton import limit_sources, load_skeleton
-from veca_marl.sim.taxels import TAXELS_PER_TRIANGLE, taxels_of
-from veca_marl.sim.touch_picture import picture_of_touch
+from veca_marl.envs.adapters.torchrl.env import VecaEnv
+from veca_marl.envs.core.game import Game
+from veca_marl.envs.core.task import TASKS, Task
+from veca_marl.envs.rendering.touch_picture import picture_of_touch
+from veca_marl.sim.body.anatomy.skeleton import limit_sources, load_skeleton
+from veca_marl.sim.body.proprioception import ProprioceptionQuality, kept_parts, part_slices
+from veca_marl.sim.touch.taxels import TAXELS_PER_TRIANGLE, taxels_of
+from veca_marl.sim.vision.optics import Camera, look_at
 
 mpl.use("Agg")
 import matplotlib.pyplot as plt

@@ -9,8 +9,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from veca_marl.sim.head_conditioning import condition
-from veca_marl.sim.sofa import read_sofa
+from veca_marl.sim.hearing.head_conditioning import condition
+from veca_marl.sim.hearing.sofa import read_sofa
 
 LICENCE = (
     "HRTF measurements of a KEMAR dummy-head microphone. Copyright 1994 MIT Media Laboratory "

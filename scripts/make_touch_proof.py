@@ -15,16 +15,16 @@ from pathlib import Path
 import matplotlib as mpl
 import numpy as np
 
-from veca_marl.sim.bodies.humanoid import Humanoid, HumanoidCfg
-from veca_marl.sim.bodies.postures import Posture
-from veca_marl.sim.bullet import pybullet
-from veca_marl.sim.playground import PlaygroundCfg, RoomCfg
-from veca_marl.sim.pose import Floats
-from veca_marl.sim.props import Prop, PropCfg, PropShape
-from veca_marl.sim.senses.touch import TouchCfg, TouchSense
-from veca_marl.sim.skeleton import load_skeleton
-from veca_marl.sim.taxels import load_taxels
-from veca_marl.sim.world import GRAVITY_MPS2, ClockCfg, World
+from veca_marl.sim.body.anatomy.skeleton import load_skeleton
+from veca_marl.sim.body.humanoid.humanoid import Humanoid, HumanoidCfg
+from veca_marl.sim.body.humanoid.postures import Posture
+from veca_marl.sim.geometry.pose import Floats
+from veca_marl.sim.physics.bullet import pybullet
+from veca_marl.sim.physics.playground import PlaygroundCfg, RoomCfg
+from veca_marl.sim.physics.props import Prop, PropCfg, PropShape
+from veca_marl.sim.physics.world import GRAVITY_MPS2, ClockCfg, World
+from veca_marl.sim.touch.sense import TouchCfg, TouchSense
+from veca_marl.sim.touch.taxels import load_taxels
 
 mpl.use("Agg")
 import matplotlib.pyplot as plt

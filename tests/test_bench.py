@@ -13,13 +13,13 @@ from veca_marl.bench.references import as_visual_shapes, busy_room, measure_ears
 from veca_marl.bench.rollouts import measure_rollouts
 from veca_marl.bench.skin_costs import touched_child
 from veca_marl.bench.stopwatch import Probes, Stopwatch
-from veca_marl.config import compose
-from veca_marl.envs.env import VecaEnv
-from veca_marl.envs.game_cfg import GameCfg
-from veca_marl.envs.task import TASKS
-from veca_marl.sim.bullet import pybullet
-from veca_marl.sim.optics import Camera
-from veca_marl.sim.playground import PlaygroundCfg
+from veca_marl.config.root import compose
+from veca_marl.envs.adapters.torchrl.env import VecaEnv
+from veca_marl.envs.core.game_cfg import GameCfg
+from veca_marl.envs.core.task import TASKS
+from veca_marl.sim.physics.bullet import pybullet
+from veca_marl.sim.physics.playground import PlaygroundCfg
+from veca_marl.sim.vision.optics import Camera
 
 QUICK = ["--steps", "3", "--repeats", "1"]
 

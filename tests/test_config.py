@@ -6,14 +6,14 @@ import pytest
 import yaml
 from omegaconf import OmegaConf
 
-from veca_marl.config import CONF, Config, compose, compose_node
-from veca_marl.config_errors import ConfigError
-from veca_marl.envs.task import TASKS
-from veca_marl.sim.bodies.humanoid import Detail, HumanoidCfg
-from veca_marl.sim.bodies.joint_controls import JointActionKind as Act
-from veca_marl.sim.bodies.walker import WalkerCfg
+from veca_marl.config.errors import ConfigError
+from veca_marl.config.root import CONF, Config, compose, compose_node
+from veca_marl.envs.core.task import TASKS
+from veca_marl.sim.body.humanoid.humanoid import Detail, HumanoidCfg
+from veca_marl.sim.body.humanoid.joint_controls import JointActionKind as Act
+from veca_marl.sim.body.walker.walker import WalkerCfg
+from veca_marl.sim.hearing.sense import AudioQuality
 from veca_marl.sim.senses import SensesCfg
-from veca_marl.sim.senses.audio import AudioQuality
 
 KICK = "+task=KickTheBall"
 PUSH = "+task=PushOut1v1"
@@ -139,7 +139,7 @@ def test_compose_works_inside_a_running_hydra_application(tmp_path):
     app.write_text(
         "import hydra\n"
         "from hydra.core.hydra_config import HydraConfig\n"
-        "from veca_marl.config import compose\n"
+        "from veca_marl.config.root import compose\n"
         "@hydra.main(version_base='1.3', config_path=None)\n"
         "def main(cfg):\n"
         "    inner = compose(['+task=KickTheBall', 'seed=3'])\n"

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from veca_marl.api import list_tasks
-from veca_marl.envs.task import find_task
-from veca_marl.sim.skeleton import limit_sources
+from veca_marl.envs.core.task import find_task
+from veca_marl.sim.body.anatomy.skeleton import limit_sources
 
 ROOT = Path(__file__).resolve().parent.parent
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import gymnasium
 import pytest
 
-import veca_marl.gymnasium_ids as ids
+import veca_marl.envs.adapters.gymnasium_ids as ids
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGES = [ROOT / "docs" / "other_doors.md", ROOT / "README.md"]

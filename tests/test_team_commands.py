@@ -8,9 +8,9 @@ import sys
 import pytest
 import torch
 
-from veca_marl.cross_play import main as cross_play
-from veca_marl.cross_play import spread
 from veca_marl.evaluate import main as evaluate
+from veca_marl.tournament import main as cross_play
+from veca_marl.tournament import spread
 
 TASK = ["+task=PushOut1v1", "task.max_seconds=1", "senses/vision=blind", "senses/touch=numb"]
 SMALL = [

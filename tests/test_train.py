@@ -10,8 +10,8 @@ import pytest
 import torch
 import yaml
 
-from veca_marl.assembly import find_device
-from veca_marl.config_errors import ConfigError
+from veca_marl.config.errors import ConfigError
+from veca_marl.runs.assembly import find_device
 
 SMOKE = ["+experiment=smoke", "log=silent", "device=cpu", "threads=1"]
 

@@ -2,7 +2,7 @@ import av
 import numpy as np
 import pytest
 
-from veca_marl.video import write_video
+from veca_marl.runs.video import write_video
 
 RATE, FPS = 22_050, 25
 
@@ -97,7 +97,7 @@ def test_a_failure_leaves_the_old_film(tmp_path, monkeypatch):
     def fail(*_):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("veca_marl.video._video_frames", fail)
+    monkeypatch.setattr("veca_marl.runs.video._video_frames", fail)
     with pytest.raises(OSError, match="No space left"):
         write_video(path, film(9), None, FPS, RATE)
     assert [p.name for p in tmp_path.iterdir()] == ["film.mp4"]

@@ -18,7 +18,7 @@ __all__ = ["__version__", "list_tasks", "make"]
 
 
 if sys.modules.get("gymnasium"):  # whoever loaded it finds the ids there; nobody else pays for it
-    import_module("veca_marl.gymnasium_ids").register_ids()
+    import_module("veca_marl.envs.adapters.gymnasium_ids").register_ids()
 
 
 def __getattr__(name: str) -> Any:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from veca_marl.config import compose
-from veca_marl.envs.env import VecaEnv
-from veca_marl.envs.game_cfg import GameCfg
-from veca_marl.envs.task import TASKS
+from veca_marl.config.root import compose
+from veca_marl.envs.adapters.torchrl.env import VecaEnv
+from veca_marl.envs.core.game_cfg import GameCfg
+from veca_marl.envs.core.task import TASKS
 
 
 def list_tasks() -> list[str]:

@@ -16,15 +16,21 @@ from pathlib import Path
 import torch
 from tensordict.nn import TensorDictSequential
 
-from veca_marl.algos.checkpoint import CheckpointError
-from veca_marl.algos.evaluation import Exploration, Scores, evaluate, interval, random_policy
-from veca_marl.algos.learnt import load_actor
 from veca_marl.algos.specs import team_specs
-from veca_marl.assembly import make_env
-from veca_marl.config import Config, compose
-from veca_marl.config_errors import ConfigError, one_line
-from veca_marl.envs.env import VecaEnv
-from veca_marl.run_folder import open_run
+from veca_marl.algos.training.checkpoint import CheckpointError
+from veca_marl.algos.training.evaluation import (
+    Exploration,
+    Scores,
+    evaluate,
+    interval,
+    random_policy,
+)
+from veca_marl.algos.training.learnt import load_actor
+from veca_marl.config.errors import ConfigError, one_line
+from veca_marl.config.root import Config, compose
+from veca_marl.envs.adapters.torchrl.env import VecaEnv
+from veca_marl.runs.assembly import make_env
+from veca_marl.runs.run_folder import open_run
 
 _LEARNING = ("self_play", "warm_start", "learner", "algo@learner")
 

@@ -19,13 +19,13 @@ from hydra.errors import HydraException
 from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
-from veca_marl.algos.checkpoint import CheckpointError
-from veca_marl.algos.loop import Trainer
-from veca_marl.assembly import make_reporters, make_trainer
-from veca_marl.config import CONF, Config, to_config
-from veca_marl.config_errors import ConfigError, one_line
-from veca_marl.recording import record_episode
-from veca_marl.run_folder import RunFolder, new_run, open_run, remove_if_empty
+from veca_marl.algos.training.checkpoint import CheckpointError
+from veca_marl.algos.training.loop import Trainer
+from veca_marl.config.errors import ConfigError, one_line
+from veca_marl.config.root import CONF, Config, to_config
+from veca_marl.runs.assembly import make_reporters, make_trainer
+from veca_marl.runs.recording import record_episode
+from veca_marl.runs.run_folder import RunFolder, new_run, open_run, remove_if_empty
 
 _COMMAND = "python -m veca_marl.train"
 _DISK_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)

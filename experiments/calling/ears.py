@@ -1,4 +1,4 @@
-"""Measure how loud calls are in both ears at rest: the numbers of `envs/experts/hearing.py`.
+"""Measure how loud calls are in both ears at rest: the numbers of the experts of hearing.
 
 python experiments/calling/ears.py
 
@@ -14,13 +14,13 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from veca_marl.config import compose
-from veca_marl.envs.contests import line_up
-from veca_marl.envs.experts.hearing import loudness
-from veca_marl.envs.experts.legs import legs_of
-from veca_marl.envs.game import Game
-from veca_marl.envs.navigation import free_place
-from veca_marl.sim.calls import Call
+from veca_marl.config.root import compose
+from veca_marl.envs.core.game import Game
+from veca_marl.envs.experts.control.legs import legs_of
+from veca_marl.envs.experts.perception.hearing import loudness
+from veca_marl.envs.tasks.multi_agent.contests import line_up
+from veca_marl.envs.tasks.multi_agent.navigation import free_place
+from veca_marl.sim.sound.calls import Call
 
 CALLS = {"walker_voice": 300, "mitten_voice": 120}  # how many, by body
 REST_STEPS = 40  # then a crawler's head is still

@@ -22,13 +22,13 @@ from typing import Any
 
 import numpy as np
 
-from veca_marl.config import compose
-from veca_marl.envs.experts.crawl import Crawl
-from veca_marl.envs.experts.rhythms import BACK, CRAWL, Rhythm
-from veca_marl.envs.experts.walking import bearing_rad
-from veca_marl.envs.game import Game
-from veca_marl.sim.bodies.joint_controls import Springs
-from veca_marl.sim.pose import Floats
+from veca_marl.config.root import compose
+from veca_marl.envs.core.game import Game
+from veca_marl.envs.experts.control.crawl import Crawl
+from veca_marl.envs.experts.control.rhythms import BACK, CRAWL, Rhythm
+from veca_marl.envs.experts.control.walking import bearing_rad
+from veca_marl.sim.body.humanoid.joint_controls import Springs
+from veca_marl.sim.geometry.pose import Floats
 
 BODIES = ("mitten_position", "mitten")
 POPULATION = 14

@@ -17,11 +17,11 @@ from pathlib import Path
 import numpy as np
 
 import veca_marl
-from veca_marl.config import compose
-from veca_marl.envs.game import Game
-from veca_marl.envs.game_cfg import GameCfg
-from veca_marl.envs.scripts import play_script
-from veca_marl.envs.team import Script
+from veca_marl.config.root import compose
+from veca_marl.envs.core.game import Game
+from veca_marl.envs.core.game_cfg import GameCfg
+from veca_marl.envs.core.scripts import play_script
+from veca_marl.envs.core.team import Script
 
 HERE = Path(__file__).parent
 COLUMNS = [

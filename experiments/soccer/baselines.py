@@ -12,12 +12,12 @@ from typing import Any
 
 import numpy as np
 
-from veca_marl.config import compose
-from veca_marl.envs.experts.walking import walk_to
-from veca_marl.envs.game import Game
-from veca_marl.envs.scripts import play_script
-from veca_marl.envs.task import Player
-from veca_marl.envs.team import Script
+from veca_marl.config.root import compose
+from veca_marl.envs.core.game import Game
+from veca_marl.envs.core.scripts import play_script
+from veca_marl.envs.core.task import Player
+from veca_marl.envs.core.team import Script
+from veca_marl.envs.experts.control.walking import walk_to
 
 EPISODES = 48
 Command = tuple[float, float]  # speed ahead and turning rate, as shares of the greatest

@@ -6,9 +6,9 @@ import pytest
 import torch
 from fake_env import FakeEnv
 
-from veca_marl.algos.learner import PPOCfg
-from veca_marl.algos.networks import NetworkCfg
-from veca_marl.algos.ppo import PPO
+from veca_marl.algos.networks.actor_critic import NetworkCfg
+from veca_marl.algos.ppo.learner import PPOCfg
+from veca_marl.algos.ppo.ppo import PPO
 from veca_marl.algos.specs import team_specs
 
 SMALL = NetworkCfg(channels=[4, 8, 8], vector_features=16, trunk_features=32)

@@ -3,7 +3,7 @@
 import pytest
 from rollouts import KINDS
 
-from veca_marl.envs.task import TASKS
+from veca_marl.envs.core.task import TASKS
 
 
 @pytest.fixture(scope="module", params=sorted(TASKS))

@@ -8,11 +8,11 @@ from rollouts import digest, play, random_row
 from torchrl.envs import check_env_specs
 
 from veca_marl.bench.free_play import free_play
-from veca_marl.config import CONF, compose
-from veca_marl.envs.env import VecaEnv
-from veca_marl.envs.game import Game
-from veca_marl.envs.game_cfg import GameCfg
-from veca_marl.sim.bodies.base import MOUNTS
+from veca_marl.config.root import CONF, compose
+from veca_marl.envs.adapters.torchrl.env import VecaEnv
+from veca_marl.envs.core.game import Game
+from veca_marl.envs.core.game_cfg import GameCfg
+from veca_marl.sim.body.base import MOUNTS
 
 BODIES = sorted(path.stem for path in (CONF / "body").glob("*.yaml"))
 SENSES = ("vision", "audio", "touch", "proprioception")

@@ -7,9 +7,9 @@ from gymnasium.utils.env_checker import check_env
 from pettingzoo.test import parallel_api_test, parallel_seed_test
 from rollouts import game_cfg, play
 
-from veca_marl.envs.env import VecaEnv
-from veca_marl.envs.gymnasium import VecaGymEnv
-from veca_marl.envs.pettingzoo import VecaParallelEnv
+from veca_marl.envs.adapters.gymnasium import VecaGymEnv
+from veca_marl.envs.adapters.pettingzoo import VecaParallelEnv
+from veca_marl.envs.adapters.torchrl.env import VecaEnv
 
 STEPS = 15
 SHORT = "task.max_seconds=0.4"  # an episode ends within the steps, and another begins

@@ -3,19 +3,19 @@
 import subprocess
 import sys
 from functools import partial
-from pathlib import Path
 
 import numpy as np
 import pytest
 import torch
+from paths import HELPERS
 from rollouts import by_chance, digest, game_cfg, play, returns
 from torchrl.collectors import Collector
 from torchrl.envs import SerialEnv, check_env_specs
 
-from veca_marl.envs.env import VecaEnv
-from veca_marl.envs.game import Game
-from veca_marl.envs.task import TASKS
-from veca_marl.envs.team import Script
+from veca_marl.envs.adapters.torchrl.env import VecaEnv
+from veca_marl.envs.core.game import Game
+from veca_marl.envs.core.task import TASKS
+from veca_marl.envs.core.team import Script
 
 STEPS = 25
 WORLDS = 2
@@ -67,7 +67,7 @@ def test_the_same_seed_gives_the_same_bytes_in_a_used_env(env, rollout):
 def test_the_same_seed_gives_the_same_bytes_in_another_process(task, kind, rollout):
     if kind != "own":
         pytest.skip("a process for each kind of action would cost time and show nothing new")
-    program = Path(__file__).with_name("rollouts.py")
+    program = HELPERS / "rollouts.py"
     asked = [sys.executable, str(program), task, str(STEPS), "1"]
     answer = subprocess.run(asked, capture_output=True, text=True, check=True)
     assert answer.stdout.split()[-1] == digest(rollout)

@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from veca_marl.envs.scoring import cosine, flat
-from veca_marl.envs.task import TASKS, Player, Task, TaskCfg, Team, find_task, terms
-from veca_marl.sim.bodies.humanoid import Humanoid
-from veca_marl.sim.props import PropCfg, PropShape
-from veca_marl.sim.sounds import SoundCfg, SoundKind
+from veca_marl.envs.core.scoring import cosine, flat
+from veca_marl.envs.core.task import TASKS, Player, Task, TaskCfg, Team, find_task, terms
+from veca_marl.sim.body.humanoid.humanoid import Humanoid
+from veca_marl.sim.physics.props import PropCfg, PropShape
+from veca_marl.sim.sound.sounds import SoundCfg, SoundKind
 
 
 @dataclass

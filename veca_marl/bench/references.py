@@ -13,17 +13,19 @@ from numpy.typing import NDArray
 
 from veca_marl.bench.skin_costs import SkinCosts, measure_skin
 from veca_marl.bench.stopwatch import thread_ms
-from veca_marl.sim.bodies.walker import Walker, WalkerCfg
-from veca_marl.sim.bullet import pybullet
-from veca_marl.sim.optics import Camera
-from veca_marl.sim.playground import PlaygroundCfg
-from veca_marl.sim.pose import Pose
-from veca_marl.sim.props import PropCfg, PropShape
-from veca_marl.sim.rotations import matrix_to_quaternion
-from veca_marl.sim.scene import Bools, Scene, Shape
-from veca_marl.sim.senses.audio import AudioCfg, AudioSense
-from veca_marl.sim.sounds import SoundCfg, SoundKind, make_sound
-from veca_marl.sim.world import World
+from veca_marl.sim.body.walker.walker import Walker, WalkerCfg
+from veca_marl.sim.geometry.pose import Pose
+from veca_marl.sim.geometry.primitives import Shape
+from veca_marl.sim.geometry.rotations import matrix_to_quaternion
+from veca_marl.sim.geometry.scene import Scene
+from veca_marl.sim.geometry.tables import Bools
+from veca_marl.sim.hearing.sense import AudioCfg, AudioSense
+from veca_marl.sim.physics.bullet import pybullet
+from veca_marl.sim.physics.playground import PlaygroundCfg
+from veca_marl.sim.physics.props import PropCfg, PropShape
+from veca_marl.sim.physics.world import World
+from veca_marl.sim.sound.sounds import SoundCfg, SoundKind, make_sound
+from veca_marl.sim.vision.optics import Camera
 
 N_LOOSE_PROPS = 20
 VIEWS = 8

@@ -11,10 +11,10 @@ import torch
 from tensordict import TensorDictBase
 
 from veca_marl.bench.stopwatch import Probes, Stopwatch
-from veca_marl.envs.env import VecaEnv
-from veca_marl.envs.game import Game
-from veca_marl.envs.game_cfg import GameCfg
-from veca_marl.sim.senses.base import Sense
+from veca_marl.envs.adapters.torchrl.env import VecaEnv
+from veca_marl.envs.core.game import Game
+from veca_marl.envs.core.game_cfg import GameCfg
+from veca_marl.sim.sense import Sense
 
 PHYSICS, SOURCES, TASK, ENV, POLICY, TORCHRL = (
     "physics",

@@ -8,13 +8,13 @@ from statistics import median
 import numpy as np
 
 from veca_marl.bench.stopwatch import thread_ms
-from veca_marl.sim.bodies.humanoid import Humanoid, HumanoidCfg
-from veca_marl.sim.bodies.postures import Posture
-from veca_marl.sim.playground import PlaygroundCfg
-from veca_marl.sim.props import PropCfg, PropShape
-from veca_marl.sim.senses.touch import TouchCfg, TouchSense
-from veca_marl.sim.skinning import skin
-from veca_marl.sim.world import World
+from veca_marl.sim.body.humanoid.humanoid import Humanoid, HumanoidCfg
+from veca_marl.sim.body.humanoid.postures import Posture
+from veca_marl.sim.geometry.skinning import skin
+from veca_marl.sim.physics.playground import PlaygroundCfg
+from veca_marl.sim.physics.props import PropCfg, PropShape
+from veca_marl.sim.physics.world import World
+from veca_marl.sim.touch.sense import TouchCfg, TouchSense
 
 CONTACTS = (0, 3, 20)
 _ARMS_OUT = Posture(0.0, {"upper_arm.abduction": 30.0})  # a child that does not touch itself

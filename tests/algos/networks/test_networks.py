@@ -1,0 +1,182 @@
+import math
+
+import pytest
+import torch
+from fake_env import FakeEnv
+from torchrl.data import Bounded, Composite
+
+from veca_marl.algos.networks.actor_critic import NetworkCfg, Precision, TeamNetwork, Trunk
+from veca_marl.algos.networks.encoders import (
+    ImageEncoder,
+    Places,
+    Pooling,
+    VectorEncoder,
+    make_encoder,
+    scale_of,
+)
+from veca_marl.algos.specs import ArrayLayout, team_specs
+
+IMAGE = ArrayLayout((2, 3, 84, 84), "uint8", 0.0, 255.0)
+SPECTRUM = ArrayLayout((2, 250), "float32", -8.0, 3.0)
+
+
+def network(cfg=None, **env):
+    fake = FakeEnv(**env)
+    return fake, TeamNetwork("agents", team_specs(fake)["agents"], cfg or NetworkCfg())
+
+
+def test_encoder_is_chosen_by_what_the_array_looks_like():
+    assert isinstance(make_encoder("a", IMAGE, (16, 32, 32), 64, Pooling.flatten), ImageEncoder)
+    assert isinstance(make_encoder("b", SPECTRUM, (16, 32, 32), 64, Pooling.flatten), VectorEncoder)
+    # depth is not bytes: it has no colour channels to stack
+    assert isinstance(
+        make_encoder(
+            "c", ArrayLayout((2, 8, 8), "float32", 0.0, 9.0), (16, 32, 32), 64, Pooling.flatten
+        ),
+        VectorEncoder,
+    )
+    with pytest.raises(ValueError, match=r"touch: no encoder for int64\(3,\); choices: uint8"):
+        make_encoder("touch", ArrayLayout((3,), "int64", 0, 1), (16, 32, 32), 64, Pooling.flatten)
+
+
+@pytest.mark.parametrize("size", [(84, 84), (36, 36), (20, 31), (4, 4), (120, 96)])
+def test_images_of_any_size_are_encoded(size):
+    encoder = ImageEncoder((2, 3, *size))
+    image = torch.randint(0, 256, (3, 2, 3, *size), dtype=torch.uint8)
+    assert encoder(image).shape == (3, encoder.features)
+
+
+def test_image_encoder_has_the_layers_of_the_design():
+    encoder = ImageEncoder(IMAGE.shape)
+    shapes = [tuple(p.shape) for p in encoder.parameters() if p.ndim == 4]
+    assert shapes == [(16, 6, 8, 8), (32, 16, 4, 4), (32, 32, 3, 3)]
+    assert encoder.features == 32 * 7 * 7
+
+
+def test_blocks_of_images_are_encoded_as_all_at_once():
+    torch.manual_seed(0)
+    encoder = ImageEncoder(IMAGE.shape)
+    image = torch.randint(0, 256, (70, *IMAGE.shape), dtype=torch.uint8)
+    whole = encoder.layers(image.flatten(1, 2) / 255.0)
+    torch.testing.assert_close(encoder(image), whole, rtol=1e-5, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("compressed", "low", "high", "expected"),
+    [
+        (True, -8.0, 4.0, [-1.0, 0.0, 1.0]),
+        (False, -math.inf, math.inf, [-8.0, -2.0, 4.0]),
+        (True, -math.inf, math.inf, [-math.log(9.0), -math.log(3.0), math.log(5.0)]),
+    ],
+)
+def test_bounds_become_one_and_what_has_none_passes_or_is_compressed(
+    compressed, low, high, expected
+):
+    scale = scale_of(ArrayLayout((3,), "float32", low, high), compressed)
+    torch.testing.assert_close(scale(torch.tensor([-8.0, -2.0, 4.0])), torch.tensor(expected))
+
+
+def test_only_the_senses_that_are_named_are_compressed():
+    """Of the senses of a world: spectra are in decades already, and proprioception is not."""
+    layouts = {
+        "audio": ArrayLayout((2, 250), "float32", -math.inf, math.inf),
+        "proprioception": ArrayLayout((534,), "float32", -math.inf, math.inf),
+    }
+    encoders = Trunk(layouts, NetworkCfg()).encoders
+    hundred = torch.tensor([100.0])
+    assert encoders["audio"].scale(hundred) == hundred
+    assert encoders["proprioception"].scale(hundred) == pytest.approx(math.log(101.0))
+
+
+@pytest.mark.parametrize("left_out", ["vision", "audio"])
+def test_a_sense_that_is_not_there_leaves_no_parameters(left_out):
+    kept = {"vision", "audio"} - {left_out}
+    _, both = network()
+    _, one = network(senses=tuple(kept))
+    names = {name for name, _ in one.named_parameters()}
+    assert not any(left_out in name for name in names)
+    assert any(next(iter(kept)) in name for name in names)
+    assert sum(p.numel() for p in one.parameters()) < sum(p.numel() for p in both.parameters())
+
+
+@pytest.mark.parametrize("discrete", [False, True])
+@pytest.mark.parametrize("precision", list(Precision))
+def test_actor_acts_within_the_spec_for_every_agent(discrete, precision):
+    env, net = network(NetworkCfg(precision=precision), discrete=discrete, agents=3)
+    out = net.actor(env.reset())
+    assert env.full_action_spec["agents", "action"].is_in(out["agents", "action"])
+    assert out["agents", "action_log_prob"].shape == (4, 3)
+    value = net.critic(out)["agents", "state_value"]
+    assert value.shape == (4, 3, 1)
+    assert value.dtype == torch.float32
+
+
+def test_agents_of_a_team_share_one_policy():
+    env, net = network(agents=2)
+    td = env.reset()
+    for name in ("vision", "audio"):
+        array = td["agents", "observation", name]
+        array[:, 1] = array[:, 0]
+    features = net.trunk(td)["agents", "features"]
+    torch.testing.assert_close(features[:, 0], features[:, 1])
+
+
+def test_unlearnable_actions_are_refused_with_the_choices():
+    env = FakeEnv(worlds=1)
+    wide = Bounded(-2.0, 2.0, shape=(1, 1, 2))
+    env.action_spec = Composite(agents=Composite(action=wide, shape=(1, 1)), shape=(1,))
+    with pytest.raises(ValueError, match=r"(?s)team 'agents': cannot learn .* choices: Bounded in"):
+        team_specs(env)
+
+
+@pytest.mark.parametrize(
+    ("kwargs", "message"),
+    [({"channels": [1, 2]}, "need 3 numbers"), ({"trunk_features": 0}, "must be positive")],
+)
+def test_impossible_sizes_are_refused(kwargs, message):
+    with pytest.raises(ValueError, match=message):
+        NetworkCfg(**kwargs)
+
+
+def test_places_are_where_maps_are_lit():
+    maps = torch.zeros(2, 3, 5, 9)
+    maps[0, 0, 0, 8] = maps[0, 1, 4, 4] = 40.0
+    right, down, bright = Places(3)(maps).reshape(2, 3, 3).unbind(1)
+    torch.testing.assert_close(right[0], torch.tensor([1.0, 0.0, 0.0]), atol=1e-5, rtol=0.0)
+    torch.testing.assert_close(down[0], torch.tensor([-1.0, 1.0, 0.0]), atol=1e-5, rtol=0.0)
+    torch.testing.assert_close(bright[0], torch.tensor([40.0, 40.0, 0.0]))
+    torch.testing.assert_close(right[1], torch.zeros(3), atol=1e-6, rtol=0.0)  # dark: the middle
+
+
+@pytest.mark.parametrize("shape", [(3, 84, 84), (2, 3, 21, 40), (1, 8, 6)])
+def test_places_take_any_size(shape):
+    encoder = ImageEncoder(shape, (4, 8, 8), Pooling.places)
+    features = encoder(torch.randint(0, 256, (5, *shape), dtype=torch.uint8))
+    assert features.shape == (5, encoder.features) == (5, 24)
+    features.sum().backward()
+    assert all(p.grad is not None for p in encoder.parameters())
+
+
+def test_places_learn_from_fewer_images_where_a_thing_is():
+    """An orange square of 6 x 6 pixels somewhere in grey noise: its column, from 256 images."""
+    torch.manual_seed(0)
+    columns = torch.randint(0, 58, (512,))
+    images = torch.randint(60, 120, (512, 3, 64, 64), dtype=torch.uint8)
+    for image, left in zip(images, columns, strict=True):
+        image[:, 20:26, left : left + 6] = torch.tensor([250, 110, 20])[:, None, None]
+    wanted = (columns.float() / 29.0 - 1.0)[:, None]
+
+    def error(pooling):
+        torch.manual_seed(1)
+        encoder = ImageEncoder((3, 64, 64), (8, 16, 16), pooling)
+        model = torch.nn.Sequential(encoder, torch.nn.Linear(encoder.features, 1))
+        optimizer = torch.optim.Adam(model.parameters(), 1e-3)
+        for batch in torch.randint(0, 256, (100, 64)):
+            loss = (model(images[batch]) - wanted[batch]).square().mean()
+            optimizer.zero_grad()
+            loss.backward()
+            optimizer.step()
+        with torch.no_grad():
+            return (model(images[256:]) - wanted[256:]).square().mean().sqrt().item()
+
+    assert error(Pooling.places) < 0.6 * error(Pooling.flatten)

@@ -1,0 +1,129 @@
+import math
+from copy import deepcopy
+
+import pytest
+import torch
+from fake_env import FakeEnv
+from torchrl.envs import ExplorationType, set_exploration_type
+
+from veca_marl.algos.ppo.learner import PPOCfg
+from veca_marl.algos.training.collect import CollectCfg, Experience
+
+
+def gae_by_hand(value, following, reward, done, terminated, gamma=0.99, lmbda=0.95):
+    """Schulman et al. 2016, equation 16, one step at a time from the end."""
+    advantage = torch.zeros_like(value)
+    ahead = torch.zeros_like(value[:, 0])
+    for t in reversed(range(value.shape[1])):
+        delta = reward[:, t] + gamma * following[:, t] * ~terminated[:, t] - value[:, t]
+        ahead = delta + gamma * lmbda * ~done[:, t] * ahead
+        advantage[:, t] = ahead
+    return advantage
+
+
+@pytest.mark.parametrize("terminated", [False, True])
+@pytest.mark.parametrize("agents", [1, 2])
+def test_advantages_equal_the_recursion(make_ppo, agents, terminated):
+    ppo = make_ppo(agents=agents)
+    with torch.no_grad(), set_exploration_type(ExplorationType.RANDOM):
+        batch = FakeEnv(4, agents=agents, horizon=5).rollout(
+            13, ppo.policy, break_when_any_done=False, auto_cast_to_device=False
+        )
+    if terminated:  # by the rules instead of by the clock: no value after the end
+        batch["next", "agents", "terminated"] |= batch["next", "agents", "truncated"]
+    learner = ppo.learners["agents"]
+    found = learner.advantages(batch)
+
+    with torch.no_grad():  # values the plain way: the network looks at every observation
+        network = learner.network
+        value = network.critic(network.trunk(batch.clone()))["agents", "state_value"]
+        following = network.critic(network.trunk(batch["next"].clone()))["agents", "state_value"]
+    team = batch["next", "agents"]
+    expected = gae_by_hand(value, following, team["reward"], team["done"], team["terminated"])
+    assert batch["next", "done"].any(), "the test must see ends of episodes"
+    torch.testing.assert_close(found["advantage"], expected, rtol=1e-4, atol=1e-5)
+    torch.testing.assert_close(found["value_target"], expected + value, rtol=1e-4, atol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("discrete", "teams"), [(False, ("agents",)), (True, ("red", "blue"))], ids=["one", "two"]
+)
+def test_toy_is_learnt(make_ppo, discrete, teams):
+    env = {"discrete": discrete, "teams": teams}
+    ppo = make_ppo(**env)
+    player = ppo.copy_policy()
+    experience = Experience(
+        lambda worlds, seed: FakeEnv(worlds, seed, **env),
+        player,
+        CollectCfg(processes=0, worlds=8, steps=32),
+    )
+    experience.restart(0)
+    paid = []
+    for _ in range(16):
+        batch = experience.collect()
+        paid.append([batch["next", team, "reward"].mean().item() for team in teams])
+        ppo.learn(ppo.prepare(batch))
+        ppo.refresh(player)
+        experience.update_policy()
+    experience.close()
+    assert max(paid[0]) < 0.3
+    assert min(paid[-1]) > 0.7
+
+
+def test_rate_falls_when_the_policy_moves_too_far_and_rises_when_hardly(make_ppo):
+    schedule = make_ppo().learners["agents"].schedule
+    start = schedule.get_last_lr()[0]
+    schedule.step(0.017)
+    assert schedule.get_last_lr()[0] == pytest.approx(start / 1.5)
+    schedule.step(0.003)
+    assert schedule.get_last_lr()[0] == pytest.approx(start)
+    schedule.step(0.01)
+    assert schedule.get_last_lr()[0] == pytest.approx(start)
+    for _ in range(20):
+        schedule.step(0.001)
+    assert schedule.get_last_lr()[0] == PPOCfg().max_learning_rate
+
+
+def test_rewards_that_are_not_finite_stop_the_learning(make_ppo):
+    ppo = make_ppo()
+    with torch.no_grad():
+        batch = FakeEnv(2).rollout(8, ppo.policy, break_when_any_done=False)
+    batch["next", "agents", "reward"][0, 0] = math.nan
+    before = torch.cat([p.flatten() for p in ppo.policy.parameters()])
+    with pytest.raises(FloatingPointError, match="team 'agents': the gradient is nan"):
+        ppo.learn(ppo.prepare(batch))
+    assert torch.equal(before, torch.cat([p.flatten() for p in ppo.policy.parameters()]))
+
+
+def test_state_continues_the_learning_exactly(make_ppo):
+    def batch(ppo, seed):
+        torch.manual_seed(seed)
+        with torch.no_grad(), set_exploration_type(ExplorationType.RANDOM):
+            return ppo.prepare(FakeEnv(4, seed).rollout(16, ppo.policy, break_when_any_done=False))
+
+    one, other = make_ppo(), make_ppo(seed=7)
+    one.learn(batch(one, 0))
+    other.load_state_dict(deepcopy(one.state_dict()))  # as read from a file
+    for ppo in (one, other):
+        ppo.learn(batch(ppo, 1))
+    pairs = zip(one.policy.parameters(), other.policy.parameters(), strict=True)
+    assert all(torch.equal(p, q) for p, q in pairs)
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [{"gamma": 1.5}, {"clip": 0.0}, {"epochs": 0}, {"learning_rate": 1.0}, {"target_kl": -1.0}],
+)
+def test_impossible_numbers_are_refused_by_name(wrong):
+    (name,) = wrong
+    with pytest.raises(ValueError, match=f"algo.{name} must be"):
+        PPOCfg(**wrong)
+
+
+def test_defaults_are_the_papers_table():
+    cfg = PPOCfg()
+    table = (cfg.gamma, cfg.gae_lambda, cfg.clip, cfg.entropy_coefficient, cfg.max_gradient_norm)
+    assert table == (0.99, 0.95, 0.2, 0.03, 5.0)
+    assert (cfg.epochs, cfg.minibatches, cfg.value_coefficient) == (4, 4, 0.5)
+    collect = CollectCfg()
+    assert collect.processes * collect.worlds == 8

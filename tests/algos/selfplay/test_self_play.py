@@ -1,0 +1,161 @@
+"""Self-play: turns, past opponents, and resumption that meets the same ones."""
+
+import pytest
+import torch
+from fake_env import make_fake_env
+from test_loop import FRAMES, Interrupt, read
+
+from veca_marl.algos.selfplay.self_play import Pool, SelfPlay, SelfPlayCfg
+from veca_marl.algos.specs import team_specs
+from veca_marl.algos.training.checkpoint import CheckpointError, Checkpoints, Identity
+from veca_marl.algos.training.collect import CollectCfg
+from veca_marl.algos.training.evaluation import EvalCfg
+from veca_marl.algos.training.learnt import load_actor
+from veca_marl.algos.training.loop import Budget, Trainer
+from veca_marl.algos.training.metrics import CsvReporter
+
+TEAMS = ("red", "blue")
+
+
+def make_env(worlds, seed):
+    return make_fake_env(worlds, seed, teams=TEAMS, senses=("audio",))
+
+
+@pytest.fixture
+def make(tmp_path, make_ppo):
+    def trainer(name, batches=8, latest=0.5, reporters=None, every=1):
+        folder = tmp_path / name
+        folder.mkdir(exist_ok=True)
+        algorithm = make_ppo(teams=TEAMS, senses=("audio",))
+        network = {
+            k: v.value if hasattr(v, "value") else v
+            for k, v in vars(algorithm.learners["red"].cfg.network).items()
+        }
+        stored = {"algo": {"network": network}, "learner": {}}
+        identity = Identity("Toy", team_specs(make_env(1, 0)))
+        return Trainer(
+            make_env=make_env,
+            algorithm=algorithm,
+            collect=CollectCfg(0, worlds=4, steps=16),
+            evaluation=EvalCfg(every_frames=every * FRAMES, episodes=2, worlds=2),
+            budget=Budget(batches * FRAMES),
+            checkpoints=Checkpoints(folder / "checkpoints", identity, stored),
+            reporters=[CsvReporter(folder)] if reporters is None else reporters,
+            seed=0,
+            progress_bar=False,
+            matchmaking=SelfPlay(
+                SelfPlayCfg(list(TEAMS), latest), algorithm, Pool(folder / "pool"), 0
+            ),
+        )
+
+    return trainer
+
+
+def weights(trainer, team):
+    actor = trainer.algorithm.actors[team]
+    return torch.cat([p.detach().flatten() for p in actor.parameters()])
+
+
+def test_teams_learn_in_turns(make):
+    trainer = make("turns", batches=1)
+    before = {team: weights(trainer, team) for team in TEAMS}
+    trainer.run()
+    assert (weights(trainer, "red") != before["red"]).any()
+    torch.testing.assert_close(weights(trainer, "blue"), before["blue"], rtol=0.0, atol=0.0)
+    trainer = make("turns2", batches=2)
+    trainer.run()
+    assert (weights(trainer, "blue") != before["blue"]).any()
+
+
+def test_the_pool_keeps_the_beginning_and_the_end_of_every_turn(make, tmp_path):
+    make("pool", batches=4).run()
+    pool = Pool(tmp_path / "pool" / "pool")
+    assert pool.members("red") == [0, FRAMES, 3 * FRAMES]
+    assert pool.members("blue") == [0, 2 * FRAMES, 4 * FRAMES]
+    assert pool.members("red", until=FRAMES) == [0, FRAMES]
+    assert pool.members("green") == []
+
+
+def test_the_opponent_plays_as_it_was(make):
+    trainer = make("past", batches=6, latest=0.0)
+    trainer.run()
+    matches = trainer.matchmaking
+    matches.begin_stage(6, 6 * FRAMES)
+    assert matches.turn == "red"
+    assert matches.met in (0, 2 * FRAMES, 4 * FRAMES, 6 * FRAMES)
+    trainer.algorithm.refresh(trainer.player)
+    matches.dress(trainer.player)
+    past = matches.pool.load("blue", matches.met)
+    for name, array in trainer.player[1].state_dict().items():
+        torch.testing.assert_close(array, past[name])
+    now = trainer.algorithm.actors["red"].state_dict()
+    for name, array in trainer.player[0].state_dict().items():
+        torch.testing.assert_close(array, now[name])
+
+
+def test_logs_say_whom_it_met(make, tmp_path):
+    make("log", batches=6).run()
+    rows = read(tmp_path / "log" / "metrics.csv")
+    assert [float(row["self_play/turn"]) for row in rows] == [0.0, 1.0] * 3
+    met = [row["self_play/met"] for row in rows]
+    assert "" in met
+    assert any(met)
+    for row in rows:
+        learns, rests = TEAMS if float(row["self_play/turn"]) == 0.0 else TEAMS[::-1]
+        assert row[f"{learns}/kl"] != ""
+        assert row[f"{rests}/kl"] == ""
+
+
+def test_a_resumed_run_meets_the_same_opponents(make, tmp_path):
+    make("whole").run()
+    with pytest.raises(KeyboardInterrupt):
+        make("cut", reporters=[CsvReporter(tmp_path / "cut"), Interrupt(5 * FRAMES)]).run()
+    again = make("cut", reporters=[])
+    again.resume(again.checkpoints.latest())
+    again.reporters = [CsvReporter(tmp_path / "cut", again.progress.frames)]
+    again.run()
+    for kind in ("metrics", "evaluations"):
+        one, other = (read(tmp_path / name / f"{kind}.csv") for name in ("whole", "cut"))
+        assert one == other
+
+
+def test_a_frozen_opponent_is_what_another_run_learnt(make, tmp_path):
+    trainer = make("other", batches=2)
+    trainer.run()
+    spec = team_specs(make_env(1, 0))["blue"]
+    actor = load_actor(tmp_path / "other", "blue", spec)
+    learnt = trainer.algorithm.actors["blue"].state_dict()
+    for name, array in actor.state_dict().items():
+        torch.testing.assert_close(array, learnt[name])
+    assert not any(p.requires_grad for p in actor.parameters())
+
+
+def test_what_an_earlier_version_learnt_is_refused(make, tmp_path):
+    make("other", batches=1).run()
+    path = Checkpoints(tmp_path / "other" / "checkpoints", None, {}).latest()
+    torch.save(torch.load(path, weights_only=True) | {"format": 1}, path)
+    with pytest.raises(CheckpointError, match="not a checkpoint of this version"):
+        load_actor(path, "blue", team_specs(make_env(1, 0))["blue"])
+
+
+def test_opponents_that_cannot_be_loaded_are_named(make, tmp_path):
+    make("other", batches=1).run()
+    spec = team_specs(make_env(1, 0))["blue"]
+    with pytest.raises(CheckpointError, match=r"learnt the teams \['blue', 'red'\], not 'green'"):
+        load_actor(tmp_path / "other", "green", spec)
+    with pytest.raises(CheckpointError, match="other specs"):
+        load_actor(tmp_path / "other", "blue", team_specs(make_fake_env(1, 0))["agents"])
+    with pytest.raises(CheckpointError, match="neither a checkpoint nor the folder"):
+        load_actor(tmp_path / "nothing", "blue", spec)
+
+
+@pytest.mark.parametrize("teams", [["red"], ["red", "red"], ["a", "b", "c"]])
+def test_self_play_is_for_two(teams):
+    with pytest.raises(ValueError, match="two teams, or none"):
+        SelfPlayCfg(teams)
+
+
+def test_self_play_is_for_teams_that_learn(make_ppo, tmp_path):
+    algorithm = make_ppo(teams=TEAMS)
+    with pytest.raises(ValueError, match=r"\['green'\] do not learn; there are \['blue', 'red'\]"):
+        SelfPlay(SelfPlayCfg(["red", "green"]), algorithm, Pool(tmp_path), 0)

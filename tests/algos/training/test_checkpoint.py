@@ -1,0 +1,142 @@
+import resource
+import signal
+from contextlib import contextmanager
+from dataclasses import replace
+
+import pytest
+import torch
+from fake_env import FakeEnv
+
+from veca_marl.algos.specs import team_specs
+from veca_marl.algos.training.checkpoint import (
+    CheckpointError,
+    Checkpoints,
+    Identity,
+    load_checkpoint,
+)
+
+CPU = torch.device("cpu")
+
+
+@pytest.fixture
+def identity():
+    return Identity("Toy", team_specs(FakeEnv()))
+
+
+@pytest.fixture
+def checkpoints(tmp_path, identity):
+    return Checkpoints(tmp_path / "checkpoints", identity, {"seed": 3}, keep_last=2)
+
+
+def names(checkpoints):
+    return sorted(path.name for path in checkpoints.folder.iterdir())
+
+
+def test_state_comes_back_as_it_was(checkpoints, identity):
+    state = {"w": torch.randn(3), "n": 7, "nested": {"x": [1.5, None]}}
+    found = load_checkpoint(checkpoints.save(state, 10, best=False), identity, CPU)
+    assert torch.equal(found.pop("w"), state.pop("w"))
+    assert found == state
+
+
+def test_last_few_and_the_best_stay(checkpoints, identity):
+    for frames, best in ((10, False), (20, True), (30, False), (40, False)):
+        checkpoints.save({"frames": frames}, frames, best)
+    assert names(checkpoints) == [
+        "best.pt",
+        "frames_000000000030.pt",
+        "frames_000000000040.pt",
+    ]
+    assert checkpoints.latest().name == "frames_000000000040.pt"
+    assert load_checkpoint(checkpoints.folder / "best.pt", identity, CPU) == {"frames": 20}
+
+
+def test_another_task_is_refused_naming_both(checkpoints, identity):
+    path = checkpoints.save({}, 10, best=False)
+    with pytest.raises(CheckpointError, match=r"is of task Toy, wanted: Other"):
+        load_checkpoint(path, replace(identity, task="Other"), CPU)
+
+
+@pytest.mark.parametrize(
+    ("other", "message"),
+    [
+        (
+            {"image": 20},
+            r"vision\.shape: \[2, 3, 16, 16\] in the checkpoint, \[2, 3, 20, 20\] here",
+        ),
+        ({"senses": ("audio",)}, r"agents\.observations\.vision: .* absent here"),
+        ({"discrete": True}, r"agents\.action\.discrete: False in the checkpoint, True here"),
+        ({"agents": 2}, r"agents\.agents: 1 in the checkpoint, 2 here"),
+        ({"teams": ("red",)}, r"agents: .* absent here; red: absent in the checkpoint"),
+    ],
+)
+def test_other_specs_are_refused_naming_what_differs(checkpoints, other, message):
+    path = checkpoints.save({}, 10, best=False)
+    specs = team_specs(FakeEnv(**other))
+    with pytest.raises(CheckpointError, match=f"made for other specs: .*{message}"):
+        load_checkpoint(path, Identity("Toy", specs), CPU)
+
+
+@contextmanager
+def full_disk():
+    """No file may grow over 2 kB: writes fail as they do on a full disk.
+
+    Not a fixture: pytest's own report, where it goes to a file, must not be written under it.
+    """
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (2048, limits[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+
+
+def test_full_disk_leaves_the_old_checkpoint_intact(checkpoints, identity):
+    path = checkpoints.save({"w": torch.zeros(3)}, 10, best=True)
+    before = path.read_bytes()
+    refused = r"cannot write .*000020.pt: .* intact .*000010.pt"
+    with pytest.raises(CheckpointError, match=refused), full_disk():
+        checkpoints.save({"w": torch.zeros(100_000)}, 20, best=True)
+    assert path.read_bytes() == before
+    assert names(checkpoints) == ["best.pt", "frames_000000000010.pt"]
+    assert checkpoints.latest() == path
+
+
+@pytest.mark.parametrize("content", [b"", b"not a checkpoint", None])
+def test_broken_files_are_named(tmp_path, identity, content):
+    path = tmp_path / "x.pt"
+    if content is None:
+        torch.save({"some": "thing"}, path)
+    else:
+        path.write_bytes(content)
+    with pytest.raises(CheckpointError, match=r"x\.pt"):
+        load_checkpoint(path, identity, CPU)
+
+
+def test_a_truncated_file_is_named(checkpoints, identity):
+    path = checkpoints.save({"w": torch.zeros(1000)}, 10, best=False)
+    path.write_bytes(path.read_bytes()[:500])
+    with pytest.raises(CheckpointError, match="cannot read the checkpoint"):
+        load_checkpoint(path, identity, CPU)
+
+
+def test_a_folder_without_checkpoints_is_named(checkpoints):
+    with pytest.raises(CheckpointError, match="no checkpoint in"):
+        checkpoints.latest()
+
+
+@pytest.mark.usefixtures("ctrl_c")
+def test_an_interruption_waits_until_the_file_is_whole(checkpoints, identity, monkeypatch):
+    save = torch.save
+
+    def interrupted_save(*arguments):
+        signal.raise_signal(signal.SIGINT)
+        save(*arguments)
+
+    monkeypatch.setattr(torch, "save", interrupted_save)
+    with pytest.raises(KeyboardInterrupt):
+        checkpoints.save({"n": 1}, 10, best=True)
+    for path in (checkpoints.latest(), checkpoints.folder / "best.pt"):
+        assert load_checkpoint(path, identity, CPU) == {"n": 1}
+    with pytest.raises(KeyboardInterrupt):  # and is heard at once again
+        signal.raise_signal(signal.SIGINT)

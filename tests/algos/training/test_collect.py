@@ -1,0 +1,84 @@
+import multiprocessing
+
+import pytest
+import torch
+from fake_env import make_fake_env
+
+from veca_marl.algos.training.collect import CollectCfg, Experience
+
+
+@pytest.fixture(params=[0, 2], ids=["in_process", "two_processes"])
+def experience(request, make_ppo):
+    ppo = make_ppo()
+    player = ppo.copy_policy()
+    worlds = 4 if request.param else 8
+    played = Experience(make_fake_env, player, CollectCfg(request.param, worlds, steps=16))
+    played.ppo, played.player = ppo, player
+    yield played
+    played.close()
+
+
+def test_batch_is_worlds_by_steps(experience):
+    experience.restart(3)
+    batch = experience.collect()
+    assert batch.batch_size == (8, 16)
+    assert batch["agents", "observation", "vision"].dtype == torch.uint8
+    # rows are worlds, not pieces of worlds: each holds the same whole episodes
+    assert torch.equal(batch["next", "done"].squeeze(-1).sum(-1), torch.full((8,), 2))
+    images = batch["agents", "observation", "vision"].flatten(2).float().mean(-1)
+    assert len({tuple(row.tolist()) for row in images}) == 8, "two worlds play the same game"
+
+
+def test_restart_repeats_everything_and_another_seed_nothing(experience):
+    batches = {}
+    for name, seed in (("first", 3), ("other", 4), ("again", 3)):
+        experience.restart(seed)
+        experience.collect()
+        batches[name] = experience.collect().clone()
+    for key in (("agents", "action"), ("agents", "observation", "audio"), ("next", "done")):
+        assert torch.equal(batches["first"][key], batches["again"][key])
+    assert not torch.equal(
+        batches["first"]["agents", "action"], batches["other"]["agents", "action"]
+    )
+
+
+def test_worlds_play_with_the_parameters_they_were_handed(experience):
+    def logits():
+        experience.restart(0)
+        return experience.collect()["agents", "loc"].clone()
+
+    before = logits()
+    with torch.no_grad():
+        for p in experience.ppo.policy.parameters():
+            p.add_(0.1)
+    assert torch.equal(logits(), before), "learning leaked into the worlds"
+    experience.ppo.refresh(experience.player)
+    experience.update_policy()
+    assert not torch.equal(logits(), before)
+
+
+def test_collecting_leaves_the_settings_of_the_program_alone(make_ppo):
+    before, threads = multiprocessing.get_start_method(), torch.get_num_threads()
+    experience = Experience(make_fake_env, make_ppo().copy_policy(), CollectCfg(1, 2, 4))
+    experience.close()
+    assert multiprocessing.get_start_method() == before
+    assert torch.get_num_threads() == threads
+
+
+@pytest.mark.slow
+def test_spawned_workers_collect_what_forked_ones_do(make_ppo, monkeypatch):
+    batches = []
+    for method in ("fork", "spawn"):
+        monkeypatch.setattr("veca_marl.algos.training.collect.start_method", lambda m=method: m)
+        experience = Experience(make_fake_env, make_ppo().copy_policy(), CollectCfg(1, 2, 8))
+        experience.restart(5)
+        batches.append(experience.collect()["agents", "action"].clone())
+        experience.close()
+    assert torch.equal(*batches)
+
+
+@pytest.mark.parametrize("wrong", [{"processes": -1}, {"worlds": 0}, {"steps": 0}, {"threads": 0}])
+def test_impossible_numbers_are_refused_by_name(wrong):
+    (name,) = wrong
+    with pytest.raises(ValueError, match=f"collect.{name} must be"):
+        CollectCfg(**wrong)

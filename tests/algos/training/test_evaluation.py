@@ -1,0 +1,107 @@
+import numpy as np
+import pytest
+import torch
+from fake_env import FakeEnv
+from scipy import stats
+
+from veca_marl.algos.training.evaluation import (
+    EvalCfg,
+    Exploration,
+    Scores,
+    comparison_line,
+    difference,
+    evaluate,
+    interval,
+    random_policy,
+)
+
+DETERMINISTIC, STOCHASTIC = Exploration.deterministic, Exploration.stochastic
+
+
+def oracle(td):
+    """Reads the state off the image and acts with its sign."""
+    bright = td["agents", "observation", "vision"].float().mean((-1, -2, -3, -4)) > 100
+    sign = bright.float() * 2 - 1
+    return td.set(("agents", "action"), sign.unsqueeze(-1).expand(*sign.shape, 2).clone())
+
+
+def test_scores_are_sums_over_whole_episodes():
+    scores = evaluate(FakeEnv(3, horizon=6), oracle, 7, 0, DETERMINISTIC)["agents"]
+    assert scores.returns.shape == (9,)  # 7 rounded up: 3 episodes in each of 3 worlds
+    assert (scores.returns == 6).all()
+    assert (scores.lengths == 6).all()
+    assert (scores.terms["right"] == 6).all()
+
+
+def test_result_depends_on_the_seed_alone():
+    def play(seed, used):
+        env = FakeEnv(4)
+        if used:
+            env.rollout(5)
+        return evaluate(env, random_policy(env), 8, seed, STOCHASTIC)["agents"].returns
+
+    np.testing.assert_array_equal(play(1, used=False), play(1, used=True))
+    assert (play(1, used=False) != play(2, used=False)).any()
+
+
+def test_random_play_earns_nothing_here():
+    env = FakeEnv(8, horizon=8)
+    returns = evaluate(env, random_policy(env), 200, 0, STOCHASTIC)["agents"].returns
+    assert abs(returns.mean()) < 4 * returns.std() / np.sqrt(len(returns))
+    assert returns.std() == pytest.approx(np.sqrt(8), rel=0.2)  # of 8 independent signs
+
+
+def test_deterministic_play_takes_the_mode_and_stochastic_play_draws(make_ppo):
+    policy = make_ppo().policy
+    runs = {}
+    for mode in Exploration:
+        torch.manual_seed(0)
+        env = FakeEnv(2)
+        runs[mode] = [evaluate(env, policy, 4, 1, mode)["agents"].returns for _ in range(2)]
+    np.testing.assert_array_equal(*runs[DETERMINISTIC])
+    np.testing.assert_array_equal(*runs[STOCHASTIC])  # drawn from the seed
+    assert (runs[DETERMINISTIC][0] != runs[STOCHASTIC][0]).any()
+
+
+def test_teams_are_scored_apart():
+    scores = evaluate(FakeEnv(2, teams=("red", "blue")), both_teams, 4, 0, STOCHASTIC)
+    np.testing.assert_array_equal(scores["red"].returns, -scores["blue"].returns)
+
+
+def both_teams(td):
+    red = torch.ones_like(td["red", "observation", "audio"][..., 0, :2])
+    return td.set(("red", "action"), red).set(("blue", "action"), -red)
+
+
+def test_interval_is_students():
+    values = np.array([1.0, 2.0, 4.0, 9.0])
+    low, high = stats.t.interval(0.95, 3, values.mean(), stats.sem(values))
+    assert interval(values) == pytest.approx((low, high))
+    assert np.isnan(interval(values[:1])).all()
+
+
+def test_difference_is_welchs():
+    rng = np.random.default_rng(0)
+    one, other = rng.normal(1, 1, 12), rng.normal(0, 3, 7)
+    expected = stats.ttest_ind(one, other, equal_var=False).confidence_interval(0.95)
+    mean, low, high = difference(one, other)
+    assert mean == pytest.approx(one.mean() - other.mean())
+    assert (low, high) == pytest.approx((expected.low, expected.high))
+    assert difference(np.ones(3), np.zeros(3)) == (1.0, 1.0, 1.0)
+
+
+def test_comparison_line_names_team_means_and_intervals():
+    def scores(*returns):
+        return Scores(np.array(returns), np.ones(len(returns)), {})
+
+    line = comparison_line("red", scores(3.0, 5.0), scores(0.0, 0.0))
+    assert line.startswith("red: return of policy 4.000 [-8.706, 16.706], random 0.000")
+    assert "difference 4.000" in line
+    assert "\n" not in line
+
+
+@pytest.mark.parametrize("wrong", [{"every_frames": 0}, {"episodes": 0}, {"worlds": 0}])
+def test_impossible_numbers_are_refused_by_name(wrong):
+    (name,) = wrong
+    with pytest.raises(ValueError, match=f"eval.{name} must be"):
+        EvalCfg(**wrong)

@@ -1,0 +1,95 @@
+import csv
+import math
+
+import pytest
+import torch
+from fake_env import FakeEnv
+from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
+from tensordict import TensorDict
+
+from veca_marl.algos.training.metrics import (
+    CsvReporter,
+    Stopwatch,
+    TensorBoardReporter,
+    TrainingEpisodes,
+)
+
+
+def rows_of(path):
+    with path.open() as file:
+        return list(csv.DictReader(file))
+
+
+def test_episodes_are_summed_across_batches():
+    """Cutting the same play into batches of any length finds the same episodes."""
+    play = FakeEnv(3, horizon=7).rollout(42, break_when_any_done=False)
+    whole = TrainingEpisodes().add(play, "agents")
+    in_pieces = TrainingEpisodes()
+    found, weights = [], []
+    for piece in play.split([5, 1, 20, 16], dim=1):
+        means = in_pieces.add(piece, "agents")
+        ended = int(piece["next", "done"].sum())
+        assert math.isnan(means["return"]) == (ended == 0)
+        if ended:
+            found.append(means["return"] * ended)
+            weights.append(ended)
+    assert sum(weights) == 3 * 6
+    assert sum(found) / sum(weights) == pytest.approx(whole["return"])
+    assert whole["length"] == 7
+    assert whole["right"] == pytest.approx(whole["return"])
+    assert whole["reward_per_step"] == pytest.approx(whole["return"] / 7)
+
+
+def test_unfinished_episodes_are_forgotten_at_a_restart():
+    play = FakeEnv(1, horizon=4).rollout(3, break_when_any_done=False)
+    ending = FakeEnv(1, horizon=4).rollout(4, break_when_any_done=False)
+    episodes = TrainingEpisodes()
+    episodes.add(play, "agents")
+    episodes.restart()
+    assert episodes.add(ending, "agents")["length"] == 4
+
+
+def test_teams_rewards_are_means_over_their_agents():
+    step = TensorDict({"agents": {"reward": torch.tensor([[[[1.0], [3.0]]]])}}, (1, 1))
+    step["done"] = torch.ones(1, 1, 1, dtype=torch.bool)
+    assert TrainingEpisodes().add(TensorDict({"next": step}, (1, 1)), "agents")["return"] == 2.0
+
+
+def test_csv_has_one_row_per_write_and_blanks_for_nothing(tmp_path):
+    reporter = CsvReporter(tmp_path)
+    reporter.write("metrics", 10, {"a/return": math.nan, "a/kl": 0.25})
+    reporter.write("metrics", 20, {"a/return": 1.5, "a/kl": 1e-9})
+    assert rows_of(tmp_path / "metrics.csv") == [
+        {"frames": "10", "a/return": "", "a/kl": "0.25"},
+        {"frames": "20", "a/return": "1.5", "a/kl": "1e-09"},
+    ]
+
+
+def test_resumed_csv_drops_what_will_be_written_again(tmp_path):
+    first = CsvReporter(tmp_path)
+    for frames in (10, 20, 30):
+        first.write("metrics", frames, {"x": frames})
+    CsvReporter(tmp_path, resumed_frames=20).write("metrics", 30, {"x": 7})
+    assert [row["x"] for row in rows_of(tmp_path / "metrics.csv")] == ["10", "20", "7"]
+
+
+def test_tensorboard_gets_every_finite_number(tmp_path):
+    reporter = TensorBoardReporter(tmp_path)
+    reporter.write("evaluations", 10, {"team": "red", "return": 2.5, "length": math.nan})
+    reporter.close()
+    events = EventAccumulator(str(tmp_path / "tensorboard")).Reload()
+    assert events.Tags()["scalars"] == ["evaluations/red/return"]
+    (point,) = events.Scalars("evaluations/red/return")
+    assert (point.step, point.value) == (10, 2.5)
+
+
+def test_stopwatch_accounts_for_all_the_time():
+    watch = Stopwatch()
+    with watch.measure("collect"):
+        sum(range(100_000))
+    with watch.measure("update"):
+        sum(range(100_000))
+    lines = watch.table(frames=100).splitlines()
+    assert [line.split()[0] for line in lines] == ["part", "collect", "update", "other", "total"]
+    shares = [float(line.split()[2].rstrip("%")) for line in lines[1:]]
+    assert sum(shares[:-1]) == pytest.approx(100.0, abs=0.3)

@@ -1,0 +1,189 @@
+"""VecaEnv: batches of games behind TorchRL's face, in one process and in several."""
+
+from functools import partial
+
+import numpy as np
+import pytest
+import torch
+from torch import multiprocessing
+from torchrl.collectors import MultiSyncCollector
+from torchrl.envs import ParallelEnv, check_env_specs
+
+from veca_marl.api import make
+from veca_marl.config.root import compose
+from veca_marl.envs.adapters.torchrl.env import VecaEnv
+
+CHEAP = ("playground=simple", "senses/vision=blind")
+
+
+def cfg_of(*overrides):
+    return compose(["+task=KickTheBall", *overrides]).game
+
+
+@pytest.fixture
+def env():
+    env = VecaEnv(cfg_of(*CHEAP), worlds=3, seed=4)
+    yield env
+    env.close()
+
+
+def with_action(env, value):
+    state = env.reset()
+    return state.set(("agents", "action"), torch.as_tensor(value))
+
+
+def test_shapes_are_worlds_by_players_by_what_it_is(env):
+    played = env.step(env.rand_action(env.reset()))
+    assert played.batch_size == (3,)
+    assert played["agents", "action"].shape == (3, 1, 2)
+    assert played["next", "agents", "observation", "audio"].shape == (3, 1, 2, 250)
+    assert played["next", "agents", "reward"].shape == (3, 1, 1)
+    assert played["next", "agents", "terms", "kick"].shape == (3, 1, 1)
+    assert played["next", "done"].shape == (3, 1)
+
+
+@pytest.mark.parametrize("worlds", [0, -1])
+def test_there_is_at_least_one_world(worlds):
+    with pytest.raises(ValueError, match=f"worlds={worlds}"):
+        VecaEnv(cfg_of(*CHEAP), worlds=worlds)
+
+
+@pytest.mark.parametrize("wrong", [np.nan, np.inf, -np.inf, 1.5, -2.0])
+def test_one_impossible_number_stops_all_worlds(env, wrong):
+    """The bad one is in the last world: those before it have not moved either."""
+    action = torch.zeros(3, 1, 2)
+    action[:, 0, 0] = 1.0
+    action[2, 0, 1] = wrong
+    state = with_action(env, action)
+    before = [game.world.scene.positions.copy() for game in env.games]
+    with pytest.raises(ValueError, match=r"world 2, agents: action"):
+        env.step(state)
+    for game, positions in zip(env.games, before, strict=True):
+        np.testing.assert_array_equal(game.world.scene.positions, positions)
+        assert game.steps == 0
+
+
+@pytest.mark.parametrize("shape", [(3, 1, 3), (3, 2, 2), (2, 1, 2), (3, 2)])
+def test_a_wrong_shape_is_refused(env, shape):
+    state = env.reset()
+    state = state.exclude(("agents", "action"))
+    loose = torch.zeros(shape)
+    with pytest.raises((ValueError, RuntimeError), match=r"shape|batch"):
+        env.step(state.set(("agents", "action"), loose))
+    assert all(game.steps == 0 for game in env.games)
+
+
+def test_the_reward_of_a_step_is_that_of_its_terms(env):
+    state = env.reset()
+    for _ in range(5):
+        state = env.step(env.rand_action(state))["next"]
+        terms = state["agents", "terms"]
+        paid = terms["kick"] * 1.0 + terms["approach"] * 0.01
+        torch.testing.assert_close(state["agents", "reward"], paid)
+
+
+def test_seeds_and_streams(env):
+    """Equal seeds, equal worlds; the worlds of a batch differ."""
+    first = [env.set_seed(9), env.reset()][1].clone()
+    again = [env.set_seed(9), env.reset()][1].clone()
+    other = [env.set_seed(10), env.reset()][1].clone()
+    audio = ("agents", "observation", "audio")
+    assert torch.equal(first[audio], again[audio])
+    assert not torch.equal(first[audio], other[audio])
+    assert not torch.equal(first[audio][0], first[audio][1])
+
+
+def test_the_constructor_seeds_as_set_seed_does(env):
+    fresh = VecaEnv(cfg_of(*CHEAP), worlds=3, seed=9)
+    env.set_seed(9)
+    audio = ("agents", "observation", "audio")
+    assert torch.equal(fresh.reset()[audio], env.reset()[audio])
+    fresh.close()
+
+
+def test_episodes_follow_each_other_by_themselves():
+    env = VecaEnv(cfg_of(*CHEAP, "task.max_seconds=0.2"), worlds=2)
+    rollout = env.rollout(12, break_when_any_done=False)
+    ended = rollout["next", "truncated"].squeeze(-1).sum(1).tolist()
+    assert ended == [2, 2]
+    env.close()
+
+
+def test_worlds_may_end_at_different_times():
+    env = VecaEnv(cfg_of(*CHEAP, "task.max_seconds=0.4"), worlds=2)
+    state = env.reset()
+    for _ in range(5):
+        _, state = env.step_and_maybe_reset(env.rand_action(state))
+    state["_reset"] = torch.tensor([[True], [False]])
+    state = env.reset(state)
+    ended = []
+    for _ in range(10):
+        played, state = env.step_and_maybe_reset(env.rand_action(state))
+        ended.append(played["next", "done"].squeeze(-1).tolist())
+    assert [step for step, (_, second) in enumerate(ended) if second] == [4]
+    assert [step for step, (first, _) in enumerate(ended) if first] == [9]
+    env.close()
+
+
+def test_a_closed_env_has_closed_its_worlds(env):
+    other = VecaEnv(cfg_of(*CHEAP), worlds=2)
+    games = other.games
+    other.close()
+    assert all(game.world.client == -1 for game in games)
+
+
+def make_env():
+    """For worker processes."""
+    return VecaEnv(cfg_of(*CHEAP), worlds=2)
+
+
+def test_it_works_in_a_parallel_env_of_forked_processes():
+    env = ParallelEnv(2, make_env, mp_start_method="fork")
+    check_env_specs(env)
+    env.set_seed(1)
+    rollout = env.rollout(5)
+    assert rollout.batch_size == (2, 2, 5)
+    env.close()
+
+
+@pytest.mark.slow
+def test_it_works_in_a_parallel_env_of_spawned_processes():
+    env = ParallelEnv(2, make_env, mp_start_method="spawn")
+    assert env.rollout(3).batch_size == (2, 2, 3)
+    env.close()
+
+
+@pytest.fixture
+def forking():
+    before = multiprocessing.get_start_method(allow_none=True)
+    multiprocessing.set_start_method("fork", force=True)
+    yield
+    multiprocessing.set_start_method(before, force=True)
+
+
+def collected(seed):
+    torch.manual_seed(seed)
+    collector = MultiSyncCollector(
+        [partial(VecaEnv, cfg_of(*CHEAP), 2)] * 2,
+        None,
+        frames_per_batch=40,
+        total_frames=80,
+        cat_results="stack",
+        auto_register_policy_transforms=False,
+    )
+    collector.set_seed(seed)
+    batches = [batch["next", "agents", "observation", "audio"].clone() for batch in collector]
+    collector.shutdown()
+    return batches
+
+
+@pytest.mark.usefixtures("forking")
+def test_it_works_in_a_collector_of_several_processes():
+    batches = collected(0)
+    assert [batch.shape[:3] for batch in batches] == [(2, 2, 10)] * 2
+    assert not torch.equal(batches[0][0], batches[0][1])  # the processes play different games
+
+
+def test_an_agent_without_any_sense_is_refused():
+    with pytest.raises(ValueError, match=r"at least one of \['vision', 'audio'\]"):
+        make("KickTheBall", senses={"vision": "blind", "audio": "deaf"})

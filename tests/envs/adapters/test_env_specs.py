@@ -1,0 +1,52 @@
+"""Specs of senses and bodies, translated for TorchRL."""
+
+import numpy as np
+import pytest
+import torch
+from torchrl.data import Bounded, Categorical, Unbounded
+
+from veca_marl.envs.adapters.torchrl.specs import done_spec, observation_spec, to_torchrl
+from veca_marl.sim.spec import ArraySpec
+
+
+def test_bounds_are_kept():
+    spec = to_torchrl(ArraySpec((2,), np.float32, -1.0, 1.0), (4, 3))
+    assert isinstance(spec, Bounded)
+    assert spec.shape == (4, 3, 2)
+    assert spec.dtype is torch.float32
+    assert (spec.space.low == -1.0).all()
+    assert (spec.space.high == 1.0).all()
+
+
+def test_images_stay_bytes():
+    spec = to_torchrl(ArraySpec((2, 3, 8, 8), np.uint8, 0, 255), (1, 1))
+    assert spec.dtype is torch.uint8
+    assert spec.is_in(torch.full((1, 1, 2, 3, 8, 8), 255, dtype=torch.uint8))
+
+
+@pytest.mark.parametrize(("low", "high"), [(-np.inf, np.inf), (-8.0, np.inf), (-np.inf, 0.0)])
+def test_what_is_open_on_one_side_is_unbounded(low, high):
+    assert isinstance(to_torchrl(ArraySpec((3,), np.float32, low, high), (1,)), Unbounded)
+
+
+def test_a_choice_is_categorical():
+    spec = to_torchrl(ArraySpec((), np.int64, 0, 6), (4, 3))
+    assert isinstance(spec, Categorical)
+    assert spec.n == 7
+    assert spec.shape == (4, 3)
+    assert spec.is_in(torch.full((4, 3), 6))
+    assert not spec.is_in(torch.full((4, 3), 7))
+
+
+def test_a_team_observes_its_senses_and_its_terms():
+    senses = {"audio": ArraySpec((2, 250), np.float32, -8.0)}
+    spec = observation_spec(senses, ("kick", "approach"), 4, 2)
+    assert spec["observation", "audio"].shape == (4, 2, 2, 250)
+    assert set(spec["terms"].keys()) == {"kick", "approach"}
+    assert spec["terms", "kick"].shape == (4, 2, 1)
+
+
+def test_flags_are_booleans():
+    flags = done_spec((4, 2))
+    assert set(flags) == {"done", "terminated", "truncated"}
+    assert all(flag.dtype is torch.bool and flag.shape == (4, 2, 1) for flag in flags.values())

@@ -1,0 +1,207 @@
+"""The PettingZoo door with several teams, and what it refuses."""
+
+import importlib
+import sys
+
+import numpy as np
+import pytest
+from duels import STEPS, duel
+from gymnasium import spaces
+from pettingzoo.test import api_test, parallel_api_test, parallel_seed_test
+from pettingzoo.utils import parallel_to_aec
+
+from veca_marl.bench.free_play import free_play
+from veca_marl.config.root import compose
+from veca_marl.envs.adapters.pettingzoo import VecaParallelEnv, parallel_env
+from veca_marl.envs.adapters.torchrl.env import VecaEnv
+from veca_marl.envs.core.game_cfg import GameCfg
+
+AGENTS = ["red", "blue_0", "blue_1"]
+
+
+@pytest.fixture
+def cfg():
+    with duel("senses/vision=blind") as cfg:
+        yield cfg
+
+
+@pytest.fixture
+def env(cfg):
+    env = VecaParallelEnv(cfg)
+    yield env
+    env.close()
+
+
+def still(env):
+    return {name: np.zeros(2, np.float32) for name in env.agents}
+
+
+def test_a_game_of_two_teams_is_accepted(env, cfg):
+    parallel_api_test(env, num_cycles=10)
+    parallel_seed_test(lambda: VecaParallelEnv(cfg), num_cycles=10)
+
+
+# it recommends one array as observation and numbers in all names
+@pytest.mark.filterwarnings("ignore::UserWarning:pettingzoo.test.api_test")
+def test_agents_may_also_act_in_turn(env):
+    api_test(parallel_to_aec(env), num_cycles=10)
+
+
+def test_agents_are_the_players_while_an_episode_lasts(env):
+    assert (env.possible_agents, env.agents) == (AGENTS, [])
+    env.reset()
+    assert env.agents == AGENTS
+    for _ in range(STEPS):
+        assert env.num_agents == 3
+        _, _, terminations, truncations, _ = env.step(still(env))
+    assert terminations == dict.fromkeys(AGENTS, True)
+    assert truncations == dict.fromkeys(AGENTS, False)
+    assert env.agents == []
+
+
+def test_every_agent_has_its_own_pay_and_senses(env, cfg):
+    """The same as `VecaEnv`, player by player; no two players hear or earn the same."""
+    other = VecaEnv(cfg, seed=3)
+    state = other.reset()
+    observations, infos = env.reset(seed=3)
+    assert infos == {name: {} for name in AGENTS}
+    state = other.step(state.update(other.full_action_spec.zero()))["next"]
+    observations, rewards, _, _, infos = env.step(still(env))
+    for name, (team, index) in zip(AGENTS, (("red", 0), ("blue", 0), ("blue", 1)), strict=True):
+        row = state[team][0, index]
+        np.testing.assert_array_equal(observations[name]["audio"], row["observation", "audio"])
+        assert np.float32(rewards[name]) == row["reward"].item()
+        terms = infos[name]["terms"]
+        assert rewards[name] == terms["place"] + 0.5 * terms["luck"]
+    assert len(set(rewards.values())) == 3
+    other.close()
+
+
+def test_bodies_of_joints_feel_and_nothing_that_was_returned_changes():
+    game = compose(["+task=KickTheBall", "playground=simple", "body=mitten"]).game
+    with free_play(2, game.task, ("vision", "audio", "touch", "proprioception")) as task:
+        env = VecaParallelEnv(
+            GameCfg(task, game.playground, game.body, game.senses, game.clock), seed=1
+        )
+        seen, _ = env.reset()
+        kept = {(n, s): array.copy() for n in env.agents for s, array in seen[n].items()}
+        assert {sense for _, sense in kept} == {"vision", "audio", "touch", "proprioception"}
+        for _ in range(2):
+            later, *_ = env.step({name: env.action_space(name).sample() for name in env.agents})
+        for (name, sense), array in kept.items():
+            np.testing.assert_array_equal(seen[name][sense], array, err_msg=sense)
+            assert (later[name][sense] != array).any(), sense
+            assert later[name] in env.observation_space(name)
+        env.close()
+
+
+def test_a_seed_begins_the_stream_anew_and_none_goes_on_with_it(env):
+    def start(**seed):
+        env.reset(**seed)
+        return env.step(still(env))[1]["red"]
+
+    first, second = start(seed=5), start()
+    assert first != second
+    assert (start(seed=5), start()) == (first, second)
+
+
+def test_the_first_seed_is_the_constructors(cfg):
+    told, made = VecaParallelEnv(cfg), VecaParallelEnv(cfg, seed=6)
+    told.reset(seed=6)
+    made.reset()
+    assert told.step(still(told))[1] == made.step(still(made))[1]
+    told.close()
+    made.close()
+
+
+def test_spaces_are_those_of_the_specs():
+    env = parallel_env(
+        "KickTheBall", body="walker_discrete", overrides=["senses.vision.depth=true"]
+    )
+    assert env.action_space("agents") == spaces.Discrete(7)
+    senses = env.observation_space("agents")
+    assert senses["vision"] == spaces.Box(0, 255, (2, 3, 84, 84), np.uint8)
+    assert senses["audio"].low.min() == -8.0
+    assert senses["audio"].high.max() == np.finfo(np.float32).max
+    assert senses["depth"].shape == (2, 84, 84)
+    observations, _ = env.reset()
+    assert observations["agents"] in senses
+    # a plain int does as well as what a space samples
+    env.step({"agents": 1})
+    env.close()
+
+
+def test_a_picture_shows_the_eyes_and_the_room():
+    env = parallel_env("KickTheBall", render_mode="rgb_array")
+    with pytest.raises(RuntimeError, match=r"reset\(\) before render"):
+        env.render()
+    env.reset(seed=0)
+    picture = env.render()
+    assert (picture.shape[0], picture.shape[2], picture.dtype) == (252, 3, np.uint8)
+    env.step({"agents": np.ones(2, np.float32)})
+    assert (env.render() != picture).any()
+    assert env.metadata["render_fps"] == 25
+    env.close()
+    env.close()  # closing twice is harmless
+
+
+def test_a_picture_must_have_been_asked_for(env):
+    env.reset()
+    with pytest.raises(RuntimeError, match="rgb_array"):
+        env.render()
+
+
+@pytest.mark.parametrize(
+    ("actions", "said"),
+    [
+        ({"green": np.zeros(2)}, r"unknown agents \['green'\]; there are .*'blue_0'"),
+        ({"blue_0": None}, r"no action for \['blue_0'\]; each of .*'red'"),
+        ({"blue_0": np.zeros(3)}, r"blue_0: action .* must be the two numbers"),
+        ({"blue_1": np.full(2, np.nan)}, r"blue_1: action .*\[-1, 1\]"),
+        ({"red": "forward"}, r"red: action 'forward'|red: action array"),
+    ],
+)
+def test_wrong_actions_are_answered_with_what_is_right(env, actions, said):
+    env.reset()
+    told = still(env) | actions
+    with pytest.raises(ValueError, match=said):
+        env.step({name: row for name, row in told.items() if row is not None})
+    env.step(still(env))  # and the game goes on
+
+
+def test_there_is_no_step_without_an_episode(env):
+    actions = {name: np.zeros(2) for name in AGENTS}
+    with pytest.raises(RuntimeError, match=r"reset\(\) before step"):
+        env.step(actions)
+    env.reset()
+    for _ in range(STEPS):
+        env.step(actions)
+    with pytest.raises(RuntimeError, match=r"reset\(\) before step"):
+        env.step(actions)
+
+
+@pytest.mark.parametrize("space", ["observation_space", "action_space"])
+def test_the_space_of_a_stranger(env, space):
+    with pytest.raises(ValueError, match=r"unknown agent 'green'; there are \['red'"):
+        getattr(env, space)("green")
+
+
+@pytest.mark.parametrize(
+    ("task", "choices", "said"),
+    [
+        ("Chess", {}, "unknown task 'Chess'.*choices:.*KickTheBall"),
+        ("KickTheBall", {"body": "bird"}, "unknown body 'bird'.*choices:.*walker"),
+        ("KickTheBall", {"render_mode": "human"}, "render_mode='human'.*rgb_array"),
+        ("KickTheBall", {"seed": -1}, "seed=-1"),
+    ],
+)
+def test_wrong_choices_are_answered_with_those_there_are(task, choices, said):
+    with pytest.raises(ValueError, match=said):
+        parallel_env(task, **choices)
+
+
+def test_without_pettingzoo_the_extra_is_named(monkeypatch):
+    monkeypatch.setitem(sys.modules, "pettingzoo", None)
+    monkeypatch.delitem(sys.modules, "veca_marl.envs.adapters.pettingzoo")
+    with pytest.raises(ModuleNotFoundError, match=r"pip install 'veca_marl\[pettingzoo\]'"):
+        importlib.import_module("veca_marl.envs.adapters.pettingzoo")

@@ -1,0 +1,27 @@
+"""Experts as policies of an environment."""
+
+import pytest
+
+from veca_marl.api import make
+from veca_marl.envs.adapters.torchrl.scripted import ExpertPolicy
+
+
+@pytest.mark.parametrize("body", ["walker", "walker_discrete"])
+def test_the_expert_plays_all_worlds_and_kicks(body):
+    env = make("KickTheBall", worlds=2, body=body, senses={"vision": "blind"}, seed=1)
+    played = env.rollout(300, policy=ExpertPolicy(env))
+    kicks = played["next", "agents", "terms", "kick"].sum(1).flatten()
+    env.close()
+    assert played.shape == (2, 300)
+    assert (kicks >= 1).all()
+
+
+def test_each_world_is_played_by_what_is_heard_in_it():
+    together = make("KickTheBall", worlds=2, senses={"vision": "blind"}, seed=1)
+    alone = make("KickTheBall", worlds=1, senses={"vision": "blind"}, seed=1)
+    both = together.rollout(20, policy=ExpertPolicy(together))["agents", "action"]
+    first = alone.rollout(20, policy=ExpertPolicy(alone))["agents", "action"]
+    assert (both[0] == first[0]).all()
+    assert not (both[0] == both[1]).all()
+    together.close()
+    alone.close()

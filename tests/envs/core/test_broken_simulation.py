@@ -1,0 +1,93 @@
+"""A simulation that goes non-finite ends the episode; the next one has a sound world."""
+
+import logging
+import math
+
+import numpy as np
+import pytest
+import torch
+
+from veca_marl.bench.free_play import free_play
+from veca_marl.config.root import compose
+from veca_marl.envs.adapters.pettingzoo import VecaParallelEnv
+from veca_marl.envs.adapters.torchrl.env import VecaEnv
+from veca_marl.envs.core.game import Game
+from veca_marl.envs.core.game_cfg import GameCfg
+from veca_marl.sim.physics.bullet import pybullet
+
+CFG = compose(["+task=KickTheBall", "body=mitten"]).game
+SENSES = ("vision", "audio", "proprioception")
+
+
+@pytest.fixture
+def cfg():
+    with free_play(2, CFG.task, SENSES) as task:
+        yield GameCfg(task, CFG.playground, CFG.body, CFG.senses, CFG.clock)
+
+
+def break_down(game):
+    """Let Bullet lose a body, as an exploding simulation would."""
+    body = game.players[0].body
+    nan = (math.nan,) * 3
+    pybullet.resetBaseVelocity(
+        body.articulation.body_id, nan, nan, physicsClientId=game.world.client
+    )
+
+
+def test_the_episode_is_truncated_with_its_cause_and_no_nan_gets_out(cfg, caplog):
+    env = VecaEnv(cfg, worlds=2, seed=0)
+    state = env.reset()
+    break_down(env.games[1])
+    with caplog.at_level(logging.WARNING):
+        after = env.step(env.rand_action(state))["next"]
+    assert after["truncated"].squeeze(-1).tolist() == [False, True]
+    assert not after["terminated"].any()
+    for key, value in after.items(True, True):
+        assert torch.isfinite(value).all(), key
+    (record,) = [r for r in caplog.records if r.name == "veca_marl.envs.core.game"]
+    assert "agents_0" in record.getMessage()
+    assert "not finite" in record.getMessage()
+    env.close()
+
+
+def test_the_next_episode_is_as_in_a_new_world(cfg):
+    broken, sound = Game(cfg), Game(cfg)
+    broken.reset(np.random.default_rng(0))
+    break_down(broken)
+    rows = {player.name: np.zeros(82) for player in broken.players}
+    assert broken.step(rows, np.random.default_rng(0)).truncated
+    films = []
+    for game in (broken, sound):
+        rng = np.random.default_rng(3)
+        game.reset(rng)
+        film = []
+        for player in game.players:
+            game.observe(player)
+        for _ in range(10):
+            assert not game.step(rows, rng).truncated
+            film.append({p.name: game.observe(p) for p in game.players})
+            film[-1] = {n: {k: v.copy() for k, v in seen.items()} for n, seen in film[-1].items()}
+        films.append(film)
+        game.close()
+    for ours, theirs in zip(*films, strict=True):
+        for player, senses in ours.items():
+            for name, seen in senses.items():
+                np.testing.assert_array_equal(seen, theirs[player][name])
+
+
+def test_other_doors_go_on_in_a_sound_world_too(cfg):
+    broken, sound = (VecaParallelEnv(cfg, render_mode="rgb_array") for _ in range(2))
+    broken.reset(seed=0)
+    break_down(broken._played.game)
+    *_, truncations, _ = broken.step({name: np.zeros(82) for name in broken.agents})
+    assert truncations == {"agents_0": True, "agents_1": True}
+    assert broken.agents == []
+    np.testing.assert_equal(broken.reset(seed=1), sound.reset(seed=1))
+    np.testing.assert_array_equal(broken.render(), sound.render())
+    broken.close()
+    sound.close()
+
+
+def test_a_task_for_walkers_says_so():
+    with pytest.raises(ValueError, match="a body that walks and kicks; choose body=walker"):
+        Game(CFG)

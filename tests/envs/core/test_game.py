@@ -1,0 +1,195 @@
+"""A game: players, commands, time, and what it refuses."""
+
+import numpy as np
+import pytest
+
+from veca_marl.config.root import compose
+from veca_marl.envs.core.game import Game, player_names
+from veca_marl.envs.core.task import TASKS, Player, Task, TaskCfg, Team, find_task, register, terms
+from veca_marl.sim.body.walker.walker import Walker
+from veca_marl.sim.spec import ArraySpec
+
+
+def cfg_of(*overrides):
+    return compose(["+task=KickTheBall", "playground=simple", *overrides]).game
+
+
+@pytest.fixture
+def game():
+    game = Game(cfg_of())
+    game.reset(np.random.default_rng(0))
+    yield game
+    game.close()
+
+
+@pytest.fixture
+def duel():
+    """A game of two teams, the second of two players, that ends after three steps."""
+
+    class Duel(Task):
+        """Terms: push."""
+
+        teams = (Team("red"), Team("blue", 2))
+        cfg: TaskCfg
+
+        def build(self):
+            self.steps = 0
+
+        def reset(self, rng):
+            self.steps = 0
+            for x, player in enumerate(self.players):
+                player.body.place((float(x), 0.0, 0.0), rng.uniform(-1.0, 1.0))
+
+        def after_step(self, rng):
+            self.steps += 1
+
+        def reward(self, player):
+            return {}
+
+        def terminated(self):
+            return self.steps >= 3
+
+        def expert(self, player, observation):
+            return 0.0, 0.0
+
+    cfg = cfg_of()
+    cfg.task = TaskCfg(name="Duel")
+    register(Duel)
+    game = Game(cfg)
+    game.reset(np.random.default_rng(0))
+    yield game
+    game.close()
+    del TASKS["Duel"]
+
+
+def still(game):
+    return {player.name: np.zeros(2, np.float32) for player in game.players}
+
+
+def test_players_are_named_by_their_teams(duel):
+    assert [player.name for player in duel.players] == ["red", "blue_0", "blue_1"]
+    assert [player.name for player in duel.team("blue")] == ["blue_0", "blue_1"]
+    assert player_names(Team("solo")) == ["solo"]
+
+
+def test_teams_wear_their_shirts(duel):
+    colours = duel.world.scene.geoms.colours
+    red, *blues = (
+        colours[duel.world.scene.find(name).geoms] for name in ("red", "blue_0", "blue_1")
+    )
+    np.testing.assert_array_equal(*blues)
+    assert (red != blues[0]).any()
+
+
+def test_the_rules_end_a_game_before_its_time(duel):
+    outcomes = [duel.step(still(duel), np.random.default_rng(0)) for _ in range(3)]
+    assert [outcome.terminated for outcome in outcomes] == [False, False, True]
+    assert not any(outcome.truncated for outcome in outcomes)
+
+
+def test_a_reset_game_starts_its_time_anew(game):
+    game.step(still(game), np.random.default_rng(0))
+    game.reset(np.random.default_rng(0))
+    assert game.steps == 0
+
+
+def test_one_impossible_action_stops_everybody(duel):
+    before = duel.world.scene.positions.copy()
+    actions = {name: np.ones(2, np.float32) for name in ("red", "blue_0", "blue_1")}
+    actions["blue_1"][0] = np.nan
+    with pytest.raises(ValueError, match=r"blue_1: action .*nan"):
+        duel.step(actions, np.random.default_rng(0))
+    np.testing.assert_array_equal(duel.world.scene.positions, before)
+    assert duel.steps == 0
+    # the next step does what is told then
+    duel.step(still(duel), np.random.default_rng(0))
+    np.testing.assert_allclose(duel.world.scene.positions[:, :2], before[:, :2], atol=1e-6)
+
+
+def test_everybody_must_be_told(duel):
+    actions = still(duel)
+    del actions["blue_0"]
+    with pytest.raises(ValueError, match=r"no action for \['blue_0'\]"):
+        duel.step(actions, np.random.default_rng(0))
+    with pytest.raises(ValueError, match="'green'"):
+        duel.step({**still(duel), "green": np.zeros(2)}, np.random.default_rng(0))
+
+
+def test_pay_is_the_weighted_sum(game):
+    assert game.pay({"kick": 1.0, "approach": -0.5}) == pytest.approx(1.0 - 0.005)
+
+
+def test_a_task_that_does_not_exist_is_answered_with_those_that_do():
+    with pytest.raises(ValueError, match=r"unknown task 'Chess'.*KickTheBall"):
+        find_task("Chess")
+    cfg = cfg_of()
+    cfg.task = TaskCfg(name="Chess")
+    with pytest.raises(ValueError, match="Chess"):
+        Game(cfg)
+
+
+def test_a_name_is_registered_once():
+    with pytest.raises(ValueError, match="two tasks"):
+        register(TASKS["KickTheBall"])
+
+
+@pytest.mark.parametrize("weights", [{"kick": 1.0}, {"kick": 1.0, "approch": 0.01}, {}])
+def test_other_terms_than_the_tasks_own_are_refused(weights):
+    cfg = cfg_of()
+    cfg.task.weights = weights
+    with pytest.raises(ValueError, match=r"KickTheBall pays \['approach', 'kick'\]"):
+        Game(cfg)
+
+
+@pytest.mark.parametrize("seconds", [0.0, -1.0, np.nan, np.inf])
+def test_an_episode_has_a_length(seconds):
+    with pytest.raises(ValueError, match="max_seconds"):
+        TaskCfg(max_seconds=seconds)
+
+
+def test_a_weight_is_a_number():
+    with pytest.raises(ValueError, match=r"weights.*kick"):
+        TaskCfg(weights={"kick": float("nan")})
+
+
+def test_terms_are_not_shared_between_tasks():
+    default = terms(a=1.0).default_factory
+    default()["a"] = 2.0
+    assert default() == {"a": 1.0}
+
+
+def test_absent_senses_leave_no_key():
+    game = Game(cfg_of("senses/vision=blind"))
+    game.reset(np.random.default_rng(0))
+    assert set(game.observe(game.players[0])) == {"audio"}
+    game.close()
+
+
+@pytest.mark.parametrize(
+    ("sense", "presets"),
+    [
+        ("vision", ("binocular", "monocular", "grey", "blur", "infant")),
+        ("audio", ("hrtf", "stereo", "mono")),
+    ],
+)
+def test_quality_changes_content_but_never_shape(sense, presets):
+    specs: list[ArraySpec] = []
+    contents = []
+    for preset in presets:
+        game = Game(cfg_of(f"senses/{sense}={preset}"))
+        rng = np.random.default_rng(1)
+        game.reset(rng)
+        game.observe(game.players[0])
+        game.step(still(game), rng)
+        specs.append(game.senses["agents"][sense].specs[sense])
+        contents.append(game.observe(game.players[0])[sense].tobytes())
+        game.close()
+    assert all(spec == specs[0] for spec in specs)
+    assert len(set(contents)) == len(presets)
+
+
+def test_a_player_is_a_body_on_a_team(game):
+    (player,) = game.players
+    assert isinstance(player, Player)
+    assert isinstance(player.body, Walker)
+    assert (player.name, player.team) == ("agents", "agents")

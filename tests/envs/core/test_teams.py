@@ -1,0 +1,267 @@
+"""Teams: own bodies and senses, players who are out, teams that play by themselves."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+from knockouts import knockout
+from torchrl.collectors import Collector
+from torchrl.envs import SerialEnv, check_env_specs
+
+from veca_marl.config.root import ConfigError, compose
+from veca_marl.envs.adapters.pettingzoo import VecaParallelEnv
+from veca_marl.envs.adapters.torchrl.env import VecaEnv
+from veca_marl.envs.adapters.torchrl.scripted import ExpertPolicy
+from veca_marl.envs.core.game import Game
+from veca_marl.envs.core.team import Script, TeamCfg, TeamSensesCfg
+from veca_marl.sim.body.walker.controls import ActionKind
+from veca_marl.sim.body.walker.walker import WalkerCfg
+from veca_marl.sim.hearing.sense import AudioCfg
+from veca_marl.sim.senses import SensesCfg
+
+STEPS = 13  # two games of 6 steps, and one of a third
+
+
+@pytest.fixture(scope="module")
+def cfg():
+    with knockout() as cfg:
+        yield cfg
+
+
+@pytest.fixture(scope="module")
+def env(cfg):
+    env = VecaEnv(cfg, 3)
+    yield env
+    env.close()
+
+
+@pytest.fixture(scope="module")
+def rollout(env):
+    env.set_seed(4)
+    torch.manual_seed(0)
+    return env.rollout(STEPS, break_when_any_done=False)
+
+
+def test_specs_hold(env):
+    check_env_specs(env, break_when_any_done="both")
+
+
+def test_the_mask_falls_when_a_player_is_out_and_rises_with_the_next_game(rollout):
+    left = torch.cat([rollout[team, "mask"] for team in ("red", "blue")], -1).sum(-1)
+    assert left.tolist() == [[3, 3, 2, 2, 1, 1] * 2 + [3]] * 3
+    after = torch.cat([rollout["next", team, "mask"] for team in ("red", "blue")], -1).sum(-1)
+    assert after.tolist() == [[3, 2, 2, 1, 1, 0] * 2 + [3]] * 3
+
+
+def test_flags_of_a_player_stay_up_until_the_game_starts_anew(rollout):
+    for team in ("red", "blue"):
+        out = ~rollout["next", team, "mask"].unsqueeze(-1)
+        torch.testing.assert_close(rollout["next", team, "terminated"], out)
+        torch.testing.assert_close(rollout["next", team, "done"], out)
+        assert not rollout["next", team, "truncated"].any()
+        torch.testing.assert_close(rollout[team, "mask"], ~rollout[team, "done"].squeeze(-1))
+    over = rollout["next", "done"].squeeze(-1)
+    assert over.tolist() == [([False] * 5 + [True]) * 2 + [False]] * 3
+
+
+def test_who_is_out_is_paid_nothing_and_perceives_zeros(rollout):
+    for team in ("red", "blue"):
+        playing = rollout[team, "mask"]
+        paid = rollout["next", team, "reward"].squeeze(-1)
+        assert (paid[playing] > 0.0).all()
+        assert (paid[~playing] == 0.0).all()
+        for seen in rollout["next", team, "observation"].values():
+            felt = seen.flatten(3).abs().sum(-1)
+            assert (felt[playing] > 0.0).all()
+            assert (felt[~playing] == 0.0).all()
+
+
+def test_who_is_out_rests_whatever_it_is_told(cfg):
+    game = Game(cfg)
+    rng = np.random.default_rng(0)
+    game.reset(rng)
+    while not game.out:
+        game.step({p.name: np.array([1.0, 0.0]) for p in game.actors}, rng)
+    (name,) = game.out
+    body = next(p.body for p in game.players if p.name == name)
+    before = body.position
+    told = {p.name: np.array([0.0, 0.0]) for p in game.actors} | {name: np.array([np.nan, 1.0])}
+    game.step(told, rng)
+    np.testing.assert_allclose(body.position[:2], before[:2], atol=1e-9)
+    del told[name]
+    game.step(told, rng)  # and needs no action
+    game.close()
+
+
+def test_worlds_are_single_games_though_players_leave(cfg, env, rollout):
+    game, rng = Game(cfg), np.random.default_rng([4, 1])
+    game.reset(rng)
+    seen = {p.name: game.observe(p) for p in game.players}
+    for step in rollout[1].unbind(0):
+        out = game.out
+        actions = {
+            name: step[team, "action"][index].numpy()
+            for team, names in env.group_map.items()
+            for index, name in enumerate(names)
+        }
+        outcome = game.step(actions, rng)
+        for team, names in env.group_map.items():
+            for index, name in enumerate(names):
+                if name in out:
+                    continue
+                player = next(p for p in game.players if p.name == name)
+                for sense, array in game.observe(player).items():
+                    got = step["next", team, "observation", sense][index].numpy()
+                    np.testing.assert_array_equal(got, array)
+        if outcome.done:
+            game.reset(rng)
+            seen = {p.name: game.observe(p) for p in game.players}
+    assert set(seen) == {"red", "blue_0", "blue_1"}
+    game.close()
+
+
+def test_one_world_that_starts_anew_brings_nobody_back_in_another(env):
+    env.set_seed(4)
+    state = env.reset()
+    for _ in range(3):
+        _, state = env.step_and_maybe_reset(env.rand_action(state))
+    masks = {team: state[team, "mask"].clone() for team in env.group_map}
+    state["_reset"] = torch.tensor([[True], [False], [False]])
+    state = env.reset(state)
+    for team, before in masks.items():
+        assert state[team, "mask"][0].all()
+        torch.testing.assert_close(state[team, "mask"][1:], before[1:])
+        torch.testing.assert_close(state[team, "done"][1:].squeeze(-1), ~before[1:])
+    assert sum((~mask[1:]).sum() for mask in masks.values()) == 2
+
+
+@pytest.mark.parametrize("serial", [False, True])
+def test_collectors_keep_who_is_out(cfg, serial):
+    def make():
+        return VecaEnv(cfg, 2) if not serial else SerialEnv(2, lambda: VecaEnv(cfg, 1))
+
+    collector = Collector(
+        make,
+        None,
+        frames_per_batch=2 * STEPS,
+        total_frames=2 * STEPS,
+        auto_register_policy_transforms=False,
+    )
+    (batch,) = list(collector)
+    collector.shutdown()
+    batch = batch.reshape(2, STEPS)
+    left = torch.cat([batch[team, "mask"].reshape(2, STEPS, -1) for team in ("red", "blue")], -1)
+    assert left.sum(-1).tolist() == [[3, 3, 2, 2, 1, 1] * 2 + [3]] * 2
+
+
+def test_pettingzoo_lets_them_go(cfg):
+    env = VecaParallelEnv(cfg)
+    env.reset(seed=0)
+    numbers, ends = [], []
+    while env.agents:
+        numbers.append(len(env.agents))
+        told = {name: np.zeros(2, np.float32) for name in env.agents}
+        observations, rewards, terminations, truncations, infos = env.step(told)
+        for given in (observations, rewards, terminations, truncations, infos):
+            assert len(given) == numbers[-1]
+        ends.append(sum(terminations.values()))
+    assert numbers == [3, 3, 2, 2, 1, 1]
+    assert ends == [0, 1] * 3
+    env.close()
+
+
+# ---- own senses and bodies
+
+
+def test_teams_have_their_own_senses(env):
+    assert set(env.observation_spec["red", "observation"].keys()) == {"proprioception"}
+    assert set(env.observation_spec["blue", "observation"].keys()) == {"proprioception", "audio"}
+
+
+def test_a_team_may_have_another_body_and_other_grades(cfg):
+    discrete = TeamCfg(WalkerCfg(action=ActionKind.discrete))
+    deaf = TeamCfg(senses=TeamSensesCfg(audio=AudioCfg(present=False)))
+    env = VecaEnv(replace(cfg, team={"red": discrete, "blue": deaf}), 2)
+    assert env.full_action_spec["red", "action"].dtype is torch.int64
+    assert env.full_action_spec["blue", "action"].shape == (2, 2, 2)
+    assert set(env.observation_spec["blue", "observation"].keys()) == {"proprioception"}
+    check_env_specs(env)
+    env.close()
+
+
+def test_the_command_line_knows_teams():
+    cfg = compose(
+        [
+            "+task=SoccerTwoPlayer",
+            "+body@team.attacker.body=walker_discrete",
+            "+senses/vision@team.attacker.senses.vision=blind",
+            "opponent.defender=random",
+        ]
+    ).game
+    assert cfg.body_of("attacker").action is ActionKind.discrete
+    assert cfg.body_of("defender").action is ActionKind.continuous
+    assert not cfg.senses_of("attacker").vision.present
+    assert cfg.senses_of("defender").vision.present
+    assert cfg.senses_of("attacker").touch == cfg.senses.touch
+    assert cfg.script == {"defender": Script.random}
+
+
+def test_every_sense_can_differ_by_team():
+    assert set(vars(TeamSensesCfg())) == set(vars(SensesCfg()))
+
+
+# ---- scripts
+
+
+def test_a_scripted_expert_plays_as_the_expert_from_outside(cfg):
+    whole = VecaEnv(cfg, 2, seed=3)
+    scripted = VecaEnv(replace(cfg, script={"blue": Script.expert}), 2, seed=3)
+    assert scripted.group_map == {"red": ["red"]}
+    assert "blue" not in scripted.full_observation_spec.keys()  # noqa: SIM118
+    one = whole.rollout(STEPS, ExpertPolicy(whole), break_when_any_done=False)
+    other = scripted.rollout(STEPS, ExpertPolicy(scripted), break_when_any_done=False)
+    for key in (("red", "observation", "proprioception"), ("next", "red", "reward"), "done"):
+        torch.testing.assert_close(one[key], other[key], rtol=0.0, atol=0.0)
+    ours, theirs = (env.games[1].world.scene.positions for env in (whole, scripted))
+    np.testing.assert_array_equal(ours, theirs)
+    whole.close()
+    scripted.close()
+
+
+@pytest.mark.parametrize(("script", "moves"), [(Script.idle, False), (Script.random, True)])
+def test_scripts_without_rules(cfg, script, moves):
+    game, rng = Game(replace(cfg, script={"red": script})), np.random.default_rng(1)
+    game.reset(rng)
+    assert [player.name for player in game.actors] == ["blue_0", "blue_1"]
+    (red,) = game.team("red")
+    before = red.body.position
+    game.step({p.name: np.zeros(2) for p in game.actors}, rng)
+    assert bool(np.abs(red.body.position - before)[:2].max() > 1e-6) is moves
+    game.close()
+
+
+# ---- what is refused
+
+
+def test_teams_that_do_not_play_are_named(cfg):
+    for wrong in ({"team": {"green": TeamCfg()}}, {"script": {"green": Script.idle}}):
+        with pytest.raises(ValueError, match=r"no teams \['green'\]; it has \['red', 'blue'\]"):
+            Game(replace(cfg, **wrong))
+
+
+def test_somebody_must_act(cfg):
+    with pytest.raises(ValueError, match="all teams of Knockout are scripted"):
+        Game(replace(cfg, script={"red": Script.idle, "blue": Script.idle}))
+
+
+def test_an_unknown_opponent_is_answered_with_the_choices():
+    with pytest.raises(ConfigError, match=r"opponent.agents=experts: choices: expert, random"):
+        compose(["+task=KickTheBall", "opponent.agents=experts"])
+
+
+def test_a_playground_holds_so_many(cfg):
+    room = replace(cfg.playground.rooms[0], size_m=(1.5, 1.5, 2.6))
+    small = replace(cfg.playground, rooms=[room])
+    with pytest.raises(ValueError, match=r"3 players are too many .* holds 2"):
+        Game(replace(cfg, playground=small))

@@ -1,0 +1,80 @@
+"""CallMap: where in a house a call comes from, by what two ears hear."""
+
+import math
+
+import numpy as np
+import pytest
+
+from veca_marl.config.root import compose
+from veca_marl.envs.core.game import Game
+from veca_marl.envs.experts.perception.hearing import CallMap, loudness
+from veca_marl.sim.sound.calls import Call
+
+STEPS = 10
+
+
+@pytest.fixture(scope="module")
+def game():
+    shut = ("senses/vision=blind", "senses/touch=numb")
+    made = Game(compose(["+task=MultiAgentNav", *shut]).game)
+    yield made
+    made.close()
+
+
+def heard(game, call_map, listener, caller, call=Call.high):
+    """Let one who stands in one place, x, y and yaw, hear who calls from another for a while."""
+    ears, mouth = game.players
+    rng = np.random.default_rng(0)
+    ears.body.place((*listener[:2], 0.0), math.radians(listener[2]))
+    mouth.body.place((*caller, 0.0), 0.0)
+    for _ in range(STEPS):
+        wishes = {ears.name: (0.0, 0.0), mouth.name: (0.0, 0.0, call)}
+        game.step({p.name: p.body.encode(wishes[p.name]) for p in game.players}, rng)
+        audio, _ = [game.observe(player).get("audio") for player in game.players]
+    call_map.hear(ears.body.mount("head"), audio)
+
+
+@pytest.fixture
+def call_map(game):
+    game.reset(np.random.default_rng(0))
+    for player in game.players:
+        game.observe(player)
+    return CallMap(game.world)
+
+
+def test_silence_says_nothing(game, call_map):
+    heard(game, call_map, (0.0, 0.0, 0.0), (1.0, 0.0), Call.none)
+    assert not call_map.heard
+
+
+@pytest.mark.parametrize(
+    ("listener", "caller"),
+    [
+        ((-1.0, 0.0, 0.0), (-0.2, 1.0)),  # ahead to the left; what is behind is another room
+        ((1.0, -1.0, 90.0), (0.5, 1.0)),
+        ((-4.0, 2.6, 0.0), (3.5, 2.2)),  # along the hall
+        ((0.8, 2.2, -90.0), (1.1, 0.0)),  # through an open door
+        ((-3.0, 1.0, 0.0), (0.5, 0.6)),  # through a wall
+    ],
+)
+def test_a_call_is_told_from_two_headings(game, call_map, listener, caller):
+    """One heading leaves open whether a call comes from before or behind."""
+    x, y, yaw_deg = listener
+    for turned_deg in (0.0, 40.0, 80.0):
+        heard(game, call_map, (x, y, yaw_deg + turned_deg), caller)
+    away_m = math.dist((x, y), caller)
+    assert math.dist(call_map.best()[:2], caller) < 0.4 + 0.25 * away_m
+
+
+def test_of_two_callers_after_each_other_the_later_one_is_believed(game, call_map):
+    for caller in ((0.5, 0.8), (-0.5, -1.0)):
+        for yaw_deg in np.linspace(0.0, 720.0, 80):
+            heard(game, call_map, (0.0, 0.0, yaw_deg), caller)
+    assert math.dist(call_map.best()[:2], (-0.5, -1.0)) < 0.6
+
+
+def test_loudness_is_the_root_of_the_energy():
+    audio = np.full((2, 250), -np.inf)
+    audio[0, [3, 200]] = math.log10(3.0), math.log10(4.0)
+    audio[1, 7] = 2.0
+    np.testing.assert_allclose(loudness(audio), (math.log10(5.0), 2.0))

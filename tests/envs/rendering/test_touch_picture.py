@@ -1,0 +1,55 @@
+"""The picture of the touched skin."""
+
+import cv2
+import numpy as np
+import pytest
+from touching import Stage, of_bone
+
+from veca_marl.envs.rendering.touch_picture import picture_of_touch, save_picture_of_touch
+
+
+def red(picture):
+    """Pixels in a colour of the scale rather than that of the pale body or the background."""
+    r, _, b = np.moveaxis(picture.astype(int), -1, 0)
+    return r - b > 60
+
+
+def test_what_is_touched_glows_on_the_side_that_shows_it():
+    stage = Stage()
+    untouched = picture_of_touch(stage.scene, stage.body, stage.read())
+    assert untouched.shape == (252, 336, 3)
+    assert not red(untouched).any()
+    stage.add("SPHERE", (0.06,), stage.at("chest", (0.1, 0.0, 0.09)))
+    readings = stage.read()
+    assert of_bone(readings, "chest").any()
+    front, back = np.split(red(picture_of_touch(stage.scene, stage.body, readings)), 2, axis=1)
+    assert front.sum() > 20
+    assert not back.any()
+
+
+def test_a_firmer_touch_has_another_colour():
+    readings = np.zeros((1648, 6))
+    stage = Stage()
+    stage.read()
+    colours = []
+    for value in (0.1, 0.5, 1.0):
+        readings[:] = value
+        picture = picture_of_touch(stage.scene, stage.body, readings)
+        colours.append(picture[red(picture)].mean(axis=0))
+    green = [colour[1] for colour in colours]
+    assert green[0] > green[1] > green[2]
+
+
+def test_the_file_holds_the_picture(tmp_path):
+    stage = Stage()
+    readings = stage.read()
+    save_picture_of_touch(tmp_path / "touch.png", stage.scene, stage.body, readings, height=120)
+    saved = cv2.imread(str(tmp_path / "touch.png"))[..., ::-1]
+    np.testing.assert_array_equal(saved, picture_of_touch(stage.scene, stage.body, readings, 120))
+
+
+def test_readings_of_something_else_are_refused():
+    stage = Stage()
+    stage.scene.update()
+    with pytest.raises(ValueError, match=r"\(9888,\).*want \(1648, 6\)"):
+        picture_of_touch(stage.scene, stage.body, np.zeros(9888))

@@ -1,0 +1,82 @@
+"""CrawlBaby: getting ahead pays, the start holds, the expert crawls."""
+
+import numpy as np
+import pytest
+from babies import (
+    BODIES,
+    check_walkers_are_refused,
+    child_game,
+    hold,
+    play,
+    rest,
+    starts,
+    terms_at_rest,
+)
+
+from veca_marl.envs.tasks.locomotion.crawl_baby import CrawlBabyCfg
+from veca_marl.sim.body.humanoid.postures import ON_ALL_FOURS, ON_BACK
+
+
+@pytest.fixture(scope="module")
+def game():
+    with child_game("CrawlBaby") as game:
+        yield game
+
+
+@pytest.mark.parametrize(
+    ("shift_m", "paid"), [(0.02, 0.5), (-0.02, -0.5), (0.2, 1.0), (-0.2, -1.0)]
+)
+def test_getting_ahead_pays_up_to_the_top_speed(game, shift_m, paid):
+    """20 mm in a step of 40 ms are 0.5 m/s; going back costs as much."""
+    game.reset(np.random.default_rng(1))
+    body = game.players[0].body
+    game.task._place = body.position - shift_m * body.forward
+    assert rest(game).terms["agents"]["forward"] == pytest.approx(paid, abs=0.12)
+
+
+def test_face_down_is_the_right_orientation(game):
+    paid = terms_at_rest(game, ON_ALL_FOURS)
+    assert paid["torso"] > 0.9
+    assert paid["hip"] > 0.9
+    paid = terms_at_rest(game, ON_BACK)
+    assert paid["torso"] < -0.9
+    assert paid["hip"] < -0.9
+
+
+def test_it_starts_on_hands_and_knees_with_the_room_ahead(game):
+    for body in starts(game, 12):
+        assert game.task.room.contains(body.position + 4.5 * body.forward)
+        assert body.bone("neck").position[2] > 0.2
+        assert np.linalg.norm(body.velocities(), axis=1).max() == 0.0
+
+
+def test_the_start_holds_if_the_posture_is_held(game):
+    for body in starts(game, 4):
+        for _ in range(25):
+            hold(game, body.angles_of(ON_ALL_FOURS))
+        assert body.bone("neck").position[2] > 0.2
+        assert body.bone("chest").forward[2] < -0.8
+
+
+@pytest.mark.parametrize("body", BODIES)
+def test_the_expert_crawls_ahead(body):
+    rng, ways_m, speeds_mps = np.random.default_rng(3), [], []
+    with child_game("CrawlBaby", f"body={body}") as game:
+        for _ in range(3):
+            outcomes, way_m = play(game, rng)
+            speeds_mps += [outcome.terms["agents"]["forward"] for outcome in outcomes]
+            ways_m.append(way_m)
+    assert min(ways_m) > 1.0
+    assert np.mean(speeds_mps) > 0.15
+
+
+def test_a_walker_is_refused():
+    check_walkers_are_refused("CrawlBaby")
+
+
+@pytest.mark.parametrize(
+    "wrong", [{"spread_deg": -1.0}, {"top_mps": 0.0}, {"top_mps": float("inf")}]
+)
+def test_impossible_numbers_are_refused(wrong):
+    with pytest.raises(ValueError, match=next(iter(wrong))):
+        CrawlBabyCfg(**wrong)

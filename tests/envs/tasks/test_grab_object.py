@@ -1,0 +1,135 @@
+"""GrabObject: what lifting earns, and that it can be done."""
+
+import numpy as np
+import pytest
+
+from veca_marl.config.root import compose
+from veca_marl.envs.core.game import Game
+from veca_marl.envs.tasks.objects.grab_object import GrabObjectCfg
+from veca_marl.sim.vision.visibility import is_visible
+
+
+@pytest.fixture(scope="module")
+def game():
+    game = Game(compose(["+task=GrabObject", "senses/vision=blind", "senses/touch=numb"]).game)
+    yield game
+    game.close()
+
+
+def play(game, seconds, choose):
+    rng, outcomes = np.random.default_rng(0), []
+    game.reset(rng)
+    for _ in range(round(seconds / 0.04)):
+        outcomes.append(game.step({"agents": choose(game)}, rng).terms["agents"])
+    return outcomes
+
+
+def by_expert(game):
+    player = game.players[0]
+    return player.body.encode(game.task.expert(player, {}))
+
+
+def limp(game):
+    return np.zeros(82, np.float32)
+
+
+def test_nothing_bursts_apart_at_the_start(game):
+    game.reset(np.random.default_rng(3))
+    before = game.task.toy.position
+    posture = game.task.child.joint_angles()
+    rng = np.random.default_rng(0)
+    for _ in range(12):
+        game.step({"agents": game.players[0].body.encode(posture)}, rng)
+    assert np.linalg.norm(game.task.toy.position - before) < 0.003
+    # without the expert's help its trunk sags, but the child does not slide or jump
+    assert np.linalg.norm(game.task.child.position[:2]) < 0.03
+    assert np.abs(game.task.child.velocities()).max() < 1.5
+
+
+def test_the_hands_are_not_at_the_toy_at_the_start(game):
+    for seed in range(10):
+        game.reset(np.random.default_rng(seed))
+        assert game.task.held_m == 0.0
+        assert not game.task.solved
+        assert game.task.toy.velocity == pytest.approx(np.zeros(3))
+
+
+def test_the_expert_lifts_and_is_paid_for_the_height(game):
+    terms = play(game, 4.0, by_expert)
+    lift = sum(term["lift"] for term in terms)
+    assert game.task.held_m > 0.05
+    assert game.task.solved
+    # the terms telescope: what was paid is the height in which it is held
+    assert lift == pytest.approx(game.task.held_m, abs=1e-9)
+
+
+def test_letting_go_costs_what_lifting_earned(game):
+    play(game, 4.0, by_expert)
+    held = game.task.held_m
+    rng = np.random.default_rng(0)
+    lost = 0.0
+    for _ in range(50):
+        lost += game.step({"agents": limp(game)}, rng).terms["agents"]["lift"]
+    assert lost < -0.5 * held
+
+
+def test_a_toy_that_flies_by_itself_earns_nothing(game):
+    game.reset(np.random.default_rng(0))
+    game.task.toy.place((0.5, 0.5, 0.3))
+    rng = np.random.default_rng(0)
+    assert game.step({"agents": limp(game)}, rng).terms["agents"]["lift"] == 0.0
+
+
+def test_approach_is_the_way_of_both_hands(game):
+    game.reset(np.random.default_rng(0))
+    toy, child = game.task.toy.position, game.task.child
+    before = np.linalg.norm(child.palms() - toy, axis=1).sum()
+    terms = play(game, 0.6, by_expert)
+    after = np.linalg.norm(child.palms() - game.task.toy.position, axis=1).sum()
+    assert sum(term["approach"] for term in terms) == pytest.approx(before - after, abs=1e-9)
+    assert after < before
+
+
+def test_effort_is_the_square_of_all_torques(game):
+    rng = np.random.default_rng(0)
+    game.reset(rng)
+    row = rng.uniform(-1.0, 1.0, 82).astype(np.float32)
+    effort = game.step({"agents": row}, rng).terms["agents"]["effort"]
+    assert effort == pytest.approx(float(row.astype(float) @ row), rel=1e-6)
+    assert game.weights["effort"] == -0.004  # the paper's
+
+
+def test_the_eyes_see_the_toy_because_they_look_at_it(game):
+    game.reset(np.random.default_rng(0))
+    child, toy = game.task.child, game.task.toy
+
+    def off_axis():
+        eye = child.mount("eye_left")
+        way = toy.position - eye.position
+        return 1.0 - eye.rotation[:, 0] @ way / np.linalg.norm(way)
+
+    looking = off_axis()
+    assert is_visible(game.world.scene, child, toy)
+    child.release_look()
+    assert off_axis() > 2.0 * looking
+
+
+@pytest.mark.parametrize(
+    ("numbers", "word"),
+    [
+        ({"edge_m": 0.2}, "edge_m"),
+        ({"mass_kg": 0.0}, "mass_kg"),
+        ({"ahead_m": (0.3, 0.2)}, "ahead_m"),
+        ({"aside_m": -0.1}, "aside_m"),
+        ({"near_m": float("nan")}, "near_m"),
+        ({"lifted_m": 0.0}, "lifted_m"),
+    ],
+)
+def test_impossible_numbers_are_refused(numbers, word):
+    with pytest.raises(ValueError, match=word):
+        GrabObjectCfg(**numbers)
+
+
+def test_a_walker_cannot_play():
+    with pytest.raises(ValueError, match="body with joints"):
+        Game(compose(["+task=GrabObject", "body=walker"]).game)

@@ -1,0 +1,196 @@
+"""KickTheBall: what the paper asks for, and that it takes two ears."""
+
+import math
+
+import numpy as np
+import pytest
+
+from veca_marl.config.root import compose
+from veca_marl.envs.core.game import Game
+from veca_marl.envs.tasks.multimodal.kick_the_ball import KickTheBallCfg
+
+
+def game_of(*overrides):
+    game = Game(compose(["+task=KickTheBall", *overrides]).game)
+    game.reset(np.random.default_rng(0))
+    game.observe(game.players[0])
+    return game
+
+
+@pytest.fixture(scope="module")
+def game():
+    game = game_of("senses/vision=blind")
+    yield game
+    game.close()
+
+
+def stand(game, seconds, rng=None):
+    rng = rng or np.random.default_rng(0)
+    for _ in range(round(seconds / 0.04)):
+        yield game.step({"agents": np.zeros(2, np.float32)}, rng)
+
+
+def launches(game, count):
+    for seed in range(count):
+        game.reset(np.random.default_rng(seed))
+        yield game.task.ball
+
+
+def test_the_ball_comes_out_of_either_side_wall(game):
+    sides = []
+    for ball in launches(game, 40):
+        x, y, z = ball.position
+        assert abs(abs(y) - (3.0 - 0.17)) < 1e-9
+        assert abs(x) <= 2.0
+        assert z == pytest.approx(0.15)
+        sides.append(np.sign(y))
+    assert 8 < sides.count(1.0) < 32
+
+
+def test_it_rolls_into_the_room_at_the_speed_asked_for(game):
+    speeds = []
+    for ball in launches(game, 40):
+        velocity = ball.velocity
+        assert velocity[1] * ball.position[1] < 0.0
+        aside = math.degrees(math.atan2(abs(velocity[0]), abs(velocity[1])))
+        assert aside <= 30.0
+        speeds.append(np.linalg.norm(velocity))
+    assert min(speeds) >= 0.5
+    assert max(speeds) <= 1.0
+    assert np.ptp(speeds) > 0.3
+
+
+def test_it_rolls_without_slipping_from_the_start(game):
+    game.reset(np.random.default_rng(3))
+    game.players[0].body.place((2.0, 0.0, 0.0))
+    start = np.linalg.norm(game.task.ball.velocity)
+    for _ in stand(game, 1.0):
+        pass
+    assert np.linalg.norm(game.task.ball.velocity) == pytest.approx(start, rel=0.1)
+
+
+def test_the_player_starts_inside_and_faces_anywhere(game):
+    yaws = []
+    for _ in launches(game, 40):
+        body = game.players[0].body
+        assert game.task.room.contains(body.position, margin_m=0.2)
+        yaws.append(body.yaw_rad)
+    assert min(yaws) < -2.0
+    assert max(yaws) > 2.0
+
+
+def test_a_ball_nobody_kicks_is_replaced(game):
+    game.reset(np.random.default_rng(1))
+    game.players[0].body.place((2.5, 2.5, 0.0), math.pi)
+    places = []
+    for _ in stand(game, 6.2):
+        places.append(game.task.ball.position)
+    jumps = np.linalg.norm(np.diff(places, axis=0), axis=1)
+    assert (jumps > 0.3).sum() == 1
+    assert np.argmax(jumps) == pytest.approx(6.0 / 0.04 - 1, abs=2)
+
+
+def test_a_kicked_ball_that_comes_back_does_not_count_again(game):
+    game.reset(np.random.default_rng(1))
+    game.players[0].body.place((0.0, 0.0, 0.0))
+    kicks = 0.0
+    for _ in range(9):  # 0.36 s: the next ball comes after 0.4 s
+        game.task.ball.place((0.36, 0.0, 0.15))
+        outcome = game.step({"agents": np.zeros(2, np.float32)}, np.random.default_rng(0))
+        kicks += outcome.terms["agents"]["kick"]
+    assert kicks == 1.0
+
+
+def test_a_kick_counts_once_and_brings_the_next_ball(game):
+    game.reset(np.random.default_rng(1))
+    body, ball = game.players[0].body, game.task.ball
+    body.place((0.0, 0.0, 0.0))
+    ball.place((0.36, 0.0, 0.15))
+    kicks, places = [], []
+    for outcome in stand(game, 0.8):
+        kicks.append(outcome.terms["agents"]["kick"])
+        places.append(ball.position)
+    assert kicks[0] == 1.0
+    assert sum(kicks) == 1.0
+    assert places[5][0] > 0.6  # it flew off
+    assert abs(abs(places[11][1]) - 2.83) < 0.1  # 0.4 s later the next one comes
+
+
+@pytest.mark.parametrize(("bearing_deg", "expected"), [(0, 1.0), (60, 0.5), (90, 0.0), (180, -1.0)])
+def test_approach_is_the_cosine_of_the_way_to_the_ball(game, bearing_deg, expected):
+    game.reset(np.random.default_rng(1))
+    body, ball = game.players[0].body, game.task.ball
+    body.place((0.0, 0.0, 0.0))
+    bearing = math.radians(bearing_deg)
+    ball.place((2.0 * math.cos(bearing), 2.0 * math.sin(bearing), 0.15))
+    outcome = game.step({"agents": np.array([1.0, 0.0], np.float32)}, np.random.default_rng(0))
+    assert outcome.terms["agents"]["approach"] == pytest.approx(expected, abs=0.03)
+
+
+@pytest.mark.parametrize(("facing", "forward"), [(0.0, 0.3), (math.pi, -1.0)])
+def test_creeping_up_to_the_ball_is_no_approach(game, facing, forward):
+    """Else following the ball for ever, slowly or backward, pays more than kicking it."""
+    game.reset(np.random.default_rng(1))
+    game.players[0].body.place((0.0, 0.0, 0.0), facing)
+    game.task.ball.place((2.0, 0.0, 0.15))
+    creep = {"agents": np.array([forward, 0.0], np.float32)}
+    outcome = game.step(creep, np.random.default_rng(0))
+    assert game.players[0].body.velocity[0] > 0.1
+    assert outcome.terms["agents"]["approach"] == 0.0
+
+
+def test_standing_still_is_no_approach(game):
+    game.reset(np.random.default_rng(1))
+    game.players[0].body.place((2.0, 0.0, 0.0), 0.0)
+    outcome = next(stand(game, 0.04))
+    assert outcome.terms["agents"]["approach"] == 0.0
+
+
+def test_it_never_ends_early(game):
+    game.reset(np.random.default_rng(1))
+    outcomes = list(stand(game, 20.0))
+    assert not any(outcome.terminated for outcome in outcomes)
+    assert [outcome.truncated for outcome in outcomes].index(True) == 499
+
+
+@pytest.mark.parametrize(("side", "y"), [("left", 1.0), ("right", -1.0)])
+def test_the_ball_is_heard_from_its_side(game, side, y):
+    """With a head between the ears the nearer one hears more."""
+    game.reset(np.random.default_rng(1))
+    game.players[0].body.place((0.0, 0.0, 0.0))
+    game.observe(game.players[0])
+    for _ in range(5):
+        game.task.ball.place((0.0, y, 0.15))
+        game.step({"agents": np.zeros(2, np.float32)}, np.random.default_rng(0))
+        left, right = game.observe(game.players[0])["audio"].mean(axis=-1)
+    assert (left > right) == (side == "left")
+
+
+def kicks_of_expert(audio, episodes):
+    game, rng = game_of("senses/vision=blind", f"senses/audio={audio}"), np.random.default_rng(5)
+    player, kicks = game.players[0], []
+    for _ in range(episodes):
+        game.reset(rng)
+        seen, total = game.observe(player), 0.0
+        for _ in range(game.max_steps):
+            row = player.body.encode(game.task.expert(player, seen))
+            total += game.step({"agents": row}, rng).terms["agents"]["kick"]
+            seen = game.observe(player)
+        kicks.append(total)
+    game.close()
+    return np.array(kicks)
+
+
+def test_the_expert_needs_both_ears():
+    hrtf, mono = kicks_of_expert("hrtf", 6), kicks_of_expert("mono", 6)
+    assert hrtf.mean() > 2.0
+    assert hrtf.mean() > 2.0 * mono.mean()
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [{"speed_mps": (1.0, 0.5)}, {"speed_mps": (0.0, 1.0)}, {"life_s": 0.0}, {"rest_s": -1.0}],
+)
+def test_impossible_numbers_are_refused(wrong):
+    with pytest.raises(ValueError, match=next(iter(wrong))):
+        KickTheBallCfg(**wrong)

@@ -1,0 +1,88 @@
+"""MoveToTarget: progress is paid, the mark is only seen, and it can be done."""
+
+import numpy as np
+import pytest
+
+from veca_marl.config.root import compose
+from veca_marl.envs.core.game import Game
+from veca_marl.envs.tasks.objects.move_to_target import MoveToTargetCfg
+
+
+@pytest.fixture(scope="module")
+def game():
+    game = Game(compose(["+task=MoveToTarget", "senses/vision=blind", "senses/touch=numb"]).game)
+    yield game
+    game.close()
+
+
+def limp(game, rng):
+    return game.step({"agents": np.zeros(82, np.float32)}, rng).terms["agents"]
+
+
+def test_the_mark_is_out_of_the_toy_and_within_reach_on_either_side(game):
+    sides = []
+    for seed in range(20):
+        game.reset(np.random.default_rng(seed))
+        assert 0.08 <= game.task.distance_m <= 0.12
+        assert not game.task.solved
+        sides.append(np.sign(game.task.mark.position[1]))
+    assert 3 < sides.count(1.0) < 17
+
+
+def test_progress_is_the_way_to_the_mark(game):
+    rng = np.random.default_rng(0)
+    game.reset(rng)
+    way = game.task.mark.position - game.task.toy.position
+    way[2] = 0.0
+    far = game.task.distance_m
+    game.task.toy.push(1.0 * way / np.linalg.norm(way))
+    paid = sum(limp(game, rng)["progress"] for _ in range(3))
+    assert paid == pytest.approx(far - game.task.distance_m, abs=1e-9)
+    assert paid > 0.01
+    game.task.toy.push(-1.0 * way / np.linalg.norm(way))
+    assert limp(game, rng)["progress"] < 0.0
+
+
+def test_the_toy_passes_over_the_mark(game):
+    rng = np.random.default_rng(0)
+    game.reset(rng)
+    game.task.toy.place(game.task.mark.position * (1, 1, 0) + np.array([0.0, 0.0, 0.035]))
+    limp(game, rng)
+    assert game.task.solved
+    assert game.task.toy.position[2] == pytest.approx(0.035, abs=0.002)
+
+
+def test_the_expert_brings_it_there(game):
+    player, solved = game.players[0], 0
+    for seed in range(3):
+        rng, over = np.random.default_rng(seed), False
+        game.reset(rng)
+        while not over:
+            row = player.body.encode(game.task.expert(player, {}))
+            over = game.step({"agents": row}, rng).truncated
+        solved += game.task.solved
+    assert solved >= 2
+
+
+def test_a_toy_out_of_reach_is_not_paid_for(game):
+    rng = np.random.default_rng(0)
+    game.reset(rng)
+    start = game.task.distance_m
+    game.task.toy.place((1.0, 1.0, 0.035))
+    assert limp(game, rng)["progress"] == pytest.approx(start - 0.15)
+    game.task.toy.place((2.0, 2.0, 0.035))
+    assert limp(game, rng)["progress"] == 0.0
+
+
+@pytest.mark.parametrize(
+    ("numbers", "word"),
+    [
+        ({"way_m": (0.03, 0.1)}, "way_m"),
+        ({"there_m": 0.0}, "there_m"),
+        ({"far_m": 0.1}, "far_m"),
+        ({"edge_m": -1.0}, "edge_m"),
+    ],
+)
+def test_impossible_numbers_are_refused(numbers, word):
+    with pytest.raises(ValueError, match=word):
+        MoveToTargetCfg(**numbers)

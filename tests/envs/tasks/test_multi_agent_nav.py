@@ -1,0 +1,360 @@
+"""MultiAgentNav: its rules, its bad input, and that the experts need each other's voices."""
+
+import math
+
+import numpy as np
+import pytest
+
+from veca_marl.config.root import ConfigError, compose
+from veca_marl.envs.core.game import Game
+from veca_marl.envs.experts.control.legs import legs_of
+from veca_marl.envs.experts.control.travelling import Traveller
+from veca_marl.envs.tasks.multi_agent.contests import line_up
+from veca_marl.envs.tasks.multi_agent.multi_agent_nav import MultiAgentNavCfg, Muted
+from veca_marl.envs.tasks.multi_agent.navigation import gap_m
+from veca_marl.sim.sound.calls import CALLS, Call, call_waveform
+
+STEP_S = 0.04
+EARS_ALONE = ("senses/vision=blind", "senses/touch=numb")
+REACH_M = 0.6  # from the middle of the object: its radius and the task's reach
+
+
+def game_of(*overrides, agents=2, playground="four_rooms"):
+    overrides = [f"task.agents={agents}", f"playground={playground}", *overrides]
+    return Game(compose(["+task=MultiAgentNav", *EARS_ALONE, *overrides]).game)
+
+
+@pytest.fixture(scope="module")
+def game():
+    game = game_of()
+    yield game
+    game.close()
+
+
+@pytest.fixture(scope="module")
+def crowd():
+    game = game_of(agents=4)
+    yield game
+    game.close()
+
+
+def begin(game, seed=0):
+    """Start, and take everybody far away from the object, which comes to the middle of a room."""
+    game.reset(np.random.default_rng(seed))
+    game.task.target.place((0.0, 0.0, 0.2))
+    for n, player in enumerate(game.players):
+        player.body.place((4.0, 3.0 + 0.6 * n, 0.0))
+    game.world.refresh()
+
+
+def step(game, **wishes):
+    """Let an agent step pass; who is not named stands."""
+    wishes = {player.name: wishes.get(player.name, (0.0, 0.0)) for player in game.players}
+    rows = {player.name: player.body.encode(wishes[player.name]) for player in game.players}
+    return game.step(rows, np.random.default_rng(0))
+
+
+def put(game, number, x, y=0.0, yaw_deg=0.0):
+    game.players[number].body.place((x, y, 0.0), math.radians(yaw_deg))
+    game.world.refresh()
+
+
+def reached(outcome):
+    return [terms["reached"] for terms in outcome.terms.values()]
+
+
+# ---- how it starts
+
+
+def test_agents_start_in_rooms_of_their_own_and_the_object_in_one_of_these(crowd):
+    plan, homes = crowd.task.plan, set()
+    for seed in range(40):
+        crowd.reset(np.random.default_rng(seed))
+        rooms = [plan.room_of(player.body.position) for player in crowd.players]
+        assert sorted(rooms) == [0, 1, 2, 3]
+        homes.add(rooms.index(plan.room_of(crowd.task.target.position)))
+        assert crowd.task.arrived == set()
+    assert homes == {0, 1, 2, 3}
+
+
+def test_two_agents_start_in_any_two_rooms_the_object_with_one_of_them(game):
+    plan, pairs = game.task.plan, set()
+    for seed in range(40):
+        game.reset(np.random.default_rng(seed))
+        pair = tuple(plan.room_of(player.body.position) for player in game.players)
+        assert plan.room_of(game.task.target.position) in pair
+        pairs.add(pair)
+    assert {one for one, _ in pairs} == {0, 1, 2, 3}
+    assert all(one != other for one, other in pairs)
+
+
+def test_the_start_is_free_and_at_rest(game):
+    for seed in range(10):
+        game.reset(np.random.default_rng(seed))
+        before = [player.body.position[:2] for player in game.players]
+        before.append(game.task.target.position[:2])
+        step(game)
+        after = [player.body.position[:2] for player in game.players]
+        after.append(game.task.target.position[:2])
+        np.testing.assert_allclose(after, before, atol=1e-6)
+        for place in after[:-1]:
+            assert math.dist(place, after[-1]) > REACH_M
+
+
+@pytest.mark.parametrize("agents", [2, 7])
+def test_there_is_always_room_to_start(agents):
+    """A room of 3 x 3 m with furniture holds the object and who starts beside it."""
+    game = game_of(agents=agents, playground="seven_rooms")
+    gaps = []
+    for seed in range(400):
+        game.task.reset(np.random.default_rng(seed))
+        gaps += [gap_m(player.body.position, game.task.target) for player in game.players]
+    assert min(gaps) >= 0.8
+    game.close()
+
+
+# ---- what pays, and when it ends
+
+
+def test_each_arrival_pays_everybody_once(crowd):
+    begin(crowd)
+    assert reached(step(crowd)) == [0.0] * 4
+    put(crowd, 2, 0.5)
+    assert reached(step(crowd)) == [1.0] * 4
+    assert reached(step(crowd)) == [0.0] * 4
+    put(crowd, 2, 1.5)
+    assert reached(step(crowd)) == [0.0] * 4
+    put(crowd, 2, 0.5)
+    assert reached(step(crowd)) == [0.0] * 4
+
+
+def test_two_who_arrive_together_pay_twice_and_the_last_ends_the_game(crowd):
+    begin(crowd)
+    put(crowd, 0, 0.5)
+    put(crowd, 1, -0.5)
+    outcome = step(crowd)
+    assert reached(outcome) == [2.0] * 4
+    assert not outcome.done
+    put(crowd, 2, 0.0, 0.5)
+    assert not step(crowd).done
+    put(crowd, 0, 1.5)  # it was there: that is enough
+    put(crowd, 3, 0.0, -0.5)
+    outcome = step(crowd)
+    assert reached(outcome) == [1.0] * 4
+    assert outcome.terminated
+
+
+@pytest.mark.parametrize(("away_m", "arrived"), [(REACH_M - 0.01, True), (REACH_M + 0.01, False)])
+def test_the_reach_is_measured_to_the_surface(game, away_m, arrived):
+    begin(game)
+    put(game, 0, away_m)
+    assert reached(step(game)) == [float(arrived)] * 2
+
+
+def test_time_runs_out(game):
+    begin(game)
+    steps = round(game.task.cfg.max_seconds / STEP_S)
+    outcomes = [step(game) for _ in range(steps)]
+    assert not any(outcome.done for outcome in outcomes[:-1])
+    assert outcomes[-1].truncated
+    assert not outcomes[-1].terminated
+
+
+def test_the_weights_are_those_of_the_paper():
+    assert MultiAgentNavCfg().weights == {"reached": 1.0, "ahead": 0.05, "aside": 0.03}
+
+
+def walked(game, yaw_deg, forward=1.0):
+    """Walk a step 1.5 m east of the object and return who was paid what for the way."""
+    begin(game)
+    put(game, 0, 1.5, yaw_deg=yaw_deg)
+    name = game.players[0].name
+    terms = step(game, **{name: (forward, 0.0)}).terms
+    other = terms[game.players[1].name]
+    assert (other["ahead"], other["aside"]) == (0.0, 0.0)
+    return terms[name]["ahead"], terms[name]["aside"]
+
+
+def test_walking_pays_forward_metres_while_the_object_is_seen(game):
+    np.testing.assert_allclose(walked(game, 180.0), (STEP_S, 0.0), atol=1e-4)
+    np.testing.assert_allclose(walked(game, 165.0), (STEP_S, 0.0), atol=1e-4)
+    assert walked(game, 180.0, forward=-1.0)[0] == pytest.approx(-0.3 * STEP_S, rel=0.01)
+
+
+def test_walking_pays_nothing_while_the_object_is_out_of_view_or_behind_a_wall(game):
+    assert walked(game, 0.0) == (0.0, 0.0)
+    begin(game)
+    put(game, 0, 2.5, -1.0, yaw_deg=160.0)
+    name = game.players[0].name
+    assert step(game, **{name: (1.0, 0.0)}).terms[name]["ahead"] == 0.0
+
+
+def test_through_a_door_the_object_is_seen(game):
+    begin(game)
+    game.task.target.place((0.5, 0.9, 0.2))
+    put(game, 0, 3.0, 0.9, yaw_deg=180.0)
+    name = game.players[0].name
+    assert step(game, **{name: (1.0, 0.0)}).terms[name]["ahead"] == pytest.approx(STEP_S, rel=0.01)
+
+
+def test_who_has_arrived_earns_nothing_more_for_its_way(game):
+    begin(game)
+    put(game, 0, 0.62, yaw_deg=180.0)
+    name = game.players[0].name
+    assert step(game, **{name: (1.0, 0.0)}).terms[name]["ahead"] == 0.0
+    assert game.task.arrived == {name}
+
+
+# ---- how many, where
+
+
+@pytest.mark.parametrize(
+    ("playground", "agents"), [("two_rooms", 2), ("three_rooms", 3), ("seven_rooms", 4)]
+)
+def test_experts_come_together_in_every_house(playground, agents):
+    game = game_of("task.max_seconds=40", agents=agents, playground=playground)
+    assert [player.team for player in game.players] == ["seekers"] * agents
+    assert math.isfinite(seconds_needed(game, seed=1))
+    game.close()
+
+
+@pytest.mark.parametrize(("playground", "rooms"), [("single_room", 1), ("three_rooms", 3)])
+def test_more_agents_than_rooms_are_refused(playground, rooms):
+    wrong = rf"task.agents={rooms + 1} .* playground '{playground}' has {rooms}; choose"
+    with pytest.raises(ValueError, match=wrong):
+        game_of(agents=rooms + 1, playground=playground)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        ("task.agents=1", r"task.agents=1 must be at least 2"),
+        ("task.radius_m=0", r"task.radius_m=0.0 must be a positive number"),
+        ("task.reach_m=nan", r"task.reach_m=nan must be a positive number"),
+        ("task.muted=most", r"muted"),
+    ],
+)
+def test_impossible_numbers_are_refused(wrong, message):
+    with pytest.raises((ConfigError, ValueError), match=message):
+        compose(["+task=MultiAgentNav", wrong])
+
+
+def test_bodies_with_joints_play_and_are_heard():
+    game = game_of("body=mitten")
+    game.reset(np.random.default_rng(0))
+    one, other = game.players
+    game.observe(other)
+    one.body.place((0.0, 0.0, 0.5))
+    other.body.place((1.5, 0.0, 0.5))
+    rest = {p.name: np.zeros(p.body.action_spec.shape, np.float32) for p in game.players}
+    loud = []
+    for sounds in ([], [call_waveform(CALLS[Call.high], 22_050)]):
+        for sound in sounds:
+            one.body.make_sound(sound)
+        outcome = game.step(rest, np.random.default_rng(0))
+        loud.append(game.observe(other)["audio"].max())
+        assert set(outcome.terms[one.name]) == {"reached", "ahead", "aside"}
+    assert loud[1] > loud[0] + 3.0
+    game.close()
+
+
+def test_a_joint_level_body_crawls_to_the_object_that_it_sees_and_calls():
+    game = game_of("body=mitten_voice", "senses/touch=numb", "task.max_seconds=30")
+    rng = np.random.default_rng(0)
+    game.reset(rng)
+    finder, other = game.players
+    assert finder.body.bone("chest").forward[2] < -0.8
+    room = game.task.plan.rooms[0]
+    line_up(finder, room.middle_m - np.array([0.8, 0.0, 0.0]), 0.0)
+    line_up(other, game.task.plan.rooms[2].middle_m, 0.0)
+    game.task.target.place(room.middle_m + np.array([0.7, 0.0, 0.2]))
+    called = False
+    while finder.name not in game.task.arrived:
+        heard, _ = [game.observe(player) for player in game.players]
+        wish = game.task.expert(finder, heard)
+        rest = np.zeros(other.body.action_spec.shape, np.float32)
+        rows = {finder.name: finder.body.encode(wish), other.name: rest}
+        called = called or rows[finder.name][-1] > 0.6
+        assert not game.step(rows, rng).done
+    assert called
+    game.close()
+
+
+@pytest.mark.parametrize("body", ["mitten_voice", "full_voice"])
+def test_on_hands_and_knees_they_come_together_through_a_house(body):
+    game = game_of(f"body={body}", "task.max_seconds=90", playground="seven_rooms")
+    assert math.isfinite(seconds_needed(game, seed=1))
+    game.close()
+
+
+def test_who_cannot_get_on_goes_back_and_comes_round():
+    """On hands and knees with the head against a wall, the way leads back."""
+    game = game_of("body=mitten_voice", playground="two_rooms")
+    rng = np.random.default_rng(0)
+    game.reset(rng)
+    player, other = game.players
+    low, size = game.task.plan.rooms[0].lower_m, game.task.plan.rooms[0].size_m
+    line_up(player, (low[0] + 0.55, low[1] + size[1] / 2.0), math.pi)
+    goal = np.array([low[0] + 2.0, low[1] + size[1] / 2.0])
+    legs = legs_of([player], STEP_S)[player.name]
+    traveller = Traveller(player.body, legs, game.task.plan, STEP_S)
+    still = np.zeros(other.body.action_spec.shape, np.float32)
+    for _ in range(25 * 25):
+        row = player.body.encode(traveller.to(goal))
+        game.step({player.name: row, other.name: still}, rng)
+        if traveller.is_at(goal):
+            break
+    assert traveller.is_at(goal)
+    game.close()
+
+
+# ---- what the voices are worth
+
+
+def seconds_needed(game, seed):
+    """Let the experts play, and return when all had come; inf if they had not."""
+    rng = np.random.default_rng(seed)
+    game.reset(rng)
+    while True:
+        wishes = {p.name: game.task.expert(p, game.observe(p)) for p in game.players}
+        outcome = game.step({p.name: p.body.encode(wishes[p.name]) for p in game.players}, rng)
+        if outcome.done:
+            return game.steps * STEP_S if outcome.terminated else math.inf
+
+
+def test_the_same_game_is_played_twice():
+    times = []
+    for _ in range(2):
+        game = game_of(agents=3)
+        times.append(seconds_needed(game, seed=5))
+        game.close()
+    assert times[0] == times[1] < math.inf
+
+
+def test_muting_is_by_where_they_start():
+    voices = {}
+    for muted in Muted:
+        game = game_of(f"task.muted={muted.value}", agents=3)
+        game.reset(np.random.default_rng(2))
+        home = game.task.plan.room_of(game.task.target.position)
+        voices[muted] = {
+            game.task.plan.room_of(player.body.position) == home: player.body.muted
+            for player in game.players
+        }
+        game.close()
+    assert voices == {
+        Muted.nobody: {True: False, False: False},
+        Muted.finder: {True: True, False: False},
+        Muted.everybody: {True: True, False: True},
+    }
+
+
+def test_the_experts_solve_it_and_without_the_finders_voice_do_much_worse():
+    """The sound carries it: the same starts; everything is told in experiments/calling."""
+    times = {}
+    for muted in (Muted.nobody, Muted.finder):
+        game = game_of(f"task.muted={muted.value}", playground="seven_rooms")
+        times[muted] = np.array([seconds_needed(game, seed) for seed in range(6)])
+        game.close()
+    assert np.isfinite(times[Muted.nobody]).all()
+    assert np.isinf(times[Muted.finder]).sum() >= 3

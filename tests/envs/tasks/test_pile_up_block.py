@@ -1,0 +1,124 @@
+"""PileUpBlock: what is paid, what counts as piled up, and that the expert can."""
+
+import numpy as np
+import pytest
+from blocks import blocks_game, play, sit, sits
+
+from veca_marl.config.root import ConfigError, compose
+from veca_marl.envs.core.game import Game
+from veca_marl.envs.tasks.objects.pile_up_block import PileUpBlockCfg
+
+EDGE = 0.06
+EXPERT_SEEDS = (0, 1, 2, 3)
+AWAY = (1.0, 1.0, EDGE / 2)
+
+
+@pytest.fixture(scope="module")
+def game():
+    game = blocks_game("PileUpBlock")
+    yield game
+    game.close()
+
+
+def starts(game, count):
+    for seed in range(count):
+        game.reset(np.random.default_rng(seed))
+        yield [block.position for block in game.task.blocks]
+
+
+def test_blocks_lie_apart_before_the_child(game):
+    places = np.array(list(starts(game, 30)))
+    np.testing.assert_allclose(places[:, :, 2], EDGE / 2, atol=1e-9)
+    assert (np.abs(places[:, 0] - places[:, 1]).max(axis=1) > 2 * EDGE).all()
+    assert places[:, 0, 1].min() >= 0.07
+    assert places[:, 1, 1].max() <= -0.07
+    assert np.ptp(places[:, 0], axis=0)[:2].min() > 0.02
+
+
+def test_the_start_is_at_rest(game):
+    for before in starts(game, 3):
+        terms = list(sit(game, 0.2))  # then a child that bears no weight leans over
+        assert sits(game)
+        assert np.abs(game.players[0].body.velocities()).max() < 1.0
+        for block, place in zip(game.task.blocks, before, strict=True):
+            assert np.linalg.norm(block.position - place) < 0.003
+        assert max(abs(step["height"]) for step in terms) < 0.1
+
+
+def test_a_block_on_the_other_is_worth_one_edge(game):
+    game.reset(np.random.default_rng(0))
+    one, other = game.task.blocks
+    one.place(AWAY)
+    other.place((AWAY[0], AWAY[1], 1.5 * EDGE))
+    *_, terms = sit(game, 0.6)
+    assert terms["height"] == pytest.approx(1.0, abs=0.03)
+    assert game.task.solved
+    assert game.pay(terms) == pytest.approx(game.world.clock.step_s, rel=0.03)
+
+
+def test_a_block_that_is_held_up_counts_as_high_but_is_not_piled_up(game):
+    game.reset(np.random.default_rng(0))
+    one, other = game.task.blocks
+    one.place(AWAY)
+    other.place((AWAY[0] + 0.2, AWAY[1], 0.5), velocity=(0.0, 0.0, 1.0))
+    *_, terms = sit(game, 0.08)
+    assert terms["height"] > 5.0
+    assert not game.task.solved
+
+
+def test_blocks_side_by_side_are_not_piled_up(game):
+    game.reset(np.random.default_rng(0))
+    one, other = game.task.blocks
+    one.place(AWAY)
+    other.place((AWAY[0] + EDGE, AWAY[1], EDGE / 2))
+    *_, terms = sit(game, 0.4)
+    assert abs(terms["height"]) < 0.05
+    assert not game.task.solved
+
+
+def test_a_touched_pile_is_not_solved(game):
+    game.reset(np.random.default_rng(0))
+    one, other = game.task.blocks
+    hand = game.players[0].body.bone("l_hand").position
+    one.place((hand[0], hand[1], EDGE / 2))
+    other.place((hand[0], hand[1], 1.5 * EDGE))
+    for _ in sit(game, 0.04):
+        assert not game.task.solved
+
+
+def test_the_expert_piles_up(game):
+    heights, solved = [], 0
+    for seed in EXPERT_SEEDS:
+        total, piled_up = play(game, seed)
+        heights.append(total["height"])
+        solved += piled_up
+        assert sits(game)
+    assert solved >= len(EXPERT_SEEDS) / 2
+    assert min(heights) > 20.0  # it lifts in every episode, though it may drop the block
+    assert np.mean(heights) > 0.3 * game.max_steps
+
+
+@pytest.mark.parametrize(
+    ("numbers", "told"),
+    [
+        ({"edge_m": 0.0}, "edge_m=0.0"),
+        ({"edge_m": 0.2}, "at most 0.1"),
+        ({"mass_kg": -1.0}, "mass_kg=-1.0"),
+        ({"ahead_m": (0.3, 0.2)}, "ahead_m"),
+        ({"aside_m": (0.01, 0.2)}, "aside_m"),
+    ],
+)
+def test_what_cannot_be_is_refused(numbers, told):
+    with pytest.raises(ValueError, match=told):
+        PileUpBlockCfg(**numbers)
+
+
+def test_a_walker_is_refused():
+    game = compose(["+task=PileUpBlock", "body=walker"]).game
+    with pytest.raises(ValueError, match="choose body=full"):
+        Game(game)
+
+
+def test_a_wrong_number_on_the_command_line_is_one_line():
+    with pytest.raises(ConfigError, match="edge_m"):
+        compose(["+task=PileUpBlock", "task.edge_m=-1"])

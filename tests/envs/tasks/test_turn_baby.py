@@ -1,0 +1,64 @@
+"""TurnBaby: the reward knows back from belly, the start is at rest, the expert turns over."""
+
+import numpy as np
+import pytest
+from babies import (
+    BODIES,
+    check_limbs_fall_and_none_flies,
+    check_walkers_are_refused,
+    child_game,
+    play,
+    starts,
+    terms_at_rest,
+)
+
+from veca_marl.envs.tasks.locomotion.turn_baby import TurnBabyCfg
+from veca_marl.sim.body.humanoid.postures import ON_BACK, ON_BELLY
+
+
+@pytest.fixture(scope="module")
+def game():
+    with child_game("TurnBaby") as game:
+        yield game
+
+
+def test_the_belly_pays_and_the_back_costs(game):
+    assert terms_at_rest(game, ON_BACK) == pytest.approx({"torso": -1.0, "hip": -1.0}, abs=0.1)
+    assert terms_at_rest(game, ON_BELLY) == pytest.approx({"torso": 1.0, "hip": 1.0}, abs=0.1)
+
+
+def test_an_episode_is_worth_ten(game):
+    best = game.pay({"torso": 1.0, "hip": 1.0}) * game.max_steps
+    assert best == pytest.approx(10.0)
+
+
+def test_it_starts_on_the_back_at_rest_with_joints_anywhere(game):
+    angles = []
+    for body in starts(game, 8):
+        angles.append(body.joint_angles())
+        outcome = check_limbs_fall_and_none_flies(game)
+        assert outcome.terms["agents"]["hip"] < -0.8
+        assert outcome.terms["agents"]["torso"] < -0.8
+    moving = np.ptp(angles, axis=0) > 0.0
+    assert moving.sum() == 40
+
+
+@pytest.mark.parametrize("body", BODIES)
+def test_the_expert_lies_on_the_belly_in_the_end(body):
+    rng = np.random.default_rng(3)
+    with child_game("TurnBaby", f"body={body}") as game:
+        for _ in range(3):
+            last = play(game, rng)[0][-1]
+            assert min(last.terms["agents"].values()) > 0.8
+            assert last.truncated
+            assert not last.terminated
+
+
+def test_a_walker_is_refused():
+    check_walkers_are_refused("TurnBaby")
+
+
+@pytest.mark.parametrize("wrong", [-1.0, 31.0, float("nan")])
+def test_impossible_spreads_are_refused(wrong):
+    with pytest.raises(ValueError, match="spread_deg"):
+        TurnBabyCfg(spread_deg=wrong)

@@ -1,0 +1,40 @@
+"""Help for the tests of the tasks with blocks."""
+
+import numpy as np
+
+from veca_marl.config.root import compose
+from veca_marl.envs.core.game import Game
+
+
+def blocks_game(task, *overrides):
+    """Return a game that looks at nothing: eyes are dear."""
+    game = Game(compose([f"+task={task}", "senses/vision=blind", *overrides]).game)
+    game.reset(np.random.default_rng(0))
+    return game
+
+
+def sit(game, seconds):
+    """Let the child hold its posture, yield the terms of every step."""
+    player, rng = game.players[0], np.random.default_rng(0)
+    posture = player.body.joint_angles()
+    for _ in range(round(seconds / game.world.clock.step_s)):
+        outcome = game.step({player.name: player.body.encode(posture)}, rng)
+        yield outcome.terms[player.name]
+
+
+def play(game, seed):
+    """Let the expert play an episode; return the sum of the terms and whether it was solved."""
+    player, rng, total, over = game.players[0], np.random.default_rng(seed), {}, False
+    game.reset(rng)
+    while not over:
+        row = player.body.encode(game.task.expert(player, {}))
+        outcome = game.step({player.name: row}, rng)
+        for name, value in outcome.terms[player.name].items():
+            total[name] = total.get(name, 0.0) + value
+        over = outcome.done
+    return total, game.task.solved
+
+
+def sits(game):
+    """Say whether the child has not toppled."""
+    return game.players[0].body.bone("pelvis").rotation[2, 2] > 0.8

@@ -1,0 +1,48 @@
+"""Games of two teams played blind: how tests of rings and pitches set them up and watch."""
+
+import numpy as np
+
+from veca_marl.config.root import compose
+from veca_marl.envs.core.game import Game
+from veca_marl.envs.core.scripts import play_script
+from veca_marl.envs.core.team import Script
+
+
+def game_of(task, *overrides, seed=0):
+    game = Game(compose([f"+task={task}", "senses/vision=blind", *overrides]).game)
+    game.reset(np.random.default_rng(seed))
+    return game
+
+
+def steps(game, rng, **scripts):
+    """Play to the end, each team by the script named for it; yield every outcome."""
+    over = False
+    while not over:
+        for player in game.players:
+            now = Script.idle if player.name in game.out else Script[scripts[player.team]]
+            play_script(now, game.task, player, lambda _: {}, rng)
+        outcome = game.advance(rng)
+        yield outcome
+        over = outcome.done
+
+
+def episodes(game, count, **scripts):
+    """Yield for each of so many episodes its outcomes, step by step."""
+    for seed in range(count):
+        rng = np.random.default_rng([2026, seed])
+        game.reset(rng)
+        yield list(steps(game, rng, **scripts))
+
+
+def paid_in_all(game, outcome):
+    return sum(game.pay(terms) for terms in outcome.terms.values())
+
+
+def rest(game, seconds=0.04):
+    """Let everybody rest for a while; return the outcomes."""
+    rng, outcomes = np.random.default_rng(0), []
+    for _ in range(round(seconds / 0.04)):
+        for player in game.players:
+            player.body.rest()
+        outcomes.append(game.advance(rng))
+    return outcomes

@@ -1,0 +1,76 @@
+"""Several joint-level bodies in one place, driven at random."""
+
+import numpy as np
+from walking import empty_world, wall
+
+from veca_marl.sim.body.humanoid.humanoid import Detail, Humanoid, HumanoidCfg
+from veca_marl.sim.body.humanoid.postures import ON_BACK, ON_BELLY
+from veca_marl.sim.physics.bullet import pybullet
+
+# a room of 3 m x 3 m
+WALLS = [
+    wall("east", position=(1.55, 0.0, 0.0)),
+    wall("west", position=(-1.55, 0.0, 0.0)),
+    wall("north", position=(0.0, 1.55, 0.0), yaw_deg=0.0),
+    wall("south", position=(0.0, -1.55, 0.0), yaw_deg=0.0),
+]
+
+
+def heap(bodies, detail=Detail.full, walls=False):
+    """Return a frozen world and bodies in it that lie upon each other."""
+    world = empty_world(*(WALLS if walls else ()))
+    heaped = [Humanoid(f"child_{i}", HumanoidCfg(detail=detail), world) for i in range(bodies)]
+    world.freeze()
+    lay(world, heaped)
+    return world, heaped
+
+
+def lay(world, bodies):
+    world.reset(np.random.default_rng(0))
+    for i, body in enumerate(bodies):
+        body.place((0.1 * i, 0.1 * (i % 2), 0.2 * i), 0.5 * i, ON_BACK if i % 2 else ON_BELLY)
+    world.refresh()
+
+
+def thrash(world, bodies, seconds, seed=0):
+    """Drive all joints by full torques of random sign; yield after every agent step."""
+    rng = np.random.default_rng(seed)
+    for _ in range(round(seconds * 25)):
+        for body in bodies:
+            body.act(rng.choice([-1.0, 1.0], body.action_spec.shape))
+        world.step()
+        yield
+
+
+def weightless(world):
+    """Switch gravity off."""
+    pybullet.setGravity(0.0, 0.0, 0.0, physicsClientId=world.client)
+
+
+def fling(world, body, speed_radps, seed=0):
+    """Give all joints random speeds."""
+    rng = np.random.default_rng(seed)
+    joints = body.articulation
+    joints.speeds[joints.moving] = rng.uniform(-speed_radps, speed_radps, len(joints.moving))
+    joints._set(np.arange(len(joints.moving)))
+    world.refresh()
+
+
+def kinetic_energy(world, body):
+    """Return joules in all links of a body, light ones included."""
+    body_id, client = body.articulation.body_id, world.client
+    links = range(pybullet.getNumJoints(body_id, physicsClientId=client))
+    states = pybullet.getLinkStates(body_id, links, 1, 1, physicsClientId=client)
+    velocity, spin = pybullet.getBaseVelocity(body_id, physicsClientId=client)
+    turn = pybullet.getBasePositionAndOrientation(body_id, physicsClientId=client)[1]
+    energy = _energy(world, body_id, -1, turn, velocity, spin)
+    for link, state in zip(links, states, strict=True):
+        energy += _energy(world, body_id, link, state[1], state[6], state[7])
+    return energy
+
+
+def _energy(world, body_id, link, turn, velocity, spin):
+    info = pybullet.getDynamicsInfo(body_id, link, physicsClientId=world.client)
+    rotation = np.reshape(pybullet.getMatrixFromQuaternion(turn), (3, 3))
+    local_spin = rotation.T @ spin
+    return 0.5 * (info[0] * np.dot(velocity, velocity) + np.dot(info[2], local_spin**2))

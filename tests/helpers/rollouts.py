@@ -1,0 +1,111 @@
+"""Rollouts that the laws compare: by random actions, by the expert, and their digests.
+
+Run as a program it prints the digest of a rollout, so that another process can be asked.
+"""
+
+import hashlib
+import sys
+from dataclasses import replace
+
+import numpy as np
+import torch
+
+from veca_marl.config.root import compose
+from veca_marl.envs.adapters.torchrl.env import VecaEnv
+from veca_marl.envs.core.game import Game
+from veca_marl.envs.core.scripts import play_script
+from veca_marl.envs.core.team import Script
+from veca_marl.sim.body.voice_controls import VoiceKind
+from veca_marl.sim.body.walker.walker import WalkerCfg
+
+# the ways to act in a task: its own body's, and another
+KINDS = ("own", "other")
+
+
+def game_cfg(task, kind="own", *overrides):
+    """Return what is played: with the task's own body, or one that is commanded otherwise."""
+    own = compose([f"+task={task}", *overrides])
+    if kind == "own":
+        return own.game
+    return compose([f"+task={task}", f"body={other_body(own.game.body)}", *overrides]).game
+
+
+def other_body(own):
+    if not isinstance(own, WalkerCfg):
+        return "mitten_position"
+    # where players call, the house is silent without voices: the ears would be constant
+    return "walker_discrete" if own.voice is VoiceKind.silent else "walker_discrete_voice"
+
+
+def random_row(spec, rng):
+    if spec.shape == ():
+        return np.asarray(rng.integers(int(spec.high) + 1), spec.dtype)
+    return rng.uniform(spec.low, spec.high, spec.shape).astype(spec.dtype)
+
+
+def play(env, steps, seed):
+    """Seed an env, play random actions drawn with numpy, return all steps as one TensorDict."""
+    env.set_seed(seed)
+    rng = np.random.default_rng(seed)
+    state, steps_played = env.reset(), []
+    for _ in range(steps):
+        fill_actions(env, state, rng)
+        played, state = env.step_and_maybe_reset(state)
+        steps_played.append(played.clone())
+    return torch.stack(steps_played, -1)
+
+
+def fill_actions(env, state, rng):
+    for team, names in env.group_map.items():
+        spec = env.games[0].team(team)[0].body.action_spec
+        rows = [[random_row(spec, rng) for _ in names] for _ in env.games]
+        state[team, "action"] = torch.from_numpy(np.array(rows))
+
+
+def digest(rollout):
+    """Return a hash of every byte of a TensorDict."""
+    total = hashlib.sha256()
+    leaves = rollout.items(include_nested=True, leaves_only=True)
+    for key, value in sorted(leaves, key=lambda item: str(item[0])):
+        total.update(str(key).encode())
+        total.update(value.contiguous().numpy().tobytes())
+    return total.hexdigest()
+
+
+def returns(cfg, episodes, script, seed=0):
+    """Play episodes and return what the players of the first team were paid in each.
+
+    Other teams play at random: a game between two who choose alike does not say who is better.
+
+    Args:
+        cfg: The game.
+        episodes: How many.
+        script: Who chooses for the first team.
+        seed: Of everything random.
+    """
+    others = {team.name: Script.random for team in cfg.teams[1:]}
+    game, rng = Game(replace(cfg, script=others)), np.random.default_rng(seed)
+    paid = []
+    for _ in range(episodes):
+        game.reset(rng)
+        total, over = 0.0, False
+        while not over:
+            for player in game.actors:
+                now = Script.idle if player.name in game.out else script
+                play_script(now, game.task, player, game.observe, rng)
+            outcome = game.advance(rng)
+            total += float(np.mean([game.pay(outcome.terms[p.name]) for p in game.actors]))
+            over = outcome.done
+        paid.append(total)
+    game.close()
+    return np.array(paid)
+
+
+def by_chance(task, player, observation, rng):
+    return random_row(player.body.action_spec, rng)
+
+
+if __name__ == "__main__":
+    name, n_steps, start = sys.argv[1:]
+    fresh = VecaEnv(game_cfg(name), worlds=2)
+    print(digest(play(fresh, int(n_steps), int(start))))  # noqa: T201  its answer

@@ -1,0 +1,37 @@
+"""Poses of a body's skin that several tests share."""
+
+import numpy as np
+
+from veca_marl.sim.body.anatomy.skeleton import forward_kinematics, load_skeleton
+from veca_marl.sim.body.looks import bone_geoms, dressed_skin
+from veca_marl.sim.geometry.rotations import quaternions_to_matrices
+
+SHIRT = (0.2, 0.4, 0.9)
+
+
+def random_angles(rng, share=1.0):
+    """Joint angles ``(82,)`` anywhere within a share of their ranges."""
+    limits = np.array([(j.low_rad, j.high_rad) for j in load_skeleton().joints])
+    return share * rng.uniform(limits[:, 0], limits[:, 1])
+
+
+def random_turn(rng):
+    turn = np.empty((1, 3, 3))
+    quaternion = rng.normal(size=(1, 4))
+    quaternions_to_matrices(quaternion / np.linalg.norm(quaternion), turn)
+    return turn[0]
+
+
+def add_body(scene, name="body"):
+    """Add a body in its zero pose, pelvis at the origin."""
+    skeleton = load_skeleton()
+    item = scene.add_object(name, bone_geoms(skeleton, SHIRT), dressed_skin(skeleton, SHIRT))
+    pose(item, np.zeros(82))
+    return item
+
+
+def pose(item, angles, position=(0.0, 0.0, 0.0), rotation=None):
+    """Put a body somewhere with some joint angles; the scene is not updated."""
+    item.positions[0] = position
+    item.rotations[0] = np.eye(3) if rotation is None else rotation
+    forward_kinematics(load_skeleton(), angles, item.positions, item.rotations)

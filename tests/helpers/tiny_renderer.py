@@ -1,0 +1,55 @@
+"""PyBullet's software renderer on a scene of ours."""
+
+import numpy as np
+
+from veca_marl.sim.geometry.primitives import Shape
+from veca_marl.sim.geometry.rotations import matrix_to_quaternion
+from veca_marl.sim.physics.bullet import pybullet
+
+
+class TinyRenderer:
+    """Shows the primitives of a scene as bodies whose ids are the primitives' rows."""
+
+    def __init__(self, scene):
+        self.client = pybullet.connect(pybullet.DIRECT)
+        for g in range(len(scene.geoms.shapes)):
+            assert self._add(scene.geoms, g) == g
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        pybullet.disconnect(self.client)
+
+    def segment(self, camera, pose):
+        """Return ``(H, W)`` which primitive is where, -1 for none."""
+        forward, _, up = pose.rotation.T
+        view = pybullet.computeViewMatrix(pose.position, pose.position + forward, up)
+        projection = pybullet.computeProjectionMatrixFOV(
+            camera.fov_deg, camera.width / camera.height, camera.near_m, camera.far_m
+        )
+        *_, segmentation = pybullet.getCameraImage(
+            camera.width,
+            camera.height,
+            view,
+            projection,
+            shadow=0,
+            renderer=pybullet.ER_TINY_RENDERER,
+            physicsClientId=self.client,
+        )
+        return np.reshape(segmentation, (camera.height, camera.width))
+
+    def _add(self, geoms, g):
+        size = geoms.sizes[g].tolist()
+        rod = {"radius": size[0], "length": size[1]}
+        kind = {
+            Shape.SPHERE: {"shapeType": pybullet.GEOM_SPHERE, "radius": size[0]},
+            Shape.BOX: {"shapeType": pybullet.GEOM_BOX, "halfExtents": size},
+            Shape.CYLINDER: {"shapeType": pybullet.GEOM_CYLINDER} | rod,
+            Shape.CAPSULE: {"shapeType": pybullet.GEOM_CAPSULE} | rod,
+        }[Shape(geoms.shapes[g])]
+        visual = pybullet.createVisualShape(**kind, physicsClientId=self.client)
+        orientation = matrix_to_quaternion(geoms.rotations[g])
+        return pybullet.createMultiBody(
+            0.0, -1, visual, geoms.positions[g], orientation, physicsClientId=self.client
+        )

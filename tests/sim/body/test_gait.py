@@ -1,0 +1,159 @@
+"""How a walking child looks: feet, joints, head."""
+
+import math
+
+import numpy as np
+import pytest
+from walking import ball, empty_world, let_pass, walker_in
+
+from veca_marl.sim.body.anatomy.skeleton import Soles, load_skeleton
+from veca_marl.sim.body.walker.gait import Gait
+
+SKELETON = load_skeleton()
+SOLES = Soles(SKELETON)
+LOW = np.array([joint.low_rad for joint in SKELETON.joints])
+HIGH = np.array([joint.high_rad for joint in SKELETON.joints])
+WALKS = [(1.0, 0.0), (0.5, 0.0), (0.2, 0.0), (-1.0, 0.0), (0.0, 2.0), (1.0, 1.5), (0.0, 0.0)]
+
+
+def steps_of(walker, world, steps):
+    """Yield after each step; the bones are where they were drawn."""
+    for _ in range(steps):
+        world.step()
+        yield walker._drawn.positions, walker._drawn.rotations
+
+
+@pytest.mark.parametrize("walk", WALKS)
+def test_the_lowest_sole_is_on_the_floor(walk):
+    world = empty_world()
+    walker = walker_in(world)
+    walker.walk(*walk)
+    for positions, rotations in steps_of(walker, world, 60):
+        assert SOLES.lowest_m(positions, rotations) == pytest.approx(0.0, abs=1e-9)
+        assert positions[:, 2].min() > 0.0
+
+
+@pytest.mark.parametrize("walk", WALKS)
+def test_all_joints_stay_within_their_limits_without_being_cut(walk):
+    gait = Gait(SKELETON)
+    gait._low, gait._high = np.full(82, -np.inf), np.full(82, np.inf)
+    gait._turn_neck = lambda *_: None
+    for step in range(100):
+        gait.advance(*walk, 0.04)
+        if step == 50:
+            gait.kick()
+        angles = gait.pose(0.0, 0.0)
+        for angle, joint in zip(angles, SKELETON.joints, strict=True):
+            slack = math.radians(1.0)
+            assert joint.low_rad - slack <= angle <= joint.high_rad + slack, joint
+
+
+@pytest.mark.parametrize("speed", [1.0, 0.6, 0.3, -0.7])
+def test_a_foot_that_carries_stays_where_it_is(speed):
+    """At least one sole stands still at every moment of a steady walk."""
+    world = empty_world()
+    walker = walker_in(world, walk_speed_mps=1.0)
+    walker.walk(speed, 0.0)
+    let_pass(world, 1.0)
+    feet = [SKELETON.bone("l_foot"), SKELETON.bone("r_foot")]
+    places = np.array([p[feet].copy() for p, _ in steps_of(walker, world, 50)])
+    slid = np.linalg.norm(np.diff(places, axis=0), axis=2).min(axis=1) / 0.04
+    assert np.median(slid) < 0.02 * abs(speed)
+    # in the step in which the weight changes over, neither foot stands for all of it
+    assert np.mean(slid < 0.1 * abs(speed)) > 0.6
+
+
+@pytest.mark.parametrize(("speed", "turn"), [(0.8, 0.8), (0.5, -1.0), (0.0, 1.5)])
+def test_on_a_curve_the_outer_foot_goes_further(speed, turn):
+    """Each foot keeps to its own circle, so the ankle that carries hardly slides."""
+    world = empty_world()
+    walker = walker_in(world)
+    walker.walk(speed, turn)
+    let_pass(world, 1.0)
+    feet = [SKELETON.bone("l_foot"), SKELETON.bone("r_foot")]
+    places = np.array([p[feet, :2].copy() for p, _ in steps_of(walker, world, 50)])
+    slid = np.linalg.norm(np.diff(places, axis=0), axis=2).min(axis=1) / 0.04
+    assert np.median(slid) < 0.3 * abs(turn) * 0.045
+
+
+def test_both_feet_walk():
+    world = empty_world()
+    walker = walker_in(world)
+    walker.walk(1.0, 0.0)
+    let_pass(world, 1.0)
+    feet = [SKELETON.bone("l_foot"), SKELETON.bone("r_foot")]
+    heights = np.array([p[feet, 2].copy() for p, _ in steps_of(walker, world, 25)])
+    assert (np.ptp(heights, axis=0) > 0.03).all()
+    assert np.corrcoef(heights.T)[0, 1] < -0.3
+
+
+def test_the_arms_swing_against_the_legs():
+    gait = Gait(SKELETON)
+    arm, leg = SKELETON.joint("l_upper_arm", "flexion"), SKELETON.joint("l_thigh", "flexion")
+    seen = []
+    for _ in range(60):
+        gait.advance(1.0, 0.0, 0.04)
+        seen.append(gait.pose(0.0, 0.0)[[arm, leg]].copy())
+    assert np.corrcoef(np.array(seen[20:]).T)[0, 1] < -0.6
+
+
+def test_standing_is_still():
+    gait = Gait(SKELETON)
+    gait.advance(0.0, 0.0, 0.04)
+    one = gait.pose(0.0, 0.0).copy()
+    gait.advance(0.0, 0.0, 0.04)
+    np.testing.assert_array_equal(one, gait.pose(0.0, 0.0))
+
+
+def test_a_walker_who_stops_comes_to_stand():
+    gait = Gait(SKELETON)
+    standing = gait.pose(0.0, 0.0).copy()
+    for speed in (1.0, 0.0):
+        for _ in range(40):
+            gait.advance(speed, 0.3 * speed, 0.04)
+    np.testing.assert_allclose(gait.pose(0.0, 0.0), standing, atol=1e-3)
+
+
+def test_nothing_jumps():
+    """No joint turns faster than a child's, though the commands jump."""
+    gait, rng, fastest = Gait(SKELETON), np.random.default_rng(0), 0.0
+    before = gait.pose(0.0, 0.0).copy()
+    for step in range(400):
+        if step % 15 == 0:
+            walk = rng.uniform(-1.0, 1.0), rng.uniform(-2.0, 2.0)
+        gait.advance(*walk, 0.04)
+        now = gait.pose(0.0, 0.0)
+        fastest = max(fastest, np.abs(now - before).max() / 0.04)
+        before = now.copy()
+    assert fastest < 25.0
+
+
+def test_a_kick_swings_the_right_leg_and_ends():
+    world = empty_world(ball(position=(0.3, 0.0, 0.1)))
+    walker = walker_in(world)
+    let_pass(world, 0.4)
+    standing = walker.bone("r_foot").position
+    assert walker.kick(world.prop("ball"))
+    foot = SKELETON.bone("r_foot")
+    path = np.array([p[foot].copy() for p, _ in steps_of(walker, world, 25)]) - standing
+    assert path[:4, 0].max() > 0.12
+    assert path[:4, 2].max() > 0.05
+    np.testing.assert_allclose(path[-1], 0.0, atol=1e-3)
+
+
+@pytest.mark.parametrize("share", [-1.0, -0.5, 0.3, 1.0])
+def test_the_neck_and_the_head_share_a_turn_exactly(share):
+    world = empty_world()
+    walker = walker_in(world, head_pitch_deg=0.0)
+    down, left = walker._gait.pitch_range_rad, walker._gait.yaw_range_rad
+    pitch = share * down[1] if share > 0 else -share * down[0]
+    walker.rotate_up_down_head(math.degrees(pitch))
+    world.step()
+    forward = walker.mount("head").rotation[:, 0]
+    assert math.asin(-forward[2]) == pytest.approx(pitch, abs=1e-9)
+    walker.rotate_up_down_head(-math.degrees(pitch))
+    walker.rotate_left_right_head(-math.degrees(share * left[1]))
+    world.step()
+    forward = walker.mount("head").rotation[:, 0]
+    turned = math.atan2(forward[1], forward[0])
+    assert turned == pytest.approx(math.remainder(share * left[1], math.tau), abs=1e-9)

@@ -1,0 +1,256 @@
+"""The joint-level body: how it is placed, read, and what its hands carry."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from heaps import thrash
+from walking import empty_world, let_pass
+
+from veca_marl.sim.body.anatomy.skeleton import Underside, load_skeleton
+from veca_marl.sim.body.anatomy.skin_springs import skin_spring
+from veca_marl.sim.body.base import MOUNTS, Body, BodyCfg
+from veca_marl.sim.body.family import make_body
+from veca_marl.sim.body.humanoid.humanoid import (
+    Detail,
+    Humanoid,
+    HumanoidCfg,
+    JointActionKind,
+)
+from veca_marl.sim.body.humanoid.postures import ON_BACK, POSTURES, Posture, posture_angles
+from veca_marl.sim.physics.bullet import pybullet
+
+SKELETON = load_skeleton()
+ALL = [bone.name for bone in SKELETON.bones]
+
+
+# ---- names and counts
+
+
+@pytest.mark.parametrize("detail", Detail)
+def test_both_details_speak_of_47_bones_and_82_joints(make_child, detail):
+    _, body = make_child(detail=detail)
+    assert len(body.bone_names) == len(set(body.bone_names)) == 47
+    assert len(body.joint_names) == len(set(body.joint_names)) == 82
+    assert body.velocities().shape == body.angular_velocities().shape == (47, 3)
+    for read in (body.joint_angles, body.joint_velocities, body.joint_torques):
+        assert read().shape == (82,)
+    assert len(body.articulation.moving) == {Detail.full: 82, Detail.mitten: 40}[detail]
+    for mount in MOUNTS:
+        assert np.isfinite(body.mount(mount).position).all()
+
+
+def test_it_is_made_by_its_configuration():
+    world = empty_world()
+    body: Body = make_body("child", HumanoidCfg(), world)
+    assert isinstance(body, Humanoid)
+    with pytest.raises(ValueError, match="BodyCfg is no body"):
+        make_body("nobody", BodyCfg(), world)
+    world.close()
+
+
+# ---- where it is
+
+
+@pytest.mark.parametrize("name", sorted(POSTURES))
+@pytest.mark.parametrize("height_m", [0.0, 0.4])
+def test_its_lowest_point_is_where_it_is_placed(make_child, name, height_m):
+    world, body = make_child()
+    body.place((1.0, -2.0, height_m), 0.8, POSTURES[name])
+    world.refresh()
+    lowest = Underside(SKELETON, ALL, skin=True).lowest_m(
+        body.bone_positions(), body.bone_rotations()
+    )
+    assert lowest == pytest.approx(height_m, abs=1e-9)
+    np.testing.assert_allclose(body.position[:2], (1.0, -2.0), atol=1e-9)
+    expected = posture_angles(SKELETON, POSTURES[name])
+    np.testing.assert_allclose(body.joint_angles(), expected, atol=1e-12)
+    np.testing.assert_allclose(body.forward, (math.cos(0.8), math.sin(0.8), 0.0), atol=1e-9)
+
+
+def test_velocities_are_those_that_bullet_has(make_child):
+    world, body = make_child()
+    client, body_id = world.client, body.articulation.body_id
+    for _ in thrash(world, [body], 1.0):
+        pass
+    velocities, spins = body.velocities(), body.angular_velocities()
+    assert np.abs(spins).max() > 5.0
+    for link in range(pybullet.getNumJoints(body_id, physicsClientId=client)):
+        name = pybullet.getJointInfo(body_id, link, physicsClientId=client)[12].decode()
+        if name not in body.bone_names:
+            continue
+        state = pybullet.getLinkState(body_id, link, 1, 1, physicsClientId=client)
+        bone = body.bone_names.index(name)
+        lever = np.subtract(state[0], state[4])  # Bullet's is that of the centre of mass
+        np.testing.assert_allclose(spins[bone], state[7], atol=1e-6)
+        np.testing.assert_allclose(
+            velocities[bone] + np.cross(spins[bone], lever), state[6], atol=1e-3
+        )
+
+
+def test_fingers_of_a_mitten_are_straight_and_follow_the_hand(make_child):
+    world, body = make_child(detail=Detail.mitten)
+    for _ in thrash(world, [body], 1.0):
+        pass
+    hand, finger = body.bone("l_hand"), body.bone("l_index_distal")
+    local = hand.rotation.T @ (finger.position - hand.position)
+    full_world, full = make_child()
+    full_world.refresh()
+    hand, finger = full.bone("l_hand"), full.bone("l_index_distal")
+    np.testing.assert_allclose(
+        local, hand.rotation.T @ (finger.position - hand.position), atol=1e-9
+    )
+    fingers = np.setdiff1d(np.arange(82), body.articulation.moving)
+    assert not body.joint_angles()[fingers].any()
+    assert not body.joint_torques()[fingers].any()
+
+
+@pytest.mark.parametrize(
+    ("position", "posture", "message"),
+    [
+        ((0.0, 0.0, math.nan), ON_BACK, "cannot be at"),
+        ((0.0, 0.0), ON_BACK, "cannot be at"),
+        ((0.0, 0.0, 0.0), Posture(0.0, {"knee.flexion": 5.0}), "no joint 'knee.flexion'"),
+        ((0.0, 0.0, 0.0), Posture(0.0, {"l_shank.flexion": -5.0}), "it moves from 0 to 148"),
+        ((0.0, 0.0, 0.0), np.full(82, np.nan), "cannot be at nan degrees"),
+        ((0.0, 0.0, 0.0), np.zeros(40), r"angles \(40,\), not \(82,\)"),
+    ],
+)
+def test_impossible_places_are_refused(make_child, position, posture, message):
+    _, body = make_child()
+    with pytest.raises(ValueError, match=message):
+        body.place(position, 0.0, posture)
+
+
+@pytest.mark.parametrize(
+    ("numbers", "message"),
+    [
+        ({"detail": "stick"}, r"body.detail='stick'; there are \['full', 'mitten'\]"),
+        (
+            {"action": "muscles"},
+            r"body.action='muscles'; there are \['torque', 'position', 'increment'\]",
+        ),
+        ({"joints": "some"}, r"body.joints='some'"),
+        ({"strength": 0.0}, r"body.strength=0.0"),
+        ({"strength": 2.0}, r"body.strength=2.0"),
+        ({"friction": math.nan}, r"body.friction=nan"),
+        ({"eye_range_deg": -1.0}, r"body.eye_range_deg=-1.0"),
+    ],
+)
+def test_impossible_numbers_are_refused(numbers, message):
+    with pytest.raises(ValueError, match=message):
+        HumanoidCfg(**numbers)
+
+
+# ---- physics
+
+
+def test_a_fall_is_free_until_the_floor(make_child):
+    world, body = make_child()
+    body.place((0.0, 0.0, 1.0))
+    start = body.position[2]
+    let_pass(world, 0.2)
+    assert body.velocity[2] == pytest.approx(-9.81 * 0.2, rel=0.01)
+    assert body.position[2] - start == pytest.approx(-0.5 * 9.81 * 0.2**2, rel=0.06)
+
+
+def test_fingers_and_palms_and_soles_are_softer_than_bones(make_child):
+    world, body = make_child()
+    client, body_id = world.client, body.articulation.body_id
+    stiff = {}
+    for link in range(pybullet.getNumJoints(body_id, physicsClientId=client)):
+        name = pybullet.getJointInfo(body_id, link, physicsClientId=client)[12].decode()
+        stiff[name] = pybullet.getDynamicsInfo(body_id, link, physicsClientId=client)[9]
+    for name in ("l_hand__skin", "r_foot__skin", "l_index_distal"):
+        bone = SKELETON.bones[SKELETON.bone(name.removesuffix("__skin"))]
+        assert stiff[name] == pytest.approx(skin_spring(bone).stiffness_npm)
+    assert stiff["l_hand"] == stiff["chest"] < 0.0, "Bullet's word for rigid"
+
+
+def test_skin_that_carries_weight_is_pressed_in_by_it(make_child):
+    """Hooke, at every point in which a sitting child's hands and feet rest on the floor."""
+    world, body = make_child(action=JointActionKind.position)
+    body.place((0.0, 0.0, 0.0), 0.0, POSTURES["sitting"])
+    wanted = posture_angles(SKELETON, POSTURES["sitting"])
+    body.act(body.encode(wanted))
+    let_pass(world, 6.0)
+    client, body_id = world.client, body.articulation.body_id
+    pressed = 0
+    for point in pybullet.getContactPoints(body_id, world.floor_id, physicsClientId=client):
+        stiffness = pybullet.getDynamicsInfo(body_id, point[3], physicsClientId=client)[9]
+        if stiffness > 0.0 and point[9] > 0.5:
+            assert point[9] == pytest.approx(-stiffness * point[8], rel=0.04)
+            pressed += 1
+    assert pressed >= 2
+
+
+@pytest.mark.slow
+def test_ten_thousand_resets_take_no_memory(make_child):
+    world, body = make_child(detail=Detail.mitten)
+
+    def resident_kb():
+        return int(Path("/proc/self/statm").read_text().split()[1]) * 4
+
+    def reset(times):
+        for _ in range(times):
+            world.reset(np.random.default_rng(0))
+            body.place((0.0, 0.0, 0.0), 0.1, ON_BACK)
+
+    if not Path("/proc/self/statm").exists():
+        pytest.skip("memory is read from /proc")
+    reset(500)
+    before = resident_kb()
+    reset(10_000)
+    assert resident_kb() - before < 1000
+
+
+def test_many_resets_leave_no_trace(make_child):
+    world, body = make_child(detail=Detail.mitten)
+
+    def film():
+        world.reset(np.random.default_rng(0))
+        body.place((0.0, 0.0, 0.0), 0.3, ON_BACK)
+        return [body.bone_positions() for _ in thrash(world, [body], 0.4)]
+
+    first = film()
+    for _ in range(200):
+        world.reset(np.random.default_rng(0))
+    np.testing.assert_array_equal(film(), first)
+
+
+@pytest.mark.parametrize("what", ["base", "joint"])
+def test_a_simulation_that_breaks_is_told_and_shows_no_nan(make_child, what):
+    world, body = make_child()
+    world.step()
+    nan = math.nan
+    if what == "base":
+        pybullet.resetBaseVelocity(
+            body.articulation.body_id, (nan,) * 3, (0, 0, 0), physicsClientId=world.client
+        )
+    else:
+        pybullet.resetJointStatesMultiDof(
+            body.articulation.body_id, [3], [[nan]], [[0.0]], physicsClientId=world.client
+        )
+    assert body.is_finite
+    world.step()
+    assert not body.is_finite
+    for seen in (body.bone_positions(), body.velocities(), body.joint_angles(), body.position):
+        assert np.isfinite(seen).all()
+    world.reset(np.random.default_rng(0))
+    assert not body.is_finite, "Bullet's collisions are lost for good"
+
+
+# ---- palms
+
+
+def test_palms_are_on_the_inside_of_both_hands(make_child):
+    _, body = make_child()
+    body.place((0.0, 0.0, 0.0))
+    left, right = body.palms()
+    for palm, side in ((left, "l"), (right, "r")):
+        wrist = body.bone(f"{side}_hand").position
+        assert 0.0 < wrist[2] - palm[2] < 0.05
+    # a standing body's palms face its thighs
+    assert 0.0 < body.bone("l_hand").position[1] - left[1] < 0.02
+    assert 0.0 < right[1] - body.bone("r_hand").position[1] < 0.02

@@ -1,0 +1,170 @@
+"""What the joints of the joint-level body are told: torques, angles, increments of angles."""
+
+import math
+
+import numpy as np
+import pytest
+from heaps import weightless
+from walking import let_pass
+
+from veca_marl.sim.body.anatomy.skeleton import load_skeleton
+from veca_marl.sim.body.humanoid.humanoid import Detail, JointActionKind, JointChoice
+from veca_marl.sim.body.humanoid.joint_controls import PositionTarget
+from veca_marl.sim.body.humanoid.postures import POSTURES, Posture, posture_angles
+
+SKELETON = load_skeleton()
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_positive_torque_turns_a_joint_to_its_positive_side(make_child, sign):
+    world, body = make_child()
+    weightless(world)
+    body.place((0.0, 0.0, 2.0))
+    for name in ("l_forearm.flexion", "r_upper_arm.abduction", "head.rotation"):
+        body.place((0.0, 0.0, 2.0), 0.0, _middle())
+        before = body.joint_angles()
+        torques = np.zeros(82)
+        torques[body.joint_names.index(name)] = 0.1 * sign
+        body.apply_torque(torques)
+        let_pass(world, 0.12)
+        moved = (body.joint_angles() - before)[body.joint_names.index(name)]
+        assert moved * sign > 0.01, name
+
+
+def _middle():
+    return np.array([(joint.low_rad + joint.high_rad) / 2 for joint in SKELETON.joints])
+
+
+def test_torques_hold_until_the_next_and_rest_after_a_reset(make_child):
+    world, body = make_child()
+    row = np.random.default_rng(0).uniform(-1, 1, 82)
+    body.act(row)
+    let_pass(world, 0.2)
+    np.testing.assert_array_equal(body.joint_torques(), row)
+    world.reset(np.random.default_rng(0))
+    world.step()
+    assert not body.joint_torques().any()
+
+
+def test_joints_go_to_commanded_angles(make_child):
+    world, body = make_child(action=JointActionKind.position)
+    weightless(world)
+    body.place((0.0, 0.0, 2.0))
+    bent = {"upper_arm.abduction": 60.0, "forearm.flexion": 50.0, "thigh.flexion": 30.0}
+    bent |= {"head.rotation": -30.0, "spine.lateral": 10.0, "l_index_middle.flexion": 40.0}
+    wanted = posture_angles(SKELETON, Posture(0.0, bent))
+    body.act(body.encode(wanted))
+    let_pass(world, 2.0)
+    np.testing.assert_allclose(body.joint_angles(), wanted, atol=math.radians(2.0))
+
+
+def test_commanded_angles_keep_a_child_sitting(make_child):
+    world, body = make_child(action=JointActionKind.position, detail=Detail.mitten)
+    body.place((0.0, 0.0, 0.0), 0.0, POSTURES["sitting"])
+    wanted = posture_angles(SKELETON, POSTURES["sitting"])
+    body.act(body.encode(wanted))
+    head_m = body.bone("head").position[2]
+    let_pass(world, 4.0)
+    assert body.bone("head").position[2] > 0.85 * head_m
+
+
+@pytest.mark.parametrize("detail", Detail)
+def test_torques_of_a_wish_keep_a_child_sitting_still(make_child, detail):
+    """Given once per agent step, they must not shake it."""
+    world, body = make_child(action=JointActionKind.torque, detail=detail)
+    body.place((0.0, 0.0, 0.0), 0.0, POSTURES["sitting"])
+    wanted = body.angles_of(POSTURES["sitting"])
+    head_m = body.bone("head").position[2]
+    for _ in range(150):
+        body.act(body.encode(wanted))
+        world.step()
+    assert body.bone("head").position[2] > 0.85 * head_m
+    assert np.abs(body.velocities()).max() < 0.1
+
+
+def test_increments_of_zero_keep_a_posture(make_child):
+    world, body = make_child(action=JointActionKind.increment, detail=Detail.mitten)
+    body.place((0.0, 0.0, 0.0), 0.0, POSTURES["sitting"])
+    head_m = body.bone("head").position[2]
+    for _ in range(100):
+        body.act(np.zeros(82))
+        world.step()
+    assert body.bone("head").position[2] > 0.85 * head_m
+
+
+def test_increments_add_up_to_targets(make_child):
+    world, body = make_child(action=JointActionKind.increment)
+    weightless(world)
+    body.place((0.0, 0.0, 2.0))
+    bent = {"forearm.flexion": 50.0, "thigh.flexion": 30.0, "head.rotation": -30.0}
+    wanted = posture_angles(SKELETON, Posture(0.0, bent))
+    rows = []
+    for _ in range(50):
+        rows.append(body.encode(wanted))
+        body.act(rows[-1])
+        world.step()
+    np.testing.assert_allclose(body.joint_angles(), wanted, atol=math.radians(2.0))
+    assert np.abs(rows[0]).max() > 0.0
+    np.testing.assert_allclose(rows[-1], 0.0, atol=1e-6)
+
+
+def test_increments_stop_at_the_stops_and_start_anew(make_child):
+    world, body = make_child(action=JointActionKind.increment)
+    weightless(world)
+    for _ in range(3):
+        body.place((0.0, 0.0, 2.0))
+        elbow = body.joint_names.index("l_forearm.flexion")
+        row = np.zeros(82)
+        row[elbow] = 1.0
+        for _ in range(12):
+            body.act(row)
+            world.step()
+        bent = body.joint_angles()[elbow]
+        assert bent > 0.9 * SKELETON.joints[elbow].high_rad
+        body.act(-row)  # what was asked for beyond the stop is not owed
+        world.step()
+        body.act(-row)
+        world.step()
+        assert body.joint_angles()[elbow] < bent - math.radians(5.0)
+
+
+def test_wishes_and_targets_are_inverse(make_child):
+    _, body = make_child(action=JointActionKind.position)
+    angles = np.random.default_rng(0).uniform(body._low, body._high)
+    control = PositionTarget()
+    wishes = control.wishes(angles, angles, body._low, body._high)
+    shares = control.shares(wishes, angles, body._low, body._high)
+    np.testing.assert_allclose(shares, 0.0, atol=1e-9)
+
+
+def test_limbs_alone_may_be_commanded(make_child):
+    world, body = make_child(joints=JointChoice.limbs)
+    assert body.action_spec.shape == (40,)
+    body.act(np.full(40, 0.5))
+    world.step()
+    fingers = [i for i, name in enumerate(body.joint_names) if "thumb" in name or "index" in name]
+    assert not body.joint_torques()[fingers].any()
+    assert (body.joint_torques() != 0.0).sum() == 40
+
+
+@pytest.mark.parametrize(
+    ("row", "message"),
+    [
+        (np.zeros(81), r"shape \(81,\), not \(82,\)"),
+        (np.full(82, np.nan), r"spine.flexion is nan, not in \[-1, 1\]"),
+        (np.full(82, np.inf), r"spine.flexion is inf"),
+        (np.full(82, 1.01), r"spine.flexion is 1.01"),
+    ],
+)
+def test_impossible_actions_are_refused(make_child, row, message):
+    _, body = make_child()
+    with pytest.raises(ValueError, match=message):
+        body.act(row)
+    with pytest.raises(ValueError, match=message):
+        body.apply_torque(row)
+
+
+def test_apply_torque_is_for_bodies_driven_by_torque(make_child):
+    _, body = make_child(action=JointActionKind.position)
+    with pytest.raises(ValueError, match=r"needs body.action=torque"):
+        body.apply_torque(np.zeros(82))

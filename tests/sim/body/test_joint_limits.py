@@ -1,0 +1,92 @@
+"""Joint limits hold exactly, at every physics step, and holding them gives no energy."""
+
+import numpy as np
+import pytest
+from heaps import fling, heap, kinetic_energy, thrash, weightless
+from walking import empty_world
+
+from veca_marl.sim.body.anatomy.skeleton import load_skeleton
+from veca_marl.sim.body.humanoid.articulation import damping_number
+from veca_marl.sim.body.humanoid.humanoid import Detail, Humanoid, HumanoidCfg
+from veca_marl.sim.physics.world import ClockCfg
+
+LOW = np.array([joint.low_rad for joint in load_skeleton().joints])
+HIGH = np.array([joint.high_rad for joint in load_skeleton().joints])
+
+
+@pytest.fixture(params=Detail)
+def alone(request):
+    world, (body,) = heap(1, request.param)
+    yield world, body
+    world.close()
+
+
+def watch_limits(world, body):
+    """Return a list that grows by Bullet's angles after every physics step, hold included."""
+    seen = []
+
+    def note():
+        body.articulation.read()
+        seen.append(body.joint_angles())
+
+    world.after_substep.append(note)
+    return seen
+
+
+def test_no_joint_is_beyond_its_stop_after_any_substep(alone):
+    world, body = alone
+    seen = watch_limits(world, body)
+    for _ in thrash(world, [body], 2.0):
+        pass
+    seen = np.array(seen)
+    assert len(seen) == 2 * 25 * 5
+    assert (seen >= LOW).all()
+    assert (seen <= HIGH).all()
+    assert ((seen == LOW) | (seen == HIGH)).any(0).sum() > 30, "many stops were met"
+
+
+@pytest.mark.parametrize("way", [1.0, -1.0])
+def test_all_joints_pressed_against_their_stops_stay_there(alone, way):
+    world, body = alone
+    weightless(world)
+    body.place((0.0, 0.0, 2.0))
+    body.act(np.full(82, way))
+    for _ in range(50):
+        world.step()
+    moving = body.articulation.moving
+    away = np.abs(body.joint_angles() - (HIGH if way > 0 else LOW))[moving]
+    # self-collision keeps a few from their stops
+    assert np.mean(away < np.radians(1.0)) > 0.8
+    assert (body.joint_angles() <= HIGH).all()
+    assert (body.joint_angles() >= LOW).all()
+
+
+@pytest.mark.parametrize("speed_radps", [5.0, 15.0])
+def test_a_weightless_body_that_hits_its_stops_gains_no_energy(alone, speed_radps):
+    world, body = alone
+    weightless(world)
+    body.place((0.0, 0.0, 2.0))
+    fling(world, body, speed_radps)
+    energies, met = [kinetic_energy(world, body)], 0
+    for _ in range(25):
+        world.step()
+        energies.append(kinetic_energy(world, body))
+        met += int(((body.joint_angles() == LOW) | (body.joint_angles() == HIGH)).sum())
+    assert met > 30
+    assert (np.diff(energies) <= 0.0).all()
+
+
+def test_damping_is_stable_in_all_postures(alone):
+    """Explicit damping: ``dt max eig(M^-1 D) <= 1``; from 2 on it would explode."""
+    world, body = alone
+    rng = np.random.default_rng(0)
+    for _ in range(50):
+        body.place((0.0, 0.0, 1.0), 0.0, rng.uniform(LOW, HIGH))
+        assert damping_number(body.articulation, world.clock.substep_s) <= 1.0
+
+
+def test_too_long_physics_steps_are_refused():
+    world = empty_world(clock=ClockCfg(substeps=3))
+    with pytest.raises(ValueError, match=r"steps of 13.3 ms are too long .* raise clock.substeps"):
+        Humanoid("child", HumanoidCfg(), world)
+    world.close()

@@ -1,0 +1,80 @@
+"""Which parts of a body meet: limbs meet the trunk and each other, never themselves."""
+
+import numpy as np
+import pytest
+from walking import empty_world, let_pass
+
+from veca_marl.sim.body.anatomy.skeleton import load_skeleton
+from veca_marl.sim.body.humanoid.humanoid import Humanoid, HumanoidCfg, JointActionKind
+from veca_marl.sim.body.humanoid.postures import Posture, posture_angles
+from veca_marl.sim.body.humanoid.self_collision import limb, may_meet
+from veca_marl.sim.physics.bullet import pybullet
+
+BONES = [bone.name for bone in load_skeleton().bones]
+
+
+def test_every_bone_is_of_one_of_five_limbs():
+    count = {name: sum(limb(bone) == name for bone in BONES) for name in map(limb, BONES)}
+    assert count == {"trunk": 5, "l_arm": 18, "r_arm": 18, "l_leg": 3, "r_leg": 3}
+
+
+@pytest.mark.parametrize(
+    ("a", "b", "meet"),
+    [
+        ("l_hand", "head", True),
+        ("l_hand", "r_index_distal", True),
+        ("l_thigh", "r_thigh", True),
+        ("l_forearm", "chest", True),
+        ("l_upper_arm", "chest", False),
+        ("pelvis", "r_thigh", False),
+        ("l_hand", "l_thumb_distal", False),
+        ("head", "chest", False),
+    ],
+)
+def test_who_meets_whom(a, b, meet):
+    assert may_meet(a, b) is may_meet(b, a) is meet
+
+
+@pytest.fixture
+def floating():
+    """A body without weight, far from the floor, that goes to commanded angles."""
+    world = empty_world()
+    body = Humanoid("child", HumanoidCfg(action=JointActionKind.position), world)
+    pybullet.setGravity(0.0, 0.0, 0.0, physicsClientId=world.client)
+    world.freeze()
+    world.reset(np.random.default_rng(0))
+    body.place((0.0, 0.0, 2.0))
+    yield world, body
+    world.close()
+
+
+def contacts(world, body):
+    found = pybullet.getContactPoints(
+        body.articulation.body_id, body.articulation.body_id, physicsClientId=world.client
+    )
+    return [contact for contact in found if contact[8] < 0.0]
+
+
+def go_to(world, body, **degrees):
+    angles = posture_angles(body._skeleton, Posture(0.0, degrees))
+    body.act(body.encode(angles))
+    let_pass(world, 1.5)
+    return angles
+
+
+def test_who_stands_touches_nothing_of_himself_but_the_thighs_with_the_hands(floating):
+    world, body = floating
+    let_pass(world, 0.2)
+    hands = [body.bone(f"{side}_hand").position for side in "lr"]
+    for contact in contacts(world, body):
+        assert min(np.linalg.norm(contact[5] - hand) for hand in hands) < 0.06
+        assert -contact[8] < 0.0035, "no deeper than the skin of the hand"
+
+
+def test_legs_stop_each_other(floating):
+    world, body = floating
+    wanted = go_to(world, body, **{"thigh.abduction": -25.0})
+    assert contacts(world, body)
+    gap = body.bone("l_shank").position[1] - body.bone("r_shank").position[1]
+    assert gap > 2 * 0.0185, "the left shank stays left of the right one"
+    assert np.abs(body.joint_angles() - wanted).max() > np.radians(3.0)

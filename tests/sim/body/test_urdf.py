@@ -1,0 +1,270 @@
+"""The URDF of the body: counts, order, masses, limits; and Bullet reads it as we mean it."""
+
+import xml.etree.ElementTree as ET
+
+import numpy as np
+import pytest
+from walking import empty_world
+
+from veca_marl.sim.body.anatomy.hulls import MARGIN_M
+from veca_marl.sim.body.anatomy.inertia import Inertia, bone_inertia, joined
+from veca_marl.sim.body.anatomy.skeleton import BoneBox, load_skeleton
+from veca_marl.sim.body.anatomy.skin_springs import SkinLayer, skin_layer, skin_spring
+from veca_marl.sim.body.anatomy.urdf import Build, _Writer, body_files, bone_of
+from veca_marl.sim.body.humanoid.humanoid import Detail, Humanoid, HumanoidCfg
+from veca_marl.sim.geometry.pose import Pose
+from veca_marl.sim.physics.bullet import pybullet
+
+SKELETON = load_skeleton()
+LOW = np.array([joint.low_rad for joint in SKELETON.joints])
+HIGH = np.array([joint.high_rad for joint in SKELETON.joints])
+
+
+@pytest.fixture(scope="module")
+def robots():
+    return {
+        fingers: ET.fromstring(body_files(SKELETON, Build(fingers)).urdf)
+        for fingers in (True, False)
+    }
+
+
+@pytest.fixture(params=Detail)
+def humanoid(request):
+    world = empty_world()
+    yield Humanoid("child", HumanoidCfg(detail=request.param), world)
+    world.close()
+
+
+def names(robot, tag, kind=None):
+    return [e.get("name") for e in robot.iter(tag) if kind in (None, e.get("type"))]
+
+
+def test_47_bones_36_light_links_4_skins_6_second_shapes_and_82_hinges(robots):
+    links = names(robots[True], "link")
+    assert len(links) == len(set(links)) == 47 + 36 + 4 + 6
+    bones = {bone.name for bone in SKELETON.bones}
+    assert {bone_of(link) for link in links} & bones == bones
+    assert set(links) >= {bone.name for bone in SKELETON.bones}
+    assert sorted(names(robots[True], "joint", "revolute")) == sorted(
+        f"{joint.bone}.{joint.label}" for joint in SKELETON.joints
+    )
+
+
+def test_with_fingers_no_link_has_two_shapes_and_most_are_taken_as_they_are(robots):
+    """Bullet wraps a shape up where its frame is not that of the inertia."""
+    alone = 0
+    for link in robots[True].findall("link"):
+        shapes = link.findall("collision")
+        assert len(shapes) <= 1
+        for shape in shapes:
+            alone += shape.find("origin").attrib == link.find("inertial/origin").attrib
+    assert alone >= 45
+    # two capsules in the trunk twice and the toes twice, with their skins
+    parts = [name for name in names(robots[True], "link") if "__part" in name]
+    assert len(parts) == 6
+
+
+def test_the_mitten_has_40_hinges_and_no_finger(robots):
+    assert len(names(robots[False], "joint", "revolute")) == 40
+    assert not [
+        name for name in names(robots[False], "link") if "_thumb_" in name or "index" in name
+    ]
+
+
+@pytest.mark.parametrize("fingers", [True, False])
+def test_parents_are_written_before_their_children(robots, fingers):
+    known = names(robots[fingers], "link")
+    for joint in robots[fingers].findall("joint"):
+        parent, child = (joint.find(end).get("link") for end in ("parent", "child"))
+        assert known.index(parent) < known.index(child)
+
+
+@pytest.mark.parametrize("fingers", [True, False])
+def test_ten_kilograms_and_no_impossible_inertia(robots, fingers):
+    masses = [float(mass.get("value")) for mass in robots[fingers].iter("mass")]
+    assert sum(masses) == pytest.approx(10.0, abs=1e-9)
+    assert min(masses) > 0.0
+    for inertia in robots[fingers].iter("inertia"):
+        x, y, z = sorted(float(inertia.get(key)) for key in ("ixx", "iyy", "izz"))
+        assert 0.0 < x <= y <= z < x + y
+
+
+def test_bullet_reads_the_table(humanoid):
+    client, body = humanoid._world.client, humanoid.articulation
+    for joint in range(pybullet.getNumJoints(body.body_id, physicsClientId=client)):
+        info = pybullet.getJointInfo(body.body_id, joint, physicsClientId=client)
+        if info[2] != pybullet.JOINT_REVOLUTE:
+            continue
+        ours = SKELETON.joints[humanoid.joint_names.index(info[1].decode())]
+        assert (info[8], info[9], info[10]) == (ours.low_rad, ours.high_rad, ours.torque_nm)
+        assert info[16] < joint
+
+
+def test_bones_are_where_bullet_has_them(humanoid):
+    client, body = humanoid._world.client, humanoid.articulation.body_id
+    count = pybullet.getNumJoints(body, physicsClientId=client)
+    links = {
+        pybullet.getJointInfo(body, link, physicsClientId=client)[12].decode(): link
+        for link in range(count)
+    }
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        humanoid.place(rng.uniform(0.0, 2.0, 3), rng.uniform(-3.0, 3.0), rng.uniform(LOW, HIGH))
+        for name, link in links.items():
+            if name in humanoid.bone_names:
+                state = pybullet.getLinkState(
+                    body, link, computeForwardKinematics=1, physicsClientId=client
+                )
+                turn = np.reshape(pybullet.getMatrixFromQuaternion(state[5]), (3, 3))
+                bone = humanoid.bone(name)
+                np.testing.assert_allclose(bone.position, state[4], atol=1e-6)
+                np.testing.assert_allclose(bone.rotation, turn, atol=5e-6)
+
+
+def shapes_of_bullet(humanoid):
+    """Kind, centre and rotation of every collision shape, by bone, out of Bullet."""
+    where, client = humanoid.articulation.body_id, humanoid._world.client
+    shapes = {}
+    for link in range(-1, pybullet.getNumJoints(where, physicsClientId=client)):
+        if link < 0:
+            name = humanoid.bone_names[0]
+            frame = pybullet.getBasePositionAndOrientation(where, physicsClientId=client)
+        else:
+            name = bone_of(pybullet.getJointInfo(where, link, physicsClientId=client)[12].decode())
+            frame = pybullet.getLinkState(where, link, 0, 1, physicsClientId=client)[:2]
+        for shape in pybullet.getCollisionShapeData(where, link, physicsClientId=client):
+            place, turn = pybullet.multiplyTransforms(*frame, *shape[5:7])
+            turn = np.reshape(pybullet.getMatrixFromQuaternion(turn), (3, 3))
+            bone = shapes.setdefault(name.partition("__")[0], [])
+            bone.append((shape[2], np.array(place), turn))
+    return shapes
+
+
+def test_what_things_meet_is_where_it_is_drawn(humanoid):
+    """Centres and axes of rods and boxes; hulls are in the frames of their bones."""
+    scene = humanoid._world.scene
+    rng = np.random.default_rng(0)
+    humanoid.place(rng.uniform(0.0, 2.0, 3), 0.7, rng.uniform(LOW, HIGH))
+    humanoid._world.refresh()
+    drawn, shapes = scene.objects[humanoid.object_id], shapes_of_bullet(humanoid)
+    for row in range(drawn.rows.start, drawn.rows.stop):
+        bone = humanoid.bone_names[scene.geoms.frames[row] - drawn.rows.start]
+        if not scene.geoms.tangible[row] or bone not in shapes:
+            continue  # eyes are only seen, and fingers of a mitten are in the hulls of its hands
+        centre, axis = scene.geoms.positions[row], scene.geoms.rotations[row][:, 2]
+        found = 0
+        for kind, place, turn in shapes[bone]:
+            if kind == pybullet.GEOM_MESH:
+                frame = humanoid.bone(bone)
+                np.testing.assert_allclose(place, frame.position, atol=1e-5)
+                np.testing.assert_allclose(turn, frame.rotation, atol=1e-5)
+            elif np.allclose(place, centre, atol=1e-5):
+                assert abs(turn[:, 2] @ axis) == pytest.approx(1.0, abs=1e-5), bone
+            else:
+                continue
+            found += 1
+        assert found, bone
+
+
+def reach(bone, frame, skin_m, ways):
+    """How far the primitives of a bone at a pose stand out along directions ``(n, 3)``, metres."""
+    local = ways @ frame.rotation
+    farthest = []
+    for part in bone.colliders:
+        if isinstance(part, BoneBox):
+            far = local @ np.array(part.centre) + np.abs(local) @ (np.array(part.half) + skin_m)
+        else:
+            ends = np.stack([local @ np.array(end) for end in (part.start, part.end)])
+            far = ends.max(axis=0) + part.radius + skin_m
+        farthest.append(far)
+    return np.max(farthest, axis=0) + ways @ frame.position
+
+
+def test_hulls_of_a_mitten_reach_as_far_as_what_is_in_them():
+    files = body_files(SKELETON, Build(fingers=False))
+    assert {name.removesuffix(".obj") for name in files.hulls} == {
+        "pelvis",
+        "chest",
+        *(
+            f"{side}_{part}"
+            for side in "lr"
+            for part in ("foot", "foot__skin", "hand__skin", "hand__thumb")
+        ),
+    }
+    ways = np.random.default_rng(0).normal(size=(500, 3))
+    ways /= np.linalg.norm(ways, axis=1, keepdims=True)
+    writer = _Writer(SKELETON, Build(fingers=False))
+    for name, content in files.hulls.items():
+        link = name.removesuffix(".obj")
+        index = [bone.name for bone in SKELETON.bones].index(link.partition("__")[0])
+        soft, thumb = "__" in link, link.endswith("__thumb")
+        expected = np.max(
+            [
+                reach(part, pose, part.skin_thickness_m if soft else 0.0, ways)
+                for part, pose in writer._members(index)
+                if (soft or skin_layer(part) is not SkinLayer.SKIN)
+                and ("thumb" in part.name) == thumb
+            ],
+            axis=0,
+        )
+        points = [line.split()[1:] for line in content.splitlines() if line.startswith("v")]
+        got = (ways @ np.array(points, float).T).max(axis=1) + MARGIN_M
+        # Bullet rounds the corners of boxes by its margin, by 0.73 mm at most
+    np.testing.assert_allclose(got, expected, atol=8e-4, err_msg=link)
+
+
+def test_what_is_joined_weighs_as_points_do():
+    """The inertia of parts from the theorem equals that of many points from the definition."""
+    rng = np.random.default_rng(0)
+    parts, points, masses = [], [], []
+    for mass in (0.5, 2.0):
+        local, shares = rng.normal(size=(40, 3)), np.full(40, mass / 40)
+        turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+        place = rng.normal(size=3)
+        parts.append((Pose(place, turn), _of_points(local, shares)))
+        points.append(place + local @ turn.T)
+        masses.append(shares)
+    expected = _of_points(np.concatenate(points), np.concatenate(masses))
+    whole = joined(parts)
+    assert whole.mass_kg == pytest.approx(2.5)
+    np.testing.assert_allclose(whole.centre, expected.centre, atol=1e-12)
+    np.testing.assert_allclose(whole.matrix, expected.matrix, atol=1e-12)
+
+
+def _of_points(points, masses):
+    centre = masses @ points / masses.sum()
+    away = points - centre
+    matrix = sum(
+        m * (a @ a * np.eye(3) - np.outer(a, a)) for m, a in zip(masses, away, strict=True)
+    )
+    return Inertia(masses.sum(), centre, matrix)
+
+
+def test_a_capsule_weighs_as_sand_in_its_shape():
+    bone = SKELETON.bones[SKELETON.bone("l_thigh")]
+    part, radius = bone.colliders[0], bone.colliders[0].radius + bone.skin_thickness_m
+    rng = np.random.default_rng(0)
+    low, high = np.minimum(part.start, part.end) - radius, np.maximum(part.start, part.end) + radius
+    sand = rng.uniform(low, high, (400_000, 3))
+    nearest = np.clip(sand[:, 2], part.end[2], part.start[2])
+    sand = sand[np.hypot(np.hypot(sand[:, 0], sand[:, 1]), sand[:, 2] - nearest) < radius]
+    expected = bone.mass_kg * np.cov(sand.T)
+    expected = np.trace(expected) * np.eye(3) - expected
+    np.testing.assert_allclose(bone_inertia(bone).matrix, expected, atol=0.01 * expected.max())
+
+
+def test_only_hands_feet_and_fingers_are_soft(robots):
+    soft = {
+        bone_of(link.get("name"))
+        for link in robots[True].findall("link")
+        if link.find("contact/stiffness") is not None
+    }
+    assert soft == {b.name for b in SKELETON.bones if skin_layer(b) is not SkinLayer.BONE}
+    assert len(soft) == 4 + 30
+
+
+def test_the_spring_reaches_the_bone_under_the_force_of_the_table():
+    for bone in SKELETON.bones:
+        spring = skin_spring(bone)
+        assert spring.stiffness_npm * spring.thickness_m == pytest.approx(bone.skin_force_n)
+        assert spring.damping_nspm > 0.0

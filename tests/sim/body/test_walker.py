@@ -1,0 +1,363 @@
+"""The walking body: where it goes, what its head and eyes do, whom it hears, what it refuses."""
+
+import math
+
+import numpy as np
+import pytest
+from walking import ball, empty_world, let_pass, walker_in, wall
+
+from veca_marl.sim.body.base import MOUNTS
+from veca_marl.sim.body.walker.controls import MOVES, WALK_CONTROLS, ActionKind
+from veca_marl.sim.body.walker.walker import WalkerCfg
+from veca_marl.sim.hearing.sense import AudioCfg, AudioSense
+from veca_marl.sim.senses import SensesCfg, give_senses
+from veca_marl.sim.vision.visibility import is_visible
+
+
+def bearing_deg(pose):
+    forward = pose.rotation[:, 0]
+    return math.degrees(math.atan2(forward[1], forward[0]))
+
+
+def down_deg(pose):
+    return math.degrees(math.asin(-pose.rotation[2, 0]))
+
+
+# ---- where it goes
+
+
+@pytest.mark.parametrize("speed", [1.0, 0.25, -0.8])
+def test_it_walks_as_fast_as_it_is_told(speed):
+    world = empty_world()
+    walker = walker_in(world, yaw_deg=30.0)
+    walker.walk(speed, 0.0)
+    let_pass(world, 2.0)
+    way = 2.0 * speed * np.array([math.cos(math.pi / 6), math.sin(math.pi / 6), 0.0])
+    np.testing.assert_allclose(walker.position[:2], way[:2], atol=1e-9)
+    np.testing.assert_allclose(walker.velocity, way / 2.0, atol=1e-9)
+
+
+@pytest.mark.parametrize("turn_degps", [90.0, -45.0])
+def test_it_turns_as_fast_as_it_is_told_and_left_is_positive(turn_degps):
+    world = empty_world()
+    walker = walker_in(world)
+    walker.walk(0.0, math.radians(turn_degps))
+    let_pass(world, 1.0)
+    assert bearing_deg(walker.bone("pelvis")) == pytest.approx(turn_degps, abs=1e-9)
+    np.testing.assert_allclose(walker.position[:2], 0.0, atol=1e-12)
+
+
+def test_it_walks_round_a_circle():
+    """Radius = speed / turn rate; after a full turn it is back, but for the substeps' chords."""
+    world = empty_world()
+    walker = walker_in(world)
+    walker.walk(1.0, 2.0 * math.pi / 4.0)
+    let_pass(world, 2.0)
+    across = np.linalg.norm(walker.position[:2])
+    assert across == pytest.approx(2.0 * 4.0 / (2.0 * math.pi), rel=0.01)
+    let_pass(world, 2.0)
+    np.testing.assert_allclose(walker.position[:2], 0.0, atol=1e-6)
+
+
+def test_full_actions_are_the_configured_speeds():
+    world = empty_world()
+    walker = walker_in(world, walk_speed_mps=0.8, turn_speed_degps=50.0)
+    walker.act(np.array([1.0, -1.0], np.float32))
+    let_pass(world, 0.04)
+    assert np.linalg.norm(walker.velocity) == pytest.approx(0.8, rel=1e-3)
+    assert bearing_deg(walker.bone("pelvis")) == pytest.approx(-50.0 * 0.04)
+
+
+def test_backward_is_slower():
+    world = empty_world()
+    walker = walker_in(world, walk_speed_mps=0.8, backward_share=0.25)
+    walker.act(np.array([-1.0, 0.0], np.float32))
+    let_pass(world, 0.04)
+    np.testing.assert_allclose(walker.velocity, (-0.2, 0.0, 0.0), atol=1e-6)
+
+
+def test_an_action_holds_until_the_next():
+    world = empty_world()
+    walker = walker_in(world)
+    walker.act(np.array([1.0, 0.0], np.float32))
+    let_pass(world, 1.0)
+    walker.act(np.array([0.0, 0.0], np.float32))
+    let_pass(world, 1.0)
+    assert walker.position[0] == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("move", MOVES)
+def test_discrete_moves_are_continuous_ones(move):
+    positions = []
+    for kind in ActionKind:
+        world = empty_world()
+        walker = walker_in(world, action=kind)
+        walker.act(WALK_CONTROLS[kind].encode(*MOVES[move]))
+        let_pass(world, 0.4)
+        positions.append((*walker.position, walker.yaw_rad))
+    assert positions[0] == positions[1]
+
+
+@pytest.mark.parametrize(
+    ("kind", "row"),
+    [
+        (ActionKind.continuous, np.array([np.nan, 0.0])),
+        (ActionKind.continuous, np.array([0.0, np.inf])),
+        (ActionKind.continuous, np.array([1.5, 0.0])),
+        (ActionKind.continuous, np.array([0.0, -1.0001])),
+        (ActionKind.continuous, np.array([0.0])),
+        (ActionKind.continuous, np.array([[0.0, 0.0]])),
+        (ActionKind.continuous, np.array(1)),
+        (ActionKind.continuous, None),
+        (ActionKind.discrete, np.array(7)),
+        (ActionKind.discrete, np.array(-1)),
+        (ActionKind.discrete, np.array(1.5)),
+        (ActionKind.discrete, np.array(np.nan)),
+        (ActionKind.discrete, np.array([1])),
+        (ActionKind.discrete, np.array(True)),
+    ],
+)
+def test_impossible_actions_are_refused_and_nothing_moves(kind, row):
+    world = empty_world()
+    walker = walker_in(world, action=kind)
+    with pytest.raises(ValueError, match="action") as refusal:
+        walker.act(row)
+    assert "forward" in str(refusal.value)
+    before = world.scene.positions.copy()
+    let_pass(world, 0.04)
+    np.testing.assert_array_equal(world.scene.positions[:, :2], before[:, :2])
+
+
+# ---- head and eyes
+
+
+def test_the_head_nods_down_and_shakes_right_for_positive_degrees():
+    world = empty_world()
+    walker = walker_in(world, head_pitch_deg=0.0)
+    walker.rotate_up_down_head(20.0)
+    let_pass(world, 0.04)
+    assert down_deg(walker.mount("head")) == pytest.approx(20.0)
+    walker.rotate_up_down_head(-50.0)
+    let_pass(world, 0.04)
+    assert down_deg(walker.mount("head")) == pytest.approx(-30.0)
+    walker.rotate_up_down_head(30.0)
+    walker.rotate_left_right_head(40.0)
+    let_pass(world, 0.04)
+    assert bearing_deg(walker.mount("head")) == pytest.approx(-40.0)
+
+
+def test_the_head_stops_where_the_neck_ends():
+    world = empty_world()
+    walker = walker_in(world)
+    for turn, reached, stop in (
+        (walker.rotate_up_down_head, down_deg, 80.0),
+        (walker.rotate_up_down_head, down_deg, -70.0),
+    ):
+        turn(math.copysign(500.0, stop))
+        let_pass(world, 0.04)
+        assert reached(walker.mount("head")) == pytest.approx(stop)
+    walker.place((0.0, 0.0, 0.0))
+    walker.rotate_up_down_head(-12.0)
+    walker.rotate_left_right_head(500.0)
+    let_pass(world, 0.04)
+    assert bearing_deg(walker.mount("head")) == pytest.approx(-110.0)
+    walker.rotate_left_right_head(-500.0)
+    let_pass(world, 0.04)
+    assert bearing_deg(walker.mount("head")) == pytest.approx(110.0)
+
+
+@pytest.mark.parametrize("wrong", [math.nan, math.inf])
+def test_a_head_cannot_turn_by_no_number(wrong):
+    walker = walker_in(empty_world())
+    with pytest.raises(ValueError, match="degrees"):
+        walker.rotate_up_down_head(wrong)
+    with pytest.raises(ValueError, match="degrees"):
+        walker.rotate_left_right_head(wrong)
+
+
+def test_both_eyes_meet_at_the_point_they_look_toward():
+    world = empty_world()
+    walker = walker_in(world)
+    head = walker.mount("head").rotation
+    for point in ((0.3, 0.0, 0.7), (1.0, 0.4, 0.2), (5.0, -2.0, 1.0)):
+        walker.look_toward_point(point)
+        for eye in ("eye_left", "eye_right"):
+            pose = walker.mount(eye)
+            way = np.array(point) - pose.position
+            np.testing.assert_allclose(pose.rotation[:, 0], way / np.linalg.norm(way), atol=1e-9)
+            np.testing.assert_allclose(pose.rotation.T @ pose.rotation, np.eye(3), atol=1e-12)
+            assert np.linalg.det(pose.rotation) == pytest.approx(1.0)
+    np.testing.assert_array_equal(walker.mount("head").rotation, head)
+    np.testing.assert_array_equal(walker.mount("ear_left").rotation, head)
+
+
+def test_eyes_converge_on_what_is_near():
+    walker = walker_in(empty_world())
+
+    def convergence_deg(distance_m):
+        centre = (walker.mount("eye_left").position + walker.mount("eye_right").position) / 2.0
+        walker.look_toward_point(centre + distance_m * walker.mount("head").rotation[:, 0])
+        left, right = (walker.mount(eye).rotation[:, 0] for eye in ("eye_left", "eye_right"))
+        return math.degrees(math.acos(min(left @ right, 1.0)))
+
+    spacing = np.linalg.norm(walker.mount("eye_left").position - walker.mount("eye_right").position)
+    for distance_m in (0.2, 1.0):
+        expected = 2.0 * math.degrees(math.atan(spacing / 2.0 / distance_m))
+        assert convergence_deg(distance_m) == pytest.approx(expected, rel=1e-6)
+
+
+def test_eyes_keep_their_point_while_walking_until_released():
+    world = empty_world()
+    walker = walker_in(world)
+    walker.look_toward_point((3.0, 1.0, 0.5))
+    walker.walk(0.5, 0.1)
+    for _ in range(25):
+        world.step()
+        pose = walker.mount("eye_left")
+        way = np.array([3.0, 1.0, 0.5]) - pose.position
+        np.testing.assert_allclose(pose.rotation[:, 0], way / np.linalg.norm(way), atol=1e-9)
+    walker.release_look()
+    np.testing.assert_array_equal(walker.mount("eye_left").rotation, walker.mount("head").rotation)
+
+
+def test_eyes_turn_only_as_far_as_their_muscles_reach():
+    walker = walker_in(empty_world(), head_pitch_deg=0.0, eye_range_deg=40.0)
+    walker.look_toward_point((-5.0, 0.1, 0.7))
+    ahead = walker.mount("head").rotation[:, 0]
+    for eye in ("eye_left", "eye_right"):
+        away = math.degrees(math.acos(walker.mount(eye).rotation[:, 0] @ ahead))
+        assert away == pytest.approx(40.0, abs=1.0)
+
+
+@pytest.mark.parametrize("wrong", [(1.0, 2.0), (1.0, np.nan, 0.0), "up"])
+def test_eyes_cannot_look_nowhere(wrong):
+    with pytest.raises(ValueError, match=r"look toward|could not convert"):
+        walker_in(empty_world()).look_toward_point(wrong)
+
+
+def test_the_lenses_take_a_positive_distance():
+    walker = walker_in(empty_world())
+    walker.adjust_focal_length(0.4)
+    assert walker.focal_distance_m == 0.4
+    walker.adjust_focal_length(math.inf)
+    for wrong in (0.0, -1.0, math.nan):
+        with pytest.raises(ValueError, match="focal distance"):
+            walker.adjust_focal_length(wrong)
+
+
+def test_the_organs_are_where_a_face_has_them():
+    walker = walker_in(empty_world(), head_pitch_deg=0.0)
+    at = {name: walker.mount(name).position for name in MOUNTS}
+    assert at["eye_left"][1] > 0.0 > at["eye_right"][1]
+    assert at["ear_left"][1] > at["eye_left"][1]
+    assert at["mouth"][2] < at["eye_left"][2]
+    assert at["mouth"][0] > at["ear_left"][0]
+    middle = (at["ear_left"] + at["ear_right"]) / 2.0
+    np.testing.assert_allclose(middle, at["head"], atol=1e-12)
+    with pytest.raises(KeyError, match=r"no mount 'nose'.*mouth"):
+        walker.mount("nose")
+
+
+def test_it_sees_what_is_before_its_eyes():
+    world = empty_world(ball(), ball("behind", position=(-1.0, 0.0, 0.1)))
+    walker, other = walker_in(world), walker_in(world, "other", place=(1.5, 0.3, 0.0))
+    world.refresh()
+    assert is_visible(world.scene, walker, world.prop("ball"))
+    assert is_visible(world.scene, walker, world.prop("ball"), "eye_right")
+    assert is_visible(world.scene, walker, other)
+    assert not is_visible(world.scene, walker, world.prop("behind"))
+    world.prop("ball").place((1.0, 0.0, -0.5))
+    world.refresh()
+    assert not is_visible(world.scene, walker, world.prop("ball"))
+    with pytest.raises(ValueError, match=r"no eye 'third'.*eye_left"):
+        is_visible(world.scene, walker, other, "third")
+
+
+def test_a_wall_hides():
+    world = empty_world(ball(position=(2.0, 0.0, 0.1)), wall(position=(1.0, 0.0, 0.0)))
+    walker = walker_in(world)
+    world.refresh()
+    assert not is_visible(world.scene, walker, world.prop("ball"))
+
+
+# ---- voice
+
+
+def hears(world, walker):
+    sense = AudioSense(AudioCfg(waveform=True), walker, world.sound)
+    return lambda: np.sqrt(np.mean(sense.read()["waveform"] ** 2))
+
+
+def test_everybody_hears_a_voice_the_speaker_most():
+    world = empty_world()
+    speaker, friend = walker_in(world), walker_in(world, "friend", place=(2.0, 0.0, 0.0))
+    own, others = hears(world, speaker), hears(world, friend)
+    tone = np.sin(2.0 * np.pi * 300.0 * np.arange(8820) / 22_050).astype(np.float32)
+    speaker.make_sound(tone)
+    heard = []
+    for _ in range(10):
+        world.step()
+        heard.append((own(), others()))
+    loudest = np.max(heard, axis=0)
+    assert loudest[0] > 3.0 * loudest[1] > 0.0
+
+
+def test_a_silent_world_is_silent():
+    world = empty_world()
+    listen = hears(world, walker_in(world))
+    world.step()
+    assert listen() == 0.0
+
+
+def test_a_new_episode_begins_in_silence():
+    world = empty_world()
+    walker = walker_in(world)
+    listen = hears(world, walker)
+    world.freeze()
+    walker.make_sound(np.ones(22_050, np.float32))
+    world.reset(np.random.default_rng(0))
+    world.step()
+    assert listen() == 0.0
+
+
+# ---- doors
+
+
+@pytest.mark.parametrize("number", ["walk_speed_mps", "radius_m", "kick_reach_m", "push_limit_kg"])
+@pytest.mark.parametrize("wrong", [-1.0, math.nan, math.inf])
+def test_impossible_bodies_are_refused(number, wrong):
+    with pytest.raises(ValueError, match=number):
+        WalkerCfg(**{number: wrong})
+
+
+def test_an_unknown_kind_of_action_is_answered_with_those_there_are():
+    with pytest.raises(ValueError, match=r"body\.action='fly'.*'continuous', 'discrete'"):
+        WalkerCfg(action="fly")
+
+
+def test_a_capsule_must_be_higher_than_wide():
+    with pytest.raises(ValueError, match="height_m"):
+        WalkerCfg(radius_m=0.5, height_m=0.6)
+    with pytest.raises(ValueError, match="radius_m"):
+        WalkerCfg(radius_m=0.0)
+
+
+@pytest.mark.parametrize("wrong", [(np.nan, 0.0), (0.0, np.inf)])
+def test_nobody_walks_at_no_speed(wrong):
+    with pytest.raises(ValueError, match="cannot walk"):
+        walker_in(empty_world()).walk(*wrong)
+
+
+def test_nobody_stands_nowhere():
+    walker = walker_in(empty_world())
+    for wrong in (((np.nan, 0.0, 0.0), 0.0), ((0.0, 0.0, 0.0), np.nan)):
+        with pytest.raises(ValueError, match="cannot stand"):
+            walker.place(*wrong)
+    np.testing.assert_allclose(walker.position[:2], 0.0)
+
+
+def test_unknown_senses_are_answered_with_those_there_are():
+    world = empty_world()
+    walker = walker_in(world)
+    with pytest.raises(ValueError, match=r"\['smell'\].*audio.*vision"):
+        give_senses(walker, ("vision", "smell"), SensesCfg(), world)

@@ -1,0 +1,202 @@
+import numpy as np
+import pytest
+from listening import EAR, RATE, STEP, direction, room, yaw
+
+from veca_marl.sim.geometry.pose import Pose
+from veca_marl.sim.hearing.sense import AudioCfg, AudioQuality, AudioSense, Window
+from veca_marl.sim.sense import check_spec
+from veca_marl.sim.sound.soundfield import SoundField
+from veca_marl.sim.sound.sounds import Clip, Noise
+from veca_marl.sim.sound.waveforms import buzz, tone
+
+
+def buzz_at(pitch):
+    return Clip(buzz(pitch, 0.1, RATE), loop=True)
+
+
+def tone_at(pitch):
+    return Clip(tone(pitch, 0.1, RATE), loop=True)
+
+
+class Dummy:
+    """A head with two ears a little behind its middle."""
+
+    def __init__(self):
+        self.position = np.zeros(3)
+        self.rotation = np.eye(3)
+
+    def mount(self, name):
+        offset = {
+            "head": (0.0, 0.0, 0.0),
+            "ear_left": (-0.01, EAR, 0.02),
+            "ear_right": (-0.01, -EAR, 0.02),
+        }[name]
+        return Pose(self.position + self.rotation @ np.array(offset), self.rotation)
+
+
+class Scene:
+    """One body, one source."""
+
+    def __init__(self, sound, box=None, **numbers):
+        self.field = SoundField(box, STEP, RATE, image_order=2)
+        self.body = Dummy()
+        self.source = self.field.add_source("source", sound)
+        self.sense = AudioSense(AudioCfg(**numbers), self.body, self.field)
+        self.reset()
+
+    def reset(self, seed=0):
+        self.field.reset(np.random.default_rng(seed))
+        self.sense.reset()
+
+    def hear(self, n_steps=3):
+        for _ in range(n_steps):
+            self.field.advance()
+            observation = self.sense.read()
+        return {name: value.copy() for name, value in observation.items()}
+
+
+@pytest.mark.parametrize("quality", AudioQuality)
+@pytest.mark.parametrize("waveform", [False, True])
+def test_quality_changes_content_never_shape(quality, waveform):
+    scene = Scene(buzz_at(150.0), quality=quality, waveform=waveform)
+    scene.source.position = (1.0, 1.0, 0.0)
+    observation = scene.hear()
+    assert set(observation) == set(scene.sense.specs)
+    assert ("waveform" in observation) == waveform
+    assert scene.sense.specs["audio"].shape == (2, 250)
+    for name, value in observation.items():
+        check_spec(name, value, scene.sense.specs[name])
+        assert np.isfinite(value).all()
+
+
+def test_observation_is_the_papers_formula():
+    scene = Scene(Noise(0.1, RATE), waveform=True)
+    scene.source.position = (1.0, 0.5, 0.0)
+    heard = np.concatenate([scene.hear(1)["waveform"] for _ in range(3)], axis=1)
+    scene.reset()
+    expected = np.log10(np.abs(np.fft.rfft(heard[:, -1024:])) + 1e-8)[:, :250]
+    assert np.allclose(scene.hear(3)["audio"], expected, atol=1e-3)
+
+
+def test_exact_silence_is_minus_eight_also_before_the_first_step():
+    scene = Scene(Clip(np.zeros(10), loop=True))
+    assert scene.sense.specs["audio"].low == -8.0
+    assert (scene.sense.read()["audio"] == -8.0).all()
+    assert (scene.hear()["audio"] == -8.0).all()
+
+
+def test_noise_floor_takes_the_magic_out_of_silence():
+    """White noise of level -80 dB has 10 log10(1024) - 80 dB in each bin, on average."""
+    scene = Scene(Clip(np.zeros(10), loop=True), noise_floor_db=-80.0)
+    expected = 0.5 * np.log10(1024) - 4.0
+    assert np.allclose(scene.hear()["audio"], expected, atol=1e-4)
+    loud, floored = (
+        Scene(Noise(0.1, RATE), noise_floor_db=floor_db).hear()["audio"]
+        for floor_db in (None, -80.0)
+    )
+    assert np.allclose(loud, floored, atol=1e-3)
+
+
+def test_hann_window_confines_a_tone():
+    far = {}
+    for window in Window:
+        scene = Scene(tone_at(1010.0), window=window, quality=AudioQuality.mono)
+        scene.source.position = (1.0, 0.0, 0.0)
+        audio = scene.hear()["audio"][0]
+        assert audio.argmax() == 47
+        far[window] = audio.max() - audio[150:].max()
+    assert far[Window.hann] > far[Window.rectangular] + 2.0
+
+
+def test_level_is_heard_at_one_metre():
+    """A tone on a bin: magnitude = amplitude x 1024 / 2."""
+    frequency = 47 * RATE / 1024
+    sound = 0.1 * np.sqrt(2) * np.sin(2 * np.pi * frequency * np.arange(4 * STEP) / RATE)
+    scene = Scene(Clip(sound), quality=AudioQuality.mono)
+    scene.source.position = scene.body.mount("ear_left").position + np.array([1.0, -EAR, 0.0])
+    peak = scene.hear()["audio"][0, 47]
+    assert peak == pytest.approx(np.log10(0.1 * np.sqrt(2) * 512), abs=0.002)
+
+
+def test_stereo_hears_at_the_bodys_own_ears():
+    """Level at either ear is 1/d of that ear's own distance."""
+    scene = Scene(Noise(0.1, RATE), quality=AudioQuality.stereo, waveform=True)
+    scene.body.rotation = yaw(0.5)
+    scene.body.position = np.array([3.0, -1.0, 0.5])
+    scene.source.position = (3.2, -0.7, 0.6)
+    distance = [
+        np.linalg.norm(scene.source.position - scene.body.mount(ear).position)
+        for ear in ("ear_left", "ear_right")
+    ]
+    heard = np.concatenate([scene.hear(1)["waveform"] for _ in range(8)], axis=1)[:, 500:]
+    level = np.sqrt(np.mean(heard**2, axis=1))
+    assert level[0] / level[1] == pytest.approx(distance[1] / distance[0], rel=0.01)
+
+
+def test_it_does_not_matter_how_the_head_was_turned_at_birth():
+    heard = []
+    for at_birth in (0.0, 2.0):
+        body = Dummy()
+        body.rotation = yaw(at_birth)
+        field = SoundField(None, STEP, RATE)
+        field.add_source("noise", Noise(0.1, RATE)).position = (0.4, 0.5, 0.0)
+        sense = AudioSense(AudioCfg(quality=AudioQuality.stereo), body, field)
+        body.rotation = yaw(0.5)
+        field.reset(np.random.default_rng(0))
+        sense.reset()
+        field.advance()
+        heard.append(sense.read()["audio"])
+    assert np.allclose(heard[0], heard[1], atol=1e-3)
+
+
+def test_louder_ear_is_the_near_one():
+    for quality in (AudioQuality.hrtf, AudioQuality.stereo):
+        scene = Scene(buzz_at(150.0), quality=quality)
+        scene.source.position = (0.0, 1.0, 0.0)
+        left, right = scene.hear()["audio"].mean(axis=1)
+        assert left > right + 0.03
+
+
+def test_impossible_grades_are_refused():
+    with pytest.raises(ValueError, match="no sofa_path"):
+        AudioCfg(sofa_sample_rate_hz=44_100.0)
+    with pytest.raises(ValueError, match="noise_floor_db"):
+        AudioCfg(noise_floor_db=float("nan"))
+    with pytest.raises(ValueError, match="nowhere"):
+        Scene(buzz_at(150.0), sofa_path="nowhere.sofa")
+
+
+def scenes(quality, count, seed):
+    """Observations ``(count, 500)`` and directions ``(count, 3)`` of random scenes in a room."""
+    rng = np.random.default_rng(seed)
+    scene = Scene(buzz_at(120.0), box=room(0.5), quality=quality)
+    observations, directions = [], []
+    for _ in range(count):
+        scene.reset(int(rng.integers(1 << 30)))
+        to_source = direction(rng.uniform(-180, 180), rng.uniform(-15, 15))
+        scene.body.rotation = yaw(rng.uniform(-np.pi, np.pi))
+        scene.body.position = np.array([4.0, 3.0, 1.5]) + rng.uniform(-0.5, 0.5, 3)
+        way = rng.uniform(0.6, 2.0) * to_source
+        scene.source.position = scene.body.position + scene.body.rotation @ way
+        observations.append(scene.hear(3)["audio"].ravel())
+        directions.append(to_source)
+    return np.array(observations), np.array(directions)
+
+
+def decode(quality):
+    """Cosine between true and decoded direction, by ridge regression on unseen scenes."""
+    heard, directions = scenes(quality, 700, seed=0)
+    test_heard, test_directions = scenes(quality, 150, seed=1)
+    mean, scale = heard.mean(axis=0), heard.std() + 1e-9
+    x, test = (heard - mean) / scale, (test_heard - mean) / scale
+    weights = np.linalg.solve(x.T @ x + 10.0 * np.eye(x.shape[1]), x.T @ directions)
+    found = test @ weights
+    found /= np.linalg.norm(found, axis=1, keepdims=True)
+    return float((found * test_directions).sum(axis=1).mean())
+
+
+def test_direction_can_be_read_from_the_observation_with_a_head_only():
+    cosine = {quality.value: decode(quality) for quality in AudioQuality}
+    assert cosine["hrtf"] > 0.8
+    assert cosine["stereo"] < cosine["hrtf"] - 0.1
+    assert abs(cosine["mono"]) < 0.15

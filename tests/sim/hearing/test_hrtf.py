@@ -1,0 +1,164 @@
+import numpy as np
+import pytest
+from listening import RATE, direction
+from paths import ROOT, SHARED
+
+from veca_marl.sim.hearing.head_conditioning import condition, ear_incidence
+from veca_marl.sim.hearing.head_response import HeadResponse, minimum_phase
+from veca_marl.sim.hearing.hrtf import HeadTable, direction_vectors, kemar_table
+from veca_marl.sim.hearing.receivers import HeadRelated
+from veca_marl.sim.hearing.sofa import read_sofa
+from veca_marl.sim.hearing.spherical_head import HEAD_RADIUS_M, sphere_response, woodworth_arrival_s
+from veca_marl.sim.sound.receiver import filter_length, lead_samples
+
+DATA = ROOT / "veca_marl/data/kemar.npz"
+KEMAR_SOFA = SHARED / "data/hrtf/MIT_KEMAR_normal_pinna.sofa"
+N_FFT = 1024
+FREQUENCY = np.fft.rfftfreq(N_FFT, 1.0 / RATE)
+
+
+def sphere_head(n_taps=128):
+    angles = np.linspace(0.0, np.pi, 91)
+    magnitude = np.abs(sphere_response(angles, FREQUENCY))
+    filters = minimum_phase(magnitude, n_taps)
+    azimuth = np.deg2rad(np.arange(0, 360, 10))
+    elevation = np.deg2rad(np.arange(-80, 90, 10))
+    directions = direction_vectors(azimuth, elevation).reshape(-1, 3)
+    incidence = ear_incidence(directions)
+    row = np.rint(np.rad2deg(incidence) / 2.0).astype(int)
+    return HeadResponse(
+        directions,
+        filters[row].astype(np.float32),
+        woodworth_arrival_s(incidence),
+        RATE,
+        HEAD_RADIUS_M,
+        "",
+    )
+
+
+def level_db(table, azimuth_deg, elevation_deg=0.0):
+    """Level of both ears (2, F), through the same reading as in the stream."""
+    head = HeadRelated(table)
+    out = np.zeros((2, filter_length(head, RATE, 0.0)), np.float32)
+    head.write_filters(direction(azimuth_deg, elevation_deg)[None], np.ones(1), RATE, out)
+    return 20.0 * np.log10(np.abs(np.fft.rfft(out, N_FFT)))
+
+
+def band(low_hz, high_hz):
+    return (low_hz <= FREQUENCY) & (high_hz > FREQUENCY)
+
+
+def test_shipped_head_carries_its_licence():
+    head = HeadResponse.load(DATA)
+    for word in ("1994", "MIT", "Gardner", "Martin", "cited", "Modified"):
+        assert word in head.licence
+    assert kemar_table().licence == head.licence
+    assert DATA.stat().st_size < 250_000
+
+
+def test_shipped_head_is_what_the_script_makes():
+    if not KEMAR_SOFA.exists():
+        pytest.skip("the KEMAR SOFA file is not here")
+    made = condition(read_sofa(KEMAR_SOFA), RATE, 128)
+    shipped = HeadResponse.load(DATA)
+    assert np.abs(made.filters - shipped.filters).max() < 1e-3
+    assert np.abs(made.arrival_s - shipped.arrival_s).max() < 1e-7
+    assert made.head_radius_m == pytest.approx(0.087, abs=0.002)
+
+
+def test_table_returns_the_measured_responses():
+    head, table = HeadResponse.load(DATA), kemar_table()
+    heard = band(200, 5384)
+    measured = 20.0 * np.log10(np.abs(np.fft.rfft(head.filters, N_FFT))[..., heard])
+    errors = []
+    for i in range(0, len(head.directions), 7):
+        x, y, z = head.directions[i]
+        azimuth, elevation = np.rad2deg(np.arctan2(y, x)), np.rad2deg(np.arcsin(z))
+        errors.append(level_db(table, azimuth, elevation)[:, heard] - measured[i])
+    assert np.sqrt(np.mean(np.square(errors))) < 0.2
+
+
+def test_head_is_symmetric():
+    """KEMAR's right ear is a mirror of its left: mirrored sounds swap the ears."""
+    table = kemar_table()
+    for azimuth in (0, 30, 77, 150):
+        assert np.allclose(level_db(table, azimuth), level_db(table, -azimuth)[::-1], atol=0.05)
+
+
+def test_low_frequencies_pass_unchanged():
+    levels = [level_db(kemar_table(), azimuth)[:, 1] for azimuth in range(0, 360, 30)]
+    assert np.abs(levels).max() < 1.5
+
+
+def test_level_difference_grows_with_frequency():
+    level = level_db(kemar_table(), 60.0)
+    difference = level[0] - level[1]
+    bands = [(200, 500), (500, 1000), (1000, 2000), (4000, 5400)]
+    d = [difference[band(*edges)].mean() for edges in bands]
+    assert d[0] < 5.0
+    assert d[0] < d[1] < d[2]
+    assert d[3] > 12.0
+
+
+@pytest.mark.parametrize(("head", "low", "high"), [("kemar", 3.0, 9.0), ("sphere", 0.0, 0.05)])
+def test_front_and_back_differ_by_the_pinna_only(head, low, high):
+    table = kemar_table() if head == "kemar" else HeadTable(sphere_head())
+    difference = (level_db(table, 30.0) - level_db(table, 150.0))[:, band(2000, 5400)]
+    assert low <= np.sqrt(np.mean(difference**2)) <= high
+
+
+def test_arrival_times_below_the_lowest_ring_are_those_of_the_sphere():
+    table = kemar_table()
+    assert np.allclose(table.arrival_samples[:, 0], 0.0, atol=1e-6)
+    assert table.arrival_samples.min() > -lead_samples(RATE)
+
+
+def test_table_is_shared_and_read_only():
+    assert kemar_table() is kemar_table()
+    with pytest.raises(ValueError, match="read-only"):
+        kemar_table().filters[0] = 0.0
+
+
+def test_other_rates_are_refused():
+    with pytest.raises(ValueError, match="48000"):
+        kemar_table(48_000)
+    with pytest.raises(ValueError, match="16000"):
+        HeadRelated(kemar_table()).write_filters(np.ones((1, 3)), np.ones(1), 16_000, None)
+
+
+def test_sphere_has_its_known_limits():
+    """Duda & Martens 1998: no head at 0 Hz; pressure doubles at the lit pole."""
+    response = sphere_response(np.deg2rad([0, 90, 180]), [50.0, 8000.0], distance_m=100.0)
+    level = 20.0 * np.log10(np.abs(response))
+    assert np.abs(level[:, 0]).max() < 0.3
+    assert level[0, 1] == pytest.approx(6.02, abs=0.3)
+
+
+def test_sphere_delays_as_kuhn_and_woodworth():
+    """Kuhn 1977: 3a/c sin at low frequency, Woodworth's ray at high frequency."""
+    ears = np.deg2rad([45.0, 135.0])
+    for frequency, factor in ((100.0, 1.5), (6000.0, 1.0)):
+        around = np.array([0.999, 1.001]) * frequency
+        phase = np.unwrap(np.angle(sphere_response(ears, around, distance_m=100.0)), axis=1)
+        delay = -np.diff(phase, axis=1)[:, 0] / (2 * np.pi * np.diff(around)[0])
+        if factor == 1.5:
+            expected = 3.0 * HEAD_RADIUS_M / 343.0 * np.sin(np.pi / 4)
+        else:
+            near, far = woodworth_arrival_s(ears)
+            expected = far - near
+        assert delay[1] - delay[0] == pytest.approx(expected, rel=0.05)
+
+
+def test_minimum_phase_keeps_the_magnitude_and_comes_first():
+    magnitude = np.abs(np.fft.rfft([1.0, -0.4, 0.2], 512))
+    assert np.allclose(minimum_phase(magnitude, 3), [1.0, -0.4, 0.2], atol=1e-6)
+    late = np.abs(np.fft.rfft([0.2, -0.4, 1.0], 512))
+    assert minimum_phase(late, 4)[0] == pytest.approx(1.0, abs=1e-6)
+
+
+def test_compact_file_comes_back(tmp_path):
+    head = sphere_head(32)
+    head.save(tmp_path / "head.npz")
+    again = HeadResponse.load(tmp_path / "head.npz")
+    assert np.allclose(again.filters, head.filters, atol=1e-3)
+    assert (again.sample_rate_hz, again.head_radius_m) == (RATE, HEAD_RADIUS_M)

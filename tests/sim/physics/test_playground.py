@@ -1,0 +1,115 @@
+"""Playgrounds as data: the shipped ones stand, impossible ones are refused."""
+
+import math
+
+import numpy as np
+import pytest
+from walking import ball, let_pass, walker_in
+
+from veca_marl.config.root import CONF, compose
+from veca_marl.sim.physics.playground import PlaygroundCfg, RoomCfg
+from veca_marl.sim.physics.world import World
+
+SHIPPED = sorted(path.stem for path in (CONF / "playground").glob("*.yaml"))
+
+
+@pytest.fixture(scope="module", params=SHIPPED)
+def playground(request):
+    return compose(["+task=KickTheBall", f"playground={request.param}"]).playground
+
+
+def test_its_name_is_that_of_its_file(playground):
+    assert playground.name in SHIPPED
+
+
+def test_its_things_stand_still(playground):
+    """Nothing overlaps, floats or falls over in 3 s."""
+    world = World(playground)
+    before = world.scene.positions.copy()
+    let_pass(world, 3.0)
+    np.testing.assert_allclose(world.scene.positions, before, atol=0.005)
+
+
+def test_its_things_are_inside_its_rooms(playground):
+    world = World(playground)
+    for name, prop in world.props.items():
+        if not name.startswith("wall"):
+            assert any(room.contains(prop.position) for room in playground.rooms), name
+
+
+def test_its_walls_keep_a_walker_in(playground):
+    world = World(playground)
+    walker = walker_in(world)
+    for yaw_deg in range(0, 360, 45):
+        walker.place((0.0, 0.0, 0.0), math.radians(yaw_deg))
+        walker.walk(1.0, 0.0)
+        let_pass(world, 6.0)
+        assert playground.rooms[0].contains(walker.position, margin_m=0.1)
+
+
+def test_a_room_knows_what_is_inside():
+    room = RoomCfg(lower_m=(1.0, 2.0, 0.0), size_m=(3.0, 4.0, 2.5))
+    assert room.contains(np.array([1.1, 5.9, 0.1]))
+    assert not room.contains(np.array([0.9, 3.0, 1.0]))
+    assert not room.contains(np.array([1.1, 5.9, 0.1]), margin_m=0.2)
+
+
+def test_floor_points_keep_their_distance_from_the_walls():
+    room = RoomCfg(lower_m=(1.0, 2.0, 0.5), size_m=(3.0, 4.0, 2.5))
+    rng = np.random.default_rng(0)
+    points = np.array([room.sample_floor(rng, margin_m=1.0) for _ in range(500)])
+    assert (points[:, 2] == 0.5).all()
+    np.testing.assert_allclose(points.min(axis=0)[:2], (2.0, 3.0), atol=0.05)
+    np.testing.assert_allclose(points.max(axis=0)[:2], (3.0, 5.0), atol=0.05)
+
+
+def test_a_margin_may_not_be_wider_than_the_room():
+    with pytest.raises(ValueError, match=r"'closet'.*2\.0 m"):
+        RoomCfg(name="closet", size_m=(3.0, 6.0, 2.5)).sample_floor(np.random.default_rng(0), 2.0)
+
+
+@pytest.mark.parametrize("wrong", [(0.0, 1.0, 1.0), (1.0, -1.0, 1.0), (1.0, 1.0, math.nan)])
+def test_impossible_sizes_are_refused(wrong):
+    with pytest.raises(ValueError, match="'attic': size_m"):
+        RoomCfg(name="attic", size_m=wrong)
+
+
+@pytest.mark.parametrize("wrong", [-0.1, 1.0, math.nan])
+def test_impossible_echoes_are_refused(wrong):
+    with pytest.raises(ValueError, match="reflection"):
+        RoomCfg(reflection=wrong)
+
+
+def test_a_room_must_be_somewhere():
+    with pytest.raises(ValueError, match="lower_m"):
+        RoomCfg(lower_m=(0.0, math.inf, 0.0))
+
+
+def test_impossible_playgrounds_are_refused():
+    with pytest.raises(ValueError, match="no room"):
+        PlaygroundCfg(name="void", rooms=[])
+    with pytest.raises(ValueError, match=r"share the names \['ball'\]"):
+        PlaygroundCfg(name="twins", props=[ball(), ball()])
+    with pytest.raises(ValueError, match="image_order=-1"):
+        PlaygroundCfg(name="early", image_order=-1)
+
+
+def test_an_impossible_room_on_the_command_line_is_one_line():
+    with pytest.raises(ValueError, match="image_order"):
+        compose(["+task=KickTheBall", "playground.image_order=-1"])
+
+
+def test_a_start_has_the_middle_ahead():
+    room = RoomCfg(lower_m=(1.0, 2.0, 0.0), size_m=(4.0, 6.0, 2.0))
+    rng = np.random.default_rng(0)
+    starts = [room.sample_start(rng, margin_m=0.5) for _ in range(20)]
+    for point, heading in starts:
+        ahead = 1.5 * np.array([math.cos(heading), math.sin(heading), 0.0])
+        np.testing.assert_allclose(point + ahead, (3.0, 5.0, 0.0), atol=1e-12)
+        assert room.contains(point + np.array([0.0, 0.0, 1.0]), margin_m=0.5 - 1e-9)
+    assert np.ptp([heading for _, heading in starts]) > 3.0
+
+
+def test_a_start_needs_a_room_of_some_size():
+    with pytest.raises(ValueError, match="leaves no floor"):
+        RoomCfg(size_m=(1.0, 1.0, 1.0)).sample_start(np.random.default_rng(0), margin_m=0.6)

@@ -1,0 +1,200 @@
+"""Props: what is seen is what collides, and nonsense is refused at the door."""
+
+import math
+
+import numpy as np
+import pytest
+from walking import ball, box, empty_world, let_pass, wall
+
+from veca_marl.sim.physics.bullet import pybullet
+from veca_marl.sim.physics.props import SIZE_NAMES, PropCfg, PropShape
+from veca_marl.sim.sound.sounds import SoundCfg
+
+SIZES = {
+    PropShape.sphere: [0.2],
+    PropShape.box: [0.2, 0.4, 0.6],
+    PropShape.cylinder: [0.2, 0.5],
+    PropShape.capsule: [0.2, 0.5],
+    PropShape.wall: [2.0, 0.1, 1.0],
+    PropShape.goal: [1.2, 0.8, 0.04],
+}
+
+
+def of(shape, **more):
+    return PropCfg(name="thing", shape=shape, size_m=SIZES[shape], **more)
+
+
+@pytest.mark.parametrize("shape", PropShape)
+def test_what_is_drawn_is_what_collides(shape):
+    """Rays of the physics hit exactly where the drawn primitives are."""
+    world = empty_world(of(shape, position_m=(0.3, -0.2, 1.0), yaw_deg=33.0))
+    world.refresh()
+    geoms = world.scene.find("thing").geoms
+    rng = np.random.default_rng(0)
+    table = world.scene.geoms
+    low, high = pybullet.getAABB(world.prop("thing").body_id, physicsClientId=world.client)
+    points = rng.uniform(low, high, (3000, 3))
+    inside = np.zeros(len(points), bool)
+    for g in range(geoms.start, geoms.stop):
+        inside |= _inside(table.shapes[g], table.sizes[g], table.positions[g], table.rotations[g])(
+            points
+        )
+    probe = pybullet.createCollisionShape(
+        pybullet.GEOM_SPHERE, radius=0.001, physicsClientId=world.client
+    )
+    needle = pybullet.createMultiBody(0, probe, physicsClientId=world.client)
+    solid = []
+    for point in points:
+        pybullet.resetBasePositionAndOrientation(
+            needle, point, (0, 0, 0, 1), physicsClientId=world.client
+        )
+        near = pybullet.getClosestPoints(
+            needle, world.prop("thing").body_id, 0.5, physicsClientId=world.client
+        )
+        solid.append(bool(near) and min(n[8] for n in near) < -0.001)
+    assert inside.sum() > 10
+    assert np.mean(inside != np.array(solid)) < 0.003
+
+
+def _inside(shape, size, position, rotation):
+    """Say which points are inside a primitive."""
+
+    def check(points):
+        local = (points - position) @ rotation
+        if shape == 0:
+            return np.linalg.norm(local, axis=1) < size[0]
+        if shape == 1:
+            return (np.abs(local) < size).all(axis=1)
+        across, along = np.hypot(local[:, 0], local[:, 1]), np.abs(local[:, 2]) - size[1] / 2
+        if shape == 2:
+            return (across < size[0]) & (along < 0.0)
+        return np.hypot(across, np.maximum(along, 0.0)) < size[0]
+
+    return check
+
+
+@pytest.mark.parametrize("shape", [PropShape.sphere, PropShape.box, PropShape.cylinder])
+def test_a_prop_rests_on_the_floor(shape):
+    half = SIZES[shape][-1] if shape is PropShape.sphere else SIZES[shape][-1] / 2
+    world = empty_world(of(shape, mass_kg=1.0, position_m=(0.0, 0.0, half + 0.05)))
+    let_pass(world, 2.0)
+    assert world.prop("thing").position[2] == pytest.approx(half, abs=0.003)
+    assert world.prop("thing").lowest_m == pytest.approx(0.0, abs=0.025)  # Bullet's AABB margin
+
+
+def test_a_goal_has_two_posts_on_the_floor_and_a_bar_over_them():
+    world = empty_world(of(PropShape.goal))
+    world.refresh()
+    table, rows = world.scene.geoms, world.scene.find("thing").geoms
+    left, right, bar = range(rows.start, rows.stop)
+    for post, y in ((left, -0.6), (right, 0.6)):
+        np.testing.assert_allclose(table.positions[post], (0.0, y, 0.4), atol=1e-6)
+        assert table.sizes[post][1] == pytest.approx(0.8)
+        np.testing.assert_allclose(table.rotations[post][:, 2], (0.0, 0.0, 1.0), atol=1e-6)
+    np.testing.assert_allclose(table.positions[bar], (0.0, 0.0, 0.8), atol=1e-6)
+    np.testing.assert_allclose(np.abs(table.rotations[bar][:, 2]), (0.0, 1.0, 0.0), atol=1e-6)
+    assert table.sizes[bar][1] == pytest.approx(1.2)
+
+
+def test_a_fixed_prop_stays():
+    world = empty_world(box(mass_kg=0.0, position=(0.0, 0.0, 2.0)))
+    world.prop("box").push((5.0, 0.0, 0.0))
+    let_pass(world, 0.4)
+    np.testing.assert_array_equal(world.prop("box").position, (0.0, 0.0, 2.0))
+    assert world.prop("box").fixed
+
+
+def test_place_undoes_turns_and_sets_velocities():
+    world = empty_world(box(position=(0.0, 0.0, 2.0)))
+    thing = world.prop("box")
+    thing.push((0.0, 0.0, 0.0), (3.0, 2.0, 1.0))
+    let_pass(world, 0.4)
+    thing.place((1.0, 2.0, 3.0), math.pi / 2, velocity=(0.5, 0.0, 0.0))
+    np.testing.assert_array_equal(thing.position, (1.0, 2.0, 3.0))
+    np.testing.assert_allclose(thing.rotation[:, 0], (0.0, 1.0, 0.0), atol=1e-12)
+    np.testing.assert_array_equal(thing.velocity, (0.5, 0.0, 0.0))
+
+
+def test_its_sound_goes_along():
+    world = empty_world(ball(position=(0.0, 0.0, 0.1), sound=SoundCfg()))
+    world.prop("ball").push((1.0, 0.0, 0.0), (0.0, 10.0, 0.0))
+    let_pass(world, 0.4)
+    source = world.sound.sources["ball"]
+    assert source is world.prop("ball").sound
+    np.testing.assert_array_equal(source.position, world.prop("ball").position)
+    assert source.position[0] > 0.3
+
+
+def test_what_a_caller_keeps_does_not_change():
+    world = empty_world(ball(position=(0.0, 0.0, 2.0)))
+    before = world.prop("ball").position
+    let_pass(world, 0.4)
+    assert before[2] == 2.0
+
+
+@pytest.mark.parametrize("shape", PropShape)
+def test_sizes_are_counted_and_named(shape):
+    for wrong in ([], [*SIZES[shape], 1.0], [-1.0] * len(SIZES[shape]), [math.nan] * 3):
+        with pytest.raises(ValueError, match=SIZE_NAMES[shape][0]) as refusal:
+            PropCfg(name="thing", shape=shape, size_m=wrong)
+        assert "'thing'" in str(refusal.value)
+
+
+@pytest.mark.parametrize(
+    ("field", "wrong"),
+    [
+        ("mass_kg", -1.0),
+        ("mass_kg", math.nan),
+        ("friction", -0.1),
+        ("rolling_friction", math.inf),
+        ("restitution", 1.5),
+        ("restitution", math.nan),
+        ("position_m", (0.0, math.nan, 0.0)),
+        ("yaw_deg", math.inf),
+    ],
+)
+def test_impossible_numbers_are_refused(field, wrong):
+    with pytest.raises(ValueError, match=field):
+        of(PropShape.sphere, **{field: wrong})
+
+
+def test_an_unknown_shape_is_answered_with_those_there_are():
+    with pytest.raises(ValueError, match=r"'thing': shape='torus'.*'sphere'"):
+        PropCfg(name="thing", shape="torus", size_m=[1.0])
+
+
+def test_a_prop_needs_a_name():
+    with pytest.raises(ValueError, match="without a name"):
+        PropCfg(shape=PropShape.sphere, size_m=[0.1])
+
+
+def test_a_prop_is_not_put_nowhere():
+    thing = empty_world(ball()).prop("ball")
+    for wrong in ((0.0, 0.0), (0.0, math.nan, 0.0)):
+        with pytest.raises(ValueError, match="'ball': position"):
+            thing.place(wrong)
+        with pytest.raises(ValueError, match="'ball': velocity"):
+            thing.push(wrong)
+
+
+def test_radius_is_that_of_the_cylinder_round_it():
+    world = empty_world(of(PropShape.box), ball(radius_m=0.07), wall(length_m=3.0))
+    assert world.prop("thing").radius_m == pytest.approx(math.hypot(0.2, 0.4) / 2)
+    assert world.prop("ball").radius_m == 0.07
+    assert world.prop("wall").radius_m == pytest.approx(math.hypot(3.0, 0.1) / 2)
+
+
+def test_what_is_not_tangible_is_only_seen():
+    mark = PropCfg(name="mark", shape=PropShape.cylinder, size_m=[0.1, 0.05], tangible=False)
+    world = empty_world(mark, ball(position=(0.0, 0.0, 0.3), restitution=0.0))
+    let_pass(world, 1.0)
+    resting = world.prop("ball")
+    assert resting.position[2] == pytest.approx(resting.cfg.size_m[0], abs=0.002)
+    own = world.scene.geoms.objects == world.prop("mark").object_id
+    assert not world.scene.geoms.tangible[own].any()
+    assert world.scene.geoms.visible[own].all()
+
+
+def test_what_is_not_tangible_must_be_fixed():
+    with pytest.raises(ValueError, match="mass_kg"):
+        PropCfg(name="mark", size_m=[1.0, 1.0, 1.0], mass_kg=1.0, tangible=False)

@@ -1,0 +1,198 @@
+"""Sound between rooms: walls weaken it, open doors do not, and going through one does not click."""
+
+import numpy as np
+import pytest
+import scipy.signal
+from listening import RATE, STEP, ratio_db, spatialisation
+from listening import render as render_field
+
+from veca_marl.config.root import compose
+from veca_marl.sim.body.walker.walker import Walker, WalkerCfg
+from veca_marl.sim.geometry.pose import Pose
+from veca_marl.sim.hearing.sense import AudioCfg, AudioSense
+from veca_marl.sim.physics.world import World
+from veca_marl.sim.sound.acoustics import Room
+from veca_marl.sim.sound.calls import Call
+from veca_marl.sim.sound.house import House
+from veca_marl.sim.sound.soundfield import SoundField
+from veca_marl.sim.sound.sounds import Clip
+
+WEST = Room((-3.0, -3.0, 0.0), (6.0, 6.0, 2.6), 0.5)
+EAST = Room((3.1, -3.0, 0.0), (5.0, 6.0, 2.6), 0.4)
+BETWEEN = ((3.05, 0.0, 1.3), np.eye(3), (0.05, 3.0, 1.3))
+NOISE = np.random.default_rng(0).standard_normal(12 * STEP).astype(np.float32)
+LOSS_DB = 30.0
+
+
+def house(*walls, loss_db=LOSS_DB, order=1):
+    house = House([WEST, EAST], order, loss_db)
+    for wall in walls:
+        house.add_wall(*wall)
+    return house
+
+
+def pose(*position):
+    return Pose(np.array(position), np.eye(3))
+
+
+def hear(rooms, source, head, quality="hrtf", sound=NOISE, order=1):
+    def place(_):
+        return [np.array(source)], head
+
+    return render_field([sound], place, quality, room=rooms, order=order, n_steps=12)
+
+
+def level_db(heard):
+    return 10.0 * np.log10(np.mean(heard[:, 3 * STEP :].astype(float) ** 2))
+
+
+@pytest.mark.parametrize("quality", ["hrtf", "stereo", "mono"])
+def test_inside_one_room_a_house_is_that_room(quality):
+    for room, source, head in (
+        (WEST, (-2.0, 1.0, 0.5), pose(1.0, -1.0, 1.0)),
+        (EAST, (4.0, 1.0, 0.5), pose(7.0, -1.0, 1.0)),
+    ):
+        alone = render_field(
+            [NOISE], lambda _, s=source, h=head: ([np.array(s)], h), quality, room=room,
+            order=1, n_steps=12,
+        )  # fmt: skip
+        in_house = hear(house(BETWEEN), source, head, quality)
+        # the blocks of a house have the length that its largest room needs
+        assert ratio_db(alone, in_house) > 110.0
+
+
+@pytest.mark.parametrize("loss_db", [0.0, 10.0, 30.0])
+def test_each_wall_takes_its_loss(loss_db):
+    source, head = (1.0, 0.5, 1.0), pose(5.0, -0.3, 1.0)
+    second = ((4.0, 0.0, 1.3), np.eye(3), (0.05, 3.0, 1.3))
+    levels = [
+        level_db(hear(house(*walls, loss_db=loss_db), source, head))
+        for walls in ((), (BETWEEN,), (BETWEEN, second))
+    ]
+    assert levels[0] - levels[1] == pytest.approx(loss_db, abs=0.01)
+    assert levels[0] - levels[2] == pytest.approx(2.0 * loss_db, abs=0.01)
+
+
+def test_what_no_wall_hides_in_the_next_room_is_heard_as_in_the_free_field():
+    source, head = (1.0, 0.5, 1.0), pose(5.0, -0.3, 1.0)
+    free = hear(None, source, head)
+    through_the_opening = hear(house(), source, head)
+    assert ratio_db(free, through_the_opening) > 110.0
+
+
+@pytest.mark.parametrize(
+    ("one", "other", "count"),
+    [
+        ((0.0, 0.0, 1.0), (6.0, 0.0, 1.0), 1),
+        ((6.0, 0.0, 1.0), (0.0, 0.0, 1.0), 1),
+        ((0.0, 0.0, 1.0), (2.9, 0.0, 1.0), 0),  # ends before it
+        ((0.0, 0.0, 1.0), (0.0, 2.0, 1.0), 0),  # along it
+        ((3.0, -2.0, 1.0), (3.0, 2.0, 1.0), 0),  # on its face
+        ((0.0, 0.0, 2.7), (6.0, 0.0, 2.7), 0),  # over it
+        ((0.0, 0.0, 2.5), (6.0, 0.0, 2.698), 1),  # over the far edge only
+        ((0.0, 3.5, 1.0), (6.0, 3.5, 1.0), 0),  # past its end
+        ((3.05, 0.0, 1.0), (3.05, 0.0, 1.0), 0),  # nowhere to go
+    ],
+)
+def test_a_line_crosses_a_wall_or_it_does_not(one, other, count):
+    assert house(BETWEEN).walls_between(np.array(one), np.array(other)) == count
+
+
+def test_a_turned_wall_is_crossed_where_it_stands():
+    c = np.sqrt(0.5)
+    turned = np.array([[c, -c, 0.0], [c, c, 0.0], [0.0, 0.0, 1.0]])
+    rooms = house(((0.0, 0.0, 1.0), turned, (2.0, 0.05, 1.0)))  # along x = y
+    assert rooms.walls_between(np.array([1.0, 0.0, 1.0]), np.array([0.0, 1.0, 1.0])) == 1
+    assert rooms.walls_between(np.array([1.0, 0.0, 1.0]), np.array([0.0, -1.0, 1.0])) == 0
+
+
+def test_a_place_belongs_to_the_room_it_is_in_or_nearest_to():
+    rooms = house()
+    places = (0.0, 3.04, 3.06, 3.1, 7.0, 99.0, -99.0)
+    assert [rooms.room_of(np.array([x, 0.0, 1.0])) for x in places] == [0, 0, 1, 1, 1, 1, 0]
+
+
+def test_going_through_a_door_and_behind_a_wall_does_not_click():
+    """A 300 Hz tone; what a click would add lies above 2 kHz."""
+    beside = ((3.05, -1.5, 1.3), np.eye(3), (0.05, 1.5, 1.3))
+    tone = np.sin(2.0 * np.pi * 300.0 * np.arange(60 * STEP) / RATE).astype(np.float32)
+    field = SoundField(house(beside), STEP, RATE)
+    source = field.add_source("tone", Clip(tone))
+    listener = field.add_listener(spatialisation("hrtf"))
+    field.reset(np.random.default_rng(0))
+    source.position = (1.0, 1.0, 1.0)
+    heard, through = [], []
+    for step in range(60):
+        # through the opening at y = 0.5, then south, behind the wall
+        head = pose(min(2.0 + 0.05 * step, 4.0), 0.5 - 0.05 * max(0, step - 40), 1.0)
+        through.append((field_house(field).room_of(head.position), walls(field, source, head)))
+        field.advance()
+        heard.append(listener.render(head))
+    assert len(set(through)) == 3  # same room, through the opening, behind the wall
+    high = scipy.signal.firwin(401, 2000.0, fs=RATE, pass_zero=False)
+    sound = np.concatenate(heard, axis=1)[:, 3 * STEP :]
+    clicks = np.abs(scipy.signal.lfilter(high, 1.0, sound))[:, 800:].max()
+    assert clicks < 10 ** (-60 / 20) * np.abs(sound).max()
+
+
+def field_house(field):
+    return field._surroundings
+
+
+def walls(field, source, head):
+    return field_house(field).walls_between(source.position, head.position)
+
+
+@pytest.mark.parametrize("wrong", [-1.0, np.nan, np.inf])
+def test_impossible_losses_are_refused(wrong):
+    with pytest.raises(ValueError, match="transmission_loss_db"):
+        house(loss_db=wrong)
+    with pytest.raises(ValueError, match="at least one room"):
+        House([])
+
+
+def test_two_rooms_have_a_door_that_sound_goes_through():
+    cfg = compose(["+task=KickTheBall", "playground=two_rooms"]).playground
+    world = World(cfg)
+    between = [
+        world.house.walls_between(np.array([1.0, y, 1.0]), np.array([5.0, y, 1.0]))
+        for y in (-1.0, 1.7)
+    ]
+    assert between == [1, 0]
+    assert [world.house.room_of(np.array([x, 0.0, 1.0])) for x in (0.0, 5.0)] == [0, 1]
+    world.close()
+
+
+def test_a_wall_that_goes_up_is_heard_though_nobody_moves():
+    rooms = house()
+    field = SoundField(rooms, STEP, RATE)
+    field.add_source("noise", Clip(NOISE)).position = (1.0, 0.5, 1.0)
+    listener = field.add_listener(spatialisation("mono"))
+    field.reset(np.random.default_rng(0))
+    levels = []
+    for step in range(10):
+        if step == 5:
+            rooms.add_wall(*BETWEEN)
+        field.advance()
+        levels.append(10.0 * np.log10(np.mean(listener.render(pose(5.0, 0.0, 1.0)) ** 2) + 1e-12))
+    assert levels[4] - levels[8] == pytest.approx(LOSS_DB, abs=2.0)
+
+
+def test_a_walker_in_the_next_room_hears_a_voice_through_the_door_or_through_the_wall():
+    world = World(compose(["+task=KickTheBall", "playground=two_rooms"]).playground)
+    speaker, friend = (Walker(name, WalkerCfg(), world) for name in ("speaker", "friend"))
+    ears = AudioSense(AudioCfg(waveform=True), friend, world.sound)
+    world.freeze()
+    loudest = []
+    for y in (-1.0, 1.7):
+        world.reset(np.random.default_rng(0))
+        ears.reset()
+        speaker.place((1.0, y, 0.0))
+        friend.place((5.0, y, 0.0), np.pi)
+        speaker.call(Call.high)
+        for _ in range(8):
+            world.step()
+            loudest.append(np.abs(ears.read()["waveform"]).max())
+    world.close()
+    wall, door = max(loudest[:8]), max(loudest[8:])
+    assert 20.0 * np.log10(door / wall) == pytest.approx(30.0, abs=1.0)

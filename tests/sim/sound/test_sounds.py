@@ -1,0 +1,168 @@
+import numpy as np
+import pytest
+import scipy.io.wavfile
+from listening import RATE, STEP
+
+from veca_marl.sim.sound import waveforms
+from veca_marl.sim.sound.sounds import Clip, Noise, Silence, SoundCfg, SoundKind, Voice, make_sound
+
+
+def emit(sound, n_steps=50, seed=0):
+    sound.reset(np.random.default_rng(seed))
+    return np.concatenate([sound.emit(STEP) for _ in range(n_steps)])
+
+
+def rms(samples):
+    return np.sqrt(np.mean(np.square(samples, dtype=np.float64)))
+
+
+@pytest.mark.parametrize("kind", [SoundKind.buzz, SoundKind.tone, SoundKind.noise])
+def test_level_is_the_rms_pressure_at_one_metre(kind):
+    samples = emit(make_sound(SoundCfg(kind, frequency_hz=200.0, level=0.3)))
+    assert samples.dtype == np.float32
+    assert rms(samples) == pytest.approx(0.3, rel=0.02)
+
+
+def test_buzz_has_all_harmonics_of_the_observed_band_and_nothing_else():
+    spectrum = np.abs(np.fft.rfft(emit(Clip(waveforms.buzz(150.0, 0.1, RATE), loop=True), 25)))
+    harmonics = spectrum[150:5400:150]
+    assert harmonics.min() > 0.1 * harmonics.max()
+    between = np.delete(spectrum, np.arange(0, len(spectrum), 150))
+    assert between.max() < 1e-3 * harmonics.max()
+
+
+def test_buzz_does_not_peak():
+    assert np.abs(waveforms.buzz(150.0, 0.1, RATE)).max() < 0.35
+
+
+def test_loops_close_without_a_seam():
+    loop = waveforms.tone(441.0, 1.0, RATE)
+    bend = np.abs(np.diff(np.concatenate([loop[-2:], loop]), 2))
+    assert bend[:2].max() < 1.001 * bend[2:].max()
+
+
+@pytest.mark.parametrize("kind", [SoundKind.buzz, SoundKind.noise])
+def test_seed_decides_every_byte(kind):
+    first, again = (emit(make_sound(SoundCfg(kind)), seed=3) for _ in range(2))
+    assert first.tobytes() == again.tobytes()
+    assert emit(make_sound(SoundCfg(kind)), seed=4).tobytes() != first.tobytes()
+
+
+def test_noise_is_white_above_the_high_pass():
+    spectrum = np.abs(np.fft.rfft(emit(Noise(1.0, RATE), 200))) ** 2
+    hertz = np.fft.rfftfreq(200 * STEP, 1.0 / RATE)
+    low = spectrum[hertz < 20.0].mean()
+    middle = spectrum[(hertz > 500) & (hertz < 1500)].mean()
+    high = spectrum[(hertz > 5000) & (hertz < 10000)].mean()
+    assert high / middle == pytest.approx(1.0, abs=0.05)
+    assert low < 1e-2 * middle
+
+
+def test_noise_without_reset_has_no_random_numbers():
+    with pytest.raises(RuntimeError, match="reset"):
+        Noise(1.0, RATE).emit(STEP)
+
+
+def test_clip_plays_once_and_falls_silent():
+    waveform = np.arange(1, STEP + 101, dtype=np.float32)
+    clip = Clip(waveform)
+    for _ in range(2):
+        played = emit(clip, 3)
+        assert np.array_equal(played[: waveform.size], waveform)
+        assert not played[waveform.size :].any()
+
+
+def test_looping_clip_repeats_from_a_random_place():
+    waveform = np.arange(100, dtype=np.float32)
+    played = emit(Clip(waveform, loop=True), 2)
+    assert np.array_equal(played, (played[0] + np.arange(2 * STEP)) % 100)
+    starts = {float(emit(Clip(waveform, loop=True), 1, seed)[0]) for seed in range(5)}
+    assert len(starts) > 1
+
+
+def test_voice_speaks_in_order_then_falls_silent():
+    voice = Voice(RATE)
+    rng = np.random.default_rng(0)
+    first, second = rng.standard_normal((2, 700))
+    voice.reset(rng)
+    assert not voice.emit(STEP).any()
+    voice.say(first)
+    voice.say(second)
+    spoken = np.concatenate([voice.emit(STEP) for _ in range(3)])
+    alone = Voice(RATE)
+    alone.say(second)
+    assert np.array_equal(spoken[700:1400], alone.emit(700))
+    assert not spoken[1400:].any()
+    voice.say(first)
+    voice.hush()
+    assert not voice.emit(STEP).any()
+
+
+def test_voice_takes_out_steady_pressure():
+    voice = Voice(RATE)
+    voice.say(np.ones(RATE))
+    assert np.abs(voice.emit(RATE)[RATE // 4 :]).max() < 1e-6
+
+
+@pytest.mark.parametrize("bad", [np.ones((2, 100)), [np.nan], [np.inf, 0.0]])
+def test_bad_waveforms_are_refused(bad):
+    with pytest.raises(ValueError, match="waveform"):
+        Voice(RATE).say(bad)
+    with pytest.raises(ValueError, match="waveform"):
+        Clip(bad)
+
+
+@pytest.mark.parametrize("dtype", [np.uint8, np.int16, np.int32, np.float32])
+def test_wav_files_are_resampled_mixed_and_scaled(tmp_path, dtype):
+    rate = 44_100
+    sine = 0.5 * np.sin(2 * np.pi * 1000 * np.arange(rate) / rate)
+    if dtype == np.uint8:
+        samples = np.round(sine * 128 + 128).astype(dtype)
+    elif dtype == np.float32:
+        samples = sine.astype(dtype)
+    else:
+        samples = np.round(sine * np.iinfo(dtype).max).astype(dtype)
+    scipy.io.wavfile.write(tmp_path / "sine.wav", rate, np.stack([samples, samples], axis=1))
+    own = waveforms.load_wav(tmp_path / "sine.wav", RATE)
+    assert own.size == RATE
+    assert rms(own[2000:-2000]) == pytest.approx(0.5 / np.sqrt(2), rel=0.02)
+    assert np.abs(np.fft.rfft(own)).argmax() == 1000
+    cfg = SoundCfg(SoundKind.clip, level=0.05, path=str(tmp_path / "sine.wav"))
+    assert rms(emit(make_sound(cfg))) == pytest.approx(0.05, rel=0.02)
+
+
+def test_files_that_are_no_sounds_are_refused(tmp_path):
+    (tmp_path / "page.wav").write_text("<html>404</html>")
+    with pytest.raises(ValueError, match=r"page\.wav"):
+        waveforms.load_wav(tmp_path / "page.wav", RATE)
+    scipy.io.wavfile.write(tmp_path / "mute.wav", RATE, np.zeros(100, np.int16))
+    with pytest.raises(ValueError, match="silent"):
+        waveforms.load_wav(tmp_path / "mute.wav", RATE, level=0.1)
+
+
+@pytest.mark.parametrize(
+    ("numbers", "what"),
+    [
+        ({"frequency_hz": 20.0}, "at least 80"),
+        ({"frequency_hz": np.nan}, "at least 80"),
+        ({"level": -1.0}, "level"),
+        ({"kind": SoundKind.clip}, "needs a path"),
+        ({"path": "a.wav"}, "needs a path"),
+    ],
+)
+def test_impossible_sounds_are_refused(numbers, what):
+    with pytest.raises(ValueError, match=what):
+        SoundCfg(**numbers)
+
+
+def test_pitch_above_the_band_is_refused():
+    with pytest.raises(ValueError, match="12000 Hz"):
+        waveforms.tone(12_000.0, 0.1, RATE)
+
+
+def test_every_kind_can_be_made(tmp_path):
+    scipy.io.wavfile.write(tmp_path / "a.wav", RATE, np.ones(100, np.int16) * 99)
+    for kind in SoundKind:
+        path = str(tmp_path / "a.wav") if kind is SoundKind.clip else None
+        assert emit(make_sound(SoundCfg(kind, path=path)), 2).shape == (2 * STEP,)
+    assert not emit(Silence()).any()

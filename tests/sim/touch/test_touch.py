@@ -1,0 +1,219 @@
+"""Touch: Hooke's law on geometry, superposition, symmetry, and the dense truth."""
+
+import time
+
+import numpy as np
+import pytest
+from skins import add_body, pose, random_angles, random_turn
+from touching import SPREAD, Stage, dense, of_bone
+
+from veca_marl.sim.body.anatomy.skeleton import BoneCapsule, load_skeleton
+from veca_marl.sim.geometry.primitives import Shape
+from veca_marl.sim.geometry.signed_distances import is_within, signed_distance
+from veca_marl.sim.touch.model import neighbours
+
+
+def press_forearm(stage, depth_m, radius=0.04, side="l"):
+    """Press a ball against the middle of a forearm from the front (its x), so deep."""
+    name = f"{side}_forearm"
+    bone = load_skeleton().bones[stage.bone(name)]
+    capsule = bone.colliders[0]
+    assert isinstance(capsule, BoneCapsule)
+    away = capsule.radius + bone.skin_thickness_m + radius - depth_m
+    return stage.add("SPHERE", (radius,), stage.at(name, (away, 0.0, -0.0475)))
+
+
+def test_nothing_touched_reads_exactly_nothing():
+    stage = Stage()
+    stage.add("SPHERE", (0.1,), (0.5, 0.0, 0.0))
+    stage.add("BOX", (1.0, 1.0, 0.1), (0.0, 0.0, -0.6))
+    assert not stage.read().any()
+
+
+@pytest.mark.parametrize("share", [0.1, 0.25, 0.5, 0.75, 1.0])
+def test_a_ball_pressed_to_a_depth_reads_its_share_of_the_skin(share):
+    """Hooke's law: on a round limb the deepest taxel reads depth / d_max, up to its place."""
+    stage = Stage()
+    thickness = load_skeleton().bones[stage.bone("l_forearm")].skin_thickness_m
+    press_forearm(stage, share * thickness, radius=0.5)
+    assert of_bone(stage.read(), "l_forearm").max() == pytest.approx(share, abs=0.06)
+
+
+def test_a_floor_that_rises_presses_flat_soles_by_as_much():
+    """Under the toes, the lowest part of the foot, the skin reads its share; the heel follows."""
+    stage = Stage()
+    thickness = load_skeleton().bones[stage.bone("l_foot")].skin_thickness_m
+    lowest = stage.at("l_foot", (0.0, 0.0, -0.0345 - 0.0042))[2] - thickness
+    floor = stage.add("BOX", (2.0, 2.0, 0.05), (0.0, 0.0, 0.0))
+    readings = []
+    for share in (0.5, 0.8):
+        floor.positions[0] = (0.0, 0.0, lowest + share * thickness - 0.05)
+        readings.append(of_bone(stage.read(), "l_foot"))
+        assert readings[-1].max() == pytest.approx(share, abs=0.04)
+    risen = (readings[1] - readings[0])[(readings[0] > 0.05) & (readings[1] < 1.0)]
+    assert len(risen) > 40
+    assert np.median(risen) == pytest.approx(0.3, abs=0.02)
+
+
+def test_contact_with_the_bone_reads_one():
+    stage = Stage()
+    press_forearm(stage, 0.008, radius=0.5)
+    readings = of_bone(stage.read(), "l_forearm")
+    assert readings.max() == pytest.approx(1.0, abs=0.03)
+    assert readings.max() <= 1.0
+
+
+def test_deeper_is_never_less():
+    before = np.zeros((1648, 6))
+    for depth in (0.001, 0.002, 0.004):
+        stage = Stage()
+        press_forearm(stage, depth, radius=0.5)
+        now = stage.read()
+        assert (now >= before - 1e-3).all()
+        assert now.sum() > before.sum()
+        before = now
+
+
+def test_two_separate_contacts_are_the_sum_of_each_alone():
+    alone = []
+    for sides in ("l", "r", "lr"):
+        stage = Stage()
+        for side in sides:
+            press_forearm(stage, 0.003, side=side)
+        alone.append(stage.read())
+    left, right, both = alone
+    assert left.any()
+    assert right.any()
+    assert not ((left > 0) & (right > 0)).any()
+    np.testing.assert_array_equal(both, left + right)
+
+
+def test_of_two_things_on_one_taxel_the_deeper_counts():
+    readings = []
+    for depths in ((0.002,), (0.004,), (0.002, 0.004)):
+        stage = Stage()
+        for depth in depths:
+            press_forearm(stage, depth)
+        readings.append(stage.read())
+    one, other, both = readings
+    np.testing.assert_array_equal(both, np.maximum(one, other))
+
+
+def test_left_and_right_feel_alike():
+    """A scene mirrored in the middle plane; a mirrored triangle runs the other way round."""
+    readings = []
+    for side, sign in (("l", 1.0), ("r", -1.0)):
+        stage = Stage()
+        hand = stage.at(f"{side}_hand", (0.005, -sign * 0.015, -0.03))
+        stage.add("SPHERE", (0.01,), hand)
+        readings.append(of_bone(stage.read(), f"{side}_hand"))
+    left, right = readings
+    assert (left > 0).sum() > 5
+    np.testing.assert_allclose(left, right[:, [0, 2, 1, 5, 4, 3]], atol=1e-6)
+
+
+def test_moving_body_and_thing_together_changes_nothing():
+    rng = np.random.default_rng(0)
+    still = Stage()
+    ball = press_forearm(still, 0.003)
+    before = still.read()
+    turn, shift = random_turn(rng), rng.normal(size=3)
+    moved = Stage(SPREAD, position=shift, rotation=turn)
+    moved.add("SPHERE", (0.04,), turn @ ball.positions[0] + shift, turn)
+    assert before.any()
+    np.testing.assert_allclose(moved.read(), before, atol=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_what_is_driven_by_contact_equals_the_dense_truth(seed):
+    """Random poses over the whole ranges, all shapes, the body itself and another body."""
+    rng = np.random.default_rng(seed)
+    stage = Stage(random_angles(rng), rotation=random_turn(rng))
+    other = add_body(stage.scene, "other")
+    pose(other, random_angles(rng), rng.normal(size=3) * 0.1, random_turn(rng))
+    sizes = {"SPHERE": (0.06,), "BOX": (0.05, 0.07, 0.04), "CYLINDER": (0.05, 0.1)}
+    sizes["CAPSULE"] = (0.04, 0.1)
+    for shape, size in sizes.items():
+        for _ in range(3):
+            bone = rng.integers(47)
+            place = stage.body.positions[bone] + rng.normal(size=3) * 0.04
+            stage.add(shape, size, place, random_turn(rng))
+    readings = stage.read()
+    assert (readings > 0).sum() > 200
+    np.testing.assert_allclose(readings, dense(stage), atol=1e-12)
+
+
+def test_the_gradient_of_every_shape_is_that_of_its_distance():
+    rng = np.random.default_rng(3)
+    sizes = {Shape.SPHERE: (0.3, 0, 0), Shape.BOX: (0.3, 0.2, 0.4), Shape.CYLINDER: (0.2, 0.5, 0)}
+    sizes[Shape.CAPSULE] = (0.2, 0.5, 0.0)
+    step = 1e-6
+    for shape, size in sizes.items():
+        size = tuple(map(float, size))
+        for point in rng.uniform(-0.6, 0.6, (200, 3)):
+            distance, *slope = signed_distance(int(shape), size, *point)
+            there = signed_distance(int(shape), size, *(point + step * np.array(slope)))[0]
+            assert np.linalg.norm(slope) == pytest.approx(1.0, abs=1e-9)
+            assert there - distance == pytest.approx(step, rel=1e-3)
+            assert is_within(int(shape), size, *point) == (distance < 0.0)
+
+
+def test_two_bodies_press_each_other_as_springs_in_series():
+    """Forearms crossed front to front, pressed by half of both skins: each reads a half."""
+    stage = Stage()
+    other = add_body(stage.scene, "other")
+    bone = load_skeleton().bones[stage.bone("l_forearm")]
+    thick, radius = bone.skin_thickness_m, bone.colliders[0].radius
+    apart = 2.0 * radius + thick  # of 2 radii + 2 skins
+    half_turn = np.diag((-1.0, 1.0, -1.0))  # the arms hang at nearly 45 degrees
+    pose(other, SPREAD, rotation=half_turn)
+    index, middle = stage.bone("l_forearm"), np.array([0.0, 0.0, -0.0475])
+    there = other.positions[index] + other.rotations[index] @ middle
+    here = stage.at("l_forearm", middle + np.array([apart, 0.0, 0.0]))
+    pose(other, SPREAD, here - there, half_turn)
+    assert of_bone(stage.read(), "l_forearm").max() == pytest.approx(0.5, abs=0.05)
+
+
+def test_a_hand_feels_the_own_leg_but_no_bone_feels_its_neighbours():
+    skeleton = load_skeleton()
+    stage = Stage(np.zeros(82))
+    before = stage.read()
+    angles = np.zeros(82)
+    angles[skeleton.joint("l_upper_arm", "abduction")] = -0.04
+    pose(stage.body, angles)
+    pressed = stage.read()
+    assert of_bone(pressed, "l_forearm").sum() > of_bone(before, "l_forearm").sum()
+    together = neighbours(skeleton)
+    thigh, pelvis, shank = (skeleton.bone(b) for b in ("l_thigh", "pelvis", "l_shank"))
+    assert together[thigh, pelvis]
+    assert together[thigh, shank]
+    assert together[thigh, skeleton.bone("r_thigh")]
+    assert not together[thigh, skeleton.bone("l_hand")]
+    np.testing.assert_array_equal(together, together.T)
+
+
+def test_a_time_step_does_not_enter():
+    """The reading is a function of where things are: read twice, or after a detour, it is equal."""
+    stage = Stage()
+    ball = press_forearm(stage, 0.003)
+    first = stage.read()
+    place = ball.positions[0].copy()
+    ball.positions[0] += (0.0, 0.0, 0.3)
+    assert not stage.read().any()
+    ball.positions[0] = place
+    np.testing.assert_array_equal(stage.read(), first)
+
+
+def test_what_is_far_costs_next_to_nothing():
+    costs = []
+    for count in (0, 300):
+        stage = Stage()
+        press_forearm(stage, 0.003)
+        for _ in range(count):
+            stage.add("SPHERE", (0.1,), (5.0, 5.0, 0.5))
+        stage.read()
+        start = time.process_time()
+        for _ in range(300):
+            stage.sense.update_taxels()
+        costs.append(time.process_time() - start)
+    assert costs[1] < 1.5 * costs[0]

@@ -1,0 +1,114 @@
+"""The sense of touch: one spec for all qualities, on a walker in a world."""
+
+import numpy as np
+import pytest
+from touching import SPREAD, Named, Stage, of_bone
+
+from veca_marl.config.root import compose
+from veca_marl.sim.body.walker.walker import Walker, WalkerCfg
+from veca_marl.sim.geometry.primitives import Geom, Shape
+from veca_marl.sim.geometry.scene import Scene
+from veca_marl.sim.physics.playground import PlaygroundCfg
+from veca_marl.sim.physics.world import World
+from veca_marl.sim.sense import check_spec
+from veca_marl.sim.senses import SensesCfg, give_senses
+from veca_marl.sim.touch.sense import TouchCfg, TouchQuality, TouchSense
+
+
+def touched(cfg):
+    """A body touched on a hand, a finger and a thigh, and what it observes."""
+    stage = Stage(SPREAD, cfg)
+    stage.add("SPHERE", (0.02,), stage.at("l_hand", (0.0, 0.025, -0.03)))
+    stage.add("SPHERE", (0.02,), stage.at("l_index_proximal", (0.0, 0.023, -0.008)))
+    stage.add("SPHERE", (0.05,), stage.at("r_thigh", (0.085, 0.0, -0.08)))
+    stage.scene.update()
+    observed = stage.sense.read()["touch"]
+    return stage.sense, observed, observed.reshape(-1, 6)
+
+
+@pytest.mark.parametrize("quality", list(TouchQuality))
+def test_quality_changes_what_is_felt_never_its_spec(quality):
+    sense, observed, _ = touched(TouchCfg(quality=quality))
+    assert sense.specs == touched(TouchCfg())[0].specs
+    assert sense.specs["touch"].shape == (9888,)
+    check_spec("touch", observed, sense.specs["touch"])
+    assert 0.0 < observed.max() <= 1.0
+    assert observed.min() == 0.0
+
+
+def test_hands_feel_with_their_fingers_and_nothing_else():
+    _, _, everywhere = touched(TouchCfg())
+    _, _, hands = touched(TouchCfg(quality=TouchQuality.hands))
+    for bone in ("l_hand", "l_index_proximal"):
+        assert of_bone(hands, bone).any()
+        np.testing.assert_array_equal(of_bone(hands, bone), of_bone(everywhere, bone))
+    assert of_bone(everywhere, "r_thigh").any()
+    assert not of_bone(hands, "r_thigh").any()
+
+
+def test_binary_touch_says_where_and_not_how_much():
+    _, fine, _ = touched(TouchCfg())
+    _, all_or_none, _ = touched(TouchCfg(quality=TouchQuality.binary))
+    np.testing.assert_array_equal(all_or_none, fine > 0.0)
+    _, firm, _ = touched(TouchCfg(quality=TouchQuality.binary, binary_above=0.3))
+    np.testing.assert_array_equal(firm, fine > 0.3)
+    assert 0 < firm.sum() < all_or_none.sum()
+
+
+def test_coarse_touch_is_the_mean_of_each_bone():
+    _, _, fine = touched(TouchCfg())
+    _, _, coarse = touched(TouchCfg(quality=TouchQuality.coarse))
+    for bone in ("l_hand", "r_thigh", "head"):
+        assert np.unique(of_bone(coarse, bone)).size == 1
+        assert of_bone(coarse, bone)[0, 0] == pytest.approx(of_bone(fine, bone).mean(), rel=1e-5)
+
+
+def test_successive_reads_share_no_memory():
+    sense, observed, _ = touched(TouchCfg())
+    assert not np.shares_memory(observed, sense.read()["touch"])
+
+
+@pytest.mark.parametrize(
+    ("name", "quality"),
+    [("skin", "skin"), ("hands", "hands"), ("binary", "binary"), ("coarse", "coarse")],
+)
+def test_every_preset_is_its_quality(name, quality):
+    touch = compose(["+task=KickTheBall", f"senses/touch={name}"]).senses.touch
+    assert touch.present
+    assert touch.quality is TouchQuality[quality]
+
+
+def test_who_is_numb_has_no_touch():
+    senses = compose(["+task=KickTheBall", "senses/touch=numb"]).senses
+    world = World(PlaygroundCfg())
+    walker = Walker("walker", WalkerCfg(), world)
+    assert set(give_senses(walker, ["audio", "touch"], senses, world)) == {"audio"}
+    assert set(give_senses(walker, ["touch"], SensesCfg(), world)) == {"touch"}
+    world.close()
+
+
+def test_a_walker_feels_the_floor_with_its_soles():
+    world = World(PlaygroundCfg())
+    walker = Walker("walker", WalkerCfg(), world)
+    sense = TouchSense(TouchCfg(), walker, world.scene)
+    world.freeze()
+    world.reset(np.random.default_rng(0))
+    world.refresh()
+    readings = sense.update_taxels()
+    for foot in ("l_foot", "r_foot"):
+        assert of_bone(readings, foot).max() > 0.9  # it stands on its bones
+    assert not of_bone(readings, "head").any()
+    world.close()
+
+
+def test_a_thing_without_skin_cannot_feel():
+    scene = Scene()
+    ball = scene.add_object("ball", [[Geom(Shape.SPHERE, (0.1,))]])
+    with pytest.raises(ValueError, match="ball has no skin"):
+        TouchSense(TouchCfg(), Named("ball", ball.id), scene)
+
+
+@pytest.mark.parametrize("numbers", [{"quality": "rough"}, {"binary_above": 1.0}])
+def test_impossible_grades_are_refused(numbers):
+    with pytest.raises(ValueError, match=r"skin.*hands.*binary.*coarse|binary_above 1.0"):
+        TouchCfg(**numbers)

@@ -1,0 +1,107 @@
+"""Things darken the floor where they are near it, and only there."""
+
+import numpy as np
+import pytest
+
+from veca_marl.sim.geometry.pose import Pose
+from veca_marl.sim.geometry.primitives import Geom, Shape
+from veca_marl.sim.geometry.scene import Scene
+from veca_marl.sim.vision.contact_shadows import DARKNESS, LARGEST_M, REACH_M, distance_to
+from veca_marl.sim.vision.optics import Camera
+
+DOWN = np.array([[0, 0, 1], [0, 1, 0], [-1, 0, 0.0]])
+LOW_BOX = Shape.BOX, (0.1, 0.1, 0.02)
+SIZES = {
+    Shape.SPHERE: (0.3,),
+    Shape.BOX: (0.2, 0.3, 0.4),
+    Shape.CYLINDER: (0.2, 0.5),
+    Shape.CAPSULE: (0.2, 0.5),
+}
+
+
+def surface_points(shape, size):
+    """Points all over a primitive, found by marching rays out of its middle."""
+    rng = np.random.default_rng(0)
+    ways = rng.normal(size=(200_000, 3))
+    ways /= np.linalg.norm(ways, axis=1, keepdims=True)
+    x, y, z = np.abs(ways).T
+    across = np.hypot(x, y)
+    with np.errstate(divide="ignore"):
+        if shape is Shape.SPHERE:
+            t = np.full(len(ways), size[0])
+        elif shape is Shape.BOX:
+            t = np.min(np.divide(size, np.abs(ways)), axis=1)
+        elif shape is Shape.CYLINDER:
+            t = np.minimum(size[0] / across, size[1] / 2 / z)
+        else:
+            half = size[1] / 2
+            t = size[0] / across
+            capped = t * z > half
+            cap = z * half + np.sqrt(np.maximum(size[0] ** 2 - (across * half) ** 2, 0))
+            t[capped] = cap[capped]
+    return ways * t[:, None]
+
+
+@pytest.mark.parametrize("shape", list(Shape))
+def test_distance_is_that_to_the_nearest_surface_point(shape):
+    size = np.zeros(3, np.float32)
+    size[: len(SIZES[shape])] = SIZES[shape]
+    surface = surface_points(shape, SIZES[shape])
+    for point in np.random.default_rng(1).uniform(-1, 1, (60, 3)):
+        inside = np.linalg.norm(point) < np.linalg.norm(
+            surface[np.argmax(surface @ point / np.linalg.norm(surface, axis=1))]
+        )
+        nearest = np.linalg.norm(surface - point, axis=1).min()
+        got = distance_to(int(shape), size, tuple(point))
+        assert got <= 0.0 if inside else got == pytest.approx(nearest, abs=0.006)
+
+
+def floor_brightness(bottom_m=None, shape=Shape.SPHERE, size=(0.2,)):
+    """Red of the floor seen from above, beside and around a thing at some height."""
+    scene = Scene()
+    scene.add_object("floor", [[Geom(Shape.BOX, (9, 9, 0.5), (1, 1, 1), offset=(0, 0, -0.5))]])
+    if bottom_m is not None:
+        half = size[0] if shape is Shape.SPHERE else size[2]
+        thing = scene.add_object("thing", [[Geom(shape, size)]])
+        thing.positions[0] = (0, 0, bottom_m + half)
+    scene.update()
+    views = Camera(200, 200).render(scene, [Pose(np.array([0, 0, 2.0]), DOWN)])
+    return np.where(views.ids[0] == 0, views.rgb[0, ..., 0].astype(float), np.nan)
+
+
+def test_a_standing_thing_darkens_the_floor_around_it():
+    bare, shaded = floor_brightness(), floor_brightness(0.0, *LOW_BOX)
+    ratio = shaded / bare
+    assert np.nanmin(ratio) < 0.75
+    assert np.nanmin(ratio) >= 1.0 - DARKNESS - 0.01
+    seen = np.isfinite(ratio)
+    np.testing.assert_allclose(ratio[seen], ratio[::-1, ::-1][seen], atol=0.02)
+    assert ratio[0, 0] == 1.0
+
+
+def test_what_hangs_high_darkens_nothing():
+    bare = floor_brightness()
+    darkest = [
+        np.nanmin(floor_brightness(height_m, *LOW_BOX) / bare)
+        for height_m in (0.0, 0.5 * REACH_M, 1.01 * REACH_M)
+    ]
+    assert darkest == sorted(darkest)
+    assert darkest[0] < darkest[1] < darkest[2] == 1.0
+
+
+def test_what_is_as_large_as_a_room_casts_no_shadow():
+    wide = (LARGEST_M, 0.1, 0.1)
+    assert np.nanmin(floor_brightness(0.0, Shape.BOX, wide) / floor_brightness()) == 1.0
+
+
+def test_nothing_darkens_itself():
+    """A sheet that lies in the floor's plane has the colour of one that is held up."""
+    colours = []
+    for height_m in (0.002, 1.0):
+        scene = Scene()
+        sheet = scene.add_object("sheet", [[Geom(Shape.BOX, (0.5, 0.5, 0.002))]])
+        sheet.positions[0] = (0, 0, height_m)
+        scene.update()
+        views = Camera().render(scene, [Pose(np.array([0, 0, 2.0]), DOWN)])
+        colours.append(views.rgb[0, 42, 42])
+    np.testing.assert_array_equal(*colours)

@@ -1,0 +1,146 @@
+"""The renderer against other ways to see the same scene."""
+
+import math
+
+import numpy as np
+import pytest
+from eye_scenes import cast, clutter, random_pose, random_rotations, small_camera
+from tiny_renderer import TinyRenderer
+
+from veca_marl.sim.geometry.pose import Pose
+from veca_marl.sim.geometry.primitives import Geom, Shape
+from veca_marl.sim.geometry.scene import Scene
+from veca_marl.sim.vision.optics import Camera, look_at, view_axes
+from veca_marl.sim.vision.raster import draw_geoms
+
+
+def draw(scene, camera, pose, bounded):
+    depth = np.full((camera.height, camera.width), camera.lens.far, np.float32)
+    surfaces = np.full(depth.shape, -1, np.int16)
+    drawn = np.ones(len(scene.geoms.shapes), np.bool_)
+    draw_geoms(scene.geoms, drawn, view_axes(pose), camera.lens, bounded, depth, surfaces)
+    return depth, surfaces
+
+
+@pytest.mark.parametrize("fov_deg", [40.0, 90.0, 140.0])
+def test_bounding_rectangles_lose_no_pixel(fov_deg):
+    rng = np.random.default_rng(0)
+    camera = small_camera(fov_deg=fov_deg)
+    for _ in range(8):
+        scene = clutter(rng)
+        for _ in range(12):
+            pose = random_pose(rng)
+            bounded, full = (draw(scene, camera, pose, way) for way in (True, False))
+            np.testing.assert_array_equal(bounded[1], full[1])
+            np.testing.assert_array_equal(bounded[0], full[0])
+
+
+@pytest.mark.parametrize("shape", [Shape.CYLINDER, Shape.CAPSULE])
+def test_bounding_rectangles_hold_rods_that_pass_the_eye(shape):
+    rng = np.random.default_rng(7)
+    camera = small_camera()
+    for _ in range(60):
+        scene = Scene()
+        rods = scene.add_object("rods", [[Geom(shape, (0.05, 4.0))]] * 8)
+        rods.positions[:] = rng.uniform(-1, 1, (8, 3))
+        rods.rotations[:] = random_rotations(8, rng)
+        scene.update()
+        pose = random_pose(rng)
+        bounded, full = (draw(scene, camera, pose, way) for way in (True, False))
+        np.testing.assert_array_equal(bounded[1], full[1])
+
+
+@pytest.mark.parametrize("shape", list(Shape))
+def test_agrees_with_textbook_ray_casting(shape):
+    rng = np.random.default_rng(int(shape))
+    camera = small_camera()
+    differing, total = 0, 0
+    for _ in range(20):
+        scene, pose = clutter(rng, shapes=(shape,)), random_pose(rng)
+        views = camera.render(scene, [pose])
+        depth, ids = cast(scene, camera, pose)
+        same = views.ids[0] == ids
+        differing, total = differing + np.sum(~same), total + same.size
+        np.testing.assert_allclose(views.depth[0][same], depth[same], rtol=2e-3, atol=1e-4)
+    assert differing <= 2e-4 * total  # rounding at silhouettes
+
+
+def test_thin_things_stay_whole_far_away():
+    """A finger of 5 mm radius at 20 m covers its analytic area in a telescope."""
+    scene = Scene()
+    finger = scene.add_object("finger", [[Geom(Shape.CAPSULE, (0.005, 0.04))]])
+    finger.positions[0] = (20.0, 0.0, 0.0)
+    scene.update()
+    camera = Camera(400, 400, fov_deg=0.2, far_m=50.0)
+    ids = camera.render(scene, [Pose(np.zeros(3), np.eye(3))]).ids[0]
+    metres_per_pixel = 2 * math.tan(math.radians(0.1)) * 20.0 / 400
+    area = 0.01 * 0.04 + math.pi * 0.005**2
+    assert (ids == 0).sum() * metres_per_pixel**2 == pytest.approx(area, rel=0.02)
+
+
+def test_looking_straight_along_axes():
+    """Rays exactly parallel to faces and axes divide by zero in careless formulas."""
+    camera = Camera(63, 63)
+    for shape, size in zip(Shape, [(0.2,), (0.2, 0.3, 0.4), (0.2, 0.5), (0.2, 0.5)], strict=True):
+        scene = Scene()
+        scene.add_object("thing", [[Geom(shape, size)]])
+        scene.update()
+        for eye in np.concatenate((np.eye(3), -np.eye(3))):
+            forward = -eye
+            left = np.roll(np.abs(eye), 1)
+            pose = Pose(2.0 * eye, np.stack([forward, left, np.cross(forward, left)], 1))
+            views = camera.render(scene, [pose])
+            depth, ids = cast(scene, camera, pose)
+            assert (views.ids[0] == ids).mean() > 0.999
+            assert views.ids[0, 31, 31] == 0
+            assert views.depth[0, 31, 31] == pytest.approx(depth[31, 31], abs=1e-5)
+
+
+def test_same_pose_same_bytes():
+    rng = np.random.default_rng(1)
+    scene, pose = clutter(rng), random_pose(rng)
+    first, second = (Camera().render(scene, [pose]) for _ in range(2))
+    for one, two in zip(first, second, strict=True):
+        assert one.tobytes() == two.tobytes()
+
+
+def sampled_at_corners(camera):
+    """The camera with its rays through the lower left corners of the pixels, as TinyRenderer's."""
+    half_pixel = np.float32(camera.lens.tan_y / camera.height)
+    corners = camera.lens._replace(
+        columns=camera.lens.columns - half_pixel, rows=camera.lens.rows - half_pixel
+    )
+    moved = Camera(camera.width, camera.height, camera.fov_deg, camera.near_m, camera.far_m)
+    object.__setattr__(moved, "lens", corners)
+    return moved
+
+
+@pytest.mark.parametrize(
+    ("shapes", "agreement"),
+    # its boxes are exact; its balls, and more so its cylinders and capsules, are coarse polyhedra
+    [((Shape.BOX,), 0.9995), ((Shape.SPHERE,), 0.99), ((Shape.CYLINDER, Shape.CAPSULE), 0.975)],
+)
+def test_agrees_with_tiny_renderer(shapes, agreement):
+    rng = np.random.default_rng(2)
+    scene = clutter(rng, shapes=shapes)
+    camera = Camera(84, 84, 60.0, near_m=0.02, far_m=12.0)
+    same = []
+    with TinyRenderer(scene) as tiny:
+        for _ in range(30):
+            eye = rng.uniform((-2.8, -2.8, 0.8), (-2.2, 2.8, 1.8))
+            pose = look_at(eye, rng.uniform((-0.5, -0.5, 0.2), (0.5, 0.5, 0.6)))
+            _, surfaces = draw(scene, sampled_at_corners(camera), pose, bounded=True)
+            same.append(np.mean(surfaces == tiny.segment(camera, pose)))
+    assert np.mean(same) >= agreement
+
+
+def test_the_middle_of_the_picture_is_the_optical_axis():
+    """Which of the two ways to sample is centred: a box on the axis looks symmetric to us."""
+    scene = Scene()
+    scene.add_object("box", [[Geom(Shape.BOX, (0.3, 0.31, 0.31), offset=(2, 0, 0))]])
+    scene.update()
+    camera, pose = Camera(84, 84, 60.0), Pose(np.zeros(3), np.eye(3))
+    _, surfaces = draw(scene, camera, pose, bounded=True)
+    assert 0 < (surfaces == 0).sum() < surfaces.size
+    np.testing.assert_array_equal(surfaces, surfaces[:, ::-1])
+    np.testing.assert_array_equal(surfaces, surfaces[::-1])

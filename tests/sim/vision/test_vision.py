@@ -1,0 +1,236 @@
+"""Two eyes on a body."""
+
+import hashlib
+import math
+import os
+import pathlib
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from eye_scenes import EYE_SPACING_M, FakeBody, ball_at, clutter
+from paths import HELPERS
+
+from veca_marl.sim.geometry.primitives import Geom, Shape
+from veca_marl.sim.geometry.scene import Scene
+from veca_marl.sim.sense import check_spec
+from veca_marl.sim.vision.sense import Eyes, VisionCfg, VisionSense
+
+EVERYTHING = {"depth": True, "segmentation": True}
+
+
+def body_before(target=(2.0, 0.0, 0.0), **numbers):
+    return FakeBody(np.zeros(3), np.array(target), **numbers)
+
+
+@pytest.mark.parametrize(
+    "cfg",
+    [
+        VisionCfg(**EVERYTHING),
+        VisionCfg(**EVERYTHING, width=40, height=30),
+        VisionCfg(**EVERYTHING, eyes=Eyes.monocular),
+        VisionCfg(**EVERYTHING, grey=True, blur_deg=1.0, infant_age_months=1.0, defocus=True),
+        VisionCfg(),
+    ],
+)
+def test_reads_what_the_specs_promise(cfg):
+    rng = np.random.default_rng(0)
+    sense = VisionSense(cfg, body_before(focal_distance_m=0.5), clutter(rng))
+    read = sense.read()
+    assert read.keys() == sense.specs.keys()
+    for name, spec in sense.specs.items():
+        check_spec(name, read[name], spec)
+        assert read[name].min() >= spec.low
+        assert read[name].max() <= spec.high
+        assert read[name].flags.c_contiguous
+    assert ("depth" in read) == cfg.depth
+
+
+def test_quality_does_not_change_the_specs():
+    cfgs = [
+        VisionCfg(),
+        VisionCfg(eyes=Eyes.monocular),
+        VisionCfg(grey=True),
+        VisionCfg(blur_deg=2.0, defocus=True, infant_age_months=3.0),
+    ]
+    scene = ball_at((2, 0, 0))
+    specs = [VisionSense(cfg, body_before(), scene).specs for cfg in cfgs]
+    assert all(one == specs[0] for one in specs)
+
+
+@pytest.mark.parametrize("target", [(0.5, 0.0, 0.0), (1.0, 0.4, -0.2), (3.0, -1.0, 0.5)])
+def test_vergence_brings_a_point_to_the_centre_of_both_eyes(target):
+    sense = VisionSense(VisionCfg(segmentation=True), body_before(target), ball_at(target, 0.05))
+    for ids in sense.read()["segmentation"]:
+        rows, columns = np.nonzero(ids == 0)
+        assert (columns.mean() + 0.5, rows.mean() + 0.5) == pytest.approx((42, 42), abs=0.51)
+
+
+def test_disparity_is_that_of_the_distance():
+    """Eyes set on 1 m see a ball at 0.6 m apart by the difference of the vergence angles."""
+    body, scene = body_before((1.0, 0.0, 0.0)), ball_at((0.6, 0, 0), 0.03)
+    sense = VisionSense(VisionCfg(width=600, height=600, segmentation=True), body, scene)
+    left, right = (np.nonzero(ids == 0)[1].mean() for ids in sense.read()["segmentation"])
+    half = EYE_SPACING_M / 2
+    apart_rad = 2 * (math.atan(half / 0.6) - math.atan(half / 1.0))
+    apart_pixels = math.degrees(apart_rad) / sense.camera.degrees_per_pixel
+    assert left - right == pytest.approx(
+        apart_pixels, rel=0.03
+    )  # the left eye sees it to the right
+
+
+def test_one_eye_fills_both_places():
+    scene = clutter(np.random.default_rng(1))
+    both = VisionSense(VisionCfg(**EVERYTHING), body_before(), scene).read()
+    one = VisionSense(VisionCfg(**EVERYTHING, eyes=Eyes.monocular), body_before(), scene).read()
+    for name, images in one.items():
+        np.testing.assert_array_equal(images[0], images[1])
+        np.testing.assert_array_equal(images[0], both[name][0])
+    assert (both["vision"][0] != both["vision"][1]).any()
+
+
+def test_colours_are_in_their_channels():
+    sense = VisionSense(VisionCfg(), body_before(), ball_at((2, 0, 0), 0.3, (1.0, 0.0, 0.0)))
+    red, green, blue = sense.read()["vision"][0, :, 42, 42]
+    assert red > 100
+    assert green == blue == 0
+
+
+def test_defocus_follows_the_bodys_focal_distance():
+    rng = np.random.default_rng(2)
+    scene, body = clutter(rng), body_before(focal_distance_m=math.inf)
+    sharp = VisionSense(VisionCfg(width=200, height=200), body, scene).read()["vision"]
+    sense = VisionSense(VisionCfg(width=200, height=200, defocus=True), body, scene)
+    far = sense.read()["vision"]
+    body.focal_distance_m = 0.1
+    near = sense.read()["vision"]
+    assert (near != far).any()
+    assert np.abs(near - sharp.astype(int)).mean() > np.abs(far - sharp.astype(int)).mean()
+
+
+@pytest.fixture
+def room():
+    """One ball in sight, one behind a wall, one behind glass, one behind the back."""
+    scene = Scene()
+    ball = Geom(Shape.SPHERE, (0.1,), (1, 0, 0))
+    for name, position in {
+        "plain": (2, 0.4, 0),
+        "walled": (3, -0.6, 0),
+        "glazed": (2, 0, 0),
+        "back": (-2, 0, 0),
+    }.items():
+        scene.add_object(name, [[ball]]).positions[0] = position
+    scene.add_object("wall", [[Geom(Shape.BOX, (0.05, 0.4, 0.5), offset=(2, -0.6, 0))]])
+    pane = Geom(Shape.BOX, (0.01, 0.2, 0.2), offset=(1.5, 0, 0), transparent=True)
+    scene.add_object("pane", [[pane]])
+    scene.update()
+    return scene
+
+
+def test_what_is_visible(room):
+    sense = VisionSense(VisionCfg(), body_before(), room)
+    seen = {item.name for item in room.objects if sense.is_visible(item.id)}
+    assert seen == {"plain", "glazed", "wall", "pane"}
+
+
+def test_visible_again_after_the_wall_has_gone(room):
+    sense, walled = VisionSense(VisionCfg(), body_before(), room), room.find("walled")
+    assert not sense.is_visible(walled.id)
+    room.find("wall").positions[0] = (0, 0, 10)
+    room.update()
+    assert sense.is_visible(walled.id)
+
+
+def test_visible_after_the_eyes_have_turned(room):
+    body = body_before()
+    sense, back = VisionSense(VisionCfg(), body, room), room.find("back")
+    assert not sense.is_visible(back.id)
+    body.target = np.array([-2.0, 0.1, 0.0])
+    assert sense.is_visible(back.id)
+
+
+def test_seen_fraction_is_the_share_of_pixels(room):
+    cfg = VisionCfg(segmentation=True)
+    sense, plain = VisionSense(cfg, body_before(), room), room.find("plain")
+    expected = np.mean(sense.read()["segmentation"] == plain.id)
+    assert sense.seen_fraction(plain.id) == pytest.approx(expected)
+    assert 0.001 < expected < 0.1
+
+
+def test_the_own_head_is_hidden_and_another_head_is_not():
+    scene = Scene()
+    head, hand = Geom(Shape.SPHERE, (0.015,)), Geom(Shape.SPHERE, (0.02,), offset=(0.5, 0, 0))
+    scene.add_object("other", [[head]]).positions[0] = (1.0, 0.2, 0)
+    me = scene.add_object("me", [[head], [hand]])
+    me.positions[0] = (0.05, 0, 0)
+    scene.update()
+    body = body_before(object_id=me.id, own_head_frames=(0,))
+    sense = VisionSense(VisionCfg(segmentation=True, depth=True), body, scene)
+    read = sense.read()
+    mine = read["segmentation"] == me.id
+    assert mine.any()
+    assert read["depth"][mine].min() > 0.4
+    assert (read["segmentation"] == 0).any()
+    scene.add_object("late", [[Geom(Shape.SPHERE, (0.1,))]]).positions[0] = (1.5, -0.3, 0)
+    scene.update()
+    assert sense.is_visible(2)
+    assert sense.read()["depth"][mine].min() > 0.4
+
+
+def test_reading_twice_gives_the_same_bytes():
+    scene, body = clutter(np.random.default_rng(5)), body_before()
+    cfg = VisionCfg(**EVERYTHING)
+    one, two = VisionSense(cfg, body, scene), VisionSense(cfg, body, scene)
+    first = {name: value.copy() for name, value in one.read().items()}
+    for name, value in two.read().items():
+        assert value.tobytes() == first[name].tobytes() == one.read()[name].tobytes()
+
+
+def digest_of_a_look():
+    """Fingerprint of everything that dimmed eyes read from a cluttered room."""
+    cfg = VisionCfg(**EVERYTHING, blur_deg=0.5, infant_age_months=2.0, defocus=True)
+    scene = clutter(np.random.default_rng(6))
+    read = VisionSense(cfg, body_before(focal_distance_m=0.5), scene).read()
+    return hashlib.sha256(b"".join(read[name].tobytes() for name in sorted(read))).hexdigest()
+
+
+def digest_elsewhere(**environment):
+    """The same fingerprint from another process."""
+    code = "import test_vision; print(test_vision.digest_of_a_look())"
+    other = subprocess.run(
+        [sys.executable, "-c", code],
+        cwd=pathlib.Path(__file__).parent,
+        env=os.environ | {"PYTHONPATH": str(HELPERS)} | environment,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    return other.stdout.split()[-1]
+
+
+def test_another_process_sees_the_same_bytes():
+    assert digest_elsewhere() == digest_of_a_look()
+
+
+@pytest.mark.slow
+def test_freshly_compiled_kernels_see_the_same_bytes(tmp_path):
+    """With reordering allowed, compiled and cached kernels differ in the last bit."""
+    first = digest_of_a_look()
+    assert digest_elsewhere(NUMBA_CACHE_DIR=str(tmp_path)) == first
+    assert digest_elsewhere(NUMBA_CACHE_DIR=str(tmp_path)) == first
+
+
+@pytest.mark.parametrize(
+    ("numbers", "named"),
+    [
+        ({"width": 0}, "0x84"),
+        ({"fov_deg": 200.0}, "fov_deg 200.0"),
+        ({"eyes": "three"}, "binocular.*monocular"),
+        ({"blur_deg": -1.0}, "blur_deg -1.0"),
+        ({"infant_age_months": -2.0}, "-2.0 months"),
+    ],
+)
+def test_impossible_configurations_are_refused(numbers, named):
+    with pytest.raises(ValueError, match=named):
+        VisionCfg(**numbers)

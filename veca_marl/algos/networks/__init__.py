@@ -1,0 +1,1 @@
+"""Networks: an encoder per sense, actors and critics."""

@@ -1,0 +1,1 @@
+"""Self-play: pools of past policies, matchmaking, Elo ratings."""

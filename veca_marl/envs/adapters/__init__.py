@@ -1,0 +1,1 @@
+"""The same game for other libraries: TorchRL, Gymnasium, PettingZoo."""

@@ -1,0 +1,134 @@
+"""A task as a PettingZoo `ParallelEnv`: numpy in, numpy out, all agents at once."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+try:
+    from pettingzoo import ParallelEnv
+except ModuleNotFoundError as error:
+    raise ModuleNotFoundError(
+        "this door needs PettingZoo: pip install 'veca_marl[pettingzoo]'", name=error.name
+    ) from error
+
+from veca_marl.api import choose
+from veca_marl.envs.adapters.seeded_game import SeededGame
+from veca_marl.envs.adapters.spaces import Space, action_space, observation_space
+from veca_marl.envs.core.game import Observation
+from veca_marl.envs.core.game_cfg import GameCfg
+
+Infos = dict[str, dict[str, Any]]
+
+
+class VecaParallelEnv(ParallelEnv[str, Observation, Any]):
+    """One game; the agents are its players. Who is out is no longer in `agents`.
+
+    Observations are dicts with one array per sense, `infos[agent]["terms"]` the unweighted reward
+    terms by name. The same seed gives the same bytes as the first world of a `VecaEnv`.
+
+    Args:
+        cfg: What is played.
+        seed: Where the random stream starts when `reset` is not told.
+        render_mode: `rgb_array` if `render` is to be called.
+    """
+
+    def __init__(self, cfg: GameCfg, seed: int = 0, render_mode: str | None = None) -> None:
+        self._played = SeededGame(cfg, seed, render_mode)
+        game = self._played.game
+        self.metadata = self._played.metadata
+        self.render_mode = render_mode
+        self.possible_agents = list(self._played.names)
+        self.agents: list[str] = []
+        self.observation_spaces = {p.name: observation_space(game, p) for p in game.actors}
+        self.action_spaces = {p.name: action_space(p) for p in game.actors}
+
+    def observation_space(self, agent: str) -> Space:
+        """Return what an agent perceives: a `Dict` with one space per sense."""
+        return self.observation_spaces[self._known(agent)]
+
+    def action_space(self, agent: str) -> Space:
+        """Return what an agent can do: `Box` or `Discrete`."""
+        return self.action_spaces[self._known(agent)]
+
+    def _known(self, agent: str) -> str:
+        if agent not in self.action_spaces:
+            raise ValueError(f"unknown agent {agent!r}; there are {self.possible_agents}")
+        return agent
+
+    def reset(
+        self, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[dict[str, Observation], Infos]:
+        """Begin an episode.
+
+        Args:
+            seed: Starts the random stream anew; None goes on with it.
+            options: Not used.
+
+        Returns:
+            Observations and empty infos, by agent.
+        """
+        observations = self._played.reset(seed)
+        self.agents = list(self.possible_agents)
+        return observations, {name: {} for name in self.agents}
+
+    def step(
+        self, actions: Mapping[str, Any]
+    ) -> tuple[dict[str, Observation], dict[str, float], dict[str, bool], dict[str, bool], Infos]:
+        """Play one step of those in `agents`; when the episode is over, `agents` is empty.
+
+        Raises:
+            RuntimeError: If no episode is running.
+            ValueError: If an action is missing, impossible, or for an agent who is not there.
+        """
+        step = self._played.step(actions)
+        names = self.agents
+        self.agents = [] if step.done else self._played.playing
+        return (
+            step.observations,
+            step.rewards,
+            step.terminated,
+            dict.fromkeys(names, step.truncated),
+            {name: {"terms": dict(step.terms[name])} for name in names},
+        )
+
+    def render(self) -> NDArray[np.uint8]:
+        """Return a picture ``(252, width, 3)``: the first agent's eyes and skin, and the room."""
+        return self._played.render()
+
+    def close(self) -> None:
+        """Give the world's resources back."""
+        self._played.close()
+        self.agents = []
+
+
+def parallel_env(
+    task: str,
+    *,
+    playground: str | None = None,
+    body: str | None = None,
+    senses: Mapping[str, str] | None = None,
+    seed: int = 0,
+    overrides: Sequence[str] = (),
+    render_mode: str | None = None,
+) -> VecaParallelEnv:
+    """Make a task as a PettingZoo environment. The choices are those of `veca_marl.make`.
+
+    Args:
+        task: One of `veca_marl.list_tasks`.
+        playground: A file of `conf/playground`; None is the task's own.
+        body: A file of `conf/body`.
+        senses: Sense to preset, a file of `conf/senses/<sense>`.
+        seed: Where the random stream starts when `reset` is not told.
+        overrides: Anything else the command line takes.
+        render_mode: `rgb_array` if `render` is to be called.
+
+    Raises:
+        ConfigError: If there is no such choice; the message lists those there are.
+        ValueError: If a number is impossible.
+    """
+    cfg = choose(task, playground=playground, body=body, senses=senses, overrides=overrides)
+    return VecaParallelEnv(cfg, seed, render_mode)

@@ -1,0 +1,181 @@
+"""A task as a TorchRL environment: W worlds in one process behind one batched `EnvBase`."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from tensordict import TensorDict, TensorDictBase
+from torchrl.data import Categorical, Composite, Unbounded
+
+from veca_marl.envs.adapters.torchrl.layout import Arrays, Layout
+from veca_marl.envs.adapters.torchrl.lean_env import LeanEnv
+from veca_marl.envs.adapters.torchrl.specs import done_spec, observation_spec, to_torchrl
+from veca_marl.envs.core.game import Game, Outcome
+from veca_marl.envs.core.game_cfg import GameCfg
+from veca_marl.envs.rendering.spectator import Spectator
+from veca_marl.sim.compilation import announce_compilation
+
+
+class VecaEnv(LeanEnv):
+    """W equal games in one process, `batch_size=[W]`, one TorchRL group per team.
+
+    Keys, with n players in a team::
+
+        (team, "observation", sense)   (W, n, *sense shape)
+        (team, "action")               (W, n, A) float32 in [-1, 1], or (W, n) int64
+        (team, "terms", name)          (W, n, 1) unweighted reward terms of the last step
+        (team, "reward")               (W, n, 1) weighted sum of the terms
+        (team, "done" | "terminated" | "truncated")  (W, n, 1), and the same at the root (W, 1)
+        (team, "mask")                 (W, n) bool, in tasks that eliminate: False who is out
+
+    The flags at the root say when a game is over for everyone and starts anew. A player can be out
+    before (`Task.is_out`): it stays in the batch with its flags up, its mask down, zeros for
+    observation and reward, and its action is not looked at.
+
+    Teams that follow a script (`GameCfg.script`) are part of the world: they have no keys.
+
+    Args:
+        cfg: What is played.
+        worlds: How many games.
+        seed: Seed of the first world's randomness; world i draws from its own stream.
+
+    Raises:
+        ValueError: If there is less than one world, or the configuration is impossible.
+    """
+
+    def __init__(self, cfg: GameCfg, worlds: int = 1, seed: int = 0) -> None:
+        if worlds < 1:
+            raise ValueError(f"worlds={worlds}: at least one is needed")
+        announce_compilation()
+        super().__init__(device=None, batch_size=torch.Size([worlds]))
+        self.cfg = cfg
+        self.games = [Game(cfg) for _ in range(worlds)]
+        self._teams = [team.name for team in cfg.teams if team.name not in cfg.script]
+        self._eliminates = type(self.games[0].task).eliminates
+        self.group_map = {
+            team: [player.name for player in self.games[0].team(team)] for team in self._teams
+        }
+        self._players = [{team: game.team(team) for team in self._teams} for game in self.games]
+        self._make_specs()
+        self.spectator = Spectator(self.games[0])
+        self.set_seed(seed)
+
+    def _make_specs(self) -> None:
+        worlds = self.batch_size[0]
+        observed, action, reward = (Composite(shape=(worlds,)) for _ in range(3))
+        done = Composite(done_spec((worlds,)), shape=(worlds,))
+        for team in self._teams:
+            players = self._players[0][team]
+            batch = (worlds, len(players))
+            specs = {
+                name: spec
+                for sense in self.games[0].senses[players[0].name].values()
+                for name, spec in sense.specs.items()
+            }
+            observed[team] = observation_spec(specs, tuple(self.games[0].weights), *batch)
+            if self._eliminates:
+                observed[team, "mask"] = Categorical(2, shape=batch, dtype=torch.bool)
+            action[team] = Composite(
+                action=to_torchrl(players[0].body.action_spec, batch), shape=batch
+            )
+            reward[team] = Composite(reward=Unbounded((*batch, 1)), shape=batch)
+            done[team] = Composite(done_spec(batch), shape=batch)
+        self.observation_spec, self.action_spec = observed, action
+        self.reward_spec, self.done_spec = reward, done
+        self._action_shapes = {team: action[team, "action"].shape for team in self._teams}
+        self._start = Layout(observed)
+        self._next = Layout(observed.clone().update(reward).update(done))
+
+    def _set_seed(self, seed: int | None) -> None:
+        worlds = self.batch_size[0]
+        self._rngs = [
+            np.random.default_rng(None if seed is None else [seed, world])
+            for world in range(worlds)
+        ]
+
+    def _reset(self, tensordict: TensorDictBase | None = None, **_: Any) -> TensorDict:
+        wanted = None if tensordict is None else tensordict.get("_reset", None)
+        mask = np.ones(len(self.games), bool) if wanted is None else wanted.numpy().ravel()
+        arrays = self._start.new()
+        for world in np.flatnonzero(mask):
+            game = self.games[world]
+            game.reset(self._rngs[world])
+            self._players[world] = {team: game.team(team) for team in self._teams}
+            self._observe(world, arrays, out=frozenset())
+        return self._start.tensordict(arrays)
+
+    def _step(self, tensordict: TensorDictBase) -> TensorDict:
+        self._command({team: self._actions(team, tensordict) for team in self._teams})
+        arrays = self._next.new()
+        for world, game in enumerate(self.games):
+            out = game.out
+            outcome = game.advance(self._rngs[world])
+            self._observe(world, arrays, out)
+            self._score(world, arrays, outcome)
+        return self._next.tensordict(arrays)
+
+    def _actions(self, team: str, tensordict: TensorDictBase) -> NDArray[Any]:
+        action = tensordict.get((team, "action"))
+        expected = self._action_shapes[team]
+        if action.shape != expected:
+            raise ValueError(
+                f"action of {team}: shape {tuple(action.shape)}, not {tuple(expected)}"
+            )
+        plain = action.is_cpu and not action.requires_grad
+        return action.numpy() if plain else action.numpy(force=True)
+
+    def _command(self, actions: dict[str, NDArray[Any]]) -> None:
+        """Hand the actions out in all worlds before any of them moves."""
+        for world, game in enumerate(self.games):
+            rows = {
+                name: actions[team][world, index]
+                for team, names in self.group_map.items()
+                for index, name in enumerate(names)
+            }
+            try:
+                game.command(rows)
+            except ValueError as error:
+                raise ValueError(f"world {world}, {error}") from None
+
+    def _observe(self, world: int, arrays: Arrays, out: frozenset[str]) -> None:
+        """Let all players of a world perceive but those who were out before this step."""
+        game = self.games[world]
+        for team, players in self._players[world].items():
+            senses = arrays[team]["observation"]
+            for index, player in enumerate(players):
+                if self._eliminates:
+                    arrays[team]["mask"][world, index] = player.name not in game.out
+                if player.name in out:
+                    continue
+                for name, value in game.observe(player).items():
+                    senses[name][world, index] = value
+
+    def _score(self, world: int, arrays: Arrays, outcome: Outcome) -> None:
+        """Pay all players of a world, and say whether their game is over."""
+        game = self.games[world]
+        _flag(arrays, world, outcome.terminated, outcome.truncated)
+        for team, players in self._players[world].items():
+            for index, player in enumerate(players):
+                over = outcome.terminated_for(player.name)
+                _flag(arrays[team], (world, index), over, outcome.truncated)
+                terms = outcome.terms[player.name]
+                arrays[team]["reward"][world, index] = game.pay(terms)
+                for name, value in terms.items():
+                    arrays[team]["terms"][name][world, index] = value
+
+    def close(self, *, raise_if_closed: bool = True) -> None:
+        """Close all worlds."""
+        for game in self.games:
+            game.close()
+        super().close(raise_if_closed=raise_if_closed)
+
+
+def _flag(arrays: Arrays, index: int | tuple[int, int], terminated: bool, truncated: bool) -> None:
+    """Put the flags up that are up; new arrays have them down."""
+    if terminated or truncated:
+        arrays["terminated"][index] = terminated
+        arrays["truncated"][index] = truncated
+        arrays["done"][index] = True

@@ -1,0 +1,1 @@
+"""Controllers that experts share: gaits, key poses, inverse kinematics."""

@@ -1,0 +1,1 @@
+"""What experts infer from observations."""

@@ -1,0 +1,1 @@
+"""Skills built from controllers: lifting, carrying, sitting up, soccer."""

@@ -1,0 +1,112 @@
+"""Coming to sit on the heels, as children do: over the belly, up on the hands, back.
+
+A sit-up from the back was searched for in vain: trunk and head weigh more than the legs.
+"""
+
+from __future__ import annotations
+
+from veca_marl.envs.experts.control.key_poses import KeyPoses
+from veca_marl.envs.experts.skills.turn_over import TurnOver
+from veca_marl.sim.body.humanoid.humanoid import Humanoid
+from veca_marl.sim.body.humanoid.joint_controls import Springs
+from veca_marl.sim.body.humanoid.postures import Posture
+
+# Drawn by hand, then improved by a random search, as those of `turn_over`.
+_POSES = {
+    # on the belly: hands beside the shoulders, knees bent
+    "prepare": Posture(
+        joints_deg={
+            "upper_arm.flexion": 70,
+            "upper_arm.abduction": 33,
+            "upper_arm.internal_rotation": -6,
+            "forearm.flexion": 126,
+            "thigh.flexion": -7,
+            "thigh.abduction": 20,
+            "shank.flexion": 88,
+            "spine.flexion": 12,
+            "neck.flexion": -40,
+            "foot.dorsiflexion": -44,
+        }
+    ),
+    # arms stretch, knees come under the hips
+    "push": Posture(
+        joints_deg={
+            "upper_arm.flexion": 79,
+            "upper_arm.abduction": 20,
+            "upper_arm.internal_rotation": 3,
+            "forearm.flexion": 38,
+            "hand.flexion": -44,
+            "thigh.flexion": 102,
+            "thigh.abduction": 40,
+            "shank.flexion": 131,
+            "spine.flexion": -15,
+            "neck.flexion": -44,
+            "foot.dorsiflexion": -43,
+        }
+    ),
+    # hips onto the heels, leaning on straight arms, head up
+    "sit": Posture(
+        joints_deg={
+            "upper_arm.flexion": 52,
+            "upper_arm.internal_rotation": 11,
+            "hand.flexion": -52,
+            "thigh.flexion": 107,
+            "thigh.abduction": 20,
+            "thigh.internal_rotation": -7,
+            "shank.flexion": 148,
+            "chest.flexion": -10,
+            "neck.flexion": -38,
+            "head.flexion": -23,
+            "foot.dorsiflexion": -52,
+        }
+    ),
+}
+_SPEEDS_RADPS = {"prepare": 10.0, "push": 10.0, "sit": 4.0}
+_PATIENCE_S = {"lie": 0.4, "prepare": 0.3, "push": 1.1, "sit": 2.0}
+_AFTER = {"lie": "prepare", "prepare": "push", "push": "sit"}
+_ON_BELLY = 0.7  # cosine of the chest with down
+_SUNK_M = 0.17  # height of the top of the chest of who did not make it
+
+
+class SitUp:
+    """Turns over, prepares, pushes, sits; begins again if it falls.
+
+    Args:
+        body: Who sits up.
+        step_s: Time between two wishes.
+    """
+
+    def __init__(self, body: Humanoid, step_s: float) -> None:
+        self._body, self._step_s = body, step_s
+        self._turn = TurnOver(body, step_s)
+        self._way = KeyPoses(body, _POSES, step_s)
+        self.reset()
+
+    def reset(self) -> None:
+        """Begin with turning over."""
+        self._begin("lie")
+        self._turn.reset()
+
+    def wish(self) -> Springs:
+        """Return where springs shall pull the joints now."""
+        self._since_s += self._step_s
+        if self._stage == "lie":
+            if not self._body.bone("chest").forward[2] < -_ON_BELLY:
+                self._since_s = 0.0
+            wish = self._turn.wish()
+        else:
+            wish = self._way.toward(self._stage, _SPEEDS_RADPS[self._stage])
+        self._go_on()
+        return Springs(wish, ahead_s=0.0)
+
+    def _go_on(self) -> None:
+        late = self._since_s >= _PATIENCE_S[self._stage]
+        if late and self._stage in _AFTER:
+            self._begin(_AFTER[self._stage])
+        elif late and self._body.bone("neck").position[2] < _SUNK_M:
+            self.reset()
+
+    def _begin(self, stage: str) -> None:
+        self._stage, self._since_s = stage, 0.0
+        if stage == "prepare":
+            self._way.reset()

@@ -1,0 +1,108 @@
+"""Turning from the back to the belly over the left side."""
+
+from __future__ import annotations
+
+from veca_marl.envs.experts.control.key_poses import KeyPoses
+from veca_marl.sim.body.humanoid.humanoid import Humanoid
+from veca_marl.sim.body.humanoid.postures import ON_BACK, Posture
+from veca_marl.sim.geometry.pose import Floats
+
+# Drawn by hand, then improved by a random search over the angles for the returns of TurnBaby, with
+# torques and with position targets.
+_POSES = {
+    # legs up and crossed, trunk bent: the weight goes over the left side
+    "swing": Posture(
+        joints_deg={
+            "l_upper_arm.flexion": 170,
+            "l_upper_arm.abduction": -10,
+            "r_upper_arm.flexion": 65,
+            "r_upper_arm.abduction": -10,
+            "r_forearm.flexion": 25,
+            "r_thigh.flexion": 20,
+            "r_thigh.abduction": -25,
+            "r_shank.flexion": 55,
+            "l_thigh.flexion": 85,
+            "l_thigh.abduction": -25,
+            "spine.rotation": 10,
+            "chest.flexion": 30,
+            "spine.flexion": -5,
+            "chest.lateral": -20,
+            "neck.rotation": -55,
+            "neck.flexion": 45,
+        }
+    ),
+    # on the side: stretch, and reach across with the right arm
+    "over": Posture(
+        joints_deg={
+            "l_upper_arm.flexion": 140,
+            "l_upper_arm.abduction": 50,
+            "l_forearm.flexion": 5,
+            "r_upper_arm.flexion": 100,
+            "r_upper_arm.abduction": -40,
+            "r_forearm.flexion": 65,
+            "r_thigh.flexion": 25,
+            "r_thigh.abduction": -25,
+            "l_thigh.flexion": -10,
+            "l_thigh.abduction": 55,
+            "chest.rotation": 10,
+            "spine.rotation": 10,
+            "chest.flexion": -10,
+            "spine.flexion": -15,
+            "chest.lateral": 20,
+            "neck.rotation": 25,
+            "neck.flexion": 15,
+        }
+    ),
+    # on the belly, arms and legs out of the way
+    "lie": Posture(
+        joints_deg={
+            "upper_arm.flexion": 160,
+            "upper_arm.abduction": 20,
+            "forearm.flexion": 20,
+            "neck.flexion": -20,
+            "head.flexion": -20,
+            "foot.dorsiflexion": -50,
+        }
+    ),
+    "rest": ON_BACK,
+}
+_SPEED_RADPS = 9.0
+_ON_SIDE, _NEARLY_OVER, _FALLEN_BACK = -0.2, 0.55, -0.5  # cosines of the trunk with down
+_PATIENCE_S, _REST_S = 2.0, 0.5
+
+
+class TurnOver:
+    """Swings over the side, stretches, lies; tries again if it falls back.
+
+    Args:
+        body: Who turns.
+        step_s: Time between two wishes.
+    """
+
+    def __init__(self, body: Humanoid, step_s: float) -> None:
+        self._body, self._step_s = body, step_s
+        self._way = KeyPoses(body, _POSES, step_s)
+        self.reset()
+
+    def reset(self) -> None:
+        """Begin with a swing."""
+        self._way.reset()
+        self._pose, self._since_s = "swing", 0.0
+
+    def wish(self) -> Floats:
+        """Return the ``(82,)`` joint angles to go to now."""
+        chosen = self._next()
+        self._since_s = self._since_s + self._step_s if chosen == self._pose else 0.0
+        self._pose = chosen
+        return self._way.toward(chosen, _SPEED_RADPS)
+
+    def _next(self) -> str:
+        down = -self._body.bone("chest").forward[2] - self._body.bone("pelvis").forward[2]
+        down, late = down / 2.0, self._since_s > _PATIENCE_S
+        if self._pose == "swing":
+            return "over" if down > _ON_SIDE else "rest" if late else "swing"
+        if self._pose == "rest":
+            return "swing" if self._since_s > _REST_S else "rest"
+        if down < _FALLEN_BACK:
+            return "swing"
+        return "lie" if down > _NEARLY_OVER else self._pose

@@ -1,0 +1,130 @@
+"""A picture of the touched skin: the body with each taxel coloured by its reading.
+
+The debug view of the paper: what is touched glows from yellow to red on a pale body.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from veca_marl.sim.geometry.pose import Floats, Pose
+from veca_marl.sim.geometry.scene import Scene, SceneObject
+from veca_marl.sim.touch.taxels import load_taxels, taxel_positions
+from veca_marl.sim.vision.optics import Camera, view_axes
+from veca_marl.sim.vision.raster import NOTHING
+from veca_marl.sim.vision.shading import Images
+from veca_marl.sim.vision.triangles import draw_triangles, illuminate_triangles, to_eye
+
+PALE = (0.86, 0.86, 0.84)
+BACKGROUND = (0.13, 0.14, 0.17)
+# colours at readings of 0, a half and 1
+_SCALE = np.array([(0.98, 0.93, 0.35), (0.98, 0.55, 0.10), (0.85, 0.05, 0.10)])
+_DISTANCE_M, _RAISED_M, _FOV_DEG = 1.5, 0.35, 36.0
+
+
+def picture_of_touch(
+    scene: Scene, body: SceneObject, readings: Floats, height: int = 252
+) -> Images:
+    """Draw the front and the back of a body, its pelvis upright, its touched taxels coloured.
+
+    Args:
+        scene: The world, as of its last `update`.
+        body: Whose skin it is.
+        readings: ``(1648, 6)`` in [0, 1], as from `TouchSense.update_taxels`.
+        height: Pixels of the picture.
+
+    Returns:
+        ``(height, 2 * width, 3)`` uint8, with a width of 2/3 of the height.
+
+    Raises:
+        ValueError: If the body has no skin, or the readings are not those of its taxels.
+    """
+    triangles = body.triangles.stop - body.triangles.start
+    if readings.shape != load_taxels().depths.shape or triangles != len(readings):
+        raise ValueError(
+            f"{body.name} has {triangles} triangles, the readings have shape {readings.shape}: "
+            f"want {load_taxels().depths.shape}"
+        )
+    camera = Camera(max(height * 2 // 3, 1), height, _FOV_DEG)
+    return np.concatenate(
+        [_portrait(scene, body, readings, camera, pose) for pose in _viewpoints(body)], axis=1
+    )
+
+
+def save_picture_of_touch(
+    path: str | Path, scene: Scene, body: SceneObject, readings: Floats, height: int = 504
+) -> None:
+    """Write `picture_of_touch` as a PNG file.
+
+    Raises:
+        OSError: If the file cannot be written.
+    """
+    picture = picture_of_touch(scene, body, readings, height)
+    if not cv2.imwrite(str(path), picture[..., ::-1]):
+        raise OSError(f"cannot write {path}")
+
+
+def _viewpoints(body: SceneObject) -> list[Pose]:
+    """Before and behind the pelvis, a little headwards: who lies is seen from below, too."""
+    centre = body.positions.mean(axis=0)
+    ahead, _, up = body.rotations[0].T
+    return [_upright(_DISTANCE_M * way + _RAISED_M * up, centre, up) for way in (ahead, -ahead)]
+
+
+def _upright(offset: Floats, centre: Floats, up: Floats) -> Pose:
+    """Return the pose of a camera that looks at a point, with `up` upwards in the picture."""
+    forward = -offset / np.linalg.norm(offset)
+    above = up - up.dot(forward) * forward
+    above /= np.linalg.norm(above)
+    return Pose(centre + offset, np.stack([forward, np.cross(above, forward), above], axis=1))
+
+
+def _portrait(
+    scene: Scene, body: SceneObject, readings: Floats, camera: Camera, pose: Pose
+) -> Images:
+    """Draw the pale body lit from above, its touched taxels in the colours of their readings."""
+    meshes, view = scene.meshes, view_axes(pose)
+    seen = np.empty_like(meshes.vertices)
+    to_eye(meshes.vertices, view, seen)
+    depth = np.full((camera.height, camera.width), camera.far_m, np.float32)
+    surfaces = np.full(depth.shape, NOTHING, np.int16)
+    lights = np.zeros(depth.shape, np.float32)
+    drawn = np.zeros(len(meshes.triangles), np.bool_)
+    drawn[body.triangles] = True
+    draw_triangles(meshes.triangles, seen, drawn, camera.lens, 0, depth, surfaces)
+    illuminate_triangles(meshes, seen, camera.lens, 0, surfaces, lights)
+    picture = np.where(
+        (surfaces == NOTHING)[..., None], BACKGROUND, lights[..., None] * np.array(PALE)
+    )
+    seen_from = pose.position + depth[..., None] * _rays(camera, pose)
+    taxels, _ = taxel_positions(load_taxels(), meshes.vertices[body.vertices])
+    triangles = surfaces - body.triangles.start
+    own = surfaces != NOTHING
+    felt = _nearest(seen_from[own], triangles[own], taxels, readings)
+    touched = felt > 0.0
+    glow = np.stack([np.interp(felt[touched], (0.0, 0.5, 1.0), c) for c in _SCALE.T], axis=1)
+    shades = picture[own]
+    shades[touched] = glow
+    picture[own] = shades
+    image: Images = np.round(255.0 * picture.clip(0.0, 1.0)).astype(np.uint8)
+    return image
+
+
+def _rays(camera: Camera, pose: Pose) -> Floats:
+    """Way ``(H, W, 3)`` through each pixel per metre along the optical axis."""
+    x, y = np.meshgrid(camera.lens.columns, camera.lens.rows)
+    rays: Floats = np.stack([np.ones_like(x), -x, y], axis=-1) @ pose.rotation.T
+    return rays
+
+
+def _nearest(
+    points: Floats, triangles: NDArray[np.int16], taxels: Floats, readings: Floats
+) -> Floats:
+    """Return the reading ``(N,)`` of the nearest of the six taxels of each point's triangle."""
+    away = np.linalg.norm(points[:, None] - taxels[triangles], axis=2)
+    felt: Floats = readings[triangles, away.argmin(axis=1)]
+    return felt

@@ -1,0 +1,1 @@
+"""Tasks in which a body learns to move: TurnBaby, SitBaby, CrawlBaby, RunBaby."""

@@ -1,0 +1,1 @@
+"""Tasks of several agents: navigation, ring, soccer."""

@@ -1,0 +1,1 @@
+"""Tasks that need more than one sense: KickTheBall."""

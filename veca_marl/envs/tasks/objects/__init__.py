@@ -1,0 +1,1 @@
+"""Tasks of manipulation: grasping, moving, turning and piling objects."""

@@ -1,0 +1,58 @@
+"""A film of one episode: what the player sees and feels, beside the room, with what it hears."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from tensordict import TensorDictBase
+from torchrl.envs import ExplorationType, set_exploration_type
+
+from veca_marl.algos.training.evaluation import Policy
+from veca_marl.envs.adapters.torchrl.env import VecaEnv
+from veca_marl.envs.core.game_cfg import GameCfg
+from veca_marl.runs.video import write_video
+
+SAMPLE_RATE_HZ = 22_050  # of the ears
+
+
+def record_episode(path: Path, game: GameCfg, policy: Policy, seed: int) -> None:
+    """Play one episode with the policy's most likely actions and write it as a video.
+
+    The first player of the first team is filmed; a deaf one makes a silent film.
+
+    Args:
+        path: The MP4 file.
+        game: What is played.
+        policy: Who plays.
+        seed: Start of the episode.
+    """
+    env = VecaEnv(_with_waveform(game), worlds=1, seed=seed)
+    frames: list[NDArray[np.uint8]] = []
+    sound: list[NDArray[Any]] = []
+    with torch.no_grad(), set_exploration_type(ExplorationType.DETERMINISTIC):
+        state, done = env.reset(), False
+        while not done:
+            played, state = env.step_and_maybe_reset(policy(state))
+            seen = _first_player(played["next"], env)
+            frames.append(env.spectator.frame(seen))
+            if "waveform" in seen:
+                sound.append(seen["waveform"])
+            done = bool(played["next", "done"].all())
+    env.close()
+    waveform = np.concatenate(sound, axis=1) if sound else None
+    write_video(path, frames, waveform, game.clock.control_rate_hz, SAMPLE_RATE_HZ)
+
+
+def _with_waveform(game: GameCfg) -> GameCfg:
+    audio = replace(game.senses.audio, waveform=True)
+    return replace(game, senses=replace(game.senses, audio=audio))
+
+
+def _first_player(step: TensorDictBase, env: VecaEnv) -> dict[str, NDArray[Any]]:
+    team = next(iter(env.group_map))
+    return {name: array[0, 0].numpy() for name, array in step[team, "observation"].items()}

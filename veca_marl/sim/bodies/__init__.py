@@ -1,1 +1,0 @@
-"""Bodies: what moves in a world by its own will."""

@@ -1,0 +1,1 @@
+"""Bodies: a skeleton, how it is moved, its voice and its proprioception."""

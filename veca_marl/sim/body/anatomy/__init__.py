@@ -1,0 +1,1 @@
+"""The skeleton, its inertia, its skin mesh and its URDF."""

@@ -1,0 +1,60 @@
+"""Convex hulls of rods and boxes, as Bullet reads them from files.
+
+Bullet meets two links of several shapes each in as many contacts as shapes meet, and solves them in
+an order that depends on what the links did in episodes long past. Of a link with one shape there is
+one contact with each other link, and the order is that of the links.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from veca_marl.sim.body.anatomy.skeleton import BoneBox, BoneCapsule
+from veca_marl.sim.geometry.pose import Floats, Pose
+from veca_marl.sim.geometry.rotations import rotation_with_z
+
+# Bullet lays a skin of its own round every hull (`gDefaultCollisionMargin` of its importer)
+MARGIN_M = 0.001
+_RINGS, _AROUND = 7, 20  # points of a half sphere: rings from pole to equator, and round each
+
+
+def surface_points(part: BoneCapsule | BoneBox, pose: Pose, skin_m: float) -> Floats:
+    """Return points ``(n, 3)`` whose hull is a primitive at a pose, with its skin.
+
+    Those of a capsule lie so far out that the hull is as often without it as within it.
+    """
+    if isinstance(part, BoneBox):
+        corners = np.array(np.meshgrid(*[(-1.0, 1.0)] * 3)).reshape(3, -1).T
+        half = np.array(part.half) + skin_m - MARGIN_M
+        local = np.array(part.centre) + corners * half
+    else:
+        start, end = np.array(part.start), np.array(part.end)
+        axis = (end - start) / np.linalg.norm(end - start)
+        ball = (part.radius + skin_m - MARGIN_M) * _BULGE * _half_sphere(axis)
+        local = np.concatenate([end + ball, start - ball])
+    points: Floats = pose.position + local @ pose.rotation.T
+    return points
+
+
+def as_obj(points: Floats) -> str:
+    """Return points as Wavefront OBJ; the faces only name them all, Bullet finds the hull."""
+    rows = [f"v {x:.7g} {y:.7g} {z:.7g}" for x, y, z in points]
+    last = len(points)
+    rows += [f"f {i} {min(i + 1, last)} {min(i + 2, last)}" for i in range(1, last + 1, 3)]
+    return "\n".join(rows) + "\n"
+
+
+def _half_sphere(axis: Floats) -> Floats:
+    """Points on the unit half sphere about an axis, the rim included."""
+    polar = np.linspace(0.0, math.pi / 2.0, _RINGS)
+    around = np.linspace(0.0, 2.0 * math.pi, _AROUND, endpoint=False)
+    polar, around = (grid.ravel() for grid in np.meshgrid(polar, around))
+    x, y = np.sin(polar) * np.cos(around), np.sin(polar) * np.sin(around)
+    points: Floats = np.stack([x, y, np.cos(polar)], axis=1) @ rotation_with_z(axis).T
+    return np.unique(points.round(12), axis=0)
+
+
+# the points of a ring stand out by as much as the middles of its sides stay behind
+_BULGE = 2.0 / (1.0 + math.cos(math.pi / _AROUND))

@@ -1,0 +1,1 @@
+"""The joint-level body: an articulated multibody driven by torques or set-points."""

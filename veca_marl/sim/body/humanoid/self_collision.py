@@ -1,0 +1,45 @@
+"""Which parts of one body can meet: limbs meet the trunk and each other, not themselves."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+
+from veca_marl.sim.physics.bullet import pybullet
+
+_LEG = ("thigh", "shank", "foot")
+_TRUNK = ("pelvis", "spine", "chest", "neck", "head")
+
+
+def limb(bone: str) -> str:
+    """Return which of `trunk`, `l_arm`, `r_arm`, `l_leg`, `r_leg` a bone belongs to."""
+    if bone in _TRUNK:
+        return "trunk"
+    side, part = bone.split("_", 1)
+    return f"{side}_leg" if part in _LEG else f"{side}_arm"
+
+
+def may_meet(a: str, b: str) -> bool:
+    """Say whether two bones of one body collide.
+
+    Bones of one limb overlap at their joints by construction, and so do shoulders and hips with
+    the trunk; joint limits keep them apart. Without these exceptions dozens of lasting contacts
+    make the body twitch and its physics several times dearer.
+    """
+    if limb(a) == limb(b):
+        return False
+    roots = [bone for bone in (a, b) if bone.endswith(("upper_arm", "thigh"))]
+    return not (roots and "trunk" in (limb(a), limb(b)))
+
+
+def allow_self_collision(client: int, body_id: int, links: Sequence[tuple[int, str]]) -> None:
+    """Switch Bullet's contacts off for the pairs of links that must not meet.
+
+    Args:
+        client: The PyBullet client.
+        body_id: A body loaded with `URDF_USE_SELF_COLLISION`.
+        links: Index and bone of every link with a collider.
+    """
+    for (a, bone_a), (b, bone_b) in itertools.combinations(links, 2):
+        if not may_meet(bone_a, bone_b):
+            pybullet.setCollisionFilterPair(body_id, body_id, a, b, 0, physicsClientId=client)

@@ -1,0 +1,84 @@
+"""What a body looks like: a skin in clothes over its bones, with hair and eyes."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from veca_marl.sim.body.anatomy.skeleton import Bone, BoneBox, BoneCapsule, Skeleton
+from veca_marl.sim.body.anatomy.skin_mesh import load_skin
+from veca_marl.sim.body.mounts import EYES, ORGANS_M
+from veca_marl.sim.geometry.meshes import Mesh
+from veca_marl.sim.geometry.primitives import Geom, Shape
+from veca_marl.sim.geometry.rotations import rotation_with_z
+
+SKIN = (0.93, 0.74, 0.62)
+TROUSERS = (0.25, 0.28, 0.40)
+SHOES = (0.30, 0.20, 0.15)
+HAIR = (0.35, 0.22, 0.12)
+PUPILS = (0.10, 0.08, 0.08)
+SHIRTS = ((0.20, 0.40, 0.90), (0.90, 0.30, 0.20), (0.20, 0.75, 0.30), (0.90, 0.80, 0.20))
+
+_CLOTHED = {"spine": "shirt", "chest": "shirt", "upper_arm": "shirt"}
+_CLOTHED |= {"pelvis": "trousers", "thigh": "trousers", "shank": "trousers", "foot": "shoes"}
+# hair grows behind and above this plane of the head's frame: n . x = d, metres
+_HAIRLINE_NORMAL, _HAIRLINE_M = np.array([-0.6, 0.0, 0.8]), 0.048
+
+
+def dressed_skin(skeleton: Skeleton, shirt: tuple[float, float, float]) -> Mesh:
+    """Return the skin in the clothes of its wearer."""
+    mesh = load_skin()
+    by_bone = np.array([_colour(bone, shirt) for bone in skeleton.bones], np.float32)
+    colours = by_bone[mesh.owners]
+    colours[_hairy(mesh, skeleton.bone("head"))] = HAIR
+    return replace(mesh, colours=colours)
+
+
+def bone_geoms(skeleton: Skeleton, shirt: tuple[float, float, float]) -> list[list[Geom]]:
+    """Return the primitives on each of the 47 frames of a body.
+
+    The bones with their flexible skin are there to be touched and to cast shadows; what eyes see
+    of them is the mesh. The eyes are drawn, so that others see where it looks.
+    """
+    frames = [
+        [_geom(part, bone, _colour(bone, shirt)) for part in bone.colliders]
+        for bone in skeleton.bones
+    ]
+    frames[skeleton.bone("head")] += [
+        Geom(Shape.SPHERE, (0.012,), PUPILS, offset=ORGANS_M[eye], tangible=False) for eye in EYES
+    ]
+    return frames
+
+
+def _hairy(mesh: Mesh, head: int) -> NDArray[np.bool_]:
+    """Mask ``(T,)`` of the triangles under the hair."""
+    on_head = np.where(mesh.frames[:, :1] == head, mesh.offsets[:, 0], mesh.offsets[:, 1])
+    centres = on_head[mesh.triangles].mean(axis=1)
+    hairy: NDArray[np.bool_] = (mesh.owners == head) & (centres @ _HAIRLINE_NORMAL > _HAIRLINE_M)
+    return hairy
+
+
+def _colour(bone: Bone, shirt: tuple[float, float, float]) -> tuple[float, float, float]:
+    part = bone.name.removeprefix("l_").removeprefix("r_")
+    colours = {"shirt": shirt, "trousers": TROUSERS, "shoes": SHOES}
+    return colours.get(_CLOTHED.get(part, ""), SKIN)
+
+
+def _geom(part: BoneCapsule | BoneBox, bone: Bone, colour: tuple[float, float, float]) -> Geom:
+    skin = bone.skin_thickness_m
+    if isinstance(part, BoneBox):
+        x, y, z = (half + skin for half in part.half)
+        return Geom(Shape.BOX, (x, y, z), colour, offset=part.centre, visible=False, skin_m=skin)
+    start, end = np.array(part.start), np.array(part.end)
+    length = float(np.linalg.norm(end - start))
+    return Geom(
+        Shape.CAPSULE,
+        (part.radius + skin, length),
+        colour,
+        (start + end) / 2,
+        rotation_with_z((end - start) / length),
+        visible=False,
+        skin_m=skin,
+    )

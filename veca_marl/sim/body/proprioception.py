@@ -1,0 +1,154 @@
+"""The body's sense of itself: how its bones lie, how its joints bend, move and strain, and balance.
+
+What the paper lists under proprioception: bone orientations, joint angles, joint angular
+velocities and the vestibular sense; the motors' torques are our addition.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import Enum
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from veca_marl.sim.body.base import Body
+from veca_marl.sim.geometry.pose import Floats
+from veca_marl.sim.geometry.rotations import heading_rad
+from veca_marl.sim.physics.world import GRAVITY_MPS2, World
+from veca_marl.sim.sense import Sense
+from veca_marl.sim.spec import ArraySpec
+
+_UP = np.array([0.0, 0.0, 1.0])
+
+
+class ProprioceptionQuality(Enum):
+    """What is left of the sense; the rest reads 0."""
+
+    full = "full"
+    joints = "joints"
+    vestibular = "vestibular"
+
+
+@dataclass
+class ProprioceptionCfg:
+    """How well a body feels itself.
+
+    Attributes:
+        present: False leaves the sense out of the observation.
+        quality: All of it, only the joints (angles, velocities, torques), or only balance.
+    """
+
+    present: bool = True
+    quality: ProprioceptionQuality = ProprioceptionQuality.full
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.quality, ProprioceptionQuality):
+            choices = [quality.name for quality in ProprioceptionQuality]
+            raise ValueError(f"senses.proprioception.quality={self.quality!r}; there are {choices}")
+
+
+class ProprioceptionSense(Sense):
+    """One vector: ``(534,)`` float32 for 47 bones and 82 joints.
+
+    Its parts, in this order:
+
+    ====================  ===========  ==========================================================
+    part                  numbers      what
+    ====================  ===========  ==========================================================
+    bone_orientations     47 x 6       forward and up axis of each bone in the heading frame:
+                                       upright, turned with the pelvis about the vertical, so it
+                                       tells what is up but is no compass. Two axes are continuous
+                                       where quaternions jump (Zhou et al., CVPR 2019)
+    joint_angles          82           rad
+    joint_velocities      82           rad/s
+    joint_torques         82           share of the joint's strength, [-1, 1]
+    head_acceleration     3            m/s^2, what the otoliths feel in the head frame: mean
+                                       acceleration over the last agent step minus gravity, so
+                                       (0, 0, 9.81) at rest and upright
+    head_turning          3            rad/s, angular velocity in the head frame (the canals)
+    ====================  ===========  ==========================================================
+
+    Attributes:
+        parts: Where each part is in the vector.
+    """
+
+    def __init__(self, cfg: ProprioceptionCfg, body: Body, world: World) -> None:
+        self._body = body
+        self._step_s = world.clock.step_s
+        self._measures: dict[str, Callable[[], Floats]] = {
+            "bone_orientations": self._bone_orientations,
+            "joint_angles": body.joint_angles,
+            "joint_velocities": body.joint_velocities,
+            "joint_torques": body.joint_torques,
+            "head_acceleration": self._head_acceleration,
+            "head_turning": self._head_turning,
+        }
+        self._kept = kept_parts(cfg.quality)
+        self.parts = part_slices(len(body.bone_names), len(body.joint_names))
+        size = self.parts["head_turning"].stop
+        self.specs = {"proprioception": ArraySpec((size,), np.float32)}
+        self._vector = np.zeros(size, np.float32)
+        self.reset()
+
+    def reset(self) -> None:
+        """Feel no acceleration from having been put elsewhere."""
+        self._velocity, self._spin = self._body.head_motion()
+        self._acceleration = np.zeros(3)
+
+    def read(self) -> dict[str, NDArray[Any]]:
+        """See `Sense`. Call once per agent step: the acceleration is that since the last call."""
+        before = self._velocity
+        self._velocity, self._spin = self._body.head_motion()
+        self._acceleration = (self._velocity - before) / self._step_s
+        for name in self._kept:
+            self._vector[self.parts[name]] = self._measures[name]()
+        return {"proprioception": self._vector}
+
+    def _bone_orientations(self) -> Floats:
+        rotations = self._body.bone_rotations()
+        yaw = heading_rad(rotations[0])
+        c, s = math.cos(yaw), math.sin(yaw)
+        to_heading = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+        turned: Floats = to_heading @ rotations[:, :, ::2]
+        # bone by bone: forward axis, then up axis
+        return np.swapaxes(turned, 1, 2).ravel()
+
+    def _head_acceleration(self) -> Floats:
+        felt: Floats = self._acceleration + GRAVITY_MPS2 * _UP
+        return self._in_head(felt)
+
+    def _head_turning(self) -> Floats:
+        return self._in_head(self._spin)
+
+    def _in_head(self, vector: Floats) -> Floats:
+        turned: Floats = self._body.mount("head").rotation.T @ vector
+        return turned
+
+
+def kept_parts(quality: ProprioceptionQuality) -> tuple[str, ...]:
+    """Return the parts that a quality leaves; the others read 0."""
+    first_word = {
+        ProprioceptionQuality.full: "",
+        ProprioceptionQuality.joints: "joint",
+        ProprioceptionQuality.vestibular: "head",
+    }[quality]
+    return tuple(part for part in part_slices(0, 0) if part.startswith(first_word))
+
+
+def part_slices(bones: int, joints: int) -> dict[str, slice]:
+    """Return where each part is in the vector of a body with so many bones and joints."""
+    sizes = {
+        "bone_orientations": 6 * bones,
+        "joint_angles": joints,
+        "joint_velocities": joints,
+        "joint_torques": joints,
+        "head_acceleration": 3,
+        "head_turning": 3,
+    }
+    ends = np.cumsum(list(sizes.values())).tolist()
+    starts = [0, *ends[:-1]]
+    return {name: slice(*ends) for name, *ends in zip(sizes, starts, ends, strict=True)}

@@ -1,0 +1,1 @@
+"""The walking body: a capsule in the physics, animated by forward kinematics."""

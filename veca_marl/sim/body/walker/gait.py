@@ -1,0 +1,228 @@
+"""How the walking body moves its bones: joint angles from the phase of the stride, a kick, a gaze.
+
+The gait is kinematic, not a simulation of forces. The feet are led and the legs follow by inverse
+kinematics: a foot that carries the body stays where it is on the floor, the other swings forward,
+and the pelvis rides over them as over an inverted pendulum. Feet land flat and strides are short,
+as in children who have just learnt to walk. The trunk does not sway, so the head's senses are
+steady. Amplitudes are ours, chosen by eye within the ranges of motion of the skeleton.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from veca_marl.sim.body.anatomy.skeleton import Skeleton
+from veca_marl.sim.geometry.pose import Floats
+
+_CARRYING = 0.5  # share of the stride in which a foot is on the floor
+
+
+@dataclass(frozen=True)
+class GaitCfg:
+    """Numbers of the gait.
+
+    Attributes:
+        step_m: How far a foot on the floor falls back beneath the body at full stride.
+        step_centre_m: Middle of that way, before the hip: thighs bend forward more than back.
+        full_stride_mps: Speed from which the stride no longer lengthens, only quickens.
+        turning_m: A turn of 1 rad/s asks for strides like walking at so many m/s.
+        leg_m: Height of the hips above the ankles in standing.
+        sink_m: How much lower the pelvis is at full stride.
+        bob_m: Amplitude of its rise and fall, twice per stride.
+        lift_m: Height of a foot in mid swing at full stride.
+        toe_rad: How far the toes hang in mid swing.
+        arm_swing_rad: Amplitude of the upper arm at full stride.
+        elbow_rad: Flexion of the elbows.
+        settle_s: Time constant with which the stride follows a change of speed.
+        kick_s: Duration of a kick.
+    """
+
+    step_m: float = 0.2
+    step_centre_m: float = 0.005
+    full_stride_mps: float = 0.6
+    turning_m: float = 0.15
+    leg_m: float = 0.286
+    sink_m: float = 0.010
+    bob_m: float = 0.008
+    lift_m: float = 0.045
+    toe_rad: float = 0.35
+    arm_swing_rad: float = 0.5
+    elbow_rad: float = 0.5
+    settle_s: float = 0.08
+    kick_s: float = 0.36
+
+
+# the kicking leg: share of the kick, flexion of thigh and knee (rad); the strike comes first,
+# because the ball leaves at once, and the leg follows through
+_KICK = np.array([[0.0, 0.5, 0.8], [0.2, 1.1, 0.15], [0.5, 1.0, 0.4], [1.0, 0.45, 0.7]])
+_KICK_TOES_RAD = -0.4
+
+
+class Gait:
+    """Turns speed and time into the 82 joint angles of a walking child."""
+
+    def __init__(self, skeleton: Skeleton, cfg: GaitCfg | None = None) -> None:
+        self.cfg = cfg or GaitCfg()
+        joint = skeleton.joint
+        self._thigh = (joint("l_thigh", "flexion"), joint("r_thigh", "flexion"))
+        self._abduct = (joint("l_thigh", "abduction"), joint("r_thigh", "abduction"))
+        self._twist = (joint("l_thigh", "internal_rotation"), joint("r_thigh", "internal_rotation"))
+        self._shank = (joint("l_shank", "flexion"), joint("r_shank", "flexion"))
+        self._foot = (joint("l_foot", "dorsiflexion"), joint("r_foot", "dorsiflexion"))
+        self._ankle_roll = (joint("l_foot", "inversion"), joint("r_foot", "inversion"))
+        self._arm = (joint("l_upper_arm", "flexion"), joint("r_upper_arm", "flexion"))
+        self._elbow = (joint("l_forearm", "flexion"), joint("r_forearm", "flexion"))
+        self._nod = (joint("neck", "flexion"), joint("head", "flexion"))
+        self._shake = (joint("neck", "rotation"), joint("head", "rotation"))
+        self._low = np.array([j.low_rad for j in skeleton.joints])
+        self._high = np.array([j.high_rad for j in skeleton.joints])
+        origins = skeleton.origins
+        self._hip_y_m = tuple(float(origins[skeleton.bone(f"{s}_thigh"), 1]) for s in "lr")
+        self._thigh_m = -float(origins[skeleton.bone("l_shank"), 2])
+        self._shank_m = -float(origins[skeleton.bone("l_foot"), 2])
+        self.angles: Floats = np.zeros(len(skeleton.joints))
+        self.reset()
+
+    @property
+    def pitch_range_rad(self) -> tuple[float, float]:
+        """Least and greatest head pitch (down is positive): neck and head together."""
+        low, high = self._low[list(self._nod)].sum(), self._high[list(self._nod)].sum()
+        return float(low), float(high)
+
+    @property
+    def yaw_range_rad(self) -> tuple[float, float]:
+        """Least and greatest head yaw (left is positive): neck and head together."""
+        low, high = self._low[list(self._shake)].sum(), self._high[list(self._shake)].sum()
+        return float(low), float(high)
+
+    def reset(self) -> None:
+        """Stand still."""
+        self.phase = 0.0
+        self._speed_mps = self._turn_radps = 0.0
+        self._kick_left_s = 0.0
+
+    def kick(self) -> None:
+        """Begin a kick with the right leg."""
+        self._kick_left_s = self.cfg.kick_s
+
+    def advance(self, speed_mps: float, turn_radps: float, step_s: float) -> None:
+        """Move the stride on; turning on the spot steps as well.
+
+        Args:
+            speed_mps: Forward speed, negative when walking backward.
+            turn_radps: Turning speed, left is positive.
+            step_s: Time step.
+        """
+        follow = 1.0 - math.exp(-step_s / self.cfg.settle_s)
+        self._speed_mps += follow * (speed_mps - self._speed_mps)
+        self._turn_radps += follow * (turn_radps - self._turn_radps)
+        self.phase = (self.phase + _CARRYING * step_s / self._carrying_s()) % 1.0
+        if self._kick_left_s > 0.0:
+            self._kick_left_s -= step_s
+            self.phase = 0.5  # the kicking foot is about to land
+
+    def pose(self, head_pitch_rad: float, head_yaw_rad: float) -> Floats:
+        """Write and return the ``(82,)`` joint angles for this moment."""
+        if self._kick_left_s > 0.0:
+            self._lead_foot(0, (self.cfg.step_centre_m, 0.0), 0.0, 0.0, 0.0)
+            self._swing_kicking_leg()
+        else:
+            self._step(0)
+            self._step(1)
+        self._turn_neck(self._nod, head_pitch_rad, self.pitch_range_rad)
+        self._turn_neck(self._shake, head_yaw_rad, self.yaw_range_rad)
+        np.clip(self.angles, self._low, self._high, out=self.angles)
+        return self.angles
+
+    def _pace_mps(self) -> float:
+        return abs(self._speed_mps) + self.cfg.turning_m * abs(self._turn_radps)
+
+    def _share(self) -> float:
+        """Length of the stride as a share of the full one."""
+        return min(1.0, self._pace_mps() / self.cfg.full_stride_mps)
+
+    def _carrying_s(self) -> float:
+        """How long a foot stays on the floor."""
+        return self.cfg.step_m / max(self._pace_mps(), self.cfg.full_stride_mps)
+
+    def _step(self, side: int) -> None:
+        """Lead one foot along its stride, and swing the arm of the same side against it."""
+        phase = (self.phase + 0.5 * side) % 1.0
+        share, on_floor = self._share(), phase < _CARRYING
+        # from 0.5, where the foot lands, to -0.5, where it lifts off, and back through the air
+        along = 0.5 - phase / _CARRYING
+        lift = toes = 0.0
+        if not on_floor:
+            flight = (phase - _CARRYING) / (1.0 - _CARRYING)
+            along = -0.5 * math.cos(math.pi * flight)
+            height = share * math.sin(math.pi * flight)
+            lift, toes = self.cfg.lift_m * height, -self.cfg.toe_rad * height
+        place, yaw = self._foothold(side, -along * self._carrying_s())
+        self._lead_foot(side, place, yaw, lift, toes)
+        swing = self.cfg.arm_swing_rad * math.copysign(share, self._speed_mps)
+        self.angles[self._arm[side]] = -swing * math.cos(2.0 * math.pi * phase)
+        self.angles[self._elbow[side]] = self.cfg.elbow_rad
+
+    def _foothold(self, side: int, time_s: float) -> tuple[tuple[float, float], float]:
+        """Return where a foot on the floor is below its hip as the body moves along its arc.
+
+        Args:
+            side: 0 is left, 1 is right.
+            time_s: Since the foot was straight beneath the hip.
+
+        Returns:
+            Forward and left of the hip, metres, and the yaw of the foot against the pelvis.
+        """
+        turned, hip_y_m = self._turn_radps * time_s, self._hip_y_m[side]
+        way_m = self._speed_mps * time_s
+        x = self.cfg.step_centre_m * self._share() - way_m * math.cos(turned / 2.0)
+        y = hip_y_m - way_m * math.sin(turned / 2.0)
+        c, s = math.cos(turned), math.sin(turned)
+        return (c * x + s * y, c * y - s * x - hip_y_m), -turned
+
+    def _lead_foot(
+        self, side: int, place: tuple[float, float], yaw: float, lift_m: float, toes: float
+    ) -> None:
+        """Bend a leg so that its ankle is where it shall be and the foot points where it shall.
+
+        The law of cosines gives the knee. The hip turns about y, then x, then z, so with the turn
+        about z given the other two follow one after the other.
+        """
+        share = self._share()
+        bob = self.cfg.bob_m * math.cos(4.0 * math.pi * self.phase)
+        down_m = self.cfg.leg_m - share * (self.cfg.sink_m + bob) - lift_m
+        thigh_m, shank_m = self._thigh_m, self._shank_m
+        reach = min(math.hypot(*place, down_m), thigh_m + shank_m)
+        inside = (thigh_m**2 + shank_m**2 - reach**2) / (2.0 * thigh_m * shank_m)
+        knee = math.pi - math.acos(max(inside, -1.0))
+        back, below = shank_m * math.sin(knee), thigh_m + shank_m * math.cos(knee)
+        aside = -back * math.sin(yaw)
+        roll = math.asin(place[1] / math.hypot(aside, below)) - math.atan2(aside, below)
+        below = below * math.cos(roll) - aside * math.sin(roll)
+        thigh = math.atan2(place[0], down_m) + math.atan2(back * math.cos(yaw), below)
+        outward = 1.0 if side == 0 else -1.0
+        self.angles[self._thigh[side]] = thigh
+        self.angles[self._abduct[side]] = outward * roll
+        self.angles[self._twist[side]] = -outward * yaw
+        self.angles[self._shank[side]] = knee
+        self.angles[self._foot[side]] = toes - (thigh - knee)
+        self.angles[self._ankle_roll[side]] = outward * roll
+
+    def _swing_kicking_leg(self) -> None:
+        done = 1.0 - self._kick_left_s / self.cfg.kick_s
+        self.angles[self._thigh[1]] = np.interp(done, _KICK[:, 0], _KICK[:, 1])
+        self.angles[self._shank[1]] = np.interp(done, _KICK[:, 0], _KICK[:, 2])
+        self.angles[self._foot[1]] = _KICK_TOES_RAD * (1.0 - done)
+
+    def _turn_neck(
+        self, joints: tuple[int, ...], turn_rad: float, turn_range_rad: tuple[float, float]
+    ) -> None:
+        """Share a turn out so that neck and head reach their stops together."""
+        limits, whole = (
+            (self._high, turn_range_rad[1]) if turn_rad >= 0.0 else (self._low, turn_range_rad[0])
+        )
+        for joint in joints:
+            self.angles[joint] = turn_rad * limits[joint] / whole

@@ -1,0 +1,1 @@
+"""Shared geometry: primitives, the scene, poses, rotations, distances, rays, meshes."""

@@ -1,0 +1,210 @@
+"""The world as eyes and skin meet it: objects made of primitives, and skins, on moving frames.
+
+The owner of an object (the world for props, a body for its bones) writes the poses of its frames
+into the scene's tables; `Scene.update` then carries every primitive and every mesh to its place.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from veca_marl.sim.geometry.meshes import Mesh, empty_meshes, with_mesh
+from veca_marl.sim.geometry.pose import Floats
+from veca_marl.sim.geometry.primitives import Geom
+from veca_marl.sim.geometry.skinning import skin
+from veca_marl.sim.geometry.tables import (
+    Bools,
+    GeomTable,
+    SurfaceTable,
+    compose,
+    geom_table,
+    joined,
+)
+
+MOST_SURFACES = int(np.iinfo(np.int16).max)  # a picture stores rows and ids in 16 bits
+
+
+class Scene:
+    """Objects, the frames they hang on and the primitives they are made of.
+
+    `positions` and `rotations` are the frame table. They are views that `add_object` replaces:
+    look them up (or an object's slice of them) at each use and do not keep them over an addition.
+
+    Attributes:
+        objects: The objects in order of their ids.
+        geoms: The table of primitives; replaced by `add_object`.
+        meshes: The table of skins; likewise.
+        surfaces: What pixels can show; likewise.
+        version: Counts the changes, so that what was seen of an older state can be told.
+    """
+
+    def __init__(self) -> None:
+        self.objects: list[SceneObject] = []
+        self.geoms = geom_table([], 0, 0)
+        self.meshes = empty_meshes()
+        self.surfaces = SurfaceTable(self.geoms.colours, self.geoms.objects, self.geoms.frames)
+        self.version = 0
+        self._positions = np.zeros((0, 3))
+        self._rotations = np.zeros((0, 3, 3))
+
+    @property
+    def positions(self) -> Floats:
+        """``(F, 3)`` metres: where each frame is in the world. The owners write into it."""
+        return self._positions
+
+    @property
+    def rotations(self) -> Floats:
+        """``(F, 3, 3)``: each frame's axes to the world's. The owners write into it."""
+        return self._rotations
+
+    def add_object(
+        self, name: str, frames: Sequence[Sequence[Geom]], mesh: Mesh | None = None
+    ) -> SceneObject:
+        """Add an object whose frames start at the world's origin.
+
+        Args:
+            name: Unique in the scene.
+            frames: The primitives on each of its frames; a frame may be empty.
+            mesh: A skin over those frames.
+
+        Raises:
+            ValueError: If the name is taken, there is no frame, or the scene is full.
+        """
+        if any(name == known.name for known in self.objects):
+            raise ValueError(f"object {name!r} is already in the scene")
+        if not frames:
+            raise ValueError(f"object {name!r} has no frame")
+        first_row, first_geom = len(self._positions), len(self.geoms.shapes)
+        first_vertex, first_triangle = len(self.meshes.vertices), len(self.meshes.triangles)
+        total = len(self.surfaces.objects) + sum(map(len, frames))
+        total += 0 if mesh is None else len(mesh.triangles)
+        if total > MOST_SURFACES:
+            raise ValueError(
+                f"{name!r} makes {total} primitives and triangles: a scene holds {MOST_SURFACES}"
+            )
+        self._add_surfaces(geom_table(frames, len(self.objects), first_row), mesh)
+        self._positions = np.concatenate((self._positions, np.zeros((len(frames), 3))))
+        self._rotations = np.concatenate((self._rotations, np.tile(np.eye(3), (len(frames), 1, 1))))
+        item = SceneObject(
+            id=len(self.objects),
+            name=name,
+            rows=slice(first_row, len(self._positions)),
+            geoms=slice(first_geom, len(self.geoms.shapes)),
+            vertices=slice(first_vertex, len(self.meshes.vertices)),
+            triangles=slice(first_triangle, len(self.meshes.triangles)),
+            scene=self,
+        )
+        self.objects.append(item)
+        self.version += 1
+        return item
+
+    def _add_surfaces(self, added: GeomTable, mesh: Mesh | None) -> None:
+        """Put primitives below the primitives and triangles below the triangles."""
+        count, first_row = len(self.geoms.shapes), len(self._positions)
+        self.geoms = joined(self.geoms, added)
+        old: tuple[NDArray[Any], ...] = self.surfaces
+        new: tuple[NDArray[Any], ...] = (added.colours, added.objects, added.frames)
+        skins: tuple[NDArray[Any], ...] = tuple(column[:0] for column in old)
+        if mesh is not None:
+            ids = np.full(len(mesh.owners), len(self.objects), np.int16)
+            skins = (mesh.colours, ids, mesh.owners + first_row)
+            self.meshes = with_mesh(self.meshes, mesh, first_row)
+        columns: list[Any] = [
+            np.concatenate((rows[:count], geoms, rows[count:], triangles))
+            for rows, geoms, triangles in zip(old, new, skins, strict=True)
+        ]
+        self.surfaces = SurfaceTable(*columns)
+        # one memory: who paints a primitive paints the surface
+        self.geoms = self.geoms._replace(colours=self.surfaces.colours[: len(self.geoms.shapes)])
+
+    def find(self, name: str) -> SceneObject:
+        """Return the object called `name`.
+
+        Raises:
+            KeyError: If there is none; the message lists those that exist.
+        """
+        for item in self.objects:
+            if item.name == name:
+                return item
+        raise KeyError(
+            f"no object {name!r} in the scene; there are {[o.name for o in self.objects]}"
+        )
+
+    def update(self) -> None:
+        """Carry everything to where its frames are now. The world calls it once per step."""
+        g = self.geoms
+        compose(
+            self._positions,
+            self._rotations,
+            g.frames,
+            g.offsets,
+            g.turns,
+            g.positions,
+            g.rotations,
+        )
+        if len(self.meshes.vertices):
+            skin(self.meshes, self._positions, self._rotations)
+        self.version += 1
+
+    def hidden(self, object_id: int, frames: Sequence[int]) -> Bools:
+        """Return a mask ``(S,)`` that is true for the surfaces on some frames of an object.
+
+        Args:
+            object_id: Which object.
+            frames: Indices among the frames of that object.
+
+        Raises:
+            ValueError: If there is no such object or frame.
+        """
+        if not 0 <= object_id < len(self.objects):
+            raise ValueError(f"object id {object_id}: the scene has 0..{len(self.objects) - 1}")
+        rows = self.objects[object_id].rows
+        count = rows.stop - rows.start
+        if not all(0 <= frame < count for frame in frames):
+            raise ValueError(f"frames {tuple(frames)}: object {object_id} has 0..{count - 1}")
+        return np.isin(self.surfaces.frames, [rows.start + frame for frame in frames])
+
+
+@dataclass(frozen=True, eq=False)
+class SceneObject:
+    """One named thing in a scene.
+
+    Attributes:
+        id: Its value in segmentation images.
+        name: Unique in the scene.
+        rows: Its rows in the frame table.
+        geoms: Its rows in the table of primitives.
+        vertices: Its rows in the table of skins; none if it has no skin.
+        triangles: Likewise.
+        scene: The scene it is in.
+    """
+
+    id: int
+    name: str
+    rows: slice
+    geoms: slice
+    vertices: slice
+    triangles: slice
+    scene: Scene = field(repr=False)
+
+    @property
+    def positions(self) -> Floats:
+        """``(frames, 3)`` metres: a view for the owner to write into; do not keep it."""
+        return self.scene.positions[self.rows]
+
+    @property
+    def rotations(self) -> Floats:
+        """``(frames, 3, 3)``: a view for the owner to write into; do not keep it."""
+        return self.scene.rotations[self.rows]
+
+    def paint(self, colour: tuple[float, float, float]) -> None:
+        """Give all its primitives one colour ``(red, green, blue)`` in [0, 1]."""
+        if len(colour) != 3 or not all(0.0 <= c <= 1.0 for c in colour):
+            raise ValueError(f"colour {colour}: want three numbers in [0, 1]")
+        self.scene.geoms.colours[self.geoms] = colour
+        self.scene.version += 1

@@ -1,0 +1,1 @@
+"""Hearing: receivers, head-related transfer functions and the sense of hearing."""

@@ -1,0 +1,138 @@
+"""Head-related transfer functions on a regular grid, ready to be read for every direction."""
+
+from __future__ import annotations
+
+from functools import cache
+from importlib.resources import as_file, files
+
+import numpy as np
+import scipy.fft
+from numpy.typing import NDArray
+from scipy.spatial import ConvexHull
+
+from veca_marl.sim.geometry.pose import Floats
+from veca_marl.sim.hearing.head_conditioning import condition, ear_incidence
+from veca_marl.sim.hearing.head_response import HeadResponse, minimum_phase
+from veca_marl.sim.hearing.sofa import read_sofa
+from veca_marl.sim.hearing.spherical_head import woodworth_arrival_s
+
+GRID_STEP_DEG = 5
+_N_FFT = 512
+_LEAST_MAGNITUDE = 1e-5
+_BATCH = 256
+
+
+class HeadTable:
+    """A head's filters and arrival times on a regular grid of azimuths and elevations.
+
+    Shared between all listeners of a process and read-only.
+
+    Attributes:
+        filters: ``(A, E, 2, T)`` minimum-phase filters; azimuth ``a * step`` counted to the left
+            from straight ahead, elevation ``-90 + e * step`` degrees; left ear first.
+        arrival_samples: ``(A, E, 2)`` arrival time relative to the head's centre.
+        sample_rate_hz: Sampling rate.
+        head_radius_m: Radius of the sphere that fits the arrival times.
+        licence: Terms and authors of the measurement.
+    """
+
+    def __init__(self, response: HeadResponse, step_deg: int = GRID_STEP_DEG) -> None:
+        azimuth = np.deg2rad(np.arange(0, 360, step_deg))
+        elevation = np.deg2rad(np.arange(-90, 91, step_deg))
+        # no set reaches straight down: the lowest ring's filters stand for all below it
+        lowest = np.arcsin(np.clip(response.directions[:, 2].min(), -1.0, 1.0)) + 1e-6
+        corners, weights = _triangles(
+            response.directions, direction_vectors(azimuth, np.maximum(elevation, lowest))
+        )
+        self.filters = _interpolate_filters(response.filters, corners, weights)
+        arrival_s = np.einsum("aek,aekc->aec", weights, response.arrival_s[corners])
+        unmeasured = elevation < lowest
+        incidence = ear_incidence(direction_vectors(azimuth, elevation[unmeasured]))
+        arrival_s[:, unmeasured] = woodworth_arrival_s(incidence, response.head_radius_m)
+        self.arrival_samples: Floats = arrival_s * response.sample_rate_hz
+        self.filters.setflags(write=False)
+        self.arrival_samples.setflags(write=False)
+        self.sample_rate_hz = response.sample_rate_hz
+        self.head_radius_m = response.head_radius_m
+        self.licence = response.licence
+
+
+@cache
+def kemar_table(sample_rate_hz: int = 22_050) -> HeadTable:
+    """Return the head that comes with the package: KEMAR (Gardner & Martin 1994).
+
+    Raises:
+        ValueError: If the rate is not the one the data was made for.
+    """
+    with as_file(files("veca_marl") / "data" / "kemar.npz") as path:
+        response = HeadResponse.load(path)
+    if response.sample_rate_hz != sample_rate_hz:
+        raise ValueError(
+            f"KEMAR is shipped at {response.sample_rate_hz} Hz, got {sample_rate_hz}; "
+            "another rate needs the SOFA file"
+        )
+    return HeadTable(response)
+
+
+@cache
+def sofa_table(
+    path: str, sample_rate_hz: int = 22_050, stated_rate_hz: float | None = None
+) -> HeadTable:
+    """Return the head in a SOFA file, conditioned for a sampling rate.
+
+    Args:
+        path: The file.
+        sample_rate_hz: Rate at which the agents hear.
+        stated_rate_hz: Rate to believe instead of the file's own, see `read_sofa`.
+    """
+    measured = read_sofa(path, stated_rate_hz)
+    return HeadTable(condition(measured, sample_rate_hz, licence=f"see {measured.source}"))
+
+
+def direction_vectors(azimuth_rad: Floats, elevation_rad: Floats) -> Floats:
+    """Return unit vectors ``(A, E, 3)`` in the head frame: all azimuths by all elevations."""
+    azimuth, elevation = np.meshgrid(azimuth_rad, elevation_rad, indexing="ij")
+    horizontal = np.cos(elevation)
+    return np.stack(
+        [horizontal * np.cos(azimuth), horizontal * np.sin(azimuth), np.sin(elevation)], axis=-1
+    )
+
+
+def _triangles(measured: Floats, wanted: Floats) -> tuple[NDArray[np.int64], Floats]:
+    """Find the spherical triangle of measured directions around each wanted one.
+
+    Returns:
+        Indices ``(A, E, 3)`` into the measured directions, and weights that sum to 1.
+    """
+    nadir = np.array([[0.0, 0.0, -1.0]])
+    closed = np.concatenate([measured, nadir])  # the hull must enclose the origin
+    triangles = ConvexHull(closed).simplices
+    inverse = np.linalg.inv(closed[triangles].transpose(0, 2, 1))
+    flat = wanted.reshape(-1, 3)
+    corners, weights = [], []
+    for batch in np.array_split(flat, 1 + len(flat) // _BATCH):
+        coordinates = np.einsum("tij,qj->qti", inverse, batch)
+        best = coordinates.min(axis=-1).argmax(axis=1)
+        corners.append(triangles[best])
+        weights.append(np.maximum(coordinates[np.arange(len(batch)), best], 0.0))
+    corner, weight = np.concatenate(corners), np.concatenate(weights)
+    added = corner == len(measured)
+    corner[added], weight[added] = 0, 0.0
+    weight /= weight.sum(axis=1, keepdims=True)
+    shape = (*wanted.shape[:-1], 3)
+    return corner.reshape(shape).astype(np.int64), weight.reshape(shape)
+
+
+def _interpolate_filters(
+    filters: NDArray[np.float32], corners: NDArray[np.int64], weights: Floats
+) -> NDArray[np.float32]:
+    """Blend filters by the logarithm of their magnitude; minimum phase follows from it."""
+    magnitude = np.abs(scipy.fft.rfft(filters, _N_FFT))
+    log_magnitude = np.log(np.maximum(magnitude, _LEAST_MAGNITUDE))
+    table = np.empty((*corners.shape[:2], *filters.shape[1:]), np.float32)
+    for a in range(corners.shape[0]):
+        blended = np.einsum(
+            "ek,ekcf->ecf", weights[a].astype(np.float32), log_magnitude[corners[a]]
+        )
+        table[a] = minimum_phase(np.exp(blended), filters.shape[-1])
+    return table

@@ -1,0 +1,90 @@
+"""What two ears hear in a scene where nothing moves: the paper's `getSpatialAudio`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from veca_marl.sim.geometry.pose import Floats, Pose
+from veca_marl.sim.hearing.hrtf import HeadTable, kemar_table
+from veca_marl.sim.hearing.receivers import HeadRelated
+from veca_marl.sim.sound.acoustics import Room
+from veca_marl.sim.sound.soundfield import SoundField
+from veca_marl.sim.sound.sounds import Clip
+
+
+def spatial_audio(
+    head: Pose,
+    ear_left: ArrayLike,
+    ear_right: ArrayLike,
+    sources: Sequence[tuple[ArrayLike, ArrayLike]],
+    room_size: ArrayLike | None = None,
+    beta: float | Sequence[float] = 0.5,
+    image_order: int = 6,
+    table: HeadTable | None = None,
+) -> NDArray[np.float32]:
+    """Return what the two ears of one head hear (paper, appendix: `getSpatialAudio`).
+
+    The same engine as that of the agents' ears, without its constant latency.
+
+    Args:
+        head: Position and rotation of the head.
+        ear_left: ``(3,)`` metres, world frame. The head-related response is centred between the
+            ears, and turned as the head is.
+        ear_right: ``(3,)`` metres, world frame.
+        sources: Waveforms ``(n,)`` (rms pressure at 1 m) with their positions ``(3,)`` in metres.
+            All begin at sample 0; before, there was silence.
+        room_size: ``(3,)`` metres of a room with a corner at the origin and positive coordinates;
+            None is the free field.
+        beta: Pressure reflection coefficient of the walls, one or six, see `Room`.
+        image_order: Greatest number of reflections, with a room.
+        table: The head; None is KEMAR. Its sampling rate is that of the waveforms.
+
+    Returns:
+        ``(2, n)`` float32, left ear first, as long as the longest waveform.
+
+    Raises:
+        ValueError: If the room is impossible, or a head, ear or source is outside of it.
+    """
+    table = kemar_table() if table is None else table
+    ears = np.stack([_point("ear_left", ear_left), _point("ear_right", ear_right)])
+    room = None if room_size is None else Room(np.zeros(3), room_size, beta)
+    clips = [Clip(waveform) for waveform, _ in sources]
+    positions = [_point(f"source {i}", position) for i, (_, position) in enumerate(sources)]
+    if room is not None:
+        _check_inside(room, [head.position, *ears], "the head with its ears")
+        _check_inside(room, positions, "every source")
+    n_samples = max((clip.waveform.size for clip in clips), default=0)
+    field = _still_field(room, image_order, n_samples, table.sample_rate_hz)
+    for i, (clip, position) in enumerate(zip(clips, positions, strict=True)):
+        field.add_source(str(i), clip).position = position
+    listener = field.add_listener(HeadRelated(table))
+    field.advance()
+    heard = listener.render(Pose(ears.mean(axis=0), head.rotation))
+    return heard[:, field.latency_samples :]
+
+
+def _still_field(
+    room: Room | None, image_order: int, n_samples: int, sample_rate_hz: int
+) -> SoundField:
+    """Return a field that renders all samples, and its own latency, in one step."""
+    latency = SoundField(sample_rate_hz=sample_rate_hz).latency_samples
+    return SoundField(room, n_samples + latency, sample_rate_hz, image_order)
+
+
+def _point(name: str, value: ArrayLike) -> Floats:
+    point = np.asarray(value, dtype=np.float64)
+    if point.shape != (3,) or not np.isfinite(point).all():
+        raise ValueError(f"{name}: a position must be (3,) finite metres, got {value!r}")
+    return point
+
+
+def _check_inside(room: Room, positions: Sequence[Floats], what: str) -> None:
+    for position in positions:
+        if not room.contains(position):
+            raise ValueError(
+                f"{what} must be inside the room, from {room.lower} to {room.lower + room.size} m; "
+                f"got {position}"
+            )

@@ -1,0 +1,1 @@
+"""The PyBullet world, its clock, its props and playgrounds."""

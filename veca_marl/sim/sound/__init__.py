@@ -1,0 +1,1 @@
+"""Sound: sources, waveforms, room acoustics and propagation."""

@@ -1,0 +1,189 @@
+"""Sound in a world: sources and listeners that all may move, one control step at a time.
+
+Each listener keeps its own state, so that neither their number nor their order changes what any
+of them hears. Sound is computed in steps of the simulation's clock; there is no other time.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.fft
+from numpy.typing import NDArray
+
+from veca_marl.sim.geometry.pose import Pose
+from veca_marl.sim.sound.acoustics import SPEED_OF_SOUND_MPS, Room
+from veca_marl.sim.sound.fractional_delay import HALF_WIDTH, KERNEL_LATENCY, KERNEL_TAPS
+from veca_marl.sim.sound.house import House
+from veca_marl.sim.sound.propagation import OneRoom, Path, StreamFormat, Surroundings
+from veca_marl.sim.sound.receiver import Receiver, lead_samples
+from veca_marl.sim.sound.sound_source import Source
+from veca_marl.sim.sound.sounds import Sound
+
+__all__ = ["Listener", "SoundField", "Source"]
+
+
+class SoundField:
+    """The sources of a world, the room around them, and who listens.
+
+    Attributes:
+        sources: Sources by name.
+        step_samples: Samples per control step.
+        sample_rate_hz: Sampling rate.
+        clock: Control steps since the reset.
+        latency_samples: By how much all that is heard is late beside the sound's own way; the
+            same for every quality.
+    """
+
+    def __init__(
+        self,
+        room: Room | House | None = None,
+        step_samples: int = 882,
+        sample_rate_hz: int = 22_050,
+        image_order: int = 1,
+        reach_m: float = 60.0,
+    ) -> None:
+        """Make a field without sources.
+
+        Args:
+            room: What reflects: one room or several; None is the free field.
+            step_samples: Samples per control step.
+            sample_rate_hz: Sampling rate.
+            image_order: Greatest number of reflections of the image sources; a house has its own.
+            reach_m: Sound from further away is heard as late as from here. A room's diagonal
+                takes its place if that is less.
+        """
+        if step_samples < 1 or sample_rate_hz < 1 or reach_m <= 0.0:
+            raise ValueError(
+                "step_samples, sample_rate_hz and reach_m must be positive, "
+                f"got {step_samples}, {sample_rate_hz}, {reach_m}"
+            )
+        self.sources: dict[str, Source] = {}
+        self.step_samples = step_samples
+        self.sample_rate_hz = sample_rate_hz
+        self.clock = 0
+        self.latency_samples = HALF_WIDTH + KERNEL_LATENCY + lead_samples(sample_rate_hz)
+        self._surroundings: Surroundings = (
+            room if isinstance(room, House) else OneRoom(room, image_order)
+        )
+        self._listeners: list[Listener] = []
+        if room is not None:
+            reach_m = min(reach_m, float(np.linalg.norm(room.size)))
+        longest_delay = int(np.ceil(reach_m * sample_rate_hz / SPEED_OF_SOUND_MPS))
+        self._history_samples = longest_delay + step_samples + 2 * KERNEL_TAPS
+
+    def add_source(self, name: str, sound: Sound) -> Source:
+        """Add a source at the origin; set its `position` before every step.
+
+        Raises:
+            ValueError: If the name is taken.
+        """
+        if name in self.sources:
+            raise ValueError(f"a source {name!r} exists already; sources: {sorted(self.sources)}")
+        self.sources[name] = Source(name, sound, self._history_samples)
+        return self.sources[name]
+
+    def remove(self, source: Source) -> None:
+        """Take a source out, and what is still under way from it."""
+        if self.sources.get(source.name) is not source:
+            raise ValueError(f"no source {source.name!r} here; sources: {sorted(self.sources)}")
+        del self.sources[source.name]
+        for listener in self._listeners:
+            listener.forget(source)
+
+    def add_listener(self, spatialisation: Receiver) -> Listener:
+        """Add a pair of ears with a quality of its own."""
+        listener = Listener(self, self._surroundings, spatialisation)
+        self._listeners.append(listener)
+        return listener
+
+    def reset(self, rng: np.random.Generator) -> None:
+        """Silence everything, begin all sounds anew and make all listeners forget."""
+        self.clock = 0
+        for source in self.sources.values():
+            source.reset(rng)
+        for listener in self._listeners:
+            listener.reset()
+
+    def advance(self) -> None:
+        """Let every source emit one control step of sound."""
+        self.clock += 1
+        for source in self.sources.values():
+            source.advance(self.step_samples)
+
+
+class Listener:
+    """One pair of ears. Made by `SoundField.add_listener`."""
+
+    def __init__(
+        self, field: SoundField, surroundings: Surroundings, spatialisation: Receiver
+    ) -> None:
+        self._field = field
+        self._surroundings = surroundings
+        self._spatialisation = spatialisation
+        n = field.step_samples
+        self._stream = StreamFormat.for_listener(
+            spatialisation, surroundings, field.sample_rate_hz, n
+        )
+        self._fade = np.arange(1, n + 1, dtype=np.float32) / np.float32(n)
+        self._paths: dict[str, Path] = {}
+        self._clock = field.clock
+
+    def reset(self) -> None:
+        """Forget what was heard, and where everything was."""
+        for path in self._paths.values():
+            path.reset()
+        self._clock = self._field.clock
+
+    def forget(self, source: Source) -> None:
+        """Drop what is under way from a source."""
+        self._paths.pop(source.name, None)
+
+    def render(self, head: Pose) -> NDArray[np.float32]:
+        """Hear one control step. Call once after each `SoundField.advance`.
+
+        Right after a reset, before anything was emitted, there is silence.
+
+        Args:
+            head: Midpoint between the ears and rotation of the head at the end of the step.
+
+        Returns:
+            ``(2, step_samples)`` sound pressure at the left and right ear, see `sounds` for its
+            unit; exactly 0 where nothing is to be heard.
+
+        Raises:
+            RuntimeError: If a step was left out or heard twice.
+        """
+        silence = np.zeros((2, self._field.step_samples), np.float32)
+        if self._field.clock == 0:
+            return silence
+        if self._field.clock != self._clock + 1:
+            raise RuntimeError(
+                f"a listener hears every control step once: it heard step {self._clock}, "
+                f"the field is at step {self._field.clock}; reset a listener that pauses"
+            )
+        self._clock = self._field.clock
+        heard = [path for path in self._all_paths() if path.advance(head)]
+        return self._mix(heard) if heard else silence
+
+    def _all_paths(self) -> list[Path]:
+        for name, source in self._field.sources.items():
+            if name not in self._paths:
+                self._paths[name] = Path(
+                    source, self._surroundings, self._spatialisation, self._stream
+                )
+        return list(self._paths.values())
+
+    def _mix(self, paths: list[Path]) -> NDArray[np.float32]:
+        """Filter all blocks, add them up, and fade from the old filters to the new."""
+        n, block = self._stream.step_samples, self._stream.block_samples
+        sound = scipy.fft.rfft(np.stack([path.block for path in paths]))
+        after = sum(s * path.response for s, path in zip(sound, paths, strict=True))
+        if not any(path.moved for path in paths):
+            return self._both_ears(scipy.fft.irfft(after, block)[:, -n:])
+        before = sum(s * path.response_before for s, path in zip(sound, paths, strict=True))
+        old, new = scipy.fft.irfft(np.stack([before, after]), block)[..., -n:]
+        return self._both_ears(old + (new - old) * self._fade)
+
+    @staticmethod
+    def _both_ears(channels: NDArray[np.float32]) -> NDArray[np.float32]:
+        return np.repeat(channels, 2, axis=0) if len(channels) == 1 else channels

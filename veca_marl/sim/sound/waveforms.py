@@ -1,0 +1,122 @@
+"""Waveforms: harmonic sounds made by rule, and WAV files.
+
+The level of a sound is its rms pressure at 1 m, in a unit that is free to choose; 1.0 is the full
+scale of a WAV file. A loudspeaker, a mouth or a ball emits no steady pressure, and image sources
+with positive reflection coefficients would pile it up: every sound is high-passed at
+`HIGH_PASS_HZ` (Allen & Berkley 1979 do the same to the response of the room).
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from math import gcd
+from pathlib import Path
+
+import numpy as np
+import scipy.io.wavfile
+import scipy.signal
+from numpy.typing import NDArray
+
+from veca_marl.sim.geometry.pose import Floats
+
+HIGH_PASS_HZ = 80.0
+_LOWEST_PITCH_HZ = 80.0
+_BUZZ_SLOPE = -0.5
+_BUZZ_TOP = 0.9
+
+Samples = NDArray[np.float32]
+
+
+def tone(frequency_hz: float, level: float, sample_rate_hz: float) -> Samples:
+    """Return one second of a pure tone, at a frequency in whole hertz, so that it can be looped."""
+    return _harmonics(check_pitch(frequency_hz), 1, level, int(sample_rate_hz))
+
+
+def buzz(frequency_hz: float, level: float, sample_rate_hz: float) -> Samples:
+    """Return one second of all harmonics up to 0.9 of the Nyquist frequency, -3 dB per octave.
+
+    Broadband, so that the head and the pinna have something to colour up to the top of the
+    observation (5.4 kHz). At a frequency in whole hertz, so that it can be looped.
+    """
+    pitch = check_pitch(frequency_hz)
+    n_harmonics = max(1, int(_BUZZ_TOP * sample_rate_hz / 2.0 / pitch))
+    return _harmonics(pitch, n_harmonics, level, int(sample_rate_hz))
+
+
+@cache
+def _harmonics(frequency_hz: int, n_harmonics: int, level: float, sample_rate_hz: int) -> Samples:
+    """Return one second, with the phases that keep the peaks low (Schroeder 1970, eq. 11)."""
+    if frequency_hz * n_harmonics >= sample_rate_hz / 2:
+        raise ValueError(f"{frequency_hz} Hz does not fit below half of {sample_rate_hz} Hz")
+    spectrum = np.zeros(sample_rate_hz // 2 + 1, np.complex128)
+    order = np.arange(1, n_harmonics + 1)
+    phase = -np.pi * order * (order - 1) / n_harmonics
+    spectrum[order * frequency_hz] = order**_BUZZ_SLOPE * np.exp(1j * phase)
+    samples = np.fft.irfft(spectrum, sample_rate_hz)
+    samples *= check_level(level) / np.sqrt(np.mean(samples**2))
+    emitted: Samples = samples.astype(np.float32)
+    emitted.setflags(write=False)
+    return emitted
+
+
+def load_wav(path: str | Path, sample_rate_hz: int, level: float | None = None) -> Samples:
+    """Read a WAV file as one channel ``(n,)`` at the rate of the sound field, high-passed.
+
+    Args:
+        path: The file: integers of 8 to 32 bits, or floats.
+        sample_rate_hz: Rate of the result.
+        level: Rms pressure at 1 m to scale to; None keeps the file's own (full scale is 1).
+
+    Raises:
+        ValueError: If the file is no WAV file, or silent although a level is wanted.
+    """
+    try:
+        rate, samples = scipy.io.wavfile.read(path)
+    except ValueError as error:
+        raise ValueError(f"{path}: cannot be read as a WAV file ({error})") from error
+    mono = _full_scale(samples)
+    if mono.ndim == 2:
+        mono = mono.mean(axis=1)
+    common = gcd(rate, sample_rate_hz)
+    resampled = scipy.signal.resample_poly(mono, sample_rate_hz // common, rate // common)
+    filtered = scipy.signal.sosfilt(high_pass(sample_rate_hz), resampled)
+    if level is not None:
+        rms = np.sqrt(np.mean(filtered**2))
+        if rms == 0.0:
+            raise ValueError(f"{path}: is silent and cannot be scaled to level {level}")
+        filtered = filtered * (check_level(level) / rms)
+    waveform: Samples = filtered.astype(np.float32)
+    return waveform
+
+
+def _full_scale(samples: NDArray[np.generic]) -> Floats:
+    """Return samples in [-1, 1]; 8-bit WAV files are unsigned."""
+    values: Floats = samples.astype(np.float64)
+    if samples.dtype.kind == "u":
+        return (values - 128.0) / 128.0
+    if samples.dtype.kind == "i":
+        return values / 2.0 ** (8 * samples.dtype.itemsize - 1)
+    return values
+
+
+@cache
+def high_pass(sample_rate_hz: float) -> Floats:
+    """Return the second-order sections of the filter every sound passes (Butterworth, order 2)."""
+    sections: Floats = scipy.signal.butter(
+        2, HIGH_PASS_HZ, "highpass", fs=sample_rate_hz, output="sos"
+    )
+    return sections
+
+
+def check_level(level: float) -> float:
+    """Return the level, or raise `ValueError` if it is negative or not finite."""
+    if not (np.isfinite(level) and level >= 0.0):
+        raise ValueError(f"level must be finite and not negative, got {level}")
+    return level
+
+
+def check_pitch(frequency_hz: float) -> int:
+    """Return the frequency in whole hertz; raise `ValueError` if it is below 80 Hz or no number."""
+    if not (np.isfinite(frequency_hz) and frequency_hz >= _LOWEST_PITCH_HZ):
+        raise ValueError(f"frequency_hz must be at least {_LOWEST_PITCH_HZ}, got {frequency_hz}")
+    return round(frequency_hz)

@@ -1,0 +1,1 @@
+"""Touch: taxels, the penetration model and the sense of touch."""

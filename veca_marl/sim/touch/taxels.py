@@ -1,0 +1,176 @@
+"""The taxels: six tactile elements on each triangle of the skin, 9888 in all, sorted by bone.
+
+A taxel senses at the point where the line through it, along the normal of its triangle, meets the
+physical skin: the surface at a distance of d_max, the thickness of the skin, from the rigid bone.
+The mesh that eyes see differs from that surface by some millimetres; without the shift a light
+touch on a hollow of the mesh would read nothing, and one on a bulge too much.
+"""
+
+from __future__ import annotations
+
+import functools
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+
+from veca_marl.sim.body.anatomy.skeleton import Bone, BoneBox, BoneCapsule, load_skeleton
+from veca_marl.sim.body.anatomy.skin_mesh import binding_pose, load_skin
+from veca_marl.sim.geometry.meshes import Indices, Mesh, empty_meshes, with_mesh
+from veca_marl.sim.geometry.pose import Floats
+from veca_marl.sim.geometry.skinning import skin
+
+# "in triangle formation" (the paper, section on tactile perception): three near the corners, three
+# near the middles of the edges, none on an edge, so that no two triangles share one
+BARYCENTRIC = np.array(
+    [
+        (2 / 3, 1 / 6, 1 / 6),
+        (1 / 6, 2 / 3, 1 / 6),
+        (1 / 6, 1 / 6, 2 / 3),
+        (5 / 12, 5 / 12, 1 / 6),
+        (1 / 6, 5 / 12, 5 / 12),
+        (5 / 12, 1 / 6, 5 / 12),
+    ]
+)
+PATCH_TRIANGLES = 4
+TAXELS_PER_TRIANGLE = len(BARYCENTRIC)
+_ITERATIONS, _RELAXATION = 12, 0.7
+# the mesh bulges over hollows between bones: no shift beyond these (metres) reaches the right one
+_FARTHEST_OUT_M, _FARTHEST_IN_M = -0.004, 0.012
+
+
+class TaxelTable(NamedTuple):
+    """Where the taxels are on the skin, as the loops of touch read it.
+
+    Attributes:
+        triangles: ``(T, 3)`` vertices, sorted by bone.
+        first_triangle: ``(48,)`` triangles of bone b are first[b] to first[b + 1].
+        depths: ``(T, 6)`` metres from the mesh, against the normal, to the point that senses.
+        thickness: ``(47,)`` metres of skin on each bone, d_max.
+        first_patch: ``(48,)`` patches of bone b are first[b] to first[b + 1]. A patch is a few
+            triangles beside each other, which are looked at together.
+        patches: ``(P + 1,)`` triangles of patch p are patches[p] to patches[p + 1].
+        vertices: The vertices of the triangles of each patch, one patch after the other.
+        first_vertex: ``(P + 1,)`` those of patch p are `vertices`[first[p] : first[p + 1]].
+        margins: ``(T,)`` metres, how far from a triangle its taxels sense at most.
+        layers: ``(T, 2)`` metres: middle of the depths of a triangle, and half of their range.
+    """
+
+    triangles: Indices
+    first_triangle: Indices
+    depths: Floats
+    thickness: Floats
+    first_patch: Indices
+    patches: Indices
+    vertices: Indices
+    first_vertex: Indices
+    margins: Floats
+    layers: Floats
+
+
+@functools.cache
+def load_taxels() -> TaxelTable:
+    """Return the taxels of the skin (once per process; the result is read-only)."""
+    skeleton, mesh = load_skeleton(), load_skin()
+    count = len(skeleton.bones)
+    first_triangle = np.searchsorted(mesh.owners, np.arange(count + 1))
+    starts = [np.arange(*ends, PATCH_TRIANGLES) for ends in pairwise(first_triangle)]
+    patches = np.append(np.concatenate(starts), first_triangle[-1])
+    own = [np.unique(mesh.triangles[first:end]) for first, end in pairwise(patches)]
+    depths = _depths(mesh)
+    low, high = depths.min(axis=1), depths.max(axis=1)
+    return TaxelTable(
+        triangles=np.ascontiguousarray(mesh.triangles),
+        first_triangle=first_triangle,
+        depths=depths,
+        thickness=np.array([bone.skin_thickness_m for bone in skeleton.bones]),
+        first_patch=np.cumsum([0, *map(len, starts)]),
+        patches=patches,
+        vertices=np.concatenate(own),
+        first_vertex=np.cumsum([0, *map(len, own)]),
+        margins=np.abs(depths).max(axis=1),
+        layers=np.stack([(high + low) / 2, (high - low) / 2], axis=1),
+    )
+
+
+def taxels_of(bone_name: str) -> slice:
+    """Return where the taxels of a bone are among the 9888.
+
+    Raises:
+        KeyError: If there is no such bone; the message lists those that exist.
+    """
+    bone = load_skeleton().bone(bone_name)
+    first = load_taxels().first_triangle
+    return slice(TAXELS_PER_TRIANGLE * int(first[bone]), TAXELS_PER_TRIANGLE * int(first[bone + 1]))
+
+
+def taxel_positions(taxels: TaxelTable, vertices: Floats) -> tuple[Floats, Floats]:
+    """Return where the taxels lie on the mesh, and the normals of their triangles.
+
+    Args:
+        taxels: The table.
+        vertices: ``(V, 3)`` metres.
+
+    Returns:
+        Positions ``(T, 6, 3)``, metres, and outward unit normals ``(T, 3)``.
+    """
+    corners = vertices[taxels.triangles]
+    return _on_triangles(corners), _normals(corners)
+
+
+def _on_triangles(corners: Floats) -> Floats:
+    points: Floats = np.einsum("bk,tkc->tbc", BARYCENTRIC, corners)
+    return points
+
+
+def _normals(corners: Floats) -> Floats:
+    normals: Floats = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    return normals
+
+
+def _depths(mesh: Mesh) -> Floats:
+    """Follow each normal to the physical skin, in the pose the mesh is bound in."""
+    skeleton = load_skeleton()
+    positions, rotations = binding_pose(skeleton)
+    bound = with_mesh(empty_meshes(), mesh, 0)
+    skin(bound, positions, rotations)
+    corners = bound.vertices[mesh.triangles]
+    points, normals = _on_triangles(corners), _normals(corners)
+    depths = np.zeros(points.shape[:2])
+    for index, bone in enumerate(skeleton.bones):
+        own = mesh.owners == index
+        local = (points[own] - positions[index]) @ rotations[index]
+        inward = -(normals[own] @ rotations[index])[:, None]
+        depths[own] = _way_to_skin(bone, local, inward)
+    return depths
+
+
+def _way_to_skin(bone: Bone, points: Floats, inward: Floats) -> Floats:
+    """March ``(t, 6)`` points of a bone's frame along ``(t, 1, 3)`` to the surface of its skin."""
+    way: Floats = np.zeros(points.shape[:2])
+    for _ in range(_ITERATIONS):
+        height = distance_to_bone(bone, points + way[..., None] * inward) - bone.skin_thickness_m
+        way = way + _RELAXATION * height
+    usual = 0.5 * float(np.median(distance_to_bone(bone, points)))
+    return way.clip(_FARTHEST_OUT_M, usual + _FARTHEST_IN_M)
+
+
+def distance_to_bone(bone: Bone, points: Floats) -> Floats:
+    """Return signed metres from ``(..., 3)`` points in a bone's frame to its rigid colliders."""
+    parts = [_distance(part, points) for part in bone.colliders]
+    nearest: Floats = np.min(parts, axis=0)
+    return nearest
+
+
+def _distance(part: BoneCapsule | BoneBox, points: Floats) -> Floats:
+    if isinstance(part, BoneBox):
+        beyond = np.abs(points - np.array(part.centre)) - np.array(part.half)
+        outside: Floats = np.linalg.norm(np.maximum(beyond, 0.0), axis=-1)
+        outside += np.minimum(beyond.max(axis=-1), 0.0)
+        return outside
+    start, axis = np.array(part.start), np.array(part.end) - part.start
+    share = np.clip((points - start) @ axis / (axis @ axis), 0.0, 1.0)
+    away: Floats = np.linalg.norm(points - start - share[..., None] * axis, axis=-1)
+    away -= part.radius
+    return away

@@ -1,0 +1,1 @@
+"""Vision: cameras, rasterisation, shading, optics of the eye and the sense of vision."""

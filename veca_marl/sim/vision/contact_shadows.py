@@ -1,0 +1,177 @@
+"""Soft shadows where things come near the floor: what shows that they stand on it.
+
+A floor point is darkened by its distance to the things around it, as in ambient occlusion by
+distance fields (Evans, "Fast approximations for global illumination on dynamic scenes", SIGGRAPH
+2006 course). The distances to the primitives are exact. The floor is whatever is seen in the plane
+z = 0; what is larger than a piece of furniture casts no shadow.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, TypeAlias
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from veca_marl.sim.geometry.pose import Floats
+from veca_marl.sim.geometry.primitives import Shape, bounding_radius
+from veca_marl.sim.geometry.tables import Bools, GeomTable
+from veca_marl.sim.geometry.vectors import Vector, single
+from veca_marl.sim.vision.raster import (
+    NOTHING,
+    Depths,
+    Lens,
+    Ray,
+    Rectangle,
+    Surfaces,
+    pixel_rectangle,
+)
+from veca_marl.sim.vision.screen_bounds import box_intervals
+
+# slopes, depths, surfaces and lights of one row
+Pixels: TypeAlias = tuple[Depths, Depths, Surfaces, NDArray[np.float32]]
+
+REACH_M = 0.12  # a thing farther than this from a floor point does not darken it
+DARKNESS = 0.35  # share of the light that a thing touching the point takes away
+LARGEST_M = 1.0  # bounding radius of the largest thing that casts a shadow
+_FLOOR_TOLERANCE_M = 0.01
+
+_SPHERE, _BOX, _CYLINDER = int(Shape.SPHERE), int(Shape.BOX), int(Shape.CYLINDER)
+_CAPSULE = int(Shape.CAPSULE)
+
+
+@njit(cache=True, error_model="numpy")
+def darken_contacts(
+    geoms: GeomTable,
+    casting: Bools,
+    view: Floats,
+    lens: Lens,
+    depth: Depths,
+    surfaces: Surfaces,
+    lights: NDArray[np.float32],
+) -> None:
+    """Darken the floor around what is near it.
+
+    Args:
+        geoms: The scene's primitives.
+        casting: ``(G,)`` which of them cast shadows.
+        view: ``(4, 3)`` position, right, up and forward axes of the eye in the world.
+        lens: The camera's numbers.
+        depth: ``(H, W)`` metres.
+        surfaces: ``(H, W)`` rows of the surfaces seen.
+        lights: ``(H, W)`` brightness of each pixel, scaled.
+    """
+    for g in range(geoms.shapes.shape[0]):
+        radius = bounding_radius(geoms.shapes[g], geoms.sizes[g])
+        reach, height = radius + REACH_M, geoms.positions[g, 2]
+        if not casting[g] or radius > LARGEST_M or abs(height) >= reach:
+            continue
+        around = math.sqrt(reach * reach - height * height)
+        rectangle = _floor_rectangle(geoms.positions[g], around, view, lens)
+        _darken(geoms, g, rectangle, view, lens, depth, surfaces, lights)
+
+
+@njit(cache=True, error_model="numpy")
+def _floor_rectangle(position: Floats, around: float, view: Floats, lens: Lens) -> Rectangle:
+    """Pixels that may show a square of the floor below a point."""
+    ex, ey, ez = position[0] - view[0, 0], position[1] - view[0, 1], -view[0, 2]
+    right = (view[1, 0], view[1, 1], view[1, 2])
+    up = (view[2, 0], view[2, 1], view[2, 2])
+    forward = (view[3, 0], view[3, 1], view[3, 2])
+    centre = (
+        ex * right[0] + ey * right[1] + ez * right[2],
+        ex * up[0] + ey * up[1] + ez * up[2],
+        ex * forward[0] + ey * forward[1] + ez * forward[2],
+    )
+    half = (around, around, _FLOOR_TOLERANCE_M)
+    across, upward = box_intervals(centre, half, right, up, forward, lens.near)
+    return pixel_rectangle(across, upward, lens)
+
+
+@njit(cache=True, error_model="numpy")
+def _darken(
+    geoms: GeomTable,
+    g: int,
+    rectangle: Rectangle,
+    view: Floats,
+    lens: Lens,
+    depth: Depths,
+    surfaces: Surfaces,
+    lights: NDArray[np.float32],
+) -> None:
+    """Darken the floor pixels of a rectangle by their distance to one primitive."""
+    first, end, top, bottom = rectangle
+    columns = lens.columns[first:end]
+    shape, size = geoms.shapes[g], _vector(geoms.sizes[g])
+    turn = geoms.rotations[g].T
+    frame = _vector(geoms.positions[g]), _vector(turn[0]), _vector(turn[1]), _vector(turn[2])
+    eye = _vector(view[0]), _vector(view[1]), _vector(view[2]), _vector(view[3])
+    for j in range(top, bottom):
+        pixels = columns, depth[j, first:end], surfaces[j, first:end], lights[j, first:end]
+        # the shape is a constant in each of these, so that their loops have no branches
+        if shape == _SPHERE:
+            _darken_row(_SPHERE, size, frame, eye, lens.rows[j], g, pixels)
+        elif shape == _BOX:
+            _darken_row(_BOX, size, frame, eye, lens.rows[j], g, pixels)
+        elif shape == _CYLINDER:
+            _darken_row(_CYLINDER, size, frame, eye, lens.rows[j], g, pixels)
+        else:
+            _darken_row(_CAPSULE, size, frame, eye, lens.rows[j], g, pixels)
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def _vector(array: NDArray[Any]) -> Vector:
+    """Out of an array, so that the compiler knows that loops do not change it."""
+    return array[0], array[1], array[2]
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def _darken_row(
+    shape: int,
+    size: Vector,
+    frame: Ray,
+    eye: Ray,
+    y: float,
+    name: int,
+    pixels: Pixels,
+) -> None:
+    """Darken the floor pixels of a row; the frame is a primitive's position and its three axes."""
+    columns, depth, names, lights = pixels
+    origin, ahead, left, upward = frame
+    position, right, up, forward = eye
+    for i in range(columns.shape[0]):
+        x, t = columns[i], depth[i]
+        px = position[0] + t * (forward[0] + x * right[0] + y * up[0])
+        py = position[1] + t * (forward[1] + x * right[1] + y * up[1])
+        pz = position[2] + t * (forward[2] + x * right[2] + y * up[2])
+        dx, dy, dz = px - origin[0], py - origin[1], pz - origin[2]
+        local = (
+            single(ahead[0] * dx + ahead[1] * dy + ahead[2] * dz),
+            single(left[0] * dx + left[1] * dy + left[2] * dz),
+            single(upward[0] * dx + upward[1] * dy + upward[2] * dz),
+        )
+        gap = distance_to(shape, size, local)
+        gap = gap if gap > 0.0 else 0.0
+        nearness = 1.0 - gap / REACH_M
+        no_floor = abs(pz) > _FLOOR_TOLERANCE_M or names[i] == NOTHING or names[i] == name
+        nearness = 0.0 if no_floor or nearness < 0.0 else nearness
+        lights[i] *= single(1.0 - DARKNESS * nearness * nearness)
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def distance_to(shape: int, size: NDArray[np.float32] | Vector, point: Vector) -> float:
+    """Metres from a point in a primitive's own axes to its surface; not positive within it."""
+    x, y, z = abs(point[0]), abs(point[1]), abs(point[2])
+    if shape == _SPHERE:
+        return math.sqrt(x * x + y * y + z * z) - float(size[0])
+    if shape == _BOX:
+        x, y, z = x - size[0], y - size[1], z - size[2]
+    elif shape == _CYLINDER:
+        x, y, z = math.sqrt(x * x + y * y) - size[0], 0.0, z - 0.5 * size[1]
+    else:
+        z = max(z - 0.5 * size[1], 0.0)
+        return math.sqrt(x * x + y * y + z * z) - float(size[0])
+    x, y, z = max(x, 0.0), max(y, 0.0), max(z, 0.0)
+    return math.sqrt(x * x + y * y + z * z)

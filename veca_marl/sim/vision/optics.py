@@ -1,0 +1,149 @@
+"""A pinhole camera that sees a `Scene`: colours, depths and who is where."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from veca_marl.sim.geometry.pose import Floats, Pose
+from veca_marl.sim.geometry.scene import Scene
+from veca_marl.sim.geometry.tables import Bools
+from veca_marl.sim.geometry.vectors import single
+from veca_marl.sim.vision.raster import Lens
+from veca_marl.sim.vision.views import Drawn, Views, draw_views
+
+
+@dataclass(frozen=True)
+class Camera:
+    """A pinhole camera looking along the x axis of its pose, with the z axis up.
+
+    Attributes:
+        width: Pixels.
+        height: Pixels.
+        fov_deg: Vertical field of view, as in OpenGL and PyBullet; pixels are square.
+        near_m: Nothing nearer is drawn: who presses its face to a wall would see through it.
+        far_m: Nothing farther is drawn.
+
+    Raises:
+        ValueError: If a number is not possible.
+    """
+
+    width: int = 84
+    height: int = 84
+    fov_deg: float = 60.0
+    near_m: float = 0.001
+    far_m: float = 100.0
+    lens: Lens = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        if self.width < 1 or self.height < 1:
+            raise ValueError(f"a camera of {self.width}x{self.height} pixels: want at least 1x1")
+        if not 0.0 < self.fov_deg < 170.0:
+            raise ValueError(f"fov_deg {self.fov_deg}: want degrees between 0 and 170")
+        if not 0.0 < self.near_m < self.far_m < np.inf:
+            raise ValueError(f"near_m {self.near_m}, far_m {self.far_m}: want 0 < near < far")
+        object.__setattr__(self, "lens", self._lens())
+
+    def _lens(self) -> Lens:
+        tan_y = math.tan(math.radians(self.fov_deg) / 2.0)
+        tan_x = tan_y * self.width / self.height
+        columns = ((np.arange(self.width) + 0.5) / self.width * 2.0 - 1.0) * tan_x
+        rows = (1.0 - (np.arange(self.height) + 0.5) / self.height * 2.0) * tan_y
+        return Lens(
+            columns.astype(np.float32),
+            rows.astype(np.float32),
+            single(tan_x),
+            single(tan_y),
+            single(self.near_m),
+            single(self.far_m),
+        )
+
+    @property
+    def degrees_per_pixel(self) -> float:
+        """Angle that one pixel covers at the centre of the picture."""
+        return math.degrees(2.0 * self.lens.tan_y / self.height)
+
+    def project(self, pose: Pose, points: Floats) -> Floats:
+        """Return where world points fall in the picture.
+
+        Args:
+            pose: Of the camera.
+            points: ``(N, 3)`` metres, world frame.
+
+        Returns:
+            ``(N, 3)``: column and row in pixels (0.5 is the middle of the first one) and depth in
+            metres; column and row mean nothing where the depth is not positive.
+        """
+        forward, left, up = ((points - pose.position) @ pose.rotation).T
+        tan_x, tan_y = self.lens.tan_x, self.lens.tan_y
+        column = (1.0 - left / forward / tan_x) * self.width / 2.0
+        row = (1.0 - up / forward / tan_y) * self.height / 2.0
+        return np.stack([column, row, forward], axis=1)
+
+    def render(self, scene: Scene, poses: Sequence[Pose], hidden: Bools | None = None) -> Views:
+        """Return what the camera sees of a scene from some poses, as of `Scene.update`.
+
+        Args:
+            scene: The world.
+            poses: One per view: x axis forward, y left, z up.
+            hidden: ``(S,)`` surfaces to leave out, as from `Scene.hidden`.
+        """
+        views = self._blank(len(poses))
+        axes = np.array([view_axes(pose) for pose in poses])
+        drawn = _drawn(scene, hidden)
+        draw_views(scene.geoms, scene.meshes, scene.surfaces, drawn, axes, self.lens, views)
+        return views
+
+    def _blank(self, count: int) -> Views:
+        """Buffers for so many views."""
+        size = (count, self.height, self.width)
+        return Views(
+            np.empty((*size, 3), np.uint8),
+            np.empty(size, np.float32),
+            np.empty(size, np.int16),
+            np.empty(size, np.int16),
+        )
+
+
+def view_axes(pose: Pose) -> Floats:
+    """Return ``(4, 3)``: position, right, up and forward axes of an eye, as the renderer wants."""
+    forward, left, up = pose.rotation.T
+    axes = np.empty((4, 3))
+    axes[0], axes[1], axes[2], axes[3] = pose.position, -left, up, forward
+    return axes
+
+
+def look_at(position: Floats, target: Floats) -> Pose:
+    """Return the pose of a camera at `position` that looks at `target` with a level horizon.
+
+    Raises:
+        ValueError: If the target is the position, or straight above or below it.
+    """
+    way = np.asarray(target, np.float64) - position
+    left = np.array([-way[1], way[0], 0.0])
+    if not np.linalg.norm(left) > 1e-9:
+        raise ValueError(f"cannot look level from {position} at {target}")
+    forward, left = way / np.linalg.norm(way), left / np.linalg.norm(left)
+    return Pose(
+        np.asarray(position, np.float64), np.stack([forward, left, np.cross(forward, left)], 1)
+    )
+
+
+def seen_fraction(views: Views, object_id: int) -> float:
+    """Return the share of all pixels that show an object, be it through glass or as glass."""
+    return float(np.mean((views.ids == object_id) | (views.glass_ids == object_id)))
+
+
+def _drawn(scene: Scene, hidden: Bools | None) -> Drawn:
+    """Sort out what is drawn and how."""
+    geoms, count = scene.geoms, len(scene.surfaces.objects)
+    shown = np.ones(count, np.bool_) if hidden is None else ~hidden
+    if shown.shape != (count,):
+        raise ValueError(f"hidden has shape {shown.shape}; the scene has {count} surfaces")
+    first = len(geoms.shapes)
+    casting = ~geoms.transparent & shown[:first]
+    glass = geoms.transparent & geoms.visible & shown[:first]
+    return Drawn(casting & geoms.visible, glass, casting, shown[first:])

@@ -1,0 +1,197 @@
+"""Which surface each pixel sees, and how far away: ray casting of primitives in tight rectangles.
+
+For every primitive the screen rectangle that bounds it is walked row by row, and the ray through
+each pixel is intersected with it in closed form, in its own axes. A depth buffer keeps the nearest
+hit and a surface buffer remembers whose it was. The row loops have no branches, so that the
+compiler turns them into vector instructions.
+
+A ray is ``forward + x * right + y * up`` with slopes x and y, so the parameter of a hit is its
+distance along the optical axis. Primitives are seen from outside only; an eye within one sees out.
+Anything else that fills the same two buffers, such as `triangles`, can be drawn before or after: a
+surface is an integer, and only `shading` asks what it stands for.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple, TypeAlias
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from veca_marl.sim.geometry.intersections import box_row, capsule_row, cylinder_row, sphere_row
+from veca_marl.sim.geometry.pose import Floats
+from veca_marl.sim.geometry.primitives import Shape, bounding_radius
+from veca_marl.sim.geometry.tables import Bools, GeomTable
+from veca_marl.sim.geometry.vectors import Vector, single
+from veca_marl.sim.vision.screen_bounds import Interval, box_intervals, disc_interval, rod_interval
+
+Depths: TypeAlias = NDArray[np.float32]
+Surfaces: TypeAlias = NDArray[np.int16]
+Ray: TypeAlias = tuple[Vector, Vector, Vector, Vector]
+Rectangle: TypeAlias = tuple[int, int, int, int]
+
+NOTHING = -1
+
+_SPHERE, _BOX, _CYLINDER = int(Shape.SPHERE), int(Shape.BOX), int(Shape.CYLINDER)
+# a single keeps the loops in single precision, which doubles the width of the vectors
+_HALF = single(0.5)
+
+
+class Lens(NamedTuple):
+    """The numbers of a pinhole camera that the loops need, its scalars in single precision.
+
+    Attributes:
+        columns: ``(W,)`` float32 slope to the right of each column's centre.
+        rows: ``(H,)`` float32 upward slope of each row's centre, upper row first.
+        tan_x: Slope of the right edge of the picture.
+        tan_y: Slope of the upper edge of the picture.
+        near: Metres; nearer surfaces are not drawn.
+        far: Metres; the depth where nothing is seen.
+    """
+
+    columns: NDArray[np.float32]
+    rows: NDArray[np.float32]
+    tan_x: float
+    tan_y: float
+    near: float
+    far: float
+
+
+@njit(cache=True, error_model="numpy")
+def draw_geoms(
+    geoms: GeomTable,
+    drawn: Bools,
+    view: Floats,
+    lens: Lens,
+    bounded: bool,
+    depth: Depths,
+    surfaces: Surfaces,
+) -> None:
+    """Draw primitives into a depth and a surface buffer.
+
+    Args:
+        geoms: The scene's primitives.
+        drawn: ``(G,)`` which of them to draw.
+        view: ``(4, 3)`` world coordinates: position, right, up and forward axes of the eye.
+        lens: The camera's numbers.
+        bounded: Walk the bounding rectangles; false walks the whole picture for each primitive,
+            which is the slow truth that tests compare with.
+        depth: ``(H, W)`` metres along the optical axis, updated where something nearer is hit.
+        surfaces: ``(H, W)`` row of the primitive that is seen, updated likewise.
+    """
+    for g in range(geoms.shapes.shape[0]):
+        if not drawn[g]:
+            continue
+        ray = local_ray(geoms.positions[g], geoms.rotations[g], view)
+        rectangle = (0, lens.columns.shape[0], 0, lens.rows.shape[0])
+        if bounded:
+            rectangle = _rectangle(geoms.shapes[g], geoms.sizes[g], ray, lens)
+        if rectangle[0] < rectangle[1] and rectangle[2] < rectangle[3]:
+            _draw(
+                geoms.shapes[g], geoms.sizes[g], ray, rectangle, lens, np.int16(g), depth, surfaces
+            )
+
+
+@njit(cache=True, error_model="numpy")
+def local_ray(position: Floats, rotation: Floats, view: Floats) -> Ray:
+    """Eye position and right, up and forward axes in a primitive's own axes."""
+    return (
+        into_local(
+            rotation, view[0, 0] - position[0], view[0, 1] - position[1], view[0, 2] - position[2]
+        ),
+        into_local(rotation, view[1, 0], view[1, 1], view[1, 2]),
+        into_local(rotation, view[2, 0], view[2, 1], view[2, 2]),
+        into_local(rotation, view[3, 0], view[3, 1], view[3, 2]),
+    )
+
+
+@njit(cache=True, error_model="numpy")
+def into_local(rotation: Floats, x: float, y: float, z: float) -> Vector:
+    """World vector to local axes, in single precision from here on."""
+    return (
+        single(rotation[0, 0] * x + rotation[1, 0] * y + rotation[2, 0] * z),
+        single(rotation[0, 1] * x + rotation[1, 1] * y + rotation[2, 1] * z),
+        single(rotation[0, 2] * x + rotation[1, 2] * y + rotation[2, 2] * z),
+    )
+
+
+@njit(cache=True, error_model="numpy")
+def _rectangle(shape: int, size: NDArray[np.float32], ray: Ray, lens: Lens) -> Rectangle:
+    """Pixels (first column, last + 1, first row, last + 1) that a primitive may cover."""
+    eye, right, up, forward = ray
+    centre = (
+        -(eye[0] * right[0] + eye[1] * right[1] + eye[2] * right[2]),
+        -(eye[0] * up[0] + eye[1] * up[1] + eye[2] * up[2]),
+        -(eye[0] * forward[0] + eye[1] * forward[1] + eye[2] * forward[2]),
+    )
+    tan_x, tan_y, near = lens.tan_x, lens.tan_y, lens.near
+    reach = bounding_radius(shape, size)
+    if centre[2] + reach < near or centre[2] - reach > lens.far:
+        return 0, 0, 0, 0
+    if shape == _BOX:
+        half = (size[0], size[1], size[2])
+        across, upward = box_intervals(centre, half, right, up, forward, near)
+    elif shape == _SPHERE:
+        across = disc_interval(centre[0], centre[2], size[0], tan_x)
+        upward = disc_interval(centre[1], centre[2], size[0], tan_y)
+    else:
+        half_length = _HALF * size[1]
+        across = rod_interval(
+            centre[0], centre[2], right[2], forward[2], half_length, size[0], tan_x
+        )
+        upward = rod_interval(centre[1], centre[2], up[2], forward[2], half_length, size[0], tan_y)
+    return pixel_rectangle(across, upward, lens)
+
+
+@njit(cache=True, error_model="numpy")
+def pixel_rectangle(across: Interval, upward: Interval, lens: Lens) -> Rectangle:
+    """Pixels whose centres may lie between some slopes; empty if they are outside the picture."""
+    left, right = max(across[0], -lens.tan_x), min(across[1], lens.tan_x)
+    bottom, top = max(upward[0], -lens.tan_y), min(upward[1], lens.tan_y)
+    if left >= right or bottom >= top:
+        return 0, 0, 0, 0
+    width, height = lens.columns.shape[0], lens.rows.shape[0]
+    per_x, per_y = width / (2.0 * lens.tan_x), height / (2.0 * lens.tan_y)
+    # a pixel of margin absorbs the rounding
+    return (
+        max(math.floor((left + lens.tan_x) * per_x - 1.0), 0),
+        min(math.ceil((right + lens.tan_x) * per_x + 1.0), width),
+        max(math.floor((lens.tan_y - top) * per_y - 1.0), 0),
+        min(math.ceil((lens.tan_y - bottom) * per_y + 1.0), height),
+    )
+
+
+@njit(cache=True, error_model="numpy")
+def _draw(
+    shape: int,
+    size: NDArray[np.float32],
+    ray: Ray,
+    rectangle: Rectangle,
+    lens: Lens,
+    surface: np.int16,
+    depth: Depths,
+    surfaces: Surfaces,
+) -> None:
+    """Intersect the rays of a rectangle with one primitive."""
+    eye, right, up, forward = ray
+    first, end, top, bottom = rectangle
+    columns, near = lens.columns[first:end], lens.near
+    for j in range(top, bottom):
+        y = lens.rows[j]
+        start = (forward[0] + y * up[0], forward[1] + y * up[1], forward[2] + y * up[2])
+        row, names = depth[j, first:end], surfaces[j, first:end]
+        if shape == _SPHERE:
+            sphere_row(size[0], eye, start, right, columns, near, surface, row, names)
+        elif shape == _BOX:
+            half = (size[0], size[1], size[2])
+            box_row(half, eye, start, right, columns, near, surface, row, names)
+        elif shape == _CYLINDER:
+            half_length = _HALF * size[1]
+            cylinder_row(
+                size[0], half_length, eye, start, right, columns, near, surface, row, names
+            )
+        else:
+            half_length = _HALF * size[1]
+            capsule_row(size[0], half_length, eye, start, right, columns, near, surface, row, names)

@@ -1,0 +1,234 @@
+"""Triangles into the same depth and surface buffers as primitives, and their light.
+
+Edge functions in homogeneous coordinates (Olano & Greer 1997, "Triangle scan conversion using 2D
+homogeneous coordinates"): with the corners a, b, c as seen from the eye, the ray of slopes (x, y)
+meets the triangle where ``(b x c).(x, y, 1)`` and its two cousins are not negative, at the depth
+``det(a, b, c)`` over their sum. Nothing has to be clipped, and neighbours leave no gap: for their
+common edge they compute the same number with opposite signs.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from veca_marl.sim.geometry.meshes import Indices, MeshTable
+from veca_marl.sim.geometry.pose import Floats
+from veca_marl.sim.geometry.tables import Bools
+from veca_marl.sim.geometry.vectors import Vector, single
+from veca_marl.sim.vision.raster import Depths, Lens, Rectangle, Surfaces
+from veca_marl.sim.vision.screen_bounds import Interval
+from veca_marl.sim.vision.shading import AMBIENT, BOUNCE, SUN
+
+_MARGIN_PX = 0.01  # absorbs the rounding of slopes in single precision
+
+
+@njit(cache=True, error_model="numpy")
+def to_eye(vertices: Floats, view: Floats, seen: Floats) -> None:
+    """Write where ``(V, 3)`` vertices are for an eye: metres right, up and forward.
+
+    Args:
+        vertices: World frame, metres.
+        view: ``(4, 3)`` position, right, up and forward axes of the eye in the world.
+        seen: ``(V, 3)``, written.
+    """
+    for v in range(vertices.shape[0]):
+        x = vertices[v, 0] - view[0, 0]
+        y = vertices[v, 1] - view[0, 1]
+        z = vertices[v, 2] - view[0, 2]
+        for axis in range(3):
+            seen[v, axis] = view[axis + 1, 0] * x + view[axis + 1, 1] * y + view[axis + 1, 2] * z
+
+
+@njit(cache=True, error_model="numpy")
+def draw_triangles(
+    triangles: Indices,
+    seen: Floats,
+    drawn: Bools,
+    lens: Lens,
+    first_surface: int,
+    depth: Depths,
+    surfaces: Surfaces,
+) -> None:
+    """Draw triangles that face the eye into a depth and a surface buffer.
+
+    Args:
+        triangles: ``(T, 3)`` vertices, counter-clockwise from outside.
+        seen: ``(V, 3)`` vertices as from `to_eye`.
+        drawn: ``(T,)`` which of them to draw.
+        lens: The camera's numbers.
+        first_surface: What the first triangle is called in `surfaces`; the next one more.
+        depth: ``(H, W)`` metres along the optical axis, updated where something nearer is hit.
+        surfaces: ``(H, W)``, updated likewise.
+    """
+    for t in range(triangles.shape[0]):
+        if not drawn[t]:
+            continue
+        a, b, c = _at(seen, triangles[t, 0]), _at(seen, triangles[t, 1]), _at(seen, triangles[t, 2])
+        farthest = max(a[2], b[2], c[2])
+        nearest = min(a[2], b[2], c[2])
+        if farthest <= lens.near or nearest > lens.far:
+            continue
+        over_a = _cross(b, c)
+        volume = a[0] * over_a[0] + a[1] * over_a[1] + a[2] * over_a[2]
+        if volume <= 0.0:  # its back
+            continue
+        rectangle = _rectangle(a, b, c, nearest, lens)
+        if rectangle[0] < rectangle[1] and rectangle[2] < rectangle[3]:
+            edges = (over_a, _cross(c, a), _cross(a, b))
+            name = np.int16(first_surface + t)
+            _fill(edges, volume, rectangle, lens, name, depth, surfaces)
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def _at(seen: Floats, vertex: int) -> Vector:
+    return seen[vertex, 0], seen[vertex, 1], seen[vertex, 2]
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def _cross(a: Vector, b: Vector) -> Vector:
+    return (
+        a[1] * b[2] - a[2] * b[1],
+        a[2] * b[0] - a[0] * b[2],
+        a[0] * b[1] - a[1] * b[0],
+    )
+
+
+@njit(cache=True, error_model="numpy")
+def _rectangle(a: Vector, b: Vector, c: Vector, nearest: float, lens: Lens) -> Rectangle:
+    """Pixels that a triangle may cover."""
+    if nearest <= lens.near:
+        return _cut_rectangle(a, b, c, lens)
+    xa, xb, xc = a[0] / a[2], b[0] / b[2], c[0] / c[2]
+    ya, yb, yc = a[1] / a[2], b[1] / b[2], c[1] / c[2]
+    across = (min(xa, xb, xc), max(xa, xb, xc))
+    upward = (min(ya, yb, yc), max(ya, yb, yc))
+    return _centres_between(across, upward, lens)
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def _centres_between(across: Interval, upward: Interval, lens: Lens) -> Rectangle:
+    """Pixels whose centres lie between some slopes: none for most triangles of a far body.
+
+    As `pixel_rectangle`, but triangles are many and small, so that a wide margin would cost more
+    than they do.
+    """
+    left, right = max(across[0], -lens.tan_x), min(across[1], lens.tan_x)
+    bottom, top = max(upward[0], -lens.tan_y), min(upward[1], lens.tan_y)
+    if left >= right or bottom >= top:
+        return 0, 0, 0, 0
+    width, height = lens.columns.shape[0], lens.rows.shape[0]
+    per_x, per_y = width / (2.0 * lens.tan_x), height / (2.0 * lens.tan_y)
+    reach = 0.5 + _MARGIN_PX
+    return (
+        max(math.ceil((left + lens.tan_x) * per_x - reach), 0),
+        min(math.floor((right + lens.tan_x) * per_x + reach), width),
+        max(math.ceil((lens.tan_y - top) * per_y - reach), 0),
+        min(math.floor((lens.tan_y - bottom) * per_y + reach), height),
+    )
+
+
+@njit(cache=True, error_model="numpy")
+def _cut_rectangle(a: Vector, b: Vector, c: Vector, lens: Lens) -> Rectangle:
+    """Pixels that a triangle which reaches behind the near plane may cover: most often none.
+
+    The limbs of the eye's own body are such triangles.
+    """
+    low_x, high_x, low_y, high_y = np.inf, -np.inf, np.inf, -np.inf
+    near = lens.near
+    for side in range(3):
+        start = a if side == 0 else (b if side == 1 else c)
+        end = b if side == 0 else (c if side == 1 else a)
+        if start[2] > near:
+            x, y = start[0] / start[2], start[1] / start[2]
+            low_x, high_x = min(low_x, x), max(high_x, x)
+            low_y, high_y = min(low_y, y), max(high_y, y)
+        if (start[2] > near) != (end[2] > near):
+            cut = (near - start[2]) / (end[2] - start[2])
+            x = (start[0] + cut * (end[0] - start[0])) / near
+            y = (start[1] + cut * (end[1] - start[1])) / near
+            low_x, high_x = min(low_x, x), max(high_x, x)
+            low_y, high_y = min(low_y, y), max(high_y, y)
+    return _centres_between((low_x, high_x), (low_y, high_y), lens)
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def _fill(
+    edges: tuple[Vector, Vector, Vector],
+    volume: float,
+    rectangle: Rectangle,
+    lens: Lens,
+    name: np.int16,
+    depth: Depths,
+    surfaces: Surfaces,
+) -> None:
+    """Meet the rays of a rectangle with one triangle."""
+    (ax, ay, az), (bx, by, bz), (cx, cy, cz) = edges
+    first, end, top, bottom = rectangle
+    for j in range(top, bottom):
+        y = lens.rows[j]
+        a, b, c = ay * y + az, by * y + bz, cy * y + cz
+        for i in range(first, end):
+            x = lens.columns[i]
+            u, v, w = a + ax * x, b + bx * x, c + cx * x
+            if u < 0.0 or v < 0.0 or w < 0.0:
+                continue
+            total = u + v + w
+            if volume > lens.near * total and volume < depth[j, i] * total:
+                depth[j, i] = volume / total
+                surfaces[j, i] = name
+
+
+@njit(cache=True, error_model="numpy")
+def illuminate_triangles(
+    meshes: MeshTable,
+    seen: Floats,
+    lens: Lens,
+    first_surface: int,
+    surfaces: Surfaces,
+    lights: NDArray[np.float32],
+) -> None:
+    """Find how bright each pixel of a skin is, as `illuminate` does for primitives.
+
+    The normal is interpolated between those of the corners (Phong 1975, "Illumination for computer
+    generated pictures"), which makes a coarse mesh look round.
+
+    Args:
+        meshes: The scene's skins.
+        seen: ``(V, 3)`` vertices as from `to_eye`.
+        lens: The camera's numbers.
+        first_surface: As in `draw_triangles`.
+        surfaces: ``(H, W)`` what is seen.
+        lights: ``(H, W)``, written where a triangle is seen.
+    """
+    for j in range(surfaces.shape[0]):
+        for i in range(surfaces.shape[1]):
+            t = surfaces[j, i] - first_surface
+            if t >= 0:
+                lights[j, i] = _light(meshes, seen, t, lens.columns[i], lens.rows[j])
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def _light(meshes: MeshTable, seen: Floats, t: int, x: float, y: float) -> float:
+    """Brightness of a triangle where the ray of slopes (x, y) meets it."""
+    i, j, k = meshes.triangles[t, 0], meshes.triangles[t, 1], meshes.triangles[t, 2]
+    a, b, c = _at(seen, i), _at(seen, j), _at(seen, k)
+    u, v, w = _edge(b, c, x, y), _edge(c, a, x, y), _edge(a, b, x, y)
+    squared, facing = 0.0, 0.0
+    for axis in range(3):
+        normal = (
+            u * meshes.normals[i, axis] + v * meshes.normals[j, axis] + w * meshes.normals[k, axis]
+        )
+        squared += normal * normal
+        facing += normal * SUN[axis]
+    facing /= max(math.sqrt(squared), 1e-30)
+    return single(AMBIENT + (1.0 - AMBIENT) * max(facing, 0.0) + BOUNCE * max(-facing, 0.0))
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def _edge(a: Vector, b: Vector, x: float, y: float) -> float:
+    normal = _cross(a, b)
+    return normal[0] * x + normal[1] * y + normal[2]
