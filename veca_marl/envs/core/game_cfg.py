@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-import veca_marl.envs.tasks  # noqa: F401  registers the tasks
 from veca_marl.envs.core.task import TaskCfg, Team, find_task
 from veca_marl.envs.core.team import Script, TeamCfg
 from veca_marl.sim.body.base import BodyCfg
