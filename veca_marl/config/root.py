@@ -22,6 +22,7 @@ from veca_marl.algos.ppo.learner import PPOCfg
 from veca_marl.algos.selfplay.self_play import SelfPlayCfg
 from veca_marl.algos.training.collect import CollectCfg
 from veca_marl.algos.training.evaluation import EvalCfg
+from veca_marl.config.conf_dir import conf_dir
 from veca_marl.config.errors import ConfigError, one_line
 from veca_marl.envs.core.game_cfg import GameCfg
 from veca_marl.envs.core.task import TASKS, TaskCfg, find_task
@@ -33,7 +34,7 @@ from veca_marl.sim.physics.playground import PlaygroundCfg
 from veca_marl.sim.physics.world import ClockCfg
 from veca_marl.sim.senses import SensesCfg
 
-CONF = Path(__file__).parents[1] / "conf"
+CONF = conf_dir()
 
 
 @dataclass

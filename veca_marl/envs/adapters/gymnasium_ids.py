@@ -9,7 +9,9 @@ from pathlib import Path
 
 import gymnasium
 
-TASKS = Path(__file__).parents[2] / "conf" / "task"
+_PACKAGE = Path(__file__).parents[2]
+_CONF = _PACKAGE / "conf" if (_PACKAGE / "conf").is_dir() else _PACKAGE.parent / "conf"
+TASKS = _CONF / "task"
 
 
 def register_ids() -> None:
