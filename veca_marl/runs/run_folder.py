@@ -14,8 +14,8 @@ from typing import cast
 
 from omegaconf import DictConfig, OmegaConf
 
-from veca_marl.config.root import compose_node
 from veca_marl.config.errors import ConfigError
+from veca_marl.config.root import compose_node
 
 _PACKAGES = ("veca_marl", "torch", "torchrl", "tensordict", "pybullet", "numpy", "numba")
 
