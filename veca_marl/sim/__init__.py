@@ -1,7 +1,7 @@
-"""The simulator: numpy, PyBullet and numba. It knows neither torch nor Hydra nor Gymnasium."""
+"""The simulator: numpy, PyBullet and numba. It depends neither on torch nor Hydra nor Gymnasium."""
 
 from pathlib import Path
 
-from veca_marl.sim.stale_kernels import forget_stale_kernels
+from veca_marl.sim.kernel_cache import configure_kernel_cache
 
-forget_stale_kernels(Path(__file__).parent)
+configure_kernel_cache(Path(__file__).parent)

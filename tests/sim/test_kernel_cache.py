@@ -1,0 +1,129 @@
+"""Compiled kernels are cached outside the package, in a folder that belongs to its sources."""
+
+import os
+import shutil
+import subprocess
+import sys
+from concurrent.futures import ThreadPoolExecutor
+
+import numba
+import pytest
+
+from veca_marl.sim import kernel_cache
+from veca_marl.sim.kernel_cache import KEPT_FOLDERS, configure_kernel_cache, source_digest
+
+SOURCES = {
+    "__init__.py": (
+        "from pathlib import Path\n"
+        "from tiny.kernel_cache import configure_kernel_cache\n"
+        "configure_kernel_cache(Path(__file__).parent)\n"
+    ),
+    "called.py": "from numba import njit\n@njit(cache=True)\ndef called():\n    return {value}\n",
+    "caller.py": (
+        "from numba import njit\nfrom tiny.called import called\n"
+        "@njit(cache=True)\ndef caller():\n    return called()\n"
+    ),
+}
+PROGRAM = (
+    "from tiny.caller import caller; print(caller(), sum(caller.stats.cache_hits.values()), "
+    "sum(caller.stats.cache_misses.values()))"
+)
+
+
+class TinyPackage:
+    """A package with two kernels, one of which calls the other, in a folder that is read-only."""
+
+    def __init__(self, root):
+        self.root, self.folder, self.cache = root, root / "installed" / "tiny", root / "cache"
+        self.folder.mkdir(parents=True)
+        shutil.copy(kernel_cache.__file__, self.folder)
+        self.write("__init__.py")
+        self.write("caller.py")
+        self.write("called.py", value=1)
+
+    def write(self, name, **values):
+        self.folder.chmod(0o755)
+        (self.folder / name).write_text(SOURCES[name].format(**values))
+        self.folder.chmod(0o555)
+
+    def call(self, **environment):
+        """Return the value, the hits and the misses of the cache of one call in a new process."""
+        folders = {"XDG_CACHE_HOME": str(self.cache), "TMPDIR": str(self.root)}
+        done = subprocess.run(
+            [sys.executable, "-B", "-c", PROGRAM],
+            cwd=self.root,
+            env=os.environ
+            | {"PYTHONPATH": str(self.folder.parent), "NUMBA_CACHE_DIR": ""}
+            | folders
+            | environment,
+            capture_output=True,
+            text=True,
+        )
+        assert done.returncode == 0, done.stderr
+        self.messages = done.stderr
+        return tuple(map(int, done.stdout.split()))
+
+    def files(self):
+        return sorted(path.name for path in self.folder.rglob("*"))
+
+
+@pytest.fixture
+def tiny(tmp_path):
+    return TinyPackage(tmp_path)
+
+
+def test_a_read_only_package_is_cached_elsewhere_and_not_written_to(tiny):
+    before = tiny.files()
+    assert tiny.call() == (1, 0, 1)
+    assert tiny.call() == (1, 1, 0)
+    assert tiny.files() == before
+    assert list((tiny.cache / "veca_marl" / "kernels").rglob("caller.caller*.nbc"))
+
+
+def test_an_edit_of_a_called_function_in_another_file_is_noticed(tiny):
+    assert tiny.call() == (1, 0, 1)
+    tiny.write("called.py", value=2)
+    assert tiny.call() == (2, 0, 1)
+    tiny.write("called.py", value=1)
+    assert tiny.call() == (1, 1, 0), "the kernels of the earlier sources are kept"
+
+
+def test_processes_that_start_at_the_same_time_share_the_folder(tiny):
+    with ThreadPoolExecutor() as pool:
+        values = [value for value, *_ in pool.map(lambda _: tiny.call(), range(2))]
+    assert values == [1, 1]
+    assert tiny.call() == (1, 1, 0)
+
+
+def test_a_directory_that_the_user_has_chosen_is_used_as_it_is(tiny, tmp_path):
+    assert tiny.call(NUMBA_CACHE_DIR=str(tmp_path / "chosen")) == (1, 0, 1)
+    assert list((tmp_path / "chosen").rglob("caller.caller*.nbc"))
+    assert not tiny.cache.exists()
+
+
+def test_without_a_writable_cache_directory_a_temporary_one_is_used_and_named(tiny):
+    tiny.cache.write_text("a file where the folder should be")
+    assert tiny.call() == (1, 0, 1)
+    assert "compiled kernels are cached in" in tiny.messages
+
+
+def test_only_the_folders_used_last_are_kept(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    parent = tmp_path / "veca_marl" / "kernels"
+    for age in range(2 * KEPT_FOLDERS):
+        (parent / f"old {age}").mkdir(parents=True)
+        os.utime(parent / f"old {age}", (1e9 - age, 1e9 - age))
+    monkeypatch.setattr(numba.config, "CACHE_DIR", "")
+    configure_kernel_cache(tmp_path)
+    kept = {folder.name for folder in parent.iterdir()}
+    assert kept == {source_digest(tmp_path), *(f"old {age}" for age in range(KEPT_FOLDERS - 1))}
+
+
+def test_the_digest_depends_on_names_and_contents(tmp_path):
+    digests = {source_digest(tmp_path)}
+    for name, text in [("a.py", "x"), ("b.py", ""), ("a.py", "xx"), ("b.py", "y")]:
+        (tmp_path / name).write_text(text)
+        digests.add(source_digest(tmp_path))
+    assert len(digests) == 5
+    (tmp_path / "notes.txt").touch()
+    assert source_digest(tmp_path) in digests
