@@ -5,13 +5,11 @@ import logging
 import pytest
 import torch
 from fake_env import FakeEnv
+from training import SMALL
 
-from veca_marl.algos.networks.actor_critic import NetworkCfg
 from veca_marl.algos.ppo.learner import PPOCfg
 from veca_marl.algos.ppo.ppo import PPO
 from veca_marl.algos.specs import team_specs
-
-SMALL = NetworkCfg(channels=[4, 8, 8], vector_features=16, trunk_features=32)
 
 
 @pytest.fixture(autouse=True, scope="session")

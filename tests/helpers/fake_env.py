@@ -1,8 +1,11 @@
 """A toy with the keys of VecaEnv: each world shows one of two states; act with its sign.
 
-The state is seen (a dark or bright image) and heard (a low or high spectrum). One step pays 1 for
-the right sign and -1 for the wrong one; the state is drawn anew after every step. A policy that
-looks or listens earns `horizon`, one that does not earns 0 on average.
+The state is visible (a dark or bright image) and audible (a low or high spectrum). The reward is 1
+for the right sign and -1 for the wrong one; a new state is drawn after every step. The return of a
+policy that uses an observation is `horizon`, that of any other 0 on average.
+
+`hybrid` gives the action two parts, a vector `move` and a choice `voice`; the reward is the mean
+over both.
 """
 
 import numpy as np
@@ -22,12 +25,14 @@ class FakeEnv(EnvBase):
         horizon=8,
         agents=1,
         discrete=False,
+        hybrid=False,
         senses=SENSES,
         teams=("agents",),
         image=16,
     ):
         super().__init__(batch_size=torch.Size([worlds]))
-        self.horizon, self.discrete, self.senses, self.image = horizon, discrete, senses, image
+        self.horizon, self.senses, self.image = horizon, senses, image
+        self.discrete, self.hybrid = discrete, hybrid
         self.group_map = {t: [f"{t}_{i}" for i in range(agents)] for t in teams}
         self.agents = agents
         lead = (worlds, agents)
@@ -36,11 +41,11 @@ class FakeEnv(EnvBase):
             "audio": Bounded(-8.0, 3.0, shape=(*lead, 2, 10), dtype=torch.float32),
         }
         observation = Composite({s: leaves[s] for s in senses}, shape=lead)
-        action = (
-            Categorical(2, shape=lead)
-            if discrete
-            else Bounded(-1.0, 1.0, shape=(*lead, 2), dtype=torch.float32)
-        )
+        choice = Categorical(2, shape=lead)
+        vector = Bounded(-1.0, 1.0, shape=(*lead, 2), dtype=torch.float32)
+        action = choice if discrete else vector
+        if hybrid:
+            action = Composite({"move": vector, "voice": choice}, shape=lead)
 
         def per_team(leaf):
             return Composite({t: Composite(leaf, shape=lead) for t in teams}, shape=(worlds,))
@@ -52,7 +57,6 @@ class FakeEnv(EnvBase):
             }
 
         self.observation_spec = per_team({"observation": observation})
-        self.observation_spec["agents" if "agents" in teams else teams[0]]  # fails early if absent
         for t in teams:
             self.observation_spec[t, "terms"] = Composite(
                 {"right": Unbounded(shape=(*lead, 1))}, shape=lead
@@ -99,13 +103,17 @@ class FakeEnv(EnvBase):
         zero = torch.zeros(self.batch_size[0], self.agents, 1)
         return TensorDict({t: self._team(zero) for t in self.group_map}, self.batch_size)
 
+    def _sign(self, action):
+        """Return the sign that was answered; with two parts the mean of theirs."""
+        if self.hybrid:
+            return (action["move"][..., 0].sign() + action["voice"] * 2.0 - 1.0) / 2.0
+        return action * 2.0 - 1.0 if self.discrete else action[..., 0].sign()
+
     def _step(self, td):
         wanted = torch.from_numpy(self.state * 2.0 - 1.0)
         rights = {}
         for t in self.group_map:
-            action = td[t, "action"]
-            given = action * 2.0 - 1.0 if self.discrete else action[..., 0].sign()
-            rights[t] = (given * wanted).float().unsqueeze(-1)
+            rights[t] = (self._sign(td[t, "action"]) * wanted).float().unsqueeze(-1)
         self.clock += 1
         for i in range(self.batch_size[0]):
             self._draw(i)

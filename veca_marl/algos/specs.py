@@ -1,4 +1,4 @@
-"""What an algorithm may know of an environment: the arrays of each team, nothing else."""
+"""What an algorithm may know of an environment: shapes, types and bounds of each team's arrays."""
 
 from __future__ import annotations
 
@@ -7,12 +7,15 @@ from dataclasses import asdict, dataclass
 from typing import Any, Protocol
 
 import torch
-from torchrl.data import Bounded, Categorical, TensorSpec
+from torchrl.data import Bounded, Categorical, Composite, TensorSpec
 from torchrl.envs import EnvBase
+
+# the part of an action that has no name: its key is (team, "action") itself
+PLAIN = "action"
 
 
 class EnvFactory(Protocol):
-    """Makes environments; the only door through which an algorithm reaches a simulator."""
+    """Makes environments: the only access of an algorithm to a simulator."""
 
     def __call__(self, worlds: int, seed: int) -> EnvBase:
         """Return an environment of ``batch_size=[worlds]``, seeded."""
@@ -26,8 +29,8 @@ class ArrayLayout:
     Attributes:
         shape: Shape without batch and agent dimensions.
         dtype: Name of the torch type, such as ``uint8``.
-        low: Least possible value, ``-inf`` if unbounded.
-        high: Greatest possible value, ``inf`` if unbounded.
+        low: Lower bound of all entries, ``-inf`` if unbounded.
+        high: Upper bound of all entries, ``inf`` if unbounded.
     """
 
     shape: tuple[int, ...]
@@ -38,31 +41,37 @@ class ArrayLayout:
 
 @dataclass(frozen=True)
 class ActionLayout:
-    """The action of one agent.
+    """One part of the action of one agent.
 
     Attributes:
-        discrete: Whether one of `size` choices is taken, or `size` numbers in [-1, 1] are given.
-        size: Number of choices or of numbers.
+        discrete: True for one of `size` choices, False for a vector of `size` numbers in [-1, 1].
+        size: Number of choices, or length of the vector.
     """
 
     discrete: bool
     size: int
 
+    @property
+    def parameters(self) -> int:
+        """Parameters of its distribution: logits, or means and scales."""
+        return self.size if self.discrete else 2 * self.size
+
 
 @dataclass(frozen=True)
 class TeamSpec:
-    """The arrays of one team, whose agents share them (and a policy).
+    """The arrays of one team; all its agents have the same ones.
 
     Attributes:
         agents: Number of agents.
-        observations: Sense name to its layout.
-        action: The action's layout.
-        masked: Whether ``(team, "mask")`` says which agents still take part.
+        observations: Sense name to layout.
+        actions: Part of the action to layout. An action without named parts has the single part
+            `PLAIN`.
+        masked: Whether ``(team, "mask")`` marks the agents that are not eliminated.
     """
 
     agents: int
     observations: dict[str, ArrayLayout]
-    action: ActionLayout
+    actions: dict[str, ActionLayout]
     masked: bool = False
 
     def to_dict(self) -> dict[str, Any]:
@@ -73,11 +82,16 @@ class TeamSpec:
         return plain
 
 
+def action_key(team: str, part: str) -> tuple[str, ...]:
+    """Return the TensorDict key of one part of a team's action."""
+    return (team, "action") if part == PLAIN else (team, "action", part)
+
+
 def team_specs(env: EnvBase) -> dict[str, TeamSpec]:
     """Read the layout of each team of `env` from its specs and its ``group_map``.
 
     Raises:
-        ValueError: If an action is neither a bounded vector in [-1, 1] nor one choice.
+        ValueError: If a part of an action is neither a vector in [-1, 1] nor one of n choices.
     """
     batch_dims = len(env.batch_size)
     return {
@@ -87,7 +101,7 @@ def team_specs(env: EnvBase) -> dict[str, TeamSpec]:
                 name: _array_layout(spec, batch_dims + 1)
                 for name, spec in sorted(env.observation_spec[team, "observation"].items())
             },
-            action=_action_layout(team, env.full_action_spec[team, "action"]),
+            actions=_action_layouts(team, env.full_action_spec[team, "action"]),
             masked="mask" in env.observation_spec[team].keys(),  # noqa: SIM118  a spec
         )
         for team, agents in env.group_map.items()
@@ -103,7 +117,16 @@ def _array_layout(spec: TensorSpec, leading: int) -> ArrayLayout:
     )
 
 
-def _action_layout(team: str, spec: TensorSpec) -> ActionLayout:
+def _action_layouts(team: str, spec: TensorSpec) -> dict[str, ActionLayout]:
+    if not isinstance(spec, Composite):
+        return {PLAIN: _action_layout(f"team {team!r}", spec)}
+    return {
+        name: _action_layout(f"team {team!r}, part {name!r} of the action", part)
+        for name, part in sorted(spec.items())
+    }
+
+
+def _action_layout(owner: str, spec: TensorSpec) -> ActionLayout:
     if isinstance(spec, Categorical):
         return ActionLayout(discrete=True, size=int(spec.space.n))
     if isinstance(spec, Bounded) and spec.dtype.is_floating_point:
@@ -111,6 +134,6 @@ def _action_layout(team: str, spec: TensorSpec) -> ActionLayout:
         if bool((spec.space.low == -unit).all()) and bool((spec.space.high == unit).all()):
             return ActionLayout(discrete=False, size=int(spec.shape[-1]))
     raise ValueError(
-        f"team {team!r}: cannot learn the action {spec}; "
+        f"{owner}: cannot learn {spec}; "
         "choices: Bounded in [-1, 1] (continuous), Categorical (discrete)"
     )

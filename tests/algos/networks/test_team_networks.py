@@ -2,10 +2,10 @@
 
 import pytest
 import torch
-from conftest import SMALL
 from fake_env import FakeEnv
 from torch.distributions import kl_divergence
 from torchrl.envs import ExplorationType, set_exploration_type
+from training import SMALL
 
 from veca_marl.algos.networks.actor_critic import Critic, NetworkCfg, Parameters
 from veca_marl.algos.ppo.learner import PPOCfg

@@ -3,7 +3,7 @@
 import pytest
 import torch
 from fake_env import make_fake_env
-from test_loop import FRAMES, Interrupt, read
+from training import FRAMES, Interrupt, read
 
 from veca_marl.algos.selfplay.self_play import Pool, SelfPlay, SelfPlayCfg
 from veca_marl.algos.specs import team_specs

@@ -65,7 +65,10 @@ def test_another_task_is_refused_naming_both(checkpoints, identity):
             r"vision\.shape: \[2, 3, 16, 16\] in the checkpoint, \[2, 3, 20, 20\] here",
         ),
         ({"senses": ("audio",)}, r"agents\.observations\.vision: .* absent here"),
-        ({"discrete": True}, r"agents\.action\.discrete: False in the checkpoint, True here"),
+        (
+            {"discrete": True},
+            r"agents\.actions\.action\.discrete: False in the checkpoint, True here",
+        ),
         ({"agents": 2}, r"agents\.agents: 1 in the checkpoint, 2 here"),
         ({"teams": ("red",)}, r"agents: .* absent here; red: absent in the checkpoint"),
     ],

@@ -1,8 +1,7 @@
-import csv
-
 import pytest
 import torch
 from fake_env import make_fake_env
+from training import FRAMES, Interrupt, read
 
 from veca_marl.algos.specs import team_specs
 from veca_marl.algos.training.checkpoint import Checkpoints, Identity
@@ -10,22 +9,6 @@ from veca_marl.algos.training.collect import CollectCfg
 from veca_marl.algos.training.evaluation import EvalCfg
 from veca_marl.algos.training.loop import Budget, Trainer
 from veca_marl.algos.training.metrics import CsvReporter
-
-FRAMES = 64  # of a batch
-
-
-class Interrupt:
-    """A reporter that is Ctrl-C: it stops the run in the middle of a stage."""
-
-    def __init__(self, frames):
-        self.frames = frames
-
-    def write(self, kind, frames, row):
-        if kind == "metrics" and frames == self.frames:
-            raise KeyboardInterrupt
-
-    def close(self):
-        pass
 
 
 @pytest.fixture
@@ -51,14 +34,6 @@ def make_trainer(tmp_path, make_ppo):
 
 def parameters(trainer):
     return torch.cat([p.flatten() for p in trainer.algorithm.policy.parameters()])
-
-
-def read(path):
-    """Return the rows of a CSV file without what the clock decides."""
-    with path.open() as file:
-        return [
-            {k: v for k, v in row.items() if k != "frames_per_s"} for row in csv.DictReader(file)
-        ]
 
 
 @pytest.mark.parametrize("processes", [0, 2], ids=["in_process", "two_processes"])

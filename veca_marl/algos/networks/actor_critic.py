@@ -8,17 +8,11 @@ from dataclasses import dataclass, field
 from enum import Enum
 
 import torch
-from tensordict.nn import (
-    NormalParamExtractor,
-    ProbabilisticTensorDictModule,
-    ProbabilisticTensorDictSequential,
-    TensorDictModule,
-)
+from tensordict.nn import ProbabilisticTensorDictSequential, TensorDictModule
 from torch import Tensor, nn
-from torch.distributions import Categorical
-from torchrl.modules import TanhNormal
 
 from veca_marl.algos.networks.encoders import Pooling, make_encoder, orthogonal
+from veca_marl.algos.networks.policy_heads import action_distribution, policy_head
 from veca_marl.algos.specs import ArrayLayout, TeamSpec
 
 
@@ -176,9 +170,19 @@ class TeamNetwork(nn.Module):
             in_keys=[(team, "observation", name) for name in spec.observations],
             out_keys=[(team, "features")],
         )
-        head, distribution = _policy_head(team, spec, cfg)
-        self.actor = ProbabilisticTensorDictSequential(self.trunk, head, distribution)
-        self.distribution_keys = list(head.out_keys)
+        heads = [
+            policy_head(
+                team,
+                part,
+                layout,
+                _of_the_agents(_linear(cfg.trunk_features, layout.parameters), spec, cfg),
+            )
+            for part, layout in spec.actions.items()
+        ]
+        self.actor = ProbabilisticTensorDictSequential(
+            self.trunk, *heads, action_distribution(team, spec.actions)
+        )
+        self.distribution_keys = [key for head in heads for key in head.out_keys]
         self.critic = TensorDictModule(
             _value_head(spec, cfg),
             in_keys=[(team, "features")],
@@ -195,6 +199,11 @@ def _of_the_agents(
     return PerAgent(make, spec.agents, ranks)
 
 
+def _linear(features: int, outputs: int) -> Callable[[], nn.Module]:
+    # a small gain: the first policy is nearly the same everywhere (Huang et al. 2022, detail 2)
+    return lambda: orthogonal(nn.Linear(features, outputs), gain=0.01)
+
+
 def _value_head(spec: TeamSpec, cfg: NetworkCfg) -> nn.Module:
     """Return what turns features ``(..., agents, F)`` into values ``(..., agents, 1)``."""
     width = cfg.trunk_features
@@ -209,30 +218,3 @@ def _value_head(spec: TeamSpec, cfg: NetworkCfg) -> nn.Module:
         )
 
     return nn.Sequential(WithTeam(), _of_the_agents(judge, spec, cfg))
-
-
-def _policy_head(
-    team: str, spec: TeamSpec, cfg: NetworkCfg
-) -> tuple[TensorDictModule, ProbabilisticTensorDictModule]:
-    """Return the layer that parametrises the distribution, and the distribution."""
-    action = spec.action
-    outputs = action.size if action.discrete else 2 * action.size
-
-    def linear() -> nn.Module:
-        # a small gain: the first policy is nearly the same everywhere (Huang et al. 2022, detail 2)
-        return orthogonal(nn.Linear(cfg.trunk_features, outputs), gain=0.01)
-
-    layer = _of_the_agents(linear, spec, cfg)
-    if not action.discrete:
-        layer = nn.Sequential(layer, NormalParamExtractor())
-    names = ["logits"] if action.discrete else ["loc", "scale"]
-    keys = [(team, name) for name in names]
-    distribution = ProbabilisticTensorDictModule(
-        in_keys=dict(zip(names, keys, strict=True)),
-        out_keys=[(team, "action")],
-        distribution_class=Categorical if action.discrete else TanhNormal,
-        distribution_kwargs={} if action.discrete else {"low": -1.0, "high": 1.0},
-        return_log_prob=True,
-        log_prob_key=(team, "action_log_prob"),
-    )
-    return TensorDictModule(layer, in_keys=[(team, "features")], out_keys=keys), distribution

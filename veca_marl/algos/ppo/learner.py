@@ -14,8 +14,9 @@ from torchrl.objectives import KLAdaptiveLR
 from torchrl.objectives.value.functional import vec_generalized_advantage_estimate
 
 from veca_marl.algos.networks.actor_critic import NetworkCfg, TeamNetwork
+from veca_marl.algos.networks.policy_heads import log_prob_keys
 from veca_marl.algos.ppo.losses import VALID, ExactKLPPOLoss
-from veca_marl.algos.specs import TeamSpec
+from veca_marl.algos.specs import TeamSpec, action_key
 
 _REPORTED = {  # name in the logs: name in the loss
     "policy_loss": "loss_objective",
@@ -105,8 +106,8 @@ class TeamLearner:
         self.batch_keys = [
             *self.network.trunk.in_keys,
             *self.network.distribution_keys,
-            (team, "action"),
-            (team, "action_log_prob"),
+            *(action_key(team, part) for part in spec.actions),
+            *log_prob_keys(team, spec.actions),
             *([(team, "mask")] if spec.masked else []),
         ]
         self._memory: TensorDictReplayBuffer | None = None
@@ -223,8 +224,6 @@ def _make_loss(team: str, network: TeamNetwork, cfg: PPOCfg) -> ExactKLPPOLoss:
         functional=False,
     )
     loss.set_keys(
-        action=(team, "action"),
-        sample_log_prob=(team, "action_log_prob"),
         reward=(team, "reward"),
         done=(team, "done"),
         terminated=(team, "terminated"),

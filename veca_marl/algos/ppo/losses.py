@@ -6,6 +6,7 @@ from typing import Any
 
 import torch
 from tensordict import TensorDictBase
+from tensordict.nn import CompositeDistribution
 from torch import Tensor
 from torch.distributions import Distribution, kl_divergence
 from torchrl.objectives import ClipPPOLoss
@@ -33,8 +34,15 @@ class ExactKLPPOLoss(ClipPPOLoss):
             old = self.actor_network.build_dist_from_params(tensordict)
         log_weight, new, _, correction = super()._log_weight(tensordict, adv_shape)
         with torch.no_grad():
-            divergence = kl_divergence(old, new)
+            divergence = _divergence(old, new)
             valid = tensordict.get(VALID, None)
             if valid is not None:
                 divergence = divergence[valid.squeeze(-1)]
         return log_weight, new, divergence, correction
+
+
+def _divergence(old: Distribution, new: Distribution) -> Tensor:
+    """Return KL(old || new); the parts of an action are independent, so theirs are summed."""
+    if isinstance(old, CompositeDistribution):
+        return sum(kl_divergence(old.dists[key], new.dists[key]) for key in old.dists)
+    return kl_divergence(old, new)

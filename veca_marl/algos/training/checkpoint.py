@@ -17,8 +17,8 @@ import torch
 
 from veca_marl.algos.specs import TeamSpec
 
-# 2: networks compress senses of many magnitudes; the same weights did something else before
-_FORMAT = 2
+# 3: actions are named parts; an older state does not say which
+_FORMAT = 3
 
 
 class CheckpointError(RuntimeError):

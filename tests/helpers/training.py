@@ -1,0 +1,30 @@
+"""Shared by tests of training: a small network, an interruption, rows of a CSV file."""
+
+import csv
+
+from veca_marl.algos.networks.actor_critic import NetworkCfg
+
+SMALL = NetworkCfg(channels=[4, 8, 8], vector_features=16, trunk_features=32)
+FRAMES = 64  # of a batch
+
+
+class Interrupt:
+    """A reporter that raises KeyboardInterrupt in the middle of a stage."""
+
+    def __init__(self, frames):
+        self.frames = frames
+
+    def write(self, kind, frames, row):
+        if kind == "metrics" and frames == self.frames:
+            raise KeyboardInterrupt
+
+    def close(self):
+        pass
+
+
+def read(path):
+    """Return the rows of a CSV file without those columns that depend on the clock."""
+    with path.open() as file:
+        return [
+            {k: v for k, v in row.items() if k != "frames_per_s"} for row in csv.DictReader(file)
+        ]

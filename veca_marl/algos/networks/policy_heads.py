@@ -1,0 +1,101 @@
+"""From features to the distribution of an action: a head for each of its parts.
+
+Keys of a part named ``move``, written by `policy_head` and `action_distribution`::
+
+    (team, "parameters", "move", "loc" | "scale" | "logits")   parameters of its distribution
+    (team, "action", "move")                                   the sample
+    (team, "action", "move_log_prob")                          its log-probability
+
+An action without named parts uses ``(team, "loc" | "scale" | "logits")``, ``(team, "action")`` and
+``(team, "action_log_prob")``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from tensordict.nn import (
+    CompositeDistribution,
+    NormalParamExtractor,
+    ProbabilisticTensorDictModule,
+    TensorDictModule,
+)
+from torch import nn
+from torch.distributions import Categorical, Distribution
+from torchrl.modules import TanhNormal
+
+from veca_marl.algos.specs import PLAIN, ActionLayout, action_key
+
+_UNIT = {"low": -1.0, "high": 1.0}
+
+
+def policy_head(team: str, part: str, layout: ActionLayout, layer: nn.Module) -> TensorDictModule:
+    """Return the module that writes the parameters of one part's distribution.
+
+    Args:
+        team: Name of the team.
+        part: Name of the part.
+        layout: Its layout.
+        layer: Maps features ``(..., agents, F)`` to ``(..., agents, layout.parameters)``.
+    """
+    if not layout.discrete:
+        layer = nn.Sequential(layer, NormalParamExtractor())
+    keys = [(*_parameter_node(team, part), name) for name in _parameter_names(layout)]
+    return TensorDictModule(layer, in_keys=[(team, "features")], out_keys=keys)
+
+
+def action_distribution(
+    team: str, actions: Mapping[str, ActionLayout]
+) -> ProbabilisticTensorDictModule:
+    """Return the module that draws an action from the parameters that the heads wrote.
+
+    Several parts are independent given the observation: a `CompositeDistribution`.
+    """
+    if set(actions) == {PLAIN}:
+        return _plain_distribution(team, actions[PLAIN])
+    return ProbabilisticTensorDictModule(
+        in_keys={"params": (team, "parameters")},
+        out_keys=[action_key(team, part) for part in actions],
+        distribution_class=CompositeDistribution,
+        distribution_kwargs={
+            "distribution_map": {part: _class_of(layout) for part, layout in actions.items()},
+            "name_map": {part: action_key(team, part) for part in actions},
+            "extra_kwargs": {part: _options_of(layout) for part, layout in actions.items()},
+        },
+        return_log_prob=True,
+    )
+
+
+def log_prob_keys(team: str, actions: Mapping[str, ActionLayout]) -> list[tuple[str, ...]]:
+    """Return where the log-probabilities of the parts are written, in the order of `actions`."""
+    return [
+        (*key[:-1], f"{key[-1]}_log_prob") for key in (action_key(team, part) for part in actions)
+    ]
+
+
+def _plain_distribution(team: str, layout: ActionLayout) -> ProbabilisticTensorDictModule:
+    return ProbabilisticTensorDictModule(
+        in_keys={name: (team, name) for name in _parameter_names(layout)},
+        out_keys=[(team, "action")],
+        distribution_class=_class_of(layout),
+        distribution_kwargs=_options_of(layout),
+        return_log_prob=True,
+        log_prob_key=(team, "action_log_prob"),
+    )
+
+
+def _parameter_node(team: str, part: str) -> tuple[str, ...]:
+    return (team,) if part == PLAIN else (team, "parameters", part)
+
+
+def _parameter_names(layout: ActionLayout) -> list[str]:
+    return ["logits"] if layout.discrete else ["loc", "scale"]
+
+
+def _class_of(layout: ActionLayout) -> type[Distribution]:
+    return Categorical if layout.discrete else TanhNormal
+
+
+def _options_of(layout: ActionLayout) -> dict[str, Any]:
+    return {} if layout.discrete else dict(_UNIT)
