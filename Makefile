@@ -5,7 +5,7 @@ BIN    := $(VENV)/bin
 ARGS   ?=
 CORES  ?= 2
 
-.PHONY: help train test test-all lint types format bench docs clean
+.PHONY: help train test test-all lint types format bench docs pages clean
 
 help:
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/'
@@ -45,7 +45,10 @@ format: $(VENV)/installed-test ## let ruff mend what it can
 bench: $(VENV)/installed ## agent-steps per second and where the time goes
 	$(BIN)/python -m veca_marl.bench --task KickTheBall $(ARGS)
 
-docs: $(VENV)/installed-test ## rewrite the task pages and the pictures
+docs: $(VENV)/installed-test ## build the documentation site in docs/_build/html
+	$(BIN)/python -m sphinx --fail-on-warning --keep-going -b html docs docs/_build/html $(ARGS)
+
+pages: $(VENV)/installed-test ## rewrite the generated pages and pictures of docs/
 	$(BIN)/python scripts/make_docs.py
 
 clean: ## forget the virtual environment and all caches; runs stay

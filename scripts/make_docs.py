@@ -1,6 +1,6 @@
 """Write what can be derived: a page per task from its docstring, tables of the body, the pictures.
 
-Run it with ``make docs``; the results are committed, so that they can be read without running it.
+Run it with ``make pages``; the results are committed, so that they can be read without running it.
 """
 
 from __future__ import annotations
@@ -209,7 +209,7 @@ def main() -> None:
     (DOCS / "images").mkdir(parents=True, exist_ok=True)
     for name, task in TASKS.items():
         (DOCS / "tasks" / f"{name}.md").write_text(task_page(task), encoding="utf-8")
-    body = DOCS / "body.md"
+    body = DOCS / "reference" / "body.md"
     body.write_text(body_page(body.read_text(encoding="utf-8")), encoding="utf-8")
     perception_picture(DOCS / "images" / "perception.png")
     feeling_picture(DOCS / "images" / "touch.png")

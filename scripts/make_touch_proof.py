@@ -2,7 +2,7 @@
 
 A ball of 0.2 kg falls 2 cm onto the palm, where skin gives way, and onto the forearm, where physics
 knows the rigid bone alone. Writes ``docs/images/touch_time_step.png`` and prints the table of
-``docs/touch.md``.
+``docs/reference/touch.md``.
 """
 
 from __future__ import annotations

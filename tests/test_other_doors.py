@@ -1,4 +1,4 @@
-"""The snippets of docs/other_doors.md run, and those of the README with them."""
+"""The snippets of docs/guides/other_libraries.md run, and those of the README with them."""
 
 import re
 from pathlib import Path
@@ -9,7 +9,7 @@ import pytest
 import veca_marl.envs.adapters.gymnasium_ids as ids
 
 ROOT = Path(__file__).resolve().parent.parent
-PAGES = [ROOT / "docs" / "other_doors.md", ROOT / "README.md"]
+PAGES = [ROOT / "docs" / "guides" / "other_libraries.md", ROOT / "README.md"]
 SNIPPETS = [
     pytest.param(snippet, id=f"{page.stem}-{number}")
     for page in PAGES

@@ -71,7 +71,7 @@ def _triple(name: str, value: ArrayLike) -> Floats:
 def image_lattice(order: int) -> NDArray[np.int64]:
     """Return the reflection indices of all image sources up to an order, direct sound first.
 
-    Allen & Berkley (1979), section II: index n along an axis means |n| reflections on that
+    Allen & Berkley (1979), section II: index n along an axis means ``|n|`` reflections on that
     axis's two walls.
 
     Args:

@@ -51,7 +51,7 @@ class TaxelTable(NamedTuple):
             triangles beside each other, which are looked at together.
         patches: ``(P + 1,)`` triangles of patch p are patches[p] to patches[p + 1].
         vertices: The vertices of the triangles of each patch, one patch after the other.
-        first_vertex: ``(P + 1,)`` those of patch p are `vertices`[first[p] : first[p + 1]].
+        first_vertex: ``(P + 1,)`` those of patch p are ``vertices[first[p] : first[p + 1]]``.
         margins: ``(T,)`` metres, how far from a triangle its taxels sense at most.
         layers: ``(T, 2)`` metres: middle of the depths of a triangle, and half of their range.
     """

@@ -172,7 +172,7 @@ def _joints() -> tuple[Joint, ...]:
 
 
 def limit_sources() -> list[tuple[str, str]]:
-    """Return where the lower and the upper limit of each joint come from; see ``docs/body.md``."""
+    """Return the sources of each joint's lower and upper limit (``docs/reference/body.md``)."""
     return [(row["lo_from"], row["hi_from"]) for row in _rows("dofs.csv")]
 
 

@@ -1,0 +1,64 @@
+"""Sphinx configuration: Markdown pages by MyST, the API reference from docstrings."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+from sphinx.application import Sphinx
+
+import veca_marl
+
+DOCS = Path(__file__).parent
+ROOT = DOCS.parent
+
+project = "veca_marl"
+author = "the authors of veca_marl"
+copyright = "2026, the authors of veca_marl"
+release = version = veca_marl.__version__
+
+extensions = [
+    "myst_parser",
+    "sphinx.ext.apidoc",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.napoleon",
+]
+exclude_patterns = ["_build"]
+default_role = "code"  # docstrings write `name` for code
+
+html_theme = "furo"
+html_title = f"veca_marl {release}"
+
+myst_enable_extensions = ["colon_fence", "deflist", "dollarmath"]
+myst_heading_anchors = 3
+
+napoleon_numpy_docstring = False
+napoleon_use_ivar = True
+napoleon_custom_sections = [("Terms", "params_style"), ("Observations", "params_style")]
+autodoc_typehints = "none"  # the signature shows them
+autodoc_member_order = "bysource"
+toc_object_entries = False  # thousands of entries in every sidebar otherwise
+
+apidoc_modules = [
+    {
+        "path": "../veca_marl",
+        "destination": "api",
+        "module_first": True,
+        "automodule_options": ["members", "show-inheritance"],
+        "max_depth": 1,
+    }
+]
+
+
+def copy_pages(_: Sphinx) -> None:
+    """Copy what the site shows and what lies elsewhere: the experiments and the changelog."""
+    shutil.rmtree(DOCS / "experiments", ignore_errors=True)
+    shutil.copytree(
+        ROOT / "experiments", DOCS / "experiments", ignore=shutil.ignore_patterns("*.py", "__*")
+    )
+    shutil.copyfile(ROOT / "CHANGELOG.md", DOCS / "changelog.md")
+
+
+def setup(app: Sphinx) -> None:
+    """Register the copy to run before any page is read."""
+    app.connect("builder-inited", copy_pages, priority=100)
