@@ -97,7 +97,7 @@ class Vice:
         self.world = World(playground, clock)
         self._body = Humanoid("child", HumanoidCfg(), self.world)
         self._props = {ball: self.world.add_prop(_prop(ball)) for ball in balls}
-        self._sense = TouchSense(TouchCfg(), self._body, self.world.scene)
+        self._sense = TouchSense(TouchCfg(), self._body, self.world)
         self.world.freeze()
 
     def press(

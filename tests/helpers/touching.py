@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from skins import add_body, pose
+from stand_in_worlds import SceneWorld
 
 from veca_marl.sim.body.anatomy.skeleton import load_skeleton
 from veca_marl.sim.geometry.primitives import Geom, Shape
@@ -32,7 +33,9 @@ class Stage:
         self.scene = Scene()
         self.body = add_body(self.scene)
         pose(self.body, angles, position, rotation)
-        self.sense = TouchSense(cfg or TouchCfg(), Named("body", self.body.id), self.scene)
+        self.sense = TouchSense(
+            cfg or TouchCfg(), Named("body", self.body.id), SceneWorld(self.scene)
+        )
 
     def add(self, shape, size, position, rotation=None):
         geom = Geom(Shape[shape], size)

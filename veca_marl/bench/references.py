@@ -115,12 +115,12 @@ def measure_ears(playground: PlaygroundCfg, steps: int) -> float:
     buzz = SoundCfg(kind=SoundKind.buzz, level=0.1)
     source = world.sound.add_source("buzz", make_sound(buzz))
     walker = Walker("listener", WalkerCfg(), world)
-    ears = AudioSense(AudioCfg(), walker, world.sound)
+    ears = AudioSense(AudioCfg(), walker, world)
     world.sound.reset(np.random.default_rng(0))
 
     def hear() -> None:
         world.sound.advance()
-        ears.read()
+        ears.compute()
 
     costs = []
     for step in range(steps):

@@ -14,7 +14,6 @@ from veca_marl.bench.stopwatch import Probes, Stopwatch
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
 from veca_marl.envs.core.game import Game
 from veca_marl.envs.core.game_cfg import GameCfg
-from veca_marl.sim.sense import Sense
 
 PHYSICS, SOURCES, TASK, ENV, POLICY, TORCHRL = (
     "physics",
@@ -135,13 +134,6 @@ def _probe_game(game: Game, probes: Probes) -> None:
         probes.put(PHYSICS, player.body, "act")
         for name, sense in game.senses[player.name].items():
             probes.put(name, sense, "read")
-            _refuse_substeps(name, sense)
-
-
-def _refuse_substeps(name: str, sense: Sense) -> None:
-    """The world has kept the bound method, so that a wrapper would not be called."""
-    if type(sense).substep is not Sense.substep:
-        raise NotImplementedError(f"{name} gathers in substeps: teach the bench to time them")
 
 
 def measure_first_world(game: GameCfg) -> float:

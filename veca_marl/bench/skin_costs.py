@@ -48,7 +48,7 @@ def touched_child(playground: PlaygroundCfg, contacts: int) -> tuple[World, Touc
     child = Humanoid("child", HumanoidCfg(), world)
     child.place((0.0, 0.0, 1.0), posture=_ARMS_OUT)
     world.scene.update()
-    sense = TouchSense(TouchCfg(), child, world.scene)
+    sense = TouchSense(TouchCfg(), child, world)
     vertices = world.scene.meshes.vertices
     for ball, row in zip(balls, np.linspace(0, len(vertices) - 1, contacts), strict=True):
         ball.place(vertices[int(row)])
@@ -58,8 +58,8 @@ def touched_child(playground: PlaygroundCfg, contacts: int) -> tuple[World, Touc
 
 def _touch_ms(playground: PlaygroundCfg, contacts: int, repeats: int) -> float:
     world, sense = touched_child(playground, contacts)
-    sense.read()
-    cost = median(thread_ms(sense.read) for _ in range(repeats))
+    sense.compute()
+    cost = median(thread_ms(sense.compute) for _ in range(repeats))
     world.close()
     return cost
 

@@ -1,9 +1,9 @@
-"""What every sense has in common."""
+"""The base class of every sense: values are computed once per state of the world."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,10 +11,22 @@ from numpy.typing import NDArray
 from veca_marl.sim.spec import ArraySpec
 
 
+class Versioned(Protocol):
+    """What a sense needs to know of a `World` to tell one state from the next.
+
+    Attributes:
+        version: Changes whenever the world is stepped, reset or refreshed.
+    """
+
+    version: int
+
+
 class Sense(ABC):
     """One modality of one body: numpy in, numpy out.
 
-    A sense keeps no state that another body's sense could see.
+    A subclass implements `compute` and is constructed as ``Sense(cfg, body, world)``. It may keep
+    state between steps (the samples heard last, for example), but shares none with other senses:
+    neither the order in which senses are read nor their number changes a value.
 
     Attributes:
         specs: Observation name to its spec, known before the first read. Most senses have one
@@ -23,23 +35,57 @@ class Sense(ABC):
 
     specs: dict[str, ArraySpec]
 
-    def reset(self) -> None:  # noqa: B027  a sense without memory has nothing to forget
-        """Forget the last episode. Called after the world and the bodies were put in place."""
+    def __init__(self, world: Versioned) -> None:
+        """Remember the world, the version of which decides when values are recomputed.
 
-    def substep(self) -> None:  # noqa: B027  most senses only look once per control step
-        """Gather what happens between two reads. Called after every physics substep; cheap."""
+        Args:
+            world: The `World` of the body.
+        """
+        self._versioned = world
+        self._computed_at: int | None = None
+        self._values: dict[str, NDArray[Any]] = {}
 
-    @abstractmethod
+    def reset(self) -> None:
+        """Discard the state of the last episode.
+
+        Call it after the world was reset and its bodies were placed, before `World.refresh`.
+        """
+        self._computed_at = None
+
     def read(self) -> dict[str, NDArray[Any]]:
-        """Sense the world as it is at the end of a control step. Called once per step.
+        """Return the observation of the world's present state.
+
+        The first call after a step, a reset or a refresh of the world computes the values; further
+        calls return the same ones at no cost. A step in which a sense is not read costs nothing;
+        each sense documents what it returns afterwards.
 
         Returns:
-            An array for each name in `specs`. The caller copies what it keeps.
+            A new dictionary with an array for each name in `specs`. The arrays are read-only and
+            are not overwritten by later reads.
+        """
+        version = self._versioned.version
+        if self._computed_at != version:
+            values = self.compute()
+            for array in values.values():
+                array.flags.writeable = False
+            self._values, self._computed_at = values, version
+        return dict(self._values)
+
+    @abstractmethod
+    def compute(self) -> dict[str, NDArray[Any]]:
+        """Compute the observation. `read` calls it at most once per version of the world.
+
+        Returns:
+            A newly allocated array for each name in `specs`.
         """
 
 
 def check_spec(name: str, value: NDArray[Any], spec: ArraySpec) -> None:
-    """Raise `ValueError` if `value` is not what `spec` promises."""
+    """Compare an observation with its spec.
+
+    Raises:
+        ValueError: If the shape or the dtype differ.
+    """
     if value.shape != spec.shape or value.dtype != np.dtype(spec.dtype):
         raise ValueError(
             f"{name}: got {value.dtype}{value.shape}, the spec says {spec.dtype}{spec.shape}"

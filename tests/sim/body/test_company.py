@@ -10,7 +10,7 @@ from veca_marl.envs.core.game import Game
 from veca_marl.envs.core.game_cfg import GameCfg
 from veca_marl.sim.body.anatomy.skeleton import load_skeleton
 from veca_marl.sim.body.voice_controls import VoiceKind
-from veca_marl.sim.senses import SensesCfg, give_senses
+from veca_marl.sim.senses import SensesCfg, make_senses
 from veca_marl.sim.touch.taxels import load_taxels
 
 SENSES = ("vision", "audio", "touch", "proprioception")
@@ -26,7 +26,7 @@ def company(listening, silent_guest=False):
     ]
     if silent_guest:
         walkers.append(walker_in(world, "guest", (15.0, 15.0, 0.0), voice=VoiceKind.calls))
-    senses = {w.name: give_senses(w, SENSES, SensesCfg(), world) for w in walkers}
+    senses = {w.name: make_senses(w, SENSES, SensesCfg(), world) for w in walkers}
     senses = {name: senses[name] for name in listening}
     world.freeze()
     world.reset(np.random.default_rng(0))
@@ -98,7 +98,7 @@ def perceived(sense, place):
     """What `one` at the origin perceives of `two` at a place, and of one who calls there."""
     world = empty_world()
     one, two = walker_in(world, "one"), walker_in(world, "two", place, 180.0)
-    senses = give_senses(one, (sense,), SensesCfg(), world)
+    senses = make_senses(one, (sense,), SensesCfg(), world)
     world.freeze()
     world.reset(np.random.default_rng(0))
     one.place((0.0, 0.0, 0.0))

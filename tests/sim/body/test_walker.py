@@ -10,7 +10,7 @@ from veca_marl.sim.body.base import MOUNTS
 from veca_marl.sim.body.walker.controls import MOVES, WALK_CONTROLS, ActionKind
 from veca_marl.sim.body.walker.walker import WalkerCfg
 from veca_marl.sim.hearing.sense import AudioCfg, AudioSense
-from veca_marl.sim.senses import SensesCfg, give_senses
+from veca_marl.sim.senses import SensesCfg, make_senses
 from veca_marl.sim.vision.visibility import is_visible
 
 
@@ -284,7 +284,7 @@ def test_a_wall_hides():
 
 
 def hears(world, walker):
-    sense = AudioSense(AudioCfg(waveform=True), walker, world.sound)
+    sense = AudioSense(AudioCfg(waveform=True), walker, world)
     return lambda: np.sqrt(np.mean(sense.read()["waveform"] ** 2))
 
 
@@ -360,4 +360,4 @@ def test_unknown_senses_are_answered_with_those_there_are():
     world = empty_world()
     walker = walker_in(world)
     with pytest.raises(ValueError, match=r"\['smell'\].*audio.*vision"):
-        give_senses(walker, ("vision", "smell"), SensesCfg(), world)
+        make_senses(walker, ("vision", "smell"), SensesCfg(), world)

@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 from listening import EAR, RATE, STEP, direction, room, yaw
+from stand_in_worlds import SoundWorld
 
 from veca_marl.sim.geometry.pose import Pose
 from veca_marl.sim.hearing.sense import AudioCfg, AudioQuality, AudioSense, Window
@@ -41,7 +42,7 @@ class Scene:
         self.field = SoundField(box, STEP, RATE, image_order=2)
         self.body = Dummy()
         self.source = self.field.add_source("source", sound)
-        self.sense = AudioSense(AudioCfg(**numbers), self.body, self.field)
+        self.sense = AudioSense(AudioCfg(**numbers), self.body, SoundWorld(self.field))
         self.reset()
 
     def reset(self, seed=0):
@@ -140,7 +141,7 @@ def test_it_does_not_matter_how_the_head_was_turned_at_birth():
         body.rotation = yaw(at_birth)
         field = SoundField(None, STEP, RATE)
         field.add_source("noise", Noise(0.1, RATE)).position = (0.4, 0.5, 0.0)
-        sense = AudioSense(AudioCfg(quality=AudioQuality.stereo), body, field)
+        sense = AudioSense(AudioCfg(quality=AudioQuality.stereo), body, SoundWorld(field))
         body.rotation = yaw(0.5)
         field.reset(np.random.default_rng(0))
         sense.reset()

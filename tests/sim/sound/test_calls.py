@@ -112,7 +112,7 @@ def heard_by(place, row, steps=12, friend_row=None):
     world = empty_world()
     speaker = walker_in(world, voice=VoiceKind.calls)
     friend = walker_in(world, "friend", place, voice=VoiceKind.calls)
-    senses = [AudioSense(AudioCfg(waveform=True), one, world.sound) for one in (speaker, friend)]
+    senses = [AudioSense(AudioCfg(waveform=True), one, world) for one in (speaker, friend)]
     quiet = np.zeros(3, np.float32)
     heard = []
     for _ in range(steps):
@@ -169,7 +169,7 @@ def test_a_joint_level_row_ends_with_the_call_and_moves_the_joints_as_without(ma
 
 def test_a_joint_level_body_calls_and_its_torques_alone_are_silent(make_child):
     world, child = make_child(voice=VoiceKind.calls)
-    ear = AudioSense(AudioCfg(waveform=True), child, world.sound)
+    ear = AudioSense(AudioCfg(waveform=True), child, world)
     row = np.zeros(83)
 
     def heard():

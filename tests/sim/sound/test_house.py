@@ -181,7 +181,7 @@ def test_a_wall_that_goes_up_is_heard_though_nobody_moves():
 def test_a_walker_in_the_next_room_hears_a_voice_through_the_door_or_through_the_wall():
     world = World(compose(["+task=KickTheBall", "playground=two_rooms"]).playground)
     speaker, friend = (Walker(name, WalkerCfg(), world) for name in ("speaker", "friend"))
-    ears = AudioSense(AudioCfg(waveform=True), friend, world.sound)
+    ears = AudioSense(AudioCfg(waveform=True), friend, world)
     world.freeze()
     loudest = []
     for y in (-1.0, 1.7):

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from stand_in_worlds import SceneWorld
 from touching import SPREAD, Named, Stage, of_bone
 
 from veca_marl.config.root import compose
@@ -11,7 +12,7 @@ from veca_marl.sim.geometry.scene import Scene
 from veca_marl.sim.physics.playground import PlaygroundCfg
 from veca_marl.sim.physics.world import World
 from veca_marl.sim.sense import check_spec
-from veca_marl.sim.senses import SensesCfg, give_senses
+from veca_marl.sim.senses import SensesCfg, make_senses
 from veca_marl.sim.touch.sense import TouchCfg, TouchQuality, TouchSense
 
 
@@ -65,6 +66,7 @@ def test_coarse_touch_is_the_mean_of_each_bone():
 
 def test_successive_reads_share_no_memory():
     sense, observed, _ = touched(TouchCfg())
+    sense.reset()
     assert not np.shares_memory(observed, sense.read()["touch"])
 
 
@@ -82,15 +84,15 @@ def test_who_is_numb_has_no_touch():
     senses = compose(["+task=KickTheBall", "senses/touch=numb"]).senses
     world = World(PlaygroundCfg())
     walker = Walker("walker", WalkerCfg(), world)
-    assert set(give_senses(walker, ["audio", "touch"], senses, world)) == {"audio"}
-    assert set(give_senses(walker, ["touch"], SensesCfg(), world)) == {"touch"}
+    assert set(make_senses(walker, ["audio", "touch"], senses, world)) == {"audio"}
+    assert set(make_senses(walker, ["touch"], SensesCfg(), world)) == {"touch"}
     world.close()
 
 
 def test_a_walker_feels_the_floor_with_its_soles():
     world = World(PlaygroundCfg())
     walker = Walker("walker", WalkerCfg(), world)
-    sense = TouchSense(TouchCfg(), walker, world.scene)
+    sense = TouchSense(TouchCfg(), walker, world)
     world.freeze()
     world.reset(np.random.default_rng(0))
     world.refresh()
@@ -105,7 +107,7 @@ def test_a_thing_without_skin_cannot_feel():
     scene = Scene()
     ball = scene.add_object("ball", [[Geom(Shape.SPHERE, (0.1,))]])
     with pytest.raises(ValueError, match="ball has no skin"):
-        TouchSense(TouchCfg(), Named("ball", ball.id), scene)
+        TouchSense(TouchCfg(), Named("ball", ball.id), SceneWorld(scene))
 
 
 @pytest.mark.parametrize("numbers", [{"quality": "rough"}, {"binary_above": 1.0}])

@@ -10,7 +10,8 @@ import sys
 import numpy as np
 import pytest
 from eye_scenes import EYE_SPACING_M, FakeBody, ball_at, clutter
-from paths import HELPERS
+from paths import HELPERS, ROOT
+from stand_in_worlds import SceneWorld
 
 from veca_marl.sim.geometry.primitives import Geom, Shape
 from veca_marl.sim.geometry.scene import Scene
@@ -18,6 +19,10 @@ from veca_marl.sim.sense import check_spec
 from veca_marl.sim.vision.sense import Eyes, VisionCfg, VisionSense
 
 EVERYTHING = {"depth": True, "segmentation": True}
+
+
+def eyes(cfg, body, scene):
+    return VisionSense(cfg, body, SceneWorld(scene))
 
 
 def body_before(target=(2.0, 0.0, 0.0), **numbers):
@@ -36,7 +41,7 @@ def body_before(target=(2.0, 0.0, 0.0), **numbers):
 )
 def test_reads_what_the_specs_promise(cfg):
     rng = np.random.default_rng(0)
-    sense = VisionSense(cfg, body_before(focal_distance_m=0.5), clutter(rng))
+    sense = eyes(cfg, body_before(focal_distance_m=0.5), clutter(rng))
     read = sense.read()
     assert read.keys() == sense.specs.keys()
     for name, spec in sense.specs.items():
@@ -55,13 +60,13 @@ def test_quality_does_not_change_the_specs():
         VisionCfg(blur_deg=2.0, defocus=True, infant_age_months=3.0),
     ]
     scene = ball_at((2, 0, 0))
-    specs = [VisionSense(cfg, body_before(), scene).specs for cfg in cfgs]
+    specs = [eyes(cfg, body_before(), scene).specs for cfg in cfgs]
     assert all(one == specs[0] for one in specs)
 
 
 @pytest.mark.parametrize("target", [(0.5, 0.0, 0.0), (1.0, 0.4, -0.2), (3.0, -1.0, 0.5)])
 def test_vergence_brings_a_point_to_the_centre_of_both_eyes(target):
-    sense = VisionSense(VisionCfg(segmentation=True), body_before(target), ball_at(target, 0.05))
+    sense = eyes(VisionCfg(segmentation=True), body_before(target), ball_at(target, 0.05))
     for ids in sense.read()["segmentation"]:
         rows, columns = np.nonzero(ids == 0)
         assert (columns.mean() + 0.5, rows.mean() + 0.5) == pytest.approx((42, 42), abs=0.51)
@@ -70,7 +75,7 @@ def test_vergence_brings_a_point_to_the_centre_of_both_eyes(target):
 def test_disparity_is_that_of_the_distance():
     """Eyes set on 1 m see a ball at 0.6 m apart by the difference of the vergence angles."""
     body, scene = body_before((1.0, 0.0, 0.0)), ball_at((0.6, 0, 0), 0.03)
-    sense = VisionSense(VisionCfg(width=600, height=600, segmentation=True), body, scene)
+    sense = eyes(VisionCfg(width=600, height=600, segmentation=True), body, scene)
     left, right = (np.nonzero(ids == 0)[1].mean() for ids in sense.read()["segmentation"])
     half = EYE_SPACING_M / 2
     apart_rad = 2 * (math.atan(half / 0.6) - math.atan(half / 1.0))
@@ -82,8 +87,8 @@ def test_disparity_is_that_of_the_distance():
 
 def test_one_eye_fills_both_places():
     scene = clutter(np.random.default_rng(1))
-    both = VisionSense(VisionCfg(**EVERYTHING), body_before(), scene).read()
-    one = VisionSense(VisionCfg(**EVERYTHING, eyes=Eyes.monocular), body_before(), scene).read()
+    both = eyes(VisionCfg(**EVERYTHING), body_before(), scene).read()
+    one = eyes(VisionCfg(**EVERYTHING, eyes=Eyes.monocular), body_before(), scene).read()
     for name, images in one.items():
         np.testing.assert_array_equal(images[0], images[1])
         np.testing.assert_array_equal(images[0], both[name][0])
@@ -91,7 +96,7 @@ def test_one_eye_fills_both_places():
 
 
 def test_colours_are_in_their_channels():
-    sense = VisionSense(VisionCfg(), body_before(), ball_at((2, 0, 0), 0.3, (1.0, 0.0, 0.0)))
+    sense = eyes(VisionCfg(), body_before(), ball_at((2, 0, 0), 0.3, (1.0, 0.0, 0.0)))
     red, green, blue = sense.read()["vision"][0, :, 42, 42]
     assert red > 100
     assert green == blue == 0
@@ -100,10 +105,11 @@ def test_colours_are_in_their_channels():
 def test_defocus_follows_the_bodys_focal_distance():
     rng = np.random.default_rng(2)
     scene, body = clutter(rng), body_before(focal_distance_m=math.inf)
-    sharp = VisionSense(VisionCfg(width=200, height=200), body, scene).read()["vision"]
-    sense = VisionSense(VisionCfg(width=200, height=200, defocus=True), body, scene)
+    sharp = eyes(VisionCfg(width=200, height=200), body, scene).read()["vision"]
+    sense = eyes(VisionCfg(width=200, height=200, defocus=True), body, scene)
     far = sense.read()["vision"]
     body.focal_distance_m = 0.1
+    scene.update()
     near = sense.read()["vision"]
     assert (near != far).any()
     assert np.abs(near - sharp.astype(int)).mean() > np.abs(far - sharp.astype(int)).mean()
@@ -129,13 +135,13 @@ def room():
 
 
 def test_what_is_visible(room):
-    sense = VisionSense(VisionCfg(), body_before(), room)
+    sense = eyes(VisionCfg(), body_before(), room)
     seen = {item.name for item in room.objects if sense.is_visible(item.id)}
     assert seen == {"plain", "glazed", "wall", "pane"}
 
 
 def test_visible_again_after_the_wall_has_gone(room):
-    sense, walled = VisionSense(VisionCfg(), body_before(), room), room.find("walled")
+    sense, walled = eyes(VisionCfg(), body_before(), room), room.find("walled")
     assert not sense.is_visible(walled.id)
     room.find("wall").positions[0] = (0, 0, 10)
     room.update()
@@ -144,7 +150,7 @@ def test_visible_again_after_the_wall_has_gone(room):
 
 def test_visible_after_the_eyes_have_turned(room):
     body = body_before()
-    sense, back = VisionSense(VisionCfg(), body, room), room.find("back")
+    sense, back = eyes(VisionCfg(), body, room), room.find("back")
     assert not sense.is_visible(back.id)
     body.target = np.array([-2.0, 0.1, 0.0])
     assert sense.is_visible(back.id)
@@ -152,7 +158,7 @@ def test_visible_after_the_eyes_have_turned(room):
 
 def test_seen_fraction_is_the_share_of_pixels(room):
     cfg = VisionCfg(segmentation=True)
-    sense, plain = VisionSense(cfg, body_before(), room), room.find("plain")
+    sense, plain = eyes(cfg, body_before(), room), room.find("plain")
     expected = np.mean(sense.read()["segmentation"] == plain.id)
     assert sense.seen_fraction(plain.id) == pytest.approx(expected)
     assert 0.001 < expected < 0.1
@@ -166,7 +172,7 @@ def test_the_own_head_is_hidden_and_another_head_is_not():
     me.positions[0] = (0.05, 0, 0)
     scene.update()
     body = body_before(object_id=me.id, own_head_frames=(0,))
-    sense = VisionSense(VisionCfg(segmentation=True, depth=True), body, scene)
+    sense = eyes(VisionCfg(segmentation=True, depth=True), body, scene)
     read = sense.read()
     mine = read["segmentation"] == me.id
     assert mine.any()
@@ -181,7 +187,7 @@ def test_the_own_head_is_hidden_and_another_head_is_not():
 def test_reading_twice_gives_the_same_bytes():
     scene, body = clutter(np.random.default_rng(5)), body_before()
     cfg = VisionCfg(**EVERYTHING)
-    one, two = VisionSense(cfg, body, scene), VisionSense(cfg, body, scene)
+    one, two = eyes(cfg, body, scene), eyes(cfg, body, scene)
     first = {name: value.copy() for name, value in one.read().items()}
     for name, value in two.read().items():
         assert value.tobytes() == first[name].tobytes() == one.read()[name].tobytes()
@@ -191,7 +197,7 @@ def digest_of_a_look():
     """Fingerprint of everything that dimmed eyes read from a cluttered room."""
     cfg = VisionCfg(**EVERYTHING, blur_deg=0.5, infant_age_months=2.0, defocus=True)
     scene = clutter(np.random.default_rng(6))
-    read = VisionSense(cfg, body_before(focal_distance_m=0.5), scene).read()
+    read = eyes(cfg, body_before(focal_distance_m=0.5), scene).read()
     return hashlib.sha256(b"".join(read[name].tobytes() for name in sorted(read))).hexdigest()
 
 
@@ -201,7 +207,7 @@ def digest_elsewhere(**environment):
     other = subprocess.run(
         [sys.executable, "-c", code],
         cwd=pathlib.Path(__file__).parent,
-        env=os.environ | {"PYTHONPATH": str(HELPERS)} | environment,
+        env=os.environ | {"PYTHONPATH": f"{HELPERS}{os.pathsep}{ROOT}"} | environment,
         capture_output=True,
         text=True,
         check=True,

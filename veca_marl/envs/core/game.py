@@ -19,7 +19,7 @@ from veca_marl.envs.core.team import Script
 from veca_marl.sim.body.family import make_body
 from veca_marl.sim.physics.world import World
 from veca_marl.sim.sense import Sense
-from veca_marl.sim.senses import give_senses
+from veca_marl.sim.senses import make_senses
 
 _LOG = logging.getLogger(__name__)
 
@@ -81,7 +81,7 @@ class Game:
         self.task = task_type(cfg.task, self.world, self.players)
         self.world.freeze()
         self.senses: dict[str, dict[str, Sense]] = {
-            player.name: give_senses(
+            player.name: make_senses(
                 player.body,
                 task_type.senses if team.senses is None else team.senses,
                 cfg.senses_of(team.name),
@@ -90,8 +90,6 @@ class Game:
             for team in cfg.teams
             for player in self.team(team.name)
         }
-        for senses in self.senses.values():
-            self.world.after_substep.extend(sense.substep for sense in senses.values())
         self.steps = 0
         self.out: frozenset[str] = frozenset()
 
@@ -205,7 +203,7 @@ class Game:
         return [player.name for player in self.players if not player.body.is_finite]
 
     def observe(self, player: Player) -> Observation:
-        """Read all senses of a player. Call it once per step: reading the ears advances them."""
+        """Read all senses of a player; within one step, every call returns the same values."""
         observation: Observation = {}
         for sense in self.senses[player.name].values():
             observation.update(sense.read())

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, fields, replace
 from enum import Enum
+from typing import Any
 
 from veca_marl.sim.body.base import BodyCfg
 from veca_marl.sim.body.proprioception import ProprioceptionCfg
@@ -21,6 +22,7 @@ class TeamSensesCfg:
     audio: AudioCfg | None = None
     proprioception: ProprioceptionCfg | None = None
     touch: TouchCfg | None = None
+    extra: dict[str, Any] | None = None
 
     def change(self, common: SensesCfg) -> SensesCfg:
         """Return the senses of everyone with what this team has otherwise."""

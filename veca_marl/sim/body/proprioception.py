@@ -77,8 +77,8 @@ class ProprioceptionSense(Sense):
     """
 
     def __init__(self, cfg: ProprioceptionCfg, body: Body, world: World) -> None:
-        self._body = body
-        self._step_s = world.clock.step_s
+        super().__init__(world)
+        self._body, self._world = body, world
         self._measures: dict[str, Callable[[], Floats]] = {
             "bone_orientations": self._bone_orientations,
             "joint_angles": body.joint_angles,
@@ -91,22 +91,31 @@ class ProprioceptionSense(Sense):
         self.parts = part_slices(len(body.bone_names), len(body.joint_names))
         size = self.parts["head_turning"].stop
         self.specs = {"proprioception": ArraySpec((size,), np.float32)}
-        self._vector = np.zeros(size, np.float32)
         self.reset()
 
     def reset(self) -> None:
-        """Feel no acceleration from having been put elsewhere."""
+        """See `Sense`. Being placed elsewhere is not an acceleration."""
+        super().reset()
         self._velocity, self._spin = self._body.head_motion()
         self._acceleration = np.zeros(3)
+        self._step = self._world.step_count
 
-    def read(self) -> dict[str, NDArray[Any]]:
-        """See `Sense`. Call once per agent step: the acceleration is that since the last call."""
-        before = self._velocity
-        self._velocity, self._spin = self._body.head_motion()
-        self._acceleration = (self._velocity - before) / self._step_s
+    def compute(self) -> dict[str, NDArray[Any]]:
+        """See `Sense`."""
+        self._measure_head()
+        vector = np.zeros(self.parts["head_turning"].stop, np.float32)
         for name in self._kept:
-            self._vector[self.parts[name]] = self._measures[name]()
-        return {"proprioception": self._vector}
+            vector[self.parts[name]] = self._measures[name]()
+        return {"proprioception": vector}
+
+    def _measure_head(self) -> None:
+        """Update velocity, spin and mean acceleration of the head since the last call."""
+        before, step_before = self._velocity, self._step
+        self._velocity, self._spin = self._body.head_motion()
+        self._step = self._world.step_count
+        elapsed_steps = max(self._step - step_before, 1)
+        elapsed_s = elapsed_steps * self._world.clock.step_s
+        self._acceleration = (self._velocity - before) / elapsed_s
 
     def _bone_orientations(self) -> Floats:
         rotations = self._body.bone_rotations()

@@ -14,9 +14,9 @@ from veca_marl.sim.body.base import Body
 from veca_marl.sim.geometry.pose import Pose
 from veca_marl.sim.hearing.hrtf import kemar_table, sofa_table
 from veca_marl.sim.hearing.receivers import HeadRelated, OneEar, TwoEars
+from veca_marl.sim.physics.world import World
 from veca_marl.sim.sense import Sense
 from veca_marl.sim.sound.receiver import Receiver
-from veca_marl.sim.sound.soundfield import SoundField
 from veca_marl.sim.spec import ArraySpec
 
 WINDOW_SAMPLES = 1024
@@ -85,7 +85,9 @@ class AudioSense(Sense):
         waveform: ``(2, step_samples)`` float32 sound pressure of this step, on request.
     """
 
-    def __init__(self, cfg: AudioCfg, body: Body, field: SoundField) -> None:
+    def __init__(self, cfg: AudioCfg, body: Body, world: World) -> None:
+        super().__init__(world)
+        field = world.sound
         self._body = body
         head = body.mount("head")
         ears = np.stack([body.mount(name).position for name in ("ear_left", "ear_right")])
@@ -102,12 +104,13 @@ class AudioSense(Sense):
             self.specs["waveform"] = ArraySpec((2, field.step_samples), np.float32)
 
     def reset(self) -> None:
-        """See `Sense`. The field forgets at its own reset."""
+        """See `Sense`."""
+        super().reset()
         self._recent[:] = 0.0
         self._listener.reset()
 
-    def read(self) -> dict[str, NDArray[Any]]:
-        """See `Sense`. Once after each `SoundField.advance`."""
+    def compute(self) -> dict[str, NDArray[Any]]:
+        """See `Sense`."""
         head = self._body.mount("head")
         centre = Pose(head.position + head.rotation @ self._centre, head.rotation)
         heard = self._listener.render(centre)

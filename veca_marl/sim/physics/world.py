@@ -85,6 +85,10 @@ class World:
 
     Build it once: `add_prop`, `attach`, then `freeze`; afterwards `reset` restores the built state
     and the caller adds the random part with `Prop.place` and `refresh`.
+
+    Attributes:
+        version: Counts steps, resets and refreshes. A sense computes its values once per version.
+        step_count: Agent steps since the world was built; a reset does not set it back.
     """
 
     def __init__(self, playground: PlaygroundCfg, clock: ClockCfg | None = None) -> None:
@@ -97,6 +101,8 @@ class World:
             playground.transmission_loss_db,
         )
         self.sound = SoundField(self.house, step_samples=22050 // self.clock.control_rate_hz)
+        self.version = 0
+        self.step_count = 0
         self.client: int = pybullet.connect(pybullet.DIRECT)
         self.props: dict[str, Prop] = {}
         self.movers: list[Mover] = []
@@ -155,6 +161,7 @@ class World:
         """
         if self._state is None:
             raise RuntimeError("freeze() the world before its first reset()")
+        self.version += 1
         self._look_ahead()
         pybullet.restoreState(self._state, physicsClientId=self.client)
         self.sound.reset(rng)
@@ -166,6 +173,7 @@ class World:
         """Show what was placed by hand: draw it, and let its sound spread for one step."""
         self._mirror()
         self.sound.advance()
+        self.version += 1
 
     def step(self) -> None:
         """Advance by one agent step."""
@@ -180,6 +188,8 @@ class World:
                 notify()
         self._mirror()
         self.sound.advance()
+        self.step_count += 1
+        self.version += 1
 
     def close(self) -> None:
         """Give the PyBullet client back. Closing twice is harmless."""

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from veca_marl.sim.body.anatomy.skeleton import Skeleton, load_skeleton
 from veca_marl.sim.body.base import Body
 from veca_marl.sim.geometry.pose import Floats
-from veca_marl.sim.geometry.scene import Scene
 from veca_marl.sim.geometry.tables import Bools
+from veca_marl.sim.physics.world import World
 from veca_marl.sim.sense import Sense
 from veca_marl.sim.spec import ArraySpec
 from veca_marl.sim.touch.model import Workspace, feel, neighbours
@@ -69,9 +69,10 @@ class TouchSense(Sense):
             Exactly 0 where nothing touches.
     """
 
-    def __init__(self, cfg: TouchCfg, body: Body, scene: Scene) -> None:
-        self._scene = scene
-        self._object = scene.objects[body.object_id]
+    def __init__(self, cfg: TouchCfg, body: Body, world: World) -> None:
+        super().__init__(world)
+        self._scene = world.scene
+        self._object = world.scene.objects[body.object_id]
         self._taxels = load_taxels()
         self._grade = _grade(cfg, load_skeleton())
         bones = len(self._taxels.thickness)
@@ -87,7 +88,7 @@ class TouchSense(Sense):
         if self._object.triangles.stop - self._object.triangles.start != len(self._readings):
             raise ValueError(f"{body.name} has no skin of {len(self._readings)} triangles to feel")
 
-    def read(self) -> dict[str, NDArray[Any]]:
+    def compute(self) -> dict[str, NDArray[Any]]:
         """See `Sense`."""
         return {"touch": self._grade(self.update_taxels()).ravel().astype(np.float32)}
 

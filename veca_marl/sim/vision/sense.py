@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veca_marl.sim.body.base import Body
-from veca_marl.sim.geometry.scene import Scene
 from veca_marl.sim.geometry.tables import Bools
+from veca_marl.sim.physics.world import World
 from veca_marl.sim.sense import Sense
 from veca_marl.sim.spec import ArraySpec
 from veca_marl.sim.vision.filters import Blur, Defocus, Filter, Grey, Look
@@ -91,17 +91,18 @@ class VisionSense(Sense):
         filters: Applied to the images in this order.
     """
 
-    def __init__(self, cfg: VisionCfg, body: Body, scene: Scene) -> None:
+    def __init__(self, cfg: VisionCfg, body: Body, world: World) -> None:
+        super().__init__(world)
         self.camera = Camera(cfg.width, cfg.height, cfg.fov_deg)
         self.filters = chosen_filters(cfg)
         self.specs = _specs(cfg, self.camera)
         self._mounts = ("eye_left", "eye_right")[: 1 if cfg.eyes is Eyes.monocular else 2]
         self._body = body
-        self._scene = scene
+        self._scene = world.scene
         self._hidden: Bools = np.zeros(0, np.bool_)
         self._seen: tuple[bytes, Views] | None = None
 
-    def read(self) -> dict[str, NDArray[Any]]:
+    def compute(self) -> dict[str, NDArray[Any]]:
         """Return `vision` ``(2, 3, H, W)`` uint8 and what else was asked for.
 
         `depth` ``(2, H, W)`` float32 metres along the optical axis and `segmentation`
