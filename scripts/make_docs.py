@@ -147,23 +147,23 @@ def both_sides(name: str) -> list[str]:
     return [name, f"r_{name[2:]}"] if name.startswith("l_") else [name]
 
 
-def begun(task: str, seed: int) -> tuple[VecaEnv, Game, np.random.Generator]:
-    """Return an environment, its one game at the start of an episode, and what it draws from."""
-    env, rng = make(task, seed=seed), np.random.default_rng(seed)
-    env.games[0].reset(rng)
-    return env, env.games[0], rng
+def begun(task: str, seed: int) -> tuple[VecaEnv, Game]:
+    """Return an environment and its only game at the start of an episode."""
+    env = make(task, seed=seed)
+    env.games[0].reset(np.random.default_rng(seed))
+    return env, env.games[0]
 
 
 def perception_picture(path: Path) -> None:
     """Draw what an agent sees and hears at one moment of KickTheBall."""
-    env, game, rng = begun("KickTheBall", seed=3)
+    env, game = begun("KickTheBall", seed=3)
     player = game.players[0]
     # the ball ahead, to the left, in view of both eyes
     player.body.place((0.6, -0.2, 0.0), yaw_rad=1.95)
     game.task.ball.place((-0.35, 0.95, 0.15), velocity=(0.1, -0.1, 0.0))
     observation = game.observe(player)
     for _ in range(6):
-        game.step({player.name: np.zeros(2, np.float32)}, rng)
+        game.step({player.name: np.zeros(2, np.float32)})
         observation = game.observe(player)
     draw_perception(env.spectator.frame(observation), observation["audio"], path)
     env.close()
@@ -188,11 +188,11 @@ def draw_perception(frame: np.ndarray, audio: np.ndarray, path: Path) -> None:
 
 def feeling_picture(path: Path) -> None:
     """Draw a child that lies on its back, and what its skin feels of the floor and of itself."""
-    env, game, rng = begun("TurnBaby", seed=2)
+    env, game = begun("TurnBaby", seed=2)
     player = game.players[0]
     for _ in range(50):
         player.body.rest()
-        game.advance(rng)
+        game.advance()
     scene, middle = game.world.scene, player.body.position
     camera = Camera(480, 360, fov_deg=34.0)
     beside = look_at(middle + np.array([0.8, 0.9, 0.7]), middle)

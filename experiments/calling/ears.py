@@ -49,7 +49,7 @@ def listen(game: Game, together: bool, rng: np.random.Generator) -> NDArray[np.f
         game.observe(player)
     for _ in range(REST_STEPS):
         wishes = {ears.name: legs[ears.name].rest(), mouth.name: legs[mouth.name].rest(Call.high)}
-        game.step({p.name: p.body.encode(wishes[p.name]) for p in game.players}, rng)
+        game.step({p.name: p.body.encode(wishes[p.name]) for p in game.players})
         heard, _ = [game.observe(player) for player in game.players]
     head, caller = ears.body.mount("head"), mouth.body.mount("mouth").position
     way = (caller - head.position) @ head.rotation

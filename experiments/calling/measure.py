@@ -47,7 +47,7 @@ def play_once(game: Game, seed: int) -> tuple[bool, float]:
             player.name: player.body.encode(game.task.expert(player, game.observe(player)))
             for player in game.players
         }
-        outcome = game.step(rows, rng)
+        outcome = game.step(rows)
         if outcome.done:
             return outcome.terminated, game.steps * game.world.clock.step_s
 

@@ -94,14 +94,14 @@ class Trial:
             Speed towards it; what it costs that the trunk was in turmoil or came to lie on its
             side.
         """
-        crawl, rng = self._start(rhythm, seed)
+        crawl = self._start(rhythm, seed)
         start, ahead = self._line()
         c, s = math.cos(aside_rad), math.sin(aside_rad)
         way = np.array([c * ahead[0] - s * ahead[1], s * ahead[0] + c * ahead[1]])
         spin, least = 0.0, 1.0
         steps = round(WAY_S / self._step_s)
         for _ in range(steps):
-            self._step(crawl.towards(bearing_rad(self.body, start + 100.0 * way)), rng)
+            self._step(crawl.towards(bearing_rad(self.body, start + 100.0 * way)))
             spin += self._spin() / steps
             least = min(least, self.face_down())
         speed = float((self.body.position[:2] - start) @ way) / WAY_S
@@ -109,14 +109,14 @@ class Trial:
 
     def back_mps(self, rhythm: Rhythm, ahead_s: float, seed: int) -> tuple[float, float]:
         """Crawl ahead as it is known, then back; return speed back and turmoil."""
-        crawl, rng = self._start(CRAWL, seed)
+        crawl = self._start(CRAWL, seed)
         for _ in range(round(ahead_s / self._step_s)):
-            self._step(crawl.wish(), rng)
+            self._step(crawl.wish())
         crawl, start, ahead = Crawl(self.body, self._step_s, rhythm), *self._line()
         spin, least = 0.0, 1.0
         steps = round(BACK_S / self._step_s)
         for _ in range(steps):
-            self._step(crawl.wish(), rng)
+            self._step(crawl.wish())
             spin += self._spin() / steps
             least = min(least, self.face_down())
         speed = float((start - self.body.position[:2]) @ ahead) / BACK_S
@@ -124,24 +124,23 @@ class Trial:
 
     def round_rad(self, rhythm: Rhythm, turn: float, seed: int) -> tuple[float, float]:
         """Turn for some time to one side; return how far, and how far away it came, metres."""
-        crawl, rng = self._start(rhythm, seed)
+        crawl = self._start(rhythm, seed)
         before, start = self.body.forward, self.body.position[:2]
         turned, away = 0.0, 0.0
         for _ in range(round(ROUND_S / self._step_s)):
-            self._step(crawl.wish(turn), rng)
+            self._step(crawl.wish(turn))
             now = self.body.forward
             turned += math.atan2(before[0] * now[1] - before[1] * now[0], float(before @ now))
             before, away = now, max(away, math.dist(self.body.position[:2], start))
         return turned * turn, away
 
-    def _start(self, rhythm: Rhythm, seed: int) -> tuple[Crawl, np.random.Generator]:
-        rng = np.random.default_rng([2026, seed])
-        self._game.reset(rng)
-        return Crawl(self.body, self._step_s, rhythm), rng
+    def _start(self, rhythm: Rhythm, seed: int) -> Crawl:
+        self._game.reset(np.random.default_rng([2026, seed]))
+        return Crawl(self.body, self._step_s, rhythm)
 
-    def _step(self, wish: Springs, rng: np.random.Generator) -> None:
+    def _step(self, wish: Springs) -> None:
         self.body.act(self.body.encode(wish))
-        self._game.advance(rng)
+        self._game.advance()
 
     def _line(self) -> tuple[Floats, Floats]:
         """Return where it is and whither it faces, ``(2,)`` each."""

@@ -48,7 +48,7 @@ def play(cfg: GameCfg, first: Script, others: Script | None, seed: int) -> tuple
             script = first if player in ours or others is None else others
             now = Script.idle if player.name in game.out else script
             play_script(now, game.task, player, game.observe, rng)
-        outcome = game.advance(rng)
+        outcome = game.advance()
         paid += float(np.mean([game.pay(outcome.terms[player.name]) for player in ours]))
         over = outcome.done
     game.close()

@@ -59,7 +59,7 @@ def episode(game: Game, play: Script | Callable[[Game, Player], Command], seed: 
         else:
             attacker.body.act(attacker.body.encode(play(game, attacker)))
         play_script(Script.random, game.task, defender, lambda _: {}, rng)
-        outcome = game.advance(rng)
+        outcome = game.advance()
         paid += game.pay(outcome.terms[attacker.name])
         if outcome.done:
             return paid, outcome.terminated

@@ -24,13 +24,13 @@ def rest(game):
     """Let the child be limp for a step; return the outcome."""
     player = game.players[0]
     row = np.zeros(player.body.action_spec.shape, np.float32)
-    return game.step({player.name: row}, np.random.default_rng(0))
+    return game.step({player.name: row})
 
 
 def hold(game, angles):
     """Let the child pull its joints to angles for a step; return the outcome."""
     player = game.players[0]
-    return game.step({player.name: player.body.encode(angles)}, np.random.default_rng(0))
+    return game.step({player.name: player.body.encode(angles)})
 
 
 def put(game, posture):
@@ -61,7 +61,7 @@ def play(game, rng):
     start, heading = player.body.position, player.body.forward
     while not (outcomes and outcomes[-1].done):
         row = player.body.encode(game.task.expert(player, {}))
-        outcomes.append(game.step({player.name: row}, rng))
+        outcomes.append(game.step({player.name: row}))
     return outcomes, (player.body.position - start) @ heading
 
 

@@ -15,10 +15,10 @@ def blocks_game(task, *overrides):
 
 def sit(game, seconds):
     """Let the child hold its posture, yield the terms of every step."""
-    player, rng = game.players[0], np.random.default_rng(0)
+    player = game.players[0]
     posture = player.body.joint_angles()
     for _ in range(round(seconds / game.world.clock.step_s)):
-        outcome = game.step({player.name: player.body.encode(posture)}, rng)
+        outcome = game.step({player.name: player.body.encode(posture)})
         yield outcome.terms[player.name]
 
 
@@ -28,7 +28,7 @@ def play(game, seed):
     game.reset(rng)
     while not over:
         row = player.body.encode(game.task.expert(player, {}))
-        outcome = game.step({player.name: row}, rng)
+        outcome = game.step({player.name: row})
         for name, value in outcome.terms[player.name].items():
             total[name] = total.get(name, 0.0) + value
         over = outcome.done

@@ -21,7 +21,7 @@ def steps(game, rng, **scripts):
         for player in game.players:
             now = Script.idle if player.name in game.out else Script[scripts[player.team]]
             play_script(now, game.task, player, lambda _: {}, rng)
-        outcome = game.advance(rng)
+        outcome = game.advance()
         yield outcome
         over = outcome.done
 
@@ -40,9 +40,9 @@ def paid_in_all(game, outcome):
 
 def rest(game, seconds=0.04):
     """Let everybody rest for a while; return the outcomes."""
-    rng, outcomes = np.random.default_rng(0), []
+    outcomes = []
     for _ in range(round(seconds / 0.04)):
         for player in game.players:
             player.body.rest()
-        outcomes.append(game.advance(rng))
+        outcomes.append(game.advance())
     return outcomes

@@ -93,7 +93,7 @@ def returns(cfg, episodes, script, seed=0):
             for player in game.actors:
                 now = Script.idle if player.name in game.out else script
                 play_script(now, game.task, player, game.observe, rng)
-            outcome = game.advance(rng)
+            outcome = game.advance()
             total += float(np.mean([game.pay(outcome.terms[p.name]) for p in game.actors]))
             over = outcome.done
         paid.append(total)

@@ -44,7 +44,7 @@ def game(cfg):
 def move(game, rng, steps):
     for _ in range(steps):
         rows = {p.name: random_row(p.body.action_spec, rng) for p in game.players}
-        game.step(rows, rng)
+        game.step(rows)
 
 
 def test_specs_hold(env):

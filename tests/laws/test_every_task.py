@@ -111,7 +111,7 @@ def test_a_reset_after_a_reset_is_clean(cfg):
         game.reset(np.random.default_rng(used_steps))
         for _ in range(used_steps):
             rows = {p.name: by_chance(game.task, p, None, rng) for p in game.players}
-            game.step(rows, rng)
+            game.step(rows)
         game.reset(np.random.default_rng(7))
         starts.append({p.name: game.observe(p) for p in game.players})
     for name, senses in starts[0].items():
@@ -214,7 +214,7 @@ def test_a_batch_of_worlds_is_single_games_side_by_side(cfg, env, rollout):
                 for team, names in env.group_map.items()
                 for index, name in enumerate(names)
             }
-            outcome = game.step(actions, rng)
+            outcome = game.step(actions)
             for team in env.group_map:
                 for index, player in enumerate(game.team(team)):
                     for name, seen in game.observe(player).items():

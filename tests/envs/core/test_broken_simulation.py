@@ -55,7 +55,7 @@ def test_the_next_episode_is_as_in_a_new_world(cfg):
     broken.reset(np.random.default_rng(0))
     break_down(broken)
     rows = {player.name: np.zeros(82) for player in broken.players}
-    assert broken.step(rows, np.random.default_rng(0)).truncated
+    assert broken.step(rows).truncated
     films = []
     for game in (broken, sound):
         rng = np.random.default_rng(3)
@@ -64,7 +64,7 @@ def test_the_next_episode_is_as_in_a_new_world(cfg):
         for player in game.players:
             game.observe(player)
         for _ in range(10):
-            assert not game.step(rows, rng).truncated
+            assert not game.step(rows).truncated
             film.append({p.name: game.observe(p) for p in game.players})
             film[-1] = {n: {k: v.copy() for k, v in seen.items()} for n, seen in film[-1].items()}
         films.append(film)

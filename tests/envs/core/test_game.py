@@ -82,13 +82,13 @@ def test_teams_wear_their_shirts(duel):
 
 
 def test_the_rules_end_a_game_before_its_time(duel):
-    outcomes = [duel.step(still(duel), np.random.default_rng(0)) for _ in range(3)]
+    outcomes = [duel.step(still(duel)) for _ in range(3)]
     assert [outcome.terminated for outcome in outcomes] == [False, False, True]
     assert not any(outcome.truncated for outcome in outcomes)
 
 
 def test_a_reset_game_starts_its_time_anew(game):
-    game.step(still(game), np.random.default_rng(0))
+    game.step(still(game))
     game.reset(np.random.default_rng(0))
     assert game.steps == 0
 
@@ -98,11 +98,11 @@ def test_one_impossible_action_stops_everybody(duel):
     actions = {name: np.ones(2, np.float32) for name in ("red", "blue_0", "blue_1")}
     actions["blue_1"][0] = np.nan
     with pytest.raises(ValueError, match=r"blue_1: action .*nan"):
-        duel.step(actions, np.random.default_rng(0))
+        duel.step(actions)
     np.testing.assert_array_equal(duel.world.scene.positions, before)
     assert duel.steps == 0
     # the next step does what is told then
-    duel.step(still(duel), np.random.default_rng(0))
+    duel.step(still(duel))
     np.testing.assert_allclose(duel.world.scene.positions[:, :2], before[:, :2], atol=1e-6)
 
 
@@ -110,9 +110,9 @@ def test_everybody_must_be_told(duel):
     actions = still(duel)
     del actions["blue_0"]
     with pytest.raises(ValueError, match=r"no action for \['blue_0'\]"):
-        duel.step(actions, np.random.default_rng(0))
+        duel.step(actions)
     with pytest.raises(ValueError, match="'green'"):
-        duel.step({**still(duel), "green": np.zeros(2)}, np.random.default_rng(0))
+        duel.step({**still(duel), "green": np.zeros(2)})
 
 
 def test_pay_is_the_weighted_sum(game):
@@ -180,7 +180,7 @@ def test_quality_changes_content_but_never_shape(sense, presets):
         rng = np.random.default_rng(1)
         game.reset(rng)
         game.observe(game.players[0])
-        game.step(still(game), rng)
+        game.step(still(game))
         specs.append(game.senses["agents"][sense].specs[sense])
         contents.append(game.observe(game.players[0])[sense].tobytes())
         game.close()

@@ -82,15 +82,15 @@ def test_who_is_out_rests_whatever_it_is_told(cfg):
     rng = np.random.default_rng(0)
     game.reset(rng)
     while not game.out:
-        game.step({p.name: np.array([1.0, 0.0]) for p in game.actors}, rng)
+        game.step({p.name: np.array([1.0, 0.0]) for p in game.actors})
     (name,) = game.out
     body = next(p.body for p in game.players if p.name == name)
     before = body.position
     told = {p.name: np.array([0.0, 0.0]) for p in game.actors} | {name: np.array([np.nan, 1.0])}
-    game.step(told, rng)
+    game.step(told)
     np.testing.assert_allclose(body.position[:2], before[:2], atol=1e-9)
     del told[name]
-    game.step(told, rng)  # and needs no action
+    game.step(told)  # and needs no action
     game.close()
 
 
@@ -105,7 +105,7 @@ def test_worlds_are_single_games_though_players_leave(cfg, env, rollout):
             for team, names in env.group_map.items()
             for index, name in enumerate(names)
         }
-        outcome = game.step(actions, rng)
+        outcome = game.step(actions)
         for team, names in env.group_map.items():
             for index, name in enumerate(names):
                 if name in out:
@@ -236,7 +236,7 @@ def test_scripts_without_rules(cfg, script, moves):
     assert [player.name for player in game.actors] == ["blue_0", "blue_1"]
     (red,) = game.team("red")
     before = red.body.position
-    game.step({p.name: np.zeros(2) for p in game.actors}, rng)
+    game.step({p.name: np.zeros(2) for p in game.actors})
     assert bool(np.abs(red.body.position - before)[:2].max() > 1e-6) is moves
     game.close()
 

@@ -24,12 +24,11 @@ def game():
 def heard(game, call_map, listener, caller, call=Call.high):
     """Let one who stands in one place, x, y and yaw, hear who calls from another for a while."""
     ears, mouth = game.players
-    rng = np.random.default_rng(0)
     ears.body.place((*listener[:2], 0.0), math.radians(listener[2]))
     mouth.body.place((*caller, 0.0), 0.0)
     for _ in range(STEPS):
         wishes = {ears.name: (0.0, 0.0), mouth.name: (0.0, 0.0, call)}
-        game.step({p.name: p.body.encode(wishes[p.name]) for p in game.players}, rng)
+        game.step({p.name: p.body.encode(wishes[p.name]) for p in game.players})
         audio, _ = [game.observe(player).get("audio") for player in game.players]
     call_map.hear(ears.body.mount("head"), audio)
 

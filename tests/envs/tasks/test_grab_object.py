@@ -20,7 +20,7 @@ def play(game, seconds, choose):
     rng, outcomes = np.random.default_rng(0), []
     game.reset(rng)
     for _ in range(round(seconds / 0.04)):
-        outcomes.append(game.step({"agents": choose(game)}, rng).terms["agents"])
+        outcomes.append(game.step({"agents": choose(game)}).terms["agents"])
     return outcomes
 
 
@@ -37,9 +37,8 @@ def test_nothing_bursts_apart_at_the_start(game):
     game.reset(np.random.default_rng(3))
     before = game.task.toy.position
     posture = game.task.child.joint_angles()
-    rng = np.random.default_rng(0)
     for _ in range(12):
-        game.step({"agents": game.players[0].body.encode(posture)}, rng)
+        game.step({"agents": game.players[0].body.encode(posture)})
     assert np.linalg.norm(game.task.toy.position - before) < 0.003
     # without the expert's help its trunk sags, but the child does not slide or jump
     assert np.linalg.norm(game.task.child.position[:2]) < 0.03
@@ -66,18 +65,16 @@ def test_the_expert_lifts_and_is_paid_for_the_height(game):
 def test_letting_go_costs_what_lifting_earned(game):
     play(game, 4.0, by_expert)
     held = game.task.held_m
-    rng = np.random.default_rng(0)
     lost = 0.0
     for _ in range(50):
-        lost += game.step({"agents": limp(game)}, rng).terms["agents"]["lift"]
+        lost += game.step({"agents": limp(game)}).terms["agents"]["lift"]
     assert lost < -0.5 * held
 
 
 def test_a_toy_that_flies_by_itself_earns_nothing(game):
     game.reset(np.random.default_rng(0))
     game.task.toy.place((0.5, 0.5, 0.3))
-    rng = np.random.default_rng(0)
-    assert game.step({"agents": limp(game)}, rng).terms["agents"]["lift"] == 0.0
+    assert game.step({"agents": limp(game)}).terms["agents"]["lift"] == 0.0
 
 
 def test_approach_is_the_way_of_both_hands(game):
@@ -94,7 +91,7 @@ def test_effort_is_the_square_of_all_torques(game):
     rng = np.random.default_rng(0)
     game.reset(rng)
     row = rng.uniform(-1.0, 1.0, 82).astype(np.float32)
-    effort = game.step({"agents": row}, rng).terms["agents"]["effort"]
+    effort = game.step({"agents": row}).terms["agents"]["effort"]
     assert effort == pytest.approx(float(row.astype(float) @ row), rel=1e-6)
     assert game.weights["effort"] == -0.004  # the paper's
 

@@ -24,10 +24,9 @@ def game():
     game.close()
 
 
-def stand(game, seconds, rng=None):
-    rng = rng or np.random.default_rng(0)
+def stand(game, seconds):
     for _ in range(round(seconds / 0.04)):
-        yield game.step({"agents": np.zeros(2, np.float32)}, rng)
+        yield game.step({"agents": np.zeros(2, np.float32)})
 
 
 def launches(game, count):
@@ -96,7 +95,7 @@ def test_a_kicked_ball_that_comes_back_does_not_count_again(game):
     kicks = 0.0
     for _ in range(9):  # 0.36 s: the next ball comes after 0.4 s
         game.task.ball.place((0.36, 0.0, 0.15))
-        outcome = game.step({"agents": np.zeros(2, np.float32)}, np.random.default_rng(0))
+        outcome = game.step({"agents": np.zeros(2, np.float32)})
         kicks += outcome.terms["agents"]["kick"]
     assert kicks == 1.0
 
@@ -123,7 +122,7 @@ def test_approach_is_the_cosine_of_the_way_to_the_ball(game, bearing_deg, expect
     body.place((0.0, 0.0, 0.0))
     bearing = math.radians(bearing_deg)
     ball.place((2.0 * math.cos(bearing), 2.0 * math.sin(bearing), 0.15))
-    outcome = game.step({"agents": np.array([1.0, 0.0], np.float32)}, np.random.default_rng(0))
+    outcome = game.step({"agents": np.array([1.0, 0.0], np.float32)})
     assert outcome.terms["agents"]["approach"] == pytest.approx(expected, abs=0.03)
 
 
@@ -134,7 +133,7 @@ def test_creeping_up_to_the_ball_is_no_approach(game, facing, forward):
     game.players[0].body.place((0.0, 0.0, 0.0), facing)
     game.task.ball.place((2.0, 0.0, 0.15))
     creep = {"agents": np.array([forward, 0.0], np.float32)}
-    outcome = game.step(creep, np.random.default_rng(0))
+    outcome = game.step(creep)
     assert game.players[0].body.velocity[0] > 0.1
     assert outcome.terms["agents"]["approach"] == 0.0
 
@@ -161,7 +160,7 @@ def test_the_ball_is_heard_from_its_side(game, side, y):
     game.observe(game.players[0])
     for _ in range(5):
         game.task.ball.place((0.0, y, 0.15))
-        game.step({"agents": np.zeros(2, np.float32)}, np.random.default_rng(0))
+        game.step({"agents": np.zeros(2, np.float32)})
         left, right = game.observe(game.players[0])["audio"].mean(axis=-1)
     assert (left > right) == (side == "left")
 
@@ -174,7 +173,7 @@ def kicks_of_expert(audio, episodes):
         seen, total = game.observe(player), 0.0
         for _ in range(game.max_steps):
             row = player.body.encode(game.task.expert(player, seen))
-            total += game.step({"agents": row}, rng).terms["agents"]["kick"]
+            total += game.step({"agents": row}).terms["agents"]["kick"]
             seen = game.observe(player)
         kicks.append(total)
     game.close()

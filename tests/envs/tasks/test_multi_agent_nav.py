@@ -51,7 +51,7 @@ def step(game, **wishes):
     """Let an agent step pass; who is not named stands."""
     wishes = {player.name: wishes.get(player.name, (0.0, 0.0)) for player in game.players}
     rows = {player.name: player.body.encode(wishes[player.name]) for player in game.players}
-    return game.step(rows, np.random.default_rng(0))
+    return game.step(rows)
 
 
 def put(game, number, x, y=0.0, yaw_deg=0.0):
@@ -251,7 +251,7 @@ def test_bodies_with_joints_play_and_are_heard():
     for sounds in ([], [call_waveform(CALLS[Call.high], 22_050)]):
         for sound in sounds:
             one.body.make_sound(sound)
-        outcome = game.step(rest, np.random.default_rng(0))
+        outcome = game.step(rest)
         loud.append(game.observe(other)["audio"].max())
         assert set(outcome.terms[one.name]) == {"reached", "ahead", "aside"}
     assert loud[1] > loud[0] + 3.0
@@ -275,7 +275,7 @@ def test_a_joint_level_body_crawls_to_the_object_that_it_sees_and_calls():
         rest = np.zeros(other.body.action_spec.shape, np.float32)
         rows = {finder.name: finder.body.encode(wish), other.name: rest}
         called = called or rows[finder.name][-1] > 0.6
-        assert not game.step(rows, rng).done
+        assert not game.step(rows).done
     assert called
     game.close()
 
@@ -301,7 +301,7 @@ def test_who_cannot_get_on_goes_back_and_comes_round():
     still = np.zeros(other.body.action_spec.shape, np.float32)
     for _ in range(25 * 25):
         row = player.body.encode(traveller.to(goal))
-        game.step({player.name: row, other.name: still}, rng)
+        game.step({player.name: row, other.name: still})
         if traveller.is_at(goal):
             break
     assert traveller.is_at(goal)
@@ -317,7 +317,7 @@ def seconds_needed(game, seed):
     game.reset(rng)
     while True:
         wishes = {p.name: game.task.expert(p, game.observe(p)) for p in game.players}
-        outcome = game.step({p.name: p.body.encode(wishes[p.name]) for p in game.players}, rng)
+        outcome = game.step({p.name: p.body.encode(wishes[p.name]) for p in game.players})
         if outcome.done:
             return game.steps * STEP_S if outcome.terminated else math.inf
 

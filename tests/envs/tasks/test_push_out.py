@@ -40,7 +40,7 @@ def push(game, seconds, *rows):
     for _ in range(round(seconds / 0.04)):
         moves = zip(game.players, rows, strict=False)
         actions = {player.name: np.array(row, np.float32) for player, row in moves}
-        outcome = game.step(actions, np.random.default_rng(0))
+        outcome = game.step(actions)
         if outcome.done:
             break
     return outcome
@@ -68,7 +68,7 @@ def test_swapped_teams_are_paid_swapped(duel):
         told = []
         for row in rows:
             actions = {p.name: row[seat] for p, seat in zip(duel.players, order, strict=True)}
-            outcome = duel.step(actions, np.random.default_rng(0))
+            outcome = duel.step(actions)
             told.append([outcome.terms[("red", "blue")[order.index(seat)]] for seat in (0, 1)])
         paid.append([[list(terms.values()) for terms in step] for step in told])
     assert np.abs(paid[0]).max() > 0.01
@@ -131,7 +131,7 @@ def test_ground_pays_for_places_not_for_the_way(duel):
     for row in ((1.0, 0.0), (-1.0, 0.2), (1.0, -0.4)):
         for _ in range(6):
             actions = {"red": np.array(row, np.float32), "blue": np.zeros(2, np.float32)}
-            total += duel.step(actions, np.random.default_rng(0)).terms["red"]["ground"]
+            total += duel.step(actions).terms["red"]["ground"]
     red = duel.players[0].body.position[:2]
     assert total == pytest.approx(0.36 - float(red @ red), abs=1e-9)
 

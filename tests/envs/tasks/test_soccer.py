@@ -122,9 +122,7 @@ def test_facing_pays_for_the_angle_that_is_made_good_and_no_more(alone):
     alone.task._now = alone.task._look()
     paid = []
     for turn in (-1.0,) * 15 + (1.0,) * 10:
-        outcome = alone.step(
-            {"attacker": np.array([0.0, turn], np.float32)}, np.random.default_rng(0)
-        )
+        outcome = alone.step({"attacker": np.array([0.0, turn], np.float32)})
         paid.append(outcome.terms["attacker"]["facing"])
     assert min(paid[:15]) > 0.0 > max(paid[15:])
     assert sum(paid) == pytest.approx(math.radians(100.0) - abs(body.yaw_rad), abs=1e-9)
@@ -136,7 +134,7 @@ def test_approach_pays_for_the_way_to_the_ball_and_a_ball_that_rolls_away_costs_
     body.place((-1.5, 0.0, 0.0))
     alone.task._now = alone.task._look()
     rows = {"attacker": np.array([1.0, 0.0], np.float32)}
-    steps = [alone.step(rows, np.random.default_rng(0)) for _ in range(10)]
+    steps = [alone.step(rows) for _ in range(10)]
     total = sum(outcome.terms["attacker"]["approach"] for outcome in steps)
     assert total == pytest.approx(body.position[0] + 1.5, abs=1e-6)
     begin(alone, (0.0, 0.0, 0.12), (1.0, 0.0, 0.0))
@@ -178,7 +176,7 @@ def at_the_ball(game, forward):
     rows["attacker"][0] = forward
     fastest = 0.0
     for _ in range(10):
-        game.step(rows, np.random.default_rng(0))
+        game.step(rows)
         fastest = max(fastest, float(game.task.ball.velocity[0]))
     return fastest
 
@@ -194,7 +192,7 @@ def test_nobody_kicks_twice_in_half_a_second(alone):
     for step in range(40):
         ball.place(np.array([0.0, 0.0, 0.12]), 0.0)
         body.place((-0.36, 0.0, 0.0))
-        alone.step({"attacker": np.array([1.0, 0.0], np.float32)}, np.random.default_rng(0))
+        alone.step({"attacker": np.array([1.0, 0.0], np.float32)})
         if ball.velocity[0] > 1.5:
             kicks.append(step)
     assert len(kicks) >= 3

@@ -86,7 +86,7 @@ def played(cfg):
     for step in range(STEPS + 1):
         if step:
             rows = {p.name: rng.uniform(-1, 1, 3).astype(np.float32) for p in game.players}
-            game.step(rows, rng)
+            game.step(rows)
         for player in game.players:
             values = game.observe(player).values()
             seen[player.name] += b"".join(value.tobytes() for value in values)

@@ -108,7 +108,7 @@ class SeededGame:
             raise RuntimeError("no episode is running: call reset() before step()")
         names = self.playing
         rows: dict[str, NDArray[Any]] = {name: np.asarray(row) for name, row in actions.items()}
-        outcome = self.game.step(rows, self.rng)
+        outcome = self.game.step(rows)
         self._running = not outcome.done
         return Step(
             self._observe(names),

@@ -67,6 +67,7 @@ class Game:
         cfg.check()
         self.cfg = cfg
         self.max_steps = round(cfg.task.max_seconds / cfg.clock.step_s)
+        self._rng: np.random.Generator | None = None
         self._build()
 
     def _build(self) -> None:
@@ -107,7 +108,12 @@ class Game:
         return [player for player in self.players if player.team == name]
 
     def reset(self, rng: np.random.Generator) -> None:
-        """Begin an episode; in a new world with new players if the old one fell apart."""
+        """Begin an episode; in a new world with new players if the old one fell apart.
+
+        Args:
+            rng: All randomness of this episode, at its start and in its steps.
+        """
+        self._rng = rng
         if self._broken():
             self.world.close()
             self._build()
@@ -120,10 +126,10 @@ class Game:
                 sense.reset()
         self.world.refresh()
 
-    def step(self, actions: Mapping[str, NDArray[Any]], rng: np.random.Generator) -> Outcome:
+    def step(self, actions: Mapping[str, NDArray[Any]]) -> Outcome:
         """Play one agent step: `command`, then `advance`."""
         self.command(actions)
-        return self.advance(rng)
+        return self.advance()
 
     def command(self, actions: Mapping[str, NDArray[Any]]) -> None:
         """Tell the actors what to do, before anything moves.
@@ -156,12 +162,15 @@ class Game:
         if missing:
             raise ValueError(f"no action for {missing}; each of {names} needs one")
 
-    def advance(self, rng: np.random.Generator) -> Outcome:
-        """Let one agent step pass, with the players doing what they were told last.
+    def advance(self) -> Outcome:
+        """Simulate one agent step with the actions that were set last.
 
-        Args:
-            rng: The game's source of randomness.
+        Raises:
+            RuntimeError: If `reset` was never called.
         """
+        rng = self._rng
+        if rng is None:
+            raise RuntimeError("no episode is running: call reset() before the first step")
         self._play_scripts(rng)
         self.task.before_step(rng)
         self.world.step()

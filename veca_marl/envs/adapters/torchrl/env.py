@@ -112,7 +112,7 @@ class VecaEnv(LeanEnv):
         arrays = self._next.new()
         for world, game in enumerate(self.games):
             out = game.out
-            outcome = game.advance(self._rngs[world])
+            outcome = game.advance()
             self._observe(world, arrays, out)
             self._score(world, arrays, outcome)
         return self._next.tensordict(arrays)
