@@ -22,7 +22,7 @@ def make(
     playground: str | None = None,
     body: str | None = None,
     senses: Mapping[str, str] | None = None,
-    seed: int = 0,
+    seed: int | None = None,
     overrides: Sequence[str] = (),
 ) -> VecaEnv:
     """Make a task as a TorchRL environment. What is left out is as on the command line.
@@ -33,7 +33,7 @@ def make(
         playground: A file of `conf/playground`, such as `simple`; None is the task's own.
         body: A file of `conf/body`, such as `walker_discrete`.
         senses: Sense to preset, a file of `conf/senses/<sense>`, such as `{"audio": "mono"}`.
-        seed: Same seed, same worlds, bit by bit.
+        seed: The same seed gives the same worlds, bit by bit; None is fresh entropy.
         overrides: Anything else the command line takes, such as `["task.life_s=4.0"]`.
 
     Returns:

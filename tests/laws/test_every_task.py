@@ -10,7 +10,7 @@ import torch
 from paths import HELPERS
 from rollouts import by_chance, digest, game_cfg, play, returns
 from torchrl.collectors import Collector
-from torchrl.envs import SerialEnv, check_env_specs
+from torchrl.envs import check_env_specs
 
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
 from veca_marl.envs.core.game import Game
@@ -170,65 +170,6 @@ def test_teams_see_the_root_flags(env, rollout):
             torch.testing.assert_close(ours[playing], root[playing])
 
 
-def test_a_partial_reset_touches_only_its_worlds(cfg):
-    """Two envs with one history; one of them resets worlds 1 and 3 only."""
-    whole, partly = VecaEnv(cfg, 4), VecaEnv(cfg, 4)
-    masked = torch.tensor([[False], [True], [False], [True]])
-    histories = []
-    for env, wanted in ((whole, None), (partly, masked)):
-        env.set_seed(3)
-        rng_state = play(env, 5, seed=3)["next"][:, -1].clone()
-        if wanted is not None:
-            rng_state["_reset"] = wanted
-            rng_state = env.reset(rng_state)
-        histories.append(rng_state)
-    kept = ~masked.squeeze(1)
-    for team in whole.group_map:
-        for name in histories[0][team, "observation"].keys():  # noqa: SIM118  a TensorDict
-            before, after = (h[team, "observation", name] for h in histories)
-            assert torch.equal(before[kept], after[kept]), name
-            assert not torch.equal(before[~kept], after[~kept]), name
-    # the worlds that went on know nothing of the others' reset
-    for env, state in zip((whole, partly), histories, strict=True):
-        torch.manual_seed(0)
-        state.update(env.rand_action(state))
-        state.update(env.step(state)["next"].clone())
-    for team in whole.group_map:
-        for name in histories[0][team, "observation"].keys():  # noqa: SIM118
-            before, after = (h[team, "observation", name] for h in histories)
-            assert torch.equal(before[kept], after[kept]), name
-    whole.close()
-    partly.close()
-
-
-def test_a_batch_of_worlds_is_single_games_side_by_side(cfg, env, rollout):
-    """World i of an env seeded s is a game alone whose random stream is `[s, i]`."""
-    for world in range(WORLDS):
-        game, rng = Game(cfg), np.random.default_rng([1, world])
-        game.reset(rng)
-        for player in game.players:
-            game.observe(player)
-        for step in rollout[world].unbind(0):
-            actions = {
-                name: step[team, "action"][index].numpy()
-                for team, names in env.group_map.items()
-                for index, name in enumerate(names)
-            }
-            outcome = game.step(actions)
-            for team in env.group_map:
-                for index, player in enumerate(game.team(team)):
-                    for name, seen in game.observe(player).items():
-                        got = step["next", team, "observation", name][index].numpy()
-                        np.testing.assert_array_equal(got, seen)
-                    reward = step["next", team, "reward"][index].item()
-                    assert reward == pytest.approx(game.pay(outcome.terms[player.name]), abs=1e-6)
-            if outcome.done:
-                game.reset(rng)
-                for player in game.players:
-                    game.observe(player)
-        game.close()
-
-
 def test_the_group_map_names_every_player_once(env):
     names = [name for team in env.group_map.values() for name in team]
     assert names == [player.name for player in env.games[0].players]
@@ -243,12 +184,6 @@ def test_the_expert_beats_chance(cfg):
     expert, chance = returns(cfg, played, Script.expert), returns(cfg, by_chance, Script.random)
     error = np.sqrt(expert.var(ddof=1) / played + chance.var(ddof=1) / by_chance)
     assert expert.mean() > chance.mean() + 2.0 * max(error, 0.1)
-
-
-def test_works_in_a_serial_env(cfg):
-    env = SerialEnv(2, partial(VecaEnv, cfg, 1))
-    check_env_specs(env)
-    env.close()
 
 
 def test_works_in_a_collector(cfg):

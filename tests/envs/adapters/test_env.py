@@ -93,6 +93,14 @@ def test_seeds_and_streams(env):
     assert not torch.equal(first[audio][0], first[audio][1])
 
 
+def test_envs_that_were_not_seeded_differ():
+    one, other = VecaEnv(cfg_of(*CHEAP)), VecaEnv(cfg_of(*CHEAP))
+    audio = ("agents", "observation", "audio")
+    assert not torch.equal(one.reset()[audio], other.reset()[audio])
+    one.close()
+    other.close()
+
+
 def test_the_constructor_seeds_as_set_seed_does(env):
     fresh = VecaEnv(cfg_of(*CHEAP), worlds=3, seed=9)
     env.set_seed(9)
@@ -122,6 +130,35 @@ def test_worlds_may_end_at_different_times():
         ended.append(played["next", "done"].squeeze(-1).tolist())
     assert [step for step, (_, second) in enumerate(ended) if second] == [4]
     assert [step for step, (first, _) in enumerate(ended) if first] == [9]
+    env.close()
+
+
+def test_a_masked_world_neither_moves_nor_needs_an_action(env):
+    env.set_seed(4)
+    state = env.reset()
+    action = torch.full((3, 1, 2), 0.5)
+    action[1] = torch.nan
+    state["agents", "action"] = action
+    state["_step"] = torch.tensor([[True], [False], [True]])
+    before = state["agents", "observation", "audio"].clone()
+    after = env.step(state)["next"]
+    assert [game.steps for game in env.games] == [1, 0, 1]
+    moved = (after["agents", "observation", "audio"] != before).flatten(1).any(1)
+    assert moved.tolist() == [True, False, True]
+    assert after["agents", "reward"][1] == 0.0
+
+
+def test_a_rollout_goes_on_until_all_worlds_are_done():
+    game = compose(["+task=PushOut1v1", "senses/vision=blind", "task.max_seconds=2.0"]).game
+    env = VecaEnv(game, worlds=4, seed=0)
+    state = env.reset()
+    for _ in range(10):  # world 0 is 10 steps ahead of the others
+        state["_step"] = torch.tensor([[True], [False], [False], [False]])
+        state = env.step_mdp(env.step(env.rand_action(state)))
+    rollout = env.rollout(200, auto_reset=False, tensordict=state, break_when_all_done=True)
+    assert rollout["next", "done"][:, -1].all()
+    first = rollout["next", "done"].squeeze(-1).int().argmax(1)
+    assert first[0] < first[1:].max()
     env.close()
 
 

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
+from batches import batch_and_singles, play_and_compare
 from knockouts import knockout
 from torchrl.collectors import Collector
 from torchrl.envs import SerialEnv, check_env_specs
@@ -94,31 +95,11 @@ def test_who_is_out_rests_whatever_it_is_told(cfg):
     game.close()
 
 
-def test_worlds_are_single_games_though_players_leave(cfg, env, rollout):
-    game, rng = Game(cfg), np.random.default_rng([4, 1])
-    game.reset(rng)
-    seen = {p.name: game.observe(p) for p in game.players}
-    for step in rollout[1].unbind(0):
-        out = game.out
-        actions = {
-            name: step[team, "action"][index].numpy()
-            for team, names in env.group_map.items()
-            for index, name in enumerate(names)
-        }
-        outcome = game.step(actions)
-        for team, names in env.group_map.items():
-            for index, name in enumerate(names):
-                if name in out:
-                    continue
-                player = next(p for p in game.players if p.name == name)
-                for sense, array in game.observe(player).items():
-                    got = step["next", team, "observation", sense][index].numpy()
-                    np.testing.assert_array_equal(got, array)
-        if outcome.done:
-            game.reset(rng)
-            seen = {p.name: game.observe(p) for p in game.players}
-    assert set(seen) == {"red", "blue_0", "blue_1"}
-    game.close()
+def test_a_batch_equals_single_worlds_though_players_leave(cfg):
+    envs = batch_and_singles(cfg, worlds=3, seed=7)
+    play_and_compare(*envs, steps=20)
+    for env in envs:
+        env.close()
 
 
 def test_one_world_that_starts_anew_brings_nobody_back_in_another(env):

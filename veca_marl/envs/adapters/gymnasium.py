@@ -31,14 +31,16 @@ class VecaGymEnv(gymnasium.Env[Observation, Any]):
 
     Args:
         cfg: What is played.
-        seed: Where the random stream starts when `reset` is not told.
+        seed: Used until `reset` is given one; None is fresh entropy.
         render_mode: `rgb_array` if `render` is to be called.
 
     Raises:
         ValueError: If several agents play.
     """
 
-    def __init__(self, cfg: GameCfg, seed: int = 0, render_mode: str | None = None) -> None:
+    def __init__(
+        self, cfg: GameCfg, seed: int | None = None, render_mode: str | None = None
+    ) -> None:
         self._played = SeededGame(cfg, seed, render_mode)
         game = self._played.game
         if len(game.actors) != 1:
@@ -57,14 +59,14 @@ class VecaGymEnv(gymnasium.Env[Observation, Any]):
         """Begin an episode.
 
         Args:
-            seed: Starts the random stream anew; None goes on with it.
-            options: Not used.
+            seed: Restarts the count of episodes; None continues it.
+            options: `{"episode": number}` begins the episode of this number.
 
         Returns:
             The observation and an empty info.
         """
-        observations = self._played.reset(seed)
-        # VecaEnv's stream instead of the one that Gymnasium would make of the same seed
+        observations = self._played.reset(seed, options)
+        # the generator of this episode, not the one that Gymnasium would make of the same seed
         self.np_random = self._played.rng
         return observations[self._agent], {}
 
@@ -99,7 +101,7 @@ def single_agent_env(
     playground: str | None = None,
     body: str | None = None,
     senses: Mapping[str, str] | None = None,
-    seed: int = 0,
+    seed: int | None = None,
     overrides: Sequence[str] = (),
     render_mode: str | None = None,
 ) -> VecaGymEnv:
@@ -112,7 +114,7 @@ def single_agent_env(
         playground: A file of `conf/playground`; None is the task's own.
         body: A file of `conf/body`.
         senses: Sense to preset, a file of `conf/senses/<sense>`.
-        seed: Where the random stream starts when `reset` is not told.
+        seed: Used until `reset` is given one; None is fresh entropy.
         overrides: Anything else the command line takes.
         render_mode: `rgb_array` if `render` is to be called.
 

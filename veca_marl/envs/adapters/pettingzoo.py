@@ -32,11 +32,13 @@ class VecaParallelEnv(ParallelEnv[str, Observation, Any]):
 
     Args:
         cfg: What is played.
-        seed: Where the random stream starts when `reset` is not told.
+        seed: Used until `reset` is given one; None is fresh entropy.
         render_mode: `rgb_array` if `render` is to be called.
     """
 
-    def __init__(self, cfg: GameCfg, seed: int = 0, render_mode: str | None = None) -> None:
+    def __init__(
+        self, cfg: GameCfg, seed: int | None = None, render_mode: str | None = None
+    ) -> None:
         self._played = SeededGame(cfg, seed, render_mode)
         game = self._played.game
         self.metadata = self._played.metadata
@@ -65,13 +67,13 @@ class VecaParallelEnv(ParallelEnv[str, Observation, Any]):
         """Begin an episode.
 
         Args:
-            seed: Starts the random stream anew; None goes on with it.
-            options: Not used.
+            seed: Restarts the count of episodes; None continues it.
+            options: `{"episode": number}` begins the episode of this number.
 
         Returns:
             Observations and empty infos, by agent.
         """
-        observations = self._played.reset(seed)
+        observations = self._played.reset(seed, options)
         self.agents = list(self.possible_agents)
         return observations, {name: {} for name in self.agents}
 
@@ -111,7 +113,7 @@ def parallel_env(
     playground: str | None = None,
     body: str | None = None,
     senses: Mapping[str, str] | None = None,
-    seed: int = 0,
+    seed: int | None = None,
     overrides: Sequence[str] = (),
     render_mode: str | None = None,
 ) -> VecaParallelEnv:
@@ -122,7 +124,7 @@ def parallel_env(
         playground: A file of `conf/playground`; None is the task's own.
         body: A file of `conf/body`.
         senses: Sense to preset, a file of `conf/senses/<sense>`.
-        seed: Where the random stream starts when `reset` is not told.
+        seed: Used until `reset` is given one; None is fresh entropy.
         overrides: Anything else the command line takes.
         render_mode: `rgb_array` if `render` is to be called.
 

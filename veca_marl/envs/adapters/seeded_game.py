@@ -1,6 +1,7 @@
 """A game with its own random stream, one episode after another: what PettingZoo and Gymnasium see.
 
-It draws, observes and pays in the order of `VecaEnv`, so that the same seed gives the same bytes.
+It draws, observes and computes rewards in the order of `VecaEnv`: the same seed gives the same
+bytes.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from veca_marl.envs.core.episodes import Episodes
 from veca_marl.envs.core.game import Game, Observation
 from veca_marl.envs.core.game_cfg import GameCfg
 from veca_marl.envs.rendering.spectator import Spectator
@@ -45,23 +47,23 @@ class SeededGame:
     Attributes:
         game: What is played.
         names: The players whose actions come from outside, team by team.
-        rng: Where its randomness comes from.
+        rng: The generator of the episode that is running.
         metadata: What Gymnasium and PettingZoo want to know about pictures.
 
     Args:
         cfg: What is played.
-        seed: As for `VecaEnv`.
+        seed: As for `VecaEnv`; None is fresh entropy.
         render_mode: `rgb_array` if `render` is to be called.
 
     Raises:
         ValueError: If there is no such render mode, or the seed is negative.
     """
 
-    def __init__(self, cfg: GameCfg, seed: int, render_mode: str | None) -> None:
+    def __init__(self, cfg: GameCfg, seed: int | None, render_mode: str | None) -> None:
         if render_mode is not None and render_mode not in RENDER_MODES:
             raise ValueError(f"render_mode={render_mode!r}; choices: {[None, *RENDER_MODES]}")
         announce_compilation()
-        self._seed(seed)
+        self._episodes = Episodes(seed)
         self.game = Game(cfg)
         self.names = [player.name for player in self.game.actors]
         self.metadata: dict[str, Any] = {
@@ -74,19 +76,22 @@ class SeededGame:
         self._seen: dict[str, Observation] = {}
         self._running = False
 
-    def _seed(self, seed: int) -> None:
-        if seed < 0:
-            raise ValueError(f"seed={seed} must be 0 or more")
-        self.rng = np.random.default_rng([seed, 0])
-
-    def reset(self, seed: int | None = None) -> dict[str, Observation]:
+    def reset(
+        self, seed: int | None = None, options: Mapping[str, Any] | None = None
+    ) -> dict[str, Observation]:
         """Begin an episode and return what all players perceive.
 
         Args:
-            seed: Starts the random stream anew, as `VecaEnv.set_seed`; None goes on with it.
+            seed: Restarts the count of episodes, as `VecaEnv.set_seed`; None continues it.
+            options: `{"episode": number}` begins the episode of this number; others are ignored,
+                as PettingZoo's own test demands.
+
+        Raises:
+            ValueError: If the seed or the number is negative.
         """
         if seed is not None:
-            self._seed(seed)
+            self._episodes = Episodes(seed)
+        self.rng = self._episodes.next((options or {}).get("episode"))
         self.game.reset(self.rng)
         self._running = True
         return self._observe(self.names)

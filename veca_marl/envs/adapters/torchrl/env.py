@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
 import torch
 from numpy.typing import NDArray
 from tensordict import TensorDict, TensorDictBase
@@ -13,6 +12,7 @@ from torchrl.data import Categorical, Composite, Unbounded
 from veca_marl.envs.adapters.torchrl.layout import Arrays, Layout
 from veca_marl.envs.adapters.torchrl.lean_env import LeanEnv
 from veca_marl.envs.adapters.torchrl.specs import done_spec, observation_spec, to_torchrl
+from veca_marl.envs.core.episodes import Episodes, fresh_seed
 from veca_marl.envs.core.game import Game, Outcome
 from veca_marl.envs.core.game_cfg import GameCfg
 from veca_marl.envs.rendering.spectator import Spectator
@@ -21,6 +21,10 @@ from veca_marl.sim.compilation import announce_compilation
 
 class VecaEnv(LeanEnv):
     """W equal games in one process, `batch_size=[W]`, one TorchRL group per team.
+
+    World w equals, bit by bit, the only world of `VecaEnv(cfg, 1, seed, first_world=w)`: with
+    `_step` masks (a masked world does not move and keeps its data, as in TorchRL's `SerialEnv`)
+    and with partial resets.
 
     Keys, with n players in a team::
 
@@ -40,18 +44,23 @@ class VecaEnv(LeanEnv):
     Args:
         cfg: What is played.
         worlds: How many games.
-        seed: Seed of the first world's randomness; world i draws from its own stream.
+        seed: All randomness of an episode follows from it, the number of the world and the number
+            of the episode; None is fresh entropy.
+        first_world: Number of the first world.
 
     Raises:
         ValueError: If there is less than one world, or the configuration is impossible.
     """
 
-    def __init__(self, cfg: GameCfg, worlds: int = 1, seed: int = 0) -> None:
+    def __init__(
+        self, cfg: GameCfg, worlds: int = 1, seed: int | None = None, *, first_world: int = 0
+    ) -> None:
         if worlds < 1:
             raise ValueError(f"worlds={worlds}: at least one is needed")
         announce_compilation()
         super().__init__(device=None, batch_size=torch.Size([worlds]))
         self.cfg = cfg
+        self._first_world = first_world
         self.games = [Game(cfg) for _ in range(worlds)]
         self._teams = [team.name for team in cfg.teams if team.name not in cfg.script]
         self._eliminates = type(self.games[0].task).eliminates
@@ -90,27 +99,46 @@ class VecaEnv(LeanEnv):
         self._next = Layout(observed.clone().update(reward).update(done))
 
     def _set_seed(self, seed: int | None) -> None:
-        worlds = self.batch_size[0]
-        self._rngs = [
-            np.random.default_rng(None if seed is None else [seed, world])
-            for world in range(worlds)
+        seed = fresh_seed() if seed is None else seed
+        self.episodes = [
+            Episodes(seed, self._first_world + world) for world in range(self.batch_size[0])
         ]
 
-    def _reset(self, tensordict: TensorDictBase | None = None, **_: Any) -> TensorDict:
-        wanted = None if tensordict is None else tensordict.get("_reset", None)
-        mask = np.ones(len(self.games), bool) if wanted is None else wanted.numpy().ravel()
+    def _reset(
+        self, tensordict: TensorDictBase | None = None, *, episode: int | None = None, **_: Any
+    ) -> TensorDict:
+        """Begin episodes in the worlds that `_reset` names, or in all.
+
+        Args:
+            tensordict: May hold a `_reset` mask.
+            episode: Number of the episode to begin; None is the one after the last.
+        """
         arrays = self._start.new()
-        for world in np.flatnonzero(mask):
+        for world in self._chosen(tensordict, "_reset"):
             game = self.games[world]
-            game.reset(self._rngs[world])
+            game.reset(self.episodes[world].next(episode))
             self._players[world] = {team: game.team(team) for team in self._teams}
             self._observe(world, arrays, out=frozenset())
         return self._start.tensordict(arrays)
 
+    def _chosen(self, tensordict: TensorDictBase | None, mask: str) -> list[int]:
+        """Return the worlds that a mask `(W,)` or `(W, 1)` names; all if there is none."""
+        chosen = None if tensordict is None else tensordict.get(mask, None)
+        if chosen is None:
+            return list(range(len(self.games)))
+        return [world for world, (flag,) in enumerate(chosen.view(-1, 1).tolist()) if flag]
+
     def _step(self, tensordict: TensorDictBase) -> TensorDict:
-        self._command({team: self._actions(team, tensordict) for team in self._teams})
+        worlds = self._chosen(tensordict, "_step")
+        for team in self._teams:  # left there by TorchRL 0.14's rollout(break_when_all_done=True),
+            tensordict.get(team).pop("_neg_step", None)  # which then fails on its own key
+        self._command(worlds, {team: self._actions(team, tensordict) for team in self._teams})
         arrays = self._next.new()
-        for world, game in enumerate(self.games):
+        if len(worlds) < len(self.games):
+            still = sorted(set(range(len(self.games))) - set(worlds))
+            self._next.copy_rows(tensordict, arrays, still)
+        for world in worlds:
+            game = self.games[world]
             out = game.out
             outcome = game.advance()
             self._observe(world, arrays, out)
@@ -127,9 +155,10 @@ class VecaEnv(LeanEnv):
         plain = action.is_cpu and not action.requires_grad
         return action.numpy() if plain else action.numpy(force=True)
 
-    def _command(self, actions: dict[str, NDArray[Any]]) -> None:
-        """Hand the actions out in all worlds before any of them moves."""
-        for world, game in enumerate(self.games):
+    def _command(self, worlds: list[int], actions: dict[str, NDArray[Any]]) -> None:
+        """Apply the actions in all worlds that will step before any of them moves."""
+        for world in worlds:
+            game = self.games[world]
             rows = {
                 name: actions[team][world, index]
                 for team, names in self.group_map.items()

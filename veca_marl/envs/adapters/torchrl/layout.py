@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import torch
-from tensordict import TensorDict
+from tensordict import TensorDict, TensorDictBase
 from torchrl.data import Composite
 
 Arrays = dict[str, Any]  # name -> array, or name -> Arrays
@@ -38,6 +38,23 @@ class Layout:
         for name, layout in self._inner.items():
             arrays[name] = layout.new()
         return arrays
+
+    def copy_rows(self, source: TensorDictBase, arrays: Arrays, rows: list[int]) -> None:
+        """Copy rows of what `source` holds of this layout; what it does not hold stays as it is.
+
+        Args:
+            source: Where to copy from.
+            arrays: What `new` returned.
+            rows: Indices along the first axis.
+        """
+        for name in self._leaves:
+            value = source.get(name, None)
+            if value is not None:
+                arrays[name][rows] = value[rows].numpy(force=True)
+        for name, layout in self._inner.items():
+            inner = source.get(name, None)
+            if inner is not None:
+                layout.copy_rows(inner, arrays[name], rows)
 
     def tensordict(self, arrays: Arrays) -> TensorDict:
         """Return tensors on the memory of what `new` returned."""
