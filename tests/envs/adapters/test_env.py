@@ -155,6 +155,7 @@ def test_a_rollout_goes_on_until_all_worlds_are_done():
     for _ in range(10):  # world 0 is 10 steps ahead of the others
         state["_step"] = torch.tensor([[True], [False], [False], [False]])
         state = env.step_mdp(env.step(env.rand_action(state)))
+    del state["_step"]
     rollout = env.rollout(200, auto_reset=False, tensordict=state, break_when_all_done=True)
     assert rollout["next", "done"][:, -1].all()
     first = rollout["next", "done"].squeeze(-1).int().argmax(1)
