@@ -24,12 +24,12 @@ $(VENV)/installed-test: $(VENV)/bin/python pyproject.toml
 train: $(VENV)/installed ## train PPO on KickTheBall; more with ARGS="senses/audio=mono seed=1"
 	$(BIN)/python -m veca_marl.train +task=KickTheBall $(ARGS)
 
-lint: $(VENV)/installed-test ## style, formatting and the arrows between the rooms
+lint: $(VENV)/installed-test ## style, formatting and the import contracts
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/lint-imports
 
-types: $(VENV)/installed-test ## mypy --strict on the simulator and the tasks
+types: $(VENV)/installed-test ## mypy --strict on the whole package
 	$(BIN)/mypy
 
 test: lint types ## lint, types, layer contracts and the quick tests
