@@ -10,6 +10,7 @@ from typing import Any, ClassVar, NamedTuple, get_type_hints
 import numpy as np
 from numpy.typing import NDArray
 
+from veca_marl.registry import Registry
 from veca_marl.sim.body.base import Body
 from veca_marl.sim.body.humanoid.humanoid import Humanoid
 from veca_marl.sim.body.walker.walker import Walker
@@ -180,20 +181,19 @@ class Task(ABC):
         return hint
 
 
-TASKS: dict[str, type[Task]] = {}
+TASKS: Registry[type[Task]] = Registry("task")
 
 
 def register(task: type[Task]) -> type[Task]:
-    """Make a task known by its class name."""
-    if task.__name__ in TASKS:
-        raise ValueError(f"two tasks are called {task.__name__}")
-    TASKS[task.__name__] = task
+    """Register a task by its class name.
+
+    Raises:
+        ValueError: If another task has this name.
+    """
+    TASKS.add(task.__name__, task)
     return task
 
 
 def find_task(name: str) -> type[Task]:
     """Return a task by name; raise `ValueError` with the names that exist."""
-    try:
-        return TASKS[name]
-    except KeyError:
-        raise ValueError(f"unknown task {name!r}; there are {sorted(TASKS)}") from None
+    return TASKS.find(name)
