@@ -54,7 +54,7 @@ def listen(game: Game, together: bool, rng: np.random.Generator) -> NDArray[np.f
     head, caller = ears.body.mount("head"), mouth.body.mount("mouth").position
     way = (caller - head.position) @ head.rotation
     away_m = float(np.linalg.norm(way))
-    walls = world.house.walls_between(head.position, caller)
+    walls = world.house.obstacles_between(head.position, caller)
     left, right = loudness(heard["audio"])
     loss = world.playground.transmission_loss_db / 20.0 * walls
     return np.array(

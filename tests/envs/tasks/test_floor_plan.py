@@ -105,7 +105,7 @@ def test_doors_are_openings_of_the_walls(house):
             (0.0, 2.1, 1),
         ):
             middle = np.array([x, y, height_m]) + shift_m * aside
-            crossed = world.house.walls_between(middle - out, middle + out)
+            crossed = world.house.obstacles_between(middle - out, middle + out)
             assert crossed == walls, (door.name, shift_m, height_m)
     world.close()
 

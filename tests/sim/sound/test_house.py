@@ -27,8 +27,12 @@ LOSS_DB = 30.0
 def house(*walls, loss_db=LOSS_DB, order=1):
     house = House([WEST, EAST], order, loss_db)
     for wall in walls:
-        house.add_wall(*wall)
+        put_up(house, *wall)
     return house
+
+
+def put_up(house, centre, rotation, half):
+    house.obstacles.move(house.obstacles.add(half), centre, rotation)
 
 
 def pose(*position):
@@ -95,15 +99,15 @@ def test_what_no_wall_hides_in_the_next_room_is_heard_as_in_the_free_field():
     ],
 )
 def test_a_line_crosses_a_wall_or_it_does_not(one, other, count):
-    assert house(BETWEEN).walls_between(np.array(one), np.array(other)) == count
+    assert house(BETWEEN).obstacles_between(np.array(one), np.array(other)) == count
 
 
 def test_a_turned_wall_is_crossed_where_it_stands():
     c = np.sqrt(0.5)
     turned = np.array([[c, -c, 0.0], [c, c, 0.0], [0.0, 0.0, 1.0]])
     rooms = house(((0.0, 0.0, 1.0), turned, (2.0, 0.05, 1.0)))  # along x = y
-    assert rooms.walls_between(np.array([1.0, 0.0, 1.0]), np.array([0.0, 1.0, 1.0])) == 1
-    assert rooms.walls_between(np.array([1.0, 0.0, 1.0]), np.array([0.0, -1.0, 1.0])) == 0
+    assert rooms.obstacles_between(np.array([1.0, 0.0, 1.0]), np.array([0.0, 1.0, 1.0])) == 1
+    assert rooms.obstacles_between(np.array([1.0, 0.0, 1.0]), np.array([0.0, -1.0, 1.0])) == 0
 
 
 def test_a_place_belongs_to_the_room_it_is_in_or_nearest_to():
@@ -140,7 +144,7 @@ def field_house(field):
 
 
 def walls(field, source, head):
-    return field_house(field).walls_between(source.position, head.position)
+    return field_house(field).obstacles_between(source.position, head.position)
 
 
 @pytest.mark.parametrize("wrong", [-1.0, np.nan, np.inf])
@@ -155,7 +159,7 @@ def test_two_rooms_have_a_door_that_sound_goes_through():
     cfg = compose(["+task=KickTheBall", "playground=two_rooms"]).playground
     world = World(cfg)
     between = [
-        world.house.walls_between(np.array([1.0, y, 1.0]), np.array([5.0, y, 1.0]))
+        world.house.obstacles_between(np.array([1.0, y, 1.0]), np.array([5.0, y, 1.0]))
         for y in (-1.0, 1.7)
     ]
     assert between == [1, 0]
@@ -163,8 +167,8 @@ def test_two_rooms_have_a_door_that_sound_goes_through():
     world.close()
 
 
-def test_a_wall_that_goes_up_is_heard_though_nobody_moves():
-    rooms = house()
+def test_an_obstacle_that_moves_is_heard_although_source_and_listener_rest():
+    rooms = house(BETWEEN)
     field = SoundField(rooms, STEP, RATE)
     field.add_source("noise", Clip(NOISE)).position = (1.0, 0.5, 1.0)
     listener = field.add_listener(spatialisation("mono"))
@@ -172,10 +176,16 @@ def test_a_wall_that_goes_up_is_heard_though_nobody_moves():
     levels = []
     for step in range(10):
         if step == 5:
-            rooms.add_wall(*BETWEEN)
+            rooms.obstacles.move(0, (3.05, 0.0, 9.0), np.eye(3))
         field.advance()
         levels.append(10.0 * np.log10(np.mean(listener.render(pose(5.0, 0.0, 1.0)) ** 2) + 1e-12))
-    assert levels[4] - levels[8] == pytest.approx(LOSS_DB, abs=2.0)
+    assert levels[8] - levels[4] == pytest.approx(LOSS_DB, abs=2.0)
+
+
+@pytest.mark.parametrize("half", [(1.0, 1.0), (1.0, 0.0, 1.0), (1.0, np.nan, 1.0)])
+def test_impossible_obstacles_are_refused(half):
+    with pytest.raises(ValueError, match="three positive, finite lengths"):
+        house().obstacles.add(half)
 
 
 def test_a_walker_in_the_next_room_hears_a_voice_through_the_door_or_through_the_wall():

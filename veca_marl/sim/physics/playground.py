@@ -135,8 +135,8 @@ class PlaygroundCfg:
 
     Attributes:
         name: As on the command line.
-        rooms: Boxes of air; the first is where single-room tasks play. Fixed props of shape `wall`
-            between them take sound away.
+        rooms: Boxes of air; the first is where single-room tasks play. Walls and large boxes
+            between them attenuate sound, see `props.stops_sound`.
         doors: The openings between rooms.
         props: Walls, furniture and toys.
         floor_size_m: Extent of the drawn floor along x and y.
@@ -144,7 +144,7 @@ class PlaygroundCfg:
         floor_colour: Red, green, blue in [0, 1].
         floor_checker_m: Edge of the floor's checker pattern.
         image_order: Greatest number of reflections of a sound; 0 is the direct sound alone.
-        transmission_loss_db: What each wall takes from a sound of another room; see `sim.house`.
+        transmission_loss_db: Attenuation of a sound from another room by each obstacle.
     """
 
     name: str = ""

@@ -19,8 +19,13 @@ from veca_marl.sim.geometry.rotations import (
 )
 from veca_marl.sim.geometry.scene import Scene
 from veca_marl.sim.physics.bullet import pybullet
+from veca_marl.sim.sound.obstacles import Obstacles
 from veca_marl.sim.sound.sound_source import Source
 from veca_marl.sim.sound.sounds import SoundCfg
+
+SOUND_OBSTACLE_M = (0.7, 1.0)
+"""Least width and height of a box that stops sound as a wall does. Sound below 340 Hz, with waves
+longer than a metre, bends round anything smaller; furniture that is lower is not in the way."""
 
 
 class PropShape(Enum):
@@ -64,7 +69,7 @@ class PropCfg:
         colour: Red, green, blue in [0, 1].
         checker_m: Edge of a checker pattern; 0 is plain.
         transparent: Seen through, and no hindrance to `is_visible`.
-        tangible: Whether things and skins meet it; a mark on the floor is only seen.
+        tangible: Whether it collides, is felt and stops sound; a mark on the floor is only seen.
         sound: What it emits; None is a silent thing.
     """
 
@@ -141,6 +146,18 @@ def prop_geoms(cfg: PropCfg) -> tuple[Geom, ...]:
             return _goal_geoms(size, look)
 
 
+def stops_sound(cfg: PropCfg) -> bool:
+    """Return whether a prop attenuates sound between rooms: a wall or a large box, such as a door.
+
+    See `SOUND_OBSTACLE_M`.
+    """
+    if cfg.shape is not PropShape.box:
+        return cfg.tangible and cfg.shape is PropShape.wall
+    length_x, length_y, height = cfg.size_m
+    width_m, height_m = SOUND_OBSTACLE_M
+    return cfg.tangible and max(length_x, length_y) >= width_m and height >= height_m
+
+
 def _goal_geoms(size: tuple[float, ...], look: dict[str, Any]) -> tuple[Geom, ...]:
     """Two posts and a bar; the mouth of the goal faces x, its width lies along y."""
     width, height, radius = size
@@ -176,6 +193,19 @@ def collision_shape(client: int, geoms: tuple[Geom, ...]) -> int:
     return int(shape)
 
 
+class _Obstacle:
+    """The box of a prop among the obstacles of the sound."""
+
+    def __init__(self, box: Geom, obstacles: Obstacles) -> None:
+        self._offset = np.asarray(box.offset)
+        self._obstacles = obstacles
+        self._number = obstacles.add(box.size)
+
+    def move(self, position: Floats, rotation: Floats) -> None:
+        """Follow the frame of the prop."""
+        self._obstacles.move(self._number, position + rotation @ self._offset, rotation)
+
+
 class Prop:
     """A prop in a world: read where it is and put it somewhere else.
 
@@ -186,12 +216,20 @@ class Prop:
         sound: Its sound source; None for a silent thing.
     """
 
-    def __init__(self, cfg: PropCfg, client: int, scene: Scene, sound: Source | None) -> None:
+    def __init__(
+        self,
+        cfg: PropCfg,
+        client: int,
+        scene: Scene,
+        sound: Source | None,
+        obstacles: Obstacles,
+    ) -> None:
         self.cfg = cfg
         self.sound = sound
         self._client = client
         self._scene = scene
         geoms = prop_geoms(cfg)
+        self._obstacle = _Obstacle(geoms[0], obstacles) if stops_sound(cfg) else None
         drawn = scene.add_object(cfg.name, [geoms])
         self.object_id = drawn.id
         self._row = drawn.rows.start
@@ -301,7 +339,7 @@ class Prop:
             )
 
     def mirror(self) -> None:
-        """Copy the pose from the physics into the drawn scene and to the sound source."""
+        """Copy the pose from the physics to the scene, the sound source and the obstacle."""
         mirror([self])
 
 
@@ -322,6 +360,8 @@ def mirror(props: Sequence[Prop]) -> None:
     for prop in props:
         if prop.sound is not None:
             prop.sound.position = scene.positions[prop._row]
+        if prop._obstacle is not None:
+            prop._obstacle.move(scene.positions[prop._row], scene.rotations[prop._row])
 
 
 def _three_finite(name: str, what: str, vector: Sequence[float] | Floats) -> list[float]:

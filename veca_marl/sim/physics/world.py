@@ -12,7 +12,7 @@ from veca_marl.sim.geometry.primitives import Geom, Shape
 from veca_marl.sim.geometry.scene import Scene
 from veca_marl.sim.physics.bullet import pybullet
 from veca_marl.sim.physics.playground import PlaygroundCfg
-from veca_marl.sim.physics.props import Prop, PropCfg, PropShape, mirror
+from veca_marl.sim.physics.props import Prop, PropCfg, mirror
 from veca_marl.sim.sound.acoustics import Room
 from veca_marl.sim.sound.house import House
 from veca_marl.sim.sound.soundfield import SoundField
@@ -122,14 +122,10 @@ class World:
             raise ValueError(f"the name {cfg.name!r} is taken; there are {taken}")
         sound = None if cfg.sound is None else make_sound(cfg.sound)
         source = None if sound is None else self.sound.add_source(cfg.name, sound)
-        prop = Prop(cfg, self.client, self.scene, source)
+        prop = Prop(cfg, self.client, self.scene, source, self.house.obstacles)
         self.props[cfg.name] = prop
         if not prop.fixed:
             self._moving.append(prop)
-        elif cfg.shape is PropShape.wall:
-            half = np.array(cfg.size_m) / 2
-            up = half[2] * prop.rotation[:, 2]
-            self.house.add_wall(prop.position + up, prop.rotation, half)
         return prop
 
     def prop(self, name: str) -> Prop:

@@ -67,7 +67,7 @@ class CallMap:
         return place
 
     def _walls(self, ears: Floats) -> NDArray[Any]:
-        between = self._world.house.walls_between
+        between = self._world.house.obstacles_between
         return np.array([between(ears, place) for place in self._places])
 
 
