@@ -17,6 +17,7 @@ import numpy as np
 
 from veca_marl.api import make
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
+from veca_marl.envs.core.expert import find_expert, has_expert
 from veca_marl.envs.core.game import Game
 from veca_marl.envs.core.task import TASKS, Task
 from veca_marl.envs.rendering.touch_picture import picture_of_touch
@@ -45,7 +46,7 @@ def task_page(task: type[Task]) -> str:
         "",
         f"Teams: {teams}. Senses: {', '.join(task.senses)}.",
         "",
-        f"The expert: {inspect.cleandoc(task.expert.__doc__ or '')}",
+        expert_text(task.__name__),
         "",
         "## Numbers",
         "",
@@ -61,6 +62,13 @@ def task_page(task: type[Task]) -> str:
         "",
     ]
     return "\n".join(lines)
+
+
+def expert_text(task: str) -> str:
+    """Return what the page of a task says about its expert."""
+    if not has_expert(task):
+        return "The task has no scripted expert."
+    return f"The expert: {inspect.cleandoc(find_expert(task).__doc__ or '')}"
 
 
 def default(field: dataclasses.Field[Any]) -> Any:

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from veca_marl.config.root import compose
 from veca_marl.envs.core.game import Game
-from veca_marl.envs.experts.control.legs import legs_of
-from veca_marl.envs.experts.perception.hearing import loudness
+from veca_marl.envs.experts.control.locomotion import locomotion_of
+from veca_marl.envs.experts.perception.call_localization import loudness
 from veca_marl.envs.tasks.multi_agent.contests import line_up
 from veca_marl.envs.tasks.multi_agent.navigation import free_place
 from veca_marl.sim.sound.calls import Call
@@ -44,7 +44,7 @@ def listen(game: Game, together: bool, rng: np.random.Generator) -> NDArray[np.f
             places = [free_place(room, [], 0.5, rng) for _ in game.players]
         for player, place in zip(game.players, places, strict=True):
             line_up(player, place, rng.uniform(-math.pi, math.pi))
-    legs = legs_of(game.players, world.clock.step_s)
+    legs = {p.name: locomotion_of(p, world.clock.step_s) for p in game.players}
     for player in game.players:
         game.observe(player)
     for _ in range(REST_STEPS):

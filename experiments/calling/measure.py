@@ -44,7 +44,7 @@ def play_once(game: Game, seed: int) -> tuple[bool, float]:
     game.reset(rng)
     while True:
         rows = {
-            player.name: player.body.encode(game.task.expert(player, game.observe(player)))
+            player.name: player.body.encode(game.expert_of(player).act(game.observe(player)))
             for player in game.players
         }
         outcome = game.step(rows)

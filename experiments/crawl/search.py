@@ -24,9 +24,9 @@ import numpy as np
 
 from veca_marl.config.root import compose
 from veca_marl.envs.core.game import Game
-from veca_marl.envs.experts.control.crawl import Crawl
-from veca_marl.envs.experts.control.rhythms import BACK, CRAWL, Rhythm
-from veca_marl.envs.experts.control.walking import bearing_rad
+from veca_marl.envs.experts.control.crawl_gait import CrawlGait
+from veca_marl.envs.experts.control.gait_patterns import BACK, CRAWL, GaitPattern
+from veca_marl.envs.experts.control.steering import bearing_rad
 from veca_marl.sim.body.humanoid.joint_controls import Springs
 from veca_marl.sim.geometry.pose import Floats
 
@@ -87,8 +87,8 @@ class Trial:
         self._chest = self.body.bone_names.index("chest")
         self._step_s = self._game.world.clock.step_s
 
-    def way_mps(self, rhythm: Rhythm, aside_rad: float, seed: int) -> tuple[float, float]:
-        """Crawl for some time to a place far away.
+    def way_mps(self, rhythm: GaitPattern, aside_rad: float, seed: int) -> tuple[float, float]:
+        """CrawlGait for some time to a place far away.
 
         Returns:
             Speed towards it; what it costs that the trunk was in turmoil or came to lie on its
@@ -107,36 +107,36 @@ class Trial:
         speed = float((self.body.position[:2] - start) @ way) / WAY_S
         return speed, self._turmoil(spin, least)
 
-    def back_mps(self, rhythm: Rhythm, ahead_s: float, seed: int) -> tuple[float, float]:
-        """Crawl ahead as it is known, then back; return speed back and turmoil."""
+    def back_mps(self, rhythm: GaitPattern, ahead_s: float, seed: int) -> tuple[float, float]:
+        """CrawlGait ahead as it is known, then back; return speed back and turmoil."""
         crawl = self._start(CRAWL, seed)
         for _ in range(round(ahead_s / self._step_s)):
-            self._step(crawl.wish())
-        crawl, start, ahead = Crawl(self.body, self._step_s, rhythm), *self._line()
+            self._step(crawl.command())
+        crawl, start, ahead = CrawlGait(self.body, self._step_s, rhythm), *self._line()
         spin, least = 0.0, 1.0
         steps = round(BACK_S / self._step_s)
         for _ in range(steps):
-            self._step(crawl.wish())
+            self._step(crawl.command())
             spin += self._spin() / steps
             least = min(least, self.face_down())
         speed = float((start - self.body.position[:2]) @ ahead) / BACK_S
         return speed, self._turmoil(spin, least)
 
-    def round_rad(self, rhythm: Rhythm, turn: float, seed: int) -> tuple[float, float]:
+    def round_rad(self, rhythm: GaitPattern, turn: float, seed: int) -> tuple[float, float]:
         """Turn for some time to one side; return how far, and how far away it came, metres."""
         crawl = self._start(rhythm, seed)
         before, start = self.body.forward, self.body.position[:2]
         turned, away = 0.0, 0.0
         for _ in range(round(ROUND_S / self._step_s)):
-            self._step(crawl.wish(turn))
+            self._step(crawl.command(turn))
             now = self.body.forward
             turned += math.atan2(before[0] * now[1] - before[1] * now[0], float(before @ now))
             before, away = now, max(away, math.dist(self.body.position[:2], start))
         return turned * turn, away
 
-    def _start(self, rhythm: Rhythm, seed: int) -> Crawl:
+    def _start(self, rhythm: GaitPattern, seed: int) -> CrawlGait:
         self._game.reset(np.random.default_rng([2026, seed]))
-        return Crawl(self.body, self._step_s, rhythm)
+        return CrawlGait(self.body, self._step_s, rhythm)
 
     def _step(self, wish: Springs) -> None:
         self.body.act(self.body.encode(wish))
@@ -159,7 +159,7 @@ class Trial:
         return -float(self.body.bone("chest").forward[2])
 
 
-def ahead(trial: Trial, rhythm: Rhythm, side: float, rng: np.random.Generator) -> list[float]:
+def ahead(trial: Trial, rhythm: GaitPattern, side: float, rng: np.random.Generator) -> list[float]:
     """Return what a rhythm is worth that gets to places and turns: m/s, or worth as much."""
     worth = []
     for low, high, hand in ((0.0, 60.0, side), (60.0, 150.0, -side)):
@@ -170,17 +170,17 @@ def ahead(trial: Trial, rhythm: Rhythm, side: float, rng: np.random.Generator) -
     return [*worth, 0.3 * min(1.0, turned / math.pi) - 0.15 * max(0.0, away - 0.5)]
 
 
-def back(trial: Trial, rhythm: Rhythm, side: float, rng: np.random.Generator) -> list[float]:
+def back(trial: Trial, rhythm: GaitPattern, side: float, rng: np.random.Generator) -> list[float]:
     """Return what a rhythm is worth that leads back."""
     del side
     tries = [(float(rng.uniform(0.0, AHEAD_S)), int(rng.integers(10**6))) for _ in range(2)]
     return [float(np.subtract(*trial.back_mps(rhythm, *one))) for one in tries]
 
 
-Worth = Callable[[Trial, Rhythm, float, np.random.Generator], list[float]]
+Worth = Callable[[Trial, GaitPattern, float, np.random.Generator], list[float]]
 
 
-def score(trials: list[Trial], worth: Worth, rhythm: Rhythm, generation: int) -> float:
+def score(trials: list[Trial], worth: Worth, rhythm: GaitPattern, generation: int) -> float:
     """Return the mean of all tries and, besides, half of the worst."""
     rng, found = np.random.default_rng([7, generation]), []
     for number, trial in enumerate(trials):
@@ -189,7 +189,7 @@ def score(trials: list[Trial], worth: Worth, rhythm: Rhythm, generation: int) ->
     return float(np.mean(found) + 0.5 * min(found))
 
 
-def search(known: Rhythm, worth: Worth, minutes: float) -> Rhythm:
+def search(known: GaitPattern, worth: Worth, minutes: float) -> GaitPattern:
     from cmaes import SepCMA  # of nobody else's need
 
     begin = numbers_of(known)
@@ -197,9 +197,9 @@ def search(known: Rhythm, worth: Worth, minutes: float) -> Rhythm:
     trials = [Trial(body) for body in BODIES]
     strategy = SepCMA(np.zeros(len(begin)), 0.5, population_size=POPULATION, seed=0)
 
-    def rhythm_at(point: Any) -> Rhythm:
+    def rhythm_at(point: Any) -> GaitPattern:
         numbers = np.array(list(begin.values())) + steps * point
-        found: Rhythm = rhythm_of(dict(zip(begin, numbers.tolist(), strict=True)), known)
+        found: GaitPattern = rhythm_of(dict(zip(begin, numbers.tolist(), strict=True)), known)
         return found
 
     started = time.monotonic()

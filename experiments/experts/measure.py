@@ -20,7 +20,6 @@ import veca_marl
 from veca_marl.config.root import compose
 from veca_marl.envs.core.game import Game
 from veca_marl.envs.core.game_cfg import GameCfg
-from veca_marl.envs.core.scripts import play_script
 from veca_marl.envs.core.team import Script
 
 HERE = Path(__file__).parent
@@ -46,8 +45,7 @@ def play(cfg: GameCfg, first: Script, others: Script | None, seed: int) -> tuple
     while not over:
         for player in game.players:
             script = first if player in ours or others is None else others
-            now = Script.idle if player.name in game.out else script
-            play_script(now, game.task, player, game.observe, rng)
+            game.play_script(player, script)
         outcome = game.advance()
         paid += float(np.mean([game.pay(outcome.terms[player.name]) for player in ours]))
         over = outcome.done

@@ -14,10 +14,9 @@ import numpy as np
 
 from veca_marl.config.root import compose
 from veca_marl.envs.core.game import Game
-from veca_marl.envs.core.scripts import play_script
 from veca_marl.envs.core.task import Player
 from veca_marl.envs.core.team import Script
-from veca_marl.envs.experts.control.walking import walk_to
+from veca_marl.envs.experts.control.steering import walk_to
 
 EPISODES = 48
 Command = tuple[float, float]  # speed ahead and turning rate, as shares of the greatest
@@ -55,10 +54,10 @@ def episode(game: Game, play: Script | Callable[[Game, Player], Command], seed: 
     paid = 0.0
     while True:
         if isinstance(play, Script):
-            play_script(play, game.task, attacker, lambda _: {}, rng)
+            game.play_script(attacker, play)
         else:
             attacker.body.act(attacker.body.encode(play(game, attacker)))
-        play_script(Script.random, game.task, defender, lambda _: {}, rng)
+        game.play_script(defender, Script.random)
         outcome = game.advance()
         paid += game.pay(outcome.terms[attacker.name])
         if outcome.done:
@@ -67,7 +66,7 @@ def episode(game: Game, play: Script | Callable[[Game, Player], Command], seed: 
 
 def main() -> None:
     """Print a line for each way to play."""
-    overrides = ["+experiment=soccer", "senses/vision=blind", *sys.argv[1:]]
+    overrides = ["+experiment=soccer", "senses/vision=blind", "senses/touch=numb", *sys.argv[1:]]
     game = Game(compose(overrides).game)
     for name, play in PLAYS.items():
         paid, scored = np.transpose([episode(game, play, seed) for seed in range(EPISODES)])

@@ -60,7 +60,7 @@ def play(game, rng):
     player, outcomes = game.players[0], []
     start, heading = player.body.position, player.body.forward
     while not (outcomes and outcomes[-1].done):
-        row = player.body.encode(game.task.expert(player, {}))
+        row = player.body.encode(game.expert_of(player).act({}))
         outcomes.append(game.step({player.name: row}))
     return outcomes, (player.body.position - start) @ heading
 

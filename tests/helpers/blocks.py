@@ -27,7 +27,7 @@ def play(game, seed):
     player, rng, total, over = game.players[0], np.random.default_rng(seed), {}, False
     game.reset(rng)
     while not over:
-        row = player.body.encode(game.task.expert(player, {}))
+        row = player.body.encode(game.expert_of(player).act({}))
         outcome = game.step({player.name: row})
         for name, value in outcome.terms[player.name].items():
             total[name] = total.get(name, 0.0) + value

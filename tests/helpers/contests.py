@@ -4,12 +4,13 @@ import numpy as np
 
 from veca_marl.config.root import compose
 from veca_marl.envs.core.game import Game
-from veca_marl.envs.core.scripts import play_script
 from veca_marl.envs.core.team import Script
 
 
 def game_of(task, *overrides, seed=0):
-    game = Game(compose([f"+task={task}", "senses/vision=blind", *overrides]).game)
+    game = Game(
+        compose([f"+task={task}", "senses/vision=blind", "senses/touch=numb", *overrides]).game
+    )
     game.reset(np.random.default_rng(seed))
     return game
 
@@ -19,8 +20,7 @@ def steps(game, rng, **scripts):
     over = False
     while not over:
         for player in game.players:
-            now = Script.idle if player.name in game.out else Script[scripts[player.team]]
-            play_script(now, game.task, player, lambda _: {}, rng)
+            game.play_script(player, Script[scripts[player.team]])
         outcome = game.advance()
         yield outcome
         over = outcome.done

@@ -44,9 +44,6 @@ class Duel(Task):
     def terminated(self):
         return self.steps >= STEPS
 
-    def expert(self, player, observation):
-        return 1.0, 0.0
-
 
 @contextmanager
 def duel(*overrides):

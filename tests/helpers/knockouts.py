@@ -4,6 +4,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
 from veca_marl.config.root import compose
+from veca_marl.envs.core.expert import EXPERTS, Expert
 from veca_marl.envs.core.task import TASKS, Task, TaskCfg, Team, terms
 
 
@@ -43,7 +44,9 @@ class Knockout(Task):
     def reward(self, player):
         return {"place": float(player.body.position[0]) + 5.0}
 
-    def expert(self, player, observation):
+
+class KnockoutExpert(Expert):
+    def act(self, observation):
         return 1.0, float(observation["proprioception"].mean() > 0.0)
 
 
@@ -51,8 +54,8 @@ class Knockout(Task):
 def knockout(*overrides):
     """Make the task known for a while; yield how it is played."""
     game = compose(["+task=KickTheBall", "playground=simple", *overrides]).game
-    TASKS["Knockout"] = Knockout
+    TASKS["Knockout"], EXPERTS["Knockout"] = Knockout, KnockoutExpert
     try:
         yield replace(game, task=KnockoutCfg(name="Knockout"))
     finally:
-        del TASKS["Knockout"]
+        del TASKS["Knockout"], EXPERTS["Knockout"]

@@ -13,7 +13,6 @@ import torch
 from veca_marl.config.root import compose
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
 from veca_marl.envs.core.game import Game
-from veca_marl.envs.core.scripts import play_script
 from veca_marl.envs.core.team import Script
 from veca_marl.sim.body.voice_controls import VoiceKind
 from veca_marl.sim.body.walker.walker import WalkerCfg
@@ -91,8 +90,7 @@ def returns(cfg, episodes, script, seed=0):
         total, over = 0.0, False
         while not over:
             for player in game.actors:
-                now = Script.idle if player.name in game.out else script
-                play_script(now, game.task, player, game.observe, rng)
+                game.play_script(player, script)
             outcome = game.advance()
             total += float(np.mean([game.pay(outcome.terms[p.name]) for p in game.actors]))
             over = outcome.done

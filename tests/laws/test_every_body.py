@@ -112,6 +112,6 @@ def test_what_it_is_told_wrongly_is_refused(game):
 
 def test_a_wish_becomes_a_row_of_the_spec(game):
     body = game.players[0].body
-    row = body.encode(game.task.expert(game.players[0], {}))
+    row = body.encode(game.expert_of(game.players[0]).act({}))
     assert (row.shape, row.dtype) == (body.action_spec.shape, np.dtype(body.action_spec.dtype))
     body.act(row)

@@ -6,14 +6,11 @@ import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from veca_marl.envs.core.scoring import cosine, flat
 from veca_marl.envs.core.task import TASKS, Player, Task, TaskCfg, Team, find_task, terms
-from veca_marl.sim.body.humanoid.humanoid import Humanoid
 from veca_marl.sim.physics.props import PropCfg, PropShape
 from veca_marl.sim.sound.sounds import SoundCfg, SoundKind
 
@@ -59,11 +56,6 @@ class FreePlay(Task):
         """See `Task`."""
         way = flat(self.ball.position - player.body.position)
         return {"approach": cosine(player.body.velocity, way)}
-
-    def expert(self, player: Player, observation: dict[str, NDArray[Any]]) -> Any:
-        """Walk on, or rest all joints."""
-        body = player.body
-        return body.joint_angles() if isinstance(body, Humanoid) else (1.0, 0.0)
 
 
 def _thing(number: int) -> PropCfg:

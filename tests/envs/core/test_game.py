@@ -49,9 +49,6 @@ def duel():
         def terminated(self):
             return self.steps >= 3
 
-        def expert(self, player, observation):
-            return 0.0, 0.0
-
     cfg = cfg_of()
     cfg.task = TaskCfg(name="Duel")
     register(Duel)

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 from seeking import shipped, walker_at
 
-from veca_marl.envs.experts.control.walking import walk_to
-from veca_marl.envs.tasks.multi_agent.floor_plan import FloorPlan, Passing
+from veca_marl.envs.experts.control.steering import walk_to
+from veca_marl.envs.tasks.multi_agent.floor_plan import DoorApproach, FloorPlan
 from veca_marl.sim.physics.playground import DoorCfg, PlaygroundCfg, RoomCfg
 from veca_marl.sim.physics.world import World
 
-PASSING = Passing(before_m=0.4, right_m=0.2)
+APPROACH = DoorApproach(before_m=0.4, right_m=0.2)
 HOUSES = ("two_rooms", "three_rooms", "four_rooms", "seven_rooms")
 
 
@@ -46,7 +46,9 @@ def test_ways_lead_from_middle_through_doors_to_middle():
 
 
 def test_in_the_same_room_the_way_is_straight():
-    goal = plan_of(1.0, 3.0).waypoint(np.array([1.0, 1.0, 0.5]), np.array([3.0, 2.0, 0.5]), PASSING)
+    goal = plan_of(1.0, 3.0).waypoint(
+        np.array([1.0, 1.0, 0.5]), np.array([3.0, 2.0, 0.5]), APPROACH
+    )
     np.testing.assert_array_equal(goal, (3.0, 2.0))
 
 
@@ -54,15 +56,15 @@ def test_in_the_same_room_the_way_is_straight():
 def test_the_way_leads_before_the_door_and_then_through_it(begin_x, goal_x, side, right):
     """Keeping right: who goes to larger x at smaller y."""
     plan, goal = plan_of(1.0, 3.0), np.array([goal_x, 2.0])
-    before = plan.waypoint(np.array([begin_x, 3.5]), goal, PASSING)
+    before = plan.waypoint(np.array([begin_x, 3.5]), goal, APPROACH)
     np.testing.assert_allclose(before, (4.05 + 0.4 * side, 1.0 + 0.2 * right))
-    beyond = plan.waypoint(before, goal, PASSING)
+    beyond = plan.waypoint(before, goal, APPROACH)
     np.testing.assert_allclose(beyond, (4.05 - 0.4 * side, 1.0 + 0.2 * right))
 
 
 def test_who_takes_the_middle_goes_straight_through_and_lines_up_far_before():
     plan, goal = plan_of(1.0, 3.0), np.array([6.0, 2.0])
-    wide = Passing(before_m=0.9, right_m=0.0)
+    wide = DoorApproach(before_m=0.9, right_m=0.0)
     before = plan.waypoint(np.array([2.0, 3.5]), goal, wide)
     np.testing.assert_allclose(before, (4.05 - 0.9, 1.0))
     np.testing.assert_allclose(plan.waypoint(before, goal, wide), (4.05 + 0.9, 1.0))
@@ -72,7 +74,7 @@ def test_who_takes_the_middle_goes_straight_through_and_lines_up_far_before():
 def test_who_stays_is_in_nobodys_way(place):
     """In the room of the object, away from it and from the door, which is at (4.05, 1)."""
     plan = plan_of(1.0, 3.0)
-    aside = plan.aside_of(np.array(place))
+    aside = plan.waiting_place(np.array(place))
     assert plan.rooms[0].contains(np.array([*aside, 1.0]), 0.69)
     assert math.dist(aside, place) > 1.5
     assert math.dist(aside, (4.05, 1.0)) > 2.0
@@ -82,7 +84,7 @@ def test_a_house_that_is_cut_off_is_said_so():
     plan = plan_of(1.0)
     assert plan.distance_m(0, 2) == math.inf
     with pytest.raises(ValueError, match="no doors lead from '0' to '2'"):
-        plan.waypoint(np.array([1.0, 1.0]), np.array([10.0, 1.0]), PASSING)
+        plan.waypoint(np.array([1.0, 1.0]), np.array([10.0, 1.0]), APPROACH)
 
 
 @pytest.mark.parametrize("house", HOUSES)
@@ -113,7 +115,7 @@ def test_doors_are_openings_of_the_walls(house):
 def arrives(world, plan, walker, goal):
     """Walk for 20 s at most; return whether the walker comes to a place."""
     for _ in range(25 * 20):
-        walker.act(walker.encode(walk_to(walker, plan.waypoint(walker.position, goal, PASSING))))
+        walker.act(walker.encode(walk_to(walker, plan.waypoint(walker.position, goal, APPROACH))))
         world.step()
         if math.dist(walker.position[:2], goal[:2]) < 0.2:
             return True

@@ -26,7 +26,7 @@ def play(game, seconds, choose):
 
 def by_expert(game):
     player = game.players[0]
-    return player.body.encode(game.task.expert(player, {}))
+    return player.body.encode(game.expert_of(player).act({}))
 
 
 def limp(game):

@@ -172,7 +172,7 @@ def kicks_of_expert(audio, episodes):
         game.reset(rng)
         seen, total = game.observe(player), 0.0
         for _ in range(game.max_steps):
-            row = player.body.encode(game.task.expert(player, seen))
+            row = player.body.encode(game.expert_of(player).act(seen))
             total += game.step({"agents": row}).terms["agents"]["kick"]
             seen = game.observe(player)
         kicks.append(total)

@@ -58,7 +58,7 @@ def test_the_expert_brings_it_there(game):
         rng, over = np.random.default_rng(seed), False
         game.reset(rng)
         while not over:
-            row = player.body.encode(game.task.expert(player, {}))
+            row = player.body.encode(game.expert_of(player).act({}))
             over = game.step({"agents": row}).truncated
         solved += game.task.solved
     assert solved >= 2

@@ -7,8 +7,8 @@ import pytest
 
 from veca_marl.config.root import ConfigError, compose
 from veca_marl.envs.core.game import Game
-from veca_marl.envs.experts.control.legs import legs_of
-from veca_marl.envs.experts.control.travelling import Traveller
+from veca_marl.envs.experts.control.locomotion import locomotion_of
+from veca_marl.envs.experts.control.path_following import PathFollower
 from veca_marl.envs.tasks.multi_agent.contests import line_up
 from veca_marl.envs.tasks.multi_agent.multi_agent_nav import MultiAgentNavCfg, Muted
 from veca_marl.envs.tasks.multi_agent.navigation import gap_m
@@ -271,7 +271,7 @@ def test_a_joint_level_body_crawls_to_the_object_that_it_sees_and_calls():
     called = False
     while finder.name not in game.task.arrived:
         heard, _ = [game.observe(player) for player in game.players]
-        wish = game.task.expert(finder, heard)
+        wish = game.expert_of(finder).act(heard)
         rest = np.zeros(other.body.action_spec.shape, np.float32)
         rows = {finder.name: finder.body.encode(wish), other.name: rest}
         called = called or rows[finder.name][-1] > 0.6
@@ -296,8 +296,8 @@ def test_who_cannot_get_on_goes_back_and_comes_round():
     low, size = game.task.plan.rooms[0].lower_m, game.task.plan.rooms[0].size_m
     line_up(player, (low[0] + 0.55, low[1] + size[1] / 2.0), math.pi)
     goal = np.array([low[0] + 2.0, low[1] + size[1] / 2.0])
-    legs = legs_of([player], STEP_S)[player.name]
-    traveller = Traveller(player.body, legs, game.task.plan, STEP_S)
+    legs = locomotion_of(player, STEP_S)
+    traveller = PathFollower(player.body, legs, game.task.plan, STEP_S)
     still = np.zeros(other.body.action_spec.shape, np.float32)
     for _ in range(25 * 25):
         row = player.body.encode(traveller.to(goal))
@@ -316,7 +316,7 @@ def seconds_needed(game, seed):
     rng = np.random.default_rng(seed)
     game.reset(rng)
     while True:
-        wishes = {p.name: game.task.expert(p, game.observe(p)) for p in game.players}
+        wishes = {p.name: game.expert_of(p).act(game.observe(p)) for p in game.players}
         outcome = game.step({p.name: p.body.encode(wishes[p.name]) for p in game.players})
         if outcome.done:
             return game.steps * STEP_S if outcome.terminated else math.inf

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from veca_marl.envs.core.expert import Expert, find_expert
 from veca_marl.envs.core.game_cfg import GameCfg
 from veca_marl.envs.core.scripts import play_script
 from veca_marl.envs.core.task import Player, Team, find_task
@@ -93,6 +94,10 @@ class Game:
         }
         self.steps = 0
         self.out: frozenset[str] = frozenset()
+        self._experts: dict[str, Expert[Any]] = {}
+        for team, script in cfg.script.items():
+            if script is Script.expert:
+                self._experts.update({p.name: self._make_expert(p) for p in self.team(team)})
 
     def _make_player(self, name: str, team: Team, shirt: int) -> Player:
         body = make_body(name, self.cfg.body_of(team.name), self.world, shirt)
@@ -125,6 +130,8 @@ class Game:
             for sense in senses.values():
                 sense.reset()
         self.world.refresh()
+        for expert in self._experts.values():
+            expert.reset()
 
     def step(self, actions: Mapping[str, NDArray[Any]]) -> Outcome:
         """Play one agent step: `command`, then `advance`."""
@@ -168,10 +175,8 @@ class Game:
         Raises:
             RuntimeError: If `reset` was never called.
         """
-        rng = self._rng
-        if rng is None:
-            raise RuntimeError("no episode is running: call reset() before the first step")
-        self._play_scripts(rng)
+        rng = self._episode_rng()
+        self._play_scripts()
         self.task.before_step(rng)
         self.world.step()
         self.task.after_step(rng)
@@ -183,11 +188,42 @@ class Game:
         truncated = self.steps >= self.max_steps or self._fell_apart()
         return Outcome(terms, terminated, truncated, self.out)
 
-    def _play_scripts(self, rng: np.random.Generator) -> None:
+    def _episode_rng(self) -> np.random.Generator:
+        if self._rng is None:
+            raise RuntimeError("no episode is running: call reset() before the first step")
+        return self._rng
+
+    def _play_scripts(self) -> None:
         for team, script in self.cfg.script.items():
             for player in self.team(team):
-                script_now = Script.idle if player.name in self.out else script
-                play_script(script_now, self.task, player, self.observe, rng)
+                self.play_script(player, script)
+
+    def play_script(self, player: Player, script: Script) -> None:
+        """Set the action of a player for the next step by a script; one that is out rests.
+
+        Raises:
+            RuntimeError: If `reset` was never called.
+            ValueError: If the script is `Script.expert` and the task has no expert.
+        """
+        script_now = Script.idle if player.name in self.out else script
+        play_script(script_now, player, self._expert_command, self._episode_rng())
+
+    def _expert_command(self, player: Player) -> Any:
+        return self.expert_of(player).act(self.observe(player))
+
+    def expert_of(self, player: Player) -> Expert[Any]:
+        """Return the expert of a player. It is made at the first call and reset with the game.
+
+        Raises:
+            ValueError: If the task has no expert.
+        """
+        if player.name not in self._experts:
+            self._experts[player.name] = self._make_expert(player)
+            self._experts[player.name].reset()
+        return self._experts[player.name]
+
+    def _make_expert(self, player: Player) -> Expert[Any]:
+        return find_expert(self.cfg.task.name)(self.task, player)
 
     def _terms(self, player: Player) -> dict[str, float]:
         """Return what a player earns; nothing if it was out before this step."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from veca_marl.envs.core.expert import find_expert
 from veca_marl.envs.core.task import TaskCfg, Team, find_task
 from veca_marl.envs.core.team import Script, TeamCfg
 from veca_marl.sim.body.base import BodyCfg
@@ -56,7 +57,8 @@ class GameCfg:
         """Refuse choices for teams that do not play, and more players than there is floor for.
 
         Raises:
-            ValueError: If there are any, or if nobody is left to take actions.
+            ValueError: If there are any, if no team takes actions, or if a team is scripted by the
+                expert of a task that has none.
         """
         names = [team.name for team in self.teams]
         for key, asked in (("team", self.team), ("script", self.script)):
@@ -65,6 +67,8 @@ class GameCfg:
                 raise ValueError(f"{key}: {self.task.name} has no teams {unknown}; it has {names}")
         if set(self.script) == set(names):
             raise ValueError(f"script: all teams of {self.task.name} are scripted: {names}")
+        if Script.expert in self.script.values():
+            find_expert(self.task.name)
         players = sum(team.size for team in self.teams)
         holds = int(self.playground.floor_m2 / FLOOR_OF_A_PLAYER_M2)
         if players > holds:

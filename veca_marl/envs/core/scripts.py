@@ -1,4 +1,4 @@
-"""Teams that play by themselves: no action comes from outside, the world decides."""
+"""Actions of scripted teams, which the game chooses itself."""
 
 from __future__ import annotations
 
@@ -8,31 +8,31 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from veca_marl.envs.core.task import Player, Task
+from veca_marl.envs.core.task import Player
 from veca_marl.envs.core.team import Script
 from veca_marl.sim.spec import ArraySpec
 
-Observe = Callable[[Player], dict[str, NDArray[Any]]]
-
 
 def play_script(
-    script: Script, task: Task, player: Player, observe: Observe, rng: np.random.Generator
+    script: Script,
+    player: Player,
+    expert_command: Callable[[Player], Any],
+    rng: np.random.Generator,
 ) -> None:
-    """Tell one player what to do in the step that comes.
+    """Set the action of one player for the next step.
 
     Args:
-        script: How.
-        task: Whose rules the expert knows.
-        player: Who.
-        observe: Reads the player's senses; only the expert asks.
-        rng: The game's source of randomness.
+        script: How the action is chosen.
+        player: The player.
+        expert_command: Returns the command of the player's expert; called for `Script.expert` only.
+        rng: Random generator of the game.
     """
     if script is Script.idle:
         player.body.rest()
     elif script is Script.random:
         player.body.act(random_row(player.body.action_spec, rng))
     else:
-        player.body.act(player.body.encode(task.expert(player, observe(player))))
+        player.body.act(player.body.encode(expert_command(player)))
 
 
 def random_row(spec: ArraySpec, rng: np.random.Generator) -> NDArray[Any]:

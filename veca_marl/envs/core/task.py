@@ -8,7 +8,6 @@ from dataclasses import dataclass, field
 from typing import Any, ClassVar, NamedTuple, get_type_hints
 
 import numpy as np
-from numpy.typing import NDArray
 
 from veca_marl.registry import Registry
 from veca_marl.sim.body.base import Body
@@ -158,16 +157,6 @@ class Task(ABC):
         Who is out stays out until the next episode: it rests, perceives zeros and is paid nothing.
         """
         return False
-
-    @abstractmethod
-    def expert(self, player: Player, observation: dict[str, NDArray[Any]]) -> Any:
-        """Play by hand-written rules: return a wish that `Body.encode` turns into an action row.
-
-        For a walking body that is (forward, turn), each in [-1, 1]; for a joint-level body the 82
-        joint angles (rad) it wants to come to, or `Springs`, whether it is driven by torques or by
-        angles. The
-        docstring says whether it uses the observation alone or privileged state.
-        """
 
     @classmethod
     def teams_of(cls, cfg: Any) -> tuple[Team, ...]:

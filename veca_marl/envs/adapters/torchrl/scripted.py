@@ -8,18 +8,22 @@ from tensordict import TensorDictBase
 from torch import nn
 
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
+from veca_marl.envs.core.expert import find_expert
 
 
 class ExpertPolicy(nn.Module):
-    """Plays all teams of an environment by its task's hand-written rules.
+    """Plays all teams of an environment by the experts of its task.
 
     Args:
-        env: The environment it plays in: experts may use privileged state (`Task.expert` says
-            which do), so the policy belongs to these very worlds.
+        env: The environment it plays in. Experts may read privileged state of these worlds.
+
+    Raises:
+        ValueError: If the task has no expert.
     """
 
     def __init__(self, env: VecaEnv) -> None:
         super().__init__()
+        find_expert(env.cfg.task.name)
         self._env = env
 
     def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
@@ -29,9 +33,8 @@ class ExpertPolicy(nn.Module):
             rows = [
                 [
                     player.body.encode(
-                        game.task.expert(
-                            player,
-                            {name: array.numpy() for name, array in seen[world, index].items()},
+                        game.expert_of(player).act(
+                            {name: array.numpy() for name, array in seen[world, index].items()}
                         )
                     )
                     for index, player in enumerate(game.team(team))

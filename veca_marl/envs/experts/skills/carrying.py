@@ -8,8 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from veca_marl.envs.experts.control.sitting import Seat
-from veca_marl.envs.experts.control.two_hands import Palms, TwoHands
+from veca_marl.envs.experts.control.arm_kinematics import ArmKinematics, Palms
+from veca_marl.envs.experts.control.seated_balance import SeatedBalance
 from veca_marl.sim.body.humanoid.humanoid import Humanoid
 from veca_marl.sim.body.humanoid.postures import REACHING, REACHING_DOWN, Posture
 from veca_marl.sim.geometry.pose import Floats
@@ -67,7 +67,7 @@ class Carrier:
         upright: Posture = REACHING,
         bent: Posture = REACHING_DOWN,
     ) -> None:
-        self._hands, self._seat = TwoHands(body), Seat(body, upright, bent)
+        self._hands, self._seat = ArmKinematics(body), SeatedBalance(body, upright, bent)
         self._squeeze_m, self._clear_m = squeeze_m, clear_m
         self._carrying_m, self._thumbs = carrying_m, thumbs_m * _UP
         self.reset()

@@ -87,13 +87,13 @@ class SitUp:
         self._begin("lie")
         self._turn.reset()
 
-    def wish(self) -> Springs:
+    def command(self) -> Springs:
         """Return where springs shall pull the joints now."""
         self._since_s += self._step_s
         if self._stage == "lie":
             if not self._body.bone("chest").forward[2] < -_ON_BELLY:
                 self._since_s = 0.0
-            wish = self._turn.wish()
+            wish = self._turn.command()
         else:
             wish = self._way.toward(self._stage, _SPEEDS_RADPS[self._stage])
         self._go_on()

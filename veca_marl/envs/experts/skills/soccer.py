@@ -1,4 +1,4 @@
-"""Soccer: get behind the ball and drive it at the goal; stand in its way."""
+"""Soccer: choose the point to steer to in order to drive the ball somewhere."""
 
 from __future__ import annotations
 
@@ -6,83 +6,90 @@ import math
 
 import numpy as np
 
-from veca_marl.envs.experts.control.legs import Reach
+from veca_marl.envs.experts.control.locomotion import Clearances
 from veca_marl.envs.tasks.multi_agent.pitch import Pitch
 from veca_marl.sim.body.base import Body
 from veca_marl.sim.geometry.pose import Floats
 
-_AHEAD_S = 0.25  # the ball is taken where it will be then
+_PREDICTION_S = 0.25  # the ball's position is extrapolated by this time
 _BALL_M = 0.12
-_ASIDE_RAD = [side * math.radians(deg) for deg in range(0, 180, 15) for side in (1.0, -1.0)]
-_CORNERS = (0.0, 0.12, -0.12, 0.24, -0.24, 0.33, -0.33)  # shares of the goal's width
-_FREE_M = 0.45  # farther from a keeper no shot is freer
+_DEVIATIONS_RAD = [side * math.radians(deg) for deg in range(0, 180, 15) for side in (1.0, -1.0)]
+_GOAL_LINE_SHARES = (0.0, 0.12, -0.12, 0.24, -0.24, 0.33, -0.33)  # of the goal's width
+_FREE_M = 0.45  # a path that passes the keeper at this distance counts as free
 
 
-def attack(body: Body, reach: Reach, pitch: Pitch, aim: Floats) -> Floats:
-    """Return where to go, ``(2,)`` metres, for who wants the ball to go to a point.
+def shooting_goal(body: Body, clearances: Clearances, pitch: Pitch, aim: Floats) -> Floats:
+    """Return the point to steer to so that the ball moves to an aim, ``(2,)`` metres.
 
-    A body drives whatever comes into its reach away from itself: so go round the ball at a
-    distance until it lies between the body and the aim, then go at it. Where walls leave no room
-    for the run-up, the shot goes as near to the aim as it can.
+    A body drives a ball in contact away from itself. The path therefore leads round the ball at a
+    distance until the ball lies between the body and the aim, and then through the ball. Where
+    walls leave no space for the run-up, the shot deviates from the aim as little as possible.
 
     Args:
-        body: Who attacks.
-        reach: How near it comes to things.
-        pitch: Where, with what ball.
-        aim: ``(2,)`` or ``(3,)`` metres: where it shall go.
+        body: The body that shoots.
+        clearances: Distances that it needs.
+        pitch: The pitch with the ball.
+        aim: Where the ball should go, ``(2,)`` or ``(3,)`` metres.
     """
     ball = np.clip(
-        pitch.ball.position[:2] + _AHEAD_S * pitch.ball.velocity[:2],
+        pitch.ball.position[:2] + _PREDICTION_S * pitch.ball.velocity[:2],
         pitch.low + _BALL_M,
         pitch.high - _BALL_M,
     )
-    here, shot = body.position[:2], _possible(ball, _unit(aim[:2] - ball), reach, pitch)
+    here, shot = (
+        body.position[:2],
+        _feasible_shot(ball, _unit(aim[:2] - ball), clearances, pitch),
+    )
     behind, aside = (ball - here) @ shot, abs(_cross(shot, ball - here))
-    if aside < reach.aside_m + reach.funnel * (behind - reach.ball_m):
-        return ball - max(behind - reach.look_ahead_m, 0.0) * shot
-    return _round(here, ball, ball - reach.run_up_m * shot, reach.clear_m)
+    if aside < clearances.aside_m + clearances.funnel * (behind - clearances.ball_m):
+        return ball - max(behind - clearances.look_ahead_m, 0.0) * shot
+    return _around_ball(here, ball, ball - clearances.run_up_m * shot, clearances.clear_m)
 
 
 def open_corner(pitch: Pitch, keeper: Floats) -> Floats:
-    """Return the point of the goal line to aim at, ``(2,)`` metres: past a keeper.
+    """Return the point of the goal line whose path from the ball is farthest from a keeper.
 
     Args:
-        pitch: Where.
-        keeper: ``(2,)`` or ``(3,)`` metres: who stands in the way.
+        pitch: The pitch with the ball.
+        keeper: Position of the keeper, ``(2,)`` or ``(3,)`` metres.
+
+    Returns:
+        ``(2,)`` metres. Distances above 0.45 m count as equal; the middle is preferred.
     """
     goal, ball = pitch.goal[:2], pitch.ball.position[:2]
-    spots = [goal + np.array([0.0, share * pitch.goal_width_m]) for share in _CORNERS]
-    return max(spots, key=lambda spot: min(_gap_m(ball, spot, keeper[:2]), _FREE_M))
+    spots = [goal + np.array([0.0, share * pitch.goal_width_m]) for share in _GOAL_LINE_SHARES]
+    return max(spots, key=lambda spot: min(_segment_distance_m(ball, spot, keeper[:2]), _FREE_M))
 
 
-def _gap_m(start: Floats, end: Floats, other: Floats) -> float:
-    """Return how far a straight way passes another one, metres."""
+def _segment_distance_m(start: Floats, end: Floats, point: Floats) -> float:
+    """Return the distance of a point from a line segment, metres."""
     way = end - start
-    share = float((other - start) @ way) / max(float(way @ way), 1e-9)
-    return float(np.hypot(*(start + min(max(share, 0.0), 1.0) * way - other)))
+    share = float((point - start) @ way) / max(float(way @ way), 1e-9)
+    return float(np.hypot(*(start + min(max(share, 0.0), 1.0) * way - point)))
 
 
-def _possible(ball: Floats, shot: Floats, reach: Reach, pitch: Pitch) -> Floats:
-    """Return the direction nearest to a shot's for which the pitch has room for the run-up."""
-    for aside_rad in _ASIDE_RAD:
-        c, s = math.cos(aside_rad), math.sin(aside_rad)
-        turned = np.array([c * shot[0] - s * shot[1], s * shot[0] + c * shot[1]])
-        start = ball - reach.run_up_m * turned
-        if (start > pitch.low + reach.wall_m).all() and (start < pitch.high - reach.wall_m).all():
-            return turned
+def _feasible_shot(ball: Floats, shot: Floats, clearances: Clearances, pitch: Pitch) -> Floats:
+    """Return the direction nearest to a shot's for which the pitch has space for the run-up."""
+    margin = clearances.wall_m
+    for deviation_rad in _DEVIATIONS_RAD:
+        c, s = math.cos(deviation_rad), math.sin(deviation_rad)
+        rotated = np.array([c * shot[0] - s * shot[1], s * shot[0] + c * shot[1]])
+        start = ball - clearances.run_up_m * rotated
+        if (start > pitch.low + margin).all() and (start < pitch.high - margin).all():
+            return rotated
     return shot
 
 
-def _round(here: Floats, ball: Floats, there: Floats, clear_m: float) -> Floats:
-    """Return where to go first on the way to a point beside the ball without touching it."""
-    way = there - here
+def _around_ball(here: Floats, ball: Floats, goal: Floats, clear_m: float) -> Floats:
+    """Return the next point of a path to a goal that does not touch the ball, ``(2,)`` metres."""
+    way = goal - here
     length = float(np.hypot(*way))
     along = _unit(way)
     ahead = float((ball - here) @ along)
     left = np.array([-along[1], along[0]])
     aside = float((ball - here) @ left)
     if not (0.0 < ahead < length + 0.1 and abs(aside) < clear_m):
-        return there
+        return goal
     side = -math.copysign(1.0, aside)
     return ball + side * clear_m * 1.2 * left
 

@@ -89,7 +89,7 @@ class TurnOver:
         self._way.reset()
         self._pose, self._since_s = "swing", 0.0
 
-    def wish(self) -> Floats:
+    def command(self) -> Floats:
         """Return the ``(82,)`` joint angles to go to now."""
         chosen = self._next()
         self._since_s = self._since_s + self._step_s if chosen == self._pose else 0.0

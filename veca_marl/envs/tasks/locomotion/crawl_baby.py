@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from veca_marl.envs.core.scoring import along
 from veca_marl.envs.core.task import Player, Task, humanoid, register, terms
-from veca_marl.envs.experts.control.legs import HandsAndKnees
 from veca_marl.envs.tasks.locomotion.moving import StartCfg, start_near_edge
 from veca_marl.sim.body.humanoid.postures import ON_ALL_FOURS
 
@@ -56,14 +53,11 @@ class CrawlBaby(Task):
     def build(self) -> None:
         self.body = humanoid(self.players[0])
         self.room = self.world.playground.rooms[0]
-        self._legs = HandsAndKnees(self.body, self.world.clock.step_s)
-        self._place, self._way, self._ahead = np.zeros(3), np.zeros(3), np.zeros(3)
+        self._place, self._way = np.zeros(3), np.zeros(3)
 
     def reset(self, rng: np.random.Generator) -> None:
         start_near_edge(self.body, self.room, ON_ALL_FOURS, self.cfg.spread_deg, rng)
         self._place = self.body.position
-        self._ahead = self._place + 100.0 * self.body.forward
-        self._legs = HandsAndKnees(self.body, self.world.clock.step_s)
 
     def after_step(self, rng: np.random.Generator) -> None:
         self._way = self.body.position - self._place
@@ -76,7 +70,3 @@ class CrawlBaby(Task):
             "torso": -float(self.body.bone("chest").forward[2]),
             "hip": -float(self.body.bone("pelvis").forward[2]),
         }
-
-    def expert(self, player: Player, observation: dict[str, NDArray[Any]]) -> Any:
-        """Crawl straight on by the clock, and by the heading, which is privileged."""
-        return self._legs.to(self._ahead)

@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from veca_marl.envs.core.scoring import along, flat
 from veca_marl.envs.core.task import Player, Task, humanoid, register, terms
-from veca_marl.envs.experts.skills.run import Run
 from veca_marl.envs.tasks.locomotion.moving import StartCfg, start_near_edge
 from veca_marl.sim.body.humanoid.postures import STANDING
 
@@ -60,12 +57,10 @@ class RunBaby(Task):
         self.body = humanoid(self.players[0])
         self.room = self.world.playground.rooms[0]
         self._place, self._way = np.zeros(3), np.zeros(3)
-        self._expert = Run(self.body, self.world.clock.step_s)
 
     def reset(self, rng: np.random.Generator) -> None:
         start_near_edge(self.body, self.room, STANDING, self.cfg.spread_deg, rng)
         self._place = self.body.bone("chest").position
-        self._expert.reset()
 
     def after_step(self, rng: np.random.Generator) -> None:
         place = self.body.bone("chest").position
@@ -77,7 +72,3 @@ class RunBaby(Task):
 
     def terminated(self) -> bool:
         return bool(self.body.bone("neck").position[2] < self.cfg.fallen_m)
-
-    def expert(self, player: Player, observation: dict[str, NDArray[Any]]) -> Any:
-        """Step into the fall, the trunk held up by hips and ankles. Uses the true trunk pose."""
-        return self._expert.wish()

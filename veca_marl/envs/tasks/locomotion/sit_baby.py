@@ -4,14 +4,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from veca_marl.envs.core.scoring import share
 from veca_marl.envs.core.task import Player, Task, humanoid, register, terms
-from veca_marl.envs.experts.skills.sit_up import SitUp
 from veca_marl.envs.tasks.locomotion.moving import StartCfg, draw_posture, start_anywhere
 
 
@@ -64,19 +61,13 @@ class SitBaby(Task):
     def build(self) -> None:
         self.body = humanoid(self.players[0])
         self.room = self.world.playground.rooms[0]
-        self._expert = SitUp(self.body, self.world.clock.step_s)
 
     def reset(self, rng: np.random.Generator) -> None:
         posture = draw_posture(self.cfg.starts, rng)
         start_anywhere(self.body, self.room, posture, self.cfg.spread_deg, rng)
-        self._expert.reset()
 
     def reward(self, player: Player) -> dict[str, float]:
         return {
             "torso": share(self.body.bone("neck").position[2], self.cfg.torso_m),
             "head": share(self.body.mount("head").position[2], self.cfg.head_m),
         }
-
-    def expert(self, player: Player, observation: dict[str, NDArray[Any]]) -> Any:
-        """Turn to the belly, push up on the hands, sit on the heels. Uses the true trunk pose."""
-        return self._expert.wish()

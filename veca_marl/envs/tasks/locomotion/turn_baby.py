@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from veca_marl.envs.core.task import Player, Task, humanoid, register, terms
-from veca_marl.envs.experts.skills.turn_over import TurnOver
 from veca_marl.envs.tasks.locomotion.moving import StartCfg, face_down, start_anywhere
 from veca_marl.sim.body.humanoid.postures import ON_BACK
 
@@ -45,15 +42,9 @@ class TurnBaby(Task):
     def build(self) -> None:
         self.body = humanoid(self.players[0])
         self.room = self.world.playground.rooms[0]
-        self._expert = TurnOver(self.body, self.world.clock.step_s)
 
     def reset(self, rng: np.random.Generator) -> None:
         start_anywhere(self.body, self.room, ON_BACK, self.cfg.spread_deg, rng)
-        self._expert.reset()
 
     def reward(self, player: Player) -> dict[str, float]:
         return face_down(self.body)
-
-    def expert(self, player: Player, observation: dict[str, NDArray[Any]]) -> Any:
-        """Swing one leg and one arm across, then stretch. Uses the true attitude of the trunk."""
-        return self._expert.wish()

@@ -14,7 +14,7 @@ from veca_marl.sim.physics.playground import DoorCfg, PlaygroundCfg, RoomCfg
 _CORNER_M = 0.7  # so far from both walls somebody has room in a corner
 
 
-class Passing(NamedTuple):
+class DoorApproach(NamedTuple):
     """How somebody goes through doors.
 
     Attributes:
@@ -69,13 +69,13 @@ class FloorPlan:
         length, _ = self._routes[one].get(other, (math.inf, None))
         return length
 
-    def waypoint(self, place: Floats, goal: Floats, passing: Passing) -> Floats:
+    def waypoint(self, place: Floats, goal: Floats, approach: DoorApproach) -> Floats:
         """Return where to walk straight to, on the way to a goal.
 
         Args:
             place: ``(2,)`` or ``(3,)`` metres, where somebody is.
             goal: Likewise, where it wants to be.
-            passing: How it goes through doors.
+            approach: How it goes through doors.
 
         Returns:
             ``(2,)`` metres: the goal if it is in the same room; else a point before the next door
@@ -91,9 +91,9 @@ class FloorPlan:
             names = self.rooms[here].name, self.rooms[there].name
             raise ValueError(f"no doors lead from {names[0]!r} to {names[1]!r}")
         _, passage = self._routes[here][there]
-        return _through(passage, place, passing)
+        return _through(passage, place, approach)
 
-    def aside_of(self, place: Floats) -> Floats:
+    def waiting_place(self, place: Floats) -> Floats:
         """Return where in a room who stays is in nobody's way to a place ``(2,)`` or ``(3,)``.
 
         Returns:
@@ -146,14 +146,14 @@ def _way_out(room: RoomCfg, other: RoomCfg) -> Floats:
     return out
 
 
-def _through(passage: _Passage, place: Floats, passing: Passing) -> Floats:
+def _through(passage: _Passage, place: Floats, approach: DoorApproach) -> Floats:
     """Return where to walk to go through a door, see `FloorPlan.waypoint`."""
     out = passage.out
     right = np.array([out[1], -out[0]])
     middle = np.array(passage.door.position_m)
     half_m = passage.door.width_m / 2.0
-    keep_m = min(passing.right_m, half_m / 2.0)
+    keep_m = min(approach.right_m, half_m / 2.0)
     aside_m = float(right @ (np.array([place[0], place[1]]) - middle))
     if abs(aside_m - keep_m) <= half_m / 3.0:
-        return middle + keep_m * right + passing.before_m * out
-    return middle + keep_m * right - passing.before_m * out
+        return middle + keep_m * right + approach.before_m * out
+    return middle + keep_m * right - approach.before_m * out

@@ -8,11 +8,8 @@ from enum import Enum
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from veca_marl.envs.core.task import Player, Task, TaskCfg, Team, register, terms
-from veca_marl.envs.experts.control.legs import Legs, legs_of
-from veca_marl.envs.experts.skills.seeking import Seeker
 from veca_marl.envs.tasks.multi_agent.contests import line_up, look_ahead
 from veca_marl.envs.tasks.multi_agent.floor_plan import FloorPlan
 from veca_marl.envs.tasks.multi_agent.navigation import Sight, free_pair, free_place, gap_m, way_to
@@ -113,13 +110,11 @@ class MultiAgentNav(Task):
             )
         )
         self._sight = Sight(self.world.scene, self.target)
-        self._seekers: dict[str, Seeker] = {}
-        self._legs: dict[str, Legs] = {}
         self.arrived: set[str] = set()
         self._new = 0
 
     def reset(self, rng: np.random.Generator) -> None:
-        for memory in (self._sight, self._seekers, self.arrived):
+        for memory in (self._sight, self.arrived):
             memory.clear()
         self._new = 0
         order = rng.permutation(len(self.plan.rooms))[: len(self.players)]
@@ -134,7 +129,6 @@ class MultiAgentNav(Task):
             line_up(player, place, rng.uniform(-math.pi, math.pi))
             if self.cfg.muted is not Muted.nobody:
                 player.body.muted = room is home or self.cfg.muted is Muted.everybody
-        self._legs = legs_of(self.players, self.world.clock.step_s)
         look_ahead(self.players)
 
     def after_step(self, rng: np.random.Generator) -> None:
@@ -147,29 +141,13 @@ class MultiAgentNav(Task):
 
     def reward(self, player: Player) -> dict[str, float]:
         ahead = aside = 0.0
-        if player.name not in self.arrived and self._sight.of(player):
+        if player.name not in self.arrived and self.sees_target(player):
             ahead, aside = way_to(player.body, self.target.position, self.world.clock.step_s)
         return {"reached": float(self._new), "ahead": ahead, "aside": aside}
 
+    def sees_target(self, player: Player) -> bool:
+        """Return whether the object is visible to the left eye of a player."""
+        return self._sight.of(player)
+
     def terminated(self) -> bool:
         return len(self.arrived) == len(self.players)
-
-    def expert(self, player: Player, observation: dict[str, NDArray[Any]]) -> Any:
-        """Look round, go and call; else listen, and go where a call comes from.
-
-        Who has seen the object (`is_visible`) knows its place, goes there, calls while in its room
-        and, when it has arrived, leaves the others room. Who has not keeps a map of how likely
-        somebody calls from each place of the house: a call is as loud as it is far, 30 dB weaker
-        for each wall, and louder in the ear that it is turned to. What a caller is worth to it,
-        it has from the observation `audio` alone. Who hears nothing turns round once in each room,
-        the nearest first. Who runs into something goes back. Privileged: an agent's own place and
-        heading, and the plan of the house.
-
-        On hands and knees it needs up to a minute where a walker needs ten seconds.
-        """
-        seeker = self._seekers.get(player.name)
-        if seeker is None:
-            seeker = Seeker(player.body, self._legs[player.name], self.plan, self.world)
-            self._seekers[player.name] = seeker
-        seen = self.target.position if self._sight.of(player) else None
-        return seeker.wish(observation.get("audio"), seen, player.name in self.arrived)

@@ -4,19 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from veca_marl.envs.core.task import Player, Task, TaskCfg, terms
-from veca_marl.envs.experts.control.legs import Legs, legs_of
-from veca_marl.envs.experts.control.walking import bearing_rad
-from veca_marl.envs.experts.skills.wrestling import wrestle
 from veca_marl.envs.tasks.multi_agent.contests import (
     line_up,
     look_ahead,
-    nearest,
     on_floor,
     opponents,
     paint_disc,
@@ -72,7 +66,6 @@ class PushOut(Task):
         self._playing: set[str] = set()
         self._fallen: set[str] = set()
         self._ground: dict[str, float] = {}
-        self._legs: dict[str, Legs] = {}
         self._won: dict[str, float] = {}
 
     def reset(self, rng: np.random.Generator) -> None:
@@ -84,7 +77,6 @@ class PushOut(Task):
         self._fallen = set()
         self._ground = {player.name: self._area(player) for player in self.players}
         self._won = dict.fromkeys(self._ground, 0.0)
-        self._legs = legs_of(self.players, self.world.clock.step_s)
 
     def after_step(self, rng: np.random.Generator) -> None:
         look_ahead(self.players)
@@ -108,17 +100,9 @@ class PushOut(Task):
         left = self._playing - self._fallen
         return any(all(p.name not in left for p in self._team(team)) for team in self._teams)
 
-    def expert(self, player: Player, observation: dict[str, NDArray[Any]]) -> Any:
-        """Go round the nearest opponent and push it outwards; knows where all are.
-
-        On hands and knees it goes backwards where others turn round: turning takes room.
-        """
-        _, theirs = self._sides(player)
-        body, legs = player.body, self._legs[player.name]
-        other = nearest(body, theirs)
-        place = wrestle(body, legs.reach, other, self.middle, self.cfg.radius_m)
-        behind = abs(bearing_rad(body, place)) > legs.reach.back_rad
-        return legs.back() if behind else legs.to(place)
+    def opponents_playing(self, player: Player) -> list[Player]:
+        """Return the players of the other team that had not left the ring before this step."""
+        return [p for p in opponents(player, self.players) if p.name in self._playing]
 
     # ---- who is where
 
@@ -131,8 +115,8 @@ class PushOut(Task):
 
     def _sides(self, player: Player) -> tuple[list[Player], list[Player]]:
         """Return who played until this step: of the player's team, and of the others."""
-        theirs = [p for p in opponents(player, self.players) if p.name in self._playing]
-        return [p for p in self._team(player.team) if p.name in self._playing], theirs
+        ours = [p for p in self._team(player.team) if p.name in self._playing]
+        return ours, self.opponents_playing(player)
 
     def _mean_won(self, side: list[Player]) -> float:
         return sum(self._won[player.name] for player in side) / len(side)

@@ -4,16 +4,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from veca_marl.envs.core.scoring import aside_rad
 from veca_marl.envs.core.task import Player, Task, TaskCfg, terms
-from veca_marl.envs.experts.control.backing_off import BacksOff
-from veca_marl.envs.experts.control.legs import Legs, legs_of
-from veca_marl.envs.experts.skills.soccer import attack
 from veca_marl.envs.tasks.multi_agent.contests import line_up, look_ahead
 from veca_marl.envs.tasks.multi_agent.pitch import POST_M, Pitch
 from veca_marl.sim.body.walker.pushing import horizontal_distance
@@ -110,7 +105,6 @@ class Soccer(Task):
                 f"aside_m do not fit into room {room.name!r} of {room.size_m[:2]} m"
             )
         self._rest_s: dict[str, float] = {}
-        self._legs: dict[str, Legs] = {}
         self._paid: dict[str, float] = {}
         self._scored = False
         self._now = self._look()
@@ -124,9 +118,6 @@ class Soccer(Task):
             self._line_up(player, rng)
         look_ahead(self.players)
         self._rest_s = {player.name: 0.0 for player in self.players}
-        step_s = self.world.clock.step_s
-        legs = legs_of(self.players, step_s)
-        self._legs = {p.name: BacksOff(p.body, legs[p.name], step_s) for p in self.players}
         self._scored = False
         self._now = self._look()
 
@@ -155,14 +146,6 @@ class Soccer(Task):
 
     def terminated(self) -> bool:
         return self._scored
-
-    def expert(self, player: Player, observation: dict[str, NDArray[Any]]) -> Any:
-        """Get behind the ball and drive it at the goal; knows where the ball is."""
-        return self._attack(player, self.goal)
-
-    def _attack(self, player: Player, aim: Floats) -> Any:
-        legs = self._legs[player.name]
-        return legs.to(attack(player.body, legs.reach, self.pitch, aim))
 
     # ---- the ball
 

@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from veca_marl.envs.core.task import Player, Team, register
-from veca_marl.envs.experts.skills.soccer import open_corner
 from veca_marl.envs.tasks.multi_agent.soccer import ATTACKER, DEFENDER, Soccer, SoccerCfg
 from veca_marl.sim.geometry.pose import Floats
 
@@ -67,10 +64,3 @@ class SoccerTwoPlayer(Soccer):
         back = rng.uniform(*self.cfg.defender_from_goal_m)
         half_m = min(self.cfg.aside_m, self.cfg.goal_width_m / 2.0)
         return np.array([self.goal[0] - back, self.goal[1] + rng.uniform(-half_m, half_m), 0.0])
-
-    def expert(self, player: Player, observation: dict[str, NDArray[Any]]) -> Any:
-        """Get at the ball, away from the own goal; knows where the ball is."""
-        if player.team == ATTACKER:
-            keeper = self.players[1].body.position
-            return self._attack(player, open_corner(self.pitch, keeper))
-        return self._attack(player, 2.0 * self.ball.position - self.goal)

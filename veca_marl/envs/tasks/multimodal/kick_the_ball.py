@@ -4,17 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from veca_marl.envs.core.scoring import cosine, flat, norm
 from veca_marl.envs.core.task import Player, Task, TaskCfg, register, terms, walker
 from veca_marl.sim.physics.props import PropCfg, PropShape
 from veca_marl.sim.sound.sounds import SoundCfg, SoundKind
-
-LOUDER = 0.05  # mean difference of the ears' log10 spectra that is worth a turn of the body
 
 
 @dataclass
@@ -109,12 +105,6 @@ class KickTheBall(Task):
         walks = norm(velocity) >= self.cfg.walking_mps
         approach = cosine(velocity, way) if walks else 0.0
         return {"kick": float(self._scored), "approach": approach}
-
-    def expert(self, player: Player, observation: dict[str, NDArray[Any]]) -> tuple[float, float]:
-        """Turn to the louder ear, else walk on. Uses the sound alone."""
-        left, right = observation["audio"].mean(axis=-1)
-        turn = float(np.clip((left - right) / LOUDER, -1.0, 1.0))
-        return 1.0 - abs(turn) / 2.0, turn
 
     def _launch(self, rng: np.random.Generator) -> None:
         """Let a new ball roll out of a side wall."""

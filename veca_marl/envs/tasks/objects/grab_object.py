@@ -3,16 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from veca_marl.envs.core.task import Player, Task, humanoid, register, terms
-from veca_marl.envs.experts.skills.carrying import Carrier
-from veca_marl.envs.experts.skills.lifting import BENT, UPRIGHT, lift
 from veca_marl.envs.tasks.objects.grasping import (
     ToyCfg,
     add_toy,
@@ -21,9 +16,6 @@ from veca_marl.envs.tasks.objects.grasping import (
     lay_down,
 )
 from veca_marl.sim.body.humanoid.postures import REACHING
-from veca_marl.sim.geometry.pose import Floats
-
-_UP_M = 0.08  # the expert lifts by so much
 
 
 @dataclass
@@ -69,9 +61,7 @@ class GrabObject(Task):
     def build(self) -> None:
         self.child = humanoid(self.players[0])
         self.toy = add_toy(self.world, self.cfg)
-        self._carrier = Carrier(self.child, upright=UPRIGHT, bent=BENT)
         self._held_m = self._lifted_m = self._distance_m = self._approached_m = 0.0
-        self._script = self._play()
 
     def reset(self, rng: np.random.Generator) -> None:
         self.child.place((0.0, 0.0, 0.0), 0.0, REACHING)
@@ -79,8 +69,6 @@ class GrabObject(Task):
         self.child.look_toward_point(self.toy.position)
         self._held_m = self.held_m
         self._distance_m = self._distance()
-        self._carrier.reset()
-        self._script = self._play()
 
     def after_step(self, rng: np.random.Generator) -> None:
         self.child.look_toward_point(self.toy.position)
@@ -108,15 +96,5 @@ class GrabObject(Task):
         """Whether both hands hold the toy up."""
         return self.held_m >= self.cfg.lifted_m
 
-    def expert(self, player: Player, observation: dict[str, NDArray[Any]]) -> Floats:
-        """Squeeze the toy between both palms and lift it; if it is lost, once more.
-
-        Uses privileged state, not the observation: where the toy and its bones are.
-        """
-        return next(self._script)
-
     def _distance(self) -> float:
         return float(hand_distances(self.child, self.toy).sum())
-
-    def _play(self) -> Iterator[Floats]:
-        return lift(self.child, self._carrier, self.toy, self.cfg.edge_m / 2 + _UP_M)

@@ -3,19 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from veca_marl.envs.core.scoring import flat
 from veca_marl.envs.core.task import Player, Task, humanoid, register, terms
-from veca_marl.envs.experts.skills.carrying import Carrier
 from veca_marl.envs.tasks.objects.grasping import ToyCfg, add_toy, lay_down
 from veca_marl.sim.body.humanoid.postures import REACHING
-from veca_marl.sim.geometry.pose import Floats
 from veca_marl.sim.physics.props import PropCfg, PropShape
 
 _THIN_M = 0.001
@@ -80,9 +75,7 @@ class MoveToTarget(Task):
                 tangible=False,
             )
         )
-        self._carrier = Carrier(self.child)
         self._counted_m = self._progress_m = 0.0
-        self._script = self._play()
 
     def reset(self, rng: np.random.Generator) -> None:
         self.child.place((0.0, 0.0, 0.0), 0.0, REACHING)
@@ -91,8 +84,6 @@ class MoveToTarget(Task):
         self.mark.place(flat(self.toy.position) + np.array([0.0, way, _THIN_M / 2]))
         self.child.look_toward_point(self.toy.position)
         self._counted_m, self._progress_m = self.distance_m, 0.0
-        self._carrier.reset()
-        self._script = self._play()
 
     def after_step(self, rng: np.random.Generator) -> None:
         self.child.look_toward_point(self.toy.position)
@@ -112,21 +103,3 @@ class MoveToTarget(Task):
     def solved(self) -> bool:
         """Whether the toy is on the mark."""
         return self.distance_m <= self.cfg.there_m
-
-    def expert(self, player: Player, observation: dict[str, NDArray[Any]]) -> Floats:
-        """Squeeze the toy between both palms, carry it over the mark, let go; if lost, once more.
-
-        Uses privileged state, not the observation: where the toy, the mark and its bones are.
-        """
-        return next(self._script)
-
-    def _play(self) -> Iterator[Floats]:
-        travel_m = self.cfg.edge_m / 2 + 0.03
-        while not self.distance_m < 0.5 * self.cfg.there_m:
-            yield from self._carrier.carry(self.toy, self._place, travel_m)
-        yield from self._carrier.rest()
-
-    def _place(self) -> Floats:
-        """Return where the centre of a toy is that lies on the mark."""
-        place: Floats = flat(self.mark.position) + np.array([0.0, 0.0, self.cfg.edge_m / 2])
-        return place

@@ -4,20 +4,13 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import partial
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from veca_marl.envs.core.task import Player, Task, humanoid, register, terms
-from veca_marl.envs.experts.skills.carrying import Carrier
 from veca_marl.envs.tasks.objects.blocks import RED, BlocksCfg, add_block, height, is_free, rests_on
 from veca_marl.sim.body.humanoid.postures import REACHING
-from veca_marl.sim.geometry.pose import Floats
-from veca_marl.sim.physics.props import Prop
 
 
 @dataclass
@@ -68,8 +61,6 @@ class PileUpBlock(Task):
     def build(self) -> None:
         self.child = humanoid(self.players[0])
         self.blocks = [add_block(self.world, self.cfg, f"red_{i}", RED) for i in range(2)]
-        self._carrier = Carrier(self.child, squeeze_m=0.025, carrying_m=0.005, thumbs_m=0.005)
-        self._script = self._play()
 
     def reset(self, rng: np.random.Generator) -> None:
         self.child.place((0.0, 0.0, 0.0), 0.0, REACHING)
@@ -77,8 +68,6 @@ class PileUpBlock(Task):
             ahead, aside = rng.uniform(*self.cfg.ahead_m), rng.uniform(*self.cfg.aside_m)
             turn = math.radians(rng.uniform(-self.cfg.turn_deg, self.cfg.turn_deg))
             block.place((ahead, side * aside, self.cfg.edge_m / 2), turn)
-        self._carrier.reset()
-        self._script = self._play()
 
     def reward(self, player: Player) -> dict[str, float]:
         return {"height": sum(height(block) for block in self.blocks)}
@@ -90,23 +79,3 @@ class PileUpBlock(Task):
             rests_on(one, other) and is_free(one, self.child)
             for one, other in itertools.permutations(self.blocks)
         )
-
-    def expert(self, player: Player, observation: dict[str, NDArray[Any]]) -> Floats:
-        """Squeeze a block between both palms, carry it over the other, let go; if lost, once more.
-
-        Uses privileged state, not the observation: where the blocks and its bones are.
-        """
-        return next(self._script)
-
-    def _play(self) -> Iterator[Floats]:
-        for one, other in itertools.cycle(itertools.permutations(self.blocks)):
-            if self.solved:
-                yield from self._carrier.rest()
-            travel_m = 1.5 * self.cfg.edge_m + 0.02
-            yield from self._carrier.carry(one, partial(_above, other), travel_m)
-
-
-def _above(block: Prop) -> Floats:
-    """Return where the centre of a block is that lies on another."""
-    x, y, z = block.position
-    return np.array([x, y, z + block.cfg.size_m[0]])

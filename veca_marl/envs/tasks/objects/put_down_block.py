@@ -3,15 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from veca_marl.envs.core.task import Player, Task, humanoid, register, terms
-from veca_marl.envs.experts.skills.carrying import Carrier
 from veca_marl.envs.tasks.objects.blocks import (
     BLUE,
     RED,
@@ -21,11 +17,7 @@ from veca_marl.envs.tasks.objects.blocks import (
     is_free,
     is_still,
 )
-from veca_marl.sim.body.humanoid.postures import REACHING, reaching
-from veca_marl.sim.geometry.pose import Floats
-
-# of the seats tried this throws the fewest towers over
-_UPRIGHT, _BENT = reaching(20.0, 20.0), reaching(30.0, 22.0)
+from veca_marl.sim.body.humanoid.postures import REACHING
 
 
 @dataclass
@@ -89,8 +81,6 @@ class PutDownBlock(Task):
         self.red = add_block(self.world, self.cfg, "red", RED)
         self._fallen: set[str] = set()
         self._newly_fallen = 0
-        self._carrier = Carrier(self.child, upright=_UPRIGHT, bent=_BENT)
-        self._script = self._play()
 
     def reset(self, rng: np.random.Generator) -> None:
         self.child.place((0.0, 0.0, 0.0), 0.0, REACHING)
@@ -101,8 +91,6 @@ class PutDownBlock(Task):
         for floor, block in enumerate((*self.blue, self.red)):
             block.place((ahead, aside, (floor + 0.5) * self.cfg.edge_m + 0.002 * floor), turn)
         self._fallen, self._newly_fallen = set(), 0
-        self._carrier.reset()
-        self._script = self._play()
 
     def after_step(self, rng: np.random.Generator) -> None:
         down = {
@@ -121,21 +109,3 @@ class PutDownBlock(Task):
         """Whether the red block lies on the floor by itself and all blue ones stand."""
         down = abs(height(self.red)) < 0.1 and is_still(self.red)
         return down and is_free(self.red, self.child) and not self._fallen
-
-    def expert(self, player: Player, observation: dict[str, NDArray[Any]]) -> Floats:
-        """Squeeze the red block between both palms, lift it off, put it down on the other side.
-
-        Uses privileged state, not the observation: where the blocks and its bones are.
-        """
-        return next(self._script)
-
-    def _play(self) -> Iterator[Floats]:
-        while not self.solved:
-            travel_m = (self.cfg.blue + 0.5) * self.cfg.edge_m + 0.02
-            yield from self._carrier.carry(self.red, self._beside, travel_m, above_m=0.02)
-        yield from self._carrier.rest()
-
-    def _beside(self) -> Floats:
-        """Return a place on the floor to the other side of the child."""
-        tower = self.blue[0].position
-        return np.array([tower[0], -math.copysign(0.09, tower[1]), self.cfg.edge_m / 2])

@@ -4,22 +4,17 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from veca_marl.envs.core.scoring import angle_between_rad
 from veca_marl.envs.core.task import Player, Task, TaskCfg, humanoid, register, terms
 from veca_marl.sim.body.humanoid.postures import OFFERING
-from veca_marl.sim.geometry.pose import Floats
-from veca_marl.sim.geometry.rotations import heading_rad, turn_about_vertical
+from veca_marl.sim.geometry.rotations import turn_about_vertical
 from veca_marl.sim.physics.props import PropCfg, PropShape
 
 _GAP_M = 0.001  # between the cube and the skin of the palm at the start
-_GAIN = 0.05  # share of the remaining angle by which the expert shifts its wish, per step
-_MOST_RAD = math.radians(1.5)  # per step: faster, the cube slides off
-_SHOULDER, _WRIST = "r_upper_arm.abduction", "r_hand.radial_deviation"
+SHOULDER = "r_upper_arm.abduction"
 
 
 @dataclass
@@ -94,22 +89,19 @@ class RotateCube(Task):
                 colour=(0.9, 0.12, 0.1),
             )
         )
-        self._target, self._wish = np.eye(3), self.child.angles_of(OFFERING)
+        self.target = np.eye(3)
         self._angle_rad = self._start_rad = self._progress_rad = 0.0
-        names = self.child.joint_names
-        self._turning = [names.index(_SHOULDER), names.index(_WRIST)]
 
     def reset(self, rng: np.random.Generator) -> None:
         self.child.place((0.0, 0.0, 0.0), 0.0, OFFERING)
         above = np.array([0.0, 0.0, self.cfg.edge_m / 2 + _GAP_M])
         turned = math.radians(rng.uniform(-self.cfg.start_deg, self.cfg.start_deg))
-        hand_rad = math.radians(-OFFERING.joints_deg[_SHOULDER])
+        hand_rad = math.radians(-OFFERING.joints_deg[SHOULDER])
         self.cube.place(self.child.palms()[1] + above, hand_rad + turned)
         turn = turn_about_vertical(math.radians(self.cfg.turn_deg))
-        self._target = turn @ self.cube.rotation
+        self.target = turn @ self.cube.rotation
         self._angle_rad = self._start_rad = self.angle_rad
         self._progress_rad = 0.0
-        self._wish = self.child.angles_of(OFFERING)
 
     def after_step(self, rng: np.random.Generator) -> None:
         angle_rad = self.angle_rad if self.on_hand else self._start_rad
@@ -121,7 +113,7 @@ class RotateCube(Task):
     @property
     def angle_rad(self) -> float:
         """The angle between the cube and its target."""
-        return angle_between_rad(self.cube.rotation, self._target)
+        return angle_between_rad(self.cube.rotation, self.target)
 
     @property
     def on_hand(self) -> bool:
@@ -132,14 +124,3 @@ class RotateCube(Task):
     def solved(self) -> bool:
         """Whether the cube on the hand is turned as it should be."""
         return self.on_hand and self.angle_rad <= math.radians(self.cfg.there_deg)
-
-    def expert(self, player: Player, observation: dict[str, NDArray[Any]]) -> Floats:
-        """Turn the hand with the cube on it, by shoulder and wrist, until the cube is there.
-
-        It does not use the fingers. Uses privileged state, not the observation: the cube's turn.
-        """
-        left_rad = heading_rad(self._target @ self.cube.rotation.T)
-        # to the right arm of a child on its back, out and to the thumb is a turn to the right
-        step = np.clip(_GAIN * left_rad, -_MOST_RAD, _MOST_RAD)
-        self._wish[self._turning] -= step / len(self._turning)
-        return self._wish

@@ -7,7 +7,7 @@ import pytest
 from seeking import world_with
 
 from veca_marl.envs.core.task import Player
-from veca_marl.envs.experts.control.legs import legs_of
+from veca_marl.envs.experts.control.locomotion import locomotion_of
 from veca_marl.envs.tasks.multi_agent.contests import line_up
 from veca_marl.sim.body.humanoid.humanoid import Detail, Humanoid, HumanoidCfg, JointActionKind
 from veca_marl.sim.body.walker.walker import Walker, WalkerCfg
@@ -38,7 +38,7 @@ def start(mover):
     world, player = mover
     world.reset(np.random.default_rng(0))
     line_up(player, np.zeros(2), 0.0)
-    return legs_of([player], world.clock.step_s)[player.name]
+    return locomotion_of(player, world.clock.step_s)
 
 
 def let(mover, wish):

@@ -1,4 +1,4 @@
-"""CallMap: where in a house a call comes from, by what two ears hear."""
+"""CallSourceMap: where in a house a call comes from, by what two ears hear."""
 
 import math
 
@@ -7,7 +7,7 @@ import pytest
 
 from veca_marl.config.root import compose
 from veca_marl.envs.core.game import Game
-from veca_marl.envs.experts.perception.hearing import CallMap, loudness
+from veca_marl.envs.experts.perception.call_localization import CallSourceMap, loudness
 from veca_marl.sim.sound.calls import Call
 
 STEPS = 10
@@ -30,7 +30,7 @@ def heard(game, call_map, listener, caller, call=Call.high):
         wishes = {ears.name: (0.0, 0.0), mouth.name: (0.0, 0.0, call)}
         game.step({p.name: p.body.encode(wishes[p.name]) for p in game.players})
         audio, _ = [game.observe(player).get("audio") for player in game.players]
-    call_map.hear(ears.body.mount("head"), audio)
+    call_map.update(ears.body.mount("head"), audio)
 
 
 @pytest.fixture
@@ -38,7 +38,7 @@ def call_map(game):
     game.reset(np.random.default_rng(0))
     for player in game.players:
         game.observe(player)
-    return CallMap(game.world)
+    return CallSourceMap(game.world)
 
 
 def test_silence_says_nothing(game, call_map):

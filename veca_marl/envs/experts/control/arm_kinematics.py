@@ -35,7 +35,7 @@ class Palms(NamedTuple):
     fingers: Floats
 
 
-class TwoHands:
+class ArmKinematics:
     """The arms of a body.
 
     Args:

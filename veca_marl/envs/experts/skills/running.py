@@ -43,7 +43,7 @@ class Stride:
     abduction_rate_gain: float = 4.1
 
 
-class Run:
+class Running:
     """A rhythm in time, corrected by how the chest leans.
 
     Args:
@@ -60,7 +60,7 @@ class Run:
         """Begin with the left leg, upright."""
         self._time_s, self._lean = 0.0, np.zeros(2)
 
-    def wish(self) -> Springs:
+    def command(self) -> Springs:
         """Return where springs shall pull the joints now."""
         lean = self._leans()
         rate = (lean - self._lean) / self._step_s

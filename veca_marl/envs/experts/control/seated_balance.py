@@ -21,7 +21,7 @@ _GAIN = 0.03  # share of the remaining sag that is given back per call
 _NUDGE_RAD = 1e-4
 
 
-class Seat:
+class SeatedBalance:
     """Holds a sitting child between two postures against the weight of trunk, head and arms.
 
     Joints are springs: sent to an angle, they sag under weight. So they are sent beyond it, by as

@@ -1,4 +1,4 @@
-"""BacksOff: who gets nowhere goes back for a while, and nobody else does."""
+"""WallRecovery: who gets nowhere goes back for a while, and nobody else does."""
 
 import math
 from types import SimpleNamespace
@@ -6,16 +6,16 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from veca_marl.envs.experts.control.backing_off import BacksOff
+from veca_marl.envs.experts.control.wall_recovery import WallRecovery
 from veca_marl.sim.sound.calls import Call
 
 STEP_S = 0.04
 
 
 class Said:
-    """Legs that say what they were asked."""
+    """Locomotion that say what they were asked."""
 
-    reach = None
+    clearances = None
 
     def to(self, place, call):
         return "to", call
@@ -33,7 +33,7 @@ class Said:
 def asked(seconds, speed_mps=0.0, turn_rad_s=0.0, what="to", call=Call.none):
     """Ask again and again while a body goes and turns so fast; return what the legs were told."""
     body = SimpleNamespace(position=np.zeros(3), forward=np.array([1.0, 0.0, 0.0]))
-    legs, told = BacksOff(body, Said(), STEP_S), []
+    legs, told = WallRecovery(body, Said(), STEP_S), []
     for step in range(round(seconds / STEP_S)):
         time_s = step * STEP_S
         body.position = np.array([speed_mps * time_s, 0.0, 0.0])

@@ -1,0 +1,89 @@
+"""The expert registry, and the experts that a game makes."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from duels import duel
+from knockouts import knockout
+
+from veca_marl.envs.core.expert import EXPERTS, Expert, find_expert, has_expert, register_expert
+from veca_marl.envs.core.game import Game
+from veca_marl.envs.core.team import Script
+
+
+class Counter(Expert):
+    """Walks, and counts what it was asked."""
+
+    def __init__(self, task, player):
+        super().__init__(task, player)
+        self.resets = self.steps = 0
+
+    def reset(self):
+        self.resets, self.steps = self.resets + 1, 0
+
+    def act(self, observation):
+        self.steps += 1
+        assert set(observation) == {"vision", "audio"}
+        return 1.0, 0.0
+
+
+@pytest.fixture
+def cfg(monkeypatch):
+    with duel() as cfg:
+        monkeypatch.setitem(EXPERTS, "Duel", Counter)
+        yield cfg
+
+
+def test_a_task_without_an_expert_is_playable_and_asking_for_the_expert_lists_the_others():
+    with duel() as cfg:
+        game = Game(cfg)
+        game.reset(np.random.default_rng(0))
+        assert not has_expert("Duel")
+        with pytest.raises(ValueError, match=r"'Duel' has no expert; .*'KickTheBall'.*'TurnBaby'"):
+            game.expert_of(game.players[0])
+        game.close()
+        with pytest.raises(ValueError, match="'Duel' has no expert"):
+            Game(replace(cfg, script={"blue": Script.expert}))
+
+
+def test_a_task_has_one_expert():
+    with pytest.raises(ValueError, match="Counter: task 'KickTheBall' already has the expert"):
+        register_expert("KickTheBall")(Counter)
+    assert find_expert("KickTheBall") is not Counter
+
+
+def test_every_scripted_player_has_an_expert_of_its_own_that_is_reset_with_the_game(cfg):
+    game, rng = Game(replace(cfg, script={"blue": Script.expert})), np.random.default_rng(0)
+    experts = [game.expert_of(player) for player in game.team("blue")]
+    assert experts[0] is not experts[1]
+    assert [expert.player.name for expert in experts] == ["blue_0", "blue_1"]
+    for episode in (1, 2):
+        game.reset(rng)
+        for _ in range(2):
+            game.step({"red": np.zeros(2, np.float32)})
+        assert [(expert.resets, expert.steps) for expert in experts] == [(episode, 2)] * 2
+    game.close()
+
+
+def test_an_expert_that_is_asked_for_during_an_episode_is_reset_then(cfg):
+    game = Game(cfg)
+    game.reset(np.random.default_rng(0))
+    expert = game.expert_of(game.players[0])
+    assert (expert.resets, expert.task) == (1, game.task)
+    assert game.expert_of(game.players[0]) is expert
+    game.close()
+
+
+def test_a_player_that_is_eliminated_rests():
+    with knockout() as cfg:
+        game, rng = Game(cfg), np.random.default_rng(0)
+        game.reset(rng)
+        first = min(game.players, key=lambda player: game.task.last[player.name])
+        for _ in range(30):
+            for player in game.players:
+                game.play_script(player, Script.expert)
+            if game.advance().done:
+                break
+        assert np.linalg.norm(first.body.velocity) == pytest.approx(0.0, abs=1e-6)
+        game.close()

@@ -1,0 +1,93 @@
+"""Scripted policies: the base class `Expert` and the registry that finds the expert of a task."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping
+from typing import Any, Generic, TypeVar
+
+from numpy.typing import NDArray
+
+from veca_marl.envs.core.task import Player, Task
+
+TaskT = TypeVar("TaskT", bound=Task)
+ExpertT = TypeVar("ExpertT", bound="type[Expert[Any]]")
+
+
+class Expert(ABC, Generic[TaskT]):
+    """A scripted policy for one player of one task.
+
+    Experts serve as opponents, as demonstrators and as a check that a task can be solved. They may
+    read privileged state of the task and its bodies; the docstring of each class states which.
+    An expert keeps its own state and draws no random numbers.
+
+    Attributes:
+        task: The rules that are played.
+        player: The player that the commands are for.
+    """
+
+    def __init__(self, task: TaskT, player: Player) -> None:
+        self.task, self.player = task, player
+
+    def reset(self) -> None:
+        """Prepare for an episode. Called after the task and the senses have been reset."""
+
+    @abstractmethod
+    def act(self, observation: Mapping[str, NDArray[Any]]) -> Any:
+        """Return the command for the next step. Called once per step.
+
+        Args:
+            observation: The player's observation, by key.
+
+        Returns:
+            A command that `Body.encode` turns into an action. For a walker, ``(forward, turn)``,
+            each in [-1, 1], optionally followed by a `Call`. For a joint-level body, the target
+            angles of the 82 joints in rad, ``(82,)``, or `Springs`; both serve torque-controlled
+            and position-controlled bodies.
+        """
+
+
+EXPERTS: dict[str, type[Expert[Any]]] = {}
+
+
+def register_expert(task: str) -> Callable[[ExpertT], ExpertT]:
+    """Return a class decorator that registers an `Expert` for a task.
+
+    Args:
+        task: Class name of the task.
+
+    Raises:
+        ValueError: When the decorator is applied, if the task already has an expert.
+    """
+
+    def decorate(expert: ExpertT) -> ExpertT:
+        if task in EXPERTS:
+            raise ValueError(
+                f"{expert.__name__}: task {task!r} already has the expert {EXPERTS[task].__name__}"
+            )
+        EXPERTS[task] = expert
+        return expert
+
+    return decorate
+
+
+def has_expert(task: str) -> bool:
+    """Return whether a task, named by its class name, has an expert."""
+    return task in EXPERTS
+
+
+def find_expert(task: str) -> type[Expert[Any]]:
+    """Return the expert of a task.
+
+    Args:
+        task: Class name of the task.
+
+    Raises:
+        ValueError: If the task has no expert; the message lists the tasks that have one.
+    """
+    try:
+        return EXPERTS[task]
+    except KeyError:
+        raise ValueError(
+            f"task {task!r} has no expert; tasks with an expert: {sorted(EXPERTS)}"
+        ) from None

@@ -1,0 +1,29 @@
+"""Expert of KickTheBall: steer by the difference between the ears."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from veca_marl.envs.core.expert import Expert, register_expert
+from veca_marl.envs.tasks.multimodal.kick_the_ball import KickTheBall
+
+# difference of the ears' mean log10 spectra at which the expert turns at full speed
+_FULL_TURN_LEVEL = 0.05
+
+
+@register_expert("KickTheBall")
+class KickTheBallExpert(Expert[KickTheBall]):
+    """Turns toward the louder ear and walks forward.
+
+    Reads the observation ``audio`` only; it uses no privileged state.
+    """
+
+    def act(self, observation: Mapping[str, NDArray[Any]]) -> tuple[float, float]:
+        """Return (forward, turn), see `Expert.act`."""
+        left, right = observation["audio"].mean(axis=-1)
+        turn = float(np.clip((left - right) / _FULL_TURN_LEVEL, -1.0, 1.0))
+        return 1.0 - abs(turn) / 2.0, turn

@@ -1,0 +1,40 @@
+"""Expert of MultiAgentNav: search, call when the object is found, go to calls."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from numpy.typing import NDArray
+
+from veca_marl.envs.core.expert import Expert, register_expert
+from veca_marl.envs.experts.control.locomotion import locomotion_of
+from veca_marl.envs.experts.skills.object_search import ObjectSearch
+from veca_marl.envs.tasks.multi_agent.multi_agent_nav import MultiAgentNav
+
+
+@register_expert("MultiAgentNav")
+class MultiAgentNavExpert(Expert[MultiAgentNav]):
+    """Searches the house, calls beside the object, and goes to where calls come from.
+
+    An agent that has seen the object knows its position, goes there, calls while it is in the same
+    room, and after its arrival makes space for the others. An agent that has not seen it estimates
+    the position of callers from the observation ``audio``: the level falls with distance, by 30 dB
+    for each wall, and differs between the ears with the direction. Without calls it turns round
+    once in each room, the nearest first. An agent that is stuck moves backwards.
+
+    Reads privileged state: its own position and heading, the floor plan, and whether the object is
+    visible. A crawling body needs up to a minute where a walker needs ten seconds.
+    """
+
+    def reset(self) -> None:
+        """See `Expert.reset`."""
+        body, world = self.player.body, self.task.world
+        locomotion = locomotion_of(self.player, world.clock.step_s)
+        self._search = ObjectSearch(body, locomotion, self.task.plan, world)
+
+    def act(self, observation: Mapping[str, NDArray[Any]]) -> Any:
+        """Return a command for the player's kind of body, see `Expert.act`."""
+        task, player = self.task, self.player
+        seen = task.target.position if task.sees_target(player) else None
+        return self._search.command(observation.get("audio"), seen, player.name in task.arrived)

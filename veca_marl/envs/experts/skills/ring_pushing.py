@@ -1,0 +1,68 @@
+"""Pushing an opponent out of a ring."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from veca_marl.envs.experts.control.locomotion import Clearances
+from veca_marl.sim.body.base import Body
+from veca_marl.sim.geometry.pose import Floats
+
+# Angle by which the path passes beside the opponent: greatest when pushing would move it inwards,
+# plus a part that grows with how directly the opponent faces the body.
+_DETOUR_RAD, _FACED_DETOUR_RAD = 1.0, 0.8
+
+
+def pushing_goal(
+    body: Body, clearances: Clearances, other: Body, middle: Floats, radius_m: float
+) -> Floats:
+    """Return the point to steer to in order to push another body out of a ring.
+
+    Two bodies that face each other hold each other. The path therefore leads round the opponent on
+    the side of the middle, from where pushing moves it outwards. A body that has no contact, or is
+    farther out than its opponent, keeps a distance from the rim.
+
+    Args:
+        body: The body that pushes.
+        clearances: Distances that it needs.
+        other: The opponent.
+        middle: Middle of the ring, ``(2,)`` metres.
+        radius_m: Radius of the ring.
+
+    Returns:
+        ``(2,)`` metres.
+    """
+    here, there = body.position[:2], other.position[:2]
+    way = there - here
+    in_contact = float(np.hypot(*way)) < clearances.other_m
+    outwards = _cosine(way, there - middle)
+    faced = max(_cosine(other.forward[:2], -way), 0.0) if in_contact else 0.0
+    detour_rad = _DETOUR_RAD * (1.0 - outwards) / 2.0 + _FACED_DETOUR_RAD * faced
+    goal = here + _rotated(way, math.copysign(detour_rad, _cross(way, middle - here)))
+    here_m, there_m = (float(np.hypot(*(place - middle))) for place in (here, there))
+    is_inside = here_m < there_m - clearances.other_m / 4.0
+    if in_contact and is_inside and _cosine(body.forward[:2], way) > 0.5:
+        return goal
+    if here_m > radius_m - 2.0 * clearances.turning_m:
+        return middle
+    return _nearest_in_disc(goal, middle, radius_m - clearances.other_m)
+
+
+def _nearest_in_disc(place: Floats, middle: Floats, radius_m: float) -> Floats:
+    way = place - middle
+    return middle + way * min(radius_m / max(float(np.hypot(*way)), 1e-9), 1.0)
+
+
+def _rotated(way: Floats, angle_rad: float) -> Floats:
+    c, s = math.cos(angle_rad), math.sin(angle_rad)
+    return np.array([c * way[0] - s * way[1], s * way[0] + c * way[1]])
+
+
+def _cosine(a: Floats, b: Floats) -> float:
+    return float(a @ b) / max(float(np.hypot(*a) * np.hypot(*b)), 1e-9)
+
+
+def _cross(a: Floats, b: Floats) -> float:
+    return float(a[0] * b[1] - a[1] * b[0])
