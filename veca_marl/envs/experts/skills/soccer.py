@@ -36,11 +36,9 @@ def shooting_goal(body: Body, clearances: Clearances, pitch: Pitch, aim: Floats)
         pitch.low + _BALL_M,
         pitch.high - _BALL_M,
     )
-    here, shot = (
-        body.position[:2],
-        _feasible_shot(ball, _unit(aim[:2] - ball), clearances, pitch),
-    )
-    behind, aside = (ball - here) @ shot, abs(_cross(shot, ball - here))
+    here = body.position[:2]
+    shot = _feasible_shot(ball, _unit(aim[:2] - ball), clearances, pitch)
+    behind, aside = float((ball - here) @ shot), abs(_cross(shot, ball - here))
     if aside < clearances.aside_m + clearances.funnel * (behind - clearances.ball_m):
         return ball - max(behind - clearances.look_ahead_m, 0.0) * shot
     return _around_ball(here, ball, ball - clearances.run_up_m * shot, clearances.clear_m)

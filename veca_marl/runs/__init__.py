@@ -1,0 +1,1 @@
+"""Run folders, provenance, recordings and videos."""
