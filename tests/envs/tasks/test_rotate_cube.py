@@ -46,7 +46,7 @@ def test_the_cube_rests_on_the_hand(game):
 def test_the_target_is_a_turn_to_the_left(game):
     game.reset(np.random.default_rng(1))
     assert game.task.angle_rad == pytest.approx(math.radians(45.0), abs=1e-6)
-    turn = game.task._target @ game.task.cube.rotation.T
+    turn = game.task.target @ game.task.cube.rotation.T
     assert heading_rad(turn) == pytest.approx(math.radians(45.0), abs=1e-6)
 
 
