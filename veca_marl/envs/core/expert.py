@@ -9,6 +9,7 @@ from typing import Any, Generic, TypeVar
 from numpy.typing import NDArray
 
 from veca_marl.envs.core.task import Player, Task
+from veca_marl.registry import Registry
 
 TaskT = TypeVar("TaskT", bound=Task)
 ExpertT = TypeVar("ExpertT", bound="type[Expert[Any]]")
@@ -47,7 +48,7 @@ class Expert(ABC, Generic[TaskT]):
         """
 
 
-EXPERTS: dict[str, type[Expert[Any]]] = {}
+EXPERTS: Registry[type[Expert[Any]]] = Registry("expert of task")
 
 
 def register_expert(task: str) -> Callable[[ExpertT], ExpertT]:
@@ -57,15 +58,11 @@ def register_expert(task: str) -> Callable[[ExpertT], ExpertT]:
         task: Class name of the task.
 
     Raises:
-        ValueError: When the decorator is applied, if the task already has an expert.
+        ValueError: When the decorator is applied, if the task has another expert.
     """
 
     def decorate(expert: ExpertT) -> ExpertT:
-        if task in EXPERTS:
-            raise ValueError(
-                f"{expert.__name__}: task {task!r} already has the expert {EXPERTS[task].__name__}"
-            )
-        EXPERTS[task] = expert
+        EXPERTS.add(task, expert)
         return expert
 
     return decorate
@@ -85,9 +82,6 @@ def find_expert(task: str) -> type[Expert[Any]]:
     Raises:
         ValueError: If the task has no expert; the message lists the tasks that have one.
     """
-    try:
-        return EXPERTS[task]
-    except KeyError:
-        raise ValueError(
-            f"task {task!r} has no expert; tasks with an expert: {sorted(EXPERTS)}"
-        ) from None
+    if task not in EXPERTS:
+        raise ValueError(f"task {task!r} has no expert; tasks with an expert: {sorted(EXPERTS)}")
+    return EXPERTS[task]
