@@ -48,9 +48,8 @@ def test_a_task_without_an_expert_is_playable_and_asking_for_the_expert_lists_th
 
 
 def test_a_task_has_one_expert():
-    with pytest.raises(
-        ValueError, match="'KickTheBall' is defined twice: by .*KickTheBallExpert and .*Counter"
-    ):
+    twice = r"'KickTheBall' is defined twice: by .*KickTheBallExpert and .*Counter"
+    with pytest.raises(ValueError, match=twice):
         register_expert("KickTheBall")(Counter)
     assert find_expert("KickTheBall") is not Counter
 
