@@ -1,1 +1,0 @@
-"""Run folders, provenance, recordings and videos."""
