@@ -20,11 +20,16 @@ def child_game(task, *overrides):
     game.close()
 
 
+def zero_action(body):
+    """Return zeros for all parts of a body's action."""
+    return {part: np.zeros(spec.shape, spec.dtype) for part, spec in body.action_spec.items()}
+
+
 def rest(game):
     """Let the child be limp for a step; return the outcome."""
     player = game.players[0]
-    row = np.zeros(player.body.action_spec.shape, np.float32)
-    return game.step({player.name: row})
+    limp = zero_action(player.body)
+    return game.step({player.name: limp})
 
 
 def hold(game, angles):

@@ -37,7 +37,7 @@ def thrash(world, bodies, seconds, seed=0):
     rng = np.random.default_rng(seed)
     for _ in range(round(seconds * 25)):
         for body in bodies:
-            body.act(rng.choice([-1.0, 1.0], body.action_spec.shape))
+            body.act({"joints": rng.choice([-1.0, 1.0], 82)})
         world.step()
         yield
 

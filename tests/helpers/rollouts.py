@@ -12,9 +12,10 @@ import torch
 
 from veca_marl.config.root import compose
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
+from veca_marl.envs.core.actions import random_action
 from veca_marl.envs.core.game import Game
 from veca_marl.envs.core.team import Script
-from veca_marl.sim.body.voice_controls import VoiceKind
+from veca_marl.sim.body.voice import VoiceKind
 from veca_marl.sim.body.walker.walker import WalkerCfg
 
 # the ways to act in a task: its own body's, and another
@@ -36,12 +37,6 @@ def other_body(own):
     return "walker_discrete" if own.voice is VoiceKind.silent else "walker_discrete_voice"
 
 
-def random_row(spec, rng):
-    if spec.shape == ():
-        return np.asarray(rng.integers(int(spec.high) + 1), spec.dtype)
-    return rng.uniform(spec.low, spec.high, spec.shape).astype(spec.dtype)
-
-
 def play(env, steps, seed):
     """Seed an env, play random actions drawn with numpy, return all steps as one TensorDict."""
     env.set_seed(seed)
@@ -57,8 +52,10 @@ def play(env, steps, seed):
 def fill_actions(env, state, rng):
     for team, names in env.group_map.items():
         spec = env.games[0].team(team)[0].body.action_spec
-        rows = [[random_row(spec, rng) for _ in names] for _ in env.games]
-        state[team, "action"] = torch.from_numpy(np.array(rows))
+        rows = [[random_action(spec, rng) for _ in names] for _ in env.games]
+        for part in spec:
+            key = (team, "action") if len(spec) == 1 else (team, "action", part)
+            state[key] = torch.from_numpy(np.array([[row[part] for row in r] for r in rows]))
 
 
 def digest(rollout):
@@ -100,7 +97,7 @@ def returns(cfg, episodes, script, seed=0):
 
 
 def by_chance(task, player, observation, rng):
-    return random_row(player.body.action_spec, rng)
+    return random_action(player.body.action_spec, rng)
 
 
 if __name__ == "__main__":

@@ -1,15 +1,22 @@
 """The properties that every body must have in a game, whatever moves it."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
-from rollouts import digest, play, random_row
-from torchrl.envs import check_env_specs
+from gymnasium import spaces
+from pettingzoo.test import parallel_api_test
+from rollouts import digest, play
+from torchrl.collectors import RandomPolicy
+from torchrl.envs import SerialEnv, check_env_specs
 
 from veca_marl.bench.free_play import free_play
 from veca_marl.config.root import CONF, compose
+from veca_marl.envs.adapters.gymnasium import VecaGymEnv
+from veca_marl.envs.adapters.pettingzoo import VecaParallelEnv
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
+from veca_marl.envs.core.actions import from_parts, random_action
 from veca_marl.envs.core.game import Game
 from veca_marl.envs.core.game_cfg import GameCfg
 from veca_marl.sim.body.base import MOUNTS
@@ -43,8 +50,7 @@ def game(cfg):
 
 def move(game, rng, steps):
     for _ in range(steps):
-        rows = {p.name: random_row(p.body.action_spec, rng) for p in game.players}
-        game.step(rows)
+        game.step({p.name: random_action(p.body.action_spec, rng) for p in game.players})
 
 
 def test_specs_hold(env):
@@ -102,16 +108,109 @@ def test_eyes_turn_to_a_point_and_the_voice_is_heard(game):
     body.make_sound(0.1 * np.sin(np.arange(2000, dtype=np.float32)))
 
 
-def test_what_it_is_told_wrongly_is_refused(game):
-    body = game.players[0].body
-    with pytest.raises(ValueError, match="action"):
-        body.act(np.full(body.action_spec.shape, np.nan))
+def test_impossible_places_are_refused(game):
     with pytest.raises(ValueError, match="cannot"):
-        body.place((math.nan, 0.0, 0.0))
+        game.players[0].body.place((math.nan, 0.0, 0.0))
 
 
-def test_a_wish_becomes_a_row_of_the_spec(game):
+# ---- actions
+
+
+def test_an_action_is_named_parts_of_two_kinds(game):
+    for part, spec in game.players[0].body.action_spec.items():
+        assert part in ("move", "joints", "voice")
+        kind = "discrete" if spec.is_discrete else "continuous"
+        bounds = (spec.shape, spec.dtype, spec.low, spec.high)
+        expected = {
+            "discrete": ((), np.int64, 0, len(spec.names) - 1),
+            "continuous": ((len(spec.names),), np.float32, -1.0, 1.0),
+        }
+        assert bounds == expected[kind]
+        assert len(set(spec.names)) == len(spec.names) > 1
+
+
+def test_a_command_becomes_an_action_of_the_spec(game):
     body = game.players[0].body
-    row = body.encode(game.expert_of(game.players[0]).act({}))
-    assert (row.shape, row.dtype) == (body.action_spec.shape, np.dtype(body.action_spec.dtype))
-    body.act(row)
+    action = body.encode(game.expert_of(game.players[0]).act({}))
+    assert list(action) == list(body.action_spec)
+    for part, spec in body.action_spec.items():
+        assert (action[part].shape, action[part].dtype) == (spec.shape, np.dtype(spec.dtype))
+    body.act(action)
+
+
+def test_impossible_values_are_refused_with_agent_part_and_range_and_nothing_moves(game):
+    body, rng = game.players[1].body, np.random.default_rng(0)
+    for part, spec in body.action_spec.items():
+        actions = {p.name: random_action(p.body.action_spec, rng) for p in game.players}
+        wrong = np.asarray(spec.high + 1, spec.dtype) if spec.is_discrete else spec.high + 0.5
+        actions["agents_1"][part] = np.full(spec.shape, wrong)
+        choices = spec.names[-1] if spec.is_discrete else rf"{spec.names[0]}.* \[-1, 1\]"
+        before = body.bone_positions()
+        with pytest.raises(ValueError, match=rf"agents_1: action part '{part}'.*{choices}"):
+            game.step(actions)
+        np.testing.assert_array_equal(body.bone_positions(), before)
+
+
+def test_wrong_shapes_and_parts_are_refused(game):
+    body = game.players[1].body
+    actions = {
+        p.name: random_action(p.body.action_spec, np.random.default_rng(0)) for p in game.players
+    }
+    parts = actions["agents_1"]
+    for wrong, message in (
+        ({**parts, "tail": np.zeros(1)}, "tail"),
+        ({part: np.zeros((*spec.shape, 3)) for part, spec in body.action_spec.items()}, "part"),
+        ({}, "needs"),
+        (None, "action"),
+    ):
+        with pytest.raises(ValueError, match=rf"agents_1: .*{message}"):
+            game.command({**actions, "agents_1": wrong})
+
+
+def test_a_game_takes_the_plain_array_of_a_single_part(game):
+    rng = np.random.default_rng(0)
+    actions = {p.name: random_action(p.body.action_spec, rng) for p in game.players}
+    plain = {name: from_parts(parts) for name, parts in actions.items()}
+    several = len(actions["agents_0"]) > 1
+    assert isinstance(plain["agents_0"], dict) == several
+    game.step(plain)
+
+
+def test_torchrl_draws_and_steps_one_leaf_or_one_for_each_part(env, cfg):
+    parts = env.games[0].players[0].body.action_spec
+    several = len(parts) > 1
+    keys = {("agents", "action", part) for part in parts} if several else {("agents", "action")}
+    assert set(env.full_action_spec.keys(True, True)) == keys
+    policy = RandomPolicy(env.full_action_spec)
+    rollout = env.rollout(3, policy)
+    for key, part in zip(sorted(keys), sorted(parts), strict=True):
+        assert rollout[key].shape == (1, 3, 2, *parts[part].shape)
+        assert env.full_action_spec[key].is_in(rollout[key][:, 0])
+
+
+def test_serial_worlds_step(cfg):
+    env = SerialEnv(2, lambda: VecaEnv(cfg))
+    rollout = env.rollout(3, RandomPolicy(env.full_action_spec))
+    assert rollout.batch_size == (2, 1, 3)
+    env.close()
+
+
+def test_pettingzoo_has_a_plain_space_or_a_dict_of_parts(cfg):
+    env = VecaParallelEnv(cfg)
+    parts = env._played.game.players[0].body.action_spec
+    space = env.action_space("agents_0")
+    assert isinstance(space, spaces.Dict) == (len(parts) > 1)
+    if len(parts) > 1:
+        assert list(space) == list(parts)
+    parallel_api_test(env, num_cycles=4)
+    env.close()
+
+
+def test_gymnasium_has_a_plain_space_or_a_dict_of_parts(cfg):
+    with free_play(1, cfg.task, SENSES) as task:
+        env = VecaGymEnv(replace(cfg, task=task))
+        env.reset(seed=0)
+        action = env.action_space.sample()
+        assert isinstance(action, dict) == isinstance(env.action_space, spaces.Dict)
+        env.step(action)
+        env.close()

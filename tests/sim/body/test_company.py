@@ -6,10 +6,11 @@ from walking import box, empty_world, walker_in
 
 from veca_marl.bench.free_play import free_play
 from veca_marl.config.root import compose
+from veca_marl.envs.core.actions import random_action
 from veca_marl.envs.core.game import Game
 from veca_marl.envs.core.game_cfg import GameCfg
 from veca_marl.sim.body.anatomy.skeleton import load_skeleton
-from veca_marl.sim.body.voice_controls import VoiceKind
+from veca_marl.sim.body.voice import VoiceKind
 from veca_marl.sim.senses import SensesCfg, make_senses
 from veca_marl.sim.touch.taxels import load_taxels
 
@@ -38,7 +39,8 @@ def company(listening, silent_guest=False):
     for step in range(STEPS + 1):
         if step:
             for index, walker in enumerate(walkers):
-                walker.act(np.array([(0.9, 0.7, 0.0)[index], 0.1, (1.0, -1.0, 0.0)[index]]))
+                move = np.array([(0.9, 0.7, 0.0)[index], 0.1])
+                walker.act({"move": move, "voice": np.array((2, 1, 0)[index])})
             world.step()
         for name, of_one in senses.items():
             for sense, organ in of_one.items():
@@ -85,8 +87,7 @@ def played(cfg):
     seen = {player.name: b"" for player in game.players}
     for step in range(STEPS + 1):
         if step:
-            rows = {p.name: rng.uniform(-1, 1, 3).astype(np.float32) for p in game.players}
-            game.step(rows)
+            game.step({p.name: random_action(p.body.action_spec, rng) for p in game.players})
         for player in game.players:
             values = game.observe(player).values()
             seen[player.name] += b"".join(value.tobytes() for value in values)

@@ -38,7 +38,7 @@ def _middle():
 def test_torques_hold_until_the_next_and_rest_after_a_reset(make_child):
     world, body = make_child()
     row = np.random.default_rng(0).uniform(-1, 1, 82)
-    body.act(row)
+    body.act({"joints": row})
     let_pass(world, 0.2)
     np.testing.assert_array_equal(body.joint_torques(), row)
     world.reset(np.random.default_rng(0))
@@ -87,7 +87,7 @@ def test_increments_of_zero_keep_a_posture(make_child):
     body.place((0.0, 0.0, 0.0), 0.0, POSTURES["sitting"])
     head_m = body.bone("head").position[2]
     for _ in range(100):
-        body.act(np.zeros(82))
+        body.act({"joints": np.zeros(82)})
         world.step()
     assert body.bone("head").position[2] > 0.85 * head_m
 
@@ -100,8 +100,8 @@ def test_increments_add_up_to_targets(make_child):
     wanted = posture_angles(SKELETON, Posture(0.0, bent))
     rows = []
     for _ in range(50):
-        rows.append(body.encode(wanted))
-        body.act(rows[-1])
+        rows.append(body.encode(wanted)["joints"])
+        body.act({"joints": rows[-1]})
         world.step()
     np.testing.assert_allclose(body.joint_angles(), wanted, atol=math.radians(2.0))
     assert np.abs(rows[0]).max() > 0.0
@@ -117,13 +117,13 @@ def test_increments_stop_at_the_stops_and_start_anew(make_child):
         row = np.zeros(82)
         row[elbow] = 1.0
         for _ in range(12):
-            body.act(row)
+            body.act({"joints": row})
             world.step()
         bent = body.joint_angles()[elbow]
         assert bent > 0.9 * SKELETON.joints[elbow].high_rad
-        body.act(-row)  # what was asked for beyond the stop is not owed
+        body.act({"joints": -row})  # what was asked for beyond the stop is not owed
         world.step()
-        body.act(-row)
+        body.act({"joints": -row})
         world.step()
         assert body.joint_angles()[elbow] < bent - math.radians(5.0)
 
@@ -139,8 +139,8 @@ def test_wishes_and_targets_are_inverse(make_child):
 
 def test_limbs_alone_may_be_commanded(make_child):
     world, body = make_child(joints=JointChoice.limbs)
-    assert body.action_spec.shape == (40,)
-    body.act(np.full(40, 0.5))
+    assert body.action_spec["joints"].shape == (40,)
+    body.act({"joints": np.full(40, 0.5)})
     world.step()
     fingers = [i for i, name in enumerate(body.joint_names) if "thumb" in name or "index" in name]
     assert not body.joint_torques()[fingers].any()
@@ -150,7 +150,7 @@ def test_limbs_alone_may_be_commanded(make_child):
 @pytest.mark.parametrize(
     ("row", "message"),
     [
-        (np.zeros(81), r"shape \(81,\), not \(82,\)"),
+        (np.zeros(81), r"'joints' is float64 of shape \(81,\), not numbers of shape \(82,\)"),
         (np.full(82, np.nan), r"spine.flexion is nan, not in \[-1, 1\]"),
         (np.full(82, np.inf), r"spine.flexion is inf"),
         (np.full(82, 1.01), r"spine.flexion is 1.01"),
@@ -159,7 +159,7 @@ def test_limbs_alone_may_be_commanded(make_child):
 def test_impossible_actions_are_refused(make_child, row, message):
     _, body = make_child()
     with pytest.raises(ValueError, match=message):
-        body.act(row)
+        body.act({"joints": row})
     with pytest.raises(ValueError, match=message):
         body.apply_torque(row)
 

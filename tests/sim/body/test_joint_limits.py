@@ -50,7 +50,7 @@ def test_all_joints_pressed_against_their_stops_stay_there(alone, way):
     world, body = alone
     weightless(world)
     body.place((0.0, 0.0, 2.0))
-    body.act(np.full(82, way))
+    body.act({"joints": np.full(82, way)})
     for _ in range(50):
         world.step()
     moving = body.articulation.moving

@@ -57,7 +57,7 @@ def test_the_parts_fill_the_vector_in_the_documented_order(child):
 def test_joints_are_those_of_the_body(child):
     world, body = child
     sense = sense_of(world, body)
-    body.act(np.random.default_rng(0).uniform(-1, 1, 82))
+    body.act({"joints": np.random.default_rng(0).uniform(-1, 1, 82)})
     let_pass(world, 0.2)
     felt = parts(sense)
     for name in ("joint_angles", "joint_velocities", "joint_torques"):
@@ -130,7 +130,7 @@ def test_an_upright_pelvis_reads_forward_and_up(child):
 def test_quality_changes_content_but_not_shape(child, quality, kept):
     world, body = child
     sense = sense_of(world, body, quality=quality)
-    body.act(np.random.default_rng(0).uniform(-1, 1, 82))
+    body.act({"joints": np.random.default_rng(0).uniform(-1, 1, 82)})
     let_pass(world, 0.2)
     for name, part in parts(sense).items():
         assert part.any() == name.startswith(kept), name

@@ -62,7 +62,7 @@ def test_it_walks_round_a_circle():
 def test_full_actions_are_the_configured_speeds():
     world = empty_world()
     walker = walker_in(world, walk_speed_mps=0.8, turn_speed_degps=50.0)
-    walker.act(np.array([1.0, -1.0], np.float32))
+    walker.act({"move": np.array([1.0, -1.0], np.float32)})
     let_pass(world, 0.04)
     assert np.linalg.norm(walker.velocity) == pytest.approx(0.8, rel=1e-3)
     assert bearing_deg(walker.bone("pelvis")) == pytest.approx(-50.0 * 0.04)
@@ -71,7 +71,7 @@ def test_full_actions_are_the_configured_speeds():
 def test_backward_is_slower():
     world = empty_world()
     walker = walker_in(world, walk_speed_mps=0.8, backward_share=0.25)
-    walker.act(np.array([-1.0, 0.0], np.float32))
+    walker.act({"move": np.array([-1.0, 0.0], np.float32)})
     let_pass(world, 0.04)
     np.testing.assert_allclose(walker.velocity, (-0.2, 0.0, 0.0), atol=1e-6)
 
@@ -79,9 +79,9 @@ def test_backward_is_slower():
 def test_an_action_holds_until_the_next():
     world = empty_world()
     walker = walker_in(world)
-    walker.act(np.array([1.0, 0.0], np.float32))
+    walker.act({"move": np.array([1.0, 0.0], np.float32)})
     let_pass(world, 1.0)
-    walker.act(np.array([0.0, 0.0], np.float32))
+    walker.act({"move": np.array([0.0, 0.0], np.float32)})
     let_pass(world, 1.0)
     assert walker.position[0] == pytest.approx(1.0)
 
@@ -92,7 +92,7 @@ def test_discrete_moves_are_continuous_ones(move):
     for kind in ActionKind:
         world = empty_world()
         walker = walker_in(world, action=kind)
-        walker.act(WALK_CONTROLS[kind].encode(*MOVES[move]))
+        walker.act({"move": WALK_CONTROLS[kind].encode(*MOVES[move])})
         let_pass(world, 0.4)
         positions.append((*walker.position, walker.yaw_rad))
     assert positions[0] == positions[1]
@@ -121,8 +121,8 @@ def test_impossible_actions_are_refused_and_nothing_moves(kind, row):
     world = empty_world()
     walker = walker_in(world, action=kind)
     with pytest.raises(ValueError, match="action") as refusal:
-        walker.act(row)
-    assert "forward" in str(refusal.value)
+        walker.act({"move": row})
+    assert "'move'" in str(refusal.value)
     before = world.scene.positions.copy()
     let_pass(world, 0.04)
     np.testing.assert_array_equal(world.scene.positions[:, :2], before[:, :2])

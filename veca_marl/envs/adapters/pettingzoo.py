@@ -53,7 +53,7 @@ class VecaParallelEnv(ParallelEnv[str, Observation, Any]):
         return self.observation_spaces[self._known(agent)]
 
     def action_space(self, agent: str) -> Space:
-        """Return what an agent can do: `Box` or `Discrete`."""
+        """Return the space of an agent's actions: `Box`, `Discrete`, or a `Dict` of them."""
         return self.action_spaces[self._known(agent)]
 
     def _known(self, agent: str) -> str:

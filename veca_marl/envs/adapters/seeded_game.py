@@ -112,8 +112,7 @@ class SeededGame:
         if not self._running:
             raise RuntimeError("no episode is running: call reset() before step()")
         names = self.playing
-        rows: dict[str, NDArray[Any]] = {name: np.asarray(row) for name, row in actions.items()}
-        outcome = self.game.step(rows)
+        outcome = self.game.step(actions)
         self._running = not outcome.done
         return Step(
             self._observe(names),

@@ -8,6 +8,7 @@ import gymnasium
 import numpy as np
 from gymnasium import spaces
 
+from veca_marl.envs.core.actions import from_parts
 from veca_marl.envs.core.game import Game
 from veca_marl.envs.core.task import Player
 from veca_marl.sim.spec import ArraySpec
@@ -22,7 +23,7 @@ def to_space(spec: ArraySpec) -> Space:
     checker takes an infinite bound for an oversight.
     """
     dtype = np.dtype(spec.dtype)
-    if dtype.kind == "i" and spec.shape == ():
+    if spec.is_discrete:
         return spaces.Discrete(int(spec.high) + 1)
     limits = np.finfo(dtype) if dtype.kind == "f" else np.iinfo(dtype)
     low, high = max(spec.low, limits.min), min(spec.high, limits.max)
@@ -30,8 +31,14 @@ def to_space(spec: ArraySpec) -> Space:
 
 
 def action_space(player: Player) -> Space:
-    """Return what a player can be told: a `Box`, or `Discrete` for a body that takes moves."""
-    return to_space(player.body.action_spec)
+    """Return the space of a player's actions.
+
+    A `Box` or a `Discrete` for a body whose action has one part; a `Dict` of these if it has
+    several.
+    """
+    parts = {part: to_space(spec) for part, spec in player.body.action_spec.items()}
+    only = from_parts(parts)
+    return spaces.Dict(parts) if isinstance(only, dict) else only
 
 
 def observation_space(game: Game, player: Player) -> Space:

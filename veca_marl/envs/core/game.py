@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from veca_marl.envs.core.actions import to_parts
 from veca_marl.envs.core.expert import Expert, find_expert
 from veca_marl.envs.core.game_cfg import GameCfg
 from veca_marl.envs.core.scripts import play_script
@@ -133,17 +134,18 @@ class Game:
         for expert in self._experts.values():
             expert.reset()
 
-    def step(self, actions: Mapping[str, NDArray[Any]]) -> Outcome:
+    def step(self, actions: Mapping[str, Any]) -> Outcome:
         """Play one agent step: `command`, then `advance`."""
         self.command(actions)
         return self.advance()
 
-    def command(self, actions: Mapping[str, NDArray[Any]]) -> None:
+    def command(self, actions: Mapping[str, Any]) -> None:
         """Tell the actors what to do, before anything moves.
 
         Args:
-            actions: One action row per actor, by player name, as its body's `action_spec` says.
-                Rows of those who are out may be there, and are not looked at.
+            actions: One action per actor, by player name: a mapping with a value for each part of
+                its body's `action_spec`, or the plain array if there is one part. Actions of
+                players that are out may be there and are ignored.
 
         Raises:
             ValueError: If an action is impossible, or the actors are others.
@@ -154,11 +156,11 @@ class Game:
                 player.body.rest()
                 continue
             try:
-                player.body.act(actions[player.name])
+                player.body.act(to_parts(player.body.action_spec, actions[player.name]))
             except ValueError as error:
                 raise ValueError(f"{player.name}: {error}") from None
 
-    def _check_names(self, actions: Mapping[str, NDArray[Any]]) -> None:
+    def _check_names(self, actions: Mapping[str, Any]) -> None:
         names = [player.name for player in self.actors]
         if list(actions) == names:
             return

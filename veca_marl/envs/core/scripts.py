@@ -6,11 +6,10 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from veca_marl.envs.core.actions import random_action
 from veca_marl.envs.core.task import Player
 from veca_marl.envs.core.team import Script
-from veca_marl.sim.spec import ArraySpec
 
 
 def play_script(
@@ -30,13 +29,6 @@ def play_script(
     if script is Script.idle:
         player.body.rest()
     elif script is Script.random:
-        player.body.act(random_row(player.body.action_spec, rng))
+        player.body.act(random_action(player.body.action_spec, rng))
     else:
         player.body.act(player.body.encode(expert_command(player)))
-
-
-def random_row(spec: ArraySpec, rng: np.random.Generator) -> NDArray[Any]:
-    """Draw one action row uniformly."""
-    if spec.shape == ():
-        return np.asarray(rng.integers(int(spec.high) + 1), spec.dtype)
-    return rng.uniform(spec.low, spec.high, spec.shape).astype(spec.dtype)

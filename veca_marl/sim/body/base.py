@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
+from enum import Enum
 from typing import Any, Protocol
 
 from numpy.typing import NDArray
 
+from veca_marl.sim.body.voice import VoiceKind
 from veca_marl.sim.geometry.pose import Floats, Pose
 from veca_marl.sim.spec import ArraySpec
 
@@ -20,15 +23,25 @@ class BodyCfg:
 
     Attributes:
         eye_range_deg: How far the eyes turn in the head.
+        voice: Whether the action has a part `voice` that chooses a call.
     """
 
     eye_range_deg: float = 50.0
+    voice: VoiceKind = VoiceKind.silent
 
     def __post_init__(self) -> None:
         """All numbers of a body are magnitudes."""
+        self._check_choices(voice=VoiceKind)
         for name, value in vars(self).items():
             if isinstance(value, (int, float)) and not (math.isfinite(value) and value >= 0):
                 raise ValueError(f"body.{name}={value} must be a finite number, 0 or more")
+
+    def _check_choices(self, **kinds: type[Enum]) -> None:
+        """Raise `ValueError` for a field that is no member of its enumeration."""
+        for name, kind in kinds.items():
+            if not isinstance(getattr(self, name), kind):
+                choices = [choice.name for choice in kind]
+                raise ValueError(f"body.{name}={getattr(self, name)!r}; there are {choices}")
 
 
 class Body(Protocol):
@@ -38,7 +51,8 @@ class Body(Protocol):
         name: Unique in its world.
         object_id: The id under which its bones are drawn in the world's `Scene` and appear in
             segmentation images.
-        action_spec: The action row that `act` takes.
+        action_spec: The parts of the action that `act` takes, by name: a float32 vector in
+            [-1, 1], or one of several choices (shape ``()``, int64).
         focal_distance_m: What the eyes' lenses are adjusted to; ``inf`` when relaxed.
         muted: Whether nobody hears its voice, itself included. Stays until set anew.
         own_head_frames: Indices of the body's frames (bones) that its own eyes must not see.
@@ -48,7 +62,7 @@ class Body(Protocol):
 
     name: str
     object_id: int
-    action_spec: ArraySpec
+    action_spec: dict[str, ArraySpec]
     focal_distance_m: float
     muted: bool
     own_head_frames: tuple[int, ...]
@@ -74,12 +88,12 @@ class Body(Protocol):
         """Return where a sense organ is: one of `MOUNTS`. Eyes look along their x axis."""
         ...
 
-    def act(self, action: NDArray[Any]) -> None:
-        """Take the row that `action_spec` describes; it holds until the next call."""
+    def act(self, action: Mapping[str, Any]) -> None:
+        """Apply an action that `action_spec` describes; movement lasts until the next call."""
         ...
 
-    def encode(self, wish: Any) -> NDArray[Any]:
-        """Return the action row that comes nearest to an expert's wish."""
+    def encode(self, command: Any) -> dict[str, NDArray[Any]]:
+        """Return the action that comes nearest to an expert's command."""
         ...
 
     def rest(self) -> None:

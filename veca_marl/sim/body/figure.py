@@ -6,20 +6,25 @@ How the bones come to be where they are is the business of each body.
 from __future__ import annotations
 
 import math
+from abc import abstractmethod
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from veca_marl.sim.body.action import Action, checked_action
 from veca_marl.sim.body.anatomy.bone_motion import bone_motion
 from veca_marl.sim.body.anatomy.skeleton import load_skeleton
 from veca_marl.sim.body.looks import SHIRTS, bone_geoms, dressed_skin
 from veca_marl.sim.body.mounts import EYES, gaze, organ_pose, palm_of
+from veca_marl.sim.body.voice import VOICE
 from veca_marl.sim.geometry.pose import Floats, Pose
 from veca_marl.sim.geometry.rotations import cross
 from veca_marl.sim.physics.world import World
 from veca_marl.sim.sound.calls import CALLS, Call, call_waveform
 from veca_marl.sim.sound.sounds import Voice
+from veca_marl.sim.spec import ArraySpec
 
 
 class Figure:
@@ -30,7 +35,12 @@ class Figure:
         eye_range_deg: How far the eyes turn in the head.
         world: Where it is.
         shirt: Number of the shirt's colour.
+
+    Attributes:
+        action_spec: The parts of the action that `act` takes, by name.
     """
+
+    action_spec: dict[str, ArraySpec]
 
     def __init__(self, name: str, eye_range_deg: float, world: World, shirt: int) -> None:
         self.name = name
@@ -118,6 +128,32 @@ class Figure:
         if name in EYES and self._gaze_point is not None:
             return gaze(organ, self._gaze_point, self._eye_range_rad)
         return organ
+
+    # ---- actions
+
+    def act(self, action: Mapping[str, Any]) -> None:
+        """Apply an action: a value for each part of `action_spec`.
+
+        Movement lasts until the next action. A call is played to its end: calls that are chosen
+        in the meantime are ignored.
+
+        Raises:
+            ValueError: If a part is missing, unknown or out of its range; then nothing is applied.
+        """
+        parts = checked_action(self.action_spec, action)
+        self._move(parts)
+        if VOICE in parts:
+            self.call(Call(int(parts[VOICE])))
+
+    @abstractmethod
+    def _move(self, parts: Action) -> None:
+        """Apply the checked parts of an action that move the body."""
+
+    def _with_voice(self, parts: dict[str, NDArray[Any]], call: Call) -> dict[str, NDArray[Any]]:
+        """Return an action with a call, if this body's action has a part for it."""
+        if VOICE in self.action_spec:
+            parts[VOICE] = np.asarray(call, np.int64)
+        return parts
 
     # ---- what its head can do (the paper's API)
 

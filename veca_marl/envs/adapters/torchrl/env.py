@@ -5,13 +5,13 @@ from __future__ import annotations
 from typing import Any
 
 import torch
-from numpy.typing import NDArray
 from tensordict import TensorDict, TensorDictBase
 from torchrl.data import Categorical, Composite, Unbounded
 
+from veca_marl.envs.adapters.torchrl.actions import ActionReader, TeamActions, action_of
 from veca_marl.envs.adapters.torchrl.layout import Arrays, Layout
 from veca_marl.envs.adapters.torchrl.lean_env import LeanEnv
-from veca_marl.envs.adapters.torchrl.specs import done_spec, observation_spec, to_torchrl
+from veca_marl.envs.adapters.torchrl.specs import action_spec, done_spec, observation_spec
 from veca_marl.envs.core.episodes import Episodes, fresh_seed
 from veca_marl.envs.core.game import Game, Outcome
 from veca_marl.envs.core.game_cfg import GameCfg
@@ -30,6 +30,7 @@ class VecaEnv(LeanEnv):
 
         (team, "observation", sense)   (W, n, *sense shape)
         (team, "action")               (W, n, A) float32 in [-1, 1], or (W, n) int64
+        (team, "action", part)         instead, for a body whose action has several parts
         (team, "terms", name)          (W, n, 1) unweighted reward terms of the last step
         (team, "reward")               (W, n, 1) weighted sum of the terms
         (team, "done" | "terminated" | "truncated")  (W, n, 1), and the same at the root (W, 1)
@@ -87,14 +88,12 @@ class VecaEnv(LeanEnv):
             observed[team] = observation_spec(specs, tuple(self.games[0].weights), *batch)
             if self._eliminates:
                 observed[team, "mask"] = Categorical(2, shape=batch, dtype=torch.bool)
-            action[team] = Composite(
-                action=to_torchrl(players[0].body.action_spec, batch), shape=batch
-            )
+            action[team] = action_spec(players[0].body.action_spec, batch)
             reward[team] = Composite(reward=Unbounded((*batch, 1)), shape=batch)
             done[team] = Composite(done_spec(batch), shape=batch)
         self.observation_spec, self.action_spec = observed, action
         self.reward_spec, self.done_spec = reward, done
-        self._action_shapes = {team: action[team, "action"].shape for team in self._teams}
+        self._actions = {team: ActionReader(team, action[team, "action"]) for team in self._teams}
         self._start = Layout(observed)
         self._next = Layout(observed.clone().update(reward).update(done))
 
@@ -132,7 +131,7 @@ class VecaEnv(LeanEnv):
         worlds = self._chosen(tensordict, "_step")
         for team in self._teams:  # left there by TorchRL 0.14's rollout(break_when_all_done=True),
             tensordict.get(team).pop("_neg_step", None)  # which then fails on its own key
-        self._command(worlds, {team: self._actions(team, tensordict) for team in self._teams})
+        self._command(worlds, {team: self._actions[team].read(tensordict) for team in self._teams})
         arrays = self._next.new()
         if len(worlds) < len(self.games):
             still = sorted(set(range(len(self.games))) - set(worlds))
@@ -145,22 +144,12 @@ class VecaEnv(LeanEnv):
             self._score(world, arrays, outcome)
         return self._next.tensordict(arrays)
 
-    def _actions(self, team: str, tensordict: TensorDictBase) -> NDArray[Any]:
-        action = tensordict.get((team, "action"))
-        expected = self._action_shapes[team]
-        if action.shape != expected:
-            raise ValueError(
-                f"action of {team}: shape {tuple(action.shape)}, not {tuple(expected)}"
-            )
-        plain = action.is_cpu and not action.requires_grad
-        return action.numpy() if plain else action.numpy(force=True)
-
-    def _command(self, worlds: list[int], actions: dict[str, NDArray[Any]]) -> None:
+    def _command(self, worlds: list[int], actions: dict[str, TeamActions]) -> None:
         """Apply the actions in all worlds that will step before any of them moves."""
         for world in worlds:
             game = self.games[world]
             rows = {
-                name: actions[team][world, index]
+                name: action_of(actions[team], world, index)
                 for team, names in self.group_map.items()
                 for index, name in enumerate(names)
             }

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import torch
-from tensordict import TensorDictBase
+from numpy.typing import NDArray
+from tensordict import TensorDict, TensorDictBase
 from torch import nn
 
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
+from veca_marl.envs.core.actions import from_parts
 from veca_marl.envs.core.expert import find_expert
 
 
@@ -27,7 +31,7 @@ class ExpertPolicy(nn.Module):
         self._env = env
 
     def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
-        """Write `(team, "action")` for every team and return the same TensorDict."""
+        """Write `(team, "action")`, or its parts, for every team; return the same TensorDict."""
         for team in self._env.group_map:
             seen = tensordict[team, "observation"]
             rows = [
@@ -41,5 +45,18 @@ class ExpertPolicy(nn.Module):
                 ]
                 for world, game in enumerate(self._env.games)
             ]
-            tensordict[team, "action"] = torch.from_numpy(np.array(rows))
+            tensordict[team, "action"] = _stacked(rows, tensordict.batch_size)
         return tensordict
+
+
+def _stacked(
+    actions: list[list[dict[str, NDArray[Any]]]], worlds: torch.Size
+) -> torch.Tensor | TensorDict:
+    """Return the actions of a team, by world and player, as tensors ``(W, n, ...)``."""
+    players = len(actions[0])
+    tensors = {
+        part: torch.from_numpy(np.array([[action[part] for action in row] for row in actions]))
+        for part in actions[0][0]
+    }
+    leaf = from_parts(tensors)
+    return TensorDict(leaf, (*worlds, players)) if isinstance(leaf, dict) else leaf

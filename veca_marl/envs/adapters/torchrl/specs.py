@@ -6,6 +6,7 @@ import numpy as np
 import torch
 from torchrl.data import Bounded, Categorical, Composite, TensorSpec, Unbounded
 
+from veca_marl.envs.core.actions import ActionSpec, from_parts
 from veca_marl.sim.spec import ArraySpec
 
 DONE_KEYS = ("done", "terminated", "truncated")
@@ -14,7 +15,7 @@ DONE_KEYS = ("done", "terminated", "truncated")
 def to_torchrl(spec: ArraySpec, batch: tuple[int, ...]) -> TensorSpec:
     """Translate one array; integers without shape are a choice among `high + 1`."""
     dtype = getattr(torch, np.dtype(spec.dtype).name)
-    if dtype is torch.int64 and spec.shape == ():
+    if spec.is_discrete:
         return Categorical(int(spec.high) + 1, shape=batch, dtype=dtype)
     shape = (*batch, *spec.shape)
     if np.isfinite(spec.low) and np.isfinite(spec.high):
@@ -34,6 +35,13 @@ def observation_spec(
         terms=Composite({name: Unbounded((*batch, 1)) for name in terms}, shape=batch),
         shape=batch,
     )
+
+
+def action_spec(parts: ActionSpec, batch: tuple[int, ...]) -> Composite:
+    """Return a team's `action`: one leaf, or a composite of several named parts."""
+    leaves = from_parts({part: to_torchrl(spec, batch) for part, spec in parts.items()})
+    action = Composite(leaves, shape=batch) if isinstance(leaves, dict) else leaves
+    return Composite(action=action, shape=batch)
 
 
 def done_spec(batch: tuple[int, ...]) -> dict[str, TensorSpec]:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from veca_marl.sim.body.action import Action, checked_action
 from veca_marl.sim.body.anatomy.skeleton import Underside, forward_kinematics
 from veca_marl.sim.body.anatomy.urdf import Build
 from veca_marl.sim.body.base import BodyCfg
@@ -32,12 +33,13 @@ from veca_marl.sim.body.humanoid.postures import (
     posture_angles,
     varied,
 )
-from veca_marl.sim.body.voice_controls import ROW_ENDS, VoiceKind
+from veca_marl.sim.body.voice import voice_spec
 from veca_marl.sim.geometry.pose import Floats, Pose
 from veca_marl.sim.geometry.rotations import heading_rad
 from veca_marl.sim.physics.world import World
-from veca_marl.sim.sound.calls import Call
-from veca_marl.sim.spec import ArraySpec
+from veca_marl.sim.spec import continuous_spec
+
+JOINTS = "joints"  # the part of the action that moves
 
 _WAITING_ROOM_M = 100.0
 _ARMS_OUT = Posture(0.0, {"upper_arm.abduction": 30.0})
@@ -59,7 +61,6 @@ class HumanoidCfg(BodyCfg):
             and names are the same: the mitten ignores what is asked of its fingers.
         action: Normalised torques, angles to go to, or how far these angles go on.
         joints: Which joints an action row moves: all 82, or the 40 of the limbs without fingers.
-        voice: Whether an action row also holds a call, as its last number, see `voice_controls`.
         strength: Share of the torques in the table of joints.
         friction: Lateral friction of the skin.
     """
@@ -67,22 +68,13 @@ class HumanoidCfg(BodyCfg):
     detail: Detail = Detail.full
     action: JointActionKind = JointActionKind.torque
     joints: JointChoice = JointChoice.all
-    voice: VoiceKind = VoiceKind.silent
     strength: float = 1.0
     friction: float = 0.8
 
     def __post_init__(self) -> None:
         """Refuse what is no choice."""
         super().__post_init__()
-        for name, kind in (
-            ("detail", Detail),
-            ("action", JointActionKind),
-            ("joints", JointChoice),
-            ("voice", VoiceKind),
-        ):
-            if not isinstance(getattr(self, name), kind):
-                choices = [choice.name for choice in kind]
-                raise ValueError(f"body.{name}={getattr(self, name)!r}; there are {choices}")
+        self._check_choices(detail=Detail, action=JointActionKind, joints=JointChoice)
         if not 0.0 < self.strength <= 1.0:
             raise ValueError(f"body.strength={self.strength} must be above 0 and at most 1")
 
@@ -102,9 +94,8 @@ class Humanoid(Figure):
         self._refuse_long_steps(world.clock.substep_s)
         self._control, self._rows = JOINT_ACTIONS[cfg.action]
         self._chosen = np.array(chosen_joints(self._skeleton, cfg.joints))
-        self._end = ROW_ENDS[cfg.voice]
-        length = len(self._chosen) + self._end.numbers
-        self.action_spec = ArraySpec((length,), np.float32, -1.0, 1.0)
+        joints = continuous_spec(tuple(self.joint_names[joint] for joint in self._chosen))
+        self.action_spec = {JOINTS: joints, **voice_spec(cfg.voice)}
         self._low = np.array([joint.low_rad for joint in self._skeleton.joints])
         self._high = np.array([joint.high_rad for joint in self._skeleton.joints])
         # of what does not move there is neither angle nor torque
@@ -185,58 +176,43 @@ class Humanoid(Figure):
 
     # ---- what it can do
 
-    def act(self, action: NDArray[Any]) -> None:
-        """Drive the joints and call as an action row says; the joints' part holds until the next.
-
-        A call that has begun is called to its end: until then others go unsaid.
-
-        Raises:
-            ValueError: If the row has another length or a number outside [-1, 1].
-        """
-        row = np.asarray(action, np.float64)
-        if row.shape != self.action_spec.shape:
-            raise ValueError(f"action of shape {row.shape}, not {self.action_spec.shape}")
-        joints, end = np.split(row, [len(self._chosen)])
-        # written so that a NaN fails as well
-        wrong = np.flatnonzero(~(np.abs(joints) <= 1.0))
-        if wrong.size:
-            joint = self.joint_names[self._chosen[wrong[0]]]
-            raise ValueError(f"action of {joint} is {row[wrong[0]]}, not in [-1, 1]")
-        call = self._end.decode(end)
-        self._wishes[self._chosen] = self._rows.heed(joints, self._wishes[self._chosen])
-        self.call(call)
+    def _move(self, parts: Action) -> None:
+        row = np.asarray(parts[JOINTS], np.float64)
+        self._wishes[self._chosen] = self._rows.heed(row, self._wishes[self._chosen])
 
     def apply_torque(self, normalised: Floats) -> None:
         """Drive all 82 joints by shares of their strength in [-1, 1] (the paper's API).
 
         Raises:
-            ValueError: If this body is commanded by angles or by fewer joints, or as `act`.
+            ValueError: If this body is commanded by angles or by fewer joints, if the array has
+                another shape, or if a number is outside [-1, 1].
         """
         if self.cfg.action is not JointActionKind.torque or self.cfg.joints is not JointChoice.all:
             raise ValueError(
                 f"{self.name}: apply_torque needs body.action=torque and body.joints=all"
             )
-        self.act(np.append(normalised, self._end.encode(Call.none)))
+        spec = {JOINTS: self.action_spec[JOINTS]}
+        self._move(checked_action(spec, {JOINTS: normalised}))
 
     def rest(self) -> None:
         """Try to keep all joints where they are."""
         self.act(self.encode(self.joint_angles()))
 
-    def encode(self, wish: Any) -> NDArray[Any]:
-        """Return the row that takes the joints nearest to the ``(82,)`` angles (rad) of a wish.
+    def encode(self, command: Any) -> dict[str, NDArray[Any]]:
+        """Return the action that takes the joints nearest to ``(82,)`` angles (rad).
 
         It asks a position-controlled body for these angles; to a torque-controlled one it gives
         the torques that the position control would give at the end of the agent step: those that
-        it would give now shake the body, for they hold for the whole step. A wish of `Springs`
-        says itself how far ahead, and may hold a call.
+        it would give now shake the body, for they hold for the whole step. A command of `Springs`
+        gives this time itself, and may hold a call.
         """
         calm = self._world.clock.step_s
-        springs = wish if isinstance(wish, Springs) else Springs(np.asarray(wish), calm)
+        springs = command if isinstance(command, Springs) else Springs(np.asarray(command), calm)
         targets = np.clip(springs.targets, self._low, self._high)
         angles = self.foresee(targets, springs.ahead_s)
         wishes = self._control.wishes(targets, angles, self._low, self._high)
         row = self._rows.towards(wishes[self._chosen], self._wishes[self._chosen])
-        return np.append(row, self._end.encode(springs.call)).astype(np.float32)
+        return self._with_voice({JOINTS: row.astype(np.float32)}, springs.call)
 
     def foresee(self, targets: Floats, ahead_s: float | None = None) -> Floats:
         """Return the ``(82,)`` angles (rad) a while after springs begin to pull to targets.

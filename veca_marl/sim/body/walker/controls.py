@@ -1,4 +1,4 @@
-"""Action rows of the walking body: continuous velocities, or one of a few moves."""
+"""The `move` part of a walker's action: continuous velocities, or one of a few moves."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from veca_marl.sim.spec import ArraySpec
+from veca_marl.sim.spec import ArraySpec, continuous_spec, discrete_spec
 
 # (forward, turn) as shares of the greatest speeds; turning left is positive
 MOVES: dict[str, tuple[float, float]] = {
@@ -23,51 +23,46 @@ MOVES: dict[str, tuple[float, float]] = {
 
 
 class WalkControl(Protocol):
-    """Turns an action row into shares of the greatest walking and turning speed."""
+    """Converts between the `move` part and shares of the greatest walking and turning speed.
+
+    Attributes:
+        spec: Of the part.
+    """
 
     spec: ArraySpec
 
-    def decode(self, row: NDArray[Any]) -> tuple[float, float]:
-        """Return (forward, turn), each in [-1, 1]; raise `ValueError` for an impossible row."""
+    def decode(self, move: NDArray[Any]) -> tuple[float, float]:
+        """Return (forward, turn), each in [-1, 1], for a value that the spec admits."""
         ...
 
     def encode(self, forward: float, turn: float) -> NDArray[Any]:
-        """Return the row that comes nearest to a wish, such as an expert's."""
+        """Return the value of the part that comes nearest to (forward, turn)."""
         ...
 
 
 class ContinuousWalk:
-    """A row ``(2,)``: forward and turning velocity in [-1, 1], left positive."""
+    """Two numbers ``(2,)``: forward and turning velocity in [-1, 1], left positive."""
 
-    spec = ArraySpec((2,), np.float32, -1.0, 1.0)
+    spec = continuous_spec(("forward", "turn"))
 
-    def decode(self, row: NDArray[Any]) -> tuple[float, float]:
-        """Return the row itself, checked."""
-        if np.shape(row) != self.spec.shape:
-            raise ValueError(f"action {row!r} must be the two numbers (forward, turn)")
-        forward, turn = float(row[0]), float(row[1])
-        # written so that a NaN fails as well
-        if not (-1.0 <= forward <= 1.0 and -1.0 <= turn <= 1.0):
-            raise ValueError(f"action {row!r} must be (forward, turn), each in [-1, 1]")
-        return forward, turn
+    def decode(self, move: NDArray[Any]) -> tuple[float, float]:
+        """Return the two numbers."""
+        return float(move[0]), float(move[1])
 
     def encode(self, forward: float, turn: float) -> NDArray[Any]:
-        """Return the wish itself, cut to the range."""
+        """Return the two numbers, clipped to [-1, 1]."""
         return np.clip(np.array([forward, turn], np.float32), self.spec.low, self.spec.high)
 
 
 class DiscreteWalk:
-    """A scalar: the index of one of `MOVES`."""
+    """One of `MOVES`, by its index."""
 
-    spec = ArraySpec((), np.int64, 0, len(MOVES) - 1)
+    spec = discrete_spec(tuple(MOVES))
     _moves = tuple(MOVES.values())
 
-    def decode(self, row: NDArray[Any]) -> tuple[float, float]:
-        """Look the move up."""
-        choice = np.asarray(row)
-        if choice.shape != () or choice.dtype.kind not in "iu" or not 0 <= choice < len(MOVES):
-            raise ValueError(f"action {row!r} is not one of the moves {dict(enumerate(MOVES))}")
-        return self._moves[int(choice)]
+    def decode(self, move: NDArray[Any]) -> tuple[float, float]:
+        """Return the shares of the chosen move."""
+        return self._moves[int(move)]
 
     def encode(self, forward: float, turn: float) -> NDArray[Any]:
         """Return the index of the move with the nearest shares."""

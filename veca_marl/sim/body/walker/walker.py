@@ -13,12 +13,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from veca_marl.sim.body.action import Action
 from veca_marl.sim.body.anatomy.skeleton import Soles, forward_kinematics
 from veca_marl.sim.body.base import BodyCfg
 from veca_marl.sim.body.figure import Figure
 from veca_marl.sim.body.humanoid.humanoid import Humanoid
-from veca_marl.sim.body.voice_controls import VoiceKind, action_control
-from veca_marl.sim.body.walker.controls import ActionKind
+from veca_marl.sim.body.voice import voice_spec
+from veca_marl.sim.body.walker.controls import WALK_CONTROLS, ActionKind
 from veca_marl.sim.body.walker.crowd import crowd_of
 from veca_marl.sim.body.walker.gait import Gait
 from veca_marl.sim.body.walker.pushing import Pusher, horizontal_distance
@@ -27,6 +28,8 @@ from veca_marl.sim.physics.props import Prop
 from veca_marl.sim.physics.world import World
 from veca_marl.sim.sound.calls import Call
 
+MOVE = "move"  # the part of the action that walks
+
 
 @dataclass
 class WalkerCfg(BodyCfg):
@@ -34,7 +37,6 @@ class WalkerCfg(BodyCfg):
 
     Attributes:
         action: Continuous velocities or discrete moves.
-        voice: Whether an action row also holds a call, see `voice_controls`.
         walk_speed_mps: Speed of a full forward action.
         backward_share: A full backward action goes at this share of the forward speed.
         turn_speed_degps: Turning speed of a full turn action.
@@ -50,7 +52,6 @@ class WalkerCfg(BodyCfg):
     """
 
     action: ActionKind = ActionKind.continuous
-    voice: VoiceKind = VoiceKind.silent
     walk_speed_mps: float = 1.0
     backward_share: float = 0.3
     turn_speed_degps: float = 120.0
@@ -66,10 +67,7 @@ class WalkerCfg(BodyCfg):
 
     def __post_init__(self) -> None:
         """All are magnitudes, and a capsule is higher than wide."""
-        for name, kind in (("action", ActionKind), ("voice", VoiceKind)):
-            if not isinstance(getattr(self, name), kind):
-                choices = [choice.name for choice in kind]
-                raise ValueError(f"body.{name}={getattr(self, name)!r}; there are {choices}")
+        self._check_choices(action=ActionKind)
         super().__post_init__()
         if not 0.0 < 2.0 * self.radius_m <= self.height_m:
             raise ValueError(
@@ -84,8 +82,8 @@ class Walker(Figure):
     def __init__(self, name: str, cfg: WalkerCfg, world: World, shirt: int = 0) -> None:
         super().__init__(name, cfg.eye_range_deg, world, shirt)
         self.cfg = cfg
-        self.control = action_control(cfg.action, cfg.voice)
-        self.action_spec = self.control.spec
+        self._control = WALK_CONTROLS[cfg.action]
+        self.action_spec = {MOVE: self._control.spec, **voice_spec(cfg.voice)}
         self._gait = Gait(self._skeleton)
         self._pusher = Pusher(world.client, cfg.radius_m, cfg.height_m, cfg.push_limit_kg)
         self._soles = Soles(self._skeleton)
@@ -138,27 +136,23 @@ class Walker(Figure):
 
     # ---- what it can do (the paper's animation-based API)
 
-    def act(self, action: NDArray[Any]) -> None:
-        """Walk and call as an action row says; walking holds until the next row.
-
-        A call that has begun is called to its end: until then others go unsaid.
-        """
-        forward, turn, call = self.control.decode(action)
+    def _move(self, parts: Action) -> None:
+        forward, turn = self._control.decode(parts[MOVE])
         top_mps = self.cfg.walk_speed_mps * (self.cfg.backward_share if forward < 0.0 else 1.0)
         self.walk(forward * top_mps, turn * math.radians(self.cfg.turn_speed_degps))
-        self.call(call)
 
     def rest(self) -> None:
         """Stand where it is."""
         self.walk(0.0, 0.0)
 
-    def encode(self, wish: Any) -> NDArray[Any]:
-        """Return the row nearest to a wish ``(forward, turn)``, each in [-1, 1].
+    def encode(self, command: Any) -> dict[str, NDArray[Any]]:
+        """Return the action nearest to a command ``(forward, turn)``, each in [-1, 1].
 
-        A third element is the `Call`; without it there is none.
+        A third element is the `Call`; without it no call is chosen.
         """
-        forward, turn, *call = wish
-        return self.control.encode(forward, turn, Call(call[0]) if call else Call.none)
+        forward, turn, *call = command
+        move = self._control.encode(forward, turn)
+        return self._with_voice({MOVE: move}, Call(call[0]) if call else Call.none)
 
     @property
     def is_finite(self) -> bool:

@@ -1,0 +1,63 @@
+"""From the action tensors of a team to the numpy actions of its players."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import torch
+from numpy.typing import NDArray
+from tensordict import TensorDictBase
+from torchrl.data import Composite, TensorSpec
+
+# all players of a team in all worlds: one array ``(W, n, ...)``, or one for each part of the action
+TeamActions = NDArray[Any] | dict[str, NDArray[Any]]
+
+
+class ActionReader:
+    """Reads one team's actions from the tensordict of a step, and checks their shapes.
+
+    Args:
+        team: The team's name.
+        spec: Spec of `(team, "action")`.
+    """
+
+    def __init__(self, team: str, spec: TensorSpec) -> None:
+        self._team = team
+        self._shape = spec.shape
+        self._parts = {}
+        if isinstance(spec, Composite):
+            self._parts = {part: leaf.shape for part, leaf in spec.items()}
+
+    def read(self, tensordict: TensorDictBase) -> TeamActions:
+        """Return the actions as numpy arrays.
+
+        Raises:
+            ValueError: If a tensor has another shape than its spec.
+        """
+        action = tensordict.get((self._team, "action"))
+        if not self._parts:
+            return _to_numpy(f"action of {self._team}", action, self._shape)
+        if not isinstance(action, TensorDictBase) or set(action.keys()) != set(self._parts):
+            raise ValueError(
+                f"action of {self._team} must be a tensordict with the parts {list(self._parts)}"
+            )
+        return {
+            part: _to_numpy(f"action {part!r} of {self._team}", action.get(part), shape)
+            for part, shape in self._parts.items()
+        }
+
+
+def action_of(actions: TeamActions, world: int, player: int) -> Any:
+    """Return the action of one player: an array, or a mapping of parts."""
+    if isinstance(actions, dict):
+        return {part: array[world, player] for part, array in actions.items()}
+    return actions[world, player]
+
+
+def _to_numpy(what: str, action: Any, expected: torch.Size) -> NDArray[Any]:
+    if not isinstance(action, torch.Tensor) or action.shape != expected:
+        got = tuple(action.shape) if isinstance(action, torch.Tensor) else type(action).__name__
+        raise ValueError(f"{what}: shape {got}, not {tuple(expected)}")
+    plain = action.is_cpu and not action.requires_grad
+    array: NDArray[Any] = action.numpy() if plain else action.numpy(force=True)
+    return array

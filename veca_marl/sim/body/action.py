@@ -1,0 +1,66 @@
+"""Checks of actions: a mapping from the names of a body's action parts to their values."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from veca_marl.sim.spec import ArraySpec
+
+Action = Mapping[str, NDArray[Any]]
+
+
+def checked_action(specs: Mapping[str, ArraySpec], action: Mapping[str, Any]) -> Action:
+    """Return all parts of an action as arrays.
+
+    Args:
+        specs: The parts that are needed, by name.
+        action: A value for each of them.
+
+    Raises:
+        ValueError: If a part is missing or unknown, or a value has the wrong shape or is out of
+            its range. The message names the part, the value and the choices.
+    """
+    if action.keys() != specs.keys():
+        raise ValueError(f"action has the parts {list(action)}; it needs {list(specs)}")
+    return {part: _checked(part, spec, action[part]) for part, spec in specs.items()}
+
+
+def _checked(part: str, spec: ArraySpec, value: Any) -> NDArray[Any]:
+    array = np.asarray(value)
+    if spec.is_discrete:
+        _check_choice(part, spec, array)
+    else:
+        _check_vector(part, spec, array)
+    return array
+
+
+def _check_choice(part: str, spec: ArraySpec, value: NDArray[Any]) -> None:
+    if value.shape != () or value.dtype.kind not in "iu" or not 0 <= value <= spec.high:
+        choices = dict(enumerate(spec.names)) or f"0 to {spec.high:.0f}"
+        raise ValueError(f"action part {part!r} is {value!r}, not one of {choices}")
+
+
+def _check_vector(part: str, spec: ArraySpec, value: NDArray[Any]) -> None:
+    if value.shape != spec.shape or value.dtype.kind not in "fiu":
+        raise ValueError(
+            f"action part {part!r} is {value.dtype} of shape {value.shape}, not numbers of shape "
+            f"{spec.shape}{_listed(spec.names)}"
+        )
+    # written so that a NaN is out of range
+    inside = (value >= spec.low) & (value <= spec.high)
+    if not inside.all():
+        index = int(np.flatnonzero(~inside)[0])
+        name = spec.names[index] if spec.names else f"[{index}]"
+        raise ValueError(
+            f"action part {part!r}: {name} is {value.flat[index]}, "
+            f"not in [{spec.low:g}, {spec.high:g}]"
+        )
+
+
+def _listed(names: tuple[str, ...]) -> str:
+    """Return the names of a short vector for a message."""
+    return f" ({', '.join(names)})" if 0 < len(names) <= 8 else ""
