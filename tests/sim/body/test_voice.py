@@ -76,7 +76,7 @@ def loudness_at(place, call, steps=12):
     world = empty_world()
     speaker = walker_in(world, voice=VoiceKind.calls)
     listener = walker_in(world, "listener", place, voice=VoiceKind.calls)
-    senses = [AudioSense(AudioCfg(waveform=True), one, world.sound) for one in (speaker, listener)]
+    senses = [AudioSense(AudioCfg(waveform=True), one, world) for one in (speaker, listener)]
     heard = []
     for _ in range(steps):
         speaker.act({"move": STILL, "voice": np.array(call)})
@@ -132,7 +132,7 @@ def test_a_joint_level_body_has_a_voice_and_moves_its_joints_as_without(make_chi
 
 def test_a_joint_level_body_calls_and_its_torques_alone_are_silent(make_child):
     world, child = make_child(voice=VoiceKind.calls)
-    ear = AudioSense(AudioCfg(waveform=True), child, world.sound)
+    ear = AudioSense(AudioCfg(waveform=True), child, world)
 
     def heard():
         world.step()
