@@ -1,36 +1,62 @@
-"""The pages of tasks and of the body say what the docstrings and the data say."""
+"""The site builds, and its generated pages are those of the code and data of this commit."""
 
-import importlib.util
 import re
 import subprocess
 import sys
 from pathlib import Path
 
+import make_docs
 import pytest
+from docs_pages.body_tables import body_page
+from docs_pages.docstrings import entries, prose
+from docs_pages.observation_page import MEANINGS, all_specs
+from docs_pages.task_pages import task_page
 
 from veca_marl.api import list_tasks
+from veca_marl.config.conf_dir import conf_dir
 from veca_marl.envs.core.task import find_task
 from veca_marl.sim.body.anatomy.skeleton import limit_sources
 
 ROOT = Path(__file__).resolve().parent.parent
+DOCS = ROOT / "docs"
 
 
-def load_script():
-    spec = importlib.util.spec_from_file_location("make_docs", ROOT / "scripts" / "make_docs.py")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+def read(name):
+    return (DOCS / name).read_text(encoding="utf-8")
+
+
+def test_the_site_builds_without_a_warning(tmp_path):
+    command = [sys.executable, "-m", "sphinx", "-q", "--fail-on-warning", "--keep-going"]
+    command += ["-b", "html", "-d", tmp_path / "doctrees", DOCS, tmp_path / "html"]
+    build = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert build.returncode == 0, build.stderr
+    assert (tmp_path / "html" / "api" / "veca_marl.html").exists()
 
 
 @pytest.mark.parametrize("name", list_tasks())
-def test_the_page_of_a_task_is_that_of_its_docstring(name):
-    page = (ROOT / "docs" / "tasks" / f"{name}.md").read_text(encoding="utf-8")
-    assert page == load_script().task_page(find_task(name)), "run make pages"
+def test_the_page_of_a_task_is_current(name):
+    assert read(f"tasks/{name}.md") == task_page(find_task(name)), "run make pages"
+
+
+@pytest.mark.parametrize("name", list_tasks())
+def test_every_reward_term_of_a_task_is_documented_and_has_a_picture(name):
+    task = find_task(name)
+    assert set(entries(task, "Terms")) == set(task.cfg_type()().weights)
+    assert (DOCS / "images" / "tasks" / f"{name}.png").exists()
+
+
+@pytest.mark.parametrize("name", make_docs.PAGES)
+def test_a_generated_page_is_current(name):
+    assert read(name) == make_docs.PAGES[name](), "run make pages"
+
+
+def test_the_observation_reference_has_every_key_that_an_environment_observes():
+    assert set(all_specs()) == set(MEANINGS)
 
 
 def test_the_tables_of_the_body_are_those_of_the_data():
-    page = (ROOT / "docs" / "reference" / "body.md").read_text(encoding="utf-8")
-    assert page == load_script().body_page(page), "run make pages"
+    page = read("reference/body.md")
+    assert page == body_page(page), "run make pages"
     rows = [line for line in page.splitlines() if line.startswith("| `")]
     bones = [row for row in rows if " mm, " in row]
     joints = [row for row in rows if " N m " in row]
@@ -38,22 +64,35 @@ def test_the_tables_of_the_body_are_those_of_the_data():
     assert (len(bones), len(joints)) == (5 + 21, 12 + 35)
 
 
-def test_every_range_of_motion_names_its_source_and_the_page_explains_it():
-    page = (ROOT / "docs" / "reference" / "body.md").read_text(encoding="utf-8")
+def test_every_source_of_a_joint_range_is_explained():
     sources = {source for both in limit_sources() for source in both}
-    assert sources == set(re.findall(r"\*\*(\w+)\*\*", page.split("come from")[1]))
+    explained = read("reference/body.md").split("Sources of the ranges")[1]
+    assert sources == set(re.findall(r"\*\*(\w+)\*\*", explained))
 
 
 def test_every_preset_of_the_body_is_on_its_page():
-    page = (ROOT / "docs" / "reference" / "body.md").read_text(encoding="utf-8")
-    presets = {path.stem for path in (ROOT / "veca_marl" / "conf" / "body").glob("*.yaml")}
-    table = page.split("## Which bodies")[1].split("##")[0]
+    presets = {path.stem for path in (conf_dir() / "body").glob("*.yaml")}
+    table = read("reference/body.md").split("## Presets")[1].split("##")[0]
     assert presets <= set(re.findall(r"`(\w+)`", table))
 
 
-def test_the_site_builds_without_a_warning(tmp_path):
-    command = [sys.executable, "-m", "sphinx", "-q", "--fail-on-warning", "--keep-going"]
-    command += ["-b", "html", "-d", tmp_path / "doctrees", ROOT / "docs", tmp_path / "html"]
-    build = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert build.returncode == 0, build.stderr
-    assert (tmp_path / "html" / "api" / "veca_marl.html").exists()
+class Documented:
+    """Summary.
+
+    Attributes:
+        width: Pixels of
+            an image.
+        height: Others.
+
+    Raises:
+        ValueError: Never.
+    """
+
+
+def test_a_docstring_is_read_section_by_section():
+    assert prose(Documented) == "Summary."
+    assert entries(Documented, "Attributes") == {
+        "width": "Pixels of an image.",
+        "height": "Others.",
+    }
+    assert entries(Documented, "Returns") == {}

@@ -1,0 +1,129 @@
+"""The pictures of the pages: perception, touch, and one picture per task."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import matplotlib as mpl
+import numpy as np
+from numpy.typing import NDArray
+
+from veca_marl.api import make
+from veca_marl.envs.adapters.torchrl.env import VecaEnv
+from veca_marl.envs.core.game import Game
+from veca_marl.envs.core.task import TASKS
+from veca_marl.envs.rendering.touch_picture import picture_of_touch
+from veca_marl.sim.body.walker.walker import Walker
+from veca_marl.sim.touch.taxels import TAXELS_PER_TRIANGLE
+from veca_marl.sim.vision.optics import Camera, look_at
+
+mpl.use("Agg")
+import matplotlib.pyplot as plt
+
+BIN_HZ = 22050 / 1024
+_ABOVE_FLOOR = np.array([0.0, 0.0, 0.1])
+
+
+def write_pictures(folder: Path) -> None:
+    """Write all pictures into a folder."""
+    (folder / "tasks").mkdir(parents=True, exist_ok=True)
+    perception_picture(folder / "perception.png")
+    touch_picture(folder / "touch.png")
+    for name in TASKS:
+        task_picture(name, folder / "tasks" / f"{name}.png")
+
+
+def started(task: str, seed: int) -> tuple[VecaEnv, Game, np.random.Generator]:
+    """Return an environment, its one game at the start of an episode, and a generator."""
+    env, rng = make(task, seed=seed), np.random.default_rng(seed)
+    env.games[0].reset(rng)
+    return env, env.games[0], rng
+
+
+def task_picture(task: str, path: Path) -> None:
+    """Draw the start of an episode from inside the room, above the agents."""
+    env, game, rng = started(task, seed=1)
+    if isinstance(game.players[0].body, Walker):
+        for _ in range(25):  # one second, in which the ball of KickTheBall appears
+            game.step(
+                {
+                    player.name: np.zeros(player.body.action_spec.shape, np.float32)
+                    for player in game.actors
+                },
+                rng,
+            )
+    camera = Camera(640, 400, fov_deg=48.0)
+    image = camera.render(game.world.scene, [look_at(*viewpoint(game))]).rgb[0]
+    plt.imsave(path, image, pil_kwargs={"optimize": True})
+    env.close()
+
+
+def viewpoint(game: Game) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return where the camera of a task's picture is, and what it looks at, metres.
+
+    It is near a joint-level body, above a house of several rooms, and otherwise in a corner of the
+    room.
+    """
+    first = game.players[0].body
+    if not isinstance(first, Walker):
+        target = np.array([*first.position[:2], 0.15])
+        return target + first.forward * 1.0 + np.array([0.5, 0.9, 0.85]), target
+    rooms = game.cfg.playground.rooms
+    if len(rooms) > 1:
+        corners = np.array([room.lower_m for room in rooms])
+        centre = (corners.min(0) + (corners + [room.size_m for room in rooms]).max(0)) / 2.0
+        return centre + np.array([-0.1, -6.0, 11.0]), centre
+    room = next(room for room in rooms if room.contains(first.position + _ABOVE_FLOOR))
+    low, size = np.array(room.lower_m), np.array(room.size_m)
+    seen = [p.body.position for p in game.players if room.contains(p.body.position + _ABOVE_FLOOR)]
+    centre = low + size * (0.5, 0.5, 0.0)
+    return low + size * (0.06, 0.06, 0.85), 0.4 * centre + 0.6 * np.mean(seen, axis=0)
+
+
+def perception_picture(path: Path) -> None:
+    """Draw the observation of one agent at one moment of KickTheBall."""
+    env, game, rng = started("KickTheBall", seed=3)
+    player = game.players[0]
+    # the ball ahead, to the left, in view of both eyes
+    player.body.place((0.6, -0.2, 0.0), yaw_rad=1.95)
+    game.task.ball.place((-0.35, 0.95, 0.15), velocity=(0.1, -0.1, 0.0))
+    observation = game.observe(player)
+    for _ in range(6):
+        game.step({player.name: np.zeros(2, np.float32)}, rng)
+        observation = game.observe(player)
+    draw_perception(env.spectator.frame(observation), observation["audio"], path)
+    env.close()
+
+
+def draw_perception(frame: NDArray[np.uint8], audio: NDArray[np.float32], path: Path) -> None:
+    """Lay eyes and room over the spectra of both ears."""
+    figure, (seen, heard) = plt.subplots(
+        2, 1, figsize=(9, 5.4), height_ratios=(2, 1.1), constrained_layout=True
+    )
+    seen.imshow(frame)
+    seen.set_title("left eye, right eye, and the room from above", fontsize=10)
+    seen.axis("off")
+    frequency_khz = np.arange(audio.shape[1]) * BIN_HZ / 1000
+    heard.plot(frequency_khz, audio[0], label="left ear", lw=1)
+    heard.plot(frequency_khz, audio[1], label="right ear", lw=1)
+    heard.set(xlabel="frequency in kHz", ylabel="log10 |spectrum|", xlim=(0, frequency_khz[-1]))
+    heard.legend(frameon=False, ncols=2, loc="upper right")
+    figure.savefig(path, dpi=110)
+    plt.close(figure)
+
+
+def touch_picture(path: Path) -> None:
+    """Draw a child that lies on its back beside the readings of its taxels."""
+    env, game, rng = started("TurnBaby", seed=2)
+    player = game.players[0]
+    for _ in range(50):
+        player.body.rest()
+        game.advance(rng)
+    scene, middle = game.world.scene, player.body.position
+    camera = Camera(480, 360, fov_deg=34.0)
+    beside = look_at(middle + np.array([0.8, 0.9, 0.7]), middle)
+    readings = game.observe(player)["touch"].reshape(-1, TAXELS_PER_TRIANGLE).astype(np.float64)
+    skin = picture_of_touch(scene, scene.objects[player.body.object_id], readings, 360)
+    picture = np.concatenate([camera.render(scene, [beside]).rgb[0], skin], axis=1)
+    plt.imsave(path, picture)
+    env.close()
