@@ -13,7 +13,7 @@ from veca_marl.bench.references import as_visual_shapes, busy_room, measure_ears
 from veca_marl.bench.rollouts import measure_rollouts
 from veca_marl.bench.skin_costs import touched_child
 from veca_marl.bench.stopwatch import Probes, Stopwatch
-from veca_marl.config.root import compose
+from veca_marl.config import compose
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
 from veca_marl.envs.core.game_cfg import GameCfg
 from veca_marl.envs.core.task import TASKS

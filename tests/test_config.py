@@ -6,8 +6,7 @@ import pytest
 import yaml
 from omegaconf import OmegaConf
 
-from veca_marl.config.errors import ConfigError
-from veca_marl.config.root import CONF, Config, compose, compose_node
+from veca_marl.config import Config, ConfigError, compose, compose_node, conf_dir
 from veca_marl.envs.core.task import TASKS
 from veca_marl.sim.body.humanoid.humanoid import Detail, HumanoidCfg
 from veca_marl.sim.body.humanoid.joint_controls import JointActionKind as Act
@@ -19,8 +18,8 @@ KICK = "+task=KickTheBall"
 PUSH = "+task=PushOut1v1"
 SENSES = ("audio", "proprioception", "touch", "vision")
 GROUPS = ["algo", "body", "collect", "log", "playground", *(f"senses/{name}" for name in SENSES)]
-PRESETS = [(g, path.stem) for g in GROUPS for path in sorted((CONF / g).glob("*.yaml"))]
-EXPERIMENTS = sorted(path.stem for path in (CONF / "experiment").glob("*.yaml"))
+PRESETS = [(g, path.stem) for g in GROUPS for path in sorted((conf_dir() / g).glob("*.yaml"))]
+EXPERIMENTS = sorted(path.stem for path in (conf_dir() / "experiment").glob("*.yaml"))
 
 
 @pytest.mark.parametrize("task", sorted(TASKS))
@@ -31,7 +30,7 @@ def test_every_task_composes_to_its_own_type(task):
 
 
 def test_every_task_has_a_file_and_every_file_a_task():
-    assert {path.stem for path in (CONF / "task").glob("*.yaml")} == set(TASKS)
+    assert {path.stem for path in (conf_dir() / "task").glob("*.yaml")} == set(TASKS)
 
 
 @pytest.mark.parametrize(("group", "preset"), PRESETS)
@@ -50,12 +49,12 @@ def test_experiments_may_take_another_seed_and_sense():
 
 
 def test_no_file_is_forgotten():
-    files = {path.relative_to(CONF).as_posix() for path in CONF.rglob("*.yaml")}
+    files = {path.relative_to(conf_dir()).as_posix() for path in conf_dir().rglob("*.yaml")}
     tested = {f"{g}/{p}.yaml" for g, p in PRESETS} | {f"experiment/{n}.yaml" for n in EXPERIMENTS}
     assert files - tested - {f"task/{name}.yaml" for name in TASKS} == {"config.yaml"}
 
 
-@pytest.mark.parametrize("path", sorted(CONF.rglob("*.yaml")), ids=lambda p: p.stem)
+@pytest.mark.parametrize("path", sorted(conf_dir().rglob("*.yaml")), ids=lambda p: p.stem)
 def test_no_preset_is_called_what_yaml_reads_as_a_boolean(path):
     assert isinstance(yaml.safe_load(path.stem), str)
 
@@ -63,7 +62,7 @@ def test_no_preset_is_called_what_yaml_reads_as_a_boolean(path):
 def test_files_hold_only_what_differs_from_the_dataclasses():
     for sense in SENSES:
         default = OmegaConf.structured(SensesCfg())[sense]
-        for path in (CONF / "senses" / sense).glob("*.yaml"):
+        for path in (conf_dir() / "senses" / sense).glob("*.yaml"):
             for key, value in (OmegaConf.load(path) or {}).items():
                 merged = OmegaConf.merge({"x": default}, {"x": {key: value}})
                 assert merged.x[key] != default[key], f"{path} restates {key}"
@@ -139,7 +138,7 @@ def test_compose_works_inside_a_running_hydra_application(tmp_path):
     app.write_text(
         "import hydra\n"
         "from hydra.core.hydra_config import HydraConfig\n"
-        "from veca_marl.config.root import compose\n"
+        "from veca_marl.config import compose\n"
         "@hydra.main(version_base='1.3', config_path=None)\n"
         "def main(cfg):\n"
         "    inner = compose(['+task=KickTheBall', 'seed=3'])\n"

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from veca_marl.bench.command import argument_parser
-from veca_marl.config.root import compose
+from veca_marl.config import compose
 
 ROOT = Path(__file__).resolve().parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")

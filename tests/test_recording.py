@@ -6,7 +6,7 @@ import pytest
 from torchrl.envs.utils import RandomPolicy
 
 from veca_marl.algos.training.evaluation import random_policy
-from veca_marl.config.root import compose
+from veca_marl.config import compose
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
 from veca_marl.runs.recording import record_episode
 

@@ -10,7 +10,7 @@ import pytest
 import torch
 import yaml
 
-from veca_marl.config.errors import ConfigError
+from veca_marl.config import ConfigError
 from veca_marl.runs.assembly import find_device
 
 SMOKE = ["+experiment=smoke", "log=silent", "device=cpu", "threads=1"]

@@ -26,8 +26,7 @@ from veca_marl.algos.training.evaluation import (
     random_policy,
 )
 from veca_marl.algos.training.learnt import load_actor
-from veca_marl.config.errors import ConfigError, one_line
-from veca_marl.config.root import Config, compose
+from veca_marl.config import Config, ConfigError, compose, one_line
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
 from veca_marl.runs.assembly import make_env
 from veca_marl.runs.run_folder import open_run

@@ -18,8 +18,7 @@ import torch
 from veca_marl.algos.selfplay.self_play import Pool
 from veca_marl.algos.selfplay.tournament import Match, Rating, play_all, rate, table_of_points
 from veca_marl.algos.training.checkpoint import CheckpointError
-from veca_marl.config.errors import ConfigError, one_line
-from veca_marl.config.root import Config, to_config
+from veca_marl.config import Config, ConfigError, one_line, to_config
 from veca_marl.runs.assembly import make_algorithm, make_env, read_specs
 from veca_marl.runs.run_folder import RunFolder, open_run
 

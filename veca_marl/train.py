@@ -21,8 +21,7 @@ from omegaconf.errors import OmegaConfBaseException
 
 from veca_marl.algos.training.checkpoint import CheckpointError
 from veca_marl.algos.training.loop import Trainer
-from veca_marl.config.errors import ConfigError, one_line
-from veca_marl.config.root import CONF, Config, to_config
+from veca_marl.config import Config, ConfigError, conf_dir, one_line, prepare, to_config
 from veca_marl.runs.assembly import make_reporters, make_trainer
 from veca_marl.runs.recording import record_episode
 from veca_marl.runs.run_folder import RunFolder, new_run, open_run, remove_if_empty
@@ -74,7 +73,7 @@ def stored_config(folder: RunFolder, asked: DictConfig, overrides: list[str]) ->
     return to_config(node)
 
 
-@hydra.main(version_base="1.3", config_path=str(CONF), config_name="config")
+@hydra.main(version_base="1.3", config_path=str(conf_dir()), config_name="config")
 def run(node: DictConfig) -> None:
     """Train in the folder that Hydra made."""
     path = Path(HydraConfig.get().runtime.output_dir)
@@ -121,8 +120,9 @@ def main() -> None:
     logging.getLogger("torchrl").setLevel(logging.WARNING)
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # schedulers stop runs by it
     try:
+        sys.argv[1:] = prepare(sys.argv[1:])
         run()
-    except (HydraException, OmegaConfBaseException) as error:
+    except (ConfigError, HydraException, OmegaConfBaseException) as error:
         give_up(error)
 
 

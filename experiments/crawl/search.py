@@ -22,7 +22,7 @@ from typing import Any
 
 import numpy as np
 
-from veca_marl.config.root import compose
+from veca_marl.config import compose
 from veca_marl.envs.core.game import Game
 from veca_marl.envs.experts.control.crawl_gait import CrawlGait
 from veca_marl.envs.experts.control.gait_patterns import BACK, CRAWL, GaitPattern

@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 
 import veca_marl
-from veca_marl.config.root import compose
+from veca_marl.config import compose
 from veca_marl.envs.core.game import Game
 from veca_marl.envs.core.game_cfg import GameCfg
 from veca_marl.envs.core.team import Script

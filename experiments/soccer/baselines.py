@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from veca_marl.config.root import compose
+from veca_marl.config import compose
 from veca_marl.envs.core.game import Game
 from veca_marl.envs.core.task import Player
 from veca_marl.envs.core.team import Script

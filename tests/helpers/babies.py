@@ -5,7 +5,7 @@ from contextlib import contextmanager
 import numpy as np
 import pytest
 
-from veca_marl.config.root import compose
+from veca_marl.config import compose
 from veca_marl.envs.core.game import Game
 
 BODIES = ("mitten_limbs", "mitten_position")

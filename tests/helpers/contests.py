@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from veca_marl.config.root import compose
+from veca_marl.config import compose
 from veca_marl.envs.core.game import Game
 from veca_marl.envs.core.team import Script
 

@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 import torch
 
-from veca_marl.config.root import compose
+from veca_marl.config import compose
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
 from veca_marl.envs.core.actions import random_action
 from veca_marl.envs.core.game import Game

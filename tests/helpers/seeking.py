@@ -2,7 +2,7 @@
 
 import math
 
-from veca_marl.config.root import compose
+from veca_marl.config import compose
 from veca_marl.sim.body.walker.walker import Walker, WalkerCfg
 from veca_marl.sim.physics.playground import PlaygroundCfg, RoomCfg
 from veca_marl.sim.physics.props import PropCfg, PropShape

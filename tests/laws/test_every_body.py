@@ -12,7 +12,7 @@ from torchrl.collectors import RandomPolicy
 from torchrl.envs import SerialEnv, check_env_specs
 
 from veca_marl.bench.free_play import free_play
-from veca_marl.config.root import CONF, compose
+from veca_marl.config import compose, conf_dir
 from veca_marl.envs.adapters.gymnasium import VecaGymEnv
 from veca_marl.envs.adapters.pettingzoo import VecaParallelEnv
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
@@ -21,7 +21,7 @@ from veca_marl.envs.core.game import Game
 from veca_marl.envs.core.game_cfg import GameCfg
 from veca_marl.sim.body.base import MOUNTS
 
-BODIES = sorted(path.stem for path in (CONF / "body").glob("*.yaml"))
+BODIES = sorted(path.stem for path in (conf_dir() / "body").glob("*.yaml"))
 SENSES = ("vision", "audio", "touch", "proprioception")
 STEPS = 12
 

@@ -16,8 +16,7 @@ from veca_marl.bench.free_play import free_play
 from veca_marl.bench.references import measure_references
 from veca_marl.bench.report import as_json, references_table, rollouts_table
 from veca_marl.bench.rollouts import Rollouts, measure_first_world, measure_rollouts
-from veca_marl.config.errors import ConfigError
-from veca_marl.config.root import compose
+from veca_marl.config import ConfigError, compose
 from veca_marl.envs.core.game_cfg import GameCfg
 from veca_marl.envs.core.task import TaskCfg, find_task
 from veca_marl.sim.body.humanoid.humanoid import HumanoidCfg

@@ -1,40 +1,23 @@
-"""The typed root of the configuration, and how it is put together from choices.
-
-`compose` gives notebooks what the command line gives `train`: the same defaults, the same errors.
-"""
+"""The typed root of the configuration."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass, field, fields, is_dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, cast
 
-import hydra
-from hydra.core.config_store import ConfigStore
-from hydra.core.global_hydra import GlobalHydra
-from hydra.errors import HydraException
-from omegaconf import MISSING, DictConfig, OmegaConf
-from omegaconf.errors import OmegaConfBaseException
+from omegaconf import MISSING
 
 from veca_marl.algos.ppo.learner import PPOCfg
 from veca_marl.algos.selfplay.self_play import SelfPlayCfg
 from veca_marl.algos.training.collect import CollectCfg
 from veca_marl.algos.training.evaluation import EvalCfg
-from veca_marl.config.conf_dir import conf_dir
-from veca_marl.config.errors import ConfigError, one_line
 from veca_marl.envs.core.game_cfg import GameCfg
-from veca_marl.envs.core.task import TASKS, TaskCfg, find_task
+from veca_marl.envs.core.task import TaskCfg
 from veca_marl.envs.core.team import Script, TeamCfg
 from veca_marl.sim.body.base import BodyCfg
-from veca_marl.sim.body.humanoid.humanoid import HumanoidCfg
-from veca_marl.sim.body.walker.walker import WalkerCfg
 from veca_marl.sim.physics.playground import PlaygroundCfg
 from veca_marl.sim.physics.world import ClockCfg
 from veca_marl.sim.senses import SensesCfg
-
-CONF = conf_dir()
 
 
 @dataclass
@@ -89,6 +72,7 @@ class Config:
         total_frames: Frames of experience.
         max_minutes: Stop after the stage in which this time runs out; None for no limit.
         resume: The folder of a run to continue instead of starting one.
+        plugins: Packages that add tasks, bodies, presets and more, see `veca_marl.plugins`.
     """
 
     task: TaskCfg = MISSING
@@ -111,6 +95,7 @@ class Config:
     total_frames: int = 122_880
     max_minutes: float | None = None
     resume: str | None = None
+    plugins: list[str] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         for team, who in self.opponent.items():
@@ -178,102 +163,3 @@ def _check_opponent(team: str, who: str) -> None:
             f"opponent.{team}={who}: choices: {', '.join(_SCRIPTS)}, the folder of a run, "
             "a checkpoint"
         )
-
-
-def register_schemas() -> None:
-    """Tell Hydra the types behind the YAML files."""
-    store = ConfigStore.instance()
-    schema = OmegaConf.structured(Config)
-    # these take any key: the game knows its teams
-    by_teams = ("team", "opponent", "warm_start", "learner")
-    for by_team in by_teams:
-        OmegaConf.set_struct(schema[by_team], False)
-    store.store(name="schema", node=schema)
-    store.store(group="schema/algo", name="ppo", node=PPOCfg)
-    store.store(group="schema/body", name="walker", node=WalkerCfg)
-    store.store(group="schema/body", name="humanoid", node=HumanoidCfg)
-    for name, task in TASKS.items():
-        store.store(group="schema/task", name=name, node=task.cfg_type())
-    OmegaConf.register_new_resolver("run_folder", _run_folder, replace=True)
-
-
-def compose(overrides: Sequence[str] = ()) -> Config:
-    """Return the configuration that ``python -m veca_marl.train *overrides`` would train.
-
-    Works anywhere: in a notebook, twice, inside a running Hydra application.
-
-    Args:
-        overrides: As on the command line, such as ``["+task=KickTheBall", "senses/audio=mono"]``.
-
-    Raises:
-        ConfigError: One line that names the wrong part and the choices.
-    """
-    return to_config(compose_node(overrides))
-
-
-def compose_node(overrides: Sequence[str]) -> DictConfig:
-    """Return what `compose` returns, still typed and changeable by name."""
-    try:
-        with _own_hydra():
-            node: DictConfig = hydra.compose("config", overrides=list(overrides))
-    except (HydraException, OmegaConfBaseException) as error:
-        raise ConfigError(one_line(error)) from error
-    return node
-
-
-def to_config(node: DictConfig) -> Config:
-    """Turn Hydra's node into dataclasses, which check their values.
-
-    Raises:
-        ConfigError: If there is no task, or a value is impossible.
-    """
-    if OmegaConf.is_missing(node, "task"):
-        raise ConfigError(no_task())
-    try:
-        config = cast(Config, OmegaConf.to_object(node))
-        find_task(config.task.name)
-        _refuse_extra(config, "")
-        config.check_teams()
-    except (OmegaConfBaseException, ValueError) as error:
-        raise ConfigError(one_line(error)) from error
-    return config
-
-
-def _refuse_extra(config: Any, path: str) -> None:
-    """Raise `ValueError` for what ``+key=value`` added to a dataclass."""
-    names = [f.name for f in fields(config)]
-    for extra in sorted(set(vars(config)) - set(names)):
-        raise ValueError(f"unknown key '{path}{extra}'; choices: {', '.join(sorted(names))}")
-    for name in names:
-        if is_dataclass(getattr(config, name)):
-            _refuse_extra(getattr(config, name), f"{path}{name}.")
-
-
-def no_task() -> str:
-    """Say that a task must be chosen, and which there are."""
-    return f"no task: add +task=NAME; choices: {', '.join(sorted(TASKS))}"
-
-
-@contextmanager
-def _own_hydra() -> Iterator[None]:
-    """Compose beside whatever Hydra application is running."""
-    holder = GlobalHydra.instance()
-    running = holder.hydra
-    holder.clear()
-    try:
-        with hydra.initialize_config_dir(str(CONF), version_base="1.3"):
-            yield
-    finally:
-        GlobalHydra.instance().hydra = running
-
-
-def _run_folder(resume: str | None, task: str | None, now: str) -> str:
-    """Name the folder of a run, before Hydra makes it."""
-    if resume is not None:
-        return resume
-    if task is None:
-        raise ConfigError(no_task())
-    return f"runs/{task}/{now}"
-
-
-register_schemas()

@@ -16,8 +16,7 @@ from veca_marl.algos.training.checkpoint import Checkpoints, Identity
 from veca_marl.algos.training.learnt import load_actor, load_network
 from veca_marl.algos.training.loop import Budget, Trainer
 from veca_marl.algos.training.metrics import CsvReporter, Reporter, TensorBoardReporter
-from veca_marl.config.errors import ConfigError, one_line
-from veca_marl.config.root import Config
+from veca_marl.config import Config, ConfigError, one_line
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
 from veca_marl.envs.core.game_cfg import GameCfg
 from veca_marl.runs.run_folder import RunFolder

@@ -14,8 +14,7 @@ from typing import cast
 
 from omegaconf import DictConfig, OmegaConf
 
-from veca_marl.config.errors import ConfigError
-from veca_marl.config.root import compose_node
+from veca_marl.config import ConfigError, compose_node
 
 _PACKAGES = ("veca_marl", "torch", "torchrl", "tensordict", "pybullet", "numpy", "numba")
 
@@ -115,7 +114,7 @@ def remove_if_empty(path: Path) -> None:
 
 def _provenance(overrides: Sequence[str]) -> dict[str, object]:
     return {
-        "command": sys.argv,
+        "command": sys.orig_argv,
         "overrides": list(overrides),
         "commit": _git_commit(),
         "python": platform.python_version(),

@@ -10,7 +10,7 @@ from torchrl.collectors import MultiSyncCollector
 from torchrl.envs import ParallelEnv, check_env_specs
 
 from veca_marl.api import make
-from veca_marl.config.root import compose
+from veca_marl.config import compose
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
 
 CHEAP = ("playground=simple", "senses/vision=blind")

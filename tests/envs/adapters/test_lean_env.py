@@ -14,7 +14,7 @@ from torchrl.data import Unbounded
 from torchrl.envs import EnvBase, ParallelEnv, SerialEnv
 from torchrl.envs.utils import _StepMDP
 
-from veca_marl.config.root import compose
+from veca_marl.config import compose
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
 from veca_marl.envs.adapters.torchrl.lean_env import Onward
 

@@ -5,7 +5,7 @@ import pytest
 import torch
 from duels import STEPS, duel
 
-from veca_marl.config.root import compose
+from veca_marl.config import compose
 from veca_marl.envs.adapters.gymnasium import VecaGymEnv
 from veca_marl.envs.adapters.pettingzoo import VecaParallelEnv
 from veca_marl.envs.adapters.torchrl.env import VecaEnv

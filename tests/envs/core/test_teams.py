@@ -10,7 +10,7 @@ from knockouts import knockout
 from torchrl.collectors import Collector
 from torchrl.envs import SerialEnv, check_env_specs
 
-from veca_marl.config.root import ConfigError, compose
+from veca_marl.config import ConfigError, compose
 from veca_marl.envs.adapters.pettingzoo import VecaParallelEnv
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
 from veca_marl.envs.adapters.torchrl.scripted import ExpertPolicy

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from veca_marl.config.root import compose
+from veca_marl.config import compose
 from veca_marl.envs.core.game import Game
 from veca_marl.envs.rendering.spectator import FRAME_HEIGHT, ROOM_WIDTH, Spectator, eye_images
 from veca_marl.sim.touch.taxels import taxels_of

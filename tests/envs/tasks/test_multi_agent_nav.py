@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from babies import zero_action
 
-from veca_marl.config.root import ConfigError, compose
+from veca_marl.config import ConfigError, compose
 from veca_marl.envs.core.game import Game
 from veca_marl.envs.experts.control.locomotion import locomotion_of
 from veca_marl.envs.experts.control.path_following import PathFollower

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from blocks import blocks_game, play, sit, sits
 
-from veca_marl.config.root import ConfigError, compose
+from veca_marl.config import ConfigError, compose
 from veca_marl.envs.core.game import Game
 from veca_marl.envs.tasks.objects.pile_up_block import PileUpBlockCfg
 

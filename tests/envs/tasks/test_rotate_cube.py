@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from veca_marl.config.root import compose
+from veca_marl.config import compose
 from veca_marl.envs.core.game import Game
 from veca_marl.envs.tasks.objects.rotate_cube import RotateCubeCfg
 from veca_marl.sim.geometry.rotations import heading_rad

@@ -13,8 +13,7 @@ from babies import (
     starts,
 )
 
-from veca_marl.config.errors import ConfigError
-from veca_marl.config.root import compose
+from veca_marl.config import ConfigError, compose
 from veca_marl.envs.tasks.locomotion.sit_baby import SitBabyCfg
 from veca_marl.sim.body.humanoid.postures import ON_BACK, SITTING, STANDING, Posture
 

@@ -5,7 +5,7 @@ import pytest
 from walking import box, empty_world, walker_in
 
 from veca_marl.bench.free_play import free_play
-from veca_marl.config.root import compose
+from veca_marl.config import compose
 from veca_marl.envs.core.actions import random_action
 from veca_marl.envs.core.game import Game
 from veca_marl.envs.core.game_cfg import GameCfg

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from walking import ball, let_pass, walker_in
 
-from veca_marl.config.root import CONF, compose
+from veca_marl.config import compose, conf_dir
 from veca_marl.sim.physics.playground import PlaygroundCfg, RoomCfg
 from veca_marl.sim.physics.world import World
 
-SHIPPED = sorted(path.stem for path in (CONF / "playground").glob("*.yaml"))
+SHIPPED = sorted(path.stem for path in (conf_dir() / "playground").glob("*.yaml"))
 
 
 @pytest.fixture(scope="module", params=SHIPPED)

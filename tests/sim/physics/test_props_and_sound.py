@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from veca_marl.config.root import compose
+from veca_marl.config import compose
 from veca_marl.sim.geometry.pose import Pose
 from veca_marl.sim.hearing.receivers import OneEar
 from veca_marl.sim.physics.props import PropCfg, PropShape

@@ -6,7 +6,7 @@ import scipy.signal
 from listening import RATE, STEP, ratio_db, spatialisation
 from listening import render as render_field
 
-from veca_marl.config.root import compose
+from veca_marl.config import compose
 from veca_marl.sim.body.walker.walker import Walker, WalkerCfg
 from veca_marl.sim.geometry.pose import Pose
 from veca_marl.sim.hearing.sense import AudioCfg, AudioSense

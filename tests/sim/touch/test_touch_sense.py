@@ -5,7 +5,7 @@ import pytest
 from stand_in_worlds import SceneWorld
 from touching import SPREAD, Named, Stage, of_bone
 
-from veca_marl.config.root import compose
+from veca_marl.config import compose
 from veca_marl.sim.body.walker.walker import Walker, WalkerCfg
 from veca_marl.sim.geometry.primitives import Geom, Shape
 from veca_marl.sim.geometry.scene import Scene

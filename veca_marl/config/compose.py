@@ -1,0 +1,138 @@
+"""Composition: from overrides, as on the command line, to the typed configuration.
+
+`compose` gives notebooks what the command line gives `train`: the same defaults, the same errors.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import fields, is_dataclass
+from typing import Any, cast
+
+import hydra
+from hydra.core.global_hydra import GlobalHydra
+from hydra.errors import HydraException
+from omegaconf import DictConfig, OmegaConf
+from omegaconf.errors import OmegaConfBaseException
+
+from veca_marl.config.conf_dir import conf_dir
+from veca_marl.config.errors import ConfigError, one_line
+from veca_marl.config.overrides import plugins_in, with_integers
+from veca_marl.config.root import Config
+from veca_marl.config.schemas import register_schemas, store_tasks_without_file
+from veca_marl.config.search_path import check_configuration_files, register_search_path
+from veca_marl.envs.core.task import TASKS, find_task
+from veca_marl.plugins import PluginError, load_plugins
+
+
+def compose(overrides: Sequence[str] = ()) -> Config:
+    """Return the configuration that ``python -m veca_marl.train *overrides`` would train.
+
+    Works anywhere: in a notebook, twice, inside a running Hydra application.
+
+    Args:
+        overrides: As on the command line, such as ``["+task=KickTheBall", "senses/audio=mono"]``.
+
+    Raises:
+        ConfigError: One line that names the wrong part and the choices.
+    """
+    return to_config(compose_node(overrides))
+
+
+def compose_node(overrides: Sequence[str]) -> DictConfig:
+    """Return what `compose` returns as a typed node, whose values can be changed by name.
+
+    Raises:
+        ConfigError: One line that names the wrong part and the choices.
+    """
+    prepared = prepare(overrides)
+    try:
+        with _own_hydra():
+            node: DictConfig = hydra.compose("config", overrides=prepared)
+    except (HydraException, OmegaConfBaseException) as error:
+        raise ConfigError(one_line(error)) from error
+    return node
+
+
+def prepare(overrides: Sequence[str]) -> list[str]:
+    """Load the plug-ins, the installed ones and those named in `overrides`, before composition.
+
+    Returns:
+        The overrides, with integral numbers in exponent notation (1e6) written as integers.
+
+    Raises:
+        ConfigError: If a plug-in cannot be loaded.
+    """
+    _load_plugins(plugins_in(overrides))
+    return with_integers(overrides)
+
+
+def _load_plugins(names: Sequence[str]) -> None:
+    try:
+        load_plugins(names)
+        check_configuration_files()
+        store_tasks_without_file()
+    except PluginError as error:
+        raise ConfigError(str(error)) from error
+
+
+def to_config(node: DictConfig) -> Config:
+    """Turn Hydra's node into dataclasses, which check their values.
+
+    Raises:
+        ConfigError: If no task is chosen, or a value is impossible.
+    """
+    if OmegaConf.is_missing(node, "task"):
+        raise ConfigError(no_task())
+    _load_plugins(node.plugins)
+    try:
+        config = cast(Config, OmegaConf.to_object(node))
+        find_task(config.task.name)
+        _refuse_extra(config, "")
+        config.check_teams()
+    except (OmegaConfBaseException, ValueError) as error:
+        raise ConfigError(one_line(error)) from error
+    return config
+
+
+def _refuse_extra(config: Any, path: str) -> None:
+    """Raise `ValueError` for what ``+key=value`` added to a dataclass."""
+    names = [f.name for f in fields(config)]
+    for extra in sorted(set(vars(config)) - set(names)):
+        raise ValueError(f"unknown key '{path}{extra}'; choices: {', '.join(sorted(names))}")
+    for name in names:
+        if is_dataclass(getattr(config, name)):
+            _refuse_extra(getattr(config, name), f"{path}{name}.")
+
+
+def no_task() -> str:
+    """Return the error message for a missing task, with the choices."""
+    return f"no task: add +task=NAME; choices: {', '.join(sorted(TASKS))}"
+
+
+@contextmanager
+def _own_hydra() -> Iterator[None]:
+    """Compose without a change to the Hydra application that may be running."""
+    holder = GlobalHydra.instance()
+    running = holder.hydra
+    holder.clear()
+    try:
+        with hydra.initialize_config_dir(str(conf_dir()), version_base="1.3"):
+            yield
+    finally:
+        GlobalHydra.instance().hydra = running
+
+
+def _run_folder(resume: str | None, task: str | None, now: str) -> str:
+    """Return the folder of a run, which Hydra creates."""
+    if resume is not None:
+        return resume
+    if task is None:
+        raise ConfigError(no_task())
+    return f"runs/{task}/{now}"
+
+
+register_schemas()
+register_search_path()
+OmegaConf.register_new_resolver("run_folder", _run_folder, replace=True)

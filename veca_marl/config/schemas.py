@@ -1,0 +1,52 @@
+"""The types behind the configuration files, as Hydra stores them.
+
+Each registered task has a schema. A task without a file `conf/task/MyTask.yaml` has an entry of the
+group `task` as well, so that ``+task=MyTask`` takes the defaults of its dataclass.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from hydra.core.config_store import ConfigStore
+from omegaconf import OmegaConf
+
+from veca_marl.algos.ppo.learner import PPOCfg
+from veca_marl.config.root import Config
+from veca_marl.config.search_path import conf_dirs
+from veca_marl.envs.core.task import TASKS
+from veca_marl.sim.body.humanoid.humanoid import HumanoidCfg
+from veca_marl.sim.body.walker.walker import WalkerCfg
+
+_BY_TEAM = ("team", "opponent", "warm_start", "learner")  # their keys are the names of the teams
+
+
+def register_schemas() -> None:
+    """Store the schemas of the root and of all registered entries, present and later ones."""
+    store = ConfigStore.instance()
+    store.store(name="schema", node=root_schema())
+    store.store(group="schema/algo", name="ppo", node=PPOCfg)
+    store.store(group="schema/body", name="walker", node=WalkerCfg)
+    store.store(group="schema/body", name="humanoid", node=HumanoidCfg)
+    TASKS.listen(_store_task_schema)
+
+
+def root_schema() -> Any:
+    """Return `Config` as a node that takes any team's name where teams are keys."""
+    schema = OmegaConf.structured(Config)
+    for key in _BY_TEAM:
+        OmegaConf.set_struct(schema[key], False)
+    return schema
+
+
+def store_tasks_without_file() -> None:
+    """Store a group entry for each registered task that has no file `task/<name>.yaml`."""
+    store = ConfigStore.instance()
+    for name in TASKS:
+        if not any((folder / "task" / f"{name}.yaml").is_file() for folder in conf_dirs()):
+            entry = {"defaults": [{"/schema/task@task": name}, "_self_"], "task": {"name": name}}
+            store.store(group="task", name=name, node=entry, package="_global_")
+
+
+def _store_task_schema(name: str) -> None:
+    ConfigStore.instance().store(group="schema/task", name=name, node=TASKS[name].cfg_type())

@@ -1,0 +1,1 @@
+"""Run folders, provenance, video, and what is assembled to train."""
