@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import Any, Protocol
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,10 +29,12 @@ class Sense(ABC):
     neither the order in which senses are read nor their number changes a value.
 
     Attributes:
+        cfg_type: The dataclass of its settings.
         specs: Observation name to its spec, known before the first read. Most senses have one
             entry under their own name; extras on request (`depth`, `waveform`) are further entries.
     """
 
+    cfg_type: ClassVar[type[Any]]
     specs: dict[str, ArraySpec]
 
     def __init__(self, world: Versioned) -> None:

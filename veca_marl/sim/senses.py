@@ -1,6 +1,6 @@
 """The registry of senses: which there are, how each is configured, and how a body gets them.
 
-A further sense, in this package or in another one, is a subclass of `Sense` with a dataclass of
+A further sense, in this package or in a plug-in, is a subclass of `Sense` with a dataclass of
 settings that has the field `present`, registered under its name::
 
     @dataclass
@@ -8,13 +8,14 @@ settings that has the field `present`, registered under its name::
         present: bool = True
         range_m: float = 2.0
 
+    @register_sense("smell")
     class SmellSense(Sense):
+        cfg_type = SmellCfg
+
         def __init__(self, cfg: SmellCfg, body: Body, world: World) -> None:
             super().__init__(world)
             self.specs = {"smell": ArraySpec((3,), np.float32)}
         ...
-
-    register_sense("smell", SmellCfg, SmellSense)
 
 A task then names it in `senses`; `SensesCfg.extra` (``+senses.extra.smell.range_m=1.0``) holds its
 settings where they differ from the defaults.
@@ -24,8 +25,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
-from typing import Any, NamedTuple
+from typing import Any, Protocol, TypeVar
 
+from veca_marl.registry import Registry
 from veca_marl.sim.body.base import Body
 from veca_marl.sim.body.proprioception import ProprioceptionCfg, ProprioceptionSense
 from veca_marl.sim.hearing.sense import AudioCfg, AudioSense
@@ -35,42 +37,42 @@ from veca_marl.sim.touch.sense import TouchCfg, TouchSense
 from veca_marl.sim.vision.sense import VisionCfg, VisionSense
 
 
-class SenseType(NamedTuple):
-    """An entry of the registry.
+class SenseClass(Protocol):
+    """What the registry holds: a subclass of `Sense` with this constructor.
 
     Attributes:
-        cfg: The dataclass of its settings; all fields have defaults, `present` is one of them.
-        make: Constructs the sense from settings, body and world, usually the class itself.
+        cfg_type: The dataclass of its settings; all fields have defaults, `present` is one of them.
     """
 
-    cfg: type[Any]
-    make: Callable[[Any, Body, World], Sense]
+    cfg_type: type[Any]
+
+    def __call__(self, cfg: Any, body: Body, world: World) -> Sense:
+        """Construct the sense of a body."""
+        ...
 
 
-_REGISTRY: dict[str, SenseType] = {}
+SENSES: Registry[SenseClass] = Registry("sense")
+SenseT = TypeVar("SenseT", bound=SenseClass)
 
 
-def register_sense(name: str, cfg: type[Any], make: Callable[[Any, Body, World], Sense]) -> None:
-    """Make a sense available to tasks under a name.
+def register_sense(name: str) -> Callable[[SenseT], SenseT]:
+    """Return a class decorator that makes a sense available to tasks under a name.
 
     Args:
         name: As tasks name it; for a built-in sense also its field of `SensesCfg`.
-        cfg: See `SenseType`.
-        make: See `SenseType`.
 
     Raises:
-        ValueError: If the name is registered already, or the settings lack `present`.
+        ValueError: By the decorator, if another class has the name, or the settings of this one
+            lack the field `present`.
     """
-    if name in _REGISTRY:
-        raise ValueError(f"sense {name!r} is already registered")
-    if "present" not in {f.name for f in fields(cfg)}:
-        raise ValueError(f"sense {name!r}: {cfg.__name__} has no field 'present'")
-    _REGISTRY[name] = SenseType(cfg, make)
 
+    def register(sense: SenseT) -> SenseT:
+        if "present" not in {f.name for f in fields(sense.cfg_type)}:
+            raise ValueError(f"sense {name!r}: {sense.cfg_type.__name__} has no field 'present'")
+        SENSES.add(name, sense)
+        return sense
 
-def list_senses() -> list[str]:
-    """Return the names of all registered senses, sorted."""
-    return sorted(_REGISTRY)
+    return register
 
 
 @dataclass
@@ -103,11 +105,9 @@ class SensesCfg:
             ValueError: If no sense of that name is registered, or its settings in `extra` have
                 a field that its dataclass has not.
         """
-        if name not in _REGISTRY:
-            raise ValueError(f"unknown sense {name!r}; registered are {list_senses()}")
-        if name in _BUILT_IN:
+        if name in {f.name for f in fields(self)} - {"extra"}:
             return getattr(self, name)
-        cfg_type = _REGISTRY[name].cfg
+        cfg_type = SENSES.find(name).cfg_type
         given = self.extra.get(name, {})
         if isinstance(given, cfg_type):
             return given
@@ -134,22 +134,14 @@ def make_senses(body: Body, names: Sequence[str], cfg: SensesCfg, world: World) 
     Raises:
         ValueError: If a name is not registered, or no sense is left.
     """
-    unknown = sorted(set(names) - set(_REGISTRY))
-    if unknown:
-        raise ValueError(f"unknown senses {unknown}; registered are {list_senses()}")
     settings = {name: cfg.of(name) for name in names}
-    senses = {
-        name: _REGISTRY[name].make(own, body, world)
-        for name, own in settings.items()
-        if own.present
-    }
+    senses = {name: SENSES[name](own, body, world) for name, own in settings.items() if own.present}
     if names and not senses:
         raise ValueError(f"no sense is left: at least one of {list(names)} must be present")
     return senses
 
 
-register_sense("vision", VisionCfg, VisionSense)
-register_sense("audio", AudioCfg, AudioSense)
-register_sense("proprioception", ProprioceptionCfg, ProprioceptionSense)
-register_sense("touch", TouchCfg, TouchSense)
-_BUILT_IN = frozenset(_REGISTRY)
+register_sense("vision")(VisionSense)
+register_sense("audio")(AudioSense)
+register_sense("proprioception")(ProprioceptionSense)
+register_sense("touch")(TouchSense)

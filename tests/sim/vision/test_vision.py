@@ -6,6 +6,7 @@ import os
 import pathlib
 import subprocess
 import sys
+from collections import namedtuple
 
 import numpy as np
 import pytest
@@ -16,8 +17,11 @@ from stand_in_worlds import SceneWorld
 from veca_marl.sim.geometry.primitives import Geom, Shape
 from veca_marl.sim.geometry.scene import Scene
 from veca_marl.sim.sense import check_spec
+from veca_marl.sim.vision.optics import Camera
 from veca_marl.sim.vision.sense import Eyes, VisionCfg, VisionSense
+from veca_marl.sim.vision.visibility import is_visible
 
+Target = namedtuple("Target", "object_id")
 EVERYTHING = {"depth": True, "segmentation": True}
 
 
@@ -50,6 +54,15 @@ def test_reads_what_the_specs_promise(cfg):
         assert read[name].max() <= spec.high
         assert read[name].flags.c_contiguous
     assert ("depth" in read) == cfg.depth
+
+
+def test_is_visible_uses_the_camera_of_the_default_sense(monkeypatch):
+    scene, body, used = ball_at((2.0, 0.0, 0.0)), body_before(), []
+    render = Camera.render
+    monkeypatch.setattr(Camera, "render", lambda *args: used.append(args[0]) or render(*args))
+    assert is_visible(scene, body, Target(0))
+    assert used == [eyes(VisionCfg(), body, scene).camera]
+    assert VisionCfg(width=100, fov_deg=30.0).camera() == Camera(100, 84, 30.0)
 
 
 def test_quality_does_not_change_the_specs():

@@ -76,6 +76,8 @@ class ProprioceptionSense(Sense):
         parts: Where each part is in the vector.
     """
 
+    cfg_type = ProprioceptionCfg
+
     def __init__(self, cfg: ProprioceptionCfg, body: Body, world: World) -> None:
         super().__init__(world)
         self._body, self._world = body, world

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from enum import Enum
 from typing import Any
@@ -85,6 +86,8 @@ class AudioSense(Sense):
         waveform: ``(2, step_samples)`` float32 sound pressure of this step, on request.
     """
 
+    cfg_type = AudioCfg
+
     def __init__(self, cfg: AudioCfg, body: Body, world: World) -> None:
         super().__init__(world)
         field = world.sound
@@ -94,7 +97,10 @@ class AudioSense(Sense):
         in_head = (ears - head.position) @ head.rotation
         self._centre = in_head.mean(axis=0)
         left, right = in_head - self._centre
-        self._listener = field.add_listener(_spatialisation(cfg, left, right, field.sample_rate_hz))
+        self._listener = field.add_listener(
+            _spatialisation(cfg, left, right, field.sample_rate_hz),
+            memory_steps=math.ceil(WINDOW_SAMPLES / field.step_samples),
+        )
         self._window = _window(cfg.window)
         self._noise_power = _noise_power(cfg.noise_floor_db, self._window)
         self._recent = np.zeros((2, max(WINDOW_SAMPLES, field.step_samples)), np.float32)
@@ -113,14 +119,26 @@ class AudioSense(Sense):
         """See `Sense`."""
         head = self._body.mount("head")
         centre = Pose(head.position + head.rotation @ self._centre, head.rotation)
+        if self._listener.missed_steps:
+            self._rejoin(centre)
         heard = self._listener.render(centre)
-        n = self._step_samples
-        self._recent[:, :-n] = self._recent[:, n:]
-        self._recent[:, -n:] = heard
+        self._append(heard)
         observation = {"audio": self._observe()}
         if "waveform" in self.specs:
             observation["waveform"] = heard
         return observation
+
+    def _rejoin(self, head: Pose) -> None:
+        """Fill the window with the steps that were not read, as far as they reach into it."""
+        in_window = math.ceil(WINDOW_SAMPLES / self._step_samples)
+        self._append(self._listener.rejoin(head, min(self._listener.missed_steps, in_window)))
+
+    def _append(self, heard: NDArray[np.float32]) -> None:
+        """Move the window on by what was heard, the newest sample last."""
+        n, size = heard.shape[1], self._recent.shape[1]
+        if n < size:
+            self._recent[:, :-n] = self._recent[:, n:]
+        self._recent[:, -n:] = heard[:, -size:]
 
     def _observe(self) -> NDArray[np.float32]:
         return log_spectrum(self._recent[:, -WINDOW_SAMPLES:] * self._window, self._noise_power)

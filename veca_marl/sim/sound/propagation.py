@@ -155,6 +155,31 @@ class Path:
         self._place(head)
         return True
 
+    def rejoin(self, head: Pose, age_samples: int) -> bool:
+        """Recompute the state after steps that were left out.
+
+        The block becomes what it would be if source, head and walls had always been as they are
+        now: exact where nothing moved meanwhile.
+
+        Args:
+            head: As in `advance`.
+            age_samples: How long before the present the block shall end, at least 1.
+
+        Returns:
+            Whether there is anything to be heard in the block.
+        """
+        self.reset()
+        past = self.source.past(age_samples)
+        if not past.any():
+            return False
+        self._write_response(*self._surroundings.arrivals(self.source.position, head))
+        self.response_before = self.response
+        read_delayed(past, self._delay, self._delay, kernel_bank(), self.block)
+        heard = np.flatnonzero(self.block)
+        if heard.size:
+            self._quiet_samples = self.block.size - 1 - int(heard[-1])
+        return bool(heard.size)
+
     def _place(self, head: Pose) -> None:
         arrivals, gains = self._surroundings.arrivals(self.source.position, head)
         before = self._delay

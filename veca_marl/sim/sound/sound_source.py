@@ -16,7 +16,6 @@ class Source:
         name: Unique in its field.
         sound: What it emits; may be exchanged at any time.
         muted: Whether its sound passes unheard. The sound goes on meanwhile.
-        history: ``(H,)`` float32, what it emitted lately, newest sample last.
         jumps: How often it was teleported.
     """
 
@@ -24,9 +23,10 @@ class Source:
         self.name = name
         self.sound = sound
         self.muted = False
-        self.history: NDArray[np.float32] = np.zeros(history_samples, np.float32)
         self.jumps = 0
         self._position: Floats = np.zeros(3)
+        self._history_samples = history_samples
+        self._memory: NDArray[np.float32] = np.zeros(history_samples, np.float32)
         self._silent_samples = history_samples
 
     @property
@@ -50,15 +50,38 @@ class Source:
         self.jumps += 1
 
     @property
+    def history(self) -> NDArray[np.float32]:
+        """``(H,)`` what it emitted last, newest sample last: as much as one step is heard from."""
+        return self._memory[-self._history_samples :]
+
+    @property
     def audible(self) -> bool:
-        """Whether any of its history is other than exactly zero."""
-        return self._silent_samples < self.history.size
+        """Whether any sample of its history is other than exactly zero."""
+        return self._silent_samples < self._history_samples
+
+    def keep(self, memory_samples: int) -> None:
+        """Remember at least so many samples from now on; what was emitted before counts as silence.
+
+        Only listeners that left out steps need more than `history`, see `past`.
+        """
+        added = memory_samples - self._memory.size
+        if added > 0:
+            self._memory = np.concatenate((np.zeros(added, np.float32), self._memory))
+            self._silent_samples += added if not self.audible else 0
+
+    def past(self, age_samples: int) -> NDArray[np.float32]:
+        """Return all that is remembered except the newest samples, a view.
+
+        Args:
+            age_samples: How many of the newest samples to leave out, at least 1.
+        """
+        return self._memory[:-age_samples]
 
     def reset(self, rng: np.random.Generator) -> None:
         """Forget what was emitted and begin the sound anew."""
-        if self.audible:
-            self.history[:] = 0.0
-        self._silent_samples = self.history.size
+        if self._silent_samples < self._memory.size:
+            self._memory[:] = 0.0
+        self._silent_samples = self._memory.size
         self.sound.reset(rng)
 
     def advance(self, n_samples: int) -> None:
@@ -69,11 +92,11 @@ class Source:
                 f"source {self.name!r}: the sound emitted {emitted.shape}, not ({n_samples},)"
             )
         if self.muted or not emitted.any():
-            if not self.audible:
+            if self._silent_samples >= self._memory.size:
                 return
             emitted = np.zeros(n_samples, np.float32)
             self._silent_samples += n_samples
         else:
             self._silent_samples = 0
-        self.history[:-n_samples] = self.history[n_samples:]
-        self.history[-n_samples:] = emitted
+        self._memory[:-n_samples] = self._memory[n_samples:]
+        self._memory[-n_samples:] = emitted

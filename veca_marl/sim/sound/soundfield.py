@@ -70,6 +70,7 @@ class SoundField:
             reach_m = min(reach_m, float(np.linalg.norm(room.size)))
         longest_delay = int(np.ceil(reach_m * sample_rate_hz / SPEED_OF_SOUND_MPS))
         self._history_samples = longest_delay + step_samples + 2 * KERNEL_TAPS
+        self._memory_samples = self._history_samples
 
     def add_source(self, name: str, sound: Sound) -> Source:
         """Add a source at the origin; set its `position` before every step.
@@ -79,8 +80,10 @@ class SoundField:
         """
         if name in self.sources:
             raise ValueError(f"a source {name!r} exists already; sources: {sorted(self.sources)}")
-        self.sources[name] = Source(name, sound, self._history_samples)
-        return self.sources[name]
+        source = Source(name, sound, self._history_samples)
+        source.keep(self._memory_samples)
+        self.sources[name] = source
+        return source
 
     def remove(self, source: Source) -> None:
         """Take a source out, and what is still under way from it."""
@@ -90,10 +93,20 @@ class SoundField:
         for listener in self._listeners:
             listener.forget(source)
 
-    def add_listener(self, spatialisation: Receiver) -> Listener:
-        """Add a pair of ears with a quality of its own."""
-        listener = Listener(self, self._surroundings, spatialisation)
+    def add_listener(self, spatialisation: Receiver, memory_steps: int = 1) -> Listener:
+        """Add a pair of ears with a quality of its own.
+
+        Args:
+            spatialisation: How sound that arrives at the head becomes two signals.
+            memory_steps: How many earlier steps `Listener.rejoin` can return.
+        """
+        listener = Listener(self, self._surroundings, spatialisation, memory_steps)
         self._listeners.append(listener)
+        heard_from = self._history_samples + listener.block_samples
+        needed = heard_from + memory_steps * self.step_samples
+        self._memory_samples = max(self._memory_samples, needed)
+        for source in self.sources.values():
+            source.keep(self._memory_samples)
         return listener
 
     def reset(self, rng: np.random.Generator) -> None:
@@ -115,9 +128,14 @@ class Listener:
     """One pair of ears. Made by `SoundField.add_listener`."""
 
     def __init__(
-        self, field: SoundField, surroundings: Surroundings, spatialisation: Receiver
+        self,
+        field: SoundField,
+        surroundings: Surroundings,
+        spatialisation: Receiver,
+        memory_steps: int = 1,
     ) -> None:
         self._field = field
+        self._memory_steps = memory_steps
         self._surroundings = surroundings
         self._spatialisation = spatialisation
         n = field.step_samples
@@ -137,6 +155,41 @@ class Listener:
     def forget(self, source: Source) -> None:
         """Drop what is under way from a source."""
         self._paths.pop(source.name, None)
+
+    @property
+    def block_samples(self) -> int:
+        """How many samples of a delayed source are filtered at once."""
+        return self._stream.block_samples
+
+    @property
+    def missed_steps(self) -> int:
+        """How many control steps before the present one were not rendered."""
+        return max(self._field.clock - self._clock - 1, 0)
+
+    def rejoin(self, head: Pose, n_steps: int = 1) -> NDArray[np.float32]:
+        """Make up for steps that were not rendered; `render` then goes on with the present one.
+
+        What was emitted meanwhile is heard as if head, sources and walls had been where they are
+        now. That is exact where nothing moved; what moved lacks its Doppler shift in those steps.
+
+        Args:
+            head: See `render`.
+            n_steps: How many steps to return, at most the `memory_steps` of `add_listener`.
+
+        Returns:
+            ``(2, n_steps * step_samples)`` sound pressure of the steps before the present one.
+
+        Raises:
+            ValueError: If so many steps are not remembered.
+        """
+        if not 1 <= n_steps <= self._memory_steps:
+            raise ValueError(f"n_steps={n_steps} must be from 1 to {self._memory_steps}")
+        n, heard = self._field.step_samples, []
+        for age in range(n_steps, 0, -1):
+            audible = [path for path in self._all_paths() if path.rejoin(head, age * n)]
+            heard.append(self._mix(audible) if audible else np.zeros((2, n), np.float32))
+        self._clock = self._field.clock - 1
+        return np.concatenate(heard, axis=1)
 
     def render(self, head: Pose) -> NDArray[np.float32]:
         """Hear one control step. Call once after each `SoundField.advance`.
@@ -158,8 +211,8 @@ class Listener:
             return silence
         if self._field.clock != self._clock + 1:
             raise RuntimeError(
-                f"a listener hears every control step once: it heard step {self._clock}, "
-                f"the field is at step {self._field.clock}; reset a listener that pauses"
+                f"a listener renders every control step once: it rendered step {self._clock}, the "
+                f"field is at step {self._field.clock}; call rejoin() after steps left out"
             )
         self._clock = self._field.clock
         heard = [path for path in self._all_paths() if path.advance(head)]

@@ -69,6 +69,8 @@ class TouchSense(Sense):
             Exactly 0 where nothing touches.
     """
 
+    cfg_type = TouchCfg
+
     def __init__(self, cfg: TouchCfg, body: Body, world: World) -> None:
         super().__init__(world)
         self._scene = world.scene

@@ -58,12 +58,16 @@ class VisionCfg:
     segmentation: bool = False
 
     def __post_init__(self) -> None:
-        Camera(self.width, self.height, self.fov_deg)
+        self.camera()
         if not isinstance(self.eyes, Eyes):
             raise ValueError(f"eyes {self.eyes!r}: want one of {[eyes.name for eyes in Eyes]}")
         if self.blur_deg < 0.0:
             raise ValueError(f"blur_deg {self.blur_deg}: want 0 (none) or a positive angle")
         chosen_filters(self)
+
+    def camera(self) -> Camera:
+        """Return the camera of either eye."""
+        return Camera(self.width, self.height, self.fov_deg)
 
 
 def chosen_filters(cfg: VisionCfg) -> list[Filter]:
@@ -91,9 +95,11 @@ class VisionSense(Sense):
         filters: Applied to the images in this order.
     """
 
+    cfg_type = VisionCfg
+
     def __init__(self, cfg: VisionCfg, body: Body, world: World) -> None:
         super().__init__(world)
-        self.camera = Camera(cfg.width, cfg.height, cfg.fov_deg)
+        self.camera = cfg.camera()
         self.filters = chosen_filters(cfg)
         self.specs = _specs(cfg, self.camera)
         self._mounts = ("eye_left", "eye_right")[: 1 if cfg.eyes is Eyes.monocular else 2]

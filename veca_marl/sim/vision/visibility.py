@@ -1,4 +1,4 @@
-"""Whether an eye of a body sees a prop or another body."""
+"""Whether an eye of a body sees a prop or another body, independent of its sense of vision."""
 
 from __future__ import annotations
 
@@ -8,10 +8,15 @@ from veca_marl.sim.body.base import Body
 from veca_marl.sim.body.mounts import EYES
 from veca_marl.sim.geometry.scene import Scene
 from veca_marl.sim.vision.optics import Camera, seen_fraction
+from veca_marl.sim.vision.sense import VisionCfg
 
 
 class Visible(Protocol):
-    """What eyes can look for: a prop or a body."""
+    """What `is_visible` can look for: a prop or a body.
+
+    Attributes:
+        object_id: Its id in the scene.
+    """
 
     object_id: int
 
@@ -23,20 +28,21 @@ def is_visible(
     eye: str = "eye_left",
     camera: Camera | None = None,
 ) -> bool:
-    """Say whether an eye sees a thing, also through glass (the paper's `isVisible`).
+    """Return whether a pixel of an eye shows a thing, also through glass (the paper's `isVisible`).
 
     Args:
-        scene: Where both are.
-        body: The body that looks; its own head and neck do not hide anything.
+        scene: The scene of both, as of its last `update`.
+        body: The body whose eye it is; its own head and neck hide nothing.
         thing: A prop or a body.
         eye: ``eye_left`` or ``eye_right``.
-        camera: The eye's optics; None is as sharp as the default vision sense.
+        camera: The camera of the eye; None is that of `VisionCfg` with its defaults.
 
     Raises:
         ValueError: If there is no such eye.
     """
     if eye not in EYES:
-        raise ValueError(f"no eye {eye!r}; there are {list(EYES)}")
+        raise ValueError(f"no eye {eye!r}; choices: {list(EYES)}")
     own_head = scene.hidden(body.object_id, body.own_head_frames)
-    views = (camera or Camera()).render(scene, [body.mount(eye)], own_head)
+    camera = VisionCfg().camera() if camera is None else camera
+    views = camera.render(scene, [body.mount(eye)], own_head)
     return seen_fraction(views, thing.object_id) > 0.0
