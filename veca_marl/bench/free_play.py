@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from veca_marl.envs.core.scoring import cosine, flat
+from veca_marl.envs.core.scoring import cosine, horizontal
 from veca_marl.envs.core.task import TASKS, Player, Task, TaskCfg, Team, find_task, terms
 from veca_marl.sim.physics.props import PropCfg, PropShape
 from veca_marl.sim.sound.sounds import SoundCfg, SoundKind
@@ -54,7 +54,7 @@ class FreePlay(Task):
 
     def reward(self, player: Player) -> dict[str, float]:
         """See `Task`."""
-        way = flat(self.ball.position - player.body.position)
+        way = horizontal(self.ball.position - player.body.position)
         return {"approach": cosine(player.body.velocity, way)}
 
 

@@ -1,4 +1,4 @@
-"""The words rewards are written in."""
+"""Quantities that reward terms are composed of: distances, angles, shares, speeds."""
 
 from __future__ import annotations
 
@@ -10,47 +10,54 @@ from veca_marl.sim.geometry.pose import Floats
 
 
 def cosine(a: Floats, b: Floats) -> float:
-    """Return the cosine of the angle between two vectors; 0 if one of them has no length."""
+    """Return the cosine of the angle between two vectors; 0 if one of them has length 0."""
     length = norm(a) * norm(b)
     return float(a.dot(b)) / length if length > 1e-9 else 0.0
 
 
-def aside_rad(way: Floats, direction: Floats) -> float:
-    """Return the angle in [0, pi] between the horizontal parts of two vectors; 0 without length."""
-    cross = way[0] * direction[1] - way[1] * direction[0]
-    return math.atan2(abs(cross), way[:2].dot(direction[:2]))
+def horizontal_angle_rad(a: Floats, b: Floats) -> float:
+    """Return the angle in [0, pi] between the horizontal parts of two vectors.
+
+    Returns 0 if one of the horizontal parts has length 0.
+    """
+    cross = a[0] * b[1] - a[1] * b[0]
+    return math.atan2(abs(cross), a[:2].dot(b[:2]))
 
 
 def norm(vector: Floats) -> float:
-    """Return the length of a vector, to the last bit that of `np.linalg.norm`, which is slow."""
+    """Return the length of a vector: bit-equal to `np.linalg.norm`, and faster."""
     return math.sqrt(vector.dot(vector))
 
 
-def flat(vector: Floats) -> Floats:
-    """Return the horizontal part of a vector ``(3,)``."""
+def horizontal(vector: Floats) -> Floats:
+    """Return a vector ``(3,)`` with its vertical component set to 0."""
     return np.array([vector[0], vector[1], 0.0])
 
 
-def share(value: float, whole: float) -> float:
-    """Return how much of a whole is there, in [0, 1]: more than all is no better."""
+def clipped_share(value: float, whole: float) -> float:
+    """Return ``value / whole``, clipped to [0, 1]."""
     return float(min(max(value / whole, 0.0), 1.0))
 
 
-def along(way: Floats, direction: Floats, time_s: float, top_mps: float) -> float:
-    """Return the mean speed along a direction, m/s, at most `top_mps` either way.
+def clipped_speed_mps(
+    displacement: Floats, direction: Floats, time_s: float, top_mps: float
+) -> float:
+    """Return the mean speed along a direction, clipped to [-top_mps, top_mps].
 
-    Of the way covered, not of a velocity at one moment: a trembling body has that for nothing.
+    It is computed from a displacement, not from a velocity at one moment, so that a body that
+    oscillates on the spot has no speed.
 
     Args:
-        way: ``(3,)`` metres covered.
-        direction: ``(3,)`` of unit length; a shorter one counts less.
-        time_s: In this time.
-        top_mps: To be faster is no better.
+        displacement: ``(3,)`` metres.
+        direction: ``(3,)``, of length 1; a shorter vector scales the result.
+        time_s: Time of the displacement.
+        top_mps: Limit of the magnitude.
     """
-    return float(min(max(way @ direction / time_s, -top_mps), top_mps))
+    speed_mps = float(displacement @ direction) / time_s
+    return min(max(speed_mps, -top_mps), top_mps)
 
 
-def angle_between_rad(a: Floats, b: Floats) -> float:
-    """Return the angle of the turn that takes one orientation ``(3, 3)`` to another, in [0, pi]."""
-    cosine_of_turn = (float(np.vdot(a, b)) - 1.0) / 2.0
-    return math.acos(min(max(cosine_of_turn, -1.0), 1.0))
+def rotation_angle_rad(a: Floats, b: Floats) -> float:
+    """Return the angle in [0, pi] of the rotation between two orientations ``(3, 3)``."""
+    cosine_of_angle = (float(np.vdot(a, b)) - 1.0) / 2.0
+    return math.acos(min(max(cosine_of_angle, -1.0), 1.0))

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veca_marl.envs.core.expert import Expert, register_expert
-from veca_marl.envs.core.scoring import flat
+from veca_marl.envs.core.scoring import horizontal
 from veca_marl.envs.core.task import Player
 from veca_marl.envs.experts.skills.carrying import Carrier
 from veca_marl.envs.experts.skills.lifting import BENT, UPRIGHT, lift
@@ -74,5 +74,5 @@ class MoveToTargetExpert(Expert[MoveToTarget]):
     def _goal(self) -> Floats:
         """Return the centre of a toy that lies on the mark, ``(3,)`` metres."""
         height = np.array([0.0, 0.0, self.task.cfg.edge_m / 2])
-        goal: Floats = flat(self.task.mark.position) + height
+        goal: Floats = horizontal(self.task.mark.position) + height
         return goal

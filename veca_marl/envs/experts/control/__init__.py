@@ -1,1 +1,1 @@
-"""Controllers that experts share: gaits, key poses, inverse kinematics."""
+"""Controllers that experts share: locomotion, path following, key poses, inverse kinematics."""

@@ -1,4 +1,4 @@
-"""Both palms to points in the world: inverse kinematics of the arms by damped least squares."""
+"""Inverse kinematics of both arms by damped least squares."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from veca_marl.sim.geometry.pose import Floats
 
 _SIDES = ("l", "r")
 _ARM = ("upper_arm", "forearm", "hand")
-_PALM = 0.042  # from the wrist along the hand: near the fingers, where no forearm is in the way
-_THICKNESS = 0.0095  # from the middle of the hand to the skin of the palm
+_PALM_M = 0.042  # from the wrist along the hand; near the fingers, clear of the forearm
+_THICKNESS_M = 0.0095  # from the middle of the hand to the skin of the palm
 _INWARD = np.array([[0.0, -1.0, 0.0], [0.0, 1.0, 0.0]])  # normals of the palms, hand frames
-_NUDGE_RAD = 1e-4
+_DIFFERENCE_RAD = 1e-4  # step of the finite differences
 _DAMPING = 0.03
-_FASTEST_RAD = 0.12  # of a joint, per call: what is far away is approached, not jumped to
-_TURN_M = 0.06  # a direction that is wrong by 1 rad counts as a palm that is so far off
+_MAX_CHANGE_RAD = 0.12  # of a joint angle per call
+_DIRECTION_M = 0.06  # weight of an error of direction, metres per radian
 
 
 class Palms(NamedTuple):
-    """Where both palms are, left first.
+    """Poses of both palms, left first.
 
     Attributes:
         points: ``(2, 3)`` metres: on the skin of each palm, near the fingers, world frame.
@@ -36,10 +36,10 @@ class Palms(NamedTuple):
 
 
 class ArmKinematics:
-    """The arms of a body.
+    """Forward and inverse kinematics of the arms of a body.
 
     Args:
-        body: Whose arms.
+        body: The body.
     """
 
     def __init__(self, body: Humanoid) -> None:
@@ -58,57 +58,61 @@ class ArmKinematics:
         self._high = np.array([joint.high_rad for joint in joints])
 
     def palms(self) -> Palms:
-        """Return where the palms are."""
+        """Return the present poses of the palms."""
         return self._palms(self._body.bone_positions(), self._body.bone_rotations())
 
-    def reach(self, wish: Floats, palms: Palms, iterations: int = 4) -> Floats:
-        """Return the angles ``(82,)`` of a wish with the arms' angles replaced.
+    def reach(self, angles: Floats, palms: Palms, iterations: int = 4) -> Floats:
+        """Return joint angles ``(82,)`` rad with those of the arms replaced by a solution.
 
-        The trunk is taken as it is now; the arms start from the wish's angles.
+        The pose of the trunk is the present one. Changes are limited to 0.12 rad per joint.
 
         Args:
-            wish: ``(82,)`` rad.
-            palms: Where the palms shall come to; what cannot be reached is approached.
-            iterations: Steps of Gauss and Newton.
+            angles: ``(82,)`` rad; the solver starts from those of the arms.
+            palms: Target poses; unreachable ones are approached.
+            iterations: Number of Gauss-Newton steps.
         """
-        angles = self._body.joint_angles()
-        angles[self._joints] = wish[self._joints]
-        low = np.maximum(wish[self._joints] - _FASTEST_RAD, self._low)
-        high = np.minimum(wish[self._joints] + _FASTEST_RAD, self._high)
+        trial = self._body.joint_angles()
+        trial[self._joints] = angles[self._joints]
+        low = np.maximum(angles[self._joints] - _MAX_CHANGE_RAD, self._low)
+        high = np.minimum(angles[self._joints] + _MAX_CHANGE_RAD, self._high)
+        for _ in range(iterations):
+            change = self._gauss_newton(trial, palms)
+            trial[self._joints] = np.clip(trial[self._joints] + change, low, high)
+        reached = angles.copy()
+        reached[self._joints] = trial[self._joints]
+        return reached
+
+    def _gauss_newton(self, angles: Floats, palms: Palms) -> Floats:
+        """Return the change of the arms' angles of one damped Gauss-Newton step."""
         positions, rotations = self._body.bone_positions(), self._body.bone_rotations()
 
-        def off(trial: Floats) -> Floats:
+        def error(trial: Floats) -> Floats:
             forward_kinematics(self._skeleton, trial, positions, rotations)
             return _difference(self._palms(positions, rotations), palms)
 
-        for _ in range(iterations):
-            here = off(angles)
-            slopes = np.empty((len(here), len(self._joints)))
-            for column, joint in enumerate(self._joints):
-                nudged = angles.copy()
-                nudged[joint] += _NUDGE_RAD
-                slopes[:, column] = (off(nudged) - here) / _NUDGE_RAD
-            normal = slopes.T @ slopes + _DAMPING**2 * np.eye(len(self._joints))
-            turns = np.linalg.solve(normal, -slopes.T @ here)
-            angles[self._joints] = np.clip(angles[self._joints] + turns, low, high)
-        reached = wish.copy()
-        reached[self._joints] = angles[self._joints]
-        return reached
+        here = error(angles)
+        jacobian = np.empty((len(here), len(self._joints)))
+        for column, joint in enumerate(self._joints):
+            shifted = angles.copy()
+            shifted[joint] += _DIFFERENCE_RAD
+            jacobian[:, column] = (error(shifted) - here) / _DIFFERENCE_RAD
+        normal = jacobian.T @ jacobian + _DAMPING**2 * np.eye(len(self._joints))
+        return np.asarray(np.linalg.solve(normal, -jacobian.T @ here), np.float64)
 
     def _palms(self, positions: Floats, rotations: Floats) -> Palms:
-        turns = rotations[self._hands]
-        fingers = -turns[:, :, 2]
-        normals = np.einsum("hij,hj->hi", turns, _INWARD)
-        points = positions[self._hands] + _PALM * fingers + _THICKNESS * normals
+        hands = rotations[self._hands]
+        fingers = -hands[:, :, 2]
+        normals = np.einsum("hij,hj->hi", hands, _INWARD)
+        points = positions[self._hands] + _PALM_M * fingers + _THICKNESS_M * normals
         return Palms(points, normals, fingers)
 
 
 def _difference(palms: Palms, wanted: Palms) -> Floats:
-    """Return how far palms are from those wanted, ``(18,)`` metres."""
+    """Return the errors of palm poses, ``(18,)`` metres."""
     return np.concatenate(
         [
             (palms.points - wanted.points).ravel(),
-            _TURN_M * (palms.normals - wanted.normals).ravel(),
-            _TURN_M * (palms.fingers - wanted.fingers).ravel(),
+            _DIRECTION_M * (palms.normals - wanted.normals).ravel(),
+            _DIRECTION_M * (palms.fingers - wanted.fingers).ravel(),
         ]
     )

@@ -1,4 +1,4 @@
-"""Going through key poses: what the experts of the joint-level tasks have in common."""
+"""Rate-limited motion of all joints from one key pose to the next."""
 
 from __future__ import annotations
 
@@ -12,31 +12,31 @@ from veca_marl.sim.geometry.pose import Floats
 
 
 class KeyPoses:
-    """Leads the joints of a body from one key pose to the next, at a limited speed.
+    """Target angles that move to a key pose at a limited speed.
 
     Args:
-        body: Whose joints.
-        poses: The key poses by name; only their joint angles count.
-        step_s: Time between two wishes.
+        body: The body.
+        poses: Key poses by name; only their joint angles are used.
+        step_s: Duration of an environment step.
     """
 
     def __init__(self, body: Humanoid, poses: Mapping[str, Posture], step_s: float) -> None:
         self._body, self._step_s = body, step_s
-        self._angles = {name: body.angles_of(pose) for name, pose in poses.items()}
+        self._poses = {name: body.angles_of(pose) for name, pose in poses.items()}
         self.reset()
 
     def reset(self) -> None:
-        """Begin where the joints are."""
-        self._wish = self._body.joint_angles()
+        """Start from the present joint angles."""
+        self._targets = self._body.joint_angles()
 
     def toward(self, name: str, speed_radps: float) -> Floats:
-        """Return the ``(82,)`` angles to wish for now, on the way to a key pose.
+        """Return the target angles of the next step, ``(82,)`` rad.
 
         Args:
-            name: Of the key pose.
-            speed_radps: How fast each wished angle moves.
+            name: Name of the key pose.
+            speed_radps: Speed of each target angle.
         """
-        stride_rad = speed_radps * self._step_s
-        way = self._angles[name] - self._wish
-        self._wish = self._wish + np.clip(way, -stride_rad, stride_rad)
-        return self._wish.copy()
+        limit_rad = speed_radps * self._step_s
+        change = self._poses[name] - self._targets
+        self._targets = self._targets + np.clip(change, -limit_rad, limit_rad)
+        return self._targets.copy()

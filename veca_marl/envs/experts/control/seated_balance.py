@@ -1,4 +1,4 @@
-"""Sitting up while the arms are busy: trunk and hips bear what leans forward."""
+"""Balance of a sitting body while the arms move: gravity compensation of trunk and hips."""
 
 from __future__ import annotations
 
@@ -16,22 +16,23 @@ _TRUNK = ("spine", "chest", "neck", "head")
 _LEGS = ("thigh", "shank", "foot")
 _SIDES = ("l", "r")
 _LEANS = ("flexion", "lateral")
-_DAMPING_S = 0.03  # a trunk that sways is sent back by so much of its speed
-_GAIN = 0.03  # share of the remaining sag that is given back per call
-_NUDGE_RAD = 1e-4
+_DAMPING_S = 0.03  # damping of the trunk: change of the target angles per joint velocity
+_INTEGRAL_GAIN = 0.03  # share of the remaining error that is added to the targets per call
+_DIFFERENCE_RAD = 1e-4  # step of the finite differences
 
 
 class SeatedBalance:
-    """Holds a sitting child between two postures against the weight of trunk, head and arms.
+    """Holds a sitting body between two postures against the weight of trunk, head and arms.
 
-    Joints are springs: sent to an angle, they sag under weight. So they are sent beyond it, by as
-    much as the weight asks for and, in small steps, by what they still sag. Only forward bending is
-    corrected: correcting sideways as well makes the child roll over.
+    Joints behave as springs and deviate from their target angles under load. The targets are
+    therefore shifted by the deviation that the gravitational moments cause (feed-forward) and by
+    an integral of the remaining error (feedback). Feedback acts on forward flexion only: with
+    lateral feedback the body rolls over.
 
     Args:
-        body: Who sits.
-        upright: How it sits.
-        bent: How it bends forward.
+        body: The body that sits.
+        upright: The upright posture.
+        bent: The posture with the trunk bent forwards.
     """
 
     def __init__(self, body: Humanoid, upright: Posture, bent: Posture) -> None:
@@ -46,57 +47,64 @@ class SeatedBalance:
         self._trunk = [joint(bone, label) for label in _LEANS for bone in _TRUNK]
         self._hips = [joint(f"{side}_thigh", "flexion") for side in _SIDES]
         self._bending = [*self._trunk[: len(_TRUNK)], *self._hips]
-        self._given = np.zeros(len(self._bending))
+        self._integral = np.zeros(len(self._bending))
 
     def reset(self) -> None:
-        """Forget the sag of the last episode."""
-        self._given[:] = 0.0
+        """Clear the integral of the error."""
+        self._integral[:] = 0.0
 
-    def hold(self, wish: Floats, bend: float) -> Floats:
-        """Return a wish with the trunk's and the legs' part for one step. Call it once per step.
+    def hold(self, targets: Floats, bend: float) -> Floats:
+        """Return target angles ``(82,)`` rad with those of trunk and legs set. One call per step.
 
         Args:
-            wish: ``(82,)`` rad, with the angles of the arms.
-            bend: From 0, upright, to 1, bent.
+            targets: ``(82,)`` rad, with the target angles of the arms.
+            bend: Interpolates from 0, upright, to 1, bent.
         """
         way = self._bent - self.upright
-        held = np.where(way == 0.0, wish, self.upright + bend * way)
-        sag = (held - self._body.joint_angles())[self._bending]
-        self._given = np.clip(self._given + _GAIN * sag, -REACH_RAD, REACH_RAD)
-        held[self._bending] += self._given
-        held[[*self._trunk, *self._hips]] += self._borne()
+        held = np.where(way == 0.0, targets, self.upright + bend * way)
+        error = (held - self._body.joint_angles())[self._bending]
+        self._integral = np.clip(self._integral + _INTEGRAL_GAIN * error, -REACH_RAD, REACH_RAD)
+        held[self._bending] += self._integral
+        held[[*self._trunk, *self._hips]] += self._deflection()
         held[self._trunk] -= _DAMPING_S * self._body.joint_velocities()[self._trunk]
-        return self._eased(held)
+        return self._for_position_control(held)
 
-    def _eased(self, wish: Floats) -> Floats:
-        """Return how a body driven by angles is to be told a wish: as gently as by torques."""
+    def _for_position_control(self, targets: Floats) -> Floats:
+        """Return targets that give a position-controlled body the stiffness of torque control."""
         if self._body.cfg.action is not JointActionKind.position:
-            return wish
-        return self._body.joint_angles() + wish - self._body.foresee(wish)
+            return targets
+        return self._body.joint_angles() + targets - self._body.foresee(targets)
 
-    def _borne(self) -> Floats:
-        """Return by how much the weight bends trunk and hips, rad."""
+    def _deflection(self) -> Floats:
+        """Return the angles by which gravity deflects trunk and hips, rad."""
         angles = self._body.joint_angles()
         positions, rotations = self._body.bone_positions(), self._body.bone_rotations()
         lean_nm = self._lean_nm(positions, rotations)
         rest_j = self._energy_j(angles, positions, rotations)
         moments = []
         for joint in self._trunk:
-            angles[joint] += _NUDGE_RAD
-            moments.append((self._energy_j(angles, positions, rotations) - rest_j) / _NUDGE_RAD)
-            angles[joint] -= _NUDGE_RAD
+            angles[joint] += _DIFFERENCE_RAD
+            change_j = self._energy_j(angles, positions, rotations) - rest_j
+            moments.append(change_j / _DIFFERENCE_RAD)
+            angles[joint] -= _DIFFERENCE_RAD
         moments += [-lean_nm / len(self._hips)] * len(self._hips)
         strengths = self._body.articulation.strengths_nm[[*self._trunk, *self._hips]]
         return REACH_RAD * np.clip(np.array(moments) / strengths, -1.0, 1.0)
 
     def _energy_j(self, angles: Floats, positions: Floats, rotations: Floats) -> float:
-        """Return the potential energy of the bones in a pose, which is written to the arrays."""
+        """Return the potential energy of all bones at joint angles.
+
+        Args:
+            angles: ``(82,)`` rad.
+            positions: ``(47, 3)`` metres; overwritten, except for the pelvis.
+            rotations: ``(47, 3, 3)``; overwritten, except for the pelvis.
+        """
         forward_kinematics(self._skeleton, angles, positions, rotations)
         heights = positions[:, 2] + (rotations[:, 2] * self._centres).sum(axis=1)
         return GRAVITY_MPS2 * float(self._masses @ heights)
 
     def _lean_nm(self, positions: Floats, rotations: Floats) -> float:
-        """Return the moment with which all but the legs tips forward over the hips."""
+        """Return the forward moment of all bones except the legs about the hips, N m."""
         centres = positions + np.einsum("bij,bj->bi", rotations, self._centres)
         ahead = (centres - positions[0]) @ self._body.forward
         return GRAVITY_MPS2 * float(self._masses[self._above] @ ahead[self._above])

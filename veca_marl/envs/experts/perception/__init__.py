@@ -1,1 +1,1 @@
-"""What experts infer from observations."""
+"""What experts estimate from observations: the position of a caller."""

@@ -1,1 +1,1 @@
-"""Skills built from controllers: lifting, carrying, sitting up, soccer."""
+"""Skills that experts combine from controllers: carrying, searching, sitting up, shooting."""

@@ -1,4 +1,4 @@
-"""Taking a block between both palms and putting it somewhere else, as a script of grips."""
+"""Carrying a block between both palms, as a sequence of grips."""
 
 from __future__ import annotations
 
@@ -15,24 +15,25 @@ from veca_marl.sim.body.humanoid.postures import REACHING, REACHING_DOWN, Postur
 from veca_marl.sim.geometry.pose import Floats
 from veca_marl.sim.physics.props import Prop
 
-_SPEED_M = 0.010  # of the palms' middle, per step
-_CLOSING_M = 0.006  # of their distance, per step
-_DROOP = math.radians(20.0)  # the fingers point down by so much
+_SPEED_M = 0.010  # largest motion of the middle between the palms, per step
+_CLOSING_M = 0.006  # largest change of the distance between the palms, per step
+_FINGER_PITCH_RAD = math.radians(20.0)  # downwards
 _UP = np.array([0.0, 0.0, 1.0])
-_ABOVE = 0.10 * _UP  # the hands come and go so far above a block
+_RETREAT = 0.10 * _UP  # the hands leave a block upwards by this distance
 _SIDES = np.array([1.0, -1.0])
-_SAG_GAIN, _MOST_SAG_M = 0.03, 0.02
-_NEAR_M = 0.008
-_HIGH_M, _LOW_M = 0.10, 0.04  # heights of the palms for which it sits upright, and bends down
+_INTEGRAL_GAIN, _MAX_INTEGRAL_M = 0.03, 0.02
+_ARRIVED_M = 0.008
+_PLACED_M = 0.005
+_HIGH_M, _LOW_M = 0.10, 0.04  # heights of the palms at which the body sits upright and bent
 
 
 class Grip(NamedTuple):
-    """Where the palms shall be: on both sides of a point.
+    """Target poses of both palms, on opposite sides of a point.
 
     Attributes:
-        centre: ``(3,)`` metres.
-        gap_m: Distance of the palms.
-        yaw_rad: Turn of the line between them about the vertical; 0 has the left palm at +y.
+        centre: Middle between the palms, ``(3,)`` metres.
+        gap_m: Distance between the palms.
+        yaw_rad: Yaw of the line between them; at 0 the left palm is at +y.
     """
 
     centre: Floats
@@ -40,21 +41,21 @@ class Grip(NamedTuple):
     yaw_rad: float = 0.0
 
 
-# hands at rest, beside all that may be piled up; the child sits at the origin
+# resting place of the hands, wider than anything that is piled up; the body sits at the origin
 _HOME = Grip(np.array([0.19, 0.0, 0.11]), 0.40)
 
 
 class Carrier:
-    """The hands of a child that sits at the origin and faces x.
+    """Controller of both hands of a body that sits at the origin and faces +x.
 
     Args:
-        body: Whose hands.
-        squeeze_m: The palms press as if they wanted to come so far into the block, each.
-        carrying_m: How far the block comes in a step.
-        thumbs_m: Palms are so far above a block's middle: thumbs stay above its top.
-        clear_m: Open palms are so far away from the block, each.
-        upright: How it sits while the hands are up.
-        bent: How it sits while they are down.
+        body: The body.
+        squeeze_m: Each palm's target is this far inside the block, which sets the grip force.
+        carrying_m: Motion of a carried block per step.
+        thumbs_m: Height of the palms above the middle of a block, so that thumbs clear its top.
+        clear_m: Distance between each open palm and the block.
+        upright: Posture while the hands are up.
+        bent: Posture while the hands are down.
     """
 
     def __init__(
@@ -73,43 +74,50 @@ class Carrier:
         self.reset()
 
     def reset(self) -> None:
-        """Begin anew, from wherever the palms are."""
+        """Start from the present pose of the palms."""
         self._seat.reset()
-        self._wish = self._seat.upright.copy()
-        self._sag = np.zeros((2, 3))
+        self._targets = self._seat.upright.copy()
+        self._integral = np.zeros((2, 3))
         self._held: Grip | None = None
 
     def move(self, goal: Grip, speed_m: float = _SPEED_M) -> Floats:
-        """Return the joint angles ``(82,)`` of a step toward a grip. Call it once per step."""
+        """Return target angles ``(82,)`` rad of a motion toward a grip. One call per step.
+
+        Args:
+            goal: The grip to move to.
+            speed_m: Largest motion of the middle between the palms.
+        """
         points = self._hands.palms().points
         held = self._held or Grip(points.mean(axis=0), float(np.linalg.norm(points[0] - points[1])))
         centre = held.centre + np.clip(goal.centre - held.centre, -speed_m, speed_m)
         gap = held.gap_m + float(np.clip(goal.gap_m - held.gap_m, -_CLOSING_M, _CLOSING_M))
         self._held = Grip(centre, gap, goal.yaw_rad)
         wanted = _palms(self._held)
-        off = wanted.points - points
-        off[:] = off.mean(axis=0)  # their distance stays springy: it is what holds the block
-        self._sag = np.clip(self._sag + _SAG_GAIN * off, -_MOST_SAG_M, _MOST_SAG_M)
-        wanted = wanted._replace(points=wanted.points + self._sag)
-        self._wish = self._hands.reach(self._wish, wanted, iterations=3)
+        error = wanted.points - points
+        error[:] = error.mean(axis=0)  # none for the gap: its compliance sets the grip force
+        self._integral = np.clip(
+            self._integral + _INTEGRAL_GAIN * error, -_MAX_INTEGRAL_M, _MAX_INTEGRAL_M
+        )
+        wanted = wanted._replace(points=wanted.points + self._integral)
+        self._targets = self._hands.reach(self._targets, wanted, iterations=3)
         bend = float(np.clip((_HIGH_M - centre[2]) / (_HIGH_M - _LOW_M), 0.0, 1.0))
-        return self._seat.hold(self._wish, bend)
+        return self._seat.hold(self._targets, bend)
 
     def is_at(self, goal: Grip) -> bool:
-        """Say whether the middle of the palms has come to that of a grip."""
+        """Return whether the middle between the palms has reached that of a grip."""
         middle = self._hands.palms().points.mean(axis=0)
-        return bool(np.abs(middle - goal.centre).max() < _NEAR_M)
+        return bool(np.abs(middle - goal.centre).max() < _ARRIVED_M)
 
     def carry(
         self, block: Prop, to: Callable[[], Floats], over_m: float, above_m: float = 0.1
     ) -> Iterator[Floats]:
-        """Yield the wishes of taking a block, putting it down at a point and letting go.
+        """Yield target angles, one array per step: grip a block, put it down, release it.
 
         Args:
             block: A cube.
-            to: Returns where its centre shall come to, ``(3,)`` metres.
-            over_m: Height in which the block's centre travels.
-            above_m: The hands come from so far above the block.
+            to: Returns the target of its centre, ``(3,)`` metres.
+            over_m: Height of the block's centre while it is carried.
+            above_m: Height above the block from which the hands approach.
         """
         edge = block.cfg.size_m[0]
         wide, tight = edge + 2 * self._clear_m, edge - 2 * self._squeeze_m
@@ -129,10 +137,10 @@ class Carrier:
         here = self._hands.palms().points.mean(axis=0)
         wide += 2 * self._clear_m
         yield from self._for(Grip(here, wide, yaw), 16)
-        yield from self._until(lambda: Grip(here + _ABOVE, wide, yaw), 30)
+        yield from self._until(lambda: Grip(here + _RETREAT, wide, yaw), 30)
 
     def rest(self) -> Iterator[Floats]:
-        """Yield the wishes of bringing the hands home, round what lies about, for ever."""
+        """Yield target angles, endlessly: move the hands around objects to their resting place."""
         over = self._hands.palms().points.mean(axis=0)
         yield from self._for(Grip(over, _HOME.gap_m), 15)
         back = _HOME.centre * (1, 1, 0) + over * (0, 0, 1)
@@ -145,7 +153,7 @@ class Carrier:
         return bool(np.abs(off).max() < block.cfg.size_m[0] / 2)
 
     def _until(self, goal: Callable[[], Grip], steps: int) -> Iterator[Floats]:
-        """Move until the palms are there, or for so many steps."""
+        """Move until the palms have reached the goal, at most for a number of steps."""
         for _ in range(steps):
             yield self.move(goal())
             if self.is_at(goal()):
@@ -158,18 +166,19 @@ class Carrier:
     def _bring(
         self, block: Prop, to: Callable[[], Floats], gap_m: float, yaw_rad: float, steps: int
     ) -> Iterator[Floats]:
-        """Move the palms until the block between them is there."""
+        """Move the palms until the block between them has reached its target."""
         for _ in range(steps):
-            if not self._holds(block) or np.abs(to() - block.position).max() < 0.005:
+            if not self._holds(block) or np.abs(to() - block.position).max() < _PLACED_M:
                 return
             slip = self._hands.palms().points.mean(axis=0) - block.position
             yield self.move(Grip(to() + slip, gap_m, yaw_rad), self._carrying_m)
 
 
 def _palms(grip: Grip) -> Palms:
+    """Return the palm poses of a grip; the fingers point ahead and down."""
     c, s = math.cos(grip.yaw_rad), math.sin(grip.yaw_rad)
     across, ahead = np.array([-s, c, 0.0]), np.array([c, s, 0.0])
-    fingers = math.cos(_DROOP) * ahead - math.sin(_DROOP) * np.array([0.0, 0.0, 1.0])
+    fingers = math.cos(_FINGER_PITCH_RAD) * ahead - math.sin(_FINGER_PITCH_RAD) * _UP
     return Palms(
         points=grip.centre + np.outer(_SIDES, across) * grip.gap_m / 2,
         normals=-np.outer(_SIDES, across),
@@ -178,6 +187,6 @@ def _palms(grip: Grip) -> Palms:
 
 
 def quarter_yaw(cube: Prop) -> float:
-    """Return a cube's turn about the vertical up to quarter turns, in [-pi/4, pi/4), rad."""
+    """Return the yaw of a cube modulo a quarter turn, in [-pi/4, pi/4) rad."""
     yaw = math.atan2(cube.rotation[1, 0], cube.rotation[0, 0])
     return (yaw + math.pi / 4) % (math.pi / 2) - math.pi / 4

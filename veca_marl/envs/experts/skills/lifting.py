@@ -1,4 +1,4 @@
-"""Lifting a toy between both palms, and holding it."""
+"""Lifting a cube between both palms and holding it."""
 
 from __future__ import annotations
 
@@ -12,46 +12,50 @@ from veca_marl.sim.body.humanoid.postures import reaching
 from veca_marl.sim.geometry.pose import Floats
 from veca_marl.sim.physics.props import Prop
 
-# less bent than a child that carries: the spine bears both arms stretched out for seconds
+# less bent than for carrying, since the spine supports both extended arms for seconds
 UPRIGHT, BENT = reaching(15.0, 20.0), reaching(30.0, 20.0)
-_CLEAR_M = 0.022  # open palms are so far away from the toy, each
-_SQUEEZE_M = 0.03  # palms press as if they wanted to come so far into it, each
-_ABOVE = np.array([0.0, 0.0, 0.07])  # the hands come from so far above it
-# the palms close ahead of its middle and below: they press it toward the child and slide up
-_AT = np.array([0.02, 0.0, -0.012])
-_LIFTING_M = 0.005  # per step
-_LOST_M = 0.06  # farther from the middle of the palms it has slipped away
+_CLEARANCE_M = 0.022  # between each open palm and the cube
+_SQUEEZE_M = 0.03  # each palm's target is this far inside the cube, which sets the grip force
+_ABOVE = np.array([0.0, 0.0, 0.07])  # the hands approach from here
+# The palms close in front of the centre and below it: they press the cube toward the body and
+# slide up along it.
+_GRIP_OFFSET = np.array([0.02, 0.0, -0.012])
+_LIFT_SPEED_M = 0.005  # per step
+_LOST_M = 0.06  # distance from the middle between the palms at which the cube counts as lost
+_APPROACH_STEPS, _LOWER_STEPS, _CLOSE_STEPS, _OPEN_STEPS = 35, 30, 20, 12
 
 
 def lift(child: Humanoid, carrier: Carrier, toy: Prop, height_m: float) -> Iterator[Floats]:
-    """Yield wishes, one per step and for ever: take a toy, hold it up; if it is lost, once more.
+    """Yield target angles ``(82,)`` rad, one array per step: grip, lift and hold a cube.
+
+    The sequence never ends; it starts again when the cube is lost.
 
     Args:
-        child: Who lifts.
-        carrier: Its hands.
-        toy: A cube.
-        height_m: The palms lift it to this height.
+        child: The body that lifts.
+        carrier: Controller of its hands.
+        toy: The cube.
+        height_m: Height to which the palms lift it.
     """
     edge = float(toy.cfg.size_m[0])
-    wide, tight = edge + 2 * _CLEAR_M, edge - 2 * _SQUEEZE_M
+    wide, tight = edge + 2 * _CLEARANCE_M, edge - 2 * _SQUEEZE_M
     while True:
         yaw = quarter_yaw(toy)
-        for offset, steps in ((_ABOVE, 35), (_AT, 30)):
+        for offset, steps in ((_ABOVE, _APPROACH_STEPS), (_GRIP_OFFSET, _LOWER_STEPS)):
             for _ in range(steps):
                 goal = Grip(toy.position + offset, wide, yaw)
                 yield carrier.move(goal)
                 if carrier.is_at(goal):
                     break
-        place = toy.position + _AT
-        for _ in range(20):
+        place = toy.position + _GRIP_OFFSET
+        for _ in range(_CLOSE_STEPS):
             yield carrier.move(Grip(place, tight, yaw))
         up = np.array([place[0], place[1], height_m])
         while slip_m(child, toy) < _LOST_M:
-            yield carrier.move(Grip(up, tight, yaw), _LIFTING_M)
-        for _ in range(12):
+            yield carrier.move(Grip(up, tight, yaw), _LIFT_SPEED_M)
+        for _ in range(_OPEN_STEPS):
             yield carrier.move(Grip(child.palms().mean(axis=0), wide, yaw))
 
 
 def slip_m(child: Humanoid, toy: Prop) -> float:
-    """Return how far a toy is from the middle between the palms."""
+    """Return the distance of a cube from the middle between the palms, metres."""
     return float(np.linalg.norm(child.palms().mean(axis=0) - toy.position))

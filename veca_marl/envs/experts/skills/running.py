@@ -1,4 +1,4 @@
-"""Running as far as it goes: stepping into the fall, the trunk held up by hips and ankles."""
+"""Running: a periodic gait with feedback from the inclination of the chest."""
 
 from __future__ import annotations
 
@@ -11,13 +11,15 @@ from veca_marl.sim.body.humanoid.humanoid import Humanoid
 from veca_marl.sim.body.humanoid.joint_controls import Springs
 from veca_marl.sim.geometry.pose import Floats
 
+_ELBOW_DEG = 30.0
+
 
 @dataclass(frozen=True)
-class Stride:
-    """Numbers of the stride: angles in degrees, gains in degrees for a lean of one radian.
+class RunningPattern:
+    """Parameters of the gait: angles in degrees, gains in degrees per radian of inclination.
 
-    A lean is the horizontal part of the chest's up axis, forward or to the left. Drawn by hand,
-    then improved by a random search for the way covered before a fall.
+    Inclination is the horizontal part of the chest's up axis, forwards or to the left. The values
+    were set by hand and then improved by a random search for the distance covered before a fall.
     """
 
     frequency_hz: float = 1.88
@@ -44,68 +46,73 @@ class Stride:
 
 
 class Running:
-    """A rhythm in time, corrected by how the chest leans.
+    """Target angles of a running body.
+
+    The stance leg holds the trunk upright, the swing leg steps in the direction of the fall.
 
     Args:
-        body: Who runs.
-        step_s: Time between two wishes.
+        body: The body.
+        step_s: Duration of an environment step.
     """
 
     def __init__(self, body: Humanoid, step_s: float) -> None:
-        self._body, self._step_s, self._stride = body, step_s, Stride()
-        self._joint = {name: index for index, name in enumerate(body.joint_names)}
+        self._body, self._step_s, self._pattern = body, step_s, RunningPattern()
+        self._index = {name: index for index, name in enumerate(body.joint_names)}
         self.reset()
 
     def reset(self) -> None:
-        """Begin with the left leg, upright."""
-        self._time_s, self._lean = 0.0, np.zeros(2)
+        """Start with the left leg and the trunk upright."""
+        self._time_s, self._inclination = 0.0, np.zeros(2)
 
     def command(self) -> Springs:
-        """Return where springs shall pull the joints now."""
-        lean = self._leans()
-        rate = (lean - self._lean) / self._step_s
-        phase = 2.0 * math.pi * self._stride.frequency_hz * self._time_s
-        self._lean, self._time_s = lean, self._time_s + self._step_s
-        degrees = np.zeros(len(self._joint))
-        degrees[self._joint["spine.flexion"]] = self._stride.spine
-        sway = self._stride.sway * math.sin(phase + self._stride.sway_lead_rad)
+        """Return the target angles of the next step."""
+        inclination = self._chest_inclination()
+        rate = (inclination - self._inclination) / self._step_s
+        phase = 2.0 * math.pi * self._pattern.frequency_hz * self._time_s
+        self._inclination, self._time_s = inclination, self._time_s + self._step_s
+        degrees = np.zeros(len(self._index))
+        degrees[self._index["spine.flexion"]] = self._pattern.spine
+        sway = self._pattern.sway * math.sin(phase + self._pattern.sway_lead_rad)
         for side, shift, left in (("l_", 0.0, 1.0), ("r_", math.pi, -1.0)):
-            lift = max(0.0, math.cos(phase + shift + self._stride.lift_lead_rad))
-            limbs = self._leg(phase + shift, lift, lean[0], rate[0])
+            lift = max(0.0, math.cos(phase + shift + self._pattern.lift_lead_rad))
+            limbs = self._leg(phase + shift, lift, inclination[0], rate[0])
             limbs |= self._arm(phase + shift)
-            limbs["thigh.abduction"] = left * sway + self._aside(
-                lift, left * lean[1], left * rate[1]
+            limbs["thigh.abduction"] = left * sway + self._abduction(
+                lift, left * inclination[1], left * rate[1]
             )
             for name, angle in limbs.items():
-                degrees[self._joint[side + name]] = angle
+                degrees[self._index[side + name]] = angle
         return Springs(np.radians(degrees), ahead_s=0.0)
 
-    def _leans(self) -> Floats:
+    def _chest_inclination(self) -> Floats:
+        """Return the inclination of the chest forwards and to the left, ``(2,)``."""
         up, forward = self._body.bone("chest").up, self._body.forward
         return np.array([up @ forward, up[1] * forward[0] - up[0] * forward[1]])
 
-    def _leg(self, phase: float, lift: float, lean: float, rate: float) -> dict[str, float]:
-        """The swinging leg steps further into the fall, the standing one holds the trunk up."""
-        s = self._stride
-        correction = s.hip_gain * lean + s.hip_rate_gain * rate
+    def _leg(self, phase: float, lift: float, inclination: float, rate: float) -> dict[str, float]:
+        """Return the angles of a leg in degrees, except for the abduction of the thigh."""
+        p = self._pattern
+        correction = p.hip_gain * inclination + p.hip_rate_gain * rate
         swinging = lift > 0.0
-        hip = s.hip + s.hip_swing * math.sin(phase) + s.hip_lift * lift
-        foot = s.foot + s.foot_swing * math.sin(phase)
+        hip = p.hip + p.hip_swing * math.sin(phase) + p.hip_lift * lift
+        foot = p.foot + p.foot_swing * math.sin(phase)
         return {
             "thigh.flexion": hip + (correction if swinging else -correction),
-            "shank.flexion": s.knee + s.knee_lift * lift,
-            "foot.dorsiflexion": foot - (0.0 if swinging else s.foot_gain * lean),
+            "shank.flexion": p.knee + p.knee_lift * lift,
+            "foot.dorsiflexion": foot - (0.0 if swinging else p.foot_gain * inclination),
         }
 
     def _arm(self, phase: float) -> dict[str, float]:
-        s = self._stride
+        """Return the angles of an arm in degrees."""
+        p = self._pattern
         return {
-            "upper_arm.flexion": s.arm - s.arm_swing * math.sin(phase),
-            "upper_arm.abduction": s.arm_abduction,
-            "forearm.flexion": 30.0,
+            "upper_arm.flexion": p.arm - p.arm_swing * math.sin(phase),
+            "upper_arm.abduction": p.arm_abduction,
+            "forearm.flexion": _ELBOW_DEG,
         }
 
-    def _aside(self, lift: float, lean: float, rate: float) -> float:
-        """Step aside into a fall to the leg's side, and push the trunk back with the other."""
-        correction = self._stride.abduction_gain * lean + self._stride.abduction_rate_gain * rate
-        return self._stride.abduction + (correction if lift > 0.0 else -correction)
+    def _abduction(self, lift: float, inclination: float, rate: float) -> float:
+        """Return the lateral correction of a hip in degrees; positive is to the leg's own side."""
+        p = self._pattern
+        correction = p.abduction_gain * inclination + p.abduction_rate_gain * rate
+        return p.abduction + (correction if lift > 0.0 else -correction)

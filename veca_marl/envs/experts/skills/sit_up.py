@@ -1,6 +1,6 @@
-"""Coming to sit on the heels, as children do: over the belly, up on the hands, back.
+"""Sitting up from the back: turn to the belly, push up on the hands, sit back on the heels.
 
-A sit-up from the back was searched for in vain: trunk and head weigh more than the legs.
+A random search found no sit-up straight from the back, since trunk and head outweigh the legs.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from veca_marl.sim.body.humanoid.humanoid import Humanoid
 from veca_marl.sim.body.humanoid.joint_controls import Springs
 from veca_marl.sim.body.humanoid.postures import Posture
 
-# Drawn by hand, then improved by a random search, as those of `turn_over`.
+# set by hand, then improved by a random search, as those of `turn_over`
 _POSES = {
     # on the belly: hands beside the shoulders, knees bent
     "prepare": Posture(
@@ -28,7 +28,7 @@ _POSES = {
             "foot.dorsiflexion": -44,
         }
     ),
-    # arms stretch, knees come under the hips
+    # arms extended, knees under the hips
     "push": Posture(
         joints_deg={
             "upper_arm.flexion": 79,
@@ -44,7 +44,7 @@ _POSES = {
             "foot.dorsiflexion": -43,
         }
     ),
-    # hips onto the heels, leaning on straight arms, head up
+    # hips on the heels, supported by straight arms, head up
     "sit": Posture(
         joints_deg={
             "upper_arm.flexion": 52,
@@ -62,51 +62,52 @@ _POSES = {
     ),
 }
 _SPEEDS_RADPS = {"prepare": 10.0, "push": 10.0, "sit": 4.0}
-_PATIENCE_S = {"lie": 0.4, "prepare": 0.3, "push": 1.1, "sit": 2.0}
-_AFTER = {"lie": "prepare", "prepare": "push", "push": "sit"}
-_ON_BELLY = 0.7  # cosine of the chest with down
-_SUNK_M = 0.17  # height of the top of the chest of who did not make it
+_DURATION_S = {"lie": 0.4, "prepare": 0.3, "push": 1.1, "sit": 2.0}
+_NEXT_STAGE = {"lie": "prepare", "prepare": "push", "push": "sit"}
+_ON_BELLY = 0.7  # cosine of the angle between the front of the chest and straight down
+_FAILED_M = 0.17  # below this height of the top of the chest the attempt has failed
 
 
 class SitUp:
-    """Turns over, prepares, pushes, sits; begins again if it falls.
+    """Target angles of a body that sits up, in stages; it starts again after a failed attempt.
 
     Args:
-        body: Who sits up.
-        step_s: Time between two wishes.
+        body: The body.
+        step_s: Duration of an environment step.
     """
 
     def __init__(self, body: Humanoid, step_s: float) -> None:
         self._body, self._step_s = body, step_s
         self._turn = TurnOver(body, step_s)
-        self._way = KeyPoses(body, _POSES, step_s)
+        self._key_poses = KeyPoses(body, _POSES, step_s)
+        self._stage, self._elapsed_s = "lie", 0.0
         self.reset()
 
     def reset(self) -> None:
-        """Begin with turning over."""
+        """Start with turning over."""
         self._begin("lie")
         self._turn.reset()
 
     def command(self) -> Springs:
-        """Return where springs shall pull the joints now."""
-        self._since_s += self._step_s
+        """Return the target angles of the next step."""
+        self._elapsed_s += self._step_s
         if self._stage == "lie":
             if not self._body.bone("chest").forward[2] < -_ON_BELLY:
-                self._since_s = 0.0
-            wish = self._turn.command()
+                self._elapsed_s = 0.0
+            targets = self._turn.command()
         else:
-            wish = self._way.toward(self._stage, _SPEEDS_RADPS[self._stage])
-        self._go_on()
-        return Springs(wish, ahead_s=0.0)
+            targets = self._key_poses.toward(self._stage, _SPEEDS_RADPS[self._stage])
+        self._advance_stage()
+        return Springs(targets, ahead_s=0.0)
 
-    def _go_on(self) -> None:
-        late = self._since_s >= _PATIENCE_S[self._stage]
-        if late and self._stage in _AFTER:
-            self._begin(_AFTER[self._stage])
-        elif late and self._body.bone("neck").position[2] < _SUNK_M:
+    def _advance_stage(self) -> None:
+        late = self._elapsed_s >= _DURATION_S[self._stage]
+        if late and self._stage in _NEXT_STAGE:
+            self._begin(_NEXT_STAGE[self._stage])
+        elif late and self._body.bone("neck").position[2] < _FAILED_M:
             self.reset()
 
     def _begin(self, stage: str) -> None:
-        self._stage, self._since_s = stage, 0.0
+        self._stage, self._elapsed_s = stage, 0.0
         if stage == "prepare":
-            self._way.reset()
+            self._key_poses.reset()

@@ -7,10 +7,10 @@ from veca_marl.sim.body.humanoid.humanoid import Humanoid
 from veca_marl.sim.body.humanoid.postures import ON_BACK, Posture
 from veca_marl.sim.geometry.pose import Floats
 
-# Drawn by hand, then improved by a random search over the angles for the returns of TurnBaby, with
-# torques and with position targets.
+# set by hand, then improved by a random search for the return of TurnBaby, with torque control
+# and with position control
 _POSES = {
-    # legs up and crossed, trunk bent: the weight goes over the left side
+    # legs raised and crossed, trunk bent: the centre of mass moves over the left side
     "swing": Posture(
         joints_deg={
             "l_upper_arm.flexion": 170,
@@ -31,7 +31,7 @@ _POSES = {
             "neck.flexion": 45,
         }
     ),
-    # on the side: stretch, and reach across with the right arm
+    # on the side: extend, and reach across with the right arm
     "over": Posture(
         joints_deg={
             "l_upper_arm.flexion": 140,
@@ -67,42 +67,44 @@ _POSES = {
     "rest": ON_BACK,
 }
 _SPEED_RADPS = 9.0
-_ON_SIDE, _NEARLY_OVER, _FALLEN_BACK = -0.2, 0.55, -0.5  # cosines of the trunk with down
-_PATIENCE_S, _REST_S = 2.0, 0.5
+# cosines of the angle between the front of the trunk and straight down
+_ON_SIDE, _NEARLY_OVER, _FALLEN_BACK = -0.2, 0.55, -0.5
+_SWING_S, _REST_S = 2.0, 0.5  # longest swing, rest after it
 
 
 class TurnOver:
-    """Swings over the side, stretches, lies; tries again if it falls back.
+    """Target angles of a body that turns over; it starts again after falling back.
 
     Args:
-        body: Who turns.
-        step_s: Time between two wishes.
+        body: The body.
+        step_s: Duration of an environment step.
     """
 
     def __init__(self, body: Humanoid, step_s: float) -> None:
         self._body, self._step_s = body, step_s
-        self._way = KeyPoses(body, _POSES, step_s)
+        self._key_poses = KeyPoses(body, _POSES, step_s)
         self.reset()
 
     def reset(self) -> None:
-        """Begin with a swing."""
-        self._way.reset()
-        self._pose, self._since_s = "swing", 0.0
+        """Start with a swing."""
+        self._key_poses.reset()
+        self._pose, self._elapsed_s = "swing", 0.0
 
     def command(self) -> Floats:
-        """Return the ``(82,)`` joint angles to go to now."""
-        chosen = self._next()
-        self._since_s = self._since_s + self._step_s if chosen == self._pose else 0.0
+        """Return the target angles of the next step, ``(82,)`` rad."""
+        chosen = self._choose()
+        self._elapsed_s = self._elapsed_s + self._step_s if chosen == self._pose else 0.0
         self._pose = chosen
-        return self._way.toward(chosen, _SPEED_RADPS)
+        return self._key_poses.toward(chosen, _SPEED_RADPS)
 
-    def _next(self) -> str:
+    def _choose(self) -> str:
+        """Return the name of the key pose to move to."""
         down = -self._body.bone("chest").forward[2] - self._body.bone("pelvis").forward[2]
-        down, late = down / 2.0, self._since_s > _PATIENCE_S
+        down, late = down / 2.0, self._elapsed_s > _SWING_S
         if self._pose == "swing":
             return "over" if down > _ON_SIDE else "rest" if late else "swing"
         if self._pose == "rest":
-            return "swing" if self._since_s > _REST_S else "rest"
+            return "swing" if self._elapsed_s > _REST_S else "rest"
         if down < _FALLEN_BACK:
             return "swing"
         return "lie" if down > _NEARLY_OVER else self._pose

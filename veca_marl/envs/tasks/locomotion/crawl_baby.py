@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from veca_marl.envs.core.scoring import along
+from veca_marl.envs.core.scoring import clipped_speed_mps
 from veca_marl.envs.core.task import Player, Task, humanoid, register, terms
 from veca_marl.envs.tasks.locomotion.moving import StartCfg, start_near_edge
 from veca_marl.sim.body.humanoid.postures import ON_ALL_FOURS
@@ -66,7 +66,7 @@ class CrawlBaby(Task):
     def reward(self, player: Player) -> dict[str, float]:
         step_s, top_mps = self.world.clock.step_s, self.cfg.top_mps
         return {
-            "forward": along(self._way, self.body.forward, step_s, top_mps),
+            "forward": clipped_speed_mps(self._way, self.body.forward, step_s, top_mps),
             "torso": -float(self.body.bone("chest").forward[2]),
             "hip": -float(self.body.bone("pelvis").forward[2]),
         }

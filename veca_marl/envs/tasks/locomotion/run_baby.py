@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from veca_marl.envs.core.scoring import along, flat
+from veca_marl.envs.core.scoring import clipped_speed_mps, horizontal
 from veca_marl.envs.core.task import Player, Task, humanoid, register, terms
 from veca_marl.envs.tasks.locomotion.moving import StartCfg, start_near_edge
 from veca_marl.sim.body.humanoid.postures import STANDING
@@ -67,8 +67,12 @@ class RunBaby(Task):
         self._way, self._place = place - self._place, place
 
     def reward(self, player: Player) -> dict[str, float]:
-        ahead = flat(self.body.bone("chest").forward)
-        return {"forward": along(self._way, ahead, self.world.clock.step_s, self.cfg.top_mps)}
+        ahead = horizontal(self.body.bone("chest").forward)
+        return {
+            "forward": clipped_speed_mps(
+                self._way, ahead, self.world.clock.step_s, self.cfg.top_mps
+            )
+        }
 
     def terminated(self) -> bool:
         return bool(self.body.bone("neck").position[2] < self.cfg.fallen_m)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from veca_marl.envs.core.scoring import share
+from veca_marl.envs.core.scoring import clipped_share
 from veca_marl.envs.core.task import Player, Task, humanoid, register, terms
 from veca_marl.envs.tasks.locomotion.moving import StartCfg, draw_posture, start_anywhere
 
@@ -68,6 +68,6 @@ class SitBaby(Task):
 
     def reward(self, player: Player) -> dict[str, float]:
         return {
-            "torso": share(self.body.bone("neck").position[2], self.cfg.torso_m),
-            "head": share(self.body.mount("head").position[2], self.cfg.head_m),
+            "torso": clipped_share(self.body.bone("neck").position[2], self.cfg.torso_m),
+            "head": clipped_share(self.body.mount("head").position[2], self.cfg.head_m),
         }

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from veca_marl.envs.core.scoring import aside_rad
+from veca_marl.envs.core.scoring import horizontal_angle_rad
 from veca_marl.envs.core.task import Player, Task, TaskCfg, terms
 from veca_marl.envs.tasks.multi_agent.contests import line_up, look_ahead
 from veca_marl.envs.tasks.multi_agent.pitch import POST_M, Pitch
@@ -156,7 +156,7 @@ class Soccer(Task):
             ball,
             math.dist(ball[:2], self.goal[:2]),
             math.hypot(way[0], way[1]),
-            aside_rad(way, attacker.forward),
+            horizontal_angle_rad(way, attacker.forward),
         )
 
     def _kick(self) -> None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from veca_marl.envs.core.scoring import cosine, flat, norm
+from veca_marl.envs.core.scoring import cosine, horizontal, norm
 from veca_marl.envs.core.task import Player, Task, TaskCfg, register, terms, walker
 from veca_marl.sim.physics.props import PropCfg, PropShape
 from veca_marl.sim.sound.sounds import SoundCfg, SoundKind
@@ -101,7 +101,7 @@ class KickTheBall(Task):
             self._kicked, self._left_s = True, self.cfg.rest_s
 
     def reward(self, player: Player) -> dict[str, float]:
-        way, velocity = flat(self.ball.position - player.body.position), player.body.velocity
+        way, velocity = horizontal(self.ball.position - player.body.position), player.body.velocity
         walks = norm(velocity) >= self.cfg.walking_mps
         approach = cosine(velocity, way) if walks else 0.0
         return {"kick": float(self._scored), "approach": approach}

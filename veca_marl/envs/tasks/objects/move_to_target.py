@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from veca_marl.envs.core.scoring import flat
+from veca_marl.envs.core.scoring import horizontal
 from veca_marl.envs.core.task import Player, Task, humanoid, register, terms
 from veca_marl.envs.tasks.objects.grasping import ToyCfg, add_toy, lay_down
 from veca_marl.sim.body.humanoid.postures import REACHING
@@ -81,7 +81,7 @@ class MoveToTarget(Task):
         self.child.place((0.0, 0.0, 0.0), 0.0, REACHING)
         lay_down(self.toy, self.cfg, rng)
         way = rng.choice((-1.0, 1.0)) * rng.uniform(*self.cfg.way_m)
-        self.mark.place(flat(self.toy.position) + np.array([0.0, way, _THIN_M / 2]))
+        self.mark.place(horizontal(self.toy.position) + np.array([0.0, way, _THIN_M / 2]))
         self.child.look_toward_point(self.toy.position)
         self._counted_m, self._progress_m = self.distance_m, 0.0
 
@@ -97,7 +97,7 @@ class MoveToTarget(Task):
     @property
     def distance_m(self) -> float:
         """How far the toy is from the mark, along the floor."""
-        return float(np.linalg.norm(flat(self.toy.position - self.mark.position)))
+        return float(np.linalg.norm(horizontal(self.toy.position - self.mark.position)))
 
     @property
     def solved(self) -> bool:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from veca_marl.envs.core.scoring import angle_between_rad
+from veca_marl.envs.core.scoring import rotation_angle_rad
 from veca_marl.envs.core.task import Player, Task, TaskCfg, humanoid, register, terms
 from veca_marl.sim.body.humanoid.postures import OFFERING
 from veca_marl.sim.geometry.rotations import turn_about_vertical
@@ -113,7 +113,7 @@ class RotateCube(Task):
     @property
     def angle_rad(self) -> float:
         """The angle between the cube and its target."""
-        return angle_between_rad(self.cube.rotation, self.target)
+        return rotation_angle_rad(self.cube.rotation, self.target)
 
     @property
     def on_hand(self) -> bool:
