@@ -38,7 +38,7 @@ class Knockout(Task):
     def after_step(self, rng):
         self.steps += 1
 
-    def is_out(self, player):
+    def is_eliminated(self, player):
         return self.steps >= self.last[player.name]
 
     def reward(self, player):

@@ -185,7 +185,7 @@ class Game:
         self.steps += 1
         terms = {player.name: self._terms(player) for player in self.players}
         if self.task.eliminates:
-            self.out |= {player.name for player in self.players if self.task.is_out(player)}
+            self.out |= {player.name for player in self.players if self.task.is_eliminated(player)}
         terminated = self.task.terminated() or len(self.out) == len(self.players)
         truncated = self.steps >= self.max_steps or self._fell_apart()
         return Outcome(terms, terminated, truncated, self.out)

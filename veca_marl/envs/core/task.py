@@ -1,11 +1,11 @@
-"""What a task is: who plays, what lies on the floor, how it starts, what pays, when it ends."""
+"""Tasks: teams and players, the base class of all rules, and the registry of tasks."""
 
 from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
-from typing import Any, ClassVar, NamedTuple, get_type_hints
+from typing import Any, ClassVar, NamedTuple, TypeVar, get_type_hints
 
 import numpy as np
 
@@ -15,16 +15,18 @@ from veca_marl.sim.body.humanoid.humanoid import Humanoid
 from veca_marl.sim.body.walker.walker import Walker
 from veca_marl.sim.physics.world import World
 
+TaskType = TypeVar("TaskType", bound="type[Task]")
+
 
 class Team(NamedTuple):
-    """Players that share specs and a policy: one team is one TorchRL group.
+    """Players that share specs and a policy; a team is one TorchRL group.
 
     Attributes:
-        name: Unique in its task.
-        size: How many play.
-        senses: What they perceive by; None is what the task names for everyone.
-        shirt: Number of their shirts' colour (blue, red, green, yellow); None is the team's own
-            number, from 0 on.
+        name: Name of the team, unique in its task.
+        size: Number of players.
+        senses: Senses of its players; None takes those of the task.
+        shirt: Index of the colour of the shirts (blue, red, green, yellow); None takes the index
+            of the team.
     """
 
     name: str
@@ -34,18 +36,18 @@ class Team(NamedTuple):
 
 
 class Player(NamedTuple):
-    """One body on one team."""
+    """One body in one team."""
 
     name: str
     team: str
     body: Body
 
 
-def walker(player: Player) -> Walker:
-    """Return a player's body where a task needs one that walks and kicks.
+def require_walker(player: Player) -> Walker:
+    """Return the body of a player, for a task that needs one that walks and kicks.
 
     Raises:
-        ValueError: If it is moved by its joints.
+        ValueError: If the body is of another kind.
     """
     if not isinstance(player.body, Walker):
         raise ValueError(
@@ -54,11 +56,11 @@ def walker(player: Player) -> Walker:
     return player.body
 
 
-def humanoid(player: Player) -> Humanoid:
-    """Return a player's body where a task needs one that is moved by its joints.
+def require_humanoid(player: Player) -> Humanoid:
+    """Return the body of a player, for a task that needs one that is controlled by its joints.
 
     Raises:
-        ValueError: If it is not.
+        ValueError: If the body is of another kind.
     """
     if not isinstance(player.body, Humanoid):
         raise ValueError(
@@ -69,18 +71,18 @@ def humanoid(player: Player) -> Humanoid:
 
 
 def terms(**weights: float) -> Any:
-    """Declare the reward terms of a task and what each is worth."""
+    """Declare the reward terms of a task with the default weight of each."""
     return field(default_factory=lambda: dict(weights))
 
 
 @dataclass
 class TaskCfg:
-    """What every task can be told from the command line.
+    """Parameters that all tasks have.
 
     Attributes:
-        name: The task's class name.
-        max_seconds: Episodes are truncated after so many simulated seconds.
-        weights: What each reward term is worth, by name.
+        name: Class name of the task.
+        max_seconds: Simulated time after which an episode is truncated.
+        weights: Weight of each reward term by its name; the reward is the weighted sum.
     """
 
     name: str = ""
@@ -88,29 +90,45 @@ class TaskCfg:
     weights: dict[str, float] = terms()
 
     def __post_init__(self) -> None:
-        """An episode needs a length, a weight needs a value."""
+        """Check the values.
+
+        Raises:
+            ValueError: If the duration is not positive or a weight is not finite.
+        """
         self._check_positive("max_seconds")
         bad = {name: value for name, value in self.weights.items() if not math.isfinite(value)}
         if bad:
             raise ValueError(f"task.weights: {bad} must be finite numbers")
 
     def _check_positive(self, *names: str) -> None:
-        """Refuse numbers of these names that are zero, negative or not finite."""
+        """Raise `ValueError` if a field is zero, negative or not finite."""
         for name in names:
             value = getattr(self, name)
             if not 0.0 < value < math.inf:
                 raise ValueError(f"task.{name}={value} must be a positive number")
 
+    def _check_span(self, name: str, lowest: float, condition: str) -> None:
+        """Raise `ValueError` if a field is no pair (least, greatest) of at least `lowest`."""
+        least, greatest = getattr(self, name)
+        if not lowest <= least <= greatest < math.inf:
+            raise ValueError(
+                f"task.{name}={(least, greatest)} must be (least, greatest), {condition}"
+            )
+
 
 class Task(ABC):
     """The rules of one game.
 
-    A task never touches torch and never looks up a link: it asks the bodies and the props.
+    A task reads and places bodies and props through their public methods. It does not use torch,
+    Bullet or indices of links.
 
     Attributes:
-        teams: Who plays, see also `teams_of`.
-        senses: What the players perceive by.
-        eliminates: Whether single players may be out while others play on, see `is_out`.
+        teams: The teams, see also `teams_of`.
+        senses: Senses of the players.
+        eliminates: Whether the game can end for single players, see `is_eliminated`.
+        cfg: Parameters of the task. Subclasses annotate it with their own dataclass.
+        world: The world.
+        players: All players, team by team.
     """
 
     teams: ClassVar[tuple[Team, ...]] = (Team("agents"),)
@@ -119,53 +137,58 @@ class Task(ABC):
     cfg: TaskCfg
 
     def __init__(self, cfg: TaskCfg, world: World, players: list[Player]) -> None:
-        """Take the players into the world and build the rest."""
+        """Store the arguments and build the props.
+
+        Raises:
+            ValueError: If the names of the weights are not those of the reward terms.
+        """
         known = set(type(self).cfg_type()().weights)
         if set(cfg.weights) != known:
             raise ValueError(
                 f"task.weights has the terms {sorted(cfg.weights)}; "
-                f"{type(self).__name__} pays {sorted(known)}"
+                f"{type(self).__name__} has {sorted(known)}"
             )
         self.cfg, self.world, self.players = cfg, world, players
         self.build()
 
     @abstractmethod
     def build(self) -> None:
-        """Put the things of this task into the world. Called once."""
+        """Add the props of this task to the world. Called once per world."""
 
     @abstractmethod
     def reset(self, rng: np.random.Generator) -> None:
-        """Put everything in its starting place. Called at every episode."""
+        """Place bodies and props for an episode. Called at the start of each episode."""
 
-    def before_step(self, rng: np.random.Generator) -> None:  # noqa: B027  not every task acts
-        """Change the world, after the players chose and before the physics moves."""
+    def before_step(self, rng: np.random.Generator) -> None:  # noqa: B027  optional
+        """Change the world after the actions have been set and before the physics is simulated."""
 
-    def after_step(self, rng: np.random.Generator) -> None:  # noqa: B027  not every task counts
-        """Keep the score, after the physics moved and before anyone is paid."""
+    def after_step(self, rng: np.random.Generator) -> None:  # noqa: B027  optional
+        """Update the score after the physics has been simulated and before `reward` is called."""
 
     @abstractmethod
     def reward(self, player: Player) -> dict[str, float]:
-        """Return the terms of one player, unweighted, named as in `cfg.weights`."""
+        """Return the unweighted reward terms of one player, named as in `TaskCfg.weights`."""
 
     def terminated(self) -> bool:
-        """Say whether the game is over for everyone."""
+        """Return whether the game has ended by its rules for all players."""
         return False
 
-    def is_out(self, player: Player) -> bool:
-        """Say whether the game is over for one player, for a task that `eliminates`.
+    def is_eliminated(self, player: Player) -> bool:
+        """Return whether the game has ended for one player, in a task that `eliminates`.
 
-        Who is out stays out until the next episode: it rests, perceives zeros and is paid nothing.
+        From then until the end of the episode the player rests, its observation is zero and its
+        reward is zero.
         """
         return False
 
     @classmethod
     def teams_of(cls, cfg: Any) -> tuple[Team, ...]:
-        """Return who plays; for a task whose numbers of players are in its configuration."""
+        """Return the teams; overridden where their sizes depend on the configuration."""
         return cls.teams
 
     @classmethod
     def cfg_type(cls) -> type[TaskCfg]:
-        """Return the class this task declares for `cfg`."""
+        """Return the class with which this task annotates `cfg`."""
         hint: type[TaskCfg] = get_type_hints(cls)["cfg"]
         return hint
 
@@ -173,8 +196,8 @@ class Task(ABC):
 TASKS: Registry[type[Task]] = Registry("task")
 
 
-def register(task: type[Task]) -> type[Task]:
-    """Register a task by its class name.
+def register(task: TaskType) -> TaskType:
+    """Register a task by its class name; a class decorator.
 
     Raises:
         ValueError: If another task has this name.
@@ -184,5 +207,9 @@ def register(task: type[Task]) -> type[Task]:
 
 
 def find_task(name: str) -> type[Task]:
-    """Return a task by name; raise `ValueError` with the names that exist."""
+    """Return a task by its class name.
+
+    Raises:
+        ValueError: If there is none; the message lists the names.
+    """
     return TASKS.find(name)

@@ -37,7 +37,7 @@ class VecaEnv(LeanEnv):
         (team, "mask")                 (W, n) bool, in tasks that eliminate: False who is out
 
     The flags at the root say when a game is over for everyone and starts anew. A player can be out
-    before (`Task.is_out`): it stays in the batch with its flags up, its mask down, zeros for
+    before (`Task.is_eliminated`): it stays in the batch with its flags up, its mask down, zeros as
     observation and reward, and its action is not looked at.
 
     Teams that follow a script (`GameCfg.script`) are part of the world: they have no keys.

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import Any, Protocol
 
-from veca_marl.envs.core.task import Player, walker
+from veca_marl.envs.core.task import Player, require_walker
 from veca_marl.envs.experts.control.crawl_gait import CrawlGait
 from veca_marl.envs.experts.control.gait_patterns import BACK, CRAWL, KNEEL, GaitPattern
 from veca_marl.envs.experts.control.steering import bearing_rad, walk_to
@@ -190,4 +190,4 @@ def locomotion_of(player: Player, step_s: float) -> Locomotion:
     """
     if isinstance(player.body, Humanoid):
         return CrawlLocomotion(player.body, step_s)
-    return WalkerLocomotion(walker(player))
+    return WalkerLocomotion(require_walker(player))

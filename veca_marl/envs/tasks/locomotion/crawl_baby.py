@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from veca_marl.envs.core.scoring import clipped_speed_mps
-from veca_marl.envs.core.task import Player, Task, humanoid, register, terms
+from veca_marl.envs.core.task import Player, Task, register, require_humanoid, terms
 from veca_marl.envs.tasks.locomotion.moving import StartCfg, start_near_edge
 from veca_marl.sim.body.humanoid.postures import ON_ALL_FOURS
 
@@ -51,7 +51,7 @@ class CrawlBaby(Task):
     cfg: CrawlBabyCfg
 
     def build(self) -> None:
-        self.body = humanoid(self.players[0])
+        self.body = require_humanoid(self.players[0])
         self.room = self.world.playground.rooms[0]
         self._place, self._way = np.zeros(3), np.zeros(3)
 

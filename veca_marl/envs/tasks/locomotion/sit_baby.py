@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from veca_marl.envs.core.scoring import clipped_share
-from veca_marl.envs.core.task import Player, Task, humanoid, register, terms
+from veca_marl.envs.core.task import Player, Task, register, require_humanoid, terms
 from veca_marl.envs.tasks.locomotion.moving import StartCfg, draw_posture, start_anywhere
 
 
@@ -59,7 +59,7 @@ class SitBaby(Task):
     cfg: SitBabyCfg
 
     def build(self) -> None:
-        self.body = humanoid(self.players[0])
+        self.body = require_humanoid(self.players[0])
         self.room = self.world.playground.rooms[0]
 
     def reset(self, rng: np.random.Generator) -> None:

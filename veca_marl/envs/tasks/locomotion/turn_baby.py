@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from veca_marl.envs.core.task import Player, Task, humanoid, register, terms
+from veca_marl.envs.core.task import Player, Task, register, require_humanoid, terms
 from veca_marl.envs.tasks.locomotion.moving import StartCfg, face_down, start_anywhere
 from veca_marl.sim.body.humanoid.postures import ON_BACK
 
@@ -40,7 +40,7 @@ class TurnBaby(Task):
     cfg: TurnBabyCfg
 
     def build(self) -> None:
-        self.body = humanoid(self.players[0])
+        self.body = require_humanoid(self.players[0])
         self.room = self.world.playground.rooms[0]
 
     def reset(self, rng: np.random.Generator) -> None:

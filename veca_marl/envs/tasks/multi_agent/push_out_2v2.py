@@ -27,5 +27,5 @@ class PushOut2v2(PushOut):
     teams = (Team("red", 2, shirt=1), Team("blue", 2, shirt=0))
     eliminates = True
 
-    def is_out(self, player: Player) -> bool:
+    def is_eliminated(self, player: Player) -> bool:
         return player.name in self._fallen

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from veca_marl.envs.core.scoring import cosine, horizontal, norm
-from veca_marl.envs.core.task import Player, Task, TaskCfg, register, terms, walker
+from veca_marl.envs.core.task import Player, Task, TaskCfg, register, require_walker, terms
 from veca_marl.sim.physics.props import PropCfg, PropShape
 from veca_marl.sim.sound.sounds import SoundCfg, SoundKind
 
@@ -70,7 +70,7 @@ class KickTheBall(Task):
 
     def build(self) -> None:
         buzz = SoundCfg(kind=SoundKind.buzz, level=self.cfg.loudness)
-        self.kicker = walker(self.players[0])
+        self.kicker = require_walker(self.players[0])
         self.room = self.world.playground.rooms[0]
         self._kicked = self._scored = False
         self._left_s = 0.0

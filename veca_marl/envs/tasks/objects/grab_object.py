@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from veca_marl.envs.core.task import Player, Task, humanoid, register, terms
+from veca_marl.envs.core.task import Player, Task, register, require_humanoid, terms
 from veca_marl.envs.tasks.objects.grasping import (
     ToyCfg,
     add_toy,
@@ -59,7 +59,7 @@ class GrabObject(Task):
     cfg: GrabObjectCfg
 
     def build(self) -> None:
-        self.child = humanoid(self.players[0])
+        self.child = require_humanoid(self.players[0])
         self.toy = add_toy(self.world, self.cfg)
         self._held_m = self._lifted_m = self._distance_m = self._approached_m = 0.0
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from veca_marl.envs.core.scoring import horizontal
-from veca_marl.envs.core.task import Player, Task, humanoid, register, terms
+from veca_marl.envs.core.task import Player, Task, register, require_humanoid, terms
 from veca_marl.envs.tasks.objects.grasping import ToyCfg, add_toy, lay_down
 from veca_marl.sim.body.humanoid.postures import REACHING
 from veca_marl.sim.physics.props import PropCfg, PropShape
@@ -64,7 +64,7 @@ class MoveToTarget(Task):
     cfg: MoveToTargetCfg
 
     def build(self) -> None:
-        self.child = humanoid(self.players[0])
+        self.child = require_humanoid(self.players[0])
         self.toy = add_toy(self.world, self.cfg)
         self.mark = self.world.add_prop(
             PropCfg(

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from veca_marl.envs.core.task import Player, Task, humanoid, register, terms
+from veca_marl.envs.core.task import Player, Task, register, require_humanoid, terms
 from veca_marl.envs.tasks.objects.blocks import RED, BlocksCfg, add_block, height, is_free, rests_on
 from veca_marl.sim.body.humanoid.postures import REACHING
 
@@ -59,7 +59,7 @@ class PileUpBlock(Task):
     cfg: PileUpBlockCfg
 
     def build(self) -> None:
-        self.child = humanoid(self.players[0])
+        self.child = require_humanoid(self.players[0])
         self.blocks = [add_block(self.world, self.cfg, f"red_{i}", RED) for i in range(2)]
 
     def reset(self, rng: np.random.Generator) -> None:

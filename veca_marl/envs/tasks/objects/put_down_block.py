@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from veca_marl.envs.core.task import Player, Task, humanoid, register, terms
+from veca_marl.envs.core.task import Player, Task, register, require_humanoid, terms
 from veca_marl.envs.tasks.objects.blocks import (
     BLUE,
     RED,
@@ -74,7 +74,7 @@ class PutDownBlock(Task):
     cfg: PutDownBlockCfg
 
     def build(self) -> None:
-        self.child = humanoid(self.players[0])
+        self.child = require_humanoid(self.players[0])
         self.blue = [
             add_block(self.world, self.cfg, f"blue_{i}", BLUE) for i in range(self.cfg.blue)
         ]

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from veca_marl.envs.core.scoring import rotation_angle_rad
-from veca_marl.envs.core.task import Player, Task, TaskCfg, humanoid, register, terms
+from veca_marl.envs.core.task import Player, Task, TaskCfg, register, require_humanoid, terms
 from veca_marl.sim.body.humanoid.postures import OFFERING
 from veca_marl.sim.geometry.rotations import turn_about_vertical
 from veca_marl.sim.physics.props import PropCfg, PropShape
@@ -77,7 +77,7 @@ class RotateCube(Task):
     cfg: RotateCubeCfg
 
     def build(self) -> None:
-        self.child = humanoid(self.players[0])
+        self.child = require_humanoid(self.players[0])
         self.cube = self.world.add_prop(
             PropCfg(
                 name="cube",
