@@ -13,7 +13,7 @@ from docs_pages.observation_page import MEANINGS, all_specs
 from docs_pages.task_pages import task_page
 
 from veca_marl.api import list_tasks
-from veca_marl.config.conf_dir import conf_dir
+from veca_marl.conf_dir import conf_dir
 from veca_marl.envs.core.task import find_task
 from veca_marl.sim.body.anatomy.skeleton import limit_sources
 

@@ -1,28 +1,31 @@
 """Human-like agents that see, hear and feel in one world, and learn.
 
-`make` and `list_tasks` are the front door. They are imported when first used, so that the
-simulator (`veca_marl.sim`) can be used without loading torch.
+`make` returns a task for TorchRL, `gym_env` for Gymnasium, `parallel_env` for PettingZoo, and
+`list_tasks` the names that they take. They are imported at their first use, so that the simulator
+(`veca_marl.sim`) can be used without loading torch.
+
+Importing this package registers the Gymnasium ids `veca_marl/<task>-v0`.
 """
 
 from __future__ import annotations
 
-import sys
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from veca_marl.gymnasium_ids import register_when_imported
+
 if TYPE_CHECKING:
-    from veca_marl.api import list_tasks, make
+    from veca_marl.api import gym_env, list_tasks, make, parallel_env
 
 __version__ = "0.1.0"
-__all__ = ["__version__", "list_tasks", "make"]
-
-
-if sys.modules.get("gymnasium"):  # whoever loaded it finds the ids there; nobody else pays for it
-    import_module("veca_marl.envs.adapters.gymnasium_ids").register_ids()
+__all__ = ["__version__", "gym_env", "list_tasks", "make", "parallel_env"]
 
 
 def __getattr__(name: str) -> Any:
-    """Import the front door at its first use (PEP 562)."""
-    if name in ("make", "list_tasks"):
+    """Import `veca_marl.api` at the first use of one of its functions (PEP 562)."""
+    if name in __all__:
         return getattr(import_module("veca_marl.api"), name)
     raise AttributeError(f"module 'veca_marl' has no attribute {name!r}; there are {__all__}")
+
+
+register_when_imported()

@@ -9,7 +9,7 @@ from omegaconf import OmegaConf
 import veca_marl.envs.experts  # noqa: F401  registers the experts
 from docs_pages.docstrings import entries, prose
 from docs_pages.tables import field_table, table, text
-from veca_marl.config.conf_dir import conf_dir
+from veca_marl.conf_dir import conf_dir
 from veca_marl.envs.core.expert import find_expert, has_expert
 from veca_marl.envs.core.task import TASKS, Task
 

@@ -1,7 +1,7 @@
 """The typed configuration: its dataclasses, its composition and its errors of one line."""
 
+from veca_marl.conf_dir import conf_dir
 from veca_marl.config.compose import compose, compose_node, prepare, to_config
-from veca_marl.config.conf_dir import conf_dir
 from veca_marl.config.errors import ConfigError, one_line
 from veca_marl.config.root import Config, LogCfg
 

@@ -16,7 +16,7 @@ from hydra.errors import HydraException
 from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
-from veca_marl.config.conf_dir import conf_dir
+from veca_marl.conf_dir import conf_dir
 from veca_marl.config.errors import ConfigError, one_line
 from veca_marl.config.overrides import plugins_in, with_integers
 from veca_marl.config.root import Config

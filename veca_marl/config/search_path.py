@@ -8,7 +8,7 @@ from hydra.core.config_search_path import ConfigSearchPath
 from hydra.core.plugins import Plugins
 from hydra.plugins.search_path_plugin import SearchPathPlugin
 
-from veca_marl.config.conf_dir import conf_dir
+from veca_marl.conf_dir import conf_dir
 from veca_marl.plugins import PLUGINS, PluginError
 
 

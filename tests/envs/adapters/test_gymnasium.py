@@ -1,16 +1,12 @@
-"""The Gymnasium door: its ids, and what it refuses."""
-
-import importlib
-import subprocess
-import sys
+"""The Gymnasium adapter: what its ids take, and what it refuses."""
 
 import gymnasium
 import numpy as np
 import pytest
 from duels import duel
 
-import veca_marl
-from veca_marl.envs.adapters.gymnasium import VecaGymEnv, single_agent_env
+from veca_marl.api import gym_env
+from veca_marl.envs.adapters.gymnasium import VecaGymEnv
 
 ID = "veca_marl/KickTheBall-v0"
 CHEAP = {"playground": "simple", "senses": {"vision": "blind"}}
@@ -21,33 +17,6 @@ def env():
     env = gymnasium.make(ID, **CHEAP)
     yield env
     env.close()
-
-
-def test_every_task_has_an_id():
-    ids = [name for name in gymnasium.registry if name.startswith("veca_marl/")]
-    assert ids == [f"veca_marl/{task}-v0" for task in veca_marl.list_tasks()]
-
-
-def in_a_fresh_process(program):
-    asked = [sys.executable, "-W", "ignore", "-c", program]
-    return subprocess.run(asked, capture_output=True, text=True, check=True).stdout.strip()
-
-
-@pytest.mark.parametrize(
-    "imports",
-    [
-        "import gymnasium, veca_marl",
-        "import veca_marl.envs.adapters.gymnasium, gymnasium",
-    ],
-)
-def test_an_import_makes_the_ids_known(imports):
-    found = in_a_fresh_process(f"{imports}; print({ID!r} in gymnasium.registry)")
-    assert found == "True"
-
-
-def test_who_does_not_want_gymnasium_does_not_load_it():
-    program = "import sys, veca_marl, veca_marl.envs.core.game; print('gymnasium' in sys.modules)"
-    assert in_a_fresh_process(program) == "False"
 
 
 def test_the_id_takes_the_choices_of_make(env):
@@ -62,7 +31,7 @@ def test_the_id_takes_the_choices_of_make(env):
 def test_a_vector_of_envs_has_a_seed_for_each():
     envs = gymnasium.make_vec(ID, num_envs=2, **CHEAP)
     observations, _ = envs.reset(seed=3)
-    alone = single_agent_env("KickTheBall", **CHEAP)
+    alone = gym_env("KickTheBall", **CHEAP)
     for index in range(2):
         seen, _ = alone.reset(seed=3 + index)
         np.testing.assert_array_equal(observations["audio"][index], seen["audio"])
@@ -70,7 +39,7 @@ def test_a_vector_of_envs_has_a_seed_for_each():
     envs.close()
 
 
-def test_gymnasiums_own_random_numbers_are_those_of_the_game(env):
+def test_np_random_is_the_generator_of_the_episode(env):
     env.reset(seed=4)
     assert env.unwrapped.np_random is env.unwrapped._played.rng
 
@@ -93,8 +62,8 @@ def test_a_wrong_action_is_answered_with_what_is_right(env):
         env.unwrapped.step(np.zeros(3, np.float32))
 
 
-def test_a_task_of_several_agents_says_which_door_to_take():
-    said = r"Duel is played by 3 agents \['red', 'blue_0', 'blue_1'\].*parallel_env\('Duel'\)"
+def test_a_task_of_several_agents_names_the_function_to_use():
+    said = r"Duel has 3 agents \['red', 'blue_0', 'blue_1'\].*parallel_env\('Duel'\)"
     with duel("senses/vision=blind") as cfg, pytest.raises(ValueError, match=said):
         VecaGymEnv(cfg)
 
@@ -102,10 +71,3 @@ def test_a_task_of_several_agents_says_which_door_to_take():
 def test_wrong_choices_are_answered_with_those_there_are():
     with pytest.raises(ValueError, match=r"unknown body 'bird'.*choices:.*walker"):
         gymnasium.make(ID, body="bird")
-
-
-def test_without_gymnasium_the_extra_is_named(monkeypatch):
-    monkeypatch.setitem(sys.modules, "gymnasium", None)
-    monkeypatch.delitem(sys.modules, "veca_marl.envs.adapters.gymnasium")
-    with pytest.raises(ModuleNotFoundError, match=r"pip install 'veca_marl\[gymnasium\]'"):
-        importlib.import_module("veca_marl.envs.adapters.gymnasium")

@@ -1,24 +1,15 @@
-"""A task of one agent as a Gymnasium environment; importing this module makes the ids known."""
+"""A task of one agent as a Gymnasium environment."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from typing import Any
 
+import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 
-try:
-    import gymnasium
-except ModuleNotFoundError as error:
-    raise ModuleNotFoundError(
-        "this door needs Gymnasium: pip install 'veca_marl[gymnasium]'", name=error.name
-    ) from error
-
-from veca_marl.api import choose
-from veca_marl.envs.adapters.gymnasium_ids import register_ids
 from veca_marl.envs.adapters.seeded_game import SeededGame
-from veca_marl.envs.adapters.spaces import action_space, observation_space
+from veca_marl.envs.adapters.spaces import SensesLayout, Space, action_space
 from veca_marl.envs.core.game import Observation
 from veca_marl.envs.core.game_cfg import GameCfg
 
@@ -26,20 +17,25 @@ from veca_marl.envs.core.game_cfg import GameCfg
 class VecaGymEnv(gymnasium.Env[Observation, Any]):
     """One game of one agent.
 
-    Observations are dicts with one array per sense, `info["terms"]` the unweighted reward terms by
-    name. The same seed gives the same bytes as the first world of a `VecaEnv`.
+    Observations are dicts with one array per sense; `info["terms"]` contains the unweighted reward
+    terms by name. The same seed gives the same bytes as in the first world of a `VecaEnv`.
 
     Args:
         cfg: What is played.
         seed: Used until `reset` is given one; None is fresh entropy.
         render_mode: `rgb_array` if `render` is to be called.
+        layout: Shapes of the observations.
 
     Raises:
-        ValueError: If several agents play.
+        ValueError: If the task has several agents.
     """
 
     def __init__(
-        self, cfg: GameCfg, seed: int | None = None, render_mode: str | None = None
+        self,
+        cfg: GameCfg,
+        seed: int | None = None,
+        render_mode: str | None = None,
+        layout: SensesLayout = SensesLayout.arrays,
     ) -> None:
         self._played = SeededGame(cfg, seed, render_mode)
         game = self._played.game
@@ -47,10 +43,10 @@ class VecaGymEnv(gymnasium.Env[Observation, Any]):
             self._played.close()
             raise ValueError(_too_many(cfg.task.name, self._played.names))
         (player,) = game.actors
-        self._agent = player.name
+        self._agent, self._layout = player.name, layout
         self.metadata = self._played.metadata
         self.render_mode = render_mode
-        self.observation_space = observation_space(game, player)
+        self.observation_space: Space = layout.space(game, player)
         self.action_space = action_space(player)
 
     def reset(
@@ -68,7 +64,7 @@ class VecaGymEnv(gymnasium.Env[Observation, Any]):
         observations = self._played.reset(seed, options)
         # the generator of this episode, not the one that Gymnasium would make of the same seed
         self.np_random = self._played.rng
-        return observations[self._agent], {}
+        return self._layout.arrange(observations[self._agent]), {}
 
     def step(self, action: Any) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """Play one step.
@@ -79,7 +75,7 @@ class VecaGymEnv(gymnasium.Env[Observation, Any]):
         """
         step = self._played.step({self._agent: action})
         return (
-            step.observations[self._agent],
+            self._layout.arrange(step.observations[self._agent]),
             step.rewards[self._agent],
             step.terminated[self._agent],
             step.truncated,
@@ -95,42 +91,8 @@ class VecaGymEnv(gymnasium.Env[Observation, Any]):
         self._played.close()
 
 
-def single_agent_env(
-    task: str,
-    *,
-    playground: str | None = None,
-    body: str | None = None,
-    senses: Mapping[str, str] | None = None,
-    seed: int | None = None,
-    overrides: Sequence[str] = (),
-    render_mode: str | None = None,
-) -> VecaGymEnv:
-    """Make a task of one agent: what `gymnasium.make("veca_marl/<task>-v0", ...)` calls.
-
-    The choices are those of `veca_marl.make`.
-
-    Args:
-        task: One of `veca_marl.list_tasks`.
-        playground: A file of `conf/playground`; None is the task's own.
-        body: A file of `conf/body`.
-        senses: Sense to preset, a file of `conf/senses/<sense>`.
-        seed: Used until `reset` is given one; None is fresh entropy.
-        overrides: Anything else the command line takes.
-        render_mode: `rgb_array` if `render` is to be called.
-
-    Raises:
-        ConfigError: If there is no such choice; the message lists those there are.
-        ValueError: If the task is one for several agents, or a number is impossible.
-    """
-    cfg = choose(task, playground=playground, body=body, senses=senses, overrides=overrides)
-    return VecaGymEnv(cfg, seed, render_mode)
-
-
 def _too_many(task: str, names: list[str]) -> str:
     return (
-        f"{task} is played by {len(names)} agents {names} and Gymnasium knows one; "
-        f"use veca_marl.envs.adapters.pettingzoo.parallel_env({task!r})"
+        f"{task} has {len(names)} agents {names}, and a Gymnasium environment has one; "
+        f"use veca_marl.parallel_env({task!r})"
     )
-
-
-register_ids()

@@ -2,22 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from pettingzoo import ParallelEnv
 
-try:
-    from pettingzoo import ParallelEnv
-except ModuleNotFoundError as error:
-    raise ModuleNotFoundError(
-        "this door needs PettingZoo: pip install 'veca_marl[pettingzoo]'", name=error.name
-    ) from error
-
-from veca_marl.api import choose
 from veca_marl.envs.adapters.seeded_game import SeededGame
-from veca_marl.envs.adapters.spaces import Space, action_space, observation_space
+from veca_marl.envs.adapters.spaces import SensesLayout, Space, action_space
 from veca_marl.envs.core.game import Observation
 from veca_marl.envs.core.game_cfg import GameCfg
 
@@ -25,10 +18,10 @@ Infos = dict[str, dict[str, Any]]
 
 
 class VecaParallelEnv(ParallelEnv[str, Observation, Any]):
-    """One game; the agents are its players. Who is out is no longer in `agents`.
+    """One game; the agents are its players. An eliminated player is no longer in `agents`.
 
-    Observations are dicts with one array per sense, `infos[agent]["terms"]` the unweighted reward
-    terms by name. The same seed gives the same bytes as the first world of a `VecaEnv`.
+    Observations are dicts with one array per sense; `infos[agent]["terms"]` contains the unweighted
+    reward terms by name. The same seed gives the same bytes as in the first world of a `VecaEnv`.
 
     Args:
         cfg: What is played.
@@ -45,7 +38,7 @@ class VecaParallelEnv(ParallelEnv[str, Observation, Any]):
         self.render_mode = render_mode
         self.possible_agents = list(self._played.names)
         self.agents: list[str] = []
-        self.observation_spaces = {p.name: observation_space(game, p) for p in game.actors}
+        self.observation_spaces = {p.name: SensesLayout.arrays.space(game, p) for p in game.actors}
         self.action_spaces = {p.name: action_space(p) for p in game.actors}
 
     def observation_space(self, agent: str) -> Space:
@@ -84,7 +77,7 @@ class VecaParallelEnv(ParallelEnv[str, Observation, Any]):
 
         Raises:
             RuntimeError: If no episode is running.
-            ValueError: If an action is missing, impossible, or for an agent who is not there.
+            ValueError: If an action is missing, invalid, or for an unknown agent.
         """
         step = self._played.step(actions)
         names = self.agents
@@ -105,32 +98,3 @@ class VecaParallelEnv(ParallelEnv[str, Observation, Any]):
         """Give the world's resources back."""
         self._played.close()
         self.agents = []
-
-
-def parallel_env(
-    task: str,
-    *,
-    playground: str | None = None,
-    body: str | None = None,
-    senses: Mapping[str, str] | None = None,
-    seed: int | None = None,
-    overrides: Sequence[str] = (),
-    render_mode: str | None = None,
-) -> VecaParallelEnv:
-    """Make a task as a PettingZoo environment. The choices are those of `veca_marl.make`.
-
-    Args:
-        task: One of `veca_marl.list_tasks`.
-        playground: A file of `conf/playground`; None is the task's own.
-        body: A file of `conf/body`.
-        senses: Sense to preset, a file of `conf/senses/<sense>`.
-        seed: Used until `reset` is given one; None is fresh entropy.
-        overrides: Anything else the command line takes.
-        render_mode: `rgb_array` if `render` is to be called.
-
-    Raises:
-        ConfigError: If there is no such choice; the message lists those there are.
-        ValueError: If a number is impossible.
-    """
-    cfg = choose(task, playground=playground, body=body, senses=senses, overrides=overrides)
-    return VecaParallelEnv(cfg, seed, render_mode)

@@ -1,0 +1,69 @@
+"""The tasks' ids in Gymnasium's registry."""
+
+import subprocess
+import sys
+
+import gymnasium
+import pytest
+
+import veca_marl
+from veca_marl.envs.core.task import TASKS, Task, register
+from veca_marl.gymnasium_ids import shipped_tasks
+
+ID = "veca_marl/KickTheBall-v0"
+
+
+def in_a_fresh_process(program):
+    asked = [sys.executable, "-W", "ignore", "-c", program]
+    return subprocess.run(asked, capture_output=True, text=True, check=True).stdout.strip()
+
+
+def test_every_task_has_an_id():
+    assert shipped_tasks() == veca_marl.list_tasks()
+    assert {f"veca_marl/{task}-v0" for task in shipped_tasks()} <= set(gymnasium.registry)
+
+
+@pytest.mark.parametrize(
+    "imports",
+    [
+        "import gymnasium, veca_marl",
+        "import veca_marl, gymnasium",
+        "import veca_marl, gymnasium; gymnasium.register_envs(veca_marl)",
+        "import veca_marl.sim; from gymnasium import spaces; import gymnasium",
+    ],
+)
+def test_the_ids_exist_after_both_imports(imports):
+    found = in_a_fresh_process(f"{imports}; print({ID!r} in gymnasium.registry)")
+    assert found == "True"
+
+
+def test_gymnasium_is_loaded_by_its_own_loader():
+    program = (
+        "import veca_marl, gymnasium, inspect, sys, importlib.resources as resources;"
+        "assert 'register_envs' in inspect.getsource(gymnasium);"
+        "assert resources.files('gymnasium').joinpath('py.typed').is_file();"
+        "print(type(gymnasium.__loader__).__name__, type(gymnasium.__spec__.loader).__name__)"
+    )
+    assert in_a_fresh_process(program) == "SourceFileLoader SourceFileLoader"
+
+
+def test_neither_the_package_nor_the_simulator_loads_other_libraries():
+    program = (
+        "import sys, veca_marl.sim.physics.world;"
+        "print({'gymnasium', 'pettingzoo', 'torch', 'hydra'} & set(sys.modules))"
+    )
+    assert in_a_fresh_process(program) == "set()"
+
+
+def test_a_task_that_is_registered_later_gets_an_id():
+    assert "veca_marl/LaterTask-v0" not in gymnasium.registry
+    register(type("LaterTask", (Task,), {}))
+    try:
+        assert gymnasium.spec("veca_marl/LaterTask-v0").kwargs == {"task": "LaterTask"}
+    finally:
+        del TASKS["LaterTask"], gymnasium.registry["veca_marl/LaterTask-v0"]
+
+
+def test_an_id_with_its_module_needs_no_import():
+    env = "gymnasium.make('veca_marl:veca_marl/KickTheBall-v0', disable_env_checker=True)"
+    assert in_a_fresh_process(f"import gymnasium; print({env}.spec.id)") == ID
