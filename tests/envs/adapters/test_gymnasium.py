@@ -58,7 +58,9 @@ def test_there_is_no_step_without_an_episode(env):
 
 def test_a_wrong_action_is_answered_with_what_is_right(env):
     env.reset()
-    with pytest.raises(ValueError, match=r"agents: action .* two numbers"):
+    with pytest.raises(
+        ValueError, match=r"agents: action part 'move' .* not numbers of shape \(2,\)"
+    ):
         env.unwrapped.step(np.zeros(3, np.float32))
 
 
