@@ -9,12 +9,12 @@ with `veca_marl`, and `plugins=[my_package]` on the command line or in `veca_mar
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
-from types import ModuleType
 
 from veca_marl.registry import Registry
 
@@ -31,11 +31,26 @@ class Plugin:
 
     Attributes:
         name: Dotted name of its module.
-        conf: Folder of its configuration files; None if it has none.
     """
 
     name: str
-    conf: Path | None
+
+    @property
+    def conf(self) -> Path | None:
+        """The folder of its configuration files; None if it has none.
+
+        Raises:
+            PluginError: If `CONF_DIR` of the module is not a folder.
+        """
+        module = sys.modules[self.name]
+        declared = getattr(module, "CONF_DIR", None)
+        if declared is None:
+            folders = [Path(path) / "conf" for path in getattr(module, "__path__", ())]
+            return next((folder for folder in folders if folder.is_dir()), None)
+        folder = Path(declared)
+        if not folder.is_dir():
+            raise PluginError(f"plug-in {self.name!r}: its CONF_DIR {folder} is not a folder")
+        return folder
 
 
 PLUGINS: Registry[Plugin] = Registry("plug-in")
@@ -75,23 +90,10 @@ def _load(name: str, source: str) -> None:
     if name in PLUGINS:
         return
     try:
-        module = import_module(name)
+        import_module(name)
     except Exception as error:  # whatever the package raises, the message has to name the package
         reason = " ".join(str(error).split())
         raise PluginError(
             f"plug-in {name!r} ({source}) cannot be imported: {type(error).__name__}: {reason}"
         ) from error
-    PLUGINS.add(name, Plugin(name, _conf_of(module, source)))
-
-
-def _conf_of(module: ModuleType, source: str) -> Path | None:
-    declared = getattr(module, "CONF_DIR", None)
-    if declared is not None:
-        folder = Path(declared)
-        if not folder.is_dir():
-            raise PluginError(
-                f"plug-in {module.__name__!r} ({source}): its CONF_DIR {folder} is not a folder"
-            )
-        return folder
-    folders = [Path(path) / "conf" for path in getattr(module, "__path__", ())]
-    return next((folder for folder in folders if folder.is_dir()), None)
+    PLUGINS.add(name, Plugin(name))

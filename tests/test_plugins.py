@@ -1,0 +1,125 @@
+"""A package outside this repository adds a task and a preset: by name, and by its entry point."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from veca_marl.config import ConfigError, compose
+from veca_marl.envs.core.task import TASKS
+from veca_marl.plugins import PLUGINS, load_plugins
+
+ROOT = Path(__file__).resolve().parent.parent
+EXAMPLE = ROOT / "examples" / "plugin"
+NAME = "plugins=[veca_marl_beacon]"
+BEACON = "+task=FindBeacon"
+SHORT = ["log=silent", "collect=one_process", "collect.worlds=1", "collect.steps=64"]
+SHORT += ["algo.minibatches=2", "total_frames=128", "eval.episodes=1", "task.max_seconds=1.0"]
+
+
+@pytest.fixture
+def outside(tmp_path, monkeypatch):
+    """A folder from which packages can be imported; what they register is removed afterwards."""
+    tasks, plugins, modules = set(TASKS), set(PLUGINS), set(sys.modules)
+    monkeypatch.syspath_prepend(tmp_path)
+    yield tmp_path
+    for registry, before in ((TASKS, tasks), (PLUGINS, plugins)):
+        for name in set(registry) - before:
+            del registry[name]
+    for name in set(sys.modules) - modules:
+        if name.partition(".")[0] in {path.name for path in tmp_path.iterdir()}:
+            del sys.modules[name]
+
+
+@pytest.fixture
+def example(outside):
+    (outside / "veca_marl_beacon").symlink_to(EXAMPLE / "veca_marl_beacon")
+
+
+def write_package(folder, name, text):
+    (folder / name).mkdir()
+    (folder / name / "__init__.py").write_text(text)
+
+
+def task_text(name):
+    return (
+        "from veca_marl.envs.core.task import Task, register\n"
+        f"@register\nclass {name}(Task):\n"
+        "    def build(self): ...\n"
+        "    def reset(self, rng): ...\n"
+        "    def reward(self, player): return {}\n"
+    )
+
+
+def test_a_task_without_a_file_and_a_preset_are_found(example):
+    cfg = compose([NAME, BEACON, "senses/vision=short_sighted", "task.reach_m=0.5"])
+    assert type(cfg.task).__name__ == "FindBeaconCfg"
+    assert (cfg.task.reach_m, cfg.senses.vision.blur_deg) == (0.5, 2.0)
+    assert cfg.plugins == ["veca_marl_beacon"]
+
+
+def test_an_unknown_task_lists_those_of_plugins_too(example):
+    with pytest.raises(ConfigError, match=r"FindBeacn.*did you mean FindBeacon.*KickTheBall"):
+        compose([NAME, "+task=FindBeacn"])
+
+
+def test_a_package_that_does_not_exist_is_named_with_the_reason():
+    with pytest.raises(ConfigError, match=r"plug-in 'no_such'.*No module named 'no_such'"):
+        compose(["plugins=[no_such]", "+task=KickTheBall"])
+
+
+def test_a_package_that_fails_is_named_with_the_reason(outside):
+    write_package(outside, "broken_plugin", "raise RuntimeError('no\\nlicence')")
+    with pytest.raises(ConfigError, match=r"'broken_plugin'.*RuntimeError: no licence"):
+        compose(["plugins=[broken_plugin]", "+task=KickTheBall"])
+
+
+def test_a_task_name_that_is_taken_names_both_definitions(outside):
+    write_package(outside, "rival_plugin", task_text("KickTheBall"))
+    expected = (
+        r"rival_plugin.*'KickTheBall' is defined twice: by .*kick_the_ball.* and rival_"
+    )
+    with pytest.raises(ConfigError, match=expected):
+        compose(["plugins=[rival_plugin]", "+task=KickTheBall"])
+
+
+def test_a_configuration_file_that_is_taken_names_both_files(outside):
+    write_package(outside, "copying_plugin", "")
+    (outside / "copying_plugin" / "conf" / "playground").mkdir(parents=True)
+    (outside / "copying_plugin" / "conf" / "playground" / "simple.yaml").write_text("name: mine\n")
+    with pytest.raises(ConfigError, match=r"playground/simple.yaml is defined twice.*copying_plug"):
+        compose(["plugins=[copying_plugin]", "+task=KickTheBall"])
+
+
+def test_a_declared_folder_that_is_missing_is_refused(outside):
+    write_package(outside, "folderless_plugin", "CONF_DIR = '/no/such/folder'")
+    with pytest.raises(ConfigError, match=r"folderless_plugin.*CONF_DIR /no/such/folder"):
+        compose(["plugins=[folderless_plugin]", "+task=KickTheBall"])
+
+
+def test_a_plugin_is_loaded_once(example):
+    load_plugins(["veca_marl_beacon"])
+    load_plugins(["veca_marl_beacon"])
+    assert list(PLUGINS) == ["veca_marl_beacon"]
+
+
+@pytest.fixture(scope="module")
+def installed(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("installed")
+    pip = [sys.executable, "-m", "pip", "install", "--quiet", "--no-deps", "--no-build-isolation"]
+    subprocess.run([*pip, "--target", str(folder), str(EXAMPLE)], check=True)
+    return {**os.environ, "PYTHONPATH": f"{folder}{os.pathsep}{ROOT}"}
+
+
+def run(*arguments, env, cwd):
+    command = [sys.executable, *arguments]
+    return subprocess.run(command, env=env, cwd=cwd, capture_output=True, text=True, check=False)
+
+
+def test_an_installed_plugin_trains(installed, tmp_path):
+    arguments = ["-m", "veca_marl.train", BEACON, "senses/vision=short_sighted", *SHORT]
+    done = run(*arguments, f"hydra.run.dir={tmp_path / 'run'}", env=installed, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert len((tmp_path / "run" / "metrics.csv").read_text().splitlines()) == 3
