@@ -78,9 +78,7 @@ def test_a_package_that_fails_is_named_with_the_reason(outside):
 
 def test_a_task_name_that_is_taken_names_both_definitions(outside):
     write_package(outside, "rival_plugin", task_text("KickTheBall"))
-    expected = (
-        r"rival_plugin.*'KickTheBall' is defined twice: by .*kick_the_ball.* and rival_"
-    )
+    expected = r"rival_plugin.*'KickTheBall' is defined twice: by .*kick_the_ball.* and rival_"
     with pytest.raises(ConfigError, match=expected):
         compose(["plugins=[rival_plugin]", "+task=KickTheBall"])
 
