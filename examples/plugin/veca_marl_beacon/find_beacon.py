@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from veca_marl.envs.core.scoring import flat, norm
 from veca_marl.envs.core.task import Player, Task, TaskCfg, register, terms
 from veca_marl.sim.physics.props import PropCfg, PropShape
 from veca_marl.sim.sound.sounds import SoundCfg, SoundKind
@@ -66,4 +65,5 @@ class FindBeacon(Task):
         return self.distance_m < self.cfg.reach_m
 
     def _distance(self) -> float:
-        return norm(flat(self.beacon.position - self.players[0].body.position))
+        way = self.beacon.position - self.players[0].body.position
+        return math.hypot(way[0], way[1])
