@@ -5,9 +5,10 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from veca_marl.sim.geometry.pose import Pose
-from veca_marl.sim.geometry.primitives import Geom, Shape
+from veca_marl.sim.geometry.primitives import Shape
 from veca_marl.sim.geometry.rotations import quaternions_to_matrices
 from veca_marl.sim.geometry.scene import Scene
+from veca_marl.sim.geometry.tables import Geom
 from veca_marl.sim.vision.optics import Camera, look_at
 
 EYE_SPACING_M = 0.04
@@ -50,7 +51,7 @@ def random_pose(rng):
 def ball_at(position, radius=0.1, colour=(1.0, 0.0, 0.0)):
     """A scene with one ball."""
     scene = Scene()
-    ball = scene.add_object("ball", [[Geom(Shape.SPHERE, (radius,), colour)]])
+    ball = scene.add_object("ball", [[Geom(Shape.SPHERE, (radius,), colour=colour)]])
     ball.positions[0] = position
     scene.update()
     return scene

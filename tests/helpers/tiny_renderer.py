@@ -5,6 +5,7 @@ import numpy as np
 from veca_marl.sim.geometry.primitives import Shape
 from veca_marl.sim.geometry.rotations import matrix_to_quaternion
 from veca_marl.sim.physics.bullet import pybullet
+from veca_marl.sim.physics.collision_shapes import shape_arguments
 
 
 class TinyRenderer:
@@ -40,14 +41,7 @@ class TinyRenderer:
         return np.reshape(segmentation, (camera.height, camera.width))
 
     def _add(self, geoms, g):
-        size = geoms.sizes[g].tolist()
-        rod = {"radius": size[0], "length": size[1]}
-        kind = {
-            Shape.SPHERE: {"shapeType": pybullet.GEOM_SPHERE, "radius": size[0]},
-            Shape.BOX: {"shapeType": pybullet.GEOM_BOX, "halfExtents": size},
-            Shape.CYLINDER: {"shapeType": pybullet.GEOM_CYLINDER} | rod,
-            Shape.CAPSULE: {"shapeType": pybullet.GEOM_CAPSULE} | rod,
-        }[Shape(geoms.shapes[g])]
+        kind = shape_arguments(Shape(geoms.shapes[g]), geoms.sizes[g])
         visual = pybullet.createVisualShape(**kind, physicsClientId=self.client)
         orientation = matrix_to_quaternion(geoms.rotations[g])
         return pybullet.createMultiBody(

@@ -21,6 +21,7 @@ from veca_marl.sim.geometry.scene import Scene
 from veca_marl.sim.geometry.tables import Bools
 from veca_marl.sim.hearing.sense import AudioCfg, AudioSense
 from veca_marl.sim.physics.bullet import pybullet
+from veca_marl.sim.physics.collision_shapes import shape_arguments
 from veca_marl.sim.physics.playground import PlaygroundCfg
 from veca_marl.sim.physics.props import PropCfg, PropShape
 from veca_marl.sim.physics.world import World
@@ -194,15 +195,10 @@ def _visual_mesh(client: int, scene: Scene, triangles: NDArray[np.int64]) -> int
 
 
 def _visual_shape(client: int, shape: Shape, size: Sequence[float], colour: Sequence[float]) -> int:
-    first, second, third = (float(value) for value in size)
-    words = {
-        Shape.SPHERE: {"shapeType": pybullet.GEOM_SPHERE, "radius": first},
-        Shape.BOX: {"shapeType": pybullet.GEOM_BOX, "halfExtents": [first, second, third]},
-        Shape.CYLINDER: {"shapeType": pybullet.GEOM_CYLINDER, "radius": first, "length": second},
-        Shape.CAPSULE: {"shapeType": pybullet.GEOM_CAPSULE, "radius": first, "length": second},
-    }
     rgba = [*(float(value) for value in colour), 1.0]
-    made = pybullet.createVisualShape(**words[shape], rgbaColor=rgba, physicsClientId=client)
+    made = pybullet.createVisualShape(
+        **shape_arguments(shape, size), rgbaColor=rgba, physicsClientId=client
+    )
     return int(made)
 
 

@@ -5,6 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from veca_marl.sim.body.anatomy.skeleton import Soles, forward_kinematics, load_skeleton
+from veca_marl.sim.geometry.primitives import Shape
 from veca_marl.sim.physics.bullet import pybullet
 
 SKELETON = load_skeleton()
@@ -150,12 +151,10 @@ def test_the_lowest_point_of_the_soles_is_that_of_a_dense_sample():
     for name in ("l_foot", "r_foot"):
         frame = SKELETON.bone(name)
         for part in SKELETON.bones[frame].colliders:
-            if hasattr(part, "half"):
-                points = np.array(part.centre) + np.sign(ball) * part.half
+            if part.shape is Shape.BOX:
+                points = np.array(part.offset) + np.sign(ball) * part.size
             else:
-                points = np.concatenate(
-                    [np.array(end) + part.radius * ball for end in (part.start, part.end)]
-                )
+                points = np.concatenate([end + part.radius * ball for end in part.cap_centres()])
             world = positions[frame] + points @ rotations[frame].T
             lowest = min(lowest, world[:, 2].min())
     assert Soles(SKELETON).lowest_m(positions, rotations) == pytest.approx(lowest, abs=1e-4)

@@ -7,12 +7,11 @@ import pytest
 from walking import empty_world
 
 from veca_marl.sim.body.anatomy.hulls import MARGIN_M
-from veca_marl.sim.body.anatomy.inertia import Inertia, bone_inertia, joined
-from veca_marl.sim.body.anatomy.skeleton import BoneBox, load_skeleton
+from veca_marl.sim.body.anatomy.skeleton import load_skeleton
 from veca_marl.sim.body.anatomy.skin_springs import SkinLayer, skin_layer, skin_spring
 from veca_marl.sim.body.anatomy.urdf import Build, _Writer, body_files, bone_of
 from veca_marl.sim.body.humanoid.humanoid import Detail, Humanoid, HumanoidCfg
-from veca_marl.sim.geometry.pose import Pose
+from veca_marl.sim.geometry.primitives import Shape
 from veca_marl.sim.physics.bullet import pybullet
 
 SKELETON = load_skeleton()
@@ -171,10 +170,10 @@ def reach(bone, frame, skin_m, ways):
     local = ways @ frame.rotation
     farthest = []
     for part in bone.colliders:
-        if isinstance(part, BoneBox):
-            far = local @ np.array(part.centre) + np.abs(local) @ (np.array(part.half) + skin_m)
+        if part.shape is Shape.BOX:
+            far = local @ np.array(part.offset) + np.abs(local) @ (np.array(part.size) + skin_m)
         else:
-            ends = np.stack([local @ np.array(end) for end in (part.start, part.end)])
+            ends = np.stack([local @ end for end in part.cap_centres()])
             far = ends.max(axis=0) + part.radius + skin_m
         farthest.append(far)
     return np.max(farthest, axis=0) + ways @ frame.position
@@ -211,46 +210,6 @@ def test_hulls_of_a_mitten_reach_as_far_as_what_is_in_them():
         got = (ways @ np.array(points, float).T).max(axis=1) + MARGIN_M
         # Bullet rounds the corners of boxes by its margin, by 0.73 mm at most
     np.testing.assert_allclose(got, expected, atol=8e-4, err_msg=link)
-
-
-def test_what_is_joined_weighs_as_points_do():
-    """The inertia of parts from the theorem equals that of many points from the definition."""
-    rng = np.random.default_rng(0)
-    parts, points, masses = [], [], []
-    for mass in (0.5, 2.0):
-        local, shares = rng.normal(size=(40, 3)), np.full(40, mass / 40)
-        turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
-        place = rng.normal(size=3)
-        parts.append((Pose(place, turn), _of_points(local, shares)))
-        points.append(place + local @ turn.T)
-        masses.append(shares)
-    expected = _of_points(np.concatenate(points), np.concatenate(masses))
-    whole = joined(parts)
-    assert whole.mass_kg == pytest.approx(2.5)
-    np.testing.assert_allclose(whole.centre, expected.centre, atol=1e-12)
-    np.testing.assert_allclose(whole.matrix, expected.matrix, atol=1e-12)
-
-
-def _of_points(points, masses):
-    centre = masses @ points / masses.sum()
-    away = points - centre
-    matrix = sum(
-        m * (a @ a * np.eye(3) - np.outer(a, a)) for m, a in zip(masses, away, strict=True)
-    )
-    return Inertia(masses.sum(), centre, matrix)
-
-
-def test_a_capsule_weighs_as_sand_in_its_shape():
-    bone = SKELETON.bones[SKELETON.bone("l_thigh")]
-    part, radius = bone.colliders[0], bone.colliders[0].radius + bone.skin_thickness_m
-    rng = np.random.default_rng(0)
-    low, high = np.minimum(part.start, part.end) - radius, np.maximum(part.start, part.end) + radius
-    sand = rng.uniform(low, high, (400_000, 3))
-    nearest = np.clip(sand[:, 2], part.end[2], part.start[2])
-    sand = sand[np.hypot(np.hypot(sand[:, 0], sand[:, 1]), sand[:, 2] - nearest) < radius]
-    expected = bone.mass_kg * np.cov(sand.T)
-    expected = np.trace(expected) * np.eye(3) - expected
-    np.testing.assert_allclose(bone_inertia(bone).matrix, expected, atol=0.01 * expected.max())
 
 
 def test_only_hands_feet_and_fingers_are_soft(robots):

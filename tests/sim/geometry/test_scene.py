@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from eye_scenes import random_rotations
 
-from veca_marl.sim.geometry.primitives import Geom, Shape
+from veca_marl.sim.geometry.primitives import Shape
 from veca_marl.sim.geometry.scene import Scene
+from veca_marl.sim.geometry.tables import Geom
 
 BALL = Geom(Shape.SPHERE, (0.1,))
 

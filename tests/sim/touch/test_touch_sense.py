@@ -7,8 +7,9 @@ from touching import SPREAD, Named, Stage, of_bone
 
 from veca_marl.config import compose
 from veca_marl.sim.body.walker.walker import Walker, WalkerCfg
-from veca_marl.sim.geometry.primitives import Geom, Shape
+from veca_marl.sim.geometry.primitives import Shape
 from veca_marl.sim.geometry.scene import Scene
+from veca_marl.sim.geometry.tables import Geom
 from veca_marl.sim.physics.playground import PlaygroundCfg
 from veca_marl.sim.physics.world import World
 from veca_marl.sim.sense import check_spec

@@ -1,65 +1,24 @@
 """Things darken the floor where they are near it, and only there."""
 
 import numpy as np
-import pytest
 
 from veca_marl.sim.geometry.pose import Pose
-from veca_marl.sim.geometry.primitives import Geom, Shape
+from veca_marl.sim.geometry.primitives import Shape
 from veca_marl.sim.geometry.scene import Scene
-from veca_marl.sim.vision.contact_shadows import DARKNESS, LARGEST_M, REACH_M, distance_to
+from veca_marl.sim.geometry.tables import Geom
+from veca_marl.sim.vision.contact_shadows import DARKNESS, LARGEST_M, REACH_M
 from veca_marl.sim.vision.optics import Camera
 
 DOWN = np.array([[0, 0, 1], [0, 1, 0], [-1, 0, 0.0]])
 LOW_BOX = Shape.BOX, (0.1, 0.1, 0.02)
-SIZES = {
-    Shape.SPHERE: (0.3,),
-    Shape.BOX: (0.2, 0.3, 0.4),
-    Shape.CYLINDER: (0.2, 0.5),
-    Shape.CAPSULE: (0.2, 0.5),
-}
-
-
-def surface_points(shape, size):
-    """Points all over a primitive, found by marching rays out of its middle."""
-    rng = np.random.default_rng(0)
-    ways = rng.normal(size=(200_000, 3))
-    ways /= np.linalg.norm(ways, axis=1, keepdims=True)
-    x, y, z = np.abs(ways).T
-    across = np.hypot(x, y)
-    with np.errstate(divide="ignore"):
-        if shape is Shape.SPHERE:
-            t = np.full(len(ways), size[0])
-        elif shape is Shape.BOX:
-            t = np.min(np.divide(size, np.abs(ways)), axis=1)
-        elif shape is Shape.CYLINDER:
-            t = np.minimum(size[0] / across, size[1] / 2 / z)
-        else:
-            half = size[1] / 2
-            t = size[0] / across
-            capped = t * z > half
-            cap = z * half + np.sqrt(np.maximum(size[0] ** 2 - (across * half) ** 2, 0))
-            t[capped] = cap[capped]
-    return ways * t[:, None]
-
-
-@pytest.mark.parametrize("shape", list(Shape))
-def test_distance_is_that_to_the_nearest_surface_point(shape):
-    size = np.zeros(3, np.float32)
-    size[: len(SIZES[shape])] = SIZES[shape]
-    surface = surface_points(shape, SIZES[shape])
-    for point in np.random.default_rng(1).uniform(-1, 1, (60, 3)):
-        inside = np.linalg.norm(point) < np.linalg.norm(
-            surface[np.argmax(surface @ point / np.linalg.norm(surface, axis=1))]
-        )
-        nearest = np.linalg.norm(surface - point, axis=1).min()
-        got = distance_to(int(shape), size, tuple(point))
-        assert got <= 0.0 if inside else got == pytest.approx(nearest, abs=0.006)
 
 
 def floor_brightness(bottom_m=None, shape=Shape.SPHERE, size=(0.2,)):
     """Red of the floor seen from above, beside and around a thing at some height."""
     scene = Scene()
-    scene.add_object("floor", [[Geom(Shape.BOX, (9, 9, 0.5), (1, 1, 1), offset=(0, 0, -0.5))]])
+    scene.add_object(
+        "floor", [[Geom(Shape.BOX, (9, 9, 0.5), colour=(1, 1, 1), offset=(0, 0, -0.5))]]
+    )
     if bottom_m is not None:
         half = size[0] if shape is Shape.SPHERE else size[2]
         thing = scene.add_object("thing", [[Geom(shape, size)]])

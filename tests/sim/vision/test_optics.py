@@ -5,8 +5,9 @@ import pytest
 from eye_scenes import ball_at, clutter, random_pose, small_camera
 
 from veca_marl.sim.geometry.pose import Pose
-from veca_marl.sim.geometry.primitives import Geom, Shape
+from veca_marl.sim.geometry.primitives import Shape
 from veca_marl.sim.geometry.scene import Scene
+from veca_marl.sim.geometry.tables import Geom
 from veca_marl.sim.vision.optics import Camera, look_at, seen_fraction
 
 AHEAD = Pose(np.zeros(3), np.eye(3))
@@ -122,7 +123,7 @@ def test_the_sun_is_in_the_sky():
 
 def test_checkers_have_the_asked_edge():
     scene = Scene()
-    floor = Geom(Shape.BOX, (9, 9, 0.5), (1, 1, 1), offset=(0, 0, -0.5), checker_m=0.5)
+    floor = Geom(Shape.BOX, (9, 9, 0.5), colour=(1, 1, 1), offset=(0, 0, -0.5), checker_m=0.5)
     scene.add_object("floor", [[floor]])
     scene.update()
     down = Pose(np.array([0.1, 0.1, 5.0]), np.array([[0, 0, 1], [0, 1, 0], [-1, 0, 0.0]]))
@@ -136,7 +137,9 @@ def test_checkers_have_the_asked_edge():
 def window():
     """A red ball behind a blue pane, and a second ball behind a wall."""
     scene = ball_at((3, 0, 0))
-    glass = Geom(Shape.BOX, (0.01, 1, 1), (0.0, 0.0, 1.0), offset=(1.5, 0, 0), transparent=True)
+    glass = Geom(
+        Shape.BOX, (0.01, 1, 1), colour=(0.0, 0.0, 1.0), offset=(1.5, 0, 0), transparent=True
+    )
     scene.add_object("pane", [[glass]])
     scene.update()
     return scene

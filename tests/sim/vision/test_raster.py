@@ -8,8 +8,9 @@ from eye_scenes import cast, clutter, random_pose, random_rotations, small_camer
 from tiny_renderer import TinyRenderer
 
 from veca_marl.sim.geometry.pose import Pose
-from veca_marl.sim.geometry.primitives import Geom, Shape
+from veca_marl.sim.geometry.primitives import Shape
 from veca_marl.sim.geometry.scene import Scene
+from veca_marl.sim.geometry.tables import Geom
 from veca_marl.sim.vision.optics import Camera, look_at, view_axes
 from veca_marl.sim.vision.raster import draw_geoms
 

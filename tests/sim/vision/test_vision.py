@@ -14,8 +14,9 @@ from eye_scenes import EYE_SPACING_M, FakeBody, ball_at, clutter
 from paths import HELPERS, ROOT
 from stand_in_worlds import SceneWorld
 
-from veca_marl.sim.geometry.primitives import Geom, Shape
+from veca_marl.sim.geometry.primitives import Shape
 from veca_marl.sim.geometry.scene import Scene
+from veca_marl.sim.geometry.tables import Geom
 from veca_marl.sim.sense import check_spec
 from veca_marl.sim.vision.optics import Camera
 from veca_marl.sim.vision.sense import Eyes, VisionCfg, VisionSense
@@ -132,7 +133,7 @@ def test_defocus_follows_the_bodys_focal_distance():
 def room():
     """One ball in sight, one behind a wall, one behind glass, one behind the back."""
     scene = Scene()
-    ball = Geom(Shape.SPHERE, (0.1,), (1, 0, 0))
+    ball = Geom(Shape.SPHERE, (0.1,), colour=(1, 0, 0))
     for name, position in {
         "plain": (2, 0.4, 0),
         "walled": (3, -0.6, 0),

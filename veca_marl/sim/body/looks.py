@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from veca_marl.sim.body.anatomy.skeleton import Bone, BoneBox, BoneCapsule, Skeleton
+from veca_marl.sim.body.anatomy.skeleton import Bone, Skeleton
 from veca_marl.sim.body.anatomy.skin_mesh import load_skin
 from veca_marl.sim.body.mounts import EYES, ORGANS_M
 from veca_marl.sim.geometry.meshes import Mesh
-from veca_marl.sim.geometry.primitives import Geom, Shape
-from veca_marl.sim.geometry.rotations import rotation_with_z
+from veca_marl.sim.geometry.primitives import Primitive, Shape
+from veca_marl.sim.geometry.tables import Geom
 
 SKIN = (0.93, 0.74, 0.62)
 TROUSERS = (0.25, 0.28, 0.40)
@@ -47,7 +47,7 @@ def bone_geoms(skeleton: Skeleton, shirt: tuple[float, float, float]) -> list[li
         for bone in skeleton.bones
     ]
     frames[skeleton.bone("head")] += [
-        Geom(Shape.SPHERE, (0.012,), PUPILS, offset=ORGANS_M[eye], tangible=False) for eye in EYES
+        Geom(Shape.SPHERE, (0.012,), ORGANS_M[eye], colour=PUPILS, tangible=False) for eye in EYES
     ]
     return frames
 
@@ -66,19 +66,16 @@ def _colour(bone: Bone, shirt: tuple[float, float, float]) -> tuple[float, float
     return colours.get(_CLOTHED.get(part, ""), SKIN)
 
 
-def _geom(part: BoneCapsule | BoneBox, bone: Bone, colour: tuple[float, float, float]) -> Geom:
-    skin = bone.skin_thickness_m
-    if isinstance(part, BoneBox):
-        x, y, z = (half + skin for half in part.half)
-        return Geom(Shape.BOX, (x, y, z), colour, offset=part.centre, visible=False, skin_m=skin)
-    start, end = np.array(part.start), np.array(part.end)
-    length = float(np.linalg.norm(end - start))
+def _geom(part: Primitive, bone: Bone, colour: tuple[float, float, float]) -> Geom:
+    """A primitive of a bone with its skin on."""
+    skin_m = bone.skin_thickness_m
+    whole = part.grown(skin_m)
     return Geom(
-        Shape.CAPSULE,
-        (part.radius + skin, length),
-        colour,
-        (start + end) / 2,
-        rotation_with_z((end - start) / length),
+        whole.shape,
+        whole.size,
+        whole.offset,
+        whole.rotation,
+        colour=colour,
         visible=False,
-        skin_m=skin,
+        skin_m=skin_m,
     )

@@ -12,8 +12,9 @@ import math
 
 import numpy as np
 
-from veca_marl.sim.body.anatomy.skeleton import Bone, BoneBox
+from veca_marl.sim.body.anatomy.skeleton import Bone
 from veca_marl.sim.geometry.pose import Floats, Pose
+from veca_marl.sim.geometry.primitives import Shape
 
 ORGANS_M: dict[str, tuple[float, float, float]] = {
     "head": (0.010, 0.0, 0.066),
@@ -61,9 +62,9 @@ def palm_of(hand: Bone) -> Floats:
         ValueError: If the bone has no box, which is what a hand is made of.
     """
     for part in hand.colliders:
-        if isinstance(part, BoneBox):
+        if part.shape is Shape.BOX:
             # palms face inward, the thighs of a standing body: -y on the left, +y on the right
             inward = -1.0 if hand.name.startswith("l_") else 1.0
-            x, y, z = part.centre
-            return np.array([x, y + inward * (part.half[1] + hand.skin_thickness_m), z])
+            x, y, z = part.pose.position
+            return np.array([x, y + inward * (part.size[1] + hand.skin_thickness_m), z])
     raise ValueError(f"{hand.name} is no hand: it is not made of a box")

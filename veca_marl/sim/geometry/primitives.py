@@ -1,20 +1,26 @@
-"""Primitive shapes: spheres, boxes, cylinders and capsules, on the frames of objects."""
+"""Primitive shapes: spheres, boxes, cylinders and capsules, each at a pose on a frame.
+
+Bones, props, collision shapes, drawn surfaces and obstacles are all made of these.
+"""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import IntEnum
+from typing import Self
 
 import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
+from veca_marl.sim.geometry.pose import Floats, Pose
+from veca_marl.sim.geometry.rotations import rotation_with_z
 from veca_marl.sim.geometry.vectors import single
 
 
 class Shape(IntEnum):
-    """The primitives the eyes can draw."""
+    """The kinds of primitives; compiled loops compare the numbers."""
 
     SPHERE = 0
     BOX = 1
@@ -22,7 +28,7 @@ class Shape(IntEnum):
     CAPSULE = 3
 
 
-_SIZE_WORDS = {
+SIZE_NAMES: dict[Shape, tuple[str, ...]] = {
     Shape.SPHERE: ("radius",),
     Shape.BOX: ("half x", "half y", "half z"),
     Shape.CYLINDER: ("radius", "length"),
@@ -31,55 +37,89 @@ _SIZE_WORDS = {
 
 
 @dataclass(frozen=True, eq=False)
-class Geom:
-    """One primitive on a frame.
+class Primitive:
+    """A primitive on a frame.
 
     Attributes:
         shape: What it is.
         size: Metres. Sphere ``(radius,)``; box half extents ``(x, y, z)``; cylinder and capsule
             ``(radius, length)`` along the local z axis, where the length of a capsule is the
-            distance between the centres of its caps, as in PyBullet.
-        colour: ``(red, green, blue)`` in [0, 1].
+            distance between the centres of its caps, as in PyBullet and URDF.
         offset: ``(3,)`` metres from the frame's origin to the primitive's centre.
         rotation: ``(3, 3)`` from the primitive's axes to the frame's.
-        checker_m: Edge of the checker pattern on its surface; 0 for a plain colour.
-        transparent: Tints what lies behind it and hides nothing.
-        visible: Whether eyes see it; bones under a skin only cast shadows.
-        tangible: Whether it can be touched.
-        skin_m: Thickness of the flexible skin that makes its outer layer; 0 for rigid things.
 
     Raises:
-        ValueError: If a number is not possible.
+        ValueError: If a size is not positive, the number of sizes is not that of the shape, the
+            offset is not finite or the rotation is not a rotation.
     """
 
     shape: Shape
     size: tuple[float, ...]
-    colour: tuple[float, float, float] = (0.7, 0.7, 0.7)
     offset: ArrayLike = (0.0, 0.0, 0.0)
     rotation: ArrayLike = field(default_factory=lambda: np.eye(3))
-    checker_m: float = 0.0
-    transparent: bool = False
-    visible: bool = True
-    tangible: bool = True
-    skin_m: float = 0.0
 
     def __post_init__(self) -> None:
-        words = _SIZE_WORDS[Shape(self.shape)]
-        if len(self.size) != len(words) or not all(0.0 < s < np.inf for s in self.size):
+        names = SIZE_NAMES[Shape(self.shape)]
+        if len(self.size) != len(names) or not all(0.0 < s < np.inf for s in self.size):
             raise ValueError(
-                f"{Shape(self.shape).name} size {self.size}: want positive {', '.join(words)}"
+                f"{Shape(self.shape).name} size {self.size}: must be positive {', '.join(names)}"
             )
-        if len(self.colour) != 3 or not all(0.0 <= c <= 1.0 for c in self.colour):
-            raise ValueError(f"colour {self.colour}: want three numbers in [0, 1]")
         offset, rotation = np.asarray(self.offset, float), np.asarray(self.rotation, float)
         if offset.shape != (3,) or not np.isfinite(offset).all():
-            raise ValueError(f"offset {self.offset}: want three finite metres")
+            raise ValueError(f"offset {self.offset}: must be three finite metres")
         if not _is_rotation(rotation):
-            raise ValueError(f"rotation {self.rotation}: want an orthonormal right-handed matrix")
-        if not 0.0 <= self.checker_m < np.inf:
-            raise ValueError(f"checker_m {self.checker_m}: want 0 (plain) or an edge in metres")
-        if not 0.0 <= self.skin_m < np.inf:
-            raise ValueError(f"skin_m {self.skin_m}: want 0 (rigid) or a thickness in metres")
+            raise ValueError(
+                f"rotation {self.rotation}: must be an orthonormal right-handed matrix"
+            )
+
+    @property
+    def pose(self) -> Pose:
+        """Where the primitive is on its frame."""
+        return Pose(np.asarray(self.offset, np.float64), np.asarray(self.rotation, np.float64))
+
+    @property
+    def radius(self) -> float:
+        """Metres; raises `ValueError` for a box, which has none."""
+        if self.shape is Shape.BOX:
+            raise ValueError("a box has no radius")
+        return self.size[0]
+
+    @property
+    def length(self) -> float:
+        """Metres along z: of a cylinder, or between the centres of a capsule's caps; else 0."""
+        return self.size[1] if self.shape in (Shape.CYLINDER, Shape.CAPSULE) else 0.0
+
+    def cap_centres(self) -> tuple[Floats, Floats]:
+        """Return the lower and the upper end of the axis, ``(3,)`` metres each, in the frame."""
+        centre, rotation = self.pose
+        half = 0.5 * self.length * rotation[:, 2]
+        return centre - half, centre + half
+
+    def corners(self) -> Floats:
+        """Return the corners of a box, ``(8, 3)`` metres in the frame."""
+        if self.shape is not Shape.BOX:
+            raise ValueError(f"a {self.shape.name} has no corners")
+        centre, rotation = self.pose
+        signs = np.array(np.meshgrid(*[(-1.0, 1.0)] * 3)).reshape(3, -1).T
+        corners: Floats = centre + (signs * self.size) @ rotation.T
+        return corners
+
+    def grown(self, by_m: float) -> Self:
+        """Return the same primitive with all of its surface moved outward, corners kept sharp."""
+        size = tuple(value + by_m for value in self.size)
+        if self.shape is Shape.CYLINDER:
+            size = (self.size[0] + by_m, self.size[1] + 2.0 * by_m)
+        elif self.shape is Shape.CAPSULE:
+            size = (self.size[0] + by_m, self.size[1])
+        return replace(self, size=size)
+
+
+def capsule_between(start: ArrayLike, end: ArrayLike, radius: float) -> Primitive:
+    """Return a capsule by the centres of its caps, ``(3,)`` metres each, from below to above."""
+    low, high = np.asarray(start, np.float64), np.asarray(end, np.float64)
+    length = float(np.linalg.norm(high - low))
+    turn = rotation_with_z((high - low) / length)
+    return Primitive(Shape.CAPSULE, (radius, length), (low + high) / 2.0, turn)
 
 
 def _is_rotation(matrix: NDArray[np.float64]) -> bool:
@@ -95,7 +135,7 @@ _HALF = single(0.5)
 
 @njit(cache=True, error_model="numpy")
 def bounding_radius(shape: int, size: NDArray[np.float32]) -> float:
-    """Radius of a sphere about the centre that holds the primitive."""
+    """Radius of a sphere about the centre that contains the primitive."""
     if shape == _SPHERE:
         return float(size[0])
     if shape == _BOX:

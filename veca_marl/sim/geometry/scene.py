@@ -15,12 +15,13 @@ from numpy.typing import NDArray
 
 from veca_marl.sim.geometry.meshes import Mesh, empty_meshes, with_mesh
 from veca_marl.sim.geometry.pose import Floats
-from veca_marl.sim.geometry.primitives import Geom
 from veca_marl.sim.geometry.skinning import skin
 from veca_marl.sim.geometry.tables import (
     Bools,
+    Geom,
     GeomTable,
     SurfaceTable,
+    check_colour,
     compose,
     geom_table,
     joined,
@@ -204,7 +205,6 @@ class SceneObject:
 
     def paint(self, colour: tuple[float, float, float]) -> None:
         """Give all its primitives one colour ``(red, green, blue)`` in [0, 1]."""
-        if len(colour) != 3 or not all(0.0 <= c <= 1.0 for c in colour):
-            raise ValueError(f"colour {colour}: want three numbers in [0, 1]")
+        check_colour(colour)
         self.scene.geoms.colours[self.geoms] = colour
         self.scene.version += 1

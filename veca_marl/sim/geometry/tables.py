@@ -1,8 +1,9 @@
-"""The arrays in which a scene keeps its primitives and surfaces: what compiled loops read."""
+"""The primitives and surfaces of a scene: as a dataclass, and as arrays for compiled loops."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -10,9 +11,48 @@ from numba import njit
 from numpy.typing import NDArray
 
 from veca_marl.sim.geometry.pose import Floats
-from veca_marl.sim.geometry.primitives import Geom
+from veca_marl.sim.geometry.primitives import Primitive
 
 Bools = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class Geom(Primitive):
+    """A primitive of a scene: what eyes see and skins feel of it.
+
+    Attributes:
+        colour: ``(red, green, blue)`` in [0, 1].
+        checker_m: Edge of the checker pattern on its surface; 0 for a plain colour.
+        transparent: Whether it tints what lies behind it instead of hiding it.
+        visible: Whether eyes see it. Invisible ones, such as bones under a skin, cast shadows.
+        tangible: Whether it can be touched.
+        skin_m: Thickness of the flexible skin that is its outer layer; 0 for rigid things.
+
+    Raises:
+        ValueError: If a number is out of its range; see also `Primitive`.
+    """
+
+    colour: tuple[float, float, float] = field(default=(0.7, 0.7, 0.7), kw_only=True)
+    checker_m: float = field(default=0.0, kw_only=True)
+    transparent: bool = field(default=False, kw_only=True)
+    visible: bool = field(default=True, kw_only=True)
+    tangible: bool = field(default=True, kw_only=True)
+    skin_m: float = field(default=0.0, kw_only=True)
+
+    def __post_init__(self) -> None:
+        """Check the numbers."""
+        super().__post_init__()
+        check_colour(self.colour)
+        if not 0.0 <= self.checker_m < np.inf:
+            raise ValueError(f"checker_m {self.checker_m}: must be 0 (plain) or an edge in metres")
+        if not 0.0 <= self.skin_m < np.inf:
+            raise ValueError(f"skin_m {self.skin_m}: must be 0 (rigid) or a thickness in metres")
+
+
+def check_colour(colour: Sequence[float]) -> None:
+    """Raise `ValueError` unless a colour is three numbers in [0, 1]."""
+    if len(colour) != 3 or not all(0.0 <= c <= 1.0 for c in colour):
+        raise ValueError(f"colour {colour}: must be three numbers in [0, 1]")
 
 
 class GeomTable(NamedTuple):

@@ -11,14 +11,12 @@ from typing import Any
 import numpy as np
 
 from veca_marl.sim.geometry.pose import Floats
-from veca_marl.sim.geometry.primitives import Geom, Shape
-from veca_marl.sim.geometry.rotations import (
-    matrix_to_quaternion,
-    quaternion_from_yaw,
-    quaternions_to_matrices,
-)
+from veca_marl.sim.geometry.primitives import Shape
+from veca_marl.sim.geometry.rotations import quaternion_from_yaw, quaternions_to_matrices
 from veca_marl.sim.geometry.scene import Scene
+from veca_marl.sim.geometry.tables import Geom
 from veca_marl.sim.physics.bullet import pybullet
+from veca_marl.sim.physics.collision_shapes import create_collision_shape
 from veca_marl.sim.sound.obstacles import Obstacles
 from veca_marl.sim.sound.sound_source import Source
 from veca_marl.sim.sound.sounds import SoundCfg
@@ -170,29 +168,6 @@ def _goal_geoms(size: tuple[float, ...], look: dict[str, Any]) -> tuple[Geom, ..
     return (*posts, bar)
 
 
-def collision_shape(client: int, geoms: tuple[Geom, ...]) -> int:
-    """Make PyBullet's collision shape of one or several primitives."""
-    kinds = {
-        Shape.SPHERE: pybullet.GEOM_SPHERE,
-        Shape.BOX: pybullet.GEOM_BOX,
-        Shape.CYLINDER: pybullet.GEOM_CYLINDER,
-        Shape.CAPSULE: pybullet.GEOM_CAPSULE,
-    }
-    boxes = [list(g.size) if g.shape is Shape.BOX else [0.0, 0.0, 0.0] for g in geoms]
-    shape = pybullet.createCollisionShapeArray(
-        shapeTypes=[kinds[g.shape] for g in geoms],
-        radii=[0.0 if g.shape is Shape.BOX else g.size[0] for g in geoms],
-        halfExtents=boxes,
-        lengths=[g.size[1] if g.shape in (Shape.CYLINDER, Shape.CAPSULE) else 0.0 for g in geoms],
-        collisionFramePositions=[np.asarray(g.offset).tolist() for g in geoms],
-        collisionFrameOrientations=[
-            matrix_to_quaternion(np.asarray(g.rotation)).tolist() for g in geoms
-        ],
-        physicsClientId=client,
-    )
-    return int(shape)
-
-
 class _Obstacle:
     """The box of a prop among the obstacles of the sound."""
 
@@ -234,7 +209,7 @@ class Prop:
         self.object_id = drawn.id
         self._row = drawn.rows.start
         self.body_id: int = pybullet.createMultiBody(
-            cfg.mass_kg, collision_shape(client, geoms), physicsClientId=client
+            cfg.mass_kg, create_collision_shape(client, geoms), physicsClientId=client
         )
         pybullet.changeDynamics(
             self.body_id,

@@ -8,8 +8,9 @@ from typing import Protocol
 
 import numpy as np
 
-from veca_marl.sim.geometry.primitives import Geom, Shape
+from veca_marl.sim.geometry.primitives import Shape
 from veca_marl.sim.geometry.scene import Scene
+from veca_marl.sim.geometry.tables import Geom
 from veca_marl.sim.physics.bullet import pybullet
 from veca_marl.sim.physics.playground import PlaygroundCfg
 from veca_marl.sim.physics.props import Prop, PropCfg, mirror

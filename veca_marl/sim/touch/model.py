@@ -21,7 +21,12 @@ from numba import njit
 from veca_marl.sim.body.anatomy.skeleton import Skeleton
 from veca_marl.sim.geometry.pose import Floats
 from veca_marl.sim.geometry.primitives import bounding_radius
-from veca_marl.sim.geometry.signed_distances import Slope, distance, is_within, signed_distance
+from veca_marl.sim.geometry.signed_distances import (
+    DistanceAndGradient,
+    distance,
+    distance_and_gradient,
+    is_inside,
+)
 from veca_marl.sim.geometry.tables import Bools, GeomTable
 from veca_marl.sim.geometry.vectors import Vector
 from veca_marl.sim.touch.taxels import TaxelTable
@@ -206,9 +211,11 @@ def _taxel(a: Vector, b: Vector, c: Vector, share: Vector, normal: Vector, depth
 @njit(cache=True, error_model="numpy", inline="always")
 def _reading(thing: Thing, thickness: float, point: Vector, normal: Vector) -> float:
     """What a taxel reads of a primitive; below 0 if it faces away."""
-    if not is_within(thing[0], thing[1], point[0], point[1], point[2]):
+    if not is_inside(thing[0], thing[1], point[0], point[1], point[2]):
         return 0.0
-    slope: Slope = signed_distance(thing[0], thing[1], point[0], point[1], point[2])
+    slope: DistanceAndGradient = distance_and_gradient(
+        thing[0], thing[1], point[0], point[1], point[2]
+    )
     depth = max(-slope[0], 0.0)
     against = -(slope[1] * normal[0] + slope[2] * normal[1] + slope[3] * normal[2])
     return min(depth / thickness, 1.0) * min(against, 1.0)

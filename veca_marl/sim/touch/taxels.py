@@ -14,10 +14,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from veca_marl.sim.body.anatomy.skeleton import Bone, BoneBox, BoneCapsule, load_skeleton
+from veca_marl.sim.body.anatomy.skeleton import Bone, load_skeleton
 from veca_marl.sim.body.anatomy.skin_mesh import binding_pose, load_skin
 from veca_marl.sim.geometry.meshes import Indices, Mesh, empty_meshes, with_mesh
 from veca_marl.sim.geometry.pose import Floats
+from veca_marl.sim.geometry.signed_distances import distances_to
 from veca_marl.sim.geometry.skinning import skin
 
 # "in triangle formation" (the paper, section on tactile perception): three near the corners, three
@@ -158,19 +159,5 @@ def _way_to_skin(bone: Bone, points: Floats, inward: Floats) -> Floats:
 
 def distance_to_bone(bone: Bone, points: Floats) -> Floats:
     """Return signed metres from ``(..., 3)`` points in a bone's frame to its rigid colliders."""
-    parts = [_distance(part, points) for part in bone.colliders]
-    nearest: Floats = np.min(parts, axis=0)
+    nearest: Floats = np.min([distances_to(part, points) for part in bone.colliders], axis=0)
     return nearest
-
-
-def _distance(part: BoneCapsule | BoneBox, points: Floats) -> Floats:
-    if isinstance(part, BoneBox):
-        beyond = np.abs(points - np.array(part.centre)) - np.array(part.half)
-        outside: Floats = np.linalg.norm(np.maximum(beyond, 0.0), axis=-1)
-        outside += np.minimum(beyond.max(axis=-1), 0.0)
-        return outside
-    start, axis = np.array(part.start), np.array(part.end) - part.start
-    share = np.clip((points - start) @ axis / (axis @ axis), 0.0, 1.0)
-    away: Floats = np.linalg.norm(points - start - share[..., None] * axis, axis=-1)
-    away -= part.radius
-    return away

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from veca_marl.sim.geometry.pose import Floats
 from veca_marl.sim.geometry.primitives import Shape, bounding_radius
+from veca_marl.sim.geometry.signed_distances import distance
 from veca_marl.sim.geometry.tables import Bools, GeomTable
 from veca_marl.sim.geometry.vectors import Vector, single
 from veca_marl.sim.vision.raster import (
@@ -152,26 +153,9 @@ def _darken_row(
             single(left[0] * dx + left[1] * dy + left[2] * dz),
             single(upward[0] * dx + upward[1] * dy + upward[2] * dz),
         )
-        gap = distance_to(shape, size, local)
+        gap = distance(shape, size, local[0], local[1], local[2])
         gap = gap if gap > 0.0 else 0.0
         nearness = 1.0 - gap / REACH_M
         no_floor = abs(pz) > _FLOOR_TOLERANCE_M or names[i] == NOTHING or names[i] == name
         nearness = 0.0 if no_floor or nearness < 0.0 else nearness
         lights[i] *= single(1.0 - DARKNESS * nearness * nearness)
-
-
-@njit(cache=True, error_model="numpy", inline="always")
-def distance_to(shape: int, size: NDArray[np.float32] | Vector, point: Vector) -> float:
-    """Metres from a point in a primitive's own axes to its surface; not positive within it."""
-    x, y, z = abs(point[0]), abs(point[1]), abs(point[2])
-    if shape == _SPHERE:
-        return math.sqrt(x * x + y * y + z * z) - float(size[0])
-    if shape == _BOX:
-        x, y, z = x - size[0], y - size[1], z - size[2]
-    elif shape == _CYLINDER:
-        x, y, z = math.sqrt(x * x + y * y) - size[0], 0.0, z - 0.5 * size[1]
-    else:
-        z = max(z - 0.5 * size[1], 0.0)
-        return math.sqrt(x * x + y * y + z * z) - float(size[0])
-    x, y, z = max(x, 0.0), max(y, 0.0), max(z, 0.0)
-    return math.sqrt(x * x + y * y + z * z)

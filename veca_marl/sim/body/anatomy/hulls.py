@@ -1,4 +1,4 @@
-"""Convex hulls of rods and boxes, as Bullet reads them from files.
+"""Convex hulls of capsules and boxes, as Bullet reads them from files.
 
 Bullet meets two links of several shapes each in as many contacts as shapes meet, and solves them in
 an order that depends on what the links did in episodes long past. Of a link with one shape there is
@@ -11,8 +11,8 @@ import math
 
 import numpy as np
 
-from veca_marl.sim.body.anatomy.skeleton import BoneBox, BoneCapsule
 from veca_marl.sim.geometry.pose import Floats, Pose
+from veca_marl.sim.geometry.primitives import Primitive, Shape
 from veca_marl.sim.geometry.rotations import rotation_with_z
 
 # Bullet lays a skin of its own round every hull (`gDefaultCollisionMargin` of its importer)
@@ -20,20 +20,18 @@ MARGIN_M = 0.001
 _RINGS, _AROUND = 7, 20  # points of a half sphere: rings from pole to equator, and round each
 
 
-def surface_points(part: BoneCapsule | BoneBox, pose: Pose, skin_m: float) -> Floats:
-    """Return points ``(n, 3)`` whose hull is a primitive at a pose, with its skin.
+def surface_points(part: Primitive, pose: Pose) -> Floats:
+    """Return points ``(n, 3)`` whose hull is a capsule or a box on a frame at a pose.
 
-    Those of a capsule lie so far out that the hull is as often without it as within it.
+    Those of a capsule lie so far out that its surface is inside the hull as often as outside.
     """
-    if isinstance(part, BoneBox):
-        corners = np.array(np.meshgrid(*[(-1.0, 1.0)] * 3)).reshape(3, -1).T
-        half = np.array(part.half) + skin_m - MARGIN_M
-        local = np.array(part.centre) + corners * half
+    inner = part.grown(-MARGIN_M)
+    if part.shape is Shape.BOX:
+        local = inner.corners()
     else:
-        start, end = np.array(part.start), np.array(part.end)
-        axis = (end - start) / np.linalg.norm(end - start)
-        ball = (part.radius + skin_m - MARGIN_M) * _BULGE * _half_sphere(axis)
-        local = np.concatenate([end + ball, start - ball])
+        low, high = part.cap_centres()
+        ball = inner.radius * _BULGE * _half_sphere(part.pose.rotation[:, 2])
+        local = np.concatenate([high + ball, low - ball])
     points: Floats = pose.position + local @ pose.rotation.T
     return points
 

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import csv
 import functools
-import itertools
 import math
 import re
 from collections.abc import Sequence
@@ -20,27 +19,11 @@ from numba import njit
 from numpy.typing import NDArray
 
 from veca_marl.sim.geometry.pose import Floats
+from veca_marl.sim.geometry.primitives import Primitive, Shape, capsule_between
 
 _AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 _CAPSULE = re.compile(r"capsule a=\((.+?)\) b=\((.+?)\) r=(\S+)")
 _BOX = re.compile(r"box c=\((.+?)\) half=\((.+?)\)")
-
-
-@dataclass(frozen=True)
-class BoneCapsule:
-    """A capsule in a bone's frame: two cap centres and a radius, metres."""
-
-    start: tuple[float, float, float]
-    end: tuple[float, float, float]
-    radius: float
-
-
-@dataclass(frozen=True)
-class BoneBox:
-    """An axis-aligned box in a bone's frame: centre and half extents, metres."""
-
-    centre: tuple[float, float, float]
-    half: tuple[float, float, float]
 
 
 @dataclass(frozen=True)
@@ -69,7 +52,7 @@ class Bone:
     mass_kg: float
     skin_thickness_m: float
     skin_force_n: float
-    colliders: tuple[BoneCapsule | BoneBox, ...]
+    colliders: tuple[Primitive, ...]
     first_joint: int
     joint_count: int
 
@@ -138,15 +121,15 @@ def _rotation(roll: float, pitch: float, yaw: float) -> Floats:
     )
 
 
-def _colliders(text: str) -> tuple[BoneCapsule | BoneBox, ...]:
-    parts: list[BoneCapsule | BoneBox] = []
+def _colliders(text: str) -> tuple[Primitive, ...]:
+    parts: list[Primitive] = []
     for part in text.split(" + "):
         if capsule := _CAPSULE.fullmatch(part):
             start, end, radius = capsule.groups()
-            parts.append(BoneCapsule(_vector(start), _vector(end), float(radius)))
+            parts.append(capsule_between(_vector(start), _vector(end), float(radius)))
         elif box := _BOX.fullmatch(part):
             centre, half = box.groups()
-            parts.append(BoneBox(_vector(centre), _vector(half)))
+            parts.append(Primitive(Shape.BOX, _vector(half), offset=_vector(centre)))
         else:
             raise ValueError(f"bones.csv: cannot read the collider {part!r}")
     return tuple(parts)
@@ -228,7 +211,7 @@ class Underside:
     """
 
     def __init__(self, skeleton: Skeleton, bones: Sequence[str], skin: bool) -> None:
-        points: list[tuple[int, tuple[float, ...], float]] = []
+        points: list[tuple[int, Floats, float]] = []
         for name in bones:
             frame = skeleton.bone(name)
             grown = skeleton.bones[frame].skin_thickness_m if skin else 0.0
@@ -260,13 +243,11 @@ class Soles(Underside):
         super().__init__(skeleton, ("l_foot", "r_foot"), skin=False)
 
 
-def _extremes(part: BoneCapsule | BoneBox) -> list[tuple[tuple[float, ...], float]]:
+def _extremes(part: Primitive) -> list[tuple[Floats, float]]:
     """Return points and the radius of the ball round each, which together span a primitive."""
-    if isinstance(part, BoneCapsule):
-        return [(part.start, part.radius), (part.end, part.radius)]
-    signs = itertools.product((-1.0, 1.0), repeat=3)
-    corners = (np.array(part.centre) + np.array(sign) * part.half for sign in signs)
-    return [(tuple(corner), 0.0) for corner in corners]
+    if part.shape is not Shape.BOX:
+        return [(centre, part.radius) for centre in part.cap_centres()]
+    return [(corner, 0.0) for corner in part.corners()]
 
 
 @njit(cache=True)

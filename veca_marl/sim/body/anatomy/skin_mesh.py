@@ -15,14 +15,13 @@ import numpy as np
 
 from veca_marl.sim.body.anatomy.skeleton import (
     Bone,
-    BoneBox,
-    BoneCapsule,
     Skeleton,
     forward_kinematics,
     load_skeleton,
 )
 from veca_marl.sim.geometry.meshes import Mesh
 from veca_marl.sim.geometry.pose import Floats
+from veca_marl.sim.geometry.primitives import Shape
 
 GREY = (0.7, 0.7, 0.7)
 
@@ -221,9 +220,7 @@ def _loft_finger(loft: _Loft, skeleton: Skeleton, finger: str) -> None:
     for place, part in enumerate(_FINGERS[finger]):
         name = f"l_{finger}_{part}"
         bone = skeleton.bones[skeleton.bone(name)]
-        capsule = bone.colliders[0]
-        assert isinstance(capsule, BoneCapsule)
-        radius, length = capsule.radius + bone.skin_thickness_m, -bone.tip[2]
+        radius, length = bone.colliders[0].radius + bone.skin_thickness_m, -bone.tip[2]
         base = 0.0 if finger == "thumb" else 0.001
         shapes = (
             ((base, 1.0), (-length / 2.0, 1.0), (-length, 0.97)),
@@ -265,7 +262,7 @@ def _zone_above_m(skeleton: Skeleton, bone: Bone) -> float:
     parent = skeleton.bones[bone.parent]
     if _continues(parent, bone):
         return _BEND_SHARE * min(_length_m(bone), _length_m(parent))
-    return _KNUCKLE_ZONE_M if isinstance(parent.colliders[0], BoneBox) else _BRANCH_ZONE_M
+    return _KNUCKLE_ZONE_M if parent.colliders[0].shape is Shape.BOX else _BRANCH_ZONE_M
 
 
 def _follows(skeleton: Skeleton, owner: int, point: Floats) -> tuple[int, float]:

@@ -22,11 +22,12 @@ from typing import NamedTuple
 import numpy as np
 
 from veca_marl.sim.body.anatomy.hulls import as_obj, surface_points
-from veca_marl.sim.body.anatomy.inertia import Inertia, bone_inertia, joined
-from veca_marl.sim.body.anatomy.skeleton import Bone, BoneBox, BoneCapsule, Joint, Skeleton
+from veca_marl.sim.body.anatomy.skeleton import Bone, Joint, Skeleton
 from veca_marl.sim.body.anatomy.skin_springs import SkinLayer, is_finger, skin_layer, skin_spring
+from veca_marl.sim.geometry.inertia import Inertia, joined, primitive_inertia
 from veca_marl.sim.geometry.pose import Floats, Pose
-from veca_marl.sim.geometry.rotations import rotation_with_z
+from veca_marl.sim.geometry.primitives import Primitive
+from veca_marl.sim.physics.collision_shapes import urdf_geometry
 
 SKIN_SUFFIX, THUMB_SUFFIX = "__skin", "__thumb"
 _LIGHT_SHARE = 0.01  # of its bone's mass, for each link that is not a bone
@@ -120,7 +121,7 @@ class _Writer:
         members = self._members(index)
         layers, light = self._layers(bone, members), _LIGHT_SHARE * bone.mass_kg
         links = max(bone.joint_count - 1, 0) + len(layers) - 1
-        whole = joined([(pose, bone_inertia(part)) for part, pose in members])
+        whole = joined([(pose, _bone_inertia(part)) for part, pose in members])
         own = whole._replace(mass_kg=whole.mass_kg - links * light)
         text = self._hinges(bone, light)
         text += self._link(layers[0], own, self._rotor(bone), bone)
@@ -286,27 +287,25 @@ def _inertial(mass_kg: float, axes: Pose, matrix: Floats) -> str:
     )
 
 
+def _bone_inertia(bone: Bone) -> Inertia:
+    """Spread the mass of a bone evenly over its first collider with the skin on."""
+    return primitive_inertia(bone.colliders[0].grown(bone.skin_thickness_m), bone.mass_kg)
+
+
 def _bare(bone: Bone, pose: Pose) -> list[_Shape]:
     """Return the rigid primitives of a bone that is at a pose."""
-    return [_shape(part, pose, 0.0) for part in bone.colliders]
+    return [_shape(part, pose) for part in bone.colliders]
 
 
 def _skinned(bone: Bone, pose: Pose) -> list[_Shape]:
     """Return the primitives of a bone with its skin on."""
-    return [_shape(part, pose, bone.skin_thickness_m) for part in bone.colliders]
+    return [_shape(part.grown(bone.skin_thickness_m), pose) for part in bone.colliders]
 
 
-def _shape(part: BoneCapsule | BoneBox, pose: Pose, skin_m: float) -> _Shape:
-    if isinstance(part, BoneBox):
-        centre, turn = np.array(part.centre), np.eye(3)
-        geometry = f'<box size="{_numbers(*(2.0 * (half + skin_m) for half in part.half))}"/>'
-    else:
-        start, end = np.array(part.start), np.array(part.end)
-        length = float(np.linalg.norm(end - start))
-        centre, turn = (start + end) / 2.0, rotation_with_z((end - start) / length)
-        geometry = f'<capsule radius="{part.radius + skin_m:.9g}" length="{length:.9g}"/>'
+def _shape(part: Primitive, pose: Pose) -> _Shape:
+    centre, turn = part.pose
     place = Pose(pose.position + pose.rotation @ centre, pose.rotation @ turn)
-    return _Shape(place, geometry, surface_points(part, pose, skin_m))
+    return _Shape(place, urdf_geometry(part), surface_points(part, pose))
 
 
 def _singly(layer: _Layer) -> list[_Layer]:

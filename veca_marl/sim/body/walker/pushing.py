@@ -19,7 +19,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from veca_marl.sim.geometry.pose import Floats
+from veca_marl.sim.geometry.primitives import Primitive, Shape
 from veca_marl.sim.physics.bullet import pybullet
+from veca_marl.sim.physics.collision_shapes import create_collision_shape
 from veca_marl.sim.physics.props import Prop
 
 _ROUNDS = 3  # two walls of a corner and one to spare
@@ -38,12 +40,8 @@ class Pusher:
         self.centre_height_m = length_m / 2
         self._client = client
         self._push_limit_kg = push_limit_kg
-        shape = pybullet.createCollisionShape(
-            pybullet.GEOM_CAPSULE,
-            radius=radius_m,
-            height=length_m,
-            physicsClientId=client,
-        )
+        capsule = Primitive(Shape.CAPSULE, (radius_m, length_m))
+        shape = create_collision_shape(client, [capsule])
         self.body_id: int = pybullet.createMultiBody(0, shape, physicsClientId=client)
         pybullet.changeDynamics(
             self.body_id, -1, lateralFriction=0.2, restitution=0.0, physicsClientId=client
