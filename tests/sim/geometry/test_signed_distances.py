@@ -73,6 +73,9 @@ def test_all_ways_to_ask_for_a_distance_agree(shape):
     points = np.random.default_rng(4).uniform(-0.6, 0.6, (200, 3))
     many = distances_to(Primitive(shape, SIZES[shape]), points)
     for point, expected in zip(points, many, strict=True):
-        ways = distance(int(shape), size, *point), distance_and_gradient(int(shape), size, *point)[0]
+        ways = (
+            distance(int(shape), size, *point),
+            distance_and_gradient(int(shape), size, *point)[0],
+        )
         assert ways == pytest.approx((expected, expected), abs=1e-15)
         assert is_inside(int(shape), size, *point) == (expected < 0.0)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from veca_marl.sim.body.anatomy.inertia import bone_inertia
 from veca_marl.sim.body.anatomy.skeleton import forward_kinematics, load_skeleton
 from veca_marl.sim.body.humanoid.humanoid import Humanoid
 from veca_marl.sim.body.humanoid.joint_controls import REACH_RAD, JointActionKind
@@ -39,7 +38,7 @@ class SeatedBalance:
         self._body, self._skeleton = body, load_skeleton()
         self.upright, self._bent = body.angles_of(upright), body.angles_of(bent)
         bones = self._skeleton.bones
-        inertias = [bone_inertia(bone) for bone in bones]
+        inertias = [bone.inertia() for bone in bones]
         self._masses = np.array([inertia.mass_kg for inertia in inertias])
         self._centres = np.array([inertia.centre for inertia in inertias])
         self._above = np.array([not bone.name.endswith(_LEGS) for bone in bones])

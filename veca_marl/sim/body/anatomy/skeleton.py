@@ -18,6 +18,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from veca_marl.sim.geometry.inertia import Inertia, primitive_inertia
 from veca_marl.sim.geometry.pose import Floats
 from veca_marl.sim.geometry.primitives import Primitive, Shape, capsule_between
 
@@ -55,6 +56,10 @@ class Bone:
     colliders: tuple[Primitive, ...]
     first_joint: int
     joint_count: int
+
+    def inertia(self) -> Inertia:
+        """Return its mass properties: the mass fills its first collider with the skin evenly."""
+        return primitive_inertia(self.colliders[0].grown(self.skin_thickness_m), self.mass_kg)
 
 
 @dataclass(frozen=True)

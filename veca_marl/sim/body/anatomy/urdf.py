@@ -24,7 +24,7 @@ import numpy as np
 from veca_marl.sim.body.anatomy.hulls import as_obj, surface_points
 from veca_marl.sim.body.anatomy.skeleton import Bone, Joint, Skeleton
 from veca_marl.sim.body.anatomy.skin_springs import SkinLayer, is_finger, skin_layer, skin_spring
-from veca_marl.sim.geometry.inertia import Inertia, joined, primitive_inertia
+from veca_marl.sim.geometry.inertia import Inertia, joined
 from veca_marl.sim.geometry.pose import Floats, Pose
 from veca_marl.sim.geometry.primitives import Primitive
 from veca_marl.sim.physics.collision_shapes import urdf_geometry
@@ -121,7 +121,7 @@ class _Writer:
         members = self._members(index)
         layers, light = self._layers(bone, members), _LIGHT_SHARE * bone.mass_kg
         links = max(bone.joint_count - 1, 0) + len(layers) - 1
-        whole = joined([(pose, _bone_inertia(part)) for part, pose in members])
+        whole = joined([(pose, part.inertia()) for part, pose in members])
         own = whole._replace(mass_kg=whole.mass_kg - links * light)
         text = self._hinges(bone, light)
         text += self._link(layers[0], own, self._rotor(bone), bone)
@@ -285,11 +285,6 @@ def _inertial(mass_kg: float, axes: Pose, matrix: Floats) -> str:
         f'<inertial>{_origin(axes)}<mass value="{mass_kg!r}"/>'
         f'<inertia ixx="{x:.9g}" iyy="{y:.9g}" izz="{z:.9g}" ixy="0" ixz="0" iyz="0"/></inertial>'
     )
-
-
-def _bone_inertia(bone: Bone) -> Inertia:
-    """Spread the mass of a bone evenly over its first collider with the skin on."""
-    return primitive_inertia(bone.colliders[0].grown(bone.skin_thickness_m), bone.mass_kg)
 
 
 def _bare(bone: Bone, pose: Pose) -> list[_Shape]:
