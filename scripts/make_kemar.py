@@ -9,7 +9,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from veca_marl.sim.hearing.head_conditioning import condition
+from veca_marl.sim.hearing.conditioning import condition
 from veca_marl.sim.hearing.sofa import read_sofa
 
 LICENCE = (

@@ -12,7 +12,7 @@ from veca_marl.api import make
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
 from veca_marl.envs.core.game import Game
 from veca_marl.envs.core.task import TASKS
-from veca_marl.envs.rendering.touch_picture import picture_of_touch
+from veca_marl.envs.rendering.touch_image import touch_image
 from veca_marl.sim.body.walker.walker import Walker
 from veca_marl.sim.touch.taxels import TAXELS_PER_TRIANGLE
 from veca_marl.sim.vision.optics import Camera, look_at
@@ -123,7 +123,7 @@ def touch_picture(path: Path) -> None:
     camera = Camera(480, 360, fov_deg=34.0)
     beside = look_at(middle + np.array([0.8, 0.9, 0.7]), middle)
     readings = game.observe(player)["touch"].reshape(-1, TAXELS_PER_TRIANGLE).astype(np.float64)
-    skin = picture_of_touch(scene, scene.objects[player.body.object_id], readings, 360)
+    skin = touch_image(scene, scene.objects[player.body.object_id], readings, 360)
     picture = np.concatenate([camera.render(scene, [beside]).rgb[0], skin], axis=1)
     plt.imsave(path, picture)
     env.close()

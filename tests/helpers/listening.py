@@ -5,7 +5,7 @@ import scipy.signal
 
 from veca_marl.sim.geometry.pose import Pose
 from veca_marl.sim.hearing.hrtf import kemar_table
-from veca_marl.sim.hearing.receivers import HeadRelated, OneEar, TwoEars
+from veca_marl.sim.hearing.receivers import HrtfReceiver, MonoReceiver, StereoReceiver
 from veca_marl.sim.sound.acoustics import Room
 from veca_marl.sim.sound.soundfield import SoundField
 from veca_marl.sim.sound.sounds import Clip
@@ -29,9 +29,9 @@ SOURCES = np.array([[2.1, 3.7, 1.2], [5.0, 1.0, 0.4]])
 
 def spatialisation(quality):
     return {
-        "hrtf": lambda: HeadRelated(kemar_table()),
-        "stereo": lambda: TwoEars((0.0, EAR, 0.0), (0.0, -EAR, 0.0)),
-        "mono": OneEar,
+        "hrtf": lambda: HrtfReceiver(kemar_table()),
+        "stereo": lambda: StereoReceiver((0.0, EAR, 0.0), (0.0, -EAR, 0.0)),
+        "mono": MonoReceiver,
     }[quality]()
 
 

@@ -71,7 +71,7 @@ def dense(stage):
     points, normals = taxel_positions(taxels, vertices)
     points = points - taxels.depths[..., None] * normals[:, None]
     bones = np.repeat(np.arange(47), np.diff(taxels.first_triangle))
-    deaf = stage.sense._what_it_cannot_feel()[bones]
+    deaf = stage.sense._ignored_pairs()[bones]
     readings = np.zeros(points.shape[:2])
     geoms = scene.geoms
     for g, shape in enumerate(geoms.shapes):

@@ -3,10 +3,11 @@ import pytest
 from listening import RATE, direction
 from paths import ROOT, SHARED
 
-from veca_marl.sim.hearing.head_conditioning import condition, ear_incidence
-from veca_marl.sim.hearing.head_response import HeadResponse, minimum_phase
-from veca_marl.sim.hearing.hrtf import HeadTable, direction_vectors, kemar_table
-from veca_marl.sim.hearing.receivers import HeadRelated
+from veca_marl.sim.hearing.conditioning import condition, ear_incidence
+from veca_marl.sim.hearing.head_response import HeadResponse
+from veca_marl.sim.hearing.hrtf import HrtfTable, direction_vectors, kemar_table
+from veca_marl.sim.hearing.minimum_phase import minimum_phase
+from veca_marl.sim.hearing.receivers import HrtfReceiver
 from veca_marl.sim.hearing.sofa import read_sofa
 from veca_marl.sim.hearing.spherical_head import HEAD_RADIUS_M, sphere_response, woodworth_arrival_s
 from veca_marl.sim.sound.receiver import filter_length, lead_samples
@@ -38,7 +39,7 @@ def sphere_head(n_taps=128):
 
 def level_db(table, azimuth_deg, elevation_deg=0.0):
     """Level of both ears (2, F), through the same reading as in the stream."""
-    head = HeadRelated(table)
+    head = HrtfReceiver(table)
     out = np.zeros((2, filter_length(head, RATE, 0.0)), np.float32)
     head.write_filters(direction(azimuth_deg, elevation_deg)[None], np.ones(1), RATE, out)
     return 20.0 * np.log10(np.abs(np.fft.rfft(out, N_FFT)))
@@ -102,7 +103,7 @@ def test_level_difference_grows_with_frequency():
 
 @pytest.mark.parametrize(("head", "low", "high"), [("kemar", 3.0, 9.0), ("sphere", 0.0, 0.05)])
 def test_front_and_back_differ_by_the_pinna_only(head, low, high):
-    table = kemar_table() if head == "kemar" else HeadTable(sphere_head())
+    table = kemar_table() if head == "kemar" else HrtfTable(sphere_head())
     difference = (level_db(table, 30.0) - level_db(table, 150.0))[:, band(2000, 5400)]
     assert low <= np.sqrt(np.mean(difference**2)) <= high
 
@@ -123,7 +124,7 @@ def test_other_rates_are_refused():
     with pytest.raises(ValueError, match="48000"):
         kemar_table(48_000)
     with pytest.raises(ValueError, match="16000"):
-        HeadRelated(kemar_table()).write_filters(np.ones((1, 3)), np.ones(1), 16_000, None)
+        HrtfReceiver(kemar_table()).write_filters(np.ones((1, 3)), np.ones(1), 16_000, None)
 
 
 def test_sphere_has_its_known_limits():

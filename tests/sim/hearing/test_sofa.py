@@ -8,9 +8,9 @@ import scipy.signal
 from paths import SHARED
 
 from veca_marl.sim.hearing import sofa
-from veca_marl.sim.hearing.head_conditioning import condition, ear_incidence
-from veca_marl.sim.hearing.head_response import minimum_phase
+from veca_marl.sim.hearing.conditioning import condition, ear_incidence
 from veca_marl.sim.hearing.hrtf import direction_vectors, sofa_table
+from veca_marl.sim.hearing.minimum_phase import minimum_phase
 from veca_marl.sim.hearing.sofa import SofaError, read_sofa
 from veca_marl.sim.hearing.spherical_head import sphere_response, woodworth_arrival_s
 from veca_marl.sim.sound.acoustics import SPEED_OF_SOUND_MPS
@@ -138,7 +138,7 @@ def test_a_wrong_sampling_rate_shrinks_the_head(fields, tmp_path):
     with pytest.warns(UserWarning, match=r"radius 5\.\d cm"):
         small = condition(read_sofa(path, sample_rate_hz=70_560.0), 22_050)
     assert small.head_radius_m == pytest.approx(RADIUS * FILE_RATE / 70_560.0, abs=0.002)
-    with pytest.raises(SofaError, match=r"rate\.sofa.*that is no head"):
+    with pytest.raises(SofaError, match=r"rate\.sofa.*not that of a head"):
         condition(read_sofa(path, sample_rate_hz=176_400.0), 22_050)
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from veca_marl.config import compose
 from veca_marl.sim.geometry.pose import Pose
-from veca_marl.sim.hearing.receivers import OneEar
+from veca_marl.sim.hearing.receivers import MonoReceiver
 from veca_marl.sim.physics.props import PropCfg, PropShape
 from veca_marl.sim.physics.world import World
 from veca_marl.sim.sound.sounds import SoundCfg, SoundKind
@@ -33,7 +33,7 @@ class TwoRooms:
         for prop in (radio, *props):
             self.world.add_prop(prop)
         self.world.freeze()
-        self._listener = self.world.sound.add_listener(OneEar())
+        self._listener = self.world.sound.add_listener(MonoReceiver())
         self._head = Pose(np.array([5.0, y, 1.0]), np.eye(3))
         self.reset()
 

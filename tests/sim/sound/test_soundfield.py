@@ -27,7 +27,7 @@ from listening import (
 from paths import HELPERS
 
 from veca_marl.sim.geometry.pose import Pose
-from veca_marl.sim.hearing.receivers import TwoEars
+from veca_marl.sim.hearing.receivers import StereoReceiver
 from veca_marl.sim.sound import acoustics
 from veca_marl.sim.sound.soundfield import SoundField
 from veca_marl.sim.sound.sounds import Noise, Silence, Voice
@@ -352,4 +352,4 @@ def test_wrong_input_is_refused_at_the_door():
     with pytest.raises(ValueError, match="must be positive"):
         SoundField(step_samples=0)
     with pytest.raises(ValueError, match="three numbers"):
-        TwoEars((0.0, 1.0), (0.0, -1.0))
+        StereoReceiver((0.0, 1.0), (0.0, -1.0))

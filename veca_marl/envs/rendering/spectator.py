@@ -1,4 +1,4 @@
-"""What a person watching a game sees: the player's eyes and skin beside a view of the room."""
+"""Video frames of a game: the first player's eyes and skin beside a view of the room."""
 
 from __future__ import annotations
 
@@ -9,19 +9,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veca_marl.envs.core.game import Game, Observation
-from veca_marl.envs.rendering.touch_picture import picture_of_touch
-from veca_marl.sim.touch.taxels import TAXELS_PER_TRIANGLE
-from veca_marl.sim.vision.optics import Camera, look_at
+from veca_marl.envs.rendering.touch_image import touch_image
+from veca_marl.sim.touch import TAXELS_PER_TRIANGLE
+from veca_marl.sim.vision import Camera, look_at
 
 FRAME_HEIGHT = 252
 ROOM_WIDTH = 336
 
 
 class Spectator:
-    """Draws frames for videos; it never changes the game.
+    """Renders frames for videos; it never changes the game.
 
     Args:
-        game: Whom to watch.
+        game: The game to show.
     """
 
     def __init__(self, game: Game) -> None:
@@ -30,46 +30,52 @@ class Spectator:
         room = game.cfg.playground.rooms[0]
         low, size = np.array(room.lower_m), np.array(room.size_m)
         self._centre = low + size * (0.5, 0.5, 0.0)
-        # from inside the room, in the upper corner: no wall stands in the way
+        # inside the room, in an upper corner, where no wall hides the players
         self._eye = low + size * (0.04, 0.04, 0.92)
 
     def room(self) -> NDArray[np.uint8]:
-        """Return the room from above one corner, ``(252, 336, 3)`` uint8."""
+        """Return the first room from an upper corner, ``(252, 336, 3)`` uint8.
+
+        The camera looks at the point halfway between the centre of the floor and the mean position
+        of the players.
+        """
         players = [player.body.position for player in self._game.players]
         target = 0.5 * self._centre + 0.5 * np.mean(players, axis=0)
         pose = look_at(self._eye, target)
-        return self._camera.render(self._game.world.scene, [pose]).rgb[0].copy()
+        image: NDArray[np.uint8] = self._camera.render(self._game.world.scene, [pose]).rgb[0].copy()
+        return image
 
     def frame(self, observation: Observation) -> NDArray[np.uint8]:
         """Return one video frame: left eye, right eye, touched skin, room.
 
         Args:
-            observation: What the first actor observes now, as from `Game.observe`; a sense that
-                is not in it is not shown.
+            observation: The present observation of the first actor, as from `Game.observe`;
+                senses that are not in it are left out of the frame.
 
         Returns:
             ``(252, width, 3)`` uint8, even width.
         """
-        pictures = [self.room()]
+        images = [self.room()]
         if "touch" in observation:
-            pictures.insert(0, self._skin(observation["touch"]))
+            images.insert(0, self._skin(observation["touch"]))
         if "vision" in observation:
-            pictures[:0] = eye_images(observation["vision"])
-        return np.concatenate(pictures, axis=1)
+            images[:0] = eye_images(observation["vision"])
+        return np.concatenate(images, axis=1)
 
     def _skin(self, touch: NDArray[Any]) -> NDArray[np.uint8]:
-        """Return the first player's body, coloured where it feels something."""
+        """Return the body of the first actor, coloured by its touch readings."""
         scene = self._game.world.scene
         body = scene.objects[self._game.actors[0].body.object_id]
         readings = touch.reshape(-1, TAXELS_PER_TRIANGLE).astype(np.float64)
-        return picture_of_touch(scene, body, readings, FRAME_HEIGHT)
+        return touch_image(scene, body, readings, FRAME_HEIGHT)
 
 
 def eye_images(vision: NDArray[Any]) -> list[NDArray[np.uint8]]:
-    """Enlarge ``(2, 3, H, W)`` to two images ``(252, width, 3)``, pixels kept visible."""
-    images = []
+    """Enlarge ``(2, 3, H, W)`` uint8 to two images ``(252, width, 3)`` by nearest neighbours."""
+    images: list[NDArray[np.uint8]] = []
     for eye in vision:
         image = np.ascontiguousarray(np.moveaxis(eye, 0, -1))
         width = round(FRAME_HEIGHT * image.shape[1] / image.shape[0] / 2) * 2
-        images.append(cv2.resize(image, (width, FRAME_HEIGHT), interpolation=cv2.INTER_NEAREST))
+        size = (width, FRAME_HEIGHT)
+        images.append(np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_NEAREST)))
     return images

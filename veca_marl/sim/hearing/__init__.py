@@ -1,1 +1,24 @@
 """Hearing: receivers, head-related transfer functions and the sense of hearing."""
+
+from veca_marl.sim.hearing.hrtf import HrtfTable, kemar_table, sofa_table
+from veca_marl.sim.hearing.receivers import HrtfReceiver, MonoReceiver, StereoReceiver
+from veca_marl.sim.hearing.sense import AudioCfg, AudioQuality, AudioSense
+from veca_marl.sim.hearing.sofa import SofaError
+from veca_marl.sim.hearing.spatial_audio import spatial_audio
+from veca_marl.sim.hearing.spectrum import Window, log_spectrum
+
+__all__ = [
+    "AudioCfg",
+    "AudioQuality",
+    "AudioSense",
+    "HrtfReceiver",
+    "HrtfTable",
+    "MonoReceiver",
+    "SofaError",
+    "StereoReceiver",
+    "Window",
+    "kemar_table",
+    "log_spectrum",
+    "sofa_table",
+    "spatial_audio",
+]

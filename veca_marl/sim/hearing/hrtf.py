@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
 
 from veca_marl.sim.geometry.pose import Floats
-from veca_marl.sim.hearing.head_conditioning import condition, ear_incidence
-from veca_marl.sim.hearing.head_response import HeadResponse, minimum_phase
+from veca_marl.sim.hearing.conditioning import condition, ear_incidence
+from veca_marl.sim.hearing.head_response import HeadResponse
+from veca_marl.sim.hearing.minimum_phase import minimum_phase
 from veca_marl.sim.hearing.sofa import read_sofa
 from veca_marl.sim.hearing.spherical_head import woodworth_arrival_s
 
@@ -22,7 +23,7 @@ _LEAST_MAGNITUDE = 1e-5
 _BATCH = 256
 
 
-class HeadTable:
+class HrtfTable:
     """A head's filters and arrival times on a regular grid of azimuths and elevations.
 
     Shared between all listeners of a process and read-only.
@@ -58,7 +59,7 @@ class HeadTable:
 
 
 @cache
-def kemar_table(sample_rate_hz: int = 22_050) -> HeadTable:
+def kemar_table(sample_rate_hz: int = 22_050) -> HrtfTable:
     """Return the head that comes with the package: KEMAR (Gardner & Martin 1994).
 
     Raises:
@@ -71,13 +72,13 @@ def kemar_table(sample_rate_hz: int = 22_050) -> HeadTable:
             f"KEMAR is shipped at {response.sample_rate_hz} Hz, got {sample_rate_hz}; "
             "another rate needs the SOFA file"
         )
-    return HeadTable(response)
+    return HrtfTable(response)
 
 
 @cache
 def sofa_table(
     path: str, sample_rate_hz: int = 22_050, stated_rate_hz: float | None = None
-) -> HeadTable:
+) -> HrtfTable:
     """Return the head in a SOFA file, conditioned for a sampling rate.
 
     Args:
@@ -86,7 +87,7 @@ def sofa_table(
         stated_rate_hz: Rate to believe instead of the file's own, see `read_sofa`.
     """
     measured = read_sofa(path, stated_rate_hz)
-    return HeadTable(condition(measured, sample_rate_hz, licence=f"see {measured.source}"))
+    return HrtfTable(condition(measured, sample_rate_hz, licence=f"see {measured.source}"))
 
 
 def direction_vectors(azimuth_rad: Floats, elevation_rad: Floats) -> Floats:

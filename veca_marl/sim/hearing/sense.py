@@ -1,4 +1,4 @@
-"""Hearing: what the two ears of a body receive, as magnitude spectra and waveforms."""
+"""The sense of hearing: magnitude spectra and waveforms at the two ears of a body."""
 
 from __future__ import annotations
 
@@ -8,28 +8,34 @@ from enum import Enum
 from typing import Any
 
 import numpy as np
-import scipy.fft
 from numpy.typing import NDArray
 
 from veca_marl.sim.body.base import Body
-from veca_marl.sim.geometry.pose import Pose
+from veca_marl.sim.geometry.pose import Floats, Pose
 from veca_marl.sim.hearing.hrtf import kemar_table, sofa_table
-from veca_marl.sim.hearing.receivers import HeadRelated, OneEar, TwoEars
+from veca_marl.sim.hearing.receivers import HrtfReceiver, MonoReceiver, StereoReceiver
+from veca_marl.sim.hearing.spectrum import (
+    N_BINS,
+    SILENCE,
+    WINDOW_SAMPLES,
+    Window,
+    log_spectrum,
+    noise_power,
+    window_weights,
+)
 from veca_marl.sim.physics.world import World
 from veca_marl.sim.sense import Sense
 from veca_marl.sim.sound.receiver import Receiver
 from veca_marl.sim.spec import ArraySpec
 
-WINDOW_SAMPLES = 1024
-N_BINS = 250
-MAGNITUDE_FLOOR = 1e-8
-SILENCE = -8.0
-
 
 class AudioQuality(Enum):
-    """How sound becomes two ear signals (the three arms of the paper's figure 5).
+    """The receiver that turns sound into two ear signals (the three arms of the paper's figure 5).
 
-    `hrtf` is a human head, `stereo` two bare ears, `mono` the same sound in both ears.
+    Attributes:
+        hrtf: A head-related transfer function: level, arrival time and spectrum per direction.
+        stereo: Two omnidirectional receivers at the ears: no head shadow, no pinnae.
+        mono: One omnidirectional receiver at the centre of the head, repeated for both ears.
     """
 
     hrtf = "hrtf"
@@ -37,26 +43,19 @@ class AudioQuality(Enum):
     mono = "mono"
 
 
-class Window(Enum):
-    """What the samples are weighted with before the Fourier transform."""
-
-    rectangular = "rectangular"
-    hann = "hann"
-
-
 @dataclass
 class AudioCfg:
-    """Hearing as data.
+    """Settings of the sense of hearing.
 
     Attributes:
-        present: Whether the body hears at all.
-        quality: See `AudioQuality`. It changes what is heard, never its shape.
-        waveform: Whether the samples themselves are observed too.
-        sofa_path: A measured head (SOFA file) in place of KEMAR. Needs the extra ``[sofa]``.
-        sofa_sample_rate_hz: The sampling rate to believe instead of the SOFA file's own.
-        window: See `Window`; the paper's is rectangular.
-        noise_floor_db: Level of the ear's own noise relative to an rms pressure of 1 (about -80),
-            or None. It enters as its expected power, so nothing becomes random.
+        present: Whether the observation contains the sense.
+        quality: See `AudioQuality`. It changes the content of the observation, never its shape.
+        waveform: Whether the samples of each step are observed too.
+        sofa_path: SOFA file of a measured head in place of KEMAR. Needs the extra ``[sofa]``.
+        sofa_sample_rate_hz: Sampling rate to use instead of the one that the SOFA file states.
+        window: See `Window`.
+        noise_floor_db: Level of the receiver's own noise relative to an rms pressure of 1 (-80,
+            for example), or None. Its expected power is added, so that nothing becomes random.
     """
 
     present: bool = True
@@ -77,12 +76,17 @@ class AudioCfg:
 
 
 class AudioSense(Sense):
-    """Two ears on a body's head.
+    """Two ears on the head of a body.
+
+    After steps that were not read, the sound of those steps is computed as if the head, the
+    sources and the walls had been where they are at the next read. That is exact where nothing
+    moved; what moved lacks its Doppler shift in those steps (see `Listener.rejoin`).
 
     Observations:
         audio: ``(2, 250)`` float32, left ear first: log10 of the magnitude of the first 250 bins
-            of the Fourier transform of the last 1024 samples (the paper's own code). At 22 050 Hz
-            that is 0 to 5.4 kHz in steps of 21.5 Hz. Exact silence is -8; a full-scale tone 2.7.
+            of the Fourier transform of the last 1024 samples (the formula of the paper's code).
+            At 22 050 Hz these are 0 to 5.4 kHz in steps of 21.5 Hz. Exact silence is -8; a
+            full-scale sine is 2.7.
         waveform: ``(2, step_samples)`` float32 sound pressure of this step, on request.
     """
 
@@ -92,19 +96,14 @@ class AudioSense(Sense):
         super().__init__(world)
         field = world.sound
         self._body = body
-        head = body.mount("head")
-        ears = np.stack([body.mount(name).position for name in ("ear_left", "ear_right")])
-        in_head = (ears - head.position) @ head.rotation
-        self._centre = in_head.mean(axis=0)
-        left, right = in_head - self._centre
+        self._centre, left, right = _ears_in_head(body)
+        self._steps_in_window = math.ceil(WINDOW_SAMPLES / field.step_samples)
         self._listener = field.add_listener(
-            _spatialisation(cfg, left, right, field.sample_rate_hz),
-            memory_steps=math.ceil(WINDOW_SAMPLES / field.step_samples),
+            make_receiver(cfg, left, right, field.sample_rate_hz), self._steps_in_window
         )
-        self._window = _window(cfg.window)
-        self._noise_power = _noise_power(cfg.noise_floor_db, self._window)
+        self._weights = window_weights(cfg.window)
+        self._noise_power = noise_power(cfg.noise_floor_db, self._weights)
         self._recent = np.zeros((2, max(WINDOW_SAMPLES, field.step_samples)), np.float32)
-        self._step_samples = field.step_samples
         self.specs = {"audio": ArraySpec((2, N_BINS), np.float32, low=SILENCE)}
         if cfg.waveform:
             self.specs["waveform"] = ArraySpec((2, field.step_samples), np.float32)
@@ -119,71 +118,54 @@ class AudioSense(Sense):
         """See `Sense`."""
         head = self._body.mount("head")
         centre = Pose(head.position + head.rotation @ self._centre, head.rotation)
-        if self._listener.missed_steps:
-            self._rejoin(centre)
-        heard = self._listener.render(centre)
-        self._append(heard)
-        observation = {"audio": self._observe()}
+        missed = self._listener.missed_steps
+        if missed:
+            self._append(self._listener.rejoin(centre, min(missed, self._steps_in_window)))
+        waveform = self._listener.render(centre)
+        self._append(waveform)
+        windowed = self._recent[:, -WINDOW_SAMPLES:] * self._weights
+        observation = {"audio": log_spectrum(windowed, self._noise_power)}
         if "waveform" in self.specs:
-            observation["waveform"] = heard
+            observation["waveform"] = waveform
         return observation
 
-    def _rejoin(self, head: Pose) -> None:
-        """Fill the window with the steps that were not read, as far as they reach into it."""
-        in_window = math.ceil(WINDOW_SAMPLES / self._step_samples)
-        self._append(self._listener.rejoin(head, min(self._listener.missed_steps, in_window)))
-
-    def _append(self, heard: NDArray[np.float32]) -> None:
-        """Move the window on by what was heard, the newest sample last."""
-        n, size = heard.shape[1], self._recent.shape[1]
+    def _append(self, waveform: NDArray[np.float32]) -> None:
+        """Shift the recent samples by the length of a waveform ``(2, n)`` and append it."""
+        n, size = waveform.shape[1], self._recent.shape[1]
         if n < size:
             self._recent[:, :-n] = self._recent[:, n:]
-        self._recent[:, -n:] = heard[:, -size:]
-
-    def _observe(self) -> NDArray[np.float32]:
-        return log_spectrum(self._recent[:, -WINDOW_SAMPLES:] * self._window, self._noise_power)
+        self._recent[:, -n:] = waveform[:, -size:]
 
 
-def log_spectrum(samples: NDArray[np.float32], noise_power: float = 0.0) -> NDArray[np.float32]:
-    """Return what an ear tells the brain: ``log10(|rfft| + 1e-8)`` of the first 250 bins.
+def _ears_in_head(body: Body) -> tuple[Floats, Floats, Floats]:
+    """Return the point between the ears in the head frame, and both ears relative to it."""
+    head = body.mount("head")
+    ears = np.stack([body.mount(name).position for name in ("ear_left", "ear_right")])
+    in_head: Floats = (ears - head.position) @ head.rotation
+    centre: Floats = in_head.mean(axis=0)
+    left, right = in_head - centre
+    return centre, left, right
+
+
+def make_receiver(cfg: AudioCfg, left: Floats, right: Floats, sample_rate_hz: int) -> Receiver:
+    """Construct the receiver of a configuration.
 
     Args:
-        samples: ``(..., 1024)`` windowed sound pressure.
-        noise_power: Expected squared magnitude of the ear's own noise.
+        cfg: Quality and, for `hrtf`, the head.
+        left: ``(3,)`` metres: the left ear relative to the point between the ears, head frame.
+        right: Likewise the right ear.
+        sample_rate_hz: Sampling rate of the sound field.
 
-    Returns:
-        ``(..., 250)`` float32, from -8 on.
+    Raises:
+        SofaError: If the SOFA file cannot be used.
+        ValueError: If KEMAR is not available at this sampling rate.
     """
-    magnitude = np.abs(scipy.fft.rfft(samples)[..., :N_BINS])
-    if noise_power > 0.0:
-        magnitude = np.sqrt(magnitude**2 + np.float32(noise_power))
-    spectrum = np.log10(magnitude + np.float32(MAGNITUDE_FLOOR))
-    # the logarithm of a float32 may round to just below what the spec promises
-    observation: NDArray[np.float32] = np.maximum(spectrum, np.float32(SILENCE))
-    return observation
-
-
-def _spatialisation(
-    cfg: AudioCfg, left: NDArray[np.float64], right: NDArray[np.float64], sample_rate_hz: int
-) -> Receiver:
     match cfg.quality:
         case AudioQuality.mono:
-            return OneEar()
+            return MonoReceiver()
         case AudioQuality.stereo:
-            return TwoEars(left, right)
+            return StereoReceiver(left, right)
         case AudioQuality.hrtf if cfg.sofa_path is None:
-            return HeadRelated(kemar_table(sample_rate_hz))
+            return HrtfReceiver(kemar_table(sample_rate_hz))
         case AudioQuality.hrtf:
-            return HeadRelated(sofa_table(cfg.sofa_path, sample_rate_hz, cfg.sofa_sample_rate_hz))
-
-
-def _window(window: Window) -> NDArray[np.float32]:
-    if window is Window.hann:
-        return np.hanning(WINDOW_SAMPLES + 1)[:-1].astype(np.float32)
-    return np.ones(WINDOW_SAMPLES, np.float32)
-
-
-def _noise_power(noise_floor_db: float | None, window: NDArray[np.float32]) -> float:
-    if noise_floor_db is None:
-        return 0.0
-    return float(10.0 ** (noise_floor_db / 10.0) * (window**2).sum())
+            return HrtfReceiver(sofa_table(cfg.sofa_path, sample_rate_hz, cfg.sofa_sample_rate_hz))

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from veca_marl.sim.geometry.pose import Floats, Pose
-from veca_marl.sim.hearing.hrtf import HeadTable, kemar_table
-from veca_marl.sim.hearing.receivers import HeadRelated
+from veca_marl.sim.hearing.hrtf import HrtfTable, kemar_table
+from veca_marl.sim.hearing.receivers import HrtfReceiver
 from veca_marl.sim.sound.acoustics import Room
 from veca_marl.sim.sound.soundfield import SoundField
 from veca_marl.sim.sound.sounds import Clip
@@ -23,7 +23,7 @@ def spatial_audio(
     room_size: ArrayLike | None = None,
     beta: float | Sequence[float] = 0.5,
     image_order: int = 6,
-    table: HeadTable | None = None,
+    table: HrtfTable | None = None,
 ) -> NDArray[np.float32]:
     """Return what the two ears of one head hear (paper, appendix: `getSpatialAudio`).
 
@@ -60,7 +60,7 @@ def spatial_audio(
     field = _still_field(room, image_order, n_samples, table.sample_rate_hz)
     for i, (clip, position) in enumerate(zip(clips, positions, strict=True)):
         field.add_source(str(i), clip).position = position
-    listener = field.add_listener(HeadRelated(table))
+    listener = field.add_listener(HrtfReceiver(table))
     field.advance()
     heard = listener.render(Pose(ears.mean(axis=0), head.rotation))
     return heard[:, field.latency_samples :]

@@ -1,1 +1,13 @@
 """Touch: taxels, the penetration model and the sense of touch."""
+
+from veca_marl.sim.touch.sense import TouchCfg, TouchQuality, TouchSense
+from veca_marl.sim.touch.taxels import TAXELS_PER_TRIANGLE, load_taxels, taxels_of
+
+__all__ = [
+    "TAXELS_PER_TRIANGLE",
+    "TouchCfg",
+    "TouchQuality",
+    "TouchSense",
+    "load_taxels",
+    "taxels_of",
+]

@@ -17,7 +17,7 @@ from veca_marl.sim.geometry.tables import Bools
 from veca_marl.sim.physics.world import World
 from veca_marl.sim.sense import Sense
 from veca_marl.sim.spec import ArraySpec
-from veca_marl.sim.touch.model import Workspace, feel, neighbours
+from veca_marl.sim.touch.penetration import Workspace, feel, neighbours
 from veca_marl.sim.touch.taxels import BARYCENTRIC, TAXELS_PER_TRIANGLE, load_taxels
 
 Readings = NDArray[np.float64]
@@ -64,9 +64,9 @@ class TouchSense(Sense):
     """The skin of one body.
 
     Observations:
-        touch: ``(9888,)`` float32 in [0, 1], sorted by bone, six taxels to a triangle; see
-            `veca_marl.sim.touch.model` for what a reading means and `taxels_of` for which is where.
-            Exactly 0 where nothing touches.
+        touch: ``(9888,)`` float32 in [0, 1], sorted by bone, six taxels per triangle; see
+            `veca_marl.sim.touch.penetration` for the definition of a reading and `taxels_of` for
+            the taxels of a bone. Exactly 0 without contact.
     """
 
     cfg_type = TouchCfg
@@ -103,7 +103,7 @@ class TouchSense(Sense):
         """
         geoms = self._scene.geoms
         if self._deaf.shape[1] != len(geoms.shapes):
-            self._deaf = self._what_it_cannot_feel()
+            self._deaf = self._ignored_pairs()
             self._workspace = self._workspace._replace(near=np.zeros_like(self._deaf))
         vertices = self._scene.meshes.vertices[self._object.vertices]
         feel(
@@ -117,7 +117,7 @@ class TouchSense(Sense):
         )
         return self._readings
 
-    def _what_it_cannot_feel(self) -> Bools:
+    def _ignored_pairs(self) -> Bools:
         """Mask ``(bones, G)``: intangible things, and own bones that joints keep together."""
         geoms, rows = self._scene.geoms, self._object.rows
         deaf = np.repeat(~geoms.tangible[None], len(self._taxels.thickness), axis=0)

@@ -1,1 +1,17 @@
-"""Vision: cameras, rasterisation, shading, optics of the eye and the sense of vision."""
+"""Vision: cameras, rasterization, shading, optics of the eye and the sense of vision."""
+
+from veca_marl.sim.vision.optics import Camera, look_at, seen_fraction
+from veca_marl.sim.vision.rendering import Views
+from veca_marl.sim.vision.sense import Eyes, VisionCfg, VisionSense
+from veca_marl.sim.vision.visibility import is_visible
+
+__all__ = [
+    "Camera",
+    "Eyes",
+    "Views",
+    "VisionCfg",
+    "VisionSense",
+    "is_visible",
+    "look_at",
+    "seen_fraction",
+]

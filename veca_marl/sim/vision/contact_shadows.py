@@ -20,7 +20,7 @@ from veca_marl.sim.geometry.primitives import Shape, bounding_radius
 from veca_marl.sim.geometry.signed_distances import distance
 from veca_marl.sim.geometry.tables import Bools, GeomTable
 from veca_marl.sim.geometry.vectors import Vector, single
-from veca_marl.sim.vision.raster import (
+from veca_marl.sim.vision.rasterizer import (
     NOTHING,
     Depths,
     Lens,

@@ -30,7 +30,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from veca_marl.sim.vision.filters import Blur, Look
+from veca_marl.sim.vision.image_filters import Blur, Look
 from veca_marl.sim.vision.shading import Images
 
 _ACUITY_AGES_MONTHS = (0.0, 1.0, 1.5, 2.5, 4.0, 6.0, 9.0, 12.0, 18.0, 24.0, 30.0, 36.0, 48.0)

@@ -12,8 +12,8 @@ from veca_marl.sim.geometry.pose import Floats, Pose
 from veca_marl.sim.geometry.scene import Scene
 from veca_marl.sim.geometry.tables import Bools
 from veca_marl.sim.geometry.vectors import single
-from veca_marl.sim.vision.raster import Lens
-from veca_marl.sim.vision.views import Drawn, Views, draw_views
+from veca_marl.sim.vision.rasterizer import Lens
+from veca_marl.sim.vision.rendering import Drawn, Views, render_views
 
 
 @dataclass(frozen=True)
@@ -94,7 +94,7 @@ class Camera:
         views = self._blank(len(poses))
         axes = np.array([view_axes(pose) for pose in poses])
         drawn = _drawn(scene, hidden)
-        draw_views(scene.geoms, scene.meshes, scene.surfaces, drawn, axes, self.lens, views)
+        render_views(scene.geoms, scene.meshes, scene.surfaces, drawn, axes, self.lens, views)
         return views
 
     def _blank(self, count: int) -> Views:

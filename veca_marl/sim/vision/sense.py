@@ -14,10 +14,10 @@ from veca_marl.sim.geometry.tables import Bools
 from veca_marl.sim.physics.world import World
 from veca_marl.sim.sense import Sense
 from veca_marl.sim.spec import ArraySpec
-from veca_marl.sim.vision.filters import Blur, Defocus, Filter, Grey, Look
+from veca_marl.sim.vision.image_filters import Blur, Defocus, Filter, Grey, Look
 from veca_marl.sim.vision.infant_vision import InfantVision
 from veca_marl.sim.vision.optics import Camera, seen_fraction
-from veca_marl.sim.vision.views import Views
+from veca_marl.sim.vision.rendering import Views
 
 
 class Eyes(Enum):
@@ -63,14 +63,14 @@ class VisionCfg:
             raise ValueError(f"eyes {self.eyes!r}: want one of {[eyes.name for eyes in Eyes]}")
         if self.blur_deg < 0.0:
             raise ValueError(f"blur_deg {self.blur_deg}: want 0 (none) or a positive angle")
-        chosen_filters(self)
+        make_filters(self)
 
     def camera(self) -> Camera:
         """Return the camera of either eye."""
         return Camera(self.width, self.height, self.fov_deg)
 
 
-def chosen_filters(cfg: VisionCfg) -> list[Filter]:
+def make_filters(cfg: VisionCfg) -> list[Filter]:
     """Return the filters a configuration asks for, in the order light meets them."""
     filters: list[Filter] = []
     if cfg.defocus:
@@ -100,7 +100,7 @@ class VisionSense(Sense):
     def __init__(self, cfg: VisionCfg, body: Body, world: World) -> None:
         super().__init__(world)
         self.camera = cfg.camera()
-        self.filters = chosen_filters(cfg)
+        self.filters = make_filters(cfg)
         self.specs = _specs(cfg, self.camera)
         self._mounts = ("eye_left", "eye_right")[: 1 if cfg.eyes is Eyes.monocular else 2]
         self._body = body

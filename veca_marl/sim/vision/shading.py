@@ -19,7 +19,7 @@ from veca_marl.sim.geometry.pose import Floats
 from veca_marl.sim.geometry.primitives import Shape
 from veca_marl.sim.geometry.tables import GeomTable
 from veca_marl.sim.geometry.vectors import Vector, single
-from veca_marl.sim.vision.raster import (
+from veca_marl.sim.vision.rasterizer import (
     NOTHING,
     Depths,
     Lens,

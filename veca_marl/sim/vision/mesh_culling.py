@@ -13,15 +13,15 @@ from numba import njit
 from veca_marl.sim.geometry.meshes import MeshTable
 from veca_marl.sim.geometry.pose import Floats
 from veca_marl.sim.geometry.tables import Bools
-from veca_marl.sim.vision.raster import Depths, Lens, Surfaces, pixel_rectangle
+from veca_marl.sim.vision.mesh_rasterizer import draw_triangles, to_camera_frame
+from veca_marl.sim.vision.rasterizer import Depths, Lens, Surfaces, pixel_rectangle
 from veca_marl.sim.vision.screen_bounds import box_intervals
-from veca_marl.sim.vision.triangles import draw_triangles, to_eye
 
 _ROUNDING_M = 1e-4  # depths are stored in single precision
 
 
 @njit(cache=True, error_model="numpy")
-def draw_skins(
+def draw_meshes(
     meshes: MeshTable,
     drawn: Bools,
     view: Floats,
@@ -42,7 +42,7 @@ def draw_skins(
         culled: Leave out skins that cannot be seen; false draws all, which is the slow truth that
             tests compare with.
         first_surface: What the first triangle is called in `surfaces`; the next one more.
-        seen: ``(V, 3)`` written for the skins that were not left out, see `to_eye`.
+        seen: ``(V, 3)`` written for the skins that were not left out, see `to_camera_frame`.
         depth: ``(H, W)`` metres along the optical axis, updated where something nearer is hit.
         surfaces: ``(H, W)``, updated likewise.
     """
@@ -50,7 +50,7 @@ def draw_skins(
         if culled and is_hidden(meshes.lower[m], meshes.upper[m], view, lens, depth):
             continue
         begin, end = meshes.first_vertices[m], meshes.first_vertices[m + 1]
-        to_eye(meshes.vertices[begin:end], view, seen[begin:end])
+        to_camera_frame(meshes.vertices[begin:end], view, seen[begin:end])
         begin, end = meshes.first_triangles[m], meshes.first_triangles[m + 1]
         triangles, chosen = meshes.triangles[begin:end], drawn[begin:end]
         draw_triangles(triangles, seen, chosen, lens, first_surface + begin, depth, surfaces)
@@ -63,7 +63,7 @@ def is_hidden(lower: Floats, upper: Floats, view: Floats, lens: Lens, depth: Dep
     Args:
         lower: ``(3,)`` metres, world frame: a corner of the box, whose edges are along the axes.
         upper: ``(3,)`` the opposite corner.
-        view: See `draw_skins`.
+        view: See `draw_meshes`.
         lens: The camera's numbers.
         depth: ``(H, W)`` how near what was drawn before is.
     """

@@ -19,7 +19,7 @@ from veca_marl.sim.geometry.meshes import Indices, MeshTable
 from veca_marl.sim.geometry.pose import Floats
 from veca_marl.sim.geometry.tables import Bools
 from veca_marl.sim.geometry.vectors import Vector, single
-from veca_marl.sim.vision.raster import Depths, Lens, Rectangle, Surfaces
+from veca_marl.sim.vision.rasterizer import Depths, Lens, Rectangle, Surfaces
 from veca_marl.sim.vision.screen_bounds import Interval
 from veca_marl.sim.vision.shading import AMBIENT, BOUNCE, SUN
 
@@ -27,7 +27,7 @@ _MARGIN_PX = 0.01  # absorbs the rounding of slopes in single precision
 
 
 @njit(cache=True, error_model="numpy")
-def to_eye(vertices: Floats, view: Floats, seen: Floats) -> None:
+def to_camera_frame(vertices: Floats, view: Floats, seen: Floats) -> None:
     """Write where ``(V, 3)`` vertices are for an eye: metres right, up and forward.
 
     Args:
@@ -57,7 +57,7 @@ def draw_triangles(
 
     Args:
         triangles: ``(T, 3)`` vertices, counter-clockwise from outside.
-        seen: ``(V, 3)`` vertices as from `to_eye`.
+        seen: ``(V, 3)`` vertices as from `to_camera_frame`.
         drawn: ``(T,)`` which of them to draw.
         lens: The camera's numbers.
         first_surface: What the first triangle is called in `surfaces`; the next one more.
@@ -198,7 +198,7 @@ def illuminate_triangles(
 
     Args:
         meshes: The scene's skins.
-        seen: ``(V, 3)`` vertices as from `to_eye`.
+        seen: ``(V, 3)`` vertices as from `to_camera_frame`.
         lens: The camera's numbers.
         first_surface: As in `draw_triangles`.
         surfaces: ``(H, W)`` what is seen.

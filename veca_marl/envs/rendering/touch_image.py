@@ -14,10 +14,14 @@ from numpy.typing import NDArray
 from veca_marl.sim.geometry.pose import Floats, Pose
 from veca_marl.sim.geometry.scene import Scene, SceneObject
 from veca_marl.sim.touch.taxels import load_taxels, taxel_positions
+from veca_marl.sim.vision.mesh_rasterizer import (
+    draw_triangles,
+    illuminate_triangles,
+    to_camera_frame,
+)
 from veca_marl.sim.vision.optics import Camera, view_axes
-from veca_marl.sim.vision.raster import NOTHING
+from veca_marl.sim.vision.rasterizer import NOTHING
 from veca_marl.sim.vision.shading import Images
-from veca_marl.sim.vision.triangles import draw_triangles, illuminate_triangles, to_eye
 
 PALE = (0.86, 0.86, 0.84)
 BACKGROUND = (0.13, 0.14, 0.17)
@@ -26,9 +30,7 @@ _SCALE = np.array([(0.98, 0.93, 0.35), (0.98, 0.55, 0.10), (0.85, 0.05, 0.10)])
 _DISTANCE_M, _RAISED_M, _FOV_DEG = 1.5, 0.35, 36.0
 
 
-def picture_of_touch(
-    scene: Scene, body: SceneObject, readings: Floats, height: int = 252
-) -> Images:
+def touch_image(scene: Scene, body: SceneObject, readings: Floats, height: int = 252) -> Images:
     """Draw the front and the back of a body, its pelvis upright, its touched taxels coloured.
 
     Args:
@@ -55,15 +57,15 @@ def picture_of_touch(
     )
 
 
-def save_picture_of_touch(
+def save_touch_image(
     path: str | Path, scene: Scene, body: SceneObject, readings: Floats, height: int = 504
 ) -> None:
-    """Write `picture_of_touch` as a PNG file.
+    """Write `touch_image` as a PNG file.
 
     Raises:
         OSError: If the file cannot be written.
     """
-    picture = picture_of_touch(scene, body, readings, height)
+    picture = touch_image(scene, body, readings, height)
     if not cv2.imwrite(str(path), picture[..., ::-1]):
         raise OSError(f"cannot write {path}")
 
@@ -89,7 +91,7 @@ def _portrait(
     """Draw the pale body lit from above, its touched taxels in the colours of their readings."""
     meshes, view = scene.meshes, view_axes(pose)
     seen = np.empty_like(meshes.vertices)
-    to_eye(meshes.vertices, view, seen)
+    to_camera_frame(meshes.vertices, view, seen)
     depth = np.full((camera.height, camera.width), camera.far_m, np.float32)
     surfaces = np.full(depth.shape, NOTHING, np.int16)
     lights = np.zeros(depth.shape, np.float32)

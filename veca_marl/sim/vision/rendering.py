@@ -11,7 +11,9 @@ from veca_marl.sim.geometry.meshes import MeshTable
 from veca_marl.sim.geometry.pose import Floats
 from veca_marl.sim.geometry.tables import Bools, GeomTable, SurfaceTable
 from veca_marl.sim.vision.contact_shadows import darken_contacts
-from veca_marl.sim.vision.raster import (
+from veca_marl.sim.vision.mesh_culling import draw_meshes
+from veca_marl.sim.vision.mesh_rasterizer import illuminate_triangles
+from veca_marl.sim.vision.rasterizer import (
     NOTHING,
     Depths,
     Lens,
@@ -26,8 +28,6 @@ from veca_marl.sim.vision.shading import (
     paint,
     paint_sky,
 )
-from veca_marl.sim.vision.skins_in_view import draw_skins
-from veca_marl.sim.vision.triangles import illuminate_triangles
 
 
 class Views(NamedTuple):
@@ -64,7 +64,7 @@ class Drawn(NamedTuple):
 
 
 @njit(cache=True, error_model="numpy")
-def draw_views(
+def render_views(
     geoms: GeomTable,
     meshes: MeshTable,
     surfaces: SurfaceTable,
@@ -93,7 +93,7 @@ def draw_views(
         ids, glass_ids = views.ids[v], views.glass_ids[v]
         depth[:], ids[:], glass_ids[:] = lens.far, NOTHING, NOTHING
         draw_geoms(geoms, drawn.opaque, view, lens, True, depth, ids)
-        draw_skins(meshes, drawn.triangles, view, lens, True, first, seen, depth, ids)
+        draw_meshes(meshes, drawn.triangles, view, lens, True, first, seen, depth, ids)
         illuminate_triangles(meshes, seen, lens, first, ids, lights)
         illuminate(geoms, view, lens, depth, ids, lights)
         darken_contacts(geoms, drawn.casting, view, lens, depth, ids, lights)

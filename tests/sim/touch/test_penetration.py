@@ -9,7 +9,7 @@ from touching import SPREAD, Stage, dense, of_bone
 
 from veca_marl.sim.body.anatomy.skeleton import load_skeleton
 from veca_marl.sim.geometry.primitives import Shape
-from veca_marl.sim.touch.model import neighbours
+from veca_marl.sim.touch.penetration import neighbours
 
 
 def press_forearm(stage, depth_m, radius=0.04, side="l"):

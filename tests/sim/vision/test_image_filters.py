@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from veca_marl.sim.vision.filters import Blur, Defocus, Grey, Look
+from veca_marl.sim.vision.image_filters import Blur, Defocus, Grey, Look
 from veca_marl.sim.vision.infant_vision import (
     CONTRAST_AT_LIMIT,
     InfantVision,

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from touching import Stage, of_bone
 
-from veca_marl.envs.rendering.touch_picture import picture_of_touch, save_picture_of_touch
+from veca_marl.envs.rendering.touch_image import save_touch_image, touch_image
 
 
 def red(picture):
@@ -16,13 +16,13 @@ def red(picture):
 
 def test_what_is_touched_glows_on_the_side_that_shows_it():
     stage = Stage()
-    untouched = picture_of_touch(stage.scene, stage.body, stage.read())
+    untouched = touch_image(stage.scene, stage.body, stage.read())
     assert untouched.shape == (252, 336, 3)
     assert not red(untouched).any()
     stage.add("SPHERE", (0.06,), stage.at("chest", (0.1, 0.0, 0.09)))
     readings = stage.read()
     assert of_bone(readings, "chest").any()
-    front, back = np.split(red(picture_of_touch(stage.scene, stage.body, readings)), 2, axis=1)
+    front, back = np.split(red(touch_image(stage.scene, stage.body, readings)), 2, axis=1)
     assert front.sum() > 20
     assert not back.any()
 
@@ -34,7 +34,7 @@ def test_a_firmer_touch_has_another_colour():
     colours = []
     for value in (0.1, 0.5, 1.0):
         readings[:] = value
-        picture = picture_of_touch(stage.scene, stage.body, readings)
+        picture = touch_image(stage.scene, stage.body, readings)
         colours.append(picture[red(picture)].mean(axis=0))
     green = [colour[1] for colour in colours]
     assert green[0] > green[1] > green[2]
@@ -43,13 +43,13 @@ def test_a_firmer_touch_has_another_colour():
 def test_the_file_holds_the_picture(tmp_path):
     stage = Stage()
     readings = stage.read()
-    save_picture_of_touch(tmp_path / "touch.png", stage.scene, stage.body, readings, height=120)
+    save_touch_image(tmp_path / "touch.png", stage.scene, stage.body, readings, height=120)
     saved = cv2.imread(str(tmp_path / "touch.png"))[..., ::-1]
-    np.testing.assert_array_equal(saved, picture_of_touch(stage.scene, stage.body, readings, 120))
+    np.testing.assert_array_equal(saved, touch_image(stage.scene, stage.body, readings, 120))
 
 
 def test_readings_of_something_else_are_refused():
     stage = Stage()
     stage.scene.update()
     with pytest.raises(ValueError, match=r"\(9888,\).*want \(1648, 6\)"):
-        picture_of_touch(stage.scene, stage.body, np.zeros(9888))
+        touch_image(stage.scene, stage.body, np.zeros(9888))

@@ -12,7 +12,7 @@ from veca_marl.sim.geometry.primitives import Shape
 from veca_marl.sim.geometry.scene import Scene
 from veca_marl.sim.geometry.tables import Geom
 from veca_marl.sim.vision.optics import Camera, look_at, view_axes
-from veca_marl.sim.vision.raster import draw_geoms
+from veca_marl.sim.vision.rasterizer import draw_geoms
 
 
 def draw(scene, camera, pose, bounded):

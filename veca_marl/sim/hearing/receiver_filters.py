@@ -25,7 +25,7 @@ def _split(position: float, last: int) -> tuple[int, float]:
 
 
 @njit(cache=True)
-def bare_ear_filters(
+def omnidirectional_filters(
     arrivals: Floats,
     gains: Floats,
     samples_per_metre: float,
@@ -92,8 +92,8 @@ def head_related_filters(
         gains: ``(K,)`` what the walls left of each.
         samples_per_metre: Sampling rate over the speed of sound.
         lead: Samples by which the filter is late.
-        filters: ``(A, E, 2, T)``, see `HeadTable`; read bilinearly.
-        arrival_samples: ``(A, E, 2)``, see `HeadTable`.
+        filters: ``(A, E, 2, T)``, see `HrtfTable`; read bilinearly.
+        arrival_samples: ``(A, E, 2)``, see `HrtfTable`.
         bank: `kernel_bank`.
         out: ``(2, n)``, overwritten.
     """

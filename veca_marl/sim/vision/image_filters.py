@@ -12,7 +12,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from veca_marl.sim.vision.optics import Camera
-from veca_marl.sim.vision.raster import Depths
+from veca_marl.sim.vision.rasterizer import Depths
 from veca_marl.sim.vision.shading import Images
 
 

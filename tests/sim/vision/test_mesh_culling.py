@@ -8,9 +8,9 @@ from skins import add_body, pose, random_angles, random_turn
 from veca_marl.sim.geometry.primitives import Shape
 from veca_marl.sim.geometry.scene import Scene
 from veca_marl.sim.geometry.tables import Geom
-from veca_marl.sim.vision import skins_in_view
+from veca_marl.sim.vision.mesh_culling import draw_meshes
 from veca_marl.sim.vision.optics import Camera, look_at, view_axes
-from veca_marl.sim.vision.raster import draw_geoms
+from veca_marl.sim.vision.rasterizer import draw_geoms
 
 CAMERA = Camera(48, 40, 60.0)
 BODIES = 5
@@ -36,7 +36,7 @@ def buffers(scene, eye, culled):
     draw_geoms(geoms, geoms.visible, view, CAMERA.lens, True, depth, surfaces)
     drawn = np.ones(len(meshes.triangles), np.bool_)
     first = len(geoms.shapes)
-    skins_in_view.draw_skins(meshes, drawn, view, CAMERA.lens, culled, first, seen, depth, surfaces)
+    draw_meshes(meshes, drawn, view, CAMERA.lens, culled, first, seen, depth, surfaces)
     carried = np.isfinite(seen[meshes.first_vertices[:-1], 0])
     return depth, surfaces, carried
 
