@@ -1,1 +1,8 @@
-"""Learning: knows specs and teams, never a task, never the simulator."""
+"""Learning: knows specs and teams, never a task, never the simulator.
+
+Importing it registers the algorithms that ship with the package.
+"""
+
+from veca_marl.algos import ppo
+
+__all__ = ["ppo"]

@@ -1,1 +1,1 @@
-"""Networks: an encoder per sense, actors and critics."""
+"""Networks: encoders per sense, actors, critics, and the registry of factories."""

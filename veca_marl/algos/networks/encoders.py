@@ -11,6 +11,7 @@ import torch
 from torch import Tensor, nn
 from torchrl.modules.functional import symlog
 
+from veca_marl.algos.networks.initialisation import orthogonal
 from veca_marl.algos.specs import ArrayLayout
 
 _KERNELS = (8, 4, 3)  # Mnih et al. 2015, "Human-level control ...", with a half of their channels
@@ -18,16 +19,6 @@ _STRIDES = (4, 2, 1)
 # a CPU works 2.4 times as fast on blocks of images that fit its cache: large temporaries are
 # handed back to the system and faulted in again, page by page
 _CACHED_FLOATS = 32 * 6 * 84 * 84
-
-
-def orthogonal(layer: nn.Linear | nn.Conv2d, gain: float = math.sqrt(2.0)) -> nn.Module:
-    """Initialise `layer` as PPO implementations do.
-
-    Source: Huang et al. 2022, "The 37 implementation details of PPO", detail 2.
-    """
-    nn.init.orthogonal_(layer.weight, gain)
-    nn.init.zeros_(layer.bias)
-    return layer
 
 
 class Pooling(Enum):

@@ -1,1 +1,9 @@
 """Proximal policy optimisation."""
+
+from veca_marl.algos.algorithm import register_algorithm
+from veca_marl.algos.ppo.config import PPOCfg
+from veca_marl.algos.ppo.ppo import PPO
+
+register_algorithm("ppo", PPOCfg, PPO)
+
+__all__ = ["PPO", "PPOCfg"]

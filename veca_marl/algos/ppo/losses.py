@@ -1,31 +1,53 @@
-"""ClipPPOLoss that reports the exact divergence between the old and the new policy."""
+"""Clipped PPO with an exact divergence, in which only the agents that are present count."""
 
 from __future__ import annotations
 
 from typing import Any
 
 import torch
-from tensordict import TensorDictBase
+from tensordict import TensorDict, TensorDictBase
 from tensordict.nn import CompositeDistribution
 from torch import Tensor
 from torch.distributions import Distribution, kl_divergence
+from torchrl.modules import PopArtValueNorm
 from torchrl.objectives import ClipPPOLoss
 
-# where TorchRL's losses look for the rows that count, both to normalise and to average
+# where TorchRL's losses look for the entries that count, to normalise advantages and to average
 VALID = "shifted_valid"
 
 
-class ExactKLPPOLoss(ClipPPOLoss):
-    """Clipped PPO whose ``kl_approx`` is the analytic KL(old || new).
+class TeamPPOLoss(ClipPPOLoss):
+    """TorchRL's clipped PPO, with three additions.
 
-    TorchRL reports the mean of ``log old - log new`` over the sampled actions; its sign
-    fluctuates, and a negative value never moves an adaptive learning rate. The batch holds the
-    parameters of the distribution that acted, so the divergence itself costs no forward pass
-    (for two tanh-normals it is that of the normals: the tanh drops out). Rows that do not count
-    (`VALID` is False there) do not enter it.
+    - ``kl_approx`` is the analytic KL(old || new). TorchRL reports the mean of
+      ``log old - log new`` over the sampled actions; its sign fluctuates, and a negative value
+      never moves an adaptive learning rate. The batch holds the parameters of the distribution
+      that acted, so this costs no forward pass (for two tanh-normals it is that of the normals).
+    - Entries with `VALID` False are excluded from every reported measure; TorchRL excludes them
+      from the losses and from the normalisation of advantages alone.
+    - Optionally the value loss is normalised by running statistics, as in TorchRL's `MAPPOLoss`.
 
-    Overrides the private hook ``_log_weight``; `tests/algos/test_losses.py` pins it.
+    Overrides the private hooks ``_log_weight``, ``_get_entropy`` and ``_critic_loss_inputs``;
+    `tests/algos/ppo/test_losses.py` compares each with its formula.
+
+    Attributes:
+        value_norm: Running statistics of the value targets, or None.
     """
+
+    value_norm: PopArtValueNorm | None  # set after construction
+    _valid: Tensor | None = None  # of the batch in `forward`, (..., agents, 1)
+
+    def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
+        """Return losses and measures of a minibatch ``(n,)``."""
+        self._valid = tensordict.get(VALID, None)
+        out: TensorDictBase = super().forward(tensordict)
+        if self._valid is not None:
+            # both are means over all entries, with zeros where an entry does not count
+            share = self._valid.float().mean().clamp_min(1.0 / self._valid.numel())
+            for name in ("clip_fraction", "entropy"):
+                out[name] = out[name] / share
+        self._valid = None
+        return out
 
     def _log_weight(
         self, tensordict: TensorDictBase, adv_shape: torch.Size
@@ -35,14 +57,67 @@ class ExactKLPPOLoss(ClipPPOLoss):
         log_weight, new, _, correction = super()._log_weight(tensordict, adv_shape)
         with torch.no_grad():
             divergence = _divergence(old, new)
-            valid = tensordict.get(VALID, None)
-            if valid is not None:
-                divergence = divergence[valid.squeeze(-1)]
+        if self._valid is not None:
+            divergence = divergence[self._valid.squeeze(-1)]
+            log_weight = _zero_unless(self._valid, log_weight)
         return log_weight, new, divergence, correction
+
+    def _get_entropy(self, dist: Distribution, adv_shape: torch.Size) -> Tensor | TensorDict:
+        entropy = super()._get_entropy(dist, adv_shape)
+        if self._valid is None:
+            return entropy
+        if isinstance(entropy, Tensor):
+            return _zero_unless(self._valid, entropy)
+        return entropy.apply(lambda part: _zero_unless(self._valid, part))
+
+    def _critic_loss_inputs(
+        self, target_return: Tensor, state_value: Tensor, old_state_value: Tensor | None
+    ) -> tuple[Tensor, Tensor, Tensor | None]:
+        if self.value_norm is None:
+            return target_return, state_value, old_state_value
+        valid = self._valid
+        counted = target_return if valid is None else target_return[valid].unsqueeze(-1)
+        if counted.numel():
+            self.value_norm.update(counted)
+        normalise = self.value_norm.normalize
+        return normalise(target_return), normalise(state_value), old_state_value
+
+    def loss_critic(self, tensordict: TensorDictBase) -> tuple[Any, ...]:
+        """Return what `ClipPPOLoss.loss_critic` returns, its explained variance masked."""
+        loss, clip_fraction, explained = super().loss_critic(tensordict)
+        if self._valid is not None:
+            target = tensordict[self.tensor_keys.value_target]
+            value = tensordict[self.tensor_keys.value].detach()
+            explained = explained_variance(target, value, self._valid)
+        return loss, clip_fraction, explained
+
+
+def explained_variance(target: Tensor, value: Tensor, valid: Tensor) -> Tensor:
+    """Return 1 - Var(target - value) / Var(target) of each agent over the rows that count.
+
+    Args:
+        target: ``(rows, agents, 1)``.
+        value: The same shape.
+        valid: The same shape, True for entries that count.
+    """
+
+    def variance(x: Tensor) -> Tensor:
+        count = valid.sum(0).clamp_min(1)
+        centred = _zero_unless(valid, x - _zero_unless(valid, x).sum(0) / count)
+        return centred.square().sum(0) / count
+
+    smallest = torch.finfo(target.dtype).eps
+    return 1.0 - variance(target - value) / (variance(target) + smallest)
+
+
+def _zero_unless(valid: Tensor | None, x: Tensor) -> Tensor:
+    """Return `x` with zeros where `valid` is False; gradients there are zero too."""
+    return x if valid is None else torch.where(valid, x, torch.zeros_like(x))
 
 
 def _divergence(old: Distribution, new: Distribution) -> Tensor:
     """Return KL(old || new); the parts of an action are independent, so theirs are summed."""
     if isinstance(old, CompositeDistribution):
-        return sum(kl_divergence(old.dists[key], new.dists[key]) for key in old.dists)
+        parts = [kl_divergence(old.dists[key], new.dists[key]) for key in old.dists]
+        return torch.stack(parts).sum(0)
     return kl_divergence(old, new)

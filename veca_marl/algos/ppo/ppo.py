@@ -1,90 +1,203 @@
-"""Proximal policy optimisation of several teams: a learner for each, over the same batches."""
+"""Proximal policy optimisation (Schulman et al. 2017) of one team."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from copy import deepcopy
 from typing import Any
 
 import torch
-from tensordict import TensorDict, TensorDictBase
-from tensordict.nn import TensorDictModuleBase, TensorDictSequential
+from tensordict import TensorDictBase
+from tensordict.nn import TensorDictModuleBase
+from torch import nn
+from torchrl.data import LazyTensorStorage, SamplerWithoutReplacement, TensorDictReplayBuffer
+from torchrl.modules import PopArtValueNorm
+from torchrl.objectives import KLAdaptiveLR
 
-from veca_marl.algos.ppo.learner import PPOCfg, TeamLearner
+from veca_marl.algos.algorithm import Algorithm
+from veca_marl.algos.networks.factory import TeamNetwork, make_network
+from veca_marl.algos.ppo.advantages import advantages
+from veca_marl.algos.ppo.config import PPOCfg, ValueNormalisation
+from veca_marl.algos.ppo.losses import VALID, TeamPPOLoss
 from veca_marl.algos.specs import TeamSpec
 
+_MEASURES = {  # name in the logs: name in the loss
+    "policy_loss": "loss_objective",
+    "value_loss": "loss_critic",
+    "entropy": "entropy",
+    "kl": "kl_approx",
+    "clip_fraction": "clip_fraction",
+    "explained_variance": "explained_variance",
+}
 
-class PPO:
-    """One learner per team over the same batches.
+
+class PPO(Algorithm):
+    """Network, loss, optimiser and learning rate of one team.
+
+    A policy with hidden state learns from the stored state as an input: gradients do not flow
+    through time.
 
     Args:
-        specs: Team name to its arrays.
+        team: Name of the team: the first part of all its keys.
+        spec: Its arrays.
         cfg: The numbers.
-        device: Where networks live and learn.
-        own: The numbers of teams that have others.
-        frozen: Policies of teams that do not learn.
-
-    Attributes:
-        policy: Writes the actions of all teams; changes with every gradient step.
-        actors: The parts of `policy` by team.
-        learning: The teams that learn from the next batches; the others keep what they know.
+        device: Where it learns.
     """
 
-    def __init__(
-        self,
-        specs: Mapping[str, TeamSpec],
-        cfg: PPOCfg,
-        device: torch.device,
-        own: Mapping[str, PPOCfg] | None = None,
-        frozen: Mapping[str, TensorDictModuleBase] | None = None,
-    ) -> None:
-        self.device = device
-        own, frozen = own or {}, frozen or {}
-        self.learners = {
-            team: TeamLearner(team, spec, own.get(team, cfg), device)
-            for team, spec in specs.items()
-            if team not in frozen
-        }
-        self.learning = list(self.learners)
-        self.actors = {
-            team: frozen[team].to(device) if team in frozen else self.learners[team].network.actor
-            for team in specs
-        }
-        self.policy = TensorDictSequential(*self.actors.values())
+    exact_resume = True
 
-    def copy_policy(self) -> TensorDictSequential:
-        """Return a copy of the policy that plays on the CPU and does not change by itself."""
-        return deepcopy(self.policy).to("cpu")
+    def __init__(self, team: str, spec: TeamSpec, cfg: PPOCfg, device: torch.device) -> None:
+        self.team, self.cfg, self._masked, self._device = team, cfg, spec.masked, device
+        self.network = make_network(team, spec, cfg.network).to(device)
+        self.loss = _make_loss(team, self.network, cfg).to(device)
+        self.optimizer = torch.optim.Adam(self.network.parameters(), lr=cfg.learning_rate)
+        self.schedule = KLAdaptiveLR(
+            self.optimizer,
+            target_kl=cfg.target_kl,
+            factor=1.5,
+            min_lr=cfg.min_learning_rate,
+            max_lr=cfg.max_learning_rate,
+        )
+        self._batch_keys = _batch_keys(self.network, team, spec.masked)
+        self._memory: TensorDictReplayBuffer | None = None
 
-    @torch.no_grad()
-    def refresh(self, player: TensorDictSequential) -> None:
-        """Give a copy of the policy the parameters of now."""
-        for old, new in zip(player.parameters(), self.policy.parameters(), strict=True):
-            old.copy_(new)
+    @property
+    def actor(self) -> TensorDictModuleBase:
+        """See `Algorithm`."""
+        return self.network.actor
+
+    @property
+    def measures(self) -> list[str]:
+        """See `Algorithm`."""
+        return [*_MEASURES, "gradient_norm", "learning_rate"]
+
+    def learn(self, batch: TensorDictBase) -> dict[str, float]:
+        """See `Algorithm`: all epochs over one batch; each measure is a mean over them."""
+        return self.learn_rows(self.prepare(batch))
 
     def prepare(self, batch: TensorDictBase) -> TensorDictBase:
-        """Turn a batch ``(worlds, steps)`` as collected into rows to learn from, on the device."""
-        rows = TensorDict({}, batch.batch_size)
-        for team in self.learning:
-            rows.update(self.learners[team].prepare(batch))
-        return rows.reshape(-1).to(self.device)
+        """Return the rows ``(worlds * steps,)`` that a batch consists of, on the device."""
+        cfg = self.cfg
+        rows = batch.select(*self._batch_keys)
+        rows[self.team].update(
+            advantages(self.network, batch, self.team, cfg.gamma, cfg.gae_lambda)
+        )
+        return rows.reshape(-1).to(self._device)
 
-    def learn(self, rows: TensorDictBase) -> dict[str, dict[str, float]]:
-        """Make all epochs over `rows`; return the mean of each measure by team, if it learns."""
-        return {
-            team: learner.learn(rows.select(team)) if team in self.learning else learner.pause()
-            for team, learner in self.learners.items()
-        }
+    def learn_rows(self, rows: TensorDictBase) -> dict[str, float]:
+        """Make all epochs over `rows` and return the mean of each measure."""
+        memory = self._fill_memory(rows)
+        measured: list[dict[str, float]] = []
+        for _ in range(self.cfg.epochs):
+            epoch = [self.step(minibatch) for minibatch in memory]
+            self.schedule.step(_mean(epoch)["kl"])
+            measured += epoch
+        return _mean(measured) | {"learning_rate": self.schedule.get_last_lr()[0]}
 
-    def begin_with(self, team: str, network: Mapping[str, Any]) -> None:
-        """Let a team begin with what another run has learnt; its optimiser begins anew."""
-        self.learners[team].network.load_state_dict(network)
+    def _fill_memory(self, rows: TensorDictBase) -> TensorDictReplayBuffer:
+        if self._memory is None:
+            self._memory = TensorDictReplayBuffer(
+                storage=LazyTensorStorage(len(rows), device=rows.device),
+                sampler=SamplerWithoutReplacement(drop_last=True),
+                batch_size=len(rows) // self.cfg.minibatches,
+            )
+        self._memory.empty()
+        self._memory.extend(rows)
+        return self._memory
+
+    def step(self, minibatch: TensorDictBase) -> dict[str, float]:
+        """Take one gradient step and return what was measured.
+
+        Raises:
+            FloatingPointError: If the gradient is not finite.
+        """
+        if self._masked:
+            minibatch[VALID] = minibatch[self.team, "mask"].unsqueeze(-1)
+        out = self.loss(minibatch)
+        loss = out["loss_objective"] + out["loss_critic"] + out["loss_entropy"]
+        self.optimizer.zero_grad()
+        loss.backward()
+        norm = nn.utils.clip_grad_norm_(self.network.parameters(), self.cfg.max_gradient_norm)
+        if not torch.isfinite(norm):
+            raise FloatingPointError(
+                f"team {self.team!r}: the gradient is {norm.item()}; observations or rewards "
+                "are not finite, or the learning rate is too high"
+            )
+        self.optimizer.step()
+        measured = {name: float(out[key].detach().mean()) for name, key in _MEASURES.items()}
+        return measured | {"gradient_norm": float(norm)}
 
     def state_dict(self) -> dict[str, Any]:
-        """Return the state of every learner by team."""
-        return {team: learner.state_dict() for team, learner in self.learners.items()}
+        """See `Algorithm`: network, optimiser, learning rate, statistics of the value targets."""
+        return {name: part.state_dict() for name, part in self._parts().items()}
 
-    def load_state_dict(self, state: Mapping[str, Any]) -> None:
-        """Continue from `state_dict`."""
-        for team, learner in self.learners.items():
-            learner.load_state_dict(state[team])
+    def load_state_dict(self, state: dict[str, Any]) -> None:
+        """See `Algorithm`."""
+        for name, part in self._parts().items():
+            part.load_state_dict(state[name])
+
+    def _parts(self) -> dict[str, Any]:
+        parts = {
+            "network": self.network,
+            "optimizer": self.optimizer,
+            "schedule": self.schedule,
+        }
+        norm = self.loss.value_norm
+        return parts if norm is None else parts | {"value_norm": norm}
+
+    def warm_start(self, other: Algorithm) -> None:
+        """See `Algorithm`: takes over actor and critic.
+
+        Raises:
+            ValueError: If `other` is not PPO, or has another network.
+        """
+        if not isinstance(other, PPO):
+            raise ValueError(f"learnt by {type(other).__name__}, not by PPO")
+        there, here = vars(other.cfg.network), vars(self.cfg.network)
+        differing = [
+            f"{name}={there.get(name, 'absent')} there, {here.get(name, 'absent')} here"
+            for name in {**here, **there}
+            if there.get(name) != here.get(name)
+        ]
+        if differing:
+            raise ValueError(f"another network: {'; '.join(differing)}")
+        self.network.load_state_dict(other.network.state_dict())
+
+
+def _batch_keys(network: TeamNetwork, team: str, masked: bool) -> list[Any]:
+    """Return what is read from a batch to learn from it."""
+    actor = network.actor
+    return [
+        *network.encoder.in_keys,
+        *actor.dist_params_keys,
+        *actor.dist_sample_keys,
+        *actor.log_prob_keys,
+        *([(team, "mask")] if masked else []),
+    ]
+
+
+def _make_loss(team: str, network: TeamNetwork, cfg: PPOCfg) -> TeamPPOLoss:
+    loss = TeamPPOLoss(
+        network.actor,
+        network.critic,
+        clip_epsilon=cfg.clip,
+        entropy_coeff=cfg.entropy_coefficient,
+        critic_coeff=cfg.value_coefficient,
+        loss_critic_type="l2",
+        normalize_advantage=True,
+        normalize_advantage_exclude_dims=(-2,),  # each agent of the team by itself
+        functional=False,
+    )
+    loss.set_keys(
+        reward=(team, "reward"),
+        done=(team, "done"),
+        terminated=(team, "terminated"),
+        value=(team, "state_value"),
+        advantage=(team, "advantage"),
+        value_target=(team, "value_target"),
+    )
+    popart = cfg.value_normalisation is ValueNormalisation.popart
+    loss.value_norm = PopArtValueNorm(shape=1) if popart else None
+    return loss
+
+
+def _mean(measures: list[dict[str, float]]) -> dict[str, float]:
+    return {name: sum(m[name] for m in measures) / len(measures) for name in measures[0]}

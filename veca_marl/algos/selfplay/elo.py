@@ -1,4 +1,4 @@
-"""Elo ratings from a table of results, all games at once."""
+"""Elo ratings from a table of results, fitted to all games at once."""
 
 from __future__ import annotations
 
@@ -22,16 +22,16 @@ def elo_ratings(
     ratings that are updated game by game do.
 
     Args:
-        wins: ``(n, n)`` games that i won against j; a draw is half a game for each.
+        wins: ``(n, n)`` number of games that i won against j; a draw is half a game for each.
         mean: Mean of the ratings.
         prior_games: Drawn games of each player against one of rating `mean`; more than 0, so that
-            who has won all games has a rating.
+            the rating of a player that won all games is finite.
 
     Returns:
         ``(n,)`` Elo points.
 
     Raises:
-        ValueError: If `wins` is no square table of numbers that are 0 or more.
+        ValueError: If `wins` is not a square table of numbers that are 0 or more.
     """
     if wins.ndim != 2 or wins.shape[0] != wins.shape[1] or not (wins >= 0.0).all():
         raise ValueError(f"wins must be a square table of numbers, 0 or more; got {wins!r}")

@@ -1,4 +1,4 @@
-"""Everyone against everyone: past selves of two teams, and how strong each of them was."""
+"""Tournament: every past policy of one team against every one of the other, and their ratings."""
 
 from __future__ import annotations
 
@@ -6,24 +6,23 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from tensordict.nn import TensorDictSequential
 from torchrl.envs import EnvBase
 
-from veca_marl.algos.ppo.ppo import PPO
 from veca_marl.algos.selfplay.elo import elo_ratings
-from veca_marl.algos.selfplay.self_play import Pool
+from veca_marl.algos.selfplay.pool import Pool
 from veca_marl.algos.training.evaluation import Exploration, Scores, evaluate
+from veca_marl.algos.training.learners import Policy
 
 
 @dataclass(frozen=True)
 class Match:
-    """Some episodes between two past selves.
+    """Episodes between two past policies.
 
     Attributes:
-        members: After how many frames each of them was kept, by team.
-        wins: Episodes won, by team; the others are drawn.
-        episodes: How many were played.
-        ahead: Mean of the first team's return less the second's.
+        members: Frames after which each of them was stored, by team.
+        wins: Episodes won, by team; the others are draws.
+        episodes: Number of episodes.
+        ahead: Mean of the first team's return minus the second's.
     """
 
     members: dict[str, int]
@@ -33,14 +32,14 @@ class Match:
 
     @property
     def points(self) -> float:
-        """Share of the first team: a win counts 1, a draw one half."""
+        """Mean points of the first team: 1 for a win, one half for a draw."""
         first, second = self.wins.values()
         return (first + 0.5 * (self.episodes - first - second)) / self.episodes
 
 
 @dataclass(frozen=True)
 class Rating:
-    """How strong a past self is, in Elo points about a mean of 1000."""
+    """Strength of a past policy in Elo points; the mean of all is 1000."""
 
     team: str
     frames: int
@@ -49,42 +48,34 @@ class Rating:
 
 def play_all(
     env: EnvBase,
-    algorithm: PPO,
+    policy: Policy,
     pool: Pool,
     members: dict[str, list[int]],
     episodes: int,
     draw_margin: float,
     seed: int,
 ) -> list[Match]:
-    """Let every past self of one team meet every one of the other, from the same starts.
+    """Let every past policy of one team play against every one of the other, from equal starts.
 
     Args:
-        env: Where they play.
-        algorithm: Made for it; its actors say how the past selves are built.
-        pool: Where they are kept.
-        members: Who plays: frames by team, of two teams.
-        episodes: Of each match, rounded up to a multiple of the worlds.
-        draw_margin: Returns nearer to each other than this are a draw: who kicked no goal may
-            still have earned helper rewards.
-        seed: Of the starts.
+        env: The environment.
+        policy: A policy for all its teams, into which the past ones are loaded.
+        pool: Where those are stored.
+        members: Frames of the past policies by team, of two teams.
+        episodes: Number of episodes of each match, rounded up to a multiple of the worlds.
+        draw_margin: A smaller difference of the returns is a draw: teams that scored no goal may
+            still differ in shaping rewards.
+        seed: Seed of the starts.
     """
-    player = algorithm.copy_policy()
     first, second = members
     matches = []
     for one in members[first]:
-        _dress(player, algorithm, pool, first, one)
+        policy.actors[first].load_state_dict(pool.load(first, one))
         for other in members[second]:
-            _dress(player, algorithm, pool, second, other)
-            scores = evaluate(env, player, episodes, seed, Exploration.stochastic)
-            pair = {first: one, second: other}
-            matches.append(_judge(pair, scores, draw_margin))
+            policy.actors[second].load_state_dict(pool.load(second, other))
+            scores = evaluate(env, policy.play, episodes, seed, Exploration.stochastic)
+            matches.append(_judge({first: one, second: other}, scores, draw_margin))
     return matches
-
-
-def _dress(
-    player: TensorDictSequential, algorithm: PPO, pool: Pool, team: str, frames: int
-) -> None:
-    player[list(algorithm.actors).index(team)].load_state_dict(pool.load(team, frames))
 
 
 def _judge(members: dict[str, int], scores: dict[str, Scores], draw_margin: float) -> Match:
@@ -98,7 +89,7 @@ def _judge(members: dict[str, int], scores: dict[str, Scores], draw_margin: floa
 
 
 def rate(matches: list[Match]) -> list[Rating]:
-    """Return the Elo ratings of all who played."""
+    """Return the Elo ratings of all past policies in `matches`."""
     players = sorted({item for match in matches for item in match.members.items()})
     wins = np.zeros((len(players), len(players)))
     for match in matches:
@@ -112,7 +103,7 @@ def rate(matches: list[Match]) -> list[Rating]:
 
 
 def table_of_points(matches: list[Match]) -> NDArray[np.float64]:
-    """Return the first team's points, a row for each of its members, a column for the other's."""
+    """Return the first team's points, with a row for each of its policies, a column for the other's."""
     rows, columns = (
         sorted({list(match.members.values())[side] for match in matches}) for side in (0, 1)
     )

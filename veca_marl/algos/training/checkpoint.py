@@ -1,4 +1,4 @@
-"""Checkpoints: written whole or not at all, the last few and the best, bound to their task."""
+"""Checkpoints: written atomically, the last few and the best, bound to task and specs."""
 
 from __future__ import annotations
 
@@ -17,8 +17,9 @@ import torch
 
 from veca_marl.algos.specs import TeamSpec
 
-# 3: actions are named parts; an older state does not say which
+# 3: actions have named parts, and each team an algorithm of its own
 _FORMAT = 3
+_CPU = torch.device("cpu")
 
 
 class CheckpointError(RuntimeError):
@@ -45,35 +46,44 @@ class Identity:
 class Checkpoints:
     """The checkpoints of one run.
 
+    Each file holds the format, the identity, the configuration of the run, the numbers of each
+    team's algorithm, and under ``state`` what `save` was given.
+
     Args:
-        folder: Where they lie; made at the first save.
+        folder: Where they are; created at the first save. None keeps nothing.
         identity: What they belong to.
-        config: The run's configuration as plain data, stored beside every state.
-        keep_last: How many of the latest stay; the best always stays.
+        config: The run's configuration as plain data, for the reader.
+        keep_last: Number of the latest that are kept, beside the best one.
     """
 
     def __init__(
-        self, folder: Path, identity: Identity, config: dict[str, Any], keep_last: int = 3
+        self, folder: Path | None, identity: Identity, config: dict[str, Any], keep_last: int = 3
     ) -> None:
         self.folder, self.identity, self.config = folder, identity, config
         self.keep_last = keep_last
 
-    def save(self, state: dict[str, Any], frames: int, best: bool) -> Path:
-        """Write `state`, then remove what is too old.
+    def save(
+        self, state: dict[str, Any], algorithms: dict[str, Any], frames: int, best: bool
+    ) -> None:
+        """Write `state`, then remove checkpoints that are too old.
 
         Args:
             state: Tensors and plain data.
+            algorithms: Team to the numbers of its algorithm as plain data.
             frames: Training frames so far: the file's name.
             best: Whether it is the best so far.
 
         Raises:
-            CheckpointError: If it cannot be written; earlier checkpoints are as they were.
+            CheckpointError: If it cannot be written; earlier checkpoints are unchanged.
         """
+        if self.folder is None:
+            return
         path = self.folder / f"frames_{frames:012d}.pt"
         content = {
             "format": _FORMAT,
             "identity": self.identity.to_dict(),
             "config": self.config,
+            "algorithms": algorithms,
             "state": state,
         }
         with _interrupts_wait():
@@ -84,7 +94,6 @@ class Checkpoints:
                 self._write(file.getbuffer(), self.folder / "best.pt")
         for old in self._files()[: -self.keep_last]:
             old.unlink()
-        return path
 
     def latest(self) -> Path:
         """Return the newest checkpoint.
@@ -98,12 +107,12 @@ class Checkpoints:
         return files[-1]
 
     def _files(self) -> list[Path]:
-        return sorted(self.folder.glob("frames_*.pt"))
+        return [] if self.folder is None else sorted(self.folder.glob("frames_*.pt"))
 
     def _write(self, content: memoryview, path: Path) -> None:
         temporary = path.with_suffix(".tmp")
         try:
-            self.folder.mkdir(parents=True, exist_ok=True)
+            path.parent.mkdir(parents=True, exist_ok=True)
             with temporary.open("wb") as file:
                 file.write(content)
                 file.flush()
@@ -120,18 +129,18 @@ class Checkpoints:
 
 @contextmanager
 def _interrupts_wait() -> Iterator[None]:
-    """Let Ctrl-C wait until the block is done; torch would make an error of its own of it."""
+    """Delay Ctrl-C until the block is done; inside it torch would raise another error."""
     if threading.current_thread() is not threading.main_thread():
-        yield  # only the main thread hears it
+        yield  # only the main thread receives signals
         return
-    heard: list[int] = []
-    previous = signal.signal(signal.SIGINT, lambda number, _: heard.append(number))
+    received: list[int] = []
+    previous = signal.signal(signal.SIGINT, lambda number, _: received.append(number))
     try:
         yield
     finally:
         signal.signal(signal.SIGINT, previous)
-    if heard:
-        signal.raise_signal(heard[0])
+    if received:
+        signal.raise_signal(received[0])
 
 
 def load_checkpoint(path: Path, identity: Identity, device: torch.device) -> dict[str, Any]:
@@ -140,21 +149,22 @@ def load_checkpoint(path: Path, identity: Identity, device: torch.device) -> dic
     Raises:
         CheckpointError: If the file cannot be read, or belongs to another task or other specs.
     """
-    try:
-        content = torch.load(path, map_location=device, weights_only=True)
-    except (OSError, RuntimeError, EOFError, pickle.UnpicklingError) as error:
-        raise CheckpointError(f"cannot read the checkpoint {path}: {error}") from error
-    _check_identity(path, check_format(path, content)["identity"], identity.to_dict())
+    content = read_checkpoint(path, device)
+    _check_identity(path, content["identity"], identity.to_dict())
     state: dict[str, Any] = content["state"]
     return state
 
 
-def check_format(path: Path, content: Any) -> dict[str, Any]:
-    """Return what was read from a file, if it is a checkpoint that means here what it meant then.
+def read_checkpoint(path: Path, device: torch.device = _CPU) -> dict[str, Any]:
+    """Return everything that is in the file of a checkpoint.
 
     Raises:
-        CheckpointError: If it is not.
+        CheckpointError: If it cannot be read, or is not a checkpoint of this version.
     """
+    try:
+        content = torch.load(path, map_location=device, weights_only=True)
+    except (OSError, RuntimeError, EOFError, pickle.UnpicklingError) as error:
+        raise CheckpointError(f"cannot read the checkpoint {path}: {error}") from error
     if not isinstance(content, dict) or content.get("format") != _FORMAT:
         raise CheckpointError(f"{path} is not a checkpoint of this version (format {_FORMAT})")
     return content

@@ -1,4 +1,4 @@
-"""Where experience comes from: worlds in this process, or in several."""
+"""Collection of experience by worlds in this process, or in several."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ from veca_marl.algos.specs import EnvFactory
 
 @dataclass
 class CollectCfg:
-    """How many worlds play at once; processes x worlds are the paper's 8 workers.
+    """Number of worlds that play at the same time; processes x worlds are the paper's 8 workers.
 
     Attributes:
-        processes: Worker processes; 0 plays in this one.
-        worlds: Worlds in each process; they share one policy call.
+        processes: Worker processes; 0 steps the worlds in this one.
+        worlds: Worlds in each process; one call of the policy acts for all of them.
         steps: Steps of each world in a batch.
         threads: Torch threads of each worker process.
     """
@@ -48,12 +48,12 @@ class CollectCfg:
 
 
 class Experience:
-    """Batches of ``(worlds, steps)`` played by `policy`, restartable from a seed.
+    """Batches of ``(worlds, steps)`` collected with `policy`, restartable from a seed.
 
     Args:
         make_env: Makes the worlds.
         policy: Writes actions, on the CPU. New parameters reach the worlds by `update_policy`.
-        cfg: How many worlds, where.
+        cfg: Number of worlds and processes.
     """
 
     def __init__(self, make_env: EnvFactory, policy: TensorDictModuleBase, cfg: CollectCfg) -> None:
@@ -62,7 +62,7 @@ class Experience:
         common = {
             "frames_per_batch": cfg.frames,
             "total_frames": -1,
-            "auto_register_policy_transforms": False,
+            "auto_register_policy_transforms": True,  # the hidden state of a recurrent policy
         }
         if cfg.processes == 0:
             self._collector = Collector(make, policy, **common)
@@ -80,18 +80,18 @@ class Experience:
         self._batches: Iterator[TensorDictBase] = iter(self._collector)
 
     def restart(self, seed: int) -> None:
-        """Start new episodes in all worlds; all that follows depends on `seed` alone."""
+        """Start new episodes in all worlds; everything after depends on `seed` and parameters alone."""
         torch.manual_seed(seed)
         self._collector.set_seed(seed)
         self._collector.reset()
 
     def collect(self) -> TensorDictBase:
-        """Play on and return the next batch, ``(processes * worlds, steps)``."""
+        """Return the next batch, ``(processes * worlds, steps)``."""
         batch = next(self._batches)
         return batch if batch.ndim == 2 else batch.flatten(0, 1)
 
     def update_policy(self) -> None:
-        """Hand the policy's new parameters to the worlds."""
+        """Send the policy's new parameters and buffers to the workers."""
         self._collector.update_policy_weights_()
 
     def close(self) -> None:
@@ -103,7 +103,7 @@ class Experience:
 
 @contextmanager
 def _workers_ignore_interrupts() -> Iterator[None]:
-    """Let workers made meanwhile ignore Ctrl-C: this process hears it and ends them in order."""
+    """Let workers made inside the block ignore Ctrl-C: this process receives it and ends them."""
     inherited = {signal.SIGINT: signal.SIG_IGN, signal.SIGTERM: signal.SIG_DFL}
     previous = {number: signal.signal(number, action) for number, action in inherited.items()}
     try:
@@ -115,7 +115,7 @@ def _workers_ignore_interrupts() -> Iterator[None]:
 
 @contextmanager
 def _start_method(name: str) -> Iterator[None]:
-    """Make workers by `name`; importing torchrl sets ``spawn`` for the whole program."""
+    """Create workers by `name`; importing torchrl sets ``spawn`` for the whole program."""
     previous = multiprocessing.get_start_method()
     multiprocessing.set_start_method(name, force=True)
     try:
@@ -125,7 +125,7 @@ def _start_method(name: str) -> Iterator[None]:
 
 
 def start_method() -> str:
-    """Return how workers are made: ``fork`` (0.2 s) where it is safe, else ``spawn`` (5 s).
+    """Return how workers are created: ``fork`` (0.2 s) where it is safe, else ``spawn`` (5 s).
 
     A process that has used CUDA must not be forked, and macOS's own libraries forbid it.
     """

@@ -1,9 +1,10 @@
-"""Collect, learn, evaluate, keep: in stages, each of which depends on (seed, stage) alone.
+"""The training loop: collect, learn, evaluate, store; in stages that depend on (seed, stage) alone.
 
 A stage ends with an evaluation and a checkpoint, and the next one starts new episodes and new
-random streams from (seed, stage). A checkpoint therefore holds only what was learnt: a run resumed
-from it, after Ctrl-C, a crash or a power cut, continues as if it had never stopped, bit for bit.
-What an interrupted stage had learnt is learnt again.
+random streams from (seed, stage). A checkpoint therefore holds only what was learnt: where every
+algorithm has `Algorithm.exact_resume`, a run that is resumed from it (after Ctrl-C, a crash or a
+power cut) gives the same parameters, bit for bit, as a run that was not interrupted. What an
+interrupted stage had learnt is learnt again.
 """
 
 from __future__ import annotations
@@ -16,80 +17,48 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from torch import nn
+from torchrl import timeit
 from torchrl.envs import EnvBase
 from tqdm import tqdm
 
-from veca_marl.algos.ppo.ppo import PPO
-from veca_marl.algos.selfplay.self_play import AllLearn, Matchmaking
+from veca_marl.algos.plain import to_plain
 from veca_marl.algos.specs import EnvFactory
 from veca_marl.algos.training.checkpoint import Checkpoints, load_checkpoint
 from veca_marl.algos.training.collect import CollectCfg, Experience
-from veca_marl.algos.training.evaluation import (
-    EvalCfg,
-    Exploration,
-    Scores,
-    comparison_line,
-    evaluate,
-    interval,
-    random_policy,
-)
-from veca_marl.algos.training.metrics import Reporter, Stopwatch, TrainingEpisodes
+from veca_marl.algos.training.comparison import comparison_line, interval
+from veca_marl.algos.training.episodes import TrainingEpisodes
+from veca_marl.algos.training.evaluation import EvalCfg, RandomTeams, Scores, evaluate
+from veca_marl.algos.training.learners import Policy, TeamLearners
+from veca_marl.algos.training.matchmaking import AllLearn, Matchmaking
+from veca_marl.algos.training.progress import Budget, Progress
+from veca_marl.algos.training.reporters import Reporter
+from veca_marl.algos.training.timing import timing_table
 
-_EVALUATION_STAGE = 2**31 - 1  # in place of a stage number: starts no training stage ever uses
-
-
-@dataclass
-class Budget:
-    """How long to train.
-
-    Attributes:
-        total_frames: Frames of experience (rounded up to whole batches).
-        max_minutes: Also stop after the stage in which this time runs out; None for no limit.
-    """
-
-    total_frames: int
-    max_minutes: float | None = None
-
-
-@dataclass
-class Progress:
-    """Where a run stands; stored in its checkpoints.
-
-    Attributes:
-        stage: Finished stages.
-        iteration: Finished batches.
-        frames: Frames learnt from.
-        best_return: Best mean return of the evaluations, over all teams.
-    """
-
-    stage: int = 0
-    iteration: int = 0
-    frames: int = 0
-    best_return: float = -math.inf
+_EVALUATION_STAGE = 2**31 - 1  # in place of a stage number: seeds that no training stage uses
 
 
 @dataclass
 class Trainer:
-    """Trains an algorithm.
+    """Trains the teams of an environment.
 
     Attributes:
-        make_env: Makes the worlds.
-        algorithm: Learns.
+        make_env: Makes the environments.
+        learners: The algorithms of all teams.
         collect: How experience is gathered.
         evaluation: When and how the policy is evaluated.
         budget: How long.
-        checkpoints: Where states are kept.
+        checkpoints: Where states are stored.
         reporters: Where numbers go.
-        seed: Everything random follows from it.
+        seed: Determines all random numbers.
         progress_bar: Whether to show one.
-        matchmaking: Who learns against whom.
+        matchmaking: Which teams learn against which opponents.
         progress: Where the run stands.
-        watch: Where the time goes.
-        player: The copy of the policy that plays, on the CPU.
+        policy: A copy of the policy on the CPU, which collects and is evaluated.
     """
 
     make_env: EnvFactory
-    algorithm: PPO
+    learners: TeamLearners
     collect: CollectCfg
     evaluation: EvalCfg
     budget: Budget
@@ -99,131 +68,171 @@ class Trainer:
     progress_bar: bool = True
     matchmaking: Matchmaking = field(default_factory=AllLearn)
     progress: Progress = field(default_factory=Progress)
-    watch: Stopwatch = field(default_factory=Stopwatch)
     _resumed_frames: int = 0
 
     def __post_init__(self) -> None:
-        self.player = self.algorithm.copy_policy()
+        self.policy: Policy = self.learners.policy.copy()
+        timeit.erase()
+        self._clock = timeit("total").start()
 
     def resume(self, path: Path) -> None:
-        """Take up learning and progress from the checkpoint at `path`."""
-        state = load_checkpoint(path, self.checkpoints.identity, self.algorithm.device)
-        self.algorithm.load_state_dict(state["algorithm"])
-        self.algorithm.refresh(self.player)
+        """Continue learning and progress from the checkpoint at `path`."""
+        state = load_checkpoint(path, self.checkpoints.identity, self.learners.device)
+        self.learners.load_state_dict(state["algorithm"])
+        self.policy.take_over(self.learners.policy)
         self.progress = Progress(**state["progress"])
         self._resumed_frames = self.progress.frames
 
     def run(self) -> list[str]:
-        """Train until the budget is spent; return how each team compares with random play."""
+        """Train until the budget is spent.
+
+        Returns:
+            A line for each team that learns, which compares it with random actions, and a line for
+            each property of the run that its user should know.
+        """
         fresh = self.progress.frames == 0
         if fresh:
-            self._save(best=False)  # an interruption at any time finds something to resume from
-        with self.watch.measure("build"):
+            self._save(best=False)  # an interruption at any time finds a checkpoint
+        with timeit("build"):
             eval_env = self.make_env(self.evaluation.worlds, 0)
-            experience = Experience(self.make_env, self.player, self.collect)
+            experience = Experience(self.make_env, self.policy.collect, self.collect)
         with closing(eval_env), closing(experience):
-            with self.watch.measure("evaluate"):
-                baseline = self._play(eval_env, random_policy(eval_env), Exploration.stochastic)
+            with timeit("evaluate"):
+                baseline = self._evaluate(eval_env, self._baseline(eval_env))
             if fresh:
                 self._report_scores("random", baseline)
-            scores = self._train(experience, eval_env) or self._play(eval_env)
-        return [comparison_line(team, scores[team], baseline[team]) for team in scores]
+            scores = self._train(experience, eval_env) or self._evaluate(eval_env)
+        compared = [comparison_line(t, scores[t], baseline[t]) for t in self.learners.algorithms]
+        return [*compared, *self._notes()]
+
+    def _baseline(self, env: EnvBase) -> RandomTeams:
+        """Return random actions for the teams that learn, against the opponents they learn with."""
+        frozen = [self.policy.actors[team] for team in self.learners.frozen]
+        return RandomTeams(env, list(self.learners.algorithms), frozen)
+
+    def _notes(self) -> list[str]:
+        notes = []
+        if not self._has_best:
+            notes.append(
+                "no best.pt: several teams learn, and the mean of their returns says nothing of "
+                "their skill (it is 0 in a zero-sum game); the latest checkpoints are kept"
+            )
+        if self._resumed_frames and not self.learners.exact_resume:
+            notes.append("resumed: an algorithm of this run does not continue bit for bit")
+        return notes
+
+    @property
+    def _has_best(self) -> bool:
+        """Whether the mean return measures progress: one team learns, its opponents stay."""
+        return len(self.learners.algorithms) == 1
 
     def _train(self, experience: Experience, eval_env: EnvBase) -> dict[str, Scores] | None:
         """Go through all stages and return the scores of the last, if there was one."""
         scores = None
+        iterations = self.budget.iterations(self.collect.frames)
         with tqdm(
-            total=self._iterations() * self.collect.frames,
+            total=iterations * self.collect.frames,
             initial=self.progress.frames,
             unit=" frames",
             disable=not self.progress_bar,
         ) as bar:
-            while self.progress.iteration < self._iterations() and not self._out_of_time():
-                self._run_stage(experience, bar)
+            while self.progress.iteration < iterations and not self._out_of_time():
+                self._run_stage(experience, bar, iterations)
                 scores = self._end_stage(eval_env)
         return scores
 
+    def _out_of_time(self) -> bool:
+        return self.budget.is_spent(self._clock.elapsed())
+
     def timing(self) -> str:
         """Return a table of where the time went."""
-        return self.watch.table(self.progress.frames - self._resumed_frames)
+        return timing_table(self._clock.elapsed(), self.progress.frames - self._resumed_frames)
 
-    def _run_stage(self, experience: Experience, bar: tqdm[Any]) -> None:
+    def _run_stage(self, experience: Experience, bar: tqdm[Any], iterations: int) -> None:
         self.matchmaking.begin_stage(self.progress.stage, self.progress.frames)
-        self._equip(experience)
-        with self.watch.measure("collect"):
+        self._update_policy(experience)
+        with timeit("collect"):
             experience.restart(_seed(self.seed, self.progress.stage))
         episodes = TrainingEpisodes()
         per_stage = math.ceil(self.evaluation.every_frames / self.collect.frames)
-        until = min(self.progress.iteration + per_stage, self._iterations())
+        until = min(self.progress.iteration + per_stage, iterations)
         while self.progress.iteration < until:
             row = self._iterate(experience, episodes)
             bar.update(self.collect.frames)
             finished = {k: v for k, v in row.items() if k.endswith("/return") and v == v}
-            if finished:  # episodes: the bar keeps their last mean returns
+            if finished:  # otherwise the bar keeps the last mean returns
                 bar.set_postfix({k: f"{v:.3g}" for k, v in finished.items()})
 
     def _iterate(self, experience: Experience, episodes: TrainingEpisodes) -> dict[str, float]:
-        before = self.watch.elapsed_s
-        with self.watch.measure("collect"):
+        before = self._clock.elapsed()
+        with timeit("collect"):
             batch = experience.collect()
-        with self.watch.measure("advantage"):
-            rows = self.algorithm.prepare(batch)
-        with self.watch.measure("update"):
-            measured = self.algorithm.learn(rows)
-        with self.watch.measure("transfer"):
-            self._equip(experience)
+        with timeit("learn"):
+            measured = self.learners.learn(batch)
+        with timeit("transfer"):
+            self._update_policy(experience)
         self.progress.iteration += 1
         self.progress.frames += self.collect.frames
         row: dict[str, float] = {"iteration": self.progress.iteration}
         for team, measures in measured.items():
             both = episodes.add(batch, team) | measures
             row |= {f"{team}/{name}": value for name, value in both.items()}
-        row |= self.matchmaking.note()
-        row["frames_per_s"] = self.collect.frames / (self.watch.elapsed_s - before)
+        row |= self.matchmaking.measures()
+        row["frames_per_s"] = self.collect.frames / (self._clock.elapsed() - before)
         for reporter in self.reporters:
             reporter.write("metrics", self.progress.frames, row)
         return row
 
-    def _equip(self, experience: Experience) -> None:
-        """Let the worlds be played by what was learnt, and by whom it is to meet."""
-        self.algorithm.refresh(self.player)
-        self.matchmaking.dress(self.player)
+    def _update_policy(self, experience: Experience) -> None:
+        """Let the worlds be played by the current policy, its opponents loaded."""
+        self.policy.take_over(self.learners.policy)
+        self.matchmaking.load_opponent(self.policy)
         experience.update_policy()
 
     def _end_stage(self, eval_env: EnvBase) -> dict[str, Scores]:
-        self.algorithm.refresh(self.player)
-        with self.watch.measure("evaluate"):
-            scores = self._play(eval_env)
+        self.policy.take_over(self.learners.policy)
+        with timeit("evaluate"):
+            scores = self._evaluate(eval_env)
         self._report_scores("policy", scores)
-        mean = float(np.mean([s.returns.mean() for s in scores.values()]))
-        best = mean > self.progress.best_return
-        self.progress.best_return = max(mean, self.progress.best_return)
+        best = self._is_best(scores)
         self.progress.stage += 1
         self.matchmaking.end_stage(self.progress.frames)
-        with self.watch.measure("checkpoint"):
+        with timeit("checkpoint"):
             self._save(best)
         return scores
 
-    def _save(self, best: bool) -> None:
-        state = {"algorithm": self.algorithm.state_dict(), "progress": asdict(self.progress)}
-        self.checkpoints.save(state, self.progress.frames, best)
+    def _is_best(self, scores: dict[str, Scores]) -> bool:
+        if not self._has_best:
+            return False
+        (team,) = self.learners.algorithms
+        mean = float(scores[team].returns.mean())
+        best = mean > self.progress.best_return
+        self.progress.best_return = max(mean, self.progress.best_return)
+        return best
 
-    def _play(
-        self, env: EnvBase, policy: Any = None, exploration: Exploration | None = None
-    ) -> dict[str, Scores]:
+    def _save(self, best: bool) -> None:
+        state = {
+            "algorithm": self.learners.state_dict(),
+            "actors": self.learners.actor_states(),
+            "progress": asdict(self.progress),
+        }
+        numbers = {team: to_plain(cfg) for team, cfg in self.learners.cfgs.items()}
+        self.checkpoints.save(state, numbers, self.progress.frames, best)
+
+    def _evaluate(self, env: EnvBase, policy: nn.Module | None = None) -> dict[str, Scores]:
         return evaluate(
             env,
-            policy or self.player,
+            policy or self.policy.play,
             self.evaluation.episodes,
             _seed(self.seed, _EVALUATION_STAGE),
-            exploration or self.evaluation.exploration,
+            self.evaluation.exploration,
         )
 
-    def _report_scores(self, who: str, scores: dict[str, Scores]) -> None:
+    def _report_scores(self, player: str, scores: dict[str, Scores]) -> None:
         for team, score in scores.items():
             low, high = interval(score.returns)
             row: dict[str, float | int | str] = {
-                "player": who,
+                "player": player,
                 "team": team,
                 "episodes": len(score.returns),
                 "return": float(score.returns.mean()),
@@ -234,13 +243,6 @@ class Trainer:
             }
             for reporter in self.reporters:
                 reporter.write("evaluations", self.progress.frames, row)
-
-    def _iterations(self) -> int:
-        return math.ceil(self.budget.total_frames / self.collect.frames)
-
-    def _out_of_time(self) -> bool:
-        limit = self.budget.max_minutes
-        return limit is not None and self.watch.elapsed_s > 60.0 * limit
 
 
 def _seed(seed: int, stage: int) -> int:

@@ -1,0 +1,171 @@
+"""The interface of a learning algorithm, and the registry that finds one by name.
+
+An algorithm learns one team from batches of experience. Everything around it (training loop,
+evaluation, self-play, checkpoints, configuration) uses this interface and no other property of it.
+Teams that learn at the same time each have an algorithm of their own, possibly different ones.
+
+To add an algorithm: a dataclass of its numbers derived from `AlgorithmCfg`, a class derived from
+`Algorithm`, and ``register_algorithm("name", MyCfg, MyAlgorithm)``.
+"""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import torch
+from tensordict import TensorDictBase
+from tensordict.nn import TensorDictModuleBase
+
+from veca_marl.algos.specs import TeamSpec
+
+
+@dataclass
+class AlgorithmCfg:
+    """Base class of the numbers of an algorithm.
+
+    Attributes:
+        name: Name of the algorithm in the registry.
+    """
+
+    name: str = ""
+
+    def check_batch(self, frames: int) -> None:
+        """Raise `ValueError` if batches of so many frames cannot be learnt from."""
+
+
+class Algorithm(ABC):
+    """Learns one team.
+
+    A constructor takes the name of the team, its `TeamSpec`, the numbers and the device:
+    see `AlgorithmFactory`.
+
+    Attributes:
+        exact_resume: Whether a run that continues from `state_dict` gives the same parameters, bit
+            for bit, as a run that was not interrupted. True only if `state_dict` contains
+            everything that `learn` depends on (a replay buffer, for example); random numbers are
+            seeded from (seed, stage) by the training loop.
+    """
+
+    exact_resume: ClassVar[bool]
+
+    @property
+    @abstractmethod
+    def actor(self) -> TensorDictModuleBase:
+        """The policy: reads ``(team, "observation", ...)`` and writes the team's action.
+
+        It follows TorchRL's `exploration_type`: the mode of its distribution where deterministic
+        actions are asked for, a sample otherwise. A file for playing contains its `state_dict`.
+        A policy with hidden state brings the primers of it (`networks.memory`).
+        """
+
+    @property
+    def explorer(self) -> TensorDictModuleBase:
+        """The policy that collects experience; it contains `actor` if it is another module.
+
+        Exploration noise and uniformly random actions at the start belong here; their schedules
+        are kept in buffers, which reach the worker processes together with the parameters.
+        """
+        return self.actor
+
+    @property
+    @abstractmethod
+    def measures(self) -> Sequence[str]:
+        """Names of the numbers that `learn` returns, the same for each batch."""
+
+    @abstractmethod
+    def learn(self, batch: TensorDictBase) -> dict[str, float]:
+        """Learn from one batch and return the `measures`.
+
+        Args:
+            batch: Experience ``(worlds, steps)`` of all teams, on the CPU. Rows are consecutive
+                steps of one world; flags are under ``("next", "done")`` and the team's own.
+        """
+
+    def idle(self) -> dict[str, float]:
+        """Return the `measures` of a batch that the team does not learn from: not a number."""
+        return dict.fromkeys(self.measures, math.nan)
+
+    @abstractmethod
+    def state_dict(self) -> dict[str, Any]:
+        """Return tensors and plain data from which `load_state_dict` continues."""
+
+    @abstractmethod
+    def load_state_dict(self, state: dict[str, Any]) -> None:
+        """Continue from `state_dict`."""
+
+    def warm_start(self, other: Algorithm) -> None:
+        """Take over the parameters of `other`, an algorithm of the same kind from another run.
+
+        Everything else (optimiser, replay buffer) starts from the beginning.
+
+        Raises:
+            ValueError: If the parameters do not fit.
+        """
+        self.actor.load_state_dict(other.actor.state_dict())
+
+
+AlgorithmFactory = Callable[[str, TeamSpec, Any, torch.device], Algorithm]
+
+
+@dataclass(frozen=True)
+class RegisteredAlgorithm:
+    """What the registry knows of an algorithm.
+
+    Attributes:
+        cfg_type: Dataclass of its numbers.
+        factory: Makes it from (team, spec, numbers, device).
+    """
+
+    cfg_type: type[AlgorithmCfg]
+    factory: AlgorithmFactory
+
+
+ALGORITHMS: dict[str, RegisteredAlgorithm] = {}
+
+
+def register_algorithm(
+    name: str, cfg_type: type[AlgorithmCfg], factory: AlgorithmFactory
+) -> RegisteredAlgorithm:
+    """Make an algorithm known under `name`, the value of ``algo.name``.
+
+    Raises:
+        ValueError: If another algorithm has the name, or the default of ``cfg_type.name`` differs.
+    """
+    entry = RegisteredAlgorithm(cfg_type, factory)
+    if ALGORITHMS.get(name, entry) != entry:
+        raise ValueError(f"there is an algorithm {name!r} already: {ALGORITHMS[name].factory}")
+    if cfg_type.name != name:
+        raise ValueError(f"{cfg_type.__name__}.name is {cfg_type.name!r} by default, not {name!r}")
+    ALGORITHMS[name] = entry
+    return entry
+
+
+def find_algorithm(name: str) -> RegisteredAlgorithm:
+    """Return the algorithm called `name`.
+
+    Raises:
+        ValueError: If there is none.
+    """
+    if name not in ALGORITHMS:
+        raise ValueError(f"unknown algorithm {name!r}; choices: {', '.join(sorted(ALGORITHMS))}")
+    return ALGORITHMS[name]
+
+
+def make_algorithm(
+    team: str, spec: TeamSpec, cfg: AlgorithmCfg, device: torch.device
+) -> Algorithm:
+    """Return the algorithm that `cfg` names, for one team.
+
+    Raises:
+        ValueError: If it is unknown, or `cfg` is not of its type.
+    """
+    entry = find_algorithm(cfg.name)
+    if not isinstance(cfg, entry.cfg_type):
+        raise ValueError(
+            f"algo.name={cfg.name} takes {entry.cfg_type.__name__}, got {type(cfg).__name__}"
+        )
+    return entry.factory(team, spec, cfg, device)

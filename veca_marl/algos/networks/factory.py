@@ -1,0 +1,156 @@
+"""What makes the network of a team: exchangeable, chosen by name in the configuration.
+
+To train a network of your own, derive from `NetworkFactory` (often `encoder` and `features` are
+all there is to write), derive its numbers from `NetworkCfg`, and call `register_network`. It is
+then chosen by ``algo/network=NAME`` on the command line.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from tensordict.nn import (
+    ProbabilisticTensorDictSequential,
+    TensorDictModule,
+    TensorDictModuleBase,
+)
+from torch import nn
+
+from veca_marl.algos.networks.initialisation import orthogonal
+from veca_marl.algos.networks.policy_heads import action_distribution, policy_head
+from veca_marl.algos.specs import TeamSpec
+
+
+@dataclass
+class NetworkCfg:
+    """Base class of the numbers of a network.
+
+    Attributes:
+        name: Name of the network in the registry.
+    """
+
+    name: str = ""
+
+
+class NetworkFactory(ABC):
+    """Makes encoder, actor and critic of one team.
+
+    Args:
+        team: Name of the team, the first part of all keys.
+        spec: Its arrays.
+        cfg: The numbers.
+
+    Attributes:
+        features: Length of the vector that the encoder writes for each agent.
+    """
+
+    features: int
+
+    def __init__(self, team: str, spec: TeamSpec, cfg: Any) -> None:
+        self.team, self.spec, self.cfg = team, spec, cfg
+
+    @abstractmethod
+    def encoder(self) -> TensorDictModuleBase:
+        """Return the module from observations to ``(team, "features")``, ``(..., agents, F)``.
+
+        A recurrent one reads its hidden state under ``(team, "memory", name)``, writes the new one
+        under ``("next", team, "memory", name)`` and has a method ``make_tensordict_primer``.
+        """
+
+    def actor(self, encoder: TensorDictModuleBase) -> ProbabilisticTensorDictSequential:
+        """Return `encoder`, a head for each part of the action, and the distribution."""
+        heads = [
+            policy_head(self.team, part, layout, self.policy_layer(layout.parameters))
+            for part, layout in self.spec.actions.items()
+        ]
+        return ProbabilisticTensorDictSequential(
+            encoder, *heads, action_distribution(self.team, self.spec.actions)
+        )
+
+    def policy_layer(self, outputs: int) -> nn.Module:
+        """Return the layer from features to the parameters of a distribution.
+
+        Its gain is small, so that the first policy hardly depends on the observation.
+        Source: Huang et al. 2022, "The 37 implementation details of PPO", detail 2.
+        """
+        return orthogonal(nn.Linear(self.features, outputs), gain=0.01)
+
+    def critic(self) -> TensorDictModuleBase:
+        """Return the module from ``(team, "features")`` to ``(team, "state_value")``."""
+        layer = orthogonal(nn.Linear(self.features, 1), gain=1.0)
+        return TensorDictModule(
+            layer, in_keys=[(self.team, "features")], out_keys=[(self.team, "state_value")]
+        )
+
+
+class TeamNetwork(nn.Module):
+    """Actor and critic of one team over a shared encoder.
+
+    Attributes:
+        encoder: Writes ``(team, "features")``.
+        actor: Encoder, policy heads and distribution: writes the action and its log-probability.
+        critic: The value head alone. It reads the features that the actor has already computed,
+            which halves an update and leaves loss and gradient unchanged.
+    """
+
+    def __init__(self, factory: NetworkFactory) -> None:
+        super().__init__()
+        self.encoder = factory.encoder()
+        self.actor = factory.actor(self.encoder)
+        self.critic = factory.critic()
+
+
+MakeFactory = Callable[[str, TeamSpec, Any], NetworkFactory]
+
+
+@dataclass(frozen=True)
+class RegisteredNetwork:
+    """What the registry knows of a network.
+
+    Attributes:
+        cfg_type: Dataclass of its numbers.
+        factory: Makes its factory from (team, spec, numbers).
+    """
+
+    cfg_type: type[NetworkCfg]
+    factory: MakeFactory
+
+
+NETWORKS: dict[str, RegisteredNetwork] = {}
+
+
+def register_network(name: str, cfg_type: type[NetworkCfg], factory: MakeFactory) -> None:
+    """Make a network known under `name`, the value of ``algo.network.name``.
+
+    Raises:
+        ValueError: If another network has the name, or the default of ``cfg_type.name`` differs.
+    """
+    entry = RegisteredNetwork(cfg_type, factory)
+    if NETWORKS.get(name, entry) != entry:
+        raise ValueError(f"there is a network {name!r} already: {NETWORKS[name].factory}")
+    if cfg_type.name != name:
+        raise ValueError(f"{cfg_type.__name__}.name is {cfg_type.name!r} by default, not {name!r}")
+    NETWORKS[name] = entry
+
+
+def find_network(name: str) -> RegisteredNetwork:
+    """Return the network called `name`.
+
+    Raises:
+        ValueError: If there is none.
+    """
+    if name not in NETWORKS:
+        raise ValueError(f"unknown network {name!r}; choices: {', '.join(sorted(NETWORKS))}")
+    return NETWORKS[name]
+
+
+def make_network(team: str, spec: TeamSpec, cfg: NetworkCfg) -> TeamNetwork:
+    """Return the network of a team as `cfg` describes it.
+
+    Raises:
+        ValueError: If there is no network called ``cfg.name``.
+    """
+    return TeamNetwork(find_network(cfg.name).factory(team, spec, cfg))

@@ -1,0 +1,175 @@
+"""The paper's network: an encoder per sense, joined; policy and value heads on the result."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import dataclass, field
+from enum import Enum
+
+import torch
+from tensordict.nn import TensorDictModule
+from torch import Tensor, nn
+
+from veca_marl.algos.networks.encoders import Pooling, make_encoder
+from veca_marl.algos.networks.factory import NetworkCfg, NetworkFactory, register_network
+from veca_marl.algos.networks.initialisation import orthogonal
+from veca_marl.algos.networks.per_agent import CentralValue, PerAgent
+from veca_marl.algos.specs import ArrayLayout, TeamSpec
+
+
+class Precision(Enum):
+    """Arithmetic of the encoder; parameters, heads and losses are always float32."""
+
+    float32 = "float32"
+    bfloat16 = "bfloat16"
+
+
+class Critic(Enum):
+    """The input of an agent's critic; its actor reads its own observation alone in both cases.
+
+    Attributes:
+        own: The agent's observation: independent PPO (de Witt et al. 2020).
+        central: The observations of its whole team: MAPPO (Yu et al. 2022).
+    """
+
+    own = "own"
+    central = "central"
+
+
+class Parameters(Enum):
+    """Whether the agents of a team share one network or have one each."""
+
+    shared = "shared"
+    separate = "separate"
+
+
+@dataclass
+class MultisenseCfg(NetworkCfg):
+    """Sizes of the network.
+
+    Attributes:
+        channels: Output channels of the three convolutions of an image encoder.
+        pooling: Pooling of an image's last feature maps.
+        vector_features: Width of the encoder of any sense that is not an image.
+        compressed: Senses with values of many magnitudes: symlog is applied before their encoder.
+            Otherwise accelerations would dominate the angles beside them. Names of senses that a
+            team does not have are ignored.
+        trunk_features: Width of the joined layer that both heads read.
+        precision: Arithmetic of the encoder.
+        critic: Input of the critic.
+        parameters: One network for a team, or one for each of its agents.
+    """
+
+    name: str = "multisense"
+    channels: list[int] = field(default_factory=lambda: [16, 32, 32])
+    pooling: Pooling = Pooling.flatten
+    vector_features: int = 64
+    compressed: list[str] = field(default_factory=lambda: ["proprioception"])
+    trunk_features: int = 256
+    precision: Precision = Precision.float32
+    critic: Critic = Critic.own
+    parameters: Parameters = Parameters.shared
+
+    def __post_init__(self) -> None:
+        if len(self.channels) != 3:
+            raise ValueError(f"network.channels: need 3 numbers, got {list(self.channels)}")
+        if min(*self.channels, self.vector_features, self.trunk_features) < 1:
+            raise ValueError(f"network: sizes must be positive, got {self}")
+
+
+class Trunk(nn.Module):
+    """Observations ``(..., agents, *shape)`` of each sense to features ``(..., agents, F)``.
+
+    Agents are folded into the batch: they share the parameters. A sense that the team does not
+    have leaves no parameters.
+    """
+
+    def __init__(self, observations: dict[str, ArrayLayout], cfg: MultisenseCfg) -> None:
+        super().__init__()
+        self.ranks = {name: len(layout.shape) for name, layout in observations.items()}
+        encoders = {
+            name: make_encoder(
+                name,
+                layout,
+                cfg.channels,
+                cfg.vector_features,
+                cfg.pooling,
+                name in cfg.compressed,
+            )
+            for name, layout in observations.items()
+        }
+        self.encoders = nn.ModuleDict(encoders)
+        joined = sum(encoder.features for encoder in encoders.values())
+        self.join = nn.Sequential(orthogonal(nn.Linear(joined, cfg.trunk_features)), nn.ReLU())
+        self.precision = cfg.precision
+
+    def forward(self, *observations: Tensor) -> Tensor:
+        """Encode and join one tensor per sense, in the order of the spec."""
+        first_rank = next(iter(self.ranks.values()))
+        leading = observations[0].shape[: observations[0].ndim - first_rank]
+        with self._arithmetic(observations[0].device):
+            parts = [
+                encoder(array.reshape(-1, *array.shape[len(leading) :]))
+                for encoder, array in zip(self.encoders.values(), observations, strict=True)
+            ]
+            features: Tensor = self.join(torch.cat(parts, dim=-1))
+        return features.float().reshape(*leading, -1)
+
+    def _arithmetic(self, device: torch.device) -> AbstractContextManager[object]:
+        if self.precision is Precision.float32:
+            return nullcontext()
+        return torch.autocast(device.type, dtype=torch.bfloat16)
+
+
+class Multisense(NetworkFactory):
+    """Makes the parts of the default network."""
+
+    cfg: MultisenseCfg
+
+    def __init__(self, team: str, spec: TeamSpec, cfg: MultisenseCfg) -> None:
+        super().__init__(team, spec, cfg)
+        self.features = cfg.trunk_features
+
+    def encoder(self) -> TensorDictModule:
+        """Return the encoder of all senses, joined."""
+        layouts = self.spec.observations
+        ranks = [len(layout.shape) for layout in layouts.values()]
+        return TensorDictModule(
+            self._for_agents(lambda: Trunk(layouts, self.cfg), ranks),
+            in_keys=[(self.team, "observation", name) for name in layouts],
+            out_keys=[(self.team, "features")],
+        )
+
+    def policy_layer(self, outputs: int) -> nn.Module:
+        """See `NetworkFactory`; shared by the agents or not."""
+        base = super().policy_layer
+        return self._for_agents(lambda: base(outputs))
+
+    def critic(self) -> TensorDictModule:
+        """Return the value head; a central one also reads which agents are present."""
+        width, central = self.features, self.cfg.critic is Critic.central
+
+        def own() -> nn.Module:
+            return orthogonal(nn.Linear(width, 1), gain=1.0)
+
+        def joint() -> nn.Module:
+            layers = orthogonal(nn.Linear(2 * width, width)), nn.ReLU()
+            return nn.Sequential(*layers, orthogonal(nn.Linear(width, 1), gain=1.0))
+
+        head = self._for_agents(joint if central else own)
+        masked = central and self.spec.masked
+        return TensorDictModule(
+            CentralValue(head) if central else head,
+            in_keys=[(self.team, "features"), *([(self.team, "mask")] if masked else [])],
+            out_keys=[(self.team, "state_value")],
+        )
+
+    def _for_agents(self, make: Callable[[], nn.Module], ranks: Sequence[int] = (1,)) -> nn.Module:
+        """Return one module for the whole team, or one for each of its agents."""
+        if self.cfg.parameters is Parameters.shared:
+            return make()
+        return PerAgent(make, self.spec.agents, ranks)
+
+
+register_network("multisense", MultisenseCfg, Multisense)

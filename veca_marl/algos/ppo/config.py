@@ -1,0 +1,87 @@
+"""The numbers of proximal policy optimisation."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import Enum
+
+from veca_marl.algos.algorithm import AlgorithmCfg
+from veca_marl.algos.networks.factory import NetworkCfg
+from veca_marl.algos.networks.multisense import MultisenseCfg
+
+
+class ValueNormalisation(Enum):
+    """Scale of the value loss.
+
+    Attributes:
+        none: That of the returns.
+        popart: Targets and predictions are normalised by running statistics of the targets
+            (TorchRL's `PopArtValueNorm`; Yu et al. 2022).
+    """
+
+    none = "none"
+    popart = "popart"
+
+
+@dataclass
+class PPOCfg(AlgorithmCfg):
+    """Numbers of PPO; the defaults are those of the paper's table where it gives them.
+
+    Attributes:
+        network: The network and its sizes.
+        gamma: Discount.
+        gae_lambda: Lambda of the generalised advantage estimate (Schulman et al. 2016).
+        clip: Clipping range of the probability ratio.
+        entropy_coefficient: Weight of the entropy bonus, for each part of the action.
+        value_coefficient: Weight of the value loss.
+        value_normalisation: Scale of the value loss.
+        max_gradient_norm: Gradients are scaled down to this norm.
+        epochs: Passes over each batch.
+        minibatches: Parts of the batch in one pass.
+        learning_rate: Initial value of the adaptive rate (ours).
+        target_kl: The rate is divided by 1.5 above twice this divergence, multiplied by 1.5 below
+            half of it: the rule of rl_games with its target of 0.008 (ours; the paper says
+            "adaptive to the KL divergence").
+        min_learning_rate: Lower bound of the rate.
+        max_learning_rate: Upper bound of the rate.
+    """
+
+    name: str = "ppo"
+    network: NetworkCfg = field(default_factory=MultisenseCfg)
+    gamma: float = 0.99
+    gae_lambda: float = 0.95
+    clip: float = 0.2
+    entropy_coefficient: float = 0.03
+    value_coefficient: float = 0.5
+    value_normalisation: ValueNormalisation = ValueNormalisation.none
+    max_gradient_norm: float = 5.0
+    epochs: int = 4
+    minibatches: int = 4
+    learning_rate: float = 3e-4
+    target_kl: float = 0.008
+    min_learning_rate: float = 1e-6
+    max_learning_rate: float = 1e-3
+
+    def __post_init__(self) -> None:
+        for name in ("gamma", "gae_lambda"):
+            if not 0.0 <= getattr(self, name) <= 1.0:
+                raise ValueError(f"algo.{name} must be in [0, 1], got {getattr(self, name)}")
+        for name in ("clip", "max_gradient_norm", "target_kl", "min_learning_rate"):
+            if not getattr(self, name) > 0.0:
+                raise ValueError(f"algo.{name} must be positive, got {getattr(self, name)}")
+        for name in ("epochs", "minibatches"):
+            if getattr(self, name) < 1:
+                raise ValueError(f"algo.{name} must be at least 1, got {getattr(self, name)}")
+        if not self.min_learning_rate <= self.learning_rate <= self.max_learning_rate:
+            raise ValueError(
+                f"algo.learning_rate must be in [{self.min_learning_rate}, "
+                f"{self.max_learning_rate}], got {self.learning_rate}"
+            )
+
+    def check_batch(self, frames: int) -> None:
+        """See `AlgorithmCfg`: each minibatch needs at least one frame."""
+        if frames < self.minibatches:
+            raise ValueError(
+                f"a batch of {frames} frames cannot be split into "
+                f"algo.minibatches={self.minibatches}"
+            )

@@ -1,0 +1,50 @@
+"""How the returns of two policies compare, with confidence intervals."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+from veca_marl.algos.training.evaluation import Scores
+
+
+def interval(values: NDArray[np.float64], confidence: float = 0.95) -> tuple[float, float]:
+    """Return the confidence interval of the mean by Student's t; NaN for fewer than two values."""
+    if len(values) < 2:
+        return math.nan, math.nan
+    error = math.sqrt(float(values.var(ddof=1)) / len(values))
+    half = float(stats.t.ppf((1 + confidence) / 2, len(values) - 1)) * error
+    return float(values.mean() - half), float(values.mean() + half)
+
+
+def paired_difference(
+    one: NDArray[np.float64], other: NDArray[np.float64], confidence: float = 0.95
+) -> tuple[float, float, float]:
+    """Return the mean difference of pairs and its confidence interval.
+
+    Entries with one index belong to episodes that start alike, so differences of starts cancel.
+
+    Raises:
+        ValueError: If there are not equally many.
+    """
+    if one.shape != other.shape:
+        raise ValueError(f"pairs need equally many episodes, got {len(one)} and {len(other)}")
+    return float((one - other).mean()), *interval(one - other, confidence)
+
+
+def comparison_line(team: str, policy: Scores, baseline: Scores) -> str:
+    """Return one line that compares a policy with the random baseline, episode by episode."""
+    parts = [
+        f"{name} {scores.returns.mean():.3f} [{low:.3f}, {high:.3f}]"
+        for name, scores in (("policy", policy), ("random", baseline))
+        for low, high in [interval(scores.returns)]
+    ]
+    mean, low, high = paired_difference(policy.returns, baseline.returns)
+    return (
+        f"{team}: return of {parts[0]}, {parts[1]}, difference {mean:.3f} "
+        f"[{low:.3f}, {high:.3f}] (means of {len(policy.returns)} paired episodes, "
+        "95 % intervals)"
+    )

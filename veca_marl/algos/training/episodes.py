@@ -1,0 +1,115 @@
+"""Sums over whole episodes: of what a policy is evaluated by, and of what is collected."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+from tensordict import TensorDictBase
+
+
+def team_measures(step: TensorDictBase, team: str) -> dict[str, NDArray[np.float64]]:
+    """Return what is summed over an episode, as means over the team's agents.
+
+    Args:
+        step: The ``next`` part of some frames.
+        team: Name of the team.
+
+    Returns:
+        ``return`` (the reward), ``length`` (one for each step) and each entry of
+        ``(team, "info")`` (the unweighted reward terms): arrays of the batch shape of `step`.
+    """
+    reward = _agent_mean(step[team, "reward"])
+    measures = {"return": reward, "length": np.ones_like(reward)}
+    info = step[team].get("info", None)
+    for name, term in sorted(info.items()) if info is not None else ():
+        measures[name] = _agent_mean(term)
+    return measures
+
+
+def _agent_mean(array: object) -> NDArray[np.float64]:
+    mean: NDArray[np.float64] = array.squeeze(-1).double().mean(-1).cpu().numpy()  # type: ignore[attr-defined]
+    return mean
+
+
+class EpisodeTally:
+    """Sums of `team_measures` over the first `quota` episodes of each world.
+
+    Args:
+        teams: Names of the teams.
+        worlds: Number of worlds.
+        quota: Episodes of each world that count.
+    """
+
+    def __init__(self, teams: list[str], worlds: int, quota: int) -> None:
+        self.teams, self.quota = teams, quota
+        self._open: dict[tuple[str, str], NDArray[np.float64]] = {}
+        self._finished: dict[tuple[str, str], list[list[float]]] = {}
+        self._episodes = np.zeros(worlds, dtype=np.int64)
+
+    @property
+    def complete(self) -> bool:
+        """Whether every world has finished its episodes."""
+        return bool((self._episodes >= self.quota).all())
+
+    def add(self, step: TensorDictBase) -> None:
+        """Add one step ``(worlds,)``, the ``next`` part of a frame."""
+        ended = np.flatnonzero(step["done"].squeeze(-1).numpy())
+        for team in self.teams:
+            for name, values in team_measures(step, team).items():
+                key = (team, name)
+                sums = self._open.setdefault(key, np.zeros(len(self._episodes)))
+                sums += values
+                lists = self._finished.setdefault(key, [[] for _ in self._episodes])
+                for world in ended:
+                    lists[world].append(float(sums[world]))
+                sums[ended] = 0.0
+        self._episodes[ended] += 1
+
+    def sums(self, team: str) -> dict[str, NDArray[np.float64]]:
+        """Return for each measure the sums ``(worlds * quota,)``, world by world."""
+        return {
+            name: np.array([sums[: self.quota] for sums in lists]).ravel()
+            for (owner, name), lists in self._finished.items()
+            if owner == team
+        }
+
+
+class TrainingEpisodes:
+    """Means over episodes that begin and end in different batches.
+
+    TorchRL's `RewardSum` and `StepCounter` do the same inside the environment, for rewards and
+    steps; this one also sums the reward terms, and adds nothing to a step of the worlds.
+    """
+
+    def __init__(self) -> None:
+        self._open: dict[tuple[str, str], NDArray[np.float64]] = {}
+
+    def add(self, batch: TensorDictBase, team: str) -> dict[str, float]:
+        """Return means over the episodes that ended in `batch` ``(worlds, steps)``.
+
+        Returns:
+            ``return``, ``length`` and each reward term, NaN where no episode ended; and
+            ``reward_per_step``, the mean over all steps.
+        """
+        done = batch["next", "done"].squeeze(-1).cpu().numpy()
+        measures = team_measures(batch["next"], team)
+        means = {"reward_per_step": float(measures["return"].mean())}
+        for name, values in measures.items():
+            sums = self._finish((team, name), values, done)
+            means[name] = float(np.mean(sums)) if sums else math.nan
+        return means
+
+    def _finish(
+        self, key: tuple[str, str], values: NDArray[np.float64], done: NDArray[np.bool_]
+    ) -> list[float]:
+        carried = self._open.setdefault(key, np.zeros(len(values)))
+        finished: list[float] = []
+        for world, row in enumerate(values):
+            pieces = np.split(row, np.flatnonzero(done[world]) + 1)
+            sums = [float(piece.sum()) for piece in pieces]
+            sums[0] += carried[world]
+            carried[world] = sums.pop()
+            finished += sums
+        return finished

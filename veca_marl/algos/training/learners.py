@@ -1,0 +1,128 @@
+"""All teams together: an algorithm for each team that learns, a frozen policy for each other."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from copy import deepcopy
+from typing import Any
+
+import torch
+from tensordict import TensorDictBase
+from tensordict.nn import TensorDictModuleBase, TensorDictSequential
+from torch import nn
+
+from veca_marl.algos.algorithm import Algorithm, AlgorithmCfg, make_algorithm
+from veca_marl.algos.specs import TeamSpec
+
+
+class Policy(nn.Module):
+    """What acts for all teams.
+
+    Args:
+        actors: Team to the policy that is evaluated.
+        explorers: Team to the policy that collects; it shares its modules with the actor.
+
+    Attributes:
+        actors: See above.
+        play: Writes the actions of all teams, for evaluation.
+        collect: Writes the actions of all teams, for collection.
+    """
+
+    def __init__(
+        self,
+        actors: Mapping[str, TensorDictModuleBase],
+        explorers: Mapping[str, TensorDictModuleBase],
+    ) -> None:
+        super().__init__()
+        self.actors = nn.ModuleDict(actors)
+        self.play = TensorDictSequential(*actors.values())
+        self.collect = TensorDictSequential(*explorers.values())
+
+    def copy(self) -> Policy:
+        """Return an independent copy on the CPU."""
+        return deepcopy(self).to("cpu")
+
+    @torch.no_grad()
+    def take_over(self, other: Policy) -> None:
+        """Take over parameters and buffers of `other`, a policy of the same structure."""
+        for own, new in zip(_tensors(self), _tensors(other), strict=True):
+            own.copy_(new)
+
+
+def _tensors(module: nn.Module) -> list[torch.Tensor]:
+    return [*module.parameters(), *module.buffers()]
+
+
+class TeamLearners:
+    """The algorithms of all teams that learn, on the same batches.
+
+    Args:
+        specs: Team name to its arrays.
+        cfg: The numbers of the algorithm of every team.
+        device: Where networks are and learn.
+        own: Numbers of teams with other ones.
+        frozen: Policies of teams that do not learn.
+
+    Attributes:
+        algorithms: Team to its algorithm, without frozen teams.
+        frozen: Team to its policy.
+        learning: Teams that learn from the next batches, a subset of `algorithms`.
+        policy: Acts for all teams; changes with every gradient step.
+    """
+
+    def __init__(
+        self,
+        specs: Mapping[str, TeamSpec],
+        cfg: AlgorithmCfg,
+        device: torch.device,
+        own: Mapping[str, AlgorithmCfg] | None = None,
+        frozen: Mapping[str, TensorDictModuleBase] | None = None,
+    ) -> None:
+        self.device, self.specs = device, dict(specs)
+        own, frozen = own or {}, frozen or {}
+        self.frozen = {team: actor.to(device) for team, actor in frozen.items()}
+        self.cfgs = {team: own.get(team, cfg) for team in specs if team not in frozen}
+        self.algorithms: dict[str, Algorithm] = {
+            team: make_algorithm(team, specs[team], numbers, device)
+            for team, numbers in self.cfgs.items()
+        }
+        self.learning = list(self.algorithms)
+        self.policy = self._make_policy()
+
+    def _make_policy(self) -> Policy:
+        actors, explorers = {}, {}
+        for team in self.specs:
+            if team in self.frozen:
+                actors[team] = explorers[team] = self.frozen[team]
+            else:
+                algorithm = self.algorithms[team]
+                actors[team], explorers[team] = algorithm.actor, algorithm.explorer
+        return Policy(actors, explorers)
+
+    @property
+    def exact_resume(self) -> bool:
+        """Whether a resumed run continues bit for bit: only if every algorithm does."""
+        return all(algorithm.exact_resume for algorithm in self.algorithms.values())
+
+    def learn(self, batch: TensorDictBase) -> dict[str, dict[str, float]]:
+        """Learn from one batch ``(worlds, steps)``; return the measures of each team.
+
+        Teams that do not learn at present have measures that are not a number.
+        """
+        return {
+            team: algorithm.learn(batch) if team in self.learning else algorithm.idle()
+            for team, algorithm in self.algorithms.items()
+        }
+
+    def actor_states(self) -> dict[str, dict[str, Any]]:
+        """Return what a file for playing contains, by team."""
+        return {team: algorithm.actor.state_dict() for team, algorithm in self.algorithms.items()}
+
+    def state_dict(self) -> dict[str, Any]:
+        """Return the state of every algorithm by team."""
+        return {team: algorithm.state_dict() for team, algorithm in self.algorithms.items()}
+
+    def load_state_dict(self, state: dict[str, Any]) -> None:
+        """Continue from `state_dict`."""
+        for team, algorithm in self.algorithms.items():
+            algorithm.load_state_dict(state[team])

@@ -1,0 +1,97 @@
+"""The loggers that ``log.logger`` names."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from enum import Enum
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+from torchrl.record.loggers import Logger, MLFlowLogger, TensorboardLogger, WandbLogger
+
+from veca_marl.algos.training.reporters import CsvReporter, LoggerReporter, Reporter
+
+
+class LoggerKind(Enum):
+    """A place for the numbers of a run.
+
+    Attributes:
+        csv: ``metrics.csv`` and ``evaluations.csv`` in the folder of the run.
+        tensorboard: Event files in its folder ``tensorboard``.
+        wandb: Weights & Biases, project ``veca_marl``; ``WANDB_MODE=offline`` stays local.
+        mlflow: MLflow; ``MLFLOW_TRACKING_URI`` or its folder ``mlflow``.
+    """
+
+    csv = "csv"
+    tensorboard = "tensorboard"
+    wandb = "wandb"
+    mlflow = "mlflow"
+
+
+class _Tensorboard(TensorboardLogger):
+    """TorchRL's logger, with the points after a checkpoint hidden when a run resumes from it."""
+
+    def __init__(self, folder: Path, resumed_frames: int) -> None:
+        self._purge_step = resumed_frames + 1 if resumed_frames else None
+        super().__init__(exp_name="tensorboard", log_dir=str(folder))
+
+    def _create_experiment(self) -> Any:
+        from torch.utils.tensorboard import SummaryWriter
+
+        path = str(Path(self.log_dir) / self.exp_name)
+        return SummaryWriter(path, purge_step=self._purge_step)
+
+
+def _wandb(folder: Path, resumed_frames: int) -> Logger:
+    return WandbLogger(
+        exp_name=folder.name, save_dir=str(folder), project="veca_marl", id=_identifier(folder)
+    )
+
+
+def _mlflow(folder: Path, resumed_frames: int) -> Logger:
+    import mlflow
+
+    uri = mlflow.get_tracking_uri() if mlflow.is_tracking_uri_set() else ""
+    return MLFlowLogger(exp_name="veca_marl", tracking_uri=uri or f"file:{folder / 'mlflow'}")
+
+
+def _identifier(folder: Path) -> str:
+    """Return a name of the run by which a resumed one continues its curves."""
+    return "-".join(folder.resolve().parts[-2:])
+
+
+_MAKERS: dict[LoggerKind, Callable[[Path, int], Logger]] = {
+    LoggerKind.tensorboard: _Tensorboard,
+    LoggerKind.wandb: _wandb,
+    LoggerKind.mlflow: _mlflow,
+}
+
+
+def check_installed(kind: LoggerKind) -> None:
+    """Check that the package behind a logger can be imported.
+
+    Raises:
+        ValueError: If it is not installed.
+    """
+    if kind is not LoggerKind.csv and find_spec(kind.value) is None:
+        raise ValueError(
+            f"log.logger: {kind.value} is not installed: pip install 'veca_marl[{kind.value}]'"
+        )
+
+
+def make_reporter(kind: LoggerKind, folder: Path, resumed_frames: int = 0) -> Reporter:
+    """Return what writes the numbers of a run.
+
+    Args:
+        kind: Where to.
+        folder: Folder of the run.
+        resumed_frames: Frames of the checkpoint from which the run continues, or 0.
+
+    Raises:
+        ValueError: If the package behind it is not installed.
+    """
+    check_installed(kind)
+    if kind is LoggerKind.csv:
+        return CsvReporter(folder, resumed_frames)
+    return LoggerReporter(_MAKERS[kind](folder, resumed_frames))

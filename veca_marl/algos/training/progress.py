@@ -1,0 +1,44 @@
+"""How long a run trains, and where it stands."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+
+@dataclass
+class Budget:
+    """How long to train.
+
+    Attributes:
+        total_frames: Frames of experience (rounded up to whole batches).
+        max_minutes: Also stop after the stage in which this time runs out; None for no limit.
+    """
+
+    total_frames: int
+    max_minutes: float | None = None
+
+    def iterations(self, frames_per_batch: int) -> int:
+        """Return the number of batches."""
+        return math.ceil(self.total_frames / frames_per_batch)
+
+    def is_spent(self, elapsed_s: float) -> bool:
+        """Return whether the time has run out."""
+        return self.max_minutes is not None and elapsed_s > 60.0 * self.max_minutes
+
+
+@dataclass
+class Progress:
+    """Where a run stands; stored in its checkpoints.
+
+    Attributes:
+        stage: Finished stages.
+        iteration: Finished batches.
+        frames: Frames learnt from.
+        best_return: Best mean return of the evaluations, where one team learns.
+    """
+
+    stage: int = 0
+    iteration: int = 0
+    frames: int = 0
+    best_return: float = -math.inf

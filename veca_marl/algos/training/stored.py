@@ -1,0 +1,80 @@
+"""What a team learnt in another run: to play against, to evaluate, or to start from."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import torch
+from tensordict.nn import TensorDictModuleBase
+
+from veca_marl.algos.algorithm import (
+    Algorithm,
+    AlgorithmCfg,
+    find_algorithm,
+    make_algorithm,
+)
+from veca_marl.algos.networks.factory import NetworkCfg, find_network
+from veca_marl.algos.plain import from_plain
+from veca_marl.algos.specs import TeamSpec
+from veca_marl.algos.training.checkpoint import CheckpointError, read_checkpoint
+
+
+def load_actor(path: Path, team: str, spec: TeamSpec) -> TensorDictModuleBase:
+    """Return the policy of a team from another run, without gradients.
+
+    Args:
+        path: A checkpoint, or the folder of a run: its latest checkpoint.
+        team: Name of the team, there and here.
+        spec: Its arrays here.
+
+    Raises:
+        CheckpointError: If there is no such checkpoint, or it does not hold this team.
+    """
+    algorithm, content = _make(path, team, spec)
+    algorithm.actor.load_state_dict(content["state"]["actors"][team])
+    return algorithm.actor.requires_grad_(False)
+
+
+def load_algorithm(path: Path, team: str, spec: TeamSpec) -> Algorithm:
+    """Return the algorithm of a team in the state that another run left it in.
+
+    Args:
+        path: See `load_actor`.
+        team: See `load_actor`.
+        spec: See `load_actor`.
+
+    Raises:
+        CheckpointError: See `load_actor`.
+    """
+    algorithm, content = _make(path, team, spec)
+    algorithm.load_state_dict(content["state"]["algorithm"][team])
+    return algorithm
+
+
+def _make(path: Path, team: str, spec: TeamSpec) -> tuple[Algorithm, dict]:
+    content = read_checkpoint(_file(path))
+    stored, learnt = content["identity"]["specs"], content["algorithms"]
+    if team not in learnt:
+        raise CheckpointError(f"{path} has learnt the teams {sorted(learnt)}, not {team!r}")
+    if stored[team] != spec.to_dict():
+        raise CheckpointError(f"{path}: team {team!r} has other specs there than here")
+    try:
+        cfg = from_plain(AlgorithmCfg, learnt[team], _find_type)
+        return make_algorithm(team, spec, cfg, torch.device("cpu")), content
+    except ValueError as error:
+        raise CheckpointError(f"{path}: team {team!r}: {error}") from error
+
+
+def _find_type(base: type, name: str) -> type:
+    if issubclass(base, AlgorithmCfg):
+        return find_algorithm(name).cfg_type
+    return find_network(name).cfg_type if issubclass(base, NetworkCfg) else base
+
+
+def _file(path: Path) -> Path:
+    if path.is_file():
+        return path
+    found = sorted((path / "checkpoints").glob("frames_*.pt"))
+    if not found:
+        raise CheckpointError(f"{path} is neither a checkpoint nor the folder of a run with one")
+    return found[-1]

@@ -1,0 +1,24 @@
+"""A table of the time that TorchRL's `timeit` has measured."""
+
+from __future__ import annotations
+
+from torchrl import timeit
+
+
+def timing_table(elapsed_s: float, frames: int) -> str:
+    """Return lines of seconds, share and milliseconds per frame of each part.
+
+    Beyond `timeit.print`: shares of the whole, the time that no part accounts for, and the time
+    per frame.
+
+    Args:
+        elapsed_s: The whole time.
+        frames: Frames learnt from in it.
+    """
+    parts = timeit.todict(percall=False)
+    parts["other"] = max(0.0, elapsed_s - sum(parts.values()))
+    lines = [f"{'part':<12}{'seconds':>10}{'share':>8}{'ms/frame':>10}"]
+    for part, seconds in [*parts.items(), ("total", elapsed_s)]:
+        share, each = seconds / elapsed_s, 1e3 * seconds / max(frames, 1)
+        lines.append(f"{part:<12}{seconds:>10.1f}{share:>8.1%}{each:>10.3f}")
+    return "\n".join(lines)
