@@ -18,14 +18,14 @@ from tensordict.nn import TensorDictSequential
 
 from veca_marl.algos.specs import team_specs
 from veca_marl.algos.training.checkpoint import CheckpointError
+from veca_marl.algos.training.comparison import interval
 from veca_marl.algos.training.evaluation import (
     Exploration,
+    RandomTeams,
     Scores,
     evaluate,
-    interval,
-    random_policy,
 )
-from veca_marl.algos.training.learnt import load_actor
+from veca_marl.algos.training.stored import load_actor
 from veca_marl.config import Config, ConfigError, compose, one_line
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
 from veca_marl.runs.assembly import make_env
@@ -56,11 +56,16 @@ def play_again(
     cfg = compose([*_about_the_game(folder.overrides), *overrides])
     env = _worlds(cfg, episodes, seed)
     specs = team_specs(env)
-    actors = [load_actor(cfg.frozen.get(team, learnt), team, spec) for team, spec in specs.items()]
-    policy, chance = TensorDictSequential(*actors), random_policy(env)
+    actors = {
+        team: load_actor(cfg.frozen.get(team, learnt), team, spec) for team, spec in specs.items()
+    }
+    baseline = RandomTeams(
+        env, [team for team in actors if team not in cfg.frozen], [actors[t] for t in cfg.frozen]
+    )
+    policy = TensorDictSequential(*actors.values())
     table = {
         "policy": evaluate(env, policy, episodes, seed, exploration),
-        "random": evaluate(env, chance, episodes, seed, Exploration.stochastic),
+        "random": evaluate(env, baseline, episodes, seed, exploration),
     }
     env.close()
     return table

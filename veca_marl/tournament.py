@@ -15,11 +15,11 @@ from pathlib import Path
 import numpy as np
 import torch
 
-from veca_marl.algos.selfplay.self_play import Pool
+from veca_marl.algos.selfplay.pool import Pool
 from veca_marl.algos.selfplay.tournament import Match, Rating, play_all, rate, table_of_points
 from veca_marl.algos.training.checkpoint import CheckpointError
 from veca_marl.config import Config, ConfigError, one_line, to_config
-from veca_marl.runs.assembly import make_algorithm, make_env, read_specs
+from veca_marl.runs.assembly import make_env, make_learners, read_specs
 from veca_marl.runs.run_folder import RunFolder, open_run
 
 
@@ -46,9 +46,9 @@ def tournament(folder: RunFolder, members: int, episodes: int, draw_margin: floa
 def _play(
     cfg: Config, pool: Pool, chosen: dict[str, list[int]], episodes: int, draw_margin: float
 ) -> list[Match]:
-    algorithm = make_algorithm(cfg, read_specs(cfg.game), torch.device("cpu"))
+    learners = make_learners(cfg, read_specs(cfg.game), torch.device("cpu"))
     env = make_env(cfg.game, min(episodes, cfg.eval.worlds), cfg.seed)
-    matches = play_all(env, algorithm, pool, chosen, episodes, draw_margin, cfg.seed)
+    matches = play_all(env, learners.policy, pool, chosen, episodes, draw_margin, cfg.seed)
     env.close()
     return matches
 

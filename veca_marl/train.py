@@ -18,6 +18,7 @@ from hydra.core.hydra_config import HydraConfig
 from hydra.errors import HydraException
 from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
+from torchrl import timeit
 
 from veca_marl.algos.training.checkpoint import CheckpointError
 from veca_marl.algos.training.loop import Trainer
@@ -36,8 +37,8 @@ def train(cfg: Config, folder: RunFolder, trainer: Trainer) -> list[str]:
     trainer.reporters = make_reporters(cfg, folder, trainer.progress.frames)
     lines = trainer.run()
     if cfg.log.video:
-        with trainer.watch.measure("video"):
-            record_episode(folder.video, cfg.game, trainer.player, cfg.seed)
+        with timeit("video"):
+            record_episode(folder.video, cfg.game, trainer.policy.play, cfg.seed)
     for reporter in trainer.reporters:
         reporter.close()
     folder.write("comparison.txt", "\n".join(lines))

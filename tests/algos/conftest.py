@@ -7,9 +7,9 @@ import torch
 from fake_env import FakeEnv
 from training import SMALL
 
-from veca_marl.algos.ppo.learner import PPOCfg
-from veca_marl.algos.ppo.ppo import PPO
+from veca_marl.algos.ppo import PPOCfg
 from veca_marl.algos.specs import team_specs
+from veca_marl.algos.training.learners import TeamLearners
 
 
 @pytest.fixture(autouse=True, scope="session")
@@ -22,6 +22,8 @@ def one_thread():
 def make_ppo():
     def make(seed=0, network=SMALL, **env):
         torch.manual_seed(seed)
-        return PPO(team_specs(FakeEnv(1, **env)), PPOCfg(network=network), torch.device("cpu"))
+        return TeamLearners(
+            team_specs(FakeEnv(1, **env)), PPOCfg(network=network), torch.device("cpu")
+        )
 
     return make

@@ -58,7 +58,7 @@ class FakeEnv(EnvBase):
 
         self.observation_spec = per_team({"observation": observation})
         for t in teams:
-            self.observation_spec[t, "terms"] = Composite(
+            self.observation_spec[t, "info"] = Composite(
                 {"right": Unbounded(shape=(*lead, 1))}, shape=lead
             )
         self.action_spec = per_team({"action": action})
@@ -91,7 +91,7 @@ class FakeEnv(EnvBase):
 
     def _team(self, right):
         return TensorDict(
-            {"observation": self._senses(), "terms": {"right": right.clone()}}, right.shape[:2]
+            {"observation": self._senses(), "info": {"right": right.clone()}}, right.shape[:2]
         )
 
     def _reset(self, tensordict=None, **kwargs):

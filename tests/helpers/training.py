@@ -2,9 +2,9 @@
 
 import csv
 
-from veca_marl.algos.networks.actor_critic import NetworkCfg
+from veca_marl.algos.networks.multisense import MultisenseCfg
 
-SMALL = NetworkCfg(channels=[4, 8, 8], vector_features=16, trunk_features=32)
+SMALL = MultisenseCfg(channels=[4, 8, 8], vector_features=16, trunk_features=32)
 FRAMES = 64  # of a batch
 
 

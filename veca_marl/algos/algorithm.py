@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -21,6 +21,7 @@ from tensordict import TensorDictBase
 from tensordict.nn import TensorDictModuleBase
 
 from veca_marl.algos.specs import TeamSpec
+from veca_marl.registry import Registry, origin
 
 
 @dataclass
@@ -124,46 +125,46 @@ class RegisteredAlgorithm:
     factory: AlgorithmFactory
 
 
-ALGORITHMS: dict[str, RegisteredAlgorithm] = {}
+ALGORITHMS: Registry[RegisteredAlgorithm] = Registry("algorithm")
 
 
-def register_algorithm(
-    name: str, cfg_type: type[AlgorithmCfg], factory: AlgorithmFactory
-) -> RegisteredAlgorithm:
+def register_algorithm(name: str, cfg_type: type[AlgorithmCfg], factory: AlgorithmFactory) -> None:
     """Make an algorithm known under `name`, the value of ``algo.name``.
 
     Raises:
         ValueError: If another algorithm has the name, or the default of ``cfg_type.name`` differs.
     """
-    entry = RegisteredAlgorithm(cfg_type, factory)
-    if ALGORITHMS.get(name, entry) != entry:
-        raise ValueError(f"there is an algorithm {name!r} already: {ALGORITHMS[name].factory}")
-    if cfg_type.name != name:
-        raise ValueError(f"{cfg_type.__name__}.name is {cfg_type.name!r} by default, not {name!r}")
-    ALGORITHMS[name] = entry
-    return entry
+    check_entry(ALGORITHMS, name, cfg_type, factory)
+    ALGORITHMS.add(name, RegisteredAlgorithm(cfg_type, factory))
 
 
-def find_algorithm(name: str) -> RegisteredAlgorithm:
-    """Return the algorithm called `name`.
+def check_entry(
+    registry: Mapping[str, Any], name: str, cfg_type: type, factory: Callable[..., Any]
+) -> None:
+    """Check that an entry of a registry is new, and that its numbers name it by default.
+
+    A definition that is executed again (a notebook cell) is not another one.
 
     Raises:
-        ValueError: If there is none.
+        ValueError: If it is not so.
     """
-    if name not in ALGORITHMS:
-        raise ValueError(f"unknown algorithm {name!r}; choices: {', '.join(sorted(ALGORITHMS))}")
-    return ALGORITHMS[name]
+    present = registry.get(name)
+    if present is not None and origin(present.factory) != origin(factory):
+        raise ValueError(
+            f"{name!r} is defined twice: by {origin(present.factory)} and {origin(factory)}"
+        )
+    default = getattr(cfg_type, "name", None)
+    if default != name:
+        raise ValueError(f"{cfg_type.__name__}.name is {default!r} by default, not {name!r}")
 
 
-def make_algorithm(
-    team: str, spec: TeamSpec, cfg: AlgorithmCfg, device: torch.device
-) -> Algorithm:
+def make_algorithm(team: str, spec: TeamSpec, cfg: AlgorithmCfg, device: torch.device) -> Algorithm:
     """Return the algorithm that `cfg` names, for one team.
 
     Raises:
         ValueError: If it is unknown, or `cfg` is not of its type.
     """
-    entry = find_algorithm(cfg.name)
+    entry = ALGORITHMS.find(cfg.name)
     if not isinstance(cfg, entry.cfg_type):
         raise ValueError(
             f"algo.name={cfg.name} takes {entry.cfg_type.__name__}, got {type(cfg).__name__}"

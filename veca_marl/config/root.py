@@ -7,10 +7,11 @@ from pathlib import Path
 
 from omegaconf import MISSING
 
-from veca_marl.algos.ppo.learner import PPOCfg
+from veca_marl.algos.algorithm import AlgorithmCfg
 from veca_marl.algos.selfplay.self_play import SelfPlayCfg
 from veca_marl.algos.training.collect import CollectCfg
 from veca_marl.algos.training.evaluation import EvalCfg
+from veca_marl.algos.training.loggers import LoggerKind, check_installed
 from veca_marl.envs.core.game_cfg import GameCfg
 from veca_marl.envs.core.task import TaskCfg
 from veca_marl.envs.core.team import Script, TeamCfg
@@ -25,18 +26,22 @@ class LogCfg:
     """What a run leaves behind beside metrics.csv, evaluations.csv and checkpoints.
 
     Attributes:
-        tensorboard: Curves for TensorBoard.
+        logger: Where numbers go: csv, tensorboard, wandb, mlflow, several of them, or none.
         progress_bar: A progress bar while training.
         video: An episode of the trained policy with the agent's own sound, at the end.
         keep_checkpoints: How many of the latest checkpoints stay beside the best one.
     """
 
-    tensorboard: bool = True
+    logger: list[LoggerKind] = field(
+        default_factory=lambda: [LoggerKind.csv, LoggerKind.tensorboard]
+    )
     progress_bar: bool = True
     video: bool = True
     keep_checkpoints: int = 3
 
     def __post_init__(self) -> None:
+        for kind in self.logger:
+            check_installed(kind)
         if self.keep_checkpoints < 1:
             raise ValueError(
                 f"log.keep_checkpoints must be at least 1, got {self.keep_checkpoints}"
@@ -83,8 +88,8 @@ class Config:
     team: dict[str, TeamCfg] = field(default_factory=dict)
     opponent: dict[str, str] = field(default_factory=dict)
     warm_start: dict[str, str] = field(default_factory=dict)
-    algo: PPOCfg = MISSING
-    learner: dict[str, PPOCfg] = field(default_factory=dict)
+    algo: AlgorithmCfg = MISSING
+    learner: dict[str, AlgorithmCfg] = field(default_factory=dict)
     self_play: SelfPlayCfg = field(default_factory=SelfPlayCfg)
     collect: CollectCfg = field(default_factory=CollectCfg)
     eval: EvalCfg = field(default_factory=EvalCfg)
@@ -106,12 +111,8 @@ class Config:
             raise ValueError(f"seed must be 0 or more, got {self.seed}")
         if self.max_minutes is not None and not self.max_minutes > 0:
             raise ValueError(f"max_minutes must be positive, got {self.max_minutes}")
-        minibatches = max(cfg.minibatches for cfg in (self.algo, *self.learner.values()))
-        if self.collect.frames < minibatches:
-            raise ValueError(
-                f"collect: a batch of {self.collect.frames} frames cannot be split into "
-                f"algo.minibatches={minibatches}"
-            )
+        for algorithm in (self.algo, *self.learner.values()):
+            algorithm.check_batch(self.collect.frames)
         if self.threads is not None and self.threads < 1:
             raise ValueError(f"threads must be at least 1, got {self.threads}")
 

@@ -9,9 +9,10 @@ from __future__ import annotations
 from typing import Any
 
 from hydra.core.config_store import ConfigStore
-from omegaconf import OmegaConf
+from omegaconf import MISSING, OmegaConf
 
-from veca_marl.algos.ppo.learner import PPOCfg
+from veca_marl.algos.algorithm import ALGORITHMS
+from veca_marl.algos.networks.factory import NETWORKS
 from veca_marl.config.root import Config
 from veca_marl.config.search_path import conf_dirs
 from veca_marl.envs.core.task import TASKS
@@ -25,7 +26,8 @@ def register_schemas() -> None:
     """Store the schemas of the root and of all registered entries, present and later ones."""
     store = ConfigStore.instance()
     store.store(name="schema", node=root_schema())
-    store.store(group="schema/algo", name="ppo", node=PPOCfg)
+    ALGORITHMS.listen(_store_algorithm)
+    NETWORKS.listen(_store_network)
     store.store(group="schema/body", name="walker", node=WalkerCfg)
     store.store(group="schema/body", name="humanoid", node=HumanoidCfg)
     TASKS.listen(_store_task_schema)
@@ -46,6 +48,26 @@ def store_tasks_without_file() -> None:
         if not any((folder / "task" / f"{name}.yaml").is_file() for folder in conf_dirs()):
             entry = {"defaults": [{"/schema/task@task": name}, "_self_"], "task": {"name": name}}
             store.store(group="task", name=name, node=entry, package="_global_")
+
+
+def _store_algorithm(name: str) -> None:
+    """Store the schema of an algorithm; its network is chosen in the group ``algo/network``.
+
+    An algorithm without a file ``algo/<name>.yaml`` has an entry of the group ``algo`` as well.
+    """
+    store = ConfigStore.instance()
+    node = OmegaConf.structured(ALGORITHMS[name].cfg_type)
+    defaults: list[Any] = [{"/schema/algo@_here_": name}]
+    if "network" in node:
+        defaults.append({"network": node.network.name})
+        node.network = MISSING
+    store.store(group="schema/algo", name=name, node=node)
+    if not any((folder / "algo" / f"{name}.yaml").is_file() for folder in conf_dirs()):
+        store.store(group="algo", name=name, node={"defaults": [*defaults, "_self_"]})
+
+
+def _store_network(name: str) -> None:
+    ConfigStore.instance().store(group="algo/network", name=name, node=NETWORKS[name].cfg_type)
 
 
 def _store_task_schema(name: str) -> None:

@@ -1,4 +1,4 @@
-"""From a configuration to what trains: environments, algorithm, matchmaking, checkpoints, logs."""
+"""Makes a trainer from a configuration: environments, algorithms, opponents, checkpoints, logs."""
 
 from __future__ import annotations
 
@@ -9,13 +9,16 @@ from typing import Any, cast
 import torch
 from omegaconf import OmegaConf
 
-from veca_marl.algos.ppo.ppo import PPO
-from veca_marl.algos.selfplay.self_play import Pool, SelfPlay
+from veca_marl.algos.selfplay.pool import Pool
+from veca_marl.algos.selfplay.self_play import SelfPlay
 from veca_marl.algos.specs import TeamSpec, team_specs
-from veca_marl.algos.training.checkpoint import Checkpoints, Identity
-from veca_marl.algos.training.learnt import load_actor, load_network
-from veca_marl.algos.training.loop import Budget, Trainer
-from veca_marl.algos.training.metrics import CsvReporter, Reporter, TensorBoardReporter
+from veca_marl.algos.training.checkpoint import CheckpointError, Checkpoints, Identity
+from veca_marl.algos.training.learners import TeamLearners
+from veca_marl.algos.training.loggers import make_reporter
+from veca_marl.algos.training.loop import Trainer
+from veca_marl.algos.training.progress import Budget
+from veca_marl.algos.training.reporters import Reporter
+from veca_marl.algos.training.stored import load_actor, load_algorithm
 from veca_marl.config import Config, ConfigError, one_line
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
 from veca_marl.envs.core.game_cfg import GameCfg
@@ -23,31 +26,30 @@ from veca_marl.runs.run_folder import RunFolder
 
 
 def make_env(game: GameCfg, worlds: int, seed: int) -> VecaEnv:
-    """Return `worlds` games in one environment; bound to its game it is an `EnvFactory`."""
+    """Return `worlds` games in one environment; with its game bound it is an `EnvFactory`."""
     return VecaEnv(game, worlds, seed)
 
 
-def make_trainer(cfg: Config, folder: RunFolder) -> Trainer:
-    """Put together what trains as configured, into `folder`.
+def make_trainer(cfg: Config, folder: RunFolder | None = None) -> Trainer:
+    """Return what trains as configured.
+
+    Args:
+        cfg: The configuration.
+        folder: Folder of the run; None stores nothing.
 
     Raises:
-        ConfigError: If the device or the world cannot be.
-        CheckpointError: If the run to continue does not fit.
+        ConfigError: If the device does not exist or no world can be made.
+        CheckpointError: If a run to continue or to load from does not fit.
     """
     device = find_device(cfg.device)
     if cfg.threads is not None:
         torch.set_num_threads(cfg.threads)
     torch.manual_seed(cfg.seed)
     specs = read_specs(cfg.game)
-    checkpoints = Checkpoints(
-        folder.checkpoints,
-        Identity(cfg.task.name, specs),
-        cast(dict[str, Any], OmegaConf.to_container(OmegaConf.structured(cfg), enum_to_str=True)),
-        cfg.log.keep_checkpoints,
-    )
+    checkpoints = _make_checkpoints(cfg, folder, specs)
     trainer = Trainer(
         make_env=partial(make_env, cfg.game),
-        algorithm=make_algorithm(cfg, specs, device),
+        learners=make_learners(cfg, specs, device),
         collect=cfg.collect,
         evaluation=cfg.eval,
         budget=Budget(cfg.total_frames, cfg.max_minutes),
@@ -57,38 +59,53 @@ def make_trainer(cfg: Config, folder: RunFolder) -> Trainer:
         progress_bar=cfg.log.progress_bar,
     )
     if cfg.self_play.teams:
-        pool = Pool(folder.pool)
-        trainer.matchmaking = make_self_play(cfg, trainer.algorithm, pool)
+        if folder is None:
+            raise ConfigError("self_play.teams: past policies are stored in the folder of a run")
+        trainer.matchmaking = SelfPlay(cfg.self_play, trainer.learners, Pool(folder.pool), cfg.seed)
     if cfg.resume is not None:
         trainer.resume(checkpoints.latest())
     return trainer
 
 
-def make_algorithm(cfg: Config, specs: dict[str, TeamSpec], device: torch.device) -> PPO:
-    """Return what learns all teams but those with an opponent from another run.
+def _make_checkpoints(
+    cfg: Config, folder: RunFolder | None, specs: dict[str, TeamSpec]
+) -> Checkpoints:
+    plain = OmegaConf.to_container(OmegaConf.structured(cfg), enum_to_str=True)
+    return Checkpoints(
+        None if folder is None else folder.checkpoints,
+        Identity(cfg.task.name, specs),
+        cast(dict[str, Any], plain),
+        cfg.log.keep_checkpoints,
+    )
+
+
+def make_learners(cfg: Config, specs: dict[str, TeamSpec], device: torch.device) -> TeamLearners:
+    """Return the algorithms of all teams; teams with an opponent from another run are frozen.
 
     Raises:
-        CheckpointError: If an opponent, or what a team begins with, cannot be loaded.
+        CheckpointError: If an opponent, or what a team starts from, cannot be loaded.
     """
     actors = {team: load_actor(path, team, specs[team]) for team, path in cfg.frozen.items()}
-    algorithm = PPO(specs, cfg.algo, device, cfg.learner, actors)
+    learners = TeamLearners(specs, cfg.algo, device, cfg.learner, actors)
     if cfg.resume is None:
         for team, path in cfg.warm_start.items():
-            network = cfg.learner.get(team, cfg.algo).network
-            algorithm.begin_with(team, load_network(Path(path), team, specs[team], network))
-    return algorithm
+            _warm_start(learners, team, Path(path))
+    return learners
 
 
-def make_self_play(cfg: Config, algorithm: PPO, pool: Pool) -> SelfPlay:
-    """Return the matchmaking between a team and past selves of another."""
-    return SelfPlay(cfg.self_play, algorithm, pool, cfg.seed)
+def _warm_start(learners: TeamLearners, team: str, path: Path) -> None:
+    stored = load_algorithm(path, team, learners.specs[team])
+    try:
+        learners.algorithms[team].warm_start(stored)
+    except ValueError as error:
+        raise CheckpointError(f"{path}: team {team!r}: {error}") from error
 
 
 def read_specs(game: GameCfg) -> dict[str, TeamSpec]:
-    """Build one world to see what its teams perceive and do.
+    """Return the arrays of each team; one world is built and closed for it.
 
     Raises:
-        ConfigError: If no world can be made from `game`.
+        ConfigError: If no world can be made.
     """
     try:
         env = make_env(game, 1, 0)
@@ -113,8 +130,5 @@ def find_device(name: str) -> torch.device:
 
 
 def make_reporters(cfg: Config, folder: RunFolder, resumed_frames: int) -> list[Reporter]:
-    """Return what writes the numbers down, rid of rows that will be written again."""
-    reporters: list[Reporter] = [CsvReporter(folder.path, resumed_frames)]
-    if cfg.log.tensorboard:
-        reporters.append(TensorBoardReporter(folder.path, resumed_frames))
-    return reporters
+    """Return the loggers of a run, without rows that will be written again."""
+    return [make_reporter(kind, folder.path, resumed_frames) for kind in cfg.log.logger]

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from tensordict import TensorDictBase
 from torchrl.envs import ExplorationType, set_exploration_type
 
-from veca_marl.algos.training.evaluation import Policy
+from veca_marl.algos.networks.memory import with_memory
+from veca_marl.algos.training.evaluation import ActionPolicy
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
 from veca_marl.envs.core.game_cfg import GameCfg
 from veca_marl.runs.video import write_video
@@ -20,7 +21,7 @@ from veca_marl.runs.video import write_video
 SAMPLE_RATE_HZ = 22_050  # of the ears
 
 
-def record_episode(path: Path, game: GameCfg, policy: Policy, seed: int) -> None:
+def record_episode(path: Path, game: GameCfg, policy: ActionPolicy, seed: int) -> None:
     """Play one episode with the policy's most likely actions and write it as a video.
 
     The first player of the first team is filmed; a deaf one makes a silent film.
@@ -35,9 +36,10 @@ def record_episode(path: Path, game: GameCfg, policy: Policy, seed: int) -> None
     frames: list[NDArray[np.uint8]] = []
     sound: list[NDArray[Any]] = []
     with torch.no_grad(), set_exploration_type(ExplorationType.DETERMINISTIC):
-        state, done = env.reset(), False
+        playing = with_memory(env, policy)
+        state, done = playing.reset(), False
         while not done:
-            played, state = env.step_and_maybe_reset(policy(state))
+            played, state = playing.step_and_maybe_reset(policy(state))
             seen = _first_player(played["next"], env)
             frames.append(env.spectator.frame(seen))
             if "waveform" in seen:

@@ -5,7 +5,6 @@ import torch
 from fake_env import FakeEnv
 from torchrl.data import Bounded, Composite
 
-from veca_marl.algos.networks.actor_critic import NetworkCfg, Precision, TeamNetwork, Trunk
 from veca_marl.algos.networks.encoders import (
     ImageEncoder,
     Places,
@@ -14,6 +13,8 @@ from veca_marl.algos.networks.encoders import (
     make_encoder,
     scale_of,
 )
+from veca_marl.algos.networks.factory import make_network
+from veca_marl.algos.networks.multisense import MultisenseCfg, Precision, Trunk
 from veca_marl.algos.specs import ArrayLayout, team_specs
 
 IMAGE = ArrayLayout((2, 3, 84, 84), "uint8", 0.0, 255.0)
@@ -22,7 +23,7 @@ SPECTRUM = ArrayLayout((2, 250), "float32", -8.0, 3.0)
 
 def network(cfg=None, **env):
     fake = FakeEnv(**env)
-    return fake, TeamNetwork("agents", team_specs(fake)["agents"], cfg or NetworkCfg())
+    return fake, make_network("agents", team_specs(fake)["agents"], cfg or MultisenseCfg())
 
 
 def test_encoder_is_chosen_by_what_the_array_looks_like():
@@ -82,7 +83,7 @@ def test_only_the_senses_that_are_named_are_compressed():
         "audio": ArrayLayout((2, 250), "float32", -math.inf, math.inf),
         "proprioception": ArrayLayout((534,), "float32", -math.inf, math.inf),
     }
-    encoders = Trunk(layouts, NetworkCfg()).encoders
+    encoders = Trunk(layouts, MultisenseCfg()).encoders
     hundred = torch.tensor([100.0])
     assert encoders["audio"].scale(hundred) == hundred
     assert encoders["proprioception"].scale(hundred) == pytest.approx(math.log(101.0))
@@ -102,7 +103,7 @@ def test_a_sense_that_is_not_there_leaves_no_parameters(left_out):
 @pytest.mark.parametrize("discrete", [False, True])
 @pytest.mark.parametrize("precision", list(Precision))
 def test_actor_acts_within_the_spec_for_every_agent(discrete, precision):
-    env, net = network(NetworkCfg(precision=precision), discrete=discrete, agents=3)
+    env, net = network(MultisenseCfg(precision=precision), discrete=discrete, agents=3)
     out = net.actor(env.reset())
     assert env.full_action_spec["agents", "action"].is_in(out["agents", "action"])
     assert out["agents", "action_log_prob"].shape == (4, 3)
@@ -117,7 +118,7 @@ def test_agents_of_a_team_share_one_policy():
     for name in ("vision", "audio"):
         array = td["agents", "observation", name]
         array[:, 1] = array[:, 0]
-    features = net.trunk(td)["agents", "features"]
+    features = net.encoder(td)["agents", "features"]
     torch.testing.assert_close(features[:, 0], features[:, 1])
 
 
@@ -135,7 +136,7 @@ def test_unlearnable_actions_are_refused_with_the_choices():
 )
 def test_impossible_sizes_are_refused(kwargs, message):
     with pytest.raises(ValueError, match=message):
-        NetworkCfg(**kwargs)
+        MultisenseCfg(**kwargs)
 
 
 def test_places_are_where_maps_are_lit():

@@ -7,14 +7,14 @@ from torch.distributions import kl_divergence
 from torchrl.envs import ExplorationType, set_exploration_type
 from training import SMALL
 
-from veca_marl.algos.networks.actor_critic import Critic, NetworkCfg, Parameters
-from veca_marl.algos.ppo.learner import PPOCfg
-from veca_marl.algos.ppo.ppo import PPO
+from veca_marl.algos.networks.multisense import Critic, MultisenseCfg, Parameters
+from veca_marl.algos.ppo import PPOCfg
 from veca_marl.algos.specs import team_specs
+from veca_marl.algos.training.learners import TeamLearners
 
 
 def sized(**options):
-    return NetworkCfg(**{**vars(SMALL), **options})
+    return MultisenseCfg(**{**vars(SMALL), **options})
 
 
 def seen(agents, worlds=4):
@@ -24,10 +24,10 @@ def seen(agents, worlds=4):
 
 
 def values_and_means(ppo, state):
-    learner = ppo.learners["agents"]
+    learner = ppo.algorithms["agents"]
     with torch.no_grad(), set_exploration_type(ExplorationType.DETERMINISTIC):
         acted = learner.network.actor(state.clone())
-        value = learner.network.critic.module(acted["agents", "features"])
+        value = learner.network.critic(acted)["agents", "state_value"]
     return value.squeeze(-1), acted["agents", "loc"]
 
 
@@ -56,7 +56,7 @@ def test_agents_with_one_observation_act_alike_only_if_they_share(make_ppo, para
     state = seen(2)
     for array in state["agents", "observation"].values():
         array[:, 1] = array[:, 0]
-    features = ppo.learners["agents"].network.trunk(state)["agents", "features"]
+    features = ppo.algorithms["agents"].network.encoder(state)["agents", "features"]
     alike = torch.allclose(features[:, 0], features[:, 1], atol=1e-6)
     assert alike is (parameters is Parameters.shared)
 
@@ -64,7 +64,7 @@ def test_agents_with_one_observation_act_alike_only_if_they_share(make_ppo, para
 def test_separate_networks_count_the_agents(make_ppo):
     def count(**options):
         ppo = make_ppo(network=sized(**options), agents=3)
-        return sum(p.numel() for p in ppo.learners["agents"].network.parameters())
+        return sum(p.numel() for p in ppo.algorithms["agents"].network.parameters())
 
     assert count(parameters=Parameters.separate) == 3 * count()
 
@@ -75,14 +75,14 @@ def test_all_of_them_learn_the_toy(make_ppo, critic, parameters):
     network = sized(critic=critic, parameters=parameters)
     ppo = make_ppo(network=network, agents=2, senses=("audio",))
     env = FakeEnv(8, agents=2, senses=("audio",))
-    paid = []
+    rewards = []
     for _ in range(25):
         with torch.no_grad(), set_exploration_type(ExplorationType.RANDOM):
-            batch = env.rollout(32, ppo.policy, break_when_any_done=False)
-        ppo.learn(ppo.prepare(batch))
-        paid.append(batch["next", "agents", "reward"].mean().item())
-    assert paid[0] < 0.3
-    assert paid[-1] > 0.7
+            batch = env.rollout(32, ppo.policy.collect, break_when_any_done=False)
+        ppo.learn(batch)
+        rewards.append(batch["next", "agents", "reward"].mean().item())
+    assert rewards[0] < 0.3
+    assert rewards[-1] > 0.7
 
 
 # ---- rows that do not count
@@ -93,7 +93,7 @@ class LeavingEnv(FakeEnv):
 
     def __init__(self, worlds, **options):
         super().__init__(worlds, agents=2, **options)
-        mask = self.observation_spec["agents", "terms", "right"].squeeze(-1)
+        mask = self.observation_spec["agents", "info", "right"].squeeze(-1)
         self.observation_spec["agents", "mask"] = type(self.full_done_spec["done"])(
             2, shape=mask.shape, dtype=torch.bool
         )
@@ -109,16 +109,16 @@ class LeavingEnv(FakeEnv):
 def leaving(make_ppo):
     env = LeavingEnv(8)
     torch.manual_seed(0)
-    ppo = PPO(team_specs(env), PPOCfg(network=SMALL), torch.device("cpu"))
+    ppo = TeamLearners(team_specs(env), PPOCfg(network=SMALL), torch.device("cpu"))
     with torch.no_grad(), set_exploration_type(ExplorationType.RANDOM):
-        batch = env.rollout(16, ppo.policy, break_when_any_done=False)
-    return ppo, ppo.prepare(batch)
+        batch = env.rollout(16, ppo.policy.collect, break_when_any_done=False)
+    return ppo, ppo.algorithms["agents"].prepare(batch)
 
 
 def test_rows_that_do_not_count_change_nothing(leaving):
     """Nonsense in the masked rows leaves every gradient as it was."""
     ppo, rows = leaving
-    learner = ppo.learners["agents"]
+    learner = ppo.algorithms["agents"]
     mask = rows["agents", "mask"]
     assert 0 < (~mask).sum() < mask.numel()
     gradients = []
@@ -137,7 +137,7 @@ def test_rows_that_do_not_count_change_nothing(leaving):
 
 def test_the_divergence_is_that_of_the_rows_that_count(leaving):
     ppo, rows = leaving
-    learner = ppo.learners["agents"]
+    learner = ppo.algorithms["agents"]
     with torch.no_grad():
         for p in learner.network.actor.parameters():
             p.add_(0.1 * torch.randn_like(p))

@@ -11,7 +11,8 @@ from veca_marl.algos.specs import ActionLayout, team_specs
 
 def play(ppo, steps, **env):
     with torch.no_grad(), set_exploration_type(ExplorationType.RANDOM):
-        return FakeEnv(8, hybrid=True, **env).rollout(steps, ppo.policy, break_when_any_done=False)
+        env = FakeEnv(8, hybrid=True, **env)
+        return env.rollout(steps, ppo.policy.collect, break_when_any_done=False)
 
 
 def move_policy(ppo, scale):
@@ -37,7 +38,7 @@ def test_parts_are_read_from_the_spec():
 @pytest.mark.parametrize("agents", [1, 2])
 def test_every_part_is_within_its_spec(make_ppo, agents):
     env = FakeEnv(4, hybrid=True, agents=agents)
-    acted = make_ppo(hybrid=True, agents=agents).policy(env.reset())
+    acted = make_ppo(hybrid=True, agents=agents).policy.play(env.reset())
     spec = env.full_action_spec["agents", "action"]
     for part in ("move", "voice"):
         assert spec[part].is_in(acted["agents", "action", part])
@@ -45,9 +46,9 @@ def test_every_part_is_within_its_spec(make_ppo, agents):
 
 def test_ratio_entropy_and_divergence_are_over_all_parts(make_ppo):
     ppo = make_ppo(hybrid=True)
-    rows = ppo.prepare(play(ppo, 16))
+    rows = ppo.algorithms["agents"].prepare(play(ppo, 16))
     move_policy(ppo, 0.1)
-    learner = ppo.learners["agents"]
+    learner = ppo.algorithms["agents"]
     torch.manual_seed(0)  # the entropy of the continuous part is sampled
     out = learner.loss(rows.clone())
 
@@ -81,7 +82,7 @@ def test_both_parts_are_learnt(make_ppo):
     rewards = []
     for _ in range(20):
         batch = play(ppo, 32, senses=("audio",))
-        ppo.learn(ppo.prepare(batch))
+        ppo.learn(batch)
         rewards.append(batch["next", "agents", "reward"].mean().item())
     assert rewards[0] < 0.3
     assert rewards[-1] > 0.7  # one part alone reaches 0.5 at most

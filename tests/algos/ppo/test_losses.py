@@ -18,9 +18,9 @@ def perturb(ppo, scale=0.05):
 def minibatch(ppo, agents, **env):
     with torch.no_grad(), set_exploration_type(ExplorationType.RANDOM):
         batch = FakeEnv(8, agents=agents, **env).rollout(
-            16, ppo.policy, break_when_any_done=False, auto_cast_to_device=False
+            16, ppo.policy.collect, break_when_any_done=False, auto_cast_to_device=False
         )
-    return ppo.prepare(batch)
+    return ppo.algorithms["agents"].prepare(batch)
 
 
 @pytest.mark.parametrize("discrete", [False, True])
@@ -29,12 +29,12 @@ def test_loss_equals_the_formula(make_ppo, discrete, agents):
     ppo = make_ppo(discrete=discrete, agents=agents)
     rows = minibatch(ppo, agents, discrete=discrete)
     perturb(ppo, scale=0.2)
-    learner = ppo.learners["agents"]
+    learner = ppo.algorithms["agents"]
     out = learner.loss(rows)
 
     team = rows["agents"]
     with torch.no_grad():
-        features = learner.network.trunk(rows.clone())["agents", "features"]
+        features = learner.network.encoder(rows.clone())["agents", "features"]
         value = learner.network.critic.module(features)
         new = learner.network.actor.get_dist(rows.clone())
     advantage = team["advantage"]
@@ -59,7 +59,7 @@ def test_reported_divergence_is_exact(make_ppo, discrete):
     """Pins the private hook of TorchRL that `ExactKLPPOLoss` overrides."""
     ppo = make_ppo(discrete=discrete)
     rows = minibatch(ppo, 1, discrete=discrete)
-    learner = ppo.learners["agents"]
+    learner = ppo.algorithms["agents"]
     assert learner.loss(rows)["kl_approx"] == pytest.approx(0.0, abs=1e-6)
     perturb(ppo)
     reported = learner.loss(rows)["kl_approx"]
@@ -80,13 +80,13 @@ def test_value_head_alone_as_critic_gives_the_gradient_of_the_whole(make_ppo):
     """The features the critic reads are those of this forward pass, with their gradient."""
     ppo = make_ppo()
     rows = minibatch(ppo, 1)
-    learner = ppo.learners["agents"]
-    first_layer = learner.network.trunk.module.encoders["vision"].layers[0].weight
+    learner = ppo.algorithms["agents"]
+    first_layer = learner.network.encoder.module.encoders["vision"].layers[0].weight
 
     learner.loss(rows)["loss_critic"].backward()
     shared = first_layer.grad.clone()
     first_layer.grad = None
-    features = learner.network.trunk(rows.clone())["agents", "features"]
+    features = learner.network.encoder(rows.clone())["agents", "features"]
     error = rows["agents", "value_target"] - learner.network.critic.module(features)
     (0.5 * error.square().mean()).backward()
     torch.testing.assert_close(shared, first_layer.grad)

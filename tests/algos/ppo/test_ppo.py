@@ -6,7 +6,8 @@ import torch
 from fake_env import FakeEnv
 from torchrl.envs import ExplorationType, set_exploration_type
 
-from veca_marl.algos.ppo.learner import PPOCfg
+from veca_marl.algos.ppo import PPOCfg
+from veca_marl.algos.ppo.advantages import advantages
 from veca_marl.algos.training.collect import CollectCfg, Experience
 
 
@@ -27,17 +28,17 @@ def test_advantages_equal_the_recursion(make_ppo, agents, terminated):
     ppo = make_ppo(agents=agents)
     with torch.no_grad(), set_exploration_type(ExplorationType.RANDOM):
         batch = FakeEnv(4, agents=agents, horizon=5).rollout(
-            13, ppo.policy, break_when_any_done=False, auto_cast_to_device=False
+            13, ppo.policy.collect, break_when_any_done=False, auto_cast_to_device=False
         )
     if terminated:  # by the rules instead of by the clock: no value after the end
         batch["next", "agents", "terminated"] |= batch["next", "agents", "truncated"]
-    learner = ppo.learners["agents"]
-    found = learner.advantages(batch)
+    learner = ppo.algorithms["agents"]
+    found = advantages(learner.network, batch, "agents", 0.99, 0.95)
 
     with torch.no_grad():  # values the plain way: the network looks at every observation
         network = learner.network
-        value = network.critic(network.trunk(batch.clone()))["agents", "state_value"]
-        following = network.critic(network.trunk(batch["next"].clone()))["agents", "state_value"]
+        value = network.critic(network.encoder(batch.clone()))["agents", "state_value"]
+        following = network.critic(network.encoder(batch["next"].clone()))["agents", "state_value"]
     team = batch["next", "agents"]
     expected = gae_by_hand(value, following, team["reward"], team["done"], team["terminated"])
     assert batch["next", "done"].any(), "the test must see ends of episodes"
@@ -51,27 +52,27 @@ def test_advantages_equal_the_recursion(make_ppo, agents, terminated):
 def test_toy_is_learnt(make_ppo, discrete, teams):
     env = {"discrete": discrete, "teams": teams}
     ppo = make_ppo(**env)
-    player = ppo.copy_policy()
+    player = ppo.policy.copy()
     experience = Experience(
         lambda worlds, seed: FakeEnv(worlds, seed, **env),
-        player,
+        player.collect,
         CollectCfg(processes=0, worlds=8, steps=32),
     )
     experience.restart(0)
-    paid = []
+    rewards = []
     for _ in range(16):
         batch = experience.collect()
-        paid.append([batch["next", team, "reward"].mean().item() for team in teams])
-        ppo.learn(ppo.prepare(batch))
-        ppo.refresh(player)
+        rewards.append([batch["next", team, "reward"].mean().item() for team in teams])
+        ppo.learn(batch)
+        player.take_over(ppo.policy)
         experience.update_policy()
     experience.close()
-    assert max(paid[0]) < 0.3
-    assert min(paid[-1]) > 0.7
+    assert max(rewards[0]) < 0.3
+    assert min(rewards[-1]) > 0.7
 
 
 def test_rate_falls_when_the_policy_moves_too_far_and_rises_when_hardly(make_ppo):
-    schedule = make_ppo().learners["agents"].schedule
+    schedule = make_ppo().algorithms["agents"].schedule
     start = schedule.get_last_lr()[0]
     schedule.step(0.017)
     assert schedule.get_last_lr()[0] == pytest.approx(start / 1.5)
@@ -87,11 +88,11 @@ def test_rate_falls_when_the_policy_moves_too_far_and_rises_when_hardly(make_ppo
 def test_rewards_that_are_not_finite_stop_the_learning(make_ppo):
     ppo = make_ppo()
     with torch.no_grad():
-        batch = FakeEnv(2).rollout(8, ppo.policy, break_when_any_done=False)
+        batch = FakeEnv(2).rollout(8, ppo.policy.collect, break_when_any_done=False)
     batch["next", "agents", "reward"][0, 0] = math.nan
     before = torch.cat([p.flatten() for p in ppo.policy.parameters()])
     with pytest.raises(FloatingPointError, match="team 'agents': the gradient is nan"):
-        ppo.learn(ppo.prepare(batch))
+        ppo.learn(batch)
     assert torch.equal(before, torch.cat([p.flatten() for p in ppo.policy.parameters()]))
 
 
@@ -99,7 +100,7 @@ def test_state_continues_the_learning_exactly(make_ppo):
     def batch(ppo, seed):
         torch.manual_seed(seed)
         with torch.no_grad(), set_exploration_type(ExplorationType.RANDOM):
-            return ppo.prepare(FakeEnv(4, seed).rollout(16, ppo.policy, break_when_any_done=False))
+            return FakeEnv(4, seed).rollout(16, ppo.policy.collect, break_when_any_done=False)
 
     one, other = make_ppo(), make_ppo(seed=7)
     one.learn(batch(one, 0))

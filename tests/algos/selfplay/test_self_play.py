@@ -5,14 +5,16 @@ import torch
 from fake_env import make_fake_env
 from training import FRAMES, Interrupt, read
 
-from veca_marl.algos.selfplay.self_play import Pool, SelfPlay, SelfPlayCfg
+from veca_marl.algos.selfplay.pool import Pool
+from veca_marl.algos.selfplay.self_play import SelfPlay, SelfPlayCfg
 from veca_marl.algos.specs import team_specs
 from veca_marl.algos.training.checkpoint import CheckpointError, Checkpoints, Identity
 from veca_marl.algos.training.collect import CollectCfg
 from veca_marl.algos.training.evaluation import EvalCfg
-from veca_marl.algos.training.learnt import load_actor
-from veca_marl.algos.training.loop import Budget, Trainer
-from veca_marl.algos.training.metrics import CsvReporter
+from veca_marl.algos.training.loop import Trainer
+from veca_marl.algos.training.progress import Budget
+from veca_marl.algos.training.reporters import CsvReporter
+from veca_marl.algos.training.stored import load_actor
 
 TEAMS = ("red", "blue")
 
@@ -27,19 +29,14 @@ def make(tmp_path, make_ppo):
         folder = tmp_path / name
         folder.mkdir(exist_ok=True)
         algorithm = make_ppo(teams=TEAMS, senses=("audio",))
-        network = {
-            k: v.value if hasattr(v, "value") else v
-            for k, v in vars(algorithm.learners["red"].cfg.network).items()
-        }
-        stored = {"algo": {"network": network}, "learner": {}}
         identity = Identity("Toy", team_specs(make_env(1, 0)))
         return Trainer(
             make_env=make_env,
-            algorithm=algorithm,
+            learners=algorithm,
             collect=CollectCfg(0, worlds=4, steps=16),
             evaluation=EvalCfg(every_frames=every * FRAMES, episodes=2, worlds=2),
             budget=Budget(batches * FRAMES),
-            checkpoints=Checkpoints(folder / "checkpoints", identity, stored),
+            checkpoints=Checkpoints(folder / "checkpoints", identity, {}),
             reporters=[CsvReporter(folder)] if reporters is None else reporters,
             seed=0,
             progress_bar=False,
@@ -52,7 +49,7 @@ def make(tmp_path, make_ppo):
 
 
 def weights(trainer, team):
-    actor = trainer.algorithm.actors[team]
+    actor = trainer.learners.policy.actors[team]
     return torch.cat([p.detach().flatten() for p in actor.parameters()])
 
 
@@ -82,14 +79,14 @@ def test_the_opponent_plays_as_it_was(make):
     matches = trainer.matchmaking
     matches.begin_stage(6, 6 * FRAMES)
     assert matches.turn == "red"
-    assert matches.met in (0, 2 * FRAMES, 4 * FRAMES, 6 * FRAMES)
-    trainer.algorithm.refresh(trainer.player)
-    matches.dress(trainer.player)
-    past = matches.pool.load("blue", matches.met)
-    for name, array in trainer.player[1].state_dict().items():
+    assert matches.past_frames in (0, 2 * FRAMES, 4 * FRAMES, 6 * FRAMES)
+    trainer.policy.take_over(trainer.learners.policy)
+    matches.load_opponent(trainer.policy)
+    past = matches.pool.load("blue", matches.past_frames)
+    for name, array in trainer.policy.actors["blue"].state_dict().items():
         torch.testing.assert_close(array, past[name])
-    now = trainer.algorithm.actors["red"].state_dict()
-    for name, array in trainer.player[0].state_dict().items():
+    now = trainer.learners.policy.actors["red"].state_dict()
+    for name, array in trainer.policy.actors["red"].state_dict().items():
         torch.testing.assert_close(array, now[name])
 
 
@@ -97,7 +94,7 @@ def test_logs_say_whom_it_met(make, tmp_path):
     make("log", batches=6).run()
     rows = read(tmp_path / "log" / "metrics.csv")
     assert [float(row["self_play/turn"]) for row in rows] == [0.0, 1.0] * 3
-    met = [row["self_play/met"] for row in rows]
+    met = [row["self_play/opponent_frames"] for row in rows]
     assert "" in met
     assert any(met)
     for row in rows:
@@ -124,7 +121,7 @@ def test_a_frozen_opponent_is_what_another_run_learnt(make, tmp_path):
     trainer.run()
     spec = team_specs(make_env(1, 0))["blue"]
     actor = load_actor(tmp_path / "other", "blue", spec)
-    learnt = trainer.algorithm.actors["blue"].state_dict()
+    learnt = trainer.learners.policy.actors["blue"].state_dict()
     for name, array in actor.state_dict().items():
         torch.testing.assert_close(array, learnt[name])
     assert not any(p.requires_grad for p in actor.parameters())

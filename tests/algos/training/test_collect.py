@@ -10,9 +10,9 @@ from veca_marl.algos.training.collect import CollectCfg, Experience
 @pytest.fixture(params=[0, 2], ids=["in_process", "two_processes"])
 def experience(request, make_ppo):
     ppo = make_ppo()
-    player = ppo.copy_policy()
+    player = ppo.policy.copy()
     worlds = 4 if request.param else 8
-    played = Experience(make_fake_env, player, CollectCfg(request.param, worlds, steps=16))
+    played = Experience(make_fake_env, player.collect, CollectCfg(request.param, worlds, steps=16))
     played.ppo, played.player = ppo, player
     yield played
     played.close()
@@ -52,14 +52,14 @@ def test_worlds_play_with_the_parameters_they_were_handed(experience):
         for p in experience.ppo.policy.parameters():
             p.add_(0.1)
     assert torch.equal(logits(), before), "learning leaked into the worlds"
-    experience.ppo.refresh(experience.player)
+    experience.player.take_over(experience.ppo.policy)
     experience.update_policy()
     assert not torch.equal(logits(), before)
 
 
 def test_collecting_leaves_the_settings_of_the_program_alone(make_ppo):
     before, threads = multiprocessing.get_start_method(), torch.get_num_threads()
-    experience = Experience(make_fake_env, make_ppo().copy_policy(), CollectCfg(1, 2, 4))
+    experience = Experience(make_fake_env, make_ppo().policy.copy().collect, CollectCfg(1, 2, 4))
     experience.close()
     assert multiprocessing.get_start_method() == before
     assert torch.get_num_threads() == threads
@@ -70,7 +70,9 @@ def test_spawned_workers_collect_what_forked_ones_do(make_ppo, monkeypatch):
     batches = []
     for method in ("fork", "spawn"):
         monkeypatch.setattr("veca_marl.algos.training.collect.start_method", lambda m=method: m)
-        experience = Experience(make_fake_env, make_ppo().copy_policy(), CollectCfg(1, 2, 8))
+        experience = Experience(
+            make_fake_env, make_ppo().policy.copy().collect, CollectCfg(1, 2, 8)
+        )
         experience.restart(5)
         batches.append(experience.collect()["agents", "action"].clone())
         experience.close()

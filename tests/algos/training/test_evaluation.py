@@ -4,14 +4,12 @@ import torch
 from fake_env import FakeEnv
 from scipy import stats
 
+from veca_marl.algos.training.comparison import comparison_line, interval, paired_difference
 from veca_marl.algos.training.evaluation import (
     EvalCfg,
     Exploration,
     Scores,
-    comparison_line,
-    difference,
     evaluate,
-    interval,
     random_policy,
 )
 
@@ -52,7 +50,7 @@ def test_random_play_earns_nothing_here():
 
 
 def test_deterministic_play_takes_the_mode_and_stochastic_play_draws(make_ppo):
-    policy = make_ppo().policy
+    policy = make_ppo().policy.play
     runs = {}
     for mode in Exploration:
         torch.manual_seed(0)
@@ -80,14 +78,16 @@ def test_interval_is_students():
     assert np.isnan(interval(values[:1])).all()
 
 
-def test_difference_is_welchs():
+def test_difference_is_the_paired_t_interval():
     rng = np.random.default_rng(0)
-    one, other = rng.normal(1, 1, 12), rng.normal(0, 3, 7)
-    expected = stats.ttest_ind(one, other, equal_var=False).confidence_interval(0.95)
-    mean, low, high = difference(one, other)
+    starts = rng.normal(0, 5, 12)  # cancel in the difference
+    one, other = starts + rng.normal(1, 1, 12), starts + rng.normal(0, 1, 12)
+    expected = stats.ttest_rel(one, other).confidence_interval(0.95)
+    mean, low, high = paired_difference(one, other)
     assert mean == pytest.approx(one.mean() - other.mean())
     assert (low, high) == pytest.approx((expected.low, expected.high))
-    assert difference(np.ones(3), np.zeros(3)) == (1.0, 1.0, 1.0)
+    with pytest.raises(ValueError, match="equally many episodes, got 12 and 3"):
+        paired_difference(one, other[:3])
 
 
 def test_comparison_line_names_team_means_and_intervals():

@@ -7,8 +7,9 @@ from veca_marl.algos.specs import team_specs
 from veca_marl.algos.training.checkpoint import Checkpoints, Identity
 from veca_marl.algos.training.collect import CollectCfg
 from veca_marl.algos.training.evaluation import EvalCfg
-from veca_marl.algos.training.loop import Budget, Trainer
-from veca_marl.algos.training.metrics import CsvReporter
+from veca_marl.algos.training.loop import Trainer
+from veca_marl.algos.training.progress import Budget
+from veca_marl.algos.training.reporters import CsvReporter
 
 
 @pytest.fixture
@@ -19,7 +20,7 @@ def make_trainer(tmp_path, make_ppo):
         identity = Identity("Toy", team_specs(make_fake_env(1, 0)))
         return Trainer(
             make_env=make_fake_env,
-            algorithm=make_ppo(seed=seed),
+            learners=make_ppo(seed=seed),
             collect=CollectCfg(processes, worlds=4 // max(processes, 1), steps=16),
             evaluation=EvalCfg(every_frames=2 * FRAMES, episodes=4, worlds=2),
             budget=Budget(batches * FRAMES, **kwargs),
@@ -33,7 +34,7 @@ def make_trainer(tmp_path, make_ppo):
 
 
 def parameters(trainer):
-    return torch.cat([p.flatten() for p in trainer.algorithm.policy.parameters()])
+    return torch.cat([p.flatten() for p in trainer.learners.policy.parameters()])
 
 
 @pytest.mark.parametrize("processes", [0, 2], ids=["in_process", "two_processes"])
@@ -47,7 +48,7 @@ def test_interrupted_and_resumed_equals_uninterrupted(make_trainer, tmp_path, pr
         stopped.run()
     resumed = make_trainer("resumed", 6, processes, reporters=[])
     with torch.no_grad():  # whatever it starts from is replaced
-        for p in resumed.algorithm.policy.parameters():
+        for p in resumed.learners.policy.parameters():
             p.add_(1.0)
     resumed.resume(resumed.checkpoints.latest())
     assert resumed.progress.frames == 2 * FRAMES
@@ -56,7 +57,7 @@ def test_interrupted_and_resumed_equals_uninterrupted(make_trainer, tmp_path, pr
 
     assert torch.equal(parameters(whole), parameters(resumed))
     for mine, other in zip(
-        whole.algorithm.learners.values(), resumed.algorithm.learners.values(), strict=True
+        whole.learners.algorithms.values(), resumed.learners.algorithms.values(), strict=True
     ):
         assert mine.schedule.get_last_lr() == other.schedule.get_last_lr()
     for name in ("metrics.csv", "evaluations.csv"):
@@ -103,7 +104,7 @@ def test_a_run_writes_a_row_per_batch_and_per_evaluation(make_trainer, tmp_path)
     ]
     assert trainer.checkpoints.latest().name == f"frames_{5 * FRAMES:012d}.pt"
     parts = [row.split()[0] for row in trainer.timing().splitlines()]
-    assert {"collect", "advantage", "update", "transfer", "evaluate", "checkpoint"} < set(parts)
+    assert {"collect", "learn", "transfer", "evaluate", "checkpoint"} < set(parts)
 
 
 def test_time_limit_stops_at_a_checkpoint(make_trainer):

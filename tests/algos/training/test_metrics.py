@@ -6,13 +6,12 @@ import torch
 from fake_env import FakeEnv
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 from tensordict import TensorDict
+from torchrl import timeit
 
-from veca_marl.algos.training.metrics import (
-    CsvReporter,
-    Stopwatch,
-    TensorBoardReporter,
-    TrainingEpisodes,
-)
+from veca_marl.algos.training.episodes import TrainingEpisodes
+from veca_marl.algos.training.loggers import LoggerKind, check_installed, make_reporter
+from veca_marl.algos.training.reporters import CsvReporter
+from veca_marl.algos.training.timing import timing_table
 
 
 def rows_of(path):
@@ -40,15 +39,6 @@ def test_episodes_are_summed_across_batches():
     assert whole["reward_per_step"] == pytest.approx(whole["return"] / 7)
 
 
-def test_unfinished_episodes_are_forgotten_at_a_restart():
-    play = FakeEnv(1, horizon=4).rollout(3, break_when_any_done=False)
-    ending = FakeEnv(1, horizon=4).rollout(4, break_when_any_done=False)
-    episodes = TrainingEpisodes()
-    episodes.add(play, "agents")
-    episodes.restart()
-    assert episodes.add(ending, "agents")["length"] == 4
-
-
 def test_teams_rewards_are_means_over_their_agents():
     step = TensorDict({"agents": {"reward": torch.tensor([[[[1.0], [3.0]]]])}}, (1, 1))
     step["done"] = torch.ones(1, 1, 1, dtype=torch.bool)
@@ -74,7 +64,7 @@ def test_resumed_csv_drops_what_will_be_written_again(tmp_path):
 
 
 def test_tensorboard_gets_every_finite_number(tmp_path):
-    reporter = TensorBoardReporter(tmp_path)
+    reporter = make_reporter(LoggerKind.tensorboard, tmp_path)
     reporter.write("evaluations", 10, {"team": "red", "return": 2.5, "length": math.nan})
     reporter.close()
     events = EventAccumulator(str(tmp_path / "tensorboard")).Reload()
@@ -83,13 +73,32 @@ def test_tensorboard_gets_every_finite_number(tmp_path):
     assert (point.step, point.value) == (10, 2.5)
 
 
-def test_stopwatch_accounts_for_all_the_time():
-    watch = Stopwatch()
-    with watch.measure("collect"):
-        sum(range(100_000))
-    with watch.measure("update"):
-        sum(range(100_000))
-    lines = watch.table(frames=100).splitlines()
-    assert [line.split()[0] for line in lines] == ["part", "collect", "update", "other", "total"]
+def test_points_after_a_checkpoint_are_hidden_when_a_run_resumes(tmp_path):
+    for resumed, value in ((0, 1.0), (10, 2.0)):
+        reporter = make_reporter(LoggerKind.tensorboard, tmp_path, resumed)
+        for frames in (10, 20) if not resumed else (20,):
+            reporter.write("metrics", frames, {"x": value})
+        reporter.close()
+    events = EventAccumulator(str(tmp_path / "tensorboard")).Reload()
+    assert [(p.step, p.value) for p in events.Scalars("metrics/x")] == [(10, 1.0), (20, 2.0)]
+
+
+@pytest.mark.parametrize("kind", [LoggerKind.wandb, LoggerKind.mlflow])
+def test_a_logger_that_is_not_installed_is_refused_by_name(monkeypatch, kind):
+    monkeypatch.setattr("veca_marl.algos.training.loggers.find_spec", lambda name: None)
+    message = rf"log.logger: {kind.name} is not installed: pip install 'veca_marl\[{kind.name}\]'"
+    with pytest.raises(ValueError, match=message):
+        check_installed(kind)
+
+
+def test_table_of_times_accounts_for_the_whole():
+    timeit.erase()
+    for part in ("collect", "learn"):
+        with timeit(part):
+            sum(range(100_000))
+    lines = timing_table(elapsed_s=1.0, frames=100).splitlines()
+    timeit.erase()
+    assert [line.split()[0] for line in lines] == ["part", "collect", "learn", "other", "total"]
     shares = [float(line.split()[2].rstrip("%")) for line in lines[1:]]
     assert sum(shares[:-1]) == pytest.approx(100.0, abs=0.3)
+    assert lines[-1].split()[-1] == "10.000"

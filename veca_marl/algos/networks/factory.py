@@ -19,9 +19,11 @@ from tensordict.nn import (
 )
 from torch import nn
 
+from veca_marl.algos.algorithm import check_entry
 from veca_marl.algos.networks.initialisation import orthogonal
 from veca_marl.algos.networks.policy_heads import action_distribution, policy_head
 from veca_marl.algos.specs import TeamSpec
+from veca_marl.registry import Registry
 
 
 @dataclass
@@ -119,7 +121,7 @@ class RegisteredNetwork:
     factory: MakeFactory
 
 
-NETWORKS: dict[str, RegisteredNetwork] = {}
+NETWORKS: Registry[RegisteredNetwork] = Registry("network")
 
 
 def register_network(name: str, cfg_type: type[NetworkCfg], factory: MakeFactory) -> None:
@@ -128,23 +130,8 @@ def register_network(name: str, cfg_type: type[NetworkCfg], factory: MakeFactory
     Raises:
         ValueError: If another network has the name, or the default of ``cfg_type.name`` differs.
     """
-    entry = RegisteredNetwork(cfg_type, factory)
-    if NETWORKS.get(name, entry) != entry:
-        raise ValueError(f"there is a network {name!r} already: {NETWORKS[name].factory}")
-    if cfg_type.name != name:
-        raise ValueError(f"{cfg_type.__name__}.name is {cfg_type.name!r} by default, not {name!r}")
-    NETWORKS[name] = entry
-
-
-def find_network(name: str) -> RegisteredNetwork:
-    """Return the network called `name`.
-
-    Raises:
-        ValueError: If there is none.
-    """
-    if name not in NETWORKS:
-        raise ValueError(f"unknown network {name!r}; choices: {', '.join(sorted(NETWORKS))}")
-    return NETWORKS[name]
+    check_entry(NETWORKS, name, cfg_type, factory)
+    NETWORKS.add(name, RegisteredNetwork(cfg_type, factory))
 
 
 def make_network(team: str, spec: TeamSpec, cfg: NetworkCfg) -> TeamNetwork:
@@ -153,4 +140,4 @@ def make_network(team: str, spec: TeamSpec, cfg: NetworkCfg) -> TeamNetwork:
     Raises:
         ValueError: If there is no network called ``cfg.name``.
     """
-    return TeamNetwork(find_network(cfg.name).factory(team, spec, cfg))
+    return TeamNetwork(NETWORKS.find(cfg.name).factory(team, spec, cfg))

@@ -117,7 +117,7 @@ def _zero_unless(valid: Tensor | None, x: Tensor) -> Tensor:
 
 def _divergence(old: Distribution, new: Distribution) -> Tensor:
     """Return KL(old || new); the parts of an action are independent, so theirs are summed."""
-    if isinstance(old, CompositeDistribution):
+    if isinstance(old, CompositeDistribution) and isinstance(new, CompositeDistribution):
         parts = [kl_divergence(old.dists[key], new.dists[key]) for key in old.dists]
         return torch.stack(parts).sum(0)
     return kl_divergence(old, new)

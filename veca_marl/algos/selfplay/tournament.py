@@ -103,7 +103,7 @@ def rate(matches: list[Match]) -> list[Rating]:
 
 
 def table_of_points(matches: list[Match]) -> NDArray[np.float64]:
-    """Return the first team's points, with a row for each of its policies, a column for the other's."""
+    """Return the first team's points: a row for each of its policies, a column for each other."""
     rows, columns = (
         sorted({list(match.members.values())[side] for match in matches}) for side in (0, 1)
     )

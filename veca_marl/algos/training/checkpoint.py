@@ -7,7 +7,7 @@ import os
 import pickle
 import signal
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -63,27 +63,34 @@ class Checkpoints:
         self.keep_last = keep_last
 
     def save(
-        self, state: dict[str, Any], algorithms: dict[str, Any], frames: int, best: bool
-    ) -> None:
+        self,
+        state: dict[str, Any],
+        frames: int,
+        best: bool,
+        algorithms: Mapping[str, Any] | None = None,
+    ) -> Path | None:
         """Write `state`, then remove checkpoints that are too old.
 
         Args:
             state: Tensors and plain data.
-            algorithms: Team to the numbers of its algorithm as plain data.
             frames: Training frames so far: the file's name.
             best: Whether it is the best so far.
+            algorithms: Team to the numbers of its algorithm as plain data.
+
+        Returns:
+            The file; None without a folder.
 
         Raises:
             CheckpointError: If it cannot be written; earlier checkpoints are unchanged.
         """
         if self.folder is None:
-            return
+            return None
         path = self.folder / f"frames_{frames:012d}.pt"
         content = {
             "format": _FORMAT,
             "identity": self.identity.to_dict(),
             "config": self.config,
-            "algorithms": algorithms,
+            "algorithms": dict(algorithms or {}),
             "state": state,
         }
         with _interrupts_wait():
@@ -94,6 +101,7 @@ class Checkpoints:
                 self._write(file.getbuffer(), self.folder / "best.pt")
         for old in self._files()[: -self.keep_last]:
             old.unlink()
+        return path
 
     def latest(self) -> Path:
         """Return the newest checkpoint.

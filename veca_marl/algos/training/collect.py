@@ -80,7 +80,7 @@ class Experience:
         self._batches: Iterator[TensorDictBase] = iter(self._collector)
 
     def restart(self, seed: int) -> None:
-        """Start new episodes in all worlds; everything after depends on `seed` and parameters alone."""
+        """Start new episodes in all worlds; what follows depends on `seed` and the policy alone."""
         torch.manual_seed(seed)
         self._collector.set_seed(seed)
         self._collector.reset()

@@ -217,7 +217,7 @@ class Trainer:
             "progress": asdict(self.progress),
         }
         numbers = {team: to_plain(cfg) for team, cfg in self.learners.cfgs.items()}
-        self.checkpoints.save(state, numbers, self.progress.frames, best)
+        self.checkpoints.save(state, self.progress.frames, best, numbers)
 
     def _evaluate(self, env: EnvBase, policy: nn.Module | None = None) -> dict[str, Scores]:
         return evaluate(

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import torch
 from tensordict.nn import TensorDictModuleBase
 
 from veca_marl.algos.algorithm import (
+    ALGORITHMS,
     Algorithm,
     AlgorithmCfg,
-    find_algorithm,
     make_algorithm,
 )
-from veca_marl.algos.networks.factory import NetworkCfg, find_network
+from veca_marl.algos.networks.factory import NETWORKS, NetworkCfg
 from veca_marl.algos.plain import from_plain
 from veca_marl.algos.specs import TeamSpec
 from veca_marl.algos.training.checkpoint import CheckpointError, read_checkpoint
@@ -51,7 +52,7 @@ def load_algorithm(path: Path, team: str, spec: TeamSpec) -> Algorithm:
     return algorithm
 
 
-def _make(path: Path, team: str, spec: TeamSpec) -> tuple[Algorithm, dict]:
+def _make(path: Path, team: str, spec: TeamSpec) -> tuple[Algorithm, dict[str, Any]]:
     content = read_checkpoint(_file(path))
     stored, learnt = content["identity"]["specs"], content["algorithms"]
     if team not in learnt:
@@ -67,8 +68,8 @@ def _make(path: Path, team: str, spec: TeamSpec) -> tuple[Algorithm, dict]:
 
 def _find_type(base: type, name: str) -> type:
     if issubclass(base, AlgorithmCfg):
-        return find_algorithm(name).cfg_type
-    return find_network(name).cfg_type if issubclass(base, NetworkCfg) else base
+        return ALGORITHMS.find(name).cfg_type
+    return NETWORKS.find(name).cfg_type if issubclass(base, NetworkCfg) else base
 
 
 def _file(path: Path) -> Path:
