@@ -53,6 +53,8 @@ def test_both_teams_leave_past_selves(played):
     kept = sorted(path.name for path in (played / "run" / "pool").iterdir())
     frames = {"red": (0, 32, 96), "blue": (0, 64, 128)}
     assert kept == sorted(f"{team}_{n:012d}.pt" for team, ns in frames.items() for n in ns)
+    assert not (played / "run" / "checkpoints" / "best.pt").exists()
+    assert "no best.pt" in (played / "run" / "comparison.txt").read_text()
     # blue alone has a critic that judges by the whole team
     central, own = (actors(played / "run", team) for team in ("blue", "red"))
     assert central.keys() != own.keys() or any(central[k].shape != own[k].shape for k in own)
@@ -139,8 +141,8 @@ def test_what_was_learnt_plays_again_elsewhere(played, tmp_path, capsys):
     assert len(printed) == 3
     assert f"{rows[0]['return']:.3f}" in printed[1]
     # a checkpoint may be named instead, and the same seed gives the same episodes
-    best = str(played / "run" / "checkpoints" / "best.pt")
-    again = [evaluate([best, "--episodes", "2", "--seed", "3"]) for _ in range(2)]
+    latest = str(sorted((played / "run" / "checkpoints").glob("*.pt"))[-1])
+    again = [evaluate([latest, "--episodes", "2", "--seed", "3"]) for _ in range(2)]
     first, second = capsys.readouterr().out.split("player")[1:]
     assert again == [0, 0]
     assert first == second
