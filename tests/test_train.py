@@ -48,7 +48,8 @@ def test_devices_that_are_here_are_found_and_others_refused(monkeypatch):
 @pytest.fixture(scope="module")
 def smoke(tmp_path_factory):
     folder = tmp_path_factory.mktemp("train")
-    done = train(folder, *SMOKE, "log.video=true", "log.logger=[csv,tensorboard]", "hydra.run.dir=run")
+    logs = ["log.video=true", "log.logger=[csv,tensorboard]"]
+    done = train(folder, *SMOKE, *logs, "hydra.run.dir=run")
     assert done.returncode == 0, done.stderr
     return folder / "run", done.stdout
 
