@@ -1,4 +1,4 @@
-"""Write the generated pages and pictures of ``docs/``: tasks, observations, configuration, body.
+"""Write the generated pages and pictures of ``docs/``: tasks and the reference pages.
 
 Run it with ``make pages``; the results are committed. ``--no-pictures`` writes the pages alone.
 """
@@ -9,6 +9,7 @@ import argparse
 from collections.abc import Callable
 from pathlib import Path
 
+from docs_pages.action_page import action_page
 from docs_pages.body_tables import body_page
 from docs_pages.config_page import config_page
 from docs_pages.observation_page import observation_page
@@ -17,6 +18,7 @@ from docs_pages.task_pages import write_task_pages
 
 DOCS = Path(__file__).resolve().parent.parent / "docs"
 PAGES: dict[str, Callable[[], str]] = {
+    "reference/actions.md": action_page,
     "reference/configuration.md": config_page,
     "reference/observations.md": observation_page,
 }
