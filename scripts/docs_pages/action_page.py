@@ -5,7 +5,7 @@ from __future__ import annotations
 from docs_pages.observation_page import describe
 from docs_pages.tables import table
 from veca_marl.api import choose
-from veca_marl.config.conf_dir import conf_dir
+from veca_marl.config import conf_dir
 from veca_marl.envs.core.game import Game
 from veca_marl.sim.spec import ArraySpec
 

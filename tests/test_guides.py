@@ -1,0 +1,72 @@
+"""The code of the guides runs, their links resolve, and their commands exist."""
+
+import pkgutil
+import re
+import subprocess
+import sys
+from importlib.util import find_spec
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+DOCS = ROOT / "docs"
+WRITTEN = [
+    page
+    for folder in (".", "getting_started", "concepts", "guides", "reference", "tasks")
+    for page in sorted((DOCS / folder).glob("*.md"))
+    if page.name != "changelog.md"
+]
+READMES = [*sorted((ROOT / "experiments").rglob("README.md")), ROOT / "CHANGELOG.md"]
+PYTHON = re.compile(r"^ *```python\n(.*?)^ *```", re.MULTILINE | re.DOTALL)
+RUN_BY_OTHERS = "other_libraries.md"  # tests/test_adapter_guides.py: each block by itself
+
+RUN_BLOCKS = """
+import pathlib, re, sys
+blocks = re.compile(sys.argv[1], re.MULTILINE | re.DOTALL)
+for page in map(pathlib.Path, sys.argv[2:]):
+    names = {"__name__": page.stem}
+    for number, block in enumerate(blocks.findall(page.read_text(encoding="utf-8"))):
+        print(f"running block {number} of {page.name}", flush=True)
+        exec(compile(block, f"{page.name}[{number}]", "exec"), names)
+"""
+
+
+def text_of(page):
+    return page.read_text(encoding="utf-8")
+
+
+def test_the_code_of_the_pages_runs(tmp_path):
+    pages = [p for p in WRITTEN if PYTHON.search(text_of(p)) and p.name != RUN_BY_OTHERS]
+    assert {"add_a_task.md", "add_a_sense.md", "first_steps.md"} <= {page.name for page in pages}
+    # in a process of its own: the pages register tasks, which stay registered
+    command = [sys.executable, "-c", RUN_BLOCKS, PYTHON.pattern, *map(str, pages)]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+@pytest.mark.parametrize("page", [*WRITTEN, *READMES], ids=lambda p: str(p.relative_to(ROOT)))
+def test_links_lead_to_files(page):
+    generated = {DOCS / "experiments": ROOT / "experiments"}  # docs/conf.py copies it
+    for link in re.findall(r"\]\((?!https?:)([^)#\s]+)", text_of(page)):
+        target = (page.parent / link).resolve()
+        for copy, original in generated.items():
+            if target.is_relative_to(copy):
+                target = original / target.relative_to(copy)
+        assert target.exists(), f"{page.name} links to {link}"
+
+
+@pytest.mark.parametrize("page", [*WRITTEN, *READMES], ids=lambda p: str(p.relative_to(ROOT)))
+def test_modules_and_scripts_of_commands_exist(page):
+    for module in re.findall(r"python -m (veca_marl[\w.]*)", text_of(page)):
+        assert find_spec(module), module
+    for script in re.findall(r"python ((?:scripts|experiments)/[\w/]+\.py)", text_of(page)):
+        assert (ROOT / script).exists(), script
+
+
+@pytest.mark.parametrize("page", [*WRITTEN, *READMES], ids=lambda p: str(p.relative_to(ROOT)))
+def test_modules_that_pages_name_exist(page):
+    for path in re.findall(r"`((?:veca_marl|tests|conf|scripts)/[\w/]+\.\w+)`", text_of(page)):
+        assert (ROOT / path).exists(), path
+    for name in re.findall(r"`(veca_marl(?:\.[a-z_0-9]+)+)", text_of(page)):
+        pkgutil.resolve_name(name)
