@@ -35,6 +35,8 @@ myst_heading_anchors = 3
 napoleon_numpy_docstring = False
 napoleon_use_ivar = True
 napoleon_custom_sections = [("Terms", "params_style"), ("Observations", "params_style")]
+# an object is documented where it is defined, not in the packages that export it
+autodoc_default_options = {"ignore-module-all": True}
 autodoc_typehints = "none"  # the signature shows them
 autodoc_member_order = "bysource"
 toc_object_entries = False  # thousands of entries in every sidebar otherwise
