@@ -128,7 +128,7 @@ def test_it_starts_from_every_seed(task):
         game.task.reset(np.random.default_rng(seed))
         for player in game.players:
             x, y = player.body.position[:2]
-            assert min(room.away_m((x, y)) for room in rooms) == 0.0, seed
+            assert min(room.distance_m((x, y)) for room in rooms) == 0.0, seed
     game.close()
 
 

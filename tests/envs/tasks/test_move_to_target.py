@@ -35,11 +35,11 @@ def test_progress_is_the_way_to_the_mark(game):
     way = game.task.mark.position - game.task.toy.position
     way[2] = 0.0
     far = game.task.distance_m
-    game.task.toy.push(1.0 * way / np.linalg.norm(way))
+    game.task.toy.set_velocity(1.0 * way / np.linalg.norm(way))
     paid = sum(limp(game)["progress"] for _ in range(3))
     assert paid == pytest.approx(far - game.task.distance_m, abs=1e-9)
     assert paid > 0.01
-    game.task.toy.push(-1.0 * way / np.linalg.norm(way))
+    game.task.toy.set_velocity(-1.0 * way / np.linalg.norm(way))
     assert limp(game)["progress"] < 0.0
 
 

@@ -30,7 +30,7 @@ def begin(game, ball=None, velocity=(0.0, 0.0, 0.0)):
         player.body.place((-2.5, 2.0 * number - 1.0, 0.0))
     if ball is not None:
         game.task.ball.place(np.array(ball), 0.0)
-        game.task.ball.push(np.array(velocity))
+        game.task.ball.set_velocity(np.array(velocity))
         game.task._now = game.task._look()
 
 

@@ -148,7 +148,7 @@ def test_a_heavy_thing_that_comes_pushes_it_away():
     world = empty_world(box(mass_kg=30.0, position=(1.0, 0.0, 0.15), friction=0.0))
     walker = walker_in(world)
     for _ in range(100):
-        world.prop("box").push((-0.5, 0.0, 0.0))
+        world.prop("box").set_velocity((-0.5, 0.0, 0.0))
         world.step()
     assert world.prop("box").position[0] == pytest.approx(-1.0, abs=0.05)
     assert walker.position[0] == pytest.approx(-1.15 - RADIUS_M, abs=0.06)

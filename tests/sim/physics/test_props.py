@@ -98,7 +98,7 @@ def test_a_goal_has_two_posts_on_the_floor_and_a_bar_over_them():
 
 def test_a_fixed_prop_stays():
     world = empty_world(box(mass_kg=0.0, position=(0.0, 0.0, 2.0)))
-    world.prop("box").push((5.0, 0.0, 0.0))
+    world.prop("box").set_velocity((5.0, 0.0, 0.0))
     let_pass(world, 0.4)
     np.testing.assert_array_equal(world.prop("box").position, (0.0, 0.0, 2.0))
     assert world.prop("box").fixed
@@ -107,7 +107,7 @@ def test_a_fixed_prop_stays():
 def test_place_undoes_turns_and_sets_velocities():
     world = empty_world(box(position=(0.0, 0.0, 2.0)))
     thing = world.prop("box")
-    thing.push((0.0, 0.0, 0.0), (3.0, 2.0, 1.0))
+    thing.set_velocity((0.0, 0.0, 0.0), (3.0, 2.0, 1.0))
     let_pass(world, 0.4)
     thing.place((1.0, 2.0, 3.0), math.pi / 2, velocity=(0.5, 0.0, 0.0))
     np.testing.assert_array_equal(thing.position, (1.0, 2.0, 3.0))
@@ -117,7 +117,7 @@ def test_place_undoes_turns_and_sets_velocities():
 
 def test_its_sound_goes_along():
     world = empty_world(ball(position=(0.0, 0.0, 0.1), sound=SoundCfg()))
-    world.prop("ball").push((1.0, 0.0, 0.0), (0.0, 10.0, 0.0))
+    world.prop("ball").set_velocity((1.0, 0.0, 0.0), (0.0, 10.0, 0.0))
     let_pass(world, 0.4)
     source = world.sound.sources["ball"]
     assert source is world.prop("ball").sound
@@ -174,7 +174,7 @@ def test_a_prop_is_not_put_nowhere():
         with pytest.raises(ValueError, match="'ball': position"):
             thing.place(wrong)
         with pytest.raises(ValueError, match="'ball': velocity"):
-            thing.push(wrong)
+            thing.set_velocity(wrong)
 
 
 def test_radius_is_that_of_the_cylinder_round_it():

@@ -50,7 +50,7 @@ def test_free_fall():
 
 def test_a_ball_that_rolls_without_slipping_keeps_its_speed():
     world = empty_world(ball(position=(0.0, 0.0, 0.1), rolling_friction=0.0))
-    world.prop("ball").push((1.0, 0.0, 0.0), (0.0, 10.0, 0.0))
+    world.prop("ball").set_velocity((1.0, 0.0, 0.0), (0.0, 10.0, 0.0))
     let_pass(world, 2.0)
     assert world.prop("ball").velocity[0] == pytest.approx(1.0, abs=1e-6)
     assert world.prop("ball").position[0] == pytest.approx(2.0, abs=1e-6)
@@ -59,7 +59,7 @@ def test_a_ball_that_rolls_without_slipping_keeps_its_speed():
 def test_rolling_resistance_slows_by_its_arm():
     """Torque m g b over the moment 7/5 m r^2 about the point of contact."""
     world = empty_world(ball(position=(0.0, 0.0, 0.1), rolling_friction=0.002))
-    world.prop("ball").push((1.0, 0.0, 0.0), (0.0, 10.0, 0.0))
+    world.prop("ball").set_velocity((1.0, 0.0, 0.0), (0.0, 10.0, 0.0))
     let_pass(world, 2.0)
     slowed = 1.0 - world.prop("ball").velocity[0]
     assert slowed == pytest.approx(2.0 * 9.81 * 0.002 / (1.4 * 0.1), rel=0.05)
@@ -68,7 +68,7 @@ def test_rolling_resistance_slows_by_its_arm():
 def test_a_ball_that_slides_ends_up_rolling_at_five_sevenths():
     """Angular momentum about the point of contact is kept: v = 5/7 v0 for a full sphere."""
     world = empty_world(ball(position=(0.0, 0.0, 0.1), rolling_friction=0.0))
-    world.prop("ball").push((2.0, 0.0, 0.0))
+    world.prop("ball").set_velocity((2.0, 0.0, 0.0))
     let_pass(world, 0.4)
     assert world.prop("ball").velocity[0] == pytest.approx(10.0 / 7.0, rel=0.04)
 
@@ -77,7 +77,7 @@ def test_a_ball_that_slides_ends_up_rolling_at_five_sevenths():
 def test_a_sliding_box_is_slowed_by_its_friction(friction):
     world = empty_world(box(position=(0.0, 0.0, 0.15), friction=friction))
     let_pass(world, 0.4)
-    world.prop("box").push((1.5, 0.0, 0.0))
+    world.prop("box").set_velocity((1.5, 0.0, 0.0))
     let_pass(world, 0.2)
     slowed = 1.5 - world.prop("box").velocity[0]
     assert slowed == pytest.approx(friction * 9.81 * 0.2, rel=0.15)

@@ -60,7 +60,7 @@ class FloorPlan:
     def room_of(self, place: Floats) -> int:
         """Return the number of the room a place ``(2,)`` or ``(3,)`` is in, or of the nearest."""
         point = float(place[0]), float(place[1])
-        return int(np.argmin([room.away_m(point) for room in self.rooms]))
+        return int(np.argmin([room.distance_m(point) for room in self.rooms]))
 
     def distance_m(self, one: int, other: int) -> float:
         """Return how long the way is from the middle of a room to that of another; inf if none."""

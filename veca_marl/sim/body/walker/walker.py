@@ -184,7 +184,7 @@ class Walker(Figure):
         way[2] = 0.0
         way /= max(float(np.linalg.norm(way)), 1e-9)
         speed = min(self.cfg.kick_speed_mps, self.cfg.kick_impulse_ns / prop.cfg.mass_kg)
-        prop.push(speed * way + np.array([0.0, 0.0, 0.2 * speed]))
+        prop.set_velocity(speed * way + np.array([0.0, 0.0, 0.2 * speed]))
         self._gait.kick()
         return True
 

@@ -1,0 +1,109 @@
+"""Props as data: what stands, lies or rolls in a room."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from enum import Enum
+
+from veca_marl.sim.sound.sounds import SoundCfg
+
+
+class PropShape(Enum):
+    """Shapes of props. `SIZE_NAMES` says what `PropCfg.size_m` means for each."""
+
+    sphere = "sphere"
+    box = "box"
+    cylinder = "cylinder"
+    capsule = "capsule"
+    wall = "wall"
+    goal = "goal"
+
+
+SIZE_NAMES: dict[PropShape, tuple[str, ...]] = {
+    PropShape.sphere: ("radius",),
+    PropShape.box: ("length_x", "length_y", "height"),
+    PropShape.cylinder: ("radius", "height"),
+    PropShape.capsule: ("radius", "length"),
+    PropShape.wall: ("length", "thickness", "height"),
+    PropShape.goal: ("width", "height", "bar_radius"),
+}
+
+
+@dataclass
+class PropCfg:
+    """One prop.
+
+    Attributes:
+        name: Unique in its world.
+        shape: Its shape.
+        size_m: Lengths in metres, see `SIZE_NAMES`: a box has full edge lengths, a capsule the
+            distance of its cap centres. Cylinders, capsules and goal posts stand along z.
+        position_m: Centre of the shape; for walls and goals the middle of the foot line.
+        yaw_deg: Rotation about z.
+        mass_kg: 0 makes it a fixed part of the world.
+        friction: Sliding friction coefficient (Coulomb) on the floor. Bullet multiplies those of
+            two objects in contact; the floor's is 1.
+        rolling_friction: Lever arm of the resistance to rolling and to spinning on the floor,
+            metres.
+        restitution: 0 (no rebound) to 1 (rebound at equal speed) on the floor; multiplied as
+            well, the floor's is 1.
+        colour: Red, green, blue in [0, 1].
+        checker_m: Edge of a checker pattern; 0 is plain.
+        transparent: Whether eyes see through it; it does not hinder `is_visible`.
+        tangible: Whether it collides, is felt and stops sound; a mark on the floor is only seen.
+        sound: What it emits; None for a silent prop.
+    """
+
+    name: str = ""
+    shape: PropShape = PropShape.box
+    size_m: list[float] = field(default_factory=list)
+    position_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    yaw_deg: float = 0.0
+    mass_kg: float = 0.0
+    friction: float = 0.6
+    rolling_friction: float = 0.001
+    restitution: float = 0.3
+    colour: tuple[float, float, float] = (0.7, 0.7, 0.7)
+    checker_m: float = 0.0
+    transparent: bool = False
+    tangible: bool = True
+    sound: SoundCfg | None = None
+
+    def __post_init__(self) -> None:
+        """Check the numbers."""
+        self._check_shape()
+        self._check_physics()
+        if not self.name:
+            raise ValueError(f"a {self.shape.value} without a name; every prop has one")
+
+    def _check_shape(self) -> None:
+        if not isinstance(self.shape, PropShape):
+            shapes = [shape.name for shape in PropShape]
+            raise ValueError(f"prop {self.name!r}: shape={self.shape!r}; there are {shapes}")
+        names = SIZE_NAMES[self.shape]
+        if len(self.size_m) != len(names) or not all(
+            math.isfinite(size) and size > 0 for size in self.size_m
+        ):
+            raise ValueError(
+                f"prop {self.name!r}: size_m={list(self.size_m)} of a {self.shape.value} "
+                f"must be {len(names)} positive lengths: {', '.join(names)}"
+            )
+        if not all(math.isfinite(value) for value in (*self.position_m, self.yaw_deg)):
+            raise ValueError(
+                f"prop {self.name!r}: position_m={tuple(self.position_m)}, yaw_deg={self.yaw_deg} "
+                "must be finite"
+            )
+
+    def _check_physics(self) -> None:
+        for quantity in ("mass_kg", "friction", "rolling_friction"):
+            value = getattr(self, quantity)
+            if not (math.isfinite(value) and value >= 0):
+                raise ValueError(f"prop {self.name!r}: {quantity}={value} is not 0 or more")
+        if not 0.0 <= self.restitution <= 1.0:
+            raise ValueError(f"prop {self.name!r}: restitution={self.restitution} is not in [0, 1]")
+        if not self.tangible and self.mass_kg > 0.0:
+            raise ValueError(
+                f"prop {self.name!r}: mass_kg={self.mass_kg}, but a prop that is not tangible "
+                "would fall through the floor: it must be fixed (mass_kg=0)"
+            )
