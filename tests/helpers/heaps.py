@@ -5,7 +5,7 @@ from walking import empty_world, wall
 
 from veca_marl.sim.body.humanoid.humanoid import Detail, Humanoid, HumanoidCfg
 from veca_marl.sim.body.humanoid.postures import ON_BACK, ON_BELLY
-from veca_marl.sim.physics.bullet import pybullet
+from veca_marl.sim.physics import pybullet
 
 # a room of 3 m x 3 m
 WALLS = [

@@ -4,8 +4,7 @@ import numpy as np
 
 from veca_marl.sim.geometry.primitives import Shape
 from veca_marl.sim.geometry.rotations import matrix_to_quaternion
-from veca_marl.sim.physics.bullet import pybullet
-from veca_marl.sim.physics.collision_shapes import shape_arguments
+from veca_marl.sim.physics import pybullet, shape_arguments
 
 
 class TinyRenderer:

@@ -5,9 +5,7 @@ import math
 import numpy as np
 
 from veca_marl.sim.body.walker.walker import Walker, WalkerCfg
-from veca_marl.sim.physics.playground import PlaygroundCfg, RoomCfg
-from veca_marl.sim.physics.props import PropCfg, PropShape
-from veca_marl.sim.physics.world import World
+from veca_marl.sim.physics import PlaygroundCfg, PropCfg, PropShape, RoomCfg, World
 
 STEP_S = 0.04
 

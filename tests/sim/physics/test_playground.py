@@ -7,8 +7,7 @@ import pytest
 from walking import ball, let_pass, walker_in
 
 from veca_marl.config import compose, conf_dir
-from veca_marl.sim.physics.playground import PlaygroundCfg, RoomCfg
-from veca_marl.sim.physics.world import World
+from veca_marl.sim.physics import PlaygroundCfg, RoomCfg, World
 
 SHIPPED = sorted(path.stem for path in (conf_dir() / "playground").glob("*.yaml"))
 

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from walking import ball, box, empty_world, let_pass, wall
 
-from veca_marl.sim.physics.bullet import pybullet
-from veca_marl.sim.physics.props import SIZE_NAMES, PropCfg, PropShape
+from veca_marl.sim.physics import SIZE_NAMES, PropCfg, PropShape, pybullet
 from veca_marl.sim.sound.sounds import SoundCfg
 
 SIZES = {

@@ -8,8 +8,7 @@ import pytest
 from veca_marl.config import compose
 from veca_marl.sim.geometry.pose import Pose
 from veca_marl.sim.hearing.receivers import MonoReceiver
-from veca_marl.sim.physics.props import PropCfg, PropShape
-from veca_marl.sim.physics.world import World
+from veca_marl.sim.physics import PropCfg, PropShape, World
 from veca_marl.sim.sound.sounds import SoundCfg, SoundKind
 
 THROUGH_WALL_M, THROUGH_DOOR_M = -1.0, 1.7  # y of straight lines from one room to the other

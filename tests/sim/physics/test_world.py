@@ -9,8 +9,7 @@ import pytest
 from walking import STEP_S, ball, box, empty_world, film, let_pass, walker_in, wall
 
 from veca_marl.config import compose
-from veca_marl.sim.physics.bullet import pybullet
-from veca_marl.sim.physics.world import ClockCfg, World
+from veca_marl.sim.physics import ClockCfg, World, pybullet
 from veca_marl.sim.sound.sounds import SoundCfg
 
 

@@ -10,7 +10,7 @@ from veca_marl.config import compose
 from veca_marl.sim.body.walker.walker import Walker, WalkerCfg
 from veca_marl.sim.geometry.pose import Pose
 from veca_marl.sim.hearing.sense import AudioCfg, AudioSense
-from veca_marl.sim.physics.world import World
+from veca_marl.sim.physics import World
 from veca_marl.sim.sound.acoustics import Room
 from veca_marl.sim.sound.calls import Call
 from veca_marl.sim.sound.house import House

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from veca_marl.sim.geometry.pose import Floats
-from veca_marl.sim.physics.playground import DoorCfg, PlaygroundCfg, RoomCfg
+from veca_marl.sim.physics import DoorCfg, PlaygroundCfg, RoomCfg
 
 _CORNER_M = 0.7  # so far from both walls somebody has room in a corner
 
