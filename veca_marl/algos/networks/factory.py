@@ -59,7 +59,8 @@ class NetworkFactory(ABC):
         """Return the module from observations to ``(team, "features")``, ``(..., agents, F)``.
 
         A recurrent one reads its hidden state under ``(team, "memory", name)``, writes the new one
-        under ``("next", team, "memory", name)`` and has a method ``make_tensordict_primer``.
+        under ``("next", team, "memory", name)`` and has a method ``make_tensordict_primer``, which
+        returns `networks.memory.memory_primer`.
         """
 
     def actor(self, encoder: TensorDictModuleBase) -> ProbabilisticTensorDictSequential:

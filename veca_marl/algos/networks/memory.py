@@ -1,26 +1,62 @@
 """Policies with hidden state: what an environment must carry for them from step to step.
 
 A module with hidden state has a method ``make_tensordict_primer`` (as TorchRL's `LSTMModule` and
-`GRUModule` have): a `TensorDictPrimer` with the spec of the state. It reads the state, writes the
-new one under ``"next"``, and the environment carries it on. At the start of an episode the primer
-writes the initial state, in those worlds alone that start anew.
+`GRUModule` have), which returns a `TensorDictPrimer` with the spec of the state. The module reads
+the state, and ``"is_init"`` where an episode begins; it writes the new state under ``"next"``, and
+the environment carries it on. When worlds are reset the primer writes the initial state in those
+worlds alone.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
+
 from torch import nn
-from torchrl.envs import Compose, EnvBase, InitTracker, TransformedEnv
+from torchrl.data import Composite, Unbounded
+from torchrl.envs import Compose, EnvBase, InitTracker, TensorDictPrimer, Transform, TransformedEnv
 from torchrl.modules.utils import get_primers_from_module
 
 
-def with_memory(env: EnvBase, policy: object) -> EnvBase:
-    """Return `env` with what `policy` needs to remember; `env` itself if it has no hidden state.
+def memory_primer(
+    team: str, agents: int, shapes: Mapping[str, tuple[int, ...]]
+) -> TensorDictPrimer:
+    """Return the primer of hidden states ``(team, "memory", name)``, zeros at the start.
 
     Args:
-        env: The environment.
+        team: Name of the team.
+        agents: Number of its agents.
+        shapes: Name to the shape of each agent's state.
+    """
+    lead = (agents,)  # the shape that everything of a team has
+    states = {name: Unbounded((*lead, *shape)) for name, shape in shapes.items()}
+    memory = Composite({"memory": Composite(states, shape=lead)}, shape=lead)
+    return TensorDictPrimer(Composite({team: memory}), expand_specs=True)
+
+
+def memory_of(policy: object) -> Compose | None:
+    """Return the transform that carries the hidden state of `policy`; None if it has none.
+
+    Args:
         policy: A module; any other callable has no hidden state.
     """
     primers = get_primers_from_module(policy, warn=False) if isinstance(policy, nn.Module) else None
     if primers is None:
-        return env
-    return TransformedEnv(env, Compose(InitTracker(), primers))
+        return None
+    for primer in _flat(primers):
+        if isinstance(primer, TensorDictPrimer):
+            primer.reset_key = "_reset"  # worlds are reset as a whole, not team by team
+    return Compose(InitTracker(), primers)
+
+
+def with_memory(env: EnvBase, policy: object) -> EnvBase:
+    """Return `env` with what `policy` needs to remember; `env` itself if it has no hidden state."""
+    return with_transform(env, memory_of(policy))
+
+
+def with_transform(env: EnvBase, transform: Compose | None) -> EnvBase:
+    """Return `env` under a copy of `transform`, if there is one."""
+    return env if transform is None else TransformedEnv(env, transform.clone())
+
+
+def _flat(transform: Transform) -> Iterable[Transform]:
+    return list(transform) if isinstance(transform, Compose) else [transform]

@@ -14,7 +14,9 @@ from tensordict import TensorDictBase
 from tensordict.nn import TensorDictModuleBase
 from torch import multiprocessing
 from torchrl.collectors import Collector, MultiSyncCollector
+from torchrl.envs import Compose, EnvBase
 
+from veca_marl.algos.networks.memory import memory_of, with_transform
 from veca_marl.algos.specs import EnvFactory
 
 
@@ -58,11 +60,11 @@ class Experience:
 
     def __init__(self, make_env: EnvFactory, policy: TensorDictModuleBase, cfg: CollectCfg) -> None:
         self.cfg = cfg
-        make = partial(make_env, cfg.worlds, 0)  # seeded by `restart`
+        make = partial(_make_env, make_env, cfg.worlds, memory_of(policy))
         common = {
             "frames_per_batch": cfg.frames,
             "total_frames": -1,
-            "auto_register_policy_transforms": True,  # the hidden state of a recurrent policy
+            "auto_register_policy_transforms": False,  # cannot know which flag resets the memory
         }
         if cfg.processes == 0:
             self._collector = Collector(make, policy, **common)
@@ -99,6 +101,10 @@ class Experience:
         threads = torch.get_num_threads()
         self._collector.shutdown()
         torch.set_num_threads(threads)  # torchrl adds one for each worker that ended
+
+
+def _make_env(make_env: EnvFactory, worlds: int, memory: Compose | None) -> EnvBase:
+    return with_transform(make_env(worlds, 0), memory)  # seeded by `restart`
 
 
 @contextmanager

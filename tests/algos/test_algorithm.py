@@ -1,0 +1,174 @@
+"""What the interface of an algorithm promises, for each one: on-policy, with and without replay."""
+
+import pytest
+import torch
+from fake_env import make_fake_env
+from toy_dqn import ForgetfulDQN, ForgetfulDQNCfg, ToyDQN, ToyDQNCfg, register
+from training import FRAMES, SMALL, Interrupt, read
+
+from veca_marl.algos.algorithm import (
+    ALGORITHMS,
+    AlgorithmCfg,
+    make_algorithm,
+    register_algorithm,
+)
+from veca_marl.algos.ppo import PPO, PPOCfg
+from veca_marl.algos.selfplay.pool import Pool
+from veca_marl.algos.selfplay.self_play import SelfPlay, SelfPlayCfg
+from veca_marl.algos.specs import team_specs
+from veca_marl.algos.training.checkpoint import Checkpoints, Identity
+from veca_marl.algos.training.collect import CollectCfg
+from veca_marl.algos.training.evaluation import EvalCfg
+from veca_marl.algos.training.learners import TeamLearners
+from veca_marl.algos.training.loop import Trainer
+from veca_marl.algos.training.progress import Budget
+from veca_marl.algos.training.reporters import CsvReporter, MemoryReporter
+from veca_marl.algos.training.stored import load_actor, load_algorithm
+
+register()
+CPU = torch.device("cpu")
+ALL = {
+    "ppo": PPOCfg(network=SMALL),
+    "toy_dqn": ToyDQNCfg(),
+    "forgetful_dqn": ForgetfulDQNCfg(),
+}
+every_algorithm = pytest.mark.parametrize("cfg", ALL.values(), ids=ALL.keys())
+
+
+def specs_of(teams=("agents",)):
+    return team_specs(make_fake_env(1, 0, discrete=True, teams=teams, senses=("audio",)))
+
+
+@pytest.fixture
+def make_trainer(tmp_path):
+    def make(name, cfg, batches, own=None, teams=("agents",), processes=0, reporters=()):
+        def make_env(worlds, seed):
+            return make_fake_env(worlds, seed, discrete=True, teams=teams, senses=("audio",))
+
+        torch.manual_seed(0)
+        folder = tmp_path / name
+        folder.mkdir(exist_ok=True)
+        specs = specs_of(teams)
+        return Trainer(
+            make_env=make_env,
+            learners=TeamLearners(specs, cfg, CPU, own),
+            collect=CollectCfg(processes, worlds=4 // max(processes, 1), steps=16),
+            evaluation=EvalCfg(every_frames=2 * FRAMES, episodes=4, worlds=2),
+            budget=Budget(batches * FRAMES),
+            checkpoints=Checkpoints(folder / "checkpoints", Identity("Toy", specs), {}),
+            reporters=reporters or [CsvReporter(folder)],
+            seed=0,
+            progress_bar=False,
+        )
+
+    return make
+
+
+def state_of(trainer):
+    return {name: array.clone() for name, array in trainer.learners.policy.state_dict().items()}
+
+
+def equal(one, other):
+    return all(torch.equal(one[name], other[name]) for name in one)
+
+
+@every_algorithm
+def test_it_learns_and_is_evaluated(make_trainer, cfg):
+    reporter = MemoryReporter()
+    trainer = make_trainer("run", cfg, 24, reporters=[reporter])
+    (line,) = trainer.run()
+    assert line.startswith("agents: return of policy")
+    policy = [row for row in reporter.rows["evaluations"] if row["player"] == "policy"]
+    assert policy[-1]["return"] > 6.0  # of 8
+    algorithm = trainer.learners.algorithms["agents"]
+    for row in reporter.rows["metrics"]:
+        assert all(row[f"agents/{name}"] == row[f"agents/{name}"] for name in algorithm.measures)
+
+
+@every_algorithm
+def test_resuming_keeps_its_promise(make_trainer, tmp_path, cfg):
+    whole = make_trainer("whole", cfg, 6)
+    whole.run()
+    stopped = make_trainer("cut", cfg, 6, reporters=[CsvReporter(tmp_path / "cut"), Interrupt(320)])
+    with pytest.raises(KeyboardInterrupt):
+        stopped.run()
+    resumed = make_trainer("cut", cfg, 6, reporters=[MemoryReporter()])
+    resumed.resume(resumed.checkpoints.latest())
+    assert resumed.progress.frames == 4 * FRAMES
+    resumed.reporters = [CsvReporter(tmp_path / "cut", resumed.progress.frames)]
+    notes = " ".join(resumed.run())
+    exact = resumed.learners.exact_resume
+    assert equal(state_of(whole), state_of(resumed)) is exact
+    assert ("does not continue bit for bit" in notes) is not exact
+    if exact:
+        assert read(tmp_path / "whole" / "metrics.csv") == read(tmp_path / "cut" / "metrics.csv")
+
+
+@every_algorithm
+def test_a_file_for_playing_gives_the_same_actions(make_trainer, tmp_path, cfg):
+    trainer = make_trainer("run", cfg, 4)
+    trainer.run()
+    actor = load_actor(tmp_path / "run", "agents", specs_of()["agents"])
+    assert not any(p.requires_grad for p in actor.parameters())
+    state = make_fake_env(4, 1, discrete=True, senses=("audio",)).reset()
+    mine, other = trainer.policy.play(state.clone()), actor(state.clone())
+    assert torch.equal(mine["agents", "action"], other["agents", "action"])
+
+
+@every_algorithm
+def test_a_run_starts_from_what_another_one_learnt(make_trainer, tmp_path, cfg):
+    trainer = make_trainer("run", cfg, 4)
+    trainer.run()
+    stored = load_algorithm(tmp_path / "run", "agents", specs_of()["agents"])
+    fresh = make_algorithm("agents", specs_of()["agents"], cfg, CPU)
+    fresh.warm_start(stored)
+    assert equal(fresh.actor.state_dict(), trainer.learners.algorithms["agents"].actor.state_dict())
+
+
+def test_workers_explore_with_the_current_buffers(make_trainer):
+    """The switch of the random warm-up is a buffer: it must reach the copy that collects."""
+    trainer = make_trainer("run", ToyDQNCfg(warm_up_frames=2 * FRAMES), 1, processes=2)
+    trainer.run()
+    assert bool(trainer.learners.algorithms["agents"].warm_up.active)
+    trainer = make_trainer("run2", ToyDQNCfg(warm_up_frames=2 * FRAMES), 2, processes=2)
+    trainer.run()
+    assert not bool(trainer.policy.collect.state_dict()["module.0.module.2.active"])
+
+
+def test_teams_may_learn_by_different_algorithms(make_trainer):
+    reporter = MemoryReporter()
+    trainer = make_trainer(
+        "run", ALL["ppo"], 2, {"blue": ToyDQNCfg()}, ("red", "blue"), reporters=[reporter]
+    )
+    lines = trainer.run()
+    assert isinstance(trainer.learners.algorithms["red"], PPO)
+    assert isinstance(trainer.learners.algorithms["blue"], ToyDQN)
+    row = reporter.rows["metrics"][-1]
+    assert {"red/kl", "blue/td_error"} <= row.keys()
+    assert [line.split(":")[0] for line in lines] == ["red", "blue", "no best.pt"]
+
+
+def test_self_play_is_for_every_algorithm(make_trainer, tmp_path):
+    trainer = make_trainer("run", ToyDQNCfg(), 6, teams=("red", "blue"))
+    pool = Pool(tmp_path / "run" / "pool")
+    trainer.matchmaking = SelfPlay(SelfPlayCfg(["red", "blue"], 0.0), trainer.learners, pool, 0)
+    trainer.run()
+    assert pool.members("red") == [0, 2 * FRAMES, 6 * FRAMES]
+    assert pool.members("blue") == [0, 4 * FRAMES]
+
+
+def test_algorithms_are_found_by_name():
+    assert ALGORITHMS["ppo"].factory is PPO
+    spec = specs_of()["agents"]
+    assert isinstance(make_algorithm("agents", spec, ForgetfulDQNCfg(), CPU), ForgetfulDQN)
+    with pytest.raises(ValueError, match=r"unknown algorithm 'pop' .*choices: .*ppo"):
+        make_algorithm("agents", spec, AlgorithmCfg("pop"), CPU)
+    with pytest.raises(ValueError, match=r"algo.name=toy_dqn takes ToyDQNCfg, got PPOCfg"):
+        make_algorithm("agents", spec, PPOCfg("toy_dqn"), CPU)
+
+
+def test_a_name_is_given_once():
+    with pytest.raises(ValueError, match=r"'ppo' is defined twice: by .*PPO and .*ToyDQN"):
+        register_algorithm("ppo", PPOCfg, ToyDQN)
+    with pytest.raises(ValueError, match=r"ToyDQNCfg.name is 'toy_dqn' by default, not 'other'"):
+        register_algorithm("other", ToyDQNCfg, ToyDQN)
