@@ -1,0 +1,80 @@
+"""The grammar of the commands that are not Hydra applications."""
+
+from dataclasses import dataclass, field
+
+import pytest
+from omegaconf import MISSING
+
+from veca_marl.config import ConfigError
+from veca_marl.config.command_line import CommandLine
+
+
+@dataclass
+class ToolCfg:
+    sizes: list[int] = field(default_factory=lambda: [1])
+    margin: float = 0.5
+
+    def __post_init__(self):
+        if self.margin < 0:
+            raise ValueError(f"tool.margin must be 0 or more, got {self.margin}")
+
+
+@dataclass
+class ToolOptions:
+    run: str = MISSING
+    episodes: int = 16
+    tool: ToolCfg = field(default_factory=ToolCfg)
+
+
+LINE = CommandLine("tool", ToolOptions, "Does something.")
+RUN = "run=runs/KickTheBall/2026-11-22_05-00-00/checkpoints/000512.pt"
+
+
+def test_options_and_other_overrides_are_separated():
+    jobs = list(LINE.jobs([RUN, "senses/audio=mono", "episodes=1e2", "tool.sizes=[1,2]", "seed=3"]))
+    assert len(jobs) == 1
+    options, others = jobs[0]
+    assert options == ToolOptions(RUN.partition("=")[2], 100, ToolCfg([1, 2]))
+    assert others == ["senses/audio=mono", "seed=3"]
+
+
+def test_multirun_runs_every_combination():
+    words = [RUN, "-m", "senses/audio=hrtf,mono", "episodes=1,2", "tool.sizes=[1,2]"]
+    jobs = [(o.episodes, others) for o, others in LINE.jobs(words)]
+    assert jobs == [
+        (1, ["senses/audio=hrtf"]),
+        (2, ["senses/audio=hrtf"]),
+        (1, ["senses/audio=mono"]),
+        (2, ["senses/audio=mono"]),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ([], "tool needs run=VALUE"),
+        ([RUN, "epsodes=3"], r"unknown key 'epsodes' \(did you mean episodes\?\); choices: .*run"),
+        ([RUN, "tool.size=[1]"], r"unknown key 'tool.size' \(did you mean sizes\?\); choices: m"),
+        ([RUN, "tool.sizes=[x]"], r"tool.sizes\[0\]: Value 'x' .* could not be converted to Integ"),
+        ([RUN, "episodes=1.5e0"], r"episodes: Value '1.5' .* could not be converted to Integer"),
+        ([RUN, "tool.margin=-1"], r"tool.margin must be 0 or more, got -1"),
+        ([RUN, "--episodes", "3"], r"unknown flag '--episodes'; choices: --help"),
+        ([RUN, "senses/audio=hrtf,mono"], r"several values need -m"),
+        (["runs/KickTheBall"], r"runs/KickTheBall"),
+        ([RUN, "x y=1"], r"x y=1"),
+    ],
+)
+def test_errors_are_one_line(words, message, capsys):
+    with pytest.raises(ConfigError, match=message):
+        list(LINE.jobs(words))
+    assert LINE.run(lambda options, others: None, words) == 2
+    printed = capsys.readouterr()
+    assert printed.err.startswith("error: ")
+    assert printed.err.count("\n") == 1
+
+
+def test_help_lists_the_options(capsys):
+    assert LINE.run(lambda options, others: pytest.fail("the command was called"), ["--help"]) == 0
+    printed = capsys.readouterr().out
+    assert "Does something." in printed
+    assert "episodes: 16" in printed

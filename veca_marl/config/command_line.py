@@ -1,0 +1,143 @@
+"""The command line of commands that are not Hydra applications, in the same grammar.
+
+A command has options of its own (a dataclass such as `BenchOptions`); every other override belongs
+to the configuration. ``-m`` runs the command once for each combination of the values that
+overrides list: ``-m senses/audio=hrtf,mono``.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, fields
+from itertools import product
+from typing import Any, Generic, TypeVar, cast
+
+from hydra.core.override_parser.types import Override
+from omegaconf import DictConfig, OmegaConf
+from omegaconf.errors import OmegaConfBaseException
+
+from veca_marl.config.errors import ConfigError, one_line
+from veca_marl.config.overrides import parse, with_integers
+from veca_marl.config.root import Config
+from veca_marl.registry import unknown
+
+Options = TypeVar("Options")
+
+_MULTIRUN = ("-m", "--multirun")
+_HELP = ("-h", "--help")
+_STATUS_INTERRUPTED = 130
+
+
+@dataclass(frozen=True)
+class CommandLine(Generic[Options]):
+    """Splits the words of a command line into the options of the command and other overrides.
+
+    Attributes:
+        command: Name of the command, such as ``evaluate``.
+        options: Dataclass of its options.
+        description: What the command does; printed by ``--help``.
+        errors: Errors, beside `ConfigError`, that end in one line.
+    """
+
+    command: str
+    options: type[Options]
+    description: str
+    errors: tuple[type[Exception], ...] = ()
+
+    def run(
+        self, call: Callable[[Options, list[str]], None], words: Sequence[str] | None = None
+    ) -> int:
+        """Call the command for each combination of values; return the exit status.
+
+        Args:
+            call: Takes the options and the other overrides.
+            words: The command line without the program; None is that of the process.
+
+        Returns:
+            0, or 2 after an error of the configuration, which is printed as one line.
+        """
+        words = list(sys.argv[1:] if words is None else words)
+        if any(word in _HELP for word in words):
+            sys.stdout.write(self.help())
+            return 0
+        expected: tuple[type[Exception], ...] = (ConfigError, *self.errors)
+        try:
+            for options, overrides in self.jobs(words):
+                call(options, overrides)
+        except expected as error:
+            sys.stderr.write(f"error: {one_line(error)}\n")
+            return 2
+        except KeyboardInterrupt:
+            return _STATUS_INTERRUPTED
+        return 0
+
+    def jobs(self, words: Sequence[str]) -> Iterator[tuple[Options, list[str]]]:
+        """Return the options and the other overrides of each run of the command.
+
+        Raises:
+            ConfigError: If an override does not follow the grammar, or an option is unknown.
+        """
+        texts = [word for word in words if word not in _MULTIRUN]
+        flags = [text for text in texts if text.startswith("-")]
+        if flags:
+            raise ConfigError(f"unknown flag {flags[0]!r}; choices: --help, --multirun, KEY=VALUE")
+        for combination in _combinations(parse(with_integers(texts)), len(texts) < len(words)):
+            own = [text for text in combination if _root(text) in self._names]
+            others = [text for text in combination if text not in own]
+            self._check_roots(others)
+            yield self._read(own), others
+
+    @property
+    def _names(self) -> list[str]:
+        return [field.name for field in fields(cast(Any, self.options))]
+
+    def _check_roots(self, overrides: list[str]) -> None:
+        choices = sorted({*self._names, *(field.name for field in fields(Config))})
+        for text in overrides:
+            root = _root(text)
+            if text[0] not in "+~" and "/" not in root and root not in choices:
+                raise ConfigError(unknown("key", root, choices))
+
+    def _read(self, own: list[str]) -> Options:
+        node: DictConfig = OmegaConf.structured(self.options)
+        try:
+            for override in parse(own):
+                OmegaConf.update(node, override.key_or_group, override.value())
+            missing = sorted(map(str, OmegaConf.missing_keys(node)))
+            if missing:
+                raise ConfigError(f"{self.command} needs {missing[0]}=VALUE")
+            return cast(Options, OmegaConf.to_object(node))
+        except (OmegaConfBaseException, ValueError) as error:
+            raise ConfigError(one_line(error)) from error
+
+    def help(self) -> str:
+        """Return the description and the options with their defaults."""
+        defaults = OmegaConf.to_yaml(OmegaConf.structured(self.options))
+        others = ", ".join(field.name for field in fields(Config))
+        return (
+            f"{self.description.strip()}\n\n"
+            f"Options and their defaults (??? has none and must be given):\n\n{defaults}\n"
+            f"Other overrides change the configuration: {others}.\n"
+        )
+
+
+def _root(text: str) -> str:
+    """Return the first part of the key of an override, or its group."""
+    return text.lstrip("+~").partition("=")[0].partition("@")[0].partition(".")[0]
+
+
+def _combinations(overrides: list[Override], multirun: bool) -> Iterator[list[str]]:
+    """Return the overrides of each run, without sweeps."""
+    swept = [override for override in overrides if override.is_sweep_override()]
+    if swept and not multirun:
+        raise ConfigError(f"{swept[0].input_line}: several values need -m (--multirun)")
+    alternatives = [_alternatives(override) for override in overrides]
+    return (list(combination) for combination in product(*alternatives))
+
+
+def _alternatives(override: Override) -> list[str]:
+    if not override.is_sweep_override():
+        return [str(override.input_line)]
+    key = override.get_key_element()
+    return [f"{key}={value}" for value in override.sweep_string_iterator()]
