@@ -1,4 +1,4 @@
-"""The README tells the truth: its commands exist and what they choose can be chosen."""
+"""The commands of the README exist and their choices can be composed."""
 
 import re
 import subprocess
@@ -6,8 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from veca_marl.bench.command import argument_parser
+from veca_marl.bench.options import BenchOptions
 from veca_marl.config import compose
+from veca_marl.config.command_line import CommandLine
 
 ROOT = Path(__file__).resolve().parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -33,7 +34,8 @@ def test_what_the_training_commands_choose_can_be_chosen(overrides):
 
 @pytest.mark.parametrize("arguments", BENCH)
 def test_the_bench_takes_its_arguments(arguments):
-    assert argument_parser().parse_args(arguments.split()).task
+    for _, overrides in CommandLine("bench", BenchOptions, "").jobs(arguments.split()):
+        assert compose(overrides).task.name
 
 
 def test_make_train_makes_an_environment_installs_and_trains():

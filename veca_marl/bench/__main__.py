@@ -1,4 +1,4 @@
-"""Run the bench as a module."""
+"""Run the benchmark as a module."""
 
 import sys
 

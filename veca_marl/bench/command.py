@@ -1,129 +1,68 @@
-"""The command line of the bench."""
+"""The command: measures rollouts and references, prints a table for each question."""
 
 from __future__ import annotations
 
-import argparse
-import os
-import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import replace
 from pathlib import Path
 
 import torch
 
 from veca_marl.bench.free_play import free_play
+from veca_marl.bench.machine import machine, machine_line
+from veca_marl.bench.options import BenchCfg, BenchOptions
 from veca_marl.bench.references import measure_references
-from veca_marl.bench.report import as_json, references_table, rollouts_table
+from veca_marl.bench.report import as_json, parts_table, references_table, throughput_table
 from veca_marl.bench.rollouts import Rollouts, measure_first_world, measure_rollouts
-from veca_marl.config import ConfigError, compose
+from veca_marl.config import ConfigError, compose, one_line
+from veca_marl.config.command_line import CommandLine
 from veca_marl.envs.core.game_cfg import GameCfg
-from veca_marl.envs.core.task import TaskCfg, find_task
-from veca_marl.sim.body.humanoid.humanoid import HumanoidCfg
+
+DESCRIPTION = """
+Measure agent steps per second, and the processor time of each part of a step:
+
+    python -m veca_marl.bench +task=KickTheBall
+    python -m veca_marl.bench +task=TurnBaby bench.agents=[1,2,4] bench.worlds=[1]
+"""
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Measure, print a table, and write JSON if asked to; return the exit status."""
-    asked = argument_parser().parse_args(arguments)
+def main(words: Sequence[str] | None = None) -> int:
+    """Run the command line; return the exit status."""
+    return CommandLine("bench", BenchOptions, DESCRIPTION).run(bench, words)
+
+
+def bench(options: BenchOptions, overrides: list[str]) -> None:
+    """Measure the game that `overrides` describe, print tables and write the JSON file.
+
+    Raises:
+        ConfigError: If a choice is impossible.
+    """
+    cfg, game = options.bench, compose(overrides).game
     torch.set_num_threads(1)
+    print(machine_line(), end="\n\n")
     try:
-        game = compose(_overrides(asked)).game
-    except ConfigError as error:
-        print(error, file=sys.stderr)
-        return 2
-    print(f"processor time of one thread; {_load()}\n")
-    with _played(game, 1, asked.things) as task:
-        first_world_s = measure_first_world(replace(game, task=task))
-    print(f"the first world of this process: {first_world_s:.2f} s\n")
-    runs = []
-    for agents in asked.agents:
-        for worlds in asked.worlds:
-            runs.append(_measure(game, agents, worlds, asked))
-            print(rollouts_table(runs[-1]), end="\n\n")
+        first_world_s = measure_first_world(game)
+        print(f"first world of this process: {first_world_s:.2f} s", end="\n\n")
+        runs = list(_measure(game, cfg))
+    except ValueError as error:
+        raise ConfigError(one_line(error)) from error
+    print(throughput_table(runs), end="\n\n")
+    print(parts_table(runs), end="\n\n")
     references = None
-    if not asked.skip_references:
-        references = measure_references(game.playground, asked.steps, asked.repeats)
+    if cfg.references:
+        references = measure_references(game.playground, cfg.steps, cfg.repeats)
         print(references_table(references))
-    if asked.json is not None:
-        asked.json.write_text(as_json(first_world_s, runs, references))
-    return 0
+    if cfg.json is not None:
+        Path(cfg.json).write_text(as_json(machine(), first_world_s, runs, references))
 
 
-def _measure(game: GameCfg, agents: int, worlds: int, asked: argparse.Namespace) -> Rollouts:
-    with _played(game, agents, asked.things) as task:
-        return measure_rollouts(replace(game, task=task), worlds, asked.steps, asked.repeats)
+def _measure(game: GameCfg, cfg: BenchCfg) -> Iterator[Rollouts]:
+    for agents in cfg.agents or [0]:
+        with _played(game, agents, cfg) as played:
+            for worlds in cfg.worlds:
+                yield measure_rollouts(played, worlds, cfg.steps, cfg.repeats)
 
 
-def _played(game: GameCfg, agents: int, things: int) -> AbstractContextManager[TaskCfg]:
-    """Return the task itself for one walker, free play for more, fuller rooms and other bodies."""
-    if isinstance(game.body, HumanoidCfg):
-        senses = (*find_task(game.task.name).senses, "touch", "proprioception")
-        return free_play(agents, game.task, senses, things)
-    if agents > 1 or things:
-        return free_play(agents, game.task, things=things)
-    return nullcontext(game.task)
-
-
-def argument_parser() -> argparse.ArgumentParser:
-    """Return what understands the command line of the bench."""
-    parser = argparse.ArgumentParser(
-        prog="python -m veca_marl.bench",
-        description="Agent steps per second, and the milliseconds of each part of a step.",
-    )
-    parser.add_argument("--task", default="KickTheBall", help="which game is played")
-    parser.add_argument("--worlds", type=_counts, default=[1, 4], help="such as 1,4")
-    parser.add_argument(
-        "--agents",
-        type=_counts,
-        default=[1],
-        help="such as 1,4; 1 plays the task, more play freely in its playground, with its senses",
-    )
-    parser.add_argument(
-        "--body", default="walker", help="what they are; bodies with joints play freely"
-    )
-    parser.add_argument("--things", type=int, default=0, help="loose things in free play")
-    parser.add_argument("--playground", help="where; the task's own if nothing is said")
-    parser.add_argument(
-        "--senses", nargs="*", default=[], metavar="SENSE=PRESET", help="such as audio=mono"
-    )
-    parser.add_argument("--steps", type=_count, default=300, help="steps of each rollout")
-    parser.add_argument("--repeats", type=_count, default=5, help="rollouts; medians count")
-    parser.add_argument("--skip-references", action="store_true", help="measure rollouts alone")
-    parser.add_argument(
-        "--json", type=_new_file, metavar="FILE", help="also write the numbers here"
-    )
-    return parser
-
-
-def _count(text: str) -> int:
-    if not text.isdecimal() or int(text) < 1:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number from 1 on")
-    return int(text)
-
-
-def _counts(text: str) -> list[int]:
-    return [_count(part) for part in text.split(",")]
-
-
-def _new_file(text: str) -> Path:
-    """Refuse before measuring what could not be written after it."""
-    path = Path(text)
-    if path.is_dir() or not path.absolute().parent.is_dir():
-        raise argparse.ArgumentTypeError(f"{text!r} is not a file in a folder that exists")
-    return path
-
-
-def _overrides(asked: argparse.Namespace) -> list[str]:
-    playground = [] if asked.playground is None else [f"playground={asked.playground}"]
-    body = f"body={asked.body}"
-    return [
-        f"+task={asked.task}",
-        body,
-        *playground,
-        *(f"senses/{sense}" for sense in asked.senses),
-    ]
-
-
-def _load() -> str:
-    load, cores = os.getloadavg()[0], os.cpu_count()
-    return f"{cores} cores, load {load:.1f}"
+def _played(game: GameCfg, agents: int, cfg: BenchCfg) -> AbstractContextManager[GameCfg]:
+    """Return the game itself, or free play of so many agents."""
+    return free_play(game, agents, cfg.loose_props, cfg.senses) if agents else nullcontext(game)

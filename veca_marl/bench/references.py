@@ -1,4 +1,4 @@
-"""Costs beside references in the same run: ratios hold on a busy machine, milliseconds do not."""
+"""Costs of single senses, beside references that are measured in the same run."""
 
 from __future__ import annotations
 
@@ -34,19 +34,19 @@ VIEWS = 8
 
 @dataclass
 class EyeCost:
-    """One eye view beside PyBullet's TinyRenderer on the same scene.
+    """Cost of one eye view, and that of PyBullet's TinyRenderer on the same scene.
 
     Attributes:
-        primitives: What there is to draw.
-        ours_ms: One 84x84 view, colours, depth and segmentation.
-        tiny_ms: The same by TinyRenderer without shadows.
-        times_as_fast: Median of the ratios of neighbouring measurements.
+        primitives: Number of primitives in the scene.
+        ours_ms: Processor time of one 84x84 view with colours, depth and segmentation.
+        tiny_ms: Processor time of the same view by TinyRenderer without shadows.
+        speed_ratio: Median of `tiny_ms / ours_ms` of measurements made in turns.
     """
 
     primitives: int
     ours_ms: float
     tiny_ms: float
-    times_as_fast: float
+    speed_ratio: float
 
 
 @dataclass
@@ -55,8 +55,8 @@ class References:
 
     Attributes:
         eye: One eye view beside TinyRenderer.
-        ears_ms: One listener and one source, milliseconds per step.
-        skin: One body's skin.
+        ears_ms: Milliseconds per step of one listener and one source.
+        skin: The skin of one body.
     """
 
     eye: EyeCost
@@ -65,7 +65,7 @@ class References:
 
 
 def measure_references(playground: PlaygroundCfg, steps: int, repeats: int) -> References:
-    """Measure eyes, ears and skin in a playground, each alone."""
+    """Measure an eye, ears and skin in a playground, one after the other."""
     return References(
         measure_eye(playground, repeats),
         measure_ears(playground, steps),
@@ -74,7 +74,7 @@ def measure_references(playground: PlaygroundCfg, steps: int, repeats: int) -> R
 
 
 def measure_eye(playground: PlaygroundCfg, repeats: int) -> EyeCost:
-    """Render `busy_room` from a walker's left eye, turned all round, beside TinyRenderer."""
+    """Render `busy_room` from the left eye of a walker in `VIEWS` directions."""
     world, watcher = busy_room(playground)
     hidden = world.scene.hidden(watcher.object_id, watcher.own_head_frames)
     eye, camera = watcher.mount("eye_left"), Camera()
@@ -93,7 +93,7 @@ def measure_eye(playground: PlaygroundCfg, repeats: int) -> EyeCost:
 
 
 def busy_room(playground: PlaygroundCfg) -> tuple[World, Walker]:
-    """Return a world with 20 more props and 2 walkers, and the walker who looks at the other."""
+    """Return a world with `N_LOOSE_PROPS` props and 2 walkers, and the walker that observes."""
     world = World(playground)
     props = [world.add_prop(cfg) for cfg in _loose_props()]
     watcher, other = (Walker(name, WalkerCfg(), world, i) for i, name in enumerate("ab"))
@@ -110,7 +110,7 @@ def busy_room(playground: PlaygroundCfg) -> tuple[World, Walker]:
 def measure_ears(playground: PlaygroundCfg, steps: int) -> float:
     """Return milliseconds per step of one listener and one source, both moving, with HRTF.
 
-    Emission, the way through the room, the head and the observed spectrum are in it.
+    Emission, propagation in the room, the head response and the observed spectrum are included.
     """
     world = World(playground)
     buzz = SoundCfg(kind=SoundKind.buzz, level=0.1)

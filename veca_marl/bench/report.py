@@ -1,51 +1,80 @@
-"""What the bench found, for people and for programs."""
+"""Results of the benchmark as tables, one for each question, and as JSON."""
 
 from __future__ import annotations
 
 import json
-import os
-import platform
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
-from importlib.metadata import version
 
 from veca_marl.bench.references import References
 from veca_marl.bench.rollouts import Rollouts
 
 
-def rollouts_table(run: Rollouts) -> str:
-    """Return the cost of a game as a table, dearest part first."""
-    total = sum(run.ms_per_part.values())
-    lines = [
-        f"{run.task} in {run.playground}: {run.worlds} x world, {run.agents} x agent",
-        f"  {run.agent_steps_per_s:,.0f} agent-steps/s "
-        f"(on the wall clock {run.wall_agent_steps_per_s:,.0f}); "
-        f"one more world is built in {run.build_s:.2f} s",
-        f"  {'part':<16}{'ms/agent-step':>14}{'share':>8}",
+def throughput_table(runs: Sequence[Rollouts]) -> str:
+    """Return the answer to: how many agent steps per second?"""
+    header = ["task", "playground", "worlds", "agents", "agent steps/s", "elapsed", "per reference"]
+    rows = [
+        [
+            run.task,
+            run.playground,
+            str(run.worlds),
+            str(run.agents),
+            f"{run.agent_steps_per_s:,.0f}",
+            f"{run.wall_agent_steps_per_s:,.0f}",
+            f"{run.agent_steps_per_reference:.2f}",
+        ]
+        for run in runs
     ]
-    for part, ms in sorted(run.ms_per_part.items(), key=lambda item: -item[1]):
-        lines.append(f"  {part:<16}{ms:>14.3f}{ms / total:>8.0%}")
-    lines.append(f"  {'all, timed':<16}{total:>14.3f}{1:>8.0%}")
-    lines.append(f"  neither physics nor senses: {run.other_share:.0%}")
-    return "\n".join(lines)
+    note = (
+        "agent steps per second of processor time, per second of elapsed time, and in the time of\n"
+        "the reference workload (comparable between machines):"
+    )
+    return f"{note}\n{_table([*[header], *rows])}"
+
+
+def parts_table(runs: Sequence[Rollouts]) -> str:
+    """Return the answer to: which part of a step takes how long?"""
+    columns = [f"{run.worlds} x {run.agents}" for run in runs]
+    parts = sorted(
+        {part for run in runs for part in run.ms_per_part},
+        key=lambda part: -max(run.ms_per_part.get(part, 0.0) for run in runs),
+    )
+    rows = [["worlds x agents", *columns]]
+    rows += [[part, *(_milliseconds(run.ms_per_part, part) for run in runs)] for part in parts]
+    rows.append(["total", *(f"{sum(run.ms_per_part.values()):.3f}" for run in runs)])
+    rows.append(["overhead", *(f"{run.overhead:.0%}" for run in runs)])
+    rows.append(["build a world (s)", *(f"{run.build_s:.2f}" for run in runs)])
+    note = "processor time per agent step (ms); overhead is what is neither physics nor senses:"
+    return f"{note}\n{_table(rows)}"
 
 
 def references_table(references: References) -> str:
-    """Return the costs beside references."""
+    """Return the answer to: what do single senses cost?"""
     eye, skin = references.eye, references.skin
-    touch = ", ".join(f"{ms:.3f} ms with {things}" for things, ms in skin.touch_ms.items())
-    return (
-        f"one eye view 84x84, {eye.primitives} primitives: {eye.ours_ms:.3f} ms; "
-        f"TinyRenderer {eye.tiny_ms:.2f} ms: {eye.times_as_fast:.1f} times as fast\n"
-        f"ears, 1 listener and 1 source, HRTF: {references.ears_ms:.3f} ms per step\n"
-        f"touch, one reading of 9888 taxels by the things on the skin: {touch}\n"
-        f"skinning: {skin.skinning_ms:.3f} ms"
-    )
+    rows = [
+        ["part", "ms"],
+        [f"eye, one view of 84x84 with {eye.primitives} primitives", f"{eye.ours_ms:.3f}"],
+        ["the same view by TinyRenderer", f"{eye.tiny_ms:.3f}"],
+        ["ratio TinyRenderer / eye", f"{eye.speed_ratio:.1f}"],
+        ["ears, one listener and one source, HRTF", f"{references.ears_ms:.3f}"],
+        *(
+            [f"touch, 9888 taxels, {contacts} contacts", f"{ms:.3f}"]
+            for contacts, ms in skin.touch_ms.items()
+        ),
+        ["skinning of one body", f"{skin.skinning_ms:.3f}"],
+    ]
+    return f"processor time of single parts:\n{_table(rows)}"
 
 
-def as_json(first_world_s: float, runs: list[Rollouts], references: References | None) -> str:
-    """Return all numbers for programs."""
+def as_json(
+    machine: Mapping[str, object],
+    first_world_s: float,
+    runs: Sequence[Rollouts],
+    references: References | None,
+) -> str:
+    """Return all results as JSON."""
     content = {
-        "machine": machine(),
+        "machine": dict(machine),
         "first_world_s": first_world_s,
         "rollouts": [asdict(run) for run in runs],
         "references": None if references is None else asdict(references),
@@ -53,12 +82,14 @@ def as_json(first_world_s: float, runs: list[Rollouts], references: References |
     return json.dumps(content, indent=2) + "\n"
 
 
-def machine() -> dict[str, str | int | None]:
-    """Return on what it was measured."""
-    packages = {name: version(name) for name in ("numpy", "numba", "torch", "torchrl", "pybullet")}
-    return {
-        "python": platform.python_version(),
-        "machine": platform.machine(),
-        "cores": os.cpu_count(),
-        **packages,
-    }
+def _milliseconds(ms_per_part: Mapping[str, float], part: str) -> str:
+    return f"{ms_per_part[part]:.3f}" if part in ms_per_part else "-"
+
+
+def _table(rows: Sequence[Sequence[str]]) -> str:
+    """Return rows as aligned text: the first column to the left, the others to the right."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    return "\n".join(
+        "  " + "  ".join([row[0].ljust(widths[0]), *map(str.rjust, row[1:], widths[1:])]).rstrip()
+        for row in rows
+    )

@@ -4,40 +4,39 @@ from __future__ import annotations
 
 import gc
 import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from statistics import median
 
 import torch
 from tensordict import TensorDictBase
 
+from veca_marl.bench.calibration import ReferenceWorkload
 from veca_marl.bench.stopwatch import Probes, Stopwatch
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
 from veca_marl.envs.core.game import Game
 from veca_marl.envs.core.game_cfg import GameCfg
 
-PHYSICS, SOURCES, TASK, ENV, POLICY, TORCHRL = (
-    "physics",
-    "sound sources",
-    "task",
-    "VecaEnv",
-    "policy",
-    "TorchRL",
-)
+PHYSICS, SOURCES, TASK = "physics", "sound sources", "task"
+ENV, POLICY, TORCHRL = "VecaEnv", "policy", "TorchRL"
+_OVERHEAD = (TASK, ENV, POLICY, TORCHRL)
+_WARM_UP_STEPS = 5
 
 
 @dataclass
 class Rollouts:
-    """What rolling out one game cost.
+    """Cost of rolling out one game, as medians over the repeats.
 
     Attributes:
-        task: Its name.
-        playground: Where it was played.
-        worlds: Worlds in the process.
-        agents: Players in each of them.
-        agent_steps_per_s: By processor time of the one thread, without the stopwatch.
-        wall_agent_steps_per_s: By the clock on the wall.
-        ms_per_part: Milliseconds of processor time per agent step, with the stopwatch.
-        other_share: Part of the step that is neither physics nor senses.
+        task: Name of the task.
+        playground: Name of the playground.
+        worlds: Worlds in the environment.
+        agents: Agents in each world.
+        agent_steps_per_s: Agent steps per second of processor time of the one thread.
+        agent_steps_per_reference: Agent steps in the processor time of one run of
+            `ReferenceWorkload`, measured in turns with the rollouts; comparable between machines.
+        wall_agent_steps_per_s: Agent steps per second of elapsed time.
+        ms_per_part: Milliseconds of processor time per agent step for each part, with stopwatch.
+        overhead: Share of the step that is neither physics nor sound sources nor senses.
         build_s: Seconds of processor time to build one more world.
     """
 
@@ -46,83 +45,106 @@ class Rollouts:
     worlds: int
     agents: int
     agent_steps_per_s: float
+    agent_steps_per_reference: float
     wall_agent_steps_per_s: float
-    ms_per_part: dict[str, float] = field(default_factory=dict)
-    other_share: float = 0.0
-    build_s: float = 0.0
+    ms_per_part: dict[str, float]
+    overhead: float
+    build_s: float
+
+
+@dataclass
+class _Repeats:
+    """Measurements of the repeats: processor and elapsed seconds, reference, times by part."""
+
+    cpu_s: list[float]
+    wall_s: list[float]
+    reference_s: list[float]
+    parts_ns: list[dict[str, int]]
 
 
 def measure_rollouts(game: GameCfg, worlds: int, steps: int, repeats: int) -> Rollouts:
-    """Roll a game out under the same random actions, in turns with and without the stopwatch.
+    """Roll a game out with the same random actions, alternately with and without stopwatch.
 
     Args:
-        game: What is played.
-        worlds: How many of it in one environment.
+        game: The game.
+        worlds: Number of worlds in the environment.
         steps: Steps of each rollout.
-        repeats: Rollouts of either kind; medians count.
+        repeats: Number of rollouts of either kind.
+
+    Raises:
+        ValueError: If no world can be made from `game`.
     """
     env = VecaEnv(game, worlds, seed=0)
     agents = len(env.games[0].players)
-    policy = RandomMoves(env, steps)
-    env.rollout(5, policy, break_when_any_done=False)
-    seconds, wall_s, splits = [], [], []
-    for _ in range(repeats):
-        wall, cpu = time.perf_counter(), time.thread_time()
-        env.rollout(steps, policy, break_when_any_done=False)
-        seconds.append(time.thread_time() - cpu)
-        wall_s.append(time.perf_counter() - wall)
-        splits.append(_split(env, policy, steps))
+    measured = _repeat(env, steps, repeats)
     env.close()
     agent_steps = steps * worlds * agents
     parts = {
-        part: 1e-6 * median(split[part] for split in splits) / agent_steps for part in splits[0]
+        part: 1e-6 * median(split[part] for split in measured.parts_ns) / agent_steps
+        for part in measured.parts_ns[0]
     }
-    rest = sum(parts.get(part, 0.0) for part in (TASK, ENV, POLICY, TORCHRL))
+    pairs = zip(measured.reference_s, measured.cpu_s, strict=True)
     return Rollouts(
         task=game.task.name,
         playground=game.playground.name,
         worlds=worlds,
         agents=agents,
-        agent_steps_per_s=agent_steps / median(seconds),
-        wall_agent_steps_per_s=agent_steps / median(wall_s),
+        agent_steps_per_s=agent_steps / median(measured.cpu_s),
+        agent_steps_per_reference=agent_steps * median(ref / cpu for ref, cpu in pairs),
+        wall_agent_steps_per_s=agent_steps / median(measured.wall_s),
         ms_per_part=parts,
-        other_share=rest / sum(parts.values()),
+        overhead=sum(parts.get(part, 0.0) for part in _OVERHEAD) / sum(parts.values()),
         build_s=_build_s(game),
     )
 
 
-class RandomMoves:
-    """Drawn beforehand, so that the policy costs next to nothing.
+def _repeat(env: VecaEnv, steps: int, repeats: int) -> _Repeats:
+    policy, reference = RandomActions(env, steps), ReferenceWorkload()
+    env.rollout(_WARM_UP_STEPS, policy, break_when_any_done=False)
+    measured = _Repeats([], [], [], [])
+    for _ in range(repeats):
+        wall, cpu = time.perf_counter(), time.thread_time()
+        env.rollout(steps, policy, break_when_any_done=False)
+        measured.cpu_s.append(time.thread_time() - cpu)
+        measured.wall_s.append(time.perf_counter() - wall)
+        measured.reference_s.append(1e-3 * reference.run_ms())
+        measured.parts_ns.append(_split(env, policy, steps))
+    reference.close()
+    return measured
+
+
+class RandomActions:
+    """Uniformly random actions, drawn before the measurement so that the policy costs little.
 
     Args:
-        env: Who moves.
-        steps: After so many steps the moves come again.
+        env: The environment with the specs of the actions.
+        steps: Number of actions drawn; they are repeated afterwards.
     """
 
     def __init__(self, env: VecaEnv, steps: int) -> None:
         torch.manual_seed(0)
         spec = env.full_action_spec
-        self._moves = {key: [spec[key].rand() for _ in range(steps)] for key in env.action_keys}
+        self._actions = {key: [spec[key].rand() for _ in range(steps)] for key in env.action_keys}
         self._step = 0
 
     def __call__(self, tensordict: TensorDictBase) -> TensorDictBase:
-        """Write each team's next move."""
-        for key, moves in self._moves.items():
-            tensordict.set(key, moves[self._step % len(moves)])
+        """Write the next action of each team."""
+        for key, actions in self._actions.items():
+            tensordict.set(key, actions[self._step % len(actions)])
         self._step += 1
         return tensordict
 
 
-def _split(env: VecaEnv, policy: RandomMoves, steps: int) -> dict[str, int]:
-    """Return nanoseconds by part of one rollout."""
+def _split(env: VecaEnv, policy: RandomActions, steps: int) -> dict[str, int]:
+    """Return the nanoseconds of each part of one rollout."""
     watch = Stopwatch(rest=TORCHRL)
     with Probes(watch) as probes:
         probes.put(ENV, env, "_step", "_reset")
         for game in env.games:
             _probe_game(game, probes)
         with watch.running():
-            moves = watch.wrap(POLICY, policy)
-            env.rollout(steps, moves, break_when_any_done=False, trust_policy=True)
+            timed = watch.wrap(POLICY, policy)
+            env.rollout(steps, timed, break_when_any_done=False, trust_policy=True)
     return dict(watch.nanoseconds)
 
 
@@ -137,9 +159,9 @@ def _probe_game(game: Game, probes: Probes) -> None:
 
 
 def measure_first_world(game: GameCfg) -> float:
-    """Return seconds of processor time to build a world and reset it, the first of a process.
+    """Return the seconds of processor time to build and reset the first world of a process.
 
-    Tables and kernels are loaded in it; kernels that are not cached are compiled in it.
+    They include loading tables and kernels, and compiling kernels that are not in the cache.
     """
     start = time.thread_time()
     env = VecaEnv(game, worlds=1, seed=0)

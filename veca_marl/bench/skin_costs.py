@@ -1,4 +1,4 @@
-"""What skin costs: to follow the bones, and to feel so many things."""
+"""Cost of the skin: skinning, and reading the taxels for several numbers of contacts."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ from veca_marl.sim.physics.world import World
 from veca_marl.sim.touch.sense import TouchCfg, TouchSense
 
 CONTACTS = (0, 3, 20)
-_ARMS_OUT = Posture(0.0, {"upper_arm.abduction": 30.0})  # a child that does not touch itself
+_ARMS_OUT = Posture(0.0, {"upper_arm.abduction": 30.0})  # no self-contact
 _RADIUS_M = 0.03
 
 
 @dataclass
 class SkinCosts:
-    """Costs of one body's skin.
+    """Cost of the skin of one body.
 
     Attributes:
-        skinning_ms: To carry the vertices along with the bones.
-        touch_ms: One reading of all taxels, by the number of things that touch.
+        skinning_ms: Milliseconds of computing the vertices from the poses of the bones.
+        touch_ms: Milliseconds of one reading of all taxels, by the number of contacts.
     """
 
     skinning_ms: float
@@ -35,13 +35,13 @@ class SkinCosts:
 
 
 def measure_skin(playground: PlaygroundCfg, repeats: int) -> SkinCosts:
-    """Measure a `full` body that hangs in the air with small balls all over it."""
+    """Measure a `full` body in the air with small balls on its skin."""
     readings = {contacts: _touch_ms(playground, contacts, repeats) for contacts in CONTACTS}
     return SkinCosts(_skinning_ms(playground, repeats), readings)
 
 
 def touched_child(playground: PlaygroundCfg, contacts: int) -> tuple[World, TouchSense]:
-    """Return a world with a child in the air, so many things on its skin, and its touch."""
+    """Return a world with a body in the air and `contacts` balls on its skin, and its touch."""
     world = World(playground)
     cfgs = [PropCfg(f"ball_{i}", PropShape.sphere, [_RADIUS_M]) for i in range(contacts)]
     balls = [world.add_prop(cfg) for cfg in cfgs]

@@ -1,4 +1,4 @@
-"""A stopwatch whose parts always sum up to the total."""
+"""A stopwatch for nested parts of a computation; their times sum to the total."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ Clock = Callable[[], int]
 
 
 class Stopwatch:
-    """Time by part, each moment counted once: a part does not contain the parts inside it.
+    """Exclusive time of each part: the time of nested parts is not counted again.
 
-    It counts processor time of the calling thread by default, so that a busy machine changes the
-    numbers less than wall time would. What looking at the clock costs is taken off.
+    The default clock is the processor time of the calling thread, which depends less on the load
+    of the machine than elapsed time. The time of reading the clock is subtracted.
 
     Args:
-        rest: The part that counts while no other does.
-        clock: Nanoseconds, never falling.
+        rest: The part that is counted while no wrapped part runs.
+        clock: Monotonic clock in nanoseconds.
 
     Attributes:
         nanoseconds: Time by part.
@@ -33,11 +33,11 @@ class Stopwatch:
         self._rest = rest
         self._part: str | None = None
         self._since = 0
-        self._look_ns = _cost_of_looking(clock)
+        self._reading_ns = _reading_ns(clock)
 
     @contextmanager
     def running(self) -> Iterator[None]:
-        """Count; what is wrapped costs no more than its call outside of this."""
+        """Count time inside the with statement; outside, wrapped calls are not timed."""
         self._part, self._since = self._rest, self._clock()
         try:
             yield
@@ -45,7 +45,7 @@ class Stopwatch:
             self._switch(None)
 
     def wrap(self, part: str, call: Callable[..., Any]) -> Callable[..., Any]:
-        """Return `call`, its time counted as `part` while the watch runs."""
+        """Return `call` with its time counted as `part` while the stopwatch runs."""
 
         def timed(*args: Any, **kwargs: Any) -> Any:
             if self._part is None:
@@ -62,16 +62,16 @@ class Stopwatch:
         now = self._clock()
         previous = self._part
         if previous is not None:
-            self.nanoseconds[previous] += now - self._since - self._look_ns
+            self.nanoseconds[previous] += now - self._since - self._reading_ns
         self._part, self._since = part, now
         return previous
 
 
 class Probes(ExitStack):
-    """Wraps methods of objects from outside, and takes the wrappers off again at the end.
+    """Replaces methods of objects by timed ones for the duration of a with statement.
 
     Args:
-        watch: What counts.
+        watch: The stopwatch that counts.
     """
 
     def __init__(self, watch: Stopwatch) -> None:
@@ -79,15 +79,15 @@ class Probes(ExitStack):
         self._watch = watch
 
     def put(self, part: str, owner: Any, *methods: str) -> None:
-        """Count the methods of one object as `part`."""
+        """Count the time of methods of one object as `part`."""
         for method in methods:
             setattr(owner, method, self._watch.wrap(part, getattr(owner, method)))
             self.callback(delattr, owner, method)
 
 
-def _cost_of_looking(clock: Clock) -> int:
-    looks = [clock() for _ in range(1000)]
-    return int(median(later - look for look, later in pairwise(looks)))
+def _reading_ns(clock: Clock) -> int:
+    readings = [clock() for _ in range(1000)]
+    return int(median(later - earlier for earlier, later in pairwise(readings)))
 
 
 def thread_ms(call: Callable[[], object]) -> float:

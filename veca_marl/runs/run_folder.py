@@ -3,20 +3,15 @@
 from __future__ import annotations
 
 import json
-import platform
-import subprocess
-import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
-from importlib.metadata import version
 from pathlib import Path
 from typing import cast
 
 from omegaconf import DictConfig, OmegaConf
 
 from veca_marl.config import ConfigError, compose_node
-
-_PACKAGES = ("veca_marl", "torch", "torchrl", "tensordict", "pybullet", "numpy", "numba")
+from veca_marl.runs.provenance import provenance
 
 
 @dataclass(frozen=True)
@@ -57,7 +52,7 @@ class RunFolder:
     def begin(self, node: DictConfig, overrides: Sequence[str]) -> None:
         """Claim the folder: write down what the run is."""
         self.path.mkdir(parents=True, exist_ok=True)
-        self.provenance.write_text(json.dumps(_provenance(overrides), indent=2) + "\n")
+        self.provenance.write_text(json.dumps(provenance(overrides), indent=2) + "\n")
         self.config.write_text(OmegaConf.to_yaml(node, resolve=True))
 
     @property
@@ -110,28 +105,3 @@ def remove_if_empty(path: Path) -> None:
     """Remove a folder that was made for a run that did not come about."""
     if path.is_dir() and not any(path.iterdir()):
         path.rmdir()
-
-
-def _provenance(overrides: Sequence[str]) -> dict[str, object]:
-    return {
-        "command": sys.orig_argv,
-        "overrides": list(overrides),
-        "commit": _git_commit(),
-        "python": platform.python_version(),
-        "packages": {name: version(name) for name in _PACKAGES},
-    }
-
-
-def _git_commit() -> str | None:
-    """Return the commit of this checkout, marked if changed; None where there is none."""
-    try:
-        described = subprocess.run(
-            ["git", "describe", "--always", "--abbrev=40", "--dirty", "--exclude", "*"],
-            cwd=Path(__file__).parent,
-            capture_output=True,
-            text=True,
-            check=True,
-        )
-    except (OSError, subprocess.CalledProcessError):
-        return None
-    return described.stdout.strip()
