@@ -1,4 +1,4 @@
-# Every word a developer needs. `make train` and `make test` work on a machine with Python 3.11 alone.
+# Commands for developers. `make train` and `make test` work on a machine with Python 3.11 alone.
 PYTHON ?= $(shell command -v python3.11 || command -v python3)
 VENV   := .venv
 BIN    := $(VENV)/bin
@@ -38,12 +38,12 @@ test: lint types ## lint, types, layer contracts and the quick tests
 test-all: lint types ## everything, the slow tests too
 	$(BIN)/pytest -n $(CORES) $(ARGS)
 
-format: $(VENV)/installed-test ## let ruff mend what it can
+format: $(VENV)/installed-test ## format and fix with ruff
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
 
-bench: $(VENV)/installed ## agent-steps per second and where the time goes
-	$(BIN)/python -m veca_marl.bench --task KickTheBall $(ARGS)
+bench: $(VENV)/installed ## agent steps per second, and the time of each part of a step
+	$(BIN)/python -m veca_marl.bench +task=KickTheBall $(ARGS)
 
 docs: $(VENV)/installed-test ## build the documentation site in docs/_build/html
 	$(BIN)/python -m sphinx --fail-on-warning --keep-going -b html docs docs/_build/html $(ARGS)
@@ -51,6 +51,6 @@ docs: $(VENV)/installed-test ## build the documentation site in docs/_build/html
 pages: $(VENV)/installed-test ## rewrite the generated pages and pictures of docs/
 	$(BIN)/python scripts/make_docs.py
 
-clean: ## forget the virtual environment and all caches; runs stay
+clean: ## remove the virtual environment and all caches; runs stay
 	rm -rf $(VENV) .pytest_cache .mypy_cache .ruff_cache build *.egg-info
 	find . -name __pycache__ -type d -exec rm -rf {} +
