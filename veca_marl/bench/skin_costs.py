@@ -10,7 +10,7 @@ import numpy as np
 from veca_marl.bench.stopwatch import thread_ms
 from veca_marl.sim.body.humanoid.humanoid import Humanoid, HumanoidCfg
 from veca_marl.sim.body.humanoid.postures import Posture
-from veca_marl.sim.geometry.skinning import skin
+from veca_marl.sim.geometry.skinning import deform_meshes
 from veca_marl.sim.physics.playground import PlaygroundCfg
 from veca_marl.sim.physics.props import PropCfg, PropShape
 from veca_marl.sim.physics.world import World
@@ -69,7 +69,7 @@ def _skinning_ms(playground: PlaygroundCfg, repeats: int) -> float:
     scene = world.scene
 
     def follow() -> None:
-        skin(scene.meshes, scene.positions, scene.rotations)
+        deform_meshes(scene.meshes, scene.positions, scene.rotations)
 
     follow()
     cost = median(thread_ms(follow) for _ in range(repeats))

@@ -10,7 +10,7 @@ from veca_marl.envs.core.scoring import (
     horizontal,
     rotation_angle_rad,
 )
-from veca_marl.sim.geometry.rotations import turn_about_vertical
+from veca_marl.sim.geometry.rotations import rotation_about_vertical
 
 EAST, NORTH = np.array([1.0, 0.0, 0.0]), np.array([0.0, 2.0, 0.0])
 
@@ -54,6 +54,6 @@ def test_clipped_speed(way, expected):
 def test_rotation_angle(angle):
     # a common turn of both changes nothing
     tilt = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
-    turned = turn_about_vertical(angle)
+    turned = rotation_about_vertical(angle)
     assert rotation_angle_rad(np.eye(3), turned) == pytest.approx(abs(angle), abs=1e-7)
     assert rotation_angle_rad(tilt, tilt @ turned) == pytest.approx(abs(angle), abs=1e-7)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from veca_marl.sim.geometry.inertia import Inertia, joined, primitive_inertia
+from veca_marl.sim.geometry.inertia import Inertia, joined_inertia, primitive_inertia
 from veca_marl.sim.geometry.pose import Pose
 from veca_marl.sim.geometry.primitives import Primitive, Shape, capsule_between
 from veca_marl.sim.geometry.signed_distances import distances_to
@@ -52,7 +52,7 @@ def test_joined_parts_have_the_inertia_of_their_points():
         points.append(place + local @ turn.T)
         masses.append(shares)
     expected = _of_points(np.concatenate(points), np.concatenate(masses))
-    whole = joined(parts)
+    whole = joined_inertia(parts)
     assert whole.mass_kg == pytest.approx(2.5)
     np.testing.assert_allclose(whole.centre, expected.centre, atol=1e-12)
     np.testing.assert_allclose(whole.matrix, expected.matrix, atol=1e-12)

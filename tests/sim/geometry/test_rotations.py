@@ -7,7 +7,7 @@ from veca_marl.sim.geometry.rotations import (
     matrix_to_quaternion,
     quaternion_from_yaw,
     quaternions_to_matrices,
-    turn_about_vertical,
+    rotation_about_vertical,
 )
 from veca_marl.sim.physics.bullet import pybullet
 
@@ -49,4 +49,4 @@ def test_yaw_turns_forward_to_the_left():
 @pytest.mark.parametrize("yaw", [0.0, 0.7, -2.0])
 def test_a_turn_about_the_vertical_is_that_of_its_quaternion(yaw):
     expected = matrices(np.array([quaternion_from_yaw(yaw)]))[0]
-    np.testing.assert_allclose(turn_about_vertical(yaw), expected, atol=1e-12)
+    np.testing.assert_allclose(rotation_about_vertical(yaw), expected, atol=1e-12)

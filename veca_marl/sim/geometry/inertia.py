@@ -39,7 +39,7 @@ def primitive_inertia(primitive: Primitive, mass_kg: float) -> Inertia:
     return Inertia(mass_kg, centre, matrix)
 
 
-def joined(parts: Sequence[tuple[Pose, Inertia]]) -> Inertia:
+def joined_inertia(parts: Sequence[tuple[Pose, Inertia]]) -> Inertia:
     """Return the inertia of rigidly joined parts (parallel axis theorem).
 
     Args:

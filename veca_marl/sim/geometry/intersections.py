@@ -1,16 +1,16 @@
-"""Rays of one picture row against one primitive, in the primitive's own axes.
+"""Intersections of the rays of one image row with one primitive, in the primitive's own axes.
 
 The ray through pixel i is ``eye + t * (start + columns[i] * right)``. Every function updates the
-depths and surfaces of the row where its primitive is hit from outside nearer than before. Written
-without branches and in single precision: these loops are where a picture's time goes.
+depths and surfaces of the row where its primitive is hit from outside and nearer than before.
+These loops take most of the rendering time; they are branch-free and in single precision.
 
-Quadrics are solved with the discriminant ``a r^2 - |eye x ray|^2`` instead of ``b^2 - a c``: both
-are equal, but the second is the small difference of two large numbers, and a finger seen from
-across a room drowns in its rounding. Boxes use the slab test (Kay & Kajiya, SIGGRAPH 1986).
+Quadrics are solved with the discriminant ``a r^2 - (eye x ray)^2`` instead of ``b^2 - a c``. Both
+are equal, but the second is a small difference of large numbers, and its rounding error exceeds
+the size of a finger seen across a room. Boxes use the slab test (Kay & Kajiya, SIGGRAPH 1986).
 
-No `fastmath` here, in `shading` or in `contact_shadows`: it lets each optimisation round in its own
-way, and a kernel fresh from the compiler then differs in the last bit from itself out of the cache.
-Same seed, same bytes costs about a twentieth of the time.
+Neither these functions nor `shading` and `contact_shadows` use `fastmath`: with it, a freshly
+compiled kernel differs in the last bit from one loaded from the cache, and the same seed would not
+give the same bytes. This costs about 5 % of the time.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from veca_marl.sim.geometry.vectors import Vector, single
 Depths = NDArray[np.float32]
 Surfaces = NDArray[np.int16]
 
-# stands in for a zero divisor: steep enough to miss or to span, small enough not to overflow
+# replaces a zero divisor: small enough that the slab is missed or spanned, without overflow
 _TINY = single(1e-12)
 _0 = single(0.0)
 _1 = single(1.0)
@@ -44,7 +44,7 @@ def sphere_row(
     depth: Depths,
     surfaces: Surfaces,
 ) -> None:
-    """Draw a sphere about the origin into a row."""
+    """Intersect a row of rays with a sphere about the origin."""
     (ox, oy, oz), (sx, sy, sz), (rx, ry, rz) = eye, start, right
     a_0, b_0, b_1 = (
         sx * sx + sy * sy + sz * sz,
@@ -77,7 +77,7 @@ def box_row(
     depth: Depths,
     surfaces: Surfaces,
 ) -> None:
-    """Draw a box of some half extents about the origin into a row."""
+    """Intersect a row of rays with a box of half extents `half` about the origin."""
     (ox, oy, oz), (sx, sy, sz), (rx, ry, rz) = eye, start, right
     hx, hy, hz = half
     for i in range(columns.shape[0]):
@@ -108,7 +108,7 @@ def cylinder_row(
     depth: Depths,
     surfaces: Surfaces,
 ) -> None:
-    """Draw a cylinder about the z axis into a row: an endless rod cut by a slab."""
+    """Intersect a row of rays with a cylinder about the z axis: an infinite cylinder and a slab."""
     (ox, oy, oz), (sx, sy, sz), (rx, ry, rz) = eye, start, right
     cross_0, cross_1 = ox * sy - oy * sx, ox * ry - oy * rx
     b_0, b_1 = ox * sx + oy * sy, ox * rx + oy * ry
@@ -142,10 +142,10 @@ def capsule_row(
     depth: Depths,
     surfaces: Surfaces,
 ) -> None:
-    """Draw a capsule about the z axis into a row.
+    """Intersect a row of rays with a capsule about the z axis.
 
-    A ray enters the endless rod beside the capsule or beyond one end; in the second case only the
-    cap of that end can be hit first.
+    A ray enters the infinite cylinder between the caps or beyond one of them; in the second case
+    only that cap can be hit first.
     """
     (ox, oy, oz), (sx, sy, sz), (rx, ry, rz) = eye, start, right
     cross_0, cross_1 = ox * sy - oy * sx, ox * ry - oy * rx

@@ -1,4 +1,4 @@
-"""Triangle meshes over the frames of objects, as data; `skinning` moves them."""
+"""Triangle meshes bound to the frames of objects, as data; `skinning` deforms them."""
 
 from __future__ import annotations
 
@@ -17,18 +17,19 @@ INFLUENCES = 2
 
 @dataclass(frozen=True, eq=False)
 class Mesh:
-    """A skin over the frames of one object.
+    """A mesh bound to the frames of one object.
 
     Attributes:
         frames: ``(V, 2)`` indices among the object's frames that each vertex follows.
-        weights: ``(V, 2)`` how much it follows each, summing to 1.
-        offsets: ``(V, 2, 3)`` the vertex in either frame at the time of binding, metres.
+        weights: ``(V, 2)`` weights of the two frames, summing to 1.
+        offsets: ``(V, 2, 3)`` position of the vertex in either frame in the binding pose, metres.
         triangles: ``(T, 3)`` vertices, counter-clockwise seen from outside.
-        owners: ``(T,)`` the frame that each triangle belongs to, for hiding a part.
+        owners: ``(T,)`` the frame that each triangle belongs to, so that a part can be hidden.
         colours: ``(T, 3)`` red, green, blue in [0, 1].
 
     Raises:
-        ValueError: If the arrays do not fit together.
+        ValueError: If the shapes of the arrays do not match, weights do not sum to 1 or a triangle
+            has a vertex that does not exist.
     """
 
     frames: Indices
@@ -58,7 +59,7 @@ class Mesh:
 
 
 class MeshTable(NamedTuple):
-    """All meshes of a scene, one row per vertex or triangle, as the renderer's loops read them.
+    """All meshes of a scene, one row per vertex or triangle, for compiled loops.
 
     Attributes:
         frames: ``(V, 2)`` rows in the scene's frame table.
@@ -67,11 +68,11 @@ class MeshTable(NamedTuple):
         triangles: ``(T, 3)`` rows of vertices.
         vertices: ``(V, 3)`` metres, world frame, as of the last `Scene.update`.
         normals: ``(V, 3)`` outward unit vectors, likewise.
-        first_vertices: ``(M + 1,)`` where each mesh's vertices begin, and where the last one's end.
+        first_vertices: ``(M + 1,)`` first vertex of each mesh, and the number of vertices.
         first_triangles: ``(M + 1,)`` likewise.
-        lower: ``(M, 3)`` metres, the corner of a box round each mesh, as of the last
-            `Scene.update`.
-        upper: ``(M, 3)`` its other corner.
+        lower: ``(M, 3)`` metres, lower corner of each mesh's axis-aligned bounding box, as of the
+            last `Scene.update`.
+        upper: ``(M, 3)`` its upper corner.
     """
 
     frames: Indices
@@ -103,7 +104,7 @@ def empty_meshes() -> MeshTable:
 
 
 def with_mesh(table: MeshTable, mesh: Mesh, first_row: int) -> MeshTable:
-    """Return a table with one mesh more, on the frames from `first_row` on."""
+    """Return the table with a mesh appended whose frames start at `first_row`."""
     count = len(mesh.frames)
     more = (
         mesh.frames + first_row,

@@ -11,11 +11,11 @@ Floats = NDArray[np.float64]
 
 
 class Pose(NamedTuple):
-    """Where something is and how it is turned.
+    """Position and orientation in the world or on another frame.
 
     Attributes:
-        position: ``(3,)`` metres, world frame.
-        rotation: ``(3, 3)`` matrix from the local frame to the world: ``world = rotation @ local``.
+        position: ``(3,)`` metres.
+        rotation: ``(3, 3)`` matrix from the local axes to the outer: ``outer = rotation @ local``.
     """
 
     position: Floats
@@ -23,10 +23,10 @@ class Pose(NamedTuple):
 
     @property
     def forward(self) -> Floats:
-        """``(3,)`` unit vector in the world frame: the local x axis, the front of a bone."""
+        """``(3,)`` unit vector: the local x axis, the front of a bone."""
         return np.array(self.rotation[:, 0])
 
     @property
     def up(self) -> Floats:
-        """``(3,)`` unit vector in the world frame: the local z axis."""
+        """``(3,)`` unit vector: the local z axis."""
         return np.array(self.rotation[:, 2])

@@ -15,13 +15,13 @@ from veca_marl.sim.geometry.pose import Floats
 
 @njit(cache=True)
 def quaternions_to_matrices(quaternions: Floats, out: Floats) -> None:
-    """Write the rotation matrices of quaternions as Bullet does, to the last bit.
+    """Write the rotation matrices of quaternions, bit-equal to Bullet's.
 
     Source: Shoemake, "Animating rotation with quaternion curves", SIGGRAPH 1985, in the order of
     operations of Bullet's `btMatrix3x3::setRotation`.
 
     Args:
-        quaternions: ``(N, 4)`` (x, y, z, w), not all 0; length does not matter.
+        quaternions: ``(N, 4)`` (x, y, z, w), not all 0, of any length.
         out: ``(N, 3, 3)``, written in place.
     """
     for n in range(quaternions.shape[0]):
@@ -48,26 +48,26 @@ def rotation_with_z(axis: Floats) -> Floats:
 
 
 def cross(a: Sequence[float] | Floats, b: Sequence[float] | Floats) -> Floats:
-    """Return the cross product of two single vectors, at a tenth of the price of numpy's."""
+    """Return the cross product of two vectors ``(3,)``, in a tenth of the time of numpy's."""
     (ax, ay, az), (bx, by, bz) = (v.tolist() if isinstance(v, np.ndarray) else v for v in (a, b))
     return np.array((ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx))
 
 
 def quaternion_from_yaw(yaw_rad: float) -> tuple[float, float, float, float]:
-    """Return the quaternion of a turn about the world's vertical, positive to the left."""
+    """Return the quaternion of a rotation about the world's vertical, positive to the left."""
     return (0.0, 0.0, math.sin(0.5 * yaw_rad), math.cos(0.5 * yaw_rad))
 
 
-def turn_about_vertical(yaw_rad: float) -> Floats:
-    """Return the matrix ``(3, 3)`` of a turn about the world's vertical, positive to the left."""
+def rotation_about_vertical(yaw_rad: float) -> Floats:
+    """Return the matrix ``(3, 3)`` of a rotation about the vertical, positive to the left."""
     c, s = math.cos(yaw_rad), math.sin(yaw_rad)
     return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
 def heading_rad(rotation: Floats) -> float:
-    """Return the turn about the vertical that is in a rotation ``(3, 3)`` (swing and twist).
+    """Return the twist about the vertical of a rotation ``(3, 3)`` (swing-twist decomposition).
 
-    Defined for all attitudes but exactly upside down.
+    Defined for all orientations but exactly upside down.
     """
     return math.atan2(rotation[1, 0] - rotation[0, 1], rotation[0, 0] + rotation[1, 1])
 
@@ -75,8 +75,8 @@ def heading_rad(rotation: Floats) -> float:
 def matrix_to_quaternion(rotation: NDArray[Any]) -> Floats:
     """Return the unit quaternion ``(4,)`` with ``w >= 0`` of a ``(3, 3)`` rotation matrix.
 
-    Solves for the greatest of the four components first, so no sign or scale is lost near half
-    turns. Source: Shepperd, "Quaternion from rotation matrix", J. Guidance and Control 1978.
+    Solves for the greatest of the four components first, which is accurate near half turns as
+    well. Source: Shepperd, "Quaternion from rotation matrix", J. Guidance and Control 1978.
     """
     r = np.asarray(rotation, dtype=np.float64)
     diagonal = np.array([r[0, 0], r[1, 1], r[2, 2], r[0, 0] + r[1, 1] + r[2, 2]])

@@ -1,7 +1,7 @@
-"""The world as eyes and skin meet it: objects made of primitives, and skins, on moving frames.
+"""The scene that vision and touch read: objects of primitives and meshes on moving frames.
 
 The owner of an object (the world for props, a body for its bones) writes the poses of its frames
-into the scene's tables; `Scene.update` then carries every primitive and every mesh to its place.
+into the scene's tables; `Scene.update` then computes the poses of all primitives and meshes.
 """
 
 from __future__ import annotations
@@ -15,33 +15,33 @@ from numpy.typing import NDArray
 
 from veca_marl.sim.geometry.meshes import Mesh, empty_meshes, with_mesh
 from veca_marl.sim.geometry.pose import Floats
-from veca_marl.sim.geometry.skinning import skin
+from veca_marl.sim.geometry.skinning import deform_meshes
 from veca_marl.sim.geometry.tables import (
     Bools,
     Geom,
     GeomTable,
     SurfaceTable,
+    appended,
     check_colour,
     compose,
     geom_table,
-    joined,
 )
 
-MOST_SURFACES = int(np.iinfo(np.int16).max)  # a picture stores rows and ids in 16 bits
+MAX_SURFACES = int(np.iinfo(np.int16).max)  # images store rows and ids in 16 bits
 
 
 class Scene:
-    """Objects, the frames they hang on and the primitives they are made of.
+    """Objects, their frames, and the primitives and meshes on these.
 
-    `positions` and `rotations` are the frame table. They are views that `add_object` replaces:
-    look them up (or an object's slice of them) at each use and do not keep them over an addition.
+    `positions` and `rotations` are the frame table. `add_object` replaces them: look them up (or
+    an object's slice of them) at each use.
 
     Attributes:
         objects: The objects in order of their ids.
         geoms: The table of primitives; replaced by `add_object`.
-        meshes: The table of skins; likewise.
+        meshes: The table of meshes; likewise.
         surfaces: What pixels can show; likewise.
-        version: Counts the changes, so that what was seen of an older state can be told.
+        version: Counts the changes: what was computed from an older version is outdated.
     """
 
     def __init__(self) -> None:
@@ -55,23 +55,23 @@ class Scene:
 
     @property
     def positions(self) -> Floats:
-        """``(F, 3)`` metres: where each frame is in the world. The owners write into it."""
+        """``(F, 3)`` metres: positions of the frames in the world, written by their owners."""
         return self._positions
 
     @property
     def rotations(self) -> Floats:
-        """``(F, 3, 3)``: each frame's axes to the world's. The owners write into it."""
+        """``(F, 3, 3)``: rotations of the frames to the world, written by their owners."""
         return self._rotations
 
     def add_object(
         self, name: str, frames: Sequence[Sequence[Geom]], mesh: Mesh | None = None
     ) -> SceneObject:
-        """Add an object whose frames start at the world's origin.
+        """Add an object with its frames at the world's origin.
 
         Args:
             name: Unique in the scene.
             frames: The primitives on each of its frames; a frame may be empty.
-            mesh: A skin over those frames.
+            mesh: A mesh bound to those frames.
 
         Raises:
             ValueError: If the name is taken, there is no frame, or the scene is full.
@@ -84,9 +84,10 @@ class Scene:
         first_vertex, first_triangle = len(self.meshes.vertices), len(self.meshes.triangles)
         total = len(self.surfaces.objects) + sum(map(len, frames))
         total += 0 if mesh is None else len(mesh.triangles)
-        if total > MOST_SURFACES:
+        if total > MAX_SURFACES:
             raise ValueError(
-                f"{name!r} makes {total} primitives and triangles: a scene holds {MOST_SURFACES}"
+                f"with object {name!r} there are {total} primitives and triangles: "
+                f"a scene holds at most {MAX_SURFACES}"
             )
         self._add_surfaces(geom_table(frames, len(self.objects), first_row), mesh)
         self._positions = np.concatenate((self._positions, np.zeros((len(frames), 3))))
@@ -105,22 +106,22 @@ class Scene:
         return item
 
     def _add_surfaces(self, added: GeomTable, mesh: Mesh | None) -> None:
-        """Put primitives below the primitives and triangles below the triangles."""
+        """Append primitives to the primitives and triangles to the triangles."""
         count, first_row = len(self.geoms.shapes), len(self._positions)
-        self.geoms = joined(self.geoms, added)
+        self.geoms = appended(self.geoms, added)
         old: tuple[NDArray[Any], ...] = self.surfaces
         new: tuple[NDArray[Any], ...] = (added.colours, added.objects, added.frames)
-        skins: tuple[NDArray[Any], ...] = tuple(column[:0] for column in old)
+        triangles: tuple[NDArray[Any], ...] = tuple(column[:0] for column in old)
         if mesh is not None:
             ids = np.full(len(mesh.owners), len(self.objects), np.int16)
-            skins = (mesh.colours, ids, mesh.owners + first_row)
+            triangles = (mesh.colours, ids, mesh.owners + first_row)
             self.meshes = with_mesh(self.meshes, mesh, first_row)
         columns: list[Any] = [
-            np.concatenate((rows[:count], geoms, rows[count:], triangles))
-            for rows, geoms, triangles in zip(old, new, skins, strict=True)
+            np.concatenate((rows[:count], geom_rows, rows[count:], triangle_rows))
+            for rows, geom_rows, triangle_rows in zip(old, new, triangles, strict=True)
         ]
         self.surfaces = SurfaceTable(*columns)
-        # one memory: who paints a primitive paints the surface
+        # shared memory: painting a primitive paints its surface
         self.geoms = self.geoms._replace(colours=self.surfaces.colours[: len(self.geoms.shapes)])
 
     def find(self, name: str) -> SceneObject:
@@ -137,23 +138,23 @@ class Scene:
         )
 
     def update(self) -> None:
-        """Carry everything to where its frames are now. The world calls it once per step."""
+        """Compute all primitives and meshes from the frames. The world calls it once per step."""
         g = self.geoms
         compose(
             self._positions,
             self._rotations,
             g.frames,
             g.offsets,
-            g.turns,
+            g.local_rotations,
             g.positions,
             g.rotations,
         )
         if len(self.meshes.vertices):
-            skin(self.meshes, self._positions, self._rotations)
+            deform_meshes(self.meshes, self._positions, self._rotations)
         self.version += 1
 
     def hidden(self, object_id: int, frames: Sequence[int]) -> Bools:
-        """Return a mask ``(S,)`` that is true for the surfaces on some frames of an object.
+        """Return a mask ``(S,)`` that is true for all surfaces on the given frames of an object.
 
         Args:
             object_id: Which object.
@@ -173,14 +174,14 @@ class Scene:
 
 @dataclass(frozen=True, eq=False)
 class SceneObject:
-    """One named thing in a scene.
+    """One named object in a scene.
 
     Attributes:
         id: Its value in segmentation images.
         name: Unique in the scene.
         rows: Its rows in the frame table.
         geoms: Its rows in the table of primitives.
-        vertices: Its rows in the table of skins; none if it has no skin.
+        vertices: Its rows in the table of meshes; none if it has no mesh.
         triangles: Likewise.
         scene: The scene it is in.
     """
@@ -195,16 +196,16 @@ class SceneObject:
 
     @property
     def positions(self) -> Floats:
-        """``(frames, 3)`` metres: a view for the owner to write into; do not keep it."""
+        """``(frames, 3)`` metres: a view that the owner writes into; `add_object` replaces it."""
         return self.scene.positions[self.rows]
 
     @property
     def rotations(self) -> Floats:
-        """``(frames, 3, 3)``: a view for the owner to write into; do not keep it."""
+        """``(frames, 3, 3)``: a view that the owner writes into; `add_object` replaces it."""
         return self.scene.rotations[self.rows]
 
     def paint(self, colour: tuple[float, float, float]) -> None:
-        """Give all its primitives one colour ``(red, green, blue)`` in [0, 1]."""
+        """Set the colour ``(red, green, blue)`` in [0, 1] of all its primitives."""
         check_colour(colour)
         self.scene.geoms.colours[self.geoms] = colour
         self.scene.version += 1

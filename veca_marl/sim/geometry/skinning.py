@@ -1,7 +1,7 @@
-"""Linear blend skinning: meshes ride on frames and bend at the joints.
+"""Linear blend skinning: meshes follow frames and bend at the joints.
 
-Each vertex follows at most two frames: ``x = sum_k w_k (R_k o_k + t_k)``, where o_k is its place in
-frame k at the time of binding (Magnenat-Thalmann, Laperriere & Thalmann 1988, "Joint-dependent
+Each vertex follows at most two frames: ``x = sum_k w_k (R_k o_k + t_k)``, where o_k is its position
+in frame k in the binding pose (Magnenat-Thalmann, Laperriere & Thalmann 1988, "Joint-dependent
 local deformations for hand animation and object grasping").
 """
 
@@ -16,17 +16,17 @@ from veca_marl.sim.geometry.pose import Floats
 
 
 @njit(cache=True)
-def skin(meshes: MeshTable, positions: Floats, rotations: Floats) -> None:
-    """Carry all vertices along with their frames, find the normals and the boxes round the meshes.
+def deform_meshes(meshes: MeshTable, positions: Floats, rotations: Floats) -> None:
+    """Compute all vertices from their frames, then the normals and the bounding boxes.
 
     Args:
         meshes: `vertices`, `normals`, `lower` and `upper` are written.
         positions: ``(F, 3)`` the scene's frames, metres.
-        rotations: ``(F, 3, 3)`` their axes to the world's.
+        rotations: ``(F, 3, 3)`` from their axes to the world's.
     """
     blend(meshes.frames, meshes.weights, meshes.offsets, positions, rotations, meshes.vertices)
-    _turn_normals(meshes.triangles, meshes.vertices, meshes.normals)
-    _bound(meshes)
+    _write_normals(meshes.triangles, meshes.vertices, meshes.normals)
+    _write_bounds(meshes)
 
 
 @njit(cache=True)
@@ -38,7 +38,7 @@ def blend(
     rotations: Floats,
     vertices: Floats,
 ) -> None:
-    """Linear blend skinning: write ``(V, 3)`` vertices; see `Mesh` for the arguments."""
+    """Write the vertices ``(V, 3)``; see `Mesh` for the other arguments."""
     for v in range(frames.shape[0]):
         x = y = z = 0.0
         for k in range(frames.shape[1]):
@@ -55,8 +55,8 @@ def blend(
 
 
 @njit(cache=True)
-def _turn_normals(triangles: Indices, vertices: Floats, normals: Floats) -> None:
-    """Mean of the normals of the triangles round each vertex, weighted by their areas."""
+def _write_normals(triangles: Indices, vertices: Floats, normals: Floats) -> None:
+    """Mean of the normals of the triangles at each vertex, weighted by their areas."""
     normals[:] = 0.0
     for t in range(triangles.shape[0]):
         a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
@@ -76,8 +76,8 @@ def _turn_normals(triangles: Indices, vertices: Floats, normals: Floats) -> None
 
 
 @njit(cache=True)
-def _bound(meshes: MeshTable) -> None:
-    """Find the box along the world's axes round each mesh."""
+def _write_bounds(meshes: MeshTable) -> None:
+    """Axis-aligned bounding box of each mesh."""
     for m in range(meshes.lower.shape[0]):
         meshes.lower[m] = math.inf
         meshes.upper[m] = -math.inf

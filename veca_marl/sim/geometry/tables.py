@@ -56,7 +56,7 @@ def check_colour(colour: Sequence[float]) -> None:
 
 
 class GeomTable(NamedTuple):
-    """All primitives of a scene, one row each, as the renderer's loops read them.
+    """All primitives of a scene, one row each, for compiled loops.
 
     Attributes:
         shapes: ``(G,)`` int32 `Shape`.
@@ -70,9 +70,9 @@ class GeomTable(NamedTuple):
         objects: ``(G,)`` int16 id of the object it belongs to.
         frames: ``(G,)`` int64 row in the frame table.
         offsets: ``(G, 3)`` metres, in the frame.
-        turns: ``(G, 3, 3)`` from the primitive's axes to the frame's.
+        local_rotations: ``(G, 3, 3)`` from the primitive's axes to the frame's.
         positions: ``(G, 3)`` metres, world frame, as of the last `Scene.update`.
-        rotations: ``(G, 3, 3)`` to the world, as of the last `Scene.update`.
+        rotations: ``(G, 3, 3)`` from the primitive's axes to the world's, likewise.
     """
 
     shapes: NDArray[np.int32]
@@ -86,16 +86,16 @@ class GeomTable(NamedTuple):
     objects: NDArray[np.int16]
     frames: NDArray[np.int64]
     offsets: Floats
-    turns: Floats
+    local_rotations: Floats
     positions: Floats
     rotations: Floats
 
 
 class SurfaceTable(NamedTuple):
-    """Everything a pixel can show: first the rows of primitives, then those of triangles.
+    """Everything that a pixel can show: first all primitives, then all triangles.
 
     Attributes:
-        colours: ``(S, 3)`` float32; the rows of primitives are also `GeomTable.colours`.
+        colours: ``(S, 3)`` float32; those of primitives share memory with `GeomTable.colours`.
         objects: ``(S,)`` int16 id of the object.
         frames: ``(S,)`` int64 row in the frame table.
     """
@@ -106,7 +106,13 @@ class SurfaceTable(NamedTuple):
 
 
 def geom_table(frames: Sequence[Sequence[Geom]], object_id: int, first_row: int) -> GeomTable:
-    """Lay the primitives of one object out as rows."""
+    """Return the primitives of one object as rows.
+
+    Args:
+        frames: The primitives on each of its frames.
+        object_id: Id of the object.
+        first_row: Row of its first frame in the scene's frame table.
+    """
     geoms = [geom for frame in frames for geom in frame]
     rows = [first_row + row for row, frame in enumerate(frames) for _ in frame]
     n = len(geoms)
@@ -114,7 +120,7 @@ def geom_table(frames: Sequence[Sequence[Geom]], object_id: int, first_row: int)
     for row, geom in enumerate(geoms):
         sizes[row, : len(geom.size)] = geom.size
     offsets = np.array([geom.offset for geom in geoms], np.float64).reshape(n, 3)
-    turns = np.array([geom.rotation for geom in geoms], np.float64).reshape(n, 3, 3)
+    rotations = np.array([geom.rotation for geom in geoms], np.float64).reshape(n, 3, 3)
     return GeomTable(
         shapes=np.array([geom.shape for geom in geoms], np.int32),
         sizes=sizes,
@@ -127,14 +133,14 @@ def geom_table(frames: Sequence[Sequence[Geom]], object_id: int, first_row: int)
         objects=np.full(n, object_id, np.int16),
         frames=np.array(rows, np.int64),
         offsets=offsets,
-        turns=turns,
+        local_rotations=rotations,
         positions=offsets.copy(),
-        rotations=turns.copy(),
+        rotations=rotations.copy(),
     )
 
 
-def joined(table: GeomTable, more: GeomTable) -> GeomTable:
-    """Put the rows of one table below those of another."""
+def appended(table: GeomTable, more: GeomTable) -> GeomTable:
+    """Return a table with the rows of another one below its own."""
     above: tuple[NDArray[Any], ...] = table
     below: tuple[NDArray[Any], ...] = more
     columns: list[Any] = [np.concatenate(pair) for pair in zip(above, below, strict=True)]
@@ -147,11 +153,11 @@ def compose(
     frame_rotations: Floats,
     frames: NDArray[np.int64],
     offsets: Floats,
-    turns: Floats,
+    local_rotations: Floats,
     positions: Floats,
     rotations: Floats,
 ) -> None:
-    """World pose of each primitive = pose of its frame x its place on the frame."""
+    """Write the world pose of each primitive: pose of its frame times its pose on the frame."""
     for g in range(frames.shape[0]):
         f = frames[g]
         for i in range(3):
@@ -162,5 +168,5 @@ def compose(
             for j in range(3):
                 total = 0.0
                 for k in range(3):
-                    total += frame_rotations[f, i, k] * turns[g, k, j]
+                    total += frame_rotations[f, i, k] * local_rotations[g, k, j]
                 rotations[g, i, j] = total

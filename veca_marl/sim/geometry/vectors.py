@@ -1,4 +1,4 @@
-"""Small vectors as compiled loops pass them: tuples of numbers, which cost no allocation."""
+"""Small vectors in compiled loops: tuples of numbers, which need no allocation."""
 
 from __future__ import annotations
 

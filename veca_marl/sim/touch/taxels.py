@@ -19,7 +19,7 @@ from veca_marl.sim.body.anatomy.skin_mesh import binding_pose, load_skin
 from veca_marl.sim.geometry.meshes import Indices, Mesh, empty_meshes, with_mesh
 from veca_marl.sim.geometry.pose import Floats
 from veca_marl.sim.geometry.signed_distances import distances_to
-from veca_marl.sim.geometry.skinning import skin
+from veca_marl.sim.geometry.skinning import deform_meshes
 
 # "in triangle formation" (the paper, section on tactile perception): three near the corners, three
 # near the middles of the edges, none on an edge, so that no two triangles share one
@@ -135,7 +135,7 @@ def _depths(mesh: Mesh) -> Floats:
     skeleton = load_skeleton()
     positions, rotations = binding_pose(skeleton)
     bound = with_mesh(empty_meshes(), mesh, 0)
-    skin(bound, positions, rotations)
+    deform_meshes(bound, positions, rotations)
     corners = bound.vertices[mesh.triangles]
     points, normals = _on_triangles(corners), _normals(corners)
     depths = np.zeros(points.shape[:2])

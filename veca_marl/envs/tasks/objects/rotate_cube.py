@@ -10,7 +10,7 @@ import numpy as np
 from veca_marl.envs.core.scoring import rotation_angle_rad
 from veca_marl.envs.core.task import Player, Task, TaskCfg, register, require_humanoid, terms
 from veca_marl.sim.body.humanoid.postures import OFFERING
-from veca_marl.sim.geometry.rotations import turn_about_vertical
+from veca_marl.sim.geometry.rotations import rotation_about_vertical
 from veca_marl.sim.physics.props import PropCfg, PropShape
 
 _GAP_M = 0.001  # between the cube and the skin of the palm at the start
@@ -98,7 +98,7 @@ class RotateCube(Task):
         turned = math.radians(rng.uniform(-self.cfg.start_deg, self.cfg.start_deg))
         hand_rad = math.radians(-OFFERING.joints_deg[SHOULDER])
         self.cube.place(self.child.palms()[1] + above, hand_rad + turned)
-        turn = turn_about_vertical(math.radians(self.cfg.turn_deg))
+        turn = rotation_about_vertical(math.radians(self.cfg.turn_deg))
         self.target = turn @ self.cube.rotation
         self._angle_rad = self._start_rad = self.angle_rad
         self._progress_rad = 0.0

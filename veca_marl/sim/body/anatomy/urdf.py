@@ -24,7 +24,7 @@ import numpy as np
 from veca_marl.sim.body.anatomy.hulls import as_obj, surface_points
 from veca_marl.sim.body.anatomy.skeleton import Bone, Joint, Skeleton
 from veca_marl.sim.body.anatomy.skin_springs import SkinLayer, is_finger, skin_layer, skin_spring
-from veca_marl.sim.geometry.inertia import Inertia, joined
+from veca_marl.sim.geometry.inertia import Inertia, joined_inertia
 from veca_marl.sim.geometry.pose import Floats, Pose
 from veca_marl.sim.geometry.primitives import Primitive
 from veca_marl.sim.physics.collision_shapes import urdf_geometry
@@ -121,7 +121,7 @@ class _Writer:
         members = self._members(index)
         layers, light = self._layers(bone, members), _LIGHT_SHARE * bone.mass_kg
         links = max(bone.joint_count - 1, 0) + len(layers) - 1
-        whole = joined([(pose, part.inertia()) for part, pose in members])
+        whole = joined_inertia([(pose, part.inertia()) for part, pose in members])
         own = whole._replace(mass_kg=whole.mass_kg - links * light)
         text = self._hinges(bone, light)
         text += self._link(layers[0], own, self._rotor(bone), bone)
