@@ -47,7 +47,7 @@ def play(cfg: GameCfg, first: Script, others: Script | None, seed: int) -> tuple
             script = first if player in ours or others is None else others
             game.play_script(player, script)
         outcome = game.advance()
-        paid += float(np.mean([game.pay(outcome.terms[player.name]) for player in ours]))
+        paid += float(np.mean([game.reward_of(outcome.terms[player.name]) for player in ours]))
         over = outcome.done
     game.close()
     return paid, outcome.terminated

@@ -59,7 +59,7 @@ def episode(game: Game, play: Script | Callable[[Game, Player], Command], seed: 
             attacker.body.act(attacker.body.encode(play(game, attacker)))
         game.play_script(defender, Script.random)
         outcome = game.advance()
-        paid += game.pay(outcome.terms[attacker.name])
+        paid += game.reward_of(outcome.terms[attacker.name])
         if outcome.done:
             return paid, outcome.terminated
 

@@ -33,16 +33,16 @@ def write_pictures(folder: Path) -> None:
         task_picture(name, folder / "tasks" / f"{name}.png")
 
 
-def started(task: str, seed: int) -> tuple[VecaEnv, Game, np.random.Generator]:
-    """Return an environment, its one game at the start of an episode, and a generator."""
-    env, rng = make(task, seed=seed), np.random.default_rng(seed)
-    env.games[0].reset(rng)
-    return env, env.games[0], rng
+def started(task: str, seed: int) -> tuple[VecaEnv, Game]:
+    """Return an environment and its only game at the start of an episode."""
+    env = make(task, seed=seed)
+    env.games[0].reset(np.random.default_rng(seed))
+    return env, env.games[0]
 
 
 def task_picture(task: str, path: Path) -> None:
     """Draw the start of an episode from inside the room, above the agents."""
-    env, game, rng = started(task, seed=1)
+    env, game = started(task, seed=1)
     if isinstance(game.players[0].body, Walker):
         for _ in range(25):  # one second, in which the ball of KickTheBall appears
             game.step(
@@ -50,7 +50,6 @@ def task_picture(task: str, path: Path) -> None:
                     player.name: np.zeros(player.body.action_spec.shape, np.float32)
                     for player in game.actors
                 },
-                rng,
             )
     camera = Camera(640, 400, fov_deg=48.0)
     image = camera.render(game.world.scene, [look_at(*viewpoint(game))]).rgb[0]
@@ -82,16 +81,16 @@ def viewpoint(game: Game) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
 
 def perception_picture(path: Path) -> None:
     """Draw the observation of one agent at one moment of KickTheBall."""
-    env, game, rng = started("KickTheBall", seed=3)
+    env, game = started("KickTheBall", seed=3)
     player = game.players[0]
     # the ball ahead, to the left, in view of both eyes
     player.body.place((0.6, -0.2, 0.0), yaw_rad=1.95)
     game.task.ball.place((-0.35, 0.95, 0.15), velocity=(0.1, -0.1, 0.0))
     observation = game.observe(player)
     for _ in range(6):
-        game.step({player.name: np.zeros(2, np.float32)}, rng)
+        game.step({player.name: np.zeros(2, np.float32)})
         observation = game.observe(player)
-    draw_perception(env.spectator.frame(observation), observation["audio"], path)
+    draw_perception(env.render(), observation["audio"], path)
     env.close()
 
 
@@ -114,11 +113,11 @@ def draw_perception(frame: NDArray[np.uint8], audio: NDArray[np.float32], path: 
 
 def touch_picture(path: Path) -> None:
     """Draw a child that lies on its back beside the readings of its taxels."""
-    env, game, rng = started("TurnBaby", seed=2)
+    env, game = started("TurnBaby", seed=2)
     player = game.players[0]
     for _ in range(50):
         player.body.rest()
-        game.advance(rng)
+        game.advance()
     scene, middle = game.world.scene, player.body.position
     camera = Camera(480, 360, fov_deg=34.0)
     beside = look_at(middle + np.array([0.8, 0.9, 0.7]), middle)

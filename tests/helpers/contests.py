@@ -35,7 +35,7 @@ def episodes(game, count, **scripts):
 
 
 def paid_in_all(game, outcome):
-    return sum(game.pay(terms) for terms in outcome.terms.values())
+    return sum(game.reward_of(terms) for terms in outcome.terms.values())
 
 
 def rest(game, seconds=0.04):

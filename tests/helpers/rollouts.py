@@ -89,7 +89,7 @@ def returns(cfg, episodes, script, seed=0):
             for player in game.actors:
                 game.play_script(player, script)
             outcome = game.advance()
-            total += float(np.mean([game.pay(outcome.terms[p.name]) for p in game.actors]))
+            total += float(np.mean([game.reward_of(outcome.terms[p.name]) for p in game.actors]))
             over = outcome.done
         paid.append(total)
     game.close()

@@ -57,7 +57,7 @@ def check_score(reward, terminated, truncated, info, row):
     assert np.float32(reward) == row["reward"].item()
     assert (terminated, truncated) == (row["terminated"].item(), row["truncated"].item())
     assert {name: np.float32(value) for name, value in info["terms"].items()} == {
-        name: value.item() for name, value in row["terms"].items()
+        name: value.item() for name, value in row["info"].items()
     }
 
 

@@ -135,7 +135,7 @@ def test_it_starts_from_every_seed(task):
 def test_the_reward_is_the_weighted_sum_of_the_terms(env, rollout):
     weights = env.games[0].weights
     for team in env.group_map:
-        terms = rollout["next", team, "terms"]
+        terms = rollout["next", team, "info"]
         assert set(terms.keys()) == set(weights)
         paid = sum(weight * terms[name] for name, weight in weights.items())
         torch.testing.assert_close(rollout["next", team, "reward"], paid)

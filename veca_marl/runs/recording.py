@@ -41,7 +41,7 @@ def record_episode(path: Path, game: GameCfg, policy: ActionPolicy, seed: int) -
         while not done:
             played, state = playing.step_and_maybe_reset(policy(state))
             seen = _first_player(played["next"], env)
-            frames.append(env.spectator.frame(seen))
+            frames.append(env.spectators[0].frame(seen))
             if "waveform" in seen:
                 sound.append(seen["waveform"])
             done = bool(played["next", "done"].all())

@@ -5,6 +5,7 @@ from functools import partial
 import numpy as np
 import pytest
 import torch
+from tensordict import TensorDict
 from torch import multiprocessing
 from torchrl.collectors import MultiSyncCollector
 from torchrl.envs import ParallelEnv, check_env_specs
@@ -38,7 +39,7 @@ def test_shapes_are_worlds_by_players_by_what_it_is(env):
     assert played["agents", "action"].shape == (3, 1, 2)
     assert played["next", "agents", "observation", "audio"].shape == (3, 1, 2, 250)
     assert played["next", "agents", "reward"].shape == (3, 1, 1)
-    assert played["next", "agents", "terms", "kick"].shape == (3, 1, 1)
+    assert played["next", "agents", "info", "kick"].shape == (3, 1, 1)
     assert played["next", "done"].shape == (3, 1)
 
 
@@ -77,7 +78,7 @@ def test_the_reward_of_a_step_is_that_of_its_terms(env):
     state = env.reset()
     for _ in range(5):
         state = env.step(env.rand_action(state))["next"]
-        terms = state["agents", "terms"]
+        terms = state["agents", "info"]
         paid = terms["kick"] * 1.0 + terms["approach"] * 0.01
         torch.testing.assert_close(state["agents", "reward"], paid)
 
@@ -160,6 +161,57 @@ def test_a_rollout_goes_on_until_all_worlds_are_done():
     assert rollout["next", "done"][:, -1].all()
     first = rollout["next", "done"].squeeze(-1).int().argmax(1)
     assert first[0] < first[1:].max()
+    env.close()
+
+
+def test_reward_terms_are_information_and_not_observation(env):
+    spec = env.full_observation_spec["agents"]
+    assert set(spec.keys()) == {"observation", "info"}
+    assert set(spec["info"].keys()) == {"kick", "approach"}
+    assert set(spec["observation"].keys()) == {"audio"}
+
+
+@pytest.mark.parametrize("device", ["cpu", "meta"])
+def test_data_are_on_the_device_of_the_env(device):
+    """There are no numbers on the device meta, but a tensor is there only if it was moved."""
+    env = VecaEnv(cfg_of(*CHEAP), worlds=2, seed=1).to(device)
+    spec = env.full_action_spec["agents", "action"]
+    assert spec.device == torch.device(device)
+    action = TensorDict({"agents": {"action": torch.zeros(spec.shape)}}, [2])
+    for played in (env._reset(), env._step(action)):
+        assert played.device == torch.device(device)
+        for key, value in played.items(True, True):
+            assert value.device == torch.device(device), key
+    env.close()
+
+
+@pytest.mark.skipif(not torch.cuda.is_available(), reason="needs CUDA")
+def test_an_env_on_cuda_is_that_on_the_cpu():
+    rollouts = []
+    for device in ("cpu", "cuda"):
+        env = VecaEnv(cfg_of(*CHEAP), worlds=2, seed=1).to(device)
+        check_env_specs(env)
+        env.set_seed(1)
+        action = torch.full(env.full_action_spec["agents", "action"].shape, 0.5, device=device)
+        policy = partial(TensorDict.set, key=("agents", "action"), item=action)
+        rollouts.append(env.rollout(15, policy, break_when_any_done=False, trust_policy=True))
+        env.close()
+    assert (rollouts[0] == rollouts[1].cpu()).all()
+
+
+def test_a_picture_of_each_world_shows_the_senses_and_the_room():
+    env = VecaEnv(cfg_of("playground=simple"), worlds=2, seed=1)
+    with pytest.raises(RuntimeError, match=r"call reset\(\)"):
+        env.render()
+    state = env.reset()
+    first, second = env.render(), env.render(1)
+    assert (first.shape[0], first.shape[2], first.dtype) == (252, 3, np.uint8)
+    assert (first != second).any()
+    left = state["agents", "observation", "vision"][0, 0, 0].permute(1, 2, 0).numpy()
+    np.testing.assert_array_equal(first[1::3, 1:252:3], left)
+    np.testing.assert_array_equal(env.render(), first)
+    with pytest.raises(IndexError, match="world=2; there are 2 worlds"):
+        env.render(2)
     env.close()
 
 

@@ -5,7 +5,7 @@ import pytest
 import torch
 from torchrl.data import Bounded, Categorical, Unbounded
 
-from veca_marl.envs.adapters.torchrl.specs import done_spec, observation_spec, to_torchrl
+from veca_marl.envs.adapters.torchrl.specs import action_spec, done_spec, to_torchrl
 from veca_marl.sim.spec import ArraySpec
 
 
@@ -38,12 +38,14 @@ def test_a_choice_is_categorical():
     assert not spec.is_in(torch.full((4, 3), 7))
 
 
-def test_a_team_observes_its_senses_and_its_terms():
-    senses = {"audio": ArraySpec((2, 250), np.float32, -8.0)}
-    spec = observation_spec(senses, ("kick", "approach"), 4, 2)
-    assert spec["observation", "audio"].shape == (4, 2, 2, 250)
-    assert set(spec["terms"].keys()) == {"kick", "approach"}
-    assert spec["terms", "kick"].shape == (4, 2, 1)
+def test_an_action_of_several_parts_is_a_composite():
+    parts = {"move": ArraySpec((2,), np.float32, -1.0, 1.0), "voice": ArraySpec((), np.int64, 0, 4)}
+    several = action_spec(parts, (4, 3))["action"]
+    assert {part: leaf.shape for part, leaf in several.items()} == {
+        "move": (4, 3, 2),
+        "voice": (4, 3),
+    }
+    assert isinstance(action_spec({"move": parts["move"]}, (4, 3))["action"], Bounded)
 
 
 def test_flags_are_booleans():

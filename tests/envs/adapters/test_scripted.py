@@ -10,7 +10,7 @@ from veca_marl.envs.adapters.torchrl.scripted import ExpertPolicy
 def test_the_expert_plays_all_worlds_and_kicks(body):
     env = make("KickTheBall", worlds=2, body=body, senses={"vision": "blind"}, seed=1)
     played = env.rollout(300, policy=ExpertPolicy(env))
-    kicks = played["next", "agents", "terms", "kick"].sum(1).flatten()
+    kicks = played["next", "agents", "info", "kick"].sum(1).flatten()
     env.close()
     assert played.shape == (2, 300)
     assert (kicks >= 1).all()

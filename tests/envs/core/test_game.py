@@ -113,7 +113,7 @@ def test_everybody_must_be_told(duel):
 
 
 def test_pay_is_the_weighted_sum(game):
-    assert game.pay({"kick": 1.0, "approach": -0.5}) == pytest.approx(1.0 - 0.005)
+    assert game.reward_of({"kick": 1.0, "approach": -0.5}) == pytest.approx(1.0 - 0.005)
 
 
 def test_a_task_that_does_not_exist_is_answered_with_those_that_do():

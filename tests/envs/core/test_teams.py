@@ -82,9 +82,9 @@ def test_who_is_out_rests_whatever_it_is_told(cfg):
     game = Game(cfg)
     rng = np.random.default_rng(0)
     game.reset(rng)
-    while not game.out:
+    while not game.eliminated:
         game.step({p.name: np.array([1.0, 0.0]) for p in game.actors})
-    (name,) = game.out
+    (name,) = game.eliminated
     body = next(p.body for p in game.players if p.name == name)
     before = body.position
     told = {p.name: np.array([0.0, 0.0]) for p in game.actors} | {name: np.array([np.nan, 1.0])}

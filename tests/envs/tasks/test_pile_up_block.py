@@ -53,7 +53,7 @@ def test_a_block_on_the_other_is_worth_one_edge(game):
     *_, terms = sit(game, 0.6)
     assert terms["height"] == pytest.approx(1.0, abs=0.03)
     assert game.task.solved
-    assert game.pay(terms) == pytest.approx(game.world.clock.step_s, rel=0.03)
+    assert game.reward_of(terms) == pytest.approx(game.world.clock.step_s, rel=0.03)
 
 
 def test_a_block_that_is_held_up_counts_as_high_but_is_not_piled_up(game):

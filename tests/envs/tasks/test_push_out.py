@@ -162,12 +162,12 @@ def test_who_is_out_stays_out_while_its_mate_plays_on(four):
     red_0.place(OUTSIDE)
     (first,) = rest(four)
     assert not first.done
-    assert first.out == {"red_0"}
+    assert first.eliminated == {"red_0"}
     assert first.terms["red_0"]["out"] == -1.0
     assert first.terms["blue_0"]["push"] == first.terms["blue_1"]["push"] == 0.5
     red_0.place(home)
     (second,) = rest(four)
-    assert second.out == {"red_0"}
+    assert second.eliminated == {"red_0"}
     assert set(second.terms["red_0"].values()) == {0.0}
     assert second.terms["blue_0"]["push"] == 0.0
     red_1.place(OUTSIDE)

@@ -42,10 +42,10 @@ def test_the_tower_stands_while_the_child_sits_still(game):
 def test_a_red_block_that_is_up_costs_and_on_the_floor_costs_nothing(game):
     game.reset(np.random.default_rng(0))
     *_, up = sit(game, 0.2)
-    assert game.pay(up) == pytest.approx(-2.0 * game.world.clock.step_s, rel=0.03)
+    assert game.reward_of(up) == pytest.approx(-2.0 * game.world.clock.step_s, rel=0.03)
     game.task.red.place((1.0, 1.0, EDGE / 2))
     *_, down = sit(game, 0.4)
-    assert game.pay(down) == pytest.approx(0.0, abs=0.002)
+    assert game.reward_of(down) == pytest.approx(0.0, abs=0.002)
     assert game.task.solved
 
 

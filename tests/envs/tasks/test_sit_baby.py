@@ -56,7 +56,7 @@ def test_head_down_and_waist_up_pays_no_more_than_lying(game):
 
 
 def test_an_episode_is_worth_ten(game):
-    assert game.pay({"torso": 1.0, "head": 1.0}) * game.max_steps == pytest.approx(10.0)
+    assert game.reward_of({"torso": 1.0, "head": 1.0}) * game.max_steps == pytest.approx(10.0)
 
 
 def test_it_starts_on_the_back_at_rest(game):

@@ -28,7 +28,7 @@ def test_the_belly_pays_and_the_back_costs(game):
 
 
 def test_an_episode_is_worth_ten(game):
-    best = game.pay({"torso": 1.0, "hip": 1.0}) * game.max_steps
+    best = game.reward_of({"torso": 1.0, "hip": 1.0}) * game.max_steps
     assert best == pytest.approx(10.0)
 
 

@@ -63,7 +63,8 @@ class VecaGymEnv(gymnasium.Env[Observation, Any]):
         """
         observations = self._played.reset(seed, options)
         # the generator of this episode, not the one that Gymnasium would make of the same seed
-        self.np_random = self._played.rng
+        if self._played.rng is not None:
+            self.np_random = self._played.rng
         return self._layout.arrange(observations[self._agent]), {}
 
     def step(self, action: Any) -> tuple[Observation, float, bool, bool, dict[str, Any]]:

@@ -1,7 +1,6 @@
-"""A game with its own random stream, one episode after another: what PettingZoo and Gymnasium see.
+"""The episodes of one world, one after another: what the Gymnasium and PettingZoo adapters share.
 
-It draws, observes and computes rewards in the order of `VecaEnv`: the same seed gives the same
-bytes.
+The order of observations and rewards is that of `VecaEnv`: the same seed gives the same bytes.
 """
 
 from __future__ import annotations
@@ -22,15 +21,15 @@ RENDER_MODES = ("rgb_array",)
 
 
 class Step(NamedTuple):
-    """What one step gave to each player, by name.
+    """The result of one step for the players that took part in it, by name.
 
     Attributes:
-        observations: What they perceive now.
-        rewards: Weighted sums of the terms.
+        observations: Observations after the step.
+        rewards: Weighted sums of the reward terms.
         terms: Unweighted reward terms by name.
-        terminated: For whom the game is over by its rules.
-        truncated: The time is up.
-        done: It is over for everyone.
+        terminated: Whether the episode has ended by the rules.
+        truncated: Whether the time is up; the same for all players.
+        done: Whether the episode has ended for all players.
     """
 
     observations: dict[str, Observation]
@@ -42,16 +41,16 @@ class Step(NamedTuple):
 
 
 class SeededGame:
-    """The first world of a `VecaEnv` with the same seed, without TorchRL.
+    """World 0 of a `VecaEnv` with the same seed, without TorchRL.
 
     Attributes:
-        game: What is played.
-        names: The players whose actions come from outside, team by team.
-        rng: The generator of the episode that is running.
-        metadata: What Gymnasium and PettingZoo want to know about pictures.
+        game: The game.
+        names: The players whose actions are given to `step`, team by team.
+        rng: The generator of the current episode; None before the first.
+        metadata: `metadata` of a Gymnasium or PettingZoo environment.
 
     Args:
-        cfg: What is played.
+        cfg: What to play.
         seed: As for `VecaEnv`; None is fresh entropy.
         render_mode: `rgb_array` if `render` is to be called.
 
@@ -62,10 +61,11 @@ class SeededGame:
     def __init__(self, cfg: GameCfg, seed: int | None, render_mode: str | None) -> None:
         if render_mode is not None and render_mode not in RENDER_MODES:
             raise ValueError(f"render_mode={render_mode!r}; choices: {[None, *RENDER_MODES]}")
-        announce_compilation()
         self._episodes = Episodes(seed)
+        announce_compilation()
         self.game = Game(cfg)
         self.names = [player.name for player in self.game.actors]
+        self.rng: np.random.Generator | None = None
         self.metadata: dict[str, Any] = {
             "name": cfg.task.name,
             "render_modes": list(RENDER_MODES),
@@ -73,18 +73,17 @@ class SeededGame:
         }
         self._spectator = Spectator(self.game)
         self._render_mode = render_mode
-        self._seen: dict[str, Observation] = {}
         self._running = False
 
     def reset(
         self, seed: int | None = None, options: Mapping[str, Any] | None = None
     ) -> dict[str, Observation]:
-        """Begin an episode and return what all players perceive.
+        """Begin an episode and return the observations of all players.
 
         Args:
             seed: Restarts the count of episodes, as `VecaEnv.set_seed`; None continues it.
-            options: `{"episode": number}` begins the episode of this number; others are ignored,
-                as PettingZoo's own test demands.
+            options: `{"episode": number}` begins the episode of this number. Other options are
+                ignored, because PettingZoo's own test passes one.
 
         Raises:
             ValueError: If the seed or the number is negative.
@@ -100,14 +99,14 @@ class SeededGame:
         """Play one step.
 
         Args:
-            actions: What each player does, by name; who is out needs none.
+            actions: The action of each player by name; eliminated players need none.
 
         Returns:
-            What it gave to each player who took part in it.
+            The result for each player that was not eliminated before the step.
 
         Raises:
             RuntimeError: If no episode is running.
-            ValueError: If an action is missing, impossible, or for a player who is not there.
+            ValueError: If an action is missing, invalid, or for an unknown player.
         """
         if not self._running:
             raise RuntimeError("no episode is running: call reset() before step()")
@@ -116,7 +115,7 @@ class SeededGame:
         self._running = not outcome.done
         return Step(
             self._observe(names),
-            {name: float(self.game.pay(outcome.terms[name])) for name in names},
+            {name: float(self.game.reward_of(outcome.terms[name])) for name in names},
             {name: outcome.terms[name] for name in names},
             {name: outcome.terminated_for(name) for name in names},
             outcome.truncated,
@@ -125,16 +124,16 @@ class SeededGame:
 
     @property
     def playing(self) -> list[str]:
-        """Those of `names` who are not out."""
-        return [name for name in self.names if name not in self.game.out]
+        """The players in `names` that are not eliminated."""
+        return [name for name in self.names if name not in self.game.eliminated]
 
     def _observe(self, names: Sequence[str]) -> dict[str, Observation]:
-        """Let players perceive, into arrays of their own."""
-        for player in self.game.actors:
-            if player.name in names:
-                seen = self.game.observe(player)
-                self._seen[player.name] = {name: np.array(array) for name, array in seen.items()}
-        return {name: dict(self._seen[name]) for name in names}
+        """Return the observations of some players, in arrays of their own."""
+        return {
+            player.name: {name: np.array(a) for name, a in self.game.observe(player).items()}
+            for player in self.game.actors
+            if player.name in names
+        }
 
     def render(self) -> NDArray[np.uint8]:
         """Return what the first player perceives beside the room, ``(252, width, 3)`` uint8.
@@ -144,11 +143,11 @@ class SeededGame:
         """
         if self._render_mode is None:
             raise RuntimeError(f"made without a render_mode; choices: {list(RENDER_MODES)}")
-        if not self._seen:
-            raise RuntimeError("nothing to see yet: call reset() before render()")
-        return self._spectator.frame(self._seen[self.names[0]])
+        if self.rng is None:
+            raise RuntimeError("no episode has begun: call reset() before render()")
+        return self._spectator.frame(self.game.observe(self.game.actors[0]))
 
     def close(self) -> None:
-        """Give the world's resources back."""
+        """Release the resources of the world."""
         self._running = False
         self.game.close()

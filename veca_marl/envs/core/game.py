@@ -1,6 +1,6 @@
-"""One task in one world with its players and their senses: a game, in numpy.
+"""One task in one world with its players and their senses, in numpy.
 
-`VecaEnv` and every other face (PettingZoo, Gymnasium) stand on this class.
+Every adapter (TorchRL, Gymnasium, PettingZoo) plays its episodes through this class.
 """
 
 from __future__ import annotations
@@ -29,40 +29,49 @@ Observation = dict[str, NDArray[Any]]
 
 
 class Outcome(NamedTuple):
-    """What one step did.
+    """The result of one step.
 
     Attributes:
         terms: Unweighted reward terms by player and name.
-        terminated: The game is over by its rules.
-        truncated: The time is up, or the simulation of a body made no sense any more.
-        out: The players for whom it is over, though others may play on.
+        terminated: Whether the episode has ended by the rules.
+        truncated: Whether the time is up, or the state of a body is not finite any more.
+        eliminated: Names of the players for whom the episode has ended.
     """
 
     terms: dict[str, dict[str, float]]
     terminated: bool
     truncated: bool
-    out: frozenset[str] = frozenset()
+    eliminated: frozenset[str] = frozenset()
 
     @property
     def done(self) -> bool:
-        """Whether it is over for everyone."""
+        """Whether the episode has ended for all players."""
         return self.terminated or self.truncated
 
     def terminated_for(self, player: str) -> bool:
-        """Say whether the game is over by its rules for one player."""
-        return self.terminated or player in self.out
+        """Return whether the episode has ended by the rules for one player."""
+        return self.terminated or player in self.eliminated
 
 
 class Game:
     """One task in one world.
 
     Attributes:
-        world: Where it is played.
+        cfg: The configuration.
+        world: The world.
         task: The rules.
-        players: Everyone, team by team.
-        actors: Those whose actions come from outside; the others follow a script.
+        players: All players, team by team.
+        actors: The players whose actions are given to `step`; the others follow a script.
         senses: The senses of each player by player name.
-        out: The names of those for whom this episode is over.
+        steps: Steps since the last reset.
+        max_steps: Steps after which an episode is truncated.
+        eliminated: Names of the players for whom this episode has ended.
+
+    Args:
+        cfg: What to play.
+
+    Raises:
+        ValueError: If the configuration is impossible; the message names the value and the choices.
     """
 
     def __init__(self, cfg: GameCfg) -> None:
@@ -73,7 +82,8 @@ class Game:
         self._build()
 
     def _build(self) -> None:
-        cfg, task_type = self.cfg, find_task(self.cfg.task.name)
+        """Build the world, the players, the task and the senses."""
+        cfg = self.cfg
         self.world = World(cfg.playground, cfg.clock)
         self.players = [
             self._make_player(name, team, number if team.shirt is None else team.shirt)
@@ -81,20 +91,15 @@ class Game:
             for name in player_names(team)
         ]
         self.actors = [player for player in self.players if player.team not in cfg.script]
-        self.task = task_type(cfg.task, self.world, self.players)
+        self.task = find_task(cfg.task.name)(cfg.task, self.world, self.players)
         self.world.freeze()
-        self.senses: dict[str, dict[str, Sense]] = {
-            player.name: make_senses(
-                player.body,
-                task_type.senses if team.senses is None else team.senses,
-                cfg.senses_of(team.name),
-                self.world,
-            )
+        self.senses = {
+            player.name: self._make_senses(player, team)
             for team in cfg.teams
             for player in self.team(team.name)
         }
         self.steps = 0
-        self.out: frozenset[str] = frozenset()
+        self.eliminated: frozenset[str] = frozenset()
         self._experts: dict[str, Expert[Any]] = {}
         for team, script in cfg.script.items():
             if script is Script.expert:
@@ -104,27 +109,46 @@ class Game:
         body = make_body(name, self.cfg.body_of(team.name), self.world, shirt)
         return Player(name, team.name, body)
 
+    def _make_senses(self, player: Player, team: Team) -> dict[str, Sense]:
+        names = self.task.senses if team.senses is None else team.senses
+        return make_senses(player.body, names, self.cfg.senses_of(team.name), self.world)
+
     @property
     def weights(self) -> dict[str, float]:
-        """What each reward term is worth."""
+        """Weight of each reward term by its name."""
         return self.task.cfg.weights
+
+    @property
+    def has_begun(self) -> bool:
+        """Whether `reset` was called."""
+        return self._rng is not None
 
     def team(self, name: str) -> list[Player]:
         """Return the players of a team."""
         return [player for player in self.players if player.team == name]
 
+    def _episode_rng(self) -> np.random.Generator:
+        """Return the generator of the episode.
+
+        Raises:
+            RuntimeError: If `reset` was never called.
+        """
+        if self._rng is None:
+            raise RuntimeError("no episode is running: call reset() first")
+        return self._rng
+
     def reset(self, rng: np.random.Generator) -> None:
-        """Begin an episode; in a new world with new players if the old one fell apart.
+        """Begin an episode; with a new world if the state of a body is not finite any more.
 
         Args:
-            rng: All randomness of this episode, at its start and in its steps.
+            rng: Generator of this episode: its start, its steps and its scripted players.
         """
         self._rng = rng
-        if self._broken():
+        if self._non_finite_bodies():
             self.world.close()
             self._build()
         self.steps = 0
-        self.out = frozenset()
+        self.eliminated = frozenset()
         self.world.reset(rng)
         self.task.reset(rng)
         for senses in self.senses.values():
@@ -140,19 +164,19 @@ class Game:
         return self.advance()
 
     def command(self, actions: Mapping[str, Any]) -> None:
-        """Tell the actors what to do, before anything moves.
+        """Set the actions of the actors for the next step, before anything moves.
 
         Args:
             actions: One action per actor, by player name: a mapping with a value for each part of
                 its body's `action_spec`, or the plain array if there is one part. Actions of
-                players that are out may be there and are ignored.
+                eliminated players are optional and ignored.
 
         Raises:
-            ValueError: If an action is impossible, or the actors are others.
+            ValueError: If an action is invalid or missing, or for a player that does not exist.
         """
         self._check_names(actions)
         for player in self.actors:
-            if player.name in self.out:
+            if player.name in self.eliminated:
                 player.body.rest()
                 continue
             try:
@@ -167,7 +191,7 @@ class Game:
         unknown = sorted(set(actions) - set(names))
         if unknown:
             raise ValueError(f"actions for unknown agents {unknown}; there are {names}")
-        missing = sorted(set(names) - set(actions) - self.out)
+        missing = sorted(set(names) - set(actions) - self.eliminated)
         if missing:
             raise ValueError(f"no action for {missing}; each of {names} needs one")
 
@@ -185,15 +209,10 @@ class Game:
         self.steps += 1
         terms = {player.name: self._terms(player) for player in self.players}
         if self.task.eliminates:
-            self.out |= {player.name for player in self.players if self.task.is_eliminated(player)}
-        terminated = self.task.terminated() or len(self.out) == len(self.players)
-        truncated = self.steps >= self.max_steps or self._fell_apart()
-        return Outcome(terms, terminated, truncated, self.out)
-
-    def _episode_rng(self) -> np.random.Generator:
-        if self._rng is None:
-            raise RuntimeError("no episode is running: call reset() before the first step")
-        return self._rng
+            self.eliminated |= {p.name for p in self.players if self.task.is_eliminated(p)}
+        terminated = self.task.terminated() or len(self.eliminated) == len(self.players)
+        truncated = self.steps >= self.max_steps or self._is_non_finite()
+        return Outcome(terms, terminated, truncated, self.eliminated)
 
     def _play_scripts(self) -> None:
         for team, script in self.cfg.script.items():
@@ -201,13 +220,13 @@ class Game:
                 self.play_script(player, script)
 
     def play_script(self, player: Player, script: Script) -> None:
-        """Set the action of a player for the next step by a script; one that is out rests.
+        """Set the action of a player for the next step by a script; an eliminated player rests.
 
         Raises:
             RuntimeError: If `reset` was never called.
             ValueError: If the script is `Script.expert` and the task has no expert.
         """
-        script_now = Script.idle if player.name in self.out else script
+        script_now = Script.idle if player.name in self.eliminated else script
         play_script(script_now, player, self._expert_command, self._episode_rng())
 
     def _expert_command(self, player: Player) -> Any:
@@ -228,25 +247,25 @@ class Game:
         return find_expert(self.cfg.task.name)(self.task, player)
 
     def _terms(self, player: Player) -> dict[str, float]:
-        """Return what a player earns; nothing if it was out before this step."""
-        if player.name in self.out:
+        """Return the reward terms of a player; zeros if it was eliminated in an earlier step."""
+        if player.name in self.eliminated:
             return dict.fromkeys(self.weights, 0.0)
         return self.task.reward(player)
 
-    def _fell_apart(self) -> bool:
-        """Log which body's simulation has gone non-finite; say whether one has."""
-        broken = self._broken()
-        if broken:
+    def _is_non_finite(self) -> bool:
+        """Return whether the state of a body is not finite; log which."""
+        names = self._non_finite_bodies()
+        if names:
             _LOG.warning(
                 "step %d of %s: the simulation of %s is not finite any more; "
                 "the episode is truncated, the next one has a new world",
                 self.steps,
                 self.cfg.task.name,
-                ", ".join(broken),
+                ", ".join(names),
             )
-        return bool(broken)
+        return bool(names)
 
-    def _broken(self) -> list[str]:
+    def _non_finite_bodies(self) -> list[str]:
         return [player.name for player in self.players if not player.body.is_finite]
 
     def observe(self, player: Player) -> Observation:
@@ -256,17 +275,17 @@ class Game:
             observation.update(sense.read())
         return observation
 
-    def pay(self, terms: dict[str, float]) -> float:
+    def reward_of(self, terms: Mapping[str, float]) -> float:
         """Return the reward: the weighted sum of the terms."""
         return sum(self.weights[name] * value for name, value in terms.items())
 
     def close(self) -> None:
-        """Give the world's resources back."""
+        """Release the resources of the world."""
         self.world.close()
 
 
 def player_names(team: Team) -> list[str]:
-    """Name the players of a team: `striker` if alone, else `red_0`, `red_1`, ..."""
+    """Return the names of a team's players: `striker` if there is one, else `red_0`, `red_1`."""
     if team.size == 1:
         return [team.name]
     return [f"{team.name}_{index}" for index in range(team.size)]

@@ -1,4 +1,4 @@
-"""What a game is made of: rules, place, bodies, senses, and what single teams have otherwise."""
+"""The configuration of a game: task, playground, bodies, senses, clock, and teams that differ."""
 
 from __future__ import annotations
 
@@ -13,21 +13,21 @@ from veca_marl.sim.physics.playground import PlaygroundCfg
 from veca_marl.sim.physics.world import ClockCfg
 from veca_marl.sim.senses import SensesCfg
 
-FLOOR_OF_A_PLAYER_M2 = 1.0  # to stand, turn and be placed apart from others
+FLOOR_OF_A_PLAYER_M2 = 1.0  # in which a player can stand, turn and be placed apart from others
 
 
 @dataclass
 class GameCfg:
-    """Everything a game is made of.
+    """The configuration of a game.
 
     Attributes:
-        task: The rules and their numbers.
-        playground: Where it is played.
-        body: What the players are.
-        senses: How well they perceive.
-        clock: How time passes.
-        team: What single teams have otherwise, by name.
-        script: Who plays for the teams that take no actions from outside, by name.
+        task: The rules and their parameters.
+        playground: Rooms and furniture.
+        body: Body of the players.
+        senses: Quality of their senses.
+        clock: Time steps.
+        team: Bodies and senses of teams that differ from the above, by team name.
+        script: How the actions of scripted teams are chosen, by team name.
     """
 
     task: TaskCfg = field(default_factory=TaskCfg)
@@ -40,27 +40,30 @@ class GameCfg:
 
     @property
     def teams(self) -> tuple[Team, ...]:
-        """Who plays."""
+        """The teams of the task."""
         return find_task(self.task.name).teams_of(self.task)
 
     def body_of(self, team: str) -> BodyCfg:
-        """Return what the players of a team are."""
+        """Return the body of the players of a team."""
         own = self.team.get(team)
         return self.body if own is None or own.body is None else own.body
 
     def senses_of(self, team: str) -> SensesCfg:
-        """Return how well the players of a team perceive."""
+        """Return the quality of the senses of a team."""
         own = self.team.get(team)
-        return self.senses if own is None else own.senses.change(self.senses)
+        return self.senses if own is None else own.senses.replace_in(self.senses)
 
     def check(self) -> None:
-        """Refuse choices for teams that do not play, and more players than there is floor for.
+        """Check the names of the teams, the scripts and the number of players.
 
         Raises:
-            ValueError: If there are any, if no team takes actions, or if a team is scripted by the
-                expert of a task that has none.
+            ValueError: If a team does not exist, all teams are scripted, the task has no expert
+                for a script, or the floor of the playground is too small for all players.
         """
-        names = [team.name for team in self.teams]
+        self._check_teams([team.name for team in self.teams])
+        self._check_floor()
+
+    def _check_teams(self, names: list[str]) -> None:
         for key, asked in (("team", self.team), ("script", self.script)):
             unknown = sorted(set(asked) - set(names))
             if unknown:
@@ -69,6 +72,8 @@ class GameCfg:
             raise ValueError(f"script: all teams of {self.task.name} are scripted: {names}")
         if Script.expert in self.script.values():
             find_expert(self.task.name)
+
+    def _check_floor(self) -> None:
         players = sum(team.size for team in self.teams)
         holds = int(self.playground.floor_m2 / FLOOR_OF_A_PLAYER_M2)
         if players > holds:

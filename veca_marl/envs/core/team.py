@@ -1,4 +1,4 @@
-"""What may differ from team to team: bodies, senses, and who decides for its players."""
+"""The configuration of single teams: body, senses, and scripts."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from veca_marl.sim.vision.sense import VisionCfg
 
 @dataclass
 class TeamSensesCfg:
-    """The senses of one team; None is as for everyone. The fields are those of `SensesCfg`."""
+    """The senses of one team; None is as for all teams. The fields are those of `SensesCfg`."""
 
     vision: VisionCfg | None = None
     audio: AudioCfg | None = None
@@ -24,19 +24,19 @@ class TeamSensesCfg:
     touch: TouchCfg | None = None
     extra: dict[str, Any] | None = None
 
-    def change(self, common: SensesCfg) -> SensesCfg:
-        """Return the senses of everyone with what this team has otherwise."""
+    def replace_in(self, common: SensesCfg) -> SensesCfg:
+        """Return the senses of all teams with those of this team replaced."""
         own = {f.name: getattr(self, f.name) for f in fields(self)}
         return replace(common, **{name: cfg for name, cfg in own.items() if cfg is not None})
 
 
 @dataclass
 class TeamCfg:
-    """What one team has otherwise than everyone.
+    """Body and senses of one team.
 
     Attributes:
-        body: What its players are; None is as for everyone.
-        senses: How well they perceive.
+        body: Body of its players; None is as for all teams.
+        senses: Senses of its players.
     """
 
     body: BodyCfg | None = None
@@ -44,12 +44,12 @@ class TeamCfg:
 
 
 class Script(Enum):
-    """Who decides for a team that nobody learns to play: it is part of the world.
+    """How the game chooses the actions of a scripted team, which is not part of the specs.
 
     Attributes:
-        expert: The task's hand-written rules.
-        random: Rows drawn uniformly from the world's random stream.
-        idle: Nobody: its players rest.
+        expert: By the expert of the task.
+        random: Uniformly, with the generator of the episode.
+        idle: Its players rest.
     """
 
     expert = "expert"

@@ -1,4 +1,4 @@
-"""Nested numpy arrays laid out as a spec says: filled by the games, handed to TorchRL uncopied."""
+"""Nested numpy arrays with the layout of a spec: the games write them, tensors share them."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ Arrays = dict[str, Any]  # name -> array, or name -> Arrays
 
 
 class Layout:
-    """The shape of one step's data, read from a spec once and not at every step.
+    """The names, shapes and types of one step's data, read from a spec once.
 
     Args:
-        spec: What a tensordict of this layout holds.
+        spec: Spec of a tensordict with this layout.
     """
 
     def __init__(self, spec: Composite) -> None:
@@ -33,14 +33,14 @@ class Layout:
                 )
 
     def new(self) -> Arrays:
-        """Return new arrays of zeros: whoever stores a step must not see it change."""
+        """Return new arrays of zeros: what was returned for earlier steps must not change."""
         arrays: Arrays = {name: np.zeros(*leaf) for name, leaf in self._leaves.items()}
         for name, layout in self._inner.items():
             arrays[name] = layout.new()
         return arrays
 
     def copy_rows(self, source: TensorDictBase, arrays: Arrays, rows: list[int]) -> None:
-        """Copy rows of what `source` holds of this layout; what it does not hold stays as it is.
+        """Copy rows of the leaves of this layout that `source` contains.
 
         Args:
             source: Where to copy from.
@@ -56,11 +56,20 @@ class Layout:
             if inner is not None:
                 layout.copy_rows(inner, arrays[name], rows)
 
-    def tensordict(self, arrays: Arrays) -> TensorDict:
-        """Return tensors on the memory of what `new` returned."""
+    def tensordict(self, arrays: Arrays, device: torch.device | None = None) -> TensorDict:
+        """Return the arrays as tensors.
+
+        Args:
+            arrays: What `new` returned. The tensors share its memory if they stay on the CPU.
+            device: Where the tensors go; None is the CPU, and a tensordict without a device.
+        """
+        tensordict = self._wrapped(arrays)
+        return tensordict if device is None else tensordict.to(device)
+
+    def _wrapped(self, arrays: Arrays) -> TensorDict:
         tensors: Arrays = {name: torch.from_numpy(arrays[name]) for name in self._leaves}
         for name, layout in self._inner.items():
-            tensors[name] = layout.tensordict(arrays[name])
-        # the shapes come from the spec: checking each tensor against the batch size again, as the
-        # constructor does, costs a third of all that VecaEnv adds to the games
+            tensors[name] = layout._wrapped(arrays[name])
+        # the shapes come from the spec: the constructor would compare each tensor with the batch
+        # size again, which costs a third of the time that VecaEnv adds to the games
         return TensorDict._new_unsafe(tensors, self._batch)

@@ -1,19 +1,66 @@
-"""From the specs of senses and bodies to those of TorchRL, team by team."""
+"""TorchRL's specs of a game, team by team, from the specs of senses and bodies."""
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 import torch
 from torchrl.data import Bounded, Categorical, Composite, TensorSpec, Unbounded
 
 from veca_marl.envs.core.actions import ActionSpec, from_parts
+from veca_marl.envs.core.game import Game
 from veca_marl.sim.spec import ArraySpec
 
 DONE_KEYS = ("done", "terminated", "truncated")
 
 
+class EnvSpecs(NamedTuple):
+    """The specs of an environment of `worlds` equal games; each has the shape `(worlds,)`."""
+
+    observation: Composite
+    action: Composite
+    reward: Composite
+    done: Composite
+
+
+def env_specs(game: Game, teams: list[str], worlds: int) -> EnvSpecs:
+    """Return the specs of an environment.
+
+    Args:
+        game: One of its games.
+        teams: The teams that take actions.
+        worlds: Number of games.
+    """
+    specs = EnvSpecs(*(Composite(shape=(worlds,)) for _ in EnvSpecs._fields))
+    specs.done.update(done_spec((worlds,)))
+    for team in teams:
+        player, *_ = players = game.team(team)
+        batch = (worlds, len(players))
+        specs.observation[team] = Composite(
+            observation=sense_specs(_senses_of(game, player.name), batch),
+            info=Composite({term: Unbounded((*batch, 1)) for term in game.weights}, shape=batch),
+            shape=batch,
+        )
+        if game.task.eliminates:
+            mask = Categorical(2, shape=batch, dtype=torch.bool)
+            specs.observation[team, "mask"] = mask
+        specs.action[team] = action_spec(player.body.action_spec, batch)
+        specs.reward[team] = Composite(reward=Unbounded((*batch, 1)), shape=batch)
+        specs.done[team] = Composite(done_spec(batch), shape=batch)
+    return specs
+
+
+def _senses_of(game: Game, player: str) -> dict[str, ArraySpec]:
+    senses = game.senses[player].values()
+    return {name: spec for sense in senses for name, spec in sense.specs.items()}
+
+
 def to_torchrl(spec: ArraySpec, batch: tuple[int, ...]) -> TensorSpec:
-    """Translate one array; integers without shape are a choice among `high + 1`."""
+    """Return the spec of one array; an integer without shape is a choice among `high + 1`.
+
+    An array that lacks a bound is `Unbounded`.
+    """
     dtype = getattr(torch, np.dtype(spec.dtype).name)
     if spec.is_discrete:
         return Categorical(int(spec.high) + 1, shape=batch, dtype=dtype)
@@ -23,18 +70,9 @@ def to_torchrl(spec: ArraySpec, batch: tuple[int, ...]) -> TensorSpec:
     return Unbounded(shape, dtype=dtype)
 
 
-def observation_spec(
-    senses: dict[str, ArraySpec], terms: tuple[str, ...], worlds: int, players: int
-) -> Composite:
-    """Return a team's `observation` and the `terms` of its reward."""
-    batch = (worlds, players)
-    return Composite(
-        observation=Composite(
-            {name: to_torchrl(spec, batch) for name, spec in senses.items()}, shape=batch
-        ),
-        terms=Composite({name: Unbounded((*batch, 1)) for name in terms}, shape=batch),
-        shape=batch,
-    )
+def sense_specs(senses: dict[str, ArraySpec], batch: tuple[int, ...]) -> Composite:
+    """Return a team's `observation`: one leaf per sense."""
+    return Composite({name: to_torchrl(one, batch) for name, one in senses.items()}, shape=batch)
 
 
 def action_spec(parts: ActionSpec, batch: tuple[int, ...]) -> Composite:
@@ -45,5 +83,5 @@ def action_spec(parts: ActionSpec, batch: tuple[int, ...]) -> Composite:
 
 
 def done_spec(batch: tuple[int, ...]) -> dict[str, TensorSpec]:
-    """Return the three flags for a batch."""
+    """Return the three flags."""
     return {key: Categorical(2, shape=(*batch, 1), dtype=torch.bool) for key in DONE_KEYS}

@@ -1,38 +1,21 @@
-"""What is left out round a step changes nothing: side by side with TorchRL's own code."""
+"""With and without the fast step, an environment gives the same data."""
 
-import hashlib
-import inspect
 from functools import partial
 
 import pytest
 import torch
+import torchrl
 from duels import duel
 from knockouts import knockout
-from tensordict import LazyStackedTensorDict, NonTensorData, TensorDict, TensorDictBase
+from tensordict import LazyStackedTensorDict, NonTensorData, TensorDictBase
 from torchrl.collectors import Collector
 from torchrl.data import Unbounded
-from torchrl.envs import EnvBase, ParallelEnv, SerialEnv
+from torchrl.envs import ParallelEnv, SerialEnv
 from torchrl.envs.utils import _StepMDP
 
 from veca_marl.config import compose
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
-from veca_marl.envs.adapters.torchrl.lean_env import Onward
-
-# Of torchrl 0.14.1. Where this fails, TorchRL has changed what `LeanEnv` stands in for: compare the
-# new code with `adapters/torchrl/lean_env.py`, mend that, and only then put the new number here.
-REPLACED = {
-    "_step_proc_data": (EnvBase._step_proc_data, "fad6929d83454ef2"),
-    "any_done": (EnvBase.any_done, "1bf3ce5a152800de"),
-    "step_mdp": (_StepMDP, "66dc2cc3e39bcf55"),
-}
-
-
-class FullEnv(VecaEnv):
-    """The same with TorchRL's own code."""
-
-    _step_proc_data = EnvBase._step_proc_data
-    any_done = EnvBase.any_done
-    _step_mdp = EnvBase._step_mdp
+from veca_marl.envs.adapters.torchrl.fast_step import NextState
 
 
 def ball():
@@ -52,7 +35,7 @@ def pair(request):
 
 
 def both(game):
-    envs = [kind(game, worlds=3, seed=5) for kind in (VecaEnv, FullEnv)]
+    envs = [VecaEnv(game, worlds=3, seed=5, fast_step=fast) for fast in (True, False)]
     yield envs
     for env in envs:
         env.close()
@@ -78,8 +61,8 @@ def assert_same(one, other):
             assert repr(a) == repr(b), key  # what is no tensor
 
 
-class Dice:
-    """Random moves, and words of its own beside them: in a team, at the root, and no tensor."""
+class RandomPolicy:
+    """Random actions, and entries of its own: in a team, at the root, and one that is no tensor."""
 
     def __init__(self, env):
         self.env, self.torch_rng = env, torch.Generator().manual_seed(3)
@@ -96,13 +79,13 @@ class Dice:
 @pytest.mark.parametrize("breaks", [True, False])
 def test_rollouts_are_those_of_torchrl(pair, breaks):
     options = {"break_when_any_done": breaks, "trust_policy": True}
-    played = [env.rollout(15, Dice(env), **options) for env in pair]
+    played = [env.rollout(15, RandomPolicy(env), **options) for env in pair]
     assert_same(*played)
 
 
 def test_steps_resets_and_masks_are_those_of_torchrl(pair):
     states = [env.reset() for env in pair]
-    policies = [Dice(env) for env in pair]
+    policies = [RandomPolicy(env) for env in pair]
     mask = torch.tensor([[False], [True], [False]])
     for step in range(12):
         pairs = [
@@ -120,17 +103,15 @@ def test_steps_resets_and_masks_are_those_of_torchrl(pair):
             assert_same(*states)
 
 
-def test_a_step_of_some_worlds_is_that_of_torchrl(pair):
-    some = torch.tensor([True, False, True])
-    played = [env.step(Dice(env)(env.reset()).set("_step", some)) for env in pair]
-    assert_same(*played)
-
-
 def test_collected_batches_are_those_of_torchrl(pair):
     batches = []
     for env in pair:
         collector = Collector(
-            lambda env=env: env, Dice(env), frames_per_batch=36, total_frames=72, trust_policy=True
+            lambda env=env: env,
+            RandomPolicy(env),
+            frames_per_batch=36,
+            total_frames=72,
+            trust_policy=True,
         )
         batches.append([batch.exclude("collector").clone() for batch in collector])
     for batch in zip(*batches, strict=True):
@@ -141,8 +122,8 @@ def test_collected_batches_are_those_of_torchrl(pair):
 def test_batches_of_envs_are_those_of_torchrl(kind):
     options = {"mp_start_method": "fork"} if kind is ParallelEnv else {}
     played = []
-    for env_type in (VecaEnv, FullEnv):
-        env = kind(2, partial(env_type, ball(), worlds=2), **options)
+    for fast in (True, False):
+        env = kind(2, partial(VecaEnv, ball(), worlds=2, fast_step=fast), **options)
         env.set_seed(1)
         torch.manual_seed(1)
         played.append(env.rollout(8, break_when_any_done=False))
@@ -151,7 +132,7 @@ def test_batches_of_envs_are_those_of_torchrl(kind):
 
 
 def moved(env):
-    return env.step(Dice(env)(env.reset()))
+    return env.step(RandomPolicy(env)(env.reset()))
 
 
 def odd_states(env):
@@ -170,15 +151,15 @@ def odd_states(env):
 
 
 def test_the_next_start_is_that_of_torchrl(pair):
-    lean, full = pair
-    assert isinstance(lean._step_mdp, Onward)
+    fast, full = pair
+    assert isinstance(fast._step_mdp, NextState)
     assert isinstance(full._step_mdp, _StepMDP)
-    for name, state in odd_states(lean):
-        one, other = lean._step_mdp(state), full._step_mdp(state)
+    for name, state in odd_states(fast):
+        one, other = fast._step_mdp(state), full._step_mdp(state)
         assert type(one) is type(other), name
         assert_same(one, other)
         assert one.is_locked == other.is_locked, name
-        for level in [one, *(one[team] for team in lean.group_map if team in one)]:
+        for level in [one, *(one[team] for team in fast.group_map if team in one)]:
             assert level is not state, name  # what a policy writes must not reach what was stored
         one.set("new", torch.zeros(one.batch_size))
         assert "new" not in state, name
@@ -215,21 +196,9 @@ def test_a_compiled_step_onward_is_that_of_torchrl(pair):
     assert_same(compiled(state), onward.general(state))
 
 
-@pytest.mark.parametrize("shape", [(3, 1), (2, 3, 1)])
-def test_any_done_is_that_of_torchrl(pair, shape):
-    for index in (None, 0, -1):
-        done = torch.zeros(shape, dtype=torch.bool)
-        if index is not None:
-            done.view(-1)[index] = True
-        states = [TensorDict({"done": done.clone()}, shape[:-1]) for _ in pair]
-        said = [bool(env.any_done(state)) for env, state in zip(pair, states, strict=True)]
-        assert said == [index is not None] * 2
-        assert_same(*states)
-
-
 def test_types_are_still_checked_where_asked(pair):
     env, _ = pair
-    state = env._step(Dice(env)(env.reset()))
+    state = env._step(RandomPolicy(env)(env.reset()))
     team = next(iter(env.group_map))
     wrong = state.clone()
     wrong[team, "reward"] = wrong[team, "reward"].double()
@@ -239,7 +208,10 @@ def test_types_are_still_checked_where_asked(pair):
         env._step_proc_data(wrong)
 
 
-@pytest.mark.parametrize("name", REPLACED)
-def test_torchrl_is_what_the_lean_code_was_compared_with(name):
-    code, known = REPLACED[name]
-    assert hashlib.sha256(inspect.getsource(code).encode()).hexdigest()[:16] == known
+def test_other_versions_of_torchrl_are_refused(monkeypatch):
+    monkeypatch.setattr(torchrl, "__version__", "0.15.2")
+    with pytest.raises(ValueError, match=r"0\.14, this is 0\.15\.2; choose fast_step=False"):
+        VecaEnv(ball(), worlds=1)
+    env = VecaEnv(ball(), worlds=1, fast_step=False)
+    env.rollout(2)
+    env.close()
