@@ -135,7 +135,7 @@ def test_a_name_is_registered_once():
 def test_other_terms_than_the_tasks_own_are_refused(weights):
     cfg = cfg_of()
     cfg.task.weights = weights
-    with pytest.raises(ValueError, match=r"KickTheBall pays \['approach', 'kick'\]"):
+    with pytest.raises(ValueError, match=r"KickTheBall has \['approach', 'kick'\]"):
         Game(cfg)
 
 
