@@ -16,7 +16,7 @@ import matplotlib as mpl
 import numpy as np
 
 from veca_marl.sim.body.anatomy.skeleton import load_skeleton
-from veca_marl.sim.body.humanoid.humanoid import Humanoid, HumanoidCfg
+from veca_marl.sim.body.humanoid import Humanoid, HumanoidCfg
 from veca_marl.sim.body.humanoid.postures import Posture
 from veca_marl.sim.geometry.pose import Floats
 from veca_marl.sim.physics.bullet import pybullet
@@ -135,13 +135,13 @@ class Vice:
     def force_n(self, prop: Prop) -> float:
         """Return the normal forces between a ball and the body."""
         points = pybullet.getContactPoints(
-            prop.body_id, self._body.articulation.body_id, physicsClientId=self.world.client
+            prop.body_id, self._body.body_id, physicsClientId=self.world.client
         )
         return math.fsum(point[9] for point in points)
 
     def _clamp(self, bone: str) -> int:
         """Hold a bone where it is."""
-        client, body_id = self.world.client, self._body.articulation.body_id
+        client, body_id = self.world.client, self._body.body_id
         names = [
             pybullet.getJointInfo(body_id, link, physicsClientId=client)[12].decode()
             for link in range(pybullet.getNumJoints(body_id, physicsClientId=client))

@@ -8,9 +8,9 @@ from omegaconf import OmegaConf
 
 from veca_marl.config import Config, ConfigError, compose, compose_node, conf_dir
 from veca_marl.envs.core.task import TASKS
-from veca_marl.sim.body.humanoid.humanoid import Detail, HumanoidCfg
-from veca_marl.sim.body.humanoid.joint_controls import JointActionKind as Act
-from veca_marl.sim.body.walker.walker import WalkerCfg
+from veca_marl.sim.body.humanoid import Detail, HumanoidCfg
+from veca_marl.sim.body.humanoid import JointActionKind as Act
+from veca_marl.sim.body.walker import WalkerCfg
 from veca_marl.sim.hearing.sense import AudioQuality
 from veca_marl.sim.senses import SensesCfg
 

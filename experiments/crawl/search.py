@@ -27,7 +27,7 @@ from veca_marl.envs.core.game import Game
 from veca_marl.envs.experts.control.crawl_gait import CrawlGait
 from veca_marl.envs.experts.control.gait_patterns import BACK, CRAWL, GaitPattern
 from veca_marl.envs.experts.control.steering import bearing_rad
-from veca_marl.sim.body.humanoid.joint_controls import Springs
+from veca_marl.sim.body.humanoid import JointCommand
 from veca_marl.sim.geometry.pose import Floats
 
 BODIES = ("mitten_position", "mitten")
@@ -107,10 +107,10 @@ class Trial:
         speed = float((self.body.position[:2] - start) @ way) / WAY_S
         return speed, self._turmoil(spin, least)
 
-    def back_mps(self, rhythm: GaitPattern, ahead_s: float, seed: int) -> tuple[float, float]:
+    def back_mps(self, rhythm: GaitPattern, horizon_s: float, seed: int) -> tuple[float, float]:
         """CrawlGait ahead as it is known, then back; return speed back and turmoil."""
         crawl = self._start(CRAWL, seed)
-        for _ in range(round(ahead_s / self._step_s)):
+        for _ in range(round(horizon_s / self._step_s)):
             self._step(crawl.command())
         crawl, start, ahead = CrawlGait(self.body, self._step_s, rhythm), *self._line()
         spin, least = 0.0, 1.0
@@ -138,7 +138,7 @@ class Trial:
         self._game.reset(np.random.default_rng([2026, seed]))
         return CrawlGait(self.body, self._step_s, rhythm)
 
-    def _step(self, wish: Springs) -> None:
+    def _step(self, wish: JointCommand) -> None:
         self.body.act(self.body.encode(wish))
         self._game.advance()
 

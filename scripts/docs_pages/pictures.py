@@ -13,7 +13,7 @@ from veca_marl.envs.adapters.torchrl.env import VecaEnv
 from veca_marl.envs.core.game import Game
 from veca_marl.envs.core.task import TASKS
 from veca_marl.envs.rendering.touch_image import touch_image
-from veca_marl.sim.body.walker.walker import Walker
+from veca_marl.sim.body.walker import Walker
 from veca_marl.sim.touch.taxels import TAXELS_PER_TRIANGLE
 from veca_marl.sim.vision.optics import Camera, look_at
 

@@ -3,7 +3,7 @@
 import numpy as np
 from walking import empty_world, wall
 
-from veca_marl.sim.body.humanoid.humanoid import Detail, Humanoid, HumanoidCfg
+from veca_marl.sim.body.humanoid import Detail, Humanoid, HumanoidCfg
 from veca_marl.sim.body.humanoid.postures import ON_BACK, ON_BELLY
 from veca_marl.sim.physics import pybullet
 
@@ -50,7 +50,7 @@ def weightless(world):
 def fling(world, body, speed_radps, seed=0):
     """Give all joints random speeds."""
     rng = np.random.default_rng(seed)
-    joints = body.articulation
+    joints = body._articulation
     joints.speeds[joints.moving] = rng.uniform(-speed_radps, speed_radps, len(joints.moving))
     joints._set(np.arange(len(joints.moving)))
     world.refresh()
@@ -58,7 +58,7 @@ def fling(world, body, speed_radps, seed=0):
 
 def kinetic_energy(world, body):
     """Return joules in all links of a body, light ones included."""
-    body_id, client = body.articulation.body_id, world.client
+    body_id, client = body.body_id, world.client
     links = range(pybullet.getNumJoints(body_id, physicsClientId=client))
     states = pybullet.getLinkStates(body_id, links, 1, 1, physicsClientId=client)
     velocity, spin = pybullet.getBaseVelocity(body_id, physicsClientId=client)

@@ -15,8 +15,8 @@ from veca_marl.envs.adapters.torchrl.env import VecaEnv
 from veca_marl.envs.core.actions import random_action
 from veca_marl.envs.core.game import Game
 from veca_marl.envs.core.team import Script
-from veca_marl.sim.body.voice import VoiceKind
-from veca_marl.sim.body.walker.walker import WalkerCfg
+from veca_marl.sim.body import VoiceKind
+from veca_marl.sim.body.walker import WalkerCfg
 
 # the ways to act in a task: its own body's, and another
 KINDS = ("own", "other")

@@ -3,7 +3,7 @@
 import math
 
 from veca_marl.config import compose
-from veca_marl.sim.body.walker.walker import Walker, WalkerCfg
+from veca_marl.sim.body.walker import Walker, WalkerCfg
 from veca_marl.sim.physics import PlaygroundCfg, PropCfg, PropShape, RoomCfg, World
 
 BALL_M = 0.2

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from veca_marl.sim.body.walker.walker import Walker, WalkerCfg
+from veca_marl.sim.body.walker import Walker, WalkerCfg
 from veca_marl.sim.physics import PlaygroundCfg, PropCfg, PropShape, RoomCfg, World
 
 STEP_S = 0.04

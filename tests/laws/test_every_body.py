@@ -19,7 +19,7 @@ from veca_marl.envs.adapters.torchrl.env import VecaEnv
 from veca_marl.envs.core.actions import from_parts, random_action
 from veca_marl.envs.core.game import Game
 from veca_marl.envs.core.game_cfg import GameCfg
-from veca_marl.sim.body.base import MOUNTS
+from veca_marl.sim.body import MOUNTS
 
 BODIES = sorted(path.stem for path in (conf_dir() / "body").glob("*.yaml"))
 SENSES = ("vision", "audio", "touch", "proprioception")

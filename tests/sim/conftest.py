@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from walking import empty_world
 
-from veca_marl.sim.body.humanoid.humanoid import Humanoid, HumanoidCfg
+from veca_marl.sim.body.humanoid import Humanoid, HumanoidCfg
 
 
 @pytest.fixture

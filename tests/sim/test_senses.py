@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from walking import ball, box, empty_world
 
-from veca_marl.sim.body.humanoid.humanoid import Detail, Humanoid, HumanoidCfg
+from veca_marl.sim.body.humanoid import Detail, Humanoid, HumanoidCfg
 from veca_marl.sim.body.proprioception import ProprioceptionCfg, ProprioceptionQuality
-from veca_marl.sim.body.walker.walker import Walker, WalkerCfg
+from veca_marl.sim.body.walker import Walker, WalkerCfg
 from veca_marl.sim.hearing.sense import AudioCfg, AudioQuality
 from veca_marl.sim.physics.props import PropCfg
 from veca_marl.sim.sense import Sense

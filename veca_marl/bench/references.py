@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from veca_marl.bench.skin_costs import SkinCosts, measure_skin
 from veca_marl.bench.stopwatch import thread_ms
-from veca_marl.sim.body.walker.walker import Walker, WalkerCfg
+from veca_marl.sim.body.walker import Walker, WalkerCfg
 from veca_marl.sim.geometry.pose import Pose
 from veca_marl.sim.geometry.primitives import Shape
 from veca_marl.sim.geometry.rotations import matrix_to_quaternion

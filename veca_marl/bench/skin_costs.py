@@ -8,7 +8,7 @@ from statistics import median
 import numpy as np
 
 from veca_marl.bench.stopwatch import thread_ms
-from veca_marl.sim.body.humanoid.humanoid import Humanoid, HumanoidCfg
+from veca_marl.sim.body.humanoid import Humanoid, HumanoidCfg
 from veca_marl.sim.body.humanoid.postures import Posture
 from veca_marl.sim.geometry.skinning import deform_meshes
 from veca_marl.sim.physics.playground import PlaygroundCfg

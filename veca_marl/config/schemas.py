@@ -16,8 +16,8 @@ from veca_marl.algos.networks.factory import NETWORKS
 from veca_marl.config.root import Config
 from veca_marl.config.search_path import conf_dirs
 from veca_marl.envs.core.task import TASKS
-from veca_marl.sim.body.humanoid.humanoid import HumanoidCfg
-from veca_marl.sim.body.walker.walker import WalkerCfg
+from veca_marl.sim.body.humanoid import HumanoidCfg
+from veca_marl.sim.body.walker import WalkerCfg
 
 _BY_TEAM = ("team", "opponent", "warm_start", "learner")  # their keys are the names of the teams
 

@@ -28,7 +28,7 @@ from dataclasses import dataclass, field, fields
 from typing import Any, Protocol, TypeVar
 
 from veca_marl.registry import Registry
-from veca_marl.sim.body.base import Body
+from veca_marl.sim.body import Body
 from veca_marl.sim.body.proprioception import ProprioceptionCfg, ProprioceptionSense
 from veca_marl.sim.hearing.sense import AudioCfg, AudioSense
 from veca_marl.sim.physics.world import World

@@ -29,9 +29,7 @@ def break_down(game):
     """Let Bullet lose a body, as an exploding simulation would."""
     body = game.players[0].body
     nan = (math.nan,) * 3
-    pybullet.resetBaseVelocity(
-        body.articulation.body_id, nan, nan, physicsClientId=game.world.client
-    )
+    pybullet.resetBaseVelocity(body.body_id, nan, nan, physicsClientId=game.world.client)
 
 
 def test_the_episode_is_truncated_with_its_cause_and_no_nan_gets_out(cfg, caplog):

@@ -6,7 +6,7 @@ import pytest
 from veca_marl.config import compose
 from veca_marl.envs.core.game import Game, player_names
 from veca_marl.envs.core.task import TASKS, Player, Task, TaskCfg, Team, find_task, register, terms
-from veca_marl.sim.body.walker.walker import Walker
+from veca_marl.sim.body.walker import Walker
 from veca_marl.sim.spec import ArraySpec
 
 

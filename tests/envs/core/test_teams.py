@@ -16,8 +16,7 @@ from veca_marl.envs.adapters.torchrl.env import VecaEnv
 from veca_marl.envs.adapters.torchrl.scripted import ExpertPolicy
 from veca_marl.envs.core.game import Game
 from veca_marl.envs.core.team import Script, TeamCfg, TeamSensesCfg
-from veca_marl.sim.body.walker.controls import ActionKind
-from veca_marl.sim.body.walker.walker import WalkerCfg
+from veca_marl.sim.body.walker import WalkActionKind, WalkerCfg
 from veca_marl.sim.hearing.sense import AudioCfg
 from veca_marl.sim.senses import SensesCfg
 
@@ -161,7 +160,7 @@ def test_teams_have_their_own_senses(env):
 
 
 def test_a_team_may_have_another_body_and_other_grades(cfg):
-    discrete = TeamCfg(WalkerCfg(action=ActionKind.discrete))
+    discrete = TeamCfg(WalkerCfg(action=WalkActionKind.discrete))
     deaf = TeamCfg(senses=TeamSensesCfg(audio=AudioCfg(present=False)))
     env = VecaEnv(replace(cfg, team={"red": discrete, "blue": deaf}), 2)
     assert env.full_action_spec["red", "action"].dtype is torch.int64
@@ -180,8 +179,8 @@ def test_the_command_line_knows_teams():
             "opponent.defender=random",
         ]
     ).game
-    assert cfg.body_of("attacker").action is ActionKind.discrete
-    assert cfg.body_of("defender").action is ActionKind.continuous
+    assert cfg.body_of("attacker").action is WalkActionKind.discrete
+    assert cfg.body_of("defender").action is WalkActionKind.continuous
     assert not cfg.senses_of("attacker").vision.present
     assert cfg.senses_of("defender").vision.present
     assert cfg.senses_of("attacker").touch == cfg.senses.touch

@@ -53,7 +53,7 @@ def test_it_starts_on_hands_and_knees_with_the_room_ahead(game):
 def test_the_start_holds_if_the_posture_is_held(game):
     for body in starts(game, 4):
         for _ in range(25):
-            hold(game, body.angles_of(ON_ALL_FOURS))
+            hold(game, body.posture_angles(ON_ALL_FOURS))
         assert body.bone("neck").position[2] > 0.2
         assert body.bone("chest").forward[2] < -0.8
 

@@ -26,7 +26,7 @@ def game():
 
 def terms_in(game, posture, seconds=0.04):
     """Return the terms after holding a posture."""
-    angles = put(game, posture).angles_of(posture)
+    angles = put(game, posture).posture_angles(posture)
     for _ in range(round(seconds / 0.04)):
         outcome = hold(game, angles)
     return outcome.terms["agents"]

@@ -9,8 +9,8 @@ from veca_marl.config import compose
 from veca_marl.envs.core.actions import random_action
 from veca_marl.envs.core.game import Game
 from veca_marl.envs.core.game_cfg import GameCfg
+from veca_marl.sim.body import VoiceKind
 from veca_marl.sim.body.anatomy.skeleton import load_skeleton
-from veca_marl.sim.body.voice import VoiceKind
 from veca_marl.sim.senses import SensesCfg, make_senses
 from veca_marl.sim.touch.taxels import load_taxels
 

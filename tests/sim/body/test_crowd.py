@@ -8,8 +8,8 @@ import pybullet
 import pytest
 from walking import empty_world, let_pass, walker_in, wall
 
-from veca_marl.sim.body.humanoid.humanoid import Detail, Humanoid, HumanoidCfg
-from veca_marl.sim.body.walker.crowd import part
+from veca_marl.sim.body.humanoid import Detail, Humanoid, HumanoidCfg
+from veca_marl.sim.body.walker.walker_collisions import separate
 
 RADIUS_M = 0.11
 SLACK_M = 0.003
@@ -141,11 +141,11 @@ def test_a_throng_comes_to_rest():
     far = np.abs(places).max() + 12 * 2.0 * RADIUS_M
     radii, shoves = np.full(12, RADIUS_M), np.zeros((12, 2))
     for _ in range(400):
-        if not part(places, radii, shoves):
+        if not separate(places, radii, shoves):
             break
         places += shoves
         assert np.linalg.norm(shoves, axis=1).max() < 2.0 * RADIUS_M
-    assert not part(places, radii, shoves)
+    assert not separate(places, radii, shoves)
     assert np.abs(places).max() < far
 
 
@@ -158,8 +158,8 @@ def standing_humanoid(world, place=(0.5, 0.0, 0.0)):
 def gap_m(world, walker, humanoid):
     """Distance of the capsule from the nearest bone, negative inside."""
     points = pybullet.getClosestPoints(
-        walker._pusher.body_id,
-        humanoid.articulation.body_id,
+        walker.body_id,
+        humanoid.body_id,
         1.0,
         physicsClientId=world.client,
     )
@@ -187,9 +187,7 @@ def test_a_joint_level_body_that_comes_shoves_the_walker_aside():
     world = empty_world()
     humanoid = standing_humanoid(world, (0.0, 0.0, 0.0))
     walker = walker_in(world, place=(0.45, 0.0, 0.0))
-    pybullet.resetBaseVelocity(
-        humanoid.articulation.body_id, (1.5, 0.0, 0.0), physicsClientId=world.client
-    )
+    pybullet.resetBaseVelocity(humanoid.body_id, (1.5, 0.0, 0.0), physicsClientId=world.client)
     let_pass(world, 0.6)
     assert walker.position[0] > 0.5
     assert gap_m(world, walker, humanoid) > -0.02

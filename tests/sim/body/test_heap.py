@@ -5,7 +5,7 @@ import pytest
 from heaps import heap, lay, thrash
 from walking import ball, box, empty_world
 
-from veca_marl.sim.body.humanoid.humanoid import Detail, Humanoid, HumanoidCfg
+from veca_marl.sim.body.humanoid import Detail, Humanoid, HumanoidCfg
 from veca_marl.sim.body.humanoid.postures import ON_BACK, SITTING, STANDING
 
 
@@ -14,7 +14,7 @@ def run(bodies, seconds, hold=True):
     world, heaped = heap(bodies, walls=True)
     if not hold:
         for body in heaped:
-            body.articulation.hold_limits = lambda: None
+            body._articulation.hold_limits = lambda: None
     seen, speeds = [], []
     for _ in thrash(world, heaped, seconds):
         assert all(body.is_finite for body in heaped)

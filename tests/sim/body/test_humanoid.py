@@ -8,11 +8,10 @@ import pytest
 from heaps import thrash
 from walking import empty_world, let_pass
 
+from veca_marl.sim.body import MOUNTS, Body, BodyCfg, make_body
 from veca_marl.sim.body.anatomy.skeleton import Underside, load_skeleton
 from veca_marl.sim.body.anatomy.skin_springs import skin_spring
-from veca_marl.sim.body.base import MOUNTS, Body, BodyCfg
-from veca_marl.sim.body.family import make_body
-from veca_marl.sim.body.humanoid.humanoid import (
+from veca_marl.sim.body.humanoid import (
     Detail,
     Humanoid,
     HumanoidCfg,
@@ -36,7 +35,7 @@ def test_both_details_speak_of_47_bones_and_82_joints(make_child, detail):
     assert body.velocities().shape == body.angular_velocities().shape == (47, 3)
     for read in (body.joint_angles, body.joint_velocities, body.joint_torques):
         assert read().shape == (82,)
-    assert len(body.articulation.moving) == {Detail.full: 82, Detail.mitten: 40}[detail]
+    assert len(body._articulation.moving) == {Detail.full: 82, Detail.mitten: 40}[detail]
     for mount in MOUNTS:
         assert np.isfinite(body.mount(mount).position).all()
 
@@ -71,7 +70,7 @@ def test_its_lowest_point_is_where_it_is_placed(make_child, name, height_m):
 
 def test_velocities_are_those_that_bullet_has(make_child):
     world, body = make_child()
-    client, body_id = world.client, body.articulation.body_id
+    client, body_id = world.client, body.body_id
     for _ in thrash(world, [body], 1.0):
         pass
     velocities, spins = body.velocities(), body.angular_velocities()
@@ -101,7 +100,7 @@ def test_fingers_of_a_mitten_are_straight_and_follow_the_hand(make_child):
     np.testing.assert_allclose(
         local, hand.rotation.T @ (finger.position - hand.position), atol=1e-9
     )
-    fingers = np.setdiff1d(np.arange(82), body.articulation.moving)
+    fingers = np.setdiff1d(np.arange(82), body._articulation.moving)
     assert not body.joint_angles()[fingers].any()
     assert not body.joint_torques()[fingers].any()
 
@@ -157,7 +156,7 @@ def test_a_fall_is_free_until_the_floor(make_child):
 
 def test_fingers_and_palms_and_soles_are_softer_than_bones(make_child):
     world, body = make_child()
-    client, body_id = world.client, body.articulation.body_id
+    client, body_id = world.client, body.body_id
     stiff = {}
     for link in range(pybullet.getNumJoints(body_id, physicsClientId=client)):
         name = pybullet.getJointInfo(body_id, link, physicsClientId=client)[12].decode()
@@ -175,7 +174,7 @@ def test_skin_that_carries_weight_is_pressed_in_by_it(make_child):
     wanted = posture_angles(SKELETON, POSTURES["sitting"])
     body.act(body.encode(wanted))
     let_pass(world, 6.0)
-    client, body_id = world.client, body.articulation.body_id
+    client, body_id = world.client, body.body_id
     pressed = 0
     for point in pybullet.getContactPoints(body_id, world.floor_id, physicsClientId=client):
         stiffness = pybullet.getDynamicsInfo(body_id, point[3], physicsClientId=client)[9]
@@ -226,11 +225,11 @@ def test_a_simulation_that_breaks_is_told_and_shows_no_nan(make_child, what):
     nan = math.nan
     if what == "base":
         pybullet.resetBaseVelocity(
-            body.articulation.body_id, (nan,) * 3, (0, 0, 0), physicsClientId=world.client
+            body.body_id, (nan,) * 3, (0, 0, 0), physicsClientId=world.client
         )
     else:
         pybullet.resetJointStatesMultiDof(
-            body.articulation.body_id, [3], [[nan]], [[0.0]], physicsClientId=world.client
+            body.body_id, [3], [[nan]], [[0.0]], physicsClientId=world.client
         )
     assert body.is_finite
     world.step()

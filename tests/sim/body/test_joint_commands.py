@@ -8,8 +8,8 @@ from heaps import weightless
 from walking import let_pass
 
 from veca_marl.sim.body.anatomy.skeleton import load_skeleton
-from veca_marl.sim.body.humanoid.humanoid import Detail, JointActionKind, JointChoice
-from veca_marl.sim.body.humanoid.joint_controls import PositionTarget
+from veca_marl.sim.body.humanoid import Detail, JointActionKind, JointChoice
+from veca_marl.sim.body.humanoid.joint_control import PositionControl
 from veca_marl.sim.body.humanoid.postures import POSTURES, Posture, posture_angles
 
 SKELETON = load_skeleton()
@@ -73,7 +73,7 @@ def test_torques_of_a_wish_keep_a_child_sitting_still(make_child, detail):
     """Given once per agent step, they must not shake it."""
     world, body = make_child(action=JointActionKind.torque, detail=detail)
     body.place((0.0, 0.0, 0.0), 0.0, POSTURES["sitting"])
-    wanted = body.angles_of(POSTURES["sitting"])
+    wanted = body.posture_angles(POSTURES["sitting"])
     head_m = body.bone("head").position[2]
     for _ in range(150):
         body.act(body.encode(wanted))
@@ -128,13 +128,13 @@ def test_increments_stop_at_the_stops_and_start_anew(make_child):
         assert body.joint_angles()[elbow] < bent - math.radians(5.0)
 
 
-def test_wishes_and_targets_are_inverse(make_child):
+def test_set_points_and_targets_are_inverse(make_child):
     _, body = make_child(action=JointActionKind.position)
     angles = np.random.default_rng(0).uniform(body._low, body._high)
-    control = PositionTarget()
-    wishes = control.wishes(angles, angles, body._low, body._high)
-    shares = control.shares(wishes, angles, body._low, body._high)
-    np.testing.assert_allclose(shares, 0.0, atol=1e-9)
+    control = PositionControl()
+    set_points = control.set_points(angles, angles, body._low, body._high)
+    torques = control.torques(set_points, angles, body._low, body._high)
+    np.testing.assert_allclose(torques, 0.0, atol=1e-9)
 
 
 def test_limbs_alone_may_be_commanded(make_child):

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 from heaps import fling, heap, kinetic_energy, thrash, weightless
+from veca_marl.sim.body.humanoid._articulation import damping_number
 from walking import empty_world
 
 from veca_marl.sim.body.anatomy.skeleton import load_skeleton
-from veca_marl.sim.body.humanoid.articulation import damping_number
-from veca_marl.sim.body.humanoid.humanoid import Detail, Humanoid, HumanoidCfg
+from veca_marl.sim.body.humanoid import Detail, Humanoid, HumanoidCfg
 from veca_marl.sim.physics.world import ClockCfg
 
 LOW = np.array([joint.low_rad for joint in load_skeleton().joints])
@@ -26,7 +26,7 @@ def watch_limits(world, body):
     seen = []
 
     def note():
-        body.articulation.read()
+        body._articulation.read()
         seen.append(body.joint_angles())
 
     world.after_substep.append(note)
@@ -53,7 +53,7 @@ def test_all_joints_pressed_against_their_stops_stay_there(alone, way):
     body.act({"joints": np.full(82, way)})
     for _ in range(50):
         world.step()
-    moving = body.articulation.moving
+    moving = body._articulation.moving
     away = np.abs(body.joint_angles() - (HIGH if way > 0 else LOW))[moving]
     # self-collision keeps a few from their stops
     assert np.mean(away < np.radians(1.0)) > 0.8
@@ -82,7 +82,7 @@ def test_damping_is_stable_in_all_postures(alone):
     rng = np.random.default_rng(0)
     for _ in range(50):
         body.place((0.0, 0.0, 1.0), 0.0, rng.uniform(LOW, HIGH))
-        assert damping_number(body.articulation, world.clock.substep_s) <= 1.0
+        assert damping_number(body._articulation, world.clock.substep_s) <= 1.0
 
 
 def test_too_long_physics_steps_are_refused():

@@ -7,7 +7,7 @@ import pytest
 from heaps import weightless
 from walking import empty_world, let_pass, walker_in
 
-from veca_marl.sim.body.humanoid.humanoid import Detail, Humanoid, HumanoidCfg
+from veca_marl.sim.body.humanoid import Detail, Humanoid, HumanoidCfg
 from veca_marl.sim.body.humanoid.postures import ON_BACK, ON_BELLY
 from veca_marl.sim.body.proprioception import (
     ProprioceptionCfg,

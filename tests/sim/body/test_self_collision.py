@@ -5,9 +5,9 @@ import pytest
 from walking import empty_world, let_pass
 
 from veca_marl.sim.body.anatomy.skeleton import load_skeleton
-from veca_marl.sim.body.humanoid.humanoid import Humanoid, HumanoidCfg, JointActionKind
+from veca_marl.sim.body.humanoid import Humanoid, HumanoidCfg, JointActionKind
 from veca_marl.sim.body.humanoid.postures import Posture, posture_angles
-from veca_marl.sim.body.humanoid.self_collision import limb, may_meet
+from veca_marl.sim.body.humanoid.self_collision import limb, may_collide
 from veca_marl.sim.physics.bullet import pybullet
 
 BONES = [bone.name for bone in load_skeleton().bones]
@@ -32,7 +32,7 @@ def test_every_bone_is_of_one_of_five_limbs():
     ],
 )
 def test_who_meets_whom(a, b, meet):
-    assert may_meet(a, b) is may_meet(b, a) is meet
+    assert may_collide(a, b) is may_collide(b, a) is meet
 
 
 @pytest.fixture
@@ -49,9 +49,7 @@ def floating():
 
 
 def contacts(world, body):
-    found = pybullet.getContactPoints(
-        body.articulation.body_id, body.articulation.body_id, physicsClientId=world.client
-    )
+    found = pybullet.getContactPoints(body.body_id, body.body_id, physicsClientId=world.client)
     return [contact for contact in found if contact[8] < 0.0]
 
 

@@ -10,7 +10,7 @@ from veca_marl.sim.body.anatomy.hulls import MARGIN_M
 from veca_marl.sim.body.anatomy.skeleton import load_skeleton
 from veca_marl.sim.body.anatomy.skin_springs import SkinLayer, skin_layer, skin_spring
 from veca_marl.sim.body.anatomy.urdf import Build, _Writer, body_files, bone_of
-from veca_marl.sim.body.humanoid.humanoid import Detail, Humanoid, HumanoidCfg
+from veca_marl.sim.body.humanoid import Detail, Humanoid, HumanoidCfg
 from veca_marl.sim.geometry.primitives import Shape
 from veca_marl.sim.physics.bullet import pybullet
 
@@ -89,7 +89,7 @@ def test_ten_kilograms_and_no_impossible_inertia(robots, fingers):
 
 
 def test_bullet_reads_the_table(humanoid):
-    client, body = humanoid._world.client, humanoid.articulation
+    client, body = humanoid._world.client, humanoid._articulation
     for joint in range(pybullet.getNumJoints(body.body_id, physicsClientId=client)):
         info = pybullet.getJointInfo(body.body_id, joint, physicsClientId=client)
         if info[2] != pybullet.JOINT_REVOLUTE:
@@ -100,7 +100,7 @@ def test_bullet_reads_the_table(humanoid):
 
 
 def test_bones_are_where_bullet_has_them(humanoid):
-    client, body = humanoid._world.client, humanoid.articulation.body_id
+    client, body = humanoid._world.client, humanoid.body_id
     count = pybullet.getNumJoints(body, physicsClientId=client)
     links = {
         pybullet.getJointInfo(body, link, physicsClientId=client)[12].decode(): link
@@ -122,7 +122,7 @@ def test_bones_are_where_bullet_has_them(humanoid):
 
 def shapes_of_bullet(humanoid):
     """Kind, centre and rotation of every collision shape, by bone, out of Bullet."""
-    where, client = humanoid.articulation.body_id, humanoid._world.client
+    where, client = humanoid.body_id, humanoid._world.client
     shapes = {}
     for link in range(-1, pybullet.getNumJoints(where, physicsClientId=client)):
         if link < 0:

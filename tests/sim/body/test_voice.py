@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 from walking import empty_world, walker_in
 
-from veca_marl.sim.body.humanoid.humanoid import JointActionKind
-from veca_marl.sim.body.humanoid.joint_controls import Springs
-from veca_marl.sim.body.voice import VoiceKind
-from veca_marl.sim.body.walker.controls import MOVES, ActionKind
+from veca_marl.sim.body import VoiceKind
+from veca_marl.sim.body.humanoid import JointActionKind, JointCommand
+from veca_marl.sim.body.walker.walk_commands import MOVES, WalkActionKind
 from veca_marl.sim.hearing.sense import AudioCfg, AudioSense
 from veca_marl.sim.sound.calls import Call
 
@@ -19,7 +18,7 @@ def spec_of(part):
     return part.shape, part.dtype, part.low, part.high
 
 
-@pytest.mark.parametrize("kind", ActionKind)
+@pytest.mark.parametrize("kind", WalkActionKind)
 def test_a_walker_has_a_discrete_voice_beside_its_movement(kind):
     silent = walker_in(empty_world(), action=kind).action_spec
     calling = walker_in(empty_world(), action=kind, voice=VoiceKind.calls).action_spec
@@ -30,7 +29,7 @@ def test_a_walker_has_a_discrete_voice_beside_its_movement(kind):
     assert calling["voice"].names == tuple(call.name for call in Call)
 
 
-@pytest.mark.parametrize("kind", ActionKind)
+@pytest.mark.parametrize("kind", WalkActionKind)
 @pytest.mark.parametrize("call", Call)
 def test_a_walkers_command_is_encoded_part_by_part(kind, call):
     walker = walker_in(empty_world(), action=kind, voice=VoiceKind.calls)
@@ -121,9 +120,9 @@ def test_a_joint_level_body_has_a_voice_and_moves_its_joints_as_without(make_chi
     _, calling = make_child(action=action, voice=VoiceKind.calls)
     assert list(silent.action_spec) == ["joints"]
     assert spec_of(calling.action_spec["voice"]) == CALLS_SPEC
-    without = silent.encode(Springs(wanted, ahead_s=0.0, call=Call.rising))
+    without = silent.encode(JointCommand(wanted, horizon_s=0.0, call=Call.rising))
     for call in Call:
-        encoded = calling.encode(Springs(wanted, ahead_s=0.0, call=call))
+        encoded = calling.encode(JointCommand(wanted, horizon_s=0.0, call=call))
         np.testing.assert_array_equal(encoded["joints"], without["joints"])
         assert encoded["voice"] == call
     assert list(without) == ["joints"]

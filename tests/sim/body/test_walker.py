@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from walking import ball, empty_world, let_pass, walker_in, wall
 
-from veca_marl.sim.body.base import MOUNTS
-from veca_marl.sim.body.walker.controls import MOVES, WALK_CONTROLS, ActionKind
-from veca_marl.sim.body.walker.walker import WalkerCfg
+from veca_marl.sim.body import MOUNTS
+from veca_marl.sim.body.walker import WalkerCfg
+from veca_marl.sim.body.walker.walk_commands import MOVES, WALK_ACTIONS, WalkActionKind
 from veca_marl.sim.hearing.sense import AudioCfg, AudioSense
 from veca_marl.sim.senses import SensesCfg, make_senses
 from veca_marl.sim.vision.visibility import is_visible
@@ -89,10 +89,10 @@ def test_an_action_holds_until_the_next():
 @pytest.mark.parametrize("move", MOVES)
 def test_discrete_moves_are_continuous_ones(move):
     positions = []
-    for kind in ActionKind:
+    for kind in WalkActionKind:
         world = empty_world()
         walker = walker_in(world, action=kind)
-        walker.act({"move": WALK_CONTROLS[kind].encode(*MOVES[move])})
+        walker.act({"move": WALK_ACTIONS[kind].encode(*MOVES[move])})
         let_pass(world, 0.4)
         positions.append((*walker.position, walker.yaw_rad))
     assert positions[0] == positions[1]
@@ -101,20 +101,20 @@ def test_discrete_moves_are_continuous_ones(move):
 @pytest.mark.parametrize(
     ("kind", "row"),
     [
-        (ActionKind.continuous, np.array([np.nan, 0.0])),
-        (ActionKind.continuous, np.array([0.0, np.inf])),
-        (ActionKind.continuous, np.array([1.5, 0.0])),
-        (ActionKind.continuous, np.array([0.0, -1.0001])),
-        (ActionKind.continuous, np.array([0.0])),
-        (ActionKind.continuous, np.array([[0.0, 0.0]])),
-        (ActionKind.continuous, np.array(1)),
-        (ActionKind.continuous, None),
-        (ActionKind.discrete, np.array(7)),
-        (ActionKind.discrete, np.array(-1)),
-        (ActionKind.discrete, np.array(1.5)),
-        (ActionKind.discrete, np.array(np.nan)),
-        (ActionKind.discrete, np.array([1])),
-        (ActionKind.discrete, np.array(True)),
+        (WalkActionKind.continuous, np.array([np.nan, 0.0])),
+        (WalkActionKind.continuous, np.array([0.0, np.inf])),
+        (WalkActionKind.continuous, np.array([1.5, 0.0])),
+        (WalkActionKind.continuous, np.array([0.0, -1.0001])),
+        (WalkActionKind.continuous, np.array([0.0])),
+        (WalkActionKind.continuous, np.array([[0.0, 0.0]])),
+        (WalkActionKind.continuous, np.array(1)),
+        (WalkActionKind.continuous, None),
+        (WalkActionKind.discrete, np.array(7)),
+        (WalkActionKind.discrete, np.array(-1)),
+        (WalkActionKind.discrete, np.array(1.5)),
+        (WalkActionKind.discrete, np.array(np.nan)),
+        (WalkActionKind.discrete, np.array([1])),
+        (WalkActionKind.discrete, np.array(True)),
     ],
 )
 def test_impossible_actions_are_refused_and_nothing_moves(kind, row):

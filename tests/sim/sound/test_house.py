@@ -7,7 +7,7 @@ from listening import RATE, STEP, ratio_db, spatialisation
 from listening import render as render_field
 
 from veca_marl.config import compose
-from veca_marl.sim.body.walker.walker import Walker, WalkerCfg
+from veca_marl.sim.body.walker import Walker, WalkerCfg
 from veca_marl.sim.geometry.pose import Pose
 from veca_marl.sim.hearing.sense import AudioCfg, AudioSense
 from veca_marl.sim.physics import World

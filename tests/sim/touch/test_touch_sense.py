@@ -6,7 +6,7 @@ from stand_in_worlds import SceneWorld
 from touching import SPREAD, Named, Stage, of_bone
 
 from veca_marl.config import compose
-from veca_marl.sim.body.walker.walker import Walker, WalkerCfg
+from veca_marl.sim.body.walker import Walker, WalkerCfg
 from veca_marl.sim.geometry.primitives import Shape
 from veca_marl.sim.geometry.scene import Scene
 from veca_marl.sim.geometry.tables import Geom

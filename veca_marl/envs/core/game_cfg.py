@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 from veca_marl.envs.core.expert import find_expert
 from veca_marl.envs.core.task import TaskCfg, Team, find_task
 from veca_marl.envs.core.team import Script, TeamCfg
-from veca_marl.sim.body.base import BodyCfg
-from veca_marl.sim.body.walker.walker import WalkerCfg
+from veca_marl.sim.body import BodyCfg
+from veca_marl.sim.body.walker import WalkerCfg
 from veca_marl.sim.physics.playground import PlaygroundCfg
 from veca_marl.sim.physics.world import ClockCfg
 from veca_marl.sim.senses import SensesCfg

@@ -10,9 +10,9 @@ from typing import Any, ClassVar, NamedTuple, TypeVar, get_type_hints
 import numpy as np
 
 from veca_marl.registry import Registry
-from veca_marl.sim.body.base import Body
-from veca_marl.sim.body.humanoid.humanoid import Humanoid
-from veca_marl.sim.body.walker.walker import Walker
+from veca_marl.sim.body import Body
+from veca_marl.sim.body.humanoid import Humanoid
+from veca_marl.sim.body.walker import Walker
 from veca_marl.sim.physics.world import World
 
 TaskType = TypeVar("TaskType", bound="type[Task]")

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, fields, replace
 from enum import Enum
 from typing import Any
 
-from veca_marl.sim.body.base import BodyCfg
+from veca_marl.sim.body import BodyCfg
 from veca_marl.sim.body.proprioception import ProprioceptionCfg
 from veca_marl.sim.hearing.sense import AudioCfg
 from veca_marl.sim.senses import SensesCfg

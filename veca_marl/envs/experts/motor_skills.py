@@ -17,7 +17,7 @@ from veca_marl.envs.tasks.locomotion.crawl_baby import CrawlBaby
 from veca_marl.envs.tasks.locomotion.run_baby import RunBaby
 from veca_marl.envs.tasks.locomotion.sit_baby import SitBaby
 from veca_marl.envs.tasks.locomotion.turn_baby import TurnBaby
-from veca_marl.sim.body.humanoid.joint_controls import Springs
+from veca_marl.sim.body.humanoid import JointCommand
 from veca_marl.sim.geometry.pose import Floats
 
 _FAR_M = 100.0
@@ -58,8 +58,8 @@ class SitBabyExpert(Expert[SitBaby]):
         """See `Expert.reset`."""
         self._skill.reset()
 
-    def act(self, observation: Mapping[str, NDArray[Any]]) -> Springs:
-        """Return target angles as `Springs`."""
+    def act(self, observation: Mapping[str, NDArray[Any]]) -> JointCommand:
+        """Return target angles as `JointCommand`."""
         return self._skill.command()
 
 
@@ -76,8 +76,8 @@ class CrawlBabyExpert(Expert[CrawlBaby]):
         self._goal = body.position + _FAR_M * body.forward
         self._locomotion = CrawlLocomotion(body, self.task.world.clock.step_s)
 
-    def act(self, observation: Mapping[str, NDArray[Any]]) -> Springs:
-        """Return target angles as `Springs`."""
+    def act(self, observation: Mapping[str, NDArray[Any]]) -> JointCommand:
+        """Return target angles as `JointCommand`."""
         return self._locomotion.to(self._goal)
 
 
@@ -96,6 +96,6 @@ class RunBabyExpert(Expert[RunBaby]):
         """See `Expert.reset`."""
         self._skill.reset()
 
-    def act(self, observation: Mapping[str, NDArray[Any]]) -> Springs:
-        """Return target angles as `Springs`."""
+    def act(self, observation: Mapping[str, NDArray[Any]]) -> JointCommand:
+        """Return target angles as `JointCommand`."""
         return self._skill.command()

@@ -35,7 +35,7 @@ class RotateCubeExpert(Expert[RotateCube]):
 
     def reset(self) -> None:
         """See `Expert.reset`."""
-        self._angles = self.task.child.angles_of(OFFERING)
+        self._angles = self.task.child.posture_angles(OFFERING)
 
     def act(self, observation: Mapping[str, NDArray[Any]]) -> Floats:
         """Return target angles ``(82,)`` in rad."""

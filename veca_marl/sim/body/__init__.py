@@ -1,1 +1,11 @@
-"""Bodies: a skeleton, how it is moved, its voice and its proprioception."""
+"""Bodies: a humanoid that walks by kinematics, and one whose joints are driven in physics.
+
+`Body` is the base class; `make_body` makes one from its configuration; `register_body` adds a kind.
+"""
+
+from veca_marl.sim.body.base import Body, BodyCfg
+from veca_marl.sim.body.mounts import MOUNTS
+from veca_marl.sim.body.registry import BODIES, make_body, register_body
+from veca_marl.sim.body.voice import VoiceKind
+
+__all__ = ["BODIES", "MOUNTS", "Body", "BodyCfg", "VoiceKind", "make_body", "register_body"]

@@ -1,28 +1,42 @@
-"""What senses, tasks and environments may ask of any body, whatever moves it."""
+"""The base class of all bodies: 47 bones in the scene, a head with sense organs, a voice.
+
+Senses, tasks and experts know bodies by this class. A subclass moves the bones: `Walker` by
+kinematics, `Humanoid` by physics.
+"""
 
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum
-from typing import Any, Protocol
+from typing import Any, ClassVar
 
+import numpy as np
 from numpy.typing import NDArray
 
-from veca_marl.sim.body.voice import VoiceKind
+from veca_marl.sim.body.action import Action, checked_action
+from veca_marl.sim.body.anatomy.bone_motion import bone_motion
+from veca_marl.sim.body.anatomy.skeleton import load_skeleton
+from veca_marl.sim.body.appearance import SHIRTS, bone_geoms, dressed_skin
+from veca_marl.sim.body.mounts import EYES, Gaze, palm_centre, resting_mount
+from veca_marl.sim.body.voice import VOICE, VoiceKind, voice_spec
 from veca_marl.sim.geometry.pose import Floats, Pose
+from veca_marl.sim.geometry.rotations import cross
+from veca_marl.sim.physics.props import Prop
+from veca_marl.sim.physics.world import World
+from veca_marl.sim.sound.calls import CALLS, Call, call_waveform
+from veca_marl.sim.sound.sounds import Voice
 from veca_marl.sim.spec import ArraySpec
-
-MOUNTS = ("head", "eye_left", "eye_right", "ear_left", "ear_right", "mouth")
 
 
 @dataclass
 class BodyCfg:
-    """What every body can be told.
+    """Parameters that all bodies have.
 
     Attributes:
-        eye_range_deg: How far the eyes turn in the head.
+        eye_range_deg: Largest rotation of the eyes in the head, to each side and up and down.
         voice: Whether the action has a part `voice` that chooses a call.
     """
 
@@ -30,7 +44,7 @@ class BodyCfg:
     voice: VoiceKind = VoiceKind.silent
 
     def __post_init__(self) -> None:
-        """All numbers of a body are magnitudes."""
+        """Check that all numbers are finite and not negative."""
         self._check_choices(voice=VoiceKind)
         for name, value in vars(self).items():
             if isinstance(value, (int, float)) and not (math.isfinite(value) and value >= 0):
@@ -44,105 +58,267 @@ class BodyCfg:
                 raise ValueError(f"body.{name}={getattr(self, name)!r}; there are {choices}")
 
 
-class Body(Protocol):
+class Body(ABC):
     """A humanoid in a world.
 
-    Attributes:
+    A subclass sets `cfg_type`, gives the constructor the parts of its action that move it,
+    attaches itself to the world (`World.attach`) and writes the poses of its bones with `_frames`
+    when the world calls `mirror`.
+
+    Args:
         name: Unique in its world.
-        object_id: The id under which its bones are drawn in the world's `Scene` and appear in
-            segmentation images.
+        cfg: Its parameters.
+        world: The world, not yet frozen.
+        shirt: Index of the shirt's colour.
+
+    Attributes:
+        cfg_type: Class of the configuration that describes this kind of body.
+        name: Unique in its world.
+        object_id: The id of its bones in the world's `Scene` and in segmentation images.
         action_spec: The parts of the action that `act` takes, by name: a float32 vector in
             [-1, 1], or one of several choices (shape ``()``, int64).
-        focal_distance_m: What the eyes' lenses are adjusted to; ``inf`` when relaxed.
-        muted: Whether nobody hears its voice, itself included. Stays until set anew.
-        own_head_frames: Indices of the body's frames (bones) that its own eyes must not see.
+        own_head_frames: Indices of the frames (bones) that its own eyes do not see.
         joint_names: The 82 joints, such as `l_forearm.flexion`, in the order of all joint arrays.
         bone_names: The 47 bones, such as `l_forearm`, in the order of all bone arrays.
     """
 
-    name: str
-    object_id: int
+    cfg_type: ClassVar[type[BodyCfg]]
     action_spec: dict[str, ArraySpec]
-    focal_distance_m: float
-    muted: bool
-    own_head_frames: tuple[int, ...]
-    joint_names: tuple[str, ...]
-    bone_names: tuple[str, ...]
+
+    def __init__(self, name: str, cfg: BodyCfg, world: World, shirt: int = 0) -> None:
+        self.name = name
+        self._world = world
+        self._skeleton = load_skeleton()
+        self._add_to_scene(SHIRTS[shirt % len(SHIRTS)])
+        self._head = self._skeleton.bone("head")
+        self.own_head_frames: tuple[int, ...] = (self._skeleton.bone("neck"), self._head)
+        self._hands = [self._skeleton.bone(f"{side}_hand") for side in ("l", "r")]
+        self._palms = np.array([palm_centre(self._skeleton.bones[hand]) for hand in self._hands])
+        self._voice = Voice(world.sound.sample_rate_hz)
+        self._mouth = world.sound.add_source(f"{name}.voice", self._voice)
+        self._gaze = Gaze(math.radians(cfg.eye_range_deg))
+        self.joint_names = tuple(f"{j.bone}.{j.label}" for j in self._skeleton.joints)
+        self.bone_names = tuple(bone.name for bone in self._skeleton.bones)
+        joints = len(self._skeleton.joints)
+        self._angles, self._speeds, self._torques = (np.zeros(joints) for _ in range(3))
+        self._pelvis_velocity, self._pelvis_spin = np.zeros(3), np.zeros(3)
+        self.action_spec = {**self._movement_spec(cfg), **voice_spec(cfg.voice)}
+
+    def _add_to_scene(self, shirt: tuple[float, float, float]) -> None:
+        scene = self._world.scene
+        self._drawn = scene.add_object(
+            self.name, bone_geoms(self._skeleton, shirt), dressed_skin(self._skeleton, shirt)
+        )
+        self.object_id = self._drawn.id
+        self._built_colours = scene.geoms.colours[self._drawn.geoms].copy()
+
+    # ---- what each kind of body defines
+
+    @property
+    @abstractmethod
+    def body_id(self) -> int:
+        """PyBullet's id of what collides: a capsule, or the articulated bones."""
+
+    @property
+    def obstacle_ids(self) -> tuple[int, ...]:
+        """PyBullet's ids of what walkers are kept out of; empty for walkers themselves."""
+        return ()
+
+    @property
+    @abstractmethod
+    def velocity(self) -> Floats:
+        """``(3,)`` m/s: velocity of the pelvis in the world frame."""
+
+    @property
+    @abstractmethod
+    def forward(self) -> Floats:
+        """``(3,)`` horizontal unit vector that the trunk faces."""
+
+    @property
+    def is_finite(self) -> bool:
+        """Whether the simulation of this body is valid; if not, the world must be rebuilt."""
+        return True
+
+    @abstractmethod
+    def _movement_spec(self, cfg: Any) -> dict[str, ArraySpec]:
+        """Return the parts of the action that move the body."""
+
+    @abstractmethod
+    def _move(self, parts: Action) -> None:
+        """Apply the checked parts of an action that move the body."""
+
+    @abstractmethod
+    def encode(self, command: Any) -> dict[str, NDArray[Any]]:
+        """Return the action that comes nearest to an expert's command."""
+
+    @abstractmethod
+    def rest(self) -> None:
+        """Stand still, or hold the joints where they are, until the next action."""
+
+    @abstractmethod
+    def place(self, position: Floats | tuple[float, float, float], yaw_rad: float = 0.0) -> None:
+        """Start at a place on the floor, facing `yaw_rad`, at rest.
+
+        Raises:
+            ValueError: If a number is not finite.
+        """
+
+    # ---- calls from the world, see `Mover`
+
+    def reset(self) -> None:
+        """Return to the state in which the body was built, at the origin.
+
+        The voice is audible and silent, the eyes look straight ahead, the colours are the first
+        ones. Tasks then put the body in its starting place.
+        """
+        self.muted = False
+        self._world.scene.geoms.colours[self._drawn.geoms] = self._built_colours
+        self.place((0.0, 0.0, 0.0))
+
+    # ---- poses and motion
 
     @property
     def position(self) -> Floats:
         """``(3,)`` metres: the pelvis in the world frame."""
-        ...
-
-    @property
-    def velocity(self) -> Floats:
-        """``(3,)`` m/s: velocity of the pelvis in the world frame."""
-        ...
-
-    @property
-    def forward(self) -> Floats:
-        """``(3,)`` horizontal unit vector the trunk faces."""
-        ...
-
-    def mount(self, name: str) -> Pose:
-        """Return where a sense organ is: one of `MOUNTS`. Eyes look along their x axis."""
-        ...
-
-    def act(self, action: Mapping[str, Any]) -> None:
-        """Apply an action that `action_spec` describes; movement lasts until the next call."""
-        ...
-
-    def encode(self, command: Any) -> dict[str, NDArray[Any]]:
-        """Return the action that comes nearest to an expert's command."""
-        ...
-
-    def rest(self) -> None:
-        """Do nothing until the next call: stand, or keep the joints where they are."""
-        ...
-
-    def place(self, position: Floats | tuple[float, float, float], yaw_rad: float = 0.0) -> None:
-        """Start anew at a place of the floor, facing `yaw_rad`, at rest."""
-        ...
-
-    @property
-    def is_finite(self) -> bool:
-        """Whether the simulation of this body makes sense; if not, build the world anew."""
-        ...
-
-    # ---- the paper's physical API
+        return np.array(self._drawn.positions[0])
 
     def bone(self, name: str) -> Pose:
-        """Return the pose of a bone."""
-        ...
+        """Return the pose of a bone by name, such as `l_hand`."""
+        index = self._skeleton.bone(name)
+        return Pose(self._drawn.positions[index].copy(), self._drawn.rotations[index].copy())
+
+    def palms(self) -> Floats:
+        """Return the centres of the palms, left first, ``(2, 3)`` metres in the world frame."""
+        positions, rotations = self._frames()
+        centres: Floats = positions[self._hands] + np.einsum(
+            "hij,hj->hi", rotations[self._hands], self._palms
+        )
+        return centres
 
     def bone_positions(self) -> Floats:
         """Return the origins of all bones, ``(47, 3)`` metres in the world frame."""
-        ...
+        return np.array(self._drawn.positions)
 
     def bone_rotations(self) -> Floats:
-        """Return the frames of all bones, ``(47, 3, 3)`` to the world frame."""
-        ...
+        """Return the rotations of all bones, ``(47, 3, 3)``, from their frames to the world's."""
+        return np.array(self._drawn.rotations)
+
+    def joint_angles(self) -> Floats:
+        """Return all joint angles, ``(82,)`` rad, in the order of `joint_names`."""
+        return self._angles.copy()
+
+    def joint_velocities(self) -> Floats:
+        """Return all joint velocities, ``(82,)`` rad/s."""
+        return self._speeds.copy()
+
+    def joint_torques(self) -> Floats:
+        """Return the motor torques, ``(82,)`` in [-1, 1] of each joint's greatest torque."""
+        return self._torques.copy()
 
     def velocities(self) -> Floats:
         """Return the velocities of the bones' origins, ``(47, 3)`` m/s in the world frame."""
-        ...
+        return self._bone_motion()[0]
 
     def angular_velocities(self) -> Floats:
         """Return the angular velocities of the bones, ``(47, 3)`` rad/s in the world frame."""
-        ...
-
-    def joint_angles(self) -> Floats:
-        """Return all joint angles, ``(82,)`` rad."""
-        ...
-
-    def joint_velocities(self) -> Floats:
-        """Return how fast all joints turn, ``(82,)`` rad/s."""
-        ...
-
-    def joint_torques(self) -> Floats:
-        """Return what the joints' motors give, ``(82,)`` as shares of their strength."""
-        ...
+        return self._bone_motion()[1]
 
     def head_motion(self) -> tuple[Floats, Floats]:
-        """Return velocity ``(3,)`` m/s and angular velocity ``(3,)`` rad/s of the middle head."""
-        ...
+        """Return velocity ``(3,)`` m/s and angular velocity ``(3,)`` rad/s of the head's centre."""
+        velocities, spins = self._bone_motion()
+        lever = self.mount("head").position - self._drawn.positions[self._head]
+        spin = spins[self._head]
+        return velocities[self._head] + cross(spin, lever), spin
+
+    def mount(self, name: str) -> Pose:
+        """Return the pose of a sense organ, one of `MOUNTS`; eyes look along their x axis."""
+        head = Pose(self._drawn.positions[self._head], self._drawn.rotations[self._head])
+        organ = resting_mount(name, head)
+        return self._gaze.turned(organ) if name in EYES else organ
+
+    def touches(self, prop: Prop) -> bool:
+        """Return whether any part of the body is in contact with a prop."""
+        return prop.touches(self.body_id)
+
+    # ---- actions
+
+    def act(self, action: Mapping[str, Any]) -> None:
+        """Apply an action: a value for each part of `action_spec`.
+
+        Movement lasts until the next action. A call is played to its end: calls that are chosen
+        in the meantime are ignored.
+
+        Raises:
+            ValueError: If a part is missing, unknown or out of its range; then nothing is applied.
+        """
+        parts = checked_action(self.action_spec, action)
+        self._move(parts)
+        if VOICE in parts:
+            self.call(Call(int(parts[VOICE])))
+
+    def _with_voice(self, parts: dict[str, NDArray[Any]], call: Call) -> dict[str, NDArray[Any]]:
+        """Return an action with a call, if this body's action has a part for it."""
+        if VOICE in self.action_spec:
+            parts[VOICE] = np.asarray(call, np.int64)
+        return parts
+
+    # ---- eyes and voice (the paper's API)
+
+    @property
+    def focal_distance_m(self) -> float:
+        """The distance to which the lenses of the eyes are adjusted; ``inf`` when relaxed."""
+        return self._gaze.focal_distance_m
+
+    def look_toward_point(self, point: Floats | tuple[float, float, float]) -> None:
+        """Turn the eyes, not the head, to a point and keep them there until `release_look`.
+
+        Raises:
+            ValueError: If `point` is not three finite metres.
+        """
+        self._gaze.look_toward(point)
+
+    def release_look(self) -> None:
+        """Let the eyes look straight ahead again."""
+        self._gaze.point = None
+
+    def adjust_focal_length(self, focal_distance_m: float) -> None:
+        """Adjust the lenses to a distance in metres; ``inf`` is relaxed.
+
+        Raises:
+            ValueError: If the distance is not positive.
+        """
+        self._gaze.adjust(focal_distance_m)
+
+    @property
+    def muted(self) -> bool:
+        """Whether the voice is inaudible to all agents, including this one; False after a reset."""
+        return self._mouth.muted
+
+    @muted.setter
+    def muted(self, muted: bool) -> None:
+        self._mouth.muted = muted
+
+    def make_sound(self, waveform: NDArray[np.float32]) -> None:
+        """Play samples at 22 050 Hz from the mouth; all agents hear them, including this one."""
+        self._voice.say(waveform)
+
+    def call(self, call: Call) -> None:
+        """Play a call; it is ignored while another sound of this mouth is being played."""
+        if call is not Call.none and not self._voice.speaking:
+            self._voice.say(call_waveform(CALLS[call], self._world.sound.sample_rate_hz))
+
+    # ---- for subclasses
+
+    def _bone_motion(self) -> tuple[Floats, Floats]:
+        return bone_motion(
+            self._skeleton,
+            self._angles,
+            self._speeds,
+            *self._frames(),
+            self._pelvis_velocity,
+            self._pelvis_spin,
+        )
+
+    def _frames(self) -> tuple[NDArray[Any], NDArray[Any]]:
+        """Return the bones' positions and rotations in the scene, to write into."""
+        return self._drawn.positions, self._drawn.rotations

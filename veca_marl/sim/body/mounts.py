@@ -1,8 +1,8 @@
-"""Where the sense organs sit in the head, and how the eyes turn in it.
+"""Where the sense organs are in the head, and how the eyes rotate in it.
 
 Distances are those of a child of about one year, in the frame of the head bone (origin at the top
-of the neck): the interpupillary distance of 45 mm and the head breadth of 128 mm are of the size
-that anthropometry reports for that age (from memory, not checked against a table); the rest
+of the neck). The interpupillary distance of 45 mm and the head breadth of 128 mm are of the order
+that anthropometry reports for that age (quoted from memory, not checked against a table); the rest
 follows from the head of our skeleton.
 """
 
@@ -16,7 +16,7 @@ from veca_marl.sim.body.anatomy.skeleton import Bone
 from veca_marl.sim.geometry.pose import Floats, Pose
 from veca_marl.sim.geometry.primitives import Shape
 
-ORGANS_M: dict[str, tuple[float, float, float]] = {
+MOUNTS_M: dict[str, tuple[float, float, float]] = {
     "head": (0.010, 0.0, 0.066),
     "eye_left": (0.078, 0.0225, 0.075),
     "eye_right": (0.078, -0.0225, 0.075),
@@ -24,28 +24,71 @@ ORGANS_M: dict[str, tuple[float, float, float]] = {
     "ear_right": (0.010, -0.064, 0.066),
     "mouth": (0.088, 0.0, 0.030),
 }
+MOUNTS = tuple(MOUNTS_M)
 EYES = ("eye_left", "eye_right")
 
 
-def organ_pose(name: str, head: Pose) -> Pose:
-    """Return the pose of an organ at rest in the head; raise `KeyError` listing the organs."""
+def resting_mount(name: str, head: Pose) -> Pose:
+    """Return the pose of an organ whose axes are the head's.
+
+    Raises:
+        KeyError: If there is no such organ; the message lists those that exist.
+    """
     try:
-        offset = ORGANS_M[name]
+        offset = MOUNTS_M[name]
     except KeyError:
-        raise KeyError(f"no mount {name!r}; there are {list(ORGANS_M)}") from None
+        raise KeyError(f"no mount {name!r}; there are {list(MOUNTS_M)}") from None
     return Pose(head.position + head.rotation @ np.array(offset), head.rotation)
 
 
-def gaze(eye: Pose, point: Floats, range_rad: float) -> Pose:
-    """Turn an eye toward a point, as far as its muscles reach.
+class Gaze:
+    """The state of both eyes: a point at which they look, and the distance of focus.
 
     Args:
-        eye: Pose of the eye at rest.
+        range_rad: Largest rotation of the eyes in the head.
+
+    Attributes:
+        point: ``(3,)`` metres in the world frame; None when the eyes look straight ahead.
+        focal_distance_m: To which the lenses are adjusted; ``inf`` when relaxed.
+    """
+
+    def __init__(self, range_rad: float) -> None:
+        self._range_rad = range_rad
+        self.relax()
+
+    def relax(self) -> None:
+        """Look straight ahead with relaxed lenses."""
+        self.point: Floats | None = None
+        self.focal_distance_m = math.inf
+
+    def look_toward(self, point: Floats | tuple[float, float, float]) -> None:
+        """Look at a point from now on; raise `ValueError` unless it is three finite numbers."""
+        target = np.array(point, dtype=np.float64)
+        if target.shape != (3,) or not np.isfinite(target).all():
+            raise ValueError(f"cannot look toward {point!r}: three finite metres are needed")
+        self.point = target
+
+    def adjust(self, focal_distance_m: float) -> None:
+        """Focus at a distance; raise `ValueError` unless it is positive."""
+        if not focal_distance_m > 0:
+            raise ValueError(f"focal distance {focal_distance_m} must be positive metres or inf")
+        self.focal_distance_m = float(focal_distance_m)
+
+    def turned(self, eye: Pose) -> Pose:
+        """Return the pose of an eye, given its pose when it looks straight ahead."""
+        return eye if self.point is None else aimed(eye, self.point, self._range_rad)
+
+
+def aimed(eye: Pose, point: Floats, range_rad: float) -> Pose:
+    """Rotate an eye toward a point within its range.
+
+    Args:
+        eye: Pose of the eye when it looks straight ahead.
         point: ``(3,)`` metres, world frame.
-        range_rad: Greatest turn to either side and up or down.
+        range_rad: Largest rotation to either side and up or down.
 
     Returns:
-        The pose whose x axis points at `point` or, beyond the range, as near as it can.
+        The pose with its x axis toward `point`; yaw and pitch are clipped to the range.
     """
     x, y, z = eye.rotation.T @ (point - eye.position)
     yaw = min(max(math.atan2(y, x), -range_rad), range_rad)
@@ -55,16 +98,16 @@ def gaze(eye: Pose, point: Floats, range_rad: float) -> Pose:
     return Pose(eye.position, eye.rotation @ turn)
 
 
-def palm_of(hand: Bone) -> Floats:
-    """Return the middle of the palm's skin in the frame of a hand, ``(3,)`` metres.
+def palm_centre(hand: Bone) -> Floats:
+    """Return the centre of the palm's surface in the frame of a hand, ``(3,)`` metres.
 
     Raises:
-        ValueError: If the bone has no box, which is what a hand is made of.
+        ValueError: If the bone has no box; hands are modelled as boxes.
     """
     for part in hand.colliders:
         if part.shape is Shape.BOX:
-            # palms face inward, the thighs of a standing body: -y on the left, +y on the right
+            # palms face the thighs of a standing body: -y on the left side, +y on the right
             inward = -1.0 if hand.name.startswith("l_") else 1.0
             x, y, z = part.pose.position
             return np.array([x, y + inward * (part.size[1] + hand.skin_thickness_m), z])
-    raise ValueError(f"{hand.name} is no hand: it is not made of a box")
+    raise ValueError(f"{hand.name} is no hand: it has no box")

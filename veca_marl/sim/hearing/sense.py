@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from veca_marl.sim.body.base import Body
+from veca_marl.sim.body import Body
 from veca_marl.sim.geometry.pose import Floats, Pose
 from veca_marl.sim.hearing.hrtf import kemar_table, sofa_table
 from veca_marl.sim.hearing.receivers import HrtfReceiver, MonoReceiver, StereoReceiver

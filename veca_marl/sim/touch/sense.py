@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from veca_marl.sim.body import Body
 from veca_marl.sim.body.anatomy.skeleton import Skeleton, load_skeleton
-from veca_marl.sim.body.base import Body
 from veca_marl.sim.geometry.pose import Floats
 from veca_marl.sim.geometry.tables import Bools
 from veca_marl.sim.physics.world import World

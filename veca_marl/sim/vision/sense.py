@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from veca_marl.sim.body.base import Body
+from veca_marl.sim.body import Body
 from veca_marl.sim.geometry.tables import Bools
 from veca_marl.sim.physics.world import World
 from veca_marl.sim.sense import Sense

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Protocol
 
-from veca_marl.sim.body.base import Body
+from veca_marl.sim.body import Body
 from veca_marl.sim.body.mounts import EYES
 from veca_marl.sim.geometry.scene import Scene
 from veca_marl.sim.vision.optics import Camera, seen_fraction

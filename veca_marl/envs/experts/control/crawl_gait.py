@@ -7,8 +7,7 @@ import math
 import numpy as np
 
 from veca_marl.envs.experts.control.gait_patterns import CRAWL, GaitPattern, LimbPattern
-from veca_marl.sim.body.humanoid.humanoid import Humanoid
-from veca_marl.sim.body.humanoid.joint_controls import Springs
+from veca_marl.sim.body.humanoid import Humanoid, JointCommand
 from veca_marl.sim.geometry.pose import Floats
 
 _FADE_IN_S = 0.4  # blend from the posture at the start to the gait
@@ -31,7 +30,7 @@ class CrawlGait:
         self._index = {name: index for index, name in enumerate(body.joint_names)}
         self._time_s, self._turn, self._start = 0.0, 0.0, body.joint_angles()
 
-    def towards(self, bearing_rad: float) -> Springs:
+    def towards(self, bearing_rad: float) -> JointCommand:
         """Return joint targets for one step that steer to a bearing.
 
         Args:
@@ -39,7 +38,7 @@ class CrawlGait:
         """
         return self.command(min(max(bearing_rad / self.pattern.full_turn_rad, -1.0), 1.0))
 
-    def command(self, turn: float = 0.0) -> Springs:
+    def command(self, turn: float = 0.0) -> JointCommand:
         """Return joint targets for one step.
 
         Args:
@@ -51,7 +50,7 @@ class CrawlGait:
         self._turn += (turn - self._turn) * min(1.0, self._step_s / self.pattern.steering_s)
         self._time_s += self._step_s
         angles = self._start + share * (self._angles(phase) - self._start)
-        return Springs(angles, ahead_s=self._step_s)
+        return JointCommand(angles, horizon_s=self._step_s)
 
     def _angles(self, phase: float) -> Floats:
         """Return the joint angles at a phase of the gait, ``(82,)`` rad."""

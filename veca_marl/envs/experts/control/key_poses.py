@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from veca_marl.sim.body.humanoid.humanoid import Humanoid
+from veca_marl.sim.body.humanoid import Humanoid
 from veca_marl.sim.body.humanoid.postures import Posture
 from veca_marl.sim.geometry.pose import Floats
 
@@ -22,7 +22,7 @@ class KeyPoses:
 
     def __init__(self, body: Humanoid, poses: Mapping[str, Posture], step_s: float) -> None:
         self._body, self._step_s = body, step_s
-        self._poses = {name: body.angles_of(pose) for name, pose in poses.items()}
+        self._poses = {name: body.posture_angles(pose) for name, pose in poses.items()}
         self.reset()
 
     def reset(self) -> None:

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from veca_marl.sim.body.anatomy.skeleton import forward_kinematics, load_skeleton
-from veca_marl.sim.body.humanoid.humanoid import Humanoid
-from veca_marl.sim.body.humanoid.joint_controls import REACH_RAD, JointActionKind
+from veca_marl.sim.body.humanoid import SATURATION_RAD, Humanoid, JointActionKind
 from veca_marl.sim.body.humanoid.postures import Posture
 from veca_marl.sim.geometry.pose import Floats
 from veca_marl.sim.physics.world import GRAVITY_MPS2
@@ -36,7 +35,7 @@ class SeatedBalance:
 
     def __init__(self, body: Humanoid, upright: Posture, bent: Posture) -> None:
         self._body, self._skeleton = body, load_skeleton()
-        self.upright, self._bent = body.angles_of(upright), body.angles_of(bent)
+        self.upright, self._bent = body.posture_angles(upright), body.posture_angles(bent)
         bones = self._skeleton.bones
         inertias = [bone.inertia() for bone in bones]
         self._masses = np.array([inertia.mass_kg for inertia in inertias])
@@ -62,7 +61,9 @@ class SeatedBalance:
         way = self._bent - self.upright
         held = np.where(way == 0.0, targets, self.upright + bend * way)
         error = (held - self._body.joint_angles())[self._bending]
-        self._integral = np.clip(self._integral + _INTEGRAL_GAIN * error, -REACH_RAD, REACH_RAD)
+        self._integral = np.clip(
+            self._integral + _INTEGRAL_GAIN * error, -SATURATION_RAD, SATURATION_RAD
+        )
         held[self._bending] += self._integral
         held[[*self._trunk, *self._hips]] += self._deflection()
         held[self._trunk] -= _DAMPING_S * self._body.joint_velocities()[self._trunk]
@@ -70,9 +71,9 @@ class SeatedBalance:
 
     def _for_position_control(self, targets: Floats) -> Floats:
         """Return targets that give a position-controlled body the stiffness of torque control."""
-        if self._body.cfg.action is not JointActionKind.position:
+        if self._body.action_kind is not JointActionKind.position:
             return targets
-        return self._body.joint_angles() + targets - self._body.foresee(targets)
+        return self._body.joint_angles() + targets - self._body.predict_angles(targets)
 
     def _deflection(self) -> Floats:
         """Return the angles by which gravity deflects trunk and hips, rad."""
@@ -87,8 +88,8 @@ class SeatedBalance:
             moments.append(change_j / _DIFFERENCE_RAD)
             angles[joint] -= _DIFFERENCE_RAD
         moments += [-lean_nm / len(self._hips)] * len(self._hips)
-        strengths = self._body.articulation.strengths_nm[[*self._trunk, *self._hips]]
-        return REACH_RAD * np.clip(np.array(moments) / strengths, -1.0, 1.0)
+        strengths = self._body.joint_strengths_nm[[*self._trunk, *self._hips]]
+        return SATURATION_RAD * np.clip(np.array(moments) / strengths, -1.0, 1.0)
 
     def _energy_j(self, angles: Floats, positions: Floats, rotations: Floats) -> float:
         """Return the potential energy of all bones at joint angles.

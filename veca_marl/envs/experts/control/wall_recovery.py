@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from veca_marl.envs.experts.control.locomotion import Locomotion
-from veca_marl.sim.body.base import Body
+from veca_marl.sim.body import Body
 from veca_marl.sim.geometry.pose import Floats
 from veca_marl.sim.sound.calls import Call
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from veca_marl.envs.experts.control.arm_kinematics import ArmKinematics, Palms
 from veca_marl.envs.experts.control.seated_balance import SeatedBalance
-from veca_marl.sim.body.humanoid.humanoid import Humanoid
+from veca_marl.sim.body.humanoid import Humanoid
 from veca_marl.sim.body.humanoid.postures import REACHING, REACHING_DOWN, Posture
 from veca_marl.sim.geometry.pose import Floats
 from veca_marl.sim.physics.props import Prop

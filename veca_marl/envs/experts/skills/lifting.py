@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from veca_marl.envs.experts.skills.carrying import Carrier, Grip, quarter_yaw
-from veca_marl.sim.body.humanoid.humanoid import Humanoid
+from veca_marl.sim.body.humanoid import Humanoid
 from veca_marl.sim.body.humanoid.postures import reaching
 from veca_marl.sim.geometry.pose import Floats
 from veca_marl.sim.physics.props import Prop

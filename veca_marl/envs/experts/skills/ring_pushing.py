@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from veca_marl.envs.experts.control.locomotion import Clearances
-from veca_marl.sim.body.base import Body
+from veca_marl.sim.body import Body
 from veca_marl.sim.geometry.pose import Floats
 
 # Angle by which the path passes beside the opponent: greatest when pushing would move it inwards,

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from veca_marl.sim.body.humanoid.humanoid import Humanoid
-from veca_marl.sim.body.humanoid.joint_controls import Springs
+from veca_marl.sim.body.humanoid import Humanoid, JointCommand
 from veca_marl.sim.geometry.pose import Floats
 
 _ELBOW_DEG = 30.0
@@ -64,7 +63,7 @@ class Running:
         """Start with the left leg and the trunk upright."""
         self._time_s, self._inclination = 0.0, np.zeros(2)
 
-    def command(self) -> Springs:
+    def command(self) -> JointCommand:
         """Return the target angles of the next step."""
         inclination = self._chest_inclination()
         rate = (inclination - self._inclination) / self._step_s
@@ -82,7 +81,7 @@ class Running:
             )
             for name, angle in limbs.items():
                 degrees[self._index[side + name]] = angle
-        return Springs(np.radians(degrees), ahead_s=0.0)
+        return JointCommand(np.radians(degrees), horizon_s=0.0)
 
     def _chest_inclination(self) -> Floats:
         """Return the inclination of the chest forwards and to the left, ``(2,)``."""

@@ -7,8 +7,7 @@ from __future__ import annotations
 
 from veca_marl.envs.experts.control.key_poses import KeyPoses
 from veca_marl.envs.experts.skills.turn_over import TurnOver
-from veca_marl.sim.body.humanoid.humanoid import Humanoid
-from veca_marl.sim.body.humanoid.joint_controls import Springs
+from veca_marl.sim.body.humanoid import Humanoid, JointCommand
 from veca_marl.sim.body.humanoid.postures import Posture
 
 # set by hand, then improved by a random search, as those of `turn_over`
@@ -88,7 +87,7 @@ class SitUp:
         self._begin("lie")
         self._turn.reset()
 
-    def command(self) -> Springs:
+    def command(self) -> JointCommand:
         """Return the target angles of the next step."""
         self._elapsed_s += self._step_s
         if self._stage == "lie":
@@ -98,7 +97,7 @@ class SitUp:
         else:
             targets = self._key_poses.toward(self._stage, _SPEEDS_RADPS[self._stage])
         self._advance_stage()
-        return Springs(targets, ahead_s=0.0)
+        return JointCommand(targets, horizon_s=0.0)
 
     def _advance_stage(self) -> None:
         late = self._elapsed_s >= _DURATION_S[self._stage]

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from veca_marl.envs.core.task import TaskCfg
-from veca_marl.sim.body.humanoid.humanoid import Humanoid
+from veca_marl.sim.body.humanoid import Humanoid
 from veca_marl.sim.body.humanoid.postures import POSTURES, Posture
 from veca_marl.sim.physics.playground import RoomCfg
 
@@ -46,7 +46,7 @@ def start_anywhere(
 ) -> None:
     """Put a child anywhere in a room, facing anywhere, its joints a little off a posture."""
     place = room.sample_floor(rng, margin_m=_FROM_WALLS_M)
-    varied = body.vary(posture, spread_deg, rng)
+    varied = body.perturb(posture, spread_deg, rng)
     body.place(place, rng.uniform(-math.pi, math.pi), varied)
 
 
@@ -55,7 +55,7 @@ def start_near_edge(
 ) -> None:
     """Put a child near the edge of a room, the middle ahead, its joints a little off a posture."""
     place, heading = room.sample_start(rng, margin_m=_FROM_WALLS_M)
-    body.place(place, heading, body.vary(posture, spread_deg, rng))
+    body.place(place, heading, body.perturb(posture, spread_deg, rng))
 
 
 def face_down(body: Humanoid) -> dict[str, float]:

@@ -8,11 +8,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from veca_marl.envs.core.task import Player
-from veca_marl.sim.body.base import Body
-from veca_marl.sim.body.humanoid.humanoid import Humanoid
+from veca_marl.sim.body import Body
+from veca_marl.sim.body.humanoid import Humanoid
 from veca_marl.sim.body.humanoid.postures import ON_ALL_FOURS
-from veca_marl.sim.body.walker.pushing import horizontal_distance
 from veca_marl.sim.geometry.pose import Floats
+from veca_marl.sim.geometry.vectors import horizontal_distance
 from veca_marl.sim.physics.props import PropCfg, PropShape
 from veca_marl.sim.physics.world import World
 

@@ -8,10 +8,10 @@ from typing import NamedTuple
 import numpy as np
 
 from veca_marl.envs.core.task import Player
-from veca_marl.sim.body.base import Body
-from veca_marl.sim.body.walker.pushing import horizontal_distance
+from veca_marl.sim.body import Body
 from veca_marl.sim.geometry.pose import Floats
 from veca_marl.sim.geometry.scene import Scene
+from veca_marl.sim.geometry.vectors import horizontal_distance
 from veca_marl.sim.physics.playground import RoomCfg
 from veca_marl.sim.physics.props import Prop
 from veca_marl.sim.vision.visibility import is_visible

@@ -11,9 +11,9 @@ from veca_marl.envs.core.scoring import horizontal_angle_rad
 from veca_marl.envs.core.task import Player, Task, TaskCfg, terms
 from veca_marl.envs.tasks.multi_agent.contests import line_up, look_ahead
 from veca_marl.envs.tasks.multi_agent.pitch import POST_M, Pitch
-from veca_marl.sim.body.walker.pushing import horizontal_distance
-from veca_marl.sim.body.walker.walker import Walker
+from veca_marl.sim.body.walker import Walker
 from veca_marl.sim.geometry.pose import Floats
+from veca_marl.sim.geometry.vectors import horizontal_distance
 
 ATTACKER, DEFENDER = "attacker", "defender"
 _STRIDE_MPS = 0.1  # who stands does not kick: the ball bounces off

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 
 from veca_marl.envs.core.task import TaskCfg
-from veca_marl.sim.body.humanoid.humanoid import Humanoid
+from veca_marl.sim.body.humanoid import Humanoid
 from veca_marl.sim.physics.props import Prop, PropCfg, PropShape
 from veca_marl.sim.physics.world import World
 
@@ -76,4 +76,4 @@ def is_still(block: Prop) -> bool:
 
 def is_free(block: Prop, child: Humanoid) -> bool:
     """Say whether no part of a child touches a block."""
-    return not block.touches(child.articulation.body_id)
+    return not child.touches(block)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from veca_marl.envs.core.task import TaskCfg
-from veca_marl.sim.body.humanoid.humanoid import Humanoid
+from veca_marl.sim.body.humanoid import Humanoid
 from veca_marl.sim.geometry.pose import Floats
 from veca_marl.sim.physics.props import Prop, PropCfg, PropShape
 from veca_marl.sim.physics.world import World

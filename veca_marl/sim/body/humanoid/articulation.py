@@ -1,4 +1,4 @@
-"""The joint-level body in Bullet: loading it, reading it, moving it, keeping its joints' stops."""
+"""The articulated bones in Bullet: their state, their torques and their joint limits."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from veca_marl.sim.geometry.pose import Floats, Pose
 from veca_marl.sim.geometry.rotations import cross, matrix_to_quaternion, quaternions_to_matrices
 from veca_marl.sim.physics.bullet import pybullet
 
-_TOP_SPEED = 30.0  # rad/s of a joint and m/s of the body: twice what human limbs reach
+_TOP_SPEED = 30.0  # rad/s of a joint and m/s of the body: twice the speed of human limbs
 _FLAGS = (
     pybullet.URDF_USE_INERTIA_FROM_FILE
     | pybullet.URDF_MAINTAIN_LINK_ORDER
@@ -26,7 +26,7 @@ _FLAGS = (
 
 
 class Motion(NamedTuple):
-    """How the pelvis moves.
+    """Pose and velocity of the pelvis.
 
     Attributes:
         pose: Its frame in the world.
@@ -40,17 +40,22 @@ class Motion(NamedTuple):
 
 
 class Articulation:
-    """A skeleton as one multibody.
+    """A skeleton as one multibody in Bullet.
 
-    Joints are numbered as in the skeleton's table; those that do not move stay at 0.
+    Joints are numbered as in the skeleton's table; fixed joints stay at 0.
+
+    Args:
+        client: The PyBullet client.
+        skeleton: The table of bones and joints.
+        build: Which joints move, and their strength and friction.
 
     Attributes:
         body_id: Bullet's id.
-        moving: ``(n,)`` indices of the joints that move, rising.
-        angles: ``(82,)`` rad, as of the last `read` or `place`.
+        moving: ``(n,)`` indices of the joints that move, ascending.
+        angles: ``(82,)`` rad, at the last `read` or `place`.
         speeds: ``(82,)`` rad/s.
-        strengths_nm: ``(82,)`` the most each joint's motor gives; 0 where nothing moves.
-        damping: ``(82,)`` N m s of the joints.
+        strengths_nm: ``(82,)`` N m, the greatest torque of each joint; 0 for fixed joints.
+        damping: ``(82,)`` N m s/rad.
     """
 
     def __init__(self, client: int, skeleton: Skeleton, build: Build) -> None:
@@ -61,7 +66,7 @@ class Articulation:
             pybullet.getJointInfo(self.body_id, link, physicsClientId=client)
             for link in range(pybullet.getNumJoints(self.body_id, physicsClientId=client))
         ]
-        # Bullet's order is its own: joints are found by name
+        # Bullet has its own order of joints: they are found by name
         found = {names[i[1].decode()]: i for i in infos if i[2] == pybullet.JOINT_REVOLUTE}
         self.moving: NDArray[np.int64] = np.array(sorted(found))
         self._links: list[int] = [found[joint][0] for joint in sorted(found)]
@@ -77,7 +82,7 @@ class Articulation:
         self._prepare(infos, {bone.name for bone in skeleton.bones})
 
     def _prepare(self, infos: list[tuple[Any, ...]], bones: set[str]) -> None:
-        """Let joints swing freely, limit their speed and say which links may meet."""
+        """Disable Bullet's motors, limit the joint speeds and choose which links collide."""
         colliders = [(-1, "pelvis")]
         for info in infos:
             bone = bone_of(info[12].decode())
@@ -103,9 +108,9 @@ class Articulation:
     # ---- reading
 
     def read(self) -> bool:
-        """Read the joints; return whether all numbers are finite, keep the old ones if not."""
+        """Read the joints; return whether all numbers are finite, keep the last ones if not."""
         states = pybullet.getJointStates(self.body_id, self._links, physicsClientId=self._client)
-        # turned round by zip: an array of tuples costs three times an array of numbers
+        # zip first: an array of tuples costs three times an array of numbers
         angles, speeds = (np.array(part) for part in list(zip(*states, strict=True))[:2])
         if not (np.isfinite(angles).all() and np.isfinite(speeds).all()):
             return False
@@ -114,14 +119,14 @@ class Articulation:
         return True
 
     def motion(self) -> Motion:
-        """Read how the pelvis moves."""
+        """Read pose and velocity of the pelvis."""
         centre, quaternion = pybullet.getBasePositionAndOrientation(
             self.body_id, physicsClientId=self._client
         )
         velocity, spin = pybullet.getBaseVelocity(self.body_id, physicsClientId=self._client)
         quaternions_to_matrices(np.array([quaternion]), self._turn)
         rotation = self._turn[0].copy()
-        lever = rotation @ self._base_centre  # Bullet speaks of the centre of mass
+        lever = rotation @ self._base_centre  # Bullet gives the centre of mass
         pose = Pose(np.array(centre) - lever, rotation)
         return Motion(pose, np.array(velocity) - cross(spin, lever), np.array(spin))
 
@@ -135,7 +140,7 @@ class Articulation:
     # ---- moving
 
     def apply(self, torques_nm: Floats) -> None:
-        """Apply torques ``(82,)`` in the next physics step; they do not last longer."""
+        """Apply torques ``(82,)``, N m, in the next physics step only."""
         pybullet.setJointMotorControlArray(
             self.body_id,
             self._links,
@@ -145,7 +150,7 @@ class Articulation:
         )
 
     def place(self, pose: Pose, angles: Floats) -> None:
-        """Put the pelvis and all joints somewhere, at rest."""
+        """Set the pose of the pelvis and all joint angles, at rest."""
         self.angles[self.moving], self.speeds[:] = angles[self.moving], 0.0
         centre = pose.position + pose.rotation @ self._base_centre
         turn = matrix_to_quaternion(pose.rotation)
@@ -157,14 +162,14 @@ class Articulation:
         self._set(np.arange(len(self._links)))
 
     def hold_limits(self) -> None:
-        """Set joints that went beyond a stop back onto it, and leave their velocity alone.
+        """Set joints that passed a limit back to it and keep their velocity. Call after `read`.
 
-        Bullet notices a limit only once it is passed. At the stop its own constraint is active and
-        takes the velocity out with the right reaction on the rest of the body; taking it out here
-        would add momentum. Call after `read`.
+        Bullet detects a limit only once it is passed. At the limit its own constraint is active and
+        removes the velocity with the right reaction on the rest of the body; removing it here would
+        add momentum.
 
-        As measured, two thirds of what it costs is saved again in the next physics step: probably
-        Bullet brings the boxes round all links up to date here, which it would do there.
+        Measured: two thirds of the cost is saved in the next physics step, probably because Bullet
+        updates the bounding boxes of all links here instead of there.
         """
         angles = self.angles[self.moving]
         held = np.minimum(np.maximum(angles, self._low), self._high)
@@ -191,24 +196,24 @@ class Articulation:
 
 
 def _load(client: int, skeleton: Skeleton, build: Build) -> int:
-    """Load the body; Bullet reads robots from files only."""
+    """Load the multibody; Bullet reads URDF from files only."""
     with tempfile.TemporaryDirectory() as folder:
         files = body_files(skeleton, build)
         path = Path(folder) / "child.urdf"
         path.write_text(files.urdf, encoding="utf-8")
         for name, content in files.hulls.items():
             (Path(folder) / name).write_text(content, encoding="utf-8")
-        # else Bullet would keep what it read under names that never come again
+        # Bullet would cache the files by their names, which are never used again
         pybullet.setPhysicsEngineParameter(enableFileCaching=0, physicsClientId=client)
         body_id: int = pybullet.loadURDF(str(path), flags=_FLAGS, physicsClientId=client)
     return body_id
 
 
 def damping_number(body: Articulation, step_s: float) -> float:
-    """Return ``dt max eig(M^-1 D)``: explicit damping is stable below 2, and calm up to 1."""
+    """Return ``dt max eig(M^-1 D)``; explicit damping is stable below 2, monotonic up to 1."""
     matrix = body.mass_matrix()
     damping = np.zeros(len(matrix))
     damping[6:] = body.damping[body.moving]
-    # similar to a symmetric matrix: real eigenvalues
+    # M^-1 D is similar to a symmetric matrix: its eigenvalues are real
     root = np.sqrt(damping)
     return step_s * float(np.linalg.eigvalsh(root[:, None] * np.linalg.inv(matrix) * root)[-1])

@@ -1,11 +1,9 @@
-"""The joint-level body: 47 bones on 82 hinges that physics moves and motors drive."""
+"""The joint-level body: 47 bones on 82 hinges, moved by physics and driven by joint torques."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from enum import Enum
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,16 +11,15 @@ from numpy.typing import NDArray
 from veca_marl.sim.body.action import Action, checked_action
 from veca_marl.sim.body.anatomy.skeleton import Underside, forward_kinematics
 from veca_marl.sim.body.anatomy.urdf import Build
-from veca_marl.sim.body.base import BodyCfg
-from veca_marl.sim.body.figure import Figure
+from veca_marl.sim.body.base import Body, BodyCfg
 from veca_marl.sim.body.humanoid.articulation import Articulation, damping_number
-from veca_marl.sim.body.humanoid.foresight import foreseen_angles
-from veca_marl.sim.body.humanoid.joint_controls import (
+from veca_marl.sim.body.humanoid.humanoid_cfg import Detail, HumanoidCfg
+from veca_marl.sim.body.humanoid.joint_control import (
     JOINT_ACTIONS,
-    REACH_RAD,
+    SATURATION_RAD,
     JointActionKind,
     JointChoice,
-    Springs,
+    JointCommand,
     chosen_joints,
 )
 from veca_marl.sim.body.humanoid.postures import (
@@ -30,87 +27,67 @@ from veca_marl.sim.body.humanoid.postures import (
     Posture,
     check_angles,
     pelvis_rotation,
+    perturbed,
     posture_angles,
-    varied,
 )
-from veca_marl.sim.body.voice import voice_spec
+from veca_marl.sim.body.humanoid.predicted_angles import predicted_angles
 from veca_marl.sim.geometry.pose import Floats, Pose
 from veca_marl.sim.geometry.rotations import heading_rad
 from veca_marl.sim.physics.world import World
-from veca_marl.sim.spec import continuous_spec
+from veca_marl.sim.spec import ArraySpec, continuous_spec
 
 JOINTS = "joints"  # the part of the action that moves
 
-_WAITING_ROOM_M = 100.0
+_UNPLACED_M = 100.0  # distance from the origin at which bodies are before the first reset
 _ARMS_OUT = Posture(0.0, {"upper_arm.abduction": 30.0})
 
 
-class Detail(Enum):
-    """Level of detail: with all fingers, or with straight fingers that are one with the hand."""
-
-    full = "full"
-    mitten = "mitten"
-
-
-@dataclass
-class HumanoidCfg(BodyCfg):
-    """Numbers of the joint-level body.
-
-    Attributes:
-        detail: `full` moves 82 joints, `mitten` 40 at a little over half the cost. Actions, senses
-            and names are the same: the mitten ignores what is asked of its fingers.
-        action: Normalised torques, angles to go to, or how far these angles go on.
-        joints: Which joints an action row moves: all 82, or the 40 of the limbs without fingers.
-        strength: Share of the torques in the table of joints.
-        friction: Lateral friction of the skin.
-    """
-
-    detail: Detail = Detail.full
-    action: JointActionKind = JointActionKind.torque
-    joints: JointChoice = JointChoice.all
-    strength: float = 1.0
-    friction: float = 0.8
-
-    def __post_init__(self) -> None:
-        """Refuse what is no choice."""
-        super().__post_init__()
-        self._check_choices(detail=Detail, action=JointActionKind, joints=JointChoice)
-        if not 0.0 < self.strength <= 1.0:
-            raise ValueError(f"body.strength={self.strength} must be above 0 and at most 1")
-
-
-class Humanoid(Figure):
-    """A body that is moved by its joints. See `Body` for what every body offers.
+class Humanoid(Body):
+    """A body that is moved by its joints. See `Body` for the common methods.
 
     Raises:
-        ValueError: If the world's physics steps are too long for the body's damping.
+        ValueError: If the world's physics steps are too long for the damping of the joints.
     """
 
+    cfg_type: ClassVar[type[BodyCfg]] = HumanoidCfg
+
     def __init__(self, name: str, cfg: HumanoidCfg, world: World, shirt: int = 0) -> None:
-        super().__init__(name, cfg.eye_range_deg, world, shirt)
+        super().__init__(name, cfg, world, shirt)
         self.cfg = cfg
         build = Build(cfg.detail is Detail.full, strength=cfg.strength, friction=cfg.friction)
-        self.articulation = Articulation(world.client, self._skeleton, build)
-        self._refuse_long_steps(world.clock.substep_s)
-        self._control, self._rows = JOINT_ACTIONS[cfg.action]
+        self._articulation = Articulation(world.client, self._skeleton, build)
+        self._check_substep(world.clock.substep_s)
+        self._control, self._update = JOINT_ACTIONS[cfg.action]
         self._chosen = np.array(chosen_joints(self._skeleton, cfg.joints))
-        joints = continuous_spec(tuple(self.joint_names[joint] for joint in self._chosen))
-        self.action_spec = {JOINTS: joints, **voice_spec(cfg.voice)}
         self._low = np.array([joint.low_rad for joint in self._skeleton.joints])
         self._high = np.array([joint.high_rad for joint in self._skeleton.joints])
-        # of what does not move there is neither angle nor torque
-        self._moving = np.isin(np.arange(len(self._low)), self.articulation.moving)
-        self._angles, self._speeds = self.articulation.angles, self.articulation.speeds
-        self._wishes = np.zeros(len(self._low))
+        # fixed joints have neither angle nor torque
+        self._moving = np.isin(np.arange(len(self._low)), self._articulation.moving)
+        self._angles, self._speeds = self._articulation.angles, self._articulation.speeds
+        self._set_points = np.zeros(len(self._low))
         self._underside = Underside(self._skeleton, self.bone_names, skin=True)
         self._finite = True
         world.attach(self)
         world.after_substep.append(self._after_substep)
-        # Bullet mixes up the contacts of saved states in which bodies meet, or parts of one body:
-        # until the first reset each waits far outside by itself, arms off the thighs
-        self.place((_WAITING_ROOM_M, 3.0 * len(world.movers), 0.0), 0.0, _ARMS_OUT)
+        # Bullet restores the contacts of a saved state wrongly if bodies, or parts of one body,
+        # touch in it: until the first reset each is far from all others, arms off the thighs
+        self.place((_UNPLACED_M, 3.0 * len(world.movers), 0.0), 0.0, _ARMS_OUT)
 
-    # ---- where it is
+    def _movement_spec(self, cfg: HumanoidCfg) -> dict[str, ArraySpec]:
+        joints = chosen_joints(self._skeleton, cfg.joints)
+        return {JOINTS: continuous_spec(tuple(self.joint_names[joint] for joint in joints))}
+
+    # ---- position, velocity and strength
+
+    @property
+    def body_id(self) -> int:
+        """PyBullet's id of the articulated bones."""
+        return self._articulation.body_id
+
+    @property
+    def obstacle_ids(self) -> tuple[int, ...]:
+        """The id of the articulated bones."""
+        return (self.body_id,)
 
     @property
     def velocity(self) -> Floats:
@@ -119,22 +96,33 @@ class Humanoid(Figure):
 
     @property
     def forward(self) -> Floats:
-        """``(3,)`` horizontal unit vector the trunk faces.
+        """``(3,)`` horizontal unit vector that the trunk faces.
 
-        It is the pelvis's forward axis turned upright the shortest way about a horizontal axis,
-        so it stays defined on back and belly; on the back it points from head to feet.
+        It is the pelvis's forward axis after the shortest rotation about a horizontal axis that
+        makes the pelvis upright, so it is defined for all attitudes; of a body that lies on its
+        back it points from head to feet.
         """
         yaw = heading_rad(self._drawn.rotations[0])
         return np.array([math.cos(yaw), math.sin(yaw), 0.0])
 
     @property
     def is_finite(self) -> bool:
-        """Whether all its numbers have been finite.
+        """Whether all its numbers have been finite since it was built.
 
-        If not, it stays as it last was: Bullet's collision detection does not recover from such
-        numbers, whatever is restored, so the world must be built anew.
+        If not, its state is no longer updated: Bullet's collision detection does not recover from
+        numbers that are not finite, whatever is restored, so the world must be rebuilt.
         """
         return self._finite
+
+    @property
+    def action_kind(self) -> JointActionKind:
+        """How the joints are commanded."""
+        return self.cfg.action
+
+    @property
+    def joint_strengths_nm(self) -> Floats:
+        """``(82,)`` N m: the greatest torque of each joint; 0 for fixed joints."""
+        return self._articulation.strengths_nm.copy()
 
     def place(
         self,
@@ -142,16 +130,16 @@ class Humanoid(Figure):
         yaw_rad: float = 0.0,
         posture: Posture | Floats = STANDING,
     ) -> None:
-        """Start anew, at rest.
+        """Start at a place in a posture, at rest.
 
         Args:
             position: ``(3,)`` metres: the pelvis is above ``(x, y)``, the lowest point of the skin
                 at height ``z``.
-            yaw_rad: Turn about the vertical.
+            yaw_rad: Rotation about the vertical.
             posture: A posture, or ``(82,)`` joint angles (rad) of an upright body.
 
         Raises:
-            ValueError: If a number is not finite or a joint cannot be at its angle.
+            ValueError: If a number is not finite or an angle is outside the limits of its joint.
         """
         place = np.array(position, np.float64)
         if place.shape != (3,) or not (np.isfinite(place).all() and math.isfinite(yaw_rad)):
@@ -162,8 +150,8 @@ class Humanoid(Figure):
         positions[0], rotations[0] = place, pelvis_rotation(attitude, yaw_rad)
         forward_kinematics(self._skeleton, angles, positions, rotations)
         positions[:, 2] += place[2] - self._underside.lowest_m(positions, rotations)
-        self.articulation.place(Pose(positions[0].copy(), rotations[0].copy()), angles)
-        self._start_anew()
+        self._articulation.place(Pose(positions[0].copy(), rotations[0].copy()), angles)
+        self._start()
 
     def _checked(self, posture: Posture | Floats) -> Floats:
         if isinstance(posture, Posture):
@@ -174,14 +162,14 @@ class Humanoid(Figure):
         check_angles(self._skeleton, angles)
         return angles
 
-    # ---- what it can do
+    # ---- commands
 
     def _move(self, parts: Action) -> None:
-        row = np.asarray(parts[JOINTS], np.float64)
-        self._wishes[self._chosen] = self._rows.heed(row, self._wishes[self._chosen])
+        action = np.asarray(parts[JOINTS], np.float64)
+        self._set_points[self._chosen] = self._update.apply(action, self._set_points[self._chosen])
 
     def apply_torque(self, normalised: Floats) -> None:
-        """Drive all 82 joints by shares of their strength in [-1, 1] (the paper's API).
+        """Drive all 82 joints by normalised torques in [-1, 1] (the paper's API).
 
         Raises:
             ValueError: If this body is commanded by angles or by fewer joints, if the array has
@@ -195,86 +183,85 @@ class Humanoid(Figure):
         self._move(checked_action(spec, {JOINTS: normalised}))
 
     def rest(self) -> None:
-        """Try to keep all joints where they are."""
-        self.act(self.encode(self.joint_angles()))
+        """Command all joints to hold their angles; no call is chosen."""
+        self._move(self.encode(self.joint_angles()))
 
     def encode(self, command: Any) -> dict[str, NDArray[Any]]:
-        """Return the action that takes the joints nearest to ``(82,)`` angles (rad).
+        """Return the action that moves the joints toward target angles.
 
-        It asks a position-controlled body for these angles; to a torque-controlled one it gives
-        the torques that the position control would give at the end of the agent step: those that
-        it would give now shake the body, for they hold for the whole step. A command of `Springs`
-        gives this time itself, and may hold a call.
+        For a position-controlled body the targets are the set-points. For a torque-controlled one
+        the action is the torques of the position control at the end of the agent step; those at
+        its start, held for the whole step, would make the body oscillate.
+
+        Args:
+            command: ``(82,)`` rad, or a `JointCommand`, which may also hold a call.
         """
-        calm = self._world.clock.step_s
-        springs = command if isinstance(command, Springs) else Springs(np.asarray(command), calm)
-        targets = np.clip(springs.targets, self._low, self._high)
-        angles = self.foresee(targets, springs.ahead_s)
-        wishes = self._control.wishes(targets, angles, self._low, self._high)
-        row = self._rows.towards(wishes[self._chosen], self._wishes[self._chosen])
-        return self._with_voice({JOINTS: row.astype(np.float32)}, springs.call)
+        if not isinstance(command, JointCommand):
+            command = JointCommand(np.asarray(command), self._world.clock.step_s)
+        targets = np.clip(command.targets, self._low, self._high)
+        angles = self.predict_angles(targets, command.horizon_s)
+        wanted = self._control.set_points(targets, angles, self._low, self._high)
+        action = self._update.encode(wanted[self._chosen], self._set_points[self._chosen])
+        return self._with_voice({JOINTS: action.astype(np.float32)}, command.call)
 
-    def foresee(self, targets: Floats, ahead_s: float | None = None) -> Floats:
-        """Return the ``(82,)`` angles (rad) a while after springs begin to pull to targets.
+    def predict_angles(self, targets: Floats, horizon_s: float | None = None) -> Floats:
+        """Return the ``(82,)`` angles (rad) after the position control has acted for a while.
 
-        The springs are those of the position control; contacts and weight are left out.
+        Contacts and weight are neglected, see `predicted_angles`.
 
         Args:
             targets: ``(82,)`` rad.
-            ahead_s: How long after; one agent step if nothing is said.
+            horizon_s: Duration; one agent step by default.
         """
-        if ahead_s is None:
-            ahead_s = self._world.clock.step_s
-        stiffness = self.articulation.strengths_nm / REACH_RAD
-        return foreseen_angles(self.articulation, targets, stiffness, ahead_s)
+        if horizon_s is None:
+            horizon_s = self._world.clock.step_s
+        stiffness = self._articulation.strengths_nm / SATURATION_RAD
+        return predicted_angles(self._articulation, targets, stiffness, horizon_s)
 
-    def angles_of(self, posture: Posture) -> Floats:
-        """Return the ``(82,)`` joint angles of a posture, rad: what `encode` takes."""
+    def posture_angles(self, posture: Posture) -> Floats:
+        """Return the ``(82,)`` joint angles of a posture, rad; `encode` takes them."""
         return posture_angles(self._skeleton, posture)
 
-    def vary(self, posture: Posture, spread_deg: float, rng: np.random.Generator) -> Posture:
-        """Return a posture with every joint a little elsewhere, see `postures.varied`."""
-        return varied(self._skeleton, posture, spread_deg, rng)
+    def perturb(self, posture: Posture, spread_deg: float, rng: np.random.Generator) -> Posture:
+        """Return a posture with normally distributed deviations, see `postures.perturbed`."""
+        return perturbed(self._skeleton, posture, spread_deg, rng)
 
-    # ---- the world moves it
-
-    def reset(self) -> None:
-        """Stand at the origin, relaxed and silent. The task usually puts it elsewhere."""
-        self.place((0.0, 0.0, 0.0))
+    # ---- calls from the world, see `Mover`
 
     def before_step(self) -> None:
-        """Nothing to look for: physics finds what it meets."""
+        """Do nothing: Bullet finds all contacts of this body."""
 
     def before_substep(self, substep_s: float) -> None:
         """Apply the torques of one physics step."""
         if not self._finite:
             return
-        shares = self._control.shares(self._wishes, self._angles, self._low, self._high)
-        np.multiply(shares, self._moving, out=self._shares)
-        self.articulation.apply(self._shares * self.articulation.strengths_nm)
+        torques = self._control.torques(self._set_points, self._angles, self._low, self._high)
+        np.multiply(torques, self._moving, out=self._torques)
+        self._articulation.apply(self._torques * self._articulation.strengths_nm)
 
     def mirror(self) -> None:
-        """Draw the bones where physics has them."""
+        """Write the poses of the bones and move the voice to the mouth."""
         self._pose_bones()
         self._mouth.position = self.mount("mouth").position
 
     def _after_substep(self) -> None:
-        if self._finite and self.articulation.read():
-            self.articulation.hold_limits()
+        if self._finite and self._articulation.read():
+            self._articulation.hold_limits()
         else:
             self._finite = False
 
-    def _start_anew(self) -> None:
-        self._relax_eyes()
-        self._shares[:] = 0.0
-        self._finite = self._finite and self.articulation.read()
-        staying = self._control.wishes(self._angles, self._angles, self._low, self._high)
-        self._wishes[:] = self._rows.start(staying)
+    def _start(self) -> None:
+        """Begin at rest in the present pose."""
+        self._gaze.relax()
+        self._torques[:] = 0.0
+        self._finite = self._finite and self._articulation.read()
+        holding = self._control.set_points(self._angles, self._angles, self._low, self._high)
+        self._set_points[:] = self._update.start(holding)
         self._pose_bones()
         self._mouth.teleport(self.mount("mouth").position)
 
     def _pose_bones(self) -> None:
-        motion = self.articulation.motion()
+        motion = self._articulation.motion()
         numbers = (motion.pose.position, motion.pose.rotation, *motion[1:])
         self._finite = self._finite and all(np.isfinite(part).all() for part in numbers)
         if not self._finite:
@@ -284,8 +271,8 @@ class Humanoid(Figure):
         self._pelvis_velocity[:], self._pelvis_spin[:] = motion[1:]
         forward_kinematics(self._skeleton, self._angles, positions, rotations)
 
-    def _refuse_long_steps(self, substep_s: float) -> None:
-        number = damping_number(self.articulation, substep_s)
+    def _check_substep(self, substep_s: float) -> None:
+        number = damping_number(self._articulation, substep_s)
         if number > 1.0:
             raise ValueError(
                 f"{self.name}: physics steps of {substep_s * 1e3:.1f} ms are too long for its "

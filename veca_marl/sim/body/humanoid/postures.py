@@ -1,6 +1,6 @@
-"""How a joint-level body may start: the pelvis's attitude and the angles of its joints.
+"""Postures in which a joint-level body can be placed: attitude of the pelvis and joint angles.
 
-The angles are ours, chosen by eye: positions in which a child can be laid down or set.
+The angles are ours, chosen by eye.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ from veca_marl.sim.geometry.pose import Floats
 
 @dataclass(frozen=True)
 class Posture:
-    """An attitude of the pelvis and the joints that are not at zero.
+    """Pitch of the pelvis and the angles of the joints that are not at zero.
 
     Attributes:
-        pitch_deg: Of the pelvis; 0 is upright, 90 on the belly, -90 on the back.
-        joints_deg: Angles by joint name (`chest.flexion`); a name without side (`thigh.flexion`)
-            means both sides.
+        pitch_deg: Pitch of the pelvis; 0 is upright, 90 prone, -90 supine.
+        joints_deg: Angles by joint name (`chest.flexion`); a name without a side
+            (`thigh.flexion`) applies to both sides.
     """
 
     pitch_deg: float = 0.0
@@ -53,7 +53,7 @@ _REACHING = {
     "upper_arm.flexion": 30.0,
     "upper_arm.abduction": 35.0,
     "forearm.flexion": 95.0,
-    # thumbs in the plane of the hand, out of the way of what the palms take
+    # thumbs in the plane of the hand, so that the palms can take objects
     "thumb_metacarpal.flexion": -20.0,
     "thumb_proximal.flexion": -10.0,
     "thumb_distal.flexion": -15.0,
@@ -61,18 +61,18 @@ _REACHING = {
 
 
 def reaching(spine_deg: float, chest_deg: float) -> Posture:
-    """Return a seat that holds while the hands work: legs apart, hands over the floor between them.
+    """Return a stable seat for manipulation: legs apart, hands above the floor between them.
 
     Args:
-        spine_deg: How far the spine is bent forward.
-        chest_deg: How far the chest is.
+        spine_deg: Forward flexion of the spine.
+        chest_deg: Forward flexion of the chest.
     """
     return Posture(5.0, {**_REACHING, "spine.flexion": spine_deg, "chest.flexion": chest_deg})
 
 
 REACHING = reaching(25.0, 20.0)
 REACHING_DOWN = reaching(35.0, 25.0)
-# on the back, the right arm out to the side, palm up: whatever lies on it stays there
+# supine, the right arm out to the side, palm up: an object on the palm stays there
 OFFERING = Posture(
     -90.0,
     {
@@ -111,7 +111,7 @@ def posture_angles(skeleton: Skeleton, posture: Posture) -> Floats:
     """Return the ``(82,)`` joint angles of a posture, rad.
 
     Raises:
-        ValueError: If a joint is unknown, or cannot be at its angle.
+        ValueError: If a joint is unknown, or an angle is outside its limits.
     """
     angles = np.zeros(len(skeleton.joints))
     for name, degrees in posture.joints_deg.items():
@@ -121,16 +121,16 @@ def posture_angles(skeleton: Skeleton, posture: Posture) -> Floats:
     return angles
 
 
-def varied(
+def perturbed(
     skeleton: Skeleton, posture: Posture, spread_deg: float, rng: np.random.Generator
 ) -> Posture:
-    """Return a posture with every joint a little elsewhere.
+    """Return a posture with a normally distributed deviation of every joint.
 
     Args:
-        skeleton: Whose joints.
-        posture: What it resembles.
-        spread_deg: Standard deviation of each joint; what would pass a stop stays on it.
-        rng: Source of the deviations.
+        skeleton: The table of joints.
+        posture: The mean.
+        spread_deg: Standard deviation; angles are clipped to the joint limits.
+        rng: Random generator.
     """
     angles = posture_angles(skeleton, posture)
     angles += rng.normal(0.0, math.radians(spread_deg), len(angles))
@@ -142,7 +142,7 @@ def varied(
 
 
 def check_angles(skeleton: Skeleton, angles: Floats) -> None:
-    """Raise `ValueError` naming the first joint that cannot be at its angle."""
+    """Raise `ValueError` for the first angle that is outside the limits of its joint."""
     for joint, angle in zip(skeleton.joints, angles, strict=True):
         # written so that a NaN fails as well
         if not joint.low_rad <= angle <= joint.high_rad:
@@ -154,14 +154,14 @@ def check_angles(skeleton: Skeleton, angles: Floats) -> None:
 
 
 def pelvis_rotation(posture: Posture, yaw_rad: float) -> Floats:
-    """Return the pelvis's frame ``(3, 3)`` in the world: pitched, then turned by `yaw_rad`."""
+    """Return the rotation ``(3, 3)`` of the pelvis in the world: pitch, then `yaw_rad`."""
     pitch = math.radians(posture.pitch_deg)
     cp, sp, cy, sy = math.cos(pitch), math.sin(pitch), math.cos(yaw_rad), math.sin(yaw_rad)
     return np.array([[cy * cp, -sy, cy * sp], [sy * cp, cy, sy * sp], [-sp, 0.0, cp]])
 
 
 def _joints(skeleton: Skeleton, name: str) -> list[int]:
-    """Return the joint of a name, or the two of a name without side."""
+    """Return the joint with a name, or the two joints of a name without a side."""
     names = [f"{joint.bone}.{joint.label}" for joint in skeleton.joints]
     found = [names.index(n) for n in (name, f"l_{name}", f"r_{name}") if n in names]
     if not found:

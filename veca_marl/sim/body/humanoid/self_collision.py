@@ -1,4 +1,4 @@
-"""Which parts of one body can meet: limbs meet the trunk and each other, not themselves."""
+"""Self-collision: limbs collide with the trunk and with each other, not with themselves."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ def limb(bone: str) -> str:
     return f"{side}_leg" if part in _LEG else f"{side}_arm"
 
 
-def may_meet(a: str, b: str) -> bool:
-    """Say whether two bones of one body collide.
+def may_collide(a: str, b: str) -> bool:
+    """Return whether two bones of one body collide.
 
     Bones of one limb overlap at their joints by construction, and so do shoulders and hips with
-    the trunk; joint limits keep them apart. Without these exceptions dozens of lasting contacts
-    make the body twitch and its physics several times dearer.
+    the trunk; joint limits keep them apart. Without these exceptions dozens of permanent
+    contacts make the body jitter and its physics several times as expensive.
     """
     if limb(a) == limb(b):
         return False
@@ -33,7 +33,7 @@ def may_meet(a: str, b: str) -> bool:
 
 
 def allow_self_collision(client: int, body_id: int, links: Sequence[tuple[int, str]]) -> None:
-    """Switch Bullet's contacts off for the pairs of links that must not meet.
+    """Disable Bullet's contacts for the pairs of links that must not collide.
 
     Args:
         client: The PyBullet client.
@@ -41,5 +41,5 @@ def allow_self_collision(client: int, body_id: int, links: Sequence[tuple[int, s
         links: Index and bone of every link with a collider.
     """
     for (a, bone_a), (b, bone_b) in itertools.combinations(links, 2):
-        if not may_meet(bone_a, bone_b):
+        if not may_collide(bone_a, bone_b):
             pybullet.setCollisionFilterPair(body_id, body_id, a, b, 0, physicsClientId=client)

@@ -1,1 +1,7 @@
-"""The walking body: a capsule in the physics, animated by forward kinematics."""
+"""The walking body: a capsule in the physics, bones posed by forward kinematics."""
+
+from veca_marl.sim.body.walker.walk_commands import WalkActionKind
+from veca_marl.sim.body.walker.walker import Walker
+from veca_marl.sim.body.walker.walker_cfg import WalkerCfg
+
+__all__ = ["WalkActionKind", "Walker", "WalkerCfg"]

@@ -1,10 +1,11 @@
-"""How the walking body moves its bones: joint angles from the phase of the stride, a kick, a gaze.
+"""The gait of the walking body: joint angles from the phase of the stride, a kick and the head.
 
-The gait is kinematic, not a simulation of forces. The feet are led and the legs follow by inverse
-kinematics: a foot that carries the body stays where it is on the floor, the other swings forward,
-and the pelvis rides over them as over an inverted pendulum. Feet land flat and strides are short,
-as in children who have just learnt to walk. The trunk does not sway, so the head's senses are
-steady. Amplitudes are ours, chosen by eye within the ranges of motion of the skeleton.
+The gait is kinematic, not a simulation of forces. The trajectories of the feet are given and the
+angles of the legs follow by inverse kinematics: the foot in stance does not slip on the floor, the
+other swings forward, and the pelvis moves up and down as over an inverted pendulum. Feet land flat
+and strides are short, as in children who have just learnt to walk. The trunk does not sway, so the
+senses in the head are steady. Amplitudes are ours, chosen by eye within the ranges of motion of the
+skeleton.
 """
 
 from __future__ import annotations
@@ -17,26 +18,26 @@ import numpy as np
 from veca_marl.sim.body.anatomy.skeleton import Skeleton
 from veca_marl.sim.geometry.pose import Floats
 
-_CARRYING = 0.5  # share of the stride in which a foot is on the floor
+_STANCE = 0.5  # fraction of the stride in which a foot is on the floor
 
 
 @dataclass(frozen=True)
 class GaitCfg:
-    """Numbers of the gait.
+    """Parameters of the gait.
 
     Attributes:
-        step_m: How far a foot on the floor falls back beneath the body at full stride.
-        step_centre_m: Middle of that way, before the hip: thighs bend forward more than back.
-        full_stride_mps: Speed from which the stride no longer lengthens, only quickens.
-        turning_m: A turn of 1 rad/s asks for strides like walking at so many m/s.
+        step_m: Distance that a foot in stance moves back relative to the hip at full stride.
+        step_centre_m: Centre of this distance ahead of the hip: thighs flex more than they extend.
+        full_stride_mps: Speed above which the stride gets faster but not longer.
+        turning_m: Walking speed (m/s) whose stride is that of a turn on the spot at 1 rad/s.
         leg_m: Height of the hips above the ankles in standing.
-        sink_m: How much lower the pelvis is at full stride.
-        bob_m: Amplitude of its rise and fall, twice per stride.
-        lift_m: Height of a foot in mid swing at full stride.
-        toe_rad: How far the toes hang in mid swing.
+        sink_m: Mean lowering of the pelvis at full stride.
+        bob_m: Amplitude of its vertical oscillation, twice per stride.
+        lift_m: Height of a foot in mid-swing at full stride.
+        toe_rad: Plantar flexion in mid-swing.
         arm_swing_rad: Amplitude of the upper arm at full stride.
         elbow_rad: Flexion of the elbows.
-        settle_s: Time constant with which the stride follows a change of speed.
+        settle_s: Time constant with which the stride follows the speed.
         kick_s: Duration of a kick.
     """
 
@@ -55,14 +56,23 @@ class GaitCfg:
     kick_s: float = 0.36
 
 
-# the kicking leg: share of the kick, flexion of thigh and knee (rad); the strike comes first,
-# because the ball leaves at once, and the leg follows through
+# the kicking leg: fraction of the kick, flexion of thigh and knee (rad); the strike comes first,
+# because the ball leaves at once, then the follow-through
 _KICK = np.array([[0.0, 0.5, 0.8], [0.2, 1.1, 0.15], [0.5, 1.0, 0.4], [1.0, 0.45, 0.7]])
 _KICK_TOES_RAD = -0.4
 
 
 class Gait:
-    """Turns speed and time into the 82 joint angles of a walking child."""
+    """Computes the 82 joint angles of a walking child from its speeds and the time.
+
+    Args:
+        skeleton: The table of bones and joints.
+        cfg: Parameters; the defaults if None.
+
+    Attributes:
+        phase: Of the stride, in [0, 1).
+        angles: ``(82,)`` rad, as of the last `pose`.
+    """
 
     def __init__(self, skeleton: Skeleton, cfg: GaitCfg | None = None) -> None:
         self.cfg = cfg or GaitCfg()
@@ -88,13 +98,13 @@ class Gait:
 
     @property
     def pitch_range_rad(self) -> tuple[float, float]:
-        """Least and greatest head pitch (down is positive): neck and head together."""
+        """Range of the head's pitch (down is positive): neck and head together."""
         low, high = self._low[list(self._nod)].sum(), self._high[list(self._nod)].sum()
         return float(low), float(high)
 
     @property
     def yaw_range_rad(self) -> tuple[float, float]:
-        """Least and greatest head yaw (left is positive): neck and head together."""
+        """Range of the head's yaw (left is positive): neck and head together."""
         low, high = self._low[list(self._shake)].sum(), self._high[list(self._shake)].sum()
         return float(low), float(high)
 
@@ -105,11 +115,11 @@ class Gait:
         self._kick_left_s = 0.0
 
     def kick(self) -> None:
-        """Begin a kick with the right leg."""
+        """Start a kick with the right leg."""
         self._kick_left_s = self.cfg.kick_s
 
     def advance(self, speed_mps: float, turn_radps: float, step_s: float) -> None:
-        """Move the stride on; turning on the spot steps as well.
+        """Advance the stride by one step; turning on the spot needs strides as well.
 
         Args:
             speed_mps: Forward speed, negative when walking backward.
@@ -119,15 +129,15 @@ class Gait:
         follow = 1.0 - math.exp(-step_s / self.cfg.settle_s)
         self._speed_mps += follow * (speed_mps - self._speed_mps)
         self._turn_radps += follow * (turn_radps - self._turn_radps)
-        self.phase = (self.phase + _CARRYING * step_s / self._carrying_s()) % 1.0
+        self.phase = (self.phase + _STANCE * step_s / self._stance_s()) % 1.0
         if self._kick_left_s > 0.0:
             self._kick_left_s -= step_s
             self.phase = 0.5  # the kicking foot is about to land
 
     def pose(self, head_pitch_rad: float, head_yaw_rad: float) -> Floats:
-        """Write and return the ``(82,)`` joint angles for this moment."""
+        """Compute and return the ``(82,)`` joint angles of the present phase."""
         if self._kick_left_s > 0.0:
-            self._lead_foot(0, (self.cfg.step_centre_m, 0.0), 0.0, 0.0, 0.0)
+            self._place_foot(0, (self.cfg.step_centre_m, 0.0), 0.0, 0.0, 0.0)
             self._swing_kicking_leg()
         else:
             self._step(0)
@@ -141,55 +151,55 @@ class Gait:
         return abs(self._speed_mps) + self.cfg.turning_m * abs(self._turn_radps)
 
     def _share(self) -> float:
-        """Length of the stride as a share of the full one."""
+        """Return the length of the stride as a fraction of the full one."""
         return min(1.0, self._pace_mps() / self.cfg.full_stride_mps)
 
-    def _carrying_s(self) -> float:
-        """How long a foot stays on the floor."""
+    def _stance_s(self) -> float:
+        """Return the duration of the stance."""
         return self.cfg.step_m / max(self._pace_mps(), self.cfg.full_stride_mps)
 
     def _step(self, side: int) -> None:
-        """Lead one foot along its stride, and swing the arm of the same side against it."""
+        """Move one foot along its trajectory and the arm of the same side in opposition."""
         phase = (self.phase + 0.5 * side) % 1.0
-        share, on_floor = self._share(), phase < _CARRYING
-        # from 0.5, where the foot lands, to -0.5, where it lifts off, and back through the air
-        along = 0.5 - phase / _CARRYING
+        share, on_floor = self._share(), phase < _STANCE
+        # from 0.5 at touchdown to -0.5 at lift-off, and back during the swing
+        along = 0.5 - phase / _STANCE
         lift = toes = 0.0
         if not on_floor:
-            flight = (phase - _CARRYING) / (1.0 - _CARRYING)
-            along = -0.5 * math.cos(math.pi * flight)
-            height = share * math.sin(math.pi * flight)
+            swing_phase = (phase - _STANCE) / (1.0 - _STANCE)
+            along = -0.5 * math.cos(math.pi * swing_phase)
+            height = share * math.sin(math.pi * swing_phase)
             lift, toes = self.cfg.lift_m * height, -self.cfg.toe_rad * height
-        place, yaw = self._foothold(side, -along * self._carrying_s())
-        self._lead_foot(side, place, yaw, lift, toes)
-        swing = self.cfg.arm_swing_rad * math.copysign(share, self._speed_mps)
-        self.angles[self._arm[side]] = -swing * math.cos(2.0 * math.pi * phase)
+        place, yaw = self._foothold(side, -along * self._stance_s())
+        self._place_foot(side, place, yaw, lift, toes)
+        arm_swing = self.cfg.arm_swing_rad * math.copysign(share, self._speed_mps)
+        self.angles[self._arm[side]] = -arm_swing * math.cos(2.0 * math.pi * phase)
         self.angles[self._elbow[side]] = self.cfg.elbow_rad
 
     def _foothold(self, side: int, time_s: float) -> tuple[tuple[float, float], float]:
-        """Return where a foot on the floor is below its hip as the body moves along its arc.
+        """Return where a foot in stance is relative to its hip while the body moves on an arc.
 
         Args:
             side: 0 is left, 1 is right.
-            time_s: Since the foot was straight beneath the hip.
+            time_s: Time since the foot was below the hip.
 
         Returns:
-            Forward and left of the hip, metres, and the yaw of the foot against the pelvis.
+            Forward and left of the hip, metres, and the yaw of the foot relative to the pelvis.
         """
         turned, hip_y_m = self._turn_radps * time_s, self._hip_y_m[side]
-        way_m = self._speed_mps * time_s
-        x = self.cfg.step_centre_m * self._share() - way_m * math.cos(turned / 2.0)
-        y = hip_y_m - way_m * math.sin(turned / 2.0)
+        distance_m = self._speed_mps * time_s
+        x = self.cfg.step_centre_m * self._share() - distance_m * math.cos(turned / 2.0)
+        y = hip_y_m - distance_m * math.sin(turned / 2.0)
         c, s = math.cos(turned), math.sin(turned)
         return (c * x + s * y, c * y - s * x - hip_y_m), -turned
 
-    def _lead_foot(
+    def _place_foot(
         self, side: int, place: tuple[float, float], yaw: float, lift_m: float, toes: float
     ) -> None:
-        """Bend a leg so that its ankle is where it shall be and the foot points where it shall.
+        """Compute the angles of a leg by inverse kinematics of its ankle and the foot's yaw.
 
-        The law of cosines gives the knee. The hip turns about y, then x, then z, so with the turn
-        about z given the other two follow one after the other.
+        The law of cosines gives the knee. The hip rotates about y, then x, then z; the rotation
+        about z is given, and the other two follow one after the other.
         """
         share = self._share()
         bob = self.cfg.bob_m * math.cos(4.0 * math.pi * self.phase)
@@ -220,9 +230,9 @@ class Gait:
     def _turn_neck(
         self, joints: tuple[int, ...], turn_rad: float, turn_range_rad: tuple[float, float]
     ) -> None:
-        """Share a turn out so that neck and head reach their stops together."""
-        limits, whole = (
+        """Distribute a rotation so that neck and head reach their limits together."""
+        limits, total = (
             (self._high, turn_range_rad[1]) if turn_rad >= 0.0 else (self._low, turn_range_rad[0])
         )
         for joint in joints:
-            self.angles[joint] = turn_rad * limits[joint] / whole
+            self.angles[joint] = turn_rad * limits[joint] / total

@@ -1,4 +1,4 @@
-"""What a body looks like: a skin in clothes over its bones, with hair and eyes."""
+"""The appearance of a body: a skin mesh with clothes and hair, and the eyes."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from veca_marl.sim.body.anatomy.skeleton import Bone, Skeleton
 from veca_marl.sim.body.anatomy.skin_mesh import load_skin
-from veca_marl.sim.body.mounts import EYES, ORGANS_M
+from veca_marl.sim.body.mounts import EYES, MOUNTS_M
 from veca_marl.sim.geometry.meshes import Mesh
 from veca_marl.sim.geometry.primitives import Primitive, Shape
 from veca_marl.sim.geometry.tables import Geom
@@ -23,12 +23,12 @@ SHIRTS = ((0.20, 0.40, 0.90), (0.90, 0.30, 0.20), (0.20, 0.75, 0.30), (0.90, 0.8
 
 _CLOTHED = {"spine": "shirt", "chest": "shirt", "upper_arm": "shirt"}
 _CLOTHED |= {"pelvis": "trousers", "thigh": "trousers", "shank": "trousers", "foot": "shoes"}
-# hair grows behind and above this plane of the head's frame: n . x = d, metres
+# hair is behind and above this plane in the head's frame: n . x = d, metres
 _HAIRLINE_NORMAL, _HAIRLINE_M = np.array([-0.6, 0.0, 0.8]), 0.048
 
 
 def dressed_skin(skeleton: Skeleton, shirt: tuple[float, float, float]) -> Mesh:
-    """Return the skin in the clothes of its wearer."""
+    """Return the skin mesh with the colours of clothes and hair."""
     mesh = load_skin()
     by_bone = np.array([_colour(bone, shirt) for bone in skeleton.bones], np.float32)
     colours = by_bone[mesh.owners]
@@ -39,21 +39,21 @@ def dressed_skin(skeleton: Skeleton, shirt: tuple[float, float, float]) -> Mesh:
 def bone_geoms(skeleton: Skeleton, shirt: tuple[float, float, float]) -> list[list[Geom]]:
     """Return the primitives on each of the 47 frames of a body.
 
-    The bones with their flexible skin are there to be touched and to cast shadows; what eyes see
-    of them is the mesh. The eyes are drawn, so that others see where it looks.
+    The primitives of the bones, with their flexible skin, are for touch and for shadows; they are
+    invisible, and the skin mesh is drawn in their place. The pupils are drawn as spheres.
     """
     frames = [
         [_geom(part, bone, _colour(bone, shirt)) for part in bone.colliders]
         for bone in skeleton.bones
     ]
     frames[skeleton.bone("head")] += [
-        Geom(Shape.SPHERE, (0.012,), ORGANS_M[eye], colour=PUPILS, tangible=False) for eye in EYES
+        Geom(Shape.SPHERE, (0.012,), MOUNTS_M[eye], colour=PUPILS, tangible=False) for eye in EYES
     ]
     return frames
 
 
 def _hairy(mesh: Mesh, head: int) -> NDArray[np.bool_]:
-    """Mask ``(T,)`` of the triangles under the hair."""
+    """Return a mask ``(T,)`` of the triangles that have the colour of hair."""
     on_head = np.where(mesh.frames[:, :1] == head, mesh.offsets[:, 0], mesh.offsets[:, 1])
     centres = on_head[mesh.triangles].mean(axis=1)
     hairy: NDArray[np.bool_] = (mesh.owners == head) & (centres @ _HAIRLINE_NORMAL > _HAIRLINE_M)
@@ -67,7 +67,7 @@ def _colour(bone: Bone, shirt: tuple[float, float, float]) -> tuple[float, float
 
 
 def _geom(part: Primitive, bone: Bone, colour: tuple[float, float, float]) -> Geom:
-    """A primitive of a bone with its skin on."""
+    """Return a primitive of a bone, grown by the thickness of its skin."""
     skin_m = bone.skin_thickness_m
     whole = part.grown(skin_m)
     return Geom(

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from veca_marl.sim.spec import ArraySpec, continuous_spec, discrete_spec
 
-# (forward, turn) as shares of the greatest speeds; turning left is positive
+# (forward, turn) as fractions of the greatest speeds; turning left is positive
 MOVES: dict[str, tuple[float, float]] = {
     "stand": (0.0, 0.0),
     "forward": (1.0, 0.0),
@@ -22,8 +22,8 @@ MOVES: dict[str, tuple[float, float]] = {
 }
 
 
-class WalkControl(Protocol):
-    """Converts between the `move` part and shares of the greatest walking and turning speed.
+class WalkAction(Protocol):
+    """Converts between the `move` part and fractions of the greatest walking and turning speed.
 
     Attributes:
         spec: Of the part.
@@ -61,23 +61,23 @@ class DiscreteWalk:
     _moves = tuple(MOVES.values())
 
     def decode(self, move: NDArray[Any]) -> tuple[float, float]:
-        """Return the shares of the chosen move."""
+        """Return the fractions of the chosen move."""
         return self._moves[int(move)]
 
     def encode(self, forward: float, turn: float) -> NDArray[Any]:
-        """Return the index of the move with the nearest shares."""
+        """Return the index of the move with the nearest fractions."""
         away = np.array(self._moves) - (forward, turn)
         return np.asarray(np.argmin((away**2).sum(axis=1)), self.spec.dtype)
 
 
-class ActionKind(Enum):
-    """How a walking body is commanded."""
+class WalkActionKind(Enum):
+    """Whether the `move` part is continuous or discrete."""
 
     continuous = "continuous"
     discrete = "discrete"
 
 
-WALK_CONTROLS: dict[ActionKind, WalkControl] = {
-    ActionKind.continuous: ContinuousWalk(),
-    ActionKind.discrete: DiscreteWalk(),
+WALK_ACTIONS: dict[WalkActionKind, WalkAction] = {
+    WalkActionKind.continuous: ContinuousWalk(),
+    WalkActionKind.discrete: DiscreteWalk(),
 }

@@ -1,0 +1,39 @@
+"""Predicted joint angles at the end of a step in which springs pull the joints to targets.
+
+A torque command is constant for one agent step (40 ms). A proportional controller as stiff as the
+joints are strong, evaluated with the angles at the start of the step, is unstable; evaluated with
+the predicted angles at its end it is stable at any stiffness: "stable PD control", Tan, Liu & Turk
+2011, IEEE Computer Graphics and Applications 31(4).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from veca_marl.sim.body.humanoid.articulation import Articulation
+from veca_marl.sim.geometry.pose import Floats
+
+
+def predicted_angles(
+    body: Articulation, targets: Floats, stiffness: Floats, horizon_s: float
+) -> Floats:
+    """Return the joint angles ``(82,)``, rad, after springs have acted, without contact and weight.
+
+    Args:
+        body: The body, with the state of the last `read`.
+        targets: ``(82,)`` rad, the rest angles of the springs.
+        stiffness: ``(82,)`` N m/rad.
+        horizon_s: Duration.
+    """
+    moving = body.moving
+    spring, damping, speeds = stiffness[moving], body.damping[moving], body.speeds[moving]
+    matrix = body.mass_matrix()
+    torques = np.zeros(len(matrix))
+    stretch = targets[moving] - body.angles[moving] - horizon_s * speeds
+    torques[6:] = spring * stretch - damping * speeds
+    resistance = np.zeros(len(matrix))
+    resistance[6:] = horizon_s * damping + horizon_s**2 * spring
+    accelerations = np.linalg.solve(matrix + np.diag(resistance), torques)[6:]
+    angles = body.angles.copy()
+    angles[moving] += horizon_s * speeds + horizon_s**2 * accelerations
+    return angles

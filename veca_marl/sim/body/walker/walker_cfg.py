@@ -1,0 +1,53 @@
+"""The parameters of the walking body."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from veca_marl.sim.body.base import BodyCfg
+from veca_marl.sim.body.walker.walk_commands import WalkActionKind
+
+
+@dataclass
+class WalkerCfg(BodyCfg):
+    """Parameters of the walking body. The paper does not give them; the values are ours.
+
+    Attributes:
+        action: Continuous velocities or discrete moves.
+        walk_speed_mps: Speed of a full forward action.
+        backward_share: Speed of a full backward action as a fraction of the forward speed.
+        turn_speed_degps: Turning speed of a full turn action.
+        radius_m: Radius of the capsule in the physics.
+        height_m: Height of the capsule.
+        push_limit_kg: Props up to this mass are pushed; heavier ones stop the walker.
+        kick_reach_m: Largest distance from the capsule's surface to that of a prop it can kick.
+        kick_angle_deg: Largest angle between the walker's heading and the direction of the prop.
+        kick_height_m: Largest height of the prop's lowest point.
+        kick_speed_mps: Speed of a light prop after a kick.
+        kick_impulse_ns: Largest impulse of a kick; it limits the speed of heavy props.
+        head_pitch_deg: Pitch of the head at the start of an episode; down is positive.
+    """
+
+    action: WalkActionKind = WalkActionKind.continuous
+    walk_speed_mps: float = 1.0
+    backward_share: float = 0.3
+    turn_speed_degps: float = 120.0
+    radius_m: float = 0.11
+    height_m: float = 0.72
+    push_limit_kg: float = 5.0
+    kick_reach_m: float = 0.15
+    kick_angle_deg: float = 60.0
+    kick_height_m: float = 0.25
+    kick_speed_mps: float = 3.0
+    kick_impulse_ns: float = 3.0
+    head_pitch_deg: float = 12.0
+
+    def __post_init__(self) -> None:
+        """Check the choices, the numbers, and that the capsule is higher than wide."""
+        self._check_choices(action=WalkActionKind)
+        super().__post_init__()
+        if not 0.0 < 2.0 * self.radius_m <= self.height_m:
+            raise ValueError(
+                f"body.radius_m={self.radius_m}, body.height_m={self.height_m}: "
+                "the radius must be positive and at most half the height"
+            )

@@ -1,0 +1,158 @@
+"""Collisions between walkers, independent of the order in which they were added to the world.
+
+Walkers are kinematic and have no mass, so Bullet does not keep them apart. All walkers of a world
+therefore move at once: each proposes a position, overlapping pairs are separated by half of their
+overlap each, and walls and heavy things take precedence. The result for a pair depends on the
+positions of both and not on which of them was added first.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Protocol
+
+import numpy as np
+from numba import njit
+
+from veca_marl.sim.geometry.pose import Floats
+from veca_marl.sim.physics.world import World
+
+# a pair of which a wall stops one walker closes half of its overlap in each round
+_ROUNDS = 16
+_TOLERANCE_M = 1e-7
+
+
+class CollidingWalker(Protocol):
+    """What the collision handling needs of a walker."""
+
+    def reset(self) -> None:
+        """See `Mover`."""
+        ...
+
+    def before_step(self) -> None:
+        """See `Mover`."""
+        ...
+
+    def mirror(self) -> None:
+        """See `Mover`."""
+        ...
+
+    @property
+    def radius_m(self) -> float:
+        """Radius of the capsule."""
+        ...
+
+    def proposed_position(self, substep_s: float) -> tuple[float, float]:
+        """Return where it would be after this physics step without obstacles, metres."""
+        ...
+
+    def resolve_contacts(self, x: float, y: float) -> tuple[float, float]:
+        """Return the position nearest to ``(x, y)`` outside walls and heavy things."""
+        ...
+
+    def set_position(self, x: float, y: float, substep_s: float) -> None:
+        """Take a position at the end of this physics step."""
+        ...
+
+
+class WalkerCollisions:
+    """Moves all walkers of one world; the world knows this object in their place."""
+
+    def __init__(self) -> None:
+        self._walkers: list[CollidingWalker] = []
+        self._radii: Floats = np.zeros(0)
+        self._positions: Floats = np.zeros((0, 2))
+        self._corrections: Floats = np.zeros((0, 2))
+
+    def add(self, walker: CollidingWalker) -> None:
+        """Add a walker."""
+        self._walkers.append(walker)
+        self._radii = np.array([one.radius_m for one in self._walkers])
+        self._positions = np.zeros((len(self._walkers), 2))
+        self._corrections = np.zeros((len(self._walkers), 2))
+
+    def reset(self) -> None:
+        """See `Mover`."""
+        for walker in self._walkers:
+            walker.reset()
+
+    def before_step(self) -> None:
+        """See `Mover`."""
+        for walker in self._walkers:
+            walker.before_step()
+
+    def before_substep(self, substep_s: float) -> None:
+        """Move all walkers by one physics step and separate those that overlap."""
+        positions, corrections = self._positions, self._corrections
+        for index, walker in enumerate(self._walkers):
+            positions[index] = walker.resolve_contacts(*walker.proposed_position(substep_s))
+        for _ in range(_ROUNDS):
+            if not separate(positions, self._radii, corrections):
+                break
+            for index in np.flatnonzero(corrections.any(axis=1)).tolist():
+                x, y = positions[index] + corrections[index]
+                positions[index] = self._walkers[index].resolve_contacts(float(x), float(y))
+        for (x, y), walker in zip(positions.tolist(), self._walkers, strict=True):
+            walker.set_position(x, y, substep_s)
+
+    def mirror(self) -> None:
+        """See `Mover`."""
+        for walker in self._walkers:
+            walker.mirror()
+
+
+def walker_collisions(world: World) -> WalkerCollisions:
+    """Return the collision handling of a world; it is attached with the first walker."""
+    for mover in world.movers:
+        if isinstance(mover, WalkerCollisions):
+            return mover
+    collisions = WalkerCollisions()
+    world.attach(collisions)
+    return collisions
+
+
+@njit(cache=True)
+def separate(positions: Floats, radii: Floats, corrections: Floats) -> bool:
+    """Write the displacements that separate all overlapping pairs of discs.
+
+    Each disc of a pair moves by half of the overlap, divided by the larger number of overlaps that
+    one of the two has: a damped Jacobi iteration, in which no disc moves by more than its deepest
+    overlap.
+
+    Args:
+        positions: ``(n, 2)`` metres on the floor plan.
+        radii: ``(n,)`` metres.
+        corrections: ``(n, 2)`` metres; overwritten.
+
+    Returns:
+        Whether any two overlap.
+    """
+    n = len(positions)
+    corrections[:] = 0.0
+    counts = np.zeros(n)
+    for i in range(n):
+        for j in range(i):
+            if _overlap(positions, radii, i, j) > _TOLERANCE_M:
+                counts[i] += 1.0
+                counts[j] += 1.0
+    for i in range(n):
+        for j in range(i):
+            overlap = _overlap(positions, radii, i, j)
+            if overlap <= _TOLERANCE_M:
+                continue
+            dx, dy = positions[i, 0] - positions[j, 0], positions[i, 1] - positions[j, 1]
+            distance = math.hypot(dx, dy)
+            if distance < 1e-9:  # coincident: the one that was added first moves toward -x
+                dx, dy, distance = 1.0, 0.0, 1.0
+            share = 0.5 * overlap / (distance * max(counts[i], counts[j]))
+            corrections[i, 0] += dx * share
+            corrections[i, 1] += dy * share
+            corrections[j, 0] -= dx * share
+            corrections[j, 1] -= dy * share
+    return bool(counts.any())
+
+
+@njit(cache=True)
+def _overlap(positions: Floats, radii: Floats, i: int, j: int) -> float:
+    dx, dy = positions[i, 0] - positions[j, 0], positions[i, 1] - positions[j, 1]
+    return float(radii[i] + radii[j] - math.hypot(dx, dy))
