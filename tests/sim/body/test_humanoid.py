@@ -44,7 +44,7 @@ def test_it_is_made_by_its_configuration():
     world = empty_world()
     body: Body = make_body("child", HumanoidCfg(), world)
     assert isinstance(body, Humanoid)
-    with pytest.raises(ValueError, match="no body is registered for BodyCfg.*WalkerCfg"):
+    with pytest.raises(ValueError, match=r"no body is registered for BodyCfg.*WalkerCfg"):
         make_body("nobody", BodyCfg(), world)
     world.close()
 
