@@ -18,14 +18,13 @@ from hydra.core.hydra_config import HydraConfig
 from hydra.errors import HydraException
 from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
-from torchrl import timeit
 
 from veca_marl.algos.training.checkpoint import CheckpointError
 from veca_marl.algos.training.loop import Trainer
 from veca_marl.config import Config, ConfigError, conf_dir, one_line, prepare, to_config
-from veca_marl.runs.assembly import make_reporters, make_trainer
-from veca_marl.runs.recording import record_episode
+from veca_marl.runs.assembly import make_trainer
 from veca_marl.runs.run_folder import RunFolder, new_run, open_run, remove_if_empty
+from veca_marl.runs.training import run_training
 
 _COMMAND = "python -m veca_marl.train"
 _DISK_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
@@ -33,18 +32,10 @@ RESUMABLE = ("resume", "total_frames", "max_minutes", "device", "threads")
 
 
 def train(cfg: Config, folder: RunFolder, trainer: Trainer) -> list[str]:
-    """Train, film, sum up; return how each team compares with random play."""
-    trainer.reporters = make_reporters(cfg, folder, trainer.progress.frames)
-    lines = trainer.run()
-    if cfg.log.video:
-        with timeit("video"):
-            record_episode(folder.video, cfg.game, trainer.policy.play, cfg.seed)
-    for reporter in trainer.reporters:
-        reporter.close()
-    folder.write("comparison.txt", "\n".join(lines))
-    folder.write("timing.txt", trainer.timing())
-    print(trainer.timing(), *lines, f"run folder: {folder.path}", sep="\n")
-    return lines
+    """Train and print the results; return how each team compares with random actions."""
+    result = run_training(cfg, folder, trainer)
+    print(result.timing, *result.comparison, f"run folder: {folder.path}", sep="\n")
+    return result.comparison
 
 
 def stored_config(folder: RunFolder, asked: DictConfig, overrides: list[str]) -> Config:

@@ -70,7 +70,9 @@ class FakeEnv(EnvBase):
 
     def _set_seed(self, seed):
         seed = 0 if seed is None else seed
-        self.rngs = [np.random.default_rng([seed, i]) for i in range(self.batch_size[0])]
+        self.seed_of_episodes = seed
+        self.rngs = [None] * self.batch_size[0]
+        self.episodes = np.full(self.batch_size[0], -1)
         self.state = np.zeros((self.batch_size[0], self.agents), dtype=np.int64)
         self.clock = np.zeros(self.batch_size[0], dtype=np.int64)
 
@@ -99,6 +101,8 @@ class FakeEnv(EnvBase):
         rows = range(self.batch_size[0]) if mask is None else np.flatnonzero(mask.numpy())
         for i in rows:
             self.clock[i] = 0
+            self.episodes[i] += 1  # an episode depends on (seed, world, episode) alone
+            self.rngs[i] = np.random.default_rng([self.seed_of_episodes, i, self.episodes[i]])
             self._draw(i)
         zero = torch.zeros(self.batch_size[0], self.agents, 1)
         return TensorDict({t: self._team(zero) for t in self.group_map}, self.batch_size)

@@ -15,7 +15,8 @@ def timing_table(elapsed_s: float, frames: int) -> str:
         elapsed_s: The whole time.
         frames: Frames learnt from in it.
     """
-    parts = timeit.todict(percall=False)
+    # `timeit.erase` leaves the names of parts, with no time
+    parts = {name: s for name, s in timeit.todict(percall=False).items() if s > 0.0}
     parts["other"] = max(0.0, elapsed_s - sum(parts.values()))
     lines = [f"{'part':<12}{'seconds':>10}{'share':>8}{'ms/frame':>10}"]
     for part, seconds in [*parts.items(), ("total", elapsed_s)]:

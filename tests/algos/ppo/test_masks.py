@@ -1,0 +1,147 @@
+"""Agents that are eliminated: their rows change neither losses, gradients nor measures."""
+
+import pytest
+import torch
+from fake_env import FakeEnv
+from torch.distributions import kl_divergence
+from torchrl.data import Categorical
+from torchrl.envs import ExplorationType, check_env_specs, set_exploration_type
+from training import SMALL
+
+from veca_marl.algos.networks.multisense import Critic, MultisenseCfg
+from veca_marl.algos.ppo import PPO, PPOCfg
+from veca_marl.algos.ppo.config import ValueNormalisation
+from veca_marl.algos.ppo.losses import VALID, explained_variance
+from veca_marl.algos.specs import team_specs
+
+
+class LeavingEnv(FakeEnv):
+    """The toy with a mask: the second of three agents is eliminated in every second step."""
+
+    def __init__(self, worlds, **options):
+        super().__init__(worlds, agents=3, **options)
+        self.observation_spec["agents", "mask"] = Categorical(
+            2, shape=(worlds, 3), dtype=torch.bool
+        )
+
+    def _team(self, right):
+        mask = torch.ones(right.shape[:2], dtype=torch.bool)
+        mask[:, 1] = torch.from_numpy(self.clock % 2 == 0)
+        return super()._team(right).set("mask", mask)
+
+
+@pytest.fixture(params=list(Critic))
+def leaving(request):
+    def make(hybrid=False, **numbers):
+        env = LeavingEnv(8, hybrid=hybrid)
+        torch.manual_seed(0)
+        network = MultisenseCfg(**{**vars(SMALL), "critic": request.param})
+        cfg = PPOCfg(network=network, **numbers)
+        ppo = PPO("agents", team_specs(env)["agents"], cfg, torch.device("cpu"))
+        with torch.no_grad(), set_exploration_type(ExplorationType.RANDOM):
+            batch = env.rollout(16, ppo.actor, break_when_any_done=False)
+        return ppo, batch
+
+    return make
+
+
+def disturbed(rows, mask, size):
+    """Return a copy with other observations, advantages and targets where `mask` is False."""
+    other = rows.clone()
+    for name in ("advantage", "value_target"):
+        other["agents", name][~mask] += size
+    other["agents", "observation", "audio"][~mask] += size
+    other["agents", "observation", "vision"][~mask] = 255
+    return other
+
+
+def move_policy(ppo):
+    torch.manual_seed(1)
+    with torch.no_grad():
+        for p in ppo.network.parameters():
+            p.add_(0.2 * torch.randn_like(p))
+
+
+def step(ppo, rows):
+    """Return losses, measures and gradient of one step that changes no parameter."""
+    ppo.optimizer.step = lambda: None
+    torch.manual_seed(0)  # the entropy of a tanh-normal is sampled
+    measures = ppo.step(rows)
+    return measures, torch.cat([p.grad.flatten() for p in ppo.network.parameters()])
+
+
+def test_the_toy_with_a_mask_keeps_the_contract_of_torchrl():
+    check_env_specs(LeavingEnv(2))
+
+
+@pytest.mark.parametrize(
+    "options",
+    [{}, {"hybrid": True}, {"value_normalisation": ValueNormalisation.popart}],
+    ids=["one_part", "two_parts", "popart"],
+)
+def test_masked_rows_change_neither_gradient_nor_measures(leaving, options):
+    ppo, batch = leaving(**options)
+    rows = ppo.prepare(batch)
+    move_policy(ppo)
+    mask = rows["agents", "mask"]
+    assert 0 < (~mask).sum() < mask.numel()
+    if ppo.loss.value_norm is not None:
+        state = {k: v.clone() for k, v in ppo.loss.value_norm.state_dict().items()}
+    measures, gradient = step(ppo, disturbed(rows, mask, 0.0))
+    if ppo.loss.value_norm is not None:
+        ppo.loss.value_norm.load_state_dict(state)
+    other_measures, other_gradient = step(ppo, disturbed(rows, mask, 50.0))
+    assert gradient.abs().max() > 0.0
+    torch.testing.assert_close(other_gradient, gradient, rtol=1e-4, atol=1e-5)
+    assert other_measures == pytest.approx(measures, rel=1e-4, abs=1e-5)
+    assert 0.0 < measures["clip_fraction"] < 1.0, "the test must see clipped ratios"
+
+
+def test_advantages_of_present_agents_ignore_masked_observations(leaving):
+    """A central critic must not average in agents that are eliminated: at the end, too."""
+    ppo, batch = leaving()
+    plain = ppo.prepare(batch.clone())
+    for part in (batch, batch["next"]):
+        gone = ~part["agents", "mask"]
+        part["agents", "observation", "audio"][gone] += 50.0
+    # the features of the batch were written while acting: write them again
+    with torch.no_grad():
+        batch = ppo.network.encoder(batch)
+    other = ppo.prepare(batch)
+    for name in ("advantage", "value_target"):
+        for agent in (0, 2):  # never eliminated
+            torch.testing.assert_close(
+                plain["agents", name][:, agent], other["agents", name][:, agent]
+            )
+
+
+def test_measures_are_means_over_the_agents_that_are_present(leaving):
+    ppo, batch = leaving()
+    rows = ppo.prepare(batch)
+    move_policy(ppo)
+    mask = rows["agents", "mask"]
+    with torch.no_grad():
+        old = ppo.actor.build_dist_from_params(rows)
+        new = ppo.actor.get_dist(rows.clone())
+        divergence = kl_divergence(old, new)[mask].mean().item()
+        weight = new.log_prob(rows["agents", "action"]) - rows["agents", "action_log_prob"]
+        outside = ((weight.exp() < 0.8) | (weight.exp() > 1.2))[mask].float().mean().item()
+        torch.manual_seed(0)
+        entropy = -new.log_prob(new.rsample((1,)))[0][mask].mean().item()
+    measures, _ = step(ppo, rows)
+    assert measures["kl"] == pytest.approx(divergence, rel=1e-4)
+    assert measures["clip_fraction"] == pytest.approx(outside, abs=0.01)
+    assert measures["entropy"] == pytest.approx(entropy, rel=1e-4)
+    assert VALID in rows.keys()  # noqa: SIM118  a TensorDict
+
+
+def test_explained_variance_is_numpys_over_the_valid_rows():
+    torch.manual_seed(0)
+    target, value = torch.randn(20, 2, 1), torch.randn(20, 2, 1)
+    valid = torch.rand(20, 2, 1) > 0.4
+    found = explained_variance(target, value, valid)
+    for agent in range(2):
+        rows = valid[:, agent, 0]
+        error = (target - value)[rows, agent].numpy().var()
+        total = target[rows, agent].numpy().var()
+        assert found[agent].item() == pytest.approx(1.0 - error / total, rel=1e-4)

@@ -1,0 +1,77 @@
+"""A whole training run: from a configuration to its numbers and its policy."""
+
+from __future__ import annotations
+
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from tensordict.nn import TensorDictModuleBase
+from torchrl import timeit
+
+from veca_marl.algos.training.loop import Trainer
+from veca_marl.algos.training.reporters import MemoryReporter
+from veca_marl.config import Config
+from veca_marl.runs.assembly import make_reporters, make_trainer
+from veca_marl.runs.recording import record_episode
+from veca_marl.runs.run_folder import RunFolder
+
+
+@dataclass(frozen=True)
+class TrainingResult:
+    """What a training run leaves behind.
+
+    Attributes:
+        metrics: A row for each batch: name to number, as in ``metrics.csv``.
+        evaluations: A row for each evaluated team, as in ``evaluations.csv``.
+        comparison: A line for each team, which compares it with random actions.
+        policy: Writes the actions of all teams into a TensorDict of the environment.
+        timing: A table of where the time went.
+        folder: Folder of the run; None if nothing was stored.
+    """
+
+    metrics: list[dict[str, Any]]
+    evaluations: list[dict[str, Any]]
+    comparison: list[str]
+    policy: TensorDictModuleBase
+    timing: str
+    folder: Path | None
+
+
+def run_training(
+    cfg: Config, folder: RunFolder | None = None, trainer: Trainer | None = None
+) -> TrainingResult:
+    """Train as configured, record the video if asked for, and return the results.
+
+    Args:
+        cfg: The configuration.
+        folder: Folder of the run; None stores nothing on disk, and records no video.
+        trainer: What `make_trainer` made from both, if it exists already.
+
+    Raises:
+        ConfigError: See `make_trainer`.
+        CheckpointError: See `make_trainer`; also if a checkpoint cannot be written.
+    """
+    trainer = trainer or make_trainer(cfg, folder)
+    memory = MemoryReporter()
+    with ExitStack() as pending:
+        written = [] if folder is None else make_reporters(cfg, folder, trainer.progress.frames)
+        for reporter in written:
+            pending.callback(reporter.close)
+        trainer.reporters = [memory, *written]
+        comparison = trainer.run()
+        if folder is not None and cfg.log.video:
+            with timeit("video"):
+                record_episode(folder.video, cfg.game, trainer.policy.play, cfg.seed)
+    if folder is not None:
+        folder.write("comparison.txt", "\n".join(comparison))
+        folder.write("timing.txt", trainer.timing())
+    return TrainingResult(
+        memory.rows["metrics"],
+        memory.rows["evaluations"],
+        comparison,
+        trainer.policy.play,
+        trainer.timing(),
+        None if folder is None else folder.path,
+    )
