@@ -94,7 +94,7 @@ def test_voice_speaks_in_order_then_falls_silent():
     assert np.array_equal(spoken[700:1400], alone.emit(700))
     assert not spoken[1400:].any()
     voice.say(first)
-    voice.hush()
+    voice.clear()
     assert not voice.emit(STEP).any()
 
 

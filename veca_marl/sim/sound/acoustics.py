@@ -16,7 +16,7 @@ SPEED_OF_SOUND_MPS = 343.0
 """Dry air at 20 degrees Celsius (ISO 9613-1)."""
 
 NEAR_FIELD_M = 0.15
-"""The 1/d law ends here: nearer sources are not louder (the mouth is this far from the ears)."""
+"""Distance below which the gain is constant (the mouth is this far from the ears)."""
 
 _WALL_MARGIN_M = 0.01
 _DECAY = 24.0 * math.log(10.0) / SPEED_OF_SOUND_MPS
@@ -52,7 +52,7 @@ class Room:
         return bool(((offset >= 0.0) & (offset <= self.size)).all())
 
     def clamp(self, position: Floats) -> Floats:
-        """Return the point ``(3,)`` itself, or the nearest one a centimetre inside the walls."""
+        """Return the point ``(3,)`` if it is inside, else the nearest one 1 cm inside the walls."""
         margin = np.minimum(_WALL_MARGIN_M, 0.25 * self.size)
         nearest: Floats = np.minimum(
             np.maximum(position, self.lower + margin), self.lower + self.size - margin
@@ -117,14 +117,14 @@ def image_sources(
 
 
 def image_gains(beta: Floats, lattice: NDArray[np.int64]) -> Floats:
-    """Return what the walls leave of each image source (Allen & Berkley 1979, eq. 10).
+    """Return the pressure gain of each image source by the walls (Allen & Berkley 1979, eq. 10).
 
     Args:
         beta: ``(6,)`` pressure reflection coefficients, see `Room`.
         lattice: ``(K, 3)`` from `image_lattice`.
 
     Returns:
-        ``(K,)`` product of the coefficients of all walls that the sound met.
+        ``(K,)`` product of the coefficients of all walls that reflected the sound.
     """
     count = np.abs(lattice)
     more, less = (count + 1) // 2, count // 2
@@ -151,8 +151,8 @@ def room_impulse_response(
 ) -> Floats:
     """Return the impulse response from a source to an omnidirectional receiver.
 
-    The textbook sum over all images (Allen & Berkley 1979, eq. 8) with the band-limited impulses
-    of Peterson (1986). Independent of the streaming engine, which is tested against it.
+    The sum over all images (Allen & Berkley 1979, eq. 8) with the band-limited impulses of Peterson
+    (1986). Independent of the streaming implementation, which is tested against it.
 
     Args:
         source: ``(3,)`` metres.
@@ -160,7 +160,7 @@ def room_impulse_response(
         room: The room both are in.
         order: Greatest number of reflections.
         sample_rate_hz: Sampling rate.
-        n_samples: Length of the response; what arrives later is left out.
+        n_samples: Length of the response; later reflections are left out.
         n_taps: Width of one band-limited impulse (odd).
 
     Returns:
@@ -171,9 +171,9 @@ def room_impulse_response(
     distance = np.linalg.norm(images - np.asarray(receiver, dtype=np.float64), axis=1)
     arrival = distance * sample_rate_hz / SPEED_OF_SOUND_MPS
     gains = image_gains(room.beta, lattice) * distance_gain(distance)
-    heard = (arrival < n_samples) & (gains != 0.0)
+    used = (arrival < n_samples) & (gains != 0.0)
     response = np.zeros(n_samples + 2 * n_taps)
-    for batch in np.array_split(np.flatnonzero(heard), 1 + int(heard.sum()) // 100_000):
+    for batch in np.array_split(np.flatnonzero(used), 1 + int(used.sum()) // 100_000):
         _add_impulses(response, arrival[batch] + n_taps, gains[batch], n_taps)
     return response[n_taps : n_taps + n_samples]
 

@@ -1,7 +1,7 @@
-"""A small vocabulary of calls: what a body that cannot speak says to others.
+"""A small vocabulary of calls with which agents can signal to each other.
 
-A call is a glide of a harmonic voice from one pitch to another. The calls differ in what the ears
-tell apart best, the pitch and its direction; they mean nothing until somebody learns it.
+A call is a glide of a harmonic voice from one pitch to another. The calls differ in pitch and in
+the direction of the glide. Their meaning is not given: it has to be learnt.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ class CallCfg:
     Attributes:
         begin_hz: Pitch at its beginning, at least 80.
         end_hz: Pitch at its end.
-        length_s: How long it takes.
+        length_s: Duration, above 0.02 and at most 5.
         level: Rms pressure at 1 m, in the middle of the call; see `waveforms`.
     """
 
@@ -36,7 +36,7 @@ class CallCfg:
     level: float = 0.1
 
     def __post_init__(self) -> None:
-        """Refuse what no mouth could say."""
+        """Check the numbers."""
         check_pitch(self.begin_hz)
         check_pitch(self.end_hz)
         check_level(self.level)
@@ -45,7 +45,7 @@ class CallCfg:
 
 
 class Call(IntEnum):
-    """What can be called; the number is that of the action."""
+    """The calls; their numbers are those of the action."""
 
     none = 0
     low = 1
@@ -65,9 +65,9 @@ CALLS: dict[Call, CallCfg] = {
 
 @cache
 def call_waveform(cfg: CallCfg, sample_rate_hz: int) -> Samples:
-    """Return the samples of a call ``(n,)``, read-only; the same for ever.
+    """Return the samples of a call ``(n,)``, read-only and cached.
 
-    The pitch glides evenly on a musical scale, that is exponentially; the phase is its integral.
+    The pitch changes exponentially in time (evenly on a musical scale); the phase is its integral.
     """
     n = round(cfg.length_s * sample_rate_hz)
     share = np.arange(n) / n

@@ -1,4 +1,4 @@
-"""Delays of a fraction of a sample: one bank of windowed sinc kernels, and the moving read."""
+"""Fractional delays: a bank of windowed sinc kernels, and reading with a moving delay."""
 
 from __future__ import annotations
 
@@ -54,16 +54,16 @@ def read_delayed(
 ) -> None:
     """Read the newest ``len(out)`` samples of a source through a delay that changes linearly.
 
-    A delay that shrinks or grows along the step is the Doppler effect itself, so nothing else has
-    to model it. The way counts as it is when the sound is heard: exact for a moving listener, and
-    for a moving source up to (v / c)^2, 0.1 % of the pitch at 10 m/s.
+    The changing delay is the Doppler effect. The delay is that of the distance at the time of
+    arrival: exact for a moving listener, and for a moving source up to ``(v / c)^2``, 0.1 % of the
+    pitch at 10 m/s.
 
     Args:
-        history: What the source emitted, newest sample last. Samples before it count as silence.
+        history: Emitted samples, newest last. Samples before them count as silence.
         delay_before: Delay in samples at the end of the last step, not negative.
         delay_after: Delay in samples at the end of this step, not negative.
         bank: `kernel_bank`.
-        out: ``(n,)`` the delayed signal, late by a further `HALF_WIDTH` samples.
+        out: ``(n,)`` the delayed signal, written; delayed by further `HALF_WIDTH` samples.
     """
     n = out.shape[0]
     first = history.shape[0] - n - HALF_WIDTH

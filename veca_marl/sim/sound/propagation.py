@@ -1,4 +1,4 @@
-"""The way from one source to one listener."""
+"""Propagation of sound from one source to one listener."""
 
 from __future__ import annotations
 
@@ -22,26 +22,26 @@ from veca_marl.sim.sound.receiver import Receiver, filter_length
 from veca_marl.sim.sound.sound_source import Source
 
 MAX_SPEED_MPS = 50.0
-"""What changes its distance faster was put elsewhere: it is cross-faded, not heard as a chirp."""
+"""A source whose distance changes faster counts as teleported: cross-faded, without a chirp."""
 
-_NOWHERE: Floats = np.zeros((0, 3))
+_NO_ARRIVALS: Floats = np.zeros((0, 3))
 
 
 class Surroundings(Protocol):
-    """Where sound travels.
+    """The rooms that sound propagates in.
 
     Attributes:
-        spread_m: Upper bound of how much further than the direct sound any image travels.
+        spread_m: Upper bound of the additional path length of any image beyond the direct sound.
     """
 
     spread_m: float
 
     def arrivals(self, source: Floats, head: Pose) -> tuple[Floats, Floats]:
-        """Say from where a source arrives at a head.
+        """Return the directions, distances and gains with which a source arrives at a head.
 
         Returns:
             ``(K, 3)`` metres from the head to the source and its images, in the head frame, and
-            ``(K,)`` what walls leave of each. K may change from step to step.
+            ``(K,)`` pressure gains by walls. K may change from step to step.
         """
         ...
 
@@ -50,7 +50,7 @@ class OneRoom:
     """One room, or the free field without reflections.
 
     Attributes:
-        gains: ``(K,)`` what the walls leave of the direct sound (1) and of each image.
+        gains: ``(K,)`` pressure gains by the walls: 1 for the direct sound, then of each image.
         spread_m: See `Surroundings`.
     """
 
@@ -60,7 +60,7 @@ class OneRoom:
         self._lower = np.zeros(3) if room is None else room.lower
         self._size = np.zeros(3) if room is None else room.size
         self.gains = image_gains(np.ones(6) if room is None else room.beta, self._lattice)
-        # an image is at most this far from its source, hence (triangle) the detour no longer
+        # the distance of an image from its source bounds the detour (triangle inequality)
         detours = 2 * ((np.abs(self._lattice) + 1) // 2) * self._size
         self.spread_m = float(np.linalg.norm(detours, axis=1).max())
 
@@ -76,7 +76,7 @@ class OneRoom:
 
 @dataclass(frozen=True)
 class StreamFormat:
-    """Lengths that all ways to one listener share.
+    """Lengths that all paths to one listener share.
 
     Attributes:
         sample_rate_hz: Sampling rate.
@@ -90,22 +90,22 @@ class StreamFormat:
 
     @staticmethod
     def for_listener(
-        spatialisation: Receiver,
+        receiver: Receiver,
         surroundings: Surroundings,
         sample_rate_hz: float,
         step_samples: int,
     ) -> StreamFormat:
-        """Return the least format in which no filter wraps around (overlap-save)."""
-        taps = filter_length(spatialisation, sample_rate_hz, surroundings.spread_m)
+        """Return the shortest block in which no filter wraps around (overlap-save)."""
+        taps = filter_length(receiver, sample_rate_hz, surroundings.spread_m)
         block = scipy.fft.next_fast_len(taps + step_samples - 1, real=True)
         return StreamFormat(sample_rate_hz, step_samples, block)
 
 
 class Path:
-    """What one listener keeps of one source.
+    """The state of one listener for one source.
 
     Attributes:
-        block: ``(N,)`` float32, the sound delayed by the direct way, newest sample last.
+        block: ``(N,)`` float32, the sound delayed by the direct path, newest sample last.
         response_before: ``(C, F)`` spectra of the filters at the end of the last step.
         response: ``(C, F)`` spectra of the filters at the end of this step.
     """
@@ -114,43 +114,43 @@ class Path:
         self,
         source: Source,
         surroundings: Surroundings,
-        spatialisation: Receiver,
+        receiver: Receiver,
         stream: StreamFormat,
     ) -> None:
         self.source = source
         self._surroundings = surroundings
-        self._spatialisation = spatialisation
+        self._receiver = receiver
         self._stream = stream
         self.block: NDArray[np.float32] = np.zeros(stream.block_samples, np.float32)
-        self._filters = np.zeros((spatialisation.n_channels, stream.block_samples), np.float32)
+        self._filters = np.zeros((receiver.n_channels, stream.block_samples), np.float32)
         self._delayed = np.zeros(stream.step_samples, np.float32)
         self._longest_delay = source.history.size - stream.step_samples - 2 * KERNEL_TAPS
-        self._leap = MAX_SPEED_MPS / SPEED_OF_SOUND_MPS * stream.step_samples
+        self._max_delay_change = MAX_SPEED_MPS / SPEED_OF_SOUND_MPS * stream.step_samples
         self.reset()
 
     def reset(self) -> None:
-        """Forget all sound and where the source was."""
+        """Clear the sound and the last position of the source."""
         self.block[:] = 0.0
         self._quiet_samples = self.block.size
-        self._forget_place()
+        self._clear_position()
 
-    def _forget_place(self) -> None:
-        self._arrivals = self._gains = _NOWHERE
+    def _clear_position(self) -> None:
+        self._arrivals = self._gains = _NO_ARRIVALS
         self._delay = 0.0
-        self._jumps = self.source.jumps
+        self._teleports = self.source.teleports
         self.response: NDArray[np.complex64] | None = None
         self.response_before: NDArray[np.complex64] | None = None
 
     @property
     def moved(self) -> bool:
-        """Whether this step begins with another filter than it ends with."""
+        """Whether the filters at the beginning and at the end of this step differ."""
         return self.response_before is not self.response
 
     def advance(self, head: Pose) -> bool:
-        """Take in one step of sound; return whether there is anything to be heard."""
+        """Take in one step of sound; return whether anything is audible."""
         if not self.source.audible and self._quiet_samples >= self.block.size:
-            # a sound that sets in has come from nowhere: it begins where its source is by then
-            self._forget_place()
+            # when the sound starts again, its path starts at the position at that time
+            self._clear_position()
             return False
         self._place(head)
         return True
@@ -158,15 +158,15 @@ class Path:
     def rejoin(self, head: Pose, age_samples: int) -> bool:
         """Recompute the state after steps that were left out.
 
-        The block becomes what it would be if source, head and walls had always been as they are
-        now: exact where nothing moved meanwhile.
+        The block becomes what it would be if source, head and obstacles had always been where
+        they are now: exact where nothing moved meanwhile.
 
         Args:
             head: As in `advance`.
-            age_samples: How long before the present the block shall end, at least 1.
+            age_samples: How many samples before the present the block ends, at least 1.
 
         Returns:
-            Whether there is anything to be heard in the block.
+            Whether anything is audible in the block.
         """
         self.reset()
         past = self.source.past(age_samples)
@@ -190,20 +190,23 @@ class Path:
         known = self.response_before is not None
         if not known:
             self.response_before = self.response
-        jumped = self._jumps != self.source.jumps or abs(self._delay - before) > self._leap
-        self._jumps = self.source.jumps
-        self._append(before if known else self._delay, jumped and known)
+        is_teleported = (
+            self._teleports != self.source.teleports
+            or abs(self._delay - before) > self._max_delay_change
+        )
+        self._teleports = self.source.teleports
+        self._append(before if known else self._delay, is_teleported and known)
 
     def _write_response(self, arrivals: Floats, gains: Floats) -> None:
         stream = self._stream
-        self._spatialisation.write_filters(arrivals, gains, stream.sample_rate_hz, self._filters)
+        self._receiver.write_filters(arrivals, gains, stream.sample_rate_hz, self._filters)
         self.response_before = self.response
         self.response = scipy.fft.rfft(self._filters)
         direct = np.sqrt(arrivals[0] @ arrivals[0]) * stream.sample_rate_hz / SPEED_OF_SOUND_MPS
         self._delay = min(float(direct), float(self._longest_delay))
         self._arrivals, self._gains = arrivals, gains
 
-    def _append(self, delay_before: float, jumped: bool) -> None:
+    def _append(self, delay_before: float, is_teleported: bool) -> None:
         """Append the delayed sound of this step to the block."""
         n = self._stream.step_samples
         self.block[:-n] = self.block[n:]
@@ -213,7 +216,7 @@ class Path:
             self._quiet_samples += n
             return
         self._quiet_samples = 0
-        if not jumped:
+        if not is_teleported:
             read_delayed(self.source.history, delay_before, self._delay, kernel_bank(), new)
             return
         history, bank, old = self.source.history, kernel_bank(), self._delayed

@@ -1,8 +1,9 @@
-"""What turns sound that arrives at a head into signals: the interface that listeners use.
+"""The interface of receivers, which turn sound that arrives at a head into signals.
 
 A receiver writes the filter from one source to its channels: the sum over the direct sound and its
-reflections, each in its direction, relative to the arrival of the direct sound at the head's
-centre. The delay of the direct sound itself is a moving read (`fractional_delay.read_delayed`).
+reflections, each with its direction and with its delay relative to the arrival of the direct sound
+at the head's centre. The delay of the direct sound is applied before
+(`fractional_delay.read_delayed`).
 """
 
 from __future__ import annotations
@@ -21,10 +22,10 @@ _REACH_S = 1.0e-3
 
 
 class Receiver(Protocol):
-    """What exchanges the quality of hearing; stateless, may be shared between listeners.
+    """Filters of one quality of hearing. Stateless: listeners may share one.
 
     Attributes:
-        n_channels: 2, or 1 where both ears hear the same.
+        n_channels: 2, or 1 where both ears have the same signal.
         n_taps: Length of the response to one arrival.
     """
 
@@ -39,27 +40,27 @@ class Receiver(Protocol):
         Args:
             arrivals: ``(K, 3)`` metres from the head's centre to the source and its images, in
                 the head frame, direct sound first.
-            gains: ``(K,)`` what the walls left of each.
+            gains: ``(K,)`` pressure gain of each by the walls.
             sample_rate_hz: Sampling rate.
             out: ``(n_channels, n)`` the filters; overwritten.
         """
         ...
 
 
-def filter_length(spatialisation: Receiver, sample_rate_hz: float, spread_m: float) -> int:
-    """Return how many samples a filter needs.
+def filter_length(receiver: Receiver, sample_rate_hz: float, spread_m: float) -> int:
+    """Return the length of the filters of a receiver, samples.
 
     Args:
-        spatialisation: Whose filter.
+        receiver: The receiver.
         sample_rate_hz: Sampling rate.
-        spread_m: How much further than the direct sound the last reflection may travel.
+        spread_m: Additional path length of the last reflection beyond the direct sound.
     """
-    # the far ear hears later than the head's centre would
+    # sound arrives later at the far ear than at the head's centre
     longest_s = spread_m / SPEED_OF_SOUND_MPS + _REACH_S
     longest = lead_samples(sample_rate_hz) + int(np.ceil(longest_s * sample_rate_hz))
-    return longest + spatialisation.n_taps + KERNEL_TAPS
+    return longest + receiver.n_taps + KERNEL_TAPS
 
 
 def lead_samples(sample_rate_hz: float) -> int:
-    """Return by how much filters are delayed: the near ear hears before the head's centre would."""
+    """Return the delay of all filters, samples: sound arrives earlier at the near ear."""
     return int(np.ceil(_LEAD_S * sample_rate_hz))

@@ -1,4 +1,4 @@
-"""A place that emits sound, and the recent past of what it emitted."""
+"""A sound source: its position and the samples that it emitted last."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ class Source:
     Attributes:
         name: Unique in its field.
         sound: What it emits; may be exchanged at any time.
-        muted: Whether its sound passes unheard. The sound goes on meanwhile.
-        jumps: How often it was teleported.
+        muted: Whether it emits silence in place of its sound, which continues meanwhile.
+        teleports: How often it was teleported.
     """
 
     def __init__(self, name: str, sound: Sound, history_samples: int) -> None:
         self.name = name
         self.sound = sound
         self.muted = False
-        self.jumps = 0
+        self.teleports = 0
         self._position: Floats = np.zeros(3)
         self._history_samples = history_samples
         self._memory: NDArray[np.float32] = np.zeros(history_samples, np.float32)
@@ -33,7 +33,7 @@ class Source:
     def position(self) -> Floats:
         """``(3,)`` metres in playground coordinates, at the end of the step.
 
-        Setting it is moving it, with Doppler; see `teleport`.
+        Setting it moves the source, with Doppler shift; see `teleport`.
         """
         return self._position
 
@@ -45,22 +45,22 @@ class Source:
         self._position = position
 
     def teleport(self, position: ArrayLike) -> None:
-        """Put it elsewhere: it did not fly there, so there is no Doppler sweep, only a fade."""
+        """Set the position without motion: the sound is cross-faded, without a Doppler sweep."""
         self.position = position
-        self.jumps += 1
+        self.teleports += 1
 
     @property
     def history(self) -> NDArray[np.float32]:
-        """``(H,)`` what it emitted last, newest sample last: as much as one step is heard from."""
+        """``(H,)`` the last samples, newest last: all that can arrive within the present step."""
         return self._memory[-self._history_samples :]
 
     @property
     def audible(self) -> bool:
-        """Whether any sample of its history is other than exactly zero."""
+        """Whether any sample of its history is not exactly zero."""
         return self._silent_samples < self._history_samples
 
     def keep(self, memory_samples: int) -> None:
-        """Remember at least so many samples from now on; what was emitted before counts as silence.
+        """Store at least so many samples from now on; those emitted before count as silence.
 
         Only listeners that left out steps need more than `history`, see `past`.
         """
@@ -70,7 +70,7 @@ class Source:
             self._silent_samples += added if not self.audible else 0
 
     def past(self, age_samples: int) -> NDArray[np.float32]:
-        """Return all that is remembered except the newest samples, a view.
+        """Return a view of all stored samples except the newest.
 
         Args:
             age_samples: How many of the newest samples to leave out, at least 1.
@@ -78,7 +78,7 @@ class Source:
         return self._memory[:-age_samples]
 
     def reset(self, rng: np.random.Generator) -> None:
-        """Forget what was emitted and begin the sound anew."""
+        """Clear the stored samples and restart the sound."""
         if self._silent_samples < self._memory.size:
             self._memory[:] = 0.0
         self._silent_samples = self._memory.size

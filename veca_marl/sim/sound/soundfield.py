@@ -1,7 +1,7 @@
-"""Sound in a world: sources and listeners that all may move, one control step at a time.
+"""Sound in a world: moving sources and moving listeners, one control step at a time.
 
-Each listener keeps its own state, so that neither their number nor their order changes what any
-of them hears. Sound is computed in steps of the simulation's clock; there is no other time.
+Each listener has its own state: neither the number nor the order of the listeners changes their
+signals. Sound advances by the steps of the simulation's clock alone.
 """
 
 from __future__ import annotations
@@ -23,15 +23,15 @@ __all__ = ["Listener", "SoundField", "Source"]
 
 
 class SoundField:
-    """The sources of a world, the room around them, and who listens.
+    """The sound sources of a world, the rooms around them and the listeners.
 
     Attributes:
         sources: Sources by name.
         step_samples: Samples per control step.
         sample_rate_hz: Sampling rate.
         clock: Control steps since the reset.
-        latency_samples: By how much all that is heard is late beside the sound's own way; the
-            same for every quality.
+        latency_samples: Delay of all signals beyond the propagation delay; the same for every
+            receiver.
     """
 
     def __init__(
@@ -42,15 +42,18 @@ class SoundField:
         image_order: int = 1,
         reach_m: float = 60.0,
     ) -> None:
-        """Make a field without sources.
+        """Create a field without sources.
 
         Args:
-            room: What reflects: one room or several; None is the free field.
+            room: One room or several; None is the free field.
             step_samples: Samples per control step.
             sample_rate_hz: Sampling rate.
             image_order: Greatest number of reflections of the image sources; a house has its own.
-            reach_m: Sound from further away is heard as late as from here. A room's diagonal
-                takes its place if that is less.
+            reach_m: Distance up to which the propagation delay grows; sound from further away
+                has the delay of this distance. The diagonal of the rooms if that is less.
+
+        Raises:
+            ValueError: If a number is not positive.
         """
         if step_samples < 1 or sample_rate_hz < 1 or reach_m <= 0.0:
             raise ValueError(
@@ -86,21 +89,25 @@ class SoundField:
         return source
 
     def remove(self, source: Source) -> None:
-        """Take a source out, and what is still under way from it."""
+        """Remove a source, with its sound that has not arrived yet.
+
+        Raises:
+            ValueError: If the source is not in this field.
+        """
         if self.sources.get(source.name) is not source:
             raise ValueError(f"no source {source.name!r} here; sources: {sorted(self.sources)}")
         del self.sources[source.name]
         for listener in self._listeners:
             listener.forget(source)
 
-    def add_listener(self, spatialisation: Receiver, memory_steps: int = 1) -> Listener:
-        """Add a pair of ears with a quality of its own.
+    def add_listener(self, receiver: Receiver, memory_steps: int = 1) -> Listener:
+        """Add a pair of ears with a receiver of its own.
 
         Args:
-            spatialisation: How sound that arrives at the head becomes two signals.
+            receiver: Turns the sound that arrives at the head into two signals.
             memory_steps: How many earlier steps `Listener.rejoin` can return.
         """
-        listener = Listener(self, self._surroundings, spatialisation, memory_steps)
+        listener = Listener(self, self._surroundings, receiver, memory_steps)
         self._listeners.append(listener)
         heard_from = self._history_samples + listener.block_samples
         needed = heard_from + memory_steps * self.step_samples
@@ -110,7 +117,11 @@ class SoundField:
         return listener
 
     def reset(self, rng: np.random.Generator) -> None:
-        """Silence everything, begin all sounds anew and make all listeners forget."""
+        """Clear all sound that is under way, restart all sounds and reset all listeners.
+
+        Args:
+            rng: Source of the sounds' phases and noises.
+        """
         self.clock = 0
         for source in self.sources.values():
             source.reset(rng)
@@ -131,29 +142,27 @@ class Listener:
         self,
         field: SoundField,
         surroundings: Surroundings,
-        spatialisation: Receiver,
+        receiver: Receiver,
         memory_steps: int = 1,
     ) -> None:
         self._field = field
         self._memory_steps = memory_steps
         self._surroundings = surroundings
-        self._spatialisation = spatialisation
+        self._receiver = receiver
         n = field.step_samples
-        self._stream = StreamFormat.for_listener(
-            spatialisation, surroundings, field.sample_rate_hz, n
-        )
+        self._stream = StreamFormat.for_listener(receiver, surroundings, field.sample_rate_hz, n)
         self._fade = np.arange(1, n + 1, dtype=np.float32) / np.float32(n)
         self._paths: dict[str, Path] = {}
         self._clock = field.clock
 
     def reset(self) -> None:
-        """Forget what was heard, and where everything was."""
+        """Clear the signals and the last positions of all sources."""
         for path in self._paths.values():
             path.reset()
         self._clock = self._field.clock
 
     def forget(self, source: Source) -> None:
-        """Drop what is under way from a source."""
+        """Drop the state that belongs to a source."""
         self._paths.pop(source.name, None)
 
     @property
@@ -167,10 +176,10 @@ class Listener:
         return max(self._field.clock - self._clock - 1, 0)
 
     def rejoin(self, head: Pose, n_steps: int = 1) -> NDArray[np.float32]:
-        """Make up for steps that were not rendered; `render` then goes on with the present one.
+        """Render steps that were left out; `render` then continues with the present one.
 
-        What was emitted meanwhile is heard as if head, sources and walls had been where they are
-        now. That is exact where nothing moved; what moved lacks its Doppler shift in those steps.
+        Head, sources and obstacles count as having been where they are now. This is exact where
+        nothing moved; moving sources have no Doppler shift in those steps.
 
         Args:
             head: See `render`.
@@ -180,7 +189,7 @@ class Listener:
             ``(2, n_steps * step_samples)`` sound pressure of the steps before the present one.
 
         Raises:
-            ValueError: If so many steps are not remembered.
+            ValueError: If `n_steps` is not from 1 to `memory_steps`.
         """
         if not 1 <= n_steps <= self._memory_steps:
             raise ValueError(f"n_steps={n_steps} must be from 1 to {self._memory_steps}")
@@ -192,19 +201,19 @@ class Listener:
         return np.concatenate(heard, axis=1)
 
     def render(self, head: Pose) -> NDArray[np.float32]:
-        """Hear one control step. Call once after each `SoundField.advance`.
+        """Render one control step. Call once after each `SoundField.advance`.
 
-        Right after a reset, before anything was emitted, there is silence.
+        The result is silence directly after a reset, before anything was emitted.
 
         Args:
             head: Midpoint between the ears and rotation of the head at the end of the step.
 
         Returns:
-            ``(2, step_samples)`` sound pressure at the left and right ear, see `sounds` for its
-            unit; exactly 0 where nothing is to be heard.
+            ``(2, step_samples)`` sound pressure at the left and right ear, see `waveforms` for its
+            unit; exactly 0 where nothing is audible.
 
         Raises:
-            RuntimeError: If a step was left out or heard twice.
+            RuntimeError: If a step was left out or is rendered twice.
         """
         silence = np.zeros((2, self._field.step_samples), np.float32)
         if self._field.clock == 0:
@@ -221,13 +230,11 @@ class Listener:
     def _all_paths(self) -> list[Path]:
         for name, source in self._field.sources.items():
             if name not in self._paths:
-                self._paths[name] = Path(
-                    source, self._surroundings, self._spatialisation, self._stream
-                )
+                self._paths[name] = Path(source, self._surroundings, self._receiver, self._stream)
         return list(self._paths.values())
 
     def _mix(self, paths: list[Path]) -> NDArray[np.float32]:
-        """Filter all blocks, add them up, and fade from the old filters to the new."""
+        """Filter all blocks, add them and cross-fade from the old filters to the new."""
         n, block = self._stream.step_samples, self._stream.block_samples
         sound = scipy.fft.rfft(np.stack([path.block for path in paths]))
         after = sum(s * path.response for s, path in zip(sound, paths, strict=True))

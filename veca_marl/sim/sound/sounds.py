@@ -1,4 +1,4 @@
-"""What sources emit, sample by sample, and sounds as data. Levels are those of `waveforms`."""
+"""The sounds that sources emit, and their configuration. Levels are those of `waveforms`."""
 
 from __future__ import annotations
 
@@ -27,16 +27,16 @@ class Sound(Protocol):
     """A stream of samples."""
 
     def reset(self, rng: np.random.Generator) -> None:
-        """Begin anew; whatever is random about the sound is drawn here."""
+        """Restart; everything random about the sound is drawn here."""
         ...
 
     def emit(self, n_samples: int) -> Samples:
-        """Return the next samples ``(n,)`` float32. The caller does not write into them."""
+        """Return the next samples ``(n,)`` float32, which the caller must not change."""
         ...
 
 
 class Silence:
-    """No sound: exactly zero."""
+    """Exactly zero."""
 
     def reset(self, rng: np.random.Generator) -> None:
         """See `Sound`."""
@@ -47,14 +47,17 @@ class Silence:
 
 
 class Clip:
-    """A recorded waveform, once or for ever."""
+    """A recorded waveform, played once or in a loop."""
 
     def __init__(self, waveform: ArrayLike, loop: bool = False) -> None:
-        """Take a waveform ``(n,)`` that is at its level already; see `waveforms`.
+        """Check and store the waveform.
 
         Args:
-            waveform: Samples at the rate of the sound field.
-            loop: Repeat for ever, from a random place on; else play once from the beginning.
+            waveform: ``(n,)`` rms pressure at 1 m, at the rate of the sound field; see `waveforms`.
+            loop: Repeat without end from a random position on; else play once from the beginning.
+
+        Raises:
+            ValueError: If the waveform is empty, not finite or not one-dimensional.
         """
         self.waveform = np.asarray(waveform, dtype=np.float32)
         if self.waveform.ndim != 1 or self.waveform.size == 0:
@@ -82,7 +85,7 @@ class Clip:
 
 
 class Noise:
-    """White Gaussian noise, drawn anew for every sample."""
+    """White Gaussian noise, independent for every sample."""
 
     def __init__(self, level: float, sample_rate_hz: float) -> None:
         self.level = check_level(level)
@@ -98,7 +101,7 @@ class Noise:
     def emit(self, n_samples: int) -> Samples:
         """See `Sound`."""
         if self._rng is None:
-            raise RuntimeError("reset the noise before it emits: it has no random numbers yet")
+            raise RuntimeError("reset() the noise before emit(): it has no random generator yet")
         white = self._rng.standard_normal(n_samples) * self.level
         filtered, self._state = scipy.signal.sosfilt(self._high_pass, white, zi=self._state)
         emitted: Samples = filtered.astype(np.float32)
@@ -106,7 +109,7 @@ class Noise:
 
 
 class Voice:
-    """A mouth: silent until it is told what to say; utterances queue up."""
+    """A mouth: emits the utterances in its queue, one after the other, else silence."""
 
     def __init__(self, sample_rate_hz: float = 22_050) -> None:
         self._high_pass = high_pass(sample_rate_hz)
@@ -127,16 +130,16 @@ class Voice:
 
     @property
     def speaking(self) -> bool:
-        """Whether something is still to be said."""
+        """Whether the queue is not empty."""
         return bool(self._queue)
 
-    def hush(self) -> None:
-        """Forget what was not said yet."""
+    def clear(self) -> None:
+        """Empty the queue."""
         self._queue.clear()
 
     def reset(self, rng: np.random.Generator) -> None:
         """See `Sound`."""
-        self.hush()
+        self.clear()
 
     def emit(self, n_samples: int) -> Samples:
         """See `Sound`."""
@@ -153,7 +156,7 @@ class Voice:
 
 
 class SoundKind(Enum):
-    """What a source of the playground sounds like."""
+    """Kinds of sounds."""
 
     buzz = "buzz"
     tone = "tone"
@@ -168,11 +171,11 @@ class SoundCfg:
     """A sound as data.
 
     Attributes:
-        kind: See `SoundKind`.
+        kind: Kind of sound.
         frequency_hz: Fundamental of a buzz or a tone, at least 80.
-        level: Rms pressure at 1 m. A voice and a clip without `rescale` bring their own.
+        level: Rms pressure at 1 m; full scale of a WAV file is 1. Not used by a voice.
         path: WAV file of a clip.
-        loop: Whether a clip repeats for ever.
+        loop: Whether a clip repeats without end.
     """
 
     kind: SoundKind = SoundKind.buzz
@@ -182,10 +185,14 @@ class SoundCfg:
     loop: bool = True
 
     def __post_init__(self) -> None:
+        """Check the numbers, and that a clip and nothing else has a path."""
         check_pitch(self.frequency_hz)
         check_level(self.level)
         if (self.path is None) == (self.kind is SoundKind.clip):
-            raise ValueError(f"a clip needs a path and nothing else does: {self.kind}, {self.path}")
+            raise ValueError(
+                f"sound of kind {self.kind.value} with path={self.path!r}: a clip needs a path, "
+                "other kinds must not have one"
+            )
 
 
 def make_sound(cfg: SoundCfg, sample_rate_hz: int = 22_050) -> Sound:

@@ -1,9 +1,9 @@
-"""Waveforms: harmonic sounds made by rule, and WAV files.
+"""Waveforms: synthesised harmonic sounds, and WAV files.
 
-The level of a sound is its rms pressure at 1 m, in a unit that is free to choose; 1.0 is the full
-scale of a WAV file. A loudspeaker, a mouth or a ball emits no steady pressure, and image sources
-with positive reflection coefficients would pile it up: every sound is high-passed at
-`HIGH_PASS_HZ` (Allen & Berkley 1979 do the same to the response of the room).
+The level of a sound is its rms pressure at 1 m in an arbitrary unit; 1.0 is the full scale of a WAV
+file. Every sound is high-passed at `HIGH_PASS_HZ`: real sources emit no constant pressure, and
+image sources with positive reflection coefficients would accumulate it (Allen & Berkley 1979 filter
+the response of the room in the same way).
 """
 
 from __future__ import annotations
@@ -28,15 +28,15 @@ Samples = NDArray[np.float32]
 
 
 def tone(frequency_hz: float, level: float, sample_rate_hz: float) -> Samples:
-    """Return one second of a pure tone, at a frequency in whole hertz, so that it can be looped."""
+    """Return one second of a pure tone; the frequency is rounded to whole hertz for looping."""
     return _harmonics(check_pitch(frequency_hz), 1, level, int(sample_rate_hz))
 
 
 def buzz(frequency_hz: float, level: float, sample_rate_hz: float) -> Samples:
     """Return one second of all harmonics up to 0.9 of the Nyquist frequency, -3 dB per octave.
 
-    Broadband, so that the head and the pinna have something to colour up to the top of the
-    observation (5.4 kHz). At a frequency in whole hertz, so that it can be looped.
+    It is broadband, so that the spectral cues of head and pinna are present up to the highest
+    frequency of the observation (5.4 kHz). The frequency is rounded to whole hertz for looping.
     """
     pitch = check_pitch(frequency_hz)
     n_harmonics = max(1, int(_BUZZ_TOP * sample_rate_hz / 2.0 / pitch))
@@ -45,9 +45,12 @@ def buzz(frequency_hz: float, level: float, sample_rate_hz: float) -> Samples:
 
 @cache
 def _harmonics(frequency_hz: int, n_harmonics: int, level: float, sample_rate_hz: int) -> Samples:
-    """Return one second, with the phases that keep the peaks low (Schroeder 1970, eq. 11)."""
+    """Return one second, with phases of low peak factor (Schroeder 1970, eq. 11)."""
     if frequency_hz * n_harmonics >= sample_rate_hz / 2:
-        raise ValueError(f"{frequency_hz} Hz does not fit below half of {sample_rate_hz} Hz")
+        raise ValueError(
+            f"{n_harmonics} harmonics of {frequency_hz} Hz must lie below half of the sampling "
+            f"rate, {sample_rate_hz} Hz"
+        )
     spectrum = np.zeros(sample_rate_hz // 2 + 1, np.complex128)
     order = np.arange(1, n_harmonics + 1)
     phase = -np.pi * order * (order - 1) / n_harmonics
@@ -68,7 +71,7 @@ def load_wav(path: str | Path, sample_rate_hz: int, level: float | None = None) 
         level: Rms pressure at 1 m to scale to; None keeps the file's own (full scale is 1).
 
     Raises:
-        ValueError: If the file is no WAV file, or silent although a level is wanted.
+        ValueError: If the file is not a WAV file, or is silent and a level is given.
     """
     try:
         rate, samples = scipy.io.wavfile.read(path)
@@ -101,7 +104,7 @@ def _full_scale(samples: NDArray[np.generic]) -> Floats:
 
 @cache
 def high_pass(sample_rate_hz: float) -> Floats:
-    """Return the second-order sections of the filter every sound passes (Butterworth, order 2)."""
+    """Return the second-order sections of the high-pass of all sounds (Butterworth, order 2)."""
     sections: Floats = scipy.signal.butter(
         2, HIGH_PASS_HZ, "highpass", fs=sample_rate_hz, output="sos"
     )
@@ -116,7 +119,7 @@ def check_level(level: float) -> float:
 
 
 def check_pitch(frequency_hz: float) -> int:
-    """Return the frequency in whole hertz; raise `ValueError` if it is below 80 Hz or no number."""
+    """Return the frequency in whole hertz; raise `ValueError` if it is not finite or below 80."""
     if not (np.isfinite(frequency_hz) and frequency_hz >= _LOWEST_PITCH_HZ):
         raise ValueError(f"frequency_hz must be at least {_LOWEST_PITCH_HZ}, got {frequency_hz}")
     return round(frequency_hz)
