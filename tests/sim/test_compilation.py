@@ -1,4 +1,4 @@
-"""Users are told once, and only when something of ours is compiled."""
+"""One message per process, only when a kernel of this package is compiled."""
 
 from numba import njit
 from numba.core.event import install_listener
@@ -16,7 +16,7 @@ def compile_new_kernel(module):
     assert compiled(1) + compiled(2) == 5
 
 
-def test_one_line_for_any_number_of_our_kernels():
+def test_one_line_for_any_number_of_kernels():
     told = []
     with install_listener("numba:compile", CompilationNotice(told.append)):
         compile_new_kernel("veca_marl.sim.one")
@@ -25,14 +25,14 @@ def test_one_line_for_any_number_of_our_kernels():
     assert "compiling kernels" in told[0]
 
 
-def test_kernels_of_others_are_their_own_affair():
+def test_kernels_of_other_packages_are_not_announced():
     told = []
     with install_listener("numba:compile", CompilationNotice(told.append)):
         compile_new_kernel("somewhere.else")
     assert told == []
 
 
-def test_announcing_twice_tells_once(monkeypatch):
+def test_announcing_twice_installs_one_notice(monkeypatch):
     registered = []
     monkeypatch.setattr(compilation, "register", lambda *what: registered.append(what))
     announce_compilation.cache_clear()

@@ -1,4 +1,4 @@
-"""Tell the user why the first run takes seconds longer to start."""
+"""A message to the user while kernels are compiled, which delays the first run by seconds."""
 
 from __future__ import annotations
 
@@ -10,22 +10,22 @@ from numba.core.event import Event, Listener, register
 
 
 class CompilationNotice(Listener):
-    """Says so when the first of our kernels is compiled; a cached one is not compiled.
+    """Writes one line when the first kernel of this package is compiled, not loaded from a cache.
 
     Args:
-        tell: Takes the line.
+        write: Function that takes the line.
     """
 
-    def __init__(self, tell: Callable[[str], object]) -> None:
-        self._tell = tell
-        self._told = False
+    def __init__(self, write: Callable[[str], object]) -> None:
+        self._write = write
+        self._is_written = False
 
     def on_start(self, event: Event) -> None:
         """See `numba.core.event.Listener`."""
         module: str = event.data["dispatcher"].py_func.__module__
-        if not self._told and module.startswith("veca_marl."):
-            self._told = True
-            self._tell("compiling kernels (once; they are cached) ...")
+        if not self._is_written and module.startswith("veca_marl."):
+            self._is_written = True
+            self._write("compiling kernels (once; they are cached) ...")
 
     def on_end(self, event: Event) -> None:
         """See `numba.core.event.Listener`."""
@@ -33,9 +33,9 @@ class CompilationNotice(Listener):
 
 @cache
 def announce_compilation() -> None:
-    """Announce in this process that kernels are compiled, if that happens. Calling twice is fine.
+    """Install the notice in this process; further calls have no effect.
 
-    It listens to numba's compiler, so that compiled kernels cost nothing more.
+    It listens to events of numba's compiler: calls of compiled kernels take no additional time.
     """
     register("numba:compile", CompilationNotice(_to_stderr))
 

@@ -23,14 +23,14 @@ def matrices(quaternions):
     return out
 
 
-def test_matrices_are_the_engines():
+def test_matrices_are_bit_equal_to_bullets():
     quaternions = unit_quaternions(500)
     for quaternion, matrix in zip(quaternions, matrices(quaternions), strict=True):
         expected = np.reshape(pybullet.getMatrixFromQuaternion(quaternion), (3, 3))
         np.testing.assert_array_equal(matrix, expected)
 
 
-def test_there_and_back():
+def test_matrix_to_quaternion_is_the_inverse():
     half_turns = np.eye(4)[:3]
     nearly = half_turns + 1e-9
     quaternions = np.concatenate((unit_quaternions(200), np.eye(4), nearly))

@@ -1,4 +1,4 @@
-"""Frames carry their primitives, and objects can come late."""
+"""Primitives follow their frames, and objects can be added at any time."""
 
 import numpy as np
 import pytest
@@ -11,7 +11,7 @@ from veca_marl.sim.geometry.tables import Geom
 BALL = Geom(Shape.SPHERE, (0.1,))
 
 
-def test_primitives_ride_on_their_frames():
+def test_primitives_follow_their_frames():
     rng = np.random.default_rng(0)
     turn, frame_turn = random_rotations(2, rng)
     scene = Scene()
@@ -29,7 +29,7 @@ def test_primitives_ride_on_their_frames():
     np.testing.assert_array_equal(scene.geoms.objects, [0, 1, 1])
 
 
-def test_an_object_may_come_after_an_update():
+def test_an_object_may_be_added_after_an_update():
     scene = Scene()
     early = scene.add_object("early", [[BALL]])
     early.positions[0] = (1, 0, 0)
@@ -57,7 +57,7 @@ def test_hidden_marks_the_primitives_of_some_frames():
     assert not scene.hidden(body.id, ()).any()
 
 
-def test_finding_lists_what_exists():
+def test_the_error_for_an_unknown_object_lists_the_objects():
     scene = Scene()
     ball = scene.add_object("ball", [[BALL]])
     assert scene.find("ball") is ball

@@ -51,7 +51,7 @@ def volume(vertices, triangles):
     return np.einsum("ti,ti->", a, np.cross(b, c)) / 6
 
 
-def test_skins_of_two_bodies_do_not_meddle():
+def test_meshes_of_two_bodies_are_independent():
     rng = np.random.default_rng(2)
     scene = Scene()
     one, two = add_body(scene, "one"), add_body(scene, "two")
@@ -73,6 +73,6 @@ def test_skins_of_two_bodies_do_not_meddle():
         ("colours", np.zeros((5, 3), np.float32)),
     ],
 )
-def test_meshes_that_do_not_fit_together_are_refused(field, wrong):
+def test_inconsistent_meshes_are_refused(field, wrong):
     with pytest.raises(ValueError, match=r"weights|offsets|vertices outside|colours"):
         dataclasses.replace(load_skin(), **{field: wrong})

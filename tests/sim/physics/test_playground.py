@@ -1,4 +1,4 @@
-"""Playgrounds as data: the shipped ones stand, impossible ones are refused."""
+"""Playgrounds as data: the shipped ones are stable, impossible ones are refused."""
 
 import math
 
@@ -21,7 +21,7 @@ def test_its_name_is_that_of_its_file(playground):
     assert playground.name in SHIPPED
 
 
-def test_its_things_stand_still(playground):
+def test_its_props_stay_at_rest(playground):
     """Nothing overlaps, floats or falls over in 3 s."""
     world = World(playground)
     before = world.scene.positions.copy()
@@ -29,14 +29,14 @@ def test_its_things_stand_still(playground):
     np.testing.assert_allclose(world.scene.positions, before, atol=0.005)
 
 
-def test_its_things_are_inside_its_rooms(playground):
+def test_its_props_are_inside_its_rooms(playground):
     world = World(playground)
     for name, prop in world.props.items():
         if not name.startswith("wall"):
             assert any(room.contains(prop.position) for room in playground.rooms), name
 
 
-def test_its_walls_keep_a_walker_in(playground):
+def test_a_walker_cannot_leave_it(playground):
     world = World(playground)
     walker = walker_in(world)
     for yaw_deg in range(0, 360, 45):
@@ -79,7 +79,7 @@ def test_impossible_echoes_are_refused(wrong):
         RoomCfg(reflection=wrong)
 
 
-def test_a_room_must_be_somewhere():
+def test_positions_of_rooms_must_be_finite():
     with pytest.raises(ValueError, match="lower_m"):
         RoomCfg(lower_m=(0.0, math.inf, 0.0))
 
@@ -98,7 +98,7 @@ def test_an_impossible_room_on_the_command_line_is_one_line():
         compose(["+task=KickTheBall", "playground.image_order=-1"])
 
 
-def test_a_start_has_the_middle_ahead():
+def test_a_start_faces_the_middle():
     room = RoomCfg(lower_m=(1.0, 2.0, 0.0), size_m=(4.0, 6.0, 2.0))
     rng = np.random.default_rng(0)
     starts = [room.sample_start(rng, margin_m=0.5) for _ in range(20)]

@@ -1,4 +1,4 @@
-"""Props: what is seen is what collides, and nonsense is refused at the door."""
+"""Props: the drawn shape is the collision shape, and impossible configurations are refused."""
 
 import math
 
@@ -24,7 +24,7 @@ def of(shape, **more):
 
 
 @pytest.mark.parametrize("shape", PropShape)
-def test_what_is_drawn_is_what_collides(shape):
+def test_the_drawn_shape_is_the_collision_shape(shape):
     """Rays of the physics hit exactly where the drawn primitives are."""
     world = empty_world(of(shape, position_m=(0.3, -0.2, 1.0), yaw_deg=33.0))
     world.refresh()
@@ -103,7 +103,7 @@ def test_a_fixed_prop_stays():
     assert world.prop("box").fixed
 
 
-def test_place_undoes_turns_and_sets_velocities():
+def test_place_sets_the_whole_pose_and_the_velocities():
     world = empty_world(box(position=(0.0, 0.0, 2.0)))
     thing = world.prop("box")
     thing.set_velocity((0.0, 0.0, 0.0), (3.0, 2.0, 1.0))
@@ -114,7 +114,7 @@ def test_place_undoes_turns_and_sets_velocities():
     np.testing.assert_array_equal(thing.velocity, (0.5, 0.0, 0.0))
 
 
-def test_its_sound_goes_along():
+def test_its_sound_source_follows():
     world = empty_world(ball(position=(0.0, 0.0, 0.1), sound=SoundCfg()))
     world.prop("ball").set_velocity((1.0, 0.0, 0.0), (0.0, 10.0, 0.0))
     let_pass(world, 0.4)
@@ -124,7 +124,7 @@ def test_its_sound_goes_along():
     assert source.position[0] > 0.3
 
 
-def test_what_a_caller_keeps_does_not_change():
+def test_returned_positions_are_copies():
     world = empty_world(ball(position=(0.0, 0.0, 2.0)))
     before = world.prop("ball").position
     let_pass(world, 0.4)
@@ -157,7 +157,7 @@ def test_impossible_numbers_are_refused(field, wrong):
         of(PropShape.sphere, **{field: wrong})
 
 
-def test_an_unknown_shape_is_answered_with_those_there_are():
+def test_the_error_for_an_unknown_shape_lists_the_shapes():
     with pytest.raises(ValueError, match=r"'thing': shape='torus'.*'sphere'"):
         PropCfg(name="thing", shape="torus", size_m=[1.0])
 
@@ -167,7 +167,7 @@ def test_a_prop_needs_a_name():
         PropCfg(shape=PropShape.sphere, size_m=[0.1])
 
 
-def test_a_prop_is_not_put_nowhere():
+def test_a_position_must_be_finite():
     thing = empty_world(ball()).prop("ball")
     for wrong in ((0.0, 0.0), (0.0, math.nan, 0.0)):
         with pytest.raises(ValueError, match="'ball': position"):
@@ -183,7 +183,7 @@ def test_radius_is_that_of_the_cylinder_round_it():
     assert world.prop("wall").radius_m == pytest.approx(math.hypot(3.0, 0.1) / 2)
 
 
-def test_what_is_not_tangible_is_only_seen():
+def test_an_intangible_prop_is_only_seen():
     mark = PropCfg(name="mark", shape=PropShape.cylinder, size_m=[0.1, 0.05], tangible=False)
     world = empty_world(mark, ball(position=(0.0, 0.0, 0.3), restitution=0.0))
     let_pass(world, 1.0)
@@ -194,6 +194,6 @@ def test_what_is_not_tangible_is_only_seen():
     assert world.scene.geoms.visible[own].all()
 
 
-def test_what_is_not_tangible_must_be_fixed():
+def test_an_intangible_prop_must_be_fixed():
     with pytest.raises(ValueError, match="mass_kg"):
         PropCfg(name="mark", size_m=[1.0, 1.0, 1.0], mass_kg=1.0, tangible=False)

@@ -1,4 +1,4 @@
-"""Physical laws, the clock, and worlds that come back as they were."""
+"""Physical laws, the clock, and the exact restoration of worlds."""
 
 import resource
 import time
@@ -55,7 +55,7 @@ def test_a_ball_that_rolls_without_slipping_keeps_its_speed():
     assert world.prop("ball").position[0] == pytest.approx(2.0, abs=1e-6)
 
 
-def test_rolling_resistance_slows_by_its_arm():
+def test_rolling_resistance_is_that_of_its_lever_arm():
     """Torque m g b over the moment 7/5 m r^2 about the point of contact."""
     world = empty_world(ball(position=(0.0, 0.0, 0.1), rolling_friction=0.002))
     world.prop("ball").set_velocity((1.0, 0.0, 0.0), (0.0, 10.0, 0.0))
@@ -64,7 +64,7 @@ def test_rolling_resistance_slows_by_its_arm():
     assert slowed == pytest.approx(2.0 * 9.81 * 0.002 / (1.4 * 0.1), rel=0.05)
 
 
-def test_a_ball_that_slides_ends_up_rolling_at_five_sevenths():
+def test_a_sliding_ball_ends_up_rolling_at_five_sevenths_of_its_speed():
     """Angular momentum about the point of contact is kept: v = 5/7 v0 for a full sphere."""
     world = empty_world(ball(position=(0.0, 0.0, 0.1), rolling_friction=0.0))
     world.prop("ball").set_velocity((2.0, 0.0, 0.0))
@@ -83,7 +83,7 @@ def test_a_sliding_box_is_slowed_by_its_friction(friction):
 
 
 @pytest.mark.parametrize("restitution", [0.0, 0.5, 0.8])
-def test_a_ball_bounces_as_high_as_its_restitution_says(restitution):
+def test_the_height_of_a_bounce_follows_from_the_restitution(restitution):
     """Height after the bounce = e^2 x height of the fall, within a substep's way."""
     world = empty_world(ball(position=(0.0, 0.0, 1.1), restitution=restitution))
     heights = film(world, 25)[:, world.prop("ball")._row, 2] - 0.1
@@ -104,7 +104,7 @@ def test_energy_is_not_created():
     assert all(np.linalg.norm(prop.velocity) < 0.05 for prop in world.props.values())
 
 
-def test_the_clock_does_not_know_wall_time():
+def test_wall_time_has_no_influence():
     def fall(pause_s):
         world = empty_world(ball(position=(0.0, 0.0, 2.0)))
         for _ in range(5):
@@ -115,7 +115,7 @@ def test_the_clock_does_not_know_wall_time():
     assert fall(0.0).tobytes() == fall(0.02).tobytes()
 
 
-def test_the_clock_says_how_long_a_step_is():
+def test_duration_of_steps():
     clock = ClockCfg(control_rate_hz=50, substeps=3)
     world = empty_world(ball(position=(0.0, 0.0, 5.0)), clock=clock)
     for _ in range(50):
@@ -188,7 +188,7 @@ def test_worlds_in_one_process_do_not_disturb_each_other():
     np.testing.assert_array_equal(alone, together)
 
 
-def test_a_reset_brings_everything_back():
+def test_a_reset_restores_everything():
     """Also what the task does not place: the walker, and fixed things that were moved."""
     sounding = ball(position=(1.0, 0.0, 0.1), sound=SoundCfg())
     world = empty_world(sounding, wall(position=(3.0, 0.0, 0.0)))
@@ -243,7 +243,7 @@ def test_ten_thousand_resets_leak_nothing():
     assert resident_kb() - before < 4_000  # 0.4 kB a reset; one leaked state would be 20
 
 
-def test_closed_worlds_give_their_client_back():
+def test_closed_worlds_release_their_client():
     for _ in range(3):
         world = empty_world()
         client = world.client
@@ -262,7 +262,7 @@ def test_names_are_unique():
         empty_world(ball("floor"))
 
 
-def test_an_unknown_prop_is_answered_with_those_there_are():
+def test_the_error_for_an_unknown_prop_lists_the_props():
     with pytest.raises(KeyError, match=r"no prop 'dog'.*'ball'"):
         empty_world(ball()).prop("dog")
 
@@ -274,7 +274,7 @@ def test_two_bodies_need_two_names():
         walker_in(world, "walker")
 
 
-def test_a_frozen_world_takes_nobody_in():
+def test_nothing_can_be_added_to_a_frozen_world():
     world = empty_world()
     with pytest.raises(RuntimeError, match="freeze"):
         world.reset(np.random.default_rng(0))
@@ -287,7 +287,7 @@ def test_a_frozen_world_takes_nobody_in():
         world.freeze()
 
 
-def test_nothing_leaves_the_room_while_somebody_runs_about():
+def test_nothing_leaves_the_room_while_a_walker_runs_about():
     """60 s of shoving toys among furniture: all stays inside, on the floor, and slow."""
     world = World(furnished())
     walker = walker_in(world)
@@ -313,7 +313,7 @@ def test_an_impossible_contact_share_is_refused(share):
         ClockCfg(contact_share=share)
 
 
-def test_worlds_that_look_ahead_differently_do_not_disturb_each_other():
+def test_worlds_of_different_contact_share_do_not_disturb_each_other():
     """Bullet keeps one number for all worlds of a process."""
 
     def fall(*others):

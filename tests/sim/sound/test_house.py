@@ -1,4 +1,4 @@
-"""Sound between rooms: walls weaken it, open doors do not, and going through one does not click."""
+"""Sound between rooms: walls attenuate it, open doors do not, changes of room do not click."""
 
 import numpy as np
 import pytest
@@ -66,7 +66,7 @@ def test_inside_one_room_a_house_is_that_room(quality):
 
 
 @pytest.mark.parametrize("loss_db", [0.0, 10.0, 30.0])
-def test_each_wall_takes_its_loss(loss_db):
+def test_each_wall_attenuates_by_its_loss(loss_db):
     source, head = (1.0, 0.5, 1.0), pose(5.0, -0.3, 1.0)
     second = ((4.0, 0.0, 1.3), np.eye(3), (0.05, 3.0, 1.3))
     levels = [
@@ -77,7 +77,7 @@ def test_each_wall_takes_its_loss(loss_db):
     assert levels[0] - levels[2] == pytest.approx(2.0 * loss_db, abs=0.01)
 
 
-def test_what_no_wall_hides_in_the_next_room_is_heard_as_in_the_free_field():
+def test_without_a_wall_between_sound_of_another_room_is_that_of_the_free_field():
     source, head = (1.0, 0.5, 1.0), pose(5.0, -0.3, 1.0)
     free = hear(None, source, head)
     through_the_opening = hear(house(), source, head)
@@ -98,11 +98,11 @@ def test_what_no_wall_hides_in_the_next_room_is_heard_as_in_the_free_field():
         ((3.05, 0.0, 1.0), (3.05, 0.0, 1.0), 0),  # nowhere to go
     ],
 )
-def test_a_line_crosses_a_wall_or_it_does_not(one, other, count):
+def test_crossings_of_a_wall(one, other, count):
     assert house(BETWEEN).obstacles_between(np.array(one), np.array(other)) == count
 
 
-def test_a_turned_wall_is_crossed_where_it_stands():
+def test_crossings_of_a_rotated_wall():
     c = np.sqrt(0.5)
     turned = np.array([[c, -c, 0.0], [c, c, 0.0], [0.0, 0.0, 1.0]])
     rooms = house(((0.0, 0.0, 1.0), turned, (2.0, 0.05, 1.0)))  # along x = y
@@ -110,7 +110,7 @@ def test_a_turned_wall_is_crossed_where_it_stands():
     assert rooms.obstacles_between(np.array([1.0, 0.0, 1.0]), np.array([0.0, -1.0, 1.0])) == 0
 
 
-def test_a_place_belongs_to_the_room_it_is_in_or_nearest_to():
+def test_a_point_belongs_to_the_room_that_contains_it_or_the_nearest():
     rooms = house()
     places = (0.0, 3.04, 3.06, 3.1, 7.0, 99.0, -99.0)
     assert [rooms.room_of(np.array([x, 0.0, 1.0])) for x in places] == [0, 0, 1, 1, 1, 1, 0]
@@ -167,7 +167,7 @@ def test_two_rooms_have_a_door_that_sound_goes_through():
     world.close()
 
 
-def test_an_obstacle_that_moves_is_heard_although_source_and_listener_rest():
+def test_a_moving_obstacle_is_heard_while_source_and_listener_are_at_rest():
     rooms = house(BETWEEN)
     field = SoundField(rooms, STEP, RATE)
     field.add_source("noise", Clip(NOISE)).position = (1.0, 0.5, 1.0)

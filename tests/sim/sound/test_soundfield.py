@@ -1,4 +1,4 @@
-"""Laws of the streaming engine, each against an independent computation or a known limit."""
+"""Laws of the sound field, each against an independent computation or a known limit."""
 
 import os
 import subprocess
@@ -82,7 +82,7 @@ def test_sounds_add_up(quality):
     assert ratio_db(sum(apart), both) > 110.0
 
 
-def test_a_listener_hears_the_same_bytes_in_company():
+def test_other_listeners_do_not_change_a_byte():
     def hear(company):
         field = SoundField(room(), STEP, RATE, 2)
         sources = [field.add_source(str(i), Noise(0.1, RATE)) for i in range(2)]
@@ -193,7 +193,7 @@ def test_a_sound_that_begins_late_is_the_same_sound():
 
 
 @pytest.mark.parametrize("quality", QUALITIES)
-def test_doubling_the_distance_takes_six_decibels(quality):
+def test_doubling_the_distance_attenuates_by_six_decibels(quality):
     sound = noise(8 * STEP)
     level = [
         10.0 * np.log10(np.mean(render_still([sound], [(d, 0, 0)], STILL, quality)[:, 3000:] ** 2))
@@ -202,7 +202,7 @@ def test_doubling_the_distance_takes_six_decibels(quality):
     assert np.diff(level) == pytest.approx(-6.02, abs=0.25)
 
 
-def test_sound_needs_its_time():
+def test_sound_arrives_after_its_propagation_delay():
     pulse = np.zeros(4 * STEP, np.float32)
     pulse[0] = 1.0
     for distance in (1.0, 10.0):
@@ -224,7 +224,7 @@ def test_interaural_time_is_that_of_a_head(azimuth):
 
 
 @pytest.mark.parametrize("quality", QUALITIES)
-def test_mirrored_world_is_heard_with_mirrored_ears(quality):
+def test_a_mirrored_scene_gives_mirrored_signals(quality):
     sound = noise(6 * STEP)
     mirror = np.array([1.0, -1.0, 1.0])
     box = acoustics.Room((-4.0, -3.0, -1.5), (8.0, 6.0, 3.0), (0.7, 0.6, 0.8, 0.5, 0.4, 0.3))
@@ -235,7 +235,7 @@ def test_mirrored_world_is_heard_with_mirrored_ears(quality):
     assert ratio_db(here[::-1], there) > 50.0
 
 
-def test_mono_ears_are_equal_and_deaf_to_direction():
+def test_mono_signals_are_equal_and_independent_of_direction():
     sound = noise(5 * STEP)
     heard = [
         render_still([sound], [2.0 * direction(azimuth)], STILL, "mono") for azimuth in (0, 110)
@@ -244,7 +244,7 @@ def test_mono_ears_are_equal_and_deaf_to_direction():
     assert ratio_db(heard[0], heard[1]) > 90.0
 
 
-def test_turning_the_head_is_turning_the_world():
+def test_rotating_the_head_equals_rotating_the_scene():
     sound = noise(5 * STEP)
     position = 2.0 * direction(40, 20)
     here = render_still([sound], [position], STILL)
@@ -253,7 +253,7 @@ def test_turning_the_head_is_turning_the_world():
     assert ratio_db(here, there) > 90.0
 
 
-def test_reset_forgets_what_was_under_way():
+def test_reset_clears_sound_that_is_under_way():
     field = SoundField(room(), STEP, RATE, 2)
     voice = Voice(RATE)
     field.add_source("mouth", voice).position = SOURCES[0]
@@ -304,7 +304,7 @@ def test_sources_at_the_ear_and_outside_the_room_stay_finite():
 
 
 @pytest.mark.parametrize("quality", QUALITIES)
-def test_what_is_outside_the_room_is_heard_as_just_inside(quality):
+def test_sources_outside_the_room_are_heard_as_just_inside(quality):
     sound, outside = noise(4 * STEP), np.array([9.0, -0.5, 1.2])
     inside = room().clamp(outside)
     heard = [
@@ -316,14 +316,14 @@ def test_what_is_outside_the_room_is_heard_as_just_inside(quality):
     assert heard[0].tobytes() == heard[1].tobytes()
 
 
-def test_further_than_the_reach_is_late_only_by_the_reach():
+def test_the_delay_is_limited_to_that_of_the_reach():
     pulse = np.zeros(8 * STEP, np.float32)
     pulse[0] = 1.0
     heard = render_still([pulse], [(500.0, 0.0, 0.0)], STILL, "mono")[0]
     assert np.abs(heard).argmax() == pytest.approx(60.0 / 343.0 * RATE + LATENCY, abs=1.0)
 
 
-def test_a_step_is_heard_once_and_none_is_left_out():
+def test_every_step_is_rendered_exactly_once():
     field = SoundField(None, STEP, RATE)
     listener = field.add_listener(spatialisation("mono"))
     field.reset(np.random.default_rng(0))
@@ -340,7 +340,7 @@ def test_a_step_is_heard_once_and_none_is_left_out():
     listener.render(STILL)
 
 
-def test_wrong_input_is_refused_at_the_door():
+def test_invalid_arguments_are_refused():
     field = SoundField(None, STEP, RATE)
     source = field.add_source("ball", Silence())
     with pytest.raises(ValueError, match="'ball' exists"):

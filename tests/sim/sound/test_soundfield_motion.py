@@ -62,7 +62,7 @@ def test_moving_and_turning_does_not_click():
     assert 20 * np.log10(np.abs(clicks).max() / np.abs(heard).max()) < -70.0
 
 
-def test_what_moved_in_silence_begins_anew_where_it_is():
+def test_a_source_that_moved_in_silence_starts_at_its_new_position():
     """Otherwise its first word would sweep along the way it went unheard."""
     voice, word = Voice(RATE), noise(3 * STEP)
     field = SoundField(None, STEP, RATE)
@@ -89,7 +89,7 @@ def test_what_moved_in_silence_begins_anew_where_it_is():
 
 
 @pytest.mark.parametrize("how", ["teleport", "too fast to fly"])
-def test_a_jump_is_neither_a_chirp_nor_a_click(how):
+def test_a_teleport_gives_neither_a_chirp_nor_a_click(how):
     """Flying 1.5 m in a step would shift 1 kHz by 110 Hz; a jump leaves the pitch alone."""
     far = 2.5 if how == "teleport" else 7.0
     field = SoundField(None, STEP, RATE)

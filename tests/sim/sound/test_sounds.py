@@ -31,18 +31,18 @@ def test_buzz_has_all_harmonics_of_the_observed_band_and_nothing_else():
     assert between.max() < 1e-3 * harmonics.max()
 
 
-def test_buzz_does_not_peak():
+def test_buzz_has_a_low_peak_factor():
     assert np.abs(waveforms.buzz(150.0, 0.1, RATE)).max() < 0.35
 
 
-def test_loops_close_without_a_seam():
+def test_loops_are_continuous():
     loop = waveforms.tone(441.0, 1.0, RATE)
     bend = np.abs(np.diff(np.concatenate([loop[-2:], loop]), 2))
     assert bend[:2].max() < 1.001 * bend[2:].max()
 
 
 @pytest.mark.parametrize("kind", [SoundKind.buzz, SoundKind.noise])
-def test_seed_decides_every_byte(kind):
+def test_same_seed_same_bytes(kind):
     first, again = (emit(make_sound(SoundCfg(kind)), seed=3) for _ in range(2))
     assert first.tobytes() == again.tobytes()
     assert emit(make_sound(SoundCfg(kind)), seed=4).tobytes() != first.tobytes()
@@ -58,7 +58,7 @@ def test_noise_is_white_above_the_high_pass():
     assert low < 1e-2 * middle
 
 
-def test_noise_without_reset_has_no_random_numbers():
+def test_noise_must_be_reset_before_it_emits():
     with pytest.raises(RuntimeError, match="reset"):
         Noise(1.0, RATE).emit(STEP)
 
@@ -72,7 +72,7 @@ def test_clip_plays_once_and_falls_silent():
         assert not played[waveform.size :].any()
 
 
-def test_looping_clip_repeats_from_a_random_place():
+def test_a_looping_clip_starts_at_a_random_position():
     waveform = np.arange(100, dtype=np.float32)
     played = emit(Clip(waveform, loop=True), 2)
     assert np.array_equal(played, (played[0] + np.arange(2 * STEP)) % 100)
@@ -98,7 +98,7 @@ def test_voice_speaks_in_order_then_falls_silent():
     assert not voice.emit(STEP).any()
 
 
-def test_voice_takes_out_steady_pressure():
+def test_voice_filters_out_constant_pressure():
     voice = Voice(RATE)
     voice.say(np.ones(RATE))
     assert np.abs(voice.emit(RATE)[RATE // 4 :]).max() < 1e-6
@@ -131,7 +131,7 @@ def test_wav_files_are_resampled_mixed_and_scaled(tmp_path, dtype):
     assert rms(emit(make_sound(cfg))) == pytest.approx(0.05, rel=0.02)
 
 
-def test_files_that_are_no_sounds_are_refused(tmp_path):
+def test_invalid_wav_files_are_refused(tmp_path):
     (tmp_path / "page.wav").write_text("<html>404</html>")
     with pytest.raises(ValueError, match=r"page\.wav"):
         waveforms.load_wav(tmp_path / "page.wav", RATE)
