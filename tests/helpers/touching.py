@@ -1,4 +1,4 @@
-"""A scene with a body and things that press it, and a second, dense way to read its taxels."""
+"""A scene with a body and primitives in contact with it, and a dense reference for the taxels."""
 
 from dataclasses import dataclass
 
@@ -21,7 +21,7 @@ for _side in "lr":
 
 @dataclass
 class Named:
-    """All that a sense of touch asks of a body."""
+    """The attributes of a body that `TouchSense` uses."""
 
     name: str
     object_id: int
@@ -65,13 +65,13 @@ def of_bone(readings, name):
 
 
 def dense(stage):
-    """Every taxel against every primitive that its bone can feel, with numpy formulas."""
+    """Every taxel against every primitive that its bone can sense, with numpy formulas."""
     taxels, scene = load_taxels(), stage.scene
     vertices = scene.meshes.vertices[stage.body.vertices]
     points, normals = taxel_positions(taxels, vertices)
     points = points - taxels.depths[..., None] * normals[:, None]
     bones = np.repeat(np.arange(47), np.diff(taxels.first_triangle))
-    deaf = stage.sense._ignored_pairs()[bones]
+    ignored = stage.sense._ignored_pairs()[bones]
     readings = np.zeros(points.shape[:2])
     geoms = scene.geoms
     for g, shape in enumerate(geoms.shapes):
@@ -80,7 +80,7 @@ def dense(stage):
         against = -np.einsum("tki,ti->tk", outward, normals @ geoms.rotations[g])
         share = np.clip(-depth / (taxels.thickness[bones] + geoms.skins[g])[:, None], 0.0, 1.0)
         felt = share * np.clip(against, 0.0, 1.0)
-        readings = np.maximum(readings, np.where(deaf[:, g, None], 0.0, felt))
+        readings = np.maximum(readings, np.where(ignored[:, g, None], 0.0, felt))
     return readings
 
 

@@ -16,7 +16,7 @@ from veca_marl.sim.sense import Sense
 from veca_marl.sim.senses import SENSES, SensesCfg, make_senses, register_sense
 from veca_marl.sim.sound.sounds import SoundCfg
 from veca_marl.sim.spec import ArraySpec
-from veca_marl.sim.touch.sense import TouchCfg, TouchQuality
+from veca_marl.sim.touch import TouchCfg, TouchQuality
 from veca_marl.sim.vision.sense import Eyes, VisionCfg
 
 NAMES = ("vision", "audio", "proprioception", "touch")

@@ -1,4 +1,4 @@
-"""Touch: Hooke's law on geometry, superposition, symmetry, and the dense truth."""
+"""The penetration model: proportionality, superposition, symmetry, and a dense reference."""
 
 import time
 
@@ -9,11 +9,11 @@ from touching import SPREAD, Stage, dense, of_bone
 
 from veca_marl.sim.body.anatomy.skeleton import load_skeleton
 from veca_marl.sim.geometry.primitives import Shape
-from veca_marl.sim.touch.penetration import neighbours
+from veca_marl.sim.touch.penetration import adjacent_bones
 
 
 def press_forearm(stage, depth_m, radius=0.04, side="l"):
-    """Press a ball against the middle of a forearm from the front (its x), so deep."""
+    """Press a ball into the middle of a forearm from the front (its x axis) to a given depth."""
     name = f"{side}_forearm"
     bone = load_skeleton().bones[stage.bone(name)]
     capsule = bone.colliders[0]
@@ -22,7 +22,7 @@ def press_forearm(stage, depth_m, radius=0.04, side="l"):
     return stage.add("SPHERE", (radius,), stage.at(name, (away, 0.0, -0.0475)))
 
 
-def test_nothing_touched_reads_exactly_nothing():
+def test_without_contact_all_readings_are_exactly_zero():
     stage = Stage()
     stage.add("SPHERE", (0.1,), (0.5, 0.0, 0.0))
     stage.add("BOX", (1.0, 1.0, 0.1), (0.0, 0.0, -0.6))
@@ -30,16 +30,16 @@ def test_nothing_touched_reads_exactly_nothing():
 
 
 @pytest.mark.parametrize("share", [0.1, 0.25, 0.5, 0.75, 1.0])
-def test_a_ball_pressed_to_a_depth_reads_its_share_of_the_skin(share):
-    """Hooke's law: on a round limb the deepest taxel reads depth / d_max, up to its place."""
+def test_the_reading_is_the_penetration_relative_to_the_skin_thickness(share):
+    """On a round limb the deepest taxel reads depth / d_max, except for its own offset."""
     stage = Stage()
     thickness = load_skeleton().bones[stage.bone("l_forearm")].skin_thickness_m
     press_forearm(stage, share * thickness, radius=0.5)
     assert of_bone(stage.read(), "l_forearm").max() == pytest.approx(share, abs=0.06)
 
 
-def test_a_floor_that_rises_presses_flat_soles_by_as_much():
-    """Under the toes, the lowest part of the foot, the skin reads its share; the heel follows."""
+def test_a_rising_floor_raises_the_readings_of_the_soles_in_proportion():
+    """The toes are the lowest part of the foot; the readings of the heel rise by as much."""
     stage = Stage()
     thickness = load_skeleton().bones[stage.bone("l_foot")].skin_thickness_m
     lowest = stage.at("l_foot", (0.0, 0.0, -0.0345 - 0.0042))[2] - thickness
@@ -62,7 +62,7 @@ def test_contact_with_the_bone_reads_one():
     assert readings.max() <= 1.0
 
 
-def test_deeper_is_never_less():
+def test_readings_do_not_decrease_with_depth():
     before = np.zeros((1648, 6))
     for depth in (0.001, 0.002, 0.004):
         stage = Stage()
@@ -87,7 +87,7 @@ def test_two_separate_contacts_are_the_sum_of_each_alone():
     np.testing.assert_array_equal(both, left + right)
 
 
-def test_of_two_things_on_one_taxel_the_deeper_counts():
+def test_of_two_primitives_on_one_taxel_the_larger_reading_counts():
     readings = []
     for depths in ((0.002,), (0.004,), (0.002, 0.004)):
         stage = Stage()
@@ -98,8 +98,8 @@ def test_of_two_things_on_one_taxel_the_deeper_counts():
     np.testing.assert_array_equal(both, np.maximum(one, other))
 
 
-def test_left_and_right_feel_alike():
-    """A scene mirrored in the middle plane; a mirrored triangle runs the other way round."""
+def test_mirrored_contacts_give_mirrored_readings():
+    """Mirrored in the median plane; the vertex order of a mirrored triangle is reversed."""
     readings = []
     for side, sign in (("l", 1.0), ("r", -1.0)):
         stage = Stage()
@@ -111,7 +111,7 @@ def test_left_and_right_feel_alike():
     np.testing.assert_allclose(left, right[:, [0, 2, 1, 5, 4, 3]], atol=1e-6)
 
 
-def test_moving_body_and_thing_together_changes_nothing():
+def test_readings_are_invariant_to_rigid_motion_of_the_scene():
     rng = np.random.default_rng(0)
     still = Stage()
     ball = press_forearm(still, 0.003)
@@ -124,8 +124,8 @@ def test_moving_body_and_thing_together_changes_nothing():
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_what_is_driven_by_contact_equals_the_dense_truth(seed):
-    """Random poses over the whole ranges, all shapes, the body itself and another body."""
+def test_readings_equal_those_of_a_dense_reference(seed):
+    """Random poses over the whole joint ranges; all shapes, self-contact and another body."""
     rng = np.random.default_rng(seed)
     stage = Stage(random_angles(rng), rotation=random_turn(rng))
     other = add_body(stage.scene, "other")
@@ -142,8 +142,8 @@ def test_what_is_driven_by_contact_equals_the_dense_truth(seed):
     np.testing.assert_allclose(readings, dense(stage), atol=1e-12)
 
 
-def test_two_bodies_press_each_other_as_springs_in_series():
-    """Forearms crossed front to front, pressed by half of both skins: each reads a half."""
+def test_two_skins_in_contact_act_as_springs_in_series():
+    """Forearms crossed front to front at half of the sum of both thicknesses: each reads 0.5."""
     stage = Stage()
     other = add_body(stage.scene, "other")
     bone = load_skeleton().bones[stage.bone("l_forearm")]
@@ -158,7 +158,7 @@ def test_two_bodies_press_each_other_as_springs_in_series():
     assert of_bone(stage.read(), "l_forearm").max() == pytest.approx(0.5, abs=0.05)
 
 
-def test_a_hand_feels_the_own_leg_but_no_bone_feels_its_neighbours():
+def test_self_contact_is_sensed_except_between_adjacent_bones():
     skeleton = load_skeleton()
     stage = Stage(np.zeros(82))
     before = stage.read()
@@ -167,7 +167,7 @@ def test_a_hand_feels_the_own_leg_but_no_bone_feels_its_neighbours():
     pose(stage.body, angles)
     pressed = stage.read()
     assert of_bone(pressed, "l_forearm").sum() > of_bone(before, "l_forearm").sum()
-    together = neighbours(skeleton)
+    together = adjacent_bones(skeleton)
     thigh, pelvis, shank = (skeleton.bone(b) for b in ("l_thigh", "pelvis", "l_shank"))
     assert together[thigh, pelvis]
     assert together[thigh, shank]
@@ -176,8 +176,8 @@ def test_a_hand_feels_the_own_leg_but_no_bone_feels_its_neighbours():
     np.testing.assert_array_equal(together, together.T)
 
 
-def test_a_time_step_does_not_enter():
-    """The reading is a function of where things are: read twice, or after a detour, it is equal."""
+def test_the_reading_depends_on_the_present_geometry_only():
+    """Equal when read again after the primitive was moved away and back."""
     stage = Stage()
     ball = press_forearm(stage, 0.003)
     first = stage.read()
@@ -188,7 +188,7 @@ def test_a_time_step_does_not_enter():
     np.testing.assert_array_equal(stage.read(), first)
 
 
-def test_what_is_far_costs_next_to_nothing():
+def test_distant_primitives_add_less_than_half_of_the_cost():
     costs = []
     for count in (0, 300):
         stage = Stage()

@@ -1,4 +1,4 @@
-"""The sense of touch: one spec for all qualities, on a walker in a world."""
+"""The sense of touch: its qualities, presets and configuration errors."""
 
 import numpy as np
 import pytest
@@ -14,11 +14,11 @@ from veca_marl.sim.physics.playground import PlaygroundCfg
 from veca_marl.sim.physics.world import World
 from veca_marl.sim.sense import check_spec
 from veca_marl.sim.senses import SensesCfg, make_senses
-from veca_marl.sim.touch.sense import TouchCfg, TouchQuality, TouchSense
+from veca_marl.sim.touch import TouchCfg, TouchQuality, TouchSense
 
 
 def touched(cfg):
-    """A body touched on a hand, a finger and a thigh, and what it observes."""
+    """The sense and the observation of a body touched on a hand, a finger and a thigh."""
     stage = Stage(SPREAD, cfg)
     stage.add("SPHERE", (0.02,), stage.at("l_hand", (0.0, 0.025, -0.03)))
     stage.add("SPHERE", (0.02,), stage.at("l_index_proximal", (0.0, 0.023, -0.008)))
@@ -29,7 +29,7 @@ def touched(cfg):
 
 
 @pytest.mark.parametrize("quality", list(TouchQuality))
-def test_quality_changes_what_is_felt_never_its_spec(quality):
+def test_quality_changes_the_content_but_not_the_spec(quality):
     sense, observed, _ = touched(TouchCfg(quality=quality))
     assert sense.specs == touched(TouchCfg())[0].specs
     assert sense.specs["touch"].shape == (9888,)
@@ -38,7 +38,7 @@ def test_quality_changes_what_is_felt_never_its_spec(quality):
     assert observed.min() == 0.0
 
 
-def test_hands_feel_with_their_fingers_and_nothing_else():
+def test_hands_keeps_hands_and_fingers_only():
     _, _, everywhere = touched(TouchCfg())
     _, _, hands = touched(TouchCfg(quality=TouchQuality.hands))
     for bone in ("l_hand", "l_index_proximal"):
@@ -65,23 +65,17 @@ def test_coarse_touch_is_the_mean_of_each_bone():
         assert of_bone(coarse, bone)[0, 0] == pytest.approx(of_bone(fine, bone).mean(), rel=1e-5)
 
 
-def test_successive_reads_share_no_memory():
-    sense, observed, _ = touched(TouchCfg())
-    sense.reset()
-    assert not np.shares_memory(observed, sense.read()["touch"])
-
-
 @pytest.mark.parametrize(
     ("name", "quality"),
     [("skin", "skin"), ("hands", "hands"), ("binary", "binary"), ("coarse", "coarse")],
 )
-def test_every_preset_is_its_quality(name, quality):
+def test_every_preset_selects_its_quality(name, quality):
     touch = compose(["+task=KickTheBall", f"senses/touch={name}"]).senses.touch
     assert touch.present
     assert touch.quality is TouchQuality[quality]
 
 
-def test_who_is_numb_has_no_touch():
+def test_the_preset_numb_leaves_touch_out():
     senses = compose(["+task=KickTheBall", "senses/touch=numb"]).senses
     world = World(PlaygroundCfg())
     walker = Walker("walker", WalkerCfg(), world)
@@ -90,7 +84,7 @@ def test_who_is_numb_has_no_touch():
     world.close()
 
 
-def test_a_walker_feels_the_floor_with_its_soles():
+def test_a_standing_walker_has_contact_at_its_soles():
     world = World(PlaygroundCfg())
     walker = Walker("walker", WalkerCfg(), world)
     sense = TouchSense(TouchCfg(), walker, world)
@@ -99,12 +93,12 @@ def test_a_walker_feels_the_floor_with_its_soles():
     world.refresh()
     readings = sense.update_taxels()
     for foot in ("l_foot", "r_foot"):
-        assert of_bone(readings, foot).max() > 0.9  # it stands on its bones
+        assert of_bone(readings, foot).max() > 0.9  # the weight rests on the bones
     assert not of_bone(readings, "head").any()
     world.close()
 
 
-def test_a_thing_without_skin_cannot_feel():
+def test_a_body_without_skin_is_refused():
     scene = Scene()
     ball = scene.add_object("ball", [[Geom(Shape.SPHERE, (0.1,))]])
     with pytest.raises(ValueError, match="ball has no skin"):
@@ -112,6 +106,6 @@ def test_a_thing_without_skin_cannot_feel():
 
 
 @pytest.mark.parametrize("numbers", [{"quality": "rough"}, {"binary_above": 1.0}])
-def test_impossible_grades_are_refused(numbers):
-    with pytest.raises(ValueError, match=r"skin.*hands.*binary.*coarse|binary_above 1.0"):
+def test_invalid_settings_are_refused(numbers):
+    with pytest.raises(ValueError, match=r"skin.*hands.*binary.*coarse|binary_above=1.0"):
         TouchCfg(**numbers)

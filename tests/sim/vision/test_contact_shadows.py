@@ -1,4 +1,4 @@
-"""Things darken the floor where they are near it, and only there."""
+"""Contact shadows: primitives darken the floor near them, and only there."""
 
 import numpy as np
 
@@ -14,7 +14,7 @@ LOW_BOX = Shape.BOX, (0.1, 0.1, 0.02)
 
 
 def floor_brightness(bottom_m=None, shape=Shape.SPHERE, size=(0.2,)):
-    """Red of the floor seen from above, beside and around a thing at some height."""
+    """Red channel of the floor from above, beside and around a primitive at some height."""
     scene = Scene()
     scene.add_object(
         "floor", [[Geom(Shape.BOX, (9, 9, 0.5), colour=(1, 1, 1), offset=(0, 0, -0.5))]]
@@ -28,7 +28,7 @@ def floor_brightness(bottom_m=None, shape=Shape.SPHERE, size=(0.2,)):
     return np.where(views.ids[0] == 0, views.rgb[0, ..., 0].astype(float), np.nan)
 
 
-def test_a_standing_thing_darkens_the_floor_around_it():
+def test_a_standing_primitive_darkens_the_floor_around_it():
     bare, shaded = floor_brightness(), floor_brightness(0.0, *LOW_BOX)
     ratio = shaded / bare
     assert np.nanmin(ratio) < 0.75
@@ -38,7 +38,7 @@ def test_a_standing_thing_darkens_the_floor_around_it():
     assert ratio[0, 0] == 1.0
 
 
-def test_what_hangs_high_darkens_nothing():
+def test_a_primitive_beyond_the_reach_casts_no_shadow():
     bare = floor_brightness()
     darkest = [
         np.nanmin(floor_brightness(height_m, *LOW_BOX) / bare)
@@ -48,13 +48,13 @@ def test_what_hangs_high_darkens_nothing():
     assert darkest[0] < darkest[1] < darkest[2] == 1.0
 
 
-def test_what_is_as_large_as_a_room_casts_no_shadow():
+def test_a_primitive_larger_than_the_limit_casts_no_shadow():
     wide = (LARGEST_M, 0.1, 0.1)
     assert np.nanmin(floor_brightness(0.0, Shape.BOX, wide) / floor_brightness()) == 1.0
 
 
-def test_nothing_darkens_itself():
-    """A sheet that lies in the floor's plane has the colour of one that is held up."""
+def test_a_primitive_does_not_darken_itself():
+    """A sheet in the plane of the floor has the colour of one above it."""
     colours = []
     for height_m in (0.002, 1.0):
         scene = Scene()

@@ -1,11 +1,11 @@
-"""Filters against the numbers that define them."""
+"""Image filters compared with their definitions."""
 
 import math
 
 import numpy as np
 import pytest
 
-from veca_marl.sim.vision.image_filters import Blur, Defocus, Grey, Look
+from veca_marl.sim.vision.image_filters import Blur, Defocus, FilterContext, Grey
 from veca_marl.sim.vision.infant_vision import (
     CONTRAST_AT_LIMIT,
     InfantVision,
@@ -19,9 +19,9 @@ CAMERA = Camera(200, 200, fov_deg=20.0)
 AGES = np.arange(0.0, 60.0, 0.25)
 
 
-def look_from(depth_m=1.0, focal_distance_m=1.0, camera=CAMERA):
+def context_of(depth_m=1.0, focal_distance_m=1.0, camera=CAMERA):
     depth = np.full((2, camera.height, camera.width), depth_m, np.float32)
-    return Look(camera, depth, focal_distance_m)
+    return FilterContext(camera, depth, focal_distance_m)
 
 
 def grating(cycles_per_pixel, amplitude=100.0):
@@ -31,7 +31,7 @@ def grating(cycles_per_pixel, amplitude=100.0):
 
 
 def contrast(images, cycles_per_pixel):
-    """Amplitude of a frequency in the middle of the picture, over whole periods."""
+    """Amplitude of a frequency in the middle of the image, over whole periods."""
     row = images[0, 100, 20:180, 0] - images[0, 100, 20:180, 0].mean()
     phase = np.exp(2j * np.pi * cycles_per_pixel * np.arange(len(row)))
     return 2 * abs(np.mean(row * phase))
@@ -42,10 +42,10 @@ def coloured():
 
 
 @pytest.mark.parametrize("filtered", [Grey(), Blur(0.5), Defocus(), InfantVision(2.0)])
-def test_filters_return_new_images_of_the_same_kind(filtered):
+def test_filters_return_new_images_of_equal_shape_and_dtype(filtered):
     images = coloured()
     before = images.copy()
-    out = filtered(images, look_from(focal_distance_m=0.2))
+    out = filtered(images, context_of(focal_distance_m=0.2))
     assert (out.shape, out.dtype) == (images.shape, np.uint8)
     assert not np.shares_memory(out, images)
     np.testing.assert_array_equal(images, before)
@@ -54,36 +54,36 @@ def test_filters_return_new_images_of_the_same_kind(filtered):
 
 def test_grey_is_luma_in_every_channel():
     images = coloured()
-    out = Grey()(images, look_from())
+    out = Grey()(images, context_of())
     np.testing.assert_array_equal(out[..., 0], out[..., 1])
     np.testing.assert_array_equal(out[..., 0], out[..., 2])
     np.testing.assert_allclose(out[..., 0], images @ (0.299, 0.587, 0.114), atol=0.6)
 
 
 @pytest.mark.parametrize("cycles_per_pixel", [0.025, 0.05, 0.1])
-def test_blur_passes_a_grating_by_its_transfer(cycles_per_pixel):
+def test_blur_attenuates_a_grating_by_its_transfer_function(cycles_per_pixel):
     cycles_per_degree = cycles_per_pixel / CAMERA.degrees_per_pixel
     images = grating(cycles_per_pixel)
-    out = Blur(0.2)(images, look_from())
+    out = Blur(0.2)(images, context_of())
     expected = math.exp(-2 * math.pi**2 * 0.2**2 * cycles_per_degree**2)
     passed = contrast(out, cycles_per_pixel) / contrast(images, cycles_per_pixel)
     assert passed == pytest.approx(expected, abs=0.012)
 
 
-def test_blur_is_an_angle_and_not_a_number_of_pixels():
+def test_blur_is_defined_in_degrees_not_pixels():
     assert Camera(84, 84, 60.0).degrees_per_pixel == pytest.approx(60 / 84, rel=0.12)
     fine = Camera(200, 200, fov_deg=10.0)
     images = grating(0.05)
     coarse_pass, fine_pass = (
-        contrast(Blur(0.1)(images, look_from(camera=camera)), 0.05) for camera in (CAMERA, fine)
+        contrast(Blur(0.1)(images, context_of(camera=camera)), 0.05) for camera in (CAMERA, fine)
     )
     assert coarse_pass > fine_pass + 10
 
 
 def test_defocus_is_sharp_at_the_focal_distance():
     images = coloured()
-    np.testing.assert_array_equal(Defocus()(images, look_from(0.7, 0.7)), images)
-    np.testing.assert_array_equal(Defocus()(images, look_from(1e6, math.inf)), images)
+    np.testing.assert_array_equal(Defocus()(images, context_of(0.7, 0.7)), images)
+    np.testing.assert_array_equal(Defocus()(images, context_of(1e6, math.inf)), images)
 
 
 @pytest.mark.parametrize(("depth_m", "focal_m"), [(0.4, 2.0), (3.0, 0.5), (0.3, math.inf)])
@@ -93,7 +93,7 @@ def test_defocus_blurs_by_the_circle_of_confusion(depth_m, focal_m):
     disc_rad = pupil_m * abs(1 / depth_m - 1 / focal_m)
     sigma = math.degrees(disc_rad) / 4 / CAMERA.degrees_per_pixel
     images = grating(frequency)
-    out = Defocus(pupil_m)(images, look_from(depth_m, focal_m))
+    out = Defocus(pupil_m)(images, context_of(depth_m, focal_m))
     passed = contrast(out, frequency) / contrast(images, frequency)
     # a mixture of two Gaussians of the same mean variance passes a little more
     expected = math.exp(-2 * math.pi**2 * sigma**2 * frequency**2)
@@ -101,8 +101,8 @@ def test_defocus_blurs_by_the_circle_of_confusion(depth_m, focal_m):
     assert passed == pytest.approx(expected, abs=0.03)
 
 
-def test_defocus_leaves_the_focused_half_alone():
-    look = look_from(1.0, 1.0)
+def test_defocus_does_not_change_the_focused_half():
+    look = context_of(1.0, 1.0)
     look.depth[:, :, 100:] = 0.2
     images = grating(0.1)
     out = Defocus()(images, look)
@@ -113,7 +113,7 @@ def test_defocus_leaves_the_focused_half_alone():
 def test_a_wider_pupil_defocuses_more():
     images = grating(0.05)
     narrow, wide = (
-        contrast(Defocus(pupil_m)(images, look_from(0.4, 2.0)), 0.05) for pupil_m in (0.002, 0.008)
+        contrast(Defocus(pupil_m)(images, context_of(0.4, 2.0)), 0.05) for pupil_m in (0.002, 0.008)
     )
     assert wide < narrow
 
@@ -133,7 +133,7 @@ def test_a_grating_at_the_acuity_limit_keeps_the_stated_contrast():
     age_months = 1.0
     frequency = acuity_cpd(age_months) * CAMERA.degrees_per_pixel
     images = grating(frequency)
-    out = InfantVision(age_months)(images, look_from())
+    out = InfantVision(age_months)(images, context_of())
     passed = contrast(out, frequency) / contrast(images, frequency)
     assert passed == pytest.approx(CONTRAST_AT_LIMIT, abs=0.02)
     assert acuity_blur_deg(2.0) == pytest.approx(acuity_blur_deg(1.0) / 2.0)
@@ -143,24 +143,24 @@ def uniform(colour):
     return np.broadcast_to(np.uint8(colour), (2, 200, 200, 3)).copy()
 
 
-def test_infants_see_paler_colours_of_the_same_luma():
+def test_infant_vision_reduces_saturation_and_keeps_luma():
     luma = np.array([0.299, 0.587, 0.114])
     for colour in [(200, 80, 60), (60, 160, 80), (70, 80, 170)]:
         spreads = []
         for age_months in (0.0, 2.0, 6.0, 24.0):
-            seen = InfantVision(age_months)(uniform(colour), look_from())[0, 100, 100]
+            seen = InfantVision(age_months)(uniform(colour), context_of())[0, 100, 100]
             assert seen @ luma == pytest.approx(colour @ luma, abs=1.0)
             spreads.append(np.ptp(seen.astype(int)))
         assert spreads == sorted(spreads)
         assert spreads[0] < 0.5 * spreads[-1]
     np.testing.assert_array_equal(
-        InfantVision(24.0)(uniform((200, 80, 60)), look_from()), uniform((200, 80, 60))
+        InfantVision(24.0)(uniform((200, 80, 60)), context_of()), uniform((200, 80, 60))
     )
 
 
-def test_newborns_see_no_blue_from_grey():
+def test_newborns_do_not_tell_blue_from_grey():
     """At birth only the red-green gain is left: a step in blue moves red and blue with luma."""
-    seen = InfantVision(0.0)(uniform((100, 100, 200)), look_from())[0, 0, 0].astype(float)
+    seen = InfantVision(0.0)(uniform((100, 100, 200)), context_of())[0, 0, 0].astype(float)
     luma = 100 + 0.114 * 100
     assert seen[2] == pytest.approx(luma, abs=0.6)
 
@@ -170,12 +170,12 @@ def test_newborns_see_no_blue_from_grey():
     [
         (lambda: Blur(-1.0), "-1.0"),
         (lambda: Blur(math.nan), "nan"),
-        (lambda: Defocus(0.0), "0.0 m"),
-        (lambda: InfantVision(-1.0), "-1.0 months"),
-        (lambda: Defocus()(coloured(), look_from(1.0, 0.0)), "focal distance 0.0"),
-        (lambda: Defocus()(coloured(), look_from(1.0, math.nan)), "focal distance nan"),
+        (lambda: Defocus(0.0), "pupil_m 0.0"),
+        (lambda: InfantVision(-1.0), "age_months -1.0"),
+        (lambda: Defocus()(coloured(), context_of(1.0, 0.0)), "focal_distance_m 0.0"),
+        (lambda: Defocus()(coloured(), context_of(1.0, math.nan)), "focal_distance_m nan"),
     ],
 )
-def test_impossible_numbers_are_refused(make, named):
+def test_invalid_parameters_are_refused(make, named):
     with pytest.raises(ValueError, match=named):
         make()

@@ -1,4 +1,4 @@
-"""Skins that cannot be seen are left out, and the picture is the same to the last bit."""
+"""Hidden meshes are skipped, and the image is bit-identical."""
 
 import numpy as np
 import pytest
@@ -28,7 +28,7 @@ def crowd(rng):
 
 
 def buffers(scene, eye, culled):
-    """Depths and surfaces of one view, and which vertices were carried to the eye."""
+    """Depths and surfaces of one view, and which vertices were transformed."""
     view, geoms, meshes = view_axes(eye), scene.geoms, scene.meshes
     size = (CAMERA.height, CAMERA.width)
     depth, surfaces = np.full(size, CAMERA.far_m, np.float32), np.full(size, -1, np.int16)
@@ -41,7 +41,7 @@ def buffers(scene, eye, culled):
     return depth, surfaces, carried
 
 
-def test_the_boxes_hold_the_skins_tightly():
+def test_bounding_boxes_are_tight():
     scene = crowd(np.random.default_rng(0))
     for body, lower, upper in zip(
         scene.objects[-BODIES:], scene.meshes.lower, scene.meshes.upper, strict=True
@@ -51,8 +51,8 @@ def test_the_boxes_hold_the_skins_tightly():
         np.testing.assert_array_equal(upper, vertices.max(axis=0))
 
 
-def test_the_picture_does_not_change_by_a_bit():
-    """Eyes anywhere, also within the boxes and among the limbs."""
+def test_culling_does_not_change_a_bit_of_the_image():
+    """Random cameras, also inside the bounding boxes and between the limbs."""
     rng, left_out, shown = np.random.default_rng(1), 0, 0
     for _ in range(12):
         scene = crowd(rng)
@@ -75,7 +75,7 @@ def test_the_picture_does_not_change_by_a_bit():
 @pytest.mark.parametrize(
     ("wall_x", "yaw", "left_out"), [(1.0, 0.0, True), (3.0, 0.0, False), (3.0, np.pi, True)]
 )
-def test_bodies_behind_walls_or_the_eye_are_left_out(wall_x, yaw, left_out):
+def test_meshes_behind_walls_or_the_camera_are_skipped(wall_x, yaw, left_out):
     scene = Scene()
     scene.add_object("wall", [[Geom(Shape.BOX, (0.05, 3.0, 3.0), offset=(wall_x, 0.0, 0.0))]])
     pose(add_body(scene), np.zeros(82), np.array([2.0, 0.0, 0.0]))

@@ -1,4 +1,4 @@
-"""Skins in the eyes: against ray casting, in the picture, and hidden from their wearer."""
+"""The mesh rasterizer: against ray casting, among primitives, and without the own head."""
 
 import time
 
@@ -18,7 +18,7 @@ CAMERA = Camera(44, 36, 60.0)
 
 
 def cast_triangles(scene, camera, pose_):
-    """Depth ``(H, W)`` by intersecting each ray with each triangle that faces the eye, in double
+    """Depth ``(H, W)`` by intersecting each ray with each triangle that faces the camera, in double
     precision (Moeller & Trumbore 1997)."""
     depth = np.full((camera.height, camera.width), camera.far_m)
     x, y = np.meshgrid(camera.lens.columns.astype(float), camera.lens.rows.astype(float))
@@ -39,8 +39,8 @@ def cast_triangles(scene, camera, pose_):
 
 
 @pytest.mark.parametrize("distance_m", [0.05, 0.25, 0.6, 2.0])
-def test_depths_are_those_of_ray_casting(distance_m):
-    """Also when the eye is among the triangles, some of which reach behind it."""
+def test_depths_equal_those_of_ray_casting(distance_m):
+    """Also with the camera among the triangles, some of which cross its plane."""
     rng = np.random.default_rng(int(100 * distance_m))
     differing = total = 0
     for _ in range(3):
@@ -76,7 +76,7 @@ def test_a_pixel_shows_the_body_and_its_colours():
         assert (np.abs(share - wanted).max(1) < 0.02).mean() > 0.005, colour
 
 
-def test_what_is_before_a_skin_hides_it_and_what_is_behind_is_hidden():
+def test_meshes_and_primitives_occlude_each_other():
     scene = Scene()
     body = add_body(scene)
     for name, x in (("before", 0.5), ("behind", -0.5)):
@@ -107,8 +107,8 @@ def test_the_own_head_is_hidden_and_the_hands_are_not():
     assert not own[:30].any()  # nothing of the own face hangs in the view
 
 
-def test_light_is_that_of_a_ball_where_the_skin_is_round():
-    """A mesh of the top of the head, lit by interpolated normals, fades as smoothly as a sphere."""
+def test_interpolated_normals_light_a_mesh_as_smoothly_as_a_sphere():
+    """The top of the head compared with a sphere."""
     scene = Scene()
     add_body(scene)
     scene.update()
@@ -123,7 +123,7 @@ def test_light_is_that_of_a_ball_where_the_skin_is_round():
     np.testing.assert_allclose(ours, theirs, rtol=0.12)
 
 
-def test_a_skin_costs_less_than_twice_what_the_bones_would():
+def test_a_mesh_costs_less_than_twice_as_much_as_the_bones():
     costs = {}
     for name in ("skin", "bones"):
         scene = Scene()
@@ -141,8 +141,8 @@ def test_a_skin_costs_less_than_twice_what_the_bones_would():
     assert costs["skin"] < 2.0 * costs["bones"]
 
 
-def test_the_own_shoulders_behind_the_eye_cost_next_to_nothing():
-    """Triangles that reach through the plane of the eye are most often out of its sight."""
+def test_triangles_behind_the_camera_add_little_cost():
+    """Most triangles that cross the plane of the camera are outside of its field of view."""
     skeleton = load_skeleton()
     scene = Scene()
     body = add_body(scene)

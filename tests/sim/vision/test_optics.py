@@ -1,4 +1,4 @@
-"""Where things fall in a picture, and how far away they are."""
+"""The camera: projection, depth, clipping planes, transparency and errors."""
 
 import numpy as np
 import pytest
@@ -34,7 +34,7 @@ def test_left_is_left_and_up_is_up(position, right, below):
     assert row == pytest.approx(42, abs=0.3) if below is None else (row > 50) == below
 
 
-def test_points_fall_where_they_are_projected():
+def test_rendered_positions_equal_projected_ones():
     rng = np.random.default_rng(0)
     camera = Camera(640, 480, fov_deg=70.0)
     for _ in range(40):
@@ -46,7 +46,7 @@ def test_points_fall_where_they_are_projected():
         assert centre_of(ids, 0) == pytest.approx((column, row), abs=0.6)
 
 
-def test_depth_of_a_wall_is_along_the_optical_axis():
+def test_depth_is_measured_along_the_optical_axis():
     scene = Scene()
     scene.add_object("wall", [[Geom(Shape.BOX, (0.5, 50, 50), offset=(4.5, 0, 0))]])
     scene.update()
@@ -54,8 +54,8 @@ def test_depth_of_a_wall_is_along_the_optical_axis():
     np.testing.assert_allclose(views.depth, 4.0, rtol=1e-5)
 
 
-def test_depth_is_that_of_the_projection():
-    """Points that a picture claims to see lie on the ball it claims they belong to."""
+def test_depth_inverts_the_projection():
+    """Points reconstructed from pixels and depths lie on the ball of their segmentation id."""
     camera, scene = Camera(), ball_at((2, 0.3, 0.1), radius=0.4)
     views = camera.render(scene, [AHEAD])
     rows, columns = np.nonzero(views.ids[0] == 0)
@@ -64,7 +64,7 @@ def test_depth_is_that_of_the_projection():
     np.testing.assert_allclose(np.linalg.norm(points - (2, 0.3, 0.1), axis=1), 0.4, atol=1e-4)
 
 
-def test_nothing_is_sky():
+def test_pixels_without_a_surface_show_the_sky():
     camera = Camera(far_m=30.0)
     views = camera.render(ball_at((-2, 0, 0)), [AHEAD])
     assert (views.ids == -1).all()
@@ -73,7 +73,7 @@ def test_nothing_is_sky():
     assert views.rgb[0, 0].mean() > views.rgb[0, -1].mean()
 
 
-def test_near_and_far_planes_cut():
+def test_near_and_far_planes_clip():
     camera = Camera(near_m=1.0, far_m=3.0)
     for distance, seen in [(0.5, False), (2.0, True), (3.5, False)]:
         ids = camera.render(ball_at((distance, 0, 0)), [AHEAD]).ids
@@ -90,8 +90,8 @@ def test_views_do_not_depend_on_each_other():
             np.testing.assert_array_equal(one[0], many[v])
 
 
-def test_more_pixels_show_the_same():
-    """A picture of three times the size has the small one's pixels at the middles of its own."""
+def test_a_higher_resolution_shows_the_same_scene():
+    """An image of three times the size contains the pixels of the small one."""
     rng = np.random.default_rng(4)
     scene, pose = clutter(rng), random_pose(rng)
     small = Camera(50, 40).render(scene, [pose])
@@ -115,13 +115,13 @@ def lit_ball(direction):
     return views.rgb[views.ids == 0].mean()
 
 
-def test_the_sun_is_in_the_sky():
+def test_light_comes_from_above():
     above, below = lit_ball((0.01, 0, 1)), lit_ball((0.01, 0, -1))
     assert above > 1.5 * below
     assert below > 40  # what is in the shade can still be seen
 
 
-def test_checkers_have_the_asked_edge():
+def test_checker_tiles_have_the_configured_edge():
     scene = Scene()
     floor = Geom(Shape.BOX, (9, 9, 0.5), colour=(1, 1, 1), offset=(0, 0, -0.5), checker_m=0.5)
     scene.add_object("floor", [[floor]])
@@ -145,7 +145,7 @@ def window():
     return scene
 
 
-def test_glass_tints_and_hides_nothing(window):
+def test_transparent_primitives_tint_and_do_not_occlude(window):
     views = Camera().render(window, [AHEAD])
     assert views.ids[0, 42, 42] == 0
     assert views.glass_ids[0, 42, 42] == 1
@@ -158,20 +158,20 @@ def test_glass_tints_and_hides_nothing(window):
     assert (bare.glass_ids == -1).all()
 
 
-def test_glass_behind_a_wall_is_not_seen(window):
+def test_transparent_primitives_behind_a_wall_are_hidden(window):
     window.add_object("wall", [[Geom(Shape.BOX, (0.1, 5, 5), offset=(1, 0, 0))]])
     window.update()
     views = Camera().render(window, [AHEAD])
     assert seen_fraction(views, 0) == seen_fraction(views, 1) == 0.0
 
 
-def test_look_at_looks_level():
+def test_look_at_has_a_level_horizon():
     pose = look_at(np.array([1.0, 2.0, 3.0]), np.array([-1.0, 0.5, 1.0]))
     np.testing.assert_allclose(pose.rotation.T @ pose.rotation, np.eye(3), atol=1e-12)
     assert np.linalg.det(pose.rotation) == pytest.approx(1.0)
     assert pose.rotation[2, 1] == 0.0
     assert pose.rotation[2, 2] > 0.0
-    with pytest.raises(ValueError, match="cannot look level"):
+    with pytest.raises(ValueError, match="no level camera"):
         look_at(np.zeros(3), np.array([0.0, 0.0, 1.0]))
 
 
@@ -185,6 +185,6 @@ def test_look_at_looks_level():
         ({"near_m": 2.0, "far_m": 1.0}, "near"),
     ],
 )
-def test_impossible_cameras_are_refused(numbers, named):
+def test_invalid_cameras_are_refused(numbers, named):
     with pytest.raises(ValueError, match=named):
         Camera(**numbers)

@@ -1,4 +1,4 @@
-"""The renderer against other ways to see the same scene."""
+"""The rasterizer of primitives compared with ray casting and TinyRenderer."""
 
 import math
 
@@ -37,7 +37,7 @@ def test_bounding_rectangles_lose_no_pixel(fov_deg):
 
 
 @pytest.mark.parametrize("shape", [Shape.CYLINDER, Shape.CAPSULE])
-def test_bounding_rectangles_hold_rods_that_pass_the_eye(shape):
+def test_bounding_rectangles_contain_rods_beside_the_camera(shape):
     rng = np.random.default_rng(7)
     camera = small_camera()
     for _ in range(60):
@@ -52,7 +52,7 @@ def test_bounding_rectangles_hold_rods_that_pass_the_eye(shape):
 
 
 @pytest.mark.parametrize("shape", list(Shape))
-def test_agrees_with_textbook_ray_casting(shape):
+def test_agrees_with_ray_casting_in_double_precision(shape):
     rng = np.random.default_rng(int(shape))
     camera = small_camera()
     differing, total = 0, 0
@@ -66,8 +66,8 @@ def test_agrees_with_textbook_ray_casting(shape):
     assert differing <= 2e-4 * total  # rounding at silhouettes
 
 
-def test_thin_things_stay_whole_far_away():
-    """A finger of 5 mm radius at 20 m covers its analytic area in a telescope."""
+def test_thin_primitives_are_complete_at_a_distance():
+    """A capsule of 5 mm radius at 20 m covers its analytic area in a narrow field of view."""
     scene = Scene()
     finger = scene.add_object("finger", [[Geom(Shape.CAPSULE, (0.005, 0.04))]])
     finger.positions[0] = (20.0, 0.0, 0.0)
@@ -79,8 +79,8 @@ def test_thin_things_stay_whole_far_away():
     assert (ids == 0).sum() * metres_per_pixel**2 == pytest.approx(area, rel=0.02)
 
 
-def test_looking_straight_along_axes():
-    """Rays exactly parallel to faces and axes divide by zero in careless formulas."""
+def test_rays_parallel_to_faces_and_axes():
+    """Such rays cause divisions by zero."""
     camera = Camera(63, 63)
     for shape, size in zip(Shape, [(0.2,), (0.2, 0.3, 0.4), (0.2, 0.5), (0.2, 0.5)], strict=True):
         scene = Scene()
@@ -97,7 +97,7 @@ def test_looking_straight_along_axes():
             assert views.depth[0, 31, 31] == pytest.approx(depth[31, 31], abs=1e-5)
 
 
-def test_same_pose_same_bytes():
+def test_the_same_pose_gives_the_same_bytes():
     rng = np.random.default_rng(1)
     scene, pose = clutter(rng), random_pose(rng)
     first, second = (Camera().render(scene, [pose]) for _ in range(2))
@@ -135,8 +135,8 @@ def test_agrees_with_tiny_renderer(shapes, agreement):
     assert np.mean(same) >= agreement
 
 
-def test_the_middle_of_the_picture_is_the_optical_axis():
-    """Which of the two ways to sample is centred: a box on the axis looks symmetric to us."""
+def test_pixel_centres_are_symmetric_about_the_optical_axis():
+    """A box on the axis is symmetric in the image; TinyRenderer samples at pixel corners."""
     scene = Scene()
     scene.add_object("box", [[Geom(Shape.BOX, (0.3, 0.31, 0.31), offset=(2, 0, 0))]])
     scene.update()

@@ -1,4 +1,4 @@
-"""Bounds against the silhouettes of densely sampled surfaces: never inside, hardly outside."""
+"""Screen bounds compared with silhouettes of densely sampled surfaces: safe and tight."""
 
 import numpy as np
 import pytest
@@ -11,7 +11,7 @@ NEAR = 0.01
 
 
 def slopes_ahead(across, forward):
-    """Least and greatest slope of the points in front of the eye, cut to the picture."""
+    """Least and greatest slope of the points in front of the camera, clipped to the image."""
     ahead = forward > NEAR
     if not ahead.any():
         return LIMIT, -LIMIT

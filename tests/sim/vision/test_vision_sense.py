@@ -1,4 +1,4 @@
-"""Two eyes on a body."""
+"""The sense of vision: specs, binocular geometry, visibility and determinism."""
 
 import hashlib
 import math
@@ -44,7 +44,7 @@ def body_before(target=(2.0, 0.0, 0.0), **numbers):
         VisionCfg(),
     ],
 )
-def test_reads_what_the_specs_promise(cfg):
+def test_observations_match_their_specs(cfg):
     rng = np.random.default_rng(0)
     sense = eyes(cfg, body_before(focal_distance_m=0.5), clutter(rng))
     read = sense.read()
@@ -79,15 +79,15 @@ def test_quality_does_not_change_the_specs():
 
 
 @pytest.mark.parametrize("target", [(0.5, 0.0, 0.0), (1.0, 0.4, -0.2), (3.0, -1.0, 0.5)])
-def test_vergence_brings_a_point_to_the_centre_of_both_eyes(target):
+def test_vergence_centres_a_point_in_both_eyes(target):
     sense = eyes(VisionCfg(segmentation=True), body_before(target), ball_at(target, 0.05))
     for ids in sense.read()["segmentation"]:
         rows, columns = np.nonzero(ids == 0)
         assert (columns.mean() + 0.5, rows.mean() + 0.5) == pytest.approx((42, 42), abs=0.51)
 
 
-def test_disparity_is_that_of_the_distance():
-    """Eyes set on 1 m see a ball at 0.6 m apart by the difference of the vergence angles."""
+def test_disparity_is_the_difference_of_vergence_angles():
+    """Eyes converged at 1 m, a ball at 0.6 m."""
     body, scene = body_before((1.0, 0.0, 0.0)), ball_at((0.6, 0, 0), 0.03)
     sense = eyes(VisionCfg(width=600, height=600, segmentation=True), body, scene)
     left, right = (np.nonzero(ids == 0)[1].mean() for ids in sense.read()["segmentation"])
@@ -99,7 +99,7 @@ def test_disparity_is_that_of_the_distance():
     )  # the left eye sees it to the right
 
 
-def test_one_eye_fills_both_places():
+def test_monocular_repeats_the_left_image():
     scene = clutter(np.random.default_rng(1))
     both = eyes(VisionCfg(**EVERYTHING), body_before(), scene).read()
     one = eyes(VisionCfg(**EVERYTHING, eyes=Eyes.monocular), body_before(), scene).read()
@@ -109,7 +109,7 @@ def test_one_eye_fills_both_places():
     assert (both["vision"][0] != both["vision"][1]).any()
 
 
-def test_colours_are_in_their_channels():
+def test_channels_are_red_green_blue():
     sense = eyes(VisionCfg(), body_before(), ball_at((2, 0, 0), 0.3, (1.0, 0.0, 0.0)))
     red, green, blue = sense.read()["vision"][0, :, 42, 42]
     assert red > 100
@@ -148,13 +148,13 @@ def room():
     return scene
 
 
-def test_what_is_visible(room):
+def test_is_visible_through_glass_and_not_through_walls(room):
     sense = eyes(VisionCfg(), body_before(), room)
     seen = {item.name for item in room.objects if sense.is_visible(item.id)}
     assert seen == {"plain", "glazed", "wall", "pane"}
 
 
-def test_visible_again_after_the_wall_has_gone(room):
+def test_is_visible_after_the_wall_has_moved(room):
     sense, walled = eyes(VisionCfg(), body_before(), room), room.find("walled")
     assert not sense.is_visible(walled.id)
     room.find("wall").positions[0] = (0, 0, 10)
@@ -162,7 +162,7 @@ def test_visible_again_after_the_wall_has_gone(room):
     assert sense.is_visible(walled.id)
 
 
-def test_visible_after_the_eyes_have_turned(room):
+def test_is_visible_after_the_eyes_have_turned(room):
     body = body_before()
     sense, back = eyes(VisionCfg(), body, room), room.find("back")
     assert not sense.is_visible(back.id)
@@ -170,7 +170,7 @@ def test_visible_after_the_eyes_have_turned(room):
     assert sense.is_visible(back.id)
 
 
-def test_seen_fraction_is_the_share_of_pixels(room):
+def test_seen_fraction_is_the_fraction_of_pixels(room):
     cfg = VisionCfg(segmentation=True)
     sense, plain = eyes(cfg, body_before(), room), room.find("plain")
     expected = np.mean(sense.read()["segmentation"] == plain.id)
@@ -198,17 +198,8 @@ def test_the_own_head_is_hidden_and_another_head_is_not():
     assert sense.read()["depth"][mine].min() > 0.4
 
 
-def test_reading_twice_gives_the_same_bytes():
-    scene, body = clutter(np.random.default_rng(5)), body_before()
-    cfg = VisionCfg(**EVERYTHING)
-    one, two = eyes(cfg, body, scene), eyes(cfg, body, scene)
-    first = {name: value.copy() for name, value in one.read().items()}
-    for name, value in two.read().items():
-        assert value.tobytes() == first[name].tobytes() == one.read()[name].tobytes()
-
-
-def digest_of_a_look():
-    """Fingerprint of everything that dimmed eyes read from a cluttered room."""
+def digest_of_an_observation():
+    """Hash of an observation with all filters in a cluttered room."""
     cfg = VisionCfg(**EVERYTHING, blur_deg=0.5, infant_age_months=2.0, defocus=True)
     scene = clutter(np.random.default_rng(6))
     read = eyes(cfg, body_before(focal_distance_m=0.5), scene).read()
@@ -216,8 +207,8 @@ def digest_of_a_look():
 
 
 def digest_elsewhere(**environment):
-    """The same fingerprint from another process."""
-    code = "import test_vision; print(test_vision.digest_of_a_look())"
+    """The same hash from another process."""
+    code = "import test_vision; print(test_vision.digest_of_an_observation())"
     other = subprocess.run(
         [sys.executable, "-c", code],
         cwd=pathlib.Path(__file__).parent,
@@ -229,14 +220,14 @@ def digest_elsewhere(**environment):
     return other.stdout.split()[-1]
 
 
-def test_another_process_sees_the_same_bytes():
-    assert digest_elsewhere() == digest_of_a_look()
+def test_another_process_computes_the_same_bytes():
+    assert digest_elsewhere() == digest_of_an_observation()
 
 
 @pytest.mark.slow
-def test_freshly_compiled_kernels_see_the_same_bytes(tmp_path):
-    """With reordering allowed, compiled and cached kernels differ in the last bit."""
-    first = digest_of_a_look()
+def test_freshly_compiled_kernels_compute_the_same_bytes(tmp_path):
+    """With floating-point reordering, compiled and cached kernels would differ in the last bit."""
+    first = digest_of_an_observation()
     assert digest_elsewhere(NUMBA_CACHE_DIR=str(tmp_path)) == first
     assert digest_elsewhere(NUMBA_CACHE_DIR=str(tmp_path)) == first
 
@@ -248,9 +239,9 @@ def test_freshly_compiled_kernels_see_the_same_bytes(tmp_path):
         ({"fov_deg": 200.0}, "fov_deg 200.0"),
         ({"eyes": "three"}, "binocular.*monocular"),
         ({"blur_deg": -1.0}, "blur_deg -1.0"),
-        ({"infant_age_months": -2.0}, "-2.0 months"),
+        ({"infant_age_months": -2.0}, "age_months -2.0"),
     ],
 )
-def test_impossible_configurations_are_refused(numbers, named):
+def test_invalid_settings_are_refused(numbers, named):
     with pytest.raises(ValueError, match=named):
         VisionCfg(**numbers)

@@ -1,7 +1,4 @@
-"""A picture of the touched skin: the body with each taxel coloured by its reading.
-
-The debug view of the paper: what is touched glows from yellow to red on a pale body.
-"""
+"""The touch image: a body with each taxel coloured by its reading (the paper's debug view)."""
 
 from __future__ import annotations
 
@@ -20,36 +17,36 @@ from veca_marl.sim.vision.mesh_rasterizer import (
     to_camera_frame,
 )
 from veca_marl.sim.vision.optics import Camera, view_axes
-from veca_marl.sim.vision.rasterizer import NOTHING
+from veca_marl.sim.vision.rasterizer import NO_SURFACE
 from veca_marl.sim.vision.shading import Images
 
 PALE = (0.86, 0.86, 0.84)
 BACKGROUND = (0.13, 0.14, 0.17)
-# colours at readings of 0, a half and 1
+# colours of readings 0, 0.5 and 1
 _SCALE = np.array([(0.98, 0.93, 0.35), (0.98, 0.55, 0.10), (0.85, 0.05, 0.10)])
 _DISTANCE_M, _RAISED_M, _FOV_DEG = 1.5, 0.35, 36.0
 
 
 def touch_image(scene: Scene, body: SceneObject, readings: Floats, height: int = 252) -> Images:
-    """Draw the front and the back of a body, its pelvis upright, its touched taxels coloured.
+    """Render front and back of a body with an upright pelvis, its taxels in contact coloured.
 
     Args:
-        scene: The world, as of its last `update`.
-        body: Whose skin it is.
+        scene: The scene, as of its last `update`.
+        body: The body.
         readings: ``(1648, 6)`` in [0, 1], as from `TouchSense.update_taxels`.
-        height: Pixels of the picture.
+        height: Height of the image in pixels.
 
     Returns:
         ``(height, 2 * width, 3)`` uint8, with a width of 2/3 of the height.
 
     Raises:
-        ValueError: If the body has no skin, or the readings are not those of its taxels.
+        ValueError: If the body has no skin, or the readings have another shape than its taxels.
     """
     triangles = body.triangles.stop - body.triangles.start
     if readings.shape != load_taxels().depths.shape or triangles != len(readings):
         raise ValueError(
             f"{body.name} has {triangles} triangles, the readings have shape {readings.shape}: "
-            f"want {load_taxels().depths.shape}"
+            f"must be {load_taxels().depths.shape}"
         )
     camera = Camera(max(height * 2 // 3, 1), height, _FOV_DEG)
     return np.concatenate(
@@ -65,20 +62,20 @@ def save_touch_image(
     Raises:
         OSError: If the file cannot be written.
     """
-    picture = touch_image(scene, body, readings, height)
-    if not cv2.imwrite(str(path), picture[..., ::-1]):
+    image = touch_image(scene, body, readings, height)
+    if not cv2.imwrite(str(path), image[..., ::-1]):
         raise OSError(f"cannot write {path}")
 
 
 def _viewpoints(body: SceneObject) -> list[Pose]:
-    """Before and behind the pelvis, a little headwards: who lies is seen from below, too."""
+    """Return poses in front of and behind the pelvis, somewhat towards the head."""
     centre = body.positions.mean(axis=0)
     ahead, _, up = body.rotations[0].T
     return [_upright(_DISTANCE_M * way + _RAISED_M * up, centre, up) for way in (ahead, -ahead)]
 
 
 def _upright(offset: Floats, centre: Floats, up: Floats) -> Pose:
-    """Return the pose of a camera that looks at a point, with `up` upwards in the picture."""
+    """Return the pose of a camera that looks at a point, with `up` upwards in the image."""
     forward = -offset / np.linalg.norm(offset)
     above = up - up.dot(forward) * forward
     above /= np.linalg.norm(above)
@@ -88,36 +85,36 @@ def _upright(offset: Floats, centre: Floats, up: Floats) -> Pose:
 def _portrait(
     scene: Scene, body: SceneObject, readings: Floats, camera: Camera, pose: Pose
 ) -> Images:
-    """Draw the pale body lit from above, its touched taxels in the colours of their readings."""
+    """Render the body in pale grey, with taxels in contact in the colours of their readings."""
     meshes, view = scene.meshes, view_axes(pose)
     seen = np.empty_like(meshes.vertices)
     to_camera_frame(meshes.vertices, view, seen)
     depth = np.full((camera.height, camera.width), camera.far_m, np.float32)
-    surfaces = np.full(depth.shape, NOTHING, np.int16)
+    surfaces = np.full(depth.shape, NO_SURFACE, np.int16)
     lights = np.zeros(depth.shape, np.float32)
     drawn = np.zeros(len(meshes.triangles), np.bool_)
     drawn[body.triangles] = True
     draw_triangles(meshes.triangles, seen, drawn, camera.lens, 0, depth, surfaces)
     illuminate_triangles(meshes, seen, camera.lens, 0, surfaces, lights)
-    picture = np.where(
-        (surfaces == NOTHING)[..., None], BACKGROUND, lights[..., None] * np.array(PALE)
+    colours = np.where(
+        (surfaces == NO_SURFACE)[..., None], BACKGROUND, lights[..., None] * np.array(PALE)
     )
-    seen_from = pose.position + depth[..., None] * _rays(camera, pose)
+    points = pose.position + depth[..., None] * _rays(camera, pose)
     taxels, _ = taxel_positions(load_taxels(), meshes.vertices[body.vertices])
     triangles = surfaces - body.triangles.start
-    own = surfaces != NOTHING
-    felt = _nearest(seen_from[own], triangles[own], taxels, readings)
+    own = surfaces != NO_SURFACE
+    felt = _nearest(points[own], triangles[own], taxels, readings)
     touched = felt > 0.0
-    glow = np.stack([np.interp(felt[touched], (0.0, 0.5, 1.0), c) for c in _SCALE.T], axis=1)
-    shades = picture[own]
-    shades[touched] = glow
-    picture[own] = shades
-    image: Images = np.round(255.0 * picture.clip(0.0, 1.0)).astype(np.uint8)
+    marks = np.stack([np.interp(felt[touched], (0.0, 0.5, 1.0), c) for c in _SCALE.T], axis=1)
+    shades = colours[own]
+    shades[touched] = marks
+    colours[own] = shades
+    image: Images = np.round(255.0 * colours.clip(0.0, 1.0)).astype(np.uint8)
     return image
 
 
 def _rays(camera: Camera, pose: Pose) -> Floats:
-    """Way ``(H, W, 3)`` through each pixel per metre along the optical axis."""
+    """Return the vectors ``(H, W, 3)`` along the rays per metre of depth, world frame."""
     x, y = np.meshgrid(camera.lens.columns, camera.lens.rows)
     rays: Floats = np.stack([np.ones_like(x), -x, y], axis=-1) @ pose.rotation.T
     return rays

@@ -1,6 +1,7 @@
 """Touch: taxels, the penetration model and the sense of touch."""
 
-from veca_marl.sim.touch.sense import TouchCfg, TouchQuality, TouchSense
+from veca_marl.sim.touch.quality import TouchQuality
+from veca_marl.sim.touch.sense import TouchCfg, TouchSense
 from veca_marl.sim.touch.taxels import TAXELS_PER_TRIANGLE, load_taxels, taxels_of
 
 __all__ = [

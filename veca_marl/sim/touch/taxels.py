@@ -1,9 +1,9 @@
 """The taxels: six tactile elements on each triangle of the skin, 9888 in all, sorted by bone.
 
-A taxel senses at the point where the line through it, along the normal of its triangle, meets the
-physical skin: the surface at a distance of d_max, the thickness of the skin, from the rigid bone.
-The mesh that eyes see differs from that surface by some millimetres; without the shift a light
-touch on a hollow of the mesh would read nothing, and one on a bulge too much.
+The sensing point of a taxel is where the line through the taxel, along the normal of its triangle,
+meets the physical skin: the surface at the distance d_max, the thickness of the skin, from the
+rigid bone. The rendered mesh differs from that surface by some millimetres; without the shift,
+light contact on a hollow of the mesh would read 0, and contact on a bulge too much.
 """
 
 from __future__ import annotations
@@ -36,25 +36,25 @@ BARYCENTRIC = np.array(
 PATCH_TRIANGLES = 4
 TAXELS_PER_TRIANGLE = len(BARYCENTRIC)
 _ITERATIONS, _RELAXATION = 12, 0.7
-# the mesh bulges over hollows between bones: no shift beyond these (metres) reaches the right one
+# limits of the shift in metres: over gaps between bones the mesh has no physical skin below it
 _FARTHEST_OUT_M, _FARTHEST_IN_M = -0.004, 0.012
 
 
 class TaxelTable(NamedTuple):
-    """Where the taxels are on the skin, as the loops of touch read it.
+    """The places of the taxels on the skin, as arrays for compiled loops.
 
     Attributes:
         triangles: ``(T, 3)`` vertices, sorted by bone.
         first_triangle: ``(48,)`` triangles of bone b are first[b] to first[b + 1].
-        depths: ``(T, 6)`` metres from the mesh, against the normal, to the point that senses.
-        thickness: ``(47,)`` metres of skin on each bone, d_max.
+        depths: ``(T, 6)`` metres from the mesh, against the normal, to the sensing point.
+        thickness: ``(47,)`` metres, d_max: thickness of the skin on each bone.
         first_patch: ``(48,)`` patches of bone b are first[b] to first[b + 1]. A patch is a few
-            triangles beside each other, which are looked at together.
+            consecutive triangles that the broad phase treats as one.
         patches: ``(P + 1,)`` triangles of patch p are patches[p] to patches[p + 1].
         vertices: The vertices of the triangles of each patch, one patch after the other.
         first_vertex: ``(P + 1,)`` those of patch p are ``vertices[first[p] : first[p + 1]]``.
-        margins: ``(T,)`` metres, how far from a triangle its taxels sense at most.
-        layers: ``(T, 2)`` metres: middle of the depths of a triangle, and half of their range.
+        margins: ``(T,)`` metres: greatest distance of a sensing point from its triangle.
+        layers: ``(T, 2)`` metres: middle of the range of depths of a triangle, and half of it.
     """
 
     triangles: Indices
@@ -95,7 +95,7 @@ def load_taxels() -> TaxelTable:
 
 
 def taxels_of(bone_name: str) -> slice:
-    """Return where the taxels of a bone are among the 9888.
+    """Return the slice of the 9888 taxels that lie on a bone.
 
     Raises:
         KeyError: If there is no such bone; the message lists those that exist.
@@ -106,7 +106,7 @@ def taxels_of(bone_name: str) -> slice:
 
 
 def taxel_positions(taxels: TaxelTable, vertices: Floats) -> tuple[Floats, Floats]:
-    """Return where the taxels lie on the mesh, and the normals of their triangles.
+    """Return the positions of the taxels on the mesh and the normals of their triangles.
 
     Args:
         taxels: The table.
@@ -120,18 +120,20 @@ def taxel_positions(taxels: TaxelTable, vertices: Floats) -> tuple[Floats, Float
 
 
 def _on_triangles(corners: Floats) -> Floats:
+    """Return the six points ``(T, 6, 3)`` on triangles ``(T, 3, 3)``."""
     points: Floats = np.einsum("bk,tkc->tbc", BARYCENTRIC, corners)
     return points
 
 
 def _normals(corners: Floats) -> Floats:
+    """Return the outward unit normals ``(T, 3)`` of triangles ``(T, 3, 3)``."""
     normals: Floats = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     return normals
 
 
 def _depths(mesh: Mesh) -> Floats:
-    """Follow each normal to the physical skin, in the pose the mesh is bound in."""
+    """Return the depths ``(T, 6)`` of the physical skin below the mesh, in the binding pose."""
     skeleton = load_skeleton()
     positions, rotations = binding_pose(skeleton)
     bound = with_mesh(empty_meshes(), mesh, 0)
@@ -143,18 +145,27 @@ def _depths(mesh: Mesh) -> Floats:
         own = mesh.owners == index
         local = (points[own] - positions[index]) @ rotations[index]
         inward = -(normals[own] @ rotations[index])[:, None]
-        depths[own] = _way_to_skin(bone, local, inward)
+        depths[own] = _march_to_skin(bone, local, inward)
     return depths
 
 
-def _way_to_skin(bone: Bone, points: Floats, inward: Floats) -> Floats:
-    """March ``(t, 6)`` points of a bone's frame along ``(t, 1, 3)`` to the surface of its skin."""
-    way: Floats = np.zeros(points.shape[:2])
+def _march_to_skin(bone: Bone, points: Floats, inward: Floats) -> Floats:
+    """Find how far points lie above the skin of a bone, by relaxed sphere tracing.
+
+    Args:
+        bone: The bone.
+        points: ``(t, 6, 3)`` metres in its frame.
+        inward: ``(t, 1, 3)`` unit direction of the search.
+
+    Returns:
+        ``(t, 6)`` metres, clipped where the search does not reach the skin.
+    """
+    depth: Floats = np.zeros(points.shape[:2])
     for _ in range(_ITERATIONS):
-        height = distance_to_bone(bone, points + way[..., None] * inward) - bone.skin_thickness_m
-        way = way + _RELAXATION * height
-    usual = 0.5 * float(np.median(distance_to_bone(bone, points)))
-    return way.clip(_FARTHEST_OUT_M, usual + _FARTHEST_IN_M)
+        height = distance_to_bone(bone, points + depth[..., None] * inward) - bone.skin_thickness_m
+        depth = depth + _RELAXATION * height
+    typical = 0.5 * float(np.median(distance_to_bone(bone, points)))
+    return depth.clip(_FARTHEST_OUT_M, typical + _FARTHEST_IN_M)
 
 
 def distance_to_bone(bone: Bone, points: Floats) -> Floats:

@@ -1,9 +1,9 @@
-"""Soft shadows where things come near the floor: what shows that they stand on it.
+"""Soft contact shadows of primitives on the floor.
 
-A floor point is darkened by its distance to the things around it, as in ambient occlusion by
-distance fields (Evans, "Fast approximations for global illumination on dynamic scenes", SIGGRAPH
-2006 course). The distances to the primitives are exact. The floor is whatever is seen in the plane
-z = 0; what is larger than a piece of furniture casts no shadow.
+A floor point is darkened by its distance to nearby primitives, as in ambient occlusion by distance
+fields (Evans, "Fast approximations for global illumination on dynamic scenes", SIGGRAPH 2006
+course). The distances are exact. All visible points in the plane z = 0 count as floor; primitives
+larger than furniture cast no shadow.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from veca_marl.sim.geometry.signed_distances import distance
 from veca_marl.sim.geometry.tables import Bools, GeomTable
 from veca_marl.sim.geometry.vectors import Vector, single
 from veca_marl.sim.vision.rasterizer import (
-    NOTHING,
+    NO_SURFACE,
     Depths,
     Lens,
     Ray,
@@ -34,9 +34,9 @@ from veca_marl.sim.vision.screen_bounds import box_intervals
 # slopes, depths, surfaces and lights of one row
 Pixels: TypeAlias = tuple[Depths, Depths, Surfaces, NDArray[np.float32]]
 
-REACH_M = 0.12  # a thing farther than this from a floor point does not darken it
-DARKNESS = 0.35  # share of the light that a thing touching the point takes away
-LARGEST_M = 1.0  # bounding radius of the largest thing that casts a shadow
+REACH_M = 0.12  # greatest distance at which a primitive darkens a floor point
+DARKNESS = 0.35  # fraction of the brightness removed at distance 0
+LARGEST_M = 1.0  # bounding radius of the largest primitive that casts a shadow
 _FLOOR_TOLERANCE_M = 0.01
 
 _SPHERE, _BOX, _CYLINDER = int(Shape.SPHERE), int(Shape.BOX), int(Shape.CYLINDER)
@@ -44,7 +44,7 @@ _CAPSULE = int(Shape.CAPSULE)
 
 
 @njit(cache=True, error_model="numpy")
-def darken_contacts(
+def darken_contact_shadows(
     geoms: GeomTable,
     casting: Bools,
     view: Floats,
@@ -53,16 +53,16 @@ def darken_contacts(
     surfaces: Surfaces,
     lights: NDArray[np.float32],
 ) -> None:
-    """Darken the floor around what is near it.
+    """Darken floor pixels near primitives.
 
     Args:
         geoms: The scene's primitives.
         casting: ``(G,)`` which of them cast shadows.
-        view: ``(4, 3)`` position, right, up and forward axes of the eye in the world.
-        lens: The camera's numbers.
+        view: ``(4, 3)`` position, right, up and forward axes of the camera, world frame.
+        lens: Parameters of the camera.
         depth: ``(H, W)`` metres.
-        surfaces: ``(H, W)`` rows of the surfaces seen.
-        lights: ``(H, W)`` brightness of each pixel, scaled.
+        surfaces: ``(H, W)`` indices of the visible surfaces.
+        lights: ``(H, W)`` brightness of each pixel, multiplied in place.
     """
     for g in range(geoms.shapes.shape[0]):
         radius = bounding_radius(geoms.shapes[g], geoms.sizes[g])
@@ -76,7 +76,7 @@ def darken_contacts(
 
 @njit(cache=True, error_model="numpy")
 def _floor_rectangle(position: Floats, around: float, view: Floats, lens: Lens) -> Rectangle:
-    """Pixels that may show a square of the floor below a point."""
+    """Return the pixels that may show a square of the floor below a point."""
     ex, ey, ez = position[0] - view[0, 0], position[1] - view[0, 1], -view[0, 2]
     right = (view[1, 0], view[1, 1], view[1, 2])
     up = (view[2, 0], view[2, 1], view[2, 2])
@@ -111,7 +111,7 @@ def _darken(
     eye = _vector(view[0]), _vector(view[1]), _vector(view[2]), _vector(view[3])
     for j in range(top, bottom):
         pixels = columns, depth[j, first:end], surfaces[j, first:end], lights[j, first:end]
-        # the shape is a constant in each of these, so that their loops have no branches
+        # a constant shape per call keeps the loops free of branches
         if shape == _SPHERE:
             _darken_row(_SPHERE, size, frame, eye, lens.rows[j], g, pixels)
         elif shape == _BOX:
@@ -124,7 +124,7 @@ def _darken(
 
 @njit(cache=True, error_model="numpy", inline="always")
 def _vector(array: NDArray[Any]) -> Vector:
-    """Out of an array, so that the compiler knows that loops do not change it."""
+    """Return three numbers of an array as scalars, which the compiler knows loops do not change."""
     return array[0], array[1], array[2]
 
 
@@ -156,6 +156,6 @@ def _darken_row(
         gap = distance(shape, size, local[0], local[1], local[2])
         gap = gap if gap > 0.0 else 0.0
         nearness = 1.0 - gap / REACH_M
-        no_floor = abs(pz) > _FLOOR_TOLERANCE_M or names[i] == NOTHING or names[i] == name
+        no_floor = abs(pz) > _FLOOR_TOLERANCE_M or names[i] == NO_SURFACE or names[i] == name
         nearness = 0.0 if no_floor or nearness < 0.0 else nearness
         lights[i] *= single(1.0 - DARKNESS * nearness * nearness)

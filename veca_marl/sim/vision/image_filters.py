@@ -1,4 +1,4 @@
-"""What dims an eye: filters from images to images that combine in a list."""
+"""Filters of the eyes' images, which can be combined in a list."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from veca_marl.sim.vision.rasterizer import Depths
 from veca_marl.sim.vision.shading import Images
 
 
-class Look(NamedTuple):
-    """What a filter may know beside the images.
+class FilterContext(NamedTuple):
+    """What a filter can use besides the images.
 
     Attributes:
-        camera: That took them.
+        camera: The camera of the images.
         depth: ``(V, H, W)`` metres along the optical axis.
-        focal_distance_m: What the eyes are adjusted to; ``inf`` when relaxed.
+        focal_distance_m: Distance to which the eyes are accommodated; ``inf`` when relaxed.
     """
 
     camera: Camera
@@ -31,18 +31,18 @@ class Look(NamedTuple):
 
 
 class Filter(Protocol):
-    """From ``(V, H, W, 3)`` uint8 images to new ones of the same shape."""
+    """A function from ``(V, H, W, 3)`` uint8 images to new images of the same shape."""
 
-    def __call__(self, images: Images, look: Look) -> Images:
-        """Return the filtered images; those handed in stay as they are."""
+    def __call__(self, images: Images, context: FilterContext) -> Images:
+        """Return the filtered images; the arguments are not changed."""
         ...
 
 
 @dataclass(frozen=True)
 class Grey:
-    """Luma in all three channels. Weights: Recommendation ITU-R BT.601, as in OpenCV."""
+    """Luma in all three channels, with the weights of ITU-R BT.601 (as in OpenCV)."""
 
-    def __call__(self, images: Images, look: Look) -> Images:
+    def __call__(self, images: Images, context: FilterContext) -> Images:
         """Return grey images."""
         out = np.empty_like(images)
         for image, grey in zip(images, out, strict=True):
@@ -52,9 +52,9 @@ class Grey:
 
 @dataclass(frozen=True)
 class Blur:
-    """Gaussian blur. It passes a grating of f cycles/degree by exp(-2 pi^2 sigma^2 f^2).
+    """Gaussian blur; its transfer at f cycles per degree is ``exp(-2 pi^2 sigma^2 f^2)``.
 
-    Angles count as at the centre of the picture; towards the edges a pixel covers a little less.
+    Angles are those at the centre of the image; towards the edges a pixel covers slightly less.
 
     Attributes:
         sigma_deg: Standard deviation in degrees of visual angle.
@@ -67,26 +67,26 @@ class Blur:
 
     def __post_init__(self) -> None:
         if not 0.0 < self.sigma_deg < math.inf:
-            raise ValueError(f"a blur of {self.sigma_deg} degrees: want a positive angle")
+            raise ValueError(f"sigma_deg {self.sigma_deg} must be a positive angle")
 
-    def __call__(self, images: Images, look: Look) -> Images:
+    def __call__(self, images: Images, context: FilterContext) -> Images:
         """Return blurred images."""
         out = np.empty_like(images)
         for image, blurred in zip(images, out, strict=True):
-            _gaussian(image, self.sigma_deg / look.camera.degrees_per_pixel, blurred)
+            _gaussian(image, self.sigma_deg / context.camera.degrees_per_pixel, blurred)
         return out
 
 
 @dataclass(frozen=True)
 class Defocus:
-    """Blur of what is not at the distance that the eyes are adjusted to.
+    """Blur of surfaces that are not at the focal distance of the eyes.
 
-    A thin lens spreads a point at z metres, seen by an eye adjusted to f metres, over a disc of the
-    angular diameter ``pupil * |1 / z - 1 / f|`` radians (Smith, "Angular diameter of defocus blur
+    A thin lens focused at f metres spreads a point at z metres over a disc of the angular diameter
+    ``pupil * |1 / z - 1 / f|`` radians (Smith, "Angular diameter of defocus blur
     discs", Am. J. Optometry 1982; Strasburger, Bach & Heinrich, "Blur unblurred", i-Perception
-    2018). The disc is drawn as the Gaussian of equal variance, ``(diameter / 4)^2``. Each pixel
-    gathers its neighbours by its own depth, so a sharp edge in front of a blurred ground leaks a
-    little into it.
+    2018). The disc is approximated by the Gaussian of equal variance, ``(diameter / 4)^2``. Each
+    pixel gathers its neighbours by its own depth, so that a sharp edge in front of a blurred
+    background leaks slightly into it.
 
     Attributes:
         pupil_m: Diameter of the pupil. About 4 mm in indoor light (Watson & Yellott, "A unified
@@ -100,19 +100,19 @@ class Defocus:
 
     def __post_init__(self) -> None:
         if not 0.0 < self.pupil_m < math.inf:
-            raise ValueError(f"a pupil of {self.pupil_m} m: want a positive diameter")
+            raise ValueError(f"pupil_m {self.pupil_m} must be a positive diameter")
 
-    def __call__(self, images: Images, look: Look) -> Images:
+    def __call__(self, images: Images, context: FilterContext) -> Images:
         """Return images that are sharp at the focal distance.
 
         Raises:
             ValueError: If the focal distance is not positive.
         """
-        if not look.focal_distance_m > 0.0:
-            raise ValueError(f"focal distance {look.focal_distance_m} m: want a positive one")
+        if not context.focal_distance_m > 0.0:
+            raise ValueError(f"focal_distance_m {context.focal_distance_m} must be positive")
         out = np.empty_like(images)
-        for image, depth, blurred in zip(images, look.depth, out, strict=True):
-            variance = self._variance(depth, look)
+        for image, depth, blurred in zip(images, context.depth, out, strict=True):
+            variance = self._variance(depth, context)
             levels = _levels(float(variance.max()))
             stack = np.stack([image] * len(levels))
             for level, sigma in enumerate(levels[1:], start=1):
@@ -120,19 +120,19 @@ class Defocus:
             _blend(stack, variance, np.square(levels), blurred)
         return out
 
-    def _variance(self, depth: Depths, look: Look) -> Depths:
-        """Variance of each pixel's blur in square pixels."""
-        radians_per_pixel = math.radians(look.camera.degrees_per_pixel)
-        defocus_dioptres = np.abs(1.0 / depth - np.float32(1.0 / look.focal_distance_m))
+    def _variance(self, depth: Depths, context: FilterContext) -> Depths:
+        """Return the variance of the blur of each pixel in square pixels."""
+        radians_per_pixel = math.radians(context.camera.degrees_per_pixel)
+        defocus_dioptres = np.abs(1.0 / depth - np.float32(1.0 / context.focal_distance_m))
         sigma = defocus_dioptres * np.float32(self.pupil_m / 4.0 / radians_per_pixel)
-        # wider than an eighth of the picture, nothing is left to blur
-        widest = np.float32(look.camera.height / 8.0)
+        # an upper bound of an eighth of the image, where hardly any contrast is left
+        widest = np.float32(context.camera.height / 8.0)
         variance: Depths = np.square(np.minimum(sigma, widest))
         return variance
 
 
 def _levels(largest_variance: float) -> NDArray[np.float64]:
-    """Blurs to mix from: 0, then octaves of half a pixel until the largest is covered."""
+    """Return standard deviations in pixels: 0, then octaves from 0.5 up to the largest blur."""
     octaves = max(0, math.ceil(math.log2(max(math.sqrt(largest_variance), 0.5) / 0.5)))
     return np.concatenate(([0.0], 0.5 * 2.0 ** np.arange(octaves + 1)))
 
@@ -141,7 +141,7 @@ def _levels(largest_variance: float) -> NDArray[np.float64]:
 def _blend(
     stack: NDArray[np.uint8], variance: Depths, levels: NDArray[np.float64], out: Images
 ) -> None:
-    """Mix the two blurred images around each pixel's variance, so that the mixture has it."""
+    """Interpolate per pixel between the blurred images of the nearest variances."""
     last = len(levels) - 2
     for j in range(out.shape[0]):
         for i in range(out.shape[1]):
@@ -156,5 +156,5 @@ def _blend(
 
 
 def _gaussian(image: Images, sigma_pixels: float, out: Images) -> None:
-    """Blur one ``(H, W, 3)`` image; beyond its edges it goes on with its last pixels."""
+    """Blur one ``(H, W, 3)`` image; the border pixels are replicated beyond its edges."""
     cv2.GaussianBlur(image, (0, 0), sigma_pixels, dst=out, borderType=cv2.BORDER_REPLICATE)

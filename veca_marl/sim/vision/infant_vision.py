@@ -1,6 +1,6 @@
-"""How infants see, by age: acuity and colour.
+"""Visual acuity and colour vision of infants by age.
 
-What is measured and what is ours:
+Sources, and what is our own assumption:
 
 - *Acuity*: mean monocular grating acuity on the Teller Acuity Cards, table 2 of Mayer, Beiser,
   Warner, Pratt, Raye & Lang, "Monocular acuity norms for the Teller Acuity Cards between ages one
@@ -8,15 +8,15 @@ What is measured and what is ours:
   transcription of the Gilmore lab's visual-acuity repository). Its means at 9 and 12 months, 6.79
   and 6.42 of 30 and 40 infants, are pooled, as acuity does not fall with age. The value at birth,
   0.69, is Brown & Yamamoto's for term newborns (Am. J. Ophthalmology 1986, also acuity cards).
-  Between the ages octaves are interpolated linearly; beyond four years the last value is held.
-- *Blur*: that a grating at the acuity limit keeps 10 % of its contrast is a convention of ours, in
-  the manner of resolution criteria for lenses; the limit itself is where infants stop responding.
+  Between the ages, octaves are interpolated linearly; beyond four years the last value is used.
+- *Blur*: that a grating at the acuity limit keeps 10 % of its contrast is our own convention, in
+  analogy to resolution criteria for lenses; the limit itself is where infants stop responding.
 - *Colour*: the order of events is measured: newborns tell few and only large saturated colours
   from grey, red first (Adams & Courage, Vision Research 1998), three-month-olds are trichromatic,
   with blue-yellow later than red-green (Teller, Vision Research 1998), and thresholds go on
   falling for years (Knoblauch, Vital-Durand & Barbur, Vision Research 2001). Banks & Bennett
-  (J. Opt. Soc. Am. A 1988) explain the newborn's weakness by the immature cones alone. **The gains
-  below are our interpolation of that order, not measurements.**
+  (J. Opt. Soc. Am. A 1988) explain the poor colour vision of newborns by immature cones alone.
+  **The gains below are our interpolation of that order, not measurements.**
 
 Contrast sensitivity below the acuity limit, field of view and eye alignment are an adult's.
 """
@@ -30,7 +30,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from veca_marl.sim.vision.image_filters import Blur, Look
+from veca_marl.sim.vision.image_filters import Blur, FilterContext
 from veca_marl.sim.vision.shading import Images
 
 _ACUITY_AGES_MONTHS = (0.0, 1.0, 1.5, 2.5, 4.0, 6.0, 9.0, 12.0, 18.0, 24.0, 30.0, 36.0, 48.0)
@@ -47,13 +47,13 @@ _LUMA = np.array([0.299, 0.587, 0.114])
 
 
 def acuity_cpd(age_months: float) -> float:
-    """Return the finest grating an infant resolves, in cycles per degree."""
+    """Return the highest spatial frequency that an infant resolves, in cycles per degree."""
     octaves = np.interp(age_months, _ACUITY_AGES_MONTHS, np.log2(_ACUITY_CPD))
     return float(2.0**octaves)
 
 
 def acuity_blur_deg(limit_cpd: float) -> float:
-    """Return the Gaussian blur that leaves a grating at the limit `CONTRAST_AT_LIMIT` of itself.
+    """Return the Gaussian blur that reduces a grating at the limit to `CONTRAST_AT_LIMIT`.
 
     Solves ``exp(-2 pi^2 sigma^2 f^2) = CONTRAST_AT_LIMIT`` for sigma, in degrees.
     """
@@ -78,14 +78,14 @@ def colour_matrix(red_green: float, blue_yellow: float) -> NDArray[np.float64]:
 
 @dataclass(frozen=True)
 class InfantVision:
-    """What an infant of some age sees: `acuity_cpd` as blur, `colour_gains` as paler colours.
+    """The filter of an infant of a given age: `acuity_cpd` as blur, `colour_gains` as saturation.
 
-    At 84 pixels for 60 degrees the images themselves end at 0.7 cycles per degree, near the acuity
-    of a newborn: such images blur little at one month and not visibly from three on. Acuity needs
-    more pixels per degree to matter; colour does not.
+    Images of 84 pixels for 60 degrees are limited to 0.7 cycles per degree, near the acuity of a
+    newborn: the blur is small at one month and invisible from three months on. Acuity has an
+    effect only with more pixels per degree; colour has one in any case.
 
     Attributes:
-        age_months: Since birth at term.
+        age_months: Age since birth at term.
 
     Raises:
         ValueError: If the age is negative.
@@ -97,13 +97,13 @@ class InfantVision:
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.age_months < math.inf:
-            raise ValueError(f"an infant of {self.age_months} months: want an age from 0 on")
+            raise ValueError(f"age_months {self.age_months} must be finite and not negative")
         object.__setattr__(self, "_blur", Blur(acuity_blur_deg(acuity_cpd(self.age_months))))
         object.__setattr__(self, "_colours", colour_matrix(*colour_gains(self.age_months)))
 
-    def __call__(self, images: Images, look: Look) -> Images:
-        """Return the images as an infant sees them."""
-        out = self._blur(images, look)
+    def __call__(self, images: Images, context: FilterContext) -> Images:
+        """Return blurred images of reduced saturation."""
+        out = self._blur(images, context)
         for image in out:
             cv2.transform(image, self._colours, dst=image)
         return out

@@ -1,9 +1,8 @@
-"""Skins into the depth and surface buffers: those outside the picture or behind walls cost nothing.
+"""Meshes in the depth and surface buffers, with culling of those that are hidden.
 
-A box round each skin says which pixels it may cover and how near it may come. Where all of them
-show something nearer already, or there are none, none of its triangles could change anything, so
-that leaving it out does not change a bit of the picture. With many bodies in many rooms that is
-what most of them are.
+The axis-aligned bounding box of a mesh bounds the pixels that it may cover and its least depth. If
+all of these pixels show a nearer surface already, or there are none, the mesh cannot change the
+image and is skipped. With many bodies in several rooms this applies to most of them.
 """
 
 from __future__ import annotations
@@ -32,22 +31,22 @@ def draw_meshes(
     depth: Depths,
     surfaces: Surfaces,
 ) -> None:
-    """Draw all skins over what was drawn before.
+    """Draw all meshes into the buffers, which hold the primitives already.
 
     Args:
-        meshes: The scene's skins.
+        meshes: The scene's meshes.
         drawn: ``(T,)`` which of their triangles to draw.
-        view: ``(4, 3)`` position, right, up and forward axes of the eye in the world.
-        lens: The camera's numbers.
-        culled: Leave out skins that cannot be seen; false draws all, which is the slow truth that
-            tests compare with.
-        first_surface: What the first triangle is called in `surfaces`; the next one more.
-        seen: ``(V, 3)`` written for the skins that were not left out, see `to_camera_frame`.
-        depth: ``(H, W)`` metres along the optical axis, updated where something nearer is hit.
+        view: ``(4, 3)`` position, right, up and forward axes of the camera, world frame.
+        lens: Parameters of the camera.
+        culled: Whether to skip hidden meshes; False draws all, the slow reference of the tests.
+        first_surface: Index of the first triangle in `surfaces`; the others follow.
+        seen: ``(V, 3)`` camera coordinates, written for meshes that are not skipped; see
+            `to_camera_frame`.
+        depth: ``(H, W)`` metres along the optical axis, updated where a nearer surface is hit.
         surfaces: ``(H, W)``, updated likewise.
     """
     for m in range(meshes.lower.shape[0]):
-        if culled and is_hidden(meshes.lower[m], meshes.upper[m], view, lens, depth):
+        if culled and is_occluded(meshes.lower[m], meshes.upper[m], view, lens, depth):
             continue
         begin, end = meshes.first_vertices[m], meshes.first_vertices[m + 1]
         to_camera_frame(meshes.vertices[begin:end], view, seen[begin:end])
@@ -57,15 +56,15 @@ def draw_meshes(
 
 
 @njit(cache=True, error_model="numpy")
-def is_hidden(lower: Floats, upper: Floats, view: Floats, lens: Lens, depth: Depths) -> bool:
-    """Say whether nothing in a box can be seen.
+def is_occluded(lower: Floats, upper: Floats, view: Floats, lens: Lens, depth: Depths) -> bool:
+    """Return whether a box is entirely hidden or outside of the image.
 
     Args:
-        lower: ``(3,)`` metres, world frame: a corner of the box, whose edges are along the axes.
+        lower: ``(3,)`` metres, world frame: the least corner of an axis-aligned box.
         upper: ``(3,)`` the opposite corner.
         view: See `draw_meshes`.
-        lens: The camera's numbers.
-        depth: ``(H, W)`` how near what was drawn before is.
+        lens: Parameters of the camera.
+        depth: ``(H, W)`` metres, of what is drawn already.
     """
     half = (
         (upper[0] - lower[0]) / 2.0,

@@ -1,10 +1,10 @@
-"""Triangles into the same depth and surface buffers as primitives, and their light.
+"""Rasterization and lighting of triangles, into the same buffers as primitives.
 
 Edge functions in homogeneous coordinates (Olano & Greer 1997, "Triangle scan conversion using 2D
-homogeneous coordinates"): with the corners a, b, c as seen from the eye, the ray of slopes (x, y)
-meets the triangle where ``(b x c).(x, y, 1)`` and its two cousins are not negative, at the depth
-``det(a, b, c)`` over their sum. Nothing has to be clipped, and neighbours leave no gap: for their
-common edge they compute the same number with opposite signs.
+homogeneous coordinates"): with the corners a, b, c in the camera frame, the ray of slopes (x, y)
+hits the triangle if ``(b x c).(x, y, 1)`` and its two cyclic permutations are not negative, at the
+depth ``det(a, b, c)`` over their sum. No clipping is needed, and adjacent triangles leave no gap:
+their values for the common edge are equal with opposite signs.
 """
 
 from __future__ import annotations
@@ -23,16 +23,16 @@ from veca_marl.sim.vision.rasterizer import Depths, Lens, Rectangle, Surfaces
 from veca_marl.sim.vision.screen_bounds import Interval
 from veca_marl.sim.vision.shading import AMBIENT, BOUNCE, SUN
 
-_MARGIN_PX = 0.01  # absorbs the rounding of slopes in single precision
+_MARGIN_PX = 0.01  # covers rounding errors of slopes in single precision
 
 
 @njit(cache=True, error_model="numpy")
 def to_camera_frame(vertices: Floats, view: Floats, seen: Floats) -> None:
-    """Write where ``(V, 3)`` vertices are for an eye: metres right, up and forward.
+    """Write vertices ``(V, 3)`` in the camera frame: metres right, up and forward.
 
     Args:
         vertices: World frame, metres.
-        view: ``(4, 3)`` position, right, up and forward axes of the eye in the world.
+        view: ``(4, 3)`` position, right, up and forward axes of the camera, world frame.
         seen: ``(V, 3)``, written.
     """
     for v in range(vertices.shape[0]):
@@ -53,15 +53,15 @@ def draw_triangles(
     depth: Depths,
     surfaces: Surfaces,
 ) -> None:
-    """Draw triangles that face the eye into a depth and a surface buffer.
+    """Draw the triangles that face the camera into a depth and a surface buffer.
 
     Args:
         triangles: ``(T, 3)`` vertices, counter-clockwise from outside.
         seen: ``(V, 3)`` vertices as from `to_camera_frame`.
         drawn: ``(T,)`` which of them to draw.
-        lens: The camera's numbers.
-        first_surface: What the first triangle is called in `surfaces`; the next one more.
-        depth: ``(H, W)`` metres along the optical axis, updated where something nearer is hit.
+        lens: Parameters of the camera.
+        first_surface: Index of the first triangle in `surfaces`; the others follow.
+        depth: ``(H, W)`` metres along the optical axis, updated where a nearer surface is hit.
         surfaces: ``(H, W)``, updated likewise.
     """
     for t in range(triangles.shape[0]):
@@ -74,7 +74,7 @@ def draw_triangles(
             continue
         over_a = _cross(b, c)
         volume = a[0] * over_a[0] + a[1] * over_a[1] + a[2] * over_a[2]
-        if volume <= 0.0:  # its back
+        if volume <= 0.0:  # back face
             continue
         rectangle = _rectangle(a, b, c, nearest, lens)
         if rectangle[0] < rectangle[1] and rectangle[2] < rectangle[3]:
@@ -99,7 +99,7 @@ def _cross(a: Vector, b: Vector) -> Vector:
 
 @njit(cache=True, error_model="numpy")
 def _rectangle(a: Vector, b: Vector, c: Vector, nearest: float, lens: Lens) -> Rectangle:
-    """Pixels that a triangle may cover."""
+    """Return the pixels that a triangle may cover."""
     if nearest <= lens.near:
         return _cut_rectangle(a, b, c, lens)
     xa, xb, xc = a[0] / a[2], b[0] / b[2], c[0] / c[2]
@@ -111,10 +111,10 @@ def _rectangle(a: Vector, b: Vector, c: Vector, nearest: float, lens: Lens) -> R
 
 @njit(cache=True, error_model="numpy", inline="always")
 def _centres_between(across: Interval, upward: Interval, lens: Lens) -> Rectangle:
-    """Pixels whose centres lie between some slopes: none for most triangles of a far body.
+    """Return the pixels with centres between two pairs of slopes.
 
-    As `pixel_rectangle`, but triangles are many and small, so that a wide margin would cost more
-    than they do.
+    As `pixel_rectangle` with a narrower margin: most triangles of a distant body contain no pixel
+    centre, and a margin of one pixel would cost more than they do.
     """
     left, right = max(across[0], -lens.tan_x), min(across[1], lens.tan_x)
     bottom, top = max(upward[0], -lens.tan_y), min(upward[1], lens.tan_y)
@@ -133,9 +133,9 @@ def _centres_between(across: Interval, upward: Interval, lens: Lens) -> Rectangl
 
 @njit(cache=True, error_model="numpy")
 def _cut_rectangle(a: Vector, b: Vector, c: Vector, lens: Lens) -> Rectangle:
-    """Pixels that a triangle which reaches behind the near plane may cover: most often none.
+    """Return the pixels that a triangle crossing the near plane may cover, most often none.
 
-    The limbs of the eye's own body are such triangles.
+    Such triangles belong mostly to the body of the eye itself.
     """
     low_x, high_x, low_y, high_y = np.inf, -np.inf, np.inf, -np.inf
     near = lens.near
@@ -165,7 +165,7 @@ def _fill(
     depth: Depths,
     surfaces: Surfaces,
 ) -> None:
-    """Meet the rays of a rectangle with one triangle."""
+    """Intersect the rays of a rectangle with one triangle and update the buffers."""
     (ax, ay, az), (bx, by, bz), (cx, cy, cz) = edges
     first, end, top, bottom = rectangle
     for j in range(top, bottom):
@@ -191,18 +191,18 @@ def illuminate_triangles(
     surfaces: Surfaces,
     lights: NDArray[np.float32],
 ) -> None:
-    """Find how bright each pixel of a skin is, as `illuminate` does for primitives.
+    """Compute the brightness of the pixels that show triangles, as `illuminate` for primitives.
 
     The normal is interpolated between those of the corners (Phong 1975, "Illumination for computer
-    generated pictures"), which makes a coarse mesh look round.
+    generated pictures"), which makes a coarse mesh look smooth.
 
     Args:
-        meshes: The scene's skins.
+        meshes: The scene's meshes.
         seen: ``(V, 3)`` vertices as from `to_camera_frame`.
-        lens: The camera's numbers.
+        lens: Parameters of the camera.
         first_surface: As in `draw_triangles`.
-        surfaces: ``(H, W)`` what is seen.
-        lights: ``(H, W)``, written where a triangle is seen.
+        surfaces: ``(H, W)`` visible surfaces.
+        lights: ``(H, W)``, written where a triangle is visible.
     """
     for j in range(surfaces.shape[0]):
         for i in range(surfaces.shape[1]):
@@ -213,7 +213,7 @@ def illuminate_triangles(
 
 @njit(cache=True, error_model="numpy", inline="always")
 def _light(meshes: MeshTable, seen: Floats, t: int, x: float, y: float) -> float:
-    """Brightness of a triangle where the ray of slopes (x, y) meets it."""
+    """Return the brightness of a triangle where the ray of slopes (x, y) hits it."""
     i, j, k = meshes.triangles[t, 0], meshes.triangles[t, 1], meshes.triangles[t, 2]
     a, b, c = _at(seen, i), _at(seen, j), _at(seen, k)
     u, v, w = _edge(b, c, x, y), _edge(c, a, x, y), _edge(a, b, x, y)

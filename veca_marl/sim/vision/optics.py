@@ -1,4 +1,4 @@
-"""A pinhole camera that sees a `Scene`: colours, depths and who is where."""
+"""A pinhole camera that renders a `Scene`: colours, depths and object ids."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from veca_marl.sim.geometry.scene import Scene
 from veca_marl.sim.geometry.tables import Bools
 from veca_marl.sim.geometry.vectors import single
 from veca_marl.sim.vision.rasterizer import Lens
-from veca_marl.sim.vision.rendering import Drawn, Views, render_views
+from veca_marl.sim.vision.rendering import DrawMasks, Views, render_views
 
 
 @dataclass(frozen=True)
@@ -24,11 +24,11 @@ class Camera:
         width: Pixels.
         height: Pixels.
         fov_deg: Vertical field of view, as in OpenGL and PyBullet; pixels are square.
-        near_m: Nothing nearer is drawn: who presses its face to a wall would see through it.
-        far_m: Nothing farther is drawn.
+        near_m: Near plane. Small, since an eye in contact with a wall would see through it.
+        far_m: Far plane.
 
     Raises:
-        ValueError: If a number is not possible.
+        ValueError: If a number is outside of its range.
     """
 
     width: int = 84
@@ -40,11 +40,11 @@ class Camera:
 
     def __post_init__(self) -> None:
         if self.width < 1 or self.height < 1:
-            raise ValueError(f"a camera of {self.width}x{self.height} pixels: want at least 1x1")
+            raise ValueError(f"width x height {self.width}x{self.height} must be at least 1x1")
         if not 0.0 < self.fov_deg < 170.0:
-            raise ValueError(f"fov_deg {self.fov_deg}: want degrees between 0 and 170")
+            raise ValueError(f"fov_deg {self.fov_deg} must be between 0 and 170")
         if not 0.0 < self.near_m < self.far_m < np.inf:
-            raise ValueError(f"near_m {self.near_m}, far_m {self.far_m}: want 0 < near < far")
+            raise ValueError(f"near_m {self.near_m}, far_m {self.far_m}: must be 0 < near < far")
         object.__setattr__(self, "lens", self._lens())
 
     def _lens(self) -> Lens:
@@ -63,19 +63,19 @@ class Camera:
 
     @property
     def degrees_per_pixel(self) -> float:
-        """Angle that one pixel covers at the centre of the picture."""
+        """Visual angle of a pixel at the centre of the image."""
         return math.degrees(2.0 * self.lens.tan_y / self.height)
 
     def project(self, pose: Pose, points: Floats) -> Floats:
-        """Return where world points fall in the picture.
+        """Project world points to the image.
 
         Args:
-            pose: Of the camera.
+            pose: Pose of the camera.
             points: ``(N, 3)`` metres, world frame.
 
         Returns:
             ``(N, 3)``: column and row in pixels (0.5 is the middle of the first one) and depth in
-            metres; column and row mean nothing where the depth is not positive.
+            metres; column and row are undefined where the depth is not positive.
         """
         forward, left, up = ((points - pose.position) @ pose.rotation).T
         tan_x, tan_y = self.lens.tan_x, self.lens.tan_y
@@ -84,12 +84,12 @@ class Camera:
         return np.stack([column, row, forward], axis=1)
 
     def render(self, scene: Scene, poses: Sequence[Pose], hidden: Bools | None = None) -> Views:
-        """Return what the camera sees of a scene from some poses, as of `Scene.update`.
+        """Render a scene from some poses, as of its last `update`.
 
         Args:
-            scene: The world.
+            scene: The scene.
             poses: One per view: x axis forward, y left, z up.
-            hidden: ``(S,)`` surfaces to leave out, as from `Scene.hidden`.
+            hidden: ``(S,)`` mask of surfaces to leave out, as from `Scene.hidden`.
         """
         views = self._blank(len(poses))
         axes = np.array([view_axes(pose) for pose in poses])
@@ -98,7 +98,7 @@ class Camera:
         return views
 
     def _blank(self, count: int) -> Views:
-        """Buffers for so many views."""
+        """Return uninitialised buffers for a number of views."""
         size = (count, self.height, self.width)
         return Views(
             np.empty((*size, 3), np.uint8),
@@ -109,7 +109,7 @@ class Camera:
 
 
 def view_axes(pose: Pose) -> Floats:
-    """Return ``(4, 3)``: position, right, up and forward axes of an eye, as the renderer wants."""
+    """Return ``(4, 3)``: position, right, up and forward axes of a camera pose, world frame."""
     forward, left, up = pose.rotation.T
     axes = np.empty((4, 3))
     axes[0], axes[1], axes[2], axes[3] = pose.position, -left, up, forward
@@ -125,7 +125,7 @@ def look_at(position: Floats, target: Floats) -> Pose:
     way = np.asarray(target, np.float64) - position
     left = np.array([-way[1], way[0], 0.0])
     if not np.linalg.norm(left) > 1e-9:
-        raise ValueError(f"cannot look level from {position} at {target}")
+        raise ValueError(f"no level camera at {position} can look at {target}")
     forward, left = way / np.linalg.norm(way), left / np.linalg.norm(left)
     return Pose(
         np.asarray(position, np.float64), np.stack([forward, left, np.cross(forward, left)], 1)
@@ -133,12 +133,12 @@ def look_at(position: Floats, target: Floats) -> Pose:
 
 
 def seen_fraction(views: Views, object_id: int) -> float:
-    """Return the share of all pixels that show an object, be it through glass or as glass."""
+    """Return the fraction of pixels that show an object, also through or as a transparent one."""
     return float(np.mean((views.ids == object_id) | (views.glass_ids == object_id)))
 
 
-def _drawn(scene: Scene, hidden: Bools | None) -> Drawn:
-    """Sort out what is drawn and how."""
+def _drawn(scene: Scene, hidden: Bools | None) -> DrawMasks:
+    """Return the masks of a scene without its hidden surfaces."""
     geoms, count = scene.geoms, len(scene.surfaces.objects)
     shown = np.ones(count, np.bool_) if hidden is None else ~hidden
     if shown.shape != (count,):
@@ -146,4 +146,4 @@ def _drawn(scene: Scene, hidden: Bools | None) -> Drawn:
     first = len(geoms.shapes)
     casting = ~geoms.transparent & shown[:first]
     glass = geoms.transparent & geoms.visible & shown[:first]
-    return Drawn(casting & geoms.visible, glass, casting, shown[first:])
+    return DrawMasks(casting & geoms.visible, glass, casting, shown[first:])

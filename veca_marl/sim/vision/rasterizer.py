@@ -1,14 +1,14 @@
-"""Which surface each pixel sees, and how far away: ray casting of primitives in tight rectangles.
+"""Rasterization of primitives: ray casting within tight screen rectangles.
 
-For every primitive the screen rectangle that bounds it is walked row by row, and the ray through
-each pixel is intersected with it in closed form, in its own axes. A depth buffer keeps the nearest
-hit and a surface buffer remembers whose it was. The row loops have no branches, so that the
-compiler turns them into vector instructions.
+For every primitive the rays through the pixels of its bounding rectangle are intersected with it in
+closed form, row by row, in its own axes. A depth buffer stores the nearest hit and a surface buffer
+the index of the surface that was hit. The row loops have no branches, so that the compiler
+vectorises them.
 
-A ray is ``forward + x * right + y * up`` with slopes x and y, so the parameter of a hit is its
-distance along the optical axis. Primitives are seen from outside only; an eye within one sees out.
-Anything else that fills the same two buffers, such as `triangles`, can be drawn before or after: a
-surface is an integer, and only `shading` asks what it stands for.
+A ray is ``forward + x * right + y * up`` with slopes x and y, so that the parameter of a hit is its
+distance along the optical axis. Only the outer side of a primitive is drawn: a camera inside of one
+does not see it. Other rasterizers, such as `mesh_rasterizer`, fill the same two buffers before or
+afterwards; only `shading` interprets the surface indices.
 """
 
 from __future__ import annotations
@@ -32,23 +32,23 @@ Surfaces: TypeAlias = NDArray[np.int16]
 Ray: TypeAlias = tuple[Vector, Vector, Vector, Vector]
 Rectangle: TypeAlias = tuple[int, int, int, int]
 
-NOTHING = -1
+NO_SURFACE = -1
 
 _SPHERE, _BOX, _CYLINDER = int(Shape.SPHERE), int(Shape.BOX), int(Shape.CYLINDER)
-# a single keeps the loops in single precision, which doubles the width of the vectors
+# a float32 constant keeps the loops in single precision: twice as many vector lanes
 _HALF = single(0.5)
 
 
 class Lens(NamedTuple):
-    """The numbers of a pinhole camera that the loops need, its scalars in single precision.
+    """Intrinsic parameters of a pinhole camera for compiled loops; scalars in single precision.
 
     Attributes:
         columns: ``(W,)`` float32 slope to the right of each column's centre.
         rows: ``(H,)`` float32 upward slope of each row's centre, upper row first.
-        tan_x: Slope of the right edge of the picture.
-        tan_y: Slope of the upper edge of the picture.
+        tan_x: Slope of the right edge of the image.
+        tan_y: Slope of the upper edge of the image.
         near: Metres; nearer surfaces are not drawn.
-        far: Metres; the depth where nothing is seen.
+        far: Metres; the depth of pixels without a surface.
     """
 
     columns: NDArray[np.float32]
@@ -74,12 +74,12 @@ def draw_geoms(
     Args:
         geoms: The scene's primitives.
         drawn: ``(G,)`` which of them to draw.
-        view: ``(4, 3)`` world coordinates: position, right, up and forward axes of the eye.
-        lens: The camera's numbers.
-        bounded: Walk the bounding rectangles; false walks the whole picture for each primitive,
-            which is the slow truth that tests compare with.
-        depth: ``(H, W)`` metres along the optical axis, updated where something nearer is hit.
-        surfaces: ``(H, W)`` row of the primitive that is seen, updated likewise.
+        view: ``(4, 3)`` position, right, up and forward axes of the camera, world frame.
+        lens: Parameters of the camera.
+        bounded: Whether to restrict each primitive to its bounding rectangle; False covers the
+            whole image, the slow reference of the tests.
+        depth: ``(H, W)`` metres along the optical axis, updated where a nearer surface is hit.
+        surfaces: ``(H, W)`` row of the visible primitive, updated likewise.
     """
     for g in range(geoms.shapes.shape[0]):
         if not drawn[g]:
@@ -96,7 +96,7 @@ def draw_geoms(
 
 @njit(cache=True, error_model="numpy")
 def local_ray(position: Floats, rotation: Floats, view: Floats) -> Ray:
-    """Eye position and right, up and forward axes in a primitive's own axes."""
+    """Return camera position and right, up and forward axes in a primitive's own axes."""
     return (
         into_local(
             rotation, view[0, 0] - position[0], view[0, 1] - position[1], view[0, 2] - position[2]
@@ -109,7 +109,7 @@ def local_ray(position: Floats, rotation: Floats, view: Floats) -> Ray:
 
 @njit(cache=True, error_model="numpy")
 def into_local(rotation: Floats, x: float, y: float, z: float) -> Vector:
-    """World vector to local axes, in single precision from here on."""
+    """Return a world vector in local axes, in single precision."""
     return (
         single(rotation[0, 0] * x + rotation[1, 0] * y + rotation[2, 0] * z),
         single(rotation[0, 1] * x + rotation[1, 1] * y + rotation[2, 1] * z),
@@ -119,7 +119,7 @@ def into_local(rotation: Floats, x: float, y: float, z: float) -> Vector:
 
 @njit(cache=True, error_model="numpy")
 def _rectangle(shape: int, size: NDArray[np.float32], ray: Ray, lens: Lens) -> Rectangle:
-    """Pixels (first column, last + 1, first row, last + 1) that a primitive may cover."""
+    """Return pixels (first column, last + 1, first row, last + 1) that a primitive may cover."""
     eye, right, up, forward = ray
     centre = (
         -(eye[0] * right[0] + eye[1] * right[1] + eye[2] * right[2]),
@@ -147,14 +147,14 @@ def _rectangle(shape: int, size: NDArray[np.float32], ray: Ray, lens: Lens) -> R
 
 @njit(cache=True, error_model="numpy")
 def pixel_rectangle(across: Interval, upward: Interval, lens: Lens) -> Rectangle:
-    """Pixels whose centres may lie between some slopes; empty if they are outside the picture."""
+    """Return the pixels with centres between two pairs of slopes; empty outside of the image."""
     left, right = max(across[0], -lens.tan_x), min(across[1], lens.tan_x)
     bottom, top = max(upward[0], -lens.tan_y), min(upward[1], lens.tan_y)
     if left >= right or bottom >= top:
         return 0, 0, 0, 0
     width, height = lens.columns.shape[0], lens.rows.shape[0]
     per_x, per_y = width / (2.0 * lens.tan_x), height / (2.0 * lens.tan_y)
-    # a pixel of margin absorbs the rounding
+    # one pixel of margin covers rounding errors
     return (
         max(math.floor((left + lens.tan_x) * per_x - 1.0), 0),
         min(math.ceil((right + lens.tan_x) * per_x + 1.0), width),
@@ -174,7 +174,7 @@ def _draw(
     depth: Depths,
     surfaces: Surfaces,
 ) -> None:
-    """Intersect the rays of a rectangle with one primitive."""
+    """Intersect the rays of a rectangle with one primitive and update the buffers."""
     eye, right, up, forward = ray
     first, end, top, bottom = rectangle
     columns, near = lens.columns[first:end], lens.near

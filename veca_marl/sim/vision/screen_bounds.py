@@ -1,7 +1,7 @@
-"""Tight screen rectangles of primitives: what makes analytic rendering fast.
+"""Tight screen bounds of primitives, so that few rays miss the primitive they are tested with.
 
-Screen positions are slopes: a point at (right, up, forward) metres of the eye has the slopes
-(right / forward, up / forward). An interval whose low end is above its high end is empty.
+Screen positions are slopes: a point at (right, up, forward) metres in the camera frame has the
+slopes (right / forward, up / forward). An interval with its low end above its high end is empty.
 """
 
 from __future__ import annotations
@@ -17,19 +17,19 @@ from veca_marl.sim.geometry.vectors import Vector
 Interval: TypeAlias = tuple[float, float]
 
 _EDGES_PER_AXIS = 4
-# a tangent beyond this angle from the optical axis (89 degrees) lies outside every picture
+# tangents beyond this angle from the optical axis (89 degrees) lie outside of every image
 _GRAZING_RAD = 1.5533
 
 
 @njit(cache=True, error_model="numpy")
 def disc_interval(across: float, forward: float, radius: float, limit: float) -> Interval:
-    """Slopes between the two tangents from the eye to a disc, cut to [-limit, limit].
+    """Return the slopes of the two tangents from the camera to a disc, cut to [-limit, limit].
 
     Args:
         across: Metres from the optical axis to the disc's centre, along one screen axis.
         forward: Metres to the disc's centre along the optical axis.
         radius: Metres.
-        limit: Slope of the picture's edge.
+        limit: Slope of the edge of the image.
     """
     squared = across * across + forward * forward - radius * radius
     if squared <= 0.0:
@@ -41,14 +41,14 @@ def disc_interval(across: float, forward: float, radius: float, limit: float) ->
         return (middle - half) / steep, (middle + half) / steep
     if forward <= -radius:
         return limit, -limit
-    # the disc reaches through the plane of the eye: one tangent only bounds what is ahead
+    # the disc crosses the plane of the camera: only one tangent bounds the part in front of it
     edge = _forward_tangent(abs(across), forward, radius)
     return (edge, limit) if across > 0.0 else (-limit, -edge)
 
 
 @njit(cache=True, error_model="numpy")
 def _forward_tangent(across: float, forward: float, radius: float) -> float:
-    """Slope of the tangent, on the side of the optical axis, to a disc beside the eye."""
+    """Return the slope of the tangent to a disc beside the camera, on the optical axis' side."""
     angle = math.atan2(across, forward)
     angle -= math.asin(radius / math.sqrt(across * across + forward * forward))
     return math.tan(angle) if angle < _GRAZING_RAD else math.inf
@@ -64,11 +64,11 @@ def rod_interval(
     radius: float,
     limit: float,
 ) -> Interval:
-    """Slopes that a capsule covers; a cylinder lies within the capsule of the same numbers."""
+    """Return bounds of the slopes of a capsule, and of the cylinder that it contains."""
     ahead = forward + half_length * axis_forward
     behind = forward - half_length * axis_forward
     if ahead * behind < 0.0:
-        return -limit, limit  # its axis passes the eye: no tangent bounds it
+        return -limit, limit  # the axis crosses the plane of the camera: no tangent bounds it
     low, high = disc_interval(across + half_length * axis_across, ahead, radius, limit)
     other_low, other_high = disc_interval(across - half_length * axis_across, behind, radius, limit)
     return min(low, other_low), max(high, other_high)
@@ -78,12 +78,12 @@ def rod_interval(
 def box_intervals(
     centre: Vector, half: Vector, right: Vector, up: Vector, forward: Vector, near: float
 ) -> tuple[Interval, Interval]:
-    """Slopes (right, up) that a box covers, from its edges cut at the near plane.
+    """Return bounds of the slopes (right, up) of a box, from its edges clipped at the near plane.
 
     Args:
-        centre: The box's centre seen from the eye: (right, up, forward) metres.
+        centre: The box's centre in the camera frame: (right, up, forward) metres.
         half: Half extents along the box's own axes.
-        right: The eye's right axis in the box's own axes; likewise `up` and `forward`.
+        right: The camera's right axis in the box's own axes; likewise `up` and `forward`.
         up: See `right`.
         forward: See `right`.
         near: Metres; nothing nearer is drawn.

@@ -1,4 +1,4 @@
-"""Two eyes: what a body sees from its eye mounts."""
+"""The sense of vision: the images of two eyes."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from veca_marl.sim.geometry.tables import Bools
 from veca_marl.sim.physics.world import World
 from veca_marl.sim.sense import Sense
 from veca_marl.sim.spec import ArraySpec
-from veca_marl.sim.vision.image_filters import Blur, Defocus, Filter, Grey, Look
+from veca_marl.sim.vision.image_filters import Blur, Defocus, Filter, FilterContext, Grey
 from veca_marl.sim.vision.infant_vision import InfantVision
 from veca_marl.sim.vision.optics import Camera, seen_fraction
 from veca_marl.sim.vision.rendering import Views
 
 
 class Eyes(Enum):
-    """How many eyes are open. The observation's shape does not depend on it."""
+    """The number of open eyes; the shape of the observation does not depend on it."""
 
     binocular = "binocular"
     monocular = "monocular"
@@ -29,20 +29,20 @@ class Eyes(Enum):
 
 @dataclass
 class VisionCfg:
-    """The eyes and what dims them.
+    """Settings of the sense of vision.
 
     Attributes:
-        present: Whether the body can see at all.
+        present: Whether the observation contains the sense.
         width: Pixels of each eye's image.
         height: Pixels of each eye's image.
         fov_deg: Vertical field of view.
-        eyes: Monocular repeats the left eye's image for the right one.
-        grey: Take the colours away.
+        eyes: `monocular` repeats the image of the left eye for the right one.
+        grey: Replace colours by luma.
         blur_deg: Standard deviation of a Gaussian blur in degrees of visual angle; 0 for none.
-        infant_age_months: Acuity and colour vision of that age; None for an adult's.
-        defocus: Blur what is not at the distance to which the eyes' lenses are adjusted.
-        depth: Also observe the distance of each pixel.
-        segmentation: Also observe whose each pixel is.
+        infant_age_months: Acuity and colour vision of an infant of that age; None for an adult's.
+        defocus: Blur surfaces that are not at the focal distance of the eyes.
+        depth: Also observe the depth of each pixel.
+        segmentation: Also observe the object id of each pixel.
     """
 
     present: bool = True
@@ -60,9 +60,9 @@ class VisionCfg:
     def __post_init__(self) -> None:
         self.camera()
         if not isinstance(self.eyes, Eyes):
-            raise ValueError(f"eyes {self.eyes!r}: want one of {[eyes.name for eyes in Eyes]}")
+            raise ValueError(f"eyes {self.eyes!r}; choices: {[eyes.name for eyes in Eyes]}")
         if self.blur_deg < 0.0:
-            raise ValueError(f"blur_deg {self.blur_deg}: want 0 (none) or a positive angle")
+            raise ValueError(f"blur_deg {self.blur_deg} must be 0 (none) or a positive angle")
         make_filters(self)
 
     def camera(self) -> Camera:
@@ -71,7 +71,7 @@ class VisionCfg:
 
 
 def make_filters(cfg: VisionCfg) -> list[Filter]:
-    """Return the filters a configuration asks for, in the order light meets them."""
+    """Return the filters of a configuration: optics of the lens first, then retina."""
     filters: list[Filter] = []
     if cfg.defocus:
         filters.append(Defocus())
@@ -85,14 +85,21 @@ def make_filters(cfg: VisionCfg) -> list[Filter]:
 
 
 class VisionSense(Sense):
-    """What one body sees.
+    """Two eyes of one body. It has no memory: steps that were not read change nothing.
 
-    Rendering is lazy and done once per state of the world: `read`, `is_visible` and
-    `seen_fraction` share it in any order.
+    Rendering is lazy and happens once per state of the scene and the eyes: `read`, `is_visible` and
+    `seen_fraction` share it in any order. `is_visible` and `seen_fraction` follow eyes that are
+    turned within a step, `read` does not.
+
+    Observations:
+        vision: ``(2, 3, H, W)`` uint8, left eye first.
+        depth: ``(2, H, W)`` float32 metres along the optical axis, on request.
+        segmentation: ``(2, H, W)`` int16 object ids (-1 is the sky), on request. Like depth it
+            shows what is behind transparent objects.
 
     Attributes:
-        camera: The lens and the pixels of either eye.
-        filters: Applied to the images in this order.
+        camera: The camera of either eye.
+        filters: Filters in the order of their application.
     """
 
     cfg_type = VisionCfg
@@ -109,50 +116,46 @@ class VisionSense(Sense):
         self._seen: tuple[bytes, Views] | None = None
 
     def compute(self) -> dict[str, NDArray[Any]]:
-        """Return `vision` ``(2, 3, H, W)`` uint8 and what else was asked for.
-
-        `depth` ``(2, H, W)`` float32 metres along the optical axis and `segmentation`
-        ``(2, H, W)`` int16 object ids (-1 is the sky) show what is behind transparent objects.
-        """
+        """See `Sense`."""
         views = self.views()
         rgb = views.rgb
-        look = Look(self.camera, views.depth, self._body.focal_distance_m)
+        context = FilterContext(self.camera, views.depth, self._body.focal_distance_m)
         for apply in self.filters:
-            rgb = apply(rgb, look)
+            rgb = apply(rgb, context)
         everything: dict[str, NDArray[Any]] = {
             "vision": rgb.transpose(0, 3, 1, 2),
             "depth": views.depth,
             "segmentation": views.ids,
         }
-        return {name: _two(everything[name]) for name in self.specs}
+        return {name: _for_both_eyes(everything[name]) for name in self.specs}
 
     def views(self) -> Views:
-        """Return what the open eyes see now, before any filter; not to be written into."""
+        """Return the present images of the open eyes before any filter; do not write into them."""
         poses = [self._body.mount(name) for name in self._mounts]
         state = self._scene.version.to_bytes(8) + b"".join(
             array.tobytes() for pose in poses for array in pose
         )
         if self._seen is None or self._seen[0] != state:
-            self._seen = state, self.camera.render(self._scene, poses, self._own_head())
+            self._seen = state, self.camera.render(self._scene, poses, self._own_head_mask())
         return self._seen[1]
 
     def seen_fraction(self, object_id: int) -> float:
-        """Return the share of the eyes' pixels that show an object, also through glass."""
+        """Return the fraction of all pixels that show an object, also through transparent ones."""
         return seen_fraction(self.views(), object_id)
 
     def is_visible(self, object_id: int) -> bool:
-        """Return whether a pixel of an open eye shows an object, also through glass."""
+        """Return whether a pixel of an open eye shows an object, also through transparent ones."""
         return self.seen_fraction(object_id) > 0.0
 
-    def _own_head(self) -> Bools:
-        """Mask of the surfaces that would fill the eyes; renewed when the scene has grown."""
+    def _own_head_mask(self) -> Bools:
+        """Return the mask of the surfaces of the own head, recomputed when the scene has grown."""
         if len(self._hidden) != len(self._scene.surfaces.objects):
             self._hidden = self._scene.hidden(self._body.object_id, self._body.own_head_frames)
         return self._hidden
 
 
 def _specs(cfg: VisionCfg, camera: Camera) -> dict[str, ArraySpec]:
-    """Names and shapes of what `VisionSense.read` will return."""
+    """Return the specs of a configuration."""
     size = (2, cfg.height, cfg.width)
     specs = {"vision": ArraySpec((2, 3, cfg.height, cfg.width), np.uint8, 0, 255)}
     if cfg.depth:
@@ -162,6 +165,6 @@ def _specs(cfg: VisionCfg, camera: Camera) -> dict[str, ArraySpec]:
     return specs
 
 
-def _two(images: NDArray[Any]) -> NDArray[Any]:
-    """One image per eye, contiguous: a closed eye's place is filled by the open one's."""
+def _for_both_eyes(images: NDArray[Any]) -> NDArray[Any]:
+    """Return contiguous images of both eyes; that of the open one stands for a closed one."""
     return np.ascontiguousarray(images if len(images) == 2 else images.repeat(2, axis=0))

@@ -1,9 +1,9 @@
-"""Colours for a picture whose surfaces and depths are known: each pixel is lit once.
+"""Deferred shading: colours of an image from its surface and depth buffers, once per pixel.
 
-A fixed sun from above, light from all around that leaves the sides away from the sun visible, a
-checker pattern where a primitive asks for one, and a sky that fades upwards. Light is computed in
-the primitive's own axes along runs of pixels that see the same one, so that the inner loops are
-short and without branches.
+Lambert's cosine law for one directional light, an ambient term, light reflected from below, an
+optional checker pattern, and a vertical gradient for the sky. Brightness is computed in the
+primitive's own axes along runs of pixels that show the same primitive, so that the inner loops have
+no branches.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from veca_marl.sim.geometry.primitives import Shape
 from veca_marl.sim.geometry.tables import GeomTable
 from veca_marl.sim.geometry.vectors import Vector, single
 from veca_marl.sim.vision.rasterizer import (
-    NOTHING,
+    NO_SURFACE,
     Depths,
     Lens,
     Surfaces,
@@ -31,9 +31,9 @@ from veca_marl.sim.vision.rasterizer import (
 Images: TypeAlias = NDArray[np.uint8]
 Lights: TypeAlias = NDArray[np.float32]
 
-SUN = (0.36, 0.26, 0.896)  # unit vector towards it
-AMBIENT = 0.45  # share of a colour that is seen where no sun falls
-BOUNCE = 0.12  # share thrown back onto the sides that face away
+SUN = (0.36, 0.26, 0.896)  # unit vector towards the directional light
+AMBIENT = 0.45  # brightness of surfaces parallel to the light
+BOUNCE = 0.12  # brightness added to surfaces that face away from the light
 DARK_TILE = 0.82  # brightness of every second tile of a checker pattern
 SKY = (0.60, 0.75, 0.95)
 GLASS_OPACITY = 0.3  # weight of a transparent primitive's own colour
@@ -41,13 +41,13 @@ GLASS_OPACITY = 0.3  # weight of a transparent primitive's own colour
 _SPHERE, _BOX, _CYLINDER = int(Shape.SPHERE), int(Shape.BOX), int(Shape.CYLINDER)
 _0, _1, _HALF, _255 = single(0.0), single(1.0), single(0.5), single(255.0)
 _AMBIENT, _DIRECT, _BOUNCE = single(AMBIENT), single(1.0 - AMBIENT), single(BOUNCE)
-# tiles start a little beside the origin, so that a face on a tile's edge does not flicker
+# offset of the tiles from the origin, so that a face in the plane of tile edges does not flicker
 _TILE_SHIFT = 0.01
 
 
 @njit(cache=True, error_model="numpy")
-def paint_sky(lens: Lens, rgb: Images) -> None:
-    """Fill a picture ``(H, W, 3)`` with a sky that is lighter towards the top."""
+def fill_sky(lens: Lens, rgb: Images) -> None:
+    """Fill an image ``(H, W, 3)`` with a vertical gradient, lighter towards the top."""
     for j in range(rgb.shape[0]):
         brightness = 0.875 + 0.125 * lens.rows[j] / lens.tan_y
         for c in range(3):
@@ -57,12 +57,14 @@ def paint_sky(lens: Lens, rgb: Images) -> None:
 
 
 @njit(cache=True, error_model="numpy")
-def paint(colours: Lights, surfaces: Surfaces, lights: Lights, opacity: float, rgb: Images) -> None:
-    """Lay the lit colours of the surfaces over a picture.
+def blend_colours(
+    colours: Lights, surfaces: Surfaces, lights: Lights, opacity: float, rgb: Images
+) -> None:
+    """Blend the lit colours of the surfaces over an image.
 
     Args:
         colours: ``(S, 3)`` of the scene's surfaces, in [0, 1].
-        surfaces: ``(H, W)`` rows of the surfaces seen; where `NOTHING`, the picture stays.
+        surfaces: ``(H, W)`` indices of the visible surfaces; `NO_SURFACE` leaves a pixel unchanged.
         lights: ``(H, W)`` brightness of each pixel, as from `illuminate`.
         opacity: Weight of the new colours, in [0, 1].
         rgb: ``(H, W, 3)``, updated.
@@ -70,7 +72,7 @@ def paint(colours: Lights, surfaces: Surfaces, lights: Lights, opacity: float, r
     for j in range(rgb.shape[0]):
         for i in range(rgb.shape[1]):
             g = surfaces[j, i]
-            if g == NOTHING:
+            if g == NO_SURFACE:
                 continue
             scale = single(opacity) * _255 * lights[j, i]
             for c in range(3):
@@ -83,15 +85,15 @@ def paint(colours: Lights, surfaces: Surfaces, lights: Lights, opacity: float, r
 def illuminate(
     geoms: GeomTable, view: Floats, lens: Lens, depth: Depths, surfaces: Surfaces, lights: Lights
 ) -> None:
-    """Find how bright each pixel's surface is: Lambert's cosine law plus ambient light.
+    """Compute the brightness of the pixels that show primitives.
 
     Args:
         geoms: The scene's primitives.
-        view: ``(4, 3)`` position, right, up and forward axes of the eye in the world.
-        lens: The camera's numbers.
+        view: ``(4, 3)`` position, right, up and forward axes of the camera, world frame.
+        lens: Parameters of the camera.
         depth: ``(H, W)`` metres.
-        surfaces: ``(H, W)`` rows of the surfaces seen, `NOTHING` for none.
-        lights: ``(H, W)``, written where a primitive is seen.
+        surfaces: ``(H, W)`` indices of the visible surfaces, `NO_SURFACE` for none.
+        lights: ``(H, W)``, written where a primitive is visible.
     """
     width = surfaces.shape[1]
     for j in range(surfaces.shape[0]):
@@ -100,7 +102,7 @@ def illuminate(
             first, g = end, surfaces[j, end]
             while end < width and surfaces[j, end] == g:
                 end += 1
-            if g == NOTHING or g >= geoms.shapes.shape[0]:
+            if g == NO_SURFACE or g >= geoms.shapes.shape[0]:
                 continue
             columns, run = lens.columns[first:end], depth[j, first:end]
             _light_run(geoms, g, view, lens.rows[j], columns, run, lights[j, first:end])
@@ -118,7 +120,7 @@ def _light_run(
     depth: Depths,
     lights: Lights,
 ) -> None:
-    """Light a run of pixels that see one primitive."""
+    """Compute the brightness of a run of pixels that show one primitive."""
     eye, right, up, forward = local_ray(geoms.positions[g], geoms.rotations[g], view)
     sun = into_local(geoms.rotations[g], SUN[0], SUN[1], SUN[2])
     start = (forward[0] + y * up[0], forward[1] + y * up[1], forward[2] + y * up[2])
@@ -137,7 +139,7 @@ def _light_run(
 
 @njit(cache=True, error_model="numpy")
 def _local_normal(shape: int, size: Lights, point: Vector) -> Vector:
-    """Outward unit normal in a primitive's own axes."""
+    """Return the outward unit normal at a point of a primitive, in its own axes."""
     x, y, z = point
     if shape == _BOX:
         ax, ay, az = abs(x) - size[0], abs(y) - size[1], abs(z) - size[2]
@@ -166,7 +168,7 @@ def _local_normal(shape: int, size: Lights, point: Vector) -> Vector:
 def _tile_run(
     view: Floats, y: float, columns: Depths, depth: Depths, edge_m: float, lights: Lights
 ) -> None:
-    """Darken every second tile of a checker pattern that fills space."""
+    """Darken every second cell of a three-dimensional checker pattern in the world frame."""
     per_m = 1.0 / edge_m
     for i in range(columns.shape[0]):
         x, t = columns[i], depth[i]
@@ -179,9 +181,9 @@ def _tile_run(
 
 
 @njit(cache=True, error_model="numpy")
-def name_objects(objects: Surfaces, surfaces: Surfaces) -> None:
-    """Turn rows of surfaces into object ids, in place; `NOTHING` stays."""
+def to_object_ids(objects: Surfaces, surfaces: Surfaces) -> None:
+    """Replace surface indices by object ids, in place; `NO_SURFACE` is kept."""
     for j in range(surfaces.shape[0]):
         for i in range(surfaces.shape[1]):
-            if surfaces[j, i] != NOTHING:
+            if surfaces[j, i] != NO_SURFACE:
                 surfaces[j, i] = objects[surfaces[j, i]]

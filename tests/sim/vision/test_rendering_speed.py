@@ -1,4 +1,4 @@
-"""The price of a look, against PyBullet's software renderer in the same run."""
+"""The cost of rendering relative to PyBullet's software renderer in the same run."""
 
 import time
 
@@ -34,13 +34,15 @@ def crowded_room(rng):
     return scene
 
 
-def processor_s(look, repeats):
-    """Processor time of one call. Wall time would flatter us on a busy machine: a short call fits
-    between two interruptions, a long one does not."""
-    look()
+def processor_s(render, repeats):
+    """Processor time of one call.
+
+    Wall time on a busy machine would favour the shorter call, which fits between interruptions.
+    """
+    render()
     start = time.process_time()
     for _ in range(repeats):
-        look()
+        render()
     return (time.process_time() - start) / repeats
 
 
