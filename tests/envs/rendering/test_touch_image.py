@@ -51,5 +51,5 @@ def test_the_file_holds_the_picture(tmp_path):
 def test_readings_of_something_else_are_refused():
     stage = Stage()
     stage.scene.update()
-    with pytest.raises(ValueError, match=r"\(9888,\).*want \(1648, 6\)"):
+    with pytest.raises(ValueError, match=r"\(9888,\).*must be \(1648, 6\)"):
         touch_image(stage.scene, stage.body, np.zeros(9888))

@@ -208,7 +208,7 @@ def digest_of_an_observation():
 
 def digest_elsewhere(**environment):
     """The same hash from another process."""
-    code = "import test_vision; print(test_vision.digest_of_an_observation())"
+    code = "import test_vision_sense; print(test_vision_sense.digest_of_an_observation())"
     other = subprocess.run(
         [sys.executable, "-c", code],
         cwd=pathlib.Path(__file__).parent,
