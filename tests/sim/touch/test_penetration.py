@@ -189,15 +189,18 @@ def test_the_reading_depends_on_the_present_geometry_only():
 
 
 def test_distant_primitives_add_less_than_half_of_the_cost():
-    costs = []
+    """The least of several batches, alternating, since other processes disturb single ones."""
+    stages, costs = [], []
     for count in (0, 300):
-        stage = Stage()
-        press_forearm(stage, 0.003)
+        stages.append(Stage())
+        press_forearm(stages[-1], 0.003)
         for _ in range(count):
-            stage.add("SPHERE", (0.1,), (5.0, 5.0, 0.5))
-        stage.read()
-        start = time.process_time()
-        for _ in range(300):
-            stage.sense.update_taxels()
-        costs.append(time.process_time() - start)
-    assert costs[1] < 1.5 * costs[0]
+            stages[-1].add("SPHERE", (0.1,), (5.0, 5.0, 0.5))
+        stages[-1].read()
+    for _ in range(15):
+        for stage in stages:
+            start = time.thread_time()
+            for _ in range(20):
+                stage.sense.update_taxels()
+            costs.append(time.thread_time() - start)
+    assert min(costs[1::2]) < 1.5 * min(costs[::2])
