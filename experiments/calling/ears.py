@@ -18,7 +18,7 @@ from veca_marl.config import compose
 from veca_marl.envs.core.game import Game
 from veca_marl.envs.experts.control.locomotion import locomotion_of
 from veca_marl.envs.experts.perception.call_localization import loudness
-from veca_marl.envs.tasks.multi_agent.contests import line_up
+from veca_marl.envs.tasks.multi_agent.contests import place_player
 from veca_marl.envs.tasks.multi_agent.navigation import free_place
 from veca_marl.sim.sound.calls import Call
 
@@ -43,7 +43,7 @@ def listen(game: Game, together: bool, rng: np.random.Generator) -> NDArray[np.f
         while math.dist(*places) < LEAST_M:
             places = [free_place(room, [], 0.5, rng) for _ in game.players]
         for player, place in zip(game.players, places, strict=True):
-            line_up(player, place, rng.uniform(-math.pi, math.pi))
+            place_player(player, place, rng.uniform(-math.pi, math.pi))
     legs = {p.name: locomotion_of(p, world.clock.step_s) for p in game.players}
     for player in game.players:
         game.observe(player)

@@ -8,9 +8,15 @@ from seeking import world_with
 
 from veca_marl.envs.core.task import Player
 from veca_marl.envs.experts.control.locomotion import locomotion_of
+<<<<<<< HEAD
 from veca_marl.envs.tasks.multi_agent.contests import line_up
 from veca_marl.sim.body.humanoid import Detail, Humanoid, HumanoidCfg, JointActionKind
 from veca_marl.sim.body.walker import Walker, WalkerCfg
+=======
+from veca_marl.envs.tasks.multi_agent.contests import place_player
+from veca_marl.sim.body.humanoid.humanoid import Detail, Humanoid, HumanoidCfg, JointActionKind
+from veca_marl.sim.body.walker.walker import Walker, WalkerCfg
+>>>>>>> 132edd8 (wip)
 
 BODIES = {
     "walker": (Walker, WalkerCfg()),
@@ -37,7 +43,7 @@ def mover(request):
 def start(mover):
     world, player = mover
     world.reset(np.random.default_rng(0))
-    line_up(player, np.zeros(2), 0.0)
+    place_player(player, np.zeros(2), 0.0)
     return locomotion_of(player, world.clock.step_s)
 
 

@@ -30,7 +30,7 @@ def test_getting_ahead_pays_up_to_the_top_speed(game, shift_m, paid):
     """20 mm in a step of 40 ms are 0.5 m/s; going back costs as much."""
     game.reset(np.random.default_rng(1))
     body = game.players[0].body
-    game.task._place = body.position - shift_m * body.forward
+    game.task._position = body.position - shift_m * body.forward
     assert rest(game).terms["agents"]["forward"] == pytest.approx(paid, abs=0.12)
 
 

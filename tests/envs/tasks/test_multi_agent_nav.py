@@ -10,7 +10,7 @@ from veca_marl.config import ConfigError, compose
 from veca_marl.envs.core.game import Game
 from veca_marl.envs.experts.control.locomotion import locomotion_of
 from veca_marl.envs.experts.control.path_following import PathFollower
-from veca_marl.envs.tasks.multi_agent.contests import line_up
+from veca_marl.envs.tasks.multi_agent.contests import place_player
 from veca_marl.envs.tasks.multi_agent.multi_agent_nav import MultiAgentNavCfg, Muted
 from veca_marl.envs.tasks.multi_agent.navigation import gap_m
 from veca_marl.sim.sound.calls import CALLS, Call, call_waveform
@@ -266,8 +266,8 @@ def test_a_joint_level_body_crawls_to_the_object_that_it_sees_and_calls():
     finder, other = game.players
     assert finder.body.bone("chest").forward[2] < -0.8
     room = game.task.plan.rooms[0]
-    line_up(finder, room.middle_m - np.array([0.8, 0.0, 0.0]), 0.0)
-    line_up(other, game.task.plan.rooms[2].middle_m, 0.0)
+    place_player(finder, room.middle_m - np.array([0.8, 0.0, 0.0]), 0.0)
+    place_player(other, game.task.plan.rooms[2].middle_m, 0.0)
     game.task.target.place(room.middle_m + np.array([0.7, 0.0, 0.2]))
     called = False
     while finder.name not in game.task.arrived:
@@ -295,7 +295,7 @@ def test_who_cannot_get_on_goes_back_and_comes_round():
     game.reset(rng)
     player, other = game.players
     low, size = game.task.plan.rooms[0].lower_m, game.task.plan.rooms[0].size_m
-    line_up(player, (low[0] + 0.55, low[1] + size[1] / 2.0), math.pi)
+    place_player(player, (low[0] + 0.55, low[1] + size[1] / 2.0), math.pi)
     goal = np.array([low[0] + 2.0, low[1] + size[1] / 2.0])
     legs = locomotion_of(player, STEP_S)
     traveller = PathFollower(player.body, legs, game.task.plan, STEP_S)
@@ -344,18 +344,18 @@ def test_muting_is_by_where_they_start():
         }
         game.close()
     assert voices == {
-        Muted.nobody: {True: False, False: False},
+        Muted.none: {True: False, False: False},
         Muted.finder: {True: True, False: False},
-        Muted.everybody: {True: True, False: True},
+        Muted.all: {True: True, False: True},
     }
 
 
 def test_the_experts_solve_it_and_without_the_finders_voice_do_much_worse():
     """The sound carries it: the same starts; everything is told in experiments/calling."""
     times = {}
-    for muted in (Muted.nobody, Muted.finder):
+    for muted in (Muted.none, Muted.finder):
         game = game_of(f"task.muted={muted.value}", playground="seven_rooms")
         times[muted] = np.array([seconds_needed(game, seed) for seed in range(6)])
         game.close()
-    assert np.isfinite(times[Muted.nobody]).all()
+    assert np.isfinite(times[Muted.none]).all()
     assert np.isinf(times[Muted.finder]).sum() >= 3

@@ -9,7 +9,13 @@ from seeking import BALL_M, ball_at, walker_at, wall_across, world_with
 
 from veca_marl.envs.core.task import Player
 from veca_marl.envs.tasks.multi_agent import navigation
-from veca_marl.envs.tasks.multi_agent.navigation import Sight, free_pair, free_place, gap_m, way_to
+from veca_marl.envs.tasks.multi_agent.navigation import (
+    PropVisibility,
+    displacement_to,
+    free_pair,
+    free_place,
+    gap_m,
+)
 from veca_marl.sim.physics.playground import RoomCfg
 from veca_marl.sim.vision.optics import Camera, look_at, seen_fraction
 
@@ -39,13 +45,13 @@ def mover(velocity, yaw_deg=0.0):
     ],
 )
 def test_the_way_is_split_by_the_body_and_the_side_of_the_object(velocity, target, way):
-    np.testing.assert_allclose(way_to(mover(velocity), target, STEP_S), way, atol=1e-15)
+    np.testing.assert_allclose(displacement_to(mover(velocity), target, STEP_S), way, atol=1e-15)
 
 
 def test_the_way_turns_with_the_body():
     """A quarter to the left, what was ahead is to the right."""
     np.testing.assert_allclose(
-        way_to(mover((1.0, 0.0), yaw_deg=90.0), AHEAD, STEP_S), (0.0, 0.04), atol=1e-15
+        displacement_to(mover((1.0, 0.0), yaw_deg=90.0), AHEAD, STEP_S), (0.0, 0.04), atol=1e-15
     )
 
 
@@ -99,8 +105,8 @@ def test_walls_hide_the_object_from_one_and_not_from_another(world):
     behind = Player("behind", "team", walker_at(world, name="behind"))
     near = Player("near", "team", walker_at(world, 2.0, name="near"))
     world.refresh()
-    sight = Sight(world.scene, world.props["ball"])
-    assert [sight.of(player) for player in (behind, near, behind)] == [False, True, False]
+    sight = PropVisibility(world.scene, world.props["ball"])
+    assert [sight.for_player(player) for player in (behind, near, behind)] == [False, True, False]
 
 
 def test_an_eye_is_asked_once_a_picture(world, monkeypatch):
@@ -111,15 +117,15 @@ def test_an_eye_is_asked_once_a_picture(world, monkeypatch):
         return True
 
     monkeypatch.setattr(navigation, "is_visible", look)
-    sight, player = Sight(world.scene, world.props["ball"]), Player("one", "team", None)
-    assert sight.of(player)
-    assert sight.of(player)
+    sight, player = PropVisibility(world.scene, world.props["ball"]), Player("one", "team", None)
+    assert sight.for_player(player)
+    assert sight.for_player(player)
     assert len(asked) == 1
     world.step()
-    assert sight.of(player)
+    assert sight.for_player(player)
     assert len(asked) == 2
     sight.clear()
-    assert sight.of(player)
+    assert sight.for_player(player)
     assert len(asked) == 3
 
 

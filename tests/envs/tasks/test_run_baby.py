@@ -17,7 +17,7 @@ def game():
 def shifted(game, posture, shift_m):
     """Return the term of a step of rest in which the chest got so far ahead."""
     body = put(game, posture)
-    game.task._place = body.bone("chest").position - shift_m * body.forward
+    game.task._position = body.bone("chest").position - shift_m * body.forward
     return rest(game).terms["agents"]["forward"]
 
 

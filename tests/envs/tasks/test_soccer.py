@@ -31,7 +31,7 @@ def begin(game, ball=None, velocity=(0.0, 0.0, 0.0)):
     if ball is not None:
         game.task.ball.place(np.array(ball), 0.0)
         game.task.ball.set_velocity(np.array(velocity))
-        game.task._now = game.task._look()
+        game.task._state = game.task._observe_state()
 
 
 def roll_in(game, ball, velocity, seconds=1.5):
@@ -119,7 +119,7 @@ def test_facing_pays_for_the_angle_that_is_made_good_and_no_more(alone):
     begin(alone, (0.0, 0.0, 0.12))
     body = alone.players[0].body
     body.place((-2.0, 0.0, 0.0), math.radians(100.0))
-    alone.task._now = alone.task._look()
+    alone.task._state = alone.task._observe_state()
     paid = []
     for turn in (-1.0,) * 15 + (1.0,) * 10:
         outcome = alone.step({"attacker": np.array([0.0, turn], np.float32)})
@@ -132,7 +132,7 @@ def test_approach_pays_for_the_way_to_the_ball_and_a_ball_that_rolls_away_costs_
     begin(alone, (0.0, 0.0, 0.12))
     body = alone.players[0].body
     body.place((-1.5, 0.0, 0.0))
-    alone.task._now = alone.task._look()
+    alone.task._state = alone.task._observe_state()
     rows = {"attacker": np.array([1.0, 0.0], np.float32)}
     steps = [alone.step(rows) for _ in range(10)]
     total = sum(outcome.terms["attacker"]["approach"] for outcome in steps)

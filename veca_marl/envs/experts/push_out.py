@@ -32,7 +32,7 @@ class PushOutExpert(Expert[PushOut]):
         """Return a command for the player's kind of body, see `Expert.act`."""
         task, body, clearances = self.task, self.player.body, self._locomotion.clearances
         other = nearest(body, task.opponents_playing(self.player))
-        goal = pushing_goal(body, clearances, other, task.middle, task.cfg.radius_m)
+        goal = pushing_goal(body, clearances, other, task.ring.middle, task.ring.radius_m)
         if abs(bearing_rad(body, goal)) > clearances.back_rad:
             return self._locomotion.back()
         return self._locomotion.to(goal)

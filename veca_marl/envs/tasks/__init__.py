@@ -1,4 +1,4 @@
-"""The tasks. Importing this package registers them all."""
+"""Rules of the tasks that ship with the package. Importing this package registers them."""
 
 from veca_marl.envs.tasks.locomotion.crawl_baby import CrawlBaby
 from veca_marl.envs.tasks.locomotion.run_baby import RunBaby

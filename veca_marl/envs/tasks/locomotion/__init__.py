@@ -1,1 +1,1 @@
-"""Tasks in which a body learns to move: TurnBaby, SitBaby, CrawlBaby, RunBaby."""
+"""Tasks of motor skills of one joint-level body: TurnBaby, SitBaby, CrawlBaby, RunBaby."""

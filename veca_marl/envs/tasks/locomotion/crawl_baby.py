@@ -1,4 +1,4 @@
-"""CrawlBaby: on hands and knees, get ahead."""
+"""CrawlBaby: crawl forwards on hands and knees."""
 
 from __future__ import annotations
 
@@ -8,17 +8,22 @@ import numpy as np
 
 from veca_marl.envs.core.scoring import clipped_speed_mps
 from veca_marl.envs.core.task import Player, Task, register, require_humanoid, terms
-from veca_marl.envs.tasks.locomotion.moving import StartCfg, start_near_edge
+from veca_marl.envs.tasks.locomotion.start_poses import (
+    StartCfg,
+    face_down_cosines,
+    start_near_edge,
+)
 from veca_marl.sim.body.humanoid.postures import ON_ALL_FOURS
 
 
 @dataclass
 class CrawlBabyCfg(StartCfg):
-    """How the child starts, and what getting ahead is worth.
+    """Parameters of CrawlBaby.
 
     Attributes:
-        spread_deg: Standard deviation of every joint from the posture `on_all_fours` at the start.
-        top_mps: To be faster is no better.
+        spread_deg: Standard deviation of every joint angle at the start about the posture
+            `on_all_fours`, in [0, 30].
+        top_mps: Speed at which the term `forward` is clipped.
     """
 
     max_seconds: float = 8.0
@@ -33,18 +38,19 @@ class CrawlBabyCfg(StartCfg):
 
 @register
 class CrawlBaby(Task):
-    """A child is on hands and knees near the edge of the room, the middle ahead; it shall crawl.
+    """A joint-level body on hands and knees has to crawl from the edge of the room to its middle.
 
-    The paper rewards "the velocity and the orientation of the torso and hip" and says no more.
-    Ours: velocity is that of the pelvis along the trunk's heading, and face down is the right
-    orientation. Orientation is worth little beside velocity, since it is right at the start. The
-    episode lasts 8 s and never ends early; 1 m of crawling is worth 2.5 with the default weights.
+    The paper (table of tasks in the appendix; "Joint-level Locomotion & Control") rewards "the
+    velocity and the orientation of its torso and hip" and gives no numbers. In this task the
+    velocity is that of the pelvis along the heading of the trunk, and the rewarded orientation is
+    face down. The orientation has a small weight, since it is right at the start. An episode
+    lasts `max_seconds` and never terminates. With the default weights, 1 m adds 2.5 to the return.
 
     Terms:
-        forward: mean velocity of the pelvis in this step along the horizontal heading of the trunk,
-            m/s, at most `top_mps` either way.
-        torso: cosine of the angle between the front of the chest and straight down, in [-1, 1].
-        hip: the same of the pelvis.
+        forward: Mean velocity of the pelvis during the step along the horizontal heading of the
+            trunk, m/s, clipped to [-top_mps, top_mps].
+        torso: Cosine of the angle between the front of the chest and straight down, in [-1, 1].
+        hip: The same for the pelvis.
     """
 
     senses = ("proprioception", "touch")
@@ -53,20 +59,17 @@ class CrawlBaby(Task):
     def build(self) -> None:
         self.body = require_humanoid(self.players[0])
         self.room = self.world.playground.rooms[0]
-        self._place, self._way = np.zeros(3), np.zeros(3)
+        self._position, self._displacement = np.zeros(3), np.zeros(3)
 
     def reset(self, rng: np.random.Generator) -> None:
         start_near_edge(self.body, self.room, ON_ALL_FOURS, self.cfg.spread_deg, rng)
-        self._place = self.body.position
+        self._position = self.body.position
 
     def after_step(self, rng: np.random.Generator) -> None:
-        self._way = self.body.position - self._place
-        self._place = self.body.position
+        position = self.body.position
+        self._displacement, self._position = position - self._position, position
 
     def reward(self, player: Player) -> dict[str, float]:
         step_s, top_mps = self.world.clock.step_s, self.cfg.top_mps
-        return {
-            "forward": clipped_speed_mps(self._way, self.body.forward, step_s, top_mps),
-            "torso": -float(self.body.bone("chest").forward[2]),
-            "hip": -float(self.body.bone("pelvis").forward[2]),
-        }
+        speed_mps = clipped_speed_mps(self._displacement, self.body.forward, step_s, top_mps)
+        return {"forward": speed_mps, **face_down_cosines(self.body)}

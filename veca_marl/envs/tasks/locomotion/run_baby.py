@@ -1,4 +1,4 @@
-"""RunBaby: from standing, get ahead on two feet."""
+"""RunBaby: run forwards on two feet."""
 
 from __future__ import annotations
 
@@ -8,19 +8,20 @@ import numpy as np
 
 from veca_marl.envs.core.scoring import clipped_speed_mps, horizontal
 from veca_marl.envs.core.task import Player, Task, register, require_humanoid, terms
-from veca_marl.envs.tasks.locomotion.moving import StartCfg, start_near_edge
+from veca_marl.envs.tasks.locomotion.start_poses import StartCfg, start_near_edge
 from veca_marl.sim.body.humanoid.postures import STANDING
 
 
 @dataclass
 class RunBabyCfg(StartCfg):
-    """How the child starts, what getting ahead is worth, and what a fall is.
+    """Parameters of RunBaby.
 
     Attributes:
-        spread_deg: Standard deviation of every joint from the posture `standing` at the start.
-        top_mps: To be faster is no better.
-        fallen_m: Who has the top of the chest (where the neck begins) lower than this has fallen.
-            It is at 0.61 m in who stands.
+        spread_deg: Standard deviation of every joint angle at the start about the posture
+            `standing`, in [0, 30].
+        top_mps: Speed at which the term `forward` is clipped.
+        fallen_m: Height of the top of the chest (the base of the neck) below which the body has
+            fallen, in [0, 0.5]; it is 0.61 m when standing. 0 turns the termination off.
     """
 
     max_seconds: float = 8.0
@@ -38,16 +39,17 @@ class RunBabyCfg(StartCfg):
 
 @register
 class RunBaby(Task):
-    """A child stands near the edge of the room, the middle ahead; it shall run.
+    """A joint-level body stands at the edge of the room, faces its middle and has to run.
 
-    The paper rewards "the velocity to the direction of its torso" and says no more. Ours: the
-    velocity is that of the chest along the horizontal part of its forward axis, so that to dive
-    headlong or to slide on the belly pays little. A fall ends the episode (`task.fallen_m=0` lets
-    it go on); else it lasts 8 s. 1 m of running is worth 2.5 with the default weight.
+    The paper (table of tasks in the appendix; "Joint-level Locomotion & Control") rewards "the
+    velocity to the direction of its torso" and gives no numbers. In this task the velocity is
+    that of the chest along the horizontal part of its forward axis, so that a body that dives or
+    slides on its belly is rewarded little. A fall terminates the episode; otherwise it lasts
+    `max_seconds`. With the default weight, 1 m adds 2.5 to the return.
 
     Terms:
-        forward: mean velocity of the chest in this step along its forward axis as far as that is
-            horizontal, m/s, at most `top_mps` either way.
+        forward: Mean velocity of the chest during the step along the horizontal part of its
+            forward axis, m/s, clipped to [-top_mps, top_mps].
     """
 
     senses = ("proprioception", "touch")
@@ -56,23 +58,20 @@ class RunBaby(Task):
     def build(self) -> None:
         self.body = require_humanoid(self.players[0])
         self.room = self.world.playground.rooms[0]
-        self._place, self._way = np.zeros(3), np.zeros(3)
+        self._position, self._displacement = np.zeros(3), np.zeros(3)
 
     def reset(self, rng: np.random.Generator) -> None:
         start_near_edge(self.body, self.room, STANDING, self.cfg.spread_deg, rng)
-        self._place = self.body.bone("chest").position
+        self._position = self.body.bone("chest").position
 
     def after_step(self, rng: np.random.Generator) -> None:
-        place = self.body.bone("chest").position
-        self._way, self._place = place - self._place, place
+        position = self.body.bone("chest").position
+        self._displacement, self._position = position - self._position, position
 
     def reward(self, player: Player) -> dict[str, float]:
+        step_s, top_mps = self.world.clock.step_s, self.cfg.top_mps
         ahead = horizontal(self.body.bone("chest").forward)
-        return {
-            "forward": clipped_speed_mps(
-                self._way, ahead, self.world.clock.step_s, self.cfg.top_mps
-            )
-        }
+        return {"forward": clipped_speed_mps(self._displacement, ahead, step_s, top_mps)}
 
     def terminated(self) -> bool:
         return bool(self.body.bone("neck").position[2] < self.cfg.fallen_m)

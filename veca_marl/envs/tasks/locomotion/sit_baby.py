@@ -1,4 +1,4 @@
-"""SitBaby: from lying on the back, come to sit."""
+"""SitBaby: sit up from lying on the back."""
 
 from __future__ import annotations
 
@@ -9,19 +9,20 @@ import numpy as np
 
 from veca_marl.envs.core.scoring import clipped_share
 from veca_marl.envs.core.task import Player, Task, register, require_humanoid, terms
-from veca_marl.envs.tasks.locomotion.moving import StartCfg, draw_posture, start_anywhere
+from veca_marl.envs.tasks.locomotion.start_poses import StartCfg, draw_posture, start_anywhere
 
 
 @dataclass
 class SitBabyCfg(StartCfg):
-    """How the child lies at the start, and how high who sits is.
+    """Parameters of SitBaby.
 
     Attributes:
-        starts: Shares of the postures in which episodes begin. Who learns may begin further on in
-            part of them (a curriculum, see experiments/sitting).
-        spread_deg: Standard deviation of every joint from the posture at the start.
-        torso_m: Height of the top of the chest (where the neck begins) of who sits upright.
-        head_m: Height of the middle of the head of who sits upright.
+        starts: Weights of the postures in which episodes start, by name. Other postures than
+            `on_back` make a curriculum, see experiments/sitting.
+        spread_deg: Standard deviation of every joint angle at the start about the posture, in
+            [0, 30].
+        torso_m: Height of the top of the chest (the base of the neck) when sitting upright.
+        head_m: Height of the middle of the head when sitting upright.
     """
 
     max_seconds: float = 10.0
@@ -40,19 +41,19 @@ class SitBabyCfg(StartCfg):
 
 @register
 class SitBaby(Task):
-    """A child lies on its back, with its joints a little anywhere; it shall come to sit.
+    """A joint-level body lies on its back at a random place in the room and has to sit up.
 
-    The paper rewards "the position of its torso and head" and says no more. Ours: what counts is
-    how high they are, as a share of the height of a child that sits upright and no higher, so
-    that to stand up is no better than to sit. How it sits is its own affair: on its bottom, on its
-    heels, leaning on its hands. The torso is measured at its top: measured at the waist, a bridge
-    on neck and feet would pay. The episode begins anywhere in the room, lasts 10 s and never ends
-    early; with the default weights it is worth 10 to who sat all the time, and about 2 to who
-    stays on the back.
+    The paper (table of tasks in the appendix; "Joint-level Locomotion & Control") rewards "the
+    position of its torso and head" and gives no numbers. This task rewards their heights, as
+    shares of the heights when sitting upright and clipped to 1, so that standing up brings no
+    more than sitting. The torso is measured at its top, since a bridge on neck and feet raises
+    the waist. Any way of sitting counts: on the bottom, on the heels, supported by the hands. An
+    episode lasts `max_seconds` and never terminates. With the default weights its return is 10
+    when sitting and about 2 when lying on the back.
 
     Terms:
-        torso: height of the top of the chest above the floor, as a share of `torso_m`, in [0, 1].
-        head: the same of the middle of the head and `head_m`.
+        torso: Height of the top of the chest divided by `torso_m`, clipped to [0, 1].
+        head: Height of the middle of the head divided by `head_m`, clipped to [0, 1].
     """
 
     senses = ("proprioception", "touch")

@@ -1,4 +1,4 @@
-"""TurnBaby: lie on the back, turn over to the belly."""
+"""TurnBaby: turn over from the back to the belly."""
 
 from __future__ import annotations
 
@@ -7,16 +7,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from veca_marl.envs.core.task import Player, Task, register, require_humanoid, terms
-from veca_marl.envs.tasks.locomotion.moving import StartCfg, face_down, start_anywhere
+from veca_marl.envs.tasks.locomotion.start_poses import StartCfg, face_down_cosines, start_anywhere
 from veca_marl.sim.body.humanoid.postures import ON_BACK
 
 
 @dataclass
 class TurnBabyCfg(StartCfg):
-    """How the child lies at the start, and what lying on the belly is worth.
+    """Parameters of TurnBaby.
 
     Attributes:
-        spread_deg: Standard deviation of every joint from the posture `on_back` at the start.
+        spread_deg: Standard deviation of every joint angle at the start about the posture
+            `on_back`, in [0, 30].
     """
 
     max_seconds: float = 8.0
@@ -25,15 +26,16 @@ class TurnBabyCfg(StartCfg):
 
 @register
 class TurnBaby(Task):
-    """A child lies on its back, with its joints a little anywhere; it shall turn to its belly.
+    """A joint-level body lies on its back at a random place in the room and has to turn over.
 
-    The paper rewards "the orientation of its torso and hip" and says no more. Ours: the episode
-    begins anywhere in the room, lasts 8 s and never ends early; with the default weights it is
-    worth -10 to who stays on the back and +10 to who lay on the belly all the time.
+    The paper (table of tasks in the appendix; "Joint-level Locomotion & Control") rewards "the
+    orientation of its torso and hip" and gives no numbers. This task rewards a front that points
+    straight down. An episode lasts `max_seconds` and never terminates. With the default weights
+    its return is -10 on the back and +10 on the belly.
 
     Terms:
-        torso: cosine of the angle between the front of the chest and straight down, in [-1, 1].
-        hip: the same of the pelvis.
+        torso: Cosine of the angle between the front of the chest and straight down, in [-1, 1].
+        hip: The same for the pelvis.
     """
 
     senses = ("proprioception", "touch")
@@ -47,4 +49,4 @@ class TurnBaby(Task):
         start_anywhere(self.body, self.room, ON_BACK, self.cfg.spread_deg, rng)
 
     def reward(self, player: Player) -> dict[str, float]:
-        return face_down(self.body)
+        return face_down_cosines(self.body)

@@ -1,1 +1,1 @@
-"""Tasks of several agents: navigation, ring, soccer."""
+"""Tasks of several agents: MultiAgentNav, PushOut and Soccer."""

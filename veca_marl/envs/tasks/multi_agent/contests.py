@@ -1,4 +1,4 @@
-"""Games of one team against another on one floor: what rings and pitches share."""
+"""Shared parts of games between two teams on one floor: starting poses, opponents, markings."""
 
 from __future__ import annotations
 
@@ -16,66 +16,66 @@ from veca_marl.sim.geometry.vectors import horizontal_distance
 from veca_marl.sim.physics.props import PropCfg, PropShape
 from veca_marl.sim.physics.world import World
 
-_FAR_M = 10.0
+_HORIZON_M = 10.0
 
 Colour = tuple[float, float, float]
 
 
-def line_up(player: Player, place: Floats, heading_rad: float) -> None:
-    """Let a player start: who walks stands, a joint-level body is on hands and knees.
+def place_player(player: Player, place: Floats, heading_rad: float) -> None:
+    """Place a player: a walker standing, a joint-level body on hands and knees.
 
     Args:
-        player: Who.
-        place: ``(2,)`` metres on the floor plan.
-        heading_rad: Where it faces.
+        player: The player.
+        place: ``(2,)`` or ``(3,)`` metres; the height is ignored.
+        heading_rad: Heading.
     """
-    spot = np.array([place[0], place[1], 0.0])
+    position = np.array([place[0], place[1], 0.0])
     if isinstance(player.body, Humanoid):
-        player.body.place(spot, heading_rad, ON_ALL_FOURS)
+        player.body.place(position, heading_rad, ON_ALL_FOURS)
     else:
-        player.body.place(spot, heading_rad)
+        player.body.place(position, heading_rad)
 
 
-def look_ahead(players: Sequence[Player]) -> None:
-    """Let the eyes of joint-level bodies look ahead to the horizon, as far as they turn.
+def direct_gaze_ahead(players: Sequence[Player]) -> None:
+    """Turn the eyes of joint-level bodies to the horizon in front, as far as they turn.
 
-    On hands and knees the face is turned to the floor.
+    On hands and knees the face points to the floor.
     """
     for player in players:
         body = player.body
         if isinstance(body, Humanoid):
-            body.look_toward_point(body.mount("head").position + _FAR_M * body.forward)
+            body.look_toward_point(body.mount("head").position + _HORIZON_M * body.forward)
 
 
 def opponents(player: Player, players: Sequence[Player]) -> list[Player]:
-    """Return those of other teams."""
+    """Return the players of other teams."""
     return [other for other in players if other.team != player.team]
 
 
 def nearest(body: Body, others: Sequence[Player]) -> Body:
-    """Return whose pelvis is nearest to a body's, on the floor plan; on a tie the first."""
+    """Return the body with the smallest horizontal distance; the first one in case of a tie."""
     return min(
         (other.body for other in others),
         key=lambda other: horizontal_distance(other.position, body.position),
     )
 
 
-def on_floor(direction_rad: float, distance_m: float = 1.0) -> Floats:
-    """Return a point of the floor plan seen from its origin, ``(2,)`` metres."""
+def polar_point(direction_rad: float, distance_m: float = 1.0) -> Floats:
+    """Return the point of the floor at polar coordinates, ``(2,)`` metres."""
     return distance_m * np.array([math.cos(direction_rad), math.sin(direction_rad)])
 
 
-def paint_disc(
+def add_painted_disc(
     world: World, name: str, centre: Floats, radius_m: float, top_m: float, colour: Colour
 ) -> None:
-    """Paint a disc on the floor: seen, not felt, and no step to stumble over.
+    """Add a disc to the floor that is visible and has no collision.
 
     Args:
-        world: Where.
-        name: Of the prop.
+        world: The world.
+        name: Name of the prop.
         centre: ``(2,)`` metres.
-        radius_m: Of the disc.
-        top_m: How thick the paint is; of two discs the thicker one is seen.
+        radius_m: Radius.
+        top_m: Thickness; of two overlapping discs the thicker one is visible.
         colour: Red, green, blue in [0, 1].
     """
     world.add_prop(

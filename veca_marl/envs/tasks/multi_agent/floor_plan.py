@@ -1,4 +1,4 @@
-"""Rooms and the doors between them as a graph: how to get from one to another."""
+"""Floor plan of a house: rooms and doors as a graph, and shortest paths through it."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ import numpy as np
 from veca_marl.sim.geometry.pose import Floats
 from veca_marl.sim.physics import DoorCfg, PlaygroundCfg, RoomCfg
 
-_CORNER_M = 0.7  # so far from both walls somebody has room in a corner
+_CORNER_M = 0.7  # distance of a waiting place in a corner from both walls
 
 
 class DoorApproach(NamedTuple):
-    """How somebody goes through doors.
+    """How a body passes through doors.
 
     Attributes:
-        before_m: From so far before it the opening is straight ahead; so far beyond it all is
-            passed.
-        right_m: How far to the right of the middle, if the door is wide enough: others come the
-            other way.
+        before_m: Distance from the door of the points in front of it and beyond it that the path
+            leads through.
+        right_m: Lateral offset to the right of the middle, limited by the width of the door, that
+            keeps bodies apart that come from opposite sides.
     """
 
     before_m: float
@@ -29,21 +29,30 @@ class DoorApproach(NamedTuple):
 
 
 class _Passage(NamedTuple):
-    """A door as one of its two rooms has it."""
+    """A door, seen from one of its two rooms.
+
+    Attributes:
+        door: The door.
+        out: Unit vector out of the room, normal to the wall, ``(2,)``.
+        beyond: Number of the room on the other side.
+    """
 
     door: DoorCfg
-    out: Floats  # (2,) unit vector, square to the wall
+    out: Floats
     beyond: int
 
 
 class FloorPlan:
-    """Rooms as nodes, doors as edges.
+    """Rooms as nodes and doors as edges of a graph.
 
-    Ways are measured between the middles of rooms and doors: the way from room to room is always
-    the same one, wherever in it somebody stands.
+    Lengths are measured between the middles of rooms and doors, so that the shortest path between
+    two rooms does not depend on the position within them.
 
     Args:
-        playground: What is planned.
+        playground: The house.
+
+    Attributes:
+        rooms: The rooms, by number.
     """
 
     def __init__(self, playground: PlaygroundCfg) -> None:
@@ -58,31 +67,31 @@ class FloorPlan:
         self._routes = [self._routes_from(room) for room in range(len(self.rooms))]
 
     def room_of(self, place: Floats) -> int:
-        """Return the number of the room a place ``(2,)`` or ``(3,)`` is in, or of the nearest."""
+        """Return the number of the room that contains a place, or of the nearest one."""
         point = float(place[0]), float(place[1])
         return int(np.argmin([room.distance_m(point) for room in self.rooms]))
 
     def distance_m(self, one: int, other: int) -> float:
-        """Return how long the way is from the middle of a room to that of another; inf if none."""
+        """Return the length of the shortest path between the middles of two rooms; inf if none."""
         if one == other:
             return 0.0
         length, _ = self._routes[one].get(other, (math.inf, None))
         return length
 
     def waypoint(self, place: Floats, goal: Floats, approach: DoorApproach) -> Floats:
-        """Return where to walk straight to, on the way to a goal.
+        """Return the next point of the shortest path to a goal that can be reached straight.
 
         Args:
-            place: ``(2,)`` or ``(3,)`` metres, where somebody is.
-            goal: Likewise, where it wants to be.
-            approach: How it goes through doors.
+            place: Present place, ``(2,)`` or ``(3,)`` metres.
+            goal: ``(2,)`` or ``(3,)`` metres.
+            approach: How to pass through doors.
 
         Returns:
-            ``(2,)`` metres: the goal if it is in the same room; else a point before the next door
-            or, for somebody who has the opening straight ahead, one beyond it.
+            ``(2,)`` metres: the goal if it is in the same room; otherwise a point in front of the
+            next door or, if the opening is straight ahead, a point beyond it.
 
         Raises:
-            ValueError: If no doors lead there.
+            ValueError: If no path exists.
         """
         here, there = self.room_of(place), self.room_of(goal)
         if here == there:
@@ -94,24 +103,28 @@ class FloorPlan:
         return _through(passage, place, approach)
 
     def waiting_place(self, place: Floats) -> Floats:
-        """Return where in a room who stays is in nobody's way to a place ``(2,)`` or ``(3,)``.
+        """Return a waiting place near a place that leaves the paths to it free.
+
+        Args:
+            place: ``(2,)`` or ``(3,)`` metres.
 
         Returns:
-            ``(2,)`` metres: of four places near the corners, or halfway there in a small room, the
-            one that is farthest from the place and from all doors.
+            ``(2,)`` metres: of four places near the corners of the room (in a small room halfway
+            to the corners), the one with the greatest distance from the place and from all doors.
         """
         here = self.room_of(place)
         room = self.rooms[here]
         low, size = np.array(room.lower_m[:2]), np.array(room.size_m[:2])
         inset = np.minimum(_CORNER_M, size / 4.0)
-        keep_off = [place[:2], *(passage.door.position_m for passage in self._passages[here])]
+        doors = [np.array(passage.door.position_m) for passage in self._passages[here]]
+        avoided = [place[:2], *doors]
         corners = [
             low + np.where([right, far], size - inset, inset) for right in (0, 1) for far in (0, 1)
         ]
-        return max(corners, key=lambda corner: min(math.dist(corner, off) for off in keep_off))
+        return max(corners, key=lambda corner: min(math.dist(corner, other) for other in avoided))
 
     def _routes_from(self, start: int) -> dict[int, tuple[float, _Passage]]:
-        """Return length and first door of the shortest way to every other room (Dijkstra 1959)."""
+        """Return length and first door of the shortest path to every other room (Dijkstra 1959)."""
         found: dict[int, tuple[float, _Passage]] = {}
         frontier = [(0.0, start, -1)]  # length, room, number of the first door
         done = set()
@@ -129,14 +142,14 @@ class FloorPlan:
         return found
 
     def _length_m(self, room: int, passage: _Passage) -> float:
-        """Return how far it is through a door, from the middle of a room to that of the next."""
+        """Return the length of the path through a door between the middles of its rooms."""
         door = passage.door.position_m
         middles = (self.rooms[number].middle_m[:2] for number in (room, passage.beyond))
         return sum(math.dist(door, middle) for middle in middles)
 
 
 def _way_out(room: RoomCfg, other: RoomCfg) -> Floats:
-    """Return the unit vector ``(2,)`` from a room to one beside it, square to the wall between."""
+    """Return the unit normal ``(2,)`` of the wall between two rooms, towards the second."""
     low, size = np.array(room.lower_m[:2]), np.array(room.size_m[:2])
     other_low, other_size = np.array(other.lower_m[:2]), np.array(other.size_m[:2])
     gaps = np.stack([other_low - low - size, low - other_low - other_size])  # above, below
@@ -147,7 +160,7 @@ def _way_out(room: RoomCfg, other: RoomCfg) -> Floats:
 
 
 def _through(passage: _Passage, place: Floats, approach: DoorApproach) -> Floats:
-    """Return where to walk to go through a door, see `FloorPlan.waypoint`."""
+    """Return the next point of a path through a door, see `FloorPlan.waypoint`."""
     out = passage.out
     right = np.array([out[1], -out[0]])
     middle = np.array(passage.door.position_m)

@@ -1,4 +1,4 @@
-"""MultiAgentNav: who finds the object calls the others."""
+"""MultiAgentNav: search for an object in a house and call the other agents to it."""
 
 from __future__ import annotations
 
@@ -10,37 +10,49 @@ from typing import Any
 import numpy as np
 
 from veca_marl.envs.core.task import Player, Task, TaskCfg, Team, register, terms
-from veca_marl.envs.tasks.multi_agent.contests import line_up, look_ahead
+from veca_marl.envs.tasks.multi_agent.contests import direct_gaze_ahead, place_player
 from veca_marl.envs.tasks.multi_agent.floor_plan import FloorPlan
-from veca_marl.envs.tasks.multi_agent.navigation import Sight, free_pair, free_place, gap_m, way_to
+from veca_marl.envs.tasks.multi_agent.navigation import (
+    PropVisibility,
+    displacement_to,
+    free_pair,
+    free_place,
+    gap_m,
+)
 from veca_marl.sim.physics.props import PropCfg, PropShape
 
-_PASS_M = 0.2  # who stands at the object leaves so much between itself and the wall
+_PASSAGE_M = 0.2  # width that an agent at the object leaves free towards the walls
 
 
 class Muted(Enum):
-    """Whose voice is not heard: to ask what hearing is worth."""
+    """Agents without a voice, for measuring what hearing contributes.
 
-    nobody = "nobody"
+    Attributes:
+        none: All agents have a voice.
+        finder: The agent that starts in the room of the object has none.
+        all: No agent has a voice.
+    """
+
+    none = "none"
     finder = "finder"
-    everybody = "everybody"
+    all = "all"
 
 
 @dataclass
 class MultiAgentNavCfg(TaskCfg):
-    """How many seek what, and what finding it is worth.
+    """Parameters of MultiAgentNav.
 
     Attributes:
-        agents: How many seek, at least 2; the playground needs a room for each.
-        radius_m: Radius of the object, a ball too heavy to be moved.
-        reach_m: Who comes so near to its surface has reached it.
-        muted: Whose calls nobody hears; the finder is who starts in the object's room.
+        agents: Number of agents, at least 2; the playground needs a room for each.
+        radius_m: Radius of the object, a fixed ball.
+        reach_m: Distance from the surface of the object within which an agent has reached it.
+        muted: Agents without a voice, see `Muted`.
     """
 
     agents: int = 2
     radius_m: float = 0.2
     reach_m: float = 0.4
-    muted: Muted = Muted.nobody
+    muted: Muted = Muted.none
     weights: dict[str, float] = terms(reached=1.0, ahead=0.05, aside=0.03)
 
     def __post_init__(self) -> None:
@@ -49,36 +61,37 @@ class MultiAgentNavCfg(TaskCfg):
             raise ValueError(f"task.agents={self.agents} must be at least 2")
         if not isinstance(self.muted, Muted):
             choices = [choice.name for choice in Muted]
-            raise ValueError(f"task.muted={self.muted!r}; there are {choices}")
+            raise ValueError(f"task.muted={self.muted!r}; choices: {choices}")
         self._check_positive("radius_m", "reach_m")
 
 
 @register
 class MultiAgentNav(Task):
-    """Agents start in rooms of their own, the object lies in one of these; all must come to it.
+    """Agents start in separate rooms, one of which contains an object that all have to reach.
 
-    Nobody sees through walls, so that the one who finds the object should call: in the next room
-    the call is heard from where it comes from, through a door as it is, through a wall 30 dB
-    weaker. Each agent that reaches the object for the first time earns 1 for everybody; when the
-    last one has, the game is over. The paper gives the rooms, the shared reward and the helper
-    reward; sizes and times are ours.
+    An agent sees the object only from its room or through a door, so the agent that finds it
+    should call the others. A call is heard from its direction in the next room; a wall attenuates
+    it by 30 dB. The episode terminates when all agents have reached the object.
 
-    The paper's table of tasks lists vision, touch and proprioception, but its text has the others
-    come "using auditory perception": here they have ears as well.
+    The rooms, the shared reward and the helper reward are those of the paper (table of tasks and
+    "Helper Rewards" in the appendix; "Multi-Agent Reinforcement Learning"); sizes and times are
+    not in the paper. Departures: the paper's table lists vision, touch and proprioception, but its
+    text has agents come "using auditory perception", so hearing is included here; the helper
+    reward is in metres per step, see `displacement_to`.
 
-    `playground=seven_rooms`, its own, takes up to 7 agents: the ways are short, but who is not
-    called has much to search. `two_rooms`, `three_rooms` and `four_rooms` are for so many.
-    Joint-level bodies start on hands and knees and look ahead as far as their eyes turn; with
-    `body=mitten_voice` or `full_voice` they can call. They need more time: a scripted crawl solves
-    nearly every game within `task.max_seconds=90`.
+    The default `playground=seven_rooms` serves up to 7 agents; `two_rooms`, `three_rooms` and
+    `four_rooms` serve as many as their names say. Joint-level bodies start on hands and knees with
+    the eyes turned ahead; with `body=mitten_voice` or `full_voice` they can call. They need more
+    time: the scripted expert solves nearly every game with `task.max_seconds=90`.
 
     Terms:
-        reached: how many agents reached the object for the first time in this step, the same for
-            all. "All agents receive +1 reward when each agent navigates to the object" is read as
-            +1 for each of them, so that n agents earn n.
-        ahead: metres covered forward in this step (backward is negative) while the object is
-            visible to the left eye and until it is reached; the paper's Vis a_f.
-        aside: metres covered to the side the object is on, likewise; the paper's Vis a_l L.
+        reached: Number of agents that reached the object for the first time in this step, equal
+            for all agents. The paper's "all agents receive +1 reward when each agent navigates to
+            the object" is read as +1 for each agent that arrives.
+        ahead: Displacement forwards during the step, m (negative backwards), while the object is
+            visible to the left eye and the agent has not reached it. In the paper ``Vis a_f``.
+        aside: Displacement to the side on which the object is, m, under the same conditions. In
+            the paper ``Vis a_l L``.
     """
 
     senses = ("vision", "touch", "proprioception", "audio")
@@ -109,45 +122,46 @@ class MultiAgentNav(Task):
                 colour=(0.95, 0.15, 0.1),
             )
         )
-        self._sight = Sight(self.world.scene, self.target)
+        self._visibility = PropVisibility(self.world.scene, self.target)
         self.arrived: set[str] = set()
-        self._new = 0
+        self._newly_arrived = 0
 
     def reset(self, rng: np.random.Generator) -> None:
-        for memory in (self._sight, self.arrived):
-            memory.clear()
-        self._new = 0
+        self._visibility.clear()
+        self.arrived.clear()
+        self._newly_arrived = 0
         order = rng.permutation(len(self.plan.rooms))[: len(self.players)]
         rooms = [self.plan.rooms[index] for index in order]
         home = rooms[rng.integers(len(rooms))]
-        clear_m = self.cfg.radius_m + self.cfg.reach_m + _PASS_M
+        clear_m = self.cfg.radius_m + self.cfg.reach_m + _PASSAGE_M
         apart_m = self.cfg.radius_m + clear_m
         (x, y, floor_m), beside = free_pair(home, self._furniture, clear_m, apart_m, rng)
         self.target.place((x, y, floor_m + self.cfg.radius_m))
         for room, player in zip(rooms, self.players, strict=True):
             place = beside if room is home else free_place(room, self._furniture, clear_m, rng)
-            line_up(player, place, rng.uniform(-math.pi, math.pi))
-            if self.cfg.muted is not Muted.nobody:
-                player.body.muted = room is home or self.cfg.muted is Muted.everybody
-        look_ahead(self.players)
+            place_player(player, place, rng.uniform(-math.pi, math.pi))
+            if self.cfg.muted is not Muted.none:
+                player.body.muted = room is home or self.cfg.muted is Muted.all
+        direct_gaze_ahead(self.players)
 
     def after_step(self, rng: np.random.Generator) -> None:
-        look_ahead(self.players)
+        direct_gaze_ahead(self.players)
         before = len(self.arrived)
         for player in self.players:
             if gap_m(player.body.position, self.target) <= self.cfg.reach_m:
                 self.arrived.add(player.name)
-        self._new = len(self.arrived) - before
+        self._newly_arrived = len(self.arrived) - before
 
     def reward(self, player: Player) -> dict[str, float]:
-        ahead = aside = 0.0
+        ahead_m = aside_m = 0.0
         if player.name not in self.arrived and self.sees_target(player):
-            ahead, aside = way_to(player.body, self.target.position, self.world.clock.step_s)
-        return {"reached": float(self._new), "ahead": ahead, "aside": aside}
-
-    def sees_target(self, player: Player) -> bool:
-        """Return whether the object is visible to the left eye of a player."""
-        return self._sight.of(player)
+            step_s = self.world.clock.step_s
+            ahead_m, aside_m = displacement_to(player.body, self.target.position, step_s)
+        return {"reached": float(self._newly_arrived), "ahead": ahead_m, "aside": aside_m}
 
     def terminated(self) -> bool:
         return len(self.arrived) == len(self.players)
+
+    def sees_target(self, player: Player) -> bool:
+        """Return whether the object is visible to the left eye of a player."""
+        return self._visibility.for_player(player)

@@ -1,4 +1,4 @@
-"""The soccer pitch: a ball, a goal between boards, corners that give the ball back."""
+"""The soccer pitch: a ball, a goal, and boards that close the goal line and the corners."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from veca_marl.sim.physics.world import World
 
 POST_M = 0.04
 _BOARD_M = (0.06, 0.3)  # thickness and height
-_CORNER_M = 0.5  # of the floor, along both walls, behind a board across each corner
+_CORNER_M = 0.5  # length along both walls that the board across a corner cuts off
 _WHITE, _YELLOW, _ORANGE = (0.95, 0.95, 0.95), (0.95, 0.75, 0.1), (1.0, 0.4, 0.05)
 
 
 class PitchCfg(Protocol):
-    """What a pitch is told, see `SoccerCfg`."""
+    """Parameters of a pitch, see `SoccerCfg`."""
 
     radius_m: float
     mass_kg: float
@@ -28,38 +28,54 @@ class PitchCfg(Protocol):
 
 
 class Pitch:
-    """A pitch in the first room of a world; it lies along x, the goal is at the greater end.
+    """A pitch in the first room of a world, along x, with the goal at the end of greater x.
+
+    Args:
+        world: The world; ball, goal and boards are added to it.
+        cfg: Parameters.
 
     Attributes:
-        goal: ``(3,)`` metres, the middle of the goal line on the floor.
-        goal_width_m: Between the axes of the posts.
+        goal: Middle of the goal line on the floor, ``(3,)`` metres.
+        goal_width_m: Distance between the axes of the posts.
         ball: The ball.
-        low: ``(2,)`` metres, a corner of the floor before the goal line.
-        high: ``(2,)`` metres, the corner across.
+        low: Lower corner of the floor in front of the goal line, ``(2,)`` metres.
+        high: Upper corner, ``(2,)`` metres.
     """
 
     def __init__(self, world: World, cfg: PitchCfg) -> None:
-        room = world.playground.rooms[0]
+        self._room = room = world.playground.rooms[0]
         low, size = np.array(room.lower_m), np.array(room.size_m)
         self._cfg, self.goal_width_m = cfg, cfg.goal_width_m
         self.goal: Floats = low + np.array([size[0] - cfg.goal_from_wall_m, size[1] / 2.0, 0.0])
         self.low: Floats = low[:2]
         self.high: Floats = np.array([self.goal[0], low[1] + size[1]])
-        self.ball = self._lay_ball(world)
-        self._set_goal(world)
-        self._set_boards(world)
+        self.ball = self._add_ball(world)
+        self._add_goal(world)
+        self._add_boards(world)
 
-    def holds(self, length_m: float, width_m: float) -> bool:
-        """Say whether a part of the floor before the goal's middle is clear of the boards."""
-        size = self.high - self.low
-        return bool(length_m <= size[0] - 0.3 and width_m <= size[1] - 0.6)
-
-    def scores(self, before: Floats, after: Floats) -> bool:
-        """Say whether the ball's centre came through the goal's mouth, from the front.
+    def check_start_area(self, length_m: float, width_m: float) -> None:
+        """Check that the area of the start is clear of the boards.
 
         Args:
-            before: ``(3,)`` metres: where it was.
-            after: ``(3,)`` metres: where it is, one step later; its way is taken as straight.
+            length_m: Length in front of the goal.
+            width_m: Width, symmetric to the middle of the goal.
+
+        Raises:
+            ValueError: If it does not fit.
+        """
+        size = self.high - self.low
+        if not (length_m <= size[0] - 0.3 and width_m <= size[1] - 0.6):
+            raise ValueError(
+                f"task: {length_m} m of ball_from_goal_m and attacker_from_ball_m, {width_m} m of "
+                f"aside_m do not fit into room {self._room.name!r} of {self._room.size_m[:2]} m"
+            )
+
+    def scores(self, before: Floats, after: Floats) -> bool:
+        """Return whether the centre of the ball has passed the goal line inside the goal.
+
+        Args:
+            before: Position of the ball, ``(3,)`` metres.
+            after: Its position one step later, ``(3,)`` metres; the path is taken as straight.
         """
         if not before[0] < self.goal[0] <= after[0]:
             return False
@@ -67,7 +83,7 @@ class Pitch:
         _, aside, height = before + share * (after - before) - self.goal
         return bool(abs(aside) < self._cfg.goal_width_m / 2.0 and height < self._cfg.goal_height_m)
 
-    def _lay_ball(self, world: World) -> Prop:
+    def _add_ball(self, world: World) -> Prop:
         middle = (self.low + self.high) / 2.0
         return world.add_prop(
             PropCfg(
@@ -83,7 +99,7 @@ class Pitch:
             )
         )
 
-    def _set_goal(self, world: World) -> None:
+    def _add_goal(self, world: World) -> None:
         x, y, z = self.goal.tolist()
         world.add_prop(
             PropCfg(
@@ -95,8 +111,8 @@ class Pitch:
             )
         )
 
-    def _set_boards(self, world: World) -> None:
-        """Close the goal line beside the posts, and cut the corners: no ball is lost in them."""
+    def _add_boards(self, world: World) -> None:
+        """Close the goal line beside the posts and cut the corners, where a ball would get stuck."""
         half_m = self._cfg.goal_width_m / 2.0
         centre = float(self.goal[1])
         for side, edge in (("right", self.low[1]), ("left", self.high[1])):
@@ -105,13 +121,13 @@ class Pitch:
             corner = np.array([self.goal[0], edge])
             back = np.array([self.low[0], edge])
             along, across = np.array([_CORNER_M, 0.0]), np.array([0.0, _CORNER_M * inwards])
-            _board(world, f"end_{side}", post, corner)
-            _board(world, f"corner_{side}", corner - along, corner + across)
-            _board(world, f"back_{side}", back + along, back + across)
+            _add_board(world, f"end_{side}", post, corner)
+            _add_board(world, f"corner_{side}", corner - along, corner + across)
+            _add_board(world, f"back_{side}", back + along, back + across)
 
 
-def _board(world: World, name: str, start: Floats, end: Floats) -> None:
-    """Put a low board between two points ``(2,)`` of the floor; a ball comes back from it."""
+def _add_board(world: World, name: str, start: Floats, end: Floats) -> None:
+    """Add a low board between two points ``(2,)`` of the floor, from which a ball rebounds."""
     way, middle = end - start, (start + end) / 2.0
     thickness, height = _BOARD_M
     world.add_prop(

@@ -1,4 +1,4 @@
-"""PushOut1v1: push the other one out of the ring."""
+"""PushOut1v1: push the opponent out of the ring."""
 
 from __future__ import annotations
 
@@ -8,22 +8,25 @@ from veca_marl.envs.tasks.multi_agent.push_out import PushOut
 
 @register
 class PushOut1v1(PushOut):
-    """Two players face each other in a ring that is painted on the floor; who leaves it loses.
+    """Two players in a ring that is painted on the floor; the player that leaves it loses.
 
-    They start on opposite sides, facing the middle up to 30 degrees aside. Who has the pelvis
-    beyond the rim is out, pushed or not, and the game is over; nobody wins when the time is up.
-    The paper says "the agent must push other agents out of the ring to win" and no more: the
-    ring, the start and the reward are ours. The game is zero-sum, every term by itself.
+    They start on opposite sides and face the middle, up to `spread_deg` to the side. A player
+    whose pelvis is beyond the rim is out, whether it was pushed or not, and the episode
+    terminates. When the time is over neither has won. The paper (table of tasks in the appendix;
+    "Multi-Agent Reinforcement Learning") says "the agent must push other agents out of the ring
+    to win", with joint-level actions; the ring, the start and the reward are not in the paper.
+    Every term is zero-sum over `push` and `out` together and over `ground`.
 
-    Two walkers who meet push each other with the speed at which each walks at the other: face to
-    face they hold each other, from behind or from the side one shoves the other at half its speed.
+    Joint-level bodies start on hands and knees. Two walkers in contact push each other with the
+    speeds at which they walk towards each other: face to face they hold each other; from behind or
+    from the side one moves the other at half its speed.
 
     Terms:
-        push: 1 on the step the opponent is out.
-        out: -1 on the step the player itself is out.
-        ground: ground won in this step and lost by the opponent: the decrease of the share of the
-            ring's area that is nearer to the middle than the player, minus the opponent's. A
-            potential: over an episode it pays for the last place alone, not for the way.
+        push: 1 on the step in which the opponent is out, else 0.
+        out: -1 on the step in which the player itself is out, else 0.
+        ground: Decrease during the step of the share of the ring's area that is nearer to the
+            middle than the player, minus that of the opponent. It is the difference of a
+            potential: its sum over an episode depends only on the first and the last positions.
     """
 
     teams = (Team("red", shirt=1), Team("blue", shirt=0))

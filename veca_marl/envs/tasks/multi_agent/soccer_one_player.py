@@ -8,23 +8,25 @@ from veca_marl.envs.tasks.multi_agent.soccer import ATTACKER, Soccer
 
 @register
 class SoccerOnePlayer(Soccer):
-    """A ball, a goal at the end of the room, and a player who starts behind the ball.
+    """A player starts behind a ball and has to put it into the goal at the end of the room.
 
-    There are no rules: the player may use whatever it has. The ball is in when its centre passes
-    the goal line between the posts and under the bar, from the front; then the episode ends. A
-    ball within reach of a walker's foot (`Walker.can_kick`) is kicked by itself, away from the
-    body, at most twice a second; joint-level bodies start on hands and knees and push. The paper
-    says "put the ball into the goal with joint-level actions" and no more: the numbers and the
-    helper terms are ours.
+    Nothing is forbidden. A goal is scored when the centre of the ball passes the goal line from
+    the front, between the posts and under the bar; it terminates the episode. Joint-level bodies
+    start on hands and knees and push the ball. A ball within reach of a walker's foot
+    (`Walker.can_kick`) is kicked automatically, away from the body, at most once per
+    `kick_rest_s`. The paper (table of tasks in the appendix) says "put the ball into the goal with
+    joint-level actions [...] there is no rule"; the numbers and all terms except `goal` are not in
+    the paper.
 
     Terms:
-        goal: 1 on the step the ball is in.
-        progress: decrease in this step of the ball's distance from the middle of the goal line, m.
-        approach: how much nearer the player has come in this step to where the ball was, m: a ball
-            that rolls away costs nothing, or kicks would.
-        facing: decrease in this step of the angle between the player's forward direction and the
-            way to the ball, rad: at most pi in an episode, whatever is done. A helper for who
-            learns to look for the ball; by default it is worth nothing.
+        goal: 1 on the step in which the goal is scored, else 0.
+        progress: Decrease during the step of the distance of the ball from the middle of the goal
+            line, m.
+        approach: Decrease during the step of the distance of the player from the ball's position
+            before the step, m. It ignores the motion of the ball, so that kicking costs nothing.
+        facing: Decrease during the step of the angle between the player's forward direction and
+            the direction of the ball, rad; over an episode it adds up to at most pi. It helps
+            learning to look for the ball; its default weight is 0.
     """
 
     teams = (Team(ATTACKER),)

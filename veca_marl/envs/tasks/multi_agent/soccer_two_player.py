@@ -1,4 +1,4 @@
-"""SoccerTwoPlayer: one wants the ball in the goal, the other does not."""
+"""SoccerTwoPlayer: an attacker against a defender."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from veca_marl.sim.geometry.pose import Floats
 
 @dataclass
 class SoccerTwoPlayerCfg(SoccerCfg):
-    """The pitch lies along x: the goal's mouth looks back at the attacker.
+    """Parameters of SoccerTwoPlayer. The pitch lies along x; the attacker shoots towards +x.
 
     Attributes:
-        defender_from_goal_m: Least and greatest distance at which the defender starts before the
-            goal line.
+        defender_from_goal_m: Least and greatest distance of the defender in front of the goal line
+            at the start.
     """
 
     defender_from_goal_m: tuple[float, float] = (0.3, 0.8)
@@ -34,25 +34,25 @@ class SoccerTwoPlayerCfg(SoccerCfg):
 
 @register
 class SoccerTwoPlayer(Soccer):
-    """The pitch of SoccerOnePlayer, with a defender between the ball and the goal.
+    """SoccerOnePlayer with a defender between the ball and the goal.
 
-    There are no rules: the defender may block and tackle, and both may kick and shove whatever
-    they reach; of two walkers who reach the ball in one step the nearer one kicks. The game ends
-    with a goal, whoever shot it; when the time is up the defender has held. The paper says "the
+    Nothing is forbidden: the defender may block and tackle, and both may kick and push whatever
+    they reach; of two walkers that reach the ball in one step the nearer one kicks. A goal, by
+    either player, terminates the episode. The paper (table of tasks in the appendix) says "the
     attacker must put the ball into the goal, and the defender must block the ball from the goal
-    [...] there is no rule"; the numbers and the helper terms are ours. What the attacker gets the
-    defender loses: the game is zero-sum, every term by itself.
+    with joint-level actions [...] there is no rule"; the numbers and all terms except `goal` are
+    not in the paper. Every term of the defender is minus that of the attacker (zero-sum).
 
     Terms:
-        goal: 1 for the attacker, -1 for the defender on the step the ball is in.
-        progress: decrease in this step of the ball's distance from the middle of the goal line, m;
-            minus that for the defender.
-        approach: how much nearer the attacker has come in this step to where the ball was, m: a
-            ball that rolls away costs nothing, or kicks would. Minus that for the defender, who is
-            thus paid for standing in the attacker's way.
-        facing: decrease in this step of the angle between the attacker's forward direction and the
-            way to the ball, rad: at most pi in an episode, whatever is done; minus that for the
-            defender. A helper for who learns to look for the ball; by default worth nothing.
+        goal: 1 for the attacker on the step in which a goal is scored, else 0.
+        progress: Decrease during the step of the distance of the ball from the middle of the goal
+            line, m.
+        approach: Decrease during the step of the distance of the attacker from the ball's position
+            before the step, m. It ignores the motion of the ball, so that kicking costs nothing.
+            The defender is thus rewarded for standing in the attacker's path.
+        facing: Decrease during the step of the angle between the attacker's forward direction and
+            the direction of the ball, rad; over an episode it adds up to at most pi. It helps
+            learning to look for the ball; its default weight is 0.
     """
 
     teams = (Team(ATTACKER), Team(DEFENDER))

@@ -1,1 +1,1 @@
-"""Tasks that need more than one sense: KickTheBall."""
+"""Tasks that need several senses: KickTheBall."""

@@ -1,1 +1,1 @@
-"""Tasks of manipulation: grasping, moving, turning and piling objects."""
+"""Tasks of a sitting body with objects: grasping, moving, rotating, piling up, putting down."""

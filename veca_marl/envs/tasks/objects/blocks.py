@@ -1,4 +1,4 @@
-"""Building blocks: what the tasks with towers share."""
+"""The blocks of PileUpBlock and PutDownBlock, and relations between them."""
 
 from __future__ import annotations
 
@@ -12,17 +12,18 @@ from veca_marl.sim.physics.world import World
 
 RED = (0.9, 0.12, 0.1)
 BLUE = (0.15, 0.3, 0.9)
-_STILL_MPS = 0.05
+_REST_MPS = 0.05
+_HAND_SPAN_M = 0.1
 
 
 @dataclass
 class BlocksCfg(TaskCfg):
-    """Blocks are cubes.
+    """Parameters of cubic blocks.
 
     Attributes:
-        edge_m: Length of their edges.
-        mass_kg: Mass of one.
-        friction: Their friction on the floor; on each other it counts twice, as a factor.
+        edge_m: Length of their edges, at most 0.1 m.
+        mass_kg: Mass of one block.
+        friction: Friction on the floor; between two blocks it applies squared.
     """
 
     edge_m: float = 0.06
@@ -32,22 +33,26 @@ class BlocksCfg(TaskCfg):
     def __post_init__(self) -> None:
         super().__post_init__()
         self._check_positive("edge_m", "mass_kg", "friction")
-        if self.edge_m > 0.1:
-            raise ValueError(f"task.edge_m={self.edge_m}: a child's hands span at most 0.1 m")
+        if self.edge_m > _HAND_SPAN_M:
+            raise ValueError(
+                f"task.edge_m={self.edge_m}: a child's hands span at most {_HAND_SPAN_M} m"
+            )
 
 
 def add_block(world: World, cfg: BlocksCfg, name: str, colour: tuple[float, float, float]) -> Prop:
-    """Put a block into a world, apart from all others until it is placed."""
-    # Bullet mixes up the contacts of saved states in which things meet
+    """Add a block to a world, without contact to any other until it is placed.
+
+    Bullet does not restore contacts correctly from a state that was saved with objects in contact.
+    """
     low, edge = world.playground.rooms[0].lower_m, cfg.edge_m
     aside = 0.3 + 2.0 * edge * len(world.props)
-    place = (low[0] + aside, low[1] + 0.3, low[2] + edge / 2)
+    position = (low[0] + aside, low[1] + 0.3, low[2] + edge / 2)
     return world.add_prop(
         PropCfg(
             name=name,
             shape=PropShape.box,
             size_m=[cfg.edge_m] * 3,
-            position_m=place,
+            position_m=position,
             mass_kg=cfg.mass_kg,
             friction=cfg.friction,
             restitution=0.0,
@@ -56,24 +61,30 @@ def add_block(world: World, cfg: BlocksCfg, name: str, colour: tuple[float, floa
     )
 
 
-def height(block: Prop) -> float:
-    """Return how high a block is above its place on the floor, in its own edges."""
+def height_in_edges(block: Prop) -> float:
+    """Return the height of a block above its place on the floor, in lengths of its edge."""
     edge = block.cfg.size_m[0]
     return float(block.position[2]) / edge - 0.5
 
 
-def rests_on(block: Prop, other: Prop) -> bool:
-    """Say whether a block lies still on top of another."""
-    way, edge = block.position - other.position, block.cfg.size_m[0]
+def rests_on(block: Prop, base: Prop) -> bool:
+    """Return whether a block rests on top of another one."""
+    way, edge = block.position - base.position, block.cfg.size_m[0]
     on_top = way[2] > 0.9 * edge and math.hypot(way[0], way[1]) < 0.75 * edge
-    return bool(on_top) and block.touches(other.body_id) and is_still(block)
+    return bool(on_top) and block.touches(base.body_id) and is_at_rest(block)
 
 
-def is_still(block: Prop) -> bool:
-    """Say whether a block lies still."""
-    return math.dist(block.velocity, (0.0, 0.0, 0.0)) < _STILL_MPS
+def is_at_rest(block: Prop) -> bool:
+    """Return whether the speed of a block is below 0.05 m/s."""
+    return math.dist(block.velocity, (0.0, 0.0, 0.0)) < _REST_MPS
 
 
+<<<<<<< HEAD
 def is_free(block: Prop, child: Humanoid) -> bool:
     """Say whether no part of a child touches a block."""
     return not child.touches(block)
+=======
+def is_released(block: Prop, child: Humanoid) -> bool:
+    """Return whether no part of a body touches a block."""
+    return not block.touches(child.articulation.body_id)
+>>>>>>> 132edd8 (wip)

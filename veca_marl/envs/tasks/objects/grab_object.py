@@ -1,4 +1,4 @@
-"""GrabObject: lift the toy with both hands."""
+"""GrabObject: lift a toy with both hands."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ from veca_marl.envs.core.task import Player, Task, register, require_humanoid, t
 from veca_marl.envs.tasks.objects.grasping import (
     ToyCfg,
     add_toy,
-    hand_distances,
-    in_both_hands,
-    lay_down,
+    both_hands_near,
+    palm_distances_m,
+    place_toy,
 )
 from veca_marl.sim.body.humanoid.postures import REACHING
 
 
 @dataclass
 class GrabObjectCfg(ToyCfg):
-    """What lifting is, and what it is worth.
+    """Parameters of GrabObject.
 
     Attributes:
-        lifted_m: The task is solved while the toy is so much higher than at the start.
+        lifted_m: Height above the floor at which the task is solved while both hands are near.
     """
 
     max_seconds: float = 6.0
@@ -38,21 +38,25 @@ class GrabObjectCfg(ToyCfg):
 
 @register
 class GrabObject(Task):
-    """A child sits on the floor with a toy before it: lift it with both hands.
+    """A joint-level body sits on the floor in front of a toy and has to lift it with both hands.
 
-    The paper gives the senses (only the hands feel, the eyes always look at the object), the
-    joint-level action, the reward for the vertical displacement "when the object is close enough
-    to each hand", and both helper rewards. The numbers are ours, but for the weight of effort. So
-    is that height counts as lost when a hand leaves the toy: else letting it fall and lifting it
-    once more would pay for ever. The child is free: it may topple. An episode lasts 6 s and never
-    ends early. It is solved (`solved`) while both hands hold the toy 5 cm up.
+    From the paper (table of tasks, "Perception/Action" and "Helper Rewards" in the appendix):
+    touch is limited to the hands, the eyes look at the object, the reward is the vertical
+    displacement "when the object is close enough to each hand", with helper rewards for approach
+    and effort. Departures from the paper: approach and effort are weighted 10 to 0.004 instead of
+    1 to 0.004, and when a hand leaves the toy, the height that was rewarded is subtracted again,
+    so that dropping and lifting the toy repeatedly brings nothing. The other numbers are not in
+    the paper.
+
+    The body is free and can topple. An episode lasts `max_seconds` and never terminates. The task
+    is solved (`solved`) while both hands are near the toy and it is `lifted_m` above the floor.
 
     Terms:
-        lift: how much higher the toy came in this step, in metres, where the height of a toy that
-            is not near both hands counts as 0.
-        approach: d before the step less d after it, d the sum of the distances of both palms from
-            the toy's centre, in metres.
-        effort: sum of the squares of all 82 motors' torques, as shares of their strength.
+        lift: Increase during the step of the toy's height, m, where the height counts as 0 unless
+            both hands are near.
+        approach: Decrease during the step of the sum of the distances of both palms from the
+            centre of the toy, m.
+        effort: Sum of the squared torques of all 82 joints, each as a share of its strength.
     """
 
     senses = ("vision", "touch", "proprioception")
@@ -65,14 +69,13 @@ class GrabObject(Task):
 
     def reset(self, rng: np.random.Generator) -> None:
         self.child.place((0.0, 0.0, 0.0), 0.0, REACHING)
-        lay_down(self.toy, self.cfg, rng)
+        place_toy(self.toy, self.cfg, rng)
         self.child.look_toward_point(self.toy.position)
-        self._held_m = self.held_m
-        self._distance_m = self._distance()
+        self._held_m, self._distance_m = self.held_m, self._palm_distance_m()
 
     def after_step(self, rng: np.random.Generator) -> None:
         self.child.look_toward_point(self.toy.position)
-        held_m, distance_m = self.held_m, self._distance()
+        held_m, distance_m = self.held_m, self._palm_distance_m()
         self._lifted_m, self._approached_m = held_m - self._held_m, self._distance_m - distance_m
         self._held_m, self._distance_m = held_m, distance_m
 
@@ -86,15 +89,15 @@ class GrabObject(Task):
 
     @property
     def held_m(self) -> float:
-        """How high both hands hold the toy above its place on the floor; 0 if they do not."""
-        if not in_both_hands(self.child, self.toy, self.cfg):
+        """Height of the toy above its place on the floor; 0 unless both hands are near."""
+        if not both_hands_near(self.child, self.toy, self.cfg):
             return 0.0
         return float(self.toy.position[2]) - self.cfg.edge_m / 2
 
     @property
     def solved(self) -> bool:
-        """Whether both hands hold the toy up."""
+        """Whether the toy is lifted with both hands."""
         return self.held_m >= self.cfg.lifted_m
 
-    def _distance(self) -> float:
-        return float(hand_distances(self.child, self.toy).sum())
+    def _palm_distance_m(self) -> float:
+        return float(palm_distances_m(self.child, self.toy).sum())

@@ -1,4 +1,4 @@
-"""A toy before a sitting child: what the tasks of grasping share."""
+"""The toy of GrabObject and MoveToTarget, and its distances to the hands."""
 
 from __future__ import annotations
 
@@ -13,21 +13,21 @@ from veca_marl.sim.geometry.pose import Floats
 from veca_marl.sim.physics.props import Prop, PropCfg, PropShape
 from veca_marl.sim.physics.world import World
 
-_WIDEST_M = 0.1  # between the palms of a sitting child
+_HAND_SPAN_M = 0.1
 
 
 @dataclass
 class ToyCfg(TaskCfg):
-    """A cube on the floor before the child, whose pelvis is at the origin and faces x.
+    """Parameters of a cube on the floor in front of a body at the origin that faces +x.
 
     Attributes:
-        edge_m: Length of its edges.
-        mass_kg: Its mass.
-        friction: Its friction, see `PropCfg`.
-        ahead_m: Least and greatest distance ahead of the child at the start.
-        aside_m: It starts at most so far to the left or right.
-        turn_deg: It is turned by so much at most.
-        near_m: A hand is near while its palm is so close to the toy's surface.
+        edge_m: Length of its edges, at most 0.1 m.
+        mass_kg: Mass.
+        friction: Friction, see `PropCfg`.
+        ahead_m: Least and greatest distance in front of the pelvis at the start.
+        aside_m: Largest lateral offset at the start.
+        turn_deg: Largest yaw at the start.
+        near_m: Distance between a palm and the surface up to which the hand counts as near.
     """
 
     edge_m: float = 0.07
@@ -41,8 +41,8 @@ class ToyCfg(TaskCfg):
     def __post_init__(self) -> None:
         super().__post_init__()
         self._check_positive("edge_m", "mass_kg", "friction", "near_m")
-        if self.edge_m > _WIDEST_M:
-            raise ValueError(f"task.edge_m={self.edge_m}: hands span at most {_WIDEST_M} m")
+        if self.edge_m > _HAND_SPAN_M:
+            raise ValueError(f"task.edge_m={self.edge_m}: hands span at most {_HAND_SPAN_M} m")
         near, far = self.ahead_m
         if not self.edge_m < near <= far < math.inf:
             raise ValueError(
@@ -53,7 +53,7 @@ class ToyCfg(TaskCfg):
 
 
 def add_toy(world: World, cfg: ToyCfg) -> Prop:
-    """Put the toy into a world."""
+    """Add the toy to a world."""
     return world.add_prop(
         PropCfg(
             name="toy",
@@ -67,19 +67,19 @@ def add_toy(world: World, cfg: ToyCfg) -> Prop:
     )
 
 
-def lay_down(toy: Prop, cfg: ToyCfg, rng: np.random.Generator) -> None:
-    """Put the toy on a random place of the floor before the child."""
+def place_toy(toy: Prop, cfg: ToyCfg, rng: np.random.Generator) -> None:
+    """Place the toy at a random position and yaw on the floor in front of the body."""
     ahead, aside = rng.uniform(*cfg.ahead_m), rng.uniform(-cfg.aside_m, cfg.aside_m)
-    turn = math.radians(rng.uniform(-cfg.turn_deg, cfg.turn_deg))
-    toy.place((ahead, aside, cfg.edge_m / 2), turn)
+    yaw = math.radians(rng.uniform(-cfg.turn_deg, cfg.turn_deg))
+    toy.place((ahead, aside, cfg.edge_m / 2), yaw)
 
 
-def hand_distances(child: Humanoid, toy: Prop) -> Floats:
-    """Return how far the middles of the palms are from the toy's centre, ``(2,)`` metres."""
+def palm_distances_m(child: Humanoid, toy: Prop) -> Floats:
+    """Return the distances of both palms from the centre of the toy, ``(2,)`` metres."""
     distances: Floats = np.linalg.norm(child.palms() - toy.position, axis=1)
     return distances
 
 
-def in_both_hands(child: Humanoid, toy: Prop, cfg: ToyCfg) -> bool:
-    """Say whether both palms are near a toy; its surface is taken as half an edge away."""
-    return bool((hand_distances(child, toy) <= cfg.edge_m / 2 + cfg.near_m).all())
+def both_hands_near(child: Humanoid, toy: Prop, cfg: ToyCfg) -> bool:
+    """Return whether both palms are near the toy, taking its surface at half an edge."""
+    return bool((palm_distances_m(child, toy) <= cfg.edge_m / 2 + cfg.near_m).all())

@@ -1,4 +1,4 @@
-"""MoveToTarget: bring the toy to the mark on the floor."""
+"""MoveToTarget: move a toy to a mark on the floor."""
 
 from __future__ import annotations
 
@@ -9,21 +9,22 @@ import numpy as np
 
 from veca_marl.envs.core.scoring import horizontal
 from veca_marl.envs.core.task import Player, Task, register, require_humanoid, terms
-from veca_marl.envs.tasks.objects.grasping import ToyCfg, add_toy, lay_down
+from veca_marl.envs.tasks.objects.grasping import ToyCfg, add_toy, place_toy
 from veca_marl.sim.body.humanoid.postures import REACHING
 from veca_marl.sim.physics.props import PropCfg, PropShape
 
-_THIN_M = 0.001
+_MARK_HEIGHT_M = 0.001
 
 
 @dataclass
 class MoveToTargetCfg(ToyCfg):
-    """Where the mark is.
+    """Parameters of MoveToTarget.
 
     Attributes:
-        way_m: Least and greatest distance of the mark from the toy, to the left or the right.
-        far_m: A toy farther from the mark than this counts as so far away.
-        there_m: The task is solved while the toy's centre is so close to the mark.
+        way_m: Least and greatest distance of the mark from the toy at the start, to the left or
+            to the right.
+        far_m: Distance between toy and mark at which the distance is clipped.
+        there_m: Distance between toy and mark up to which the task is solved.
     """
 
     max_seconds: float = 10.0
@@ -47,17 +48,21 @@ class MoveToTargetCfg(ToyCfg):
 
 @register
 class MoveToTarget(Task):
-    """A child sits on the floor with a toy before it: bring it to the green mark.
+    """A joint-level body sits on the floor and has to move a toy to a green mark.
 
-    The mark is a disc on the floor that is seen and not felt. The paper gives the senses (as in
-    GrabObject: only the hands feel, the eyes look at the object), the joint-level action and the
-    reward; the numbers are ours. The child is free: it may topple. An episode lasts 10 s and never
-    ends early. It is solved (`solved`) while the toy is within 5 cm of the mark.
+    The mark is a disc on the floor without collision. The senses, the joint-level action and the
+    reward, "the difference of distance between the target position and the object's position",
+    are those of the paper (table of tasks in the appendix); the numbers are not in the paper.
+    Departures: as in GrabObject, touch is limited to the hands and the eyes look at the object;
+    the distance is clipped at `far_m`, so that a toy that is pushed across the room costs no more
+    than one out of reach.
+
+    The body is free and can topple. An episode lasts `max_seconds` and never terminates. The task
+    is solved (`solved`) while the toy is within `there_m` of the mark.
 
     Terms:
-        progress: how much nearer to the mark the toy came in this step, in metres along the floor.
-            Farther away than 0.15 m nothing changes: a toy kicked across the room is no worse than
-            one that is out of reach.
+        progress: Decrease during the step of the horizontal distance between toy and mark, m,
+            where the distance is clipped to `far_m`.
     """
 
     senses = ("vision", "touch", "proprioception")
@@ -70,36 +75,36 @@ class MoveToTarget(Task):
             PropCfg(
                 name="mark",
                 shape=PropShape.cylinder,
-                size_m=[self.cfg.there_m, _THIN_M],
+                size_m=[self.cfg.there_m, _MARK_HEIGHT_M],
                 colour=(0.1, 0.7, 0.2),
                 tangible=False,
             )
         )
-        self._counted_m = self._progress_m = 0.0
+        self._clipped_m = self._progress_m = 0.0
 
     def reset(self, rng: np.random.Generator) -> None:
         self.child.place((0.0, 0.0, 0.0), 0.0, REACHING)
-        lay_down(self.toy, self.cfg, rng)
-        way = rng.choice((-1.0, 1.0)) * rng.uniform(*self.cfg.way_m)
-        self.mark.place(horizontal(self.toy.position) + np.array([0.0, way, _THIN_M / 2]))
+        place_toy(self.toy, self.cfg, rng)
+        offset = rng.choice((-1.0, 1.0)) * rng.uniform(*self.cfg.way_m)
+        self.mark.place(horizontal(self.toy.position) + np.array([0.0, offset, _MARK_HEIGHT_M / 2]))
         self.child.look_toward_point(self.toy.position)
-        self._counted_m, self._progress_m = self.distance_m, 0.0
+        self._clipped_m, self._progress_m = self.distance_m, 0.0
 
     def after_step(self, rng: np.random.Generator) -> None:
         self.child.look_toward_point(self.toy.position)
-        counted_m = min(self.distance_m, self.cfg.far_m)
-        self._progress_m = self._counted_m - counted_m
-        self._counted_m = counted_m
+        clipped_m = min(self.distance_m, self.cfg.far_m)
+        self._progress_m = self._clipped_m - clipped_m
+        self._clipped_m = clipped_m
 
     def reward(self, player: Player) -> dict[str, float]:
         return {"progress": self._progress_m}
 
     @property
     def distance_m(self) -> float:
-        """How far the toy is from the mark, along the floor."""
+        """Horizontal distance between the toy and the mark."""
         return float(np.linalg.norm(horizontal(self.toy.position - self.mark.position)))
 
     @property
     def solved(self) -> bool:
-        """Whether the toy is on the mark."""
+        """Whether the toy is at the mark."""
         return self.distance_m <= self.cfg.there_m

@@ -1,4 +1,4 @@
-"""PileUpBlock: put one block on the other."""
+"""PileUpBlock: put one block on top of another."""
 
 from __future__ import annotations
 
@@ -9,18 +9,25 @@ from dataclasses import dataclass
 import numpy as np
 
 from veca_marl.envs.core.task import Player, Task, register, require_humanoid, terms
-from veca_marl.envs.tasks.objects.blocks import RED, BlocksCfg, add_block, height, is_free, rests_on
+from veca_marl.envs.tasks.objects.blocks import (
+    RED,
+    BlocksCfg,
+    add_block,
+    height_in_edges,
+    is_released,
+    rests_on,
+)
 from veca_marl.sim.body.humanoid.postures import REACHING
 
 
 @dataclass
 class PileUpBlockCfg(BlocksCfg):
-    """Where the blocks lie before the child, whose pelvis is at the origin and faces x.
+    """Parameters of PileUpBlock. The pelvis is at the origin and the body faces +x.
 
     Attributes:
-        ahead_m: Least and greatest distance of a block ahead of the child.
-        aside_m: Least and greatest distance of a block to its side: one left, one right.
-        turn_deg: A block is turned by so much at most.
+        ahead_m: Least and greatest distance of a block in front of the pelvis.
+        aside_m: Least and greatest lateral distance; one block is on the left, one on the right.
+        turn_deg: Largest yaw of a block.
     """
 
     max_seconds: float = 12.0
@@ -41,18 +48,20 @@ class PileUpBlockCfg(BlocksCfg):
 
 @register
 class PileUpBlock(Task):
-    """A child sits on the floor with two red blocks before it: pile them up.
+    """A joint-level body sits in front of two red blocks and has to put one on the other.
 
-    The paper gives the senses, the joint-level action and the reward, "the sum of the vertical
-    position of red blocks"; all numbers are ours. There are no helper rewards. By the paper's rule
-    a block that is held up is worth as much as one that lies on another, and more if held higher.
-    The child is free: it may topple. An episode lasts 12 s and never ends early. It is solved
-    (`solved`) while a block lies still on the other and no part of the child touches it.
+    The senses, the joint-level action and the reward, "the sum of the y-axis position of red
+    blocks" (the vertical axis), are those of the paper (table of tasks in the appendix); the
+    number of blocks and all numbers are not in the paper. By the paper's rule a block that is held
+    up is rewarded like one that lies on another, and more the higher it is held.
+
+    The body is free and can topple. An episode lasts `max_seconds` and never terminates. The task
+    is solved (`solved`) while one block rests on the other and no part of the body touches it.
 
     Terms:
-        height: how high the red blocks are above their places on the floor, in edges of a block,
-            summed over the blocks. Its weight is the duration of a step: a block that lies on the
-            other earns 1 per second.
+        height: Sum of the heights of the red blocks above the floor, in lengths of their edge. Its
+            default weight is the duration of a step in seconds, so that a block on top of another
+            adds 1 per second to the return.
     """
 
     senses = ("vision", "touch", "proprioception")
@@ -66,16 +75,16 @@ class PileUpBlock(Task):
         self.child.place((0.0, 0.0, 0.0), 0.0, REACHING)
         for block, side in zip(self.blocks, (1.0, -1.0), strict=True):
             ahead, aside = rng.uniform(*self.cfg.ahead_m), rng.uniform(*self.cfg.aside_m)
-            turn = math.radians(rng.uniform(-self.cfg.turn_deg, self.cfg.turn_deg))
-            block.place((ahead, side * aside, self.cfg.edge_m / 2), turn)
+            yaw = math.radians(rng.uniform(-self.cfg.turn_deg, self.cfg.turn_deg))
+            block.place((ahead, side * aside, self.cfg.edge_m / 2), yaw)
 
     def reward(self, player: Player) -> dict[str, float]:
-        return {"height": sum(height(block) for block in self.blocks)}
+        return {"height": sum(height_in_edges(block) for block in self.blocks)}
 
     @property
     def solved(self) -> bool:
-        """Whether one block lies on the other by itself."""
+        """Whether one block rests on the other and has been released."""
         return any(
-            rests_on(one, other) and is_free(one, self.child)
-            for one, other in itertools.permutations(self.blocks)
+            rests_on(block, base) and is_released(block, self.child)
+            for block, base in itertools.permutations(self.blocks)
         )

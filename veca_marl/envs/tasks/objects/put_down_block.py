@@ -1,4 +1,4 @@
-"""PutDownBlock: take the red block down and leave the blue ones standing."""
+"""PutDownBlock: take the red block off a tower without knocking over the blue ones."""
 
 from __future__ import annotations
 
@@ -13,24 +13,25 @@ from veca_marl.envs.tasks.objects.blocks import (
     RED,
     BlocksCfg,
     add_block,
-    height,
-    is_free,
-    is_still,
+    height_in_edges,
+    is_at_rest,
+    is_released,
 )
 from veca_marl.sim.body.humanoid.postures import REACHING
+
+_GAP_M = 0.002  # between blocks at the start: Bullet would restore contacts of the last episode
 
 
 @dataclass
 class PutDownBlockCfg(BlocksCfg):
-    """Where the tower stands before the child, whose pelvis is at the origin and faces x.
+    """Parameters of PutDownBlock. The pelvis is at the origin and the body faces +x.
 
     Attributes:
-        blue: How many blue blocks the tower has.
-        ahead_m: Least and greatest distance of the tower ahead of the child.
-        aside_m: Least and greatest distance of the tower to its left or right side.
-        turn_deg: The tower is turned by so much at most.
-        fallen: A blue block has fallen when it is so many edges lower than it was (the lowest
-            cannot fall).
+        blue: Number of blue blocks in the tower, 2 or 3.
+        ahead_m: Least and greatest distance of the tower in front of the pelvis.
+        aside_m: Least and greatest lateral distance of the tower, to the left or to the right.
+        turn_deg: Largest yaw of the tower.
+        fallen: Loss of height, in lengths of an edge, at which a blue block has fallen, in (0, 1).
     """
 
     max_seconds: float = 12.0
@@ -44,30 +45,31 @@ class PutDownBlockCfg(BlocksCfg):
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.blue not in (2, 3):
-            raise ValueError(f"task.blue={self.blue}: 2 or 3, one that can fall, within reach")
-        for name in ("ahead_m", "aside_m"):
-            near, far = getattr(self, name)
-            if not 0.0 <= near <= far < math.inf:
-                raise ValueError(f"task.{name}={(near, far)} must be (least, greatest), 0 or more")
+            raise ValueError(f"task.blue={self.blue} must be 2 or 3, so that one can fall")
+        self._check_span("ahead_m", 0.0, "0 or more")
+        self._check_span("aside_m", 0.0, "0 or more")
         if not 0.0 < self.fallen < 1.0:
             raise ValueError(f"task.fallen={self.fallen} must be between 0 and 1 edges")
 
 
 @register
 class PutDownBlock(Task):
-    """A child sits before a tower of blue blocks with a red one on top: put the red one down.
+    """A joint-level body has to take a red block off a tower of blue ones, to the floor.
 
-    The paper gives the senses, the joint-level action and the reward, "the negative sum of the
-    vertical position of red blocks" and "negative reward when blue blocks fall"; the tower and all
-    numbers are ours. The child is free: it may topple. An episode lasts 12 s and never ends early.
-    It is solved (`solved`) while the red block lies still on the floor, no part of the child
-    touches it, and no blue block has fallen.
+    The senses, the joint-level action and the reward, "the negative sum of the y-axis position of
+    red blocks" (the vertical axis) and "a negative reward when the blue blocks fall", are those of
+    the paper (table of tasks in the appendix); the tower and all numbers are not in the paper.
+
+    The body is free and can topple. An episode lasts `max_seconds` and never terminates. The task
+    is solved (`solved`) while the red block rests on the floor, no part of the body touches it and
+    no blue block has fallen.
 
     Terms:
-        height: how high the red block is above its place on the floor, in edges of a block. Its
-            weight is minus the duration of a step: on top of two blue blocks it costs 2 per second.
-        blue_fell: the number of blue blocks that fell in this step; each falls once. One costs
-            nearly as much as leaving the red block up for the whole episode.
+        height: Height of the red block above the floor, in lengths of its edge. Its default weight
+            is minus the duration of a step in seconds, so that the red block on two blue ones
+            adds -2 per second to the return.
+        blue_fell: Number of blue blocks that have fallen in this step; each falls once. With the
+            default weights one costs nearly as much as leaving the red block on the tower.
     """
 
     senses = ("vision", "touch", "proprioception")
@@ -84,28 +86,27 @@ class PutDownBlock(Task):
 
     def reset(self, rng: np.random.Generator) -> None:
         self.child.place((0.0, 0.0, 0.0), 0.0, REACHING)
-        aside = rng.choice((-1.0, 1.0)) * rng.uniform(*self.cfg.aside_m)
-        ahead = rng.uniform(*self.cfg.ahead_m)
-        turn = math.radians(rng.uniform(-self.cfg.turn_deg, self.cfg.turn_deg))
-        # not touching at first: Bullet's contacts would remember the last episode
-        for floor, block in enumerate((*self.blue, self.red)):
-            block.place((ahead, aside, (floor + 0.5) * self.cfg.edge_m + 0.002 * floor), turn)
+        y = rng.choice((-1.0, 1.0)) * rng.uniform(*self.cfg.aside_m)
+        x = rng.uniform(*self.cfg.ahead_m)
+        yaw = math.radians(rng.uniform(-self.cfg.turn_deg, self.cfg.turn_deg))
+        for level, block in enumerate((*self.blue, self.red)):
+            block.place((x, y, (level + 0.5) * self.cfg.edge_m + _GAP_M * level), yaw)
         self._fallen, self._newly_fallen = set(), 0
 
     def after_step(self, rng: np.random.Generator) -> None:
-        down = {
+        fallen = {
             block.name
-            for floor, block in enumerate(self.blue)
-            if floor > 0 and height(block) < floor - self.cfg.fallen
+            for level, block in enumerate(self.blue)
+            if level > 0 and height_in_edges(block) < level - self.cfg.fallen
         }
-        self._newly_fallen = len(down - self._fallen)
-        self._fallen |= down
+        self._newly_fallen = len(fallen - self._fallen)
+        self._fallen |= fallen
 
     def reward(self, player: Player) -> dict[str, float]:
-        return {"height": height(self.red), "blue_fell": float(self._newly_fallen)}
+        return {"height": height_in_edges(self.red), "blue_fell": float(self._newly_fallen)}
 
     @property
     def solved(self) -> bool:
-        """Whether the red block lies on the floor by itself and all blue ones stand."""
-        down = abs(height(self.red)) < 0.1 and is_still(self.red)
-        return down and is_free(self.red, self.child) and not self._fallen
+        """Whether the red block is released on the floor and all blue ones stand."""
+        on_floor = abs(height_in_edges(self.red)) < 0.1 and is_at_rest(self.red)
+        return on_floor and is_released(self.red, self.child) and not self._fallen

@@ -1,4 +1,4 @@
-"""RotateCube: turn the cube that lies on the palm."""
+"""RotateCube: rotate a cube that lies on the palm."""
 
 from __future__ import annotations
 
@@ -13,22 +13,23 @@ from veca_marl.sim.body.humanoid.postures import OFFERING
 from veca_marl.sim.geometry.rotations import rotation_about_vertical
 from veca_marl.sim.physics.props import PropCfg, PropShape
 
-_GAP_M = 0.001  # between the cube and the skin of the palm at the start
 SHOULDER = "r_upper_arm.abduction"
+_GAP_M = 0.001  # between the cube and the skin of the palm at the start
 
 
 @dataclass
 class RotateCubeCfg(TaskCfg):
-    """The cube, and how it is to be turned.
+    """Parameters of RotateCube.
 
     Attributes:
         edge_m: Length of the cube's edges.
-        mass_kg: Its mass.
-        friction: Its friction, see `PropCfg`.
-        turn_deg: The target: so far about the vertical from the start, positive to the left.
-        start_deg: At the start the cube is turned on the palm by so much at most.
-        lost_m: A cube whose centre is so far from the middle of the palm has fallen off the hand.
-        there_deg: The task is solved while the cube is within so much of its target.
+        mass_kg: Mass of the cube.
+        friction: Friction of the cube, see `PropCfg`.
+        turn_deg: Target orientation: yaw from the orientation at the start, positive to the left.
+        start_deg: Largest yaw of the cube relative to the hand at the start, in [0, 45].
+        lost_m: Distance of the cube's centre from the middle of the palm above which the cube has
+            left the hand.
+        there_deg: Angle from the target up to which the task is solved.
     """
 
     max_seconds: float = 8.0
@@ -57,20 +58,22 @@ class RotateCubeCfg(TaskCfg):
 
 @register
 class RotateCube(Task):
-    """A child lies on its back with a cube on its right palm: turn the cube to the left.
+    """A joint-level body lies on its back with a cube on its right palm and has to rotate the cube.
 
-    The back of the hand lies on the floor. The paper gives the senses (no eyes), the joint-level
-    action and the reward, the decrease of the distance between the cube's orientation and the
-    target's; the rest is ours. No sense tells the target, so it is the same in every episode: 45
-    degrees about the vertical from the start, in the world's frame. Fingers may turn the cube on
-    the hand, or the wrist and the arm the hand with the cube. An episode lasts 8 s and never ends
-    early. It is solved (`solved`) while the cube is on the hand and within 10 degrees of the
-    target.
+    The back of the hand lies on the floor. The senses (without vision), the joint-level action and
+    the reward, "the difference in distance between the target orientation and the cube's
+    orientation", are those of the paper (table of tasks in the appendix); the posture and all
+    numbers are not in the paper. No sense shows the target, so it is the same in every episode: a
+    yaw of 45 degrees from the start, in the world frame. Fingers may rotate the cube on the hand,
+    or wrist and arm may rotate the hand with the cube.
+
+    An episode lasts `max_seconds` and never terminates. The task is solved (`solved`) while the
+    cube is on the hand and within `there_deg` of the target.
 
     Terms:
-        progress: by how much the angle between the cube and its target became less in this step,
-            in radians. While the cube is off the hand the angle counts as it was at the start: all
-            that was won is lost, and how the cube rolls away is worth nothing.
+        progress: Decrease during the step of the angle between the cube and its target, rad. While
+            the cube is off the hand the angle counts as at the start, so that dropping the cube
+            takes all progress back.
     """
 
     senses = ("touch", "proprioception")
@@ -95,9 +98,9 @@ class RotateCube(Task):
     def reset(self, rng: np.random.Generator) -> None:
         self.child.place((0.0, 0.0, 0.0), 0.0, OFFERING)
         above = np.array([0.0, 0.0, self.cfg.edge_m / 2 + _GAP_M])
-        turned = math.radians(rng.uniform(-self.cfg.start_deg, self.cfg.start_deg))
+        yaw_rad = math.radians(rng.uniform(-self.cfg.start_deg, self.cfg.start_deg))
         hand_rad = math.radians(-OFFERING.joints_deg[SHOULDER])
-        self.cube.place(self.child.palms()[1] + above, hand_rad + turned)
+        self.cube.place(self.child.palms()[1] + above, hand_rad + yaw_rad)
         turn = rotation_about_vertical(math.radians(self.cfg.turn_deg))
         self.target = turn @ self.cube.rotation
         self._angle_rad = self._start_rad = self.angle_rad
@@ -112,15 +115,15 @@ class RotateCube(Task):
 
     @property
     def angle_rad(self) -> float:
-        """The angle between the cube and its target."""
+        """Angle between the orientations of the cube and its target."""
         return rotation_angle_rad(self.cube.rotation, self.target)
 
     @property
     def on_hand(self) -> bool:
-        """Whether the cube is still on the right hand."""
+        """Whether the cube is on the right hand."""
         return math.dist(self.cube.position, self.child.palms()[1]) < self.cfg.lost_m
 
     @property
     def solved(self) -> bool:
-        """Whether the cube on the hand is turned as it should be."""
+        """Whether the cube is on the hand and within `there_deg` of the target."""
         return self.on_hand and self.angle_rad <= math.radians(self.cfg.there_deg)

@@ -1,0 +1,69 @@
+"""Starting poses of the tasks of motor skills."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from veca_marl.envs.core.task import TaskCfg
+from veca_marl.sim.body.humanoid.humanoid import Humanoid
+from veca_marl.sim.body.humanoid.postures import POSTURES, Posture
+from veca_marl.sim.physics.playground import RoomCfg
+
+_WALL_CLEARANCE_M = 1.0
+
+
+@dataclass
+class StartCfg(TaskCfg):
+    """Parameters of a start in a posture.
+
+    Attributes:
+        spread_deg: Standard deviation of every joint angle about the posture, in [0, 30].
+    """
+
+    spread_deg: float = 10.0
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not 0.0 <= self.spread_deg <= 30.0:
+            raise ValueError(f"task.spread_deg={self.spread_deg} must be in [0, 30]")
+
+
+def draw_posture(weights: dict[str, float], rng: np.random.Generator) -> Posture:
+    """Draw one of the `POSTURES` with a probability proportional to its weight."""
+    names = [name for name, weight in weights.items() if weight > 0.0]
+    if len(names) == 1:
+        return POSTURES[names[0]]
+    values = np.array([weights[name] for name in names])
+    return POSTURES[names[rng.choice(len(names), p=values / values.sum())]]
+
+
+def start_anywhere(
+    body: Humanoid, room: RoomCfg, posture: Posture, spread_deg: float, rng: np.random.Generator
+) -> None:
+    """Place a body in a posture with noise, at a random position and heading in a room."""
+    position = room.sample_floor(rng, margin_m=_WALL_CLEARANCE_M)
+    noisy = body.vary(posture, spread_deg, rng)
+    body.place(position, rng.uniform(-math.pi, math.pi), noisy)
+
+
+def start_near_edge(
+    body: Humanoid, room: RoomCfg, posture: Posture, spread_deg: float, rng: np.random.Generator
+) -> None:
+    """Place a body in a posture with noise, near the edge of a room and facing its middle."""
+    position, heading_rad = room.sample_start(rng, margin_m=_WALL_CLEARANCE_M)
+    body.place(position, heading_rad, body.vary(posture, spread_deg, rng))
+
+
+def face_down_cosines(body: Humanoid) -> dict[str, float]:
+    """Return the cosines of the angles between straight down and the fronts of chest and pelvis.
+
+    Returns:
+        The reward terms ``torso`` and ``hip``, each in [-1, 1].
+    """
+    return {
+        "torso": -float(body.bone("chest").forward[2]),
+        "hip": -float(body.bone("pelvis").forward[2]),
+    }

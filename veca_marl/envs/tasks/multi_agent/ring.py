@@ -1,0 +1,83 @@
+"""The ring of the PushOut tasks: its marking, starting poses and positions relative to it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from veca_marl.envs.core.task import Player
+from veca_marl.envs.tasks.multi_agent.contests import (
+    add_painted_disc,
+    place_player,
+    polar_point,
+)
+from veca_marl.sim.body.base import Body
+from veca_marl.sim.geometry.pose import Floats
+from veca_marl.sim.physics.world import World
+
+_RIM_M = 0.06
+_CLAY, _ROPE = (0.80, 0.62, 0.36), (0.97, 0.97, 0.92)
+_TEAM_SPACING_RAD = math.radians(60.0)  # between players of a team at the start
+
+
+class Ring:
+    """A ring painted on the floor of the first room of a world.
+
+    Args:
+        world: The world.
+        radius_m: Radius.
+
+    Attributes:
+        middle: Middle, ``(2,)`` metres.
+        radius_m: The same.
+
+    Raises:
+        ValueError: If the ring does not fit into the room.
+    """
+
+    def __init__(self, world: World, radius_m: float) -> None:
+        room = world.playground.rooms[0]
+        low, size = np.array(room.lower_m[:2]), np.array(room.size_m[:2])
+        self.middle: Floats = low + size / 2.0
+        self.radius_m = radius_m
+        if size.min() / 2.0 < radius_m:
+            raise ValueError(
+                f"task.radius_m={radius_m}: the ring does not fit into the room "
+                f"{room.name!r} of {size[0]} x {size[1]} m"
+            )
+        add_painted_disc(world, "rim", self.middle, radius_m, 0.004, _ROPE)
+        add_painted_disc(world, "clay", self.middle, radius_m - _RIM_M, 0.006, _CLAY)
+
+    def area_share(self, body: Body) -> float:
+        """Return the share of the ring's area that is nearer to the middle than a body.
+
+        It is above 1 for a body whose pelvis is outside.
+        """
+        offset = body.position[:2] - self.middle
+        return float(offset @ offset) / self.radius_m**2
+
+    def place_team(
+        self,
+        players: Sequence[Player],
+        side_rad: float,
+        start_share: float,
+        spread_deg: float,
+        rng: np.random.Generator,
+    ) -> None:
+        """Place a team side by side on one side of the ring, facing the middle.
+
+        Args:
+            players: The players of the team.
+            side_rad: Direction of the team, seen from the middle.
+            start_share: Distance from the middle as a share of the radius.
+            spread_deg: Largest deviation of the heading from the direction of the middle.
+            rng: Random generator of the episode.
+        """
+        distance_m = start_share * self.radius_m
+        for number, player in enumerate(players):
+            angle_rad = side_rad + _TEAM_SPACING_RAD * (number - (len(players) - 1) / 2.0)
+            place = self.middle + polar_point(angle_rad, distance_m)
+            deviation_rad = math.radians(rng.uniform(-spread_deg, spread_deg))
+            place_player(player, place, angle_rad + math.pi + deviation_rad)
