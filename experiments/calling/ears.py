@@ -18,8 +18,8 @@ from veca_marl.config import compose
 from veca_marl.envs.core.game import Game
 from veca_marl.envs.experts.control.locomotion import locomotion_of
 from veca_marl.envs.experts.perception.call_localization import loudness
-from veca_marl.envs.tasks.multi_agent.contests import place_player
-from veca_marl.envs.tasks.multi_agent.navigation import free_place
+from veca_marl.envs.tasks.navigation.places import free_place
+from veca_marl.envs.tasks.player_starts import place_player
 from veca_marl.sim.sound.calls import Call
 
 CALLS = {"walker_voice": 300, "mitten_voice": 120}  # how many, by body

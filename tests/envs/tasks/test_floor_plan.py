@@ -8,7 +8,7 @@ import pytest
 from seeking import shipped, walker_at
 
 from veca_marl.envs.experts.control.steering import walk_to
-from veca_marl.envs.tasks.multi_agent.floor_plan import DoorApproach, FloorPlan
+from veca_marl.envs.tasks.navigation.floor_plan import DoorApproach, FloorPlan
 from veca_marl.sim.physics.playground import DoorCfg, PlaygroundCfg, RoomCfg
 from veca_marl.sim.physics.world import World
 

@@ -10,9 +10,9 @@ from veca_marl.config import ConfigError, compose
 from veca_marl.envs.core.game import Game
 from veca_marl.envs.experts.control.locomotion import locomotion_of
 from veca_marl.envs.experts.control.path_following import PathFollower
-from veca_marl.envs.tasks.multi_agent.contests import place_player
-from veca_marl.envs.tasks.multi_agent.multi_agent_nav import MultiAgentNavCfg, Muted
-from veca_marl.envs.tasks.multi_agent.navigation import gap_m
+from veca_marl.envs.tasks.navigation.multi_agent_nav import MultiAgentNavCfg, Muted
+from veca_marl.envs.tasks.navigation.places import gap_m
+from veca_marl.envs.tasks.player_starts import place_player
 from veca_marl.sim.sound.calls import CALLS, Call, call_waveform
 
 STEP_S = 0.04

@@ -6,16 +6,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from seeking import BALL_M, ball_at, walker_at, wall_across, world_with
+from veca_marl.envs.tasks.multi_agent import navigation
 
 from veca_marl.envs.core.task import Player
-from veca_marl.envs.tasks.multi_agent import navigation
-from veca_marl.envs.tasks.multi_agent.navigation import (
-    PropVisibility,
-    displacement_to,
-    free_pair,
-    free_place,
-    gap_m,
-)
+from veca_marl.envs.tasks.navigation.helper_reward import PropVisibility, displacement_to
+from veca_marl.envs.tasks.navigation.places import free_pair, free_place, gap_m
 from veca_marl.sim.physics.playground import RoomCfg
 from veca_marl.sim.vision.optics import Camera, look_at, seen_fraction
 

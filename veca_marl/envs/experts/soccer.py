@@ -11,7 +11,7 @@ from veca_marl.envs.core.expert import Expert, register_expert
 from veca_marl.envs.experts.control.locomotion import locomotion_of
 from veca_marl.envs.experts.control.wall_recovery import WallRecovery
 from veca_marl.envs.experts.skills.soccer import open_corner, shooting_goal
-from veca_marl.envs.tasks.multi_agent.soccer import ATTACKER, Soccer
+from veca_marl.envs.tasks.contests.soccer import ATTACKER, Soccer
 from veca_marl.sim.geometry.pose import Floats
 
 

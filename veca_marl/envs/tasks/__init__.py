@@ -1,15 +1,15 @@
 """Rules of the tasks that ship with the package. Importing this package registers them."""
 
+from veca_marl.envs.tasks.contests.push_out_1v1 import PushOut1v1
+from veca_marl.envs.tasks.contests.push_out_2v2 import PushOut2v2
+from veca_marl.envs.tasks.contests.soccer_one_player import SoccerOnePlayer
+from veca_marl.envs.tasks.contests.soccer_two_player import SoccerTwoPlayer
 from veca_marl.envs.tasks.locomotion.crawl_baby import CrawlBaby
 from veca_marl.envs.tasks.locomotion.run_baby import RunBaby
 from veca_marl.envs.tasks.locomotion.sit_baby import SitBaby
 from veca_marl.envs.tasks.locomotion.turn_baby import TurnBaby
-from veca_marl.envs.tasks.multi_agent.multi_agent_nav import MultiAgentNav
-from veca_marl.envs.tasks.multi_agent.push_out_1v1 import PushOut1v1
-from veca_marl.envs.tasks.multi_agent.push_out_2v2 import PushOut2v2
-from veca_marl.envs.tasks.multi_agent.soccer_one_player import SoccerOnePlayer
-from veca_marl.envs.tasks.multi_agent.soccer_two_player import SoccerTwoPlayer
 from veca_marl.envs.tasks.multimodal.kick_the_ball import KickTheBall
+from veca_marl.envs.tasks.navigation.multi_agent_nav import MultiAgentNav
 from veca_marl.envs.tasks.objects.grab_object import GrabObject
 from veca_marl.envs.tasks.objects.move_to_target import MoveToTarget
 from veca_marl.envs.tasks.objects.pile_up_block import PileUpBlock

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from veca_marl.envs.experts.control.locomotion import Locomotion
 from veca_marl.envs.experts.control.path_following import PathFollower
 from veca_marl.envs.experts.perception.call_localization import CallSourceMap
-from veca_marl.envs.tasks.multi_agent.floor_plan import FloorPlan
-from veca_marl.sim.body import Body
+from veca_marl.envs.tasks.navigation.floor_plan import FloorPlan
+from veca_marl.sim.body.base import Body
 from veca_marl.sim.geometry.pose import Floats
 from veca_marl.sim.physics.world import World
 from veca_marl.sim.sound.calls import Call

@@ -7,8 +7,8 @@ import math
 import numpy as np
 
 from veca_marl.envs.experts.control.locomotion import Clearances
-from veca_marl.envs.tasks.multi_agent.pitch import Pitch
-from veca_marl.sim.body import Body
+from veca_marl.envs.tasks.contests.pitch import Pitch
+from veca_marl.sim.body.base import Body
 from veca_marl.sim.geometry.pose import Floats
 
 _PREDICTION_S = 0.25  # the ball's position is extrapolated by this time

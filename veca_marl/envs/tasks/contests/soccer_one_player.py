@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from veca_marl.envs.core.task import Team, register
-from veca_marl.envs.tasks.multi_agent.soccer import ATTACKER, Soccer
+from veca_marl.envs.tasks.contests.soccer import ATTACKER, Soccer
 
 
 @register

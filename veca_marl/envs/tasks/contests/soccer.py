@@ -8,67 +8,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from veca_marl.envs.core.scoring import horizontal_angle_rad
-from veca_marl.envs.core.task import Player, Task, TaskCfg, terms
-from veca_marl.envs.tasks.multi_agent.contests import direct_gaze_ahead, place_player
-from veca_marl.envs.tasks.multi_agent.kicking import AutomaticKicks
-from veca_marl.envs.tasks.multi_agent.pitch import POST_M, Pitch
-<<<<<<< HEAD
-from veca_marl.sim.body.walker import Walker
-=======
+from veca_marl.envs.core.task import Player, Task
+from veca_marl.envs.tasks.contests.kicking import AutomaticKicks
+from veca_marl.envs.tasks.contests.pitch import Pitch
+from veca_marl.envs.tasks.contests.soccer_cfg import SoccerCfg
+from veca_marl.envs.tasks.player_starts import direct_gaze_ahead, place_player
 from veca_marl.sim.body.walker.pushing import horizontal_distance
->>>>>>> 132edd8 (wip)
 from veca_marl.sim.geometry.pose import Floats
-from veca_marl.sim.geometry.vectors import horizontal_distance
 
 ATTACKER, DEFENDER = "attacker", "defender"
-
-
-@dataclass
-class SoccerCfg(TaskCfg):
-    """Parameters of SoccerOnePlayer. The pitch lies along x; the attacker shoots towards +x.
-
-    Attributes:
-        radius_m: Radius of the ball.
-        mass_kg: Mass of the ball.
-        goal_width_m: Distance between the axes of the posts.
-        goal_height_m: Height of the bar.
-        goal_from_wall_m: Distance of the goal line from the end of the room.
-        ball_from_goal_m: Least and greatest distance of the ball from the goal line at the start.
-        aside_m: Largest lateral distance of ball and players from the middle line at the start.
-        attacker_from_ball_m: Least and greatest distance of the attacker behind the ball at the
-            start.
-        spread_deg: Largest angle at the start between the heading of a player and the direction
-            of the ball, in [0, 180].
-        kick_rest_s: Least time between two kicks of a player.
-    """
-
-    radius_m: float = 0.12
-    mass_kg: float = 0.3
-    goal_width_m: float = 1.4
-    goal_height_m: float = 0.8
-    goal_from_wall_m: float = 0.5
-    ball_from_goal_m: tuple[float, float] = (2.0, 2.8)
-    aside_m: float = 0.8
-    attacker_from_ball_m: tuple[float, float] = (0.8, 1.6)
-    spread_deg: float = 30.0
-    kick_rest_s: float = 0.5
-    weights: dict[str, float] = terms(goal=5.0, progress=0.5, approach=0.1, facing=0.0)
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        self._check_positive("radius_m", "mass_kg", "goal_from_wall_m", "kick_rest_s")
-        for name in ("goal_width_m", "goal_height_m"):
-            if not 2.0 * (self.radius_m + POST_M) < getattr(self, name) < math.inf:
-                raise ValueError(
-                    f"task.{name}={getattr(self, name)}: a ball of task.radius_m={self.radius_m} "
-                    "does not fit through"
-                )
-        self._check_span("ball_from_goal_m", 0.3, "0.3 m or more")
-        self._check_span("attacker_from_ball_m", 0.3, "0.3 m or more")
-        if not 0.0 <= self.aside_m < math.inf:
-            raise ValueError(f"task.aside_m={self.aside_m} must be 0 or more")
-        if not 0.0 <= self.spread_deg <= 180.0:
-            raise ValueError(f"task.spread_deg={self.spread_deg} must be in [0, 180]")
 
 
 @dataclass(frozen=True)

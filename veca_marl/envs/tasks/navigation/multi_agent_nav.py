@@ -10,16 +10,17 @@ from typing import Any
 import numpy as np
 
 from veca_marl.envs.core.task import Player, Task, TaskCfg, Team, register, terms
-from veca_marl.envs.tasks.multi_agent.contests import direct_gaze_ahead, place_player
-from veca_marl.envs.tasks.multi_agent.floor_plan import FloorPlan
-from veca_marl.envs.tasks.multi_agent.navigation import (
-    PropVisibility,
-    displacement_to,
+from veca_marl.envs.tasks.navigation.floor_plan import FloorPlan
+from veca_marl.envs.tasks.navigation.helper_reward import PropVisibility, displacement_to
+from veca_marl.envs.tasks.navigation.places import (
+    add_target,
+    check_rooms,
     free_pair,
     free_place,
+    furniture_of,
     gap_m,
 )
-from veca_marl.sim.physics.props import PropCfg, PropShape
+from veca_marl.envs.tasks.player_starts import direct_gaze_ahead, place_player
 
 _PASSAGE_M = 0.2  # width that an agent at the object leaves free towards the walls
 
@@ -102,26 +103,10 @@ class MultiAgentNav(Task):
         return (Team("seekers", cfg.agents),)
 
     def build(self) -> None:
-        playground = self.world.playground
-        rooms = len(playground.rooms)
-        if len(self.players) > rooms:
-            raise ValueError(
-                f"task.agents={len(self.players)} start in rooms of their own, but playground "
-                f"{playground.name!r} has {rooms}; choose task.agents of at most {rooms}, or "
-                "playground=two_rooms, three_rooms, four_rooms, seven_rooms"
-            )
-        self.plan = FloorPlan(playground)
-        self._furniture = [
-            prop for prop in self.world.props.values() if prop.cfg.shape is not PropShape.wall
-        ]
-        self.target = self.world.add_prop(
-            PropCfg(
-                name="target",
-                shape=PropShape.sphere,
-                size_m=[self.cfg.radius_m],
-                colour=(0.95, 0.15, 0.1),
-            )
-        )
+        check_rooms(self.world.playground, len(self.players))
+        self.plan = FloorPlan(self.world.playground)
+        self._furniture = furniture_of(self.world)
+        self.target = add_target(self.world, self.cfg.radius_m)
         self._visibility = PropVisibility(self.world.scene, self.target)
         self.arrived: set[str] = set()
         self._newly_arrived = 0

@@ -8,14 +8,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from veca_marl.envs.core.task import Player
-from veca_marl.envs.tasks.multi_agent.contests import (
-    add_painted_disc,
-    place_player,
-    polar_point,
-)
+from veca_marl.envs.tasks.player_starts import place_player
 from veca_marl.sim.body.base import Body
 from veca_marl.sim.geometry.pose import Floats
+from veca_marl.sim.physics.props import PropCfg, PropShape
 from veca_marl.sim.physics.world import World
+
+Colour = tuple[float, float, float]
 
 _RIM_M = 0.06
 _CLAY, _ROPE = (0.80, 0.62, 0.36), (0.97, 0.97, 0.92)
@@ -47,8 +46,8 @@ class Ring:
                 f"task.radius_m={radius_m}: the ring does not fit into the room "
                 f"{room.name!r} of {size[0]} x {size[1]} m"
             )
-        add_painted_disc(world, "rim", self.middle, radius_m, 0.004, _ROPE)
-        add_painted_disc(world, "clay", self.middle, radius_m - _RIM_M, 0.006, _CLAY)
+        _add_painted_disc(world, "rim", self.middle, radius_m, 0.004, _ROPE)
+        _add_painted_disc(world, "clay", self.middle, radius_m - _RIM_M, 0.006, _CLAY)
 
     def area_share(self, body: Body) -> float:
         """Return the share of the ring's area that is nearer to the middle than a body.
@@ -78,6 +77,36 @@ class Ring:
         distance_m = start_share * self.radius_m
         for number, player in enumerate(players):
             angle_rad = side_rad + _TEAM_SPACING_RAD * (number - (len(players) - 1) / 2.0)
-            place = self.middle + polar_point(angle_rad, distance_m)
+            place = self.middle + _polar_point(angle_rad, distance_m)
             deviation_rad = math.radians(rng.uniform(-spread_deg, spread_deg))
             place_player(player, place, angle_rad + math.pi + deviation_rad)
+
+
+def _polar_point(direction_rad: float, distance_m: float = 1.0) -> Floats:
+    """Return the point of the floor at polar coordinates, ``(2,)`` metres."""
+    return distance_m * np.array([math.cos(direction_rad), math.sin(direction_rad)])
+
+
+def _add_painted_disc(
+    world: World, name: str, centre: Floats, radius_m: float, top_m: float, colour: Colour
+) -> None:
+    """Add a disc to the floor that is visible and has no collision.
+
+    Args:
+        world: The world.
+        name: Name of the prop.
+        centre: ``(2,)`` metres.
+        radius_m: Radius.
+        top_m: Thickness; of two overlapping discs the thicker one is visible.
+        colour: Red, green, blue in [0, 1].
+    """
+    world.add_prop(
+        PropCfg(
+            name=name,
+            shape=PropShape.cylinder,
+            size_m=[radius_m, top_m],
+            position_m=(float(centre[0]), float(centre[1]), top_m / 2),
+            colour=colour,
+            tangible=False,
+        )
+    )

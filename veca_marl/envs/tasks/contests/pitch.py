@@ -3,28 +3,17 @@
 from __future__ import annotations
 
 import math
-from typing import Protocol
 
 import numpy as np
 
+from veca_marl.envs.tasks.contests.soccer_cfg import POST_M, SoccerCfg
 from veca_marl.sim.geometry.pose import Floats
 from veca_marl.sim.physics.props import Prop, PropCfg, PropShape
 from veca_marl.sim.physics.world import World
 
-POST_M = 0.04
 _BOARD_M = (0.06, 0.3)  # thickness and height
 _CORNER_M = 0.5  # length along both walls that the board across a corner cuts off
 _WHITE, _YELLOW, _ORANGE = (0.95, 0.95, 0.95), (0.95, 0.75, 0.1), (1.0, 0.4, 0.05)
-
-
-class PitchCfg(Protocol):
-    """Parameters of a pitch, see `SoccerCfg`."""
-
-    radius_m: float
-    mass_kg: float
-    goal_width_m: float
-    goal_height_m: float
-    goal_from_wall_m: float
 
 
 class Pitch:
@@ -42,7 +31,7 @@ class Pitch:
         high: Upper corner, ``(2,)`` metres.
     """
 
-    def __init__(self, world: World, cfg: PitchCfg) -> None:
+    def __init__(self, world: World, cfg: SoccerCfg) -> None:
         self._room = room = world.playground.rooms[0]
         low, size = np.array(room.lower_m), np.array(room.size_m)
         self._cfg, self.goal_width_m = cfg, cfg.goal_width_m
@@ -112,7 +101,7 @@ class Pitch:
         )
 
     def _add_boards(self, world: World) -> None:
-        """Close the goal line beside the posts and cut the corners, where a ball would get stuck."""
+        """Close the goal line beside the posts and cut the corners, which would trap the ball."""
         half_m = self._cfg.goal_width_m / 2.0
         centre = float(self.goal[1])
         for side, edge in (("right", self.low[1]), ("left", self.high[1])):

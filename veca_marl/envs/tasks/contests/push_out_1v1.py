@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from veca_marl.envs.core.task import Team, register
-from veca_marl.envs.tasks.multi_agent.push_out import PushOut
+from veca_marl.envs.tasks.contests.push_out import PushOut
 
 
 @register

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from veca_marl.envs.core.task import Player, Team, register
-from veca_marl.envs.tasks.multi_agent.soccer import ATTACKER, DEFENDER, Soccer, SoccerCfg
+from veca_marl.envs.tasks.contests.soccer import ATTACKER, DEFENDER, Soccer
+from veca_marl.envs.tasks.contests.soccer_cfg import SoccerCfg
 from veca_marl.sim.geometry.pose import Floats
 
 

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from veca_marl.envs.core.task import Player, Task, TaskCfg, terms
-from veca_marl.envs.tasks.multi_agent.contests import direct_gaze_ahead, opponents
-from veca_marl.envs.tasks.multi_agent.ring import Ring
+from veca_marl.envs.tasks.contests.opponents import opponents
+from veca_marl.envs.tasks.contests.ring import Ring
+from veca_marl.envs.tasks.player_starts import direct_gaze_ahead
 
 
 @dataclass

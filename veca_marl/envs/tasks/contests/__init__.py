@@ -1,0 +1,1 @@
+"""Games between players on one floor: PushOut in a ring, Soccer on a pitch."""

@@ -1,1 +1,0 @@
-"""Tasks of several agents: MultiAgentNav, PushOut and Soccer."""

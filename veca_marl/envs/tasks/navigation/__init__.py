@@ -1,0 +1,1 @@
+"""Tasks of finding objects in houses: MultiAgentNav."""

@@ -1,0 +1,71 @@
+"""The paper's helper reward of navigation tasks: motion towards an object while it is visible."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from veca_marl.envs.core.task import Player
+from veca_marl.sim.body.base import Body
+from veca_marl.sim.geometry.pose import Floats
+from veca_marl.sim.geometry.scene import Scene
+from veca_marl.sim.physics.props import Prop
+from veca_marl.sim.vision import is_visible
+
+
+class Displacement(NamedTuple):
+    """Horizontal displacement of a body during one step, in components.
+
+    Attributes:
+        ahead_m: Forward component.
+        aside_m: Lateral component, positive towards the side on which the object is.
+    """
+
+    ahead_m: float
+    aside_m: float
+
+
+def displacement_to(body: Body, target: Floats, step_s: float) -> Displacement:
+    """Return the two components of the paper's helper reward of ObjectNav and MultiAgentNav.
+
+    The reward in the paper (appendix, "ObjectNav & MultiAgentNav") is
+    ``Vis * (0.05 a_f + 0.03 a_l L)`` with the velocity's forward and left components and L = 1 or
+    -1 for an object on the left or right. The paper gives no unit. Here the velocity is in metres
+    per step: in metres per second, 25 times as much, going to and fro in front of an object has a
+    higher return than reaching it.
+
+    Args:
+        body: The body.
+        target: Position of the object, ``(3,)`` metres.
+        step_s: Duration of an environment step.
+    """
+    forward, way = body.forward, body.velocity * step_s
+    left = np.array([-forward[1], forward[0], 0.0])
+    side = float(np.sign(left @ (target - body.position)))
+    return Displacement(float(forward @ way), float(left @ way) * side)
+
+
+class PropVisibility:
+    """Visibility of one prop to players, cached for each version of the scene.
+
+    Args:
+        scene: The scene that eyes see.
+        prop: The prop.
+    """
+
+    def __init__(self, scene: Scene, prop: Prop) -> None:
+        self._scene, self._prop = scene, prop
+        self._cache: dict[str, tuple[int, bool]] = {}
+
+    def clear(self) -> None:
+        """Clear the cache."""
+        self._cache.clear()
+
+    def for_player(self, player: Player) -> bool:
+        """Return whether the prop is visible to the left eye of a player."""
+        version, seen = self._cache.get(player.name, (-1, False))
+        if version != self._scene.version:
+            seen = is_visible(self._scene, player.body, self._prop)
+            self._cache[player.name] = self._scene.version, seen
+        return seen
