@@ -6,9 +6,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from seeking import BALL_M, ball_at, walker_at, wall_across, world_with
-from veca_marl.envs.tasks.multi_agent import navigation
 
 from veca_marl.envs.core.task import Player
+from veca_marl.envs.tasks.navigation import helper_reward
 from veca_marl.envs.tasks.navigation.helper_reward import PropVisibility, displacement_to
 from veca_marl.envs.tasks.navigation.places import free_pair, free_place, gap_m
 from veca_marl.sim.physics.playground import RoomCfg
@@ -111,7 +111,7 @@ def test_an_eye_is_asked_once_a_picture(world, monkeypatch):
         asked.append(thing)
         return True
 
-    monkeypatch.setattr(navigation, "is_visible", look)
+    monkeypatch.setattr(helper_reward, "is_visible", look)
     sight, player = PropVisibility(world.scene, world.props["ball"]), Player("one", "team", None)
     assert sight.for_player(player)
     assert sight.for_player(player)
