@@ -28,7 +28,7 @@ from veca_marl.envs.experts.control.crawl_gait import CrawlGait
 from veca_marl.envs.experts.control.gait_patterns import BACK, CRAWL, GaitPattern
 from veca_marl.envs.experts.control.steering import bearing_rad
 from veca_marl.sim.body.humanoid import JointCommand
-from veca_marl.sim.geometry.pose import Floats
+from veca_marl.sim.geometry import Floats
 
 BODIES = ("mitten_position", "mitten")
 POPULATION = 14

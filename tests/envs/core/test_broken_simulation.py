@@ -13,7 +13,7 @@ from veca_marl.envs.adapters.pettingzoo import VecaParallelEnv
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
 from veca_marl.envs.core.game import Game
 from veca_marl.envs.core.game_cfg import GameCfg
-from veca_marl.sim.physics.bullet import pybullet
+from veca_marl.sim.physics import pybullet
 
 CFG = compose(["+task=KickTheBall", "body=mitten"]).game
 SENSES = ("vision", "audio", "proprioception")

@@ -10,7 +10,7 @@ from veca_marl.envs.core.scoring import (
     horizontal,
     rotation_angle_rad,
 )
-from veca_marl.sim.geometry.rotations import rotation_about_vertical
+from veca_marl.sim.geometry import rotation_about_vertical
 
 EAST, NORTH = np.array([1.0, 0.0, 0.0]), np.array([0.0, 2.0, 0.0])
 

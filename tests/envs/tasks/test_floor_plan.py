@@ -9,8 +9,7 @@ from seeking import shipped, walker_at
 
 from veca_marl.envs.experts.control.steering import walk_to
 from veca_marl.envs.tasks.navigation.floor_plan import DoorApproach, FloorPlan
-from veca_marl.sim.physics.playground import DoorCfg, PlaygroundCfg, RoomCfg
-from veca_marl.sim.physics.world import World
+from veca_marl.sim.physics import DoorCfg, PlaygroundCfg, RoomCfg, World
 
 APPROACH = DoorApproach(before_m=0.4, right_m=0.2)
 HOUSES = ("two_rooms", "three_rooms", "four_rooms", "seven_rooms")

@@ -11,7 +11,7 @@ from veca_marl.envs.core.task import Player
 from veca_marl.envs.tasks.navigation import helper_reward
 from veca_marl.envs.tasks.navigation.helper_reward import PropVisibility, displacement_to
 from veca_marl.envs.tasks.navigation.places import free_pair, free_place, gap_m
-from veca_marl.sim.physics.playground import RoomCfg
+from veca_marl.sim.physics import RoomCfg
 from veca_marl.sim.vision.optics import Camera, look_at, seen_fraction
 
 STEP_S = 0.04

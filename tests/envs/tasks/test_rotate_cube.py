@@ -8,7 +8,7 @@ import pytest
 from veca_marl.config import compose
 from veca_marl.envs.core.game import Game
 from veca_marl.envs.tasks.objects.rotate_cube import RotateCubeCfg
-from veca_marl.sim.geometry.rotations import heading_rad
+from veca_marl.sim.geometry import heading_rad
 
 
 @pytest.fixture(scope="module")

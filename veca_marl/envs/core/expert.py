@@ -43,8 +43,8 @@ class Expert(ABC, Generic[TaskT]):
         Returns:
             A command that `Body.encode` turns into an action. For a walker, ``(forward, turn)``,
             each in [-1, 1], optionally followed by a `Call`. For a joint-level body, the target
-            angles of the 82 joints in rad, ``(82,)``, or `Springs`; both serve torque-controlled
-            and position-controlled bodies.
+            angles of the 82 joints in rad, ``(82,)``, or a `JointCommand`; both serve
+            torque-controlled and position-controlled bodies.
         """
 
 

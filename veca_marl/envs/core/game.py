@@ -19,7 +19,7 @@ from veca_marl.envs.core.scripts import play_script
 from veca_marl.envs.core.task import Player, Team, find_task
 from veca_marl.envs.core.team import Script
 from veca_marl.sim.body import make_body
-from veca_marl.sim.physics.world import World
+from veca_marl.sim.physics import World
 from veca_marl.sim.sense import Sense
 from veca_marl.sim.senses import make_senses
 

@@ -9,8 +9,7 @@ from veca_marl.envs.core.task import TaskCfg, Team, find_task
 from veca_marl.envs.core.team import Script, TeamCfg
 from veca_marl.sim.body import BodyCfg
 from veca_marl.sim.body.walker import WalkerCfg
-from veca_marl.sim.physics.playground import PlaygroundCfg
-from veca_marl.sim.physics.world import ClockCfg
+from veca_marl.sim.physics import ClockCfg, PlaygroundCfg
 from veca_marl.sim.senses import SensesCfg
 
 FLOOR_OF_A_PLAYER_M2 = 1.0  # in which a player can stand, turn and be placed apart from others

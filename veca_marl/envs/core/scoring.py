@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from veca_marl.sim.geometry.pose import Floats
+from veca_marl.sim.geometry import Floats
 
 
 def cosine(a: Floats, b: Floats) -> float:

@@ -13,7 +13,7 @@ from veca_marl.registry import Registry
 from veca_marl.sim.body import Body
 from veca_marl.sim.body.humanoid import Humanoid
 from veca_marl.sim.body.walker import Walker
-from veca_marl.sim.physics.world import World
+from veca_marl.sim.physics import World
 
 TaskType = TypeVar("TaskType", bound="type[Task]")
 

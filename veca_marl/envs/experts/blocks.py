@@ -17,8 +17,8 @@ from veca_marl.envs.experts.skills.carrying import Carrier
 from veca_marl.envs.tasks.objects.pile_up_block import PileUpBlock
 from veca_marl.envs.tasks.objects.put_down_block import PutDownBlock
 from veca_marl.sim.body.humanoid.postures import reaching
-from veca_marl.sim.geometry.pose import Floats
-from veca_marl.sim.physics.props import Prop
+from veca_marl.sim.geometry import Floats
+from veca_marl.sim.physics import Prop
 
 _CARRY_CLEARANCE_M = 0.02
 _PUT_DOWN_ASIDE_M = 0.09

@@ -15,7 +15,7 @@ from veca_marl.envs.experts.skills.carrying import Carrier
 from veca_marl.envs.experts.skills.lifting import BENT, UPRIGHT, lift
 from veca_marl.envs.tasks.objects.grab_object import GrabObject
 from veca_marl.envs.tasks.objects.move_to_target import MoveToTarget
-from veca_marl.sim.geometry.pose import Floats
+from veca_marl.sim.geometry import Floats
 
 _LIFT_M = 0.08
 _CARRY_CLEARANCE_M = 0.03

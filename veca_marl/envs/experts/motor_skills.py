@@ -18,7 +18,7 @@ from veca_marl.envs.tasks.locomotion.run_baby import RunBaby
 from veca_marl.envs.tasks.locomotion.sit_baby import SitBaby
 from veca_marl.envs.tasks.locomotion.turn_baby import TurnBaby
 from veca_marl.sim.body.humanoid import JointCommand
-from veca_marl.sim.geometry.pose import Floats
+from veca_marl.sim.geometry import Floats
 
 _FAR_M = 100.0
 

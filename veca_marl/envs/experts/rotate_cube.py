@@ -13,8 +13,7 @@ from veca_marl.envs.core.expert import Expert, register_expert
 from veca_marl.envs.core.task import Player
 from veca_marl.envs.tasks.objects.rotate_cube import SHOULDER, RotateCube
 from veca_marl.sim.body.humanoid.postures import OFFERING
-from veca_marl.sim.geometry.pose import Floats
-from veca_marl.sim.geometry.rotations import heading_rad
+from veca_marl.sim.geometry import Floats, heading_rad
 
 _GAIN = 0.05  # change of the target angles per step, as a share of the remaining angle
 _MAX_CHANGE_RAD = math.radians(1.5)  # per step; with a larger one the cube slides off

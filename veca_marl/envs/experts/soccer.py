@@ -12,7 +12,7 @@ from veca_marl.envs.experts.control.locomotion import locomotion_of
 from veca_marl.envs.experts.control.wall_recovery import WallRecovery
 from veca_marl.envs.experts.skills.soccer import open_corner, shooting_goal
 from veca_marl.envs.tasks.contests.soccer import ATTACKER, Soccer
-from veca_marl.sim.geometry.pose import Floats
+from veca_marl.sim.geometry import Floats
 
 
 @register_expert("SoccerOnePlayer")

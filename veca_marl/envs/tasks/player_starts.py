@@ -7,9 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from veca_marl.envs.core.task import Player
-from veca_marl.sim.body.humanoid.humanoid import Humanoid
+from veca_marl.sim.body.humanoid import Humanoid
 from veca_marl.sim.body.humanoid.postures import ON_ALL_FOURS
-from veca_marl.sim.geometry.pose import Floats
+from veca_marl.sim.geometry import Floats
 
 _HORIZON_M = 10.0
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from veca_marl.sim.body.anatomy.skeleton import Skeleton, forward_kinematics, load_skeleton
 from veca_marl.sim.body.humanoid import Humanoid
-from veca_marl.sim.geometry.pose import Floats
+from veca_marl.sim.geometry import Floats
 
 _SIDES = ("l", "r")
 _ARM = ("upper_arm", "forearm", "hand")

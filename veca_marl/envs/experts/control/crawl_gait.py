@@ -8,7 +8,7 @@ import numpy as np
 
 from veca_marl.envs.experts.control.gait_patterns import CRAWL, GaitPattern, LimbPattern
 from veca_marl.sim.body.humanoid import Humanoid, JointCommand
-from veca_marl.sim.geometry.pose import Floats
+from veca_marl.sim.geometry import Floats
 
 _FADE_IN_S = 0.4  # blend from the posture at the start to the gait
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from veca_marl.sim.body.humanoid import Humanoid
 from veca_marl.sim.body.humanoid.postures import Posture
-from veca_marl.sim.geometry.pose import Floats
+from veca_marl.sim.geometry import Floats
 
 
 class KeyPoses:

@@ -11,10 +11,9 @@ from veca_marl.envs.experts.control.crawl_gait import CrawlGait
 from veca_marl.envs.experts.control.gait_patterns import BACK, CRAWL, KNEEL, GaitPattern
 from veca_marl.envs.experts.control.steering import bearing_rad, walk_to
 from veca_marl.envs.tasks.navigation.floor_plan import DoorApproach
-from veca_marl.sim.body.humanoid.humanoid import Humanoid
-from veca_marl.sim.body.humanoid.joint_controls import Springs
-from veca_marl.sim.body.walker.walker import Walker
-from veca_marl.sim.geometry.pose import Floats
+from veca_marl.sim.body.humanoid import Humanoid, JointCommand
+from veca_marl.sim.body.walker import Walker
+from veca_marl.sim.geometry import Floats
 from veca_marl.sim.sound.calls import Call
 
 _TURNING_RADIUS_M = 0.35  # a body that crawls in a circle steers back when it is farther away
@@ -148,12 +147,12 @@ class CrawlLocomotion:
         self._gait = CrawlGait(body, step_s)
         self._pivot: Floats | None = None
 
-    def to(self, place: Floats, call: Call = Call.none) -> Springs:
+    def to(self, place: Floats, call: Call = Call.none) -> JointCommand:
         """See `Locomotion.to`. The body turns while it moves; obstacles stop it."""
         self._pivot = None
         return self._towards(place, call)
 
-    def turn(self, left: float, call: Call = Call.none) -> Springs:
+    def turn(self, left: float, call: Call = Call.none) -> JointCommand:
         """Crawl in a small circle about the place where the turn began; see `Locomotion.turn`."""
         here = self._body.position[:2]
         if self._pivot is None:
@@ -162,15 +161,15 @@ class CrawlLocomotion:
             return self._towards(self._pivot, call)
         return self._with_pattern(CRAWL).command(left)._replace(call=call)
 
-    def rest(self, call: Call = Call.none) -> Springs:
+    def rest(self, call: Call = Call.none) -> JointCommand:
         """See `Locomotion.rest`."""
         return self._with_pattern(KNEEL).command()._replace(call=call)
 
-    def back(self, call: Call = Call.none) -> Springs:
+    def back(self, call: Call = Call.none) -> JointCommand:
         """See `Locomotion.back`."""
         return self._with_pattern(BACK).command()._replace(call=call)
 
-    def _towards(self, place: Floats, call: Call) -> Springs:
+    def _towards(self, place: Floats, call: Call) -> JointCommand:
         bearing = bearing_rad(self._body, place)
         return self._with_pattern(CRAWL).towards(bearing)._replace(call=call)
 

@@ -7,9 +7,9 @@ from typing import Any
 from veca_marl.envs.experts.control.locomotion import Locomotion
 from veca_marl.envs.experts.control.wall_recovery import WallRecovery
 from veca_marl.envs.tasks.navigation.floor_plan import FloorPlan
-from veca_marl.sim.body.base import Body
-from veca_marl.sim.body.walker.pushing import horizontal_distance
-from veca_marl.sim.geometry.pose import Floats
+from veca_marl.sim.body import Body
+from veca_marl.sim.geometry import Floats
+from veca_marl.sim.geometry.vectors import horizontal_distance
 from veca_marl.sim.sound.calls import Call
 
 _ARRIVED_M = 0.4

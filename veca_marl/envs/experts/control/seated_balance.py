@@ -7,8 +7,8 @@ import numpy as np
 from veca_marl.sim.body.anatomy.skeleton import forward_kinematics, load_skeleton
 from veca_marl.sim.body.humanoid import SATURATION_RAD, Humanoid, JointActionKind
 from veca_marl.sim.body.humanoid.postures import Posture
-from veca_marl.sim.geometry.pose import Floats
-from veca_marl.sim.physics.world import GRAVITY_MPS2
+from veca_marl.sim.geometry import Floats
+from veca_marl.sim.physics import GRAVITY_MPS2
 
 _TRUNK = ("spine", "chest", "neck", "head")
 _LEGS = ("thigh", "shank", "foot")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from veca_marl.sim.body import Body
-from veca_marl.sim.geometry.pose import Floats
+from veca_marl.sim.geometry import Floats
 
 _FULL_TURN_RAD = 0.25  # bearing at which the turning command saturates
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from veca_marl.envs.experts.control.locomotion import Locomotion
 from veca_marl.sim.body import Body
-from veca_marl.sim.geometry.pose import Floats
+from veca_marl.sim.geometry import Floats
 from veca_marl.sim.sound.calls import Call
 
 # a body is stuck that has moved and turned by less than this within this time

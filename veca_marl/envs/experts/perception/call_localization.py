@@ -7,9 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from veca_marl.sim.geometry.pose import Floats, Pose
-from veca_marl.sim.physics.playground import RoomCfg
-from veca_marl.sim.physics.world import World
+from veca_marl.sim.geometry import Floats, Pose
+from veca_marl.sim.physics import RoomCfg, World
 
 # Levels are log10 of the root of an ear's energy, measured by experiments/calling/ears.py (walkers
 # 1.88 and 0.37, crawlers 1.91 and 0.40). The standard deviations are larger than measured at rest,

@@ -12,8 +12,8 @@ from veca_marl.envs.experts.control.arm_kinematics import ArmKinematics, Palms
 from veca_marl.envs.experts.control.seated_balance import SeatedBalance
 from veca_marl.sim.body.humanoid import Humanoid
 from veca_marl.sim.body.humanoid.postures import REACHING, REACHING_DOWN, Posture
-from veca_marl.sim.geometry.pose import Floats
-from veca_marl.sim.physics.props import Prop
+from veca_marl.sim.geometry import Floats
+from veca_marl.sim.physics import Prop
 
 _SPEED_M = 0.010  # largest motion of the middle between the palms, per step
 _CLOSING_M = 0.006  # largest change of the distance between the palms, per step

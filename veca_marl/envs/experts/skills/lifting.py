@@ -9,8 +9,8 @@ import numpy as np
 from veca_marl.envs.experts.skills.carrying import Carrier, Grip, quarter_yaw
 from veca_marl.sim.body.humanoid import Humanoid
 from veca_marl.sim.body.humanoid.postures import reaching
-from veca_marl.sim.geometry.pose import Floats
-from veca_marl.sim.physics.props import Prop
+from veca_marl.sim.geometry import Floats
+from veca_marl.sim.physics import Prop
 
 # less bent than for carrying, since the spine supports both extended arms for seconds
 UPRIGHT, BENT = reaching(15.0, 20.0), reaching(30.0, 20.0)

@@ -11,9 +11,9 @@ from veca_marl.envs.experts.control.locomotion import Locomotion
 from veca_marl.envs.experts.control.path_following import PathFollower
 from veca_marl.envs.experts.perception.call_localization import CallSourceMap
 from veca_marl.envs.tasks.navigation.floor_plan import FloorPlan
-from veca_marl.sim.body.base import Body
-from veca_marl.sim.geometry.pose import Floats
-from veca_marl.sim.physics.world import World
+from veca_marl.sim.body import Body
+from veca_marl.sim.geometry import Floats
+from veca_marl.sim.physics import World
 from veca_marl.sim.sound.calls import Call
 
 CALL = Call.high

@@ -8,7 +8,7 @@ import numpy as np
 
 from veca_marl.envs.experts.control.locomotion import Clearances
 from veca_marl.sim.body import Body
-from veca_marl.sim.geometry.pose import Floats
+from veca_marl.sim.geometry import Floats
 
 # Angle by which the path passes beside the opponent: greatest when pushing would move it inwards,
 # plus a part that grows with how directly the opponent faces the body.

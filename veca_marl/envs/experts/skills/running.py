@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from veca_marl.sim.body.humanoid import Humanoid, JointCommand
-from veca_marl.sim.geometry.pose import Floats
+from veca_marl.sim.geometry import Floats
 
 _ELBOW_DEG = 30.0
 

@@ -8,8 +8,8 @@ import numpy as np
 
 from veca_marl.envs.experts.control.locomotion import Clearances
 from veca_marl.envs.tasks.contests.pitch import Pitch
-from veca_marl.sim.body.base import Body
-from veca_marl.sim.geometry.pose import Floats
+from veca_marl.sim.body import Body
+from veca_marl.sim.geometry import Floats
 
 _PREDICTION_S = 0.25  # the ball's position is extrapolated by this time
 _BALL_M = 0.12

@@ -5,7 +5,7 @@ from __future__ import annotations
 from veca_marl.envs.experts.control.key_poses import KeyPoses
 from veca_marl.sim.body.humanoid import Humanoid
 from veca_marl.sim.body.humanoid.postures import ON_BACK, Posture
-from veca_marl.sim.geometry.pose import Floats
+from veca_marl.sim.geometry import Floats
 
 # set by hand, then improved by a random search for the return of TurnBaby, with torque control
 # and with position control

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from veca_marl.envs.core.task import Player
-from veca_marl.sim.body.walker.pushing import horizontal_distance
-from veca_marl.sim.body.walker.walker import Walker
-from veca_marl.sim.physics.props import Prop
+from veca_marl.sim.body.walker import Walker
+from veca_marl.sim.geometry.vectors import horizontal_distance
+from veca_marl.sim.physics import Prop
 
 _LEAST_SPEED_MPS = 0.1  # a standing walker does not kick: the ball rebounds
 

@@ -7,9 +7,8 @@ import math
 import numpy as np
 
 from veca_marl.envs.tasks.contests.soccer_cfg import POST_M, SoccerCfg
-from veca_marl.sim.geometry.pose import Floats
-from veca_marl.sim.physics.props import Prop, PropCfg, PropShape
-from veca_marl.sim.physics.world import World
+from veca_marl.sim.geometry import Floats
+from veca_marl.sim.physics import Prop, PropCfg, PropShape, World
 
 _BOARD_M = (0.06, 0.3)  # thickness and height
 _CORNER_M = 0.5  # length along both walls that the board across a corner cuts off

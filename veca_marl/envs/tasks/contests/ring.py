@@ -9,10 +9,9 @@ import numpy as np
 
 from veca_marl.envs.core.task import Player
 from veca_marl.envs.tasks.player_starts import place_player
-from veca_marl.sim.body.base import Body
-from veca_marl.sim.geometry.pose import Floats
-from veca_marl.sim.physics.props import PropCfg, PropShape
-from veca_marl.sim.physics.world import World
+from veca_marl.sim.body import Body
+from veca_marl.sim.geometry import Floats
+from veca_marl.sim.physics import PropCfg, PropShape, World
 
 Colour = tuple[float, float, float]
 

@@ -9,7 +9,7 @@ import numpy as np
 from veca_marl.envs.core.task import Player, Team, register
 from veca_marl.envs.tasks.contests.soccer import ATTACKER, DEFENDER, Soccer
 from veca_marl.envs.tasks.contests.soccer_cfg import SoccerCfg
-from veca_marl.sim.geometry.pose import Floats
+from veca_marl.sim.geometry import Floats
 
 
 @dataclass

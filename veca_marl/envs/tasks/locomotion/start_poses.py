@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from veca_marl.envs.core.task import TaskCfg
-from veca_marl.sim.body.humanoid.humanoid import Humanoid
+from veca_marl.sim.body.humanoid import Humanoid
 from veca_marl.sim.body.humanoid.postures import POSTURES, Posture
-from veca_marl.sim.physics.playground import RoomCfg
+from veca_marl.sim.physics import RoomCfg
 
 _WALL_CLEARANCE_M = 1.0
 
@@ -45,7 +45,7 @@ def start_anywhere(
 ) -> None:
     """Place a body in a posture with noise, at a random position and heading in a room."""
     position = room.sample_floor(rng, margin_m=_WALL_CLEARANCE_M)
-    noisy = body.vary(posture, spread_deg, rng)
+    noisy = body.perturb(posture, spread_deg, rng)
     body.place(position, rng.uniform(-math.pi, math.pi), noisy)
 
 
@@ -54,7 +54,7 @@ def start_near_edge(
 ) -> None:
     """Place a body in a posture with noise, near the edge of a room and facing its middle."""
     position, heading_rad = room.sample_start(rng, margin_m=_WALL_CLEARANCE_M)
-    body.place(position, heading_rad, body.vary(posture, spread_deg, rng))
+    body.place(position, heading_rad, body.perturb(posture, spread_deg, rng))
 
 
 def face_down_cosines(body: Humanoid) -> dict[str, float]:

@@ -10,7 +10,7 @@ import numpy as np
 from veca_marl.envs.core.scoring import cosine, horizontal, norm
 from veca_marl.envs.core.task import Player, Task, TaskCfg, register, require_walker, terms
 from veca_marl.envs.tasks.multimodal.rolling_ball import launch_from_side_wall
-from veca_marl.sim.physics.props import PropCfg, PropShape
+from veca_marl.sim.physics import PropCfg, PropShape
 from veca_marl.sim.sound.sounds import SoundCfg, SoundKind
 
 _START_CLEARANCE_M = 1.5  # from the walls

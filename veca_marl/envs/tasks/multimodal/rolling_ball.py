@@ -6,8 +6,7 @@ import math
 
 import numpy as np
 
-from veca_marl.sim.physics.playground import RoomCfg
-from veca_marl.sim.physics.props import Prop
+from veca_marl.sim.physics import Prop, RoomCfg
 
 _WALL_GAP_M = 0.02  # between the ball and the wall
 _END_CLEARANCE_M = 1.0  # from the walls at both ends of the side wall

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from veca_marl.sim.geometry.pose import Floats
+from veca_marl.sim.geometry import Floats
 from veca_marl.sim.physics import DoorCfg, PlaygroundCfg, RoomCfg
 
 _CORNER_M = 0.7  # distance of a waiting place in a corner from both walls

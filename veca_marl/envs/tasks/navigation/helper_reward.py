@@ -7,10 +7,9 @@ from typing import NamedTuple
 import numpy as np
 
 from veca_marl.envs.core.task import Player
-from veca_marl.sim.body.base import Body
-from veca_marl.sim.geometry.pose import Floats
-from veca_marl.sim.geometry.scene import Scene
-from veca_marl.sim.physics.props import Prop
+from veca_marl.sim.body import Body
+from veca_marl.sim.geometry import Floats, Scene
+from veca_marl.sim.physics import Prop
 from veca_marl.sim.vision import is_visible
 
 

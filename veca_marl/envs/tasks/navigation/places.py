@@ -6,11 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from veca_marl.sim.body.walker.pushing import horizontal_distance
-from veca_marl.sim.geometry.pose import Floats
-from veca_marl.sim.physics.playground import PlaygroundCfg, RoomCfg
-from veca_marl.sim.physics.props import Prop, PropCfg, PropShape
-from veca_marl.sim.physics.world import World
+from veca_marl.sim.geometry import Floats
+from veca_marl.sim.geometry.vectors import horizontal_distance
+from veca_marl.sim.physics import PlaygroundCfg, Prop, PropCfg, PropShape, RoomCfg, World
 
 _DRAWS = 1000
 

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 
 from veca_marl.envs.core.task import TaskCfg
 from veca_marl.sim.body.humanoid import Humanoid
-from veca_marl.sim.physics.props import Prop, PropCfg, PropShape
-from veca_marl.sim.physics.world import World
+from veca_marl.sim.physics import Prop, PropCfg, PropShape, World
 
 RED = (0.9, 0.12, 0.1)
 BLUE = (0.15, 0.3, 0.9)
@@ -79,12 +78,6 @@ def is_at_rest(block: Prop) -> bool:
     return math.dist(block.velocity, (0.0, 0.0, 0.0)) < _REST_MPS
 
 
-<<<<<<< HEAD
-def is_free(block: Prop, child: Humanoid) -> bool:
-    """Say whether no part of a child touches a block."""
-    return not child.touches(block)
-=======
 def is_released(block: Prop, child: Humanoid) -> bool:
     """Return whether no part of a body touches a block."""
-    return not block.touches(child.articulation.body_id)
->>>>>>> 132edd8 (wip)
+    return not child.touches(block)

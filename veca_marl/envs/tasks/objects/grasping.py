@@ -9,9 +9,8 @@ import numpy as np
 
 from veca_marl.envs.core.task import TaskCfg
 from veca_marl.sim.body.humanoid import Humanoid
-from veca_marl.sim.geometry.pose import Floats
-from veca_marl.sim.physics.props import Prop, PropCfg, PropShape
-from veca_marl.sim.physics.world import World
+from veca_marl.sim.geometry import Floats
+from veca_marl.sim.physics import Prop, PropCfg, PropShape, World
 
 _HAND_SPAN_M = 0.1
 

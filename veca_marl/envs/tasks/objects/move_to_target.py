@@ -11,7 +11,7 @@ from veca_marl.envs.core.scoring import horizontal
 from veca_marl.envs.core.task import Player, Task, register, require_humanoid, terms
 from veca_marl.envs.tasks.objects.grasping import ToyCfg, add_toy, place_toy
 from veca_marl.sim.body.humanoid.postures import REACHING
-from veca_marl.sim.physics.props import PropCfg, PropShape
+from veca_marl.sim.physics import PropCfg, PropShape
 
 _MARK_HEIGHT_M = 0.001
 

@@ -10,8 +10,8 @@ import numpy as np
 from veca_marl.envs.core.scoring import rotation_angle_rad
 from veca_marl.envs.core.task import Player, Task, TaskCfg, register, require_humanoid, terms
 from veca_marl.sim.body.humanoid.postures import OFFERING
-from veca_marl.sim.geometry.rotations import rotation_about_vertical
-from veca_marl.sim.physics.props import PropCfg, PropShape
+from veca_marl.sim.geometry import rotation_about_vertical
+from veca_marl.sim.physics import PropCfg, PropShape
 
 SHOULDER = "r_upper_arm.abduction"
 _GAP_M = 0.001  # between the cube and the skin of the palm at the start
