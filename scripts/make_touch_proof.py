@@ -18,11 +18,18 @@ import numpy as np
 from veca_marl.sim.body.anatomy.skeleton import load_skeleton
 from veca_marl.sim.body.humanoid import Humanoid, HumanoidCfg
 from veca_marl.sim.body.humanoid.postures import Posture
-from veca_marl.sim.geometry.pose import Floats
-from veca_marl.sim.physics.bullet import pybullet
-from veca_marl.sim.physics.playground import PlaygroundCfg, RoomCfg
-from veca_marl.sim.physics.props import Prop, PropCfg, PropShape
-from veca_marl.sim.physics.world import GRAVITY_MPS2, ClockCfg, World
+from veca_marl.sim.geometry import Floats
+from veca_marl.sim.physics import (
+    GRAVITY_MPS2,
+    ClockCfg,
+    PlaygroundCfg,
+    Prop,
+    PropCfg,
+    PropShape,
+    RoomCfg,
+    World,
+    pybullet,
+)
 from veca_marl.sim.touch.sense import TouchCfg, TouchSense
 from veca_marl.sim.touch.taxels import load_taxels
 

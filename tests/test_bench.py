@@ -16,8 +16,7 @@ from veca_marl.bench.stopwatch import Probes, Stopwatch
 from veca_marl.config import compose, conf_dir
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
 from veca_marl.envs.core.task import TASKS
-from veca_marl.sim.physics.bullet import pybullet
-from veca_marl.sim.physics.playground import PlaygroundCfg
+from veca_marl.sim.physics import PlaygroundCfg, pybullet
 from veca_marl.sim.vision.optics import Camera
 
 QUICK = ["bench.steps=3", "bench.repeats=1"]

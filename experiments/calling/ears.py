@@ -20,7 +20,7 @@ from veca_marl.envs.experts.control.locomotion import locomotion_of
 from veca_marl.envs.experts.perception.call_localization import loudness
 from veca_marl.envs.tasks.navigation.places import free_place
 from veca_marl.envs.tasks.player_starts import place_player
-from veca_marl.sim.sound.calls import Call
+from veca_marl.sim.sound import Call
 
 CALLS = {"walker_voice": 300, "mitten_voice": 120}  # how many, by body
 REST_STEPS = 40  # then a crawler's head is still

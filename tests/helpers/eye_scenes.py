@@ -4,11 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from veca_marl.sim.geometry.pose import Pose
-from veca_marl.sim.geometry.primitives import Shape
-from veca_marl.sim.geometry.rotations import quaternions_to_matrices
-from veca_marl.sim.geometry.scene import Scene
-from veca_marl.sim.geometry.tables import Geom
+from veca_marl.sim.geometry import Geom, Pose, Scene, Shape, quaternions_to_matrices
 from veca_marl.sim.vision.optics import Camera, look_at
 
 EYE_SPACING_M = 0.04

@@ -3,12 +3,10 @@
 import numpy as np
 import scipy.signal
 
-from veca_marl.sim.geometry.pose import Pose
+from veca_marl.sim.geometry import Pose
 from veca_marl.sim.hearing.hrtf import kemar_table
 from veca_marl.sim.hearing.receivers import HrtfReceiver, MonoReceiver, StereoReceiver
-from veca_marl.sim.sound.acoustics import Room
-from veca_marl.sim.sound.soundfield import SoundField
-from veca_marl.sim.sound.sounds import Clip
+from veca_marl.sim.sound import Clip, Room, SoundField
 
 RATE = 22_050
 STEP = 882

@@ -4,7 +4,7 @@ import numpy as np
 
 from veca_marl.sim.body.anatomy.skeleton import forward_kinematics, load_skeleton
 from veca_marl.sim.body.appearance import bone_geoms, dressed_skin
-from veca_marl.sim.geometry.rotations import quaternions_to_matrices
+from veca_marl.sim.geometry import quaternions_to_matrices
 
 SHIRT = (0.2, 0.4, 0.9)
 

@@ -2,8 +2,8 @@
 
 from dataclasses import dataclass
 
-from veca_marl.sim.geometry.scene import Scene
-from veca_marl.sim.sound.soundfield import SoundField
+from veca_marl.sim.geometry import Scene
+from veca_marl.sim.sound import SoundField
 
 
 @dataclass

@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from veca_marl.sim.geometry.primitives import Shape
-from veca_marl.sim.geometry.rotations import matrix_to_quaternion
+from veca_marl.sim.geometry import Shape, matrix_to_quaternion
 from veca_marl.sim.physics import pybullet, shape_arguments
 
 

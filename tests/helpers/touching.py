@@ -7,9 +7,7 @@ from skins import add_body, pose
 from stand_in_worlds import SceneWorld
 
 from veca_marl.sim.body.anatomy.skeleton import load_skeleton
-from veca_marl.sim.geometry.primitives import Shape
-from veca_marl.sim.geometry.scene import Scene
-from veca_marl.sim.geometry.tables import Geom
+from veca_marl.sim.geometry import Geom, Scene, Shape
 from veca_marl.sim.touch.sense import TouchCfg, TouchSense
 from veca_marl.sim.touch.taxels import load_taxels, taxel_positions
 

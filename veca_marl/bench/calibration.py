@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from veca_marl.bench.stopwatch import thread_ms
-from veca_marl.sim.physics.bullet import pybullet
+from veca_marl.sim.physics import pybullet
 
 _SPHERES = 20
 _STEPS = 100

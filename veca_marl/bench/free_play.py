@@ -11,8 +11,8 @@ import numpy as np
 
 from veca_marl.envs.core.game_cfg import GameCfg
 from veca_marl.envs.core.task import TASKS, Player, Task, TaskCfg, Team, find_task, terms
-from veca_marl.sim.physics.props import PropCfg, PropShape
-from veca_marl.sim.sound.sounds import SoundCfg, SoundKind
+from veca_marl.sim.physics import PropCfg, PropShape
+from veca_marl.sim.sound import SoundCfg, SoundKind
 
 _BALL_RADIUS_M = 0.15
 

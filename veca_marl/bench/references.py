@@ -14,18 +14,17 @@ from numpy.typing import NDArray
 from veca_marl.bench.skin_costs import SkinCosts, measure_skin
 from veca_marl.bench.stopwatch import thread_ms
 from veca_marl.sim.body.walker import Walker, WalkerCfg
-from veca_marl.sim.geometry.pose import Pose
-from veca_marl.sim.geometry.primitives import Shape
-from veca_marl.sim.geometry.rotations import matrix_to_quaternion
-from veca_marl.sim.geometry.scene import Scene
-from veca_marl.sim.geometry.tables import Bools
+from veca_marl.sim.geometry import Bools, Pose, Scene, Shape, matrix_to_quaternion
 from veca_marl.sim.hearing.sense import AudioCfg, AudioSense
-from veca_marl.sim.physics.bullet import pybullet
-from veca_marl.sim.physics.collision_shapes import shape_arguments
-from veca_marl.sim.physics.playground import PlaygroundCfg
-from veca_marl.sim.physics.props import PropCfg, PropShape
-from veca_marl.sim.physics.world import World
-from veca_marl.sim.sound.sounds import SoundCfg, SoundKind, make_sound
+from veca_marl.sim.physics import (
+    PlaygroundCfg,
+    PropCfg,
+    PropShape,
+    World,
+    pybullet,
+    shape_arguments,
+)
+from veca_marl.sim.sound import SoundCfg, SoundKind, make_sound
 from veca_marl.sim.vision.optics import Camera
 
 N_LOOSE_PROPS = 20
@@ -128,7 +127,7 @@ def measure_ears(playground: PlaygroundCfg, steps: int) -> float:
         angle = 0.05 * step
         source.position = (2.0 * math.cos(angle), 2.0 * math.sin(angle), 0.15)
         walker.yaw_rad = -0.5 * angle
-        walker.mirror()
+        walker.write_frames()
         costs.append(thread_ms(hear))
     world.close()
     return median(costs)

@@ -10,10 +10,8 @@ import numpy as np
 from veca_marl.bench.stopwatch import thread_ms
 from veca_marl.sim.body.humanoid import Humanoid, HumanoidCfg
 from veca_marl.sim.body.humanoid.postures import Posture
-from veca_marl.sim.geometry.skinning import deform_meshes
-from veca_marl.sim.physics.playground import PlaygroundCfg
-from veca_marl.sim.physics.props import PropCfg, PropShape
-from veca_marl.sim.physics.world import World
+from veca_marl.sim.geometry import deform_meshes
+from veca_marl.sim.physics import PlaygroundCfg, PropCfg, PropShape, World
 from veca_marl.sim.touch.sense import TouchCfg, TouchSense
 
 CONTACTS = (0, 3, 20)

@@ -16,8 +16,7 @@ from veca_marl.envs.core.game_cfg import GameCfg
 from veca_marl.envs.core.task import TaskCfg
 from veca_marl.envs.core.team import Script, TeamCfg
 from veca_marl.sim.body import BodyCfg
-from veca_marl.sim.physics.playground import PlaygroundCfg
-from veca_marl.sim.physics.world import ClockCfg
+from veca_marl.sim.physics import ClockCfg, PlaygroundCfg
 from veca_marl.sim.senses import SensesCfg
 
 

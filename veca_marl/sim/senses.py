@@ -31,7 +31,7 @@ from veca_marl.registry import Registry
 from veca_marl.sim.body import Body
 from veca_marl.sim.body.proprioception import ProprioceptionCfg, ProprioceptionSense
 from veca_marl.sim.hearing.sense import AudioCfg, AudioSense
-from veca_marl.sim.physics.world import World
+from veca_marl.sim.physics import World
 from veca_marl.sim.sense import Sense
 from veca_marl.sim.touch.sense import TouchCfg, TouchSense
 from veca_marl.sim.vision.sense import VisionCfg, VisionSense

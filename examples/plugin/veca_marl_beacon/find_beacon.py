@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from veca_marl.envs.core.task import Player, Task, TaskCfg, register, terms
-from veca_marl.sim.physics.props import PropCfg, PropShape
-from veca_marl.sim.sound.sounds import SoundCfg, SoundKind
+from veca_marl.sim.physics import PropCfg, PropShape
+from veca_marl.sim.sound import SoundCfg, SoundKind
 
 
 @dataclass

@@ -8,7 +8,7 @@ import pytest
 from veca_marl.config import compose
 from veca_marl.envs.core.game import Game
 from veca_marl.envs.experts.perception.call_localization import CallSourceMap, loudness
-from veca_marl.sim.sound.calls import Call
+from veca_marl.sim.sound import Call
 
 STEPS = 10
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from veca_marl.envs.experts.control.wall_recovery import WallRecovery
-from veca_marl.sim.sound.calls import Call
+from veca_marl.sim.sound import Call
 
 STEP_S = 0.04
 

@@ -13,7 +13,7 @@ from veca_marl.envs.experts.control.path_following import PathFollower
 from veca_marl.envs.tasks.navigation.multi_agent_nav import MultiAgentNavCfg, Muted
 from veca_marl.envs.tasks.navigation.places import gap_m
 from veca_marl.envs.tasks.player_starts import place_player
-from veca_marl.sim.sound.calls import CALLS, Call, call_waveform
+from veca_marl.sim.sound import CALLS, Call, call_waveform
 
 STEP_S = 0.04
 EARS_ALONE = ("senses/vision=blind", "senses/touch=numb")

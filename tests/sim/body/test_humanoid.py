@@ -18,7 +18,7 @@ from veca_marl.sim.body.humanoid import (
     JointActionKind,
 )
 from veca_marl.sim.body.humanoid.postures import ON_BACK, POSTURES, Posture, posture_angles
-from veca_marl.sim.physics.bullet import pybullet
+from veca_marl.sim.physics import pybullet
 
 SKELETON = load_skeleton()
 ALL = [bone.name for bone in SKELETON.bones]

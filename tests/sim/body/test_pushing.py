@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from walking import ball, box, empty_world, let_pass, walker_in, wall
 
-from veca_marl.sim.physics.props import PropCfg, PropShape
+from veca_marl.sim.physics import PropCfg, PropShape
 
 RADIUS_M = 0.11
 SLACK_M = 0.004

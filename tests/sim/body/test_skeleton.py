@@ -5,8 +5,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from veca_marl.sim.body.anatomy.skeleton import Soles, forward_kinematics, load_skeleton
-from veca_marl.sim.geometry.primitives import Shape
-from veca_marl.sim.physics.bullet import pybullet
+from veca_marl.sim.geometry import Shape
+from veca_marl.sim.physics import pybullet
 
 SKELETON = load_skeleton()
 LOW = np.array([joint.low_rad for joint in SKELETON.joints])

@@ -10,7 +10,7 @@ from skins import add_body
 
 from veca_marl.sim.body.anatomy.skeleton import load_skeleton
 from veca_marl.sim.body.anatomy.skin_mesh import binding_pose, load_skin
-from veca_marl.sim.geometry.scene import Scene
+from veca_marl.sim.geometry import Scene
 from veca_marl.sim.touch.taxels import distance_to_bone
 
 

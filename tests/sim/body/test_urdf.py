@@ -11,8 +11,8 @@ from veca_marl.sim.body.anatomy.skeleton import load_skeleton
 from veca_marl.sim.body.anatomy.skin_springs import SkinLayer, skin_layer, skin_spring
 from veca_marl.sim.body.anatomy.urdf import Build, _Writer, body_files, bone_of
 from veca_marl.sim.body.humanoid import Detail, Humanoid, HumanoidCfg
-from veca_marl.sim.geometry.primitives import Shape
-from veca_marl.sim.physics.bullet import pybullet
+from veca_marl.sim.geometry import Shape
+from veca_marl.sim.physics import pybullet
 
 SKELETON = load_skeleton()
 LOW = np.array([joint.low_rad for joint in SKELETON.joints])

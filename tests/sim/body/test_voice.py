@@ -8,7 +8,7 @@ from veca_marl.sim.body import VoiceKind
 from veca_marl.sim.body.humanoid import JointActionKind, JointCommand
 from veca_marl.sim.body.walker.walk_commands import MOVES, WalkActionKind
 from veca_marl.sim.hearing.sense import AudioCfg, AudioSense
-from veca_marl.sim.sound.calls import Call
+from veca_marl.sim.sound import Call
 
 STILL = np.zeros(2, np.float32)
 CALLS_SPEC = ((), np.int64, 0, 4)

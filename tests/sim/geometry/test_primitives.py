@@ -4,10 +4,16 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from veca_marl.sim.geometry.inertia import Inertia, joined_inertia, primitive_inertia
-from veca_marl.sim.geometry.pose import Pose
-from veca_marl.sim.geometry.primitives import Primitive, Shape, capsule_between
-from veca_marl.sim.geometry.signed_distances import distances_to
+from veca_marl.sim.geometry import (
+    Inertia,
+    Pose,
+    Primitive,
+    Shape,
+    capsule_between,
+    distances_to,
+    joined_inertia,
+    primitive_inertia,
+)
 
 TURN = Rotation.from_euler("xyz", [0.4, -0.7, 1.1]).as_matrix()
 SIZES = {

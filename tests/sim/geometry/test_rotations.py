@@ -3,13 +3,13 @@ import math
 import numpy as np
 import pytest
 
-from veca_marl.sim.geometry.rotations import (
+from veca_marl.sim.geometry import (
     matrix_to_quaternion,
     quaternion_from_yaw,
     quaternions_to_matrices,
     rotation_about_vertical,
 )
-from veca_marl.sim.physics.bullet import pybullet
+from veca_marl.sim.physics import pybullet
 
 
 def unit_quaternions(count):

@@ -4,9 +4,7 @@ import numpy as np
 import pytest
 from eye_scenes import random_rotations
 
-from veca_marl.sim.geometry.primitives import Shape
-from veca_marl.sim.geometry.scene import Scene
-from veca_marl.sim.geometry.tables import Geom
+from veca_marl.sim.geometry import Geom, Scene, Shape
 
 BALL = Geom(Shape.SPHERE, (0.1,))
 

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from veca_marl.sim.geometry.primitives import Primitive, Shape
-from veca_marl.sim.geometry.signed_distances import (
+from veca_marl.sim.geometry import (
+    Primitive,
+    Shape,
     distance,
     distance_and_gradient,
     distances_to,

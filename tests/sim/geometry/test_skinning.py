@@ -7,7 +7,7 @@ import pytest
 from skins import add_body, pose, random_angles, random_turn
 
 from veca_marl.sim.body.anatomy.skin_mesh import load_skin
-from veca_marl.sim.geometry.scene import Scene
+from veca_marl.sim.geometry import Scene
 
 
 def skinned(angles, position=(0.0, 0.0, 0.0), rotation=None):

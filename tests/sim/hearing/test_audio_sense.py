@@ -3,12 +3,10 @@ import pytest
 from listening import EAR, RATE, STEP, direction, room, yaw
 from stand_in_worlds import SoundWorld
 
-from veca_marl.sim.geometry.pose import Pose
+from veca_marl.sim.geometry import Pose
 from veca_marl.sim.hearing.sense import AudioCfg, AudioQuality, AudioSense, Window
 from veca_marl.sim.sense import check_spec
-from veca_marl.sim.sound.soundfield import SoundField
-from veca_marl.sim.sound.sounds import Clip, Noise
-from veca_marl.sim.sound.waveforms import buzz, tone
+from veca_marl.sim.sound import Clip, Noise, SoundField, buzz, tone
 
 
 def buzz_at(pitch):

@@ -10,7 +10,7 @@ from veca_marl.sim.hearing.minimum_phase import minimum_phase
 from veca_marl.sim.hearing.receivers import HrtfReceiver
 from veca_marl.sim.hearing.sofa import read_sofa
 from veca_marl.sim.hearing.spherical_head import HEAD_RADIUS_M, sphere_response, woodworth_arrival_s
-from veca_marl.sim.sound.receiver import filter_length, lead_samples
+from veca_marl.sim.sound import filter_length, lead_samples
 
 DATA = ROOT / "veca_marl/data/kemar.npz"
 KEMAR_SOFA = SHARED / "data/hrtf/MIT_KEMAR_normal_pinna.sofa"

@@ -13,7 +13,7 @@ from veca_marl.sim.hearing.hrtf import direction_vectors, sofa_table
 from veca_marl.sim.hearing.minimum_phase import minimum_phase
 from veca_marl.sim.hearing.sofa import SofaError, read_sofa
 from veca_marl.sim.hearing.spherical_head import sphere_response, woodworth_arrival_s
-from veca_marl.sim.sound.acoustics import SPEED_OF_SOUND_MPS
+from veca_marl.sim.sound import SPEED_OF_SOUND_MPS
 
 h5py = pytest.importorskip("h5py")
 

@@ -2,9 +2,9 @@ import numpy as np
 import pytest
 from listening import EAR, HEAD, RATE, STEP, STILL, direction, noise, ratio_db, render_still, yaw
 
-from veca_marl.sim.geometry.pose import Pose
+from veca_marl.sim.geometry import Pose
 from veca_marl.sim.hearing.spatial_audio import spatial_audio
-from veca_marl.sim.sound.soundfield import SoundField
+from veca_marl.sim.sound import SoundField
 
 EARS = ((0.0, EAR, 0.0), (0.0, -EAR, 0.0))
 

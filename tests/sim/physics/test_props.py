@@ -7,7 +7,7 @@ import pytest
 from walking import ball, box, empty_world, let_pass, wall
 
 from veca_marl.sim.physics import SIZE_NAMES, PropCfg, PropShape, pybullet
-from veca_marl.sim.sound.sounds import SoundCfg
+from veca_marl.sim.sound import SoundCfg
 
 SIZES = {
     PropShape.sphere: [0.2],

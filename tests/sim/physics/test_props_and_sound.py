@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from veca_marl.config import compose
-from veca_marl.sim.geometry.pose import Pose
+from veca_marl.sim.geometry import Pose
 from veca_marl.sim.hearing.receivers import MonoReceiver
 from veca_marl.sim.physics import PropCfg, PropShape, World
-from veca_marl.sim.sound.sounds import SoundCfg, SoundKind
+from veca_marl.sim.sound import SoundCfg, SoundKind
 
 THROUGH_WALL_M, THROUGH_DOOR_M = -1.0, 1.7  # y of straight lines from one room to the other
 DOOR_M = (3.05, 1.7, 1.0)

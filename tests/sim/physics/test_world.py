@@ -10,7 +10,7 @@ from walking import STEP_S, ball, box, empty_world, film, let_pass, walker_in, w
 
 from veca_marl.config import compose
 from veca_marl.sim.physics import ClockCfg, World, pybullet
-from veca_marl.sim.sound.sounds import SoundCfg
+from veca_marl.sim.sound import SoundCfg
 
 
 def furnished(name="single_room"):

@@ -3,8 +3,7 @@ import pytest
 import scipy.signal
 from listening import HEAD, RATE, ROOM_SIZE, SOURCES
 
-from veca_marl.sim.sound import acoustics
-from veca_marl.sim.sound.acoustics import Room
+from veca_marl.sim.sound import Room, acoustics
 
 
 @pytest.mark.parametrize(("order", "count"), [(0, 1), (1, 7), (2, 25), (3, 63)])

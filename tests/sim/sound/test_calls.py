@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from veca_marl.sim.sound.calls import CALLS, CallCfg, call_waveform
+from veca_marl.sim.sound import CALLS, CallCfg, call_waveform
 
 RATE = 22_050
 SPOKEN = list(CALLS)

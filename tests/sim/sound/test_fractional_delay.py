@@ -2,15 +2,8 @@ import numpy as np
 import pytest
 from listening import RATE, ratio_db
 
-from veca_marl.sim.sound.fractional_delay import (
-    HALF_WIDTH,
-    KERNEL_LATENCY,
-    KERNEL_TAPS,
-    PHASES,
-    fractional_kernel,
-    kernel_bank,
-    read_delayed,
-)
+from veca_marl.sim.sound import KERNEL_TAPS, fractional_kernel, kernel_bank
+from veca_marl.sim.sound.fractional_delay import HALF_WIDTH, KERNEL_LATENCY, PHASES, read_delayed
 
 HERTZ = 3000.0
 

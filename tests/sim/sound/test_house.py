@@ -8,14 +8,10 @@ from listening import render as render_field
 
 from veca_marl.config import compose
 from veca_marl.sim.body.walker import Walker, WalkerCfg
-from veca_marl.sim.geometry.pose import Pose
+from veca_marl.sim.geometry import Pose
 from veca_marl.sim.hearing.sense import AudioCfg, AudioSense
 from veca_marl.sim.physics import World
-from veca_marl.sim.sound.acoustics import Room
-from veca_marl.sim.sound.calls import Call
-from veca_marl.sim.sound.house import House
-from veca_marl.sim.sound.soundfield import SoundField
-from veca_marl.sim.sound.sounds import Clip
+from veca_marl.sim.sound import Call, Clip, House, Room, SoundField
 
 WEST = Room((-3.0, -3.0, 0.0), (6.0, 6.0, 2.6), 0.5)
 EAST = Room((3.1, -3.0, 0.0), (5.0, 6.0, 2.6), 0.4)

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from listening import HEAD, RATE, SOURCES, STEP, noise, room, spatialisation
 
-from veca_marl.sim.sound.soundfield import SoundField
-from veca_marl.sim.sound.sounds import Clip
+from veca_marl.sim.sound import Clip, SoundField
 
 
 def field_with_noise(quality, seconds=0.3, step=STEP, memory_steps=1):

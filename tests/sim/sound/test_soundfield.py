@@ -26,11 +26,9 @@ from listening import (
 )
 from paths import HELPERS
 
-from veca_marl.sim.geometry.pose import Pose
+from veca_marl.sim.geometry import Pose
 from veca_marl.sim.hearing.receivers import StereoReceiver
-from veca_marl.sim.sound import acoustics
-from veca_marl.sim.sound.soundfield import SoundField
-from veca_marl.sim.sound.sounds import Noise, Silence, Voice
+from veca_marl.sim.sound import Noise, Silence, SoundField, Voice, acoustics
 
 QUALITIES = ("hrtf", "stereo", "mono")
 IN_ROOM = {"room": room(), "order": 2}

@@ -5,10 +5,8 @@ import pytest
 import scipy.signal
 from listening import RATE, STEP, STILL, noise, ratio_db, render, spatialisation, yaw
 
-from veca_marl.sim.geometry.pose import Pose
-from veca_marl.sim.sound import acoustics
-from veca_marl.sim.sound.soundfield import SoundField
-from veca_marl.sim.sound.sounds import Clip, Voice
+from veca_marl.sim.geometry import Pose
+from veca_marl.sim.sound import Clip, SoundField, Voice, acoustics
 
 LATENCY = SoundField().latency_samples
 

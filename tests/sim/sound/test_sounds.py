@@ -3,8 +3,16 @@ import pytest
 import scipy.io.wavfile
 from listening import RATE, STEP
 
-from veca_marl.sim.sound import waveforms
-from veca_marl.sim.sound.sounds import Clip, Noise, Silence, SoundCfg, SoundKind, Voice, make_sound
+from veca_marl.sim.sound import (
+    Clip,
+    Noise,
+    Silence,
+    SoundCfg,
+    SoundKind,
+    Voice,
+    make_sound,
+    waveforms,
+)
 
 
 def emit(sound, n_steps=50, seed=0):

@@ -8,7 +8,7 @@ from skins import add_body, pose, random_angles, random_turn
 from touching import SPREAD, Stage, dense, of_bone
 
 from veca_marl.sim.body.anatomy.skeleton import load_skeleton
-from veca_marl.sim.geometry.primitives import Shape
+from veca_marl.sim.geometry import Shape
 from veca_marl.sim.touch.penetration import adjacent_bones
 
 

@@ -9,7 +9,7 @@ from paths import ROOT
 from touching import of_bone
 
 from veca_marl.sim.body.anatomy.skeleton import load_skeleton
-from veca_marl.sim.physics.world import GRAVITY_MPS2, ClockCfg
+from veca_marl.sim.physics import GRAVITY_MPS2, ClockCfg
 
 SCRIPT = ROOT / "scripts/make_touch_proof.py"
 _SPEC = importlib.util.spec_from_file_location("make_touch_proof", SCRIPT)

@@ -7,11 +7,8 @@ from touching import SPREAD, Named, Stage, of_bone
 
 from veca_marl.config import compose
 from veca_marl.sim.body.walker import Walker, WalkerCfg
-from veca_marl.sim.geometry.primitives import Shape
-from veca_marl.sim.geometry.scene import Scene
-from veca_marl.sim.geometry.tables import Geom
-from veca_marl.sim.physics.playground import PlaygroundCfg
-from veca_marl.sim.physics.world import World
+from veca_marl.sim.geometry import Geom, Scene, Shape
+from veca_marl.sim.physics import PlaygroundCfg, World
 from veca_marl.sim.sense import check_spec
 from veca_marl.sim.senses import SensesCfg, make_senses
 from veca_marl.sim.touch import TouchCfg, TouchQuality, TouchSense

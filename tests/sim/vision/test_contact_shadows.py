@@ -2,10 +2,7 @@
 
 import numpy as np
 
-from veca_marl.sim.geometry.pose import Pose
-from veca_marl.sim.geometry.primitives import Shape
-from veca_marl.sim.geometry.scene import Scene
-from veca_marl.sim.geometry.tables import Geom
+from veca_marl.sim.geometry import Geom, Pose, Scene, Shape
 from veca_marl.sim.vision.contact_shadows import DARKNESS, LARGEST_M, REACH_M
 from veca_marl.sim.vision.optics import Camera
 

@@ -5,9 +5,7 @@ import pytest
 from eye_scenes import clutter, random_pose, random_rotations
 from skins import add_body, pose, random_angles, random_turn
 
-from veca_marl.sim.geometry.primitives import Shape
-from veca_marl.sim.geometry.scene import Scene
-from veca_marl.sim.geometry.tables import Geom
+from veca_marl.sim.geometry import Geom, Scene, Shape
 from veca_marl.sim.vision.mesh_culling import draw_meshes
 from veca_marl.sim.vision.optics import Camera, look_at, view_axes
 from veca_marl.sim.vision.rasterizer import draw_geoms

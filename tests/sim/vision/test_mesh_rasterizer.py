@@ -8,10 +8,7 @@ from eye_scenes import ball_at
 from skins import SHIRT, add_body, pose, random_angles, random_turn
 
 from veca_marl.sim.body.anatomy.skeleton import load_skeleton
-from veca_marl.sim.geometry.pose import Pose
-from veca_marl.sim.geometry.primitives import Shape
-from veca_marl.sim.geometry.scene import Scene
-from veca_marl.sim.geometry.tables import Geom
+from veca_marl.sim.geometry import Geom, Pose, Scene, Shape
 from veca_marl.sim.vision.optics import Camera, look_at
 
 CAMERA = Camera(44, 36, 60.0)

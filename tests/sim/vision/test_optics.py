@@ -4,10 +4,7 @@ import numpy as np
 import pytest
 from eye_scenes import ball_at, clutter, random_pose, small_camera
 
-from veca_marl.sim.geometry.pose import Pose
-from veca_marl.sim.geometry.primitives import Shape
-from veca_marl.sim.geometry.scene import Scene
-from veca_marl.sim.geometry.tables import Geom
+from veca_marl.sim.geometry import Geom, Pose, Scene, Shape
 from veca_marl.sim.vision.optics import Camera, look_at, seen_fraction
 
 AHEAD = Pose(np.zeros(3), np.eye(3))

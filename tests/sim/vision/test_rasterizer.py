@@ -7,10 +7,7 @@ import pytest
 from eye_scenes import cast, clutter, random_pose, random_rotations, small_camera
 from tiny_renderer import TinyRenderer
 
-from veca_marl.sim.geometry.pose import Pose
-from veca_marl.sim.geometry.primitives import Shape
-from veca_marl.sim.geometry.scene import Scene
-from veca_marl.sim.geometry.tables import Geom
+from veca_marl.sim.geometry import Geom, Pose, Scene, Shape
 from veca_marl.sim.vision.optics import Camera, look_at, view_axes
 from veca_marl.sim.vision.rasterizer import draw_geoms
 

@@ -6,9 +6,7 @@ import numpy as np
 from eye_scenes import random_rotations
 from tiny_renderer import TinyRenderer
 
-from veca_marl.sim.geometry.primitives import Shape
-from veca_marl.sim.geometry.scene import Scene
-from veca_marl.sim.geometry.tables import Geom
+from veca_marl.sim.geometry import Geom, Scene, Shape
 from veca_marl.sim.vision.optics import Camera, look_at
 
 BONES = 47

@@ -14,9 +14,7 @@ from eye_scenes import EYE_SPACING_M, FakeBody, ball_at, clutter
 from paths import HELPERS, ROOT
 from stand_in_worlds import SceneWorld
 
-from veca_marl.sim.geometry.primitives import Shape
-from veca_marl.sim.geometry.scene import Scene
-from veca_marl.sim.geometry.tables import Geom
+from veca_marl.sim.geometry import Geom, Scene, Shape
 from veca_marl.sim.sense import check_spec
 from veca_marl.sim.vision.optics import Camera
 from veca_marl.sim.vision.sense import Eyes, VisionCfg, VisionSense

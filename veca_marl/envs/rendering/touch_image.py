@@ -8,8 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from veca_marl.sim.geometry.pose import Floats, Pose
-from veca_marl.sim.geometry.scene import Scene, SceneObject
+from veca_marl.sim.geometry import Floats, Pose, Scene, SceneObject
 from veca_marl.sim.touch.taxels import load_taxels, taxel_positions
 from veca_marl.sim.vision.mesh_rasterizer import (
     draw_triangles,

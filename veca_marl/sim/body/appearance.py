@@ -10,9 +10,7 @@ from numpy.typing import NDArray
 from veca_marl.sim.body.anatomy.skeleton import Bone, Skeleton
 from veca_marl.sim.body.anatomy.skin_mesh import load_skin
 from veca_marl.sim.body.mounts import EYES, MOUNTS_M
-from veca_marl.sim.geometry.meshes import Mesh
-from veca_marl.sim.geometry.primitives import Primitive, Shape
-from veca_marl.sim.geometry.tables import Geom
+from veca_marl.sim.geometry import Geom, Mesh, Primitive, Shape
 
 SKIN = (0.93, 0.74, 0.62)
 TROUSERS = (0.25, 0.28, 0.40)

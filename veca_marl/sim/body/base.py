@@ -22,12 +22,9 @@ from veca_marl.sim.body.anatomy.skeleton import load_skeleton
 from veca_marl.sim.body.appearance import SHIRTS, bone_geoms, dressed_skin
 from veca_marl.sim.body.mounts import EYES, Gaze, palm_centre, resting_mount
 from veca_marl.sim.body.voice import VOICE, VoiceKind, voice_spec
-from veca_marl.sim.geometry.pose import Floats, Pose
-from veca_marl.sim.geometry.rotations import cross
-from veca_marl.sim.physics.props import Prop
-from veca_marl.sim.physics.world import World
-from veca_marl.sim.sound.calls import CALLS, Call, call_waveform
-from veca_marl.sim.sound.sounds import Voice
+from veca_marl.sim.geometry import Floats, Pose, cross
+from veca_marl.sim.physics import Prop, World
+from veca_marl.sim.sound import CALLS, Call, Voice, call_waveform
 from veca_marl.sim.spec import ArraySpec
 
 
@@ -63,7 +60,7 @@ class Body(ABC):
 
     A subclass sets `cfg_type`, gives the constructor the parts of its action that move it,
     attaches itself to the world (`World.attach`) and writes the poses of its bones with `_frames`
-    when the world calls `mirror`.
+    when the world calls `write_frames`.
 
     Args:
         name: Unique in its world.

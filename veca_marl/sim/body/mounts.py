@@ -13,8 +13,7 @@ import math
 import numpy as np
 
 from veca_marl.sim.body.anatomy.skeleton import Bone
-from veca_marl.sim.geometry.pose import Floats, Pose
-from veca_marl.sim.geometry.primitives import Shape
+from veca_marl.sim.geometry import Floats, Pose, Shape
 
 MOUNTS_M: dict[str, tuple[float, float, float]] = {
     "head": (0.010, 0.0, 0.066),

@@ -16,9 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veca_marl.sim.body.base import Body
-from veca_marl.sim.geometry.pose import Floats
-from veca_marl.sim.geometry.rotations import heading_rad
-from veca_marl.sim.physics.world import GRAVITY_MPS2, World
+from veca_marl.sim.geometry import Floats, heading_rad
+from veca_marl.sim.physics import GRAVITY_MPS2, World
 from veca_marl.sim.sense import Sense
 from veca_marl.sim.spec import ArraySpec
 

@@ -6,7 +6,7 @@ from veca_marl.registry import Registry
 from veca_marl.sim.body.base import Body, BodyCfg
 from veca_marl.sim.body.humanoid.humanoid import Humanoid
 from veca_marl.sim.body.walker.walker import Walker
-from veca_marl.sim.physics.world import World
+from veca_marl.sim.physics import World
 
 BODIES: Registry[type[Body]] = Registry("body")
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from enum import Enum
 
-from veca_marl.sim.sound.calls import Call
+from veca_marl.sim.sound import Call
 from veca_marl.sim.spec import ArraySpec, discrete_spec
 
 VOICE = "voice"  # the part's name

@@ -28,7 +28,7 @@ from veca_marl.sim.geometry.signed_distances import (
 )
 from veca_marl.sim.geometry.skinning import deform_meshes
 from veca_marl.sim.geometry.tables import Bools, Geom, GeomTable, SurfaceTable
-from veca_marl.sim.geometry.vectors import Vector, single
+from veca_marl.sim.geometry.vectors import Vector, horizontal_distance, single
 
 __all__ = [
     "Bools",
@@ -56,6 +56,7 @@ __all__ = [
     "distances_to",
     "empty_meshes",
     "heading_rad",
+    "horizontal_distance",
     "is_inside",
     "joined_inertia",
     "matrix_to_quaternion",

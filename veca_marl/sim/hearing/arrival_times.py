@@ -7,11 +7,11 @@ import warnings
 import numpy as np
 from numpy.typing import NDArray
 
-from veca_marl.sim.geometry.pose import Floats
+from veca_marl.sim.geometry import Floats
 from veca_marl.sim.hearing.minimum_phase import minimum_phase
 from veca_marl.sim.hearing.sofa import MeasuredHead, SofaError
 from veca_marl.sim.hearing.spherical_head import woodworth_arrival_s
-from veca_marl.sim.sound.acoustics import SPEED_OF_SOUND_MPS
+from veca_marl.sim.sound import SPEED_OF_SOUND_MPS
 
 USUAL_RADIUS_M = (0.06, 0.11)
 """A fitted radius outside of this range causes a warning."""

@@ -8,7 +8,7 @@ import numpy as np
 import scipy.signal
 from scipy.spatial import cKDTree
 
-from veca_marl.sim.geometry.pose import Floats
+from veca_marl.sim.geometry import Floats
 from veca_marl.sim.hearing.arrival_times import arrival_times
 from veca_marl.sim.hearing.head_response import HeadResponse
 from veca_marl.sim.hearing.minimum_phase import minimum_phase

@@ -10,7 +10,7 @@ import scipy.fft
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
 
-from veca_marl.sim.geometry.pose import Floats
+from veca_marl.sim.geometry import Floats
 from veca_marl.sim.hearing.conditioning import condition, ear_incidence
 from veca_marl.sim.hearing.head_response import HeadResponse
 from veca_marl.sim.hearing.minimum_phase import minimum_phase

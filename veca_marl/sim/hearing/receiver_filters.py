@@ -6,9 +6,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from veca_marl.sim.geometry.pose import Floats
-from veca_marl.sim.sound.acoustics import NEAR_FIELD_M
-from veca_marl.sim.sound.fractional_delay import KERNEL_TAPS, fractional_kernel
+from veca_marl.sim.geometry import Floats
+from veca_marl.sim.sound import KERNEL_TAPS, NEAR_FIELD_M, fractional_kernel
 
 
 @njit(cache=True)

@@ -8,12 +8,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from veca_marl.sim.geometry.pose import Floats
+from veca_marl.sim.geometry import Floats
 from veca_marl.sim.hearing.hrtf import HrtfTable
 from veca_marl.sim.hearing.receiver_filters import head_related_filters, omnidirectional_filters
-from veca_marl.sim.sound.acoustics import SPEED_OF_SOUND_MPS
-from veca_marl.sim.sound.fractional_delay import kernel_bank
-from veca_marl.sim.sound.receiver import lead_samples
+from veca_marl.sim.sound import SPEED_OF_SOUND_MPS, kernel_bank, lead_samples
 
 
 class HrtfReceiver:

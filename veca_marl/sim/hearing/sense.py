@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veca_marl.sim.body import Body
-from veca_marl.sim.geometry.pose import Floats, Pose
+from veca_marl.sim.geometry import Floats, Pose
 from veca_marl.sim.hearing.hrtf import kemar_table, sofa_table
 from veca_marl.sim.hearing.receivers import HrtfReceiver, MonoReceiver, StereoReceiver
 from veca_marl.sim.hearing.spectrum import (
@@ -23,9 +23,9 @@ from veca_marl.sim.hearing.spectrum import (
     noise_power,
     window_weights,
 )
-from veca_marl.sim.physics.world import World
+from veca_marl.sim.physics import World
 from veca_marl.sim.sense import Sense
-from veca_marl.sim.sound.receiver import Receiver
+from veca_marl.sim.sound import Receiver
 from veca_marl.sim.spec import ArraySpec
 
 

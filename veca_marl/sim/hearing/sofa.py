@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from veca_marl.sim.geometry.pose import Floats
+from veca_marl.sim.geometry import Floats
 
 _CONVENTIONS = ("SimpleFreeFieldHRIR", "FreeFieldHRIR")
 _FIELDS = ("Data.IR", "Data.SamplingRate", "SourcePosition")

@@ -7,12 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from veca_marl.sim.geometry.pose import Floats, Pose
+from veca_marl.sim.geometry import Floats, Pose
 from veca_marl.sim.hearing.hrtf import HrtfTable, kemar_table
 from veca_marl.sim.hearing.receivers import HrtfReceiver
-from veca_marl.sim.sound.acoustics import Room
-from veca_marl.sim.sound.soundfield import SoundField
-from veca_marl.sim.sound.sounds import Clip
+from veca_marl.sim.sound import Clip, Room, SoundField
 
 
 def spatial_audio(

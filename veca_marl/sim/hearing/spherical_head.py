@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.special import spherical_jn, spherical_yn
 
-from veca_marl.sim.geometry.pose import Floats
-from veca_marl.sim.sound.acoustics import SPEED_OF_SOUND_MPS
+from veca_marl.sim.geometry import Floats
+from veca_marl.sim.sound import SPEED_OF_SOUND_MPS
 
 HEAD_RADIUS_M = 0.0875
 """Radius of an average adult's head (Hartley & Fry 1921, after Duda & Martens 1998)."""

@@ -7,8 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from veca_marl.sim.geometry.primitives import Primitive, Shape
-from veca_marl.sim.geometry.rotations import matrix_to_quaternion
+from veca_marl.sim.geometry import Primitive, Shape, matrix_to_quaternion
 from veca_marl.sim.physics.bullet import pybullet
 
 _BULLET_SHAPES: dict[Shape, int] = {

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from veca_marl.sim.geometry.primitives import Shape
-from veca_marl.sim.geometry.scene import Scene
-from veca_marl.sim.geometry.tables import Geom
+from veca_marl.sim.geometry import Geom, Scene, Shape
 from veca_marl.sim.physics.bullet import pybullet
 from veca_marl.sim.physics.playground import PlaygroundCfg
 

@@ -17,5 +17,5 @@ class Mover(Protocol):
     def before_substep(self, substep_s: float) -> None:
         """Move or apply forces, before each physics step of `substep_s` seconds."""
 
-    def mirror(self) -> None:
+    def write_frames(self) -> None:
         """Write the frames of the scene and the positions of sounds, once per agent step."""

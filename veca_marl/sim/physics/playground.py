@@ -11,8 +11,8 @@ from dataclasses import dataclass, field
 
 from veca_marl.sim.physics.prop_cfg import PropCfg
 from veca_marl.sim.physics.rooms import DoorCfg, RoomCfg
-from veca_marl.sim.sound.acoustics import Room
-from veca_marl.sim.sound.house import TRANSMISSION_LOSS_DB, House
+from veca_marl.sim.sound import House, Room
+from veca_marl.sim.sound.house import TRANSMISSION_LOSS_DB
 
 THICKEST_WALL_M = 0.5
 """The threshold of a door lies within the wall: at most so far from either room."""

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass, field
 from enum import Enum
 
-from veca_marl.sim.sound.sounds import SoundCfg
+from veca_marl.sim.sound import SoundCfg
 
 
 class PropShape(Enum):

@@ -6,8 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from veca_marl.sim.geometry.primitives import Shape
-from veca_marl.sim.geometry.tables import Geom
+from veca_marl.sim.geometry import Geom, Shape
 from veca_marl.sim.physics.prop_cfg import PropCfg, PropShape
 
 SOUND_OBSTACLE_M = (0.7, 1.0)

@@ -7,16 +7,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from veca_marl.sim.geometry.pose import Floats
-from veca_marl.sim.geometry.rotations import quaternion_from_yaw, quaternions_to_matrices
-from veca_marl.sim.geometry.scene import Scene
-from veca_marl.sim.geometry.tables import Geom
+from veca_marl.sim.geometry import Floats, Geom, Scene, quaternion_from_yaw, quaternions_to_matrices
 from veca_marl.sim.physics.bullet import pybullet
 from veca_marl.sim.physics.collision_shapes import create_collision_shape
 from veca_marl.sim.physics.prop_cfg import PropCfg, PropShape
 from veca_marl.sim.physics.prop_shapes import prop_geoms, stops_sound
+from veca_marl.sim.sound import Source
 from veca_marl.sim.sound.obstacles import Obstacles
-from veca_marl.sim.sound.sound_source import Source
 
 
 class Prop:

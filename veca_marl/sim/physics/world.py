@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from veca_marl.sim.geometry.scene import Scene
+from veca_marl.sim.geometry import Scene
 from veca_marl.sim.physics.bullet import pybullet
 from veca_marl.sim.physics.clock import ClockCfg
 from veca_marl.sim.physics.floor import FLOOR_NAME, add_floor
@@ -14,8 +14,7 @@ from veca_marl.sim.physics.mover import Mover
 from veca_marl.sim.physics.playground import PlaygroundCfg, make_house
 from veca_marl.sim.physics.prop_cfg import PropCfg
 from veca_marl.sim.physics.props import Prop, follow_physics
-from veca_marl.sim.sound.soundfield import SoundField
-from veca_marl.sim.sound.sounds import make_sound
+from veca_marl.sim.sound import SoundField, make_sound
 
 GRAVITY_MPS2 = 9.81
 
@@ -150,7 +149,7 @@ class World:
     def _update_scene(self) -> None:
         follow_physics(self._moving)
         for mover in self.movers:
-            mover.mirror()
+            mover.write_frames()
         self.scene.update()
 
     def _check_not_frozen(self, what: str) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
-from veca_marl.sim.geometry.pose import Floats
+from veca_marl.sim.geometry import Floats
 
 SPEED_OF_SOUND_MPS = 343.0
 """Dry air at 20 degrees Celsius (ISO 9613-1)."""

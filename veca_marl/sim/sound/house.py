@@ -15,7 +15,7 @@ from collections.abc import Sequence
 import numpy as np
 from numba import njit
 
-from veca_marl.sim.geometry.pose import Floats, Pose
+from veca_marl.sim.geometry import Floats, Pose
 from veca_marl.sim.sound.acoustics import Room
 from veca_marl.sim.sound.obstacles import Obstacles
 from veca_marl.sim.sound.propagation import OneRoom

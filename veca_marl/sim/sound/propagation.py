@@ -9,7 +9,7 @@ import numpy as np
 import scipy.fft
 from numpy.typing import NDArray
 
-from veca_marl.sim.geometry.pose import Floats, Pose
+from veca_marl.sim.geometry import Floats, Pose
 from veca_marl.sim.sound.acoustics import (
     SPEED_OF_SOUND_MPS,
     Room,

@@ -13,7 +13,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from veca_marl.sim.geometry.pose import Floats
+from veca_marl.sim.geometry import Floats
 from veca_marl.sim.sound.acoustics import SPEED_OF_SOUND_MPS
 from veca_marl.sim.sound.fractional_delay import KERNEL_TAPS
 

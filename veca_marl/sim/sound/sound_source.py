@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from veca_marl.sim.geometry.pose import Floats
+from veca_marl.sim.geometry import Floats
 from veca_marl.sim.sound.sounds import Sound
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import scipy.fft
 from numpy.typing import NDArray
 
-from veca_marl.sim.geometry.pose import Pose
+from veca_marl.sim.geometry import Pose
 from veca_marl.sim.sound.acoustics import SPEED_OF_SOUND_MPS, Room
 from veca_marl.sim.sound.fractional_delay import HALF_WIDTH, KERNEL_LATENCY, KERNEL_TAPS
 from veca_marl.sim.sound.house import House

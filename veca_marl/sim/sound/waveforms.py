@@ -17,7 +17,7 @@ import scipy.io.wavfile
 import scipy.signal
 from numpy.typing import NDArray
 
-from veca_marl.sim.geometry.pose import Floats
+from veca_marl.sim.geometry import Floats
 
 HIGH_PASS_HZ = 80.0
 _LOWEST_PITCH_HZ = 80.0

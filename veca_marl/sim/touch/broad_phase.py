@@ -11,11 +11,7 @@ from typing import TypeAlias
 
 from numba import njit
 
-from veca_marl.sim.geometry.pose import Floats
-from veca_marl.sim.geometry.primitives import bounding_radius
-from veca_marl.sim.geometry.signed_distances import distance
-from veca_marl.sim.geometry.tables import Bools, GeomTable
-from veca_marl.sim.geometry.vectors import Vector
+from veca_marl.sim.geometry import Bools, Floats, GeomTable, Vector, bounding_radius, distance
 from veca_marl.sim.touch.taxels import TaxelTable
 
 # shape, size, position and the three axes of a primitive in the world frame

@@ -20,15 +20,16 @@ import numpy as np
 from numba import njit
 
 from veca_marl.sim.body.anatomy.skeleton import Skeleton
-from veca_marl.sim.geometry.pose import Floats
-from veca_marl.sim.geometry.signed_distances import (
+from veca_marl.sim.geometry import (
+    Bools,
     DistanceAndGradient,
+    Floats,
+    GeomTable,
+    Vector,
     distance,
     distance_and_gradient,
     is_inside,
 )
-from veca_marl.sim.geometry.tables import Bools, GeomTable
-from veca_marl.sim.geometry.vectors import Vector
 from veca_marl.sim.touch.broad_phase import (
     PlacedPrimitive,
     bounding_spheres,

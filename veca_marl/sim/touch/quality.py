@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veca_marl.sim.body.anatomy.skeleton import Skeleton, load_skeleton
-from veca_marl.sim.geometry.pose import Floats
-from veca_marl.sim.geometry.tables import Bools
+from veca_marl.sim.geometry import Bools, Floats
 from veca_marl.sim.touch.taxels import load_taxels
 
 Transform = Callable[[Floats], Floats]

@@ -10,9 +10,8 @@ from numpy.typing import NDArray
 
 from veca_marl.sim.body import Body
 from veca_marl.sim.body.anatomy.skeleton import load_skeleton
-from veca_marl.sim.geometry.pose import Floats
-from veca_marl.sim.geometry.tables import Bools
-from veca_marl.sim.physics.world import World
+from veca_marl.sim.geometry import Bools, Floats
+from veca_marl.sim.physics import World
 from veca_marl.sim.sense import Sense
 from veca_marl.sim.spec import ArraySpec
 from veca_marl.sim.touch.penetration import Workspace, adjacent_bones, read_taxels

@@ -16,10 +16,15 @@ import numpy as np
 
 from veca_marl.sim.body.anatomy.skeleton import Bone, load_skeleton
 from veca_marl.sim.body.anatomy.skin_mesh import binding_pose, load_skin
-from veca_marl.sim.geometry.meshes import Indices, Mesh, empty_meshes, with_mesh
-from veca_marl.sim.geometry.pose import Floats
-from veca_marl.sim.geometry.signed_distances import distances_to
-from veca_marl.sim.geometry.skinning import deform_meshes
+from veca_marl.sim.geometry import (
+    Floats,
+    Indices,
+    Mesh,
+    deform_meshes,
+    distances_to,
+    empty_meshes,
+    with_mesh,
+)
 
 # "in triangle formation" (the paper, section on tactile perception): three near the corners, three
 # near the middles of the edges, none on an edge, so that no two triangles share one

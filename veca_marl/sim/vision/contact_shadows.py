@@ -15,11 +15,16 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from veca_marl.sim.geometry.pose import Floats
-from veca_marl.sim.geometry.primitives import Shape, bounding_radius
-from veca_marl.sim.geometry.signed_distances import distance
-from veca_marl.sim.geometry.tables import Bools, GeomTable
-from veca_marl.sim.geometry.vectors import Vector, single
+from veca_marl.sim.geometry import (
+    Bools,
+    Floats,
+    GeomTable,
+    Shape,
+    Vector,
+    bounding_radius,
+    distance,
+    single,
+)
 from veca_marl.sim.vision.rasterizer import (
     NO_SURFACE,
     Depths,

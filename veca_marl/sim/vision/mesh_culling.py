@@ -9,9 +9,7 @@ from __future__ import annotations
 
 from numba import njit
 
-from veca_marl.sim.geometry.meshes import MeshTable
-from veca_marl.sim.geometry.pose import Floats
-from veca_marl.sim.geometry.tables import Bools
+from veca_marl.sim.geometry import Bools, Floats, MeshTable
 from veca_marl.sim.vision.mesh_rasterizer import draw_triangles, to_camera_frame
 from veca_marl.sim.vision.rasterizer import Depths, Lens, Surfaces, pixel_rectangle
 from veca_marl.sim.vision.screen_bounds import box_intervals

@@ -15,10 +15,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from veca_marl.sim.geometry.meshes import Indices, MeshTable
-from veca_marl.sim.geometry.pose import Floats
-from veca_marl.sim.geometry.tables import Bools
-from veca_marl.sim.geometry.vectors import Vector, single
+from veca_marl.sim.geometry import Bools, Floats, Indices, MeshTable, Vector, single
 from veca_marl.sim.vision.rasterizer import Depths, Lens, Rectangle, Surfaces
 from veca_marl.sim.vision.screen_bounds import Interval
 from veca_marl.sim.vision.shading import AMBIENT, BOUNCE, SUN

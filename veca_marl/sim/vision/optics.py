@@ -8,10 +8,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from veca_marl.sim.geometry.pose import Floats, Pose
-from veca_marl.sim.geometry.scene import Scene
-from veca_marl.sim.geometry.tables import Bools
-from veca_marl.sim.geometry.vectors import single
+from veca_marl.sim.geometry import Bools, Floats, Pose, Scene, single
 from veca_marl.sim.vision.rasterizer import Lens
 from veca_marl.sim.vision.rendering import DrawMasks, Views, render_views
 

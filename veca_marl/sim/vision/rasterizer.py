@@ -20,11 +20,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from veca_marl.sim.geometry import Bools, Floats, GeomTable, Shape, Vector, bounding_radius, single
 from veca_marl.sim.geometry.intersections import box_row, capsule_row, cylinder_row, sphere_row
-from veca_marl.sim.geometry.pose import Floats
-from veca_marl.sim.geometry.primitives import Shape, bounding_radius
-from veca_marl.sim.geometry.tables import Bools, GeomTable
-from veca_marl.sim.geometry.vectors import Vector, single
 from veca_marl.sim.vision.screen_bounds import Interval, box_intervals, disc_interval, rod_interval
 
 Depths: TypeAlias = NDArray[np.float32]

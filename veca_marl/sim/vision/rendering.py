@@ -7,9 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from veca_marl.sim.geometry.meshes import MeshTable
-from veca_marl.sim.geometry.pose import Floats
-from veca_marl.sim.geometry.tables import Bools, GeomTable, SurfaceTable
+from veca_marl.sim.geometry import Bools, Floats, GeomTable, MeshTable, SurfaceTable
 from veca_marl.sim.vision.contact_shadows import darken_contact_shadows
 from veca_marl.sim.vision.mesh_culling import draw_meshes
 from veca_marl.sim.vision.mesh_rasterizer import illuminate_triangles

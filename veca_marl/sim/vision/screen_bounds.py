@@ -12,7 +12,7 @@ from typing import TypeAlias
 import numpy as np
 from numba import njit
 
-from veca_marl.sim.geometry.vectors import Vector
+from veca_marl.sim.geometry import Vector
 
 Interval: TypeAlias = tuple[float, float]
 

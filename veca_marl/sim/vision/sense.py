@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veca_marl.sim.body import Body
-from veca_marl.sim.geometry.tables import Bools
-from veca_marl.sim.physics.world import World
+from veca_marl.sim.geometry import Bools
+from veca_marl.sim.physics import World
 from veca_marl.sim.sense import Sense
 from veca_marl.sim.spec import ArraySpec
 from veca_marl.sim.vision.image_filters import Blur, Defocus, Filter, FilterContext, Grey

@@ -15,10 +15,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from veca_marl.sim.geometry.pose import Floats
-from veca_marl.sim.geometry.primitives import Shape
-from veca_marl.sim.geometry.tables import GeomTable
-from veca_marl.sim.geometry.vectors import Vector, single
+from veca_marl.sim.geometry import Floats, GeomTable, Shape, Vector, single
 from veca_marl.sim.vision.rasterizer import (
     NO_SURFACE,
     Depths,

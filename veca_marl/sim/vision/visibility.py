@@ -6,7 +6,7 @@ from typing import Protocol
 
 from veca_marl.sim.body import Body
 from veca_marl.sim.body.mounts import EYES
-from veca_marl.sim.geometry.scene import Scene
+from veca_marl.sim.geometry import Scene
 from veca_marl.sim.vision.optics import Camera, seen_fraction
 from veca_marl.sim.vision.sense import VisionCfg
 

@@ -14,7 +14,7 @@ from veca_marl.envs.tasks.navigation.floor_plan import DoorApproach
 from veca_marl.sim.body.humanoid import Humanoid, JointCommand
 from veca_marl.sim.body.walker import Walker
 from veca_marl.sim.geometry import Floats
-from veca_marl.sim.sound.calls import Call
+from veca_marl.sim.sound import Call
 
 _TURNING_RADIUS_M = 0.35  # a body that crawls in a circle steers back when it is farther away
 

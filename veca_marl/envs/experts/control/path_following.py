@@ -8,9 +8,8 @@ from veca_marl.envs.experts.control.locomotion import Locomotion
 from veca_marl.envs.experts.control.wall_recovery import WallRecovery
 from veca_marl.envs.tasks.navigation.floor_plan import FloorPlan
 from veca_marl.sim.body import Body
-from veca_marl.sim.geometry import Floats
-from veca_marl.sim.geometry.vectors import horizontal_distance
-from veca_marl.sim.sound.calls import Call
+from veca_marl.sim.geometry import Floats, horizontal_distance
+from veca_marl.sim.sound import Call
 
 _ARRIVED_M = 0.4
 

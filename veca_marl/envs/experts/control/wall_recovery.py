@@ -10,7 +10,7 @@ import numpy as np
 from veca_marl.envs.experts.control.locomotion import Locomotion
 from veca_marl.sim.body import Body
 from veca_marl.sim.geometry import Floats
-from veca_marl.sim.sound.calls import Call
+from veca_marl.sim.sound import Call
 
 # a body is stuck that has moved and turned by less than this within this time
 _STUCK_S, _STUCK_M, _STUCK_RAD = 1.4, 0.15, 0.5

@@ -14,7 +14,7 @@ from veca_marl.envs.tasks.navigation.floor_plan import FloorPlan
 from veca_marl.sim.body import Body
 from veca_marl.sim.geometry import Floats
 from veca_marl.sim.physics import World
-from veca_marl.sim.sound.calls import Call
+from veca_marl.sim.sound import Call
 
 CALL = Call.high
 _LISTEN_S = 0.2  # time between two updates of the estimated position of callers

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from veca_marl.envs.core.task import Player
 from veca_marl.sim.body.walker import Walker
-from veca_marl.sim.geometry.vectors import horizontal_distance
+from veca_marl.sim.geometry import horizontal_distance
 from veca_marl.sim.physics import Prop
 
 _LEAST_SPEED_MPS = 0.1  # a standing walker does not kick: the ball rebounds

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from veca_marl.envs.core.task import Player
 from veca_marl.sim.body import Body
-from veca_marl.sim.geometry.vectors import horizontal_distance
+from veca_marl.sim.geometry import horizontal_distance
 
 
 def opponents(player: Player, players: Sequence[Player]) -> list[Player]:

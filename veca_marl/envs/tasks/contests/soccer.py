@@ -13,8 +13,7 @@ from veca_marl.envs.tasks.contests.kicking import AutomaticKicks
 from veca_marl.envs.tasks.contests.pitch import Pitch
 from veca_marl.envs.tasks.contests.soccer_cfg import SoccerCfg
 from veca_marl.envs.tasks.player_starts import direct_gaze_ahead, place_player
-from veca_marl.sim.geometry import Floats
-from veca_marl.sim.geometry.vectors import horizontal_distance
+from veca_marl.sim.geometry import Floats, horizontal_distance
 
 ATTACKER, DEFENDER = "attacker", "defender"
 

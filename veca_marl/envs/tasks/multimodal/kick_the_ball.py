@@ -11,7 +11,7 @@ from veca_marl.envs.core.scoring import cosine, horizontal, norm
 from veca_marl.envs.core.task import Player, Task, TaskCfg, register, require_walker, terms
 from veca_marl.envs.tasks.multimodal.rolling_ball import launch_from_side_wall
 from veca_marl.sim.physics import PropCfg, PropShape
-from veca_marl.sim.sound.sounds import SoundCfg, SoundKind
+from veca_marl.sim.sound import SoundCfg, SoundKind
 
 _START_CLEARANCE_M = 1.5  # from the walls
 

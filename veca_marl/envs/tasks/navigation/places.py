@@ -6,8 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from veca_marl.sim.geometry import Floats
-from veca_marl.sim.geometry.vectors import horizontal_distance
+from veca_marl.sim.geometry import Floats, horizontal_distance
 from veca_marl.sim.physics import PlaygroundCfg, Prop, PropCfg, PropShape, RoomCfg, World
 
 _DRAWS = 1000

@@ -7,7 +7,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from veca_marl.sim.body.anatomy.skeleton import Skeleton, turn
-from veca_marl.sim.geometry.pose import Floats
+from veca_marl.sim.geometry import Floats
 
 
 @njit(cache=True)

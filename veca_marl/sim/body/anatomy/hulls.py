@@ -11,9 +11,7 @@ import math
 
 import numpy as np
 
-from veca_marl.sim.geometry.pose import Floats, Pose
-from veca_marl.sim.geometry.primitives import Primitive, Shape
-from veca_marl.sim.geometry.rotations import rotation_with_z
+from veca_marl.sim.geometry import Floats, Pose, Primitive, Shape, rotation_with_z
 
 # Bullet lays a skin of its own round every hull (`gDefaultCollisionMargin` of its importer)
 MARGIN_M = 0.001

@@ -18,9 +18,14 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from veca_marl.sim.geometry.inertia import Inertia, primitive_inertia
-from veca_marl.sim.geometry.pose import Floats
-from veca_marl.sim.geometry.primitives import Primitive, Shape, capsule_between
+from veca_marl.sim.geometry import (
+    Floats,
+    Inertia,
+    Primitive,
+    Shape,
+    capsule_between,
+    primitive_inertia,
+)
 
 _AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 _CAPSULE = re.compile(r"capsule a=\((.+?)\) b=\((.+?)\) r=(\S+)")

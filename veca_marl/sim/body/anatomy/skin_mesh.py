@@ -19,9 +19,7 @@ from veca_marl.sim.body.anatomy.skeleton import (
     forward_kinematics,
     load_skeleton,
 )
-from veca_marl.sim.geometry.meshes import Mesh
-from veca_marl.sim.geometry.pose import Floats
-from veca_marl.sim.geometry.primitives import Shape
+from veca_marl.sim.geometry import Floats, Mesh, Shape
 
 GREY = (0.7, 0.7, 0.7)
 

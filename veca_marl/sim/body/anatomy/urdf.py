@@ -24,10 +24,8 @@ import numpy as np
 from veca_marl.sim.body.anatomy.hulls import as_obj, surface_points
 from veca_marl.sim.body.anatomy.skeleton import Bone, Joint, Skeleton
 from veca_marl.sim.body.anatomy.skin_springs import SkinLayer, is_finger, skin_layer, skin_spring
-from veca_marl.sim.geometry.inertia import Inertia, joined_inertia
-from veca_marl.sim.geometry.pose import Floats, Pose
-from veca_marl.sim.geometry.primitives import Primitive
-from veca_marl.sim.physics.collision_shapes import urdf_geometry
+from veca_marl.sim.geometry import Floats, Inertia, Pose, Primitive, joined_inertia
+from veca_marl.sim.physics import urdf_geometry
 
 SKIN_SUFFIX, THUMB_SUFFIX = "__skin", "__thumb"
 _LIGHT_SHARE = 0.01  # of its bone's mass, for each link that is not a bone

@@ -12,9 +12,14 @@ from numpy.typing import NDArray
 from veca_marl.sim.body.anatomy.skeleton import Skeleton
 from veca_marl.sim.body.anatomy.urdf import Build, body_files, bone_of
 from veca_marl.sim.body.humanoid.self_collision import allow_self_collision
-from veca_marl.sim.geometry.pose import Floats, Pose
-from veca_marl.sim.geometry.rotations import cross, matrix_to_quaternion, quaternions_to_matrices
-from veca_marl.sim.physics.bullet import pybullet
+from veca_marl.sim.geometry import (
+    Floats,
+    Pose,
+    cross,
+    matrix_to_quaternion,
+    quaternions_to_matrices,
+)
+from veca_marl.sim.physics import pybullet
 
 _TOP_SPEED = 30.0  # rad/s of a joint and m/s of the body: twice the speed of human limbs
 _FLAGS = (

@@ -31,9 +31,8 @@ from veca_marl.sim.body.humanoid.postures import (
     posture_angles,
 )
 from veca_marl.sim.body.humanoid.predicted_angles import predicted_angles
-from veca_marl.sim.geometry.pose import Floats, Pose
-from veca_marl.sim.geometry.rotations import heading_rad
-from veca_marl.sim.physics.world import World
+from veca_marl.sim.geometry import Floats, Pose, heading_rad
+from veca_marl.sim.physics import World
 from veca_marl.sim.spec import ArraySpec, continuous_spec
 
 JOINTS = "joints"  # the part of the action that moves
@@ -239,7 +238,7 @@ class Humanoid(Body):
         np.multiply(torques, self._moving, out=self._torques)
         self._articulation.apply(self._torques * self._articulation.strengths_nm)
 
-    def mirror(self) -> None:
+    def write_frames(self) -> None:
         """Write the poses of the bones and move the voice to the mouth."""
         self._pose_bones()
         self._mouth.position = self.mount("mouth").position

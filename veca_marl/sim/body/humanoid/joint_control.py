@@ -13,8 +13,8 @@ import numpy as np
 
 from veca_marl.sim.body.anatomy.skeleton import Skeleton
 from veca_marl.sim.body.anatomy.skin_springs import is_finger
-from veca_marl.sim.geometry.pose import Floats
-from veca_marl.sim.sound.calls import Call
+from veca_marl.sim.geometry import Floats
+from veca_marl.sim.sound import Call
 
 
 class JointCommand(NamedTuple):

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from veca_marl.sim.body.anatomy.skeleton import Skeleton
-from veca_marl.sim.geometry.pose import Floats
+from veca_marl.sim.geometry import Floats
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from veca_marl.sim.body.humanoid.articulation import Articulation
-from veca_marl.sim.geometry.pose import Floats
+from veca_marl.sim.geometry import Floats
 
 
 def predicted_angles(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Sequence
 
-from veca_marl.sim.physics.bullet import pybullet
+from veca_marl.sim.physics import pybullet
 
 _LEG = ("thigh", "shank", "foot")
 _TRUNK = ("pelvis", "spine", "chest", "neck", "head")

@@ -16,11 +16,8 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from veca_marl.sim.geometry.pose import Floats
-from veca_marl.sim.geometry.primitives import Primitive, Shape
-from veca_marl.sim.physics.bullet import pybullet
-from veca_marl.sim.physics.collision_shapes import create_collision_shape
-from veca_marl.sim.physics.props import Prop
+from veca_marl.sim.geometry import Floats, Primitive, Shape
+from veca_marl.sim.physics import Prop, create_collision_shape, pybullet
 
 _ROUNDS = 3  # two for the walls of a corner, one spare
 _LIMB_REACH_M = 1.0  # from the pelvis of a joint-level body to its stretched toes

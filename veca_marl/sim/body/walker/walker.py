@@ -20,11 +20,9 @@ from veca_marl.sim.body.walker.gait import Gait
 from veca_marl.sim.body.walker.walk_commands import WALK_ACTIONS
 from veca_marl.sim.body.walker.walker_cfg import WalkerCfg
 from veca_marl.sim.body.walker.walker_collisions import walker_collisions
-from veca_marl.sim.geometry.pose import Floats
-from veca_marl.sim.geometry.vectors import horizontal_distance
-from veca_marl.sim.physics.props import Prop
-from veca_marl.sim.physics.world import World
-from veca_marl.sim.sound.calls import Call
+from veca_marl.sim.geometry import Floats, horizontal_distance
+from veca_marl.sim.physics import Prop, World
+from veca_marl.sim.sound import Call
 from veca_marl.sim.spec import ArraySpec
 
 MOVE = "move"  # the part of the action that walks
@@ -190,7 +188,7 @@ class Walker(Body):
         self._ground[:] = x, y
         self._capsule.set_velocity(vx, vy, self._turn_radps)
 
-    def mirror(self) -> None:
+    def write_frames(self) -> None:
         """Pose the bones by the gait and move the voice to the mouth."""
         step_s = self._world.clock.step_s
         self._velocity[:2] = (self._ground - self._step_start) / step_s

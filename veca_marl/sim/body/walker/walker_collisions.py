@@ -14,8 +14,8 @@ from typing import Protocol
 import numpy as np
 from numba import njit
 
-from veca_marl.sim.geometry.pose import Floats
-from veca_marl.sim.physics.world import World
+from veca_marl.sim.geometry import Floats
+from veca_marl.sim.physics import World
 
 # a pair of which a wall stops one walker closes half of its overlap in each round
 _ROUNDS = 16
@@ -33,7 +33,7 @@ class CollidingWalker(Protocol):
         """See `Mover`."""
         ...
 
-    def mirror(self) -> None:
+    def write_frames(self) -> None:
         """See `Mover`."""
         ...
 
@@ -95,10 +95,10 @@ class WalkerCollisions:
         for (x, y), walker in zip(positions.tolist(), self._walkers, strict=True):
             walker.set_position(x, y, substep_s)
 
-    def mirror(self) -> None:
+    def write_frames(self) -> None:
         """See `Mover`."""
         for walker in self._walkers:
-            walker.mirror()
+            walker.write_frames()
 
 
 def walker_collisions(world: World) -> WalkerCollisions:
