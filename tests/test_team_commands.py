@@ -1,7 +1,8 @@
-"""Teams at the command line: self-play, cross-play, opponents from elsewhere, other algorithms."""
+"""Commands for teams: self-play, tournament, evaluation, opponents and algorithms by team."""
 
 import csv
 import json
+import shutil
 import subprocess
 import sys
 
@@ -9,7 +10,7 @@ import pytest
 import torch
 
 from veca_marl.evaluate import main as evaluate
-from veca_marl.tournament import main as cross_play
+from veca_marl.tournament import main as tournament
 from veca_marl.tournament import spread
 
 TASK = ["+task=PushOut1v1", "task.max_seconds=1", "senses/vision=blind", "senses/touch=numb"]
@@ -49,21 +50,21 @@ def played(tmp_path_factory):
     return folder
 
 
-def test_both_teams_leave_past_selves(played):
+def test_past_policies_of_both_teams_are_stored(played):
     kept = sorted(path.name for path in (played / "run" / "pool").iterdir())
     frames = {"red": (0, 32, 96), "blue": (0, 64, 128)}
     assert kept == sorted(f"{team}_{n:012d}.pt" for team, ns in frames.items() for n in ns)
     assert not (played / "run" / "checkpoints" / "best.pt").exists()
     assert "no best.pt" in (played / "run" / "comparison.txt").read_text()
-    # blue alone has a critic that judges by the whole team
+    # only the critic of blue observes the whole team
     central, own = (actors(played / "run", team) for team in ("blue", "red"))
     assert central.keys() != own.keys() or any(central[k].shape != own[k].shape for k in own)
 
 
-def test_cross_play_writes_the_matches_the_ratings_and_the_picture(played, capsys):
+def test_a_tournament_writes_the_matches_the_ratings_and_the_picture(played, capsys):
     pytest.importorskip("matplotlib", reason="the picture needs the extra [plot]")
     run = played / "run"
-    assert cross_play([str(run), "--members", "2", "--episodes", "4"]) == 0
+    assert tournament([f"run={run}", "tournament.members=2", "episodes=4"]) == 0
     matches, ratings = rows(run / "cross_play.csv"), rows(run / "elo.csv")
     assert {(m["red_frames"], m["blue_frames"]) for m in matches} == {
         (red, blue) for red in ("0", "96") for blue in ("0", "128")
@@ -76,7 +77,7 @@ def test_cross_play_writes_the_matches_the_ratings_and_the_picture(played, capsy
     assert len(capsys.readouterr().out.splitlines()) == 4
 
 
-def test_what_another_run_learnt_is_an_opponent(played, tmp_path, capsys):
+def test_a_policy_of_another_run_is_an_opponent(played, tmp_path, capsys):
     done = train(tmp_path, "run", f"opponent.blue={played / 'run'}", "total_frames=32")
     assert done.returncode == 0, done.stderr
     with (tmp_path / "run" / "metrics.csv").open() as file:
@@ -85,12 +86,12 @@ def test_what_another_run_learnt_is_an_opponent(played, tmp_path, capsys):
     assert not [name for name in columns if name.startswith("blue/") and "loss" in name]
     evaluated = {row["team"] for row in rows(tmp_path / "run" / "evaluations.csv")}
     assert evaluated == {"red", "blue"}
-    # a run without self-play has no past selves that could meet
-    assert cross_play([str(tmp_path / "run")]) == 2
+    # a run without self-play has no past policies
+    assert tournament([f"run={tmp_path / 'run'}"]) == 2
     assert "self_play.teams" in capsys.readouterr().err
 
 
-def test_a_team_begins_with_what_another_run_learnt(played, tmp_path):
+def test_a_team_starts_from_the_parameters_of_another_run(played, tmp_path):
     first = [f"warm_start.red={played / 'run'}", "opponent.blue=idle", "algo.learning_rate=1e-6"]
     done = train(tmp_path, "run", *first, "total_frames=32", "log.keep_checkpoints=9")
     assert done.returncode == 0, done.stderr
@@ -101,7 +102,7 @@ def test_a_team_begins_with_what_another_run_learnt(played, tmp_path):
     for name, array in learnt.items():
         torch.testing.assert_close(begun["network"][name], array, rtol=0.0, atol=0.0)
     assert not begun["optimizer"]["state"]
-    # resumed, it goes on from its own end, even where the other run is gone
+    # resumed, it continues from its own checkpoint, also without the other run
     config = tmp_path / "run" / "config.yaml"
     config.write_text(config.read_text().replace(str(played / "run"), str(tmp_path / "gone")))
     again = [sys.executable, "-m", "veca_marl.train", f"resume={tmp_path / 'run'}"]
@@ -122,27 +123,28 @@ def test_a_team_begins_with_what_another_run_learnt(played, tmp_path):
         (["warm_start.red={run}", "senses/vision=monocular"], "other specs"),
     ],
 )
-def test_what_cannot_be_begun_with_is_refused(played, tmp_path, arguments, message):
+def test_a_warm_start_that_does_not_fit_is_refused(played, tmp_path, arguments, message):
     done = train(tmp_path, "run", *(text.format(run=played / "run") for text in arguments))
     assert done.returncode == 2
     assert message in done.stderr
     assert not (tmp_path / "run").exists()
 
 
-def test_what_was_learnt_plays_again_elsewhere(played, tmp_path, capsys):
+def test_a_run_is_evaluated_against_another_opponent(played, tmp_path, capsys):
     table = tmp_path / "table.json"
-    run, more = str(played / "run"), ["--episodes", "4", "--json", str(table)]
+    run, more = f"run={played / 'run'}", ["episodes=4", f"evaluate.json={table}"]
     assert evaluate([run, "opponent.blue=idle", "task.max_seconds=0.4", *more]) == 0
     rows = json.loads(table.read_text())
     assert [(row["player"], row["team"]) for row in rows] == [("policy", "red"), ("random", "red")]
     assert all(row["episodes"] == 4 and row["length"] == 10.0 for row in rows)
     assert rows[0]["return"] != rows[1]["return"]
     printed = capsys.readouterr().out.splitlines()
-    assert len(printed) == 3
+    assert len(printed) == 4
+    assert printed[3].startswith("red: return of policy")
     assert f"{rows[0]['return']:.3f}" in printed[1]
     # a checkpoint may be named instead, and the same seed gives the same episodes
-    latest = str(sorted((played / "run" / "checkpoints").glob("*.pt"))[-1])
-    again = [evaluate([latest, "--episodes", "2", "--seed", "3"]) for _ in range(2)]
+    latest = sorted((played / "run" / "checkpoints").glob("*.pt"))[-1]
+    again = [evaluate([f"run={latest}", "episodes=2", "seed=3"]) for _ in range(2)]
     first, second = capsys.readouterr().out.split("player")[1:]
     assert again == [0, 0]
     assert first == second
@@ -153,20 +155,59 @@ def test_what_was_learnt_plays_again_elsewhere(played, tmp_path, capsys):
     [
         ("senses/vision=monocular", "other specs"),
         ("senses/audio=lout", "unknown senses/audio 'lout'"),
+        ("algo.clip=1", "of a run, only body, clock, eval"),
+        ("task=KickTheBall", "of a run, only body, clock, eval"),
+        ("opponent.green=idle", "opponent: no ['green'] in PushOut1v1"),
+        ("evaluate.exploration=loud", "expected one of [deterministic, stochastic]"),
+        ("episodes=0", "episodes must be at least 1"),
+        ("episode=4", "unknown key 'episode' (did you mean episodes?)"),
     ],
 )
-def test_what_does_not_fit_is_refused(played, capsys, override, message):
-    assert evaluate([str(played / "run"), override]) == 2
+def test_a_change_that_does_not_fit_is_refused(played, capsys, override, message):
+    assert evaluate([f"run={played / 'run'}", override]) == 2
     assert message in capsys.readouterr().err
+
+
+def test_a_self_play_run_is_evaluated_against_an_expert(played, tmp_path, capsys):
+    table = tmp_path / "table.json"
+    words = [f"run={played / 'run'}", "opponent.blue=expert", "senses/audio=mono", "episodes=2"]
+    assert evaluate([*words, "evaluate.exploration=stochastic", f"evaluate.json={table}"]) == 0
+    assert [row["team"] for row in json.loads(table.read_text())] == ["red", "red"]
+
+
+def test_evaluation_uses_the_stored_configuration_and_not_the_defaults_of_today(
+    played, tmp_path, capsys
+):
+    old = tmp_path / "old"
+    shutil.copytree(played / "run", old)
+    config = old / "config.yaml"
+    text = config.read_text()
+    assert "max_seconds: 1.0" in text
+    config.write_text(text.replace("max_seconds: 1.0", "max_seconds: 0.2"))
+    table = tmp_path / "table.json"
+    assert evaluate([f"run={old}", "episodes=2", f"evaluate.json={table}"]) == 0
+    assert all(row["length"] == 5.0 for row in json.loads(table.read_text()))
+
+
+def test_a_key_that_this_version_does_not_have_is_named(played, tmp_path, capsys):
+    old = tmp_path / "old"
+    shutil.copytree(played / "run", old)
+    config = old / "config.yaml"
+    config.write_text(config.read_text().replace("max_seconds:", "max_minuets:"))
+    assert evaluate([f"run={old}"]) == 2
+    error = capsys.readouterr().err
+    assert "max_minuets" in error
+    assert str(config) in error
+    assert error.count("\n") == 1
 
 
 def test_a_folder_that_is_no_run_is_refused(tmp_path, capsys):
     nowhere = tmp_path / "nowhere"
-    for command in (cross_play, evaluate):
-        assert command([str(nowhere)]) == 2
+    for command in (tournament, evaluate):
+        assert command([f"run={nowhere}"]) == 2
         assert "nowhere holds no run" in capsys.readouterr().err
 
 
-def test_past_selves_are_chosen_evenly():
+def test_past_policies_are_chosen_evenly():
     assert spread([0, 1, 2, 3, 4, 5, 6], 3) == [0, 3, 6]
     assert spread([0, 5], 6) == [0, 5]

@@ -1,84 +1,119 @@
-"""Let what a run learnt play again, also elsewhere: ``python -m veca_marl.evaluate runs/...``.
+"""Score what a run has learnt: ``python -m veca_marl.evaluate run=runs/...``.
 
-Choices after the run's folder change the game: ``senses/audio=mono``, ``opponent.defender=expert``,
-``task.starts={on_back:1}``. What was learnt must still fit: the same senses in the same shapes, the
-same actions. Choices that the run left open are as the defaults are today.
+The episodes are played on the configuration stored with the run. Other overrides change it:
+``senses/audio=mono``, ``opponent.defender=expert``, ``task.max_seconds=30``. The policies must fit:
+the same senses in the same shapes, the same actions. The random policy plays the same episodes
+against the same opponents.
 """
 
 from __future__ import annotations
 
-import argparse
 import json
 import sys
 from collections.abc import Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import torch
+from omegaconf import MISSING
 from tensordict.nn import TensorDictSequential
 
+from veca_marl.algos.selfplay.self_play import SelfPlayCfg
 from veca_marl.algos.specs import team_specs
 from veca_marl.algos.training.checkpoint import CheckpointError
-from veca_marl.algos.training.comparison import interval
-from veca_marl.algos.training.evaluation import (
-    Exploration,
-    RandomTeams,
-    Scores,
-    evaluate,
-)
+from veca_marl.algos.training.comparison import comparison_line, interval
+from veca_marl.algos.training.evaluation import Exploration, RandomTeams, Scores, evaluate
 from veca_marl.algos.training.stored import load_actor
-from veca_marl.config import Config, ConfigError, compose, one_line
+from veca_marl.config import Config, ConfigError, one_line, to_config
+from veca_marl.config.command_line import CommandLine
+from veca_marl.config.stored import change
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
-from veca_marl.runs.assembly import make_env
 from veca_marl.runs.run_folder import open_run
 
-_LEARNING = ("self_play", "warm_start", "learner", "algo@learner")
-
 Table = dict[str, dict[str, Scores]]
+"""Scores by player (policy, random) and team."""
 
 
-def play_again(
-    learnt: Path, overrides: Sequence[str], episodes: int, exploration: Exploration, seed: int
-) -> Table:
-    """Return the scores of each team of the policy, and of a random one in the same episodes.
+@dataclass
+class EvaluateCfg:
+    """How the episodes are played.
+
+    Attributes:
+        exploration: Whether policies take the mode of their distribution or a sample; None is as in
+            the run (`eval.exploration`).
+        json: File that the table is written to; None writes none.
+    """
+
+    exploration: Exploration | None = None
+    json: str | None = None
+
+
+@dataclass
+class EvaluateOptions:
+    """Options of the command.
+
+    Attributes:
+        run: Folder of a run (its latest checkpoint is used), or a checkpoint in it.
+        episodes: Number of episodes.
+        seed: Seed of the episodes.
+        evaluate: How they are played.
+    """
+
+    run: str = MISSING
+    episodes: int = 32
+    seed: int = 1
+    evaluate: EvaluateCfg = field(default_factory=EvaluateCfg)
+
+    def __post_init__(self) -> None:
+        if self.episodes < 1:
+            raise ValueError(f"episodes must be at least 1, got {self.episodes}")
+        if self.seed < 0:
+            raise ValueError(f"seed must be 0 or more, got {self.seed}")
+
+
+def evaluate_run(options: EvaluateOptions, overrides: Sequence[str] = ()) -> Table:
+    """Return the scores of each team by its policy, and by a random one in the same episodes.
 
     Args:
-        learnt: The folder of a run (its latest checkpoint counts), or one of its checkpoints.
-        overrides: What is other than in the run, as on its command line.
-        episodes: How many.
-        exploration: Whether the policy takes its most likely actions or draws them.
-        seed: Of the episodes.
+        options: The run and the episodes.
+        overrides: Changes of the stored configuration.
 
     Raises:
         ConfigError: If there is no run, or a choice is impossible.
-        CheckpointError: If what was learnt does not fit.
+        CheckpointError: If the policies do not fit.
     """
-    folder = open_run(learnt.parent.parent if learnt.is_file() else learnt)
-    cfg = compose([*_about_the_game(folder.overrides), *overrides])
-    env = _worlds(cfg, episodes, seed)
-    specs = team_specs(env)
+    checkpoint = Path(options.run)
+    cfg = _configuration(checkpoint, overrides)
+    exploration = options.evaluate.exploration or cfg.eval.exploration
+    env = _make_env(cfg, options)
     actors = {
-        team: load_actor(cfg.frozen.get(team, learnt), team, spec) for team, spec in specs.items()
+        team: load_actor(cfg.frozen.get(team, checkpoint), team, spec)
+        for team, spec in team_specs(env).items()
     }
-    baseline = RandomTeams(
-        env, [team for team in actors if team not in cfg.frozen], [actors[t] for t in cfg.frozen]
-    )
-    policy = TensorDictSequential(*actors.values())
+    learnt = [team for team in actors if team not in cfg.frozen]
+    players = {
+        "policy": TensorDictSequential(*actors.values()),
+        "random": RandomTeams(env, learnt, [actors[team] for team in cfg.frozen]),
+    }
     table = {
-        "policy": evaluate(env, policy, episodes, seed, exploration),
-        "random": evaluate(env, baseline, episodes, seed, exploration),
+        name: evaluate(env, player, options.episodes, options.seed, exploration)
+        for name, player in players.items()
     }
     env.close()
     return table
 
 
-def _about_the_game(overrides: Sequence[str]) -> list[str]:
-    """Leave out how single teams learnt: they may be opponents now, who must not be told."""
-    return [text for text in overrides if not text.lstrip("+~").startswith(_LEARNING)]
+def _configuration(checkpoint: Path, overrides: Sequence[str]) -> Config:
+    folder = open_run(checkpoint.parent.parent if checkpoint.is_file() else checkpoint, "run=")
+    node = folder.typed_config()
+    node.self_play, node.learner, node.warm_start = SelfPlayCfg(), {}, {}  # nothing is learnt here
+    change(node, overrides)
+    return to_config(node)
 
 
-def _worlds(cfg: Config, episodes: int, seed: int) -> VecaEnv:
+def _make_env(cfg: Config, options: EvaluateOptions) -> VecaEnv:
     try:
-        return make_env(cfg.game, min(episodes, cfg.eval.worlds), seed)
+        return VecaEnv(cfg.game, min(options.episodes, cfg.eval.worlds), options.seed)
     except ValueError as error:
         raise ConfigError(one_line(error)) from error
 
@@ -100,47 +135,36 @@ def summary(table: Table) -> list[dict[str, object]]:
     ]
 
 
-def lines(rows: list[dict[str, object]]) -> list[str]:
-    """Return the rows as a table to read."""
-    cells = [[f"{v:.3f}" if isinstance(v, float) else _short(v) for v in r.values()] for r in rows]
-    table = [list(rows[0]), *cells]
+def lines(rows: Sequence[dict[str, object]]) -> list[str]:
+    """Return the rows as an aligned table; a term that a team does not have is empty."""
+    columns = list(dict.fromkeys(name for row in rows for name in row))
+    table = [columns, *([_cell(row.get(name, "")) for name in columns] for row in rows)]
     widths = [max(map(len, column)) for column in zip(*table, strict=True)]
-    return [
-        "  ".join(cell.ljust(width) for cell, width in zip(line, widths, strict=True)).rstrip()
-        for line in table
-    ]
+    return ["  ".join(map(str.ljust, line, widths)).rstrip() for line in table]
 
 
-def _short(value: object) -> str:
+def _cell(value: object) -> str:
     if isinstance(value, tuple):
         return f"[{value[0]:.3f}, {value[1]:.3f}]"
-    return str(value)
+    return f"{value:.3f}" if isinstance(value, float) else str(value)
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command line; return the exit status."""
-    parser = argparse.ArgumentParser(prog="python -m veca_marl.evaluate", description=__doc__)
-    parser.add_argument("run", type=Path, help="folder of a run, or a checkpoint in it")
-    parser.add_argument("override", nargs="*", help="what is other than in the run")
-    parser.add_argument("--episodes", type=int, default=32)
-    parser.add_argument("--seed", type=int, default=1, help="of the episodes")
-    parser.add_argument("--draw", action="store_true", help="draw actions instead of the likeliest")
-    parser.add_argument("--json", type=Path, help="also write the table there")
-    asked = parser.parse_args(arguments)
-    if asked.episodes < 1 or asked.seed < 0:
-        parser.error("--episodes must be at least 1, --seed at least 0")
+def run(options: EvaluateOptions, overrides: list[str]) -> None:
+    """Evaluate, print the table and the paired comparison, write the JSON file."""
     torch.set_num_threads(1)
-    how = Exploration.stochastic if asked.draw else Exploration.deterministic
-    try:
-        table = play_again(asked.run, asked.override, asked.episodes, how, asked.seed)
-    except (ConfigError, CheckpointError) as error:
-        print(f"error: {one_line(error)}", file=sys.stderr)
-        return 2
+    table = evaluate_run(options, overrides)
     rows = summary(table)
     print(*lines(rows), sep="\n")
-    if asked.json is not None:
-        asked.json.write_text(json.dumps(rows, indent=2) + "\n")
-    return 0
+    for team, scores in table["policy"].items():
+        print(comparison_line(team, scores, table["random"][team]))
+    if options.evaluate.json is not None:
+        Path(options.evaluate.json).write_text(json.dumps(rows, indent=2) + "\n")
+
+
+def main(words: Sequence[str] | None = None) -> int:
+    """Run the command line; return the exit status."""
+    description = str(__doc__)
+    return CommandLine("evaluate", EvaluateOptions, description, (CheckpointError,)).run(run, words)
 
 
 if __name__ == "__main__":

@@ -1,60 +1,114 @@
-"""Let the past selves of a self-play run meet: ``python -m veca_marl.tournament runs/...``.
+"""Play past policies of a self-play run against each other: ``veca_marl.tournament run=runs/...``.
 
-Writes ``cross_play.csv`` (every match), ``elo.csv`` (every player's rating) and, with the extra
-``[plot]``, ``cross_play.png`` (the matrix of points) into the folder of the run.
+Writes ``cross_play.csv`` (every match), ``elo.csv`` (the rating of every policy) and, with the
+extra ``[plot]``, ``cross_play.png`` (the matrix of points) into the folder of the run.
 """
 
 from __future__ import annotations
 
-import argparse
 import csv
 import sys
 from collections.abc import Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 import torch
+from omegaconf import MISSING
 
 from veca_marl.algos.selfplay.pool import Pool
 from veca_marl.algos.selfplay.tournament import Match, Rating, play_all, rate, table_of_points
 from veca_marl.algos.training.checkpoint import CheckpointError
-from veca_marl.config import Config, ConfigError, one_line, to_config
-from veca_marl.runs.assembly import make_env, make_learners, read_specs
+from veca_marl.config import Config, ConfigError, to_config
+from veca_marl.config.command_line import CommandLine
+from veca_marl.config.stored import change
+from veca_marl.envs.adapters.torchrl.env import VecaEnv
+from veca_marl.runs.assembly import make_learners, read_specs
 from veca_marl.runs.run_folder import RunFolder, open_run
 
 
-def tournament(folder: RunFolder, members: int, episodes: int, draw_margin: float) -> list[Match]:
+@dataclass
+class TournamentCfg:
+    """Who plays, and what counts as a draw.
+
+    Attributes:
+        members: Number of past policies of each team, spread evenly over the run.
+        draw_margin: Returns that differ by less than this are a draw.
+    """
+
+    members: int = 6
+    draw_margin: float = 0.5
+
+    def __post_init__(self) -> None:
+        if self.members < 2:
+            raise ValueError(f"tournament.members must be at least 2, got {self.members}")
+        if not self.draw_margin >= 0:
+            raise ValueError(f"tournament.draw_margin must be 0 or more, got {self.draw_margin}")
+
+
+@dataclass
+class TournamentOptions:
+    """Options of the command.
+
+    Attributes:
+        run: Folder of a self-play run.
+        episodes: Number of episodes of each match.
+        tournament: Who plays, and what counts as a draw.
+    """
+
+    run: str = MISSING
+    episodes: int = 16
+    tournament: TournamentCfg = field(default_factory=TournamentCfg)
+
+    def __post_init__(self) -> None:
+        if self.episodes < 1:
+            raise ValueError(f"episodes must be at least 1, got {self.episodes}")
+        if self.tournament.members < 2:
+            raise ValueError(
+                f"tournament.members must be at least 2, got {self.tournament.members}"
+            )
+        if not self.tournament.draw_margin >= 0:
+            raise ValueError(
+                f"tournament.draw_margin must be 0 or more, got {self.tournament.draw_margin}"
+            )
+
+
+def tournament(
+    folder: RunFolder, options: TournamentOptions, overrides: Sequence[str] = ()
+) -> list[Match]:
     """Play the tournament of a run.
 
     Args:
         folder: The run.
-        members: How many past selves of each team, spread evenly over the run.
-        episodes: Of each match.
-        draw_margin: Returns nearer to each other than this are a draw.
+        options: Who plays how many episodes.
+        overrides: Changes of the stored configuration.
 
     Raises:
-        ConfigError: If it was no self-play run, or there are fewer than two past selves.
+        ConfigError: If it is not a self-play run, or a team has fewer than two past policies.
     """
-    cfg = to_config(folder.typed_config())
-    pool = Pool(folder.pool)
+    node = folder.typed_config()
+    change(node, overrides)
+    cfg = to_config(node)
+    pool, members = Pool(folder.pool), options.tournament.members
     chosen = {team: spread(pool.members(team), members) for team in cfg.self_play.teams}
     if not chosen or min(len(frames) for frames in chosen.values()) < 2:
-        raise ConfigError(f"{folder.path}: no past selves in it; was it run with self_play.teams?")
-    return _play(cfg, pool, chosen, episodes, draw_margin)
+        raise ConfigError(f"{folder.path}: no past policies; it was run without self_play.teams")
+    return _play(cfg, pool, chosen, options)
 
 
 def _play(
-    cfg: Config, pool: Pool, chosen: dict[str, list[int]], episodes: int, draw_margin: float
+    cfg: Config, pool: Pool, chosen: dict[str, list[int]], options: TournamentOptions
 ) -> list[Match]:
     learners = make_learners(cfg, read_specs(cfg.game), torch.device("cpu"))
-    env = make_env(cfg.game, min(episodes, cfg.eval.worlds), cfg.seed)
-    matches = play_all(env, learners.policy, pool, chosen, episodes, draw_margin, cfg.seed)
+    env = VecaEnv(cfg.game, min(options.episodes, cfg.eval.worlds), cfg.seed)
+    margin = options.tournament.draw_margin
+    matches = play_all(env, learners.policy, pool, chosen, options.episodes, margin, cfg.seed)
     env.close()
     return matches
 
 
 def spread(frames: Sequence[int], count: int) -> list[int]:
-    """Return `count` of the numbers, the first and the last among them, evenly between."""
+    """Return `count` of the numbers, evenly spaced, with the first and the last."""
     if len(frames) <= count:
         return list(frames)
     return [frames[i] for i in np.linspace(0, len(frames) - 1, count).round().astype(int)]
@@ -76,7 +130,7 @@ def write_results(path: Path, matches: list[Match], ratings: list[Rating]) -> No
 
 
 def draw_matrix(path: Path, matches: list[Match]) -> None:
-    """Draw the first team's points as a PNG file.
+    """Draw the points of the first team as a PNG file.
 
     Raises:
         ModuleNotFoundError: Without the extra ``[plot]``.
@@ -85,7 +139,8 @@ def draw_matrix(path: Path, matches: list[Match]) -> None:
         from matplotlib.figure import Figure
     except ModuleNotFoundError as error:
         raise ModuleNotFoundError(
-            "the picture needs matplotlib: pip install 'veca_marl[plot]'", name=error.name
+            "the picture needs matplotlib: pip install 'veca_marl[plot]'",
+            name=error.name,
         ) from error
     first, second = matches[0].members
     figure = Figure(figsize=(5.5, 4.5), layout="constrained")
@@ -97,33 +152,27 @@ def draw_matrix(path: Path, matches: list[Match]) -> None:
     for axis, team in ((axes.yaxis, first), (axes.xaxis, second)):
         frames = sorted({match.members[team] for match in matches})
         axis.set_ticks(range(len(frames)), [f"{n / 1000:.0f}k" for n in frames])
-    axes.set(xlabel=f"{second} after so many frames", ylabel=f"{first} after so many frames")
+    axes.set(xlabel=f"training frames of {second}", ylabel=f"training frames of {first}")
     figure.colorbar(image, label=f"points of {first} (win 1, draw 1/2)")
     figure.savefig(path, dpi=120, bbox_inches="tight")
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command line; return the exit status."""
-    parser = argparse.ArgumentParser(prog="python -m veca_marl.tournament", description=__doc__)
-    parser.add_argument("run", type=Path, help="folder of a self-play run")
-    parser.add_argument("--members", type=int, default=6, help="past selves of each team")
-    parser.add_argument("--episodes", type=int, default=16, help="episodes of each match")
-    parser.add_argument("--draw-margin", type=float, default=0.5, help="difference of a draw")
-    asked = parser.parse_args(arguments)
-    if min(asked.members, asked.episodes) < 1:
-        parser.error("--members and --episodes must be at least 1")
-    try:
-        folder = open_run(asked.run)
-        matches = tournament(folder, asked.members, asked.episodes, asked.draw_margin)
-    except (ConfigError, CheckpointError) as error:
-        print(f"error: {one_line(error)}", file=sys.stderr)
-        return 2
+def run(options: TournamentOptions, overrides: list[str]) -> None:
+    """Play the tournament, print the ratings and write the results into the folder of the run."""
+    torch.set_num_threads(1)
+    folder = open_run(Path(options.run), "run=")
+    matches = tournament(folder, options, overrides)
     ratings = rate(matches)
     write_results(folder.path, matches, ratings)
     for rating in sorted(ratings, key=lambda r: -r.elo):
         print(f"{rating.elo:7.0f}  {rating.team} after {rating.frames} frames")
     draw_matrix(folder.path / "cross_play.png", matches)
-    return 0
+
+
+def main(words: Sequence[str] | None = None) -> int:
+    """Run the command line; return the exit status."""
+    errors = (CheckpointError, ModuleNotFoundError)
+    return CommandLine("tournament", TournamentOptions, str(__doc__), errors).run(run, words)
 
 
 if __name__ == "__main__":

@@ -64,11 +64,19 @@ def prepare(overrides: Sequence[str]) -> list[str]:
     Raises:
         ConfigError: If a plug-in cannot be loaded.
     """
-    _load_plugins(plugins_in(overrides))
+    load_config_plugins(plugins_in(overrides))
     return with_integers(overrides)
 
 
-def _load_plugins(names: Sequence[str]) -> None:
+def load_config_plugins(names: Sequence[str]) -> None:
+    """Load plug-ins together with their configuration files.
+
+    Args:
+        names: Packages beside the installed plug-ins.
+
+    Raises:
+        ConfigError: If one cannot be loaded.
+    """
     try:
         load_plugins(names)
         check_configuration_files()
@@ -85,7 +93,7 @@ def to_config(node: DictConfig) -> Config:
     """
     if OmegaConf.is_missing(node, "task"):
         raise ConfigError(no_task())
-    _load_plugins(node.plugins)
+    load_config_plugins(node.plugins)
     try:
         config = cast(Config, OmegaConf.to_object(node))
         find_task(config.task.name)
@@ -102,8 +110,16 @@ def _refuse_extra(config: Any, path: str) -> None:
     for extra in sorted(set(vars(config)) - set(names)):
         raise ValueError(f"unknown key '{path}{extra}'; choices: {', '.join(sorted(names))}")
     for name in names:
-        if is_dataclass(getattr(config, name)):
-            _refuse_extra(getattr(config, name), f"{path}{name}.")
+        value = getattr(config, name)
+        _refuse_extra_inside(value, f"{path}{name}")
+
+
+def _refuse_extra_inside(value: Any, path: str) -> None:
+    if is_dataclass(value):
+        _refuse_extra(value, f"{path}.")
+    elif isinstance(value, dict):
+        for key, entry in value.items():
+            _refuse_extra_inside(entry, f"{path}.{key}")
 
 
 def no_task() -> str:

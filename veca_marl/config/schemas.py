@@ -16,8 +16,7 @@ from veca_marl.algos.networks.factory import NETWORKS
 from veca_marl.config.root import Config
 from veca_marl.config.search_path import conf_dirs
 from veca_marl.envs.core.task import TASKS
-from veca_marl.sim.body.humanoid import HumanoidCfg
-from veca_marl.sim.body.walker import WalkerCfg
+from veca_marl.sim.body import BODIES, BodyCfg
 
 _BY_TEAM = ("team", "opponent", "warm_start", "learner")  # their keys are the names of the teams
 
@@ -28,8 +27,7 @@ def register_schemas() -> None:
     store.store(name="schema", node=root_schema())
     ALGORITHMS.listen(_store_algorithm)
     NETWORKS.listen(_store_network)
-    store.store(group="schema/body", name="walker", node=WalkerCfg)
-    store.store(group="schema/body", name="humanoid", node=HumanoidCfg)
+    BODIES.listen(_store_body)
     TASKS.listen(_store_task_schema)
 
 
@@ -39,6 +37,11 @@ def root_schema() -> Any:
     for key in _BY_TEAM:
         OmegaConf.set_struct(schema[key], False)
     return schema
+
+
+def body_types() -> dict[str, type[BodyCfg]]:
+    """Return the dataclass of each kind of body."""
+    return {name: body.cfg_type for name, body in BODIES.items()}
 
 
 def store_tasks_without_file() -> None:
@@ -68,6 +71,15 @@ def _store_algorithm(name: str) -> None:
 
 def _store_network(name: str) -> None:
     ConfigStore.instance().store(group="algo/network", name=name, node=NETWORKS[name].cfg_type)
+
+
+def _store_body(name: str) -> None:
+    """Store the schema of a body; without a file ``body/<name>.yaml`` it can be chosen as well."""
+    store = ConfigStore.instance()
+    store.store(group="schema/body", name=name, node=BODIES[name].cfg_type)
+    if not any((folder / "body" / f"{name}.yaml").is_file() for folder in conf_dirs()):
+        entry = {"defaults": [{"/schema/body@_here_": name}, "_self_"]}
+        store.store(group="body", name=name, node=entry)
 
 
 def _store_task_schema(name: str) -> None:

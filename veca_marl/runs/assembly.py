@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import partial
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, cast
 
@@ -22,12 +22,26 @@ from veca_marl.algos.training.stored import load_actor, load_algorithm
 from veca_marl.config import Config, ConfigError, one_line
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
 from veca_marl.envs.core.game_cfg import GameCfg
+from veca_marl.plugins import load_plugins
 from veca_marl.runs.run_folder import RunFolder
 
 
-def make_env(game: GameCfg, worlds: int, seed: int) -> VecaEnv:
-    """Return `worlds` games in one environment; with its game bound it is an `EnvFactory`."""
-    return VecaEnv(game, worlds, seed)
+@dataclass(frozen=True)
+class GameFactory:
+    """Makes the environments of a game, also in worker processes that have loaded no plug-ins.
+
+    Attributes:
+        game: The game.
+        plugins: Packages that it needs, see `veca_marl.plugins`.
+    """
+
+    game: GameCfg
+    plugins: tuple[str, ...] = ()
+
+    def __call__(self, worlds: int, seed: int) -> VecaEnv:
+        """Return `worlds` games in one environment."""
+        load_plugins(self.plugins)
+        return VecaEnv(self.game, worlds, seed)
 
 
 def make_trainer(cfg: Config, folder: RunFolder | None = None) -> Trainer:
@@ -48,7 +62,7 @@ def make_trainer(cfg: Config, folder: RunFolder | None = None) -> Trainer:
     specs = read_specs(cfg.game)
     checkpoints = _make_checkpoints(cfg, folder, specs)
     trainer = Trainer(
-        make_env=partial(make_env, cfg.game),
+        make_env=GameFactory(cfg.game, tuple(cfg.plugins)),
         learners=make_learners(cfg, specs, device),
         collect=cfg.collect,
         evaluation=cfg.eval,
@@ -108,7 +122,7 @@ def read_specs(game: GameCfg) -> dict[str, TeamSpec]:
         ConfigError: If no world can be made.
     """
     try:
-        env = make_env(game, 1, 0)
+        env = VecaEnv(game, 1, 0)
     except ValueError as error:
         raise ConfigError(one_line(error)) from error
     specs = team_specs(env)

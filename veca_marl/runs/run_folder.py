@@ -1,4 +1,4 @@
-"""The folder of a run: what is in it, and that no run writes into another's."""
+"""The folder of a run: its files, how it is created and how it is opened again."""
 
 from __future__ import annotations
 
@@ -10,13 +10,14 @@ from typing import cast
 
 from omegaconf import DictConfig, OmegaConf
 
-from veca_marl.config import ConfigError, compose_node
+from veca_marl.config import ConfigError
+from veca_marl.config.stored import body_names, typed
 from veca_marl.runs.provenance import provenance
 
 
 @dataclass(frozen=True)
 class RunFolder:
-    """Where things are in the folder of a run.
+    """The files in the folder of a run.
 
     Attributes:
         path: The folder.
@@ -41,32 +42,34 @@ class RunFolder:
 
     @property
     def pool(self) -> Path:
-        """The folder of past selves."""
+        """The folder of past policies (self-play)."""
         return self.path / "pool"
 
     @property
     def provenance(self) -> Path:
-        """How the run came about."""
+        """Command line, commit and versions of the run."""
         return self.path / "provenance.json"
 
     def begin(self, node: DictConfig, overrides: Sequence[str]) -> None:
-        """Claim the folder: write down what the run is."""
+        """Create the folder with the configuration and the provenance of the run."""
         self.path.mkdir(parents=True, exist_ok=True)
-        self.provenance.write_text(json.dumps(provenance(overrides), indent=2) + "\n")
+        content = {**provenance(overrides), "bodies": body_names(node)}
+        self.provenance.write_text(json.dumps(content, indent=2) + "\n")
         self.config.write_text(OmegaConf.to_yaml(node, resolve=True))
 
-    @property
-    def overrides(self) -> list[str]:
-        """What the command line of the run said."""
-        overrides: list[str] = json.loads(self.provenance.read_text())["overrides"]
-        return overrides
-
     def typed_config(self) -> DictConfig:
-        """Return the configuration of the run, with the types that its choices have."""
-        return cast(DictConfig, OmegaConf.merge(compose_node(self.overrides), self._stored()))
+        """Return the configuration stored with the run, with the types that it had.
 
-    def _stored(self) -> DictConfig:
-        return cast(DictConfig, OmegaConf.load(self.config))
+        Raises:
+            ConfigError: If it was stored by a version with another configuration.
+        """
+        bodies = json.loads(self.provenance.read_text()).get("bodies")
+        if bodies is None:
+            raise ConfigError(f"{self.path} was stored by an older version; train it again")
+        try:
+            return typed(cast(DictConfig, OmegaConf.load(self.config)), bodies)
+        except ConfigError as error:
+            raise ConfigError(f"{self.config}: {error}") from error
 
     def write(self, name: str, text: str) -> None:
         """Write a small text file."""
@@ -74,7 +77,7 @@ class RunFolder:
 
 
 def new_run(path: Path) -> RunFolder:
-    """Return the folder of a run that has not begun.
+    """Return the folder of a new run.
 
     Raises:
         ConfigError: If there is a run in it already.
@@ -90,7 +93,7 @@ def open_run(path: Path, asked_by: str = "") -> RunFolder:
 
     Args:
         path: The folder.
-        asked_by: What the error begins with.
+        asked_by: The option that named it; the error message begins with it.
 
     Raises:
         ConfigError: If there is no run in `path`.
@@ -102,6 +105,6 @@ def open_run(path: Path, asked_by: str = "") -> RunFolder:
 
 
 def remove_if_empty(path: Path) -> None:
-    """Remove a folder that was made for a run that did not come about."""
+    """Remove the folder of a run that could not be started."""
     if path.is_dir() and not any(path.iterdir()):
         path.rmdir()

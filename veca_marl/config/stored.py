@@ -1,0 +1,127 @@
+"""The configuration stored with a run: read with its types, and changed by overrides."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, cast
+
+from hydra.core.override_parser.types import Override
+from omegaconf import DictConfig, OmegaConf, open_dict
+from omegaconf.errors import OmegaConfBaseException
+
+from veca_marl.algos.algorithm import ALGORITHMS
+from veca_marl.algos.networks.factory import NETWORKS
+from veca_marl.config.compose import compose_node, load_config_plugins
+from veca_marl.config.errors import ConfigError, one_line
+from veca_marl.config.overrides import parse, with_integers
+from veca_marl.config.schemas import body_types, root_schema
+from veca_marl.config.search_path import conf_dirs
+from veca_marl.envs.core.task import find_task
+from veca_marl.envs.core.team import TeamCfg
+
+GAME_KEYS = ("body", "clock", "eval", "opponent", "playground", "senses", "task", "team")
+"""Keys of the root that can be changed when what a run has learnt is played again."""
+
+
+def body_names(node: DictConfig) -> dict[str, str]:
+    """Return the registered name of each body in a configuration, by its key.
+
+    The stored file contains the parameters of a body, not its class; these names are stored with
+    it and given to `typed`.
+    """
+    names: dict[Any, str] = {kind: name for name, kind in body_types().items()}
+    bodies = {"body": node.body}
+    bodies |= {f"team.{team}.body": cfg.get("body") for team, cfg in node.team.items()}
+    return {
+        key: names[OmegaConf.get_type(body)] for key, body in bodies.items() if body is not None
+    }
+
+
+def typed(stored: DictConfig, bodies: Mapping[str, str]) -> DictConfig:
+    """Return a stored configuration with the types that it had.
+
+    Args:
+        stored: The content of `config.yaml` of a run.
+        bodies: What `body_names` returned for the configuration.
+
+    Raises:
+        ConfigError: If an entry has no counterpart in this version.
+    """
+    load_config_plugins(stored.get("plugins", []))
+    try:
+        node = root_schema()
+        node.task = OmegaConf.structured(find_task(stored.task.name).cfg_type())
+        node.algo = _algorithm(stored.algo)
+        for team, algo in stored.learner.items():
+            node.learner[team] = _algorithm(algo)
+        for team in stored.team:
+            node.team[team] = OmegaConf.structured(TeamCfg)
+        for key, name in bodies.items():
+            OmegaConf.update(node, key, body_types()[name]())
+        return cast(DictConfig, OmegaConf.merge(node, stored))
+    except (OmegaConfBaseException, ValueError, KeyError) as error:
+        raise ConfigError(f"stored configuration: {one_line(error)}") from error
+
+
+def _algorithm(stored: DictConfig) -> Any:
+    node = OmegaConf.structured(ALGORITHMS.find(stored.name).cfg_type)
+    if "network" in node:
+        node.network = OmegaConf.structured(NETWORKS.find(stored.network.name).cfg_type)
+    return node
+
+
+def change(node: DictConfig, overrides: Sequence[str], allowed: Sequence[str] = GAME_KEYS) -> None:
+    """Apply overrides to a typed configuration; everything else stays as it is.
+
+    The choice of a preset, such as ``senses/audio=mono``, replaces the values of its group.
+
+    Args:
+        node: The configuration; it is changed.
+        overrides: In Hydra's grammar.
+        allowed: Keys of the root that may be changed.
+
+    Raises:
+        ConfigError: If another key is to be changed, or a choice or a value does not exist.
+    """
+    for override in parse(with_integers(overrides)):
+        path = (override.package or str(override.key_or_group).replace("/", ".")).split(".")
+        if path == ["task"] or path[0] not in allowed:
+            choices = ", ".join(allowed)
+            raise ConfigError(f"{override.input_line}: of a run, only {choices} can be changed")
+        if path[0] == "team" and len(path) > 1 and path[1] not in node.team:
+            node.team[path[1]] = OmegaConf.structured(TeamCfg)
+        try:
+            _apply(node, override)
+        except OmegaConfBaseException as error:
+            raise ConfigError(one_line(error)) from error
+
+
+def _apply(node: DictConfig, override: Override) -> None:
+    key = str(override.key_or_group)
+    if _is_group(key) and isinstance(override.value(), str):
+        _choose_preset(node, override)
+    elif override.is_delete():
+        _delete(node, key)
+    else:
+        OmegaConf.update(node, key, override.value(), merge=True, force_add=override.is_add())
+
+
+def _is_group(key: str) -> bool:
+    return any((folder / key).is_dir() for folder in conf_dirs())
+
+
+def _choose_preset(node: DictConfig, override: Override) -> None:
+    key = override.package or str(override.key_or_group).replace("/", ".")
+    composed = compose_node([f"+task={node.task.name}", str(override.input_line)])
+    preset = OmegaConf.select(composed, key)
+    with open_dict(node):
+        OmegaConf.update(node, key, preset, merge=False)
+
+
+def _delete(node: DictConfig, key: str) -> None:
+    parent, _, name = key.rpartition(".")
+    owner = OmegaConf.select(node, parent) if parent else node
+    if not isinstance(owner, DictConfig) or name not in owner:
+        raise ConfigError(f"~{key}: there is nothing to delete")
+    with open_dict(owner):
+        del owner[name]
