@@ -1,4 +1,4 @@
-"""Errors of the configuration, said in one line that lists the choices."""
+"""Errors of the configuration as one line that lists the choices."""
 
 from __future__ import annotations
 
@@ -14,11 +14,13 @@ from omegaconf.errors import ConfigKeyError, OmegaConfBaseException
 
 
 class ConfigError(ValueError):
-    """A configuration that cannot be; its message is one line."""
+    """An impossible configuration; the message is one line."""
 
 
 def one_line(error: BaseException) -> str:
     """Return what is wrong and what the choices are, without a line break."""
+    if isinstance(error, ConfigError):
+        return _flat(str(error))
     chain = list(_chain(error))
     for cause in chain:
         if isinstance(cause, MissingConfigException) and cause.missing_cfg_file:
