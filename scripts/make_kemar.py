@@ -1,4 +1,4 @@
-"""Make `veca_marl/data/kemar.npz` from the SOFA file of the KEMAR measurement.
+"""Create `veca_marl/data/kemar.npz` from the SOFA file of the KEMAR measurement.
 
 Run: ``python scripts/make_kemar.py MIT_KEMAR_normal_pinna.sofa``. The file is part of libmysofa
 (in Debian: the package libmysofa1, /usr/share/libmysofa/MIT_KEMAR_normal_pinna.sofa).
@@ -22,7 +22,7 @@ LICENCE = (
 
 
 def main() -> None:
-    """Read the arguments, condition the set, write it."""
+    """Read the arguments, condition the measurement, write the file."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("sofa", type=Path, help="MIT_KEMAR_normal_pinna.sofa")
     parser.add_argument("--output", type=Path, default=Path("veca_marl/data/kemar.npz"))

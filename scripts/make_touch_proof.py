@@ -1,7 +1,8 @@
-"""Draw why touch is read from geometry: peaks of touch and of the solver's force over the step.
+"""Plot the peaks of touch readings and of solver forces over the physics step.
 
-A ball of 0.2 kg falls 2 cm onto the palm, where skin gives way, and onto the forearm, where physics
-knows the rigid bone alone. Writes ``docs/images/touch_time_step.png`` and prints the table of
+A ball of 0.2 kg falls 2 cm onto the palm, which has compliant skin, and onto the forearm, where
+only the rigid bone collides. Touch readings depend on geometry alone, solver forces on the time
+step. Writes ``docs/images/touch_time_step.png`` and prints the table of
 ``docs/reference/touch.md``.
 """
 
@@ -40,7 +41,7 @@ PICTURE = Path(__file__).resolve().parent.parent / "docs/images/touch_time_step.
 SUBSTEPS = (5, 10, 20, 40)
 _CLAMP_N = 1e5
 _WAITING_M = 20.0
-# flat hands: a thumb in the way pushes the ball aside
+# flat hands with the thumb out of the ball's path
 _POSTURE: dict[str, float] = {
     "upper_arm.abduction": 45.0,
     "thumb_metacarpal.flexion": -20.0,
@@ -51,7 +52,7 @@ _POSTURE: dict[str, float] = {
 
 @dataclass(frozen=True)
 class Spot:
-    """A place on an arm: a point of the bone in its frame and the way out of the skin."""
+    """A place on an arm: a point on the surface of a bone and the outward normal, in its frame."""
 
     bone: str
     point_m: tuple[float, float, float]
@@ -66,7 +67,7 @@ FOREARM = Spot("l_forearm", (0.0135, 0.0, -0.0475), (1.0, 0.0, 0.0))
 
 @dataclass(frozen=True)
 class Ball:
-    """What falls onto the skin."""
+    """A ball that falls onto the skin."""
 
     mass_kg: float = 0.2
     radius_m: float = 0.05
@@ -74,7 +75,7 @@ class Ball:
 
 @dataclass(frozen=True)
 class Press:
-    """What was felt, and what the solver did, after every physics step.
+    """Readings and solver forces after every physics step.
 
     Attributes:
         touch: ``(n,)`` the largest reading on the bone.
@@ -88,14 +89,14 @@ class Press:
 
 
 class Vice:
-    """A body whose arms are held by bones, and balls that press them.
+    """A body with fixed arm bones, and balls that press on them.
 
-    Nothing has weight but the balls, and they move on a rail along the normal: so they meet the
-    same skin whatever the time step.
+    Only the balls have weight, and they move along the normal only, so that they touch the same
+    point of the skin for every time step.
 
     Args:
-        clock: The time step is in it.
-        balls: What will be pressed, one after the other or together.
+        clock: The clock, which contains the time step.
+        balls: The balls, used one after the other or together.
     """
 
     def __init__(self, clock: ClockCfg, *balls: Ball) -> None:
@@ -110,7 +111,7 @@ class Vice:
     def press(
         self, seconds: float, fall_m: float, *pressed: tuple[Spot, Ball], watch: bool = True
     ) -> list[Press]:
-        """Let balls fall onto spots; return what happened at each, unless nobody watches."""
+        """Let balls fall onto spots; return readings and forces of each if `watch` is set."""
         world, body = self.world, self._body
         world.reset(np.random.default_rng(0))
         body.place((0.0, 0.0, 1.0), 0.0, Posture(0.0, _POSTURE))
@@ -129,12 +130,12 @@ class Vice:
         return [Press(np.array(f.touch), np.array(f.force_n), readings) for f in falls]
 
     def read(self) -> Floats:
-        """Return what all taxels read now."""
+        """Return the present readings of all taxels."""
         self.world.refresh()
         return self._sense.update_taxels()
 
     def pose(self, spot: Spot) -> tuple[Floats, Floats]:
-        """Return where a spot is and the way out of its skin, world frame."""
+        """Return the position of a spot and the outward normal, world frame."""
         bone = self._body.bone(spot.bone)
         out = bone.rotation @ np.array(spot.outward)
         return bone.position + bone.rotation @ np.array(spot.point_m), out
@@ -147,7 +148,7 @@ class Vice:
         return math.fsum(point[9] for point in points)
 
     def _clamp(self, bone: str) -> int:
-        """Hold a bone where it is."""
+        """Fix a bone in its present pose."""
         client, body_id = self.world.client, self._body.body_id
         names = [
             pybullet.getJointInfo(body_id, link, physicsClientId=client)[12].decode()
@@ -179,13 +180,13 @@ class _Fall:
         self.weigh()
 
     def note(self) -> None:
-        """Look, after every physics step."""
+        """Record readings and forces after a physics step."""
         self.force_n.append(self._vice.force_n(self._prop))
         self.touch.append(float(self._vice.read()[self._triangles].max()))
         self.weigh()
 
     def weigh(self) -> None:
-        """Pull the ball to the skin, on a rail, with the weight that it has on the floor."""
+        """Accelerate the ball towards the skin by g, and constrain it to the normal."""
         world, body_id = self._vice.world, self._prop.body_id
         velocity, _ = pybullet.getBaseVelocity(body_id, physicsClientId=world.client)
         along = np.dot(velocity, self._out) - GRAVITY_MPS2 * world.clock.substep_s
@@ -225,13 +226,13 @@ def clocks(contact_share: float) -> list[ClockCfg]:
 
 
 def draw(path: Path) -> None:
-    """Measure, print and draw."""
+    """Measure, print the table and plot."""
     figure, axes = plt.subplots(1, 2, figsize=(8.0, 3.2), layout="constrained")
     step_ms = [1000.0 * clock.substep_s for clock in clocks(0.02)]
     print("| physics step | " + " | ".join(f"{step:.0f} ms" for step in step_ms) + " |")
     for name, spot, share, style in (
-        ("palm, seen ahead", PALM, 0.1, "o-"),
-        ("palm, by default", PALM, 0.02, "o:"),
+        ("palm, margin 0.1", PALM, 0.1, "o-"),
+        ("palm, default", PALM, 0.02, "o:"),
         ("forearm (rigid)", FOREARM, 0.02, "s-"),
     ):
         touch, force = peaks(spot, Ball(), clocks(share))

@@ -8,7 +8,7 @@ import numpy as np
 
 from docs_pages.tables import table
 from veca_marl.sim.body.anatomy.skeleton import limit_sources, load_skeleton
-from veca_marl.sim.body.proprioception import ProprioceptionQuality, kept_parts, part_slices
+from veca_marl.sim.body.proprioception import ProprioceptionQuality, observed_parts, part_slices
 from veca_marl.sim.touch.taxels import taxels_of
 
 PARTS = {
@@ -35,7 +35,7 @@ def proprioception_table() -> list[str]:
     skeleton = load_skeleton()
     rows = []
     for part, where in part_slices(len(skeleton.bones), len(skeleton.joints)).items():
-        having = [f"`{q.name}`" for q in ProprioceptionQuality if part in kept_parts(q)]
+        having = [f"`{q.name}`" for q in ProprioceptionQuality if part in observed_parts(q)]
         unit, meaning = PARTS[part]
         place = f"{where.start} to {where.stop - 1}"
         rows.append((place, f"`{part}`", unit, meaning, ", ".join(having)))

@@ -1,4 +1,4 @@
-"""The view of a game that a person watches."""
+"""Video frames of a game."""
 
 import numpy as np
 import pytest
@@ -18,7 +18,7 @@ def game():
 
 
 def walk(game, steps, watch=lambda observation: None):
-    """Play a little; return all that was observed."""
+    """Play some steps; return all observations."""
     seen = []
     for _ in range(steps):
         game.step({"agents": np.array([1.0, 0.2], np.float32)})
@@ -28,14 +28,14 @@ def walk(game, steps, watch=lambda observation: None):
     return seen
 
 
-def test_a_frame_is_both_eyes_and_the_room(game):
+def test_a_frame_shows_both_eyes_and_the_room(game):
     frame = Spectator(game).frame(game.observe(game.players[0]))
     assert frame.shape == (FRAME_HEIGHT, 2 * FRAME_HEIGHT + ROOM_WIDTH, 3)
     assert frame.dtype == np.uint8
     assert frame.shape[1] % 2 == 0  # video codecs want it
 
 
-def test_who_feels_shows_its_skin(game):
+def test_with_touch_the_frame_shows_the_skin(game):
     spectator, touch = Spectator(game), np.zeros(9888, np.float32)
     pale = spectator.frame({"touch": touch})
     assert pale.shape == (FRAME_HEIGHT, pale.shape[1], 3)
@@ -47,12 +47,12 @@ def test_who_feels_shows_its_skin(game):
     np.testing.assert_array_equal(touched[:, -ROOM_WIDTH:], pale[:, -ROOM_WIDTH:])
 
 
-def test_the_blind_show_the_room_alone(game):
+def test_without_vision_the_frame_shows_the_room_only(game):
     spectator = Spectator(game)
     np.testing.assert_array_equal(spectator.frame({}), spectator.room())
 
 
-def test_watching_changes_nothing():
+def test_rendering_frames_does_not_change_the_game():
     films = []
     for watch in (False, True):
         game = Game(compose(["+task=KickTheBall"]).game)
@@ -64,7 +64,7 @@ def test_watching_changes_nothing():
 
 
 def test_the_room_shows_the_player(game):
-    """The picture is another one without the player's body."""
+    """The image differs without the body of the player."""
     spectator = Spectator(game)
     before = spectator.room().astype(int)
     player = game.players[0].body
@@ -74,7 +74,7 @@ def test_the_room_shows_the_player(game):
     assert (np.abs(spectator.room() - before).max(axis=-1) > 30).sum() > 100
 
 
-def test_pixels_stay_visible_when_enlarged():
+def test_eye_images_are_enlarged_without_interpolation():
     vision = np.arange(2 * 3 * 4 * 4, dtype=np.uint8).reshape(2, 3, 4, 4)
     left, _ = eye_images(vision)
     assert left.shape == (FRAME_HEIGHT, FRAME_HEIGHT, 3)

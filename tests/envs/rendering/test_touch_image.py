@@ -1,4 +1,4 @@
-"""The picture of the touched skin."""
+"""The image of the touch readings."""
 
 import cv2
 import numpy as np
@@ -9,12 +9,12 @@ from veca_marl.envs.rendering.touch_image import save_touch_image, touch_image
 
 
 def red(picture):
-    """Pixels in a colour of the scale rather than that of the pale body or the background."""
+    """Pixels in a colour of the scale, unlike body and background."""
     r, _, b = np.moveaxis(picture.astype(int), -1, 0)
     return r - b > 60
 
 
-def test_what_is_touched_glows_on_the_side_that_shows_it():
+def test_contacts_are_coloured_in_the_view_that_shows_them():
     stage = Stage()
     untouched = touch_image(stage.scene, stage.body, stage.read())
     assert untouched.shape == (252, 336, 3)
@@ -27,7 +27,7 @@ def test_what_is_touched_glows_on_the_side_that_shows_it():
     assert not back.any()
 
 
-def test_a_firmer_touch_has_another_colour():
+def test_a_larger_reading_has_another_colour():
     readings = np.zeros((1648, 6))
     stage = Stage()
     stage.read()
@@ -40,7 +40,7 @@ def test_a_firmer_touch_has_another_colour():
     assert green[0] > green[1] > green[2]
 
 
-def test_the_file_holds_the_picture(tmp_path):
+def test_the_saved_file_contains_the_image(tmp_path):
     stage = Stage()
     readings = stage.read()
     save_touch_image(tmp_path / "touch.png", stage.scene, stage.body, readings, height=120)
@@ -48,7 +48,7 @@ def test_the_file_holds_the_picture(tmp_path):
     np.testing.assert_array_equal(saved, touch_image(stage.scene, stage.body, readings, 120))
 
 
-def test_readings_of_something_else_are_refused():
+def test_readings_of_another_shape_are_refused():
     stage = Stage()
     stage.scene.update()
     with pytest.raises(ValueError, match=r"\(9888,\).*must be \(1648, 6\)"):

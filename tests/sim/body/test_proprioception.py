@@ -1,4 +1,4 @@
-"""The sense of one's own body: order, units, balance against known physics."""
+"""Proprioception: order and units of its parts, and the vestibular sense in known motion."""
 
 import math
 
@@ -54,7 +54,7 @@ def test_the_parts_fill_the_vector_in_the_documented_order(child):
     assert sense.specs["proprioception"].shape == (534,)
 
 
-def test_joints_are_those_of_the_body(child):
+def test_joint_states_equal_those_of_the_body(child):
     world, body = child
     sense = sense_of(world, body)
     body.act({"joints": np.random.default_rng(0).uniform(-1, 1, 82)})
@@ -66,7 +66,7 @@ def test_joints_are_those_of_the_body(child):
         np.testing.assert_allclose(felt[name], expected, rtol=1e-6, atol=1e-7)
 
 
-def test_lying_still_feels_gravity_alone(child):
+def test_a_body_at_rest_senses_gravity_only(child):
     world, body = child
     body.place((0.0, 0.0, 0.0), 0.4, ON_BACK)
     let_pass(world, 5.0)
@@ -78,7 +78,7 @@ def test_lying_still_feels_gravity_alone(child):
     np.testing.assert_allclose(np.mean(felt, 0), np.mean(up, 0), atol=0.1)
 
 
-def test_falling_freely_feels_nothing(child):
+def test_free_fall_senses_no_specific_force(child):
     world, body = child
     body.place((0.0, 0.0, 3.0))
     sense = sense_of(world, body)
@@ -86,17 +86,17 @@ def test_falling_freely_feels_nothing(child):
     np.testing.assert_allclose(parts(sense)["head_acceleration"], 0.0, atol=0.1)
 
 
-def test_floating_upright_feels_no_thrust(child):
+def test_weightless_rest_senses_the_specific_force_of_a_rocket(child):
     world, body = child
     weightless(world)
     body.place((0.0, 0.0, 3.0))
     sense = sense_of(world, body)
     let_pass(world, STEP_S)
-    # nothing holds it and nothing pulls it: as in a rocket whose thrust equals gravity
+    # without gravity and contact, the model still adds g: as in a rocket with a thrust of 1 g
     np.testing.assert_allclose(parts(sense)["head_acceleration"], (0.0, 0.0, 9.81), atol=1e-3)
 
 
-def test_orientations_tell_what_is_up_but_are_no_compass(child):
+def test_orientations_show_the_vertical_but_no_compass_direction(child):
     world, body = child
     sense = sense_of(world, body)
     seen = []
@@ -136,7 +136,7 @@ def test_quality_changes_content_but_not_shape(child, quality, kept):
         assert part.any() == name.startswith(kept), name
 
 
-def test_a_walker_feels_itself_in_the_same_words():
+def test_a_walker_has_the_same_parts():
     world = empty_world()
     walker = walker_in(world)
     sense = sense_of(world, walker)
@@ -153,7 +153,7 @@ def test_a_walker_feels_itself_in_the_same_words():
     world.close()
 
 
-def test_speeds_of_walking_bones_are_what_they_move_by():
+def test_velocities_of_walking_bones_equal_their_displacement():
     world = empty_world()
     walker = walker_in(world)
     walker.walk(0.5, 0.0)

@@ -18,7 +18,7 @@ def tone_at(pitch):
 
 
 class Dummy:
-    """A head with two ears a little behind its middle."""
+    """A head with two ears slightly behind its centre."""
 
     def __init__(self):
         self.position = np.zeros(3)
@@ -34,7 +34,7 @@ class Dummy:
 
 
 class Scene:
-    """One body, one source."""
+    """One body and one source in a sound field."""
 
     def __init__(self, sound, box=None, **numbers):
         self.field = SoundField(box, STEP, RATE, image_order=2)
@@ -56,7 +56,7 @@ class Scene:
 
 @pytest.mark.parametrize("quality", AudioQuality)
 @pytest.mark.parametrize("waveform", [False, True])
-def test_quality_changes_content_never_shape(quality, waveform):
+def test_quality_changes_the_content_but_not_the_shape(quality, waveform):
     scene = Scene(buzz_at(150.0), quality=quality, waveform=waveform)
     scene.source.position = (1.0, 1.0, 0.0)
     observation = scene.hear()
@@ -68,7 +68,7 @@ def test_quality_changes_content_never_shape(quality, waveform):
         assert np.isfinite(value).all()
 
 
-def test_observation_is_the_papers_formula():
+def test_the_observation_is_the_formula_of_the_paper():
     scene = Scene(Noise(0.1, RATE), waveform=True)
     scene.source.position = (1.0, 0.5, 0.0)
     heard = np.concatenate([scene.hear(1)["waveform"] for _ in range(3)], axis=1)
@@ -77,14 +77,14 @@ def test_observation_is_the_papers_formula():
     assert np.allclose(scene.hear(3)["audio"], expected, atol=1e-3)
 
 
-def test_exact_silence_is_minus_eight_also_before_the_first_step():
+def test_silence_is_minus_eight_also_before_the_first_step():
     scene = Scene(Clip(np.zeros(10), loop=True))
     assert scene.sense.specs["audio"].low == -8.0
     assert (scene.sense.read()["audio"] == -8.0).all()
     assert (scene.hear()["audio"] == -8.0).all()
 
 
-def test_noise_floor_takes_the_magic_out_of_silence():
+def test_the_noise_floor_sets_the_level_of_silence():
     """White noise of level -80 dB has 10 log10(1024) - 80 dB in each bin, on average."""
     scene = Scene(Clip(np.zeros(10), loop=True), noise_floor_db=-80.0)
     expected = 0.5 * np.log10(1024) - 4.0
@@ -96,7 +96,7 @@ def test_noise_floor_takes_the_magic_out_of_silence():
     assert np.allclose(loud, floored, atol=1e-3)
 
 
-def test_hann_window_confines_a_tone():
+def test_the_hann_window_reduces_leakage():
     far = {}
     for window in Window:
         scene = Scene(tone_at(1010.0), window=window, quality=AudioQuality.mono)
@@ -107,7 +107,7 @@ def test_hann_window_confines_a_tone():
     assert far[Window.hann] > far[Window.rectangular] + 2.0
 
 
-def test_level_is_heard_at_one_metre():
+def test_a_source_at_one_metre_has_its_own_level():
     """A tone on a bin: magnitude = amplitude x 1024 / 2."""
     frequency = 47 * RATE / 1024
     sound = 0.1 * np.sqrt(2) * np.sin(2 * np.pi * frequency * np.arange(4 * STEP) / RATE)
@@ -117,8 +117,8 @@ def test_level_is_heard_at_one_metre():
     assert peak == pytest.approx(np.log10(0.1 * np.sqrt(2) * 512), abs=0.002)
 
 
-def test_stereo_hears_at_the_bodys_own_ears():
-    """Level at either ear is 1/d of that ear's own distance."""
+def test_stereo_receives_at_the_ears_of_the_body():
+    """The level at each ear is inversely proportional to its own distance."""
     scene = Scene(Noise(0.1, RATE), quality=AudioQuality.stereo, waveform=True)
     scene.body.rotation = yaw(0.5)
     scene.body.position = np.array([3.0, -1.0, 0.5])
@@ -132,11 +132,11 @@ def test_stereo_hears_at_the_bodys_own_ears():
     assert level[0] / level[1] == pytest.approx(distance[1] / distance[0], rel=0.01)
 
 
-def test_it_does_not_matter_how_the_head_was_turned_at_birth():
+def test_the_rotation_of_the_head_at_construction_has_no_influence():
     heard = []
-    for at_birth in (0.0, 2.0):
+    for initial in (0.0, 2.0):
         body = Dummy()
-        body.rotation = yaw(at_birth)
+        body.rotation = yaw(initial)
         field = SoundField(None, STEP, RATE)
         field.add_source("noise", Noise(0.1, RATE)).position = (0.4, 0.5, 0.0)
         sense = AudioSense(AudioCfg(quality=AudioQuality.stereo), body, SoundWorld(field))
@@ -148,7 +148,7 @@ def test_it_does_not_matter_how_the_head_was_turned_at_birth():
     assert np.allclose(heard[0], heard[1], atol=1e-3)
 
 
-def test_louder_ear_is_the_near_one():
+def test_the_ear_on_the_side_of_the_source_is_louder():
     for quality in (AudioQuality.hrtf, AudioQuality.stereo):
         scene = Scene(buzz_at(150.0), quality=quality)
         scene.source.position = (0.0, 1.0, 0.0)
@@ -156,7 +156,7 @@ def test_louder_ear_is_the_near_one():
         assert left > right + 0.03
 
 
-def test_impossible_grades_are_refused():
+def test_invalid_settings_are_refused():
     with pytest.raises(ValueError, match="no sofa_path"):
         AudioCfg(sofa_sample_rate_hz=44_100.0)
     with pytest.raises(ValueError, match="noise_floor_db"):
@@ -183,7 +183,7 @@ def scenes(quality, count, seed):
 
 
 def decode(quality):
-    """Cosine between true and decoded direction, by ridge regression on unseen scenes."""
+    """Mean cosine of true and decoded direction of held-out scenes, by ridge regression."""
     heard, directions = scenes(quality, 700, seed=0)
     test_heard, test_directions = scenes(quality, 150, seed=1)
     mean, scale = heard.mean(axis=0), heard.std() + 1e-9
@@ -194,7 +194,7 @@ def decode(quality):
     return float((found * test_directions).sum(axis=1).mean())
 
 
-def test_direction_can_be_read_from_the_observation_with_a_head_only():
+def test_only_hrtf_observations_encode_the_direction():
     cosine = {quality.value: decode(quality) for quality in AudioQuality}
     assert cosine["hrtf"] > 0.8
     assert cosine["stereo"] < cosine["hrtf"] - 0.1

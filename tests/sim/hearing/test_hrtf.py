@@ -38,7 +38,7 @@ def sphere_head(n_taps=128):
 
 
 def level_db(table, azimuth_deg, elevation_deg=0.0):
-    """Level of both ears (2, F), through the same reading as in the stream."""
+    """Levels of both ears (2, F), interpolated as in the stream."""
     head = HrtfReceiver(table)
     out = np.zeros((2, filter_length(head, RATE, 0.0)), np.float32)
     head.write_filters(direction(azimuth_deg, elevation_deg)[None], np.ones(1), RATE, out)
@@ -49,7 +49,7 @@ def band(low_hz, high_hz):
     return (low_hz <= FREQUENCY) & (high_hz > FREQUENCY)
 
 
-def test_shipped_head_carries_its_licence():
+def test_the_packaged_head_contains_its_licence():
     head = HeadResponse.load(DATA)
     for word in ("1994", "MIT", "Gardner", "Martin", "cited", "Modified"):
         assert word in head.licence
@@ -57,7 +57,7 @@ def test_shipped_head_carries_its_licence():
     assert DATA.stat().st_size < 250_000
 
 
-def test_shipped_head_is_what_the_script_makes():
+def test_the_packaged_head_equals_the_output_of_the_script():
     if not KEMAR_SOFA.exists():
         pytest.skip("the KEMAR SOFA file is not here")
     made = condition(read_sofa(KEMAR_SOFA), RATE, 128)
@@ -67,7 +67,7 @@ def test_shipped_head_is_what_the_script_makes():
     assert made.head_radius_m == pytest.approx(0.087, abs=0.002)
 
 
-def test_table_returns_the_measured_responses():
+def test_the_table_reproduces_the_measured_responses():
     head, table = HeadResponse.load(DATA), kemar_table()
     heard = band(200, 5384)
     measured = 20.0 * np.log10(np.abs(np.fft.rfft(head.filters, N_FFT))[..., heard])
@@ -79,7 +79,7 @@ def test_table_returns_the_measured_responses():
     assert np.sqrt(np.mean(np.square(errors))) < 0.2
 
 
-def test_head_is_symmetric():
+def test_the_head_is_symmetric():
     """KEMAR's right ear is a mirror of its left: mirrored sounds swap the ears."""
     table = kemar_table()
     for azimuth in (0, 30, 77, 150):
@@ -114,28 +114,28 @@ def test_arrival_times_below_the_lowest_ring_are_those_of_the_sphere():
     assert table.arrival_samples.min() > -lead_samples(RATE)
 
 
-def test_table_is_shared_and_read_only():
+def test_the_table_is_shared_and_read_only():
     assert kemar_table() is kemar_table()
     with pytest.raises(ValueError, match="read-only"):
         kemar_table().filters[0] = 0.0
 
 
-def test_other_rates_are_refused():
+def test_other_sampling_rates_are_refused():
     with pytest.raises(ValueError, match="48000"):
         kemar_table(48_000)
     with pytest.raises(ValueError, match="16000"):
         HrtfReceiver(kemar_table()).write_filters(np.ones((1, 3)), np.ones(1), 16_000, None)
 
 
-def test_sphere_has_its_known_limits():
-    """Duda & Martens 1998: no head at 0 Hz; pressure doubles at the lit pole."""
+def test_the_sphere_has_the_known_limits():
+    """Duda & Martens 1998: no effect at 0 Hz; pressure doubled at the pole facing the source."""
     response = sphere_response(np.deg2rad([0, 90, 180]), [50.0, 8000.0], distance_m=100.0)
     level = 20.0 * np.log10(np.abs(response))
     assert np.abs(level[:, 0]).max() < 0.3
     assert level[0, 1] == pytest.approx(6.02, abs=0.3)
 
 
-def test_sphere_delays_as_kuhn_and_woodworth():
+def test_the_sphere_delays_as_kuhn_and_woodworth():
     """Kuhn 1977: 3a/c sin at low frequency, Woodworth's ray at high frequency."""
     ears = np.deg2rad([45.0, 135.0])
     for frequency, factor in ((100.0, 1.5), (6000.0, 1.0)):
@@ -150,14 +150,14 @@ def test_sphere_delays_as_kuhn_and_woodworth():
         assert delay[1] - delay[0] == pytest.approx(expected, rel=0.05)
 
 
-def test_minimum_phase_keeps_the_magnitude_and_comes_first():
+def test_minimum_phase_keeps_the_magnitude_and_has_the_least_delay():
     magnitude = np.abs(np.fft.rfft([1.0, -0.4, 0.2], 512))
     assert np.allclose(minimum_phase(magnitude, 3), [1.0, -0.4, 0.2], atol=1e-6)
     late = np.abs(np.fft.rfft([0.2, -0.4, 1.0], 512))
     assert minimum_phase(late, 4)[0] == pytest.approx(1.0, abs=1e-6)
 
 
-def test_compact_file_comes_back(tmp_path):
+def test_a_saved_head_response_is_loaded_unchanged(tmp_path):
     head = sphere_head(32)
     head.save(tmp_path / "head.npz")
     again = HeadResponse.load(tmp_path / "head.npz")

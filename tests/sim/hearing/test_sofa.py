@@ -1,4 +1,4 @@
-"""SOFA files that the tests write themselves (a sphere for a head), and one of the LISTEN set."""
+"""The SOFA reader: files of a spherical head that the tests write, and one of the LISTEN set."""
 
 import warnings
 
@@ -27,7 +27,7 @@ ELEVATION = np.arange(-30.0, 91.0, 30.0)
 
 
 def sphere_fields(delays_in_field=False):
-    """What a SOFA file of a spherical head contains."""
+    """The content of a SOFA file of a spherical head."""
     azimuth, elevation = (a.ravel() for a in np.meshgrid(AZIMUTH, ELEVATION, indexing="ij"))
     directions = direction_vectors(np.deg2rad(AZIMUTH), np.deg2rad(ELEVATION)).reshape(-1, 3)
     incidence = ear_incidence(directions)
@@ -78,7 +78,7 @@ def head(fields, tmp_path_factory):
     return condition(read_sofa(path), 22_050)
 
 
-def test_sphere_comes_out_as_it_went_in(head):
+def test_a_spherical_head_is_recovered(head):
     assert head.head_radius_m == pytest.approx(RADIUS, abs=0.003)
     expected = woodworth_arrival_s(ear_incidence(head.directions), RADIUS)
     expected -= expected[np.abs(head.directions[:, 1]) < 0.15].mean()
@@ -86,7 +86,7 @@ def test_sphere_comes_out_as_it_went_in(head):
     assert np.abs(head.filters.sum(axis=-1) - 1.0).max() < 0.15
 
 
-def test_swapped_ears_are_found_by_their_energy(fields, head, tmp_path):
+def test_swapped_ears_are_detected_by_their_energy(fields, head, tmp_path):
     swapped = {**fields, "Data.IR": fields["Data.IR"][:, ::-1]}
     path = write(tmp_path / "swapped.sofa", swapped)
     with pytest.warns(UserWarning, match=r"swapped\.sofa: ReceiverPosition contradicts"):
@@ -97,15 +97,15 @@ def test_swapped_ears_are_found_by_their_energy(fields, head, tmp_path):
     assert np.array_equal(found.filters, head.filters)
 
 
-def test_polarity_does_not_matter(fields, head, tmp_path):
+def test_inverted_polarity_has_no_influence(fields, head, tmp_path):
     inverted = {**fields, "Data.IR": -fields["Data.IR"]}
     found = condition(read_sofa(write(tmp_path / "inverted.sofa", inverted)), 22_050)
     assert np.allclose(found.filters, head.filters, atol=1e-6)
     assert np.allclose(found.arrival_s, head.arrival_s, atol=1e-9)
 
 
-def test_the_loudspeaker_is_taken_out(fields, head, tmp_path):
-    """One that is mute below 150 Hz and dull above 3 kHz; the head behind it is the same."""
+def test_the_response_of_the_loudspeaker_is_removed(fields, head, tmp_path):
+    """A loudspeaker without output below 150 Hz and with a roll-off above 3 kHz."""
     mute = scipy.signal.butter(2, 150.0, "highpass", fs=FILE_RATE, output="sos")
     dull = scipy.signal.butter(1, 3000.0, "lowpass", fs=FILE_RATE, output="sos")
     coloured = scipy.signal.sosfilt(np.concatenate([mute, dull]), fields["Data.IR"])
@@ -119,13 +119,13 @@ def test_the_loudspeaker_is_taken_out(fields, head, tmp_path):
     assert np.abs(20.0 * np.log10(low)).max() < 1.5
 
 
-def test_delays_may_stand_in_their_own_field(head, tmp_path):
+def test_delays_in_their_own_field_are_used(head, tmp_path):
     path = write(tmp_path / "delay.sofa", sphere_fields(delays_in_field=True))
     found = condition(read_sofa(path), 22_050)
     assert np.abs(found.arrival_s - head.arrival_s).max() < 25e-6
 
 
-def test_cartesian_positions_are_understood(fields, head, tmp_path):
+def test_cartesian_positions_are_converted(fields, head, tmp_path):
     positions = 1.4 * direction_vectors(np.deg2rad(AZIMUTH), np.deg2rad(ELEVATION)).reshape(-1, 3)
     path = write(tmp_path / "xyz.sofa", {**fields, "SourcePosition": positions}, kind="cartesian")
     measured = read_sofa(path)
@@ -133,7 +133,7 @@ def test_cartesian_positions_are_understood(fields, head, tmp_path):
     assert measured.distance_m == pytest.approx(1.4)
 
 
-def test_a_wrong_sampling_rate_shrinks_the_head(fields, tmp_path):
+def test_a_wrong_sampling_rate_is_detected_by_the_head_radius(fields, tmp_path):
     path = write(tmp_path / "rate.sofa", fields)
     with pytest.warns(UserWarning, match=r"radius 5\.\d cm"):
         small = condition(read_sofa(path, sample_rate_hz=70_560.0), 22_050)
@@ -142,7 +142,7 @@ def test_a_wrong_sampling_rate_shrinks_the_head(fields, tmp_path):
         condition(read_sofa(path, sample_rate_hz=176_400.0), 22_050)
 
 
-def test_pulses_are_no_head(fields, tmp_path):
+def test_pulses_without_a_head_are_refused(fields, tmp_path):
     pulses = np.zeros_like(fields["Data.IR"])
     pulses[:, :, 40] = 1.0
     pulses[:, 0, 40] += 0.01 * np.sign(np.sin(np.deg2rad(fields["SourcePosition"][:, 0])))
@@ -152,7 +152,7 @@ def test_pulses_are_no_head(fields, tmp_path):
 
 
 def broken(fields):
-    """Name, fields, attributes and what the message must say."""
+    """Name, fields, attributes and the expected message."""
     responses = fields["Data.IR"]
     without = {key: value for key, value in fields.items() if key != "Data.IR"}
     one_side = np.abs(fields["SourcePosition"][:, 0] - 180.0) > 100.0
@@ -176,14 +176,14 @@ def broken(fields):
 
 
 @pytest.mark.parametrize("case", range(13))
-def test_broken_files_are_refused_by_name(fields, tmp_path, case):
+def test_errors_of_invalid_files_name_the_file(fields, tmp_path, case):
     name, content, attributes, message = broken(fields)[case]
     path = write(tmp_path / f"{name}.sofa", content, **attributes)
     with pytest.raises(SofaError, match=rf"{name}\.sofa.*{message}"):
         read_sofa(path)
 
 
-def test_files_that_are_not_hdf5_or_not_there(tmp_path):
+def test_missing_files_and_files_that_are_not_hdf5_are_refused(tmp_path):
     path = tmp_path / "page.sofa"
     path.write_text("<html>404</html>")
     with pytest.raises(SofaError, match=r"page\.sofa: cannot be read"):
@@ -192,13 +192,13 @@ def test_files_that_are_not_hdf5_or_not_there(tmp_path):
         read_sofa(tmp_path / "nowhere.sofa")
 
 
-def test_missing_reader_says_which_extra_to_install(monkeypatch, tmp_path):
+def test_without_h5py_the_error_names_the_extra(monkeypatch, tmp_path):
     monkeypatch.setitem(__import__("sys").modules, "h5py", None)
     with pytest.raises(ImportError, match=r"veca_marl\[sofa\]"):
         sofa.read_sofa(tmp_path / "any.sofa")
 
 
-def test_listen_file_of_the_papers_set():
+def test_a_file_of_the_listen_set():
     """IRCAM's page says 44 100 Hz; the file says 48 000 and has the receivers reversed."""
     if not LISTEN.exists():
         pytest.skip("the LISTEN file is not here")

@@ -13,7 +13,7 @@ def ears_of(head):
     return [head.position + head.rotation @ np.array(ear) for ear in EARS]
 
 
-def test_equals_what_an_agent_hears_but_for_the_latency():
+def test_it_equals_the_sound_field_without_latency():
     sound = noise(6 * STEP)
     source = np.array([2.1, 3.7, 1.2])
     once = spatial_audio(HEAD, *ears_of(HEAD), [(sound, source)])
@@ -24,7 +24,7 @@ def test_equals_what_an_agent_hears_but_for_the_latency():
     assert ratio_db(stream[:, latency:], once[:, :-latency]) > 100.0
 
 
-def test_paths_through_a_room_add_to_the_direct_sound():
+def test_reflections_are_added_to_the_direct_sound():
     pulse = np.zeros(4000)
     pulse[0] = 1.0
     source = HEAD.position + np.array([-1.0, 0.5, 0.0])
@@ -39,14 +39,14 @@ def test_paths_through_a_room_add_to_the_direct_sound():
     assert np.abs(free[:, 1500:]).max() < 1e-6
 
 
-def test_the_pulse_arrives_when_sound_does():
+def test_a_pulse_arrives_after_the_travel_time():
     pulse = np.zeros(2000)
     pulse[0] = 1.0
     heard = spatial_audio(STILL, *EARS, [(pulse, (3.43, 0.0, 0.0))])
     assert np.abs(heard).argmax(axis=1) == pytest.approx(0.01 * RATE, abs=3.0)
 
 
-def test_several_sources_and_their_lengths():
+def test_several_sources_of_different_lengths():
     long, short = noise(3000, 0), noise(1000, 1)
     both = spatial_audio(STILL, *EARS, [(long, 2 * direction(30)), (short, 2 * direction(-100))])
     alone = spatial_audio(STILL, *EARS, [(long, 2 * direction(30))])
@@ -55,7 +55,7 @@ def test_several_sources_and_their_lengths():
     assert spatial_audio(STILL, *EARS, []).shape == (2, 0)
 
 
-def test_left_is_left_for_a_turned_head():
+def test_left_is_left_also_for_a_rotated_head():
     head = Pose(np.array([4.0, 3.0, 1.5]), yaw(np.pi / 2))
     source = head.position - np.array([1.0, 0.0, 0.0])
     heard = spatial_audio(head, *ears_of(head), [(noise(4000), source)])
@@ -73,12 +73,12 @@ def test_left_is_left_for_a_turned_head():
         ({"room_size": (8.0, 6.0, 3.0), "image_order": -1}, "order"),
     ],
 )
-def test_impossible_rooms_are_refused(numbers, what):
+def test_invalid_rooms_are_refused(numbers, what):
     with pytest.raises(ValueError, match=what):
         spatial_audio(HEAD, *ears_of(HEAD), [(noise(100), (2.1, 3.7, 1.2))], **numbers)
 
 
-def test_wrong_positions_and_waveforms_are_refused():
+def test_invalid_positions_and_waveforms_are_refused():
     with pytest.raises(ValueError, match="ear_left"):
         spatial_audio(STILL, (0.0, 0.1), EARS[1], [])
     with pytest.raises(ValueError, match="source 0"):

@@ -1,4 +1,4 @@
-"""The taxels: how many, where, and that they sense on the physical skin."""
+"""The taxels: their number, their places, and sensing points on the physical skin."""
 
 import csv
 from importlib.resources import files
@@ -21,7 +21,7 @@ from veca_marl.sim.touch.taxels import (
 
 
 def bound_points():
-    """Points of sensing ``(T, 6, 3)`` and normals in the pose the skin is bound in."""
+    """Sensing points ``(T, 6, 3)`` and normals in the binding pose of the skin."""
     scene = Scene()
     body = add_body(scene)
     body.positions[:], body.rotations[:] = binding_pose(load_skeleton())
@@ -31,7 +31,7 @@ def bound_points():
     return points - taxels.depths[..., None] * normals[:, None], normals
 
 
-def test_there_are_9888_taxels_as_many_on_each_bone_as_the_table_says():
+def test_the_9888_taxels_are_distributed_as_in_the_table_of_bones():
     with (files("veca_marl") / "data" / "bones.csv").open(encoding="utf-8") as table:
         wanted = {row["bone"]: int(row["taxels"]) for row in csv.DictReader(table)}
     slices = {bone.name: taxels_of(bone.name) for bone in load_skeleton().bones}
@@ -41,7 +41,7 @@ def test_there_are_9888_taxels_as_many_on_each_bone_as_the_table_says():
     assert [s.start for s in slices.values()] == ends[:-1]
 
 
-def test_an_unknown_patch_is_answered_with_those_there_are():
+def test_the_error_of_an_unknown_bone_lists_the_bones():
     with pytest.raises(KeyError, match=r"left_hand.*l_hand"):
         taxels_of("left_hand")
 
@@ -53,7 +53,7 @@ def test_six_taxels_form_a_triangle_within_each_triangle():
     assert len(np.unique(BARYCENTRIC.round(9), axis=0)) == 6
 
 
-def test_most_taxels_sense_on_the_physical_skin():
+def test_most_sensing_points_lie_on_the_physical_skin():
     """Within a tenth of a millimetre; the others lie over gaps between bones or at rims."""
     taxels, skeleton = load_taxels(), load_skeleton()
     points, _ = bound_points()
@@ -68,7 +68,7 @@ def test_most_taxels_sense_on_the_physical_skin():
     assert np.mean(off < 1e-4) > 0.6
 
 
-def test_patches_hold_their_triangles_and_bones_hold_their_patches():
+def test_patches_contain_their_triangles_and_bones_their_patches():
     taxels = load_taxels()
     assert np.all(np.diff(taxels.patches) > 0)
     np.testing.assert_array_equal(taxels.patches[taxels.first_patch], taxels.first_triangle)

@@ -1,4 +1,4 @@
-"""Touch on the real body does not depend on the time step, and tells what a thing weighs."""
+"""Touch on the articulated body is independent of the time step and encodes weight."""
 
 import importlib.util
 import sys
@@ -22,14 +22,14 @@ BALLS = [proof.Ball(mass) for mass in MASSES_KG]
 
 
 def rest(vice, spot, ball):
-    """The largest reading under a ball that was laid on a spot."""
+    """The largest reading under a ball at rest on a spot."""
     vice.press(0.8, 0.0, (spot, ball), watch=False)
     return of_bone(vice.read(), spot.bone).max()
 
 
 @pytest.fixture(scope="module")
 def at_rest():
-    """What a spot reads under each ball that was laid on it, for time steps of 8 to 1 ms."""
+    """Readings of each spot under each ball at rest, for time steps of 8 to 1 ms."""
     readings = {spot: [] for spot in (proof.PALM, proof.FOREARM)}
     for clock in proof.clocks(0.02):
         vice = proof.Vice(clock, *BALLS)
@@ -40,13 +40,13 @@ def at_rest():
 
 
 @pytest.mark.parametrize("bone", ["l_hand", "l_forearm"])
-def test_touch_at_rest_is_equal_over_an_eightfold_change_of_the_time_step(at_rest, bone):
+def test_touch_at_rest_is_independent_of_the_time_step(at_rest, bone):
     seen = at_rest[bone]
     assert seen.min() > 0.02
     assert (seen.max(axis=0) / seen.min(axis=0) < 1.01).all()
 
 
-def test_skin_that_yields_tells_heavy_from_light_and_rigid_bone_does_not(at_rest):
+def test_compliant_skin_distinguishes_masses_and_rigid_bone_does_not(at_rest):
     light, *_, heavy = at_rest["l_hand"][0]
     assert light < 0.05
     assert heavy > 0.9
@@ -54,7 +54,7 @@ def test_skin_that_yields_tells_heavy_from_light_and_rigid_bone_does_not(at_rest
     assert at_rest["l_forearm"].min() > 0.95
 
 
-def test_a_mass_on_the_palm_presses_it_by_its_weight_over_the_stiffness():
+def test_the_reading_on_the_palm_is_weight_over_stiffness():
     """T = m g / (k d_max), and k d_max is the force that reaches the bone.
 
     The nearest taxel is 2.4 mm beside the middle of the ball, where it presses 0.04 mm less.
@@ -71,14 +71,14 @@ def test_a_mass_on_the_palm_presses_it_by_its_weight_over_the_stiffness():
 
 
 @pytest.mark.parametrize("mass_kg", [0.2, 0.5])
-def test_the_peak_of_an_impact_stays_where_physics_looks_ahead(mass_kg):
+def test_the_peak_of_an_impact_is_stable_with_a_larger_contact_margin(mass_kg):
     touch, force = proof.peaks(proof.PALM, proof.Ball(mass_kg), proof.clocks(0.1))
     assert touch.min() > 0.3
     assert touch.max() / touch.min() < 1.4
     assert force.max() / force.min() > touch.max() / touch.min()
 
 
-def test_the_peak_of_a_slow_impact_stays_by_default():
+def test_the_peak_of_a_slow_impact_is_stable_by_default():
     """1.6 mm in the longest step, less than half of the skin."""
     touch, _ = proof.peaks(proof.PALM, proof.Ball(0.2), proof.clocks(0.02), fall_m=0.002)
     assert touch.max() / touch.min() < 1.2
@@ -90,7 +90,7 @@ def test_on_rigid_bone_the_force_grows_as_the_step_shrinks_and_touch_does_not():
     assert touch.max() / touch.min() < 1.05
 
 
-def test_balls_on_both_palms_are_felt_as_the_sum_of_each_alone():
+def test_readings_of_two_contacts_are_the_sum_of_each_alone():
     balls = [proof.Ball(0.2), proof.Ball(0.3)]
     spots = [proof.PALM, proof.RIGHT_PALM]
     vice = proof.Vice(ClockCfg(), *balls)
@@ -104,7 +104,7 @@ def test_balls_on_both_palms_are_felt_as_the_sum_of_each_alone():
     np.testing.assert_allclose(both, left + right, atol=0.005)
 
 
-def test_held_in_the_air_it_feels_exactly_nothing():
+def test_without_contact_readings_are_exactly_zero():
     ball = proof.Ball()
     vice = proof.Vice(ClockCfg(), ball)
     (press,) = vice.press(0.2, 3.0, (proof.PALM, ball))

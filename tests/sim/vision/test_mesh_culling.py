@@ -14,7 +14,7 @@ CAMERA = Camera(48, 40, 60.0)
 BODIES = 5
 
 
-def crowd(rng):
+def cluttered_scene(rng):
     scene = clutter(rng, per_shape=2)
     for n in range(BODIES):
         body = add_body(scene, f"body {n}")
@@ -40,7 +40,7 @@ def buffers(scene, eye, culled):
 
 
 def test_bounding_boxes_are_tight():
-    scene = crowd(np.random.default_rng(0))
+    scene = cluttered_scene(np.random.default_rng(0))
     for body, lower, upper in zip(
         scene.objects[-BODIES:], scene.meshes.lower, scene.meshes.upper, strict=True
     ):
@@ -53,7 +53,7 @@ def test_culling_does_not_change_a_bit_of_the_image():
     """Random cameras, also inside the bounding boxes and between the limbs."""
     rng, left_out, shown = np.random.default_rng(1), 0, 0
     for _ in range(12):
-        scene = crowd(rng)
+        scene = cluttered_scene(rng)
         eyes = [random_pose(rng) for _ in range(10)]
         for body in scene.objects[-BODIES:]:
             near = body.positions[rng.integers(len(body.positions))] + rng.normal(0.0, 0.05, 3)

@@ -1,7 +1,7 @@
-"""The body's sense of itself: how its bones lie, how its joints bend, move and strain, and balance.
+"""Proprioception: bone orientations, joint states and torques, and the vestibular sense.
 
-What the paper lists under proprioception: bone orientations, joint angles, joint angular
-velocities and the vestibular sense; the motors' torques are our addition.
+The paper lists bone orientations, joint angles, joint angular velocities and the vestibular sense;
+joint torques are an addition.
 """
 
 from __future__ import annotations
@@ -25,7 +25,13 @@ _UP = np.array([0.0, 0.0, 1.0])
 
 
 class ProprioceptionQuality(Enum):
-    """What is left of the sense; the rest reads 0."""
+    """The parts of the vector that are observed; the others read 0.
+
+    Attributes:
+        full: All parts.
+        joints: Joint angles, velocities and torques.
+        vestibular: Acceleration and angular velocity of the head.
+    """
 
     full = "full"
     joints = "joints"
@@ -34,11 +40,11 @@ class ProprioceptionQuality(Enum):
 
 @dataclass
 class ProprioceptionCfg:
-    """How well a body feels itself.
+    """Settings of proprioception.
 
     Attributes:
-        present: False leaves the sense out of the observation.
-        quality: All of it, only the joints (angles, velocities, torques), or only balance.
+        present: Whether the observation contains the sense.
+        quality: See `ProprioceptionQuality`.
     """
 
     present: bool = True
@@ -47,7 +53,7 @@ class ProprioceptionCfg:
     def __post_init__(self) -> None:
         if not isinstance(self.quality, ProprioceptionQuality):
             choices = [quality.name for quality in ProprioceptionQuality]
-            raise ValueError(f"senses.proprioception.quality={self.quality!r}; there are {choices}")
+            raise ValueError(f"senses.proprioception.quality={self.quality!r}; choices: {choices}")
 
 
 class ProprioceptionSense(Sense):
@@ -58,21 +64,24 @@ class ProprioceptionSense(Sense):
     ====================  ===========  ==========================================================
     part                  numbers      what
     ====================  ===========  ==========================================================
-    bone_orientations     47 x 6       forward and up axis of each bone in the heading frame:
-                                       upright, turned with the pelvis about the vertical, so it
-                                       tells what is up but is no compass. Two axes are continuous
-                                       where quaternions jump (Zhou et al., CVPR 2019)
+    bone_orientations     47 x 6       forward and up axis of each bone in the heading frame
+                                       (vertical z axis, x axis along the heading of the pelvis),
+                                       which shows the vertical but no compass direction. Two axes
+                                       are a continuous representation of rotations, unlike
+                                       quaternions (Zhou et al., CVPR 2019)
     joint_angles          82           rad
     joint_velocities      82           rad/s
-    joint_torques         82           share of the joint's strength, [-1, 1]
-    head_acceleration     3            m/s^2, what the otoliths feel in the head frame: mean
-                                       acceleration over the last agent step minus gravity, so
-                                       (0, 0, 9.81) at rest and upright
-    head_turning          3            rad/s, angular velocity in the head frame (the canals)
+    joint_torques         82           relative to the strength of the joint, [-1, 1]
+    head_acceleration     3            m/s^2, specific force at the otoliths in the head frame:
+                                       mean acceleration since the last read (one agent step if
+                                       every step is read) minus gravity; (0, 0, 9.81) at rest
+                                       and upright
+    head_turning          3            rad/s, angular velocity in the head frame, as sensed by the
+                                       semicircular canals
     ====================  ===========  ==========================================================
 
     Attributes:
-        parts: Where each part is in the vector.
+        parts: Slice of each part in the vector.
     """
 
     cfg_type = ProprioceptionCfg
@@ -88,7 +97,7 @@ class ProprioceptionSense(Sense):
             "head_acceleration": self._head_acceleration,
             "head_turning": self._head_turning,
         }
-        self._kept = kept_parts(cfg.quality)
+        self._observed = observed_parts(cfg.quality)
         self.parts = part_slices(len(body.bone_names), len(body.joint_names))
         size = self.parts["head_turning"].stop
         self.specs = {"proprioception": ArraySpec((size,), np.float32)}
@@ -105,7 +114,7 @@ class ProprioceptionSense(Sense):
         """See `Sense`."""
         self._measure_head()
         vector = np.zeros(self.parts["head_turning"].stop, np.float32)
-        for name in self._kept:
+        for name in self._observed:
             vector[self.parts[name]] = self._measures[name]()
         return {"proprioception": vector}
 
@@ -123,24 +132,24 @@ class ProprioceptionSense(Sense):
         yaw = heading_rad(rotations[0])
         c, s = math.cos(yaw), math.sin(yaw)
         to_heading = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
-        turned: Floats = to_heading @ rotations[:, :, ::2]
-        # bone by bone: forward axis, then up axis
-        return np.swapaxes(turned, 1, 2).ravel()
+        axes: Floats = to_heading @ rotations[:, :, ::2]
+        # per bone: forward axis, then up axis
+        return np.swapaxes(axes, 1, 2).ravel()
 
     def _head_acceleration(self) -> Floats:
-        felt: Floats = self._acceleration + GRAVITY_MPS2 * _UP
-        return self._in_head(felt)
+        specific_force: Floats = self._acceleration + GRAVITY_MPS2 * _UP
+        return self._in_head(specific_force)
 
     def _head_turning(self) -> Floats:
         return self._in_head(self._spin)
 
     def _in_head(self, vector: Floats) -> Floats:
-        turned: Floats = self._body.mount("head").rotation.T @ vector
-        return turned
+        in_head: Floats = self._body.mount("head").rotation.T @ vector
+        return in_head
 
 
-def kept_parts(quality: ProprioceptionQuality) -> tuple[str, ...]:
-    """Return the parts that a quality leaves; the others read 0."""
+def observed_parts(quality: ProprioceptionQuality) -> tuple[str, ...]:
+    """Return the names of the parts that a quality observes."""
     first_word = {
         ProprioceptionQuality.full: "",
         ProprioceptionQuality.joints: "joint",
@@ -150,7 +159,7 @@ def kept_parts(quality: ProprioceptionQuality) -> tuple[str, ...]:
 
 
 def part_slices(bones: int, joints: int) -> dict[str, slice]:
-    """Return where each part is in the vector of a body with so many bones and joints."""
+    """Return the slice of each part in the vector for given numbers of bones and joints."""
     sizes = {
         "bone_orientations": 6 * bones,
         "joint_angles": joints,

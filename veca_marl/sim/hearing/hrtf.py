@@ -1,4 +1,4 @@
-"""Head-related transfer functions on a regular grid, ready to be read for every direction."""
+"""Head-related transfer functions on a regular grid of directions, for bilinear interpolation."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ from veca_marl.sim.hearing.spherical_head import woodworth_arrival_s
 
 GRID_STEP_DEG = 5
 _N_FFT = 512
-_LEAST_MAGNITUDE = 1e-5
+_MIN_MAGNITUDE = 1e-5
 _BATCH = 256
 
 
 class HrtfTable:
-    """A head's filters and arrival times on a regular grid of azimuths and elevations.
+    """Filters and arrival times of a head on a regular grid of azimuths and elevations.
 
-    Shared between all listeners of a process and read-only.
+    Read-only and shared by all listeners of a process.
 
     Attributes:
         filters: ``(A, E, 2, T)`` minimum-phase filters; azimuth ``a * step`` counted to the left
@@ -40,7 +40,7 @@ class HrtfTable:
     def __init__(self, response: HeadResponse, step_deg: int = GRID_STEP_DEG) -> None:
         azimuth = np.deg2rad(np.arange(0, 360, step_deg))
         elevation = np.deg2rad(np.arange(-90, 91, step_deg))
-        # no set reaches straight down: the lowest ring's filters stand for all below it
+        # measurements end above the nadir: the filters of the lowest ring are used for all below it
         lowest = np.arcsin(np.clip(response.directions[:, 2].min(), -1.0, 1.0)) + 1e-6
         corners, weights = _triangles(
             response.directions, direction_vectors(azimuth, np.maximum(elevation, lowest))
@@ -60,10 +60,10 @@ class HrtfTable:
 
 @cache
 def kemar_table(sample_rate_hz: int = 22_050) -> HrtfTable:
-    """Return the head that comes with the package: KEMAR (Gardner & Martin 1994).
+    """Return the table of the packaged measurement: KEMAR (Gardner & Martin 1994).
 
     Raises:
-        ValueError: If the rate is not the one the data was made for.
+        ValueError: If the packaged data have another sampling rate.
     """
     with as_file(files("veca_marl") / "data" / "kemar.npz") as path:
         response = HeadResponse.load(path)
@@ -79,12 +79,16 @@ def kemar_table(sample_rate_hz: int = 22_050) -> HrtfTable:
 def sofa_table(
     path: str, sample_rate_hz: int = 22_050, stated_rate_hz: float | None = None
 ) -> HrtfTable:
-    """Return the head in a SOFA file, conditioned for a sampling rate.
+    """Return the table of the head in a SOFA file, conditioned for a sampling rate.
 
     Args:
         path: The file.
-        sample_rate_hz: Rate at which the agents hear.
-        stated_rate_hz: Rate to believe instead of the file's own, see `read_sofa`.
+        sample_rate_hz: Sampling rate of the sound field.
+        stated_rate_hz: Sampling rate to use instead of the file's own, see `read_sofa`.
+
+    Raises:
+        ImportError: If h5py is missing.
+        SofaError: If the file cannot be used.
     """
     measured = read_sofa(path, stated_rate_hz)
     return HrtfTable(condition(measured, sample_rate_hz, licence=f"see {measured.source}"))
@@ -99,8 +103,8 @@ def direction_vectors(azimuth_rad: Floats, elevation_rad: Floats) -> Floats:
     )
 
 
-def _triangles(measured: Floats, wanted: Floats) -> tuple[NDArray[np.int64], Floats]:
-    """Find the spherical triangle of measured directions around each wanted one.
+def _triangles(measured: Floats, requested: Floats) -> tuple[NDArray[np.int64], Floats]:
+    """Find the spherical triangle of measured directions around each requested one.
 
     Returns:
         Indices ``(A, E, 3)`` into the measured directions, and weights that sum to 1.
@@ -109,7 +113,7 @@ def _triangles(measured: Floats, wanted: Floats) -> tuple[NDArray[np.int64], Flo
     closed = np.concatenate([measured, nadir])  # the hull must enclose the origin
     triangles = ConvexHull(closed).simplices
     inverse = np.linalg.inv(closed[triangles].transpose(0, 2, 1))
-    flat = wanted.reshape(-1, 3)
+    flat = requested.reshape(-1, 3)
     corners, weights = [], []
     for batch in np.array_split(flat, 1 + len(flat) // _BATCH):
         coordinates = np.einsum("tij,qj->qti", inverse, batch)
@@ -120,16 +124,16 @@ def _triangles(measured: Floats, wanted: Floats) -> tuple[NDArray[np.int64], Flo
     added = corner == len(measured)
     corner[added], weight[added] = 0, 0.0
     weight /= weight.sum(axis=1, keepdims=True)
-    shape = (*wanted.shape[:-1], 3)
+    shape = (*requested.shape[:-1], 3)
     return corner.reshape(shape).astype(np.int64), weight.reshape(shape)
 
 
 def _interpolate_filters(
     filters: NDArray[np.float32], corners: NDArray[np.int64], weights: Floats
 ) -> NDArray[np.float32]:
-    """Blend filters by the logarithm of their magnitude; minimum phase follows from it."""
+    """Interpolate log magnitudes, and return the minimum-phase filters of the result."""
     magnitude = np.abs(scipy.fft.rfft(filters, _N_FFT))
-    log_magnitude = np.log(np.maximum(magnitude, _LEAST_MAGNITUDE))
+    log_magnitude = np.log(np.maximum(magnitude, _MIN_MAGNITUDE))
     table = np.empty((*corners.shape[:2], *filters.shape[1:]), np.float32)
     for a in range(corners.shape[0]):
         blended = np.einsum(

@@ -1,4 +1,4 @@
-"""The inner loops of hearing: from arriving sound to the filters of the ears."""
+"""Compiled loops that sum direct sound and reflections to the filters of a receiver."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ def _length(vector: Floats) -> float:
 
 @njit(cache=True)
 def _split(position: float, last: int) -> tuple[int, float]:
-    """Split a position in samples into whole and fraction, held within the filter."""
-    held = min(max(position, 0.0), float(last))
-    whole = min(int(held), last - 1)
-    return whole, held - whole
+    """Split a position in samples, clipped to the filter, into integer part and fraction."""
+    clipped = min(max(position, 0.0), float(last))
+    whole = min(int(clipped), last - 1)
+    return whole, clipped - whole
 
 
 @njit(cache=True)
@@ -33,13 +33,13 @@ def omnidirectional_filters(
     bank: NDArray[np.float32],
     out: NDArray[np.float32],
 ) -> None:
-    """Add up all arrivals at omnidirectional receivers.
+    """Sum all arrivals at omnidirectional receivers.
 
     Args:
         arrivals: ``(K, 3)`` metres in the head frame, direct sound first.
-        gains: ``(K,)`` what the walls left of each.
-        samples_per_metre: Sampling rate over the speed of sound.
-        lead: Samples by which the filter is late.
+        gains: ``(K,)`` product of the walls' reflection and transmission coefficients of each.
+        samples_per_metre: Sampling rate divided by the speed of sound.
+        lead: Samples by which the filter is delayed, so that it stays causal.
         ears: ``(E, 3)`` metres in the head frame.
         bank: `kernel_bank`.
         out: ``(E, n)``, overwritten.
@@ -63,7 +63,7 @@ def omnidirectional_filters(
 def _grid_cell(
     arrival: Floats, distance: float, n_azimuths: int, n_elevations: int
 ) -> tuple[int, int, int, float, float]:
-    """Return azimuths left and right of a direction, elevation below it, and both fractions."""
+    """Return azimuth indices around a direction, the elevation index below, and both fractions."""
     azimuth = np.arctan2(arrival[1], arrival[0]) * (n_azimuths / (2.0 * np.pi))
     sine = min(max(arrival[2] / max(distance, 1e-9), -1.0), 1.0)
     elevation = (np.arcsin(sine) / np.pi + 0.5) * (n_elevations - 1)
@@ -84,14 +84,14 @@ def head_related_filters(
     bank: NDArray[np.float32],
     out: NDArray[np.float32],
 ) -> None:
-    """Add up all arrivals at two ears on a head, each by the response of its direction.
+    """Sum all arrivals at two ears on a head, each filtered by the response of its direction.
 
     Args:
         arrivals: ``(K, 3)`` metres in the head frame, direct sound first.
-        gains: ``(K,)`` what the walls left of each.
-        samples_per_metre: Sampling rate over the speed of sound.
-        lead: Samples by which the filter is late.
-        filters: ``(A, E, 2, T)``, see `HrtfTable`; read bilinearly.
+        gains: ``(K,)`` product of the walls' reflection and transmission coefficients of each.
+        samples_per_metre: Sampling rate divided by the speed of sound.
+        lead: Samples by which the filter is delayed, so that it stays causal.
+        filters: ``(A, E, 2, T)``, see `HrtfTable`; interpolated bilinearly.
         arrival_samples: ``(A, E, 2)``, see `HrtfTable`.
         bank: `kernel_bank`.
         out: ``(2, n)``, overwritten.

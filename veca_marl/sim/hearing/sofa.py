@@ -1,4 +1,4 @@
-"""Reading measured heads from SOFA files (AES69). Needs the optional extra ``veca_marl[sofa]``."""
+"""Reader for head-related impulse responses in SOFA files (AES69). Needs ``veca_marl[sofa]``."""
 
 from __future__ import annotations
 
@@ -21,17 +21,17 @@ _FEWEST_SAMPLES = 16
 
 
 class SofaError(ValueError):
-    """A file is not a set of head-related impulse responses of one head. Names file and fault."""
+    """The file does not contain usable head-related impulse responses; the message says why."""
 
 
 @dataclass(frozen=True)
 class MeasuredHead:
-    """Impulse responses of one head as measured.
+    """Measured impulse responses of one head.
 
     Attributes:
         impulse_responses: ``(M, 2, N)``, left ear first.
         directions: ``(M, 3)`` unit vectors to the loudspeaker in the head frame.
-        delays_s: ``(M, 2)`` delay to be added before each response.
+        delays_s: ``(M, 2)`` seconds of delay before the first sample of each response.
         sample_rate_hz: Sampling rate.
         distance_m: Distance of the loudspeaker from the centre of the head.
         source: Name of the file, for messages.
@@ -48,17 +48,17 @@ class MeasuredHead:
 def read_sofa(path: str | Path, sample_rate_hz: float | None = None) -> MeasuredHead:
     """Read a SOFA file with the impulse responses of two ears.
 
-    Which receiver is the left ear is decided by the data (the ear that is louder when the sound
-    comes from the left): LISTEN files are known to state it the wrong way round.
+    The left ear is the receiver with more energy for sources on the left, whatever the file
+    states: in files of the LISTEN set the stated receiver positions are swapped.
 
     Args:
         path: The file.
-        sample_rate_hz: The rate to believe instead of the file's own; some LISTEN files say
-            48 000 where they were measured at 44 100.
+        sample_rate_hz: Sampling rate to use instead of the file's own; some LISTEN files state
+            48 000 although they were measured at 44 100.
 
     Raises:
         ImportError: If h5py is missing.
-        SofaError: If the file is anything else than such a set.
+        SofaError: If the file does not contain such responses.
     """
     try:
         import h5py
@@ -86,7 +86,7 @@ def _text(value: Any) -> str:
 def _check_convention(file: Any, name: str) -> None:
     attributes = {key: _text(value) for key, value in file.attrs.items()}
     if attributes.get("Conventions") != "SOFA":
-        raise SofaError(f"{name}: no attribute says that this is SOFA")
+        raise SofaError(f"{name}: the attribute Conventions is not SOFA")
     convention = attributes.get("SOFAConventions", "missing")
     if convention not in _CONVENTIONS:
         raise SofaError(f"{name}: SOFAConventions is {convention}, must be one of {_CONVENTIONS}")
@@ -112,7 +112,7 @@ def _measured_head(
     rate = (
         float(np.ravel(fields["Data.SamplingRate"])[0])
         if sample_rate_hz is None
-        else (sample_rate_hz)
+        else sample_rate_hz
     )
     if not _SAMPLE_RATES_HZ[0] <= rate <= _SAMPLE_RATES_HZ[1]:
         raise SofaError(f"{name}: sampling rate {rate} Hz is outside {_SAMPLE_RATES_HZ}")
@@ -168,7 +168,7 @@ def _delays(delay: Floats | None, count: int, name: str) -> Floats:
 def _ears_are_swapped(responses: Floats, directions: Floats, name: str) -> bool:
     left, right = directions[:, 1] > _LATERAL, directions[:, 1] < -_LATERAL
     if not left.any() or not right.any():
-        raise SofaError(f"{name}: has no directions on one of the sides of the head")
+        raise SofaError(f"{name}: has no directions on one side of the head")
     energy: NDArray[np.float64] = (responses**2).sum(axis=-1)
     louder_left = np.log(energy[left].sum(axis=0)) - np.log(energy[right].sum(axis=0))
     return bool(louder_left[0] < louder_left[1])
@@ -180,6 +180,6 @@ def _warn_of_stated_ears(receivers: Floats | None, left_row: int, name: str) -> 
     stated_left = receivers.reshape(-1, 3)[:2, 1] if receivers.ndim < 3 else receivers[:2, 1, 0]
     if stated_left[left_row] < stated_left[1 - left_row]:
         warnings.warn(
-            f"{name}: ReceiverPosition contradicts the data; the data decides which ear is left",
+            f"{name}: ReceiverPosition contradicts the data; the left ear is chosen by its energy",
             stacklevel=4,
         )

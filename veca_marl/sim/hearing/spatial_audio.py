@@ -1,4 +1,4 @@
-"""What two ears hear in a scene where nothing moves: the paper's `getSpatialAudio`."""
+"""Binaural rendering of a static scene: the paper's `getSpatialAudio`."""
 
 from __future__ import annotations
 
@@ -23,28 +23,29 @@ def spatial_audio(
     image_order: int = 6,
     table: HrtfTable | None = None,
 ) -> NDArray[np.float32]:
-    """Return what the two ears of one head hear (paper, appendix: `getSpatialAudio`).
+    """Render static sources for two ears of a head (the paper's appendix: `getSpatialAudio`).
 
-    The same engine as that of the agents' ears, without its constant latency.
+    It uses the sound field of the agents' hearing, without its constant latency.
 
     Args:
         head: Position and rotation of the head.
         ear_left: ``(3,)`` metres, world frame. The head-related response is centred between the
-            ears, and turned as the head is.
+            ears and has the rotation of the head.
         ear_right: ``(3,)`` metres, world frame.
         sources: Waveforms ``(n,)`` (rms pressure at 1 m) with their positions ``(3,)`` in metres.
-            All begin at sample 0; before, there was silence.
+            All begin at sample 0 after silence.
         room_size: ``(3,)`` metres of a room with a corner at the origin and positive coordinates;
             None is the free field.
         beta: Pressure reflection coefficient of the walls, one or six, see `Room`.
         image_order: Greatest number of reflections, with a room.
-        table: The head; None is KEMAR. Its sampling rate is that of the waveforms.
+        table: The head-related transfer functions; None is KEMAR. Their sampling rate is that of
+            the waveforms.
 
     Returns:
-        ``(2, n)`` float32, left ear first, as long as the longest waveform.
+        ``(2, n)`` float32, left ear first, with the length of the longest waveform.
 
     Raises:
-        ValueError: If the room is impossible, or a head, ear or source is outside of it.
+        ValueError: If the room is invalid, or the head, an ear or a source is outside of it.
     """
     table = kemar_table() if table is None else table
     ears = np.stack([_point("ear_left", ear_left), _point("ear_right", ear_right)])
@@ -55,7 +56,7 @@ def spatial_audio(
         _check_inside(room, [head.position, *ears], "the head with its ears")
         _check_inside(room, positions, "every source")
     n_samples = max((clip.waveform.size for clip in clips), default=0)
-    field = _still_field(room, image_order, n_samples, table.sample_rate_hz)
+    field = _one_step_field(room, image_order, n_samples, table.sample_rate_hz)
     for i, (clip, position) in enumerate(zip(clips, positions, strict=True)):
         field.add_source(str(i), clip).position = position
     listener = field.add_listener(HrtfReceiver(table))
@@ -64,10 +65,10 @@ def spatial_audio(
     return heard[:, field.latency_samples :]
 
 
-def _still_field(
+def _one_step_field(
     room: Room | None, image_order: int, n_samples: int, sample_rate_hz: int
 ) -> SoundField:
-    """Return a field that renders all samples, and its own latency, in one step."""
+    """Return a field with a step as long as all samples and its own latency."""
     latency = SoundField(sample_rate_hz=sample_rate_hz).latency_samples
     return SoundField(room, n_samples + latency, sample_rate_hz, image_order)
 

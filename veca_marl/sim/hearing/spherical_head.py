@@ -1,4 +1,4 @@
-"""The head as a rigid sphere: the closed forms that measured heads are completed by and held to."""
+"""Rigid-sphere model of the head: arrival times (Woodworth) and responses (Duda & Martens)."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ HEAD_RADIUS_M = 0.0875
 
 _MAX_TERMS = 200
 _TOLERANCE = 1e-8
-_LEAST_WAVE_NUMBER = 1e-3
+_MIN_WAVE_NUMBER = 1e-3
 
 
 def woodworth_arrival_s(incidence_rad: ArrayLike, radius_m: float = HEAD_RADIUS_M) -> Floats:
-    """Return when a distant sound reaches an ear, relative to the centre of the absent head.
+    """Return the arrival time of a distant source at an ear, relative to the absent head's centre.
 
     Woodworth's ray around the sphere (Woodworth & Schlosberg 1954; Kuhn 1977, eq. 2).
 
@@ -27,7 +27,7 @@ def woodworth_arrival_s(incidence_rad: ArrayLike, radius_m: float = HEAD_RADIUS_
         radius_m: Radius of the head.
 
     Returns:
-        Seconds, negative on the side of the source; same shape as the angle.
+        Seconds, negative on the side of the source; shape of the angle.
     """
     angle = np.asarray(incidence_rad, dtype=np.float64)
     lit = -np.cos(angle)
@@ -42,9 +42,9 @@ def sphere_response(
     radius_m: float = HEAD_RADIUS_M,
     distance_m: float = 1.4,
 ) -> NDArray[np.complex128]:
-    """Return the pressure on a rigid sphere over that at its centre without it.
+    """Return the pressure on a rigid sphere, relative to that at its centre in the free field.
 
-    Duda & Martens (1998), eq. 3 and 4, with the factor of the source's own distance so that the
+    Duda & Martens (1998), eq. 3 and 4, multiplied by the source's distance factor so that the
     limit at low frequency is 1.
 
     Args:
@@ -60,7 +60,7 @@ def sphere_response(
     frequencies = np.atleast_1d(np.asarray(frequency_hz, dtype=np.float64))
     wave_numbers = 2.0 * np.pi * frequencies * radius_m / SPEED_OF_SOUND_MPS
     ratio = distance_m / radius_m
-    columns = [_series(cosine, max(mu, _LEAST_WAVE_NUMBER), ratio) for mu in wave_numbers]
+    columns = [_series(cosine, max(mu, _MIN_WAVE_NUMBER), ratio) for mu in wave_numbers]
     return np.stack(columns, axis=1)
 
 
