@@ -9,8 +9,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from veca_marl.sim.hearing.conditioning import condition
-from veca_marl.sim.hearing.sofa import read_sofa
+from veca_marl.sim.hearing import condition, read_sofa
 
 LICENCE = (
     "HRTF measurements of a KEMAR dummy-head microphone. Copyright 1994 MIT Media Laboratory "

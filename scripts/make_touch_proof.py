@@ -31,8 +31,7 @@ from veca_marl.sim.physics import (
     World,
     pybullet,
 )
-from veca_marl.sim.touch.sense import TouchCfg, TouchSense
-from veca_marl.sim.touch.taxels import load_taxels
+from veca_marl.sim.touch import TouchCfg, TouchSense, load_taxels
 
 mpl.use("Agg")
 import matplotlib.pyplot as plt

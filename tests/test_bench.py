@@ -17,7 +17,7 @@ from veca_marl.config import compose, conf_dir
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
 from veca_marl.envs.core.task import TASKS
 from veca_marl.sim.physics import PlaygroundCfg, pybullet
-from veca_marl.sim.vision.optics import Camera
+from veca_marl.sim.vision import Camera
 
 QUICK = ["bench.steps=3", "bench.repeats=1"]
 ROLLOUTS = [*QUICK, "bench.worlds=[1]", "bench.references=false"]

@@ -11,7 +11,7 @@ from veca_marl.envs.core.task import TASKS
 from veca_marl.sim.body.humanoid import Detail, HumanoidCfg
 from veca_marl.sim.body.humanoid import JointActionKind as Act
 from veca_marl.sim.body.walker import WalkerCfg
-from veca_marl.sim.hearing.sense import AudioQuality
+from veca_marl.sim.hearing import AudioQuality
 from veca_marl.sim.senses import SensesCfg
 
 KICK = "+task=KickTheBall"

@@ -9,7 +9,7 @@ import numpy as np
 from docs_pages.tables import table
 from veca_marl.sim.body.anatomy.skeleton import limit_sources, load_skeleton
 from veca_marl.sim.body.proprioception import ProprioceptionQuality, observed_parts, part_slices
-from veca_marl.sim.touch.taxels import taxels_of
+from veca_marl.sim.touch import taxels_of
 
 PARTS = {
     "bone_orientations": ("", "forward and up axis of each bone in the heading frame"),

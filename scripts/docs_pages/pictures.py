@@ -14,8 +14,8 @@ from veca_marl.envs.core.game import Game
 from veca_marl.envs.core.task import TASKS
 from veca_marl.envs.rendering.touch_image import touch_image
 from veca_marl.sim.body.walker import Walker
-from veca_marl.sim.touch.taxels import TAXELS_PER_TRIANGLE
-from veca_marl.sim.vision.optics import Camera, look_at
+from veca_marl.sim.touch import TAXELS_PER_TRIANGLE
+from veca_marl.sim.vision import Camera, look_at
 
 mpl.use("Agg")
 import matplotlib.pyplot as plt

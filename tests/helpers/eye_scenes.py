@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from veca_marl.sim.geometry import Geom, Pose, Scene, Shape, quaternions_to_matrices
-from veca_marl.sim.vision.optics import Camera, look_at
+from veca_marl.sim.vision import Camera, look_at
 
 EYE_SPACING_M = 0.04
 

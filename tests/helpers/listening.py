@@ -4,8 +4,7 @@ import numpy as np
 import scipy.signal
 
 from veca_marl.sim.geometry import Pose
-from veca_marl.sim.hearing.hrtf import kemar_table
-from veca_marl.sim.hearing.receivers import HrtfReceiver, MonoReceiver, StereoReceiver
+from veca_marl.sim.hearing import HrtfReceiver, MonoReceiver, StereoReceiver, kemar_table
 from veca_marl.sim.sound import Clip, Room, SoundField
 
 RATE = 22_050

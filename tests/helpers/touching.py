@@ -8,8 +8,7 @@ from stand_in_worlds import SceneWorld
 
 from veca_marl.sim.body.anatomy.skeleton import load_skeleton
 from veca_marl.sim.geometry import Geom, Scene, Shape
-from veca_marl.sim.touch.sense import TouchCfg, TouchSense
-from veca_marl.sim.touch.taxels import load_taxels, taxel_positions
+from veca_marl.sim.touch import TouchCfg, TouchSense, load_taxels, taxel_positions
 
 # arms away from the trunk: nothing of the body touches the body
 SPREAD = np.zeros(82)

@@ -15,7 +15,7 @@ from veca_marl.bench.skin_costs import SkinCosts, measure_skin
 from veca_marl.bench.stopwatch import thread_ms
 from veca_marl.sim.body.walker import Walker, WalkerCfg
 from veca_marl.sim.geometry import Bools, Pose, Scene, Shape, matrix_to_quaternion
-from veca_marl.sim.hearing.sense import AudioCfg, AudioSense
+from veca_marl.sim.hearing import AudioCfg, AudioSense
 from veca_marl.sim.physics import (
     PlaygroundCfg,
     PropCfg,
@@ -25,7 +25,7 @@ from veca_marl.sim.physics import (
     shape_arguments,
 )
 from veca_marl.sim.sound import SoundCfg, SoundKind, make_sound
-from veca_marl.sim.vision.optics import Camera
+from veca_marl.sim.vision import Camera
 
 N_LOOSE_PROPS = 20
 VIEWS = 8

@@ -12,7 +12,7 @@ from veca_marl.sim.body.humanoid import Humanoid, HumanoidCfg
 from veca_marl.sim.body.humanoid.postures import Posture
 from veca_marl.sim.geometry import deform_meshes
 from veca_marl.sim.physics import PlaygroundCfg, PropCfg, PropShape, World
-from veca_marl.sim.touch.sense import TouchCfg, TouchSense
+from veca_marl.sim.touch import TouchCfg, TouchSense
 
 CONTACTS = (0, 3, 20)
 _ARMS_OUT = Posture(0.0, {"upper_arm.abduction": 30.0})  # no self-contact

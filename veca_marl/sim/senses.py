@@ -30,11 +30,11 @@ from typing import Any, Protocol, TypeVar
 from veca_marl.registry import Registry
 from veca_marl.sim.body import Body
 from veca_marl.sim.body.proprioception import ProprioceptionCfg, ProprioceptionSense
-from veca_marl.sim.hearing.sense import AudioCfg, AudioSense
+from veca_marl.sim.hearing import AudioCfg, AudioSense
 from veca_marl.sim.physics import World
 from veca_marl.sim.sense import Sense
-from veca_marl.sim.touch.sense import TouchCfg, TouchSense
-from veca_marl.sim.vision.sense import VisionCfg, VisionSense
+from veca_marl.sim.touch import TouchCfg, TouchSense
+from veca_marl.sim.vision import VisionCfg, VisionSense
 
 
 class SenseClass(Protocol):

@@ -17,7 +17,7 @@ from veca_marl.envs.adapters.torchrl.scripted import ExpertPolicy
 from veca_marl.envs.core.game import Game
 from veca_marl.envs.core.team import Script, TeamCfg, TeamSensesCfg
 from veca_marl.sim.body.walker import WalkActionKind, WalkerCfg
-from veca_marl.sim.hearing.sense import AudioCfg
+from veca_marl.sim.hearing import AudioCfg
 from veca_marl.sim.senses import SensesCfg
 
 STEPS = 13  # two games of 6 steps, and one of a third

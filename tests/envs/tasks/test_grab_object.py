@@ -6,7 +6,7 @@ import pytest
 from veca_marl.config import compose
 from veca_marl.envs.core.game import Game
 from veca_marl.envs.tasks.objects.grab_object import GrabObjectCfg
-from veca_marl.sim.vision.visibility import is_visible
+from veca_marl.sim.vision import is_visible
 
 
 @pytest.fixture(scope="module")

@@ -12,7 +12,7 @@ from veca_marl.envs.tasks.navigation import helper_reward
 from veca_marl.envs.tasks.navigation.helper_reward import PropVisibility, displacement_to
 from veca_marl.envs.tasks.navigation.places import free_pair, free_place, gap_m
 from veca_marl.sim.physics import RoomCfg
-from veca_marl.sim.vision.optics import Camera, look_at, seen_fraction
+from veca_marl.sim.vision import Camera, look_at, seen_fraction
 
 STEP_S = 0.04
 AHEAD = np.array([5.0, 0.0, 0.0])

@@ -12,7 +12,7 @@ from veca_marl.envs.core.game_cfg import GameCfg
 from veca_marl.sim.body import VoiceKind
 from veca_marl.sim.body.anatomy.skeleton import load_skeleton
 from veca_marl.sim.senses import SensesCfg, make_senses
-from veca_marl.sim.touch.taxels import load_taxels
+from veca_marl.sim.touch import load_taxels
 
 SENSES = ("vision", "audio", "touch", "proprioception")
 STEPS = 12

@@ -4,7 +4,7 @@ from listening import EAR, RATE, STEP, direction, room, yaw
 from stand_in_worlds import SoundWorld
 
 from veca_marl.sim.geometry import Pose
-from veca_marl.sim.hearing.sense import AudioCfg, AudioQuality, AudioSense, Window
+from veca_marl.sim.hearing import AudioCfg, AudioQuality, AudioSense, Window
 from veca_marl.sim.sense import check_spec
 from veca_marl.sim.sound import Clip, Noise, SoundField, buzz, tone
 

@@ -3,12 +3,11 @@ import pytest
 from listening import RATE, direction
 from paths import ROOT, SHARED
 
-from veca_marl.sim.hearing.conditioning import condition, ear_incidence
+from veca_marl.sim.hearing import HrtfReceiver, HrtfTable, condition, kemar_table, read_sofa
+from veca_marl.sim.hearing.conditioning import ear_incidence
 from veca_marl.sim.hearing.head_response import HeadResponse
-from veca_marl.sim.hearing.hrtf import HrtfTable, direction_vectors, kemar_table
+from veca_marl.sim.hearing.hrtf import direction_vectors
 from veca_marl.sim.hearing.minimum_phase import minimum_phase
-from veca_marl.sim.hearing.receivers import HrtfReceiver
-from veca_marl.sim.hearing.sofa import read_sofa
 from veca_marl.sim.hearing.spherical_head import HEAD_RADIUS_M, sphere_response, woodworth_arrival_s
 from veca_marl.sim.sound import filter_length, lead_samples
 

@@ -7,11 +7,10 @@ import pytest
 import scipy.signal
 from paths import SHARED
 
-from veca_marl.sim.hearing import sofa
-from veca_marl.sim.hearing.conditioning import condition, ear_incidence
-from veca_marl.sim.hearing.hrtf import direction_vectors, sofa_table
+from veca_marl.sim.hearing import SofaError, condition, read_sofa, sofa, sofa_table
+from veca_marl.sim.hearing.conditioning import ear_incidence
+from veca_marl.sim.hearing.hrtf import direction_vectors
 from veca_marl.sim.hearing.minimum_phase import minimum_phase
-from veca_marl.sim.hearing.sofa import SofaError, read_sofa
 from veca_marl.sim.hearing.spherical_head import sphere_response, woodworth_arrival_s
 from veca_marl.sim.sound import SPEED_OF_SOUND_MPS
 
@@ -170,7 +169,7 @@ def broken(fields):
         ("count", {**fields, "Data.IR": responses[:-1]}, {}, "SourcePosition has shape"),
         ("slow", {**fields, "Data.SamplingRate": np.array([100.0])}, {}, "sampling rate 100"),
         ("delay", {**fields, "Data.Delay": np.zeros((3, 2))}, {}, "Data.Delay has shape"),
-        ("side", half, {}, "one of the sides"),
+        ("side", half, {}, "one side"),
         ("text", {**fields, "Data.IR": "none"}, {}, "cannot be read"),
     ]
 

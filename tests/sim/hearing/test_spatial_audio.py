@@ -3,7 +3,7 @@ import pytest
 from listening import EAR, HEAD, RATE, STEP, STILL, direction, noise, ratio_db, render_still, yaw
 
 from veca_marl.sim.geometry import Pose
-from veca_marl.sim.hearing.spatial_audio import spatial_audio
+from veca_marl.sim.hearing import spatial_audio
 from veca_marl.sim.sound import SoundField
 
 EARS = ((0.0, EAR, 0.0), (0.0, -EAR, 0.0))

@@ -7,7 +7,7 @@ import pytest
 
 from veca_marl.config import compose
 from veca_marl.sim.geometry import Pose
-from veca_marl.sim.hearing.receivers import MonoReceiver
+from veca_marl.sim.hearing import MonoReceiver
 from veca_marl.sim.physics import PropCfg, PropShape, World
 from veca_marl.sim.sound import SoundCfg, SoundKind
 

@@ -9,7 +9,7 @@ from listening import render as render_field
 from veca_marl.config import compose
 from veca_marl.sim.body.walker import Walker, WalkerCfg
 from veca_marl.sim.geometry import Pose
-from veca_marl.sim.hearing.sense import AudioCfg, AudioSense
+from veca_marl.sim.hearing import AudioCfg, AudioSense
 from veca_marl.sim.physics import World
 from veca_marl.sim.sound import Call, Clip, House, Room, SoundField
 

@@ -27,7 +27,7 @@ from listening import (
 from paths import HELPERS
 
 from veca_marl.sim.geometry import Pose
-from veca_marl.sim.hearing.receivers import StereoReceiver
+from veca_marl.sim.hearing import StereoReceiver
 from veca_marl.sim.sound import Noise, Silence, SoundField, Voice, acoustics
 
 QUALITIES = ("hrtf", "stereo", "mono")

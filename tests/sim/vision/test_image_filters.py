@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 
+from veca_marl.sim.vision import Camera
 from veca_marl.sim.vision.image_filters import Blur, Defocus, FilterContext, Grey
 from veca_marl.sim.vision.infant_vision import (
     CONTRAST_AT_LIMIT,
@@ -13,7 +14,6 @@ from veca_marl.sim.vision.infant_vision import (
     acuity_cpd,
     colour_gains,
 )
-from veca_marl.sim.vision.optics import Camera
 
 CAMERA = Camera(200, 200, fov_deg=20.0)
 AGES = np.arange(0.0, 60.0, 0.25)

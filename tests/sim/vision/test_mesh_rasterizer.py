@@ -9,7 +9,7 @@ from skins import SHIRT, add_body, pose, random_angles, random_turn
 
 from veca_marl.sim.body.anatomy.skeleton import load_skeleton
 from veca_marl.sim.geometry import Geom, Pose, Scene, Shape
-from veca_marl.sim.vision.optics import Camera, look_at
+from veca_marl.sim.vision import Camera, look_at
 
 CAMERA = Camera(44, 36, 60.0)
 

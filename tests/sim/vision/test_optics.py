@@ -5,7 +5,7 @@ import pytest
 from eye_scenes import ball_at, clutter, random_pose, small_camera
 
 from veca_marl.sim.geometry import Geom, Pose, Scene, Shape
-from veca_marl.sim.vision.optics import Camera, look_at, seen_fraction
+from veca_marl.sim.vision import Camera, look_at, seen_fraction
 
 AHEAD = Pose(np.zeros(3), np.eye(3))
 

@@ -8,7 +8,8 @@ from eye_scenes import cast, clutter, random_pose, random_rotations, small_camer
 from tiny_renderer import TinyRenderer
 
 from veca_marl.sim.geometry import Geom, Pose, Scene, Shape
-from veca_marl.sim.vision.optics import Camera, look_at, view_axes
+from veca_marl.sim.vision import Camera, look_at
+from veca_marl.sim.vision.optics import view_axes
 from veca_marl.sim.vision.rasterizer import draw_geoms
 
 

@@ -7,7 +7,7 @@ from eye_scenes import random_rotations
 from tiny_renderer import TinyRenderer
 
 from veca_marl.sim.geometry import Geom, Scene, Shape
-from veca_marl.sim.vision.optics import Camera, look_at
+from veca_marl.sim.vision import Camera, look_at
 
 BONES = 47
 

@@ -16,9 +16,7 @@ from stand_in_worlds import SceneWorld
 
 from veca_marl.sim.geometry import Geom, Scene, Shape
 from veca_marl.sim.sense import check_spec
-from veca_marl.sim.vision.optics import Camera
-from veca_marl.sim.vision.sense import Eyes, VisionCfg, VisionSense
-from veca_marl.sim.vision.visibility import is_visible
+from veca_marl.sim.vision import Camera, Eyes, VisionCfg, VisionSense, is_visible
 
 Target = namedtuple("Target", "object_id")
 EVERYTHING = {"depth": True, "segmentation": True}

@@ -8,10 +8,10 @@ from typing import Any
 
 from veca_marl.sim.body import BodyCfg
 from veca_marl.sim.body.proprioception import ProprioceptionCfg
-from veca_marl.sim.hearing.sense import AudioCfg
+from veca_marl.sim.hearing import AudioCfg
 from veca_marl.sim.senses import SensesCfg
-from veca_marl.sim.touch.sense import TouchCfg
-from veca_marl.sim.vision.sense import VisionCfg
+from veca_marl.sim.touch import TouchCfg
+from veca_marl.sim.vision import VisionCfg
 
 
 @dataclass

@@ -9,15 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veca_marl.sim.geometry import Floats, Pose, Scene, SceneObject
-from veca_marl.sim.touch.taxels import load_taxels, taxel_positions
-from veca_marl.sim.vision.mesh_rasterizer import (
-    draw_triangles,
-    illuminate_triangles,
-    to_camera_frame,
-)
-from veca_marl.sim.vision.optics import Camera, view_axes
-from veca_marl.sim.vision.rasterizer import NO_SURFACE
-from veca_marl.sim.vision.shading import Images
+from veca_marl.sim.touch import load_taxels, taxel_positions
+from veca_marl.sim.vision import Camera
 
 PALE = (0.86, 0.86, 0.84)
 BACKGROUND = (0.13, 0.14, 0.17)
@@ -26,7 +19,9 @@ _SCALE = np.array([(0.98, 0.93, 0.35), (0.98, 0.55, 0.10), (0.85, 0.05, 0.10)])
 _DISTANCE_M, _RAISED_M, _FOV_DEG = 1.5, 0.35, 36.0
 
 
-def touch_image(scene: Scene, body: SceneObject, readings: Floats, height: int = 252) -> Images:
+def touch_image(
+    scene: Scene, body: SceneObject, readings: Floats, height: int = 252
+) -> NDArray[np.uint8]:
     """Render front and back of a body with an upright pelvis, its taxels in contact coloured.
 
     Args:
@@ -83,32 +78,20 @@ def _upright(offset: Floats, centre: Floats, up: Floats) -> Pose:
 
 def _portrait(
     scene: Scene, body: SceneObject, readings: Floats, camera: Camera, pose: Pose
-) -> Images:
+) -> NDArray[np.uint8]:
     """Render the body in pale grey, with taxels in contact in the colours of their readings."""
-    meshes, view = scene.meshes, view_axes(pose)
-    seen = np.empty_like(meshes.vertices)
-    to_camera_frame(meshes.vertices, view, seen)
-    depth = np.full((camera.height, camera.width), camera.far_m, np.float32)
-    surfaces = np.full(depth.shape, NO_SURFACE, np.int16)
-    lights = np.zeros(depth.shape, np.float32)
-    drawn = np.zeros(len(meshes.triangles), np.bool_)
-    drawn[body.triangles] = True
-    draw_triangles(meshes.triangles, seen, drawn, camera.lens, 0, depth, surfaces)
-    illuminate_triangles(meshes, seen, camera.lens, 0, surfaces, lights)
-    colours = np.where(
-        (surfaces == NO_SURFACE)[..., None], BACKGROUND, lights[..., None] * np.array(PALE)
-    )
-    points = pose.position + depth[..., None] * _rays(camera, pose)
-    taxels, _ = taxel_positions(load_taxels(), meshes.vertices[body.vertices])
-    triangles = surfaces - body.triangles.start
-    own = surfaces != NO_SURFACE
-    felt = _nearest(points[own], triangles[own], taxels, readings)
+    view = camera.render_mesh(scene, body, pose)
+    colours = np.where(view.visible[..., None], view.lights[..., None] * np.array(PALE), BACKGROUND)
+    points = pose.position + view.depth[..., None] * _rays(camera, pose)
+    taxels, _ = taxel_positions(load_taxels(), scene.meshes.vertices[body.vertices])
+    own = view.visible
+    felt = _nearest(points[own], view.triangles[own], taxels, readings)
     touched = felt > 0.0
     marks = np.stack([np.interp(felt[touched], (0.0, 0.5, 1.0), c) for c in _SCALE.T], axis=1)
     shades = colours[own]
     shades[touched] = marks
     colours[own] = shades
-    image: Images = np.round(255.0 * colours.clip(0.0, 1.0)).astype(np.uint8)
+    image: NDArray[np.uint8] = np.round(255.0 * colours.clip(0.0, 1.0)).astype(np.uint8)
     return image
 
 

@@ -2,7 +2,7 @@
 
 from veca_marl.sim.touch.quality import TouchQuality
 from veca_marl.sim.touch.sense import TouchCfg, TouchSense
-from veca_marl.sim.touch.taxels import TAXELS_PER_TRIANGLE, load_taxels, taxels_of
+from veca_marl.sim.touch.taxels import TAXELS_PER_TRIANGLE, load_taxels, taxel_positions, taxels_of
 
 __all__ = [
     "TAXELS_PER_TRIANGLE",
@@ -10,5 +10,6 @@ __all__ = [
     "TouchQuality",
     "TouchSense",
     "load_taxels",
+    "taxel_positions",
     "taxels_of",
 ]

@@ -1,6 +1,6 @@
 """Vision: cameras, rasterization, shading, optics of the eye and the sense of vision."""
 
-from veca_marl.sim.vision.optics import Camera, look_at, seen_fraction
+from veca_marl.sim.vision.optics import Camera, MeshView, look_at, seen_fraction
 from veca_marl.sim.vision.rendering import Views
 from veca_marl.sim.vision.sense import Eyes, VisionCfg, VisionSense
 from veca_marl.sim.vision.visibility import is_visible
@@ -8,6 +8,7 @@ from veca_marl.sim.vision.visibility import is_visible
 __all__ = [
     "Camera",
     "Eyes",
+    "MeshView",
     "Views",
     "VisionCfg",
     "VisionSense",

@@ -5,12 +5,34 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
-from veca_marl.sim.geometry import Bools, Floats, Pose, Scene, single
-from veca_marl.sim.vision.rasterizer import Lens
+from veca_marl.sim.geometry import Bools, Floats, Pose, Scene, SceneObject, single
+from veca_marl.sim.vision.mesh_rasterizer import (
+    draw_triangles,
+    illuminate_triangles,
+    to_camera_frame,
+)
+from veca_marl.sim.vision.rasterizer import NO_SURFACE, Depths, Lens, Surfaces
 from veca_marl.sim.vision.rendering import DrawMasks, Views, render_views
+
+
+class MeshView(NamedTuple):
+    """The image of one mesh without colours.
+
+    Attributes:
+        visible: ``(H, W)`` which pixels show it; the others of `triangles` and `lights` are void.
+        triangles: ``(H, W)`` int16 index of the triangle among those of the mesh.
+        depth: ``(H, W)`` float32 metres along the optical axis; `Camera.far_m` elsewhere.
+        lights: ``(H, W)`` float32 brightness.
+    """
+
+    visible: Bools
+    triangles: Surfaces
+    depth: Depths
+    lights: Depths
 
 
 @dataclass(frozen=True)
@@ -93,6 +115,26 @@ class Camera:
         drawn = _drawn(scene, hidden)
         render_views(scene.geoms, scene.meshes, scene.surfaces, drawn, axes, self.lens, views)
         return views
+
+    def render_mesh(self, scene: Scene, item: SceneObject, pose: Pose) -> MeshView:
+        """Render the mesh of one object alone, as of the last `Scene.update`.
+
+        Args:
+            scene: The scene.
+            item: An object of it with a mesh.
+            pose: x axis forward, y left, z up.
+        """
+        meshes = scene.meshes
+        in_camera = np.empty_like(meshes.vertices)
+        to_camera_frame(meshes.vertices, view_axes(pose), in_camera)
+        depth = np.full((self.height, self.width), self.far_m, np.float32)
+        surfaces = np.full(depth.shape, NO_SURFACE, np.int16)
+        lights = np.zeros(depth.shape, np.float32)
+        drawn = np.zeros(len(meshes.triangles), np.bool_)
+        drawn[item.triangles] = True
+        draw_triangles(meshes.triangles, in_camera, drawn, self.lens, 0, depth, surfaces)
+        illuminate_triangles(meshes, in_camera, self.lens, 0, surfaces, lights)
+        return MeshView(surfaces != NO_SURFACE, surfaces - item.triangles.start, depth, lights)
 
     def _blank(self, count: int) -> Views:
         """Return uninitialised buffers for a number of views."""
