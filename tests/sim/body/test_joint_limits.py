@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from heaps import fling, heap, kinetic_energy, thrash, weightless
-from veca_marl.sim.body.humanoid._articulation import damping_number
+from veca_marl.sim.body.humanoid.articulation import damping_number
 from walking import empty_world
 
 from veca_marl.sim.body.anatomy.skeleton import load_skeleton

@@ -9,8 +9,6 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from dataclasses import dataclass
-from enum import Enum
 from typing import Any, ClassVar
 
 import numpy as np
@@ -20,39 +18,13 @@ from veca_marl.sim.body.action import Action, checked_action
 from veca_marl.sim.body.anatomy.bone_motion import bone_motion
 from veca_marl.sim.body.anatomy.skeleton import load_skeleton
 from veca_marl.sim.body.appearance import SHIRTS, bone_geoms, dressed_skin
+from veca_marl.sim.body.body_cfg import BodyCfg
 from veca_marl.sim.body.mounts import EYES, Gaze, palm_centre, resting_mount
-from veca_marl.sim.body.voice import VOICE, VoiceKind, voice_spec
+from veca_marl.sim.body.voice import VOICE, voice_spec
 from veca_marl.sim.geometry import Floats, Pose, cross
 from veca_marl.sim.physics import Prop, World
 from veca_marl.sim.sound import CALLS, Call, Voice, call_waveform
 from veca_marl.sim.spec import ArraySpec
-
-
-@dataclass
-class BodyCfg:
-    """Parameters that all bodies have.
-
-    Attributes:
-        eye_range_deg: Largest rotation of the eyes in the head, to each side and up and down.
-        voice: Whether the action has a part `voice` that chooses a call.
-    """
-
-    eye_range_deg: float = 50.0
-    voice: VoiceKind = VoiceKind.silent
-
-    def __post_init__(self) -> None:
-        """Check that all numbers are finite and not negative."""
-        self._check_choices(voice=VoiceKind)
-        for name, value in vars(self).items():
-            if isinstance(value, (int, float)) and not (math.isfinite(value) and value >= 0):
-                raise ValueError(f"body.{name}={value} must be a finite number, 0 or more")
-
-    def _check_choices(self, **kinds: type[Enum]) -> None:
-        """Raise `ValueError` for a field that is no member of its enumeration."""
-        for name, kind in kinds.items():
-            if not isinstance(getattr(self, name), kind):
-                choices = [choice.name for choice in kind]
-                raise ValueError(f"body.{name}={getattr(self, name)!r}; there are {choices}")
 
 
 class Body(ABC):

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from veca_marl.sim.body.action import Action, checked_action
 from veca_marl.sim.body.anatomy.skeleton import Underside, forward_kinematics
 from veca_marl.sim.body.anatomy.urdf import Build
-from veca_marl.sim.body.base import Body, BodyCfg
+from veca_marl.sim.body.base import Body
+from veca_marl.sim.body.body_cfg import BodyCfg
 from veca_marl.sim.body.humanoid.articulation import Articulation, damping_number
 from veca_marl.sim.body.humanoid.humanoid_cfg import Detail, HumanoidCfg
 from veca_marl.sim.body.humanoid.joint_control import (

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum
 
-from veca_marl.sim.body.base import BodyCfg
+from veca_marl.sim.body.body_cfg import BodyCfg
 from veca_marl.sim.body.humanoid.joint_control import JointActionKind, JointChoice
 
 

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from veca_marl.sim.body.action import Action
 from veca_marl.sim.body.anatomy.skeleton import Soles, forward_kinematics
-from veca_marl.sim.body.base import Body, BodyCfg
+from veca_marl.sim.body.base import Body
+from veca_marl.sim.body.body_cfg import BodyCfg
 from veca_marl.sim.body.walker.capsule import Capsule
 from veca_marl.sim.body.walker.gait import Gait
 from veca_marl.sim.body.walker.walk_commands import WALK_ACTIONS

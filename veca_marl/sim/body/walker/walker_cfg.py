@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from veca_marl.sim.body.base import BodyCfg
+from veca_marl.sim.body.body_cfg import BodyCfg
 from veca_marl.sim.body.walker.walk_commands import WalkActionKind
 
 

@@ -1,0 +1,36 @@
+"""The parameters that all bodies have."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from enum import Enum
+
+from veca_marl.sim.body.voice import VoiceKind
+
+
+@dataclass
+class BodyCfg:
+    """Parameters that all bodies have.
+
+    Attributes:
+        eye_range_deg: Largest rotation of the eyes in the head, to each side and up and down.
+        voice: Whether the action has a part `voice` that chooses a call.
+    """
+
+    eye_range_deg: float = 50.0
+    voice: VoiceKind = VoiceKind.silent
+
+    def __post_init__(self) -> None:
+        """Check that all numbers are finite and not negative."""
+        self._check_choices(voice=VoiceKind)
+        for name, value in vars(self).items():
+            if isinstance(value, (int, float)) and not (math.isfinite(value) and value >= 0):
+                raise ValueError(f"body.{name}={value} must be a finite number, 0 or more")
+
+    def _check_choices(self, **kinds: type[Enum]) -> None:
+        """Raise `ValueError` for a field that is no member of its enumeration."""
+        for name, kind in kinds.items():
+            if not isinstance(getattr(self, name), kind):
+                choices = [choice.name for choice in kind]
+                raise ValueError(f"body.{name}={getattr(self, name)!r}; there are {choices}")
