@@ -1,4 +1,4 @@
-"""Small worlds in which the tests of physics and of the walking body happen."""
+"""Small worlds for the tests of physics and of the walking body."""
 
 import math
 
@@ -33,7 +33,7 @@ def box(name="box", edges_m=(0.3, 0.3, 0.3), mass_kg=0.5, position=(1.0, 0.0, 0.
 
 
 def wall(name="wall", length_m=6.0, thickness_m=0.1, position=(1.0, 0.0, 0.0), yaw_deg=90.0):
-    """A wall across the x axis, unless turned."""
+    """Return a wall across the x axis, rotated by `yaw_deg`."""
     return PropCfg(
         name=name,
         shape=PropShape.wall,
@@ -44,7 +44,7 @@ def wall(name="wall", length_m=6.0, thickness_m=0.1, position=(1.0, 0.0, 0.0), y
 
 
 def empty_world(*props, **more):
-    """A floor with nothing on it but these props."""
+    """Return a world with a floor and these props."""
     room = RoomCfg(lower_m=(-20.0, -20.0, 0.0), size_m=(40.0, 40.0, 3.0))
     return World(PlaygroundCfg(name="test", rooms=[room], props=list(props), image_order=0), **more)
 
@@ -61,7 +61,7 @@ def let_pass(world, seconds):
 
 
 def film(world, steps):
-    """Step and return where every frame was, ``(steps, frames, 3)``."""
+    """Step and return the positions of all frames, ``(steps, frames, 3)``."""
     seen = []
     for _ in range(steps):
         world.step()

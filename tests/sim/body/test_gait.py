@@ -1,4 +1,4 @@
-"""How a walking child looks: feet, joints, head."""
+"""The gait: feet on the floor, joint limits, continuity, kick and head."""
 
 import math
 
@@ -17,7 +17,7 @@ WALKS = [(1.0, 0.0), (0.5, 0.0), (0.2, 0.0), (-1.0, 0.0), (0.0, 2.0), (1.0, 1.5)
 
 
 def steps_of(walker, world, steps):
-    """Yield after each step; the bones are where they were drawn."""
+    """Yield the poses of the bones after each step."""
     for _ in range(steps):
         world.step()
         yield walker._drawn.positions, walker._drawn.rotations
@@ -34,7 +34,7 @@ def test_the_lowest_sole_is_on_the_floor(walk):
 
 
 @pytest.mark.parametrize("walk", WALKS)
-def test_all_joints_stay_within_their_limits_without_being_cut(walk):
+def test_joint_angles_are_within_the_limits_before_clipping(walk):
     gait = Gait(SKELETON)
     gait._low, gait._high = np.full(82, -np.inf), np.full(82, np.inf)
     gait._turn_neck = lambda *_: None
@@ -49,8 +49,8 @@ def test_all_joints_stay_within_their_limits_without_being_cut(walk):
 
 
 @pytest.mark.parametrize("speed", [1.0, 0.6, 0.3, -0.7])
-def test_a_foot_that_carries_stays_where_it_is(speed):
-    """At least one sole stands still at every moment of a steady walk."""
+def test_the_foot_in_stance_does_not_slip(speed):
+    """At least one sole is at rest at every moment of a steady walk."""
     world = empty_world()
     walker = walker_in(world, walk_speed_mps=1.0)
     walker.walk(speed, 0.0)
@@ -59,13 +59,13 @@ def test_a_foot_that_carries_stays_where_it_is(speed):
     places = np.array([p[feet].copy() for p, _ in steps_of(walker, world, 50)])
     slid = np.linalg.norm(np.diff(places, axis=0), axis=2).min(axis=1) / 0.04
     assert np.median(slid) < 0.02 * abs(speed)
-    # in the step in which the weight changes over, neither foot stands for all of it
+    # in the step in which the stance changes, neither foot is at rest for the whole step
     assert np.mean(slid < 0.1 * abs(speed)) > 0.6
 
 
 @pytest.mark.parametrize(("speed", "turn"), [(0.8, 0.8), (0.5, -1.0), (0.0, 1.5)])
-def test_on_a_curve_the_outer_foot_goes_further(speed, turn):
-    """Each foot keeps to its own circle, so the ankle that carries hardly slides."""
+def test_the_foot_in_stance_does_not_slip_on_a_curve(speed, turn):
+    """Each foot follows its own circle, so the ankle in stance hardly slips."""
     world = empty_world()
     walker = walker_in(world)
     walker.walk(speed, turn)
@@ -76,7 +76,7 @@ def test_on_a_curve_the_outer_foot_goes_further(speed, turn):
     assert np.median(slid) < 0.3 * abs(turn) * 0.045
 
 
-def test_both_feet_walk():
+def test_both_feet_lift_in_turn():
     world = empty_world()
     walker = walker_in(world)
     walker.walk(1.0, 0.0)
@@ -87,7 +87,7 @@ def test_both_feet_walk():
     assert np.corrcoef(heights.T)[0, 1] < -0.3
 
 
-def test_the_arms_swing_against_the_legs():
+def test_arms_and_legs_swing_in_opposition():
     gait = Gait(SKELETON)
     arm, leg = SKELETON.joint("l_upper_arm", "flexion"), SKELETON.joint("l_thigh", "flexion")
     seen = []
@@ -105,7 +105,7 @@ def test_standing_is_still():
     np.testing.assert_array_equal(one, gait.pose(0.0, 0.0))
 
 
-def test_a_walker_who_stops_comes_to_stand():
+def test_a_walker_that_stops_returns_to_the_standing_pose():
     gait = Gait(SKELETON)
     standing = gait.pose(0.0, 0.0).copy()
     for speed in (1.0, 0.0):
@@ -114,8 +114,8 @@ def test_a_walker_who_stops_comes_to_stand():
     np.testing.assert_allclose(gait.pose(0.0, 0.0), standing, atol=1e-3)
 
 
-def test_nothing_jumps():
-    """No joint turns faster than a child's, though the commands jump."""
+def test_joint_angles_are_continuous():
+    """Joint speeds stay below those of a child although the commands change at once."""
     gait, rng, fastest = Gait(SKELETON), np.random.default_rng(0), 0.0
     before = gait.pose(0.0, 0.0).copy()
     for step in range(400):
@@ -141,19 +141,19 @@ def test_a_kick_swings_the_right_leg_and_ends():
     np.testing.assert_allclose(path[-1], 0.0, atol=1e-3)
 
 
-@pytest.mark.parametrize("share", [-1.0, -0.5, 0.3, 1.0])
-def test_the_neck_and_the_head_share_a_turn_exactly(share):
+@pytest.mark.parametrize("fraction", [-1.0, -0.5, 0.3, 1.0])
+def test_neck_and_head_rotations_add_up_to_the_commanded_angle(fraction):
     world = empty_world()
     walker = walker_in(world, head_pitch_deg=0.0)
     down, left = walker._gait.pitch_range_rad, walker._gait.yaw_range_rad
-    pitch = share * down[1] if share > 0 else -share * down[0]
+    pitch = fraction * down[1] if fraction > 0 else -fraction * down[0]
     walker.rotate_up_down_head(math.degrees(pitch))
     world.step()
     forward = walker.mount("head").rotation[:, 0]
     assert math.asin(-forward[2]) == pytest.approx(pitch, abs=1e-9)
     walker.rotate_up_down_head(-math.degrees(pitch))
-    walker.rotate_left_right_head(-math.degrees(share * left[1]))
+    walker.rotate_left_right_head(-math.degrees(fraction * left[1]))
     world.step()
     forward = walker.mount("head").rotation[:, 0]
     turned = math.atan2(forward[1], forward[0])
-    assert turned == pytest.approx(math.remainder(share * left[1], math.tau), abs=1e-9)
+    assert turned == pytest.approx(math.remainder(fraction * left[1], math.tau), abs=1e-9)

@@ -1,11 +1,11 @@
-"""The joint-level body: how it is placed, read, and what its hands carry."""
+"""The joint-level body: names, placing, physics, resets and palms."""
 
 import math
 from pathlib import Path
 
 import numpy as np
 import pytest
-from heaps import thrash
+from humanoids import random_torques
 from walking import empty_world, let_pass
 
 from veca_marl.sim.body import MOUNTS, Body, BodyCfg, make_body
@@ -28,7 +28,7 @@ ALL = [bone.name for bone in SKELETON.bones]
 
 
 @pytest.mark.parametrize("detail", Detail)
-def test_both_details_speak_of_47_bones_and_82_joints(make_child, detail):
+def test_both_details_have_47_bones_and_82_joints(make_child, detail):
     _, body = make_child(detail=detail)
     assert len(body.bone_names) == len(set(body.bone_names)) == 47
     assert len(body.joint_names) == len(set(body.joint_names)) == 82
@@ -49,12 +49,12 @@ def test_it_is_made_by_its_configuration():
     world.close()
 
 
-# ---- where it is
+# ---- placing and reading
 
 
 @pytest.mark.parametrize("name", sorted(POSTURES))
 @pytest.mark.parametrize("height_m", [0.0, 0.4])
-def test_its_lowest_point_is_where_it_is_placed(make_child, name, height_m):
+def test_the_lowest_point_is_at_the_height_of_the_place(make_child, name, height_m):
     world, body = make_child()
     body.place((1.0, -2.0, height_m), 0.8, POSTURES[name])
     world.refresh()
@@ -68,10 +68,10 @@ def test_its_lowest_point_is_where_it_is_placed(make_child, name, height_m):
     np.testing.assert_allclose(body.forward, (math.cos(0.8), math.sin(0.8), 0.0), atol=1e-9)
 
 
-def test_velocities_are_those_that_bullet_has(make_child):
+def test_velocities_equal_those_of_bullet(make_child):
     world, body = make_child()
     client, body_id = world.client, body.body_id
-    for _ in thrash(world, [body], 1.0):
+    for _ in random_torques(world, [body], 1.0):
         pass
     velocities, spins = body.velocities(), body.angular_velocities()
     assert np.abs(spins).max() > 5.0
@@ -81,7 +81,7 @@ def test_velocities_are_those_that_bullet_has(make_child):
             continue
         state = pybullet.getLinkState(body_id, link, 1, 1, physicsClientId=client)
         bone = body.bone_names.index(name)
-        lever = np.subtract(state[0], state[4])  # Bullet's is that of the centre of mass
+        lever = np.subtract(state[0], state[4])  # Bullet gives that of the centre of mass
         np.testing.assert_allclose(spins[bone], state[7], atol=1e-6)
         np.testing.assert_allclose(
             velocities[bone] + np.cross(spins[bone], lever), state[6], atol=1e-3
@@ -90,7 +90,7 @@ def test_velocities_are_those_that_bullet_has(make_child):
 
 def test_fingers_of_a_mitten_are_straight_and_follow_the_hand(make_child):
     world, body = make_child(detail=Detail.mitten)
-    for _ in thrash(world, [body], 1.0):
+    for _ in random_torques(world, [body], 1.0):
         pass
     hand, finger = body.bone("l_hand"), body.bone("l_index_distal")
     local = hand.rotation.T @ (finger.position - hand.position)
@@ -137,7 +137,7 @@ def test_impossible_places_are_refused(make_child, position, posture, message):
         ({"eye_range_deg": -1.0}, r"body.eye_range_deg=-1.0"),
     ],
 )
-def test_impossible_numbers_are_refused(numbers, message):
+def test_impossible_parameters_are_refused(numbers, message):
     with pytest.raises(ValueError, match=message):
         HumanoidCfg(**numbers)
 
@@ -145,7 +145,7 @@ def test_impossible_numbers_are_refused(numbers, message):
 # ---- physics
 
 
-def test_a_fall_is_free_until_the_floor(make_child):
+def test_a_fall_is_a_free_fall(make_child):
     world, body = make_child()
     body.place((0.0, 0.0, 1.0))
     start = body.position[2]
@@ -154,7 +154,7 @@ def test_a_fall_is_free_until_the_floor(make_child):
     assert body.position[2] - start == pytest.approx(-0.5 * 9.81 * 0.2**2, rel=0.06)
 
 
-def test_fingers_and_palms_and_soles_are_softer_than_bones(make_child):
+def test_fingers_palms_and_soles_are_compliant(make_child):
     world, body = make_child()
     client, body_id = world.client, body.body_id
     stiff = {}
@@ -164,11 +164,11 @@ def test_fingers_and_palms_and_soles_are_softer_than_bones(make_child):
     for name in ("l_hand__skin", "r_foot__skin", "l_index_distal"):
         bone = SKELETON.bones[SKELETON.bone(name.removesuffix("__skin"))]
         assert stiff[name] == pytest.approx(skin_spring(bone).stiffness_npm)
-    assert stiff["l_hand"] == stiff["chest"] < 0.0, "Bullet's word for rigid"
+    assert stiff["l_hand"] == stiff["chest"] < 0.0, "Bullet's value for rigid"
 
 
-def test_skin_that_carries_weight_is_pressed_in_by_it(make_child):
-    """Hooke, at every point in which a sitting child's hands and feet rest on the floor."""
+def test_loaded_skin_is_compressed_by_hookes_law(make_child):
+    """At every contact of the hands and feet of a sitting body with the floor."""
     world, body = make_child(action=JointActionKind.position)
     body.place((0.0, 0.0, 0.0), 0.0, POSTURES["sitting"])
     wanted = posture_angles(SKELETON, POSTURES["sitting"])
@@ -185,7 +185,7 @@ def test_skin_that_carries_weight_is_pressed_in_by_it(make_child):
 
 
 @pytest.mark.slow
-def test_ten_thousand_resets_take_no_memory(make_child):
+def test_ten_thousand_resets_allocate_no_memory(make_child):
     world, body = make_child(detail=Detail.mitten)
 
     def resident_kb():
@@ -204,22 +204,22 @@ def test_ten_thousand_resets_take_no_memory(make_child):
     assert resident_kb() - before < 1000
 
 
-def test_many_resets_leave_no_trace(make_child):
+def test_many_resets_do_not_change_an_episode(make_child):
     world, body = make_child(detail=Detail.mitten)
 
-    def film():
+    def episode():
         world.reset(np.random.default_rng(0))
         body.place((0.0, 0.0, 0.0), 0.3, ON_BACK)
-        return [body.bone_positions() for _ in thrash(world, [body], 0.4)]
+        return [body.bone_positions() for _ in random_torques(world, [body], 0.4)]
 
-    first = film()
+    first = episode()
     for _ in range(200):
         world.reset(np.random.default_rng(0))
-    np.testing.assert_array_equal(film(), first)
+    np.testing.assert_array_equal(episode(), first)
 
 
 @pytest.mark.parametrize("what", ["base", "joint"])
-def test_a_simulation_that_breaks_is_told_and_shows_no_nan(make_child, what):
+def test_a_body_with_nan_is_reported_and_shows_finite_numbers(make_child, what):
     world, body = make_child()
     world.step()
     nan = math.nan
@@ -237,7 +237,7 @@ def test_a_simulation_that_breaks_is_told_and_shows_no_nan(make_child, what):
     for seen in (body.bone_positions(), body.velocities(), body.joint_angles(), body.position):
         assert np.isfinite(seen).all()
     world.reset(np.random.default_rng(0))
-    assert not body.is_finite, "Bullet's collisions are lost for good"
+    assert not body.is_finite, "Bullet's collision detection does not recover"
 
 
 # ---- palms

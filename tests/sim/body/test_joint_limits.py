@@ -1,14 +1,20 @@
-"""Joint limits hold exactly, at every physics step, and holding them gives no energy."""
+"""Joint limits hold exactly at every physics step, and holding them adds no energy."""
 
 import numpy as np
 import pytest
-from heaps import fling, heap, kinetic_energy, thrash, weightless
-from veca_marl.sim.body.humanoid.articulation import damping_number
+from humanoids import (
+    kinetic_energy,
+    random_torques,
+    remove_gravity,
+    set_random_joint_speeds,
+    several_humanoids,
+)
 from walking import empty_world
 
 from veca_marl.sim.body.anatomy.skeleton import load_skeleton
 from veca_marl.sim.body.humanoid import Detail, Humanoid, HumanoidCfg
 from veca_marl.sim.physics import ClockCfg
+from veca_marl.sim.body.humanoid.articulation import damping_number
 
 LOW = np.array([joint.low_rad for joint in load_skeleton().joints])
 HIGH = np.array([joint.high_rad for joint in load_skeleton().joints])
@@ -16,13 +22,13 @@ HIGH = np.array([joint.high_rad for joint in load_skeleton().joints])
 
 @pytest.fixture(params=Detail)
 def alone(request):
-    world, (body,) = heap(1, request.param)
+    world, (body,) = several_humanoids(1, request.param)
     yield world, body
     world.close()
 
 
 def watch_limits(world, body):
-    """Return a list that grows by Bullet's angles after every physics step, hold included."""
+    """Return a list to which Bullet's angles are added after every physics step."""
     seen = []
 
     def note():
@@ -33,51 +39,51 @@ def watch_limits(world, body):
     return seen
 
 
-def test_no_joint_is_beyond_its_stop_after_any_substep(alone):
+def test_no_joint_is_beyond_its_limit_after_any_physics_step(alone):
     world, body = alone
     seen = watch_limits(world, body)
-    for _ in thrash(world, [body], 2.0):
+    for _ in random_torques(world, [body], 2.0):
         pass
     seen = np.array(seen)
     assert len(seen) == 2 * 25 * 5
     assert (seen >= LOW).all()
     assert (seen <= HIGH).all()
-    assert ((seen == LOW) | (seen == HIGH)).any(0).sum() > 30, "many stops were met"
+    assert ((seen == LOW) | (seen == HIGH)).any(0).sum() > 30, "many limits were reached"
 
 
-@pytest.mark.parametrize("way", [1.0, -1.0])
-def test_all_joints_pressed_against_their_stops_stay_there(alone, way):
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_joints_driven_against_their_limits_stay_there(alone, sign):
     world, body = alone
-    weightless(world)
+    remove_gravity(world)
     body.place((0.0, 0.0, 2.0))
-    body.act({"joints": np.full(82, way)})
+    body.act({"joints": np.full(82, sign)})
     for _ in range(50):
         world.step()
     moving = body._articulation.moving
-    away = np.abs(body.joint_angles() - (HIGH if way > 0 else LOW))[moving]
-    # self-collision keeps a few from their stops
-    assert np.mean(away < np.radians(1.0)) > 0.8
+    distance = np.abs(body.joint_angles() - (HIGH if sign > 0 else LOW))[moving]
+    # self-collision keeps a few from their limits
+    assert np.mean(distance < np.radians(1.0)) > 0.8
     assert (body.joint_angles() <= HIGH).all()
     assert (body.joint_angles() >= LOW).all()
 
 
 @pytest.mark.parametrize("speed_radps", [5.0, 15.0])
-def test_a_weightless_body_that_hits_its_stops_gains_no_energy(alone, speed_radps):
+def test_reaching_the_limits_adds_no_energy_without_gravity(alone, speed_radps):
     world, body = alone
-    weightless(world)
+    remove_gravity(world)
     body.place((0.0, 0.0, 2.0))
-    fling(world, body, speed_radps)
-    energies, met = [kinetic_energy(world, body)], 0
+    set_random_joint_speeds(world, body, speed_radps)
+    energies, reached = [kinetic_energy(world, body)], 0
     for _ in range(25):
         world.step()
         energies.append(kinetic_energy(world, body))
-        met += int(((body.joint_angles() == LOW) | (body.joint_angles() == HIGH)).sum())
-    assert met > 30
+        reached += int(((body.joint_angles() == LOW) | (body.joint_angles() == HIGH)).sum())
+    assert reached > 30
     assert (np.diff(energies) <= 0.0).all()
 
 
 def test_damping_is_stable_in_all_postures(alone):
-    """Explicit damping: ``dt max eig(M^-1 D) <= 1``; from 2 on it would explode."""
+    """Explicit damping: ``dt max eig(M^-1 D) <= 1``; above 2 it is unstable."""
     world, body = alone
     rng = np.random.default_rng(0)
     for _ in range(50):

@@ -1,4 +1,4 @@
-"""Kicks: how far the foot reaches, how fast a ball leaves, and what is not kicked."""
+"""Kicks: their reach, the speed of a kicked ball, and props that cannot be kicked."""
 
 import math
 
@@ -20,26 +20,26 @@ def test_a_kick_sends_a_ball_away_at_the_documented_speed(mass_kg):
 
 
 @pytest.mark.parametrize(
-    ("thing", "why"),
+    ("prop_cfg", "reason"),
     [
         (ball(position=(0.5, 0.0, 0.1)), "out of reach"),
         (ball(position=(-0.25, 0.0, 0.1)), "behind"),
-        (ball(position=(0.0, 0.25, 0.1)), "aside"),
+        (ball(position=(0.0, 0.25, 0.1)), "to the side"),
         (ball(mass_kg=6.0, position=(0.25, 0.0, 0.1)), "too heavy"),
-        (box(mass_kg=0.0, position=(0.3, 0.0, 0.15)), "part of the building"),
+        (box(mass_kg=0.0, position=(0.3, 0.0, 0.15)), "fixed"),
         (ball(position=(0.25, 0.0, 0.7)), "too high"),
     ],
 )
-def test_a_kick_is_refused(thing, why):
-    world = empty_world(thing)
+def test_a_kick_is_refused(prop_cfg, reason):
+    world = empty_world(prop_cfg)
     walker = walker_in(world)
-    prop = world.prop(thing.name)
-    assert not walker.can_kick(prop), why
+    prop = world.prop(prop_cfg.name)
+    assert not walker.can_kick(prop), reason
     assert not walker.kick(prop)
     np.testing.assert_array_equal(prop.velocity, 0.0)
 
 
-def test_the_reach_of_the_foot_comes_from_the_configuration():
+def test_the_reach_of_a_kick_is_configured():
     reach = []
     for kick_reach_m in (0.1, 0.3):
         world = empty_world(ball())

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from heaps import weightless
+from humanoids import remove_gravity
 from walking import empty_world, let_pass, walker_in
 
 from veca_marl.sim.body.humanoid import Detail, Humanoid, HumanoidCfg
@@ -88,7 +88,7 @@ def test_free_fall_senses_no_specific_force(child):
 
 def test_weightless_rest_senses_the_specific_force_of_a_rocket(child):
     world, body = child
-    weightless(world)
+    remove_gravity(world)
     body.place((0.0, 0.0, 3.0))
     sense = sense_of(world, body)
     let_pass(world, STEP_S)

@@ -1,4 +1,4 @@
-"""Which parts of a body meet: limbs meet the trunk and each other, never themselves."""
+"""Self-collision: limbs collide with the trunk and with each other, not with themselves."""
 
 import numpy as np
 import pytest
@@ -13,13 +13,13 @@ from veca_marl.sim.physics import pybullet
 BONES = [bone.name for bone in load_skeleton().bones]
 
 
-def test_every_bone_is_of_one_of_five_limbs():
+def test_every_bone_belongs_to_one_of_five_limbs():
     count = {name: sum(limb(bone) == name for bone in BONES) for name in map(limb, BONES)}
     assert count == {"trunk": 5, "l_arm": 18, "r_arm": 18, "l_leg": 3, "r_leg": 3}
 
 
 @pytest.mark.parametrize(
-    ("a", "b", "meet"),
+    ("a", "b", "collide"),
     [
         ("l_hand", "head", True),
         ("l_hand", "r_index_distal", True),
@@ -31,13 +31,13 @@ def test_every_bone_is_of_one_of_five_limbs():
         ("head", "chest", False),
     ],
 )
-def test_who_meets_whom(a, b, meet):
-    assert may_collide(a, b) is may_collide(b, a) is meet
+def test_pairs_that_collide(a, b, collide):
+    assert may_collide(a, b) is may_collide(b, a) is collide
 
 
 @pytest.fixture
 def floating():
-    """A body without weight, far from the floor, that goes to commanded angles."""
+    """Return a position-controlled body without gravity, far from the floor."""
     world = empty_world()
     body = Humanoid("child", HumanoidCfg(action=JointActionKind.position), world)
     pybullet.setGravity(0.0, 0.0, 0.0, physicsClientId=world.client)
@@ -60,7 +60,7 @@ def go_to(world, body, **degrees):
     return angles
 
 
-def test_who_stands_touches_nothing_of_himself_but_the_thighs_with_the_hands(floating):
+def test_a_standing_body_has_contacts_of_hands_and_thighs_only(floating):
     world, body = floating
     let_pass(world, 0.2)
     hands = [body.bone(f"{side}_hand").position for side in "lr"]
@@ -69,7 +69,7 @@ def test_who_stands_touches_nothing_of_himself_but_the_thighs_with_the_hands(flo
         assert -contact[8] < 0.0035, "no deeper than the skin of the hand"
 
 
-def test_legs_stop_each_other(floating):
+def test_the_legs_do_not_pass_through_each_other(floating):
     world, body = floating
     wanted = go_to(world, body, **{"thigh.abduction": -25.0})
     assert contacts(world, body)

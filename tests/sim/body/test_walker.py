@@ -1,4 +1,4 @@
-"""The walking body: where it goes, what its head and eyes do, whom it hears, what it refuses."""
+"""The walking body: motion, head and eyes, voice, and impossible arguments."""
 
 import math
 
@@ -23,22 +23,22 @@ def down_deg(pose):
     return math.degrees(math.asin(-pose.rotation[2, 0]))
 
 
-# ---- where it goes
+# ---- motion
 
 
 @pytest.mark.parametrize("speed", [1.0, 0.25, -0.8])
-def test_it_walks_as_fast_as_it_is_told(speed):
+def test_it_walks_at_the_commanded_speed(speed):
     world = empty_world()
     walker = walker_in(world, yaw_deg=30.0)
     walker.walk(speed, 0.0)
     let_pass(world, 2.0)
-    way = 2.0 * speed * np.array([math.cos(math.pi / 6), math.sin(math.pi / 6), 0.0])
-    np.testing.assert_allclose(walker.position[:2], way[:2], atol=1e-9)
-    np.testing.assert_allclose(walker.velocity, way / 2.0, atol=1e-9)
+    distance = 2.0 * speed * np.array([math.cos(math.pi / 6), math.sin(math.pi / 6), 0.0])
+    np.testing.assert_allclose(walker.position[:2], distance[:2], atol=1e-9)
+    np.testing.assert_allclose(walker.velocity, distance / 2.0, atol=1e-9)
 
 
 @pytest.mark.parametrize("turn_degps", [90.0, -45.0])
-def test_it_turns_as_fast_as_it_is_told_and_left_is_positive(turn_degps):
+def test_it_turns_at_the_commanded_speed_and_left_is_positive(turn_degps):
     world = empty_world()
     walker = walker_in(world)
     walker.walk(0.0, math.radians(turn_degps))
@@ -47,8 +47,8 @@ def test_it_turns_as_fast_as_it_is_told_and_left_is_positive(turn_degps):
     np.testing.assert_allclose(walker.position[:2], 0.0, atol=1e-12)
 
 
-def test_it_walks_round_a_circle():
-    """Radius = speed / turn rate; after a full turn it is back, but for the substeps' chords."""
+def test_it_walks_in_a_circle():
+    """Radius = speed / turn rate; after a full turn it is back at its start."""
     world = empty_world()
     walker = walker_in(world)
     walker.walk(1.0, 2.0 * math.pi / 4.0)
@@ -76,7 +76,7 @@ def test_backward_is_slower():
     np.testing.assert_allclose(walker.velocity, (-0.2, 0.0, 0.0), atol=1e-6)
 
 
-def test_an_action_holds_until_the_next():
+def test_an_action_lasts_until_the_next():
     world = empty_world()
     walker = walker_in(world)
     walker.act({"move": np.array([1.0, 0.0], np.float32)})
@@ -87,7 +87,7 @@ def test_an_action_holds_until_the_next():
 
 
 @pytest.mark.parametrize("move", MOVES)
-def test_discrete_moves_are_continuous_ones(move):
+def test_discrete_moves_equal_continuous_ones(move):
     positions = []
     for kind in WalkActionKind:
         world = empty_world()
@@ -99,7 +99,7 @@ def test_discrete_moves_are_continuous_ones(move):
 
 
 @pytest.mark.parametrize(
-    ("kind", "row"),
+    ("kind", "value"),
     [
         (WalkActionKind.continuous, np.array([np.nan, 0.0])),
         (WalkActionKind.continuous, np.array([0.0, np.inf])),
@@ -117,11 +117,11 @@ def test_discrete_moves_are_continuous_ones(move):
         (WalkActionKind.discrete, np.array(True)),
     ],
 )
-def test_impossible_actions_are_refused_and_nothing_moves(kind, row):
+def test_impossible_actions_are_refused_and_nothing_moves(kind, value):
     world = empty_world()
     walker = walker_in(world, action=kind)
     with pytest.raises(ValueError, match="action") as refusal:
-        walker.act({"move": row})
+        walker.act({"move": value})
     assert "'move'" in str(refusal.value)
     before = world.scene.positions.copy()
     let_pass(world, 0.04)
@@ -131,7 +131,7 @@ def test_impossible_actions_are_refused_and_nothing_moves(kind, row):
 # ---- head and eyes
 
 
-def test_the_head_nods_down_and_shakes_right_for_positive_degrees():
+def test_positive_head_angles_are_down_and_right():
     world = empty_world()
     walker = walker_in(world, head_pitch_deg=0.0)
     walker.rotate_up_down_head(20.0)
@@ -146,16 +146,16 @@ def test_the_head_nods_down_and_shakes_right_for_positive_degrees():
     assert bearing_deg(walker.mount("head")) == pytest.approx(-40.0)
 
 
-def test_the_head_stops_where_the_neck_ends():
+def test_head_angles_are_clipped_to_the_range_of_the_neck():
     world = empty_world()
     walker = walker_in(world)
-    for turn, reached, stop in (
+    for turn, reached, limit in (
         (walker.rotate_up_down_head, down_deg, 80.0),
         (walker.rotate_up_down_head, down_deg, -70.0),
     ):
-        turn(math.copysign(500.0, stop))
+        turn(math.copysign(500.0, limit))
         let_pass(world, 0.04)
-        assert reached(walker.mount("head")) == pytest.approx(stop)
+        assert reached(walker.mount("head")) == pytest.approx(limit)
     walker.place((0.0, 0.0, 0.0))
     walker.rotate_up_down_head(-12.0)
     walker.rotate_left_right_head(500.0)
@@ -167,7 +167,7 @@ def test_the_head_stops_where_the_neck_ends():
 
 
 @pytest.mark.parametrize("wrong", [math.nan, math.inf])
-def test_a_head_cannot_turn_by_no_number(wrong):
+def test_head_angles_must_be_finite(wrong):
     walker = walker_in(empty_world())
     with pytest.raises(ValueError, match="degrees"):
         walker.rotate_up_down_head(wrong)
@@ -175,7 +175,7 @@ def test_a_head_cannot_turn_by_no_number(wrong):
         walker.rotate_left_right_head(wrong)
 
 
-def test_both_eyes_meet_at_the_point_they_look_toward():
+def test_both_eyes_look_at_the_point():
     world = empty_world()
     walker = walker_in(world)
     head = walker.mount("head").rotation
@@ -183,15 +183,15 @@ def test_both_eyes_meet_at_the_point_they_look_toward():
         walker.look_toward_point(point)
         for eye in ("eye_left", "eye_right"):
             pose = walker.mount(eye)
-            way = np.array(point) - pose.position
-            np.testing.assert_allclose(pose.rotation[:, 0], way / np.linalg.norm(way), atol=1e-9)
+            line = np.array(point) - pose.position
+            np.testing.assert_allclose(pose.rotation[:, 0], line / np.linalg.norm(line), atol=1e-9)
             np.testing.assert_allclose(pose.rotation.T @ pose.rotation, np.eye(3), atol=1e-12)
             assert np.linalg.det(pose.rotation) == pytest.approx(1.0)
     np.testing.assert_array_equal(walker.mount("head").rotation, head)
     np.testing.assert_array_equal(walker.mount("ear_left").rotation, head)
 
 
-def test_eyes_converge_on_what_is_near():
+def test_eyes_converge_on_near_points():
     walker = walker_in(empty_world())
 
     def convergence_deg(distance_m):
@@ -206,7 +206,7 @@ def test_eyes_converge_on_what_is_near():
         assert convergence_deg(distance_m) == pytest.approx(expected, rel=1e-6)
 
 
-def test_eyes_keep_their_point_while_walking_until_released():
+def test_eyes_keep_looking_at_the_point_until_released():
     world = empty_world()
     walker = walker_in(world)
     walker.look_toward_point((3.0, 1.0, 0.5))
@@ -214,13 +214,13 @@ def test_eyes_keep_their_point_while_walking_until_released():
     for _ in range(25):
         world.step()
         pose = walker.mount("eye_left")
-        way = np.array([3.0, 1.0, 0.5]) - pose.position
-        np.testing.assert_allclose(pose.rotation[:, 0], way / np.linalg.norm(way), atol=1e-9)
+        line = np.array([3.0, 1.0, 0.5]) - pose.position
+        np.testing.assert_allclose(pose.rotation[:, 0], line / np.linalg.norm(line), atol=1e-9)
     walker.release_look()
     np.testing.assert_array_equal(walker.mount("eye_left").rotation, walker.mount("head").rotation)
 
 
-def test_eyes_turn_only_as_far_as_their_muscles_reach():
+def test_eye_rotations_are_clipped_to_their_range():
     walker = walker_in(empty_world(), head_pitch_deg=0.0, eye_range_deg=40.0)
     walker.look_toward_point((-5.0, 0.1, 0.7))
     ahead = walker.mount("head").rotation[:, 0]
@@ -230,12 +230,12 @@ def test_eyes_turn_only_as_far_as_their_muscles_reach():
 
 
 @pytest.mark.parametrize("wrong", [(1.0, 2.0), (1.0, np.nan, 0.0), "up"])
-def test_eyes_cannot_look_nowhere(wrong):
+def test_points_to_look_at_must_be_three_finite_numbers(wrong):
     with pytest.raises(ValueError, match=r"look toward|could not convert"):
         walker_in(empty_world()).look_toward_point(wrong)
 
 
-def test_the_lenses_take_a_positive_distance():
+def test_focal_distances_must_be_positive():
     walker = walker_in(empty_world())
     walker.adjust_focal_length(0.4)
     assert walker.focal_distance_m == 0.4
@@ -245,7 +245,7 @@ def test_the_lenses_take_a_positive_distance():
             walker.adjust_focal_length(wrong)
 
 
-def test_the_organs_are_where_a_face_has_them():
+def test_the_organs_have_anatomical_positions():
     walker = walker_in(empty_world(), head_pitch_deg=0.0)
     at = {name: walker.mount(name).position for name in MOUNTS}
     assert at["eye_left"][1] > 0.0 > at["eye_right"][1]
@@ -258,7 +258,7 @@ def test_the_organs_are_where_a_face_has_them():
         walker.mount("nose")
 
 
-def test_it_sees_what_is_before_its_eyes():
+def test_objects_in_front_of_the_eyes_are_visible():
     world = empty_world(ball(), ball("behind", position=(-1.0, 0.0, 0.1)))
     walker, other = walker_in(world), walker_in(world, "other", place=(1.5, 0.3, 0.0))
     world.refresh()
@@ -273,7 +273,7 @@ def test_it_sees_what_is_before_its_eyes():
         is_visible(world.scene, walker, other, "third")
 
 
-def test_a_wall_hides():
+def test_a_wall_occludes():
     world = empty_world(ball(position=(2.0, 0.0, 0.1)), wall(position=(1.0, 0.0, 0.0)))
     walker = walker_in(world)
     world.refresh()
@@ -288,10 +288,10 @@ def hears(world, walker):
     return lambda: np.sqrt(np.mean(sense.read()["waveform"] ** 2))
 
 
-def test_everybody_hears_a_voice_the_speaker_most():
+def test_a_voice_is_loudest_for_the_speaker():
     world = empty_world()
-    speaker, friend = walker_in(world), walker_in(world, "friend", place=(2.0, 0.0, 0.0))
-    own, others = hears(world, speaker), hears(world, friend)
+    speaker, listener = walker_in(world), walker_in(world, "listener", place=(2.0, 0.0, 0.0))
+    own, others = hears(world, speaker), hears(world, listener)
     tone = np.sin(2.0 * np.pi * 300.0 * np.arange(8820) / 22_050).astype(np.float32)
     speaker.make_sound(tone)
     heard = []
@@ -309,7 +309,7 @@ def test_a_silent_world_is_silent():
     assert listen() == 0.0
 
 
-def test_a_new_episode_begins_in_silence():
+def test_a_reset_silences_the_voice():
     world = empty_world()
     walker = walker_in(world)
     listen = hears(world, walker)
@@ -320,17 +320,17 @@ def test_a_new_episode_begins_in_silence():
     assert listen() == 0.0
 
 
-# ---- doors
+# ---- impossible arguments
 
 
 @pytest.mark.parametrize("number", ["walk_speed_mps", "radius_m", "kick_reach_m", "push_limit_kg"])
 @pytest.mark.parametrize("wrong", [-1.0, math.nan, math.inf])
-def test_impossible_bodies_are_refused(number, wrong):
+def test_impossible_parameters_are_refused(number, wrong):
     with pytest.raises(ValueError, match=number):
         WalkerCfg(**{number: wrong})
 
 
-def test_an_unknown_kind_of_action_is_answered_with_those_there_are():
+def test_an_unknown_kind_of_action_is_refused_with_the_choices():
     with pytest.raises(ValueError, match=r"body\.action='fly'.*'continuous', 'discrete'"):
         WalkerCfg(action="fly")
 
@@ -343,12 +343,12 @@ def test_a_capsule_must_be_higher_than_wide():
 
 
 @pytest.mark.parametrize("wrong", [(np.nan, 0.0), (0.0, np.inf)])
-def test_nobody_walks_at_no_speed(wrong):
+def test_speeds_must_be_finite(wrong):
     with pytest.raises(ValueError, match="cannot walk"):
         walker_in(empty_world()).walk(*wrong)
 
 
-def test_nobody_stands_nowhere():
+def test_places_must_be_finite():
     walker = walker_in(empty_world())
     for wrong in (((np.nan, 0.0, 0.0), 0.0), ((0.0, 0.0, 0.0), np.nan)):
         with pytest.raises(ValueError, match="cannot stand"):
@@ -356,7 +356,7 @@ def test_nobody_stands_nowhere():
     np.testing.assert_allclose(walker.position[:2], 0.0)
 
 
-def test_unknown_senses_are_answered_with_those_there_are():
+def test_unknown_senses_are_refused_with_the_choices():
     world = empty_world()
     walker = walker_in(world)
     with pytest.raises(ValueError, match=r"'smell'.*audio.*vision"):

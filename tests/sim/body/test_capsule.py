@@ -1,4 +1,4 @@
-"""The paper's rule of collision: light things give way, heavy ones and walls stop the walker."""
+"""The paper's collision rule: light props are pushed, heavy props and walls stop the walker."""
 
 import math
 
@@ -17,7 +17,7 @@ def depth_in_wall_m(walker, wall_face_x):
 
 
 @pytest.mark.parametrize("speed", [1.0, 0.3, -1.0])
-def test_a_wall_stops_it(speed):
+def test_a_wall_stops_a_walker(speed):
     world = empty_world(wall(position=(math.copysign(1.0, speed), 0.0, 0.0)))
     walker = walker_in(world)
     walker.walk(speed, 0.0)
@@ -37,7 +37,7 @@ def test_a_fast_walker_does_not_tunnel():
         assert depth_in_wall_m(walker, 2.95) < 0.01
 
 
-def test_it_slides_along_a_wall_it_meets_at_45_degrees():
+def test_a_walker_slides_along_a_wall_at_45_degrees():
     world = empty_world(wall(position=(1.0, 0.0, 0.0), length_m=30.0))
     walker = walker_in(world, yaw_deg=45.0)
     walker.walk(1.0, 0.0)
@@ -47,7 +47,7 @@ def test_it_slides_along_a_wall_it_meets_at_45_degrees():
 
 
 @pytest.mark.parametrize("yaw_deg", [20.0, 45.0, 70.0])
-def test_a_corner_holds_it(yaw_deg):
+def test_a_corner_stops_a_walker(yaw_deg):
     world = empty_world(
         wall("east", position=(1.0, 0.0, 0.0)),
         wall("north", position=(0.0, 1.0, 0.0), yaw_deg=0.0),
@@ -59,8 +59,8 @@ def test_a_corner_holds_it(yaw_deg):
 
 
 @pytest.mark.parametrize("half_angle_deg", [20.0, 30.0, 40.0])
-def test_an_acute_corner_holds_it(half_angle_deg):
-    """Out of one wall is into the other: it takes several rounds to find the place."""
+def test_an_acute_corner_stops_a_walker(half_angle_deg):
+    """Depenetration from one wall penetrates the other: several rounds are needed."""
     tip = np.array([1.0, 0.0])
     walls = []
     for name, side in (("left", 1.0), ("right", -1.0)):
@@ -72,13 +72,13 @@ def test_an_acute_corner_holds_it(half_angle_deg):
     walker = walker_in(world, place=(-1.5, 0.0, 0.0))
     walker.walk(1.0, 0.0)
     let_pass(world, 5.0)
-    way_in_m = (RADIUS_M + 0.05) / math.sin(math.radians(half_angle_deg))
+    depth_m = (RADIUS_M + 0.05) / math.sin(math.radians(half_angle_deg))
     slack_m = SLACK_M / math.sin(math.radians(half_angle_deg))
-    assert walker.position[0] == pytest.approx(tip[0] - way_in_m, abs=slack_m)
+    assert walker.position[0] == pytest.approx(tip[0] - depth_m, abs=slack_m)
     assert abs(walker.position[1]) < SLACK_M
 
 
-def test_nobody_gets_out_of_a_room_by_running_at_its_walls():
+def test_a_walker_cannot_leave_a_room_through_its_walls():
     walls = [
         wall("east", position=(1.0, 0.0, 0.0)),
         wall("west", position=(-1.0, 0.0, 0.0)),
@@ -96,7 +96,7 @@ def test_nobody_gets_out_of_a_room_by_running_at_its_walls():
 
 
 @pytest.mark.parametrize("x", [0.9, 0.97, 1.03])
-def test_one_who_is_put_into_a_wall_stands_beside_it(x):
+def test_a_walker_placed_in_a_wall_is_moved_beside_it(x):
     world = empty_world(wall(position=(1.0, 0.0, 0.0)))
     walker = walker_in(world, place=(x, 0.0, 0.0))
     away = abs(walker.position[0] - 1.0)
@@ -105,7 +105,7 @@ def test_one_who_is_put_into_a_wall_stands_beside_it(x):
     assert abs(walker.position[0] - 1.0) == pytest.approx(away, abs=1e-9)
 
 
-def test_where_it_is_put_does_not_depend_on_where_it_was():
+def test_placing_does_not_depend_on_the_earlier_place():
     places = []
     for before in ((0.95, 0.0, 0.0), (-3.0, 2.0, 0.0)):
         world = empty_world(wall(position=(1.0, 0.0, 0.0)))
@@ -116,8 +116,8 @@ def test_where_it_is_put_does_not_depend_on_where_it_was():
     np.testing.assert_array_equal(*places)
 
 
-def test_a_heavy_box_stops_it_and_does_not_move():
-    """Not by a bit: the box is where it would be if nobody walked."""
+def test_a_heavy_box_stops_a_walker_and_does_not_move():
+    """The position of the box equals that in a world without walking, bit by bit."""
     places = []
     for speed in (1.0, 0.0):
         world = empty_world(box(mass_kg=30.0, position=(1.0, 0.0, 0.15)))
@@ -130,7 +130,7 @@ def test_a_heavy_box_stops_it_and_does_not_move():
     np.testing.assert_array_equal(*places)
 
 
-def test_paint_on_the_floor_is_no_obstacle():
+def test_an_intangible_mark_is_no_obstacle():
     mark = PropCfg(
         name="mark",
         shape=PropShape.cylinder,
@@ -144,7 +144,7 @@ def test_paint_on_the_floor_is_no_obstacle():
         assert walker.position[0] == pytest.approx(x, abs=1e-9)
 
 
-def test_a_heavy_thing_that_comes_pushes_it_away():
+def test_a_moving_heavy_prop_displaces_the_walker():
     world = empty_world(box(mass_kg=30.0, position=(1.0, 0.0, 0.15), friction=0.0))
     walker = walker_in(world)
     for _ in range(100):
@@ -154,9 +154,9 @@ def test_a_heavy_thing_that_comes_pushes_it_away():
     assert walker.position[0] == pytest.approx(-1.15 - RADIUS_M, abs=0.06)
 
 
-@pytest.mark.parametrize("thing", [ball("toy"), box("toy", mass_kg=0.5), box("toy", mass_kg=4.0)])
-def test_a_light_thing_is_pushed_and_does_not_slow_it(thing):
-    world = empty_world(thing)
+@pytest.mark.parametrize("toy_cfg", [ball("toy"), box("toy", mass_kg=0.5), box("toy", mass_kg=4.0)])
+def test_a_light_prop_is_pushed_and_does_not_slow_the_walker(toy_cfg):
+    world = empty_world(toy_cfg)
     walker = walker_in(world)
     walker.walk(0.6, 0.0)
     let_pass(world, 2.4)
@@ -167,7 +167,7 @@ def test_a_light_thing_is_pushed_and_does_not_slow_it(thing):
 
 
 @pytest.mark.parametrize(("push_limit_kg", "pushed"), [(1.0, False), (3.0, True)])
-def test_what_is_light_is_said_by_the_configuration(push_limit_kg, pushed):
+def test_the_push_limit_separates_light_from_heavy_props(push_limit_kg, pushed):
     world = empty_world(box(mass_kg=2.0))
     walker = walker_in(world, push_limit_kg=push_limit_kg)
     walker.walk(1.0, 0.0)
@@ -179,8 +179,8 @@ def test_what_is_light_is_said_by_the_configuration(push_limit_kg, pushed):
 @pytest.mark.parametrize("aside_m", [0.0, 0.02])
 @pytest.mark.parametrize("radius_m", [0.05, 0.1, 0.15])
 @pytest.mark.parametrize("speed", [0.6, 1.0])
-def test_a_ball_pinned_on_a_wall_is_squeezed_aside(aside_m, radius_m, speed):
-    """Off the middle it is wedged out faster than the walker walks, but it does not explode."""
+def test_a_ball_between_walker_and_wall_moves_sideways(aside_m, radius_m, speed):
+    """Off the centre line it leaves faster than the walker walks, but with a limited speed."""
     toy = ball(radius_m=radius_m, position=(1.0 - radius_m - 0.05, aside_m, radius_m))
     world = empty_world(wall(position=(1.05, 0.0, 0.0)), toy)
     walker = walker_in(world)
@@ -196,7 +196,7 @@ def test_a_ball_pinned_on_a_wall_is_squeezed_aside(aside_m, radius_m, speed):
 
 
 def walk_at_each_other(aside_m):
-    """Return a world, a walker and another who comes along a line so far aside."""
+    """Return a world and two walkers that walk toward each other on lines `aside_m` apart."""
     world = empty_world()
     one = walker_in(world, "one", place=(-1.0, 0.0, 0.0))
     two = walker_in(world, "two", place=(1.0, aside_m, 0.0), yaw_deg=180.0)
@@ -221,17 +221,17 @@ def test_two_walkers_head_on_stop_each_other():
     assert abs(one.position[0] + two.position[0]) < 0.05
 
 
-def test_one_who_stands_is_pushed_by_one_who_walks_but_not_through_a_wall():
+def test_a_standing_walker_is_pushed_but_not_through_a_wall():
     world = empty_world(wall(position=(1.0, 0.0, 0.0)))
     pusher = walker_in(world, "pusher", place=(-0.5, 0.0, 0.0))
-    victim = walker_in(world, "victim", place=(0.5, 0.0, 0.0))
+    standing = walker_in(world, "standing", place=(0.5, 0.0, 0.0))
     pusher.walk(1.0, 0.0)
     let_pass(world, 5.0)
-    assert depth_in_wall_m(victim, 0.95) < SLACK_M
-    assert victim.position[0] - pusher.position[0] > 2.0 * RADIUS_M - 0.02
+    assert depth_in_wall_m(standing, 0.95) < SLACK_M
+    assert standing.position[0] - pusher.position[0] > 2.0 * RADIUS_M - 0.02
 
 
-def test_three_walkers_on_one_spot_come_apart():
+def test_three_overlapping_walkers_separate():
     world = empty_world()
     walkers = [walker_in(world, f"w{i}", place=(0.01 * i, 0.005 * i, 0.0)) for i in range(3)]
     let_pass(world, 2.0)
@@ -241,15 +241,15 @@ def test_three_walkers_on_one_spot_come_apart():
             assert apart > 2.0 * RADIUS_M - 0.01
 
 
-def test_two_walkers_on_exactly_one_spot_come_apart():
+def test_two_coincident_walkers_separate():
     world = empty_world()
     one, two = walker_in(world, "one"), walker_in(world, "two")
     let_pass(world, 2.0)
     assert np.linalg.norm((one.position - two.position)[:2]) > 2.0 * RADIUS_M - 0.01
 
 
-def test_a_push_does_not_throw_things_into_the_air_or_the_ground():
-    """Low, flat, tall and round toys before a walker who turns and walks."""
+def test_pushed_props_stay_on_the_floor():
+    """Low, flat, tall and round props in front of a walker that turns and walks."""
     toys = [
         box("slab", (0.3, 0.3, 0.04), 0.3, (0.6, 0.0, 0.02)),
         box("pole", (0.06, 0.06, 0.6), 0.4, (1.4, 0.05, 0.3)),

@@ -1,10 +1,10 @@
-"""What the joints of the joint-level body are told: torques, angles, increments of angles."""
+"""The `joints` part of an action: torques, target angles, increments of target angles."""
 
 import math
 
 import numpy as np
 import pytest
-from heaps import weightless
+from humanoids import remove_gravity
 from walking import let_pass
 
 from veca_marl.sim.body.anatomy.skeleton import load_skeleton
@@ -18,7 +18,7 @@ SKELETON = load_skeleton()
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_a_positive_torque_turns_a_joint_to_its_positive_side(make_child, sign):
     world, body = make_child()
-    weightless(world)
+    remove_gravity(world)
     body.place((0.0, 0.0, 2.0))
     for name in ("l_forearm.flexion", "r_upper_arm.abduction", "head.rotation"):
         body.place((0.0, 0.0, 2.0), 0.0, _middle())
@@ -35,7 +35,7 @@ def _middle():
     return np.array([(joint.low_rad + joint.high_rad) / 2 for joint in SKELETON.joints])
 
 
-def test_torques_hold_until_the_next_and_rest_after_a_reset(make_child):
+def test_torques_last_until_the_next_action_and_are_zero_after_a_reset(make_child):
     world, body = make_child()
     row = np.random.default_rng(0).uniform(-1, 1, 82)
     body.act({"joints": row})
@@ -46,9 +46,9 @@ def test_torques_hold_until_the_next_and_rest_after_a_reset(make_child):
     assert not body.joint_torques().any()
 
 
-def test_joints_go_to_commanded_angles(make_child):
+def test_joints_move_to_target_angles(make_child):
     world, body = make_child(action=JointActionKind.position)
-    weightless(world)
+    remove_gravity(world)
     body.place((0.0, 0.0, 2.0))
     bent = {"upper_arm.abduction": 60.0, "forearm.flexion": 50.0, "thigh.flexion": 30.0}
     bent |= {"head.rotation": -30.0, "spine.lateral": 10.0, "l_index_middle.flexion": 40.0}
@@ -58,7 +58,7 @@ def test_joints_go_to_commanded_angles(make_child):
     np.testing.assert_allclose(body.joint_angles(), wanted, atol=math.radians(2.0))
 
 
-def test_commanded_angles_keep_a_child_sitting(make_child):
+def test_target_angles_keep_a_sitting_posture(make_child):
     world, body = make_child(action=JointActionKind.position, detail=Detail.mitten)
     body.place((0.0, 0.0, 0.0), 0.0, POSTURES["sitting"])
     wanted = posture_angles(SKELETON, POSTURES["sitting"])
@@ -69,8 +69,8 @@ def test_commanded_angles_keep_a_child_sitting(make_child):
 
 
 @pytest.mark.parametrize("detail", Detail)
-def test_torques_of_a_wish_keep_a_child_sitting_still(make_child, detail):
-    """Given once per agent step, they must not shake it."""
+def test_encoded_torques_keep_a_sitting_posture_without_oscillation(make_child, detail):
+    """They are computed once per agent step."""
     world, body = make_child(action=JointActionKind.torque, detail=detail)
     body.place((0.0, 0.0, 0.0), 0.0, POSTURES["sitting"])
     wanted = body.posture_angles(POSTURES["sitting"])
@@ -82,7 +82,7 @@ def test_torques_of_a_wish_keep_a_child_sitting_still(make_child, detail):
     assert np.abs(body.velocities()).max() < 0.1
 
 
-def test_increments_of_zero_keep_a_posture(make_child):
+def test_increments_of_zero_hold_a_posture(make_child):
     world, body = make_child(action=JointActionKind.increment, detail=Detail.mitten)
     body.place((0.0, 0.0, 0.0), 0.0, POSTURES["sitting"])
     head_m = body.bone("head").position[2]
@@ -94,7 +94,7 @@ def test_increments_of_zero_keep_a_posture(make_child):
 
 def test_increments_add_up_to_targets(make_child):
     world, body = make_child(action=JointActionKind.increment)
-    weightless(world)
+    remove_gravity(world)
     body.place((0.0, 0.0, 2.0))
     bent = {"forearm.flexion": 50.0, "thigh.flexion": 30.0, "head.rotation": -30.0}
     wanted = posture_angles(SKELETON, Posture(0.0, bent))
@@ -108,9 +108,9 @@ def test_increments_add_up_to_targets(make_child):
     np.testing.assert_allclose(rows[-1], 0.0, atol=1e-6)
 
 
-def test_increments_stop_at_the_stops_and_start_anew(make_child):
+def test_increments_are_clipped_at_the_limits_and_reset_by_place(make_child):
     world, body = make_child(action=JointActionKind.increment)
-    weightless(world)
+    remove_gravity(world)
     for _ in range(3):
         body.place((0.0, 0.0, 2.0))
         elbow = body.joint_names.index("l_forearm.flexion")
@@ -121,7 +121,7 @@ def test_increments_stop_at_the_stops_and_start_anew(make_child):
             world.step()
         bent = body.joint_angles()[elbow]
         assert bent > 0.9 * SKELETON.joints[elbow].high_rad
-        body.act({"joints": -row})  # what was asked for beyond the stop is not owed
+        body.act({"joints": -row})  # what was commanded beyond the limit does not accumulate
         world.step()
         body.act({"joints": -row})
         world.step()
@@ -137,7 +137,7 @@ def test_set_points_and_targets_are_inverse(make_child):
     np.testing.assert_allclose(torques, 0.0, atol=1e-9)
 
 
-def test_limbs_alone_may_be_commanded(make_child):
+def test_the_action_may_leave_out_the_fingers(make_child):
     world, body = make_child(joints=JointChoice.limbs)
     assert body.action_spec["joints"].shape == (40,)
     body.act({"joints": np.full(40, 0.5)})
@@ -164,7 +164,7 @@ def test_impossible_actions_are_refused(make_child, row, message):
         body.apply_torque(row)
 
 
-def test_apply_torque_is_for_bodies_driven_by_torque(make_child):
+def test_apply_torque_needs_a_torque_controlled_body(make_child):
     _, body = make_child(action=JointActionKind.position)
     with pytest.raises(ValueError, match=r"needs body.action=torque"):
         body.apply_torque(np.zeros(82))

@@ -1,4 +1,4 @@
-"""Several joint-level bodies in one place, driven at random."""
+"""Several overlapping joint-level bodies, random torques, and their kinetic energy."""
 
 import numpy as np
 from walking import empty_world, wall
@@ -16,24 +16,25 @@ WALLS = [
 ]
 
 
-def heap(bodies, detail=Detail.full, walls=False):
-    """Return a frozen world and bodies in it that lie upon each other."""
+def several_humanoids(bodies, detail=Detail.full, walls=False):
+    """Return a frozen world and overlapping bodies in it."""
     world = empty_world(*(WALLS if walls else ()))
-    heaped = [Humanoid(f"child_{i}", HumanoidCfg(detail=detail), world) for i in range(bodies)]
+    humanoids = [Humanoid(f"child_{i}", HumanoidCfg(detail=detail), world) for i in range(bodies)]
     world.freeze()
-    lay(world, heaped)
-    return world, heaped
+    place_overlapping(world, humanoids)
+    return world, humanoids
 
 
-def lay(world, bodies):
+def place_overlapping(world, bodies):
+    """Reset the world and place the bodies on top of each other."""
     world.reset(np.random.default_rng(0))
     for i, body in enumerate(bodies):
         body.place((0.1 * i, 0.1 * (i % 2), 0.2 * i), 0.5 * i, ON_BACK if i % 2 else ON_BELLY)
     world.refresh()
 
 
-def thrash(world, bodies, seconds, seed=0):
-    """Drive all joints by full torques of random sign; yield after every agent step."""
+def random_torques(world, bodies, seconds, seed=0):
+    """Apply full torques of random sign to all joints; yield after every agent step."""
     rng = np.random.default_rng(seed)
     for _ in range(round(seconds * 25)):
         for body in bodies:
@@ -42,13 +43,13 @@ def thrash(world, bodies, seconds, seed=0):
         yield
 
 
-def weightless(world):
-    """Switch gravity off."""
+def remove_gravity(world):
+    """Set gravity to zero."""
     pybullet.setGravity(0.0, 0.0, 0.0, physicsClientId=world.client)
 
 
-def fling(world, body, speed_radps, seed=0):
-    """Give all joints random speeds."""
+def set_random_joint_speeds(world, body, speed_radps, seed=0):
+    """Set all joint speeds to random numbers."""
     rng = np.random.default_rng(seed)
     joints = body._articulation
     joints.speeds[joints.moving] = rng.uniform(-speed_radps, speed_radps, len(joints.moving))
@@ -57,7 +58,7 @@ def fling(world, body, speed_radps, seed=0):
 
 
 def kinetic_energy(world, body):
-    """Return joules in all links of a body, light ones included."""
+    """Return the kinetic energy of all links of a body, J."""
     body_id, client = body.body_id, world.client
     links = range(pybullet.getNumJoints(body_id, physicsClientId=client))
     states = pybullet.getLinkStates(body_id, links, 1, 1, physicsClientId=client)

@@ -1,4 +1,4 @@
-"""Many in one world: every sense exists per agent, and all sense each other."""
+"""Several agents in one world: each has senses of its own, and they perceive each other."""
 
 import numpy as np
 import pytest
@@ -18,8 +18,8 @@ SENSES = ("vision", "audio", "touch", "proprioception")
 STEPS = 12
 
 
-def company(listening, silent_guest=False):
-    """Let two walk and call; return the bytes that those who listen perceive, by sense."""
+def observed_bytes(observers, silent_guest=False):
+    """Let two agents walk and call; return the bytes that the observers perceive, by sense."""
     world = empty_world(box("stool", mass_kg=8.0), box("toy", position=(0.5, 0.5, 0.15)))
     walkers = [
         walker_in(world, name, (x, 0.0, 0.0), yaw, voice=VoiceKind.calls)
@@ -28,7 +28,7 @@ def company(listening, silent_guest=False):
     if silent_guest:
         walkers.append(walker_in(world, "guest", (15.0, 15.0, 0.0), voice=VoiceKind.calls))
     senses = {w.name: make_senses(w, SENSES, SensesCfg(), world) for w in walkers}
-    senses = {name: senses[name] for name in listening}
+    senses = {name: senses[name] for name in observers}
     world.freeze()
     world.reset(np.random.default_rng(0))
     for index, walker in enumerate(walkers):
@@ -51,26 +51,26 @@ def company(listening, silent_guest=False):
 
 
 @pytest.fixture(scope="module")
-def alone():
-    return company(["one"])["one"]
+def one_alone():
+    return observed_bytes(["one"])["one"]
 
 
-def test_nobody_perceives_otherwise_because_another_perceives_too(alone):
-    for listening in (["one", "two"], ["two", "one"]):
-        assert company(listening)["one"] == alone
+def test_observations_do_not_depend_on_the_observations_of_others(one_alone):
+    for observers in (["one", "two"], ["two", "one"]):
+        assert observed_bytes(observers)["one"] == one_alone
 
 
-def test_two_perceive_differently(alone):
-    other = company(["two"])["two"]
+def test_two_agents_observe_differently(one_alone):
+    other = observed_bytes(["two"])["two"]
     for sense in SENSES:
-        assert other[sense] != alone[sense], sense
+        assert other[sense] != one_alone[sense], sense
 
 
-def test_a_guest_who_is_silent_and_out_of_sight_changes_no_hearing(alone):
-    assert company(["one"], silent_guest=True)["one"]["audio"] == alone["audio"]
+def test_a_silent_agent_out_of_sight_does_not_change_hearing(one_alone):
+    assert observed_bytes(["one"], silent_guest=True)["one"]["audio"] == one_alone["audio"]
 
 
-def test_two_equal_worlds_give_all_agents_the_same_bytes():
+def test_two_equal_worlds_give_the_same_bytes():
     game = compose(["+task=KickTheBall", "body=walker_voice"]).game
     with free_play(3, game.task, SENSES) as task:
         cfg = GameCfg(task, game.playground, game.body, game.senses, game.clock)
@@ -81,7 +81,7 @@ def test_two_equal_worlds_give_all_agents_the_same_bytes():
 
 
 def played(cfg):
-    """Play by random rows; return what each player perceived, as bytes."""
+    """Play random actions; return the observations of each player as bytes."""
     game, rng = Game(cfg), np.random.default_rng(3)
     game.reset(rng)
     seen = {player.name: b"" for player in game.players}
@@ -95,8 +95,8 @@ def played(cfg):
     return seen
 
 
-def perceived(sense, place):
-    """What `one` at the origin perceives of `two` at a place, and of one who calls there."""
+def observed(sense, place):
+    """Return an observation of `one` at the origin with `two` at a place, which makes a sound."""
     world = empty_world()
     one, two = walker_in(world, "one"), walker_in(world, "two", place, 180.0)
     senses = make_senses(one, (sense,), SensesCfg(), world)
@@ -109,25 +109,25 @@ def perceived(sense, place):
     two.make_sound(0.1 * np.sin(np.arange(2000) * 0.1).astype(np.float32))
     for _ in range(2):
         world.step()
-        observed = senses[sense].read()[sense]
+        value = senses[sense].read()[sense]
     world.close()
-    return observed
+    return value
 
 
-def test_each_sees_the_other():
-    before, behind = perceived("vision", (1.0, 0.0, 0.0)), perceived("vision", (-1.0, 0.0, 0.0))
+def test_agents_see_each_other():
+    before, behind = observed("vision", (1.0, 0.0, 0.0)), observed("vision", (-1.0, 0.0, 0.0))
     assert (before != behind).mean() > 0.05
 
 
-def test_each_hears_the_other():
-    near, far = perceived("audio", (1.0, 0.0, 0.0)), perceived("audio", (8.0, 0.0, 0.0))
+def test_agents_hear_each_other():
+    near, far = observed("audio", (1.0, 0.0, 0.0)), observed("audio", (8.0, 0.0, 0.0))
     assert (near[:, 4] - far[:, 4]).min() > 0.5  # the bin of 86 Hz; 9 times as far
 
 
-def test_each_feels_the_other():
-    """Shoulder to shoulder; the arm on that side feels it, the other does not."""
-    apart = perceived("touch", (0.0, 3.0, 0.0)).reshape(1648, 6)
-    beside = perceived("touch", (0.0, 0.22, 0.0)).reshape(1648, 6)
+def test_agents_touch_each_other():
+    """Shoulder to shoulder: only the arm on that side has contacts."""
+    apart = observed("touch", (0.0, 3.0, 0.0)).reshape(1648, 6)
+    beside = observed("touch", (0.0, 0.22, 0.0)).reshape(1648, 6)
     felt = np.abs(beside - apart).max(axis=1) > 0.01
     owner = np.repeat(np.arange(47), np.diff(load_taxels().first_triangle))
     bones = {load_skeleton().bones[bone].name for bone in owner[felt]}
