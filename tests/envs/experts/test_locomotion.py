@@ -9,8 +9,8 @@ from seeking import world_with
 from veca_marl.envs.core.task import Player
 from veca_marl.envs.experts.control.locomotion import locomotion_of
 from veca_marl.envs.tasks.player_starts import place_player
-from veca_marl.sim.body.humanoid.humanoid import Detail, Humanoid, HumanoidCfg, JointActionKind
-from veca_marl.sim.body.walker.walker import Walker, WalkerCfg
+from veca_marl.sim.body.humanoid import Detail, Humanoid, HumanoidCfg, JointActionKind
+from veca_marl.sim.body.walker import Walker, WalkerCfg
 
 BODIES = {
     "walker": (Walker, WalkerCfg()),
@@ -76,8 +76,8 @@ def test_it_stays_near_while_it_turns(mover):
 def test_it_goes_back(mover):
     """At once, and after it has gone ahead: at least 0.1 m/s, facing where it did, on its knees."""
     legs = start(mover)
-    for ahead_s in (0, 1, 2):
-        for _ in range(25 * ahead_s):
+    for horizon_s in (0, 1, 2):
+        for _ in range(25 * horizon_s):
             let(mover, legs.to(np.array([9.0, 0.0])))
         begin_m = mover[1].body.position[0]
         for _ in range(25 * 3):
