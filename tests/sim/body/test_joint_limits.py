@@ -13,8 +13,8 @@ from walking import empty_world
 
 from veca_marl.sim.body.anatomy.skeleton import load_skeleton
 from veca_marl.sim.body.humanoid import Detail, Humanoid, HumanoidCfg
-from veca_marl.sim.physics import ClockCfg
 from veca_marl.sim.body.humanoid.articulation import damping_number
+from veca_marl.sim.physics import ClockCfg
 
 LOW = np.array([joint.low_rad for joint in load_skeleton().joints])
 HIGH = np.array([joint.high_rad for joint in load_skeleton().joints])
