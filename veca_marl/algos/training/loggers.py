@@ -20,7 +20,7 @@ class LoggerKind(Enum):
         csv: ``metrics.csv`` and ``evaluations.csv`` in the folder of the run.
         tensorboard: Event files in its folder ``tensorboard``.
         wandb: Weights & Biases, project ``veca_marl``; ``WANDB_MODE=offline`` stays local.
-        mlflow: MLflow; ``MLFLOW_TRACKING_URI`` or its folder ``mlflow``.
+        mlflow: MLflow; ``MLFLOW_TRACKING_URI`` or ``mlflow.db`` there.
     """
 
     csv = "csv"
@@ -49,11 +49,24 @@ def _wandb(folder: Path, resumed_frames: int) -> Logger:
     )
 
 
-def _mlflow(folder: Path, resumed_frames: int) -> Logger:
-    import mlflow
+class _MLflow(MLFlowLogger):
+    """TorchRL's logger, which leaves its run open when it is closed; a second one could not start.
 
-    uri = mlflow.get_tracking_uri() if mlflow.is_tracking_uri_set() else ""
-    return MLFlowLogger(exp_name="veca_marl", tracking_uri=uri or f"file:{folder / 'mlflow'}")
+    MLflow's default is a folder of files, which its newer versions refuse: here it is SQLite.
+    """
+
+    def __init__(self, folder: Path, resumed_frames: int) -> None:
+        import mlflow
+
+        given = mlflow.get_tracking_uri() if mlflow.is_tracking_uri_set() else None
+        super().__init__("veca_marl", given or f"sqlite:///{folder.resolve() / 'mlflow.db'}")
+
+    def shutdown(self, timeout: float | None = None) -> None:
+        """End the run."""
+        import mlflow
+
+        super().shutdown(timeout)
+        mlflow.end_run()
 
 
 def _identifier(folder: Path) -> str:
@@ -64,7 +77,7 @@ def _identifier(folder: Path) -> str:
 _MAKERS: dict[LoggerKind, Callable[[Path, int], Logger]] = {
     LoggerKind.tensorboard: _Tensorboard,
     LoggerKind.wandb: _wandb,
-    LoggerKind.mlflow: _mlflow,
+    LoggerKind.mlflow: _MLflow,
 }
 
 
