@@ -102,3 +102,16 @@ def test_table_of_times_accounts_for_the_whole():
     shares = [float(line.split()[2].rstrip("%")) for line in lines[1:]]
     assert sum(shares[:-1]) == pytest.approx(100.0, abs=0.3)
     assert lines[-1].split()[-1] == "10.000"
+
+
+@pytest.mark.parametrize("kind", [LoggerKind.wandb, LoggerKind.mlflow])
+def test_the_loggers_of_the_extras_write_into_the_folder_of_the_run(tmp_path, monkeypatch, kind):
+    pytest.importorskip(kind.name, reason=f"needs the extra [{kind.name}]")
+    monkeypatch.setenv("WANDB_MODE", "offline")
+    monkeypatch.delenv("MLFLOW_TRACKING_URI", raising=False)
+    for resumed in (0, 10):  # a closed logger lets another one start
+        reporter = make_reporter(kind, tmp_path, resumed)
+        reporter.write("metrics", resumed + 10, {"x": 1.5, "y": math.nan})
+        reporter.close()
+    names = {path.name for path in tmp_path.iterdir()}
+    assert names == {"wandb" if kind is LoggerKind.wandb else "mlflow.db"}

@@ -11,8 +11,9 @@ import torch
 from tensordict.nn import TensorDictModule
 from torch import Tensor, nn
 
-from veca_marl.algos.networks.encoders import Pooling, make_encoder
+from veca_marl.algos.networks.encoders import make_encoder
 from veca_marl.algos.networks.factory import NetworkCfg, NetworkFactory, register_network
+from veca_marl.algos.networks.image_encoder import Pooling
 from veca_marl.algos.networks.initialisation import orthogonal
 from veca_marl.algos.networks.per_agent import CentralValue, PerAgent
 from veca_marl.algos.specs import ArrayLayout, TeamSpec

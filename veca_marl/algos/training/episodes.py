@@ -22,7 +22,7 @@ def team_measures(step: TensorDictBase, team: str) -> dict[str, NDArray[np.float
     """
     reward = _agent_mean(step[team, "reward"])
     measures = {"return": reward, "length": np.ones_like(reward)}
-    info = step[team].get("info", step[team].get("terms", None))
+    info = step[team].get("info", None)
     for name, term in sorted(info.items()) if info is not None else ():
         measures[name] = _agent_mean(term)
     return measures

@@ -1,0 +1,88 @@
+"""Algorithms, networks and loggers are choices of the configuration, also those of a user."""
+
+import pytest
+from first_seen import FirstSeenCfg
+from toy_dqn import ToyDQNCfg, register
+
+from veca_marl.algos.networks.multisense import Critic, MultisenseCfg
+from veca_marl.algos.ppo import PPOCfg
+from veca_marl.algos.training.loggers import LoggerKind
+from veca_marl.config import ConfigError, compose
+from veca_marl.runs.run_folder import RunFolder
+from veca_marl.runs.training import run_training
+
+register()
+KICK = "+task=KickTheBall"
+SMALL = [
+    KICK,
+    "task.max_seconds=1.0",
+    "senses/vision=blind",
+    "senses/proprioception=none",
+    "collect=one_process",
+    "collect.worlds=2",
+    "collect.steps=16",
+    "eval.episodes=2",
+    "eval.worlds=2",
+    "eval.every_frames=32",
+    "total_frames=64",
+    "log=silent",
+    "threads=1",
+]
+
+
+def test_an_algorithm_without_a_file_is_chosen_by_name():
+    cfg = compose([KICK, "algo=toy_dqn", "algo.batch=16"])
+    assert cfg.algo == ToyDQNCfg(batch=16)
+    with pytest.raises(ConfigError, match=r"unknown key 'algo.clip'|Key 'clip'|'clip'"):
+        compose([KICK, "algo=toy_dqn", "algo.clip=0.1"])
+    with pytest.raises(ConfigError, match=r"unknown algo 'pop'.*ppo"):
+        compose([KICK, "algo=pop"])
+
+
+def test_a_team_learns_by_an_algorithm_of_its_own():
+    push = "+task=PushOut1v1"
+    cfg = compose([push, "+algo@learner.blue=toy_dqn", "body=walker_discrete"])
+    assert isinstance(cfg.algo, PPOCfg)
+    assert cfg.learner == {"blue": ToyDQNCfg()}
+
+
+def test_a_network_is_chosen_by_name():
+    assert compose([KICK]).algo.network == MultisenseCfg()
+    assert compose([KICK, "algo=mappo"]).algo.network == MultisenseCfg(critic=Critic.central)
+    assert compose([KICK, "algo/network=first_seen"]).algo.network == FirstSeenCfg()
+    own = compose(["+task=PushOut1v1", "+algo@learner.red=mappo", "algo/network=first_seen"])
+    assert own.algo.network == FirstSeenCfg()
+    assert own.learner["red"].network == MultisenseCfg(critic=Critic.central)
+
+
+def test_loggers_are_chosen_by_name(monkeypatch):
+    assert compose([KICK, "log.logger=[]"]).log.logger == []
+    assert compose([KICK]).log.logger == [LoggerKind.csv, LoggerKind.tensorboard]
+    monkeypatch.setattr("veca_marl.algos.training.loggers.find_spec", lambda name: None)
+    with pytest.raises(ConfigError, match=r"log.logger: wandb is not installed: pip install"):
+        compose([KICK, "log.logger=[wandb]"])
+    with pytest.raises(ConfigError, match=r"wandbb"):
+        compose([KICK, "log.logger=[wandbb]"])
+
+
+def test_a_batch_that_an_algorithm_cannot_learn_from_is_refused():
+    with pytest.raises(ConfigError, match="toy_dqn needs batches of at least 4 frames, got 2"):
+        compose([*SMALL, "algo=toy_dqn", "collect.worlds=1", "collect.steps=2"])
+
+
+def test_training_from_python_returns_rows_and_a_policy_and_stores_nothing(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    result = run_training(compose(SMALL))
+    assert [row["frames"] for row in result.metrics] == [32, 64]
+    assert {"agents/return", "agents/kick", "agents/kl"} <= result.metrics[0].keys()
+    assert [row["player"] for row in result.evaluations] == ["random", "policy", "policy"]
+    assert result.comparison[0].startswith("agents: return of policy")
+    assert result.folder is None
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_recurrent_policy_is_trained_recorded_and_loaded(tmp_path):
+    cfg = compose([*SMALL, "algo/network=first_seen", "log.video=true", "log.keep_checkpoints=1"])
+    result = run_training(cfg, RunFolder(tmp_path))
+    assert (tmp_path / "videos" / "final.mp4").stat().st_size > 0
+    assert result.metrics[-1]["agents/kl"] >= 0.0

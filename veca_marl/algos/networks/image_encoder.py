@@ -1,0 +1,109 @@
+"""Encoder of images: three convolutions and a pooling of their maps."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from enum import Enum
+
+import torch
+from torch import Tensor, nn
+
+from veca_marl.algos.networks.initialisation import orthogonal
+
+_KERNELS = (8, 4, 3)  # Mnih et al. 2015, "Human-level control ...", with a half of their channels
+_STRIDES = (4, 2, 1)
+# A CPU is 2.4 times as fast on blocks of images that fit its cache: larger temporary arrays are
+# returned to the operating system, and their pages are mapped again at each use.
+_CACHED_FLOATS = 32 * 6 * 84 * 84
+
+
+class Pooling(Enum):
+    """Pooling of the last feature maps of an image.
+
+    Attributes:
+        flatten: Keeps every cell.
+        places: Keeps the position of the largest activations of each map, from which the position
+            of an object is learnt with far fewer images.
+    """
+
+    flatten = "flatten"
+    places = "places"
+
+
+class Places(nn.Module):
+    """Feature maps ``(N, C, H, W)`` to position and strength of their activation, ``(N, 3 C)``.
+
+    Positions are in [-1, 1], to the right and down: means weighted by a softmax over the map, with
+    one learnt inverse temperature for each map. Its initial value is 5, which of 1, 5 and 20
+    learnt the position of an object from few images with the smallest error.
+
+    Source: Levine et al. 2016, "End-to-end training of deep visuomotor policies" (spatial softmax).
+    The strength beside it is ours: a position alone cannot express that nothing is visible.
+    """
+
+    def __init__(self, maps: int) -> None:
+        super().__init__()
+        self.sharpness = nn.Parameter(torch.full((maps, 1), 5.0))
+
+    def forward(self, maps: Tensor) -> Tensor:
+        """Return position (right, down) and strength of each map."""
+        height, width = maps.shape[-2:]
+        flat = maps.flatten(2)
+        weights = (self.sharpness * flat).softmax(-1)
+        down, right = torch.meshgrid(_across(height, maps), _across(width, maps), indexing="ij")
+        means = [(weights * values).sum(-1) for values in (right.flatten(), down.flatten(), flat)]
+        return torch.cat(means, -1)
+
+
+def _across(cells: int, like: Tensor) -> Tensor:
+    return torch.linspace(-1.0, 1.0, cells, dtype=like.dtype, device=like.device)
+
+
+class ImageEncoder(nn.Module):
+    """``uint8 (N, ..., channels, height, width)`` to ``float (N, features)``.
+
+    All leading dimensions (eyes, colours) are stacked as channels. Kernels larger than the
+    remaining image shrink to its size, so that any image size is accepted.
+
+    Args:
+        shape: Shape of one observation: at least channels, height, width.
+        channels: Output channels of the three convolutions.
+        pooling: Pooling of the last maps.
+
+    Attributes:
+        features: Length of the output.
+    """
+
+    def __init__(
+        self,
+        shape: Sequence[int],
+        channels: Sequence[int] = (16, 32, 32),
+        pooling: Pooling = Pooling.flatten,
+    ) -> None:
+        super().__init__()
+        *stack, height, width = shape
+        size_in = math.prod(stack)
+        layers: list[nn.Module] = []
+        for size_out, kernel, stride in zip(channels, _KERNELS, _STRIDES, strict=True):
+            window = (min(kernel, height), min(kernel, width))
+            layers += [orthogonal(nn.Conv2d(size_in, size_out, window, stride)), nn.ReLU()]
+            height, width = (
+                (n - k) // stride + 1 for n, k in zip((height, width), window, strict=True)
+            )
+            size_in = size_out
+        places = pooling is Pooling.places
+        self.layers = nn.Sequential(*layers, Places(size_in) if places else nn.Flatten())
+        self.features = size_in * (3 if places else height * width)
+
+    def forward(self, image: Tensor) -> Tensor:
+        """Encode `image`; bytes are converted to floats in [0, 1] here, on the network's device."""
+        pixels = image.flatten(1, -3)
+        if pixels.is_cuda:
+            return self._encode(pixels)
+        block = max(1, _CACHED_FLOATS // pixels[0].numel())
+        return torch.cat([self._encode(part) for part in pixels.split(block)])
+
+    def _encode(self, pixels: Tensor) -> Tensor:
+        features: Tensor = self.layers(pixels.float().mul_(1.0 / 255.0))
+        return features
