@@ -1,4 +1,4 @@
-"""Help for the tests of the tasks in which a child learns to move."""
+"""Helpers for the tests of motor skills."""
 
 from contextlib import contextmanager
 
@@ -13,7 +13,7 @@ BODIES = ("mitten_limbs", "mitten_position")
 
 @contextmanager
 def child_game(task, *overrides):
-    """Lend a game that feels no touch, which is dear and read by nobody here."""
+    """Yield a game without touch, which is expensive and not needed here."""
     game = Game(compose([f"+task={task}", "senses/touch=numb", *overrides]).game)
     game.reset(np.random.default_rng(0))
     yield game
@@ -26,20 +26,20 @@ def zero_action(body):
 
 
 def rest(game):
-    """Let the child be limp for a step; return the outcome."""
+    """Simulate a step without torques; return the outcome."""
     player = game.players[0]
     limp = zero_action(player.body)
     return game.step({player.name: limp})
 
 
 def hold(game, angles):
-    """Let the child pull its joints to angles for a step; return the outcome."""
+    """Simulate a step with target angles; return the outcome."""
     player = game.players[0]
     return game.step({player.name: player.body.encode(angles)})
 
 
 def put(game, posture):
-    """Begin an episode in a posture; return the body."""
+    """Start an episode in a posture; return the body."""
     game.reset(np.random.default_rng(1))
     body = game.players[0].body
     body.place((0.0, 0.0, 0.0), 0.7, posture)
@@ -47,20 +47,20 @@ def put(game, posture):
 
 
 def terms_at_rest(game, posture):
-    """Return the terms of one limp step in a posture."""
+    """Return the terms of one step without torques in a posture."""
     put(game, posture)
     return rest(game).terms["agents"]
 
 
 def starts(game, count):
-    """Begin as many episodes, from seed 0 on; yield the body each time."""
+    """Start episodes with seeds 0, 1, ...; yield the body of each."""
     for seed in range(count):
         game.reset(np.random.default_rng(seed))
         yield game.players[0].body
 
 
 def play(game, rng):
-    """Let the expert play an episode; return all outcomes and how many metres it got ahead."""
+    """Let the expert play an episode; return all outcomes and the distance covered forwards."""
     game.reset(rng)
     player, outcomes = game.players[0], []
     start, heading = player.body.position, player.body.forward
@@ -71,7 +71,7 @@ def play(game, rng):
 
 
 def check_limbs_fall_and_none_flies(game):
-    """Nothing is thrown by the start: half a second of rest stays slow."""
+    """All velocities stay small for half a second after the start."""
     for _ in range(12):
         outcome = rest(game)
         body = game.players[0].body

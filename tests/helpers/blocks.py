@@ -1,4 +1,4 @@
-"""Help for the tests of the tasks with blocks."""
+"""Helpers for the tests of the tasks with blocks."""
 
 import numpy as np
 
@@ -7,14 +7,14 @@ from veca_marl.envs.core.game import Game
 
 
 def blocks_game(task, *overrides):
-    """Return a game that looks at nothing: eyes are dear."""
+    """Return a game without vision, which is expensive."""
     game = Game(compose([f"+task={task}", "senses/vision=blind", *overrides]).game)
     game.reset(np.random.default_rng(0))
     return game
 
 
 def sit(game, seconds):
-    """Let the child hold its posture, yield the terms of every step."""
+    """Let the body hold its posture; yield the terms of every step."""
     player = game.players[0]
     posture = player.body.joint_angles()
     for _ in range(round(seconds / game.world.clock.step_s)):
@@ -36,5 +36,5 @@ def play(game, seed):
 
 
 def sits(game):
-    """Say whether the child has not toppled."""
+    """Return whether the body has not toppled."""
     return game.players[0].body.bone("pelvis").rotation[2, 2] > 0.8

@@ -1,4 +1,4 @@
-"""Games of two teams played blind: how tests of rings and pitches set them up and watch."""
+"""Games of two teams without vision and touch, for the tests of PushOut and Soccer."""
 
 import numpy as np
 
@@ -16,7 +16,7 @@ def game_of(task, *overrides, seed=0):
 
 
 def steps(game, rng, **scripts):
-    """Play to the end, each team by the script named for it; yield every outcome."""
+    """Play an episode with one script per team; yield every outcome."""
     over = False
     while not over:
         for player in game.players:
@@ -27,19 +27,19 @@ def steps(game, rng, **scripts):
 
 
 def episodes(game, count, **scripts):
-    """Yield for each of so many episodes its outcomes, step by step."""
+    """Yield the list of outcomes of each of several episodes."""
     for seed in range(count):
         rng = np.random.default_rng([2026, seed])
         game.reset(rng)
         yield list(steps(game, rng, **scripts))
 
 
-def paid_in_all(game, outcome):
+def total_reward(game, outcome):
     return sum(game.reward_of(terms) for terms in outcome.terms.values())
 
 
 def rest(game, seconds=0.04):
-    """Let everybody rest for a while; return the outcomes."""
+    """Let all players rest for a time; return the outcomes."""
     outcomes = []
     for _ in range(round(seconds / 0.04)):
         for player in game.players:

@@ -1,4 +1,4 @@
-"""Small worlds in which somebody seeks something."""
+"""Small worlds for the tests of navigation."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""CallSourceMap: where in a house a call comes from, by what two ears hear."""
+"""CallSourceMap: localization of callers in a house from two ears."""
 
 import math
 
@@ -22,13 +22,13 @@ def game():
 
 
 def heard(game, call_map, listener, caller, call=Call.high):
-    """Let one who stands in one place, x, y and yaw, hear who calls from another for a while."""
+    """Update the map of a listener, at x, y and yaw, with the calls of a caller."""
     ears, mouth = game.players
     ears.body.place((*listener[:2], 0.0), math.radians(listener[2]))
     mouth.body.place((*caller, 0.0), 0.0)
     for _ in range(STEPS):
-        wishes = {ears.name: (0.0, 0.0), mouth.name: (0.0, 0.0, call)}
-        game.step({p.name: p.body.encode(wishes[p.name]) for p in game.players})
+        commands = {ears.name: (0.0, 0.0), mouth.name: (0.0, 0.0, call)}
+        game.step({p.name: p.body.encode(commands[p.name]) for p in game.players})
         audio, _ = [game.observe(player).get("audio") for player in game.players]
     call_map.update(ears.body.mount("head"), audio)
 
@@ -41,7 +41,7 @@ def call_map(game):
     return CallSourceMap(game.world)
 
 
-def test_silence_says_nothing(game, call_map):
+def test_silence_leaves_the_map_unchanged(game, call_map):
     heard(game, call_map, (0.0, 0.0, 0.0), (1.0, 0.0), Call.none)
     assert not call_map.heard
 
@@ -56,8 +56,8 @@ def test_silence_says_nothing(game, call_map):
         ((-3.0, 1.0, 0.0), (0.5, 0.6)),  # through a wall
     ],
 )
-def test_a_call_is_told_from_two_headings(game, call_map, listener, caller):
-    """One heading leaves open whether a call comes from before or behind."""
+def test_a_call_is_localized_with_several_headings(game, call_map, listener, caller):
+    """One heading leaves open whether a call comes from the front or from behind."""
     x, y, yaw_deg = listener
     for turned_deg in (0.0, 40.0, 80.0):
         heard(game, call_map, (x, y, yaw_deg + turned_deg), caller)
@@ -65,7 +65,7 @@ def test_a_call_is_told_from_two_headings(game, call_map, listener, caller):
     assert math.dist(call_map.best()[:2], caller) < 0.4 + 0.25 * away_m
 
 
-def test_of_two_callers_after_each_other_the_later_one_is_believed(game, call_map):
+def test_the_later_of_two_callers_is_localized(game, call_map):
     for caller in ((0.5, 0.8), (-0.5, -1.0)):
         for yaw_deg in np.linspace(0.0, 720.0, 80):
             heard(game, call_map, (0.0, 0.0, yaw_deg), caller)

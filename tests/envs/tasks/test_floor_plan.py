@@ -1,4 +1,4 @@
-"""Rooms and doors: the way through a house is there, and a walker can walk it."""
+"""Floor plans: paths through doors exist and a walker can follow them."""
 
 import itertools
 import math
@@ -28,14 +28,14 @@ def plan_of(*doors, rooms=3):
     return FloorPlan(PlaygroundCfg(name="row", rooms=row, doors=openings))
 
 
-def test_a_place_is_in_its_room_or_the_nearest():
+def test_room_of_returns_the_nearest_room():
     plan = plan_of(1.0, 3.0)
     assert [plan.room_of(np.array([x, 2.0])) for x in (-5.0, 2.0, 4.04, 4.06, 10.0)] == [
         *(0, 0, 0, 1, 2)
     ]
 
 
-def test_ways_lead_from_middle_through_doors_to_middle():
+def test_distances_are_measured_between_middles_and_doors():
     plan = plan_of(1.0, 3.0)
     half = math.dist((2.0, 2.0), (4.05, 1.0))
     assert plan.distance_m(0, 1) == pytest.approx(2.0 * half)
@@ -44,7 +44,7 @@ def test_ways_lead_from_middle_through_doors_to_middle():
     assert plan.distance_m(1, 1) == 0.0
 
 
-def test_in_the_same_room_the_way_is_straight():
+def test_the_waypoint_in_the_same_room_is_the_goal():
     goal = plan_of(1.0, 3.0).waypoint(
         np.array([1.0, 1.0, 0.5]), np.array([3.0, 2.0, 0.5]), APPROACH
     )
@@ -52,8 +52,8 @@ def test_in_the_same_room_the_way_is_straight():
 
 
 @pytest.mark.parametrize(("begin_x", "goal_x", "side", "right"), [(2, 10, -1, -1), (6, 2, 1, 1)])
-def test_the_way_leads_before_the_door_and_then_through_it(begin_x, goal_x, side, right):
-    """Keeping right: who goes to larger x at smaller y."""
+def test_waypoints_lead_in_front_of_the_door_and_through_it(begin_x, goal_x, side, right):
+    """Keep to the right: towards larger x at smaller y."""
     plan, goal = plan_of(1.0, 3.0), np.array([goal_x, 2.0])
     before = plan.waypoint(np.array([begin_x, 3.5]), goal, APPROACH)
     np.testing.assert_allclose(before, (4.05 + 0.4 * side, 1.0 + 0.2 * right))
@@ -61,7 +61,7 @@ def test_the_way_leads_before_the_door_and_then_through_it(begin_x, goal_x, side
     np.testing.assert_allclose(beyond, (4.05 - 0.4 * side, 1.0 + 0.2 * right))
 
 
-def test_who_takes_the_middle_goes_straight_through_and_lines_up_far_before():
+def test_waypoints_through_the_middle_of_the_door():
     plan, goal = plan_of(1.0, 3.0), np.array([6.0, 2.0])
     wide = DoorApproach(before_m=0.9, right_m=0.0)
     before = plan.waypoint(np.array([2.0, 3.5]), goal, wide)
@@ -70,8 +70,8 @@ def test_who_takes_the_middle_goes_straight_through_and_lines_up_far_before():
 
 
 @pytest.mark.parametrize("place", [(1.0, 1.0), (3.0, 1.0), (2.0, 3.0), (2.0, 2.0)])
-def test_who_stays_is_in_nobodys_way(place):
-    """In the room of the object, away from it and from the door, which is at (4.05, 1)."""
+def test_the_waiting_place_keeps_away_from_the_goal_and_from_doors(place):
+    """The door is at (4.05, 1)."""
     plan = plan_of(1.0, 3.0)
     aside = plan.waiting_place(np.array(place))
     assert plan.rooms[0].contains(np.array([*aside, 1.0]), 0.69)
@@ -79,7 +79,7 @@ def test_who_stays_is_in_nobodys_way(place):
     assert math.dist(aside, (4.05, 1.0)) > 2.0
 
 
-def test_a_house_that_is_cut_off_is_said_so():
+def test_a_goal_without_a_path_is_an_error():
     plan = plan_of(1.0)
     assert plan.distance_m(0, 2) == math.inf
     with pytest.raises(ValueError, match="no doors lead from '0' to '2'"):
@@ -88,7 +88,7 @@ def test_a_house_that_is_cut_off_is_said_so():
 
 @pytest.mark.parametrize("house", HOUSES)
 def test_doors_are_openings_of_the_walls(house):
-    """Through the opening the air is free, just beside it and above 2 m there is wall."""
+    """No obstacle lies in the opening; walls are beside it and above 2 m."""
     world = World(shipped(house))
     assert world.playground.doors
     for door in world.playground.doors:
@@ -112,7 +112,7 @@ def test_doors_are_openings_of_the_walls(house):
 
 
 def arrives(world, plan, walker, goal):
-    """Walk for 20 s at most; return whether the walker comes to a place."""
+    """Walk for at most 20 s; return whether the walker reaches a place."""
     for _ in range(25 * 20):
         walker.act(walker.encode(walk_to(walker, plan.waypoint(walker.position, goal, APPROACH))))
         world.step()
@@ -122,7 +122,7 @@ def arrives(world, plan, walker, goal):
 
 
 @pytest.mark.parametrize("house", HOUSES)
-def test_a_walker_comes_from_every_room_to_the_next_and_back(house):
+def test_a_walker_reaches_every_neighbouring_room(house):
     world = World(shipped(house))
     plan, walker = FloorPlan(world.playground), walker_at(world)
     pairs = list(itertools.pairwise(plan.rooms))

@@ -1,4 +1,4 @@
-"""What tasks of seeking share: the helper reward, free places, who sees the object."""
+"""Helper reward, free places and visibility in navigation tasks."""
 
 import math
 from types import SimpleNamespace
@@ -39,18 +39,18 @@ def mover(velocity, yaw_deg=0.0):
         ((0.5, -2.0), RIGHT, (0.02, 0.08)),
     ],
 )
-def test_the_way_is_split_by_the_body_and_the_side_of_the_object(velocity, target, way):
+def test_displacements_have_components_ahead_and_to_the_side(velocity, target, way):
     np.testing.assert_allclose(displacement_to(mover(velocity), target, STEP_S), way, atol=1e-15)
 
 
-def test_the_way_turns_with_the_body():
-    """A quarter to the left, what was ahead is to the right."""
+def test_displacements_are_relative_to_the_heading():
+    """After a quarter turn to the left, the front is on the right."""
     np.testing.assert_allclose(
         displacement_to(mover((1.0, 0.0), yaw_deg=90.0), AHEAD, STEP_S), (0.0, 0.04), atol=1e-15
     )
 
 
-def test_a_gap_is_measured_over_the_floor_to_the_surface():
+def test_the_gap_is_the_horizontal_distance_to_the_surface():
     world = world_with(ball_at(3.0, 4.0))
     thing = world.props["ball"]
     assert gap_m(np.array([0.0, 0.0, 7.0]), thing) == pytest.approx(5.0 - BALL_M)
@@ -58,7 +58,7 @@ def test_a_gap_is_measured_over_the_floor_to_the_surface():
     world.close()
 
 
-def test_free_places_are_clear_of_things_and_walls():
+def test_free_places_are_clear_of_props_and_walls():
     world = world_with(ball_at(0.5, 0.5))
     thing, room = world.props["ball"], RoomCfg(lower_m=(0.0, 0.0, 0.0), size_m=(2.0, 2.0, 2.0))
     rng = np.random.default_rng(0)
@@ -72,8 +72,8 @@ def test_free_places_are_clear_of_things_and_walls():
     world.close()
 
 
-def test_pairs_of_places_are_clear_and_apart_where_a_first_one_could_leave_no_second():
-    """On 1.4 x 1.4 m of floor nothing is 1 m away from the middle, or hardly anything."""
+def test_pairs_of_places_are_clear_and_apart_in_a_small_room():
+    """On 1.4 x 1.4 m of floor hardly any place is 1 m away from the middle."""
     world = world_with(ball_at(0.2, 0.2))
     thing, room = world.props["ball"], RoomCfg(lower_m=(0.0, 0.0, 0.0), size_m=(3.0, 3.0, 2.0))
     rng = np.random.default_rng(0)
@@ -90,13 +90,13 @@ def test_pairs_of_places_are_clear_and_apart_where_a_first_one_could_leave_no_se
 
 @pytest.fixture
 def world():
-    """A wall across the way between the origin and a ball; who is called `near` is beyond."""
+    """A wall between the origin and a ball; the player `near` is on the ball's side."""
     made = world_with(ball_at(3.0, 0.0), wall_across(1.5))
     yield made
     made.close()
 
 
-def test_walls_hide_the_object_from_one_and_not_from_another(world):
+def test_walls_hide_the_object(world):
     behind = Player("behind", "team", walker_at(world, name="behind"))
     near = Player("near", "team", walker_at(world, 2.0, name="near"))
     world.refresh()
@@ -104,7 +104,7 @@ def test_walls_hide_the_object_from_one_and_not_from_another(world):
     assert [sight.for_player(player) for player in (behind, near, behind)] == [False, True, False]
 
 
-def test_an_eye_is_asked_once_a_picture(world, monkeypatch):
+def test_visibility_is_computed_once_per_version_of_the_scene(world, monkeypatch):
     asked = []
 
     def look(scene, body, thing):
@@ -124,8 +124,8 @@ def test_an_eye_is_asked_once_a_picture(world, monkeypatch):
     assert len(asked) == 3
 
 
-def test_nobody_sees_through_a_wall_that_its_eye_is_pressed_to():
-    """On hands and knees an eye came within 11 mm of a wall, looking along it, and saw beyond."""
+def test_an_eye_in_contact_with_a_wall_does_not_see_through_it():
+    """Eyes of crawling bodies come within 11 mm of walls."""
     world = world_with(wall_across(2.0), ball_at(6.0, 0.0))
     world.freeze()
     world.refresh()

@@ -1,18 +1,16 @@
-"""TurnBaby: the reward knows back from belly, the start is at rest, the expert turns over."""
+"""TurnBaby: reward, start and expert."""
 
 import numpy as np
 import pytest
 from babies import (
     BODIES,
     check_limbs_fall_and_none_flies,
-    check_walkers_are_refused,
     child_game,
     play,
     starts,
     terms_at_rest,
 )
 
-from veca_marl.envs.tasks.locomotion.turn_baby import TurnBabyCfg
 from veca_marl.sim.body.humanoid.postures import ON_BACK, ON_BELLY
 
 
@@ -22,17 +20,17 @@ def game():
         yield game
 
 
-def test_the_belly_pays_and_the_back_costs(game):
+def test_the_terms_are_1_on_the_belly_and_minus_1_on_the_back(game):
     assert terms_at_rest(game, ON_BACK) == pytest.approx({"torso": -1.0, "hip": -1.0}, abs=0.1)
     assert terms_at_rest(game, ON_BELLY) == pytest.approx({"torso": 1.0, "hip": 1.0}, abs=0.1)
 
 
-def test_an_episode_is_worth_ten(game):
+def test_the_greatest_return_is_10(game):
     best = game.reward_of({"torso": 1.0, "hip": 1.0}) * game.max_steps
     assert best == pytest.approx(10.0)
 
 
-def test_it_starts_on_the_back_at_rest_with_joints_anywhere(game):
+def test_it_starts_on_the_back_at_rest_with_random_joint_angles(game):
     angles = []
     for body in starts(game, 8):
         angles.append(body.joint_angles())
@@ -44,7 +42,7 @@ def test_it_starts_on_the_back_at_rest_with_joints_anywhere(game):
 
 
 @pytest.mark.parametrize("body", BODIES)
-def test_the_expert_lies_on_the_belly_in_the_end(body):
+def test_the_expert_ends_on_the_belly(body):
     rng = np.random.default_rng(3)
     with child_game("TurnBaby", f"body={body}") as game:
         for _ in range(3):
@@ -52,13 +50,3 @@ def test_the_expert_lies_on_the_belly_in_the_end(body):
             assert min(last.terms["agents"].values()) > 0.8
             assert last.truncated
             assert not last.terminated
-
-
-def test_a_walker_is_refused():
-    check_walkers_are_refused("TurnBaby")
-
-
-@pytest.mark.parametrize("wrong", [-1.0, 31.0, float("nan")])
-def test_impossible_spreads_are_refused(wrong):
-    with pytest.raises(ValueError, match="spread_deg"):
-        TurnBabyCfg(spread_deg=wrong)

@@ -1,0 +1,86 @@
+"""Impossible parameters of tasks, and bodies that a task cannot use, are errors that name them."""
+
+import pytest
+
+from veca_marl.config import compose
+from veca_marl.envs.core.game import Game
+
+HUMANOID_TASKS = (
+    *("TurnBaby", "SitBaby", "CrawlBaby", "RunBaby"),
+    *("GrabObject", "MoveToTarget", "PileUpBlock", "PutDownBlock", "RotateCube"),
+)
+
+
+@pytest.mark.parametrize(
+    ("task", "override", "message"),
+    [
+        ("KickTheBall", "speed_mps=[1.0,0.5]", "speed_mps"),
+        ("KickTheBall", "speed_mps=[0.0,1.0]", "speed_mps"),
+        ("KickTheBall", "life_s=0.0", "life_s"),
+        ("KickTheBall", "rest_s=-1.0", "rest_s"),
+        ("TurnBaby", "spread_deg=-1.0", "spread_deg"),
+        ("TurnBaby", "spread_deg=31.0", "spread_deg"),
+        ("TurnBaby", "spread_deg=nan", "spread_deg"),
+        ("SitBaby", "torso_m=0.0", "torso_m"),
+        ("SitBaby", "head_m=inf", "head_m"),
+        ("SitBaby", "starts={on_back:0}", "task.starts=.* must be shares"),
+        ("SitBaby", "starts={on_back:-1,sitting:2}", "task.starts=.* must be shares"),
+        ("SitBaby", "starts={sitting:inf}", "task.starts=.* must be shares"),
+        ("CrawlBaby", "top_mps=0.0", "top_mps"),
+        ("CrawlBaby", "top_mps=inf", "top_mps"),
+        ("RunBaby", "top_mps=0.0", "top_mps"),
+        ("RunBaby", "fallen_m=0.7", "fallen_m"),
+        ("GrabObject", "edge_m=0.2", "edge_m"),
+        ("GrabObject", "mass_kg=0.0", "mass_kg"),
+        ("GrabObject", "ahead_m=[0.3,0.2]", "ahead_m"),
+        ("GrabObject", "aside_m=-0.1", "aside_m"),
+        ("GrabObject", "near_m=nan", "near_m"),
+        ("GrabObject", "lifted_m=0.0", "lifted_m"),
+        ("MoveToTarget", "way_m=[0.03,0.1]", "way_m"),
+        ("MoveToTarget", "there_m=0.0", "there_m"),
+        ("MoveToTarget", "far_m=0.1", "far_m"),
+        ("MoveToTarget", "edge_m=-1.0", "edge_m"),
+        ("PileUpBlock", "edge_m=0.0", "edge_m=0.0"),
+        ("PileUpBlock", "edge_m=0.2", "at most 0.1"),
+        ("PileUpBlock", "mass_kg=-1.0", "mass_kg=-1.0"),
+        ("PileUpBlock", "ahead_m=[0.3,0.2]", "ahead_m"),
+        ("PileUpBlock", "aside_m=[0.01,0.2]", "aside_m"),
+        ("PutDownBlock", "blue=0", "blue=0"),
+        ("PutDownBlock", "ahead_m=[0.3,0.2]", "ahead_m"),
+        ("PutDownBlock", "fallen=1.5", "fallen=1.5"),
+        ("RotateCube", "edge_m=0.0", "edge_m"),
+        ("RotateCube", "lost_m=0.01", "lost_m"),
+        ("RotateCube", "start_deg=60.0", "start_deg"),
+        ("RotateCube", "turn_deg=5.0", "turn_deg"),
+        ("RotateCube", "friction=inf", "friction"),
+        ("PushOut1v1", "radius_m=3.5", "does not fit into the room 'room'"),
+        ("PushOut1v1", "radius_m=0.2", "at least 0.5"),
+        ("PushOut1v1", "start_share=1.0", r"\[0.3, 0.9\]"),
+        ("PushOut1v1", "spread_deg=200", r"\[0, 180\]"),
+        ("SoccerTwoPlayer", "ball_from_goal_m=[2.0,5.0]", "do not fit into room 'room'"),
+        ("SoccerTwoPlayer", "aside_m=2.9", "do not fit into room"),
+        ("SoccerTwoPlayer", "ball_from_goal_m=[3.0,2.0]", "least, greatest"),
+        ("SoccerTwoPlayer", "radius_m=0.7", "does not fit through"),
+        ("SoccerTwoPlayer", "kick_rest_s=0", "positive"),
+        ("SoccerTwoPlayer", "spread_deg=200", r"\[0, 180\]"),
+        ("SoccerTwoPlayer", "defender_from_goal_m=[0.3,1.9]", "0.3 m nearer"),
+        ("MultiAgentNav", "agents=1", "task.agents=1 must be at least 2"),
+        ("MultiAgentNav", "radius_m=0", "task.radius_m=0.0 must be a positive number"),
+        ("MultiAgentNav", "reach_m=nan", "task.reach_m=nan must be a positive number"),
+        ("MultiAgentNav", "muted=most", "muted"),
+    ],
+)
+def test_impossible_parameters_are_refused(task, override, message):
+    with pytest.raises(ValueError, match=message):
+        Game(compose([f"+task={task}", f"task.{override}"]).game)
+
+
+@pytest.mark.parametrize("task", HUMANOID_TASKS)
+def test_tasks_at_joint_level_refuse_a_walker(task):
+    with pytest.raises(ValueError, match="body with joints; choose body=full"):
+        Game(compose([f"+task={task}", "body=walker"]).game)
+
+
+def test_kick_the_ball_refuses_a_body_with_joints():
+    with pytest.raises(ValueError, match="choose body=walker"):
+        Game(compose(["+task=KickTheBall", "body=mitten"]).game)
