@@ -15,7 +15,7 @@ from docs_pages.task_pages import task_page
 from veca_marl.api import list_tasks
 from veca_marl.conf_dir import conf_dir
 from veca_marl.envs.core.task import find_task
-from veca_marl.sim.body.anatomy.skeleton import limit_sources
+from veca_marl.sim.body.anatomy import limit_sources
 
 ROOT = Path(__file__).resolve().parent.parent
 DOCS = ROOT / "docs"

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from veca_marl.sim.body.anatomy.skeleton import forward_kinematics, load_skeleton
+from veca_marl.sim.body.anatomy import forward_kinematics, load_skeleton
 from veca_marl.sim.body.appearance import bone_geoms, dressed_skin
 from veca_marl.sim.geometry import quaternions_to_matrices
 

@@ -6,7 +6,7 @@ import numpy as np
 from skins import add_body, pose
 from stand_in_worlds import SceneWorld
 
-from veca_marl.sim.body.anatomy.skeleton import load_skeleton
+from veca_marl.sim.body.anatomy import load_skeleton
 from veca_marl.sim.geometry import Geom, Scene, Shape
 from veca_marl.sim.touch import TouchCfg, TouchSense, load_taxels, taxel_positions
 

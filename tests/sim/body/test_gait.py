@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from walking import ball, empty_world, let_pass, walker_in
 
-from veca_marl.sim.body.anatomy.skeleton import Soles, load_skeleton
+from veca_marl.sim.body.anatomy import Soles, load_skeleton
 from veca_marl.sim.body.walker.gait import Gait
 
 SKELETON = load_skeleton()

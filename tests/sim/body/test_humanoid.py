@@ -9,8 +9,7 @@ from humanoids import random_torques
 from walking import empty_world, let_pass
 
 from veca_marl.sim.body import MOUNTS, Body, BodyCfg, make_body
-from veca_marl.sim.body.anatomy.skeleton import Underside, load_skeleton
-from veca_marl.sim.body.anatomy.skin_springs import skin_spring
+from veca_marl.sim.body.anatomy import Underside, load_skeleton, skin_spring
 from veca_marl.sim.body.humanoid import (
     Detail,
     Humanoid,

@@ -7,7 +7,7 @@ import pytest
 from humanoids import remove_gravity
 from walking import let_pass
 
-from veca_marl.sim.body.anatomy.skeleton import load_skeleton
+from veca_marl.sim.body.anatomy import load_skeleton
 from veca_marl.sim.body.humanoid import Detail, JointActionKind, JointChoice
 from veca_marl.sim.body.humanoid.joint_control import PositionControl
 from veca_marl.sim.body.humanoid.postures import POSTURES, Posture, posture_angles

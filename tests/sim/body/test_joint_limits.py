@@ -11,7 +11,7 @@ from humanoids import (
 )
 from walking import empty_world
 
-from veca_marl.sim.body.anatomy.skeleton import load_skeleton
+from veca_marl.sim.body.anatomy import load_skeleton
 from veca_marl.sim.body.humanoid import Detail, Humanoid, HumanoidCfg
 from veca_marl.sim.body.humanoid.articulation import damping_number
 from veca_marl.sim.physics import ClockCfg

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from walking import empty_world, let_pass
 
-from veca_marl.sim.body.anatomy.skeleton import load_skeleton
+from veca_marl.sim.body.anatomy import load_skeleton
 from veca_marl.sim.body.humanoid import Humanoid, HumanoidCfg, JointActionKind
 from veca_marl.sim.body.humanoid.postures import Posture, posture_angles
 from veca_marl.sim.body.humanoid.self_collision import limb, may_collide

@@ -10,7 +10,7 @@ from veca_marl.envs.core.actions import random_action
 from veca_marl.envs.core.game import Game
 from veca_marl.envs.core.game_cfg import GameCfg
 from veca_marl.sim.body import VoiceKind
-from veca_marl.sim.body.anatomy.skeleton import load_skeleton
+from veca_marl.sim.body.anatomy import load_skeleton
 from veca_marl.sim.senses import SensesCfg, make_senses
 from veca_marl.sim.touch import load_taxels
 

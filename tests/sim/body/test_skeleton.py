@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from veca_marl.sim.body.anatomy.skeleton import Soles, forward_kinematics, load_skeleton
+from veca_marl.sim.body.anatomy import Soles, forward_kinematics, load_skeleton
 from veca_marl.sim.geometry import Shape
 from veca_marl.sim.physics import pybullet
 

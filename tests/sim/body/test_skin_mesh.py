@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from skins import add_body
 
-from veca_marl.sim.body.anatomy.skeleton import load_skeleton
-from veca_marl.sim.body.anatomy.skin_mesh import binding_pose, load_skin
+from veca_marl.sim.body.anatomy import binding_pose, load_skeleton, load_skin
 from veca_marl.sim.geometry import Scene
 from veca_marl.sim.touch.taxels import distance_to_bone
 

@@ -6,10 +6,17 @@ import numpy as np
 import pytest
 from walking import empty_world
 
-from veca_marl.sim.body.anatomy.hulls import MARGIN_M
-from veca_marl.sim.body.anatomy.skeleton import load_skeleton
-from veca_marl.sim.body.anatomy.skin_springs import SkinLayer, skin_layer, skin_spring
-from veca_marl.sim.body.anatomy.urdf import Build, _Writer, body_files, bone_of
+from veca_marl.sim.body.anatomy import (
+    Build,
+    SkinLayer,
+    body_files,
+    bone_of,
+    load_skeleton,
+    skin_layer,
+    skin_spring,
+)
+from veca_marl.sim.body.anatomy.urdf.hulls import MARGIN_M
+from veca_marl.sim.body.anatomy.urdf.robot import _Writer
 from veca_marl.sim.body.humanoid import Detail, Humanoid, HumanoidCfg
 from veca_marl.sim.geometry import Shape
 from veca_marl.sim.physics import pybullet

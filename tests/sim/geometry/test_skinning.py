@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from skins import add_body, pose, random_angles, random_turn
 
-from veca_marl.sim.body.anatomy.skin_mesh import load_skin
+from veca_marl.sim.body.anatomy import load_skin
 from veca_marl.sim.geometry import Scene
 
 

@@ -7,7 +7,7 @@ import pytest
 from skins import add_body, pose, random_angles, random_turn
 from touching import SPREAD, Stage, dense, of_bone
 
-from veca_marl.sim.body.anatomy.skeleton import load_skeleton
+from veca_marl.sim.body.anatomy import load_skeleton
 from veca_marl.sim.geometry import Shape
 from veca_marl.sim.touch.penetration import adjacent_bones
 

@@ -8,8 +8,7 @@ import pytest
 from skins import add_body
 from touching import SPREAD
 
-from veca_marl.sim.body.anatomy.skeleton import load_skeleton
-from veca_marl.sim.body.anatomy.skin_mesh import binding_pose
+from veca_marl.sim.body.anatomy import binding_pose, load_skeleton
 from veca_marl.sim.geometry import Scene
 from veca_marl.sim.touch.taxels import (
     BARYCENTRIC,

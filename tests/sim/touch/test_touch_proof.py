@@ -8,7 +8,7 @@ import pytest
 from paths import ROOT
 from touching import of_bone
 
-from veca_marl.sim.body.anatomy.skeleton import load_skeleton
+from veca_marl.sim.body.anatomy import load_skeleton
 from veca_marl.sim.physics import GRAVITY_MPS2, ClockCfg
 
 SCRIPT = ROOT / "scripts/make_touch_proof.py"

@@ -7,7 +7,7 @@ import pytest
 from eye_scenes import ball_at
 from skins import SHIRT, add_body, pose, random_angles, random_turn
 
-from veca_marl.sim.body.anatomy.skeleton import load_skeleton
+from veca_marl.sim.body.anatomy import load_skeleton
 from veca_marl.sim.geometry import Geom, Pose, Scene, Shape
 from veca_marl.sim.vision import Camera, look_at
 

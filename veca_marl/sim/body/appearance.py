@@ -7,8 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from veca_marl.sim.body.anatomy.skeleton import Bone, Skeleton
-from veca_marl.sim.body.anatomy.skin_mesh import load_skin
+from veca_marl.sim.body.anatomy import Bone, Skeleton, load_skin
 from veca_marl.sim.body.mounts import EYES, MOUNTS_M
 from veca_marl.sim.geometry import Geom, Mesh, Primitive, Shape
 

@@ -15,8 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veca_marl.sim.body.action import Action, checked_action
-from veca_marl.sim.body.anatomy.bone_motion import bone_motion
-from veca_marl.sim.body.anatomy.skeleton import load_skeleton
+from veca_marl.sim.body.anatomy import bone_motion, load_skeleton
 from veca_marl.sim.body.appearance import SHIRTS, bone_geoms, dressed_skin
 from veca_marl.sim.body.body_cfg import BodyCfg
 from veca_marl.sim.body.mounts import EYES, Gaze, palm_centre, resting_mount

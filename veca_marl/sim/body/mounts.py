@@ -12,7 +12,7 @@ import math
 
 import numpy as np
 
-from veca_marl.sim.body.anatomy.skeleton import Bone
+from veca_marl.sim.body.anatomy import Bone
 from veca_marl.sim.geometry import Floats, Pose, Shape
 
 MOUNTS_M: dict[str, tuple[float, float, float]] = {

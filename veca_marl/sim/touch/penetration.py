@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from veca_marl.sim.body.anatomy.skeleton import Skeleton
+from veca_marl.sim.body.anatomy import Skeleton
 from veca_marl.sim.geometry import (
     Bools,
     DistanceAndGradient,

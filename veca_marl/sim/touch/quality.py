@@ -9,7 +9,7 @@ from enum import Enum
 import numpy as np
 from numpy.typing import NDArray
 
-from veca_marl.sim.body.anatomy.skeleton import Skeleton, load_skeleton
+from veca_marl.sim.body.anatomy import Skeleton, load_skeleton
 from veca_marl.sim.geometry import Bools, Floats
 from veca_marl.sim.touch.taxels import load_taxels
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veca_marl.sim.body import Body
-from veca_marl.sim.body.anatomy.skeleton import load_skeleton
+from veca_marl.sim.body.anatomy import load_skeleton
 from veca_marl.sim.geometry import Bools, Floats
 from veca_marl.sim.physics import World
 from veca_marl.sim.sense import Sense

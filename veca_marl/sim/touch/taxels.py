@@ -14,8 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from veca_marl.sim.body.anatomy.skeleton import Bone, load_skeleton
-from veca_marl.sim.body.anatomy.skin_mesh import binding_pose, load_skin
+from veca_marl.sim.body.anatomy import Bone, binding_pose, load_skeleton, load_skin
 from veca_marl.sim.geometry import (
     Floats,
     Indices,

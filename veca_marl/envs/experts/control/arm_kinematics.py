@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from veca_marl.sim.body.anatomy.skeleton import Skeleton, forward_kinematics, load_skeleton
+from veca_marl.sim.body.anatomy import Skeleton, forward_kinematics, load_skeleton
 from veca_marl.sim.body.humanoid import Humanoid
 from veca_marl.sim.geometry import Floats
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from veca_marl.sim.body.anatomy.skeleton import forward_kinematics, load_skeleton
+from veca_marl.sim.body.anatomy import forward_kinematics, load_skeleton
 from veca_marl.sim.body.humanoid import SATURATION_RAD, Humanoid, JointActionKind
 from veca_marl.sim.body.humanoid.postures import Posture
 from veca_marl.sim.geometry import Floats

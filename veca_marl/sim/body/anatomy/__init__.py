@@ -1,1 +1,39 @@
-"""The skeleton, its inertia, its skin mesh and its URDF."""
+"""The skeleton, its kinematics, its skin mesh and its URDF."""
+
+from veca_marl.sim.body.anatomy.bone_motion import bone_motion
+from veca_marl.sim.body.anatomy.bone_tables import limit_sources, load_skeleton
+from veca_marl.sim.body.anatomy.kinematics import forward_kinematics
+from veca_marl.sim.body.anatomy.skeleton import Bone, Joint, Skeleton
+from veca_marl.sim.body.anatomy.skin_mesh import binding_pose, load_skin
+from veca_marl.sim.body.anatomy.skin_springs import (
+    SkinLayer,
+    SkinSpring,
+    is_finger,
+    skin_layer,
+    skin_spring,
+)
+from veca_marl.sim.body.anatomy.undersides import Soles, Underside
+from veca_marl.sim.body.anatomy.urdf import BodyFiles, Build, body_files, bone_of
+
+__all__ = [
+    "BodyFiles",
+    "Bone",
+    "Build",
+    "Joint",
+    "Skeleton",
+    "SkinLayer",
+    "SkinSpring",
+    "Soles",
+    "Underside",
+    "binding_pose",
+    "body_files",
+    "bone_motion",
+    "bone_of",
+    "forward_kinematics",
+    "is_finger",
+    "limit_sources",
+    "load_skeleton",
+    "load_skin",
+    "skin_layer",
+    "skin_spring",
+]

@@ -1,4 +1,4 @@
-"""How fast bones move, from how fast the pelvis and the joints do."""
+"""Velocities of all bones from those of the pelvis and the joints."""
 
 from __future__ import annotations
 
@@ -6,7 +6,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from veca_marl.sim.body.anatomy.skeleton import Skeleton, turn
+from veca_marl.sim.body.anatomy.kinematics import rotate_about_axis
+from veca_marl.sim.body.anatomy.skeleton import Skeleton
 from veca_marl.sim.geometry import Floats
 
 
@@ -23,7 +24,7 @@ def _propagate(
     velocities: Floats,
     spins: Floats,
 ) -> None:
-    """Fill rows 1..: each joint adds its speed about its axis as its predecessors turned it."""
+    """Write rows 1..: each joint adds its speed about its axis, rotated by the joints before it."""
     frame = np.empty((3, 3))
     for bone in range(1, parents.shape[0]):
         parent = parents[bone]
@@ -36,7 +37,7 @@ def _propagate(
             for row in range(3):
                 along = frame[row, 0] * x + frame[row, 1] * y + frame[row, 2] * z
                 spins[bone, row] += speeds[joint] * along
-            turn(frame, joint_axes[joint], angles[joint], frame)
+            rotate_about_axis(frame, joint_axes[joint], angles[joint], frame)
         x = positions[bone, 0] - positions[parent, 0]
         y = positions[bone, 1] - positions[parent, 1]
         z = positions[bone, 2] - positions[parent, 2]
@@ -48,7 +49,7 @@ def _propagate(
 
 @njit(cache=True, inline="always")
 def _product(a: Floats, b: Floats, i: int, j: int, row: int, column: int) -> float:
-    """One element of the product of two of many matrices: numpy's small ones cost ten times it."""
+    """One element of a product of two matrices; numpy takes ten times as long for small ones."""
     return float(
         a[i, row, 0] * b[j, 0, column]
         + a[i, row, 1] * b[j, 1, column]
@@ -65,10 +66,10 @@ def bone_motion(
     pelvis_velocity: Floats,
     pelvis_spin: Floats,
 ) -> tuple[Floats, Floats]:
-    """Return velocities (m/s) of the origins and angular velocities (rad/s) of all bones.
+    """Return the velocities (m/s) of the origins and the angular velocities (rad/s) of all bones.
 
     Args:
-        skeleton: The table.
+        skeleton: The skeleton.
         angles: ``(82,)`` joint angles, rad.
         speeds: ``(82,)`` their rates, rad/s.
         positions: ``(47, 3)`` bone origins that belong to the angles, metres.

@@ -1,13 +1,14 @@
-"""Where the skin gives way in the physics, and how: Hooke's springs over bones.
+"""Compliant skin in the physics: linear springs (Hooke's law) over the bones.
 
-Skin carries weight on hands and feet, so that what lies on them is felt by how deep it sinks in.
-There the compliant layer is a collider of its own over the rigid bone; the bone stops what presses
-through. A finger has the compliant collider alone, which saves 30 links: by its own strength it
-cannot press through its skin (at most 1.4 N at the tip, against 1.5 to 2 N). The weight of an arm
-on a fingertip can, and sinks it several millimetres into what it lies on. Elsewhere the bone is all
-the physics knows.
-Touch reads depths from geometry and needs none of this; it is only felt more finely where skin
-yields.
+The skin of hands and feet carries load, so that the depth of penetration depends on the force.
+There the compliant layer is a collider of its own over that of the rigid bone, which stops objects
+that compress the skin completely. A finger has the compliant collider alone, which saves 30 links:
+its own strength cannot compress its skin completely (at most 1.4 N at the tip, against 1.5 to
+2 N). The weight of an arm on a fingertip can; the fingertip then penetrates by several millimetres.
+All other bones are rigid in the physics.
+
+Touch reads depths from geometry and does not depend on these springs; where the skin is compliant,
+its readings vary gradually with the force.
 """
 
 from __future__ import annotations
@@ -20,11 +21,11 @@ from veca_marl.sim.body.anatomy.skeleton import Bone
 
 FINGERS = ("index", "middle", "ring", "little", "thumb")
 _DAMPING_RATIO = 0.7
-_CARRIED_KG = {True: 0.02, False: 0.5}  # what a finger, a hand or a foot typically meets; ours
+_CARRIED_KG = {True: 0.02, False: 0.5}  # typical load of a finger, of a hand or foot; our choice
 
 
 class SkinLayer(Enum):
-    """What the physics knows of a bone: the rigid bone, its soft skin, or one over the other."""
+    """Colliders of a bone: the rigid bone, its soft skin, or one over the other."""
 
     BONE = "bone"
     SKIN = "skin"
@@ -36,7 +37,7 @@ class SkinSpring:
     """A linear spring per contact point: the force is ``stiffness x depth``.
 
     Attributes:
-        stiffness_npm: N/m. The force that reaches the bone over the thickness of the skin.
+        stiffness_npm: N/m: the force that compresses the skin completely, over its thickness.
         damping_nspm: N s/m.
         thickness_m: Depth at which the bone is reached.
     """
@@ -47,19 +48,19 @@ class SkinSpring:
 
 
 def is_finger(bone: Bone) -> bool:
-    """Say whether a bone is one of the 30 phalanges."""
+    """Return whether a bone is one of the 30 phalanges."""
     return any(finger in bone.name for finger in FINGERS)
 
 
 def skin_layer(bone: Bone) -> SkinLayer:
-    """Return what the physics knows of a bone."""
+    """Return the kind of colliders of a bone."""
     if is_finger(bone):
         return SkinLayer.SKIN
     return SkinLayer.SKIN_OVER_BONE if bone.name.endswith(("hand", "foot")) else SkinLayer.BONE
 
 
 def skin_spring(bone: Bone) -> SkinSpring:
-    """Return the spring that the skin of a bone is."""
+    """Return the spring of the skin of a bone."""
     stiffness = bone.skin_force_n / bone.skin_thickness_m
     damping = 2.0 * _DAMPING_RATIO * math.sqrt(stiffness * _CARRIED_KG[is_finger(bone)])
     return SkinSpring(stiffness, damping, bone.skin_thickness_m)

@@ -9,8 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from veca_marl.sim.body.anatomy.skeleton import Skeleton
-from veca_marl.sim.body.anatomy.urdf import Build, body_files, bone_of
+from veca_marl.sim.body.anatomy import Build, Skeleton, body_files, bone_of
 from veca_marl.sim.body.humanoid.self_collision import allow_self_collision
 from veca_marl.sim.geometry import (
     Floats,

@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veca_marl.sim.body.action import Action, checked_action
-from veca_marl.sim.body.anatomy.skeleton import Underside, forward_kinematics
-from veca_marl.sim.body.anatomy.urdf import Build
+from veca_marl.sim.body.anatomy import Build, Underside, forward_kinematics
 from veca_marl.sim.body.base import Body
 from veca_marl.sim.body.body_cfg import BodyCfg
 from veca_marl.sim.body.humanoid.articulation import Articulation, damping_number

@@ -11,8 +11,7 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from veca_marl.sim.body.anatomy.skeleton import Skeleton
-from veca_marl.sim.body.anatomy.skin_springs import is_finger
+from veca_marl.sim.body.anatomy import Skeleton, is_finger
 from veca_marl.sim.geometry import Floats
 from veca_marl.sim.sound import Call
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from veca_marl.sim.body.anatomy.skeleton import Skeleton
+from veca_marl.sim.body.anatomy import Skeleton
 from veca_marl.sim.geometry import Floats
 
 

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from veca_marl.sim.body.anatomy.skeleton import Skeleton
+from veca_marl.sim.body.anatomy import Skeleton
 from veca_marl.sim.geometry import Floats
 
 _STANCE = 0.5  # fraction of the stride in which a foot is on the floor

@@ -1,8 +1,8 @@
 """Convex hulls of capsules and boxes, as Bullet reads them from files.
 
-Bullet meets two links of several shapes each in as many contacts as shapes meet, and solves them in
-an order that depends on what the links did in episodes long past. Of a link with one shape there is
-one contact with each other link, and the order is that of the links.
+Between two links of several shapes each, Bullet has one contact manifold per pair of shapes, and
+solves these in an order that depends on earlier episodes. A link with one shape has one manifold
+with each other link, and their order is that of the links.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import numpy as np
 
 from veca_marl.sim.geometry import Floats, Pose, Primitive, Shape, rotation_with_z
 
-# Bullet lays a skin of its own round every hull (`gDefaultCollisionMargin` of its importer)
+# Bullet adds a margin to every hull (`gDefaultCollisionMargin` of its importer)
 MARGIN_M = 0.001
 _RINGS, _AROUND = 7, 20  # points of a half sphere: rings from pole to equator, and round each
 
@@ -35,7 +35,7 @@ def surface_points(part: Primitive, pose: Pose) -> Floats:
 
 
 def as_obj(points: Floats) -> str:
-    """Return points as Wavefront OBJ; the faces only name them all, Bullet finds the hull."""
+    """Return points as Wavefront OBJ. Bullet computes the hull; the faces only list all points."""
     rows = [f"v {x:.7g} {y:.7g} {z:.7g}" for x, y, z in points]
     last = len(points)
     rows += [f"f {i} {min(i + 1, last)} {min(i + 2, last)}" for i in range(1, last + 1, 3)]
@@ -43,7 +43,7 @@ def as_obj(points: Floats) -> str:
 
 
 def _half_sphere(axis: Floats) -> Floats:
-    """Points on the unit half sphere about an axis, the rim included."""
+    """Points on the unit half sphere about an axis, including its rim."""
     polar = np.linspace(0.0, math.pi / 2.0, _RINGS)
     around = np.linspace(0.0, 2.0 * math.pi, _AROUND, endpoint=False)
     polar, around = (grid.ravel() for grid in np.meshgrid(polar, around))
@@ -52,5 +52,5 @@ def _half_sphere(axis: Floats) -> Floats:
     return np.unique(points.round(12), axis=0)
 
 
-# the points of a ring stand out by as much as the middles of its sides stay behind
+# the corners of a ring are as far outside the circle as the middles of its edges are inside
 _BULGE = 2.0 / (1.0 + math.cos(math.pi / _AROUND))
