@@ -1,6 +1,6 @@
-"""Rollouts that the laws compare: by random actions, by the expert, and their digests.
+"""Rollouts that the laws compare: of random actions and of scripts, and their digests.
 
-Run as a program it prints the digest of a rollout, so that another process can be asked.
+As a program it prints the digest of a rollout, for a comparison with another process.
 """
 
 import hashlib
@@ -13,17 +13,18 @@ import torch
 from veca_marl.config import compose
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
 from veca_marl.envs.core.actions import random_action
+from veca_marl.envs.core.episodes import Episodes
 from veca_marl.envs.core.game import Game
 from veca_marl.envs.core.team import Script
 from veca_marl.sim.body import VoiceKind
 from veca_marl.sim.body.walker import WalkerCfg
 
-# the ways to act in a task: its own body's, and another
+# kinds of actions in a task: those of its own body, and of another one
 KINDS = ("own", "other")
 
 
 def game_cfg(task, kind="own", *overrides):
-    """Return what is played: with the task's own body, or one that is commanded otherwise."""
+    """Return the game of a task with its own body, or with one that has other actions."""
     own = compose([f"+task={task}", *overrides])
     if kind == "own":
         return own.game
@@ -69,38 +70,34 @@ def digest(rollout):
 
 
 def returns(cfg, episodes, script, seed=0):
-    """Play episodes and return what the players of the first team were paid in each.
+    """Play episodes and return the return of the first team in each, mean over its players.
 
-    Other teams play at random: a game between two who choose alike does not say who is better.
+    Other teams take random actions, because between two equal teams neither is better.
 
     Args:
         cfg: The game.
-        episodes: How many.
-        script: Who chooses for the first team.
-        seed: Of everything random.
+        episodes: Number of episodes.
+        script: How the actions of the first team are chosen.
+        seed: Seed of all randomness.
     """
     others = {team.name: Script.random for team in cfg.teams[1:]}
-    game, rng = Game(replace(cfg, script=others)), np.random.default_rng(seed)
-    paid = []
+    game, stream = Game(replace(cfg, script=others)), Episodes(seed)
+    found = []
     for _ in range(episodes):
-        game.reset(rng)
-        total, over = 0.0, False
-        while not over:
+        game.reset(stream.next())
+        total, done = 0.0, False
+        while not done:
             for player in game.actors:
                 game.play_script(player, script)
             outcome = game.advance()
             total += float(np.mean([game.reward_of(outcome.terms[p.name]) for p in game.actors]))
-            over = outcome.done
-        paid.append(total)
+            done = outcome.done
+        found.append(total)
     game.close()
-    return np.array(paid)
-
-
-def by_chance(task, player, observation, rng):
-    return random_action(player.body.action_spec, rng)
+    return np.array(found)
 
 
 if __name__ == "__main__":
     name, n_steps, start = sys.argv[1:]
-    fresh = VecaEnv(game_cfg(name), worlds=2)
+    fresh = VecaEnv(game_cfg(name), worlds=2, seed=0)
     print(digest(play(fresh, int(n_steps), int(start))))  # noqa: T201  its answer

@@ -1,4 +1,4 @@
-"""What the laws of every task are asked of: each task, in each way to act."""
+"""The laws of every task are tested with each task and each kind of action."""
 
 import pytest
 from rollouts import KINDS

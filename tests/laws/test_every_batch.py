@@ -3,7 +3,6 @@
 import pytest
 from batches import batch_and_singles, play_and_compare
 from rollouts import game_cfg
-from torchrl.envs import check_env_specs
 
 
 @pytest.fixture(scope="module")
@@ -16,7 +15,3 @@ def envs(task, kind):
 
 def test_a_batch_equals_single_worlds_with_masks_and_partial_resets(envs):
     play_and_compare(*envs, steps=14)  # an episode has 10
-
-
-def test_specs_hold_in_a_serial_env(envs):
-    check_env_specs(envs[1])
