@@ -1,4 +1,4 @@
-"""A game of two teams, whose players stand elsewhere and are paid otherwise: for the doors."""
+"""A game of two teams in which all players have different places and rewards."""
 
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -47,7 +47,7 @@ class Duel(Task):
 
 @contextmanager
 def duel(*overrides):
-    """Make the task known for a while; yield how it is played."""
+    """Register the task within the context; yield its configuration."""
     game = compose(["+task=KickTheBall", "playground=simple", *overrides]).game
     TASKS["Duel"] = Duel
     try:

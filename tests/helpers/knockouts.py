@@ -1,4 +1,4 @@
-"""A game of two teams in which one player after another is out."""
+"""A game of two teams in which one player after another is eliminated."""
 
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -14,7 +14,7 @@ class KnockoutCfg(TaskCfg):
 
 
 class Knockout(Task):
-    """Each player has a time of its own, drawn at the start; the last one ends the game.
+    """Each player is eliminated at a time drawn at the start; the last one ends the game.
 
     Terms:
         place: how far a player has come along x.
@@ -52,7 +52,7 @@ class KnockoutExpert(Expert):
 
 @contextmanager
 def knockout(*overrides):
-    """Make the task known for a while; yield how it is played."""
+    """Register the task within the context; yield its configuration."""
     game = compose(["+task=KickTheBall", "playground=simple", *overrides]).game
     TASKS["Knockout"], EXPERTS["Knockout"] = Knockout, KnockoutExpert
     try:

@@ -1,4 +1,4 @@
-"""VecaEnv: batches of games behind TorchRL's face, in one process and in several."""
+"""VecaEnv: batches of games as a TorchRL environment, in one process and in several."""
 
 from functools import partial
 
@@ -33,7 +33,7 @@ def with_action(env, value):
     return state.set(("agents", "action"), torch.as_tensor(value))
 
 
-def test_shapes_are_worlds_by_players_by_what_it_is(env):
+def test_leaves_have_the_shapes_worlds_players_array(env):
     played = env.step(env.rand_action(env.reset()))
     assert played.batch_size == (3,)
     assert played["agents", "action"].shape == (3, 1, 2)
@@ -50,8 +50,8 @@ def test_there_is_at_least_one_world(worlds):
 
 
 @pytest.mark.parametrize("wrong", [np.nan, np.inf, -np.inf, 1.5, -2.0])
-def test_one_impossible_number_stops_all_worlds(env, wrong):
-    """The bad one is in the last world: those before it have not moved either."""
+def test_an_invalid_action_stops_the_step_of_all_worlds(env, wrong):
+    """The action of the last world is invalid; the worlds before it do not move either."""
     action = torch.zeros(3, 1, 2)
     action[:, 0, 0] = 1.0
     action[2, 0, 1] = wrong
@@ -79,12 +79,11 @@ def test_the_reward_of_a_step_is_that_of_its_terms(env):
     for _ in range(5):
         state = env.step(env.rand_action(state))["next"]
         terms = state["agents", "info"]
-        paid = terms["kick"] * 1.0 + terms["approach"] * 0.01
-        torch.testing.assert_close(state["agents", "reward"], paid)
+        expected = terms["kick"] * 1.0 + terms["approach"] * 0.01
+        torch.testing.assert_close(state["agents", "reward"], expected)
 
 
-def test_seeds_and_streams(env):
-    """Equal seeds, equal worlds; the worlds of a batch differ."""
+def test_equal_seeds_give_equal_batches_of_different_worlds(env):
     first = [env.set_seed(9), env.reset()][1].clone()
     again = [env.set_seed(9), env.reset()][1].clone()
     other = [env.set_seed(10), env.reset()][1].clone()
@@ -110,7 +109,7 @@ def test_the_constructor_seeds_as_set_seed_does(env):
     fresh.close()
 
 
-def test_episodes_follow_each_other_by_themselves():
+def test_a_rollout_resets_worlds_that_are_done():
     env = VecaEnv(cfg_of(*CHEAP, "task.max_seconds=0.2"), worlds=2)
     rollout = env.rollout(12, break_when_any_done=False)
     ended = rollout["next", "truncated"].squeeze(-1).sum(1).tolist()
@@ -118,7 +117,7 @@ def test_episodes_follow_each_other_by_themselves():
     env.close()
 
 
-def test_worlds_may_end_at_different_times():
+def test_worlds_can_end_at_different_times():
     env = VecaEnv(cfg_of(*CHEAP, "task.max_seconds=0.4"), worlds=2)
     state = env.reset()
     for _ in range(5):
@@ -190,7 +189,7 @@ def test_data_are_on_the_device_of_the_env(monkeypatch):
 
 
 @pytest.mark.skipif(not torch.cuda.is_available(), reason="needs CUDA")
-def test_an_env_on_cuda_is_that_on_the_cpu():
+def test_an_env_on_cuda_gives_the_data_of_the_cpu():
     rollouts = []
     for device in ("cpu", "cuda"):
         env = VecaEnv(cfg_of(*CHEAP), worlds=2, seed=1).to(device)

@@ -1,4 +1,4 @@
-"""Specs of senses and bodies, translated for TorchRL."""
+"""TorchRL's specs of senses and bodies."""
 
 import numpy as np
 import pytest
@@ -25,7 +25,7 @@ def test_images_stay_bytes():
 
 
 @pytest.mark.parametrize(("low", "high"), [(-np.inf, np.inf), (-8.0, np.inf), (-np.inf, 0.0)])
-def test_what_is_open_on_one_side_is_unbounded(low, high):
+def test_an_array_that_lacks_a_bound_is_unbounded(low, high):
     assert isinstance(to_torchrl(ArraySpec((3,), np.float32, low, high), (1,)), Unbounded)
 
 

@@ -135,8 +135,8 @@ def moved(env):
     return env.step(RandomPolicy(env)(env.reset()))
 
 
-def odd_states(env):
-    """Yield by name what a step may leave behind besides the usual."""
+def unusual_steps(env):
+    """Yield steps with unusual data by name."""
     usual = moved(env)
     yield "usual", usual
     yield "masked", usual.copy().set("_reset", usual["next", "done"].clone())
@@ -150,11 +150,11 @@ def odd_states(env):
     yield "locked", usual.clone().lock_()
 
 
-def test_the_next_start_is_that_of_torchrl(pair):
+def test_the_next_state_is_that_of_torchrl(pair):
     fast, full = pair
     assert isinstance(fast._step_mdp, NextState)
     assert isinstance(full._step_mdp, _StepMDP)
-    for name, state in odd_states(fast):
+    for name, state in unusual_steps(fast):
         one, other = fast._step_mdp(state), full._step_mdp(state)
         assert type(one) is type(other), name
         assert_same(one, other)
@@ -189,11 +189,11 @@ def test_the_plan_follows_the_specs(pair):
     assert env._step_mdp is not before
 
 
-def test_a_compiled_step_onward_is_that_of_torchrl(pair):
+def test_the_compiled_next_state_is_that_of_torchrl(pair):
     env, _ = pair
-    state, onward = moved(env).exclude("note"), env._step_mdp
-    compiled = torch.compile(lambda data: onward(data), backend="eager")
-    assert_same(compiled(state), onward.general(state))
+    state, next_state = moved(env).exclude("note"), env._step_mdp
+    compiled = torch.compile(lambda data: next_state(data), backend="eager")
+    assert_same(compiled(state), next_state.general(state))
 
 
 def test_types_are_still_checked_where_asked(pair):

@@ -1,4 +1,4 @@
-"""The Gymnasium adapter: what its ids take, and what it refuses."""
+"""The Gymnasium adapter: arguments, pictures and errors."""
 
 import gymnasium
 import numpy as np
@@ -28,7 +28,7 @@ def test_the_id_takes_the_choices_of_make(env):
     discrete.close()
 
 
-def test_a_vector_of_envs_has_a_seed_for_each():
+def test_each_env_of_a_vector_has_its_own_seed():
     envs = gymnasium.make_vec(ID, num_envs=2, **CHEAP)
     observations, _ = envs.reset(seed=3)
     alone = gym_env("KickTheBall", **CHEAP)
@@ -56,7 +56,7 @@ def test_there_is_no_step_without_an_episode(env):
         env.unwrapped.step(np.zeros(2, np.float32))
 
 
-def test_a_wrong_action_is_answered_with_what_is_right(env):
+def test_an_invalid_action_is_an_error_with_the_expected_shape(env):
     env.reset()
     with pytest.raises(
         ValueError, match=r"agents: action part 'move' .* not numbers of shape \(2,\)"
@@ -70,6 +70,6 @@ def test_a_task_of_several_agents_names_the_function_to_use():
         VecaGymEnv(cfg)
 
 
-def test_wrong_choices_are_answered_with_those_there_are():
+def test_an_unknown_choice_is_an_error_that_lists_the_choices():
     with pytest.raises(ValueError, match=r"unknown body 'bird'.*choices:.*walker"):
         gymnasium.make(ID, body="bird")

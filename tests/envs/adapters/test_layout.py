@@ -1,4 +1,4 @@
-"""Layouts give what TorchRL's own checks would accept, new at each step and without a copy."""
+"""Layouts give data that TorchRL's checks accept, new at each step and without a copy."""
 
 import numpy as np
 import pytest
@@ -21,7 +21,7 @@ def spec():
     return Composite(team=team, done=done, shape=(2,))
 
 
-def test_what_is_unchecked_would_pass_the_checks(spec):
+def test_the_unchecked_tensordict_is_in_the_spec(spec):
     layout = Layout(spec)
     unchecked = layout.tensordict(layout.new())
     assert spec.is_in(unchecked)
@@ -34,7 +34,7 @@ def test_what_is_unchecked_would_pass_the_checks(spec):
         assert unchecked[key].device == checked[key].device
 
 
-def test_arrays_reach_the_tensors_uncopied(spec):
+def test_tensors_share_the_memory_of_the_arrays(spec):
     layout = Layout(spec)
     arrays = layout.new()
     tensordict = layout.tensordict(arrays)

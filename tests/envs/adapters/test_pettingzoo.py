@@ -1,4 +1,4 @@
-"""The PettingZoo adapter with several teams, and what it refuses."""
+"""The PettingZoo adapter with several teams, and its errors."""
 
 import numpy as np
 import pytest
@@ -34,14 +34,14 @@ def still(env):
     return {name: np.zeros(2, np.float32) for name in env.agents}
 
 
-def test_a_game_of_two_teams_is_accepted(env, cfg):
+def test_a_game_of_two_teams_passes_pettingzoos_tests(env, cfg):
     parallel_api_test(env, num_cycles=10)
     parallel_seed_test(lambda: VecaParallelEnv(cfg), num_cycles=10)
 
 
 # it recommends one array as observation and numbers in all names
 @pytest.mark.filterwarnings("ignore::UserWarning:pettingzoo.test.api_test")
-def test_agents_may_also_act_in_turn(env):
+def test_agents_can_also_act_in_turn(env):
     api_test(parallel_to_aec(env), num_cycles=10)
 
 
@@ -57,8 +57,8 @@ def test_agents_are_the_players_while_an_episode_lasts(env):
     assert env.agents == []
 
 
-def test_every_agent_has_its_own_pay_and_senses(env, cfg):
-    """The same as `VecaEnv`, player by player; no two players hear or earn the same."""
+def test_each_agent_has_its_own_rewards_and_senses(env, cfg):
+    """The same as `VecaEnv`, player by player; no two players have the same reward."""
     other = VecaEnv(cfg, seed=3)
     state = other.reset()
     observations, infos = env.reset(seed=3)
@@ -75,7 +75,7 @@ def test_every_agent_has_its_own_pay_and_senses(env, cfg):
     other.close()
 
 
-def test_bodies_of_joints_feel_and_nothing_that_was_returned_changes():
+def test_returned_arrays_do_not_change_in_later_steps():
     game = compose(["+task=KickTheBall", "playground=simple", "body=mitten"]).game
     with free_play(2, game.task, ("vision", "audio", "touch", "proprioception")) as task:
         env = VecaParallelEnv(
@@ -124,7 +124,7 @@ def test_a_picture_shows_the_eyes_and_the_room():
     env.close()  # closing twice is harmless
 
 
-def test_a_picture_must_have_been_asked_for(env):
+def test_render_needs_a_render_mode(env):
     env.reset()
     with pytest.raises(RuntimeError, match="rgb_array"):
         env.render()
@@ -140,7 +140,7 @@ def test_a_picture_must_have_been_asked_for(env):
         ({"red": "forward"}, r"red: action part 'move' is <U7"),
     ],
 )
-def test_wrong_actions_are_answered_with_what_is_right(env, actions, said):
+def test_invalid_actions_are_errors_that_name_agent_and_part(env, actions, said):
     env.reset()
     told = still(env) | actions
     with pytest.raises(ValueError, match=said):
@@ -160,7 +160,7 @@ def test_there_is_no_step_without_an_episode(env):
 
 
 @pytest.mark.parametrize("space", ["observation_space", "action_space"])
-def test_the_space_of_a_stranger(env, space):
+def test_an_unknown_agent_is_an_error_that_lists_the_agents(env, space):
     with pytest.raises(ValueError, match=r"unknown agent 'green'; there are \['red'"):
         getattr(env, space)("green")
 
@@ -174,6 +174,6 @@ def test_the_space_of_a_stranger(env, space):
         ("KickTheBall", {"seed": -1}, "seed=-1"),
     ],
 )
-def test_wrong_choices_are_answered_with_those_there_are(task, choices, said):
+def test_unknown_choices_are_errors_that_list_the_choices(task, choices, said):
     with pytest.raises(ValueError, match=said):
         parallel_env(task, **choices)

@@ -7,7 +7,7 @@ from veca_marl.envs.adapters.torchrl.scripted import ExpertPolicy
 
 
 @pytest.mark.parametrize("body", ["walker", "walker_discrete"])
-def test_the_expert_plays_all_worlds_and_kicks(body):
+def test_the_expert_kicks_in_all_worlds(body):
     env = make("KickTheBall", worlds=2, body=body, senses={"vision": "blind"}, seed=1)
     played = env.rollout(300, policy=ExpertPolicy(env))
     kicks = played["next", "agents", "info", "kick"].sum(1).flatten()
@@ -16,7 +16,7 @@ def test_the_expert_plays_all_worlds_and_kicks(body):
     assert (kicks >= 1).all()
 
 
-def test_each_world_is_played_by_what_is_heard_in_it():
+def test_the_expert_acts_in_each_world_on_its_own_observation():
     together = make("KickTheBall", worlds=2, senses={"vision": "blind"}, seed=1)
     alone = make("KickTheBall", worlds=1, senses={"vision": "blind"}, seed=1)
     both = together.rollout(20, policy=ExpertPolicy(together))["agents", "action"]

@@ -40,7 +40,7 @@ def test_stacked_observations_are_images_and_vectors(env):
     plain.close()
 
 
-def test_an_unknown_layout_is_answered_with_the_choices():
+def test_an_unknown_layout_is_an_error_that_lists_the_choices():
     with pytest.raises(ValueError, match="unknown layout 'flat'; choices: arrays, stacked"):
         gymnasium.make(ID, layout="flat")
 

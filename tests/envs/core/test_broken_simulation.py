@@ -1,4 +1,4 @@
-"""A simulation that goes non-finite ends the episode; the next one has a sound world."""
+"""A body with a non-finite state truncates the episode; the next one has a new world."""
 
 import logging
 import math
@@ -26,13 +26,13 @@ def cfg():
 
 
 def break_down(game):
-    """Let Bullet lose a body, as an exploding simulation would."""
+    """Give a body a velocity that is not a number, as an unstable simulation would."""
     body = game.players[0].body
     nan = (math.nan,) * 3
     pybullet.resetBaseVelocity(body.body_id, nan, nan, physicsClientId=game.world.client)
 
 
-def test_the_episode_is_truncated_with_its_cause_and_no_nan_gets_out(cfg, caplog):
+def test_the_episode_is_truncated_the_cause_is_logged_and_data_are_finite(cfg, caplog):
     env = VecaEnv(cfg, worlds=2, seed=0)
     state = env.reset()
     break_down(env.games[1])
@@ -73,7 +73,7 @@ def test_the_next_episode_is_as_in_a_new_world(cfg):
                 np.testing.assert_array_equal(seen, theirs[player][name])
 
 
-def test_other_doors_go_on_in_a_sound_world_too(cfg):
+def test_pettingzoo_continues_in_a_new_world(cfg):
     broken, sound = (VecaParallelEnv(cfg, render_mode="rgb_array") for _ in range(2))
     broken.reset(seed=0)
     break_down(broken._played.game)
@@ -86,6 +86,6 @@ def test_other_doors_go_on_in_a_sound_world_too(cfg):
     sound.close()
 
 
-def test_a_task_for_walkers_says_so():
+def test_a_task_for_walkers_refuses_other_bodies():
     with pytest.raises(ValueError, match="a body that walks and kicks; choose body=walker"):
         Game(CFG)

@@ -1,4 +1,4 @@
-"""A game: players, commands, time, and what it refuses."""
+"""A game: players, actions, time and errors."""
 
 import numpy as np
 import pytest
@@ -78,19 +78,19 @@ def test_teams_wear_their_shirts(duel):
     assert (red != blues[0]).any()
 
 
-def test_the_rules_end_a_game_before_its_time(duel):
+def test_the_rules_can_end_a_game_before_its_time_is_up(duel):
     outcomes = [duel.step(still(duel)) for _ in range(3)]
     assert [outcome.terminated for outcome in outcomes] == [False, False, True]
     assert not any(outcome.truncated for outcome in outcomes)
 
 
-def test_a_reset_game_starts_its_time_anew(game):
+def test_a_reset_restarts_the_count_of_steps(game):
     game.step(still(game))
     game.reset(np.random.default_rng(0))
     assert game.steps == 0
 
 
-def test_one_impossible_action_stops_everybody(duel):
+def test_an_invalid_action_stops_the_step_of_all_players(duel):
     before = duel.world.scene.positions.copy()
     actions = {name: np.ones(2, np.float32) for name in ("red", "blue_0", "blue_1")}
     actions["blue_1"][0] = np.nan
@@ -98,12 +98,12 @@ def test_one_impossible_action_stops_everybody(duel):
         duel.step(actions)
     np.testing.assert_array_equal(duel.world.scene.positions, before)
     assert duel.steps == 0
-    # the next step does what is told then
+    # the next step applies its own actions
     duel.step(still(duel))
     np.testing.assert_allclose(duel.world.scene.positions[:, :2], before[:, :2], atol=1e-6)
 
 
-def test_everybody_must_be_told(duel):
+def test_every_actor_needs_an_action(duel):
     actions = still(duel)
     del actions["blue_0"]
     with pytest.raises(ValueError, match=r"no action for \['blue_0'\]"):
@@ -112,11 +112,11 @@ def test_everybody_must_be_told(duel):
         duel.step({**still(duel), "green": np.zeros(2)})
 
 
-def test_pay_is_the_weighted_sum(game):
+def test_the_reward_is_the_weighted_sum_of_the_terms(game):
     assert game.reward_of({"kick": 1.0, "approach": -0.5}) == pytest.approx(1.0 - 0.005)
 
 
-def test_a_task_that_does_not_exist_is_answered_with_those_that_do():
+def test_an_unknown_task_is_an_error_that_lists_the_tasks():
     with pytest.raises(ValueError, match=r"unknown task 'Chess'.*KickTheBall"):
         find_task("Chess")
     cfg = cfg_of()
@@ -132,7 +132,7 @@ def test_a_name_is_registered_once():
 
 
 @pytest.mark.parametrize("weights", [{"kick": 1.0}, {"kick": 1.0, "approch": 0.01}, {}])
-def test_other_terms_than_the_tasks_own_are_refused(weights):
+def test_weights_must_be_those_of_the_tasks_terms(weights):
     cfg = cfg_of()
     cfg.task.weights = weights
     with pytest.raises(ValueError, match=r"KickTheBall has \['approach', 'kick'\]"):
@@ -140,12 +140,12 @@ def test_other_terms_than_the_tasks_own_are_refused(weights):
 
 
 @pytest.mark.parametrize("seconds", [0.0, -1.0, np.nan, np.inf])
-def test_an_episode_has_a_length(seconds):
+def test_the_length_of_an_episode_is_positive_and_finite(seconds):
     with pytest.raises(ValueError, match="max_seconds"):
         TaskCfg(max_seconds=seconds)
 
 
-def test_a_weight_is_a_number():
+def test_a_weight_is_a_finite_number():
     with pytest.raises(ValueError, match=r"weights.*kick"):
         TaskCfg(weights={"kick": float("nan")})
 
@@ -170,7 +170,7 @@ def test_absent_senses_leave_no_key():
         ("audio", ("hrtf", "stereo", "mono")),
     ],
 )
-def test_quality_changes_content_but_never_shape(sense, presets):
+def test_presets_change_the_values_and_not_the_specs(sense, presets):
     specs: list[ArraySpec] = []
     contents = []
     for preset in presets:

@@ -1,4 +1,4 @@
-"""Teams: own bodies and senses, players who are out, teams that play by themselves."""
+"""Teams with own bodies and senses, elimination of players, and scripted teams."""
 
 from dataclasses import replace
 
@@ -47,14 +47,14 @@ def test_specs_hold(env):
     check_env_specs(env, break_when_any_done="both")
 
 
-def test_the_mask_falls_when_a_player_is_out_and_rises_with_the_next_game(rollout):
+def test_the_mask_is_false_from_elimination_to_the_next_episode(rollout):
     left = torch.cat([rollout[team, "mask"] for team in ("red", "blue")], -1).sum(-1)
     assert left.tolist() == [[3, 3, 2, 2, 1, 1] * 2 + [3]] * 3
     after = torch.cat([rollout["next", team, "mask"] for team in ("red", "blue")], -1).sum(-1)
     assert after.tolist() == [[3, 2, 2, 1, 1, 0] * 2 + [3]] * 3
 
 
-def test_flags_of_a_player_stay_up_until_the_game_starts_anew(rollout):
+def test_flags_of_an_eliminated_player_stay_up_until_the_next_episode(rollout):
     for team in ("red", "blue"):
         out = ~rollout["next", team, "mask"].unsqueeze(-1)
         torch.testing.assert_close(rollout["next", team, "terminated"], out)
@@ -65,7 +65,7 @@ def test_flags_of_a_player_stay_up_until_the_game_starts_anew(rollout):
     assert over.tolist() == [([False] * 5 + [True]) * 2 + [False]] * 3
 
 
-def test_who_is_out_is_paid_nothing_and_perceives_zeros(rollout):
+def test_observation_and_reward_of_an_eliminated_player_are_zero(rollout):
     for team in ("red", "blue"):
         playing = rollout[team, "mask"]
         paid = rollout["next", team, "reward"].squeeze(-1)
@@ -77,7 +77,7 @@ def test_who_is_out_is_paid_nothing_and_perceives_zeros(rollout):
             assert (felt[~playing] == 0.0).all()
 
 
-def test_who_is_out_rests_whatever_it_is_told(cfg):
+def test_an_eliminated_player_rests_and_needs_no_action(cfg):
     game = Game(cfg)
     rng = np.random.default_rng(0)
     game.reset(rng)
@@ -94,14 +94,14 @@ def test_who_is_out_rests_whatever_it_is_told(cfg):
     game.close()
 
 
-def test_a_batch_equals_single_worlds_though_players_leave(cfg):
+def test_a_batch_equals_single_worlds_with_elimination(cfg):
     envs = batch_and_singles(cfg, worlds=3, seed=7)
     play_and_compare(*envs, steps=20)
     for env in envs:
         env.close()
 
 
-def test_one_world_that_starts_anew_brings_nobody_back_in_another(env):
+def test_a_reset_of_one_world_keeps_the_masks_of_the_others(env):
     env.set_seed(4)
     state = env.reset()
     for _ in range(3):
@@ -117,7 +117,7 @@ def test_one_world_that_starts_anew_brings_nobody_back_in_another(env):
 
 
 @pytest.mark.parametrize("serial", [False, True])
-def test_collectors_keep_who_is_out(cfg, serial):
+def test_collectors_keep_the_masks(cfg, serial):
     def make():
         return VecaEnv(cfg, 2) if not serial else SerialEnv(2, lambda: VecaEnv(cfg, 1))
 
@@ -135,7 +135,7 @@ def test_collectors_keep_who_is_out(cfg, serial):
     assert left.sum(-1).tolist() == [[3, 3, 2, 2, 1, 1] * 2 + [3]] * 2
 
 
-def test_pettingzoo_lets_them_go(cfg):
+def test_pettingzoo_removes_eliminated_agents(cfg):
     env = VecaParallelEnv(cfg)
     env.reset(seed=0)
     numbers, ends = [], []
@@ -159,7 +159,7 @@ def test_teams_have_their_own_senses(env):
     assert set(env.observation_spec["blue", "observation"].keys()) == {"proprioception", "audio"}
 
 
-def test_a_team_may_have_another_body_and_other_grades(cfg):
+def test_a_team_can_have_its_own_body_and_senses(cfg):
     discrete = TeamCfg(WalkerCfg(action=WalkActionKind.discrete))
     deaf = TeamCfg(senses=TeamSensesCfg(audio=AudioCfg(present=False)))
     env = VecaEnv(replace(cfg, team={"red": discrete, "blue": deaf}), 2)
@@ -170,7 +170,7 @@ def test_a_team_may_have_another_body_and_other_grades(cfg):
     env.close()
 
 
-def test_the_command_line_knows_teams():
+def test_the_configuration_has_choices_for_single_teams():
     cfg = compose(
         [
             "+task=SoccerTwoPlayer",
@@ -187,14 +187,14 @@ def test_the_command_line_knows_teams():
     assert cfg.script == {"defender": Script.random}
 
 
-def test_every_sense_can_differ_by_team():
+def test_each_sense_can_differ_by_team():
     assert set(vars(TeamSensesCfg())) == set(vars(SensesCfg()))
 
 
 # ---- scripts
 
 
-def test_a_scripted_expert_plays_as_the_expert_from_outside(cfg):
+def test_a_team_scripted_by_the_expert_acts_like_the_expert_policy(cfg):
     whole = VecaEnv(cfg, 2, seed=3)
     scripted = VecaEnv(replace(cfg, script={"blue": Script.expert}), 2, seed=3)
     assert scripted.group_map == {"red": ["red"]}
@@ -210,7 +210,7 @@ def test_a_scripted_expert_plays_as_the_expert_from_outside(cfg):
 
 
 @pytest.mark.parametrize(("script", "moves"), [(Script.idle, False), (Script.random, True)])
-def test_scripts_without_rules(cfg, script, moves):
+def test_idle_and_random_scripts(cfg, script, moves):
     game, rng = Game(replace(cfg, script={"red": script})), np.random.default_rng(1)
     game.reset(rng)
     assert [player.name for player in game.actors] == ["blue_0", "blue_1"]
@@ -221,26 +221,26 @@ def test_scripts_without_rules(cfg, script, moves):
     game.close()
 
 
-# ---- what is refused
+# ---- errors
 
 
-def test_teams_that_do_not_play_are_named(cfg):
+def test_an_unknown_team_is_an_error_that_lists_the_teams(cfg):
     for wrong in ({"team": {"green": TeamCfg()}}, {"script": {"green": Script.idle}}):
         with pytest.raises(ValueError, match=r"no teams \['green'\]; it has \['red', 'blue'\]"):
             Game(replace(cfg, **wrong))
 
 
-def test_somebody_must_act(cfg):
+def test_not_all_teams_can_be_scripted(cfg):
     with pytest.raises(ValueError, match="all teams of Knockout are scripted"):
         Game(replace(cfg, script={"red": Script.idle, "blue": Script.idle}))
 
 
-def test_an_unknown_opponent_is_answered_with_the_choices():
+def test_an_unknown_opponent_is_an_error_that_lists_the_choices():
     with pytest.raises(ConfigError, match=r"opponent.agents=experts: choices: expert, random"):
         compose(["+task=KickTheBall", "opponent.agents=experts"])
 
 
-def test_a_playground_holds_so_many(cfg):
+def test_too_many_players_for_the_floor_are_an_error(cfg):
     room = replace(cfg.playground.rooms[0], size_m=(1.5, 1.5, 2.6))
     small = replace(cfg.playground, rooms=[room])
     with pytest.raises(ValueError, match=r"3 players are too many .* holds 2"):
