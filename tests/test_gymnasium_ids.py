@@ -30,6 +30,7 @@ def test_every_task_has_an_id():
         "import veca_marl, gymnasium",
         "import veca_marl, gymnasium; gymnasium.register_envs(veca_marl)",
         "import veca_marl.sim; from gymnasium import spaces; import gymnasium",
+        "import veca_marl, importlib.util; importlib.util.find_spec('gymnasium'); import gymnasium",
     ],
 )
 def test_the_ids_exist_after_both_imports(imports):

@@ -14,7 +14,6 @@ from importlib import import_module
 from importlib.abc import Loader, MetaPathFinder
 from importlib.machinery import ModuleSpec
 from importlib.metadata import entry_points
-from importlib.util import find_spec
 from types import ModuleType
 from typing import Any
 
@@ -77,11 +76,16 @@ class _GymnasiumFinder(MetaPathFinder):
     def find_spec(
         self, name: str, path: Sequence[str] | None = None, target: ModuleType | None = None
     ) -> ModuleSpec | None:
-        """See `MetaPathFinder`; every module but Gymnasium is left to the other finders."""
-        if name != "gymnasium":
+        """See `MetaPathFinder`; every module but Gymnasium is left to the other finders.
+
+        It stays in place when a spec was found: other packages look for Gymnasium's spec to learn
+        whether it is installed, without importing it.
+        """
+        if name != "gymnasium" or name in sys.modules:
             return None
-        sys.meta_path.remove(self)
-        spec = find_spec(name)
+        others = [finder for finder in sys.meta_path if finder is not self]
+        found = (finder.find_spec(name, path, target) for finder in others)
+        spec = next((spec for spec in found if spec is not None), None)
         if spec is not None and spec.loader is not None:
             spec.loader = _RegisteringLoader(spec.loader)
         return spec
