@@ -30,11 +30,11 @@ Played = NDArray[np.float64]
 ARMS = {
     "voices": [],
     "finder muted": ["task.muted=finder"],
-    "all deaf": ["senses/audio=deaf"],
+    "no hearing": ["senses/audio=deaf"],
     "mono": ["senses/audio=mono"],
     "stereo": ["senses/audio=stereo"],
 }
-FOR_MORE = ("voices", "finder muted", "all deaf")  # than two agents
+FOR_MORE = ("voices", "finder muted", "no hearing")  # than two agents
 SECONDS = {"walker_voice": 20, "mitten_voice": 90, "full_voice": 90}  # by body: who crawls is slow
 
 
