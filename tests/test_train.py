@@ -1,4 +1,4 @@
-"""The command line itself, as a user runs it."""
+"""The command line of `train`."""
 
 import csv
 import signal
@@ -34,7 +34,7 @@ def rows(path):
         return list(csv.DictReader(file))
 
 
-def test_devices_that_are_here_are_found_and_others_refused(monkeypatch):
+def test_available_devices_are_found_and_others_raise_an_error(monkeypatch):
     assert find_device("cpu") == torch.device("cpu")
     monkeypatch.setattr(torch.cuda, "device_count", lambda: 0)
     with pytest.raises(ConfigError, match=r"device=cuda is not on this machine; choices: cpu$"):
@@ -55,7 +55,7 @@ def smoke(tmp_path_factory):
 
 
 @pytest.mark.slow
-def test_smoke_run_leaves_everything(smoke):
+def test_smoke_run_writes_all_files(smoke):
     run, printed = smoke
     files = {path.relative_to(run).as_posix() for path in run.rglob("*") if path.is_file()}
     assert {
@@ -105,7 +105,7 @@ def test_interrupted_and_resumed_equals_uninterrupted(smoke, tmp_path):
 
 
 @pytest.mark.slow
-def test_an_existing_run_is_neither_overwritten_nor_changed(smoke):
+def test_an_existing_run_is_not_overwritten(smoke):
     run, _ = smoke
     before = {path: path.read_bytes() for path in run.rglob("*") if path.is_file()}
     for arguments, message in (

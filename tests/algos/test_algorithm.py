@@ -86,7 +86,7 @@ def test_it_learns_and_is_evaluated(make_trainer, cfg):
 
 
 @every_algorithm
-def test_resuming_keeps_its_promise(make_trainer, tmp_path, cfg):
+def test_resuming_is_exact_if_the_algorithm_says_so(make_trainer, tmp_path, cfg):
     whole = make_trainer("whole", cfg, 6)
     whole.run()
     stopped = make_trainer("cut", cfg, 6, reporters=[CsvReporter(tmp_path / "cut"), Interrupt(320)])

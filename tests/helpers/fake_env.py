@@ -108,7 +108,7 @@ class FakeEnv(EnvBase):
         return TensorDict({t: self._team(zero) for t in self.group_map}, self.batch_size)
 
     def _sign(self, action):
-        """Return the sign that was answered; with two parts the mean of theirs."""
+        """Return the sign of the action; with two parts the mean of theirs."""
         if self.hybrid:
             return (action["move"][..., 0].sign() + action["voice"] * 2.0 - 1.0) / 2.0
         return action * 2.0 - 1.0 if self.discrete else action[..., 0].sign()

@@ -60,7 +60,7 @@ def test_a_policy_without_memory_leaves_the_environment_as_it_is(make_ppo):
     assert with_memory(env, lambda td: td) is env
 
 
-def test_what_needs_memory_is_learnt_evaluated_and_stored(tmp_path):
+def test_a_task_that_needs_memory_is_learnt(tmp_path):
     reporter = MemoryReporter()
     specs = team_specs(make_show_once(1, 0))
     trainer = Trainer(

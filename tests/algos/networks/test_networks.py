@@ -21,7 +21,7 @@ def network(cfg=None, **env):
     return fake, make_network("agents", team_specs(fake)["agents"], cfg or MultisenseCfg())
 
 
-def test_encoder_is_chosen_by_what_the_array_looks_like():
+def test_encoder_is_chosen_by_type_and_shape():
     assert isinstance(make_encoder("a", IMAGE, (16, 32, 32), 64, Pooling.flatten), ImageEncoder)
     assert isinstance(make_encoder("b", SPECTRUM, (16, 32, 32), 64, Pooling.flatten), VectorEncoder)
     # depth is not bytes: it has no colour channels to stack
@@ -42,14 +42,14 @@ def test_images_of_any_size_are_encoded(size):
     assert encoder(image).shape == (3, encoder.features)
 
 
-def test_image_encoder_has_the_layers_of_the_design():
+def test_image_encoder_has_the_documented_layers():
     encoder = ImageEncoder(IMAGE.shape)
     shapes = [tuple(p.shape) for p in encoder.parameters() if p.ndim == 4]
     assert shapes == [(16, 6, 8, 8), (32, 16, 4, 4), (32, 32, 3, 3)]
     assert encoder.features == 32 * 7 * 7
 
 
-def test_blocks_of_images_are_encoded_as_all_at_once():
+def test_encoding_in_blocks_equals_encoding_at_once():
     torch.manual_seed(0)
     encoder = ImageEncoder(IMAGE.shape)
     image = torch.randint(0, 256, (70, *IMAGE.shape), dtype=torch.uint8)
@@ -65,14 +65,14 @@ def test_blocks_of_images_are_encoded_as_all_at_once():
         (True, -math.inf, math.inf, [-math.log(9.0), -math.log(3.0), math.log(5.0)]),
     ],
 )
-def test_bounds_become_one_and_what_has_none_passes_or_is_compressed(
+def test_bounded_arrays_are_scaled_and_unbounded_ones_optionally_compressed(
     compressed, low, high, expected
 ):
     scale = scale_of(ArrayLayout((3,), "float32", low, high), compressed)
     torch.testing.assert_close(scale(torch.tensor([-8.0, -2.0, 4.0])), torch.tensor(expected))
 
 
-def test_only_the_senses_that_are_named_are_compressed():
+def test_only_configured_senses_are_compressed():
     """Of the senses of a world: spectra are in decades already, and proprioception is not."""
     layouts = {
         "audio": ArrayLayout((2, 250), "float32", -math.inf, math.inf),
@@ -85,7 +85,7 @@ def test_only_the_senses_that_are_named_are_compressed():
 
 
 @pytest.mark.parametrize("left_out", ["vision", "audio"])
-def test_a_sense_that_is_not_there_leaves_no_parameters(left_out):
+def test_an_absent_sense_has_no_parameters(left_out):
     kept = {"vision", "audio"} - {left_out}
     _, both = network()
     _, one = network(senses=tuple(kept))
@@ -117,7 +117,7 @@ def test_agents_of_a_team_share_one_policy():
     torch.testing.assert_close(features[:, 0], features[:, 1])
 
 
-def test_unlearnable_actions_are_refused_with_the_choices():
+def test_unsupported_actions_raise_an_error_with_the_choices():
     env = FakeEnv(worlds=1)
     wide = Bounded(-2.0, 2.0, shape=(1, 1, 2))
     env.action_spec = Composite(agents=Composite(action=wide, shape=(1, 1)), shape=(1,))
@@ -129,12 +129,12 @@ def test_unlearnable_actions_are_refused_with_the_choices():
     ("kwargs", "message"),
     [({"channels": [1, 2]}, "need 3 numbers"), ({"trunk_features": 0}, "must be positive")],
 )
-def test_impossible_sizes_are_refused(kwargs, message):
+def test_invalid_sizes_raise_an_error(kwargs, message):
     with pytest.raises(ValueError, match=message):
         MultisenseCfg(**kwargs)
 
 
-def test_places_are_where_maps_are_lit():
+def test_places_are_positions_of_activations():
     maps = torch.zeros(2, 3, 5, 9)
     maps[0, 0, 0, 8] = maps[0, 1, 4, 4] = 40.0
     right, down, bright = Places(3)(maps).reshape(2, 3, 3).unbind(1)
@@ -145,7 +145,7 @@ def test_places_are_where_maps_are_lit():
 
 
 @pytest.mark.parametrize("shape", [(3, 84, 84), (2, 3, 21, 40), (1, 8, 6)])
-def test_places_take_any_size(shape):
+def test_places_accept_any_size(shape):
     encoder = ImageEncoder(shape, (4, 8, 8), Pooling.places)
     features = encoder(torch.randint(0, 256, (5, *shape), dtype=torch.uint8))
     assert features.shape == (5, encoder.features) == (5, 24)
@@ -153,7 +153,7 @@ def test_places_take_any_size(shape):
     assert all(p.grad is not None for p in encoder.parameters())
 
 
-def test_places_learn_from_fewer_images_where_a_thing_is():
+def test_places_learn_a_position_from_fewer_images():
     """An orange square of 6 x 6 pixels somewhere in grey noise: its column, from 256 images."""
     torch.manual_seed(0)
     columns = torch.randint(0, 58, (512,))

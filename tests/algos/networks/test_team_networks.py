@@ -28,14 +28,14 @@ def values_and_means(ppo, state):
 
 
 def changed(before, after):
-    """Say for which agents anything has changed in any world."""
+    """Return for each agent whether an entry changed in any world."""
     differences = (before - after).abs()
     return differences.reshape(*before.shape[:2], -1).amax((0, 2)) > 1e-6
 
 
 @pytest.mark.parametrize("critic", list(Critic))
 @pytest.mark.parametrize("parameters", list(Parameters))
-def test_actors_see_their_own_and_central_critics_the_team(make_ppo, critic, parameters):
+def test_actors_read_their_own_and_central_critics_all_observations(make_ppo, critic, parameters):
     ppo = make_ppo(network=sized(critic=critic, parameters=parameters), agents=3)
     state = seen(3)
     value, mean = values_and_means(ppo, state)
@@ -47,7 +47,7 @@ def test_actors_see_their_own_and_central_critics_the_team(make_ppo, critic, par
 
 
 @pytest.mark.parametrize("parameters", list(Parameters))
-def test_agents_with_one_observation_act_alike_only_if_they_share(make_ppo, parameters):
+def test_equal_observations_give_equal_features_only_with_shared_parameters(make_ppo, parameters):
     ppo = make_ppo(network=sized(parameters=parameters), agents=2)
     state = seen(2)
     for array in state["agents", "observation"].values():
@@ -57,7 +57,7 @@ def test_agents_with_one_observation_act_alike_only_if_they_share(make_ppo, para
     assert alike is (parameters is Parameters.shared)
 
 
-def test_separate_networks_count_the_agents(make_ppo):
+def test_separate_networks_have_parameters_for_each_agent(make_ppo):
     def count(**options):
         ppo = make_ppo(network=sized(**options), agents=3)
         return sum(p.numel() for p in ppo.algorithms["agents"].network.parameters())
@@ -67,7 +67,7 @@ def test_separate_networks_count_the_agents(make_ppo):
 
 @pytest.mark.parametrize("critic", list(Critic))
 @pytest.mark.parametrize("parameters", list(Parameters))
-def test_all_of_them_learn_the_toy(make_ppo, critic, parameters):
+def test_every_combination_learns_the_toy(make_ppo, critic, parameters):
     network = sized(critic=critic, parameters=parameters)
     ppo = make_ppo(network=network, agents=2, senses=("audio",))
     env = FakeEnv(8, agents=2, senses=("audio",))

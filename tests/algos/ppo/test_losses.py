@@ -1,4 +1,4 @@
-"""The loss that TorchRL computes for us against the formulas written by hand."""
+"""The loss of TorchRL compared with formulas written by hand."""
 
 import pytest
 import torch
@@ -8,7 +8,7 @@ from torchrl.envs import ExplorationType, set_exploration_type
 
 
 def perturb(ppo, scale=0.05):
-    """Move the policy off the one that acted, so that ratios and divergences are not trivial."""
+    """Change the parameters, so that ratios and divergences are not trivial."""
     torch.manual_seed(1)
     with torch.no_grad():
         for p in ppo.policy.parameters():
@@ -56,7 +56,7 @@ def test_loss_equals_the_formula(make_ppo, discrete, agents):
 
 @pytest.mark.parametrize("discrete", [False, True])
 def test_reported_divergence_is_exact(make_ppo, discrete):
-    """Pins the private hook of TorchRL that `ExactKLPPOLoss` overrides."""
+    """Covers the private hook of TorchRL that `TeamPPOLoss` overrides."""
     ppo = make_ppo(discrete=discrete)
     rows = minibatch(ppo, 1, discrete=discrete)
     learner = ppo.algorithms["agents"]

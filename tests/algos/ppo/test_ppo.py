@@ -8,6 +8,7 @@ from torchrl.envs import ExplorationType, set_exploration_type
 
 from veca_marl.algos.ppo import PPOCfg
 from veca_marl.algos.ppo.advantages import advantages
+from veca_marl.algos.ppo.config import ValueNormalisation
 from veca_marl.algos.training.collect import CollectCfg, Experience
 
 
@@ -71,7 +72,7 @@ def test_toy_is_learnt(make_ppo, discrete, teams):
     assert min(rewards[-1]) > 0.7
 
 
-def test_rate_falls_when_the_policy_moves_too_far_and_rises_when_hardly(make_ppo):
+def test_learning_rate_follows_the_divergence(make_ppo):
     schedule = make_ppo().algorithms["agents"].schedule
     start = schedule.get_last_lr()[0]
     schedule.step(0.017)
@@ -85,7 +86,7 @@ def test_rate_falls_when_the_policy_moves_too_far_and_rises_when_hardly(make_ppo
     assert schedule.get_last_lr()[0] == PPOCfg().max_learning_rate
 
 
-def test_rewards_that_are_not_finite_stop_the_learning(make_ppo):
+def test_rewards_that_are_not_finite_raise_an_error(make_ppo):
     ppo = make_ppo()
     with torch.no_grad():
         batch = FakeEnv(2).rollout(8, ppo.policy.collect, break_when_any_done=False)
@@ -96,7 +97,7 @@ def test_rewards_that_are_not_finite_stop_the_learning(make_ppo):
     assert torch.equal(before, torch.cat([p.flatten() for p in ppo.policy.parameters()]))
 
 
-def test_state_continues_the_learning_exactly(make_ppo):
+def test_learning_continues_exactly_from_a_state(make_ppo):
     def batch(ppo, seed):
         torch.manual_seed(seed)
         with torch.no_grad(), set_exploration_type(ExplorationType.RANDOM):
@@ -115,7 +116,7 @@ def test_state_continues_the_learning_exactly(make_ppo):
     "wrong",
     [{"gamma": 1.5}, {"clip": 0.0}, {"epochs": 0}, {"learning_rate": 1.0}, {"target_kl": -1.0}],
 )
-def test_impossible_numbers_are_refused_by_name(wrong):
+def test_invalid_numbers_raise_an_error_with_their_name(wrong):
     (name,) = wrong
     with pytest.raises(ValueError, match=f"algo.{name} must be"):
         PPOCfg(**wrong)
@@ -128,3 +129,29 @@ def test_defaults_are_the_papers_table():
     assert (cfg.epochs, cfg.minibatches, cfg.value_coefficient) == (4, 4, 0.5)
     collect = CollectCfg()
     assert collect.processes * collect.worlds == 8
+
+
+def test_value_normalisation_keeps_the_scale_of_the_value_loss(make_ppo):
+    """Returns of thousands: only the normalised loss is of the order of one."""
+    losses = {}
+    for kind in ValueNormalisation:
+        ppo = make_ppo(senses=("audio",), value_normalisation=kind)
+        with torch.no_grad(), set_exploration_type(ExplorationType.RANDOM):
+            batch = FakeEnv(8, senses=("audio",)).rollout(
+                32, ppo.policy.collect, break_when_any_done=False
+            )
+        batch["next", "agents", "reward"] *= 1000.0
+        losses[kind] = ppo.learn(batch)["agents"]["value_loss"]
+    assert losses[ValueNormalisation.none] > 1e5
+    assert losses[ValueNormalisation.popart] < 10.0
+
+
+def test_statistics_of_value_normalisation_are_part_of_the_state(make_ppo):
+    one, other = (make_ppo(seed, value_normalisation=ValueNormalisation.popart) for seed in (0, 1))
+    with torch.no_grad(), set_exploration_type(ExplorationType.RANDOM):
+        batch = FakeEnv(4).rollout(16, one.policy.collect, break_when_any_done=False)
+    one.learn(batch)
+    other.load_state_dict(deepcopy(one.state_dict()))
+    norms = [ppo.algorithms["agents"].loss.value_norm for ppo in (one, other)]
+    assert norms[0].debiasing_term > 0.0
+    assert all(torch.equal(a, b) for a, b in zip(*(n.buffers() for n in norms), strict=True))

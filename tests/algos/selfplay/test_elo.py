@@ -13,19 +13,19 @@ def expected_wins(ratings, games):
     return wins
 
 
-def test_ratings_are_found_again_from_their_own_results():
+def test_ratings_are_recovered_from_expected_results():
     ratings = np.array([900.0, 1000.0, 1100.0, 1000.0])
     fitted = elo_ratings(expected_wins(ratings, 1000.0), prior_games=1e-3)
     np.testing.assert_allclose(fitted, ratings, atol=0.5)
 
 
-def test_who_scores_three_of_four_is_191_points_ahead():
+def test_three_wins_of_four_are_191_points():
     """400 log10(3) = 190.8."""
     fitted = elo_ratings(np.array([[0.0, 300.0], [100.0, 0.0]]), prior_games=1e-3)
     assert fitted[0] - fitted[1] == pytest.approx(190.8, abs=0.2)
 
 
-def test_who_never_lost_has_a_rating_all_the_same():
+def test_a_player_without_losses_has_a_finite_rating():
     fitted = elo_ratings(np.array([[0.0, 8.0], [0.0, 0.0]]))
     assert 100.0 < fitted[0] - fitted[1] < 1500.0
 
@@ -35,11 +35,11 @@ def test_draws_are_half_a_game_for_each():
 
 
 @pytest.mark.parametrize("wins", [np.zeros((2, 3)), -np.ones((2, 2)), np.full((2, 2), np.nan)])
-def test_impossible_tables_are_refused(wins):
+def test_invalid_tables_raise_an_error(wins):
     with pytest.raises(ValueError, match="square table"):
         elo_ratings(wins)
 
 
-def test_a_prior_is_needed():
+def test_the_prior_must_be_positive():
     with pytest.raises(ValueError, match="prior_games=0"):
         elo_ratings(np.zeros((2, 2)), prior_games=0.0)

@@ -1,4 +1,4 @@
-"""Self-play: turns, past opponents, and resumption that meets the same ones."""
+"""Self-play: turns, past opponents, and resumption with the same ones."""
 
 import pytest
 import torch
@@ -64,7 +64,7 @@ def test_teams_learn_in_turns(make):
     assert (weights(trainer, "blue") != before["blue"]).any()
 
 
-def test_the_pool_keeps_the_beginning_and_the_end_of_every_turn(make, tmp_path):
+def test_the_pool_stores_the_start_and_the_end_of_every_turn(make, tmp_path):
     make("pool", batches=4).run()
     pool = Pool(tmp_path / "pool" / "pool")
     assert pool.members("red") == [0, FRAMES, 3 * FRAMES]
@@ -73,7 +73,7 @@ def test_the_pool_keeps_the_beginning_and_the_end_of_every_turn(make, tmp_path):
     assert pool.members("green") == []
 
 
-def test_the_opponent_plays_as_it_was(make):
+def test_the_opponent_plays_its_past_policy(make):
     trainer = make("past", batches=6, latest=0.0)
     trainer.run()
     matches = trainer.matchmaking
@@ -90,7 +90,7 @@ def test_the_opponent_plays_as_it_was(make):
         torch.testing.assert_close(array, now[name])
 
 
-def test_logs_say_whom_it_met(make, tmp_path):
+def test_logs_contain_team_and_age_of_the_opponent(make, tmp_path):
     make("log", batches=6).run()
     rows = read(tmp_path / "log" / "metrics.csv")
     assert [float(row["self_play/turn"]) for row in rows] == [0.0, 1.0] * 3
@@ -103,7 +103,7 @@ def test_logs_say_whom_it_met(make, tmp_path):
         assert row[f"{rests}/kl"] == ""
 
 
-def test_a_resumed_run_meets_the_same_opponents(make, tmp_path):
+def test_a_resumed_run_plays_against_the_same_opponents(make, tmp_path):
     make("whole").run()
     with pytest.raises(KeyboardInterrupt):
         make("cut", reporters=[CsvReporter(tmp_path / "cut"), Interrupt(5 * FRAMES)]).run()
@@ -116,7 +116,7 @@ def test_a_resumed_run_meets_the_same_opponents(make, tmp_path):
         assert one == other
 
 
-def test_a_frozen_opponent_is_what_another_run_learnt(make, tmp_path):
+def test_a_frozen_opponent_has_the_parameters_of_another_run(make, tmp_path):
     trainer = make("other", batches=2)
     trainer.run()
     spec = team_specs(make_env(1, 0))["blue"]
@@ -127,7 +127,7 @@ def test_a_frozen_opponent_is_what_another_run_learnt(make, tmp_path):
     assert not any(p.requires_grad for p in actor.parameters())
 
 
-def test_what_an_earlier_version_learnt_is_refused(make, tmp_path):
+def test_a_checkpoint_of_another_format_raises_an_error(make, tmp_path):
     make("other", batches=1).run()
     path = Checkpoints(tmp_path / "other" / "checkpoints", None, {}).latest()
     torch.save(torch.load(path, weights_only=True) | {"format": 1}, path)
@@ -147,12 +147,12 @@ def test_opponents_that_cannot_be_loaded_are_named(make, tmp_path):
 
 
 @pytest.mark.parametrize("teams", [["red"], ["red", "red"], ["a", "b", "c"]])
-def test_self_play_is_for_two(teams):
+def test_self_play_needs_two_teams(teams):
     with pytest.raises(ValueError, match="two teams, or none"):
         SelfPlayCfg(teams)
 
 
-def test_self_play_is_for_teams_that_learn(make_ppo, tmp_path):
+def test_self_play_needs_teams_that_learn(make_ppo, tmp_path):
     algorithm = make_ppo(teams=TEAMS)
     with pytest.raises(ValueError, match=r"\['green'\] do not learn; there are \['blue', 'red'\]"):
         SelfPlay(SelfPlayCfg(["red", "green"]), algorithm, Pool(tmp_path), 0)

@@ -32,14 +32,14 @@ def names(checkpoints):
     return sorted(path.name for path in checkpoints.folder.iterdir())
 
 
-def test_state_comes_back_as_it_was(checkpoints, identity):
+def test_a_stored_state_is_loaded_unchanged(checkpoints, identity):
     state = {"w": torch.randn(3), "n": 7, "nested": {"x": [1.5, None]}}
     found = load_checkpoint(checkpoints.save(state, 10, best=False), identity, CPU)
     assert torch.equal(found.pop("w"), state.pop("w"))
     assert found == state
 
 
-def test_last_few_and_the_best_stay(checkpoints, identity):
+def test_the_latest_and_the_best_are_kept(checkpoints, identity):
     for frames, best in ((10, False), (20, True), (30, False), (40, False)):
         checkpoints.save({"frames": frames}, frames, best)
     assert names(checkpoints) == [
@@ -51,7 +51,7 @@ def test_last_few_and_the_best_stay(checkpoints, identity):
     assert load_checkpoint(checkpoints.folder / "best.pt", identity, CPU) == {"frames": 20}
 
 
-def test_another_task_is_refused_naming_both(checkpoints, identity):
+def test_another_task_raises_an_error_with_both_names(checkpoints, identity):
     path = checkpoints.save({}, 10, best=False)
     with pytest.raises(CheckpointError, match=r"is of task Toy, wanted: Other"):
         load_checkpoint(path, replace(identity, task="Other"), CPU)
@@ -73,7 +73,7 @@ def test_another_task_is_refused_naming_both(checkpoints, identity):
         ({"teams": ("red",)}, r"agents: .* absent here; red: absent in the checkpoint"),
     ],
 )
-def test_other_specs_are_refused_naming_what_differs(checkpoints, other, message):
+def test_other_specs_raise_an_error_with_the_differences(checkpoints, other, message):
     path = checkpoints.save({}, 10, best=False)
     specs = team_specs(FakeEnv(**other))
     with pytest.raises(CheckpointError, match=f"made for other specs: .*{message}"):
@@ -82,7 +82,7 @@ def test_other_specs_are_refused_naming_what_differs(checkpoints, other, message
 
 @contextmanager
 def full_disk():
-    """No file may grow over 2 kB: writes fail as they do on a full disk.
+    """Limit files to 2 kB: writes fail as on a full disk.
 
     Not a fixture: pytest's own report, where it goes to a file, must not be written under it.
     """
@@ -106,7 +106,7 @@ def test_full_disk_leaves_the_old_checkpoint_intact(checkpoints, identity):
 
 
 @pytest.mark.parametrize("content", [b"", b"not a checkpoint", None])
-def test_broken_files_are_named(tmp_path, identity, content):
+def test_unreadable_files_are_named(tmp_path, identity, content):
     path = tmp_path / "x.pt"
     if content is None:
         torch.save({"some": "thing"}, path)
@@ -129,7 +129,7 @@ def test_a_folder_without_checkpoints_is_named(checkpoints):
 
 
 @pytest.mark.usefixtures("ctrl_c")
-def test_an_interruption_waits_until_the_file_is_whole(checkpoints, identity, monkeypatch):
+def test_an_interruption_is_delayed_until_the_file_is_written(checkpoints, identity, monkeypatch):
     save = torch.save
 
     def interrupted_save(*arguments):

@@ -18,7 +18,7 @@ def experience(request, make_ppo):
     played.close()
 
 
-def test_batch_is_worlds_by_steps(experience):
+def test_a_batch_has_the_shape_worlds_by_steps(experience):
     experience.restart(3)
     batch = experience.collect()
     assert batch.batch_size == (8, 16)
@@ -29,7 +29,7 @@ def test_batch_is_worlds_by_steps(experience):
     assert len({tuple(row.tolist()) for row in images}) == 8, "two worlds play the same game"
 
 
-def test_restart_repeats_everything_and_another_seed_nothing(experience):
+def test_restart_is_determined_by_the_seed(experience):
     batches = {}
     for name, seed in (("first", 3), ("other", 4), ("again", 3)):
         experience.restart(seed)
@@ -42,7 +42,7 @@ def test_restart_repeats_everything_and_another_seed_nothing(experience):
     )
 
 
-def test_worlds_play_with_the_parameters_they_were_handed(experience):
+def test_worlds_use_the_parameters_that_were_transferred(experience):
     def logits():
         experience.restart(0)
         return experience.collect()["agents", "loc"].clone()
@@ -57,7 +57,7 @@ def test_worlds_play_with_the_parameters_they_were_handed(experience):
     assert not torch.equal(logits(), before)
 
 
-def test_collecting_leaves_the_settings_of_the_program_alone(make_ppo):
+def test_collection_restores_process_settings(make_ppo):
     before, threads = multiprocessing.get_start_method(), torch.get_num_threads()
     experience = Experience(make_fake_env, make_ppo().policy.copy().collect, CollectCfg(1, 2, 4))
     experience.close()
@@ -66,7 +66,7 @@ def test_collecting_leaves_the_settings_of_the_program_alone(make_ppo):
 
 
 @pytest.mark.slow
-def test_spawned_workers_collect_what_forked_ones_do(make_ppo, monkeypatch):
+def test_spawned_and_forked_workers_collect_the_same(make_ppo, monkeypatch):
     batches = []
     for method in ("fork", "spawn"):
         monkeypatch.setattr("veca_marl.algos.training.collect.start_method", lambda m=method: m)
@@ -80,7 +80,7 @@ def test_spawned_workers_collect_what_forked_ones_do(make_ppo, monkeypatch):
 
 
 @pytest.mark.parametrize("wrong", [{"processes": -1}, {"worlds": 0}, {"steps": 0}, {"threads": 0}])
-def test_impossible_numbers_are_refused_by_name(wrong):
+def test_invalid_numbers_raise_an_error_with_their_name(wrong):
     (name,) = wrong
     with pytest.raises(ValueError, match=f"collect.{name} must be"):
         CollectCfg(**wrong)

@@ -17,7 +17,7 @@ DETERMINISTIC, STOCHASTIC = Exploration.deterministic, Exploration.stochastic
 
 
 def oracle(td):
-    """Reads the state off the image and acts with its sign."""
+    """Act with the sign of the state that the image shows."""
     bright = td["agents", "observation", "vision"].float().mean((-1, -2, -3, -4)) > 100
     sign = bright.float() * 2 - 1
     return td.set(("agents", "action"), sign.unsqueeze(-1).expand(*sign.shape, 2).clone())
@@ -31,7 +31,7 @@ def test_scores_are_sums_over_whole_episodes():
     assert (scores.terms["right"] == 6).all()
 
 
-def test_result_depends_on_the_seed_alone():
+def test_the_result_depends_on_the_seed_alone():
     def play(seed, used):
         env = FakeEnv(4)
         if used:
@@ -42,14 +42,14 @@ def test_result_depends_on_the_seed_alone():
     assert (play(1, used=False) != play(2, used=False)).any()
 
 
-def test_random_play_earns_nothing_here():
+def test_random_actions_have_a_mean_return_of_zero():
     env = FakeEnv(8, horizon=8)
     returns = evaluate(env, random_policy(env), 200, 0, STOCHASTIC)["agents"].returns
     assert abs(returns.mean()) < 4 * returns.std() / np.sqrt(len(returns))
     assert returns.std() == pytest.approx(np.sqrt(8), rel=0.2)  # of 8 independent signs
 
 
-def test_deterministic_play_takes_the_mode_and_stochastic_play_draws(make_ppo):
+def test_deterministic_evaluation_takes_the_mode_and_stochastic_samples(make_ppo):
     policy = make_ppo().policy.play
     runs = {}
     for mode in Exploration:
@@ -61,7 +61,7 @@ def test_deterministic_play_takes_the_mode_and_stochastic_play_draws(make_ppo):
     assert (runs[DETERMINISTIC][0] != runs[STOCHASTIC][0]).any()
 
 
-def test_teams_are_scored_apart():
+def test_teams_are_scored_separately():
     scores = evaluate(FakeEnv(2, teams=("red", "blue")), both_teams, 4, 0, STOCHASTIC)
     np.testing.assert_array_equal(scores["red"].returns, -scores["blue"].returns)
 
@@ -71,7 +71,7 @@ def both_teams(td):
     return td.set(("red", "action"), red).set(("blue", "action"), -red)
 
 
-def test_interval_is_students():
+def test_interval_is_the_t_interval():
     values = np.array([1.0, 2.0, 4.0, 9.0])
     low, high = stats.t.interval(0.95, 3, values.mean(), stats.sem(values))
     assert interval(values) == pytest.approx((low, high))
@@ -101,7 +101,7 @@ def test_comparison_line_names_team_means_and_intervals():
 
 
 @pytest.mark.parametrize("wrong", [{"every_frames": 0}, {"episodes": 0}, {"worlds": 0}])
-def test_impossible_numbers_are_refused_by_name(wrong):
+def test_invalid_numbers_raise_an_error_with_their_name(wrong):
     (name,) = wrong
     with pytest.raises(ValueError, match=f"eval.{name} must be"):
         EvalCfg(**wrong)

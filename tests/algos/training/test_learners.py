@@ -26,17 +26,16 @@ def make_env(worlds, seed):
 
 
 class Always(nn.Module):
-    """Answers with one sign; counts how often it is asked."""
+    """Acts with one sign."""
 
     in_keys, out_keys = (), (("blue", "action"),)
 
     def __init__(self, sign):
         super().__init__()
-        self.sign, self.calls = sign, 0
+        self.sign = sign
         self.unused = nn.Parameter(torch.zeros(()), requires_grad=False)
 
     def forward(self, td):
-        self.calls += 1
         lead = td["blue", "observation", "audio"].shape[:2]
         return td.set(("blue", "action"), torch.full((*lead, 2), self.sign))
 
@@ -86,7 +85,7 @@ def test_the_baseline_plays_against_the_frozen_opponents():
     assert not (state["red", "action"].abs() == 1.0).any()
 
 
-def test_a_run_compares_with_a_baseline_that_meets_the_same_opponents(make_trainer):
+def test_policy_and_baseline_play_against_the_same_opponents(make_trainer):
     frozen = Always(1.0)
     trainer = make_trainer({"blue": frozen})
     (line,) = trainer.run()
@@ -113,7 +112,7 @@ def test_one_learning_team_has_a_best_checkpoint_by_its_own_return(make_trainer,
     assert best["frames"] == red[int(np.argmax(returns))]["frames"]
 
 
-def test_several_learning_teams_keep_no_best_checkpoint_and_say_so(make_trainer, tmp_path):
+def test_several_learning_teams_keep_no_best_checkpoint_and_report_it(make_trainer, tmp_path):
     lines = make_trainer().run()
     assert not (tmp_path / "best.pt").exists()
     assert (tmp_path / f"frames_{4 * FRAMES:012d}.pt").exists()

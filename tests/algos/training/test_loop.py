@@ -77,7 +77,7 @@ def test_interruption_before_the_first_evaluation_can_be_resumed(make_trainer, t
     assert torch.equal(parameters(whole), parameters(resumed))
 
 
-def test_seed_decides_everything(make_trainer):
+def test_the_seed_determines_the_parameters(make_trainer):
     runs = {}
     for name, seed in (("a", 1), ("b", 1), ("c", 2)):
         trainer = make_trainer(name, 2, seed=seed)

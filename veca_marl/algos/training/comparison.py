@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,6 +34,31 @@ def paired_difference(
     if one.shape != other.shape:
         raise ValueError(f"pairs need equally many episodes, got {len(one)} and {len(other)}")
     return float((one - other).mean()), *interval(one - other, confidence)
+
+
+def score_rows(player: str, scores: Mapping[str, Scores]) -> list[dict[str, float | int | str]]:
+    """Return a row for each team: means over the episodes and the interval of the return.
+
+    Args:
+        player: Name of the policy, ``policy`` or ``random``.
+        scores: Team to its scores.
+    """
+    rows: list[dict[str, float | int | str]] = []
+    for team, score in scores.items():
+        low, high = interval(score.returns)
+        rows.append(
+            {
+                "player": player,
+                "team": team,
+                "episodes": len(score.returns),
+                "return": float(score.returns.mean()),
+                "return_low": low,
+                "return_high": high,
+                "length": float(score.lengths.mean()),
+                **{name: float(values.mean()) for name, values in score.terms.items()},
+            }
+        )
+    return rows
 
 
 def comparison_line(team: str, policy: Scores, baseline: Scores) -> str:

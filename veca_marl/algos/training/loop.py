@@ -16,7 +16,6 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from torch import nn
 from torchrl import timeit
 from torchrl.envs import EnvBase
@@ -26,12 +25,12 @@ from veca_marl.algos.plain import to_plain
 from veca_marl.algos.specs import EnvFactory
 from veca_marl.algos.training.checkpoint import Checkpoints, load_checkpoint
 from veca_marl.algos.training.collect import CollectCfg, Experience
-from veca_marl.algos.training.comparison import comparison_line, interval
+from veca_marl.algos.training.comparison import comparison_line, score_rows
 from veca_marl.algos.training.episodes import TrainingEpisodes
 from veca_marl.algos.training.evaluation import EvalCfg, RandomTeams, Scores, evaluate
 from veca_marl.algos.training.learners import Policy, TeamLearners
 from veca_marl.algos.training.matchmaking import AllLearn, Matchmaking
-from veca_marl.algos.training.progress import Budget, Progress
+from veca_marl.algos.training.progress import Budget, Progress, stage_seed
 from veca_marl.algos.training.reporters import Reporter
 from veca_marl.algos.training.timing import timing_table
 
@@ -152,7 +151,7 @@ class Trainer:
         self.matchmaking.begin_stage(self.progress.stage, self.progress.frames)
         self._update_policy(experience)
         with timeit("collect"):
-            experience.restart(_seed(self.seed, self.progress.stage))
+            experience.restart(stage_seed(self.seed, self.progress.stage))
         episodes = TrainingEpisodes()
         per_stage = math.ceil(self.evaluation.every_frames / self.collect.frames)
         until = min(self.progress.iteration + per_stage, iterations)
@@ -224,27 +223,11 @@ class Trainer:
             env,
             policy or self.policy.play,
             self.evaluation.episodes,
-            _seed(self.seed, _EVALUATION_STAGE),
+            stage_seed(self.seed, _EVALUATION_STAGE),
             self.evaluation.exploration,
         )
 
     def _report_scores(self, player: str, scores: dict[str, Scores]) -> None:
-        for team, score in scores.items():
-            low, high = interval(score.returns)
-            row: dict[str, float | int | str] = {
-                "player": player,
-                "team": team,
-                "episodes": len(score.returns),
-                "return": float(score.returns.mean()),
-                "return_low": low,
-                "return_high": high,
-                "length": float(score.lengths.mean()),
-                **{name: float(values.mean()) for name, values in score.terms.items()},
-            }
+        for row in score_rows(player, scores):
             for reporter in self.reporters:
                 reporter.write("evaluations", self.progress.frames, row)
-
-
-def _seed(seed: int, stage: int) -> int:
-    """Return an independent 31-bit seed for each pair."""
-    return int(np.random.SeedSequence([seed, stage]).generate_state(1)[0] >> 1)

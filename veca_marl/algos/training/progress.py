@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+import numpy as np
+
 
 @dataclass
 class Budget:
@@ -42,3 +44,8 @@ class Progress:
     iteration: int = 0
     frames: int = 0
     best_return: float = -math.inf
+
+
+def stage_seed(seed: int, stage: int) -> int:
+    """Return an independent 31-bit seed for each pair."""
+    return int(np.random.SeedSequence([seed, stage]).generate_state(1)[0] >> 1)

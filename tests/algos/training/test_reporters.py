@@ -20,7 +20,7 @@ def rows_of(path):
 
 
 def test_episodes_are_summed_across_batches():
-    """Cutting the same play into batches of any length finds the same episodes."""
+    """Batches of any length give the same episodes."""
     play = FakeEnv(3, horizon=7).rollout(42, break_when_any_done=False)
     whole = TrainingEpisodes().add(play, "agents")
     in_pieces = TrainingEpisodes()
@@ -39,13 +39,13 @@ def test_episodes_are_summed_across_batches():
     assert whole["reward_per_step"] == pytest.approx(whole["return"] / 7)
 
 
-def test_teams_rewards_are_means_over_their_agents():
+def test_returns_are_means_over_the_agents_of_a_team():
     step = TensorDict({"agents": {"reward": torch.tensor([[[[1.0], [3.0]]]])}}, (1, 1))
     step["done"] = torch.ones(1, 1, 1, dtype=torch.bool)
     assert TrainingEpisodes().add(TensorDict({"next": step}, (1, 1)), "agents")["return"] == 2.0
 
 
-def test_csv_has_one_row_per_write_and_blanks_for_nothing(tmp_path):
+def test_csv_has_one_row_per_write_and_blanks_for_nan(tmp_path):
     reporter = CsvReporter(tmp_path)
     reporter.write("metrics", 10, {"a/return": math.nan, "a/kl": 0.25})
     reporter.write("metrics", 20, {"a/return": 1.5, "a/kl": 1e-9})
@@ -55,7 +55,7 @@ def test_csv_has_one_row_per_write_and_blanks_for_nothing(tmp_path):
     ]
 
 
-def test_resumed_csv_drops_what_will_be_written_again(tmp_path):
+def test_resumed_csv_drops_later_rows(tmp_path):
     first = CsvReporter(tmp_path)
     for frames in (10, 20, 30):
         first.write("metrics", frames, {"x": frames})
