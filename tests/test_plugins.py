@@ -121,3 +121,15 @@ def test_an_installed_plugin_trains(installed, tmp_path):
     done = run(*arguments, f"hydra.run.dir={tmp_path / 'run'}", env=installed, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert len((tmp_path / "run" / "metrics.csv").read_text().splitlines()) == 3
+
+
+def test_an_installed_plugin_needs_no_naming(installed, tmp_path):
+    code = (
+        "import veca_marl, gymnasium;"
+        "assert 'FindBeacon' in veca_marl.list_tasks();"
+        "env = gymnasium.make('veca_marl/FindBeacon-v0', senses={'vision': 'blind'});"
+        "env.reset(seed=0); print(env.step(env.action_space.sample())[1])"
+    )
+    done = run("-c", code, env=installed, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert float(done.stdout) < 0.6

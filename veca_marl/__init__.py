@@ -1,8 +1,8 @@
 """Human-like agents that see, hear and feel in one world, and learn.
 
-`make` returns a task for TorchRL, `gym_env` for Gymnasium, `parallel_env` for PettingZoo, and
-`list_tasks` the names that they take. They are imported at their first use, so that the simulator
-(`veca_marl.sim`) can be used without loading torch.
+`make` returns a task for TorchRL, `gym_env` for Gymnasium, `parallel_env` for PettingZoo; `train`
+trains on a task; `list_tasks` returns the names that they take. They are imported at their first
+use, so that the simulator (`veca_marl.sim`) can be used without loading torch.
 
 Importing this package registers the Gymnasium ids `veca_marl/<task>-v0`.
 """
@@ -13,19 +13,19 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from veca_marl.gymnasium_ids import register_when_imported
+from veca_marl.version import __version__
 
 if TYPE_CHECKING:
-    from veca_marl.api import gym_env, list_tasks, make, parallel_env
+    from veca_marl.api import gym_env, list_tasks, make, parallel_env, train
 
-__version__ = "0.1.0"
-__all__ = ["__version__", "gym_env", "list_tasks", "make", "parallel_env"]
+__all__ = ["__version__", "gym_env", "list_tasks", "make", "parallel_env", "train"]
 
 
 def __getattr__(name: str) -> Any:
     """Import `veca_marl.api` at the first use of one of its functions (PEP 562)."""
     if name in __all__:
         return getattr(import_module("veca_marl.api"), name)
-    raise AttributeError(f"module 'veca_marl' has no attribute {name!r}; there are {__all__}")
+    raise AttributeError(f"module 'veca_marl' has no attribute {name!r}; choices: {__all__}")
 
 
 register_when_imported()

@@ -1,10 +1,14 @@
-"""Functions for notebooks and scripts that make tasks by name, as the command line does."""
+"""Functions for notebooks and scripts: the choices of the command line as arguments.
+
+`make`, `gym_env` and `parallel_env` make the environment of a task, `train` trains on it.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 
-from veca_marl.config import compose
+from veca_marl.config import compose, compose_node, to_config
 from veca_marl.envs.adapters.gymnasium import VecaGymEnv
 from veca_marl.envs.adapters.pettingzoo import VecaParallelEnv
 from veca_marl.envs.adapters.spaces import SensesLayout
@@ -12,12 +16,24 @@ from veca_marl.envs.adapters.torchrl.env import VecaEnv
 from veca_marl.envs.core.game_cfg import GameCfg
 from veca_marl.envs.core.task import TASKS
 from veca_marl.gymnasium_ids import register_task
+from veca_marl.plugins import load_plugins
+from veca_marl.runs.assembly import make_trainer
+from veca_marl.runs.run_folder import new_run
+from veca_marl.runs.training import TrainingResult, run_training
 
 TASKS.listen(register_task)
 
 
-def list_tasks() -> list[str]:
-    """Return the names that `make` takes."""
+def list_tasks(plugins: Sequence[str] = ()) -> list[str]:
+    """Return the names that `make` takes, with the tasks of plug-ins.
+
+    Args:
+        plugins: Packages beside the installed plug-ins, see `veca_marl.plugins`.
+
+    Raises:
+        PluginError: If a plug-in cannot be loaded.
+    """
+    load_plugins(plugins)
     return sorted(TASKS)
 
 
@@ -30,6 +46,7 @@ def make(
     senses: Mapping[str, str] | None = None,
     seed: int | None = None,
     overrides: Sequence[str] = (),
+    plugins: Sequence[str] = (),
 ) -> VecaEnv:
     """Make a task as a TorchRL environment. What is left out is as on the command line.
 
@@ -41,6 +58,7 @@ def make(
         senses: Sense to preset, a file of `conf/senses/<sense>`, such as `{"audio": "mono"}`.
         seed: The same seed gives the same worlds, bit by bit; None is fresh entropy.
         overrides: Anything else the command line takes, such as `["task.life_s=4.0"]`.
+        plugins: Packages that add tasks or presets and are not installed as plug-ins.
 
     Returns:
         An environment with `batch_size=[worlds]`.
@@ -49,7 +67,9 @@ def make(
         ConfigError: If there is no such choice; the message lists those there are.
         ValueError: If a number is impossible.
     """
-    cfg = choose(task, playground=playground, body=body, senses=senses, overrides=overrides)
+    cfg = choose(
+        task, playground=playground, body=body, senses=senses, overrides=overrides, plugins=plugins
+    )
     return VecaEnv(cfg, worlds=worlds, seed=seed)
 
 
@@ -61,6 +81,7 @@ def gym_env(
     senses: Mapping[str, str] | None = None,
     seed: int | None = None,
     overrides: Sequence[str] = (),
+    plugins: Sequence[str] = (),
     render_mode: str | None = None,
     layout: str = "arrays",
 ) -> VecaGymEnv:
@@ -73,6 +94,7 @@ def gym_env(
         senses: As for `make`.
         seed: Used until `reset` is given one; None is fresh entropy.
         overrides: As for `make`.
+        plugins: As for `make`.
         render_mode: `rgb_array` if `render` is to be called.
         layout: `arrays` gives each sense in its own shape, as TorchRL and PettingZoo get it;
             `stacked` gives both eyes as one image `(6, H, W)` and every other sense as a vector,
@@ -82,7 +104,9 @@ def gym_env(
         ConfigError: If there is no such choice; the message lists those there are.
         ValueError: If the task is one for several agents, or a number is impossible.
     """
-    cfg = choose(task, playground=playground, body=body, senses=senses, overrides=overrides)
+    cfg = choose(
+        task, playground=playground, body=body, senses=senses, overrides=overrides, plugins=plugins
+    )
     return VecaGymEnv(cfg, seed, render_mode, SensesLayout.named(layout))
 
 
@@ -94,6 +118,7 @@ def parallel_env(
     senses: Mapping[str, str] | None = None,
     seed: int | None = None,
     overrides: Sequence[str] = (),
+    plugins: Sequence[str] = (),
     render_mode: str | None = None,
 ) -> VecaParallelEnv:
     """Make a task of any number of agents as a PettingZoo `ParallelEnv`.
@@ -105,14 +130,66 @@ def parallel_env(
         senses: As for `make`.
         seed: Used until `reset` is given one; None is fresh entropy.
         overrides: As for `make`.
+        plugins: As for `make`.
         render_mode: `rgb_array` if `render` is to be called.
 
     Raises:
         ConfigError: If there is no such choice; the message lists those there are.
         ValueError: If a number is impossible.
     """
-    cfg = choose(task, playground=playground, body=body, senses=senses, overrides=overrides)
+    cfg = choose(
+        task, playground=playground, body=body, senses=senses, overrides=overrides, plugins=plugins
+    )
     return VecaParallelEnv(cfg, seed, render_mode)
+
+
+def train(
+    task: str,
+    *,
+    total_frames: float | None = None,
+    playground: str | None = None,
+    body: str | None = None,
+    senses: Mapping[str, str] | None = None,
+    seed: int = 0,
+    folder: str | Path | None = None,
+    overrides: Sequence[str] = (),
+    plugins: Sequence[str] = (),
+) -> TrainingResult:
+    """Train on a task, as ``python -m veca_marl.train`` does.
+
+    Args:
+        task: One of `list_tasks`.
+        total_frames: Frames of experience; None is the default of the command line.
+        playground: As for `make`.
+        body: As for `make`.
+        senses: As for `make`.
+        seed: Seed of the run.
+        folder: Folder of the run, as the command writes it; None stores nothing.
+        overrides: Anything else the command line takes, such as `["algo=mappo"]`.
+        plugins: As for `make`.
+
+    Returns:
+        The rows of the metrics and of the evaluations, and the policy.
+
+    Raises:
+        ConfigError: If there is no such choice, or there is a run in `folder`.
+        CheckpointError: If something cannot be loaded or stored.
+    """
+    chosen = _choices(task, playground, body, senses, plugins)
+    chosen += [] if total_frames is None else [f"total_frames={_integer(total_frames)}"]
+    chosen += [f"seed={seed}", *overrides]
+    node = compose_node(chosen)
+    cfg = to_config(node)
+    run = None if folder is None else new_run(Path(folder))
+    trainer = make_trainer(cfg, run)
+    if run is not None:
+        run.begin(node, chosen)
+    return run_training(cfg, run, trainer)
+
+
+def _integer(number: float) -> str:
+    """Return an integral number without exponent; another one as it is, to be refused."""
+    return str(int(number)) if float(number).is_integer() else str(number)
 
 
 def choose(
@@ -122,14 +199,26 @@ def choose(
     body: str | None = None,
     senses: Mapping[str, str] | None = None,
     overrides: Sequence[str] = (),
+    plugins: Sequence[str] = (),
 ) -> GameCfg:
     """Return the configuration of the game that `make` makes. The arguments are the same.
 
     Raises:
         ConfigError: If there is no such choice; the message lists those there are.
     """
+    return compose([*_choices(task, playground, body, senses, plugins), *overrides]).game
+
+
+def _choices(
+    task: str,
+    playground: str | None,
+    body: str | None,
+    senses: Mapping[str, str] | None,
+    plugins: Sequence[str],
+) -> list[str]:
+    """Return the arguments as overrides."""
     choices = [f"+task={task}"]
+    choices += [f"plugins=[{','.join(plugins)}]"] if plugins else []
     choices += [] if playground is None else [f"playground={playground}"]
     choices += [] if body is None else [f"body={body}"]
-    choices += [f"senses/{sense}={preset}" for sense, preset in (senses or {}).items()]
-    return compose([*choices, *overrides]).game
+    return choices + [f"senses/{sense}={preset}" for sense, preset in (senses or {}).items()]

@@ -1,6 +1,6 @@
 """Train on a task: ``python -m veca_marl.train +task=KickTheBall``.
 
-The Hydra entry: configuration -> environments -> algorithm -> loop.
+From Python, `veca_marl.train("KickTheBall")` does the same; see `veca_marl.api`.
 """
 
 from __future__ import annotations
@@ -11,7 +11,8 @@ import os
 import signal
 import sys
 from pathlib import Path
-from typing import NoReturn
+from types import ModuleType
+from typing import Any, NoReturn
 
 import hydra
 from hydra.core.hydra_config import HydraConfig
@@ -19,35 +20,29 @@ from hydra.errors import HydraException
 from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
+from veca_marl import api
 from veca_marl.algos.training.checkpoint import CheckpointError
 from veca_marl.algos.training.loop import Trainer
 from veca_marl.config import Config, ConfigError, conf_dir, one_line, prepare, to_config
 from veca_marl.runs.assembly import make_trainer
 from veca_marl.runs.run_folder import RunFolder, new_run, open_run, remove_if_empty
-from veca_marl.runs.training import run_training
+from veca_marl.runs.training import TrainingResult, run_training
 
 _COMMAND = "python -m veca_marl.train"
 _DISK_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 RESUMABLE = ("resume", "total_frames", "max_minutes", "device", "threads")
 
 
-def train(cfg: Config, folder: RunFolder, trainer: Trainer) -> list[str]:
-    """Train and print the results; return how each team compares with random actions."""
-    result = run_training(cfg, folder, trainer)
-    print(result.timing, *result.comparison, f"run folder: {folder.path}", sep="\n")
-    return result.comparison
-
-
 def stored_config(folder: RunFolder, asked: DictConfig, overrides: list[str]) -> Config:
-    """Return the configuration of an earlier run, with the changes a resumption may make.
+    """Return the configuration of an earlier run, with the changes that resuming allows.
 
     Args:
         folder: The earlier run.
         asked: The configuration composed from this command line.
-        overrides: What this command line says.
+        overrides: The overrides of this command line.
 
     Raises:
-        ConfigError: If anything else is to change, or it is a run of another task.
+        ConfigError: If another key is to be changed, or the run is one of another task.
     """
     task = OmegaConf.load(folder.config).task.name
     names = {text.partition("=")[0]: text.partition("=")[2] for text in overrides}
@@ -56,7 +51,7 @@ def stored_config(folder: RunFolder, asked: DictConfig, overrides: list[str]) ->
     changed = sorted(set(names) - set(RESUMABLE))
     if changed:
         raise ConfigError(
-            f"a resumed run stays as it was: cannot change {', '.join(changed)}; "
+            f"a resumed run keeps its configuration: cannot change {', '.join(changed)}; "
             f"choices: {', '.join(RESUMABLE)}"
         )
     node = folder.typed_config()
@@ -67,7 +62,7 @@ def stored_config(folder: RunFolder, asked: DictConfig, overrides: list[str]) ->
 
 @hydra.main(version_base="1.3", config_path=str(conf_dir()), config_name="config")
 def run(node: DictConfig) -> None:
-    """Train in the folder that Hydra made."""
+    """Train in the folder that Hydra has created."""
     path = Path(HydraConfig.get().runtime.output_dir)
     try:
         cfg, folder, trainer = set_up(node, path)
@@ -75,7 +70,8 @@ def run(node: DictConfig) -> None:
         remove_if_empty(path)
         give_up(error)
     try:
-        train(cfg, folder, trainer)
+        result = run_training(cfg, folder, trainer)
+        print(result.timing, *result.comparison, f"run folder: {folder.path}", sep="\n")
     except KeyboardInterrupt:
         print(f"\ninterrupted; continue with: {_COMMAND} resume={path}", file=sys.stderr)
         raise SystemExit(130) from None
@@ -88,7 +84,7 @@ def run(node: DictConfig) -> None:
 
 
 def set_up(node: DictConfig, path: Path) -> tuple[Config, RunFolder, Trainer]:
-    """Make ready to start or to continue the run in `path`; claim it last."""
+    """Return what starts or continues the run in `path`; a new folder is written last."""
     if node.resume is not None:
         folder = open_run(path, "resume=")
         cfg = stored_config(folder, node, list(HydraConfig.get().overrides.task))
@@ -101,22 +97,32 @@ def set_up(node: DictConfig, path: Path) -> tuple[Config, RunFolder, Trainer]:
 
 
 def give_up(error: Exception) -> NoReturn:
-    """Say in one line what is wrong and end with status 2."""
+    """Print the error as one line and exit with status 2."""
     print(f"error: {one_line(error)}", file=sys.stderr)
     raise SystemExit(2)
 
 
 def main() -> None:
-    """Run the command line; what is wrong with it is said in one line, with exit status 2."""
-    os.environ["HYDRA_FULL_ERROR"] = "1"  # exceptions come here instead of being printed
+    """Run the command line; errors of it end in one line and exit status 2."""
+    os.environ["HYDRA_FULL_ERROR"] = "1"  # Hydra raises exceptions instead of printing them
     logging.getLogger("torchrl").setLevel(logging.WARNING)
-    signal.signal(signal.SIGTERM, signal.default_int_handler)  # schedulers stop runs by it
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # schedulers stop jobs with SIGTERM
     try:
         sys.argv[1:] = prepare(sys.argv[1:])
         run()
     except (ConfigError, HydraException, OmegaConfBaseException) as error:
         give_up(error)
 
+
+class _CallableModule(ModuleType):
+    """`veca_marl.train` is a function, also after this module of the same name was imported."""
+
+    def __call__(self, *args: Any, **kwargs: Any) -> TrainingResult:
+        """See `veca_marl.api.train`."""
+        return api.train(*args, **kwargs)
+
+
+sys.modules[__name__].__class__ = _CallableModule
 
 if __name__ == "__main__":
     main()

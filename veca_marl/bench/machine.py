@@ -7,8 +7,8 @@ import platform
 from importlib.metadata import version
 from pathlib import Path
 
-import veca_marl
 from veca_marl.runs.provenance import checkout_commit
+from veca_marl.version import __version__
 
 _PACKAGES = ("numpy", "numba", "torch", "torchrl", "pybullet")
 
@@ -16,7 +16,7 @@ _PACKAGES = ("numpy", "numba", "torch", "torchrl", "pybullet")
 def machine() -> dict[str, str | int | float | None]:
     """Return the commit, the machine and the versions of packages."""
     return {
-        "veca_marl": veca_marl.__version__,
+        "veca_marl": __version__,
         "commit": checkout_commit(),
         "processor": _processor(),
         "cores": os.cpu_count(),

@@ -10,14 +10,14 @@ from collections.abc import Sequence
 from importlib.metadata import version
 from pathlib import Path
 
-import veca_marl
+from veca_marl.version import __version__
 
 _PACKAGES = ("torch", "torchrl", "tensordict", "pybullet", "numpy", "numba")
 
 
 def provenance(overrides: Sequence[str]) -> dict[str, object]:
     """Return what `provenance.json` of a run contains."""
-    packages = {"veca_marl": veca_marl.__version__}
+    packages = {"veca_marl": __version__}
     return {
         "command": sys.orig_argv,
         "overrides": list(overrides),
@@ -27,7 +27,7 @@ def provenance(overrides: Sequence[str]) -> dict[str, object]:
     }
 
 
-def checkout_commit(package: Path = Path(veca_marl.__file__).parent) -> str | None:
+def checkout_commit(package: Path = Path(__file__).parents[1]) -> str | None:
     """Return the commit of the checkout that the package lies in, with `-dirty` if it was changed.
 
     None for an installed package, also where its environment lies inside another repository: the

@@ -1,0 +1,56 @@
+"""The public functions of `veca_marl`."""
+
+import subprocess
+import sys
+
+import pytest
+
+import veca_marl
+from veca_marl.config import ConfigError
+from veca_marl.runs.run_folder import RunFolder
+
+TINY = ["collect=one_process", "collect.worlds=1", "collect.steps=32", "algo.minibatches=2"]
+TINY += ["log=silent", "eval.episodes=1", "eval.worlds=1", "task.max_seconds=0.4"]
+BLIND = {"vision": "blind"}
+
+
+def test_every_public_name_exists():
+    for name in veca_marl.__all__:
+        assert getattr(veca_marl, name) is not None
+
+
+def test_the_simulator_is_imported_without_torch():
+    code = (
+        "import sys, veca_marl.sim.physics; print('torch' in sys.modules, 'hydra' in sys.modules)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["False"]
+
+
+def test_train_returns_metrics_and_a_policy_and_stores_the_run(tmp_path):
+    result = veca_marl.train(
+        "KickTheBall", total_frames=64.0, senses=BLIND, folder=tmp_path / "run", overrides=TINY
+    )
+    assert [row["frames"] for row in result.metrics] == [32, 64]
+    assert {row["team"] for row in result.evaluations} == {"agents"}
+    assert RunFolder(tmp_path / "run").typed_config().total_frames == 64
+    env = veca_marl.make("KickTheBall", senses=BLIND, seed=0)
+    assert "action" in result.policy(env.reset())["agents"]
+    env.close()
+    with pytest.raises(ConfigError, match="holds a run already"):
+        veca_marl.train("KickTheBall", folder=tmp_path / "run", senses=BLIND, overrides=TINY)
+
+
+def test_train_stays_a_function_after_the_module_of_the_command_was_imported():
+    code = (
+        "import veca_marl, veca_marl.train\n"
+        "try: veca_marl.train('Chess')\n"
+        "except ValueError as error: print(error)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert "unknown task 'Chess'; choices: CrawlBaby" in done.stdout
+
+
+def test_fractions_of_frames_are_refused():
+    with pytest.raises(ConfigError, match=r"total_frames: Value '1.5' .* converted to Integer"):
+        veca_marl.train("KickTheBall", total_frames=1.5)
