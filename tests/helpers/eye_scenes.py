@@ -1,4 +1,4 @@
-"""Scenes and bodies that the tests of the eyes share, and a second way to cast rays."""
+"""Scenes and bodies of the tests of vision, and a reference ray caster."""
 
 from dataclasses import dataclass, field
 
@@ -24,7 +24,7 @@ def random_rotations(count, rng):
 
 
 def clutter(rng, per_shape=6, shapes=tuple(Shape), walls=True):
-    """Many primitives of every shape, turned at random, within a room."""
+    """Primitives of every shape in random poses within a room."""
     scene = Scene()
     if walls:
         scene.add_object("floor", [[Geom(Shape.BOX, (3, 3, 0.1), offset=(0, 0, -0.1))]])
@@ -118,7 +118,7 @@ def _cylinder(eye, ray, size):
         ends = (np.array([half, -half]) - eye[2]) / ray[..., 2:]
         at_end = eye[:2] + ends[..., None] * ray[..., None, :2]
         ends = np.where((at_end**2).sum(-1) <= radius**2, ends, np.nan)
-    # a convex thing is entered once: from outside, the first of its surfaces that is met
+    # a ray enters a convex shape once: the first surface that it hits from outside
     return np.fmin(np.where(on_side, side, np.nan), np.fmin(ends[..., 0], ends[..., 1]))
 
 

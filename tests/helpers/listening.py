@@ -1,4 +1,4 @@
-"""Scenes and measures that the tests of the ears share."""
+"""Scenes and measures of the tests of hearing."""
 
 import numpy as np
 import scipy.signal

@@ -1,4 +1,4 @@
-"""Poses of a body's skin that several tests share."""
+"""Scenes with the skin of a body in given poses."""
 
 import numpy as np
 
@@ -10,7 +10,7 @@ SHIRT = (0.2, 0.4, 0.9)
 
 
 def random_angles(rng, share=1.0):
-    """Joint angles ``(82,)`` anywhere within a share of their ranges."""
+    """Random joint angles ``(82,)`` within a fraction of their ranges."""
     limits = np.array([(j.low_rad, j.high_rad) for j in load_skeleton().joints])
     return share * rng.uniform(limits[:, 0], limits[:, 1])
 
@@ -31,7 +31,7 @@ def add_body(scene, name="body"):
 
 
 def pose(item, angles, position=(0.0, 0.0, 0.0), rotation=None):
-    """Put a body somewhere with some joint angles; the scene is not updated."""
+    """Set the pose and joint angles of a body without updating the scene."""
     item.positions[0] = position
     item.rotations[0] = np.eye(3) if rotation is None else rotation
     forward_kinematics(load_skeleton(), angles, item.positions, item.rotations)

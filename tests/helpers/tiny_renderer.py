@@ -1,4 +1,4 @@
-"""PyBullet's software renderer on a scene of ours."""
+"""PyBullet's software renderer applied to a `Scene`."""
 
 import numpy as np
 
@@ -7,7 +7,7 @@ from veca_marl.sim.physics import pybullet, shape_arguments
 
 
 class TinyRenderer:
-    """Shows the primitives of a scene as bodies whose ids are the primitives' rows."""
+    """Renders the primitives of a scene as bodies with the indices of the primitives as ids."""
 
     def __init__(self, scene):
         self.client = pybullet.connect(pybullet.DIRECT)
@@ -21,7 +21,7 @@ class TinyRenderer:
         pybullet.disconnect(self.client)
 
     def segment(self, camera, pose):
-        """Return ``(H, W)`` which primitive is where, -1 for none."""
+        """Return the index of the visible primitive per pixel, ``(H, W)``, -1 for none."""
         forward, _, up = pose.rotation.T
         view = pybullet.computeViewMatrix(pose.position, pose.position + forward, up)
         projection = pybullet.computeProjectionMatrixFOV(

@@ -2,8 +2,9 @@
 
 import numpy as np
 import pytest
-from listening import HEAD, RATE, SOURCES, STEP, noise, room, spatialisation
+from listening import HEAD, RATE, SOURCES, STEP, noise, ratio_db, room, spatialisation, yaw
 
+from veca_marl.sim.geometry import Pose
 from veca_marl.sim.sound import Clip, SoundField
 
 
@@ -43,6 +44,26 @@ def test_a_still_scene_sounds_the_same_after_steps_left_out(quality, missed):
     heard = np.concatenate(heard, axis=1)
     assert heard.any()
     np.testing.assert_allclose(heard, expected[:, -heard.shape[1] :], atol=2e-6)
+
+
+@pytest.mark.parametrize("quality", ["hrtf", "stereo", "mono"])
+def test_a_moving_scene_differs_only_until_its_reflections_have_arrived(quality):
+    """A source at 1 m/s and a turning head; steps 3 to 5 are left out."""
+    every, rare = [], []
+    for heard, missed in ((every, ()), (rare, (3, 4, 5))):
+        field, listener = field_with_noise(quality, seconds=1.0)
+        for step in range(14):
+            field.sources["0"].position = SOURCES[0] + (0.04 * step, 0.0, 0.0)
+            head = Pose(HEAD.position, HEAD.rotation @ yaw(0.05 * step))
+            field.advance()
+            if step in missed:
+                continue
+            if listener.missed_steps:
+                listener.rejoin(head)
+            heard.append(listener.render(head))
+    after_gap = ratio_db(every[6], rare[3])
+    assert 3.0 < after_gap < 60.0
+    np.testing.assert_allclose(rare[-4:], every[-4:], atol=2e-6)
 
 
 def test_several_missed_steps_can_be_made_up_for():
