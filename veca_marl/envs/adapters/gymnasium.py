@@ -21,7 +21,7 @@ class VecaGymEnv(gymnasium.Env[Observation, Any]):
     terms by name. The same seed gives the same bytes as in the first world of a `VecaEnv`.
 
     Args:
-        cfg: What is played.
+        cfg: What to play.
         seed: Used until `reset` is given one; None is fresh entropy.
         render_mode: `rgb_array` if `render` is to be called.
         layout: Shapes of the observations.
@@ -72,7 +72,7 @@ class VecaGymEnv(gymnasium.Env[Observation, Any]):
 
         Raises:
             RuntimeError: If no episode is running.
-            ValueError: If the action is impossible.
+            ValueError: If the action is invalid.
         """
         step = self._played.step({self._agent: action})
         return (
@@ -88,7 +88,7 @@ class VecaGymEnv(gymnasium.Env[Observation, Any]):
         return self._played.render()
 
     def close(self) -> None:
-        """Give the world's resources back."""
+        """Release the resources of the world."""
         self._played.close()
 
 

@@ -24,7 +24,7 @@ class VecaParallelEnv(ParallelEnv[str, Observation, Any]):
     reward terms by name. The same seed gives the same bytes as in the first world of a `VecaEnv`.
 
     Args:
-        cfg: What is played.
+        cfg: What to play.
         seed: Used until `reset` is given one; None is fresh entropy.
         render_mode: `rgb_array` if `render` is to be called.
     """
@@ -42,7 +42,7 @@ class VecaParallelEnv(ParallelEnv[str, Observation, Any]):
         self.action_spaces = {p.name: action_space(p) for p in game.actors}
 
     def observation_space(self, agent: str) -> Space:
-        """Return what an agent perceives: a `Dict` with one space per sense."""
+        """Return the space of an agent's observations: a `Dict` with one space per sense."""
         return self.observation_spaces[self._known(agent)]
 
     def action_space(self, agent: str) -> Space:
@@ -95,6 +95,6 @@ class VecaParallelEnv(ParallelEnv[str, Observation, Any]):
         return self._played.render()
 
     def close(self) -> None:
-        """Give the world's resources back."""
+        """Release the resources of the world."""
         self._played.close()
         self.agents = []

@@ -67,7 +67,7 @@ class SensesLayout(Enum):
         return cls(name)
 
     def space(self, game: Game, player: Player) -> spaces.Dict:
-        """Return what a player perceives: a `Dict` with one space per sense."""
+        """Return the space of a player's observations: a `Dict` with one space per sense."""
         specs = {
             name: spec
             for sense in game.senses[player.name].values()

@@ -1,1 +1,34 @@
-"""The game core: tasks, teams, reward terms, and the game that runs them. No torch."""
+"""The core of a game: tasks, teams, reward terms, actions, episodes, and the game itself."""
+
+from veca_marl.envs.core.actions import from_parts, random_action, to_parts
+from veca_marl.envs.core.episodes import Episodes
+from veca_marl.envs.core.expert import Expert, find_expert, has_expert, register_expert
+from veca_marl.envs.core.game import Game, Observation, Outcome
+from veca_marl.envs.core.game_cfg import GameCfg
+from veca_marl.envs.core.task import Player, Task, TaskCfg, Team, find_task, register, terms
+from veca_marl.envs.core.team import Script, TeamCfg, TeamSensesCfg
+
+__all__ = [
+    "Episodes",
+    "Expert",
+    "Game",
+    "GameCfg",
+    "Observation",
+    "Outcome",
+    "Player",
+    "Script",
+    "Task",
+    "TaskCfg",
+    "Team",
+    "TeamCfg",
+    "TeamSensesCfg",
+    "find_expert",
+    "find_task",
+    "from_parts",
+    "has_expert",
+    "random_action",
+    "register",
+    "register_expert",
+    "terms",
+    "to_parts",
+]

@@ -59,7 +59,7 @@ def _senses_of(game: Game, player: str) -> dict[str, ArraySpec]:
 def to_torchrl(spec: ArraySpec, batch: tuple[int, ...]) -> TensorSpec:
     """Return the spec of one array; an integer without shape is a choice among `high + 1`.
 
-    An array that lacks a bound is `Unbounded`.
+    The spec of an array that lacks a bound is `Unbounded`.
     """
     dtype = getattr(torch, np.dtype(spec.dtype).name)
     if spec.is_discrete:
