@@ -1,10 +1,10 @@
-"""Measure how loud calls are in both ears at rest: the numbers of the experts of hearing.
+"""Measure the levels of calls in both ears at rest: the constants of `call_localization`.
 
 python experiments/calling/ears.py
 
-Walkers that stand and crawlers that kneel hear a call from the same room or from another one. What
-the ears hear on average is compared with 1 over the distance and the loss of the walls between,
-their difference with the side that the call comes from.
+Standing walkers and kneeling crawlers hear a call from the same room or from another one. The mean
+level of the ears is compared with 1 / distance and the transmission loss of the walls, the
+difference of the ears with the direction of the call.
 """
 
 from __future__ import annotations
@@ -22,17 +22,17 @@ from veca_marl.envs.tasks.navigation.places import free_place
 from veca_marl.envs.tasks.player_starts import place_player
 from veca_marl.sim.sound import Call
 
-CALLS = {"walker_voice": 300, "mitten_voice": 120}  # how many, by body
-REST_STEPS = 40  # then a crawler's head is still
-LEAST_M = 0.8  # between the two in one room
+CALLS = {"walker_voice": 300, "mitten_voice": 120}  # number of calls by body
+REST_STEPS = 40  # after these the head of a crawler is at rest
+LEAST_M = 0.8  # least distance of two agents in one room
 
 
 def listen(game: Game, together: bool, rng: np.random.Generator) -> NDArray[np.float64]:
-    """Let one call and return what the other hears.
+    """Let one agent call; return the levels at the ears of the other one.
 
     Returns:
-        Mean of the ears without distance and walls, difference of the ears (log10), how far to the
-        left of the head the call comes from (sine).
+        Mean level corrected for distance and walls, difference of the levels (log10), and the sine
+        of the azimuth of the call, positive to the left.
     """
     game.reset(rng)
     ears, mouth = game.players
@@ -44,12 +44,15 @@ def listen(game: Game, together: bool, rng: np.random.Generator) -> NDArray[np.f
             places = [free_place(room, [], 0.5, rng) for _ in game.players]
         for player, place in zip(game.players, places, strict=True):
             place_player(player, place, rng.uniform(-math.pi, math.pi))
-    legs = {p.name: locomotion_of(p, world.clock.step_s) for p in game.players}
+    locomotion = {p.name: locomotion_of(p, world.clock.step_s) for p in game.players}
     for player in game.players:
         game.observe(player)
     for _ in range(REST_STEPS):
-        wishes = {ears.name: legs[ears.name].rest(), mouth.name: legs[mouth.name].rest(Call.high)}
-        game.step({p.name: p.body.encode(wishes[p.name]) for p in game.players})
+        commands = {
+            ears.name: locomotion[ears.name].rest(),
+            mouth.name: locomotion[mouth.name].rest(Call.high),
+        }
+        game.step({p.name: p.body.encode(commands[p.name]) for p in game.players})
         heard, _ = [game.observe(player) for player in game.players]
     head, caller = ears.body.mount("head"), mouth.body.mount("mouth").position
     way = (caller - head.position) @ head.rotation

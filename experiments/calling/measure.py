@@ -1,4 +1,4 @@
-"""Let the experts of MultiAgentNav play with and without voices, and with worse ears.
+"""Let the experts of MultiAgentNav play with and without voices, and with degraded hearing.
 
 python experiments/calling/measure.py
 
@@ -34,12 +34,12 @@ ARMS = {
     "mono": ["senses/audio=mono"],
     "stereo": ["senses/audio=stereo"],
 }
-FOR_MORE = ("voices", "finder muted", "no hearing")  # than two agents
-SECONDS = {"walker_voice": 20, "mitten_voice": 90, "full_voice": 90}  # by body: who crawls is slow
+FOR_MORE = ("voices", "finder muted", "all deaf")  # arms for more than two agents
+SECONDS = {"walker_voice": 20, "mitten_voice": 90, "full_voice": 90}  # by body; crawling is slow
 
 
 def play_once(game: Game, seed: int) -> tuple[bool, float]:
-    """Return whether all came to the object in time, and after how many seconds it was over."""
+    """Return whether all agents reached the object in time, and the duration in seconds."""
     rng = np.random.default_rng([2026, seed])
     game.reset(rng)
     while True:
@@ -54,7 +54,7 @@ def play_once(game: Game, seed: int) -> tuple[bool, float]:
 
 def play(body: str, agents: int, arm: str, episodes: int) -> Played:
     """Return for each episode whether it was solved, and its seconds: ``(episodes, 2)``."""
-    # the experts ask `is_visible`: eyes and skin are shut to save time
+    # the experts use `is_visible`; vision and touch are switched off to save time
     shut = ["senses/vision=blind", "senses/touch=numb"]
     setting = [f"body={body}", f"task.agents={agents}", f"task.max_seconds={SECONDS[body]}"]
     game = Game(compose(["+task=MultiAgentNav", *setting, *shut, *ARMS[arm]]).game)

@@ -1,13 +1,13 @@
-"""Search for a rhythm of crawling that gets to places all around, or straight back, and print it.
+"""Search for a crawling gait that reaches places in all directions, or that moves backwards.
 
 pip install cmaes
-python experiments/crawl/search.py --minutes 30        # goes on from the rhythm that there is
+python experiments/crawl/search.py --minutes 30        # starts from the present gait
 python experiments/crawl/search.py --back --minutes 30
-python experiments/crawl/search.py --measure           # what the rhythms do, without a search
+python experiments/crawl/search.py --measure           # measures the present gaits
 
-The search is an evolution strategy (SepCMA: Ros and Hansen 2008). A rhythm is tried on two bodies,
-one driven by target angles and one by torques; in each generation all are tried from the same
-starts.
+The search is an evolution strategy (SepCMA: Ros and Hansen 2008). A gait is evaluated on two
+bodies, one with position control and one with torque control; within a generation all gaits have
+the same starts. The result is printed.
 """
 
 from __future__ import annotations
@@ -33,40 +33,42 @@ from veca_marl.sim.geometry import Floats
 BODIES = ("mitten_position", "mitten")
 POPULATION = 14
 WAY_S, ROUND_S, BACK_S = 8.0, 5.0, 4.0
-AHEAD_S = 2.0  # who goes back has crawled ahead for so long at most
+AHEAD_S = 2.0  # longest time of crawling forwards before moving backwards
 STEPS = {
     "_hz": 0.15,
     "_rad": 0.3,
     "_s": 0.05,
     "shortening": 0.25,
-}  # of the search, by name; degrees:
-DEGREES = 7.0
-FALLEN = 0.5  # cosine of the chest's front with straight down: less is on the side or the back
+}  # standard deviations of the search by the ends of names
+DEGREES = 7.0  # standard deviation of all other parameters, which are angles
+FALLEN = 0.5  # cosine of the angle between the front of the chest and straight down after a fall
 Numbers = dict[str, float]
 
 
-def numbers_of(rhythm: Any, name: str = "") -> Numbers:
-    """Return all numbers of a rhythm by their place in it."""
-    if isinstance(rhythm, float):
-        return {name: rhythm}
+def numbers_of(pattern: Any, name: str = "") -> Numbers:
+    """Return all numbers of a gait by their path in it."""
+    if isinstance(pattern, float):
+        return {name: pattern}
     found: Numbers = {}
-    for key, part in parts_of(rhythm).items():
+    for key, part in parts_of(pattern).items():
         found |= numbers_of(part, f"{name}/{key}")
     return found
 
 
-def rhythm_of(numbers: Numbers, like: Any, name: str = "") -> Any:
-    """Return a rhythm like another one, with other numbers."""
+def pattern_of(numbers: Numbers, like: Any, name: str = "") -> Any:
+    """Return a copy of a gait with other numbers."""
     if isinstance(like, float):
         return numbers[name]
-    parts = {key: rhythm_of(numbers, part, f"{name}/{key}") for key, part in parts_of(like).items()}
+    parts = {
+        key: pattern_of(numbers, part, f"{name}/{key}") for key, part in parts_of(like).items()
+    }
     return parts if isinstance(like, Mapping) else type(like)(**parts)
 
 
-def parts_of(rhythm: Any) -> dict[str, Any]:
-    if is_dataclass(rhythm):
-        return {field.name: getattr(rhythm, field.name) for field in fields(rhythm)}
-    return dict(rhythm)
+def parts_of(pattern: Any) -> dict[str, Any]:
+    if is_dataclass(pattern):
+        return {field.name: getattr(pattern, field.name) for field in fields(pattern)}
+    return dict(pattern)
 
 
 def step_of(name: str) -> float:
@@ -87,14 +89,13 @@ class Trial:
         self._chest = self.body.bone_names.index("chest")
         self._step_s = self._game.world.clock.step_s
 
-    def way_mps(self, rhythm: GaitPattern, aside_rad: float, seed: int) -> tuple[float, float]:
-        """CrawlGait for some time to a place far away.
+    def way_mps(self, pattern: GaitPattern, aside_rad: float, seed: int) -> tuple[float, float]:
+        """Crawl towards a distant place for a time.
 
         Returns:
-            Speed towards it; what it costs that the trunk was in turmoil or came to lie on its
-            side.
+            Speed towards it, and the penalty of rotations and tilts of the trunk.
         """
-        crawl = self._start(rhythm, seed)
+        crawl = self._start(pattern, seed)
         start, ahead = self._line()
         c, s = math.cos(aside_rad), math.sin(aside_rad)
         way = np.array([c * ahead[0] - s * ahead[1], s * ahead[0] + c * ahead[1]])
@@ -105,14 +106,14 @@ class Trial:
             spin += self._spin() / steps
             least = min(least, self.face_down())
         speed = float((self.body.position[:2] - start) @ way) / WAY_S
-        return speed, self._turmoil(spin, least)
+        return speed, self._penalty(spin, least)
 
-    def back_mps(self, rhythm: GaitPattern, horizon_s: float, seed: int) -> tuple[float, float]:
-        """CrawlGait ahead as it is known, then back; return speed back and turmoil."""
+    def back_mps(self, pattern: GaitPattern, ahead_s: float, seed: int) -> tuple[float, float]:
+        """Crawl forwards with the present gait, then backwards; return speed and penalty."""
         crawl = self._start(CRAWL, seed)
-        for _ in range(round(horizon_s / self._step_s)):
+        for _ in range(round(ahead_s / self._step_s)):
             self._step(crawl.command())
-        crawl, start, ahead = CrawlGait(self.body, self._step_s, rhythm), *self._line()
+        crawl, start, ahead = CrawlGait(self.body, self._step_s, pattern), *self._line()
         spin, least = 0.0, 1.0
         steps = round(BACK_S / self._step_s)
         for _ in range(steps):
@@ -120,11 +121,11 @@ class Trial:
             spin += self._spin() / steps
             least = min(least, self.face_down())
         speed = float((start - self.body.position[:2]) @ ahead) / BACK_S
-        return speed, self._turmoil(spin, least)
+        return speed, self._penalty(spin, least)
 
-    def round_rad(self, rhythm: GaitPattern, turn: float, seed: int) -> tuple[float, float]:
-        """Turn for some time to one side; return how far, and how far away it came, metres."""
-        crawl = self._start(rhythm, seed)
+    def round_rad(self, pattern: GaitPattern, turn: float, seed: int) -> tuple[float, float]:
+        """Turn to one side for a time; return the angle, and the greatest distance in metres."""
+        crawl = self._start(pattern, seed)
         before, start = self.body.forward, self.body.position[:2]
         turned, away = 0.0, 0.0
         for _ in range(round(ROUND_S / self._step_s)):
@@ -134,23 +135,23 @@ class Trial:
             before, away = now, max(away, math.dist(self.body.position[:2], start))
         return turned * turn, away
 
-    def _start(self, rhythm: GaitPattern, seed: int) -> CrawlGait:
+    def _start(self, pattern: GaitPattern, seed: int) -> CrawlGait:
         self._game.reset(np.random.default_rng([2026, seed]))
-        return CrawlGait(self.body, self._step_s, rhythm)
+        return CrawlGait(self.body, self._step_s, pattern)
 
-    def _step(self, wish: JointCommand) -> None:
-        self.body.act(self.body.encode(wish))
+    def _step(self, command: JointCommand) -> None:
+        self.body.act(self.body.encode(command))
         self._game.advance()
 
     def _line(self) -> tuple[Floats, Floats]:
-        """Return where it is and whither it faces, ``(2,)`` each."""
+        """Return position and heading, ``(2,)`` each."""
         return self.body.position[:2], self.body.forward[:2]
 
     def _spin(self) -> float:
-        """Return how fast the chest turns, rad/s."""
+        """Return the angular speed of the chest, rad/s."""
         return float(np.linalg.norm(self.body.angular_velocities()[self._chest]))
 
-    def _turmoil(self, spin: float, least: float) -> float:
+    def _penalty(self, spin: float, least: float) -> float:
         side = 0.15 * max(0.0, 0.8 - least) + 0.2 * max(0.0, 0.7 - self.face_down())
         return 0.02 * spin + side
 
@@ -159,61 +160,63 @@ class Trial:
         return -float(self.body.bone("chest").forward[2])
 
 
-def ahead(trial: Trial, rhythm: GaitPattern, side: float, rng: np.random.Generator) -> list[float]:
-    """Return what a rhythm is worth that gets to places and turns: m/s, or worth as much."""
-    worth = []
+def ahead(trial: Trial, pattern: GaitPattern, side: float, rng: np.random.Generator) -> list[float]:
+    """Return scores of a gait for reaching places and turning, in m/s or weighted likewise."""
+    scores = []
     for low, high, hand in ((0.0, 60.0, side), (60.0, 150.0, -side)):
         aside_rad = hand * math.radians(rng.uniform(low, high))
-        speed, turmoil = trial.way_mps(rhythm, aside_rad, int(rng.integers(10**6)))
-        worth.append(speed - turmoil)
-    turned, away = trial.round_rad(rhythm, side, int(rng.integers(10**6)))
-    return [*worth, 0.3 * min(1.0, turned / math.pi) - 0.15 * max(0.0, away - 0.5)]
+        speed, penalty = trial.way_mps(pattern, aside_rad, int(rng.integers(10**6)))
+        scores.append(speed - penalty)
+    turned, away = trial.round_rad(pattern, side, int(rng.integers(10**6)))
+    return [*scores, 0.3 * min(1.0, turned / math.pi) - 0.15 * max(0.0, away - 0.5)]
 
 
-def back(trial: Trial, rhythm: GaitPattern, side: float, rng: np.random.Generator) -> list[float]:
-    """Return what a rhythm is worth that leads back."""
+def back(trial: Trial, pattern: GaitPattern, side: float, rng: np.random.Generator) -> list[float]:
+    """Return scores of a gait for moving backwards, m/s."""
     del side
     tries = [(float(rng.uniform(0.0, AHEAD_S)), int(rng.integers(10**6))) for _ in range(2)]
-    return [float(np.subtract(*trial.back_mps(rhythm, *one))) for one in tries]
+    return [float(np.subtract(*trial.back_mps(pattern, *one))) for one in tries]
 
 
-Worth = Callable[[Trial, GaitPattern, float, np.random.Generator], list[float]]
+Evaluation = Callable[[Trial, GaitPattern, float, np.random.Generator], list[float]]
 
 
-def score(trials: list[Trial], worth: Worth, rhythm: GaitPattern, generation: int) -> float:
-    """Return the mean of all tries and, besides, half of the worst."""
+def score(
+    trials: list[Trial], evaluate: Evaluation, pattern: GaitPattern, generation: int
+) -> float:
+    """Return the mean of all scores plus half of the lowest."""
     rng, found = np.random.default_rng([7, generation]), []
     for number, trial in enumerate(trials):
         side = 1.0 if (generation + number) % 2 else -1.0
-        found += worth(trial, rhythm, side, rng)
+        found += evaluate(trial, pattern, side, rng)
     return float(np.mean(found) + 0.5 * min(found))
 
 
-def search(known: GaitPattern, worth: Worth, minutes: float) -> GaitPattern:
-    from cmaes import SepCMA  # of nobody else's need
+def search(known: GaitPattern, evaluate: Evaluation, minutes: float) -> GaitPattern:
+    from cmaes import SepCMA  # needed by this search only
 
     begin = numbers_of(known)
     steps = np.array([step_of(name) for name in begin])
     trials = [Trial(body) for body in BODIES]
     strategy = SepCMA(np.zeros(len(begin)), 0.5, population_size=POPULATION, seed=0)
 
-    def rhythm_at(point: Any) -> GaitPattern:
+    def pattern_at(point: Any) -> GaitPattern:
         numbers = np.array(list(begin.values())) + steps * point
-        found: GaitPattern = rhythm_of(dict(zip(begin, numbers.tolist(), strict=True)), known)
+        found: GaitPattern = pattern_of(dict(zip(begin, numbers.tolist(), strict=True)), known)
         return found
 
     started = time.monotonic()
     while time.monotonic() - started < 60.0 * minutes:
         generation = strategy.generation
         points = [strategy.ask() for _ in range(POPULATION)]
-        scores = [score(trials, worth, rhythm_at(point), generation) for point in points]
+        scores = [score(trials, evaluate, pattern_at(point), generation) for point in points]
         strategy.tell([(point, -won) for point, won in zip(points, scores, strict=True)])
         print(generation, f"best {max(scores):.3f} mean {np.mean(scores):.3f}", flush=True)
-    return rhythm_at(strategy.mean)
+    return pattern_at(strategy.mean)
 
 
 def measure() -> None:
-    """Print what the rhythms do on bodies, those that they were found on and others."""
+    """Print measurements of the gaits on the bodies of the search and on others."""
     for body in (*BODIES, "full", "full_position"):
         trial = Trial(body)
         for degrees in (0, 60, -60, 120, -120):
@@ -243,14 +246,16 @@ def measure() -> None:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--minutes", type=float, default=30.0)
-    parser.add_argument("--back", action="store_true", help="search for one that leads back")
+    parser.add_argument(
+        "--back", action="store_true", help="search for a gait that moves backwards"
+    )
     parser.add_argument("--measure", action="store_true")
     asked = parser.parse_args()
     if asked.measure:
         measure()
     else:
-        known, worth = (BACK, back) if asked.back else (CRAWL, ahead)
-        pprint(search(known, worth, asked.minutes))
+        known, evaluate = (BACK, back) if asked.back else (CRAWL, ahead)
+        pprint(search(known, evaluate, asked.minutes))
 
 
 if __name__ == "__main__":

@@ -1,11 +1,11 @@
-"""Let the scripted expert and chance play every task; print the table and write results.csv.
+"""Let the expert and the random policy play every task; print the table and write results.csv.
 
 python experiments/experts/measure.py                       # all tasks, ten episodes each
 python experiments/experts/measure.py TurnBaby SitBaby --episodes 20 --body full
 python experiments/experts/measure.py SoccerTwoPlayer --body full --seconds 60
 
-Between two teams the expert plays against chance and against itself, and chance against itself.
-Rows of tasks that are not asked for stay in the table.
+In games of two teams the expert plays against the random policy and against itself, and the random
+policy against itself. Rows of tasks that are not measured stay in the table.
 """
 
 from __future__ import annotations
@@ -37,24 +37,24 @@ AGAINST = (
 
 
 def play(cfg: GameCfg, first: Script, others: Script | None, seed: int) -> tuple[float, bool]:
-    """Return what the first team is paid in one episode, and whether the rules ended it."""
+    """Return the return of the first team in one episode, and whether it was terminated."""
     game, rng = Game(cfg), np.random.default_rng([2026, seed])
     game.reset(rng)
     ours = game.team(cfg.teams[0].name)
-    paid, over = 0.0, False
+    total, over = 0.0, False
     while not over:
         for player in game.players:
             script = first if player in ours or others is None else others
             game.play_script(player, script)
         outcome = game.advance()
-        paid += float(np.mean([game.reward_of(outcome.terms[player.name]) for player in ours]))
+        total += float(np.mean([game.reward_of(outcome.terms[player.name]) for player in ours]))
         over = outcome.done
     game.close()
-    return paid, outcome.terminated
+    return total, outcome.terminated
 
 
 def measure(task: str, body: str, seconds: float | None, episodes: int) -> list[dict[str, object]]:
-    # the other experts use privileged state: eyes are shut and skins numb to save time
+    # the other experts use privileged state; vision and touch are switched off to save time
     own = [] if task == "KickTheBall" else ["senses/vision=blind", "senses/touch=numb"]
     chosen = [] if body == "own" else [f"body={body}"]
     time = [] if seconds is None else [f"task.max_seconds={seconds}"]
@@ -62,9 +62,9 @@ def measure(task: str, body: str, seconds: float | None, episodes: int) -> list[
     rows: list[dict[str, object]] = []
     for first, others in ALONE if len(cfg.teams) == 1 else AGAINST:
         played = [play(cfg, first, others, seed) for seed in range(episodes)]
-        paid, ended = (np.array(column, float) for column in zip(*played, strict=True))
-        interval = STUDENT_95[episodes] * paid.std(ddof=1) / np.sqrt(episodes)
-        numbers = (paid.mean(), interval, paid.min(), paid.max(), ended.mean())
+        total, ended = (np.array(column, float) for column in zip(*played, strict=True))
+        interval = STUDENT_95[episodes] * total.std(ddof=1) / np.sqrt(episodes)
+        numbers = (total.mean(), interval, total.min(), total.max(), ended.mean())
         rounded = [round(float(number), 3) for number in numbers]
         names = (task, body, cfg.task.max_seconds, first.value, others.value if others else "")
         values = (*names, episodes, *rounded)
@@ -74,7 +74,7 @@ def measure(task: str, body: str, seconds: float | None, episodes: int) -> list[
 
 
 def write(path: Path, rows: list[dict[str, object]]) -> None:
-    """Put rows into a table; those of other tasks that it has stay."""
+    """Write rows into a table, and keep its rows of other tasks."""
     asked, kept = {row["task"] for row in rows}, []
     if path.exists():
         with path.open(newline="") as table:
@@ -88,8 +88,10 @@ def write(path: Path, rows: list[dict[str, object]]) -> None:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("tasks", nargs="*", default=veca_marl.list_tasks())
-    parser.add_argument("--body", default="own", help="a preset; the task's own if not said")
-    parser.add_argument("--seconds", type=float, help="of an episode; the task's own if not said")
+    parser.add_argument("--body", default="own", help="a preset; by default that of the task")
+    parser.add_argument(
+        "--seconds", type=float, help="duration of an episode; by default that of the task"
+    )
     parser.add_argument("--episodes", type=int, default=10, choices=sorted(STUDENT_95))
     asked = parser.parse_args()
     rows = [

@@ -1,4 +1,4 @@
-"""What there is to win on the pitch against a defender that moves at random, without learning.
+"""Returns of simple policies without learning against a random defender in SoccerTwoPlayer.
 
 python experiments/soccer/baselines.py                                   # as in the experiment
 python experiments/soccer/baselines.py 'task.weights={goal: 5.0}'        # Hydra overrides
@@ -28,12 +28,12 @@ def stand(game: Game, attacker: Player) -> Command:
 
 
 def straight(game: Game, attacker: Player) -> Command:
-    """Walk on."""
+    """Walk forwards."""
     return 1.0, 0.0
 
 
 def chase(game: Game, attacker: Player) -> Command:
-    """Walk to the ball wherever it is, and through it."""
+    """Walk to the ball and through it."""
     return walk_to(attacker.body, game.task.ball.position)
 
 
@@ -51,7 +51,7 @@ def episode(game: Game, play: Script | Callable[[Game, Player], Command], seed: 
     rng = np.random.default_rng([2026, seed])
     game.reset(rng)
     attacker, defender = game.players
-    paid = 0.0
+    total = 0.0
     while True:
         if isinstance(play, Script):
             game.play_script(attacker, play)
@@ -59,19 +59,19 @@ def episode(game: Game, play: Script | Callable[[Game, Player], Command], seed: 
             attacker.body.act(attacker.body.encode(play(game, attacker)))
         game.play_script(defender, Script.random)
         outcome = game.advance()
-        paid += game.reward_of(outcome.terms[attacker.name])
+        total += game.reward_of(outcome.terms[attacker.name])
         if outcome.done:
-            return paid, outcome.terminated
+            return total, outcome.terminated
 
 
 def main() -> None:
-    """Print a line for each way to play."""
+    """Print one line per policy."""
     overrides = ["+experiment=soccer", "senses/vision=blind", "senses/touch=numb", *sys.argv[1:]]
     game = Game(compose(overrides).game)
     for name, play in PLAYS.items():
-        paid, scored = np.transpose([episode(game, play, seed) for seed in range(EPISODES)])
-        interval = 1.96 * paid.std(ddof=1) / EPISODES**0.5
-        print(f"{name:9}return {paid.mean():6.2f} +- {interval:.2f}, goals {scored.mean():4.0%}")
+        total, scored = np.transpose([episode(game, play, seed) for seed in range(EPISODES)])
+        interval = 1.96 * total.std(ddof=1) / EPISODES**0.5
+        print(f"{name:9}return {total.mean():6.2f} +- {interval:.2f}, goals {scored.mean():4.0%}")
     game.close()
 
 

@@ -45,7 +45,7 @@ def shooting_goal(body: Body, clearances: Clearances, pitch: Pitch, aim: Floats)
 
 
 def open_corner(pitch: Pitch, keeper: Floats) -> Floats:
-    """Return the point of the goal line whose path from the ball is farthest from a keeper.
+    """Return the point of the goal line with the path from the ball that is farthest from a keeper.
 
     Args:
         pitch: The pitch with the ball.

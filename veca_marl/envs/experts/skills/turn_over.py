@@ -53,7 +53,7 @@ _POSES = {
             "neck.flexion": 15,
         }
     ),
-    # on the belly, arms and legs out of the way
+    # on the belly, arms and legs extended
     "lie": Posture(
         joints_deg={
             "upper_arm.flexion": 160,

@@ -18,7 +18,7 @@ class PushOutCfg(TaskCfg):
     """Parameters of PushOut1v1 and PushOut2v2.
 
     Attributes:
-        radius_m: Radius of the ring, at least 0.5 m. A player whose pelvis is beyond it is out.
+        radius_m: Radius of the ring, at least 0.5 m. A player with its pelvis beyond is out.
         start_share: Distance of the players from the middle at the start, as a share of the
             radius, in [0.3, 0.9].
         spread_deg: Largest angle at the start between the heading of a player and the direction

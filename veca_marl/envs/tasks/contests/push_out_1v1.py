@@ -11,7 +11,7 @@ class PushOut1v1(PushOut):
     """Two players in a ring that is painted on the floor; the player that leaves it loses.
 
     They start on opposite sides and face the middle, up to `spread_deg` to the side. A player
-    whose pelvis is beyond the rim is out, whether it was pushed or not, and the episode
+    is out when its pelvis is beyond the rim, whether it was pushed or not, and the episode
     terminates. When the time is over neither has won. The paper (table of tasks in the appendix;
     "Multi-Agent Reinforcement Learning") says "the agent must push other agents out of the ring
     to win", with joint-level actions; the ring, the start and the reward are not in the paper.

@@ -51,7 +51,7 @@ class Ring:
     def area_share(self, body: Body) -> float:
         """Return the share of the ring's area that is nearer to the middle than a body.
 
-        It is above 1 for a body whose pelvis is outside.
+        It is above 1 for a body with its pelvis outside.
         """
         offset = body.position[:2] - self.middle
         return float(offset @ offset) / self.radius_m**2
