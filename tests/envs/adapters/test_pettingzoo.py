@@ -12,7 +12,6 @@ from veca_marl.bench.free_play import free_play
 from veca_marl.config import compose
 from veca_marl.envs.adapters.pettingzoo import VecaParallelEnv
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
-from veca_marl.envs.core.game_cfg import GameCfg
 
 AGENTS = ["red", "blue_0", "blue_1"]
 
@@ -77,10 +76,9 @@ def test_each_agent_has_its_own_rewards_and_senses(env, cfg):
 
 def test_returned_arrays_do_not_change_in_later_steps():
     game = compose(["+task=KickTheBall", "playground=simple", "body=mitten"]).game
-    with free_play(2, game.task, ("vision", "audio", "touch", "proprioception")) as task:
-        env = VecaParallelEnv(
-            GameCfg(task, game.playground, game.body, game.senses, game.clock), seed=1
-        )
+    senses = ("vision", "audio", "touch", "proprioception")
+    with free_play(game, 2, senses=senses) as cfg:
+        env = VecaParallelEnv(cfg, seed=1)
         seen, _ = env.reset()
         kept = {(n, s): array.copy() for n in env.agents for s, array in seen[n].items()}
         assert {sense for _, sense in kept} == {"vision", "audio", "touch", "proprioception"}

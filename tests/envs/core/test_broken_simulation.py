@@ -12,7 +12,6 @@ from veca_marl.config import compose
 from veca_marl.envs.adapters.pettingzoo import VecaParallelEnv
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
 from veca_marl.envs.core.game import Game
-from veca_marl.envs.core.game_cfg import GameCfg
 from veca_marl.sim.physics import pybullet
 
 CFG = compose(["+task=KickTheBall", "body=mitten"]).game
@@ -21,8 +20,8 @@ SENSES = ("vision", "audio", "proprioception")
 
 @pytest.fixture
 def cfg():
-    with free_play(2, CFG.task, SENSES) as task:
-        yield GameCfg(task, CFG.playground, CFG.body, CFG.senses, CFG.clock)
+    with free_play(CFG, 2, senses=SENSES) as cfg:
+        yield cfg
 
 
 def break_down(game):

@@ -8,7 +8,6 @@ from veca_marl.bench.free_play import free_play
 from veca_marl.config import compose
 from veca_marl.envs.core.actions import random_action
 from veca_marl.envs.core.game import Game
-from veca_marl.envs.core.game_cfg import GameCfg
 from veca_marl.sim.body import VoiceKind
 from veca_marl.sim.body.anatomy import load_skeleton
 from veca_marl.sim.senses import SensesCfg, make_senses
@@ -72,8 +71,7 @@ def test_a_silent_agent_out_of_sight_does_not_change_hearing(one_alone):
 
 def test_two_equal_worlds_give_the_same_bytes():
     game = compose(["+task=KickTheBall", "body=walker_voice"]).game
-    with free_play(3, game.task, SENSES) as task:
-        cfg = GameCfg(task, game.playground, game.body, game.senses, game.clock)
+    with free_play(game, 3, senses=SENSES) as cfg:
         first, second = (played(cfg) for _ in range(2))
     assert first.keys() == second.keys()
     assert len(first) == len(set(first.values())) == 3
