@@ -24,7 +24,7 @@ OTHER_HEAD = Pose(np.array([1.0, 1.0, 1.2]), yaw(-2.0))
 SOURCES = np.array([[2.1, 3.7, 1.2], [5.0, 1.0, 0.4]])
 
 
-def spatialisation(quality):
+def make_receiver(quality):
     return {
         "hrtf": lambda: HrtfReceiver(kemar_table()),
         "stereo": lambda: StereoReceiver((0.0, EAR, 0.0), (0.0, -EAR, 0.0)),
@@ -47,7 +47,7 @@ def render(waveforms, place, quality="hrtf", *, room=None, order=0, n_steps, ste
     """Render moving sources; `place(i)` gives source positions and head at the end of step i."""
     field = SoundField(room, step, RATE, order)
     sources = [field.add_source(str(i), Clip(w)) for i, w in enumerate(waveforms)]
-    listener = field.add_listener(spatialisation(quality))
+    listener = field.add_listener(make_receiver(quality))
     field.reset(np.random.default_rng(0))
     heard = []
     for i in range(n_steps):

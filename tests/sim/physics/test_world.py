@@ -93,7 +93,7 @@ def test_the_height_of_a_bounce_follows_from_the_restitution(restitution):
 
 
 def test_energy_is_not_created():
-    """A heap of toys comes to rest; nothing gains speed from overlaps."""
+    """Many toys dropped at one place come to rest; overlaps give no speed."""
     toys = [box(f"box{i}", (0.2, 0.2, 0.2), 0.5, (0.03 * i, 0.0, 0.1 + 0.21 * i)) for i in range(5)]
     world = empty_world(*toys)
     fastest = 0.0

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import scipy.signal
-from listening import RATE, STEP, ratio_db, spatialisation
+from listening import RATE, STEP, make_receiver, ratio_db
 from listening import render as render_field
 
 from veca_marl.config import compose
@@ -118,7 +118,7 @@ def test_going_through_a_door_and_behind_a_wall_does_not_click():
     tone = np.sin(2.0 * np.pi * 300.0 * np.arange(60 * STEP) / RATE).astype(np.float32)
     field = SoundField(house(beside), STEP, RATE)
     source = field.add_source("tone", Clip(tone))
-    listener = field.add_listener(spatialisation("hrtf"))
+    listener = field.add_listener(make_receiver("hrtf"))
     field.reset(np.random.default_rng(0))
     source.position = (1.0, 1.0, 1.0)
     heard, through = [], []
@@ -167,7 +167,7 @@ def test_a_moving_obstacle_is_heard_while_source_and_listener_are_at_rest():
     rooms = house(BETWEEN)
     field = SoundField(rooms, STEP, RATE)
     field.add_source("noise", Clip(NOISE)).position = (1.0, 0.5, 1.0)
-    listener = field.add_listener(spatialisation("mono"))
+    listener = field.add_listener(make_receiver("mono"))
     field.reset(np.random.default_rng(0))
     levels = []
     for step in range(10):

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from listening import HEAD, RATE, SOURCES, STEP, noise, ratio_db, room, spatialisation, yaw
+from listening import HEAD, RATE, SOURCES, STEP, make_receiver, noise, ratio_db, room, yaw
 
 from veca_marl.sim.geometry import Pose
 from veca_marl.sim.sound import Clip, SoundField
@@ -14,7 +14,7 @@ def field_with_noise(quality, seconds=0.3, step=STEP, memory_steps=1):
     for index, position in enumerate(SOURCES):
         waveform = noise(int(seconds * RATE), seed=index)
         field.add_source(str(index), Clip(waveform)).position = position
-    listener = field.add_listener(spatialisation(quality), memory_steps)
+    listener = field.add_listener(make_receiver(quality), memory_steps)
     field.reset(np.random.default_rng(0))
     return field, listener
 

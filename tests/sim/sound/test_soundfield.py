@@ -17,11 +17,11 @@ from listening import (
     STILL,
     direction,
     interaural_time,
+    make_receiver,
     noise,
     ratio_db,
     render_still,
     room,
-    spatialisation,
     yaw,
 )
 from paths import HELPERS
@@ -81,11 +81,11 @@ def test_sounds_add_up(quality):
 
 
 def test_other_listeners_do_not_change_a_byte():
-    def hear(company):
+    def hear(other_qualities):
         field = SoundField(room(), STEP, RATE, 2)
         sources = [field.add_source(str(i), Noise(0.1, RATE)) for i in range(2)]
-        others = [field.add_listener(spatialisation(quality)) for quality in company]
-        listener = field.add_listener(spatialisation("hrtf"))
+        others = [field.add_listener(make_receiver(quality)) for quality in other_qualities]
+        listener = field.add_listener(make_receiver("hrtf"))
         field.reset(np.random.default_rng(1))
         heard = []
         for i in range(5):
@@ -103,7 +103,7 @@ def test_other_listeners_do_not_change_a_byte():
 def test_same_seed_same_bytes_in_a_fresh_and_in_a_used_field():
     field = SoundField(room(), STEP, RATE, 1)
     source = field.add_source("noise", Noise(0.1, RATE))
-    listener = field.add_listener(spatialisation("hrtf"))
+    listener = field.add_listener(make_receiver("hrtf"))
 
     def episode(seed):
         field.reset(np.random.default_rng(seed))
@@ -255,7 +255,7 @@ def test_reset_clears_sound_that_is_under_way():
     field = SoundField(room(), STEP, RATE, 2)
     voice = Voice(RATE)
     field.add_source("mouth", voice).position = SOURCES[0]
-    listener = field.add_listener(spatialisation("hrtf"))
+    listener = field.add_listener(make_receiver("hrtf"))
     field.reset(np.random.default_rng(0))
     voice.say(noise(STEP))
     field.advance()
@@ -270,7 +270,7 @@ def test_mute_and_remove():
     field = SoundField(None, STEP, RATE)
     source = field.add_source("noise", Noise(1.0, RATE))
     source.position = (2.0, 0.0, 0.0)
-    listener = field.add_listener(spatialisation("mono"))
+    listener = field.add_listener(make_receiver("mono"))
     field.reset(np.random.default_rng(0))
 
     def hear(n_steps):
@@ -323,7 +323,7 @@ def test_the_delay_is_limited_to_that_of_the_reach():
 
 def test_every_step_is_rendered_exactly_once():
     field = SoundField(None, STEP, RATE)
-    listener = field.add_listener(spatialisation("mono"))
+    listener = field.add_listener(make_receiver("mono"))
     field.reset(np.random.default_rng(0))
     field.advance()
     listener.render(STILL)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import scipy.signal
-from listening import RATE, STEP, STILL, noise, ratio_db, render, spatialisation, yaw
+from listening import RATE, STEP, STILL, make_receiver, noise, ratio_db, render, yaw
 
 from veca_marl.sim.geometry import Pose
 from veca_marl.sim.sound import Clip, SoundField, Voice, acoustics
@@ -65,7 +65,7 @@ def test_a_source_that_moved_in_silence_starts_at_its_new_position():
     voice, word = Voice(RATE), noise(3 * STEP)
     field = SoundField(None, STEP, RATE)
     mouth = field.add_source("mouth", voice)
-    listener = field.add_listener(spatialisation("mono"))
+    listener = field.add_listener(make_receiver("mono"))
 
     def hear(n_steps):
         heard = []
@@ -93,7 +93,7 @@ def test_a_teleport_gives_neither_a_chirp_nor_a_click(how):
     field = SoundField(None, STEP, RATE)
     sound = np.sin(2 * np.pi * 1000 * np.arange(12 * STEP) / RATE)
     source = field.add_source("tone", Clip(sound))
-    listener = field.add_listener(spatialisation("mono"))
+    listener = field.add_listener(make_receiver("mono"))
     field.reset(np.random.default_rng(0))
     source.position = (1.0, 0.0, 0.0)
     heard = []
