@@ -34,7 +34,7 @@ ARMS = {
     "mono": ["senses/audio=mono"],
     "stereo": ["senses/audio=stereo"],
 }
-FOR_MORE = ("voices", "finder muted", "all deaf")  # arms for more than two agents
+FOR_MORE = ("voices", "finder muted", "no hearing")  # arms for more than two agents
 SECONDS = {"walker_voice": 20, "mitten_voice": 90, "full_voice": 90}  # by body; crawling is slow
 
 
