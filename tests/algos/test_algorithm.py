@@ -17,7 +17,7 @@ from veca_marl.algos.selfplay.pool import Pool
 from veca_marl.algos.selfplay.self_play import SelfPlay, SelfPlayCfg
 from veca_marl.algos.specs import team_specs
 from veca_marl.algos.training.checkpoint import Checkpoints, Identity
-from veca_marl.algos.training.collect import CollectCfg
+from veca_marl.algos.training.collect import CollectCfg, Experience
 from veca_marl.algos.training.evaluation import EvalCfg
 from veca_marl.algos.training.learners import TeamLearners
 from veca_marl.algos.training.loop import Trainer
@@ -41,7 +41,7 @@ def specs_of(teams=("agents",)):
 
 @pytest.fixture
 def make_trainer(tmp_path):
-    def make(name, cfg, batches, own=None, teams=("agents",), processes=0, reporters=()):
+    def make(name, cfg, batches, own=None, teams=("agents",), reporters=()):
         def make_env(worlds, seed):
             return make_fake_env(worlds, seed, discrete=True, teams=teams, senses=("audio",))
 
@@ -52,7 +52,7 @@ def make_trainer(tmp_path):
         return Trainer(
             make_env=make_env,
             learners=TeamLearners(specs, cfg, CPU, own),
-            collect=CollectCfg(processes, worlds=4 // max(processes, 1), steps=16),
+            collect=CollectCfg(0, worlds=4, steps=16),
             evaluation=EvalCfg(every_frames=2 * FRAMES, episodes=4, worlds=2),
             budget=Budget(batches * FRAMES),
             checkpoints=Checkpoints(folder / "checkpoints", Identity("Toy", specs), {}),
@@ -125,14 +125,26 @@ def test_a_run_starts_from_what_another_one_learnt(make_trainer, tmp_path, cfg):
     assert equal(fresh.actor.state_dict(), trainer.learners.algorithms["agents"].actor.state_dict())
 
 
-def test_workers_explore_with_the_current_buffers(make_trainer):
-    """The switch of the random warm-up is a buffer: it must reach the copy that collects."""
-    trainer = make_trainer("run", ToyDQNCfg(warm_up_frames=2 * FRAMES), 1, processes=2)
-    trainer.run()
-    assert bool(trainer.learners.algorithms["agents"].warm_up.active)
-    trainer = make_trainer("run2", ToyDQNCfg(warm_up_frames=2 * FRAMES), 2, processes=2)
-    trainer.run()
-    assert not bool(trainer.policy.collect.state_dict()["module.0.module.2.active"])
+def test_buffers_of_exploration_reach_the_workers():
+    """The switch of the random warm-up is a buffer, not a parameter."""
+
+    def make_env(worlds, seed):
+        return make_fake_env(worlds, seed, discrete=True, senses=("audio",))
+
+    learners = TeamLearners(specs_of(), ToyDQNCfg(epsilon=0.0), CPU)
+    policy = learners.policy.copy()
+    experience = Experience(make_env, policy.collect, CollectCfg(2, worlds=2, steps=16))
+    greedy = []
+    for active in (True, False):
+        learners.algorithms["agents"].warm_up.active.fill_(active)
+        policy.take_over(learners.policy)
+        experience.restart(0)
+        experience.update_policy()
+        batch = experience.collect()
+        best = batch["agents", "action_value"].argmax(-1)
+        greedy.append(bool((batch["agents", "action"] == best).all()))
+    experience.close()
+    assert greedy == [False, True]
 
 
 def test_teams_may_learn_by_different_algorithms(make_trainer):
