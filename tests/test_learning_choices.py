@@ -86,3 +86,10 @@ def test_a_recurrent_policy_is_trained_recorded_and_loaded(tmp_path):
     result = run_training(cfg, RunFolder(tmp_path))
     assert (tmp_path / "videos" / "final.mp4").stat().st_size > 0
     assert result.metrics[-1]["agents/kl"] >= 0.0
+
+
+@pytest.mark.parametrize("body", ["walker_voice", "walker_discrete_voice"])
+def test_a_body_with_a_voice_is_trained(body):
+    """Its action has two parts, move and voice."""
+    result = run_training(compose([*SMALL, f"body={body}"]))
+    assert result.metrics[-1]["agents/kl"] >= 0.0

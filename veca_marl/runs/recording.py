@@ -1,4 +1,4 @@
-"""A film of one episode: what the player sees and feels, beside the room, with what it hears."""
+"""Video of one episode: images and touch of an agent beside a view of the room, with its sound."""
 
 from __future__ import annotations
 
@@ -24,13 +24,14 @@ SAMPLE_RATE_HZ = 22_050  # of the ears
 def record_episode(path: Path, game: GameCfg, policy: ActionPolicy, seed: int) -> None:
     """Play one episode with the policy's most likely actions and write it as a video.
 
-    The first player of the first team is filmed; a deaf one makes a silent film.
+    It shows the first agent of the first team, with the sound that the agent receives; without
+    the sense of hearing the video is silent.
 
     Args:
         path: The MP4 file.
-        game: What is played.
-        policy: Who plays.
-        seed: Start of the episode.
+        game: The game.
+        policy: Writes the actions of all teams.
+        seed: Seed of the episode.
     """
     env = VecaEnv(_with_waveform(game), worlds=1, seed=seed)
     frames: list[NDArray[np.uint8]] = []

@@ -37,7 +37,8 @@ class ActionReader:
         action = tensordict.get((self._team, "action"))
         if not self._parts:
             return _to_numpy(f"action of {self._team}", action, self._shape)
-        if not isinstance(action, TensorDictBase) or set(action.keys()) != set(self._parts):
+        # TorchRL's policies write log-probabilities beside the parts
+        if not isinstance(action, TensorDictBase) or not self._parts.keys() <= set(action.keys()):
             raise ValueError(
                 f"action of {self._team} must be a tensordict with the parts {list(self._parts)}"
             )
