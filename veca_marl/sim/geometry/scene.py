@@ -76,19 +76,9 @@ class Scene:
         Raises:
             ValueError: If the name is taken, there is no frame, or the scene is full.
         """
-        if any(name == known.name for known in self.objects):
-            raise ValueError(f"object {name!r} is already in the scene")
-        if not frames:
-            raise ValueError(f"object {name!r} has no frame")
+        self._check_addition(name, frames, mesh)
         first_row, first_geom = len(self._positions), len(self.geoms.shapes)
         first_vertex, first_triangle = len(self.meshes.vertices), len(self.meshes.triangles)
-        total = len(self.surfaces.objects) + sum(map(len, frames))
-        total += 0 if mesh is None else len(mesh.triangles)
-        if total > MAX_SURFACES:
-            raise ValueError(
-                f"with object {name!r} there are {total} primitives and triangles: "
-                f"a scene holds at most {MAX_SURFACES}"
-            )
         self._add_surfaces(geom_table(frames, len(self.objects), first_row), mesh)
         self._positions = np.concatenate((self._positions, np.zeros((len(frames), 3))))
         self._rotations = np.concatenate((self._rotations, np.tile(np.eye(3), (len(frames), 1, 1))))
@@ -104,6 +94,21 @@ class Scene:
         self.objects.append(item)
         self.version += 1
         return item
+
+    def _check_addition(
+        self, name: str, frames: Sequence[Sequence[Geom]], mesh: Mesh | None
+    ) -> None:
+        if any(name == known.name for known in self.objects):
+            raise ValueError(f"object {name!r} is already in the scene")
+        if not frames:
+            raise ValueError(f"object {name!r} has no frame")
+        total = len(self.surfaces.objects) + sum(map(len, frames))
+        total += 0 if mesh is None else len(mesh.triangles)
+        if total > MAX_SURFACES:
+            raise ValueError(
+                f"with object {name!r} there are {total} primitives and triangles: "
+                f"a scene holds at most {MAX_SURFACES}"
+            )
 
     def _add_surfaces(self, added: GeomTable, mesh: Mesh | None) -> None:
         """Append primitives to the primitives and triangles to the triangles."""
