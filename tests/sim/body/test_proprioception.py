@@ -167,5 +167,5 @@ def test_velocities_of_walking_bones_equal_their_displacement():
 
 
 def test_an_unknown_quality_is_refused():
-    with pytest.raises(ValueError, match=r"senses.proprioception.quality='sharp'; there are"):
+    with pytest.raises(ValueError, match=r"senses.proprioception.quality='sharp'; choices"):
         ProprioceptionCfg(quality="sharp")
