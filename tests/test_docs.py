@@ -10,9 +10,8 @@ import pytest
 from docs_pages.body_tables import body_page
 from docs_pages.docstrings import entries, prose
 from docs_pages.observation_page import MEANINGS, all_specs
-from docs_pages.task_pages import task_page
+from docs_pages.task_pages import built_in_tasks, task_page
 
-from veca_marl.api import list_tasks
 from veca_marl.conf_dir import conf_dir
 from veca_marl.envs.core.task import find_task
 from veca_marl.sim.body.anatomy import limit_sources
@@ -33,12 +32,12 @@ def test_the_site_builds_without_a_warning(tmp_path):
     assert (tmp_path / "html" / "api" / "veca_marl.html").exists()
 
 
-@pytest.mark.parametrize("name", list_tasks())
+@pytest.mark.parametrize("name", built_in_tasks())
 def test_the_page_of_a_task_is_current(name):
     assert read(f"tasks/{name}.md") == task_page(find_task(name)), "run make pages"
 
 
-@pytest.mark.parametrize("name", list_tasks())
+@pytest.mark.parametrize("name", built_in_tasks())
 def test_every_reward_term_of_a_task_is_documented_and_has_a_picture(name):
     task = find_task(name)
     assert set(entries(task, "Terms")) == set(task.cfg_type()().weights)
@@ -96,3 +95,9 @@ def test_a_docstring_is_read_section_by_section():
         "height": "Others.",
     }
     assert entries(Documented, "Returns") == {}
+
+
+def test_the_changelog_and_the_citation_have_the_version_of_the_package():
+    changelog = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+    assert re.findall(r"^## \[(\d\S*)\]", changelog, re.M)[0] == veca_marl.__version__
+    assert f"version: {veca_marl.__version__}\n" in (ROOT / "CITATION.cff").read_text()

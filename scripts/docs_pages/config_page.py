@@ -78,7 +78,7 @@ def sections(cfg_type: type, path: str) -> Iterator[tuple[str, type]]:
 
     A section with several kinds, such as ``body``, is yielded once for each kind.
     """
-    kinds = [kind for kind in cfg_type.__subclasses__() if dataclasses.is_dataclass(kind)]
+    kinds = [kind for kind in cfg_type.__subclasses__() if is_built_in(kind)]
     for kind in kinds:
         yield from sections(kind, path)
     if kinds:
@@ -94,6 +94,11 @@ def nested(cfg_type: type) -> list[str]:
     """Return the fields of a dataclass that are sections themselves."""
     hints = get_type_hints(cfg_type)
     return [f.name for f in dataclasses.fields(cfg_type) if dataclasses.is_dataclass(hints[f.name])]
+
+
+def is_built_in(kind: type) -> bool:
+    """Return whether a dataclass belongs to this package, and not to a plug-in or a test."""
+    return dataclasses.is_dataclass(kind) and kind.__module__.startswith("veca_marl.")
 
 
 def names(cfg_type: type) -> list[str]:

@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 
 from docs_pages.tables import table
-from veca_marl.api import choose, list_tasks
+from docs_pages.task_pages import built_in_tasks
+from veca_marl.api import choose
 from veca_marl.envs.core.game import Game
 from veca_marl.sim.spec import ArraySpec
 
@@ -126,7 +127,7 @@ def game_specs(game: Game) -> dict[str, dict[str, ArraySpec]]:
 def task_rows() -> list[tuple[str, ...]]:
     """Return the teams of all tasks with the keys that they observe."""
     rows = []
-    for task in list_tasks():
+    for task in built_in_tasks():
         game = Game(choose(task))
         sizes = {team.name: team.size for team in game.cfg.teams}
         for team, specs in game_specs(game).items():

@@ -8,10 +8,10 @@ import matplotlib as mpl
 import numpy as np
 from numpy.typing import NDArray
 
+from docs_pages.task_pages import built_in_tasks
 from veca_marl.api import make
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
 from veca_marl.envs.core.game import Game
-from veca_marl.envs.core.task import TASKS
 from veca_marl.envs.rendering.touch_image import touch_image
 from veca_marl.sim.body.walker import Walker
 from veca_marl.sim.touch import TAXELS_PER_TRIANGLE
@@ -29,7 +29,7 @@ def write_pictures(folder: Path) -> None:
     (folder / "tasks").mkdir(parents=True, exist_ok=True)
     perception_picture(folder / "perception.png")
     touch_picture(folder / "touch.png")
-    for name in TASKS:
+    for name in built_in_tasks():
         task_picture(name, folder / "tasks" / f"{name}.png")
 
 

@@ -75,7 +75,12 @@ def choice(task: type[Task], group: str) -> str:
     raise ValueError(f"no default for {group}")
 
 
+def built_in_tasks() -> list[str]:
+    """Return the names of the tasks of this package, without those of plug-ins and tests."""
+    return sorted(n for n, task in TASKS.items() if task.__module__.startswith("veca_marl."))
+
+
 def write_task_pages(folder: Path) -> None:
     """Write the pages of all tasks."""
-    for name, task in TASKS.items():
-        (folder / f"{name}.md").write_text(task_page(task), encoding="utf-8")
+    for name in built_in_tasks():
+        (folder / f"{name}.md").write_text(task_page(TASKS[name]), encoding="utf-8")
