@@ -12,6 +12,7 @@ from docs_pages.docstrings import entries, prose
 from docs_pages.observation_page import MEANINGS, all_specs
 from docs_pages.task_pages import built_in_tasks, task_page
 
+import veca_marl
 from veca_marl.conf_dir import conf_dir
 from veca_marl.envs.core.task import find_task
 from veca_marl.sim.body.anatomy import limit_sources
