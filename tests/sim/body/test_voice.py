@@ -65,6 +65,11 @@ def test_all_parts_and_no_others_are_needed(parts):
         walker.act(action)
 
 
+def test_a_body_needs_a_mapping():
+    with pytest.raises(ValueError, match=r"not a mapping; it needs the parts \['move'\]"):
+        walker_in(empty_world()).act(STILL)
+
+
 def test_an_unknown_voice_is_refused_with_the_choices():
     with pytest.raises(ValueError, match=r"body\.voice.*silent.*calls"):
         walker_in(empty_world(), voice="loud")

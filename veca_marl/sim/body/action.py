@@ -21,9 +21,11 @@ def checked_action(specs: Mapping[str, ArraySpec], action: Mapping[str, Any]) ->
         action: A value for each of them.
 
     Raises:
-        ValueError: If a part is missing or unknown, or a value has the wrong shape or is out of
-            its range. The message names the part, the value and the choices.
+        ValueError: If the action is no mapping, if a part is missing or unknown, or if a value has
+            the wrong shape or is out of its range. The message names part, value and choices.
     """
+    if not isinstance(action, Mapping):
+        raise ValueError(f"action {action!r} is not a mapping; it needs the parts {list(specs)}")
     if action.keys() != specs.keys():
         raise ValueError(f"action has the parts {list(action)}; it needs {list(specs)}")
     return {part: _checked(part, spec, action[part]) for part, spec in specs.items()}
