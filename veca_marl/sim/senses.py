@@ -77,7 +77,7 @@ def register_sense(name: str) -> Callable[[SenseT], SenseT]:
 
 @dataclass
 class SensesCfg:
-    """The quality of each sense. The task names the senses, this grades them.
+    """Settings of all senses. The task names the senses, this sets their quality.
 
     Quality changes what an observation contains, never its shape; a sense that is not `present`
     is left out of the observation.

@@ -19,10 +19,14 @@ USUAL_RADIUS_M = (0.06, 0.11)
 POSSIBLE_RADIUS_M = (0.04, 0.16)
 """A fitted radius outside of this range is an error."""
 
+# band of the correlation; the lower end avoids the loudspeaker's roll-off, the upper the pinna
 _BAND_HZ = (300.0, 3000.0)
 _UPSAMPLING = 16
+# greatest deviation from the fitted sphere
 _OUTLIER_S = 0.25e-3
+# directions with a smaller y component count as median plane
 _MEDIAN_PLANE = 0.15
+# the radius is fitted to directions with a path difference above 0.4 of the radius
 _LATERAL_M = 0.4
 
 

@@ -15,9 +15,13 @@ from veca_marl.sim.hearing.minimum_phase import minimum_phase
 from veca_marl.sim.hearing.sofa import MeasuredHead
 from veca_marl.sim.hearing.spherical_head import sphere_response
 
+# window around the peak: seconds before it, seconds after it, and length of the fade-out
 _BEFORE_PEAK_S, _AFTER_PEAK_S, _FADE_OUT_S = 1.5e-3, 4.0e-3, 2.0e-3
+# below the first frequency the response is that of the sphere, above the second the measured one
 _BLEND_HZ = (150.0, 350.0)
+# fraction of the sampling rate above which the anti-aliasing filter would be equalised
 _TOP_OF_BAND = 0.47
+# stated distances up to this count as missing: the sphere is then computed at 1.4 m
 _FAR_FIELD_M = 0.3
 
 

@@ -24,16 +24,16 @@ class Visible(Protocol):
 def is_visible(
     scene: Scene,
     body: Body,
-    thing: Visible,
+    target: Visible,
     eye: str = "eye_left",
     camera: Camera | None = None,
 ) -> bool:
-    """Return whether a pixel of an eye shows a thing, also through glass (the paper's `isVisible`).
+    """Return whether an eye sees a prop or body, also through glass (the paper's `isVisible`).
 
     Args:
         scene: The scene of both, as of its last `update`.
-        body: The body whose eye it is; its own head and neck hide nothing.
-        thing: A prop or a body.
+        body: The body whose eye it is; its own head and neck hide notarget.
+        target: A prop or a body.
         eye: ``eye_left`` or ``eye_right``.
         camera: The camera of the eye; None is that of `VisionCfg` with its defaults.
 
@@ -45,4 +45,4 @@ def is_visible(
     own_head = scene.hidden(body.object_id, body.own_head_frames)
     camera = VisionCfg().camera() if camera is None else camera
     views = camera.render(scene, [body.mount(eye)], own_head)
-    return seen_fraction(views, thing.object_id) > 0.0
+    return seen_fraction(views, target.object_id) > 0.0
