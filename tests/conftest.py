@@ -1,4 +1,4 @@
-"""What all tests share."""
+"""Fixtures of all tests."""
 
 import signal
 
@@ -7,7 +7,7 @@ import pytest
 
 @pytest.fixture
 def ctrl_c():
-    """Let Ctrl-C interrupt, also in a background job, which a shell makes deaf to it."""
+    """Let Ctrl-C interrupt, also in a background job, in which shells ignore SIGINT."""
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     yield
     signal.signal(signal.SIGINT, before)

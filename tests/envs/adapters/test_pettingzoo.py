@@ -140,9 +140,9 @@ def test_render_needs_a_render_mode(env):
 )
 def test_invalid_actions_are_errors_that_name_agent_and_part(env, actions, said):
     env.reset()
-    told = still(env) | actions
+    actions = still(env) | actions
     with pytest.raises(ValueError, match=said):
-        env.step({name: row for name, row in told.items() if row is not None})
+        env.step({name: row for name, row in actions.items() if row is not None})
     env.step(still(env))  # and the game goes on
 
 

@@ -60,17 +60,17 @@ def cfg():
         yield cfg
 
 
-def looks(env):
+def headings(env):
     return [player.body.forward for game in env.games for player in game.players]
 
 
 def starts_of_torchrl(cfg, value, steps):
-    """Play so many steps with one action; return where the players look after each reset."""
+    """Play so many steps with one action; return the headings of the players after each reset."""
     env = VecaEnv(cfg, 2, seed=3)
     found, state = [], env.reset()
     for step in range(steps):
         if step % STEPS == 0:
-            found.append(looks(env))
+            found.append(headings(env))
         for team in env.group_map:
             shape = env.full_action_spec[team, "action"].shape
             state[team, "action"] = torch.full(shape, value)
@@ -89,7 +89,7 @@ def test_an_env_can_begin_at_an_episode(cfg):
     third = starts_of_torchrl(cfg, 0.5, 3 * STEPS)[2]
     env = VecaEnv(cfg, 2, seed=3)
     env.reset(episode=2)
-    np.testing.assert_array_equal(looks(env), third)
+    np.testing.assert_array_equal(headings(env), third)
     assert [episodes.number for episodes in env.episodes] == [3, 3]
     env.close()
 
@@ -102,7 +102,7 @@ def test_set_seed_restarts_the_count(cfg):
             env.set_seed(seed)
         for _ in range(2):
             env.reset()
-            starts.append(looks(env))
+            starts.append(headings(env))
     np.testing.assert_array_equal(starts[:2], starts[2:])
     env.close()
 
@@ -112,7 +112,7 @@ def test_all_adapters_begin_at_an_episode_alike(cfg):
     torchrl.reset(episode=4)
     pettingzoo.reset(options={"episode": 4})
     bodies = [player.body.forward for player in pettingzoo._played.game.players]
-    np.testing.assert_array_equal(bodies, looks(torchrl)[:3])
+    np.testing.assert_array_equal(bodies, headings(torchrl)[:3])
     torchrl.close()
     pettingzoo.close()
 

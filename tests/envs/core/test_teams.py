@@ -68,9 +68,9 @@ def test_flags_of_an_eliminated_player_stay_up_until_the_next_episode(rollout):
 def test_observation_and_reward_of_an_eliminated_player_are_zero(rollout):
     for team in ("red", "blue"):
         playing = rollout[team, "mask"]
-        paid = rollout["next", team, "reward"].squeeze(-1)
-        assert (paid[playing] > 0.0).all()
-        assert (paid[~playing] == 0.0).all()
+        rewards = rollout["next", team, "reward"].squeeze(-1)
+        assert (rewards[playing] > 0.0).all()
+        assert (rewards[~playing] == 0.0).all()
         for seen in rollout["next", team, "observation"].values():
             felt = seen.flatten(3).abs().sum(-1)
             assert (felt[playing] > 0.0).all()
@@ -86,11 +86,11 @@ def test_an_eliminated_player_rests_and_needs_no_action(cfg):
     (name,) = game.eliminated
     body = next(p.body for p in game.players if p.name == name)
     before = body.position
-    told = {p.name: np.array([0.0, 0.0]) for p in game.actors} | {name: np.array([np.nan, 1.0])}
-    game.step(told)
+    actions = {p.name: np.array([0.0, 0.0]) for p in game.actors} | {name: np.array([np.nan, 1.0])}
+    game.step(actions)
     np.testing.assert_allclose(body.position[:2], before[:2], atol=1e-9)
-    del told[name]
-    game.step(told)  # and needs no action
+    del actions[name]
+    game.step(actions)  # and needs no action
     game.close()
 
 
@@ -141,8 +141,8 @@ def test_pettingzoo_removes_eliminated_agents(cfg):
     numbers, ends = [], []
     while env.agents:
         numbers.append(len(env.agents))
-        told = {name: np.zeros(2, np.float32) for name in env.agents}
-        observations, rewards, terminations, truncations, infos = env.step(told)
+        actions = {name: np.zeros(2, np.float32) for name in env.agents}
+        observations, rewards, terminations, truncations, infos = env.step(actions)
         for given in (observations, rewards, terminations, truncations, infos):
             assert len(given) == numbers[-1]
         ends.append(sum(terminations.values()))

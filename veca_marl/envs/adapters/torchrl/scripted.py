@@ -38,7 +38,10 @@ class ExpertPolicy(nn.Module):
                 [
                     player.body.encode(
                         game.expert_of(player).act(
-                            {name: array.numpy() for name, array in seen[world, index].items()}
+                            {
+                                name: array.numpy(force=True)
+                                for name, array in seen[world, index].items()
+                            }
                         )
                     )
                     for index, player in enumerate(game.team(team))
