@@ -18,8 +18,8 @@ SNIPPETS = [
 ]
 
 
-def test_there_are_snippets():
-    assert len(SNIPPETS) >= 4
+def test_each_page_has_snippets():
+    assert {param.id.rsplit("-", 1)[0] for param in SNIPPETS} == {page.stem for page in PAGES}
 
 
 @pytest.mark.parametrize("snippet", SNIPPETS)
