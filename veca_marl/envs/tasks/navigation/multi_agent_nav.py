@@ -10,16 +10,9 @@ from typing import Any
 import numpy as np
 
 from veca_marl.envs.core.task import Player, Task, TaskCfg, Team, register, terms
+from veca_marl.envs.tasks.navigation import places
 from veca_marl.envs.tasks.navigation.floor_plan import FloorPlan
 from veca_marl.envs.tasks.navigation.helper_reward import PropVisibility, displacement_to
-from veca_marl.envs.tasks.navigation.places import (
-    add_target,
-    check_rooms,
-    free_pair,
-    free_place,
-    furniture_of,
-    gap_m,
-)
 from veca_marl.envs.tasks.player_starts import direct_gaze_ahead, place_player
 
 _PASSAGE_M = 0.2  # width that an agent at the object leaves free towards the walls
@@ -103,10 +96,10 @@ class MultiAgentNav(Task):
         return (Team("seekers", cfg.agents),)
 
     def build(self) -> None:
-        check_rooms(self.world.playground, len(self.players))
+        places.check_rooms(self.world.playground, len(self.players))
         self.plan = FloorPlan(self.world.playground)
-        self._furniture = furniture_of(self.world)
-        self.target = add_target(self.world, self.cfg.radius_m)
+        self._furniture = places.furniture_of(self.world)
+        self.target = places.add_target(self.world, self.cfg.radius_m)
         self._visibility = PropVisibility(self.world.scene, self.target)
         self.arrived: set[str] = set()
         self._newly_arrived = 0
@@ -120,10 +113,12 @@ class MultiAgentNav(Task):
         home = rooms[rng.integers(len(rooms))]
         clear_m = self.cfg.radius_m + self.cfg.reach_m + _PASSAGE_M
         apart_m = self.cfg.radius_m + clear_m
-        (x, y, floor_m), beside = free_pair(home, self._furniture, clear_m, apart_m, rng)
+        (x, y, floor_m), beside = places.free_pair(home, self._furniture, clear_m, apart_m, rng)
         self.target.place((x, y, floor_m + self.cfg.radius_m))
         for room, player in zip(rooms, self.players, strict=True):
-            place = beside if room is home else free_place(room, self._furniture, clear_m, rng)
+            place = (
+                beside if room is home else places.free_place(room, self._furniture, clear_m, rng)
+            )
             place_player(player, place, rng.uniform(-math.pi, math.pi))
             if self.cfg.muted is not Muted.none:
                 player.body.muted = room is home or self.cfg.muted is Muted.all
@@ -133,7 +128,7 @@ class MultiAgentNav(Task):
         direct_gaze_ahead(self.players)
         before = len(self.arrived)
         for player in self.players:
-            if gap_m(player.body.position, self.target) <= self.cfg.reach_m:
+            if places.gap_m(player.body.position, self.target) <= self.cfg.reach_m:
                 self.arrived.add(player.name)
         self._newly_arrived = len(self.arrived) - before
 
