@@ -116,10 +116,10 @@ class MultiAgentNav(Task):
         (x, y, floor_m), beside = places.free_pair(home, self._furniture, clear_m, apart_m, rng)
         self.target.place((x, y, floor_m + self.cfg.radius_m))
         for room, player in zip(rooms, self.players, strict=True):
-            place = (
-                beside if room is home else places.free_place(room, self._furniture, clear_m, rng)
-            )
-            place_player(player, place, rng.uniform(-math.pi, math.pi))
+            free = beside
+            if room is not home:
+                free = places.free_place(room, self._furniture, clear_m, rng)
+            place_player(player, free, rng.uniform(-math.pi, math.pi))
             if self.cfg.muted is not Muted.none:
                 player.body.muted = room is home or self.cfg.muted is Muted.all
         direct_gaze_ahead(self.players)
