@@ -1,0 +1,75 @@
+"""The configuration stored with a run is read with its types, without today's defaults."""
+
+import pytest
+from omegaconf import OmegaConf
+
+from veca_marl.config import ConfigError, compose_node, conf_dir, to_config
+from veca_marl.config.stored import body_names, change, typed
+from veca_marl.envs.core.task import TASKS
+from veca_marl.sim.hearing import AudioQuality
+
+BODIES = sorted(path.stem for path in (conf_dir() / "body").glob("*.yaml"))
+EXPERIMENTS = sorted(path.stem for path in (conf_dir() / "experiment").glob("*.yaml"))
+CHOICES = [
+    *([f"+task={name}"] for name in sorted(TASKS)),
+    *(["+task=KickTheBall", f"body={name}"] for name in BODIES),
+    *([f"+experiment={name}"] for name in EXPERIMENTS),
+    ["+task=PushOut1v1", "+body@team.red.body=mitten", "+algo@learner.blue=mappo"],
+]
+
+
+def read_again(node, path):
+    path.write_text(OmegaConf.to_yaml(node, resolve=True))
+    return typed(OmegaConf.load(path), body_names(node))
+
+
+@pytest.mark.parametrize("overrides", CHOICES, ids=" ".join)
+def test_it_is_read_as_it_was_stored(overrides, tmp_path):
+    node = compose_node(overrides)
+    assert to_config(read_again(node, tmp_path / "config.yaml")) == to_config(node)
+
+
+@pytest.fixture
+def stored(tmp_path):
+    node = compose_node(["+task=SoccerTwoPlayer", "senses.audio.noise_floor_db=20", "algo.clip=0.1"])
+    return read_again(node, tmp_path / "config.yaml")
+
+
+def test_a_preset_replaces_its_group_and_nothing_else(stored):
+    change(stored, ["senses/audio=mono"])
+    cfg = to_config(stored)
+    assert cfg.senses.audio.quality == AudioQuality.mono
+    assert cfg.senses.audio.noise_floor_db is None
+    assert cfg.algo.clip == 0.1
+
+
+def test_values_of_teams_and_opponents_are_changed(stored):
+    change(stored, ["opponent.defender=expert", "+senses/vision@team.attacker.senses.vision=blind"])
+    cfg = to_config(stored)
+    assert cfg.opponent == {"defender": "expert"}
+    assert not cfg.game.senses_of("attacker").vision.present
+    change(stored, ["~opponent.defender"])
+    assert to_config(stored).opponent == {}
+
+
+@pytest.mark.parametrize(
+    ("override", "message"),
+    [
+        ("algo.clip=1", r"algo.clip=1: of a run, only body, clock, eval"),
+        ("task=KickTheBall", r"task=KickTheBall: of a run, only"),
+        ("senses/audio=momo", r"unknown senses/audio 'momo' \(did you mean mono\?\)"),
+        ("task.max_second=1", r"unknown key 'task.max_second' \(did you mean max_seconds\?\)"),
+        ("task.max_seconds=x", r"task.max_seconds: Value 'x' .* could not be converted to Float"),
+        ("~opponent.defender", r"~opponent.defender: there is nothing to delete"),
+    ],
+)
+def test_a_wrong_change_is_one_line(stored, override, message):
+    with pytest.raises(ConfigError, match=message) as caught:
+        change(stored, [override])
+    assert "\n" not in str(caught.value)
+
+
+def test_an_unknown_key_that_is_added_is_refused(stored):
+    change(stored, ["+team.attacker.speed=2"])
+    with pytest.raises(ConfigError, match=r"unknown key 'team.attacker.speed'"):
+        to_config(stored)
