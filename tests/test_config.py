@@ -43,19 +43,19 @@ def test_every_experiment_composes(name):
     assert isinstance(compose([f"+experiment={name}"]), Config)
 
 
-def test_experiments_may_take_another_seed_and_sense():
+def test_experiments_accept_another_seed_and_sense():
     cfg = compose(["+experiment=audio_ablation", "senses/audio=mono", "seed=4"])
     assert (cfg.senses.audio.quality, cfg.seed) == (AudioQuality.mono, 4)
 
 
-def test_no_file_is_forgotten():
+def test_every_file_is_tested():
     files = {path.relative_to(conf_dir()).as_posix() for path in conf_dir().rglob("*.yaml")}
     tested = {f"{g}/{p}.yaml" for g, p in PRESETS} | {f"experiment/{n}.yaml" for n in EXPERIMENTS}
     assert files - tested - {f"task/{name}.yaml" for name in TASKS} == {"config.yaml"}
 
 
 @pytest.mark.parametrize("path", sorted(conf_dir().rglob("*.yaml")), ids=lambda p: p.stem)
-def test_no_preset_is_called_what_yaml_reads_as_a_boolean(path):
+def test_no_preset_has_a_name_that_yaml_reads_as_a_boolean(path):
     assert isinstance(yaml.safe_load(path.stem), str)
 
 
@@ -102,7 +102,7 @@ def test_files_hold_only_what_differs_from_the_dataclasses():
         ([PUSH, "opponent.red=nobody"], r"opponent.red=nobody: choices: expert, random, idle, the"),
         (
             [PUSH, "opponent.red=idle", "opponent.blue=idle"],
-            r"nobody learns: all of",
+            r"no team learns: all of",
         ),
         ([PUSH, "+algo@learner.green=mappo"], r"learner: no \['green'\] in PushOut1v1; choices:"),
         ([PUSH, "self_play.teams=[red]"], r"self_play.teams=\['red'\]: two teams, or none"),
@@ -112,13 +112,13 @@ def test_files_hold_only_what_differs_from_the_dataclasses():
         ),
     ],
 )
-def test_what_is_wrong_is_said_in_one_line(overrides, message):
+def test_errors_are_one_line_with_the_choices(overrides, message):
     with pytest.raises(ConfigError, match=message) as caught:
         compose(overrides)
     assert "\n" not in str(caught.value)
 
 
-def test_compose_forgets_the_last_call():
+def test_compose_does_not_depend_on_earlier_calls():
     assert compose([KICK, "seed=5"]).seed == 5
     assert compose([KICK]).seed == 0
     with pytest.raises(ConfigError):
@@ -160,7 +160,7 @@ def test_configuration_survives_the_file_of_a_run(tmp_path):
     merged = OmegaConf.merge(compose_node([KICK]), OmegaConf.load(tmp_path / "config.yaml"))
     again = OmegaConf.to_object(merged)
     assert again == compose([KICK, "senses/audio=stereo", "playground=simple", "seed=9"])
-    assert list(chain(again.playground.props)), "lists must come back typed"
+    assert list(chain(again.playground.props)), "lists keep their types"
 
 
 @pytest.mark.parametrize(

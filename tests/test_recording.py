@@ -1,4 +1,4 @@
-"""A film of a real episode: pictures of the eyes, sound of the ears."""
+"""The video of a real episode: images of the eyes, sound at the ears."""
 
 import av
 import numpy as np
@@ -34,17 +34,17 @@ def difference_of_ears(sound):
     return (settled[0] - settled[1]).std() / settled.std()
 
 
-def test_film_has_a_frame_a_step_and_what_the_ears_received(tmp_path):
-    game, pictures, sound = record(tmp_path / "film.mp4")
+def test_video_has_one_frame_per_step_and_the_sound_at_the_ears(tmp_path):
+    game, pictures, sound = record(tmp_path / "video.mp4")
     assert len(pictures) == 25
-    assert pictures[0].std() > 10, "something is to be seen"
+    assert pictures[0].std() > 10, "the images are not uniform"
     assert sound.shape[1] / 22_050 == pytest.approx(1.0, abs=0.15)
-    assert sound.std() > 0.01, "the ball buzzes"
-    assert difference_of_ears(sound) > 0.2, "two ears, two sounds"
-    assert not game.senses.audio.waveform, "the configuration of the run is left alone"
+    assert sound.std() > 0.01, "the ball is audible"
+    assert difference_of_ears(sound) > 0.2, "the ears differ"
+    assert not game.senses.audio.waveform, "the configuration of the run is unchanged"
 
 
-def test_one_sound_for_both_ears_when_mono_and_none_when_deaf(tmp_path):
+def test_mono_gives_equal_channels_and_deaf_none(tmp_path):
     _, _, mono = record(tmp_path / "mono.mp4", "senses/audio=mono")
     assert difference_of_ears(mono) < 0.05
     _, _, stereo = record(tmp_path / "stereo.mp4", "senses/audio=stereo")
@@ -54,7 +54,7 @@ def test_one_sound_for_both_ears_when_mono_and_none_when_deaf(tmp_path):
     assert len(pictures) == 25
 
 
-def test_who_is_blind_is_filmed_in_the_room(tmp_path):
+def test_a_blind_agent_is_recorded_from_the_room(tmp_path):
     _, seeing, _ = record(tmp_path / "seeing.mp4")
     _, blind, _ = record(tmp_path / "blind.mp4", "senses/vision=blind")
     assert blind[0].shape[1] < seeing[0].shape[1]

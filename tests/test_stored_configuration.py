@@ -31,7 +31,9 @@ def test_it_is_read_as_it_was_stored(overrides, tmp_path):
 
 @pytest.fixture
 def stored(tmp_path):
-    node = compose_node(["+task=SoccerTwoPlayer", "senses.audio.noise_floor_db=20", "algo.clip=0.1"])
+    node = compose_node(
+        ["+task=SoccerTwoPlayer", "senses.audio.noise_floor_db=20", "algo.clip=0.1"]
+    )
     return read_again(node, tmp_path / "config.yaml")
 
 

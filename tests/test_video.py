@@ -8,7 +8,7 @@ RATE, FPS = 22_050, 25
 
 
 def film(frames, height=64, width=96):
-    """A bright bar that moves one pixel a frame on black."""
+    """A bright bar on black that moves by one pixel per frame."""
     pictures = np.zeros((frames, height, width, 3), np.uint8)
     for i, picture in enumerate(pictures):
         picture[:, i : i + 16] = 255
@@ -38,7 +38,7 @@ def pitch(signal):
     return np.argmax(spectrum) * RATE / len(signal)
 
 
-def test_what_is_written_is_read_back(tmp_path):
+def test_a_written_video_is_read_back(tmp_path):
     path = tmp_path / "deep" / "film.mp4"
     write_video(path, film(50), 0.1 * tone(2.0), FPS, RATE)
     pictures, sound, kind = read(path)
@@ -56,7 +56,7 @@ def test_what_is_written_is_read_back(tmp_path):
     assert np.abs(middle).max() == pytest.approx(0.8, abs=0.1), "loud enough, not clipped"
 
 
-def test_loudness_between_the_ears_is_kept(tmp_path):
+def test_the_level_difference_between_the_ears_is_kept(tmp_path):
     waveform = tone(1.0, 440.0, 440.0) * np.array([[1.0], [0.25]], np.float32)
     write_video(tmp_path / "film.mp4", film(25), waveform, FPS, RATE)
     _, sound, _ = read(tmp_path / "film.mp4")
@@ -65,7 +65,7 @@ def test_loudness_between_the_ears_is_kept(tmp_path):
 
 
 @pytest.mark.parametrize("waveform", [None, np.zeros((2, RATE), np.float32)])
-def test_deaf_and_silent_films_can_be_written(tmp_path, waveform):
+def test_videos_without_sound_can_be_written(tmp_path, waveform):
     write_video(tmp_path / "film.mp4", film(25), waveform, FPS, RATE)
     pictures, sound, _ = read(tmp_path / "film.mp4")
     assert len(pictures) == 25
@@ -83,13 +83,13 @@ def test_deaf_and_silent_films_can_be_written(tmp_path, waveform):
         (film(1), np.full((2, 9), np.nan, np.float32), "waveform must be finite"),
     ],
 )
-def test_impossible_films_are_refused_and_leave_nothing(tmp_path, frames, waveform, message):
+def test_impossible_videos_are_refused_and_leave_no_file(tmp_path, frames, waveform, message):
     with pytest.raises(ValueError, match=message):
         write_video(tmp_path / "film.mp4", frames, waveform, FPS, RATE)
     assert not list(tmp_path.iterdir())
 
 
-def test_a_failure_leaves_the_old_film(tmp_path, monkeypatch):
+def test_a_failure_keeps_the_earlier_video(tmp_path, monkeypatch):
     path = tmp_path / "film.mp4"
     write_video(path, film(5), None, FPS, RATE)
     before = path.read_bytes()

@@ -22,13 +22,14 @@ from veca_marl.sim.senses import SensesCfg
 
 @dataclass
 class LogCfg:
-    """What a run leaves behind beside metrics.csv, evaluations.csv and checkpoints.
+    """Outputs of a run beside its checkpoints.
 
     Attributes:
-        logger: Where numbers go: csv, tensorboard, wandb, mlflow, several of them, or none.
+        logger: Where metrics are written: any of csv, tensorboard, wandb and mlflow.
         progress_bar: A progress bar while training.
-        video: An episode of the trained policy with the agent's own sound, at the end.
-        keep_checkpoints: How many of the latest checkpoints stay beside the best one.
+        video: Whether an episode of the trained policy is recorded at the end, with the sound at
+            the ears of the agent.
+        keep_checkpoints: Number of latest checkpoints that are kept beside the best one.
     """
 
     logger: list[LoggerKind] = field(
@@ -53,29 +54,31 @@ class Config:
 
     Attributes:
         task: The rules and their numbers: ``+task=KickTheBall``.
-        playground: Where it is played.
-        body: What the players are.
-        senses: How well they perceive.
-        clock: How time passes.
-        team: What single teams have otherwise: ``+body@team.defender.body=walker_discrete``,
+        playground: Rooms and furniture.
+        body: The bodies of the agents.
+        senses: Quality of each sense.
+        clock: Time step and control rate.
+        team: Bodies and senses of single teams that differ from the common ones:
+            ``+body@team.defender.body=walker_discrete``,
             ``+senses/vision@team.defender.senses.vision=blind``.
-        opponent: Teams that do not learn and who plays for them: expert, random, idle, or what
-            another run learnt: ``opponent.defender=expert``, ``opponent.defender=runs/...``.
-        warm_start: Teams that begin with what another run has learnt, of this task or another one
-            with the same senses and actions, and its folder or a checkpoint of it:
+        opponent: Teams that do not learn, and what selects their actions: expert, random, idle, or
+            the policy of another run: ``opponent.defender=expert``, ``opponent.defender=runs/...``.
+        warm_start: Teams that start from the parameters of another run (its folder or one of its
+            checkpoints), of this task or of one with the same senses and actions:
             ``warm_start.attacker=runs/...``.
-        algo: The learning algorithm and its numbers.
-        learner: The same for single teams: ``+algo@learner.attacker=mappo``.
-        self_play: Which teams learn against past selves.
-        collect: How experience is gathered.
-        eval: When and how the policy is evaluated.
-        log: What is written down.
-        seed: Everything random follows from it.
-        device: Where networks learn: cpu, cuda, cuda:1, ...
+        algo: The learning algorithm and its parameters.
+        learner: The algorithm of single teams: ``+algo@learner.attacker=mappo``.
+        self_play: Teams that learn against past policies of each other.
+        collect: How experience is collected.
+        eval: When and how policies are evaluated.
+        log: Outputs of the run.
+        seed: Seed of all random numbers.
+        device: Device of the networks: cpu, cuda, cuda:1, ...
         threads: Torch threads of the learner; None for all cores.
-        total_frames: Frames of experience.
-        max_minutes: Stop after the stage in which this time runs out; None for no limit.
-        resume: The folder of a run to continue instead of starting one.
+        total_frames: Frames of experience: steps of worlds, summed over all worlds.
+        max_minutes: Training stops after the stage in which this time is exceeded; None for no
+            limit.
+        resume: Folder of a run that is continued.
         plugins: Packages that add tasks, bodies, presets and more, see `veca_marl.plugins`.
     """
 
@@ -117,7 +120,7 @@ class Config:
 
     @property
     def game(self) -> GameCfg:
-        """What the environments are made from."""
+        """The configuration of the environments."""
         return GameCfg(
             self.task,
             self.playground,
@@ -129,10 +132,10 @@ class Config:
         )
 
     def check_teams(self) -> None:
-        """Refuse what is said of teams that are not there, or not there to learn.
+        """Check that entries by team name teams of the task, and learning ones where required.
 
         Raises:
-            ValueError: If there are any, or if nobody learns.
+            ValueError: If one does not, or if no team learns.
         """
         teams = [team.name for team in self.game.teams]
         learn = [team for team in teams if team not in self.opponent]
@@ -146,11 +149,11 @@ class Config:
             if unknown:
                 raise ValueError(f"{key}: no {unknown} in {self.task.name}; choices: {choices}")
         if not learn:
-            raise ValueError(f"opponent: nobody learns: all of {teams} are opponents")
+            raise ValueError(f"opponent: no team learns: all of {teams} are opponents")
 
     @property
     def frozen(self) -> dict[str, Path]:
-        """Teams that are played by what another run learnt, and where that is."""
+        """Teams with the policy of another run, and its folder or checkpoint."""
         return {team: Path(who) for team, who in self.opponent.items() if who not in _SCRIPTS}
 
 

@@ -1,4 +1,4 @@
-"""Frames and two-ear sound into one MP4 file."""
+"""Writes frames and binaural sound into an MP4 file."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ import numpy as np
 from av.codec.codec import UnknownCodecError
 from numpy.typing import NDArray
 
-_PEAK = 0.8  # of full scale: loud enough, and nothing clips
-_VIDEO_CODECS = ("libx264", "mpeg4")  # the first that this build of the codecs has
+_PEAK = 0.8  # of full scale
+_VIDEO_CODECS = ("libx264", "mpeg4")  # the first that is available is used
 
 
 def write_video(
@@ -25,13 +25,13 @@ def write_video(
 ) -> None:
     """Write an MP4 file with H.264 (or MPEG-4) pictures and AAC stereo sound.
 
-    The file appears whole or not at all. The sound is scaled as a whole to a common peak;
-    loudness within it and between the ears is kept.
+    The file is complete or does not exist. The sound is scaled by one factor to a fixed peak, so
+    that levels over time and between the ears keep their ratios.
 
     Args:
-        path: Where; parents are made.
-        frames: Pictures ``(height, width, 3)`` uint8, all alike, even height and width.
-        waveform: ``(2, samples)`` left and right ear; None for a silent film.
+        path: The file; missing folders are created.
+        frames: Images ``(height, width, 3)`` uint8 of one shape, with even height and width.
+        waveform: ``(2, samples)``, left and right ear; None for a video without sound.
         fps: Frames per second.
         sample_rate_hz: Samples per second.
 
