@@ -41,7 +41,7 @@ def compose(overrides: Sequence[str] = ()) -> Config:
 
 
 def compose_node(overrides: Sequence[str]) -> DictConfig:
-    """Return what `compose` returns as a typed node, whose values can be changed by name.
+    """Return what `compose` returns as a typed node; its values can be changed by name.
 
     Raises:
         ConfigError: One line that names the wrong part and the choices.

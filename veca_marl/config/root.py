@@ -105,8 +105,8 @@ class Config:
     plugins: list[str] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        for team, who in self.opponent.items():
-            _check_opponent(team, who)
+        for team, player in self.opponent.items():
+            _check_opponent(team, player)
         if self.total_frames < 1:
             raise ValueError(f"total_frames must be at least 1, got {self.total_frames}")
         if self.seed < 0:
@@ -128,7 +128,7 @@ class Config:
             self.senses,
             self.clock,
             self.team,
-            {team: Script(who) for team, who in self.opponent.items() if who in _SCRIPTS},
+            {team: Script(player) for team, player in self.opponent.items() if player in _SCRIPTS},
         )
 
     def check_teams(self) -> None:
@@ -154,15 +154,17 @@ class Config:
     @property
     def frozen(self) -> dict[str, Path]:
         """Teams with the policy of another run, and its folder or checkpoint."""
-        return {team: Path(who) for team, who in self.opponent.items() if who not in _SCRIPTS}
+        return {
+            team: Path(player) for team, player in self.opponent.items() if player not in _SCRIPTS
+        }
 
 
 _SCRIPTS = tuple(script.value for script in Script)
 
 
-def _check_opponent(team: str, who: str) -> None:
-    if who not in _SCRIPTS and not Path(who).exists():
+def _check_opponent(team: str, player: str) -> None:
+    if player not in _SCRIPTS and not Path(player).exists():
         raise ValueError(
-            f"opponent.{team}={who}: choices: {', '.join(_SCRIPTS)}, the folder of a run, "
+            f"opponent.{team}={player}: choices: {', '.join(_SCRIPTS)}, the folder of a run, "
             "a checkpoint"
         )
