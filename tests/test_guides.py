@@ -2,12 +2,17 @@
 
 import pkgutil
 import re
+import shlex
 import subprocess
 import sys
 from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
+
+from veca_marl.bench.options import BenchOptions
+from veca_marl.config import compose
+from veca_marl.config.command_line import CommandLine
 
 ROOT = Path(__file__).resolve().parent.parent
 DOCS = ROOT / "docs"
@@ -20,6 +25,7 @@ WRITTEN = [
 READMES = sorted((ROOT / "experiments").rglob("README.md"))
 CHANGELOG = ROOT / "CHANGELOG.md"  # names what there was
 PYTHON = re.compile(r"^ *```python\n(.*?)^ *```", re.MULTILINE | re.DOTALL)
+NEEDS_MORE = re.compile(r"\.\.\.|<|RUN|my_package|FindBeacon|launcher|glob|run=|resume=")
 RUN_BY_OTHERS = "other_libraries.md"  # tests/test_adapter_guides.py: each block by itself
 
 RUN_BLOCKS = """
@@ -35,6 +41,40 @@ for page in map(pathlib.Path, sys.argv[2:]):
 
 def text_of(page):
     return page.read_text(encoding="utf-8")
+
+
+def commands(name):
+    """Return page and arguments of the shown commands that need no run, plug-in or launcher."""
+    shown = [
+        (page.name, line.split("#")[0].strip())
+        for page in [*WRITTEN, *READMES]
+        for line in re.findall(rf"^python -m veca_marl\.{name} (.+)$", text_of(page), re.MULTILINE)
+    ]
+    return [(p, line) for p, line in shown if not NEEDS_MORE.search(line)]
+
+
+@pytest.mark.parametrize(("page", "line"), commands("train"))
+def test_what_the_training_commands_choose_can_be_chosen(page, line):
+    choices = [word for word in shlex.split(line) if word != "-m" and "hydra." not in word]
+    for combination in combinations(choices):
+        assert compose(combination).task.name
+
+
+def combinations(choices):
+    """Return the override lists of a sweep; its first and last values stand for all."""
+    first, last = [], []
+    for text in choices:
+        key, _, values = text.partition("=")
+        swept = values if "[" not in values else ""
+        first.append(f"{key}={swept.split(',')[0]}" if swept else text)
+        last.append(f"{key}={swept.split(',')[-1]}" if swept else text)
+    return [first] if first == last else [first, last]
+
+
+@pytest.mark.parametrize(("page", "line"), commands("bench"))
+def test_what_the_bench_commands_choose_can_be_chosen(page, line):
+    for _, overrides in CommandLine("bench", BenchOptions, "").jobs(shlex.split(line)):
+        assert compose(overrides).task.name
 
 
 def test_the_code_of_the_pages_runs(tmp_path):
