@@ -1,6 +1,7 @@
 """A package outside this repository adds a task and a preset: by name, and by its entry point."""
 
 import os
+import pickle
 import subprocess
 import sys
 from pathlib import Path
@@ -10,6 +11,7 @@ import pytest
 from veca_marl.config import ConfigError, compose
 from veca_marl.envs.core.task import TASKS
 from veca_marl.plugins import PLUGINS, load_plugins
+from veca_marl.runs.assembly import GameFactory
 
 ROOT = Path(__file__).resolve().parent.parent
 EXAMPLE = ROOT / "examples" / "plugin"
@@ -47,6 +49,7 @@ def task_text(name):
     return (
         "from veca_marl.envs.core.task import Task, register\n"
         f"@register\nclass {name}(Task):\n"
+        "    senses = ('proprioception',)\n"
         "    def build(self): ...\n"
         "    def reset(self, rng): ...\n"
         "    def reward(self, player): return {}\n"
@@ -133,3 +136,27 @@ def test_an_installed_plugin_needs_no_naming(installed, tmp_path):
     done = run("-c", code, env=installed, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert float(done.stdout) < 0.6
+
+
+def test_a_worker_process_loads_the_plugins_that_a_game_needs(outside):
+    """A spawned collector receives the pickled factory and has not loaded the plug-in before.
+
+    The configuration of this task is a plain `TaskCfg`, so that unpickling it imports no plug-in.
+    """
+    write_package(outside, "plain_plugin", task_text("PlainTask"))
+    cfg = compose(["plugins=[plain_plugin]", "+task=PlainTask"])
+    pickled = pickle.dumps(GameFactory(cfg.game, tuple(cfg.plugins)))
+    code = (
+        "import pickle, sys; env = pickle.loads(sys.stdin.buffer.read())(1, 0);"
+        "print(env.rollout(2).shape)"
+    )
+    path = os.pathsep.join([str(outside), str(ROOT)])
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        input=pickled,
+        env={**os.environ, "PYTHONPATH": path},
+        capture_output=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr.decode()
+    assert b"torch.Size([1, 2])" in done.stdout
