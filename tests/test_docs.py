@@ -10,6 +10,7 @@ import pytest
 from docs_pages.body_tables import body_page
 from docs_pages.docstrings import entries, prose
 from docs_pages.observation_page import MEANINGS, all_specs
+from docs_pages.pictures import perception_picture, task_picture, touch_picture
 from docs_pages.task_pages import built_in_tasks, task_page
 
 import veca_marl
@@ -96,6 +97,15 @@ def test_a_docstring_is_read_section_by_section():
         "height": "Others.",
     }
     assert entries(Documented, "Returns") == {}
+
+
+def test_the_pictures_can_be_drawn(tmp_path):
+    task_picture("KickTheBall", tmp_path / "walker.png")
+    task_picture("TurnBaby", tmp_path / "joints.png")
+    perception_picture(tmp_path / "perception.png")
+    touch_picture(tmp_path / "touch.png")
+    assert all(path.stat().st_size > 5000 for path in tmp_path.glob("*.png"))
+    assert len(list(tmp_path.glob("*.png"))) == 4
 
 
 def test_the_changelog_and_the_citation_have_the_version_of_the_package():

@@ -45,12 +45,9 @@ def task_picture(task: str, path: Path) -> None:
     env, game = started(task, seed=1)
     if isinstance(game.players[0].body, Walker):
         for _ in range(25):  # one second, in which the ball of KickTheBall appears
-            game.step(
-                {
-                    player.name: np.zeros(player.body.action_spec.shape, np.float32)
-                    for player in game.actors
-                },
-            )
+            for player in game.players:
+                player.body.rest()
+            game.advance()
     camera = Camera(640, 400, fov_deg=48.0)
     image = camera.render(game.world.scene, [look_at(*viewpoint(game))]).rgb[0]
     plt.imsave(path, image, pil_kwargs={"optimize": True})
