@@ -12,7 +12,7 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from veca_marl.gymnasium_ids import register_when_imported
+from veca_marl.gymnasium_ids import register_ids
 from veca_marl.version import __version__
 
 if TYPE_CHECKING:
@@ -28,4 +28,4 @@ def __getattr__(name: str) -> Any:
     raise AttributeError(f"module 'veca_marl' has no attribute {name!r}; choices: {__all__}")
 
 
-register_when_imported()
+register_ids()
