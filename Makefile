@@ -32,11 +32,11 @@ lint: $(VENV)/installed-test ## style, formatting and the import contracts
 types: $(VENV)/installed-test ## mypy --strict on the whole package
 	$(BIN)/mypy
 
-test: lint types ## lint, types, layer contracts and the quick tests
-	$(BIN)/pytest -n $(CORES) -m "not slow" $(ARGS)
+test: lint types ## lint, types, import contracts and the quick tests
+	$(BIN)/pytest -n $(CORES) -m "not slow" --durations=20 $(ARGS)
 
 test-all: lint types ## everything, the slow tests too
-	$(BIN)/pytest -n $(CORES) $(ARGS)
+	$(BIN)/pytest -n $(CORES) --durations=20 $(ARGS)
 
 format: $(VENV)/installed-test ## format and fix with ruff
 	$(BIN)/ruff format .
