@@ -19,14 +19,6 @@ def test_every_public_name_exists():
         assert getattr(veca_marl, name) is not None
 
 
-def test_the_simulator_is_imported_without_torch():
-    code = (
-        "import sys, veca_marl.sim.physics; print('torch' in sys.modules, 'hydra' in sys.modules)"
-    )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.split() == ["False"]
-
-
 def test_train_returns_metrics_and_a_policy_and_stores_the_run(tmp_path):
     result = veca_marl.train(
         "KickTheBall", total_frames=64.0, senses=BLIND, folder=tmp_path / "run", overrides=TINY

@@ -2,6 +2,7 @@
 
 import csv
 import json
+import re
 import shutil
 import subprocess
 import sys
@@ -9,7 +10,11 @@ import sys
 import pytest
 import torch
 
+from veca_marl.algos.training.checkpoint import CheckpointError
+from veca_marl.config import ConfigError, compose
 from veca_marl.evaluate import main as evaluate
+from veca_marl.runs.assembly import make_trainer
+from veca_marl.runs.run_folder import RunFolder
 from veca_marl.tournament import main as tournament
 from veca_marl.tournament import spread
 
@@ -124,9 +129,9 @@ def test_a_team_starts_from_the_parameters_of_another_run(played, tmp_path):
     ],
 )
 def test_a_warm_start_that_does_not_fit_is_refused(played, tmp_path, arguments, message):
-    done = train(tmp_path, "run", *(text.format(run=played / "run") for text in arguments))
-    assert done.returncode == 2
-    assert message in done.stderr
+    overrides = [text.format(run=played / "run") for text in arguments]
+    with pytest.raises((ConfigError, CheckpointError), match=re.escape(message)):
+        make_trainer(compose([*TASK, *SMALL, *overrides]), RunFolder(tmp_path / "run"))
     assert not (tmp_path / "run").exists()
 
 

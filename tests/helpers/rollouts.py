@@ -1,6 +1,6 @@
 """Rollouts that the laws compare: of random actions and of scripts, and their digests.
 
-As a program it prints the digest of a rollout, for a comparison with another process.
+As a program it prints the digest of a rollout of each task named, to compare processes.
 """
 
 import hashlib
@@ -98,6 +98,8 @@ def returns(cfg, episodes, script, seed=0):
 
 
 if __name__ == "__main__":
-    name, n_steps, start = sys.argv[1:]
-    fresh = VecaEnv(game_cfg(name), worlds=2, seed=0)
-    print(digest(play(fresh, int(n_steps), int(start))))  # noqa: T201  its answer
+    n_steps, start, *names = sys.argv[1:]
+    for name in names:
+        fresh = VecaEnv(game_cfg(name), worlds=2, seed=0)
+        print(name, digest(play(fresh, int(n_steps), int(start))))  # noqa: T201  its answer
+        fresh.close()

@@ -1,5 +1,6 @@
 """Physical laws, the clock, and the exact restoration of worlds."""
 
+import gc
 import resource
 import time
 from dataclasses import replace
@@ -250,6 +251,16 @@ def test_closed_worlds_release_their_client():
         world.close()
         world.close()
         assert not pybullet.isConnected(client)
+
+
+def test_a_world_that_is_not_referenced_any_more_releases_its_client():
+    world = empty_world(ball())
+    walker_in(world)
+    client = world.client
+    assert pybullet.isConnected(client)
+    del world
+    gc.collect()
+    assert not pybullet.isConnected(client)
 
 
 def test_names_are_unique():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import weakref
 from collections.abc import Callable
 
 import numpy as np
@@ -47,6 +48,7 @@ class World:
         self.house = make_house(playground)
         self.sound = SoundField(self.house, step_samples=self.clock.step_samples)
         self.client: int = pybullet.connect(pybullet.DIRECT)
+        self._disconnect = weakref.finalize(self, pybullet.disconnect, physicsClientId=self.client)
         self.props: dict[str, Prop] = {}
         self.movers: list[Mover] = []
         self.after_substep: list[Callable[[], None]] = []
@@ -141,10 +143,13 @@ class World:
         self.version += 1
 
     def close(self) -> None:
-        """Disconnect from PyBullet. Closing twice is harmless."""
-        if self.client >= 0:
-            pybullet.disconnect(physicsClientId=self.client)
-            self.client = -1
+        """Disconnect from PyBullet. Closing twice is harmless.
+
+        A world that is no longer referenced disconnects by itself: PyBullet has a limited number
+        of clients, and the body of one world takes 37 MB.
+        """
+        self._disconnect()
+        self.client = -1
 
     def _update_scene(self) -> None:
         follow_physics(self._moving)
