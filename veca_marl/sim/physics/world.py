@@ -146,7 +146,7 @@ class World:
         """Disconnect from PyBullet. Closing twice is harmless.
 
         A world that is no longer referenced disconnects by itself: PyBullet has a limited number
-        of clients, and the body of one world takes 37 MB.
+        of clients.
         """
         self._disconnect()
         self.client = -1
