@@ -4,6 +4,14 @@ import signal
 
 import pytest
 
+# they take longest: with several test processes they must not be left for the end
+LONGEST = ("first_light.ipynb", "train_in_a_notebook.ipynb", "test_docs.py", "test_wheel.py")
+
+
+def pytest_collection_modifyitems(items):
+    """Run the longest tests first."""
+    items.sort(key=lambda item: item.path.name not in LONGEST)
+
 
 @pytest.fixture
 def ctrl_c():
