@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Protocol
 
 from veca_marl.sim.body import Body
@@ -32,7 +33,7 @@ def is_visible(
 
     Args:
         scene: The scene of both, as of its last `update`.
-        body: The body whose eye it is; its own head and neck hide notarget.
+        body: The body whose eye it is; its own head and neck hide nothing.
         target: A prop or a body.
         eye: ``eye_left`` or ``eye_right``.
         camera: The camera of the eye; None is that of `VisionCfg` with its defaults.
@@ -43,6 +44,12 @@ def is_visible(
     if eye not in EYES:
         raise ValueError(f"no eye {eye!r}; choices: {list(EYES)}")
     own_head = scene.hidden(body.object_id, body.own_head_frames)
-    camera = VisionCfg().camera() if camera is None else camera
+    camera = _default_camera() if camera is None else camera
     views = camera.render(scene, [body.mount(eye)], own_head)
     return seen_fraction(views, target.object_id) > 0.0
+
+
+@cache
+def _default_camera() -> Camera:
+    """Return the camera of `VisionCfg` with its defaults; checking them at every call costs."""
+    return VisionCfg().camera()
