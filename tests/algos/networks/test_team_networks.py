@@ -65,8 +65,15 @@ def test_separate_networks_have_parameters_for_each_agent(make_ppo):
     assert count(parameters=Parameters.separate) == 3 * count()
 
 
-@pytest.mark.parametrize("critic", list(Critic))
-@pytest.mark.parametrize("parameters", list(Parameters))
+@pytest.mark.parametrize(
+    ("critic", "parameters"),
+    [
+        (Critic.own, Parameters.shared),
+        pytest.param(Critic.own, Parameters.separate, marks=pytest.mark.slow),
+        pytest.param(Critic.central, Parameters.shared, marks=pytest.mark.slow),
+        (Critic.central, Parameters.separate),
+    ],
+)
 def test_every_combination_learns_the_toy(make_ppo, critic, parameters):
     network = sized(critic=critic, parameters=parameters)
     ppo = make_ppo(network=network, agents=2, senses=("audio",))

@@ -267,7 +267,9 @@ def test_the_expert_of_a_joint_level_body_crawls_to_a_visible_object_and_calls()
     game.close()
 
 
-@pytest.mark.parametrize("body", ["mitten_voice", "full_voice"])
+@pytest.mark.parametrize(
+    "body", ["mitten_voice", pytest.param("full_voice", marks=pytest.mark.slow)]
+)
 def test_the_experts_on_hands_and_knees_solve_a_house(body):
     game = game_of(f"body={body}", "task.max_seconds=90", playground="seven_rooms")
     assert math.isfinite(seconds_needed(game, seed=1))
