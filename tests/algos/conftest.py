@@ -8,7 +8,7 @@ from fake_env import FakeEnv
 from training import SMALL
 
 from veca_marl.algos.ppo import PPOCfg
-from veca_marl.algos.ppo.config import ValueNormalisation
+from veca_marl.algos.ppo.value_normalisation import ValueNormalisation
 from veca_marl.algos.specs import team_specs
 from veca_marl.algos.training.learners import TeamLearners
 

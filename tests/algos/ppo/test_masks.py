@@ -10,8 +10,8 @@ from training import SMALL
 
 from veca_marl.algos.networks.multisense import Critic, MultisenseCfg
 from veca_marl.algos.ppo import PPO, PPOCfg
-from veca_marl.algos.ppo.config import ValueNormalisation
 from veca_marl.algos.ppo.losses import VALID, explained_variance
+from veca_marl.algos.ppo.value_normalisation import ValueNormalisation
 from veca_marl.algos.specs import team_specs
 
 
@@ -85,16 +85,23 @@ def test_masked_rows_change_neither_gradient_nor_measures(leaving, options):
     move_policy(ppo)
     mask = rows["agents", "mask"]
     assert 0 < (~mask).sum() < mask.numel()
-    if ppo.loss.value_norm is not None:
-        state = {k: v.clone() for k, v in ppo.loss.value_norm.state_dict().items()}
     measures, gradient = step(ppo, disturbed(rows, mask, 0.0))
-    if ppo.loss.value_norm is not None:
-        ppo.loss.value_norm.load_state_dict(state)
     other_measures, other_gradient = step(ppo, disturbed(rows, mask, 50.0))
     assert gradient.abs().max() > 0.0
     torch.testing.assert_close(other_gradient, gradient, rtol=1e-4, atol=1e-5)
     assert other_measures == pytest.approx(measures, rel=1e-4, abs=1e-5)
     assert 0.0 < measures["clip_fraction"] < 1.0, "the test must see clipped ratios"
+
+
+def test_masked_rows_do_not_enter_the_statistics_of_value_targets(leaving):
+    statistics = []
+    for size in (0.0, 50.0):
+        ppo, batch = leaving(value_normalisation=ValueNormalisation.popart)
+        rows = ppo.prepare(batch)
+        ppo.learn_rows(disturbed(rows, rows["agents", "mask"], size))
+        statistics.append(torch.cat(list(ppo.normalised_critic.statistics.buffers())[:2]))
+    assert statistics[0].abs().max() > 0.0
+    assert torch.equal(*statistics)
 
 
 def test_advantages_of_present_agents_ignore_masked_observations(leaving):

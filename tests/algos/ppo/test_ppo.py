@@ -8,7 +8,6 @@ from torchrl.envs import ExplorationType, set_exploration_type
 
 from veca_marl.algos.ppo import PPOCfg
 from veca_marl.algos.ppo.advantages import advantages
-from veca_marl.algos.ppo.config import ValueNormalisation
 from veca_marl.algos.training.collect import CollectCfg, Experience
 
 
@@ -129,29 +128,3 @@ def test_defaults_are_the_papers_table():
     assert (cfg.epochs, cfg.minibatches, cfg.value_coefficient) == (4, 4, 0.5)
     collect = CollectCfg()
     assert collect.processes * collect.worlds == 8
-
-
-def test_value_normalisation_keeps_the_scale_of_the_value_loss(make_ppo):
-    """Returns of thousands: only the normalised loss is of the order of one."""
-    losses = {}
-    for kind in ValueNormalisation:
-        ppo = make_ppo(senses=("audio",), value_normalisation=kind)
-        with torch.no_grad(), set_exploration_type(ExplorationType.RANDOM):
-            batch = FakeEnv(8, senses=("audio",)).rollout(
-                32, ppo.policy.collect, break_when_any_done=False
-            )
-        batch["next", "agents", "reward"] *= 1000.0
-        losses[kind] = ppo.learn(batch)["agents"]["value_loss"]
-    assert losses[ValueNormalisation.none] > 1e5
-    assert losses[ValueNormalisation.popart] < 10.0
-
-
-def test_statistics_of_value_normalisation_are_part_of_the_state(make_ppo):
-    one, other = (make_ppo(seed, value_normalisation=ValueNormalisation.popart) for seed in (0, 1))
-    with torch.no_grad(), set_exploration_type(ExplorationType.RANDOM):
-        batch = FakeEnv(4).rollout(16, one.policy.collect, break_when_any_done=False)
-    one.learn(batch)
-    other.load_state_dict(deepcopy(one.state_dict()))
-    norms = [ppo.algorithms["agents"].loss.value_norm for ppo in (one, other)]
-    assert norms[0].debiasing_term > 0.0
-    assert all(torch.equal(a, b) for a, b in zip(*(n.buffers() for n in norms), strict=True))

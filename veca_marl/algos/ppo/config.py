@@ -3,24 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from enum import Enum
 
 from veca_marl.algos.algorithm import AlgorithmCfg
 from veca_marl.algos.networks.factory import NetworkCfg
 from veca_marl.algos.networks.multisense import MultisenseCfg
-
-
-class ValueNormalisation(Enum):
-    """Scale of the value loss.
-
-    Attributes:
-        none: That of the returns.
-        popart: Targets and predictions are normalised by running statistics of the targets
-            (TorchRL's `PopArtValueNorm`; Yu et al. 2022).
-    """
-
-    none = "none"
-    popart = "popart"
+from veca_marl.algos.ppo.value_normalisation import ValueNormalisation
 
 
 @dataclass
@@ -34,7 +21,7 @@ class PPOCfg(AlgorithmCfg):
         clip: Clipping range of the probability ratio.
         entropy_coefficient: Weight of the entropy bonus, for each part of the action.
         value_coefficient: Weight of the value loss.
-        value_normalisation: Scale of the value loss.
+        value_normalisation: What the critic predicts, and in which unit its loss is measured.
         max_gradient_norm: Gradients are scaled down to this norm.
         epochs: Passes over each batch.
         minibatches: Parts of the batch in one pass.

@@ -25,13 +25,14 @@ class TeamPPOLoss(ClipPPOLoss):
       that acted, so this costs no forward pass (for two tanh-normals it is that of the normals).
     - Entries with `VALID` False are excluded from every reported measure; TorchRL excludes them
       from the losses and from the normalisation of advantages alone.
-    - Optionally the value loss is normalised by running statistics, as in TorchRL's `MAPPOLoss`.
+    - Optionally targets and values are normalised before the value loss. TorchRL's `MAPPOLoss`
+      updates the statistics inside the loss; here they are constant while a batch is learnt.
 
     Overrides the private hooks ``_log_weight``, ``_get_entropy`` and ``_critic_loss_inputs``;
     `tests/algos/ppo/test_losses.py` compares each with its formula.
 
     Attributes:
-        value_norm: Running statistics of the value targets, or None.
+        value_norm: Running statistics of the value targets, or None; see `NormalisedCritic`.
     """
 
     value_norm: PopArtValueNorm | None  # set after construction
@@ -75,10 +76,6 @@ class TeamPPOLoss(ClipPPOLoss):
     ) -> tuple[Tensor, Tensor, Tensor | None]:
         if self.value_norm is None:
             return target_return, state_value, old_state_value
-        valid = self._valid
-        counted = target_return if valid is None else target_return[valid].unsqueeze(-1)
-        if counted.numel():
-            self.value_norm.update(counted)
         normalise = self.value_norm.normalize
         return normalise(target_return), normalise(state_value), old_state_value
 

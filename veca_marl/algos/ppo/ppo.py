@@ -9,14 +9,14 @@ from tensordict import TensorDictBase
 from tensordict.nn import TensorDictModuleBase
 from torch import nn
 from torchrl.data import LazyTensorStorage, SamplerWithoutReplacement, TensorDictReplayBuffer
-from torchrl.modules import PopArtValueNorm
 from torchrl.objectives import KLAdaptiveLR
 
 from veca_marl.algos.algorithm import Algorithm
 from veca_marl.algos.networks.factory import TeamNetwork, make_network
 from veca_marl.algos.ppo.advantages import advantages
-from veca_marl.algos.ppo.config import PPOCfg, ValueNormalisation
+from veca_marl.algos.ppo.config import PPOCfg
 from veca_marl.algos.ppo.losses import VALID, TeamPPOLoss
+from veca_marl.algos.ppo.value_normalisation import NormalisedCritic, ValueNormalisation
 from veca_marl.algos.specs import TeamSpec
 
 _MEASURES = {  # name in the logs: name in the loss
@@ -46,8 +46,12 @@ class PPO(Algorithm):
 
     def __init__(self, team: str, spec: TeamSpec, cfg: PPOCfg, device: torch.device) -> None:
         self.team, self.cfg, self._masked, self._device = team, cfg, spec.masked, device
-        self.network = make_network(team, spec, cfg.network).to(device)
+        self.network = make_network(team, spec, cfg.network)
+        self.normalised_critic = _normalise_values(team, self.network, cfg.value_normalisation)
+        self.network.to(device)
         self.loss = _make_loss(team, self.network, cfg).to(device)
+        if self.normalised_critic is not None:
+            self.loss.value_norm = self.normalised_critic.statistics
         self.optimizer = torch.optim.Adam(self.network.parameters(), lr=cfg.learning_rate)
         self.schedule = KLAdaptiveLR(
             self.optimizer,
@@ -84,6 +88,11 @@ class PPO(Algorithm):
 
     def learn_rows(self, rows: TensorDictBase) -> dict[str, float]:
         """Make all epochs over `rows` and return the mean of each measure."""
+        if self.normalised_critic is not None:
+            targets = rows[self.team, "value_target"]
+            self.normalised_critic.update(
+                targets[rows[self.team, "mask"]] if self._masked else targets.flatten(0, -2)
+            )
         memory = self._fill_memory(rows)
         measured: list[dict[str, float]] = []
         for _ in range(self.cfg.epochs):
@@ -126,7 +135,7 @@ class PPO(Algorithm):
         return measured | {"gradient_norm": float(norm)}
 
     def state_dict(self) -> dict[str, Any]:
-        """See `Algorithm`: network, optimiser, learning rate, statistics of the value targets."""
+        """See `Algorithm`: network with its value statistics, optimiser, learning rate."""
         return {name: part.state_dict() for name, part in self._parts().items()}
 
     def load_state_dict(self, state: dict[str, Any]) -> None:
@@ -135,13 +144,11 @@ class PPO(Algorithm):
             part.load_state_dict(state[name])
 
     def _parts(self) -> dict[str, Any]:
-        parts = {
+        return {
             "network": self.network,
             "optimizer": self.optimizer,
             "schedule": self.schedule,
         }
-        norm = self.loss.value_norm
-        return parts if norm is None else parts | {"value_norm": norm}
 
     def warm_start(self, other: Algorithm) -> None:
         """See `Algorithm`: takes over actor and critic.
@@ -194,9 +201,20 @@ def _make_loss(team: str, network: TeamNetwork, cfg: PPOCfg) -> TeamPPOLoss:
         advantage=(team, "advantage"),
         value_target=(team, "value_target"),
     )
-    popart = cfg.value_normalisation is ValueNormalisation.popart
-    loss.value_norm = PopArtValueNorm(shape=1) if popart else None
+    loss.value_norm = None
     return loss
+
+
+def _normalise_values(
+    team: str, network: TeamNetwork, kind: ValueNormalisation
+) -> NormalisedCritic | None:
+    """Let the critic of `network` predict normalised values, unless `kind` is ``none``."""
+    if kind is ValueNormalisation.none:
+        return None
+    preserve = kind is ValueNormalisation.popart
+    normalised = NormalisedCritic(network.critic, (team, "state_value"), preserve)
+    network.critic = normalised.critic
+    return normalised
 
 
 def _mean(measures: list[dict[str, float]]) -> dict[str, float]:
