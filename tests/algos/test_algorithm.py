@@ -12,7 +12,10 @@ from veca_marl.algos.algorithm import (
     make_algorithm,
     register_algorithm,
 )
+from veca_marl.algos.networks.action_values import ActionValuesCfg
 from veca_marl.algos.ppo import PPO, PPOCfg
+from veca_marl.algos.sac import SACCfg
+from veca_marl.algos.sac.config import ReplayCfg
 from veca_marl.algos.selfplay.pool import Pool
 from veca_marl.algos.selfplay.self_play import SelfPlay, SelfPlayCfg
 from veca_marl.algos.specs import team_specs
@@ -29,6 +32,14 @@ register()
 CPU = torch.device("cpu")
 ALL = {
     "ppo": PPOCfg(network=SMALL),
+    "sac": SACCfg(
+        network=SMALL,
+        critic=ActionValuesCfg(hidden=[32]),
+        policy_hidden=[],
+        replay=ReplayCfg(4096, warm_up_frames=64),
+        learning_rate=1e-2,
+        updates_per_frame=0.06,
+    ),
     "toy_dqn": ToyDQNCfg(),
     "forgetful_dqn": ForgetfulDQNCfg(),
 }

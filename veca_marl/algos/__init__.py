@@ -3,6 +3,6 @@
 Importing it registers the algorithms that ship with the package.
 """
 
-from veca_marl.algos import ppo
+from veca_marl.algos import ppo, sac
 
-__all__ = ["ppo"]
+__all__ = ["ppo", "sac"]

@@ -8,7 +8,7 @@ then chosen by ``algo/network=NAME`` on the command line.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -20,7 +20,7 @@ from tensordict.nn import (
 from torch import nn
 
 from veca_marl.algos.algorithm import check_entry
-from veca_marl.algos.networks.initialisation import orthogonal
+from veca_marl.algos.networks.initialisation import orthogonal, perceptron
 from veca_marl.algos.networks.policy_heads import action_distribution, policy_head
 from veca_marl.algos.specs import TeamSpec
 from veca_marl.registry import Registry
@@ -63,23 +63,45 @@ class NetworkFactory(ABC):
         returns `networks.memory.memory_primer`.
         """
 
-    def actor(self, encoder: TensorDictModuleBase) -> ProbabilisticTensorDictSequential:
-        """Return `encoder`, a head for each part of the action, and the distribution."""
+    def per_agent(self, make: Callable[[], nn.Module], ranks: Sequence[int] = (1,)) -> nn.Module:
+        """Return one module for all agents of the team, or one that holds a module for each.
+
+        Args:
+            make: Makes one module, which maps ``(..., agents, *shape)`` to ``(..., agents, F)``.
+            ranks: Number of dimensions of each input's `shape`.
+        """
+        return make()
+
+    @property
+    def central_critic(self) -> bool:
+        """Whether an agent's critic reads what its whole team observes."""
+        return False
+
+    def actor(
+        self, encoder: TensorDictModuleBase, hidden: Sequence[int] = ()
+    ) -> ProbabilisticTensorDictSequential:
+        """Return `encoder`, a head for each part of the action, and the distribution.
+
+        Args:
+            encoder: Writes the features.
+            hidden: Widths of hidden layers in each head.
+        """
         heads = [
-            policy_head(self.team, part, layout, self.policy_layer(layout.parameters))
+            policy_head(self.team, part, layout, self.policy_layer(layout.parameters, hidden))
             for part, layout in self.spec.actions.items()
         ]
         return ProbabilisticTensorDictSequential(
             encoder, *heads, action_distribution(self.team, self.spec.actions)
         )
 
-    def policy_layer(self, outputs: int) -> nn.Module:
-        """Return the layer from features to the parameters of a distribution.
+    def policy_layer(self, outputs: int, hidden: Sequence[int] = ()) -> nn.Module:
+        """Return the layers from features to the parameters of a distribution.
 
-        Its gain is small, so that the first policy hardly depends on the observation.
+        The gain of the last one is small, so that the first policy hardly depends on the
+        observation.
         Source: Huang et al. 2022, "The 37 implementation details of PPO", detail 2.
         """
-        return orthogonal(nn.Linear(self.features, outputs), gain=0.01)
+        return self.per_agent(lambda: perceptron(self.features, hidden, outputs, gain=0.01))
 
     def critic(self) -> TensorDictModuleBase:
         """Return the module from ``(team, "features")`` to ``(team, "state_value")``."""
@@ -141,4 +163,13 @@ def make_network(team: str, spec: TeamSpec, cfg: NetworkCfg) -> TeamNetwork:
     Raises:
         ValueError: If there is no network called ``cfg.name``.
     """
-    return TeamNetwork(NETWORKS.find(cfg.name).factory(team, spec, cfg))
+    return TeamNetwork(find_network(team, spec, cfg))
+
+
+def find_network(team: str, spec: TeamSpec, cfg: NetworkCfg) -> NetworkFactory:
+    """Return what makes the parts of a team's network as `cfg` describes it.
+
+    Raises:
+        ValueError: If there is no network called ``cfg.name``.
+    """
+    return NETWORKS.find(cfg.name).factory(team, spec, cfg)

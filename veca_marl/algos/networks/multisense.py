@@ -137,19 +137,19 @@ class Multisense(NetworkFactory):
         layouts = self.spec.observations
         ranks = [len(layout.shape) for layout in layouts.values()]
         return TensorDictModule(
-            self._for_agents(lambda: Trunk(layouts, self.cfg), ranks),
+            self.per_agent(lambda: Trunk(layouts, self.cfg), ranks),
             in_keys=[(self.team, "observation", name) for name in layouts],
             out_keys=[(self.team, "features")],
         )
 
-    def policy_layer(self, outputs: int) -> nn.Module:
-        """See `NetworkFactory`; shared by the agents or not."""
-        base = super().policy_layer
-        return self._for_agents(lambda: base(outputs))
+    @property
+    def central_critic(self) -> bool:
+        """See `NetworkFactory`."""
+        return self.cfg.critic is Critic.central
 
     def critic(self) -> TensorDictModule:
         """Return the value head; a central one also reads which agents are present."""
-        width, central = self.features, self.cfg.critic is Critic.central
+        width, central = self.features, self.central_critic
 
         def own() -> nn.Module:
             return orthogonal(nn.Linear(width, 1), gain=1.0)
@@ -158,7 +158,7 @@ class Multisense(NetworkFactory):
             layers = orthogonal(nn.Linear(2 * width, width)), nn.ReLU()
             return nn.Sequential(*layers, orthogonal(nn.Linear(width, 1), gain=1.0))
 
-        head = self._for_agents(joint if central else own)
+        head = self.per_agent(joint if central else own)
         masked = central and self.spec.masked
         return TensorDictModule(
             CentralValue(head) if central else head,
@@ -166,8 +166,8 @@ class Multisense(NetworkFactory):
             out_keys=[(self.team, "state_value")],
         )
 
-    def _for_agents(self, make: Callable[[], nn.Module], ranks: Sequence[int] = (1,)) -> nn.Module:
-        """Return one module for the whole team, or one for each of its agents."""
+    def per_agent(self, make: Callable[[], nn.Module], ranks: Sequence[int] = (1,)) -> nn.Module:
+        """See `NetworkFactory`."""
         if self.cfg.parameters is Parameters.shared:
             return make()
         return PerAgent(make, self.spec.agents, ranks)

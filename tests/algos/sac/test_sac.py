@@ -1,0 +1,96 @@
+"""SAC learns the toy problem with every form of action, counts its updates and is stored."""
+
+import math
+
+import pytest
+import torch
+from fake_env import FakeEnv
+from training import SMALL
+
+from veca_marl.algos.networks.multisense import Critic, MultisenseCfg, Parameters
+from veca_marl.algos.sac.config import ReplayCfg, SACCfg
+
+FORMS = {"continuous": {}, "discrete": {"discrete": True}, "hybrid": {"hybrid": True}}
+
+
+@torch.no_grad()
+def return_of(policy, **env):
+    """Return the mean reward of the policy's most likely actions; a random policy has 0."""
+    played = FakeEnv(8, 7, senses=("audio",), **env).rollout(
+        16, policy=policy, break_when_any_done=False
+    )
+    return float(played["next", "agents", "reward"].mean())
+
+
+@pytest.mark.parametrize("form", FORMS.values(), ids=FORMS.keys())
+def test_it_learns_every_form_of_action(make_sac, collect, form):
+    algorithm = make_sac(**form)
+    for seed in range(8):
+        algorithm.learn(collect(algorithm, seed=seed, **form))
+    assert return_of(algorithm.actor, **form) > 0.9
+
+
+@pytest.mark.parametrize(
+    ("critic", "parameters"),
+    [(Critic.central, Parameters.shared), (Critic.own, Parameters.separate)],
+)
+def test_teams_learn_with_every_kind_of_parameters_and_critic(
+    make_sac, collect, critic, parameters
+):
+    network = MultisenseCfg(**vars(SMALL) | {"critic": critic, "parameters": parameters})
+    team = {"agents": 2, "hybrid": True}
+    algorithm = make_sac(changes={"network": network}, **team)
+    for seed in range(8):
+        algorithm.learn(collect(algorithm, seed=seed, **team))
+    assert return_of(algorithm.actor, **team) > 0.8
+
+
+def test_updates_follow_the_frames_and_begin_after_the_warm_up(make_sac, collect):
+    changes = {"updates_per_frame": 0.05, "replay": ReplayCfg(1024, warm_up_frames=100)}
+    algorithm = make_sac(changes=changes)
+    rows = [algorithm.learn(collect(algorithm, seed=seed)) for seed in range(4)]
+    assert list(rows[0]) == list(algorithm.measures)
+    assert math.isnan(rows[0]["critic_loss"])
+    assert math.isfinite(rows[1]["critic_loss"])
+    # 64 frames a batch: 3.2 updates from the second batch on, fractions carried over
+    assert [row["updates"] for row in rows] == [0.0, 3.0, 6.0, 9.0]
+    assert rows[-1]["updates_per_frame"] == pytest.approx(9 / 256)
+
+
+def test_actions_are_uniform_until_the_first_update(make_sac, collect):
+    algorithm = make_sac(discrete=True)
+    with torch.no_grad():
+        algorithm.network.actor[1].module.bias.copy_(torch.tensor([50.0, -50.0]))
+    share = [float(collect(algorithm, discrete=True)["agents", "action"].float().mean())]
+    algorithm.learn(collect(algorithm, discrete=True))
+    share.append(float(collect(algorithm, discrete=True)["agents", "action"].float().mean()))
+    assert share[0] == pytest.approx(0.5, abs=0.2)
+    assert share[1] < 0.1
+
+
+def test_a_gradient_that_is_not_finite_is_reported(make_sac, collect):
+    algorithm = make_sac()
+    batch = collect(algorithm)
+    batch["next", "agents", "reward"][:] = math.nan
+    with pytest.raises(FloatingPointError, match="team 'agents': the gradient is nan"):
+        algorithm.learn(batch)
+
+
+@pytest.mark.parametrize(
+    ("numbers", "message"),
+    [
+        ({"gamma": 1.5}, r"algo.gamma must be in \[0, 1\], got 1.5"),
+        ({"tau": 0.0}, r"algo.tau must be in \(0, 0.5\], got 0.0"),
+        ({"batch_size": 0}, "algo.batch_size must be at least 1, got 0"),
+        ({"learning_rate": -1.0}, "algo.learning_rate must be positive, got -1.0"),
+        ({"policy_hidden": [0]}, r"algo.policy_hidden: widths must be positive, got \[0\]"),
+    ],
+)
+def test_impossible_numbers_are_refused(numbers, message):
+    with pytest.raises(ValueError, match=message):
+        SACCfg(**numbers)
+
+
+def test_a_replay_buffer_that_is_too_small_for_a_batch_is_refused():
+    with pytest.raises(ValueError, match="capacity=100 must be at least twice the 64 frames"):
+        SACCfg(replay=ReplayCfg(100, 10)).check_batch(64)

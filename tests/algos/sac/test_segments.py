@@ -1,0 +1,160 @@
+"""Rows of the replay buffer: each observation once, and windows that stay inside an episode."""
+
+import torch
+from fake_env import FakeEnv
+from tensordict import TensorDict
+
+from veca_marl.algos.sac.config import ReplayCfg
+from veca_marl.algos.sac.replay import Replay
+from veca_marl.algos.sac.segments import END, StoredKeys, segment_rows
+from veca_marl.algos.sac.windows import transitions
+from veca_marl.algos.specs import ActionLayout, ArrayLayout, TeamSpec
+
+SPEC = TeamSpec(
+    agents=2,
+    observations={"time": ArrayLayout((), "float32", 0.0, 1e6)},
+    actions={"action": ActionLayout(discrete=False, size=1)},
+    masked=True,
+)
+GAMMA = 0.5
+
+
+def batch_of(worlds=2, steps=6, done=(), terminated=(), eliminated=(), start=0.0):
+    """Return a batch in which an observation is 1000 x world + time, and a reward 1 + time.
+
+    `done` and `terminated` name (world, step) of all agents, `eliminated` (world, step) after
+    which the second agent is eliminated until the episode ends.
+    """
+    lead = (worlds, steps, 2)
+    clock = torch.arange(steps).float() + start
+    time = (1000.0 * torch.arange(worlds)[:, None] + clock).unsqueeze(-1).expand(lead)
+    flags = {
+        "done": torch.zeros(worlds, steps, 1, dtype=torch.bool),
+        "terminated": torch.zeros(*lead, 1, dtype=torch.bool),
+    }
+    mask = torch.ones(worlds, steps + 1, 2, dtype=torch.bool)
+    for world, step in (*done, *terminated):
+        flags["done"][world, step] = True
+    for world, step in terminated:
+        flags["terminated"][world, step] = True
+    for world, step in eliminated:
+        flags["terminated"][world, step:, 1] = True
+        mask[world, step + 1 :, 1] = False
+    return TensorDict(
+        {
+            "team": {
+                "observation": {"time": time},
+                "action": time.unsqueeze(-1) / 1e4,
+                "mask": mask[:, :-1],
+            },
+            "next": {
+                "done": flags["done"],
+                "team": {
+                    "observation": {"time": time + 0.5},
+                    "mask": mask[:, 1:],
+                    "reward": (1.0 + clock)[None, :, None, None].expand(*lead, 1),
+                    "terminated": flags["terminated"],
+                },
+            },
+        },
+        (worlds, steps),
+    )
+
+
+def rows_of(batch):
+    return segment_rows(batch, StoredKeys.of("team", SPEC))
+
+
+def replay_of(*batches, capacity=200, steps=3, windows=512):
+    torch.manual_seed(0)
+    replay = Replay("team", SPEC, ReplayCfg(capacity, warm_up_frames=0), steps, windows)
+    for batch in batches:
+        replay.extend(batch)
+    return replay
+
+
+def sample_of(replay):
+    """Return (first, last, returns, discount) of the windows of the first agent."""
+    found = transitions(replay.sample(), "team", GAMMA)
+    arrays = (
+        found.first["team", "observation", "time"],
+        found.last["team", "observation", "time"],
+        found.returns,
+        found.discount,
+    )
+    counted = found.counted[:, 0]
+    return {tuple(a[i, 0].item() for a in arrays) for i in counted.nonzero().flatten()}
+
+
+def test_each_observation_is_stored_once_and_segments_end_with_the_following_one():
+    rows = rows_of(batch_of(steps=4, done=[(0, 1)]))
+    time = rows["team", "observation", "time"][:, 0].tolist()
+    assert time == [0.0, 1.0, 1.5, 2.0, 3.0, 3.5, 1000.0, 1001.0, 1002.0, 1003.0, 1003.5]
+    ends = [2, 5, 10]
+    assert rows[END].nonzero().flatten().tolist() == ends
+    assert rows["team", "action"][ends].abs().sum() == 0.0
+    assert rows["team", "reward"][:, 0, 0].tolist() == [1, 2, 0, 3, 4, 0, 1, 2, 3, 4, 0]
+
+
+def test_returns_of_a_window_inside_an_episode():
+    # rewards 1, 2, 3 from step 0: 1 + 2 / 2 + 3 / 4
+    assert (0.0, 3.0, 2.75, 0.125) in sample_of(replay_of(batch_of()))
+
+
+def test_windows_end_at_a_truncation_and_take_the_value_of_the_true_last_observation():
+    found = sample_of(replay_of(batch_of(worlds=1, done=[(0, 3)])))
+    assert found == {
+        (0.0, 3.0, 2.75, 0.125),
+        (1.0, 3.5, 2.0 + 1.5 + 1.0, 0.125),
+        (2.0, 3.5, 3.0 + 2.0, 0.25),
+        (3.0, 3.5, 4.0, 0.5),
+        (4.0, 5.5, 5.0 + 3.0, 0.25),
+        (5.0, 5.5, 6.0, 0.5),
+    }
+
+
+def test_a_terminated_window_has_no_value_after_it():
+    found = sample_of(replay_of(batch_of(worlds=1, steps=3, terminated=[(0, 1)])))
+    assert found == {(0.0, 1.5, 2.0, 0.0), (1.0, 1.5, 2.0, 0.0), (2.0, 2.5, 3.0, 0.5)}
+
+
+def test_an_agent_that_is_eliminated_ends_alone():
+    replay = replay_of(batch_of(worlds=1, steps=4, eliminated=[(0, 1)]))
+    found = transitions(replay.sample(), "team", GAMMA)
+    time = found.first["team", "observation", "time"][:, 0]
+    start = (time == 0.0) & found.counted[:, 0]
+    torch.testing.assert_close(found.discount[start][0], torch.tensor([0.125, 0.0]))
+    torch.testing.assert_close(found.returns[start][0], torch.tensor([2.75, 2.0]))
+    later = (time == 2.0) & found.counted[:, 0]
+    assert later.any()
+    assert not found.counted[later, 1].any()  # the mask of the first row
+
+
+def test_windows_do_not_connect_worlds_batches_or_the_ends_of_the_ring():
+    batches = [batch_of(start=10.0 * i) for i in range(12)]
+    found = sample_of(replay_of(*batches, capacity=50))
+    assert len(found) > 30
+    for first, last, *_ in found:
+        assert first // 10 == last // 10  # batches of a world begin at multiples of 10
+        assert 0.0 < last - first <= 3.0
+
+
+def test_a_terminated_flag_after_the_window_is_ignored():
+    found = sample_of(replay_of(batch_of(worlds=1, steps=5, terminated=[(0, 3)])))
+    assert (0.0, 3.0, 2.75, 0.125) in found
+
+
+def test_truncation_of_an_environment_keeps_its_final_observation():
+    torch.manual_seed(0)
+    env = FakeEnv(1, 0, horizon=4, senses=("audio",))
+    with torch.no_grad():
+        batch = env.rollout(8, break_when_any_done=False)
+    spec = TeamSpec(
+        1,
+        {"audio": ArrayLayout((2, 10), "float32", -8.0, 3.0)},
+        {"action": ActionLayout(discrete=False, size=2)},
+    )
+    rows = segment_rows(batch, StoredKeys.of("agents", spec))
+    final = rows["agents", "observation", "audio"][4]
+    assert torch.equal(final, batch["next", "agents", "observation", "audio"][0, 3])
+    assert rows[END].tolist() == [i % 5 == 4 for i in range(10)]

@@ -1,0 +1,159 @@
+"""Critics that read an action: the values of off-policy algorithms."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from enum import Enum
+from functools import partial
+
+import torch
+from torch import Tensor, nn
+
+from veca_marl.algos.networks.factory import NetworkCfg, NetworkFactory, find_network
+from veca_marl.algos.networks.initialisation import perceptron
+from veca_marl.algos.specs import TeamSpec
+
+
+class Normalisation(Enum):
+    """Normalisation before each activation of the critics' hidden layers.
+
+    Attributes:
+        none: No normalisation.
+        layer: Layer normalisation (Ba et al. 2016).
+    """
+
+    none = "none"
+    layer = "layer"
+
+
+_LAYERS: dict[Normalisation, type[nn.Module] | None] = {
+    Normalisation.none: None,
+    Normalisation.layer: nn.LayerNorm,
+}
+
+
+@dataclass
+class ActionValuesCfg:
+    """Sizes of the critics.
+
+    Attributes:
+        critics: Number of critics; targets use the smallest of their values (clipped double
+            Q-learning, Fujimoto et al. 2018).
+        hidden: Widths of the hidden layers of each critic, on top of the encoder.
+        normalisation: Normalisation of the hidden layers.
+    """
+
+    critics: int = 2
+    hidden: list[int] = field(default_factory=lambda: [256, 256])
+    normalisation: Normalisation = Normalisation.none
+
+    def __post_init__(self) -> None:
+        if self.critics < 1:
+            raise ValueError(f"critic.critics must be at least 1, got {self.critics}")
+        if any(width < 1 for width in self.hidden):
+            raise ValueError(f"critic.hidden: widths must be positive, got {list(self.hidden)}")
+
+
+class ActionValues(nn.Module):
+    """Values of a team's actions: one for each combination of the discrete choices.
+
+    The continuous parts of the action are an input. Every combination of the discrete parts has
+    an output, so that an expectation over them is exact (Delalleau et al. 2019, "Discrete and
+    continuous action representation for practical RL in video games"); without discrete parts
+    there is one output.
+
+    A central critic also reads the mean, over the other agents of the team that are present, of
+    their features and actions (discrete parts one-hot).
+
+    Args:
+        factory: Makes the networks of the team.
+        cfg: Sizes.
+
+    Attributes:
+        combinations: Number of outputs, the product of the numbers of choices.
+        central: Whether the critics read what the other agents observe and do.
+    """
+
+    def __init__(self, factory: NetworkFactory, cfg: ActionValuesCfg) -> None:
+        super().__init__()
+        layouts = factory.spec.actions.values()
+        vector = sum(layout.size for layout in layouts if not layout.discrete)
+        choices = [layout.size for layout in layouts if layout.discrete]
+        self.combinations = math.prod(choices)
+        self.central = factory.central_critic
+        inputs = factory.features + vector
+        if self.central:
+            inputs += factory.features + vector + sum(choices)
+        make = partial(
+            perceptron, inputs, cfg.hidden, self.combinations, norm=_LAYERS[cfg.normalisation]
+        )
+        self.critics = nn.ModuleList(factory.per_agent(make) for _ in range(cfg.critics))
+
+    def forward(self, features: Tensor, vector: Tensor, others: Tensor | None = None) -> Tensor:
+        """Return values ``(critics, ..., agents, combinations)``.
+
+        Args:
+            features: ``(..., agents, F)``.
+            vector: Continuous parts of the action, joined: ``(..., agents, A)``, A may be 0.
+            others: What `mean_of_others` returned; for central critics.
+        """
+        inputs = [features, vector] if others is None else [features, vector, others]
+        joined = torch.cat(inputs, dim=-1)
+        return torch.stack([critic(joined) for critic in self.critics])
+
+
+def mean_of_others(arrays: Tensor, mask: Tensor | None) -> Tensor:
+    """Return for each agent the mean over the other agents that are present; zeros if none is.
+
+    Args:
+        arrays: ``(..., agents, F)``.
+        mask: ``(..., agents)``, False for agents that are eliminated; None for none.
+    """
+    present = torch.ones_like(arrays[..., :1], dtype=torch.bool)
+    if mask is not None:
+        present = mask.unsqueeze(-1)
+    counted = torch.where(present, arrays, torch.zeros_like(arrays))
+    total = counted.sum(-2, keepdim=True) - counted
+    count = present.sum(-2, keepdim=True) - present.long()
+    return total / count.clamp_min(1)
+
+
+class ActorCritics(nn.Module):
+    """Actor and action values of one team over a shared encoder.
+
+    Attributes:
+        encoder: Writes ``(team, "features")``.
+        actor: Encoder, policy heads and distribution.
+        values: The critics, which read features and actions.
+    """
+
+    def __init__(
+        self, factory: NetworkFactory, critic: ActionValuesCfg, policy_hidden: list[int]
+    ) -> None:
+        super().__init__()
+        self.encoder = factory.encoder()
+        self.actor = factory.actor(self.encoder, policy_hidden)
+        self.values = ActionValues(factory, critic)
+
+
+def make_actor_critics(
+    team: str,
+    spec: TeamSpec,
+    cfg: NetworkCfg,
+    critic: ActionValuesCfg,
+    policy_hidden: list[int],
+) -> ActorCritics:
+    """Return the network of a team.
+
+    Args:
+        team: Name of the team.
+        spec: Its arrays.
+        cfg: Which encoder, and its numbers.
+        critic: Sizes of the critics.
+        policy_hidden: Widths of the hidden layers between features and policy heads.
+
+    Raises:
+        ValueError: If there is no network called ``cfg.name``.
+    """
+    return ActorCritics(find_network(team, spec, cfg), critic, policy_hidden)

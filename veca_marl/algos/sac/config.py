@@ -1,0 +1,153 @@
+"""The numbers of soft actor-critic."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import Enum
+
+from veca_marl.algos.algorithm import AlgorithmCfg
+from veca_marl.algos.networks.action_values import ActionValuesCfg
+from veca_marl.algos.networks.factory import NetworkCfg
+from veca_marl.algos.networks.multisense import MultisenseCfg
+
+
+class EncoderGradient(Enum):
+    """Which loss trains the encoder, which actor and critics share.
+
+    Attributes:
+        both: The losses of the critics and of the policy.
+        critic: The loss of the critics alone; the policy reads the features without gradient
+            (Yarats et al. 2021, "Improving sample efficiency in model-free RL from images").
+    """
+
+    both = "both"
+    critic = "critic"
+
+
+class Adaptation(Enum):
+    """How a temperature changes.
+
+    Attributes:
+        fixed: Stays at its initial value.
+        automatic: Learnt so that the entropy stays near its target (Haarnoja et al. 2018, "Soft
+            actor-critic algorithms and applications").
+    """
+
+    fixed = "fixed"
+    automatic = "automatic"
+
+
+@dataclass
+class TemperatureCfg:
+    """The weight alpha of the entropy, one for each part of the action.
+
+    Attributes:
+        initial: Initial value.
+        adaptation: How it changes.
+        entropy_per_dimension: Target entropy of a continuous part in nats, for each of its
+            dimensions (-1: Haarnoja et al. 2018; the uniform policy on [-1, 1] has 0.69).
+        entropy_of_choices: Target entropy of a discrete part as a share of that of the uniform
+            policy (ours; Christodoulou 2019 takes 0.98, which is close to a random policy).
+    """
+
+    initial: float = 0.01
+    adaptation: Adaptation = Adaptation.fixed
+    entropy_per_dimension: float = -1.0
+    entropy_of_choices: float = 0.3
+
+    def __post_init__(self) -> None:
+        if not self.initial > 0.0:
+            raise ValueError(f"temperature.initial must be positive, got {self.initial}")
+        if not 0.0 <= self.entropy_of_choices <= 1.0:
+            raise ValueError(
+                f"temperature.entropy_of_choices must be in [0, 1], got {self.entropy_of_choices}"
+            )
+
+
+@dataclass
+class ReplayCfg:
+    """The replay buffer.
+
+    Attributes:
+        capacity: Number of observations that are stored; the oldest are overwritten. Each end of an
+            episode or of a batch takes one more than there are frames.
+        warm_up_frames: Frames before the first update; the actions are uniformly random until then.
+    """
+
+    capacity: int = 50_000
+    warm_up_frames: int = 2_000
+
+    def __post_init__(self) -> None:
+        if self.warm_up_frames < 0:
+            raise ValueError(f"replay.warm_up_frames must be 0 or more, got {self.warm_up_frames}")
+        if self.capacity < max(self.warm_up_frames, 1):
+            raise ValueError(
+                f"replay.capacity={self.capacity} must be at least "
+                f"replay.warm_up_frames={self.warm_up_frames}"
+            )
+
+
+@dataclass
+class SACCfg(AlgorithmCfg):
+    """Numbers of SAC; the defaults are those of the paper's table where it gives them.
+
+    The table gives learning rate, batch size, temperature, gradient norm and discount. The others
+    are ours, unless a source is named.
+
+    Attributes:
+        network: The encoder and its sizes; whether agents share parameters and what critics read.
+        critic: Sizes of the critics.
+        policy_hidden: Widths of the hidden layers between features and policy heads.
+        encoder_gradient: Which loss trains the encoder.
+        temperature: Weight of the entropy.
+        replay: The replay buffer.
+        gamma: Discount.
+        steps: Number of rewards in a target before the value of the observation that follows
+            (n-step returns; without correction for the policy that acted).
+        learning_rate: Step size of Adam, for all parameters.
+        batch_size: Frames in an update; those at which a batch or an episode ended are left out.
+        max_gradient_norm: The gradients of critics with encoder, and of policy heads, are each
+            scaled down to this norm.
+        tau: Share of the critics' parameters in the moving average that gives the targets (0.005:
+            Haarnoja et al. 2018).
+        updates_per_frame: Updates for each frame that is collected.
+    """
+
+    name: str = "sac"
+    network: NetworkCfg = field(default_factory=MultisenseCfg)
+    critic: ActionValuesCfg = field(default_factory=ActionValuesCfg)
+    policy_hidden: list[int] = field(default_factory=lambda: [256])
+    encoder_gradient: EncoderGradient = EncoderGradient.both
+    temperature: TemperatureCfg = field(default_factory=TemperatureCfg)
+    replay: ReplayCfg = field(default_factory=ReplayCfg)
+    gamma: float = 0.99
+    steps: int = 1
+    learning_rate: float = 2.5e-4
+    batch_size: int = 64
+    max_gradient_norm: float = 5.0
+    tau: float = 0.005
+    updates_per_frame: float = 0.125
+
+    def __post_init__(self) -> None:
+        if not 0.0 <= self.gamma <= 1.0:
+            raise ValueError(f"algo.gamma must be in [0, 1], got {self.gamma}")
+        if not 0.0 < self.tau <= 0.5:
+            raise ValueError(f"algo.tau must be in (0, 0.5], got {self.tau}")
+        for name in ("learning_rate", "max_gradient_norm", "updates_per_frame"):
+            if not getattr(self, name) > 0.0:
+                raise ValueError(f"algo.{name} must be positive, got {getattr(self, name)}")
+        for name in ("steps", "batch_size"):
+            if getattr(self, name) < 1:
+                raise ValueError(f"algo.{name} must be at least 1, got {getattr(self, name)}")
+        if any(width < 1 for width in self.policy_hidden):
+            raise ValueError(
+                f"algo.policy_hidden: widths must be positive, got {list(self.policy_hidden)}"
+            )
+
+    def check_batch(self, frames: int) -> None:
+        """See `AlgorithmCfg`: the replay buffer takes a batch and the ends of its episodes."""
+        if self.replay.capacity < 2 * frames:
+            raise ValueError(
+                f"algo.replay.capacity={self.replay.capacity} must be at least twice the "
+                f"{frames} frames of a batch"
+            )

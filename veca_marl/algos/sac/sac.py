@@ -1,0 +1,188 @@
+"""Soft actor-critic of one team: replay buffer, updates, state."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import torch
+from tensordict import TensorDictBase
+from tensordict.nn import TensorDictModuleBase, TensorDictSequential
+from torch import nn
+from torchrl.objectives import SoftUpdate
+
+from veca_marl.algos.algorithm import Algorithm
+from veca_marl.algos.networks.action_values import make_actor_critics
+from veca_marl.algos.networks.exploration import UniformWarmUp
+from veca_marl.algos.sac.config import SACCfg
+from veca_marl.algos.sac.joint_action import JointAction
+from veca_marl.algos.sac.loss import TeamSACLoss
+from veca_marl.algos.sac.replay import Replay
+from veca_marl.algos.sac.temperature import Temperatures
+from veca_marl.algos.sac.windows import transitions
+from veca_marl.algos.specs import PLAIN, TeamSpec
+
+
+class SAC(Algorithm):
+    """Network, replay buffer, losses and optimiser of one team.
+
+    Actions are samples of the policy; uniformly random ones before the first update.
+
+    Args:
+        team: Name of the team: the first part of all its keys.
+        spec: Its arrays.
+        cfg: The numbers.
+        device: Where it learns.
+    """
+
+    exact_resume = False
+
+    def __init__(self, team: str, spec: TeamSpec, cfg: SACCfg, device: torch.device) -> None:
+        self.team, self.cfg, self._device = team, cfg, device
+        self.network = make_actor_critics(
+            team, spec, cfg.network, cfg.critic, list(cfg.policy_hidden)
+        ).to(device)
+        self.temperatures = Temperatures(spec.actions, cfg.temperature).to(device)
+        self.loss = TeamSACLoss(
+            team,
+            self.network,
+            JointAction(team, spec.actions),
+            self.temperatures,
+            cfg.encoder_gradient,
+        ).to(device)
+        self.targets = SoftUpdate(self.loss, tau=cfg.tau)
+        self._critics = [*self.network.encoder.parameters(), *self.network.values.parameters()]
+        self._policy = list(self.loss.policy.parameters())
+        learnt = [*self._critics, *self._policy, *self.temperatures.parameters()]
+        self.optimizer = torch.optim.Adam(learnt, lr=cfg.learning_rate)
+        self.replay = Replay(team, spec, cfg.replay, cfg.steps, cfg.batch_size)
+        self._warm_up = UniformWarmUp(team, spec).to(device)
+        self._explorer = TensorDictSequential(self.network.actor, self._warm_up)
+        self._updates, self._due = 0, 0.0
+
+    @property
+    def actor(self) -> TensorDictModuleBase:
+        """See `Algorithm`."""
+        return self.network.actor
+
+    @property
+    def explorer(self) -> TensorDictModuleBase:
+        """See `Algorithm`."""
+        return self._explorer
+
+    @property
+    def measures(self) -> list[str]:
+        """See `Algorithm`."""
+        return [*_MEASURES, *(_name(part) for part in self.temperatures.targets), *_COUNTS]
+
+    def learn(self, batch: TensorDictBase) -> dict[str, float]:
+        """See `Algorithm`: store the batch and make the updates that are due."""
+        self.replay.extend(batch)
+        measured = [self.update() for _ in range(self._take_due(batch.numel()))]
+        self._updates += len(measured)
+        self._warm_up.active.fill_(not self.replay.ready)
+        return _mean(measured) | self._alphas() | self._counts()
+
+    def _take_due(self, frames: int) -> int:
+        """Return the number of updates for a batch of so many frames."""
+        if not self.replay.ready:
+            return 0
+        self._due += frames * self.cfg.updates_per_frame
+        whole = math.floor(self._due)
+        self._due -= whole
+        return whole
+
+    def update(self) -> dict[str, float]:
+        """Take one gradient step on a sample of the replay buffer and return what was measured.
+
+        Raises:
+            FloatingPointError: If the gradient is not finite.
+        """
+        windows = self.replay.sample().to(self._device)
+        losses = self.loss(transitions(windows, self.team, self.cfg.gamma))
+        self.optimizer.zero_grad()
+        (losses.critic + losses.policy + losses.temperature).backward()
+        norms = [self._clip(self._critics), self._clip(self._policy)]
+        self.optimizer.step()
+        self.targets.step()
+        numbers = losses.measures | {"critic_loss": losses.critic, "policy_loss": losses.policy}
+        measured = {name: float(number.detach()) for name, number in numbers.items()}
+        return measured | {"critic_gradient_norm": norms[0], "policy_gradient_norm": norms[1]}
+
+    def _clip(self, parameters: list[nn.Parameter]) -> float:
+        norm = float(nn.utils.clip_grad_norm_(parameters, self.cfg.max_gradient_norm))
+        if not math.isfinite(norm):
+            raise FloatingPointError(
+                f"team {self.team!r}: the gradient is {norm}; observations or rewards are not "
+                "finite, or the learning rate is too high"
+            )
+        return norm
+
+    def _alphas(self) -> dict[str, float]:
+        return {_name(part): float(a) for part, a in self.temperatures.alphas().items()}
+
+    def _counts(self) -> dict[str, float]:
+        return {
+            "updates": float(self._updates),
+            "updates_per_frame": self._updates / self.replay.frames,
+            "replay_rows": float(len(self.replay)),
+        }
+
+    def state_dict(self) -> dict[str, Any]:
+        """See `Algorithm`: network, targets, temperatures, optimiser and counts."""
+        parts = {name: part.state_dict() for name, part in self._parts().items()}
+        return parts | {"updates": self._updates, "due": self._due}
+
+    def load_state_dict(self, state: dict[str, Any]) -> None:
+        """See `Algorithm`."""
+        for name, part in self._parts().items():
+            part.load_state_dict(state[name])
+        self._updates, self._due = state["updates"], state["due"]
+
+    def _parts(self) -> dict[str, Any]:
+        return {
+            "network": self.network,
+            "target": self.loss.target_critic_params,
+            "temperatures": self.temperatures,
+            "warm_up": self._warm_up,
+            "optimizer": self.optimizer,
+            "replay": self.replay,
+        }
+
+    def warm_start(self, other: Algorithm) -> None:
+        """See `Algorithm`: takes over actor and critics.
+
+        Raises:
+            ValueError: If `other` is not SAC, or has another network.
+        """
+        if not isinstance(other, SAC):
+            raise ValueError(f"learnt by {type(other).__name__}, not by SAC")
+        try:
+            self.network.load_state_dict(other.network.state_dict())
+        except RuntimeError as error:
+            raise ValueError(f"another network: {error}") from error
+        self.loss.target_critic_params.load_state_dict(other.loss.target_critic_params.state_dict())
+        self._warm_up.active.fill_(False)
+
+
+_MEASURES = (
+    "critic_loss",
+    "policy_loss",
+    "value",
+    "entropy",
+    "critic_gradient_norm",
+    "policy_gradient_norm",
+)
+_COUNTS = ("updates", "updates_per_frame", "replay_rows")
+
+
+def _name(part: str) -> str:
+    """Return the name in the logs of the temperature of a part of the action."""
+    return "alpha" if part == PLAIN else f"alpha_{part}"
+
+
+def _mean(measures: list[dict[str, float]]) -> dict[str, float]:
+    """Return the mean of each measure; not a number if there are none."""
+    if not measures:
+        return dict.fromkeys(_MEASURES, math.nan)
+    return {name: sum(m[name] for m in measures) / len(measures) for name in _MEASURES}
