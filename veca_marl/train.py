@@ -21,6 +21,7 @@ from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
 from veca_marl import api
+from veca_marl.algos.collection.workers import WorkerError
 from veca_marl.algos.training.checkpoint import CheckpointError
 from veca_marl.algos.training.loop import Trainer
 from veca_marl.config import Config, ConfigError, conf_dir, one_line, prepare, to_config
@@ -73,14 +74,21 @@ def run(node: DictConfig) -> None:
         result = run_training(cfg, folder, trainer)
         print(result.timing, *result.comparison, f"run folder: {folder.path}", sep="\n")
     except KeyboardInterrupt:
-        print(f"\ninterrupted; continue with: {_COMMAND} resume={path}", file=sys.stderr)
+        print(f"\ninterrupted; {_continue(path)}", file=sys.stderr)
         raise SystemExit(130) from None
     except CheckpointError as error:
         give_up(error)
+    except WorkerError as error:
+        print(f"error: {one_line(error)}; {_continue(path)}", file=sys.stderr)
+        raise SystemExit(1) from error
     except OSError as error:
         if error.errno not in _DISK_FULL:
             raise
         give_up(ConfigError(f"{error}; make room and continue with resume={path}"))
+
+
+def _continue(path: Path) -> str:
+    return f"continue with: {_COMMAND} resume={path}"
 
 
 def set_up(node: DictConfig, path: Path) -> tuple[Config, RunFolder, Trainer]:

@@ -6,13 +6,13 @@ import torch
 from fake_env import make_fake_env
 from first_seen import FirstSeenCfg, make_show_once
 
+from veca_marl.algos.collection.experience import CollectCfg, Experience
 from veca_marl.algos.networks.memory import with_memory
 from veca_marl.algos.ppo import PPOCfg
 from veca_marl.algos.selfplay.pool import Pool
 from veca_marl.algos.selfplay.tournament import play_all
 from veca_marl.algos.specs import team_specs
 from veca_marl.algos.training.checkpoint import Checkpoints, Identity
-from veca_marl.algos.training.collect import CollectCfg, Experience
 from veca_marl.algos.training.evaluation import EvalCfg, Exploration, evaluate
 from veca_marl.algos.training.learners import TeamLearners
 from veca_marl.algos.training.loop import Trainer

@@ -6,9 +6,9 @@ import torch
 from fake_env import FakeEnv
 from torchrl.envs import ExplorationType, set_exploration_type
 
+from veca_marl.algos.collection.experience import CollectCfg, Experience
 from veca_marl.algos.ppo import PPOCfg
 from veca_marl.algos.ppo.advantages import advantages
-from veca_marl.algos.training.collect import CollectCfg, Experience
 
 
 def gae_by_hand(value, following, reward, done, terminated, gamma=0.99, lmbda=0.95):

@@ -3,9 +3,9 @@ import torch
 from fake_env import make_fake_env
 from training import FRAMES, Interrupt, read
 
+from veca_marl.algos.collection.experience import CollectCfg
 from veca_marl.algos.specs import team_specs
 from veca_marl.algos.training.checkpoint import Checkpoints, Identity
-from veca_marl.algos.training.collect import CollectCfg
 from veca_marl.algos.training.evaluation import EvalCfg
 from veca_marl.algos.training.loop import Trainer
 from veca_marl.algos.training.progress import Budget

@@ -1,1 +1,1 @@
-"""The training loop: collection, evaluation, checkpoints, metrics."""
+"""The training loop: evaluation, checkpoints, metrics."""

@@ -21,10 +21,10 @@ from torchrl import timeit
 from torchrl.envs import EnvBase
 from tqdm import tqdm
 
+from veca_marl.algos.collection.experience import CollectCfg, Experience
 from veca_marl.algos.plain import to_plain
 from veca_marl.algos.specs import EnvFactory
 from veca_marl.algos.training.checkpoint import Checkpoints, load_checkpoint
-from veca_marl.algos.training.collect import CollectCfg, Experience
 from veca_marl.algos.training.comparison import comparison_line, score_rows
 from veca_marl.algos.training.episodes import TrainingEpisodes
 from veca_marl.algos.training.evaluation import EvalCfg, RandomTeams, Scores, evaluate

@@ -13,9 +13,10 @@ import torch
 from tensordict import TensorDictBase
 from tensordict.nn import TensorDictModuleBase
 from torch import multiprocessing
-from torchrl.collectors import Collector, MultiSyncCollector
+from torchrl.collectors import Collector
 from torchrl.envs import Compose, EnvBase
 
+from veca_marl.algos.collection.workers import SupervisedCollector
 from veca_marl.algos.networks.memory import memory_of, with_transform
 from veca_marl.algos.specs import EnvFactory
 
@@ -56,6 +57,10 @@ class Experience:
         make_env: Makes the worlds.
         policy: Writes actions, on the CPU. New parameters reach the worlds by `update_policy`.
         cfg: Number of worlds and processes.
+
+    Raises:
+        WorkerError: If a worker process ends; also from every other method, and, where this object
+            is made in the main thread, at once from whatever the main thread does.
     """
 
     def __init__(self, make_env: EnvFactory, policy: TensorDictModuleBase, cfg: CollectCfg) -> None:
@@ -71,7 +76,7 @@ class Experience:
         else:
             threads = torch.get_num_threads()
             with _workers_ignore_interrupts(), _start_method(start_method()):
-                self._collector = MultiSyncCollector(
+                self._collector = SupervisedCollector(
                     [make] * cfg.processes,
                     policy,
                     cat_results="stack",

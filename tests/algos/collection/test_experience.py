@@ -4,7 +4,7 @@ import pytest
 import torch
 from fake_env import make_fake_env
 
-from veca_marl.algos.training.collect import CollectCfg, Experience
+from veca_marl.algos.collection.experience import CollectCfg, Experience
 
 
 @pytest.fixture(params=[0, 2], ids=["in_process", "two_processes"])
@@ -69,7 +69,9 @@ def test_collection_restores_process_settings(make_ppo):
 def test_spawned_and_forked_workers_collect_the_same(make_ppo, monkeypatch):
     batches = []
     for method in ("fork", "spawn"):
-        monkeypatch.setattr("veca_marl.algos.training.collect.start_method", lambda m=method: m)
+        monkeypatch.setattr(
+            "veca_marl.algos.collection.experience.start_method", lambda m=method: m
+        )
         experience = Experience(
             make_fake_env, make_ppo().policy.copy().collect, CollectCfg(1, 2, 8)
         )

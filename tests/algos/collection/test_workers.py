@@ -1,0 +1,162 @@
+"""Worker processes that end too early, and the end of the process that started them."""
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from functools import partial
+
+import pytest
+from fake_env import FakeEnv, make_fake_env
+from paths import HELPERS, ROOT
+
+from veca_marl.algos.collection.experience import CollectCfg, Experience
+from veca_marl.algos.collection.workers import WorkerError
+
+KILLED = r"worker process 1 \(of 0 to 1\) was killed by SIGKILL"
+STEPS = 4
+
+
+class BrokenEnv(FakeEnv):
+    """Raises an error at its third step."""
+
+    def _step(self, td):
+        if (self.clock == 2).any():
+            raise ValueError("the ball has left the room")
+        return super()._step(td)
+
+
+def make_broken_env(worlds, seed):
+    return BrokenEnv(worlds=worlds, seed=seed)
+
+
+class UnbuildableEnv(FakeEnv):
+    def __init__(self, worlds, seed):
+        raise ValueError("no world without a floor")
+
+
+@pytest.fixture
+def start(make_ppo):
+    made = []
+
+    def start(make_env=make_fake_env, steps=STEPS):
+        policy = make_ppo(senses=("audio",)).policy.copy()
+        made.append(Experience(make_env, policy.collect, CollectCfg(2, worlds=1, steps=steps)))
+        return made[-1]
+
+    yield start
+    for experience in made:
+        experience.close()
+
+
+only_audio = partial(make_fake_env, senses=("audio",))
+
+
+def pids(experience):
+    return [process.pid for process in experience._collector.procs]
+
+
+def end(experience, index=1, number=signal.SIGKILL):
+    os.kill(pids(experience)[index], number)
+
+
+def check_that_none_is_left(processes):
+    for pid in processes:
+        with pytest.raises(ProcessLookupError):
+            os.kill(pid, 0)
+
+
+def test_a_worker_killed_while_it_collects_is_named_at_once(start):
+    experience = start(only_audio, steps=100_000)
+    experience.restart(0)
+    processes = pids(experience)
+    threading.Timer(0.2, end, [experience]).start()
+    begin = time.monotonic()
+    with pytest.raises(WorkerError, match=KILLED):
+        experience.collect()
+    experience.close()
+    assert time.monotonic() - begin < 3.0
+    check_that_none_is_left(processes)
+
+
+def test_a_worker_killed_during_other_work_interrupts_it(start):
+    experience = start(only_audio)
+    begin = time.monotonic()
+    end(experience)
+    with pytest.raises(WorkerError, match=KILLED):
+        time.sleep(10.0)  # in place of learning or an evaluation
+    assert time.monotonic() - begin < 3.0
+
+
+@pytest.mark.parametrize("use", ["update_policy", "restart", "collect"])
+def test_without_the_signal_every_call_raises_an_error(start, use):
+    """In threads other than the main one Python calls no signal handlers."""
+    experience = start(only_audio)
+    experience._collector._restore_handler()
+    end(experience)
+    with pytest.raises(WorkerError, match=KILLED):
+        getattr(experience, use)(*([3] if use == "restart" else []))
+
+
+def test_the_message_of_an_exception_in_a_worker_arrives(start):
+    experience = start(partial(make_broken_env))
+    experience.restart(0)
+    with pytest.raises(WorkerError, match="exit code 1: ValueError: the ball has left the room"):
+        experience.collect()
+
+
+def test_the_message_arrives_when_no_world_can_be_made(start):
+    with pytest.raises(WorkerError, match="ValueError: no world without a floor"):
+        start(UnbuildableEnv)
+
+
+def test_the_signal_handler_is_restored(start):
+    before = signal.getsignal(signal.SIGCHLD)
+    experience = start(only_audio)
+    assert signal.getsignal(signal.SIGCHLD) != before
+    experience.close()
+    assert signal.getsignal(signal.SIGCHLD) == before
+
+
+def test_workers_end_when_the_main_process_is_killed(tmp_path):
+    script = tmp_path / "main_process.py"
+    script.write_text(MAIN_PROCESS)
+    paths = os.pathsep.join([str(ROOT), str(HELPERS)])
+    main = subprocess.Popen(
+        [sys.executable, str(script)],
+        env={**os.environ, "PYTHONPATH": paths},
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    processes = [int(word) for word in main.stdout.readline().split()]
+    assert len(processes) == 2
+    main.kill()
+    main.communicate()
+    deadline = time.monotonic() + 3.0
+    while any(is_running(pid) for pid in processes) and time.monotonic() < deadline:
+        time.sleep(0.02)
+    assert not any(is_running(pid) for pid in processes)
+
+
+def is_running(pid):
+    """Return whether a process runs; one that has ended may wait for its new parent to read it."""
+    try:
+        with open(f"/proc/{pid}/stat") as file:
+            return file.read().rpartition(")")[2].split()[0] != "Z"
+    except FileNotFoundError:
+        return False
+
+
+MAIN_PROCESS = """
+from fake_env import make_fake_env
+from torchrl.envs.utils import RandomPolicy
+
+from veca_marl.algos.collection.experience import CollectCfg, Experience
+
+policy = RandomPolicy(make_fake_env(1, 0).action_spec)
+experience = Experience(make_fake_env, policy, CollectCfg(2, worlds=1, steps=100_000))
+print(*(process.pid for process in experience._collector.procs), flush=True)
+experience.collect()
+"""

@@ -1,0 +1,1 @@
+"""Collection of experience, and the worker processes that collect it."""

@@ -1,0 +1,233 @@
+"""Supervision of the worker processes of a collector.
+
+`MultiSyncCollector` waits without limit for the confirmation of new parameters: if a worker is
+killed, it waits forever. `SupervisedCollector` raises `WorkerError` instead, in two ways:
+
+- The signal SIGCHLD, which the system sends when a worker ends, raises it in the main thread at
+  once: also while the main process learns or evaluates.
+- Every wait for a worker checks each second whether all workers are alive. In other threads and on
+  Windows, where the signal is not received, this is the only way.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from functools import partial
+from multiprocessing.process import BaseProcess
+from queue import Empty
+from typing import Any
+
+from tensordict import TensorDictBase
+from torch import multiprocessing, nn
+from torchrl.collectors import Collector, MultiSyncCollector
+from torchrl.weight_update import SharedMemWeightSyncScheme
+
+from veca_marl.algos.collection.parent import end_with_parent
+
+_CHECK_S = 1.0
+_MESSAGE_CHARS = 1000  # with a pickle's overhead below what a pipe writes at once (4096 bytes)
+
+
+class WorkerError(RuntimeError):
+    """A worker process ended that should still collect."""
+
+
+class SupervisedCollector(MultiSyncCollector):
+    """TorchRL's collector, which raises `WorkerError` as soon as one of its processes ends.
+
+    Workers end by themselves when this process ends.
+
+    Args:
+        make_envs: As for `MultiSyncCollector`.
+        policy: As for `MultiSyncCollector`.
+        **kwargs: As for `MultiSyncCollector`.
+
+    Raises:
+        WorkerError: If a worker ends before all are ready.
+    """
+
+    procs: Sequence[BaseProcess] = ()  # torchrl replaces it while it starts them
+    _checking = False
+    _failure = ""
+
+    def __init__(self, make_envs: Sequence[Callable[[], Any]], policy: Any, **kwargs: Any) -> None:
+        self._exceptions = multiprocessing.SimpleQueue()
+        self._restore_handler = _call_when_a_child_ends(self.check)
+        schemes = {"policy": _SupervisedWeights()} if isinstance(policy, nn.Module) else {}
+        try:
+            super().__init__(
+                make_envs,
+                policy,
+                init_fn=partial(_start_worker, os.getpid()),
+                collector_class=partial(_WorkerCollector, exceptions=self._exceptions),
+                weight_sync_schemes=schemes,
+                **kwargs,
+            )
+        except BaseException as error:
+            self._raise_worker_error(error)
+            self.shutdown(raise_on_error=False)
+            raise
+
+    def check(self) -> None:
+        """Raise `WorkerError` if a worker has ended; the others are killed."""
+        if self._checking:  # called by the signal in the middle of a call of this method
+            return
+        self._checking = True
+        try:
+            self._failure = self._failure or self._find_failure()
+        finally:
+            self._checking = False
+        if self._failure:
+            self._restore_handler()  # the others end too
+            for process in self.procs:
+                if _is_running(process):
+                    process.kill()
+            raise WorkerError(self._failure)
+
+    def _find_failure(self) -> str:
+        ended = {i: _end_of(p) for i, p in enumerate(self.procs) if _has_ended(p)}
+        raised = self._raised() if ended else {}
+        return "; ".join(self._sentence(i, ended[i], raised) for i in ended)
+
+    def _sentence(self, index: int, end: str, raised: dict[int, str]) -> str:
+        reason = f": {raised[index]}" if index in raised else ""
+        return f"worker process {index} (of 0 to {len(self.procs) - 1}) {end}{reason}"
+
+    def _raised(self) -> dict[int, str]:
+        """Return the exceptions that workers have sent, by index."""
+        raised: dict[int, str] = {}
+        while not self._exceptions.empty():
+            index, message = self._exceptions.get()
+            raised.setdefault(index, message)
+        return raised
+
+    def iterator(self) -> Iterator[TensorDictBase]:
+        """See `MultiSyncCollector`; raises `WorkerError` if a worker has ended."""
+        with self._worker_errors():
+            yield from super().iterator()
+
+    def set_seed(self, seed: int, static_seed: bool = False) -> int:
+        """See `MultiSyncCollector`; raises `WorkerError` if a worker has ended."""
+        with self._worker_errors():
+            return int(super().set_seed(seed, static_seed))
+
+    def reset(self, reset_idx: Sequence[bool] | None = None) -> None:
+        """See `MultiSyncCollector`; raises `WorkerError` if a worker has ended."""
+        with self._worker_errors():
+            super().reset(reset_idx)
+
+    @contextmanager
+    def _worker_errors(self) -> Iterator[None]:
+        try:
+            yield
+        except Exception as error:
+            self._raise_worker_error(error)
+            raise
+
+    def _raise_worker_error(self, error: BaseException) -> None:
+        """Raise `WorkerError` in place of `error` if a worker has ended."""
+        try:
+            self.check()
+        except WorkerError as found:
+            raise found from error
+
+    def shutdown(self, *args: Any, **kwargs: Any) -> None:
+        """End the workers."""
+        self._restore_handler()
+        super().shutdown(*args, **kwargs)
+
+
+class _SupervisedWeights(SharedMemWeightSyncScheme):
+    """TorchRL's transfer of parameters, which checks the workers while it waits for them."""
+
+    def _wait_for_ack(
+        self, worker_ids: int | list[int] | None = None, timeout: float | None = None
+    ) -> None:
+        for queue in self._ack_queues.values():
+            while not _received(queue):
+                self.context.check()
+
+
+def _received(queue: Any) -> bool:
+    try:
+        queue.get(timeout=_CHECK_S)
+    except Empty:
+        return False
+    return True
+
+
+class _WorkerCollector(Collector):
+    """The collector in a worker; it sends an exception's message before the worker ends."""
+
+    def __init__(self, *args: Any, exceptions: Any, worker_idx: int, **kwargs: Any) -> None:
+        self._exceptions, self._index = exceptions, worker_idx
+        with self._sent():
+            super().__init__(*args, worker_idx=worker_idx, **kwargs)
+
+    def iterator(self) -> Iterator[TensorDictBase]:
+        with self._sent():
+            yield from super().iterator()
+
+    def reset(self, *args: Any, **kwargs: Any) -> None:
+        with self._sent():
+            super().reset(*args, **kwargs)
+
+    @contextmanager
+    def _sent(self) -> Iterator[None]:
+        try:
+            yield
+        except Exception as error:
+            message = f"{type(error).__name__}: {error}"
+            self._exceptions.put((self._index, message[:_MESSAGE_CHARS]))
+            raise
+
+
+def _start_worker(parent: int) -> None:
+    if hasattr(signal, "SIGCHLD"):
+        signal.signal(signal.SIGCHLD, signal.SIG_DFL)  # the parent's handler is for its workers
+    end_with_parent(parent)
+
+
+def _call_when_a_child_ends(call: Callable[[], None]) -> Callable[[], None]:
+    """Call a function in the main thread when a child process ends; return what revokes it."""
+    if not hasattr(signal, "SIGCHLD") or threading.current_thread() is not threading.main_thread():
+        return lambda: None
+    previous = signal.signal(signal.SIGCHLD, lambda *_: call())
+
+    def restore() -> None:
+        nonlocal previous
+        if previous is not None and threading.current_thread() is threading.main_thread():
+            signal.signal(signal.SIGCHLD, previous)
+            previous = None
+
+    return restore
+
+
+def _has_ended(process: BaseProcess) -> bool:
+    try:
+        return process.exitcode is not None
+    except ValueError:  # torchrl has ended and closed it, because another one had ended
+        return False
+
+
+def _is_running(process: BaseProcess) -> bool:
+    try:
+        return process.is_alive()
+    except ValueError:  # closed
+        return False
+
+
+def _end_of(process: BaseProcess) -> str:
+    code = process.exitcode or 0
+    if code >= 0:
+        return f"ended with exit code {code}"
+    try:
+        name = signal.Signals(-code).name
+    except ValueError:
+        name = f"signal {-code}"
+    hint = ", which the system sends when memory runs out" if name == "SIGKILL" else ""
+    return f"was killed by {name}{hint}"
