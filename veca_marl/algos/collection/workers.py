@@ -18,6 +18,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
 from multiprocessing.process import BaseProcess
+from multiprocessing.queues import SimpleQueue
 from queue import Empty
 from typing import Any
 
@@ -55,7 +56,7 @@ class SupervisedCollector(MultiSyncCollector):
     _failure = ""
 
     def __init__(self, make_envs: Sequence[Callable[[], Any]], policy: Any, **kwargs: Any) -> None:
-        self._exceptions = multiprocessing.SimpleQueue()
+        self._exceptions: SimpleQueue[tuple[int, str]] = multiprocessing.SimpleQueue()
         self._restore_handler = _call_when_a_child_ends(self.check)
         schemes = {"policy": _SupervisedWeights()} if isinstance(policy, nn.Module) else {}
         try:
