@@ -97,7 +97,7 @@ def test_a_policy_of_another_run_is_an_opponent(played, tmp_path, capsys):
 
 
 def test_a_team_starts_from_the_parameters_of_another_run(played, tmp_path):
-    first = [f"warm_start.red={played / 'run'}", "opponent.blue=idle", "algo.learning_rate=1e-6"]
+    first = [f"init_from.red={played / 'run'}", "opponent.blue=idle", "algo.learning_rate=1e-6"]
     done = train(tmp_path, "run", *first, "total_frames=32", "log.keep_checkpoints=9")
     assert done.returncode == 0, done.stderr
     started = tmp_path / "run" / "checkpoints" / "frames_000000000000.pt"
@@ -118,17 +118,21 @@ def test_a_team_starts_from_the_parameters_of_another_run(played, tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["warm_start.green={run}"], "no ['green'] in PushOut1v1; choices: ['red', 'blue']"),
-        (["warm_start.blue={run}", "opponent.blue=idle"], "no ['blue']"),
-        (["warm_start.red=nowhere"], "nowhere is neither a checkpoint nor the folder of a run"),
+        (["init_from.green={run}"], "no ['green'] in PushOut1v1; choices: ['red', 'blue']"),
+        (["init_from.blue={run}", "opponent.blue=idle"], "no ['blue']"),
+        (["init_from.red=nowhere"], "nowhere is neither a checkpoint nor the folder of a run"),
         (
-            ["warm_start.red={run}", "algo.network.vector_features=7"],
+            ["init_from.red={run}", "algo.network.vector_features=7"],
             "another network: vector_features=64 there, 7 here",
         ),
-        (["warm_start.red={run}", "senses/vision=monocular"], "other specs"),
+        (["init_from.red={run}", "senses/vision=monocular"], "vision: absent there"),
+        (["init_encoders.red.vision={run}", "senses/vision=monocular"], "no encoder of vision"),
+        (["init_encoders.green.audio={run}"], "init_encoders: no ['green'] in PushOut1v1"),
+        (["init_from.red={run}:green"], "has learnt the teams ['blue', 'red'], not 'green'"),
+        (["algo.network.frozen=[smell]"], "no encoder of smell; choices: proprioception"),
     ],
 )
-def test_a_warm_start_that_does_not_fit_is_refused(played, tmp_path, arguments, message):
+def test_a_source_that_does_not_fit_is_refused(played, tmp_path, arguments, message):
     overrides = [text.format(run=played / "run") for text in arguments]
     with pytest.raises((ConfigError, CheckpointError), match=re.escape(message)):
         make_trainer(compose([*TASK, *SMALL, *overrides]), RunFolder(tmp_path / "run"))

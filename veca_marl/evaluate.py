@@ -106,7 +106,8 @@ def evaluate_run(options: EvaluateOptions, overrides: Sequence[str] = ()) -> Tab
 def _configuration(checkpoint: Path, overrides: Sequence[str]) -> Config:
     folder = open_run(checkpoint.parent.parent if checkpoint.is_file() else checkpoint, "run=")
     node = folder.typed_config()
-    node.self_play, node.learner, node.warm_start = SelfPlayCfg(), {}, {}  # nothing is learnt here
+    # nothing is learnt here
+    node.self_play, node.learner, node.init_from, node.init_encoders = SelfPlayCfg(), {}, {}, {}
     change(node, overrides)
     return to_config(node)
 

@@ -132,7 +132,7 @@ def test_a_run_starts_from_what_another_one_learnt(make_trainer, tmp_path, cfg):
     trainer.run()
     stored = load_algorithm(tmp_path / "run", "agents", specs_of()["agents"])
     fresh = make_algorithm("agents", specs_of()["agents"], cfg, CPU)
-    fresh.warm_start(stored)
+    fresh.init_from(stored)
     assert equal(fresh.actor.state_dict(), trainer.learners.algorithms["agents"].actor.state_dict())
 
 

@@ -19,7 +19,9 @@ from typing import Any, ClassVar
 import torch
 from tensordict import TensorDictBase
 from tensordict.nn import TensorDictModuleBase
+from torch import nn
 
+from veca_marl.algos.sense_encoders import copy_encoders, copy_parameters
 from veca_marl.algos.specs import TeamSpec
 from veca_marl.registry import Registry, origin
 
@@ -98,15 +100,31 @@ class Algorithm(ABC):
     def load_state_dict(self, state: dict[str, Any]) -> None:
         """Continue from `state_dict`."""
 
-    def warm_start(self, other: Algorithm) -> None:
-        """Take over the parameters of `other`, an algorithm of the same kind from another run.
+    def init_from(self, other: Algorithm) -> None:
+        """Copy the parameters of `other`, an algorithm from another run, before learning begins.
 
-        Everything else (optimiser, replay buffer) starts from the beginning.
+        Everything else (optimiser, replay buffer) starts from the beginning. This method copies
+        the actor. An algorithm with further networks copies them too from one of its own kind,
+        and makes copies (target networks) equal again.
 
         Raises:
             ValueError: If the parameters do not fit.
         """
-        self.actor.load_state_dict(other.actor.state_dict())
+        copy_parameters(self.actor, other.actor)
+
+    def init_encoders(self, encoders: Mapping[str, Sequence[nn.Module]]) -> None:
+        """Copy encoders of single senses, before learning begins.
+
+        This method copies them to the encoders inside `actor`. An algorithm with encoders
+        elsewhere, or with copies of them (target networks), overrides it.
+
+        Args:
+            encoders: Sense to one module, or to one for each agent; see `copy_encoders`.
+
+        Raises:
+            ValueError: If there is no encoder of a sense, or its parameters do not fit.
+        """
+        copy_encoders(self.actor, encoders)
 
 
 AlgorithmFactory = Callable[[str, TeamSpec, Any, torch.device], Algorithm]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import Any, Protocol
 
@@ -80,6 +81,16 @@ class TeamSpec:
         for layout in plain["observations"].values():
             layout["shape"] = list(layout["shape"])
         return plain
+
+    @classmethod
+    def from_dict(cls, plain: Mapping[str, Any]) -> TeamSpec:
+        """Return what `to_dict` was called on."""
+        observations = {
+            sense: ArrayLayout(**{**layout, "shape": tuple(layout["shape"])})
+            for sense, layout in plain["observations"].items()
+        }
+        actions = {part: ActionLayout(**layout) for part, layout in plain["actions"].items()}
+        return cls(**{**plain, "observations": observations, "actions": actions})
 
 
 def action_key(team: str, part: str) -> tuple[str, ...]:

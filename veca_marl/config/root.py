@@ -63,9 +63,11 @@ class Config:
             ``+senses/vision@team.defender.senses.vision=blind``.
         opponent: Teams that do not learn, and what selects their actions: expert, random, idle, or
             the policy of another run: ``opponent.defender=expert``, ``opponent.defender=runs/...``.
-        warm_start: Teams that start from the parameters of another run (its folder or one of its
+        init_from: Teams that start from the parameters of another run (its folder or one of its
             checkpoints), of this task or of one with the same senses and actions:
-            ``warm_start.attacker=runs/...``.
+            ``init_from.attacker=runs/...``, or ``runs/...:TEAM`` for a team of another name.
+        init_encoders: Teams in which the encoder of a sense starts from another run, of any task
+            where the sense has the same shape: ``init_encoders.attacker.vision=runs/...``.
         algo: The learning algorithm and its parameters.
         learner: The algorithm of single teams: ``+algo@learner.attacker=mappo``.
         self_play: Teams that learn against past policies of each other.
@@ -89,7 +91,8 @@ class Config:
     clock: ClockCfg = field(default_factory=ClockCfg)
     team: dict[str, TeamCfg] = field(default_factory=dict)
     opponent: dict[str, str] = field(default_factory=dict)
-    warm_start: dict[str, str] = field(default_factory=dict)
+    init_from: dict[str, str] = field(default_factory=dict)
+    init_encoders: dict[str, dict[str, str]] = field(default_factory=dict)
     algo: AlgorithmCfg = MISSING
     learner: dict[str, AlgorithmCfg] = field(default_factory=dict)
     self_play: SelfPlayCfg = field(default_factory=SelfPlayCfg)
@@ -142,7 +145,8 @@ class Config:
         for key, asked, choices in (
             ("opponent", self.opponent, teams),
             ("learner", self.learner, learn),
-            ("warm_start", self.warm_start, learn),
+            ("init_from", self.init_from, learn),
+            ("init_encoders", self.init_encoders, learn),
             ("self_play.teams", self.self_play.teams, learn),
         ):
             unknown = sorted(set(asked) - set(choices))

@@ -18,7 +18,8 @@ from veca_marl.config.search_path import conf_dirs
 from veca_marl.envs.core.task import TASKS
 from veca_marl.sim.body import BODIES, BodyCfg
 
-_BY_TEAM = ("team", "opponent", "warm_start", "learner")  # their keys are the names of the teams
+# keys of the root that have the names of teams as their keys
+_BY_TEAM = ("team", "opponent", "init_from", "init_encoders", "learner")
 
 
 def register_schemas() -> None:

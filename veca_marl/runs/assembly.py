@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, cast
 
 import torch
@@ -12,13 +11,14 @@ from omegaconf import OmegaConf
 from veca_marl.algos.selfplay.pool import Pool
 from veca_marl.algos.selfplay.self_play import SelfPlay
 from veca_marl.algos.specs import TeamSpec, team_specs
-from veca_marl.algos.training.checkpoint import CheckpointError, Checkpoints, Identity
+from veca_marl.algos.training.checkpoint import Checkpoints, Identity
 from veca_marl.algos.training.learners import TeamLearners
 from veca_marl.algos.training.loggers import make_reporter
 from veca_marl.algos.training.loop import Trainer
 from veca_marl.algos.training.progress import Budget
 from veca_marl.algos.training.reporters import Reporter
-from veca_marl.algos.training.stored import load_actor, load_algorithm
+from veca_marl.algos.training.stored import load_actor
+from veca_marl.algos.transfer import init_teams
 from veca_marl.config import Config, ConfigError, one_line
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
 from veca_marl.envs.core.game_cfg import GameCfg
@@ -98,21 +98,16 @@ def make_learners(cfg: Config, specs: dict[str, TeamSpec], device: torch.device)
 
     Raises:
         CheckpointError: If an opponent, or what a team starts from, cannot be loaded.
+        ConfigError: If an algorithm cannot be made as configured.
     """
     actors = {team: load_actor(path, team, specs[team]) for team, path in cfg.frozen.items()}
-    learners = TeamLearners(specs, cfg.algo, device, cfg.learner, actors)
-    if cfg.resume is None:
-        for team, path in cfg.warm_start.items():
-            _warm_start(learners, team, Path(path))
-    return learners
-
-
-def _warm_start(learners: TeamLearners, team: str, path: Path) -> None:
-    stored = load_algorithm(path, team, learners.specs[team])
     try:
-        learners.algorithms[team].warm_start(stored)
+        learners = TeamLearners(specs, cfg.algo, device, cfg.learner, actors)
     except ValueError as error:
-        raise CheckpointError(f"{path}: team {team!r}: {error}") from error
+        raise ConfigError(one_line(error)) from error
+    if cfg.resume is None:
+        init_teams(learners, cfg.init_from, cfg.init_encoders)
+    return learners
 
 
 def read_specs(game: GameCfg) -> dict[str, TeamSpec]:

@@ -10,7 +10,12 @@ from functools import partial
 import torch
 from torch import Tensor, nn
 
-from veca_marl.algos.networks.factory import NetworkCfg, NetworkFactory, find_network
+from veca_marl.algos.networks.factory import (
+    NetworkCfg,
+    NetworkFactory,
+    find_network,
+    freeze,
+)
 from veca_marl.algos.networks.initialisation import perceptron
 from veca_marl.algos.specs import TeamSpec
 
@@ -154,6 +159,8 @@ def make_actor_critics(
         policy_hidden: Widths of the hidden layers between features and policy heads.
 
     Raises:
-        ValueError: If there is no network called ``cfg.name``.
+        ValueError: If there is no network called ``cfg.name``, or no encoder of a frozen sense.
     """
-    return ActorCritics(find_network(team, spec, cfg), critic, policy_hidden)
+    network = ActorCritics(find_network(team, spec, cfg), critic, policy_hidden)
+    freeze(network.encoder, cfg, team)
+    return network

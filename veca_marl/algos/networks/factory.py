@@ -9,8 +9,8 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, field
+from typing import Any, ClassVar
 
 from tensordict.nn import (
     ProbabilisticTensorDictSequential,
@@ -22,6 +22,7 @@ from torch import nn
 from veca_marl.algos.algorithm import check_entry
 from veca_marl.algos.networks.initialisation import orthogonal, perceptron
 from veca_marl.algos.networks.policy_heads import action_distribution, policy_head
+from veca_marl.algos.sense_encoders import encoders_of
 from veca_marl.algos.specs import TeamSpec
 from veca_marl.registry import Registry
 
@@ -32,9 +33,14 @@ class NetworkCfg:
 
     Attributes:
         name: Name of the network in the registry.
+        frozen: Senses with encoders that keep their parameters, see `init_encoders`.
+        not_parameters: Fields that a network with the same parameters may have differently.
     """
 
+    not_parameters: ClassVar[tuple[str, ...]] = ("frozen",)
+
     name: str = ""
+    frozen: list[str] = field(default_factory=list)
 
 
 class NetworkFactory(ABC):
@@ -160,10 +166,15 @@ def register_network(name: str, cfg_type: type[NetworkCfg], factory: MakeFactory
 def make_network(team: str, spec: TeamSpec, cfg: NetworkCfg) -> TeamNetwork:
     """Return the network of a team as `cfg` describes it.
 
+    Parameters of encoders in ``cfg.frozen`` do not require gradients: an optimiser takes those
+    that do.
+
     Raises:
-        ValueError: If there is no network called ``cfg.name``.
+        ValueError: If there is no network called ``cfg.name``, or no encoder of a frozen sense.
     """
-    return TeamNetwork(find_network(team, spec, cfg))
+    network = TeamNetwork(find_network(team, spec, cfg))
+    freeze(network.encoder, cfg, team)
+    return network
 
 
 def find_network(team: str, spec: TeamSpec, cfg: NetworkCfg) -> NetworkFactory:
@@ -173,3 +184,34 @@ def find_network(team: str, spec: TeamSpec, cfg: NetworkCfg) -> NetworkFactory:
         ValueError: If there is no network called ``cfg.name``.
     """
     return NETWORKS.find(cfg.name).factory(team, spec, cfg)
+
+
+def freeze(encoder: nn.Module, cfg: NetworkCfg, team: str) -> None:
+    """Let the encoders of the senses in ``cfg.frozen`` require no gradients.
+
+    Raises:
+        ValueError: If there is no encoder of one of them.
+    """
+    for frozen in encoders_of(encoder, cfg.frozen, f"algo.network.frozen of team {team!r}"):
+        frozen.requires_grad_(False)
+
+
+def trainable(network: nn.Module) -> list[nn.Parameter]:
+    """Return the parameters that an optimiser changes: all that are not frozen."""
+    return [parameter for parameter in network.parameters() if parameter.requires_grad]
+
+
+def check_same_network(here: NetworkCfg, there: NetworkCfg) -> None:
+    """Check that two configurations describe the same parameters.
+
+    Raises:
+        ValueError: If they differ; the message names the fields.
+    """
+    own, other = vars(here), vars(there)
+    differing = [
+        f"{name}={other.get(name, 'absent')} there, {own.get(name, 'absent')} here"
+        for name in {**own, **other}
+        if name not in here.not_parameters and other.get(name) != own.get(name)
+    ]
+    if differing:
+        raise ValueError(f"another network: {'; '.join(differing)}")

@@ -16,6 +16,7 @@ from veca_marl.algos.networks.factory import NetworkCfg, NetworkFactory, registe
 from veca_marl.algos.networks.image_encoder import Pooling
 from veca_marl.algos.networks.initialisation import orthogonal
 from veca_marl.algos.networks.per_agent import CentralValue, PerAgent
+from veca_marl.algos.sense_encoders import SenseEncoders
 from veca_marl.algos.specs import ArrayLayout, TeamSpec
 
 
@@ -62,6 +63,8 @@ class MultisenseCfg(NetworkCfg):
         parameters: One network for a team, or one for each of its agents.
     """
 
+    not_parameters = ("frozen", "precision")
+
     name: str = "multisense"
     channels: list[int] = field(default_factory=lambda: [16, 32, 32])
     pooling: Pooling = Pooling.flatten
@@ -100,7 +103,7 @@ class Trunk(nn.Module):
             )
             for name, layout in observations.items()
         }
-        self.encoders = nn.ModuleDict(encoders)
+        self.encoders = SenseEncoders(encoders)
         joined = sum(encoder.features for encoder in encoders.values())
         self.join = nn.Sequential(orthogonal(nn.Linear(joined, cfg.trunk_features)), nn.ReLU())
         self.precision = cfg.precision

@@ -12,11 +12,17 @@ from torchrl.data import LazyTensorStorage, SamplerWithoutReplacement, TensorDic
 from torchrl.objectives import KLAdaptiveLR
 
 from veca_marl.algos.algorithm import Algorithm
-from veca_marl.algos.networks.factory import TeamNetwork, make_network
+from veca_marl.algos.networks.factory import (
+    TeamNetwork,
+    check_same_network,
+    make_network,
+    trainable,
+)
 from veca_marl.algos.ppo.advantages import advantages
 from veca_marl.algos.ppo.config import PPOCfg
 from veca_marl.algos.ppo.losses import VALID, TeamPPOLoss
 from veca_marl.algos.ppo.value_normalisation import NormalisedCritic, ValueNormalisation
+from veca_marl.algos.sense_encoders import copy_parameters
 from veca_marl.algos.specs import TeamSpec
 
 _MEASURES = {  # name in the logs: name in the loss
@@ -52,7 +58,7 @@ class PPO(Algorithm):
         self.loss = _make_loss(team, self.network, cfg).to(device)
         if self.normalised_critic is not None:
             self.loss.value_norm = self.normalised_critic.statistics
-        self.optimizer = torch.optim.Adam(self.network.parameters(), lr=cfg.learning_rate)
+        self.optimizer = torch.optim.Adam(trainable(self.network), lr=cfg.learning_rate)
         self.schedule = KLAdaptiveLR(
             self.optimizer,
             target_kl=cfg.target_kl,
@@ -150,23 +156,13 @@ class PPO(Algorithm):
             "schedule": self.schedule,
         }
 
-    def warm_start(self, other: Algorithm) -> None:
-        """See `Algorithm`: takes over actor and critic.
-
-        Raises:
-            ValueError: If `other` is not PPO, or has another network.
-        """
-        if not isinstance(other, PPO):
-            raise ValueError(f"learnt by {type(other).__name__}, not by PPO")
-        there, here = vars(other.cfg.network), vars(self.cfg.network)
-        differing = [
-            f"{name}={there.get(name, 'absent')} there, {here.get(name, 'absent')} here"
-            for name in {**here, **there}
-            if there.get(name) != here.get(name)
-        ]
-        if differing:
-            raise ValueError(f"another network: {'; '.join(differing)}")
-        self.network.load_state_dict(other.network.state_dict())
+    def init_from(self, other: Algorithm) -> None:
+        """See `Algorithm`: copies actor and critic from PPO, the actor from another algorithm."""
+        if isinstance(other, PPO):
+            check_same_network(self.cfg.network, other.cfg.network)
+            copy_parameters(self.network, other.network)
+        else:
+            super().init_from(other)
 
 
 def _batch_keys(network: TeamNetwork, team: str, masked: bool) -> list[Any]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import torch
@@ -14,12 +15,14 @@ from torchrl.objectives import SoftUpdate
 from veca_marl.algos.algorithm import Algorithm
 from veca_marl.algos.networks.action_values import make_actor_critics
 from veca_marl.algos.networks.exploration import UniformWarmUp
+from veca_marl.algos.networks.factory import check_same_network, trainable
 from veca_marl.algos.sac.config import SACCfg
 from veca_marl.algos.sac.joint_action import JointAction
 from veca_marl.algos.sac.loss import TeamSACLoss
 from veca_marl.algos.sac.replay import Replay
 from veca_marl.algos.sac.temperature import Temperatures
 from veca_marl.algos.sac.windows import transitions
+from veca_marl.algos.sense_encoders import copy_parameters
 from veca_marl.algos.specs import PLAIN, TeamSpec
 
 
@@ -51,7 +54,7 @@ class SAC(Algorithm):
             cfg.encoder_gradient,
         ).to(device)
         self.targets = SoftUpdate(self.loss, tau=cfg.tau)
-        self._critics = [*self.network.encoder.parameters(), *self.network.values.parameters()]
+        self._critics = [*trainable(self.network.encoder), *self.network.values.parameters()]
         self._policy = list(self.loss.policy.parameters())
         learnt = [*self._critics, *self._policy, *self.temperatures.parameters()]
         self.optimizer = torch.optim.Adam(learnt, lr=cfg.learning_rate)
@@ -149,20 +152,24 @@ class SAC(Algorithm):
             "replay": self.replay,
         }
 
-    def warm_start(self, other: Algorithm) -> None:
-        """See `Algorithm`: takes over actor and critics.
-
-        Raises:
-            ValueError: If `other` is not SAC, or has another network.
-        """
-        if not isinstance(other, SAC):
-            raise ValueError(f"learnt by {type(other).__name__}, not by SAC")
-        try:
-            self.network.load_state_dict(other.network.state_dict())
-        except RuntimeError as error:
-            raise ValueError(f"another network: {error}") from error
-        self.loss.target_critic_params.load_state_dict(other.loss.target_critic_params.state_dict())
+    def init_from(self, other: Algorithm) -> None:
+        """See `Algorithm`: copies actor and critics from SAC, the actor from another algorithm."""
+        if isinstance(other, SAC):
+            check_same_network(self.cfg.network, other.cfg.network)
+            copy_parameters(self.network, other.network)
+        else:
+            super().init_from(other)
+        self._reset_targets()
         self._warm_up.active.fill_(False)
+
+    def init_encoders(self, encoders: Mapping[str, Sequence[nn.Module]]) -> None:
+        """See `Algorithm`: actor and critics share the encoders."""
+        super().init_encoders(encoders)
+        self._reset_targets()
+
+    def _reset_targets(self) -> None:
+        """Make the target networks equal to the critics."""
+        self.loss.target_critic_params.data.copy_(self.loss.critic_params.data)
 
 
 _MEASURES = (

@@ -189,6 +189,14 @@ def _check_identity(path: Path, stored: dict[str, Any], wanted: dict[str, Any]) 
         raise CheckpointError(f"{path} was made for other specs: {'; '.join(differing)}")
 
 
+def spec_differences(stored: dict[str, Any], spec: TeamSpec) -> str:
+    """Return how a stored specification differs from `spec`; empty if it does not."""
+    return "; ".join(
+        f"{name}: {there} there, {here} here"
+        for name, there, here in _differences(stored, spec.to_dict())
+    )
+
+
 def _differences(one: Any, other: Any, name: str = "") -> list[tuple[str, Any, Any]]:
     if isinstance(one, dict) and isinstance(other, dict):
         return [

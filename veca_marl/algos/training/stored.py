@@ -7,6 +7,7 @@ from typing import Any
 
 import torch
 from tensordict.nn import TensorDictModuleBase
+from torch import nn
 
 from veca_marl.algos.algorithm import (
     ALGORITHMS,
@@ -16,8 +17,13 @@ from veca_marl.algos.algorithm import (
 )
 from veca_marl.algos.networks.factory import NETWORKS, NetworkCfg
 from veca_marl.algos.plain import from_plain
+from veca_marl.algos.sense_encoders import sense_encoders
 from veca_marl.algos.specs import TeamSpec
-from veca_marl.algos.training.checkpoint import CheckpointError, read_checkpoint
+from veca_marl.algos.training.checkpoint import (
+    CheckpointError,
+    read_checkpoint,
+    spec_differences,
+)
 
 
 def load_actor(path: Path, team: str, spec: TeamSpec) -> TensorDictModuleBase:
@@ -52,13 +58,48 @@ def load_algorithm(path: Path, team: str, spec: TeamSpec) -> Algorithm:
     return algorithm
 
 
-def _make(path: Path, team: str, spec: TeamSpec) -> tuple[Algorithm, dict[str, Any]]:
+def load_encoders(path: Path, team: str) -> dict[str, list[nn.Module]]:
+    """Return the encoders of a team from another run, whatever its task and its actions are.
+
+    Args:
+        path: See `load_actor`.
+        team: Name of the team there.
+
+    Returns:
+        Sense to one module, or to one for each agent.
+
+    Raises:
+        CheckpointError: If there is no such checkpoint, or it does not hold this team.
+    """
+    algorithm, content = _make(path, team, None)
+    algorithm.actor.load_state_dict(content["state"]["actors"][team])
+    return sense_encoders(algorithm.actor)
+
+
+def teams_learnt(path: Path) -> list[str]:
+    """Return the names of the teams that a run has learnt.
+
+    Raises:
+        CheckpointError: If there is no such checkpoint.
+    """
+    return sorted(read_checkpoint(_file(path))["algorithms"])
+
+
+def _make(path: Path, team: str, spec: TeamSpec | None) -> tuple[Algorithm, dict[str, Any]]:
+    """Return the algorithm of a team, not yet loaded, and the content of the checkpoint.
+
+    Args:
+        path: See `load_actor`.
+        team: Name of the team there.
+        spec: What its arrays have to be; None for any.
+    """
     content = read_checkpoint(_file(path))
     stored, learnt = content["identity"]["specs"], content["algorithms"]
     if team not in learnt:
         raise CheckpointError(f"{path} has learnt the teams {sorted(learnt)}, not {team!r}")
-    if stored[team] != spec.to_dict():
-        raise CheckpointError(f"{path}: team {team!r} has other specs there than here")
+    if spec is not None and (differing := spec_differences(stored[team], spec)):
+        raise CheckpointError(f"{path}: team {team!r} has other specs there: {differing}")
+    spec = spec or TeamSpec.from_dict(stored[team])
     try:
         cfg = from_plain(AlgorithmCfg, learnt[team], _find_type)
         return make_algorithm(team, spec, cfg, torch.device("cpu")), content

@@ -1,0 +1,161 @@
+"""Teams that start from other runs: whole teams, encoders of single senses, frozen encoders."""
+
+import pytest
+import torch
+from fake_env import make_fake_env
+from toy_dqn import ToyDQNCfg, register
+from training import SMALL
+
+from veca_marl.algos.networks.multisense import MultisenseCfg, Parameters
+from veca_marl.algos.plain import to_plain
+from veca_marl.algos.ppo import PPOCfg
+from veca_marl.algos.sac import SACCfg
+from veca_marl.algos.sac.config import ReplayCfg
+from veca_marl.algos.sense_encoders import sense_encoders
+from veca_marl.algos.specs import TeamSpec, team_specs
+from veca_marl.algos.training.checkpoint import CheckpointError, Checkpoints, Identity
+from veca_marl.algos.training.learners import TeamLearners
+from veca_marl.algos.transfer import init_teams
+
+register()
+CPU = torch.device("cpu")
+
+
+def small_sac(**numbers):
+    replay = ReplayCfg(capacity=256, warm_up_frames=16)
+    return SACCfg(batch_size=16, updates_per_frame=0.1, replay=replay, **numbers)
+
+
+def network(**numbers):
+    return MultisenseCfg(**{**vars(SMALL), **numbers})
+
+
+def make_learners(seed=0, algo=None, teams=("agents",), discrete=False, **numbers):
+    torch.manual_seed(seed)
+    specs = team_specs(make_fake_env(1, 0, teams=teams, discrete=discrete, agents=2))
+    return TeamLearners(specs, algo or PPOCfg(network=network(**numbers)), CPU)
+
+
+def store(learners, folder):
+    checkpoints = Checkpoints(folder / "checkpoints", Identity("Toy", learners.specs), {})
+    numbers = {team: to_plain(cfg) for team, cfg in learners.cfgs.items()}
+    state = {"algorithm": learners.state_dict(), "actors": learners.actor_states()}
+    checkpoints.save(state, 0, best=False, algorithms=numbers)
+    return str(folder)
+
+
+def encoders(learners, team="agents"):
+    found = sense_encoders(learners.algorithms[team].actor)
+    return {
+        sense: [torch.cat([p.detach().flatten().clone() for p in m.parameters()]) for m in modules]
+        for sense, modules in found.items()
+    }
+
+
+def test_one_encoder_starts_from_a_run_of_another_game(tmp_path):
+    """Another action, another critic: only the shape of the sense has to be equal."""
+    there = make_learners(seed=1, discrete=True, critic=SMALL.critic, trunk_features=8)
+    here = make_learners(seed=2)
+    before = encoders(here)
+    init_teams(here, {}, {"agents": {"vision": store(there, tmp_path)}})
+    after, learnt = encoders(here), encoders(there)
+    assert torch.equal(after["vision"][0], learnt["vision"][0])
+    assert not torch.equal(before["vision"][0], learnt["vision"][0])
+    assert torch.equal(after["audio"][0], before["audio"][0])
+
+
+def test_an_encoder_is_copied_to_each_agent_with_one_of_its_own(tmp_path):
+    there, here = make_learners(seed=1), make_learners(seed=2, parameters=Parameters.separate)
+    init_teams(here, {}, {"agents": {"audio": store(there, tmp_path)}})
+    (learnt,) = encoders(there)["audio"]
+    assert [torch.equal(mine, learnt) for mine in encoders(here)["audio"]] == [True, True]
+
+
+def test_the_encoders_of_separate_agents_do_not_fit_a_shared_one(tmp_path):
+    there, here = make_learners(seed=1, parameters=Parameters.separate), make_learners(seed=2)
+    with pytest.raises(CheckpointError, match="one for each of 2 agents there, for 1 here"):
+        init_teams(here, {}, {"agents": {"audio": store(there, tmp_path)}})
+
+
+def test_teams_are_found_by_name_or_named_by_the_source(tmp_path):
+    there = make_learners(seed=1, teams=("red", "blue"))
+    source = store(there, tmp_path)
+    here = make_learners(seed=2)
+    with pytest.raises(CheckpointError, match=r"teams \['blue', 'red'\], not 'agents'; write"):
+        init_teams(here, {"agents": source}, {})
+    init_teams(here, {"agents": f"{source}:blue"}, {})
+    assert torch.equal(encoders(here)["vision"][0], encoders(there, "blue")["vision"][0])
+    both = make_learners(seed=3, teams=("red", "blue"))
+    init_teams(both, {"red": source}, {"red": {"audio": f"{source}:blue"}})
+    assert torch.equal(encoders(both, "red")["vision"][0], encoders(there, "red")["vision"][0])
+    assert torch.equal(encoders(both, "red")["audio"][0], encoders(there, "blue")["audio"][0])
+
+
+@pytest.mark.parametrize(
+    ("numbers", "sense", "message"),
+    [
+        ({"channels": [4, 8, 9]}, "vision", r"encoder of vision: layers.4.bias is \(9,\) there"),
+        ({}, "smell", "no encoder of smell; choices: audio, vision"),
+    ],
+)
+def test_an_encoder_that_does_not_fit_is_refused(tmp_path, numbers, sense, message):
+    source = store(make_learners(**numbers), tmp_path)
+    with pytest.raises(CheckpointError, match=message):
+        init_teams(make_learners(), {}, {"agents": {sense: source}})
+
+
+def test_an_actor_of_another_algorithm_with_another_network_is_refused(tmp_path):
+    there = make_learners(algo=ToyDQNCfg(), discrete=True)
+    with pytest.raises(CheckpointError, match=r"init_from.agents: .* there, absent here"):
+        init_teams(make_learners(discrete=True), {"agents": store(there, tmp_path)}, {})
+
+
+@pytest.mark.parametrize("make_cfg", [PPOCfg, small_sac], ids=["ppo", "sac"])
+def test_frozen_encoders_keep_their_parameters_and_have_no_optimiser_state(make_cfg):
+    learners = make_learners(algo=make_cfg(network=network(frozen=["vision"])))
+    algorithm = learners.algorithms["agents"]
+    before = encoders(learners)
+    with torch.no_grad():
+        batch = make_fake_env(4, 0, agents=2).rollout(
+            16, learners.policy.collect, break_when_any_done=False
+        )
+    algorithm.learn(batch)
+    after = encoders(learners)
+    assert torch.equal(after["vision"][0], before["vision"][0])
+    assert not torch.equal(after["audio"][0], before["audio"][0])
+    optimised = {id(p) for group in algorithm.optimizer.param_groups for p in group["params"]}
+    (vision,) = sense_encoders(algorithm.actor)["vision"]
+    assert not optimised & {id(p) for p in vision.parameters()}
+    assert {id(p) for p in algorithm.network.parameters() if p.requires_grad} <= optimised
+
+
+def test_target_networks_start_with_the_encoders_of_the_other_run(tmp_path):
+    there, here = make_learners(seed=1), make_learners(seed=2, algo=small_sac(network=network()))
+    init_teams(here, {}, {"agents": {"vision": store(there, tmp_path)}})
+    loss = here.algorithms["agents"].loss
+    assert torch.equal(encoders(here)["vision"][0], encoders(there)["vision"][0])
+    assert (loss.critic_params.data == loss.target_critic_params.data).all()
+
+
+def test_an_actor_is_copied_between_algorithms_with_the_same_network(tmp_path):
+    cfg = small_sac(network=network(), policy_hidden=[])
+    there, here = make_learners(seed=1), make_learners(seed=2, algo=cfg)
+    init_teams(here, {"agents": store(there, tmp_path)}, {})
+    mine, other = (each.policy.actors["agents"].state_dict() for each in (here, there))
+    assert all(torch.equal(mine[name], other[name]) for name in other)
+
+
+def test_a_frozen_team_starts_from_a_run_that_was_not_frozen(tmp_path):
+    there, here = make_learners(seed=1), make_learners(seed=2, frozen=["vision"])
+    init_teams(here, {"agents": store(there, tmp_path)}, {})
+    assert torch.equal(encoders(here)["vision"][0], encoders(there)["vision"][0])
+
+
+def test_a_frozen_sense_without_encoder_is_refused():
+    with pytest.raises(ValueError, match=r"frozen of team 'agents': no encoder of smell; choices"):
+        make_learners(frozen=["smell"])
+
+
+def test_specs_are_restored_from_plain_data():
+    for spec in make_learners(teams=("red", "blue")).specs.values():
+        assert TeamSpec.from_dict(spec.to_dict()) == spec

@@ -1,0 +1,86 @@
+"""Encoders of single senses inside a network: found by name, copied, frozen."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+
+from torch import nn
+
+
+class SenseEncoders(nn.ModuleDict):
+    """Encoder modules by the name of their sense.
+
+    A network keeps its encoders in one of these, so that `sense_encoders` finds them.
+    """
+
+
+def sense_encoders(network: nn.Module) -> dict[str, list[nn.Module]]:
+    """Return the encoders inside `network` by sense: several where agents have their own."""
+    found: dict[str, list[nn.Module]] = {}
+    for part in network.modules():
+        if isinstance(part, SenseEncoders):
+            for sense, encoder in part.items():
+                found.setdefault(sense, []).append(encoder)
+    return found
+
+
+def encoders_of(network: nn.Module, senses: Iterable[str], asked_by: str) -> list[nn.Module]:
+    """Return the encoders of some senses.
+
+    Args:
+        network: See `sense_encoders`.
+        senses: Names of senses.
+        asked_by: What named them; the error message begins with it.
+
+    Raises:
+        ValueError: If there is no encoder of a sense; the message lists the choices.
+    """
+    found = sense_encoders(network)
+    missing = sorted(set(senses) - set(found))
+    if missing:
+        choices = ", ".join(sorted(found)) or "none"
+        raise ValueError(f"{asked_by}: no encoder of {', '.join(missing)}; choices: {choices}")
+    return [encoder for sense in senses for encoder in found[sense]]
+
+
+def copy_encoders(network: nn.Module, encoders: Mapping[str, Sequence[nn.Module]]) -> None:
+    """Copy the parameters of encoders into those of `network`.
+
+    Args:
+        network: See `sense_encoders`.
+        encoders: Sense to one module, which is copied to all agents that have encoders of their
+            own, or to as many modules as `network` has.
+
+    Raises:
+        ValueError: If there is no encoder of a sense, or one does not fit.
+    """
+    for sense, sources in encoders.items():
+        targets = encoders_of(network, [sense], "init_encoders")
+        if len(sources) not in (1, len(targets)):
+            raise ValueError(
+                f"encoder of {sense}: one for each of {len(sources)} agents there, "
+                f"for {len(targets)} here"
+            )
+        for i, target in enumerate(targets):
+            try:
+                copy_parameters(target, sources[i % len(sources)])
+            except ValueError as error:
+                raise ValueError(f"encoder of {sense}: {error}") from error
+
+
+def copy_parameters(target: nn.Module, source: nn.Module) -> None:
+    """Copy parameters and buffers of `source` to `target`, a module of the same structure.
+
+    Raises:
+        ValueError: If names or shapes differ; the message names the first that does.
+    """
+    own, other = target.state_dict(), source.state_dict()
+    for name in sorted({*own, *other}):
+        here, there = _shape(own, name), _shape(other, name)
+        if here != there:
+            raise ValueError(f"{name} is {there} there, {here} here")
+    target.load_state_dict(other)
+
+
+def _shape(state: Mapping[str, object], name: str) -> str:
+    return str(tuple(getattr(state[name], "shape", ()))) if name in state else "absent"

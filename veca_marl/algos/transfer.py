@@ -1,0 +1,77 @@
+"""Teams that start from what another run has learnt: all of it, or encoders of single senses."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from veca_marl.algos.training.checkpoint import CheckpointError
+from veca_marl.algos.training.learners import TeamLearners
+from veca_marl.algos.training.stored import load_algorithm, load_encoders, teams_learnt
+
+
+def init_teams(
+    learners: TeamLearners,
+    teams: Mapping[str, str],
+    encoders: Mapping[str, Mapping[str, str]],
+) -> None:
+    """Copy parameters of other runs, first those of whole teams, then single encoders.
+
+    A source is the folder of a run or a checkpoint, and ``:TEAM`` where several teams learnt
+    there and none has the name of the team here.
+
+    Args:
+        learners: What starts.
+        teams: Team to the source of all its parameters; senses and actions must be equal.
+        encoders: Team to sense to the source of its encoder; the shape of the sense must be equal.
+
+    Raises:
+        CheckpointError: If a source cannot be read or does not fit; the message says why.
+    """
+    for team, source in teams.items():
+        _init_team(learners, team, source)
+    for team, sources in encoders.items():
+        for sense, source in sources.items():
+            _init_encoder(learners, team, sense, source)
+
+
+def _init_team(learners: TeamLearners, team: str, source: str) -> None:
+    path, there = _find(source, team)
+    stored = load_algorithm(path, there, learners.specs[team])
+    try:
+        learners.algorithms[team].init_from(stored)
+    except ValueError as error:
+        raise CheckpointError(f"init_from.{team}: {path}: {error}") from error
+
+
+def _init_encoder(learners: TeamLearners, team: str, sense: str, source: str) -> None:
+    path, there = _find(source, team)
+    found = load_encoders(path, there)
+    if sense not in found:
+        raise CheckpointError(
+            f"init_encoders.{team}.{sense}: {path} has no encoder of {sense}; "
+            f"choices: {', '.join(sorted(found)) or 'none'}"
+        )
+    try:
+        learners.algorithms[team].init_encoders({sense: found[sense]})
+    except ValueError as error:
+        raise CheckpointError(f"init_encoders.{team}.{sense}: {path}: {error}") from error
+
+
+def _find(source: str, team: str) -> tuple[Path, str]:
+    """Return the path of a source and the name that the team has there."""
+    path, there = _split(source)
+    learnt = teams_learnt(path)
+    if there or team in learnt:
+        return path, there or team
+    if len(learnt) == 1:
+        return path, learnt[0]
+    raise CheckpointError(f"{path} has learnt the teams {learnt}, not {team!r}; write {path}:TEAM")
+
+
+def _split(source: str) -> tuple[Path, str]:
+    """Return the path and the name of the team, which is empty if the source names none."""
+    if Path(source).exists() or ":" not in source:
+        return Path(source), ""
+    path, _, team = source.rpartition(":")
+    return Path(path), team
