@@ -10,6 +10,7 @@ import torch
 from fake_env import FakeEnv
 from tensordict.nn import TensorDictModuleBase
 from torch import nn
+from torchrl.modules.tensordict_module.rnn import recurrent_mode
 
 from veca_marl.algos.networks.factory import NetworkCfg, NetworkFactory, register_network
 from veca_marl.algos.networks.memory import memory_primer
@@ -55,6 +56,9 @@ class Remember(TensorDictModuleBase):
         heard = td[self.team, "observation", "audio"][..., 0, :1]
         begins = td["is_init"].unsqueeze(-1).expand_as(heard)
         first = torch.where(begins, heard, td[self.key])
+        if recurrent_mode():  # only the state before the first step of a sequence is an input
+            for t in range(1, heard.shape[1]):
+                first[:, t] = torch.where(begins[:, t], heard[:, t], first[:, t - 1])
         td[self.team, "features"] = (first + 3.0) / 3.0 * self.scale
         td["next", *self.key] = first
         return td

@@ -28,9 +28,9 @@ class ToyDQNCfg(AlgorithmCfg):
     warm_up_frames: int = 128
     epsilon: float = 0.1
 
-    def check_batch(self, frames):
-        if frames < 4:
-            raise ValueError(f"toy_dqn needs batches of at least 4 frames, got {frames}")
+    def check_batch(self, worlds, steps):
+        if worlds * steps < 4:
+            raise ValueError(f"toy_dqn needs batches of at least 4 frames, got {worlds * steps}")
 
 
 class ToyDQN(Algorithm):

@@ -36,8 +36,8 @@ class AlgorithmCfg:
 
     name: str = ""
 
-    def check_batch(self, frames: int) -> None:
-        """Raise `ValueError` if batches of so many frames cannot be learnt from."""
+    def check_batch(self, worlds: int, steps: int) -> None:
+        """Raise `ValueError` if batches of so many worlds and steps cannot be learnt from."""
 
 
 class Algorithm(ABC):

@@ -117,7 +117,7 @@ class Config:
         if self.max_minutes is not None and not self.max_minutes > 0:
             raise ValueError(f"max_minutes must be positive, got {self.max_minutes}")
         for algorithm in (self.algo, *self.learner.values()):
-            algorithm.check_batch(self.collect.frames)
+            algorithm.check_batch(self.collect.all_worlds, self.collect.steps)
         if self.threads is not None and self.threads < 1:
             raise ValueError(f"threads must be at least 1, got {self.threads}")
 

@@ -25,7 +25,7 @@ TEAMS = ("red", "blue")
 
 def make_learners(**env):
     torch.manual_seed(0)
-    cfg = PPOCfg(network=FirstSeenCfg(), learning_rate=1e-3, gamma=0.5)
+    cfg = PPOCfg(network=FirstSeenCfg(), learning_rate=1e-3, gamma=0.5, sequence_steps=8)
     return TeamLearners(team_specs(make_show_once(1, 0, **env)), cfg, CPU)
 
 

@@ -4,22 +4,12 @@ from copy import deepcopy
 import pytest
 import torch
 from fake_env import FakeEnv
+from gae import gae_by_hand
 from torchrl.envs import ExplorationType, set_exploration_type
 
 from veca_marl.algos.collection.experience import CollectCfg, Experience
 from veca_marl.algos.ppo import PPOCfg
 from veca_marl.algos.ppo.advantages import advantages
-
-
-def gae_by_hand(value, following, reward, done, terminated, gamma=0.99, lmbda=0.95):
-    """Schulman et al. 2016, equation 16, one step at a time from the end."""
-    advantage = torch.zeros_like(value)
-    ahead = torch.zeros_like(value[:, 0])
-    for t in reversed(range(value.shape[1])):
-        delta = reward[:, t] + gamma * following[:, t] * ~terminated[:, t] - value[:, t]
-        ahead = delta + gamma * lmbda * ~done[:, t] * ahead
-        advantage[:, t] = ahead
-    return advantage
 
 
 @pytest.mark.parametrize("terminated", [False, True])

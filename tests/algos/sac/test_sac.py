@@ -93,4 +93,4 @@ def test_impossible_numbers_are_refused(numbers, message):
 
 def test_a_replay_buffer_that_is_too_small_for_a_batch_is_refused():
     with pytest.raises(ValueError, match="capacity=100 must be at least twice the 64 frames"):
-        SACCfg(replay=ReplayCfg(100, 10)).check_batch(64)
+        SACCfg(replay=ReplayCfg(100, 10)).check_batch(4, 16)

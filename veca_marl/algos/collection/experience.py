@@ -45,9 +45,14 @@ class CollectCfg:
                 raise ValueError(f"collect.{name} must be at least 1, got {getattr(self, name)}")
 
     @property
+    def all_worlds(self) -> int:
+        """Worlds of all processes."""
+        return max(self.processes, 1) * self.worlds
+
+    @property
     def frames(self) -> int:
         """Frames in a batch."""
-        return max(self.processes, 1) * self.worlds * self.steps
+        return self.all_worlds * self.steps
 
 
 class Experience:

@@ -42,6 +42,11 @@ class NetworkCfg:
     name: str = ""
     frozen: list[str] = field(default_factory=list)
 
+    @property
+    def recurrent(self) -> bool:
+        """Whether the network has hidden state and learns from sequences of steps."""
+        return False
+
 
 class NetworkFactory(ABC):
     """Makes encoder, actor and critic of one team.
@@ -64,9 +69,11 @@ class NetworkFactory(ABC):
     def encoder(self) -> TensorDictModuleBase:
         """Return the module from observations to ``(team, "features")``, ``(..., agents, F)``.
 
-        A recurrent one reads its hidden state under ``(team, "memory", name)``, writes the new one
-        under ``("next", team, "memory", name)`` and has a method ``make_tensordict_primer``, which
-        returns `networks.memory.memory_primer`.
+        A recurrent one reads its hidden state under ``(team, "memory", name)`` and ``"is_init"``
+        where an episode begins, writes the new state under ``("next", team, "memory", name)`` and
+        has a method ``make_tensordict_primer``, which returns `networks.memory.memory_primer`.
+        In TorchRL's recurrent mode (`torchrl.modules.set_recurrent_mode`) its input is
+        ``(rows, time)``: it unrolls each row from the state at the row's first step.
         """
 
     def per_agent(self, make: Callable[[], nn.Module], ranks: Sequence[int] = (1,)) -> nn.Module:

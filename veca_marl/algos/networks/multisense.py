@@ -8,11 +8,12 @@ from dataclasses import dataclass, field
 from enum import Enum
 
 import torch
-from tensordict.nn import TensorDictModule
+from tensordict.nn import TensorDictModule, TensorDictModuleBase, TensorDictSequential
 from torch import Tensor, nn
 
 from veca_marl.algos.networks.encoders import make_encoder
 from veca_marl.algos.networks.factory import NetworkCfg, NetworkFactory, register_network
+from veca_marl.algos.networks.gru import GatedMemory, TeamMemory
 from veca_marl.algos.networks.image_encoder import Pooling
 from veca_marl.algos.networks.initialisation import orthogonal
 from veca_marl.algos.networks.per_agent import CentralValue, PerAgent
@@ -46,6 +47,18 @@ class Parameters(Enum):
     separate = "separate"
 
 
+class Memory(Enum):
+    """Hidden state of each agent, which lasts for an episode.
+
+    Attributes:
+        none: None: an action depends on the present observation alone.
+        gru: A gated recurrent unit between the joined layer and the heads.
+    """
+
+    none = "none"
+    gru = "gru"
+
+
 @dataclass
 class MultisenseCfg(NetworkCfg):
     """Sizes of the network.
@@ -57,7 +70,9 @@ class MultisenseCfg(NetworkCfg):
         compressed: Senses with values of many magnitudes: symlog is applied before their encoder.
             Otherwise accelerations would dominate the angles beside them. Names of senses that a
             team does not have are ignored.
-        trunk_features: Width of the joined layer that both heads read.
+        trunk_features: Width of the joined layer that both heads read, or the memory.
+        memory: Hidden state between the joined layer and the heads.
+        memory_features: Length of the hidden state of each agent; both heads read it.
         precision: Arithmetic of the encoder.
         critic: Input of the critic.
         parameters: One network for a team, or one for each of its agents.
@@ -71,6 +86,8 @@ class MultisenseCfg(NetworkCfg):
     vector_features: int = 64
     compressed: list[str] = field(default_factory=lambda: ["proprioception"])
     trunk_features: int = 256
+    memory: Memory = Memory.none
+    memory_features: int = 256
     precision: Precision = Precision.float32
     critic: Critic = Critic.own
     parameters: Parameters = Parameters.shared
@@ -78,8 +95,14 @@ class MultisenseCfg(NetworkCfg):
     def __post_init__(self) -> None:
         if len(self.channels) != 3:
             raise ValueError(f"network.channels: need 3 numbers, got {list(self.channels)}")
-        if min(*self.channels, self.vector_features, self.trunk_features) < 1:
+        sizes = (self.vector_features, self.trunk_features, self.memory_features)
+        if min(*self.channels, *sizes) < 1:
             raise ValueError(f"network: sizes must be positive, got {self}")
+
+    @property
+    def recurrent(self) -> bool:
+        """See `NetworkCfg`."""
+        return self.memory is not Memory.none
 
 
 class Trunk(nn.Module):
@@ -133,17 +156,25 @@ class Multisense(NetworkFactory):
 
     def __init__(self, team: str, spec: TeamSpec, cfg: MultisenseCfg) -> None:
         super().__init__(team, spec, cfg)
-        self.features = cfg.trunk_features
+        self.features = cfg.memory_features if cfg.recurrent else cfg.trunk_features
 
-    def encoder(self) -> TensorDictModule:
-        """Return the encoder of all senses, joined."""
+    def encoder(self) -> TensorDictModuleBase:
+        """Return the encoder of all senses, joined, and the memory after it."""
         layouts = self.spec.observations
         ranks = [len(layout.shape) for layout in layouts.values()]
-        return TensorDictModule(
+        trunk = TensorDictModule(
             self.per_agent(lambda: Trunk(layouts, self.cfg), ranks),
             in_keys=[(self.team, "observation", name) for name in layouts],
             out_keys=[(self.team, "features")],
         )
+        return TensorDictSequential(trunk, self._memory()) if self.cfg.recurrent else trunk
+
+    def _memory(self) -> TeamMemory:
+        spec, size = self.spec, self.cfg.memory_features
+        memory = self.per_agent(
+            lambda: GatedMemory(self.cfg.trunk_features, size), (1,) * (4 if spec.masked else 3)
+        )
+        return TeamMemory(self.team, spec.agents, size, spec.masked, memory)
 
     @property
     def central_critic(self) -> bool:

@@ -39,7 +39,7 @@ class TeamPPOLoss(ClipPPOLoss):
     _valid: Tensor | None = None  # of the batch in `forward`, (..., agents, 1)
 
     def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
-        """Return losses and measures of a minibatch ``(n,)``."""
+        """Return losses and measures of a minibatch: steps ``(n,)`` or sequences ``(n, time)``."""
         self._valid = tensordict.get(VALID, None)
         out: TensorDictBase = super().forward(tensordict)
         if self._valid is not None:
@@ -80,12 +80,20 @@ class TeamPPOLoss(ClipPPOLoss):
         return normalise(target_return), normalise(state_value), old_state_value
 
     def loss_critic(self, tensordict: TensorDictBase) -> tuple[Any, ...]:
-        """Return what `ClipPPOLoss.loss_critic` returns, its explained variance masked."""
+        """Return what `ClipPPOLoss.loss_critic` returns, its explained variance masked.
+
+        TorchRL takes the variance over the first dimension alone; of sequences it is the variance
+        over all steps.
+        """
         loss, clip_fraction, explained = super().loss_critic(tensordict)
-        if self._valid is not None:
+        if self._valid is not None or tensordict.ndim > 1:
             target = tensordict[self.tensor_keys.value_target]
             value = tensordict[self.tensor_keys.value].detach()
-            explained = explained_variance(target, value, self._valid)
+            valid = (
+                torch.ones_like(target, dtype=torch.bool) if self._valid is None else self._valid
+            )
+            rows = (array.flatten(0, -3) for array in (target, value, valid))
+            explained = explained_variance(*rows)
         return loss, clip_fraction, explained
 
 

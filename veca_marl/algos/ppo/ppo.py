@@ -18,8 +18,10 @@ from veca_marl.algos.networks.factory import (
     make_network,
     trainable,
 )
+from veca_marl.algos.networks.memory import memory_of
 from veca_marl.algos.ppo.advantages import advantages
-from veca_marl.algos.ppo.config import PPOCfg
+from veca_marl.algos.ppo.config import PPOCfg, check_sequences
+from veca_marl.algos.ppo.entropy import entropy_weights
 from veca_marl.algos.ppo.losses import VALID, TeamPPOLoss
 from veca_marl.algos.ppo.value_normalisation import NormalisedCritic, ValueNormalisation
 from veca_marl.algos.sense_encoders import copy_parameters
@@ -38,8 +40,9 @@ _MEASURES = {  # name in the logs: name in the loss
 class PPO(Algorithm):
     """Network, loss, optimiser and learning rate of one team.
 
-    A policy with hidden state learns from the stored state as an input: gradients do not flow
-    through time.
+    A network with hidden state learns from sequences of ``cfg.sequence_steps``: gradients flow
+    through a sequence, which starts from the state that was stored while collecting (truncated
+    backpropagation through time). Other networks learn from single steps.
 
     Args:
         team: Name of the team: the first part of all its keys.
@@ -55,7 +58,8 @@ class PPO(Algorithm):
         self.network = make_network(team, spec, cfg.network)
         self.normalised_critic = _normalise_values(team, self.network, cfg.value_normalisation)
         self.network.to(device)
-        self.loss = _make_loss(team, self.network, cfg).to(device)
+        weights = entropy_weights(team, list(spec.actions), cfg.entropy_coefficient)
+        self.loss = _make_loss(team, self.network, cfg, weights).to(device)
         if self.normalised_critic is not None:
             self.loss.value_norm = self.normalised_critic.statistics
         self.optimizer = torch.optim.Adam(trainable(self.network), lr=cfg.learning_rate)
@@ -66,6 +70,7 @@ class PPO(Algorithm):
             min_lr=cfg.min_learning_rate,
             max_lr=cfg.max_learning_rate,
         )
+        self._recurrent = memory_of(self.network.actor) is not None
         self._batch_keys = _batch_keys(self.network, team, spec.masked)
         self._memory: TensorDictReplayBuffer | None = None
 
@@ -84,12 +89,22 @@ class PPO(Algorithm):
         return self.learn_rows(self.prepare(batch))
 
     def prepare(self, batch: TensorDictBase) -> TensorDictBase:
-        """Return the rows ``(worlds * steps,)`` that a batch consists of, on the device."""
+        """Return the rows that a batch consists of, on the device.
+
+        They are steps, ``(worlds * steps,)``, or for a network with hidden state sequences,
+        ``(worlds * steps / sequence_steps, sequence_steps)``.
+
+        Raises:
+            ValueError: If the steps of the batch cannot be split into sequences.
+        """
         cfg = self.cfg
         rows = batch.select(*self._batch_keys)
         rows[self.team].update(
             advantages(self.network, batch, self.team, cfg.gamma, cfg.gae_lambda)
         )
+        if self._recurrent:
+            check_sequences(cfg.sequence_steps, batch.shape[1])
+            return rows.reshape(-1, cfg.sequence_steps).to(self._device)
         return rows.reshape(-1).to(self._device)
 
     def learn_rows(self, rows: TensorDictBase) -> dict[str, float]:
@@ -177,12 +192,14 @@ def _batch_keys(network: TeamNetwork, team: str, masked: bool) -> list[Any]:
     ]
 
 
-def _make_loss(team: str, network: TeamNetwork, cfg: PPOCfg) -> TeamPPOLoss:
+def _make_loss(
+    team: str, network: TeamNetwork, cfg: PPOCfg, entropy: float | dict[Any, float]
+) -> TeamPPOLoss:
     loss = TeamPPOLoss(
         network.actor,
         network.critic,
         clip_epsilon=cfg.clip,
-        entropy_coeff=cfg.entropy_coefficient,
+        entropy_coeff=entropy,
         critic_coeff=cfg.value_coefficient,
         loss_critic_type="l2",
         normalize_advantage=True,

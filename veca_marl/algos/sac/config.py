@@ -144,8 +144,9 @@ class SACCfg(AlgorithmCfg):
                 f"algo.policy_hidden: widths must be positive, got {list(self.policy_hidden)}"
             )
 
-    def check_batch(self, frames: int) -> None:
+    def check_batch(self, worlds: int, steps: int) -> None:
         """See `AlgorithmCfg`: the replay buffer takes a batch and the ends of its episodes."""
+        frames = worlds * steps
         if self.replay.capacity < 2 * frames:
             raise ValueError(
                 f"algo.replay.capacity={self.replay.capacity} must be at least twice the "

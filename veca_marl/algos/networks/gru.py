@@ -1,0 +1,120 @@
+"""A gated recurrent unit between the joined encoders and the heads: a state for each agent."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import torch
+from tensordict import TensorDictBase
+from tensordict.nn import TensorDictModuleBase
+from torch import Tensor, nn
+from torchrl.envs import TensorDictPrimer
+from torchrl.modules.tensordict_module.rnn import recurrent_mode
+
+from veca_marl.algos.networks.memory import memory_primer
+
+
+class GatedMemory(nn.Module):
+    """Features and the state before a step to the state after it, which is also the output.
+
+    TorchRL's `GRUModule` expects time as the last dimension before the features, where a team has
+    its agents, and resets a state where an episode begins, not where an agent is eliminated.
+
+    Source: Cho et al. 2014, "Learning phrase representations using RNN encoder-decoder", in the
+    form of `torch.nn.GRU`.
+
+    Args:
+        inputs: Length of the features.
+        size: Length of the state.
+    """
+
+    def __init__(self, inputs: int, size: int) -> None:
+        super().__init__()
+        self.gru = nn.GRU(inputs, size)
+        for name, parameter in self.gru.named_parameters():
+            if name.startswith("weight"):
+                nn.init.orthogonal_(parameter)
+            else:
+                nn.init.zeros_(parameter)
+
+    def forward(
+        self, features: Tensor, state: Tensor, begins: Tensor, present: Tensor | None = None
+    ) -> Tensor:
+        """Return the states after the steps, ``(..., agents, size)``.
+
+        In TorchRL's recurrent mode the leading dimensions are ``(rows, time)``: `state` is read at
+        the first step of each row only, and gradients flow through the whole row. Otherwise every
+        entry is a step by itself.
+
+        Args:
+            features: ``(..., agents, inputs)``.
+            state: State before each step, ``(..., agents, size)``.
+            begins: Whether the step is the first of its episode, so that the state before it is
+                zero. ``(..., agents, 1)``.
+            present: Whether the agent is not eliminated; if it is, the state after the step is
+                zero. ``(..., agents, 1)``; None if agents are never eliminated.
+        """
+        if recurrent_mode():
+            resets = begins if present is None else begins | _returns(present)
+            after = self._sequences(features, state, resets)
+        else:
+            after = self._steps(features, state.masked_fill(begins, 0.0))
+        return after if present is None else after.masked_fill(~present, 0.0)
+
+    def _steps(self, features: Tensor, before: Tensor) -> Tensor:
+        after: Tensor = self.gru(features.flatten(0, -2)[None], before.flatten(0, -2)[None])[1]
+        return after.view_as(before)
+
+    def _sequences(self, features: Tensor, state: Tensor, resets: Tensor) -> Tensor:
+        """Unroll pieces of time in which no state is reset; most sequences are one piece."""
+        time, agents = features.shape[1:3]
+        features, resets = (x.transpose(0, 1).flatten(1, 2) for x in (features, resets))
+        before, pieces = state[:, 0].flatten(0, 1)[None], []
+        starts = [t for t, reset in enumerate(resets.flatten(1).any(1).tolist()) if reset or t == 0]
+        for start, end in pairwise([*starts, time]):
+            before = before.masked_fill(resets[start], 0.0)
+            piece, before = self.gru(features[start:end], before)
+            pieces.append(piece)
+        states: Tensor = torch.cat(pieces).unflatten(1, (-1, agents)).transpose(0, 1)
+        return states
+
+
+def _returns(present: Tensor) -> Tensor:
+    """Return where an agent is present after a step in which it was not, ``(rows, time, ...)``."""
+    returns = torch.zeros_like(present)
+    returns[:, 1:] = present[:, 1:] & ~present[:, :-1]
+    return returns
+
+
+class TeamMemory(TensorDictModuleBase):
+    """Replaces ``(team, "features")`` by the state of a `GatedMemory` that reads them.
+
+    Args:
+        team: Name of the team.
+        agents: Number of its agents.
+        size: Length of the state of each agent.
+        masked: Whether agents can be eliminated: ``(team, "mask")``.
+        memory: Has the arguments of `GatedMemory.forward`; for all agents or one of its own for
+            each of them.
+    """
+
+    def __init__(self, team: str, agents: int, size: int, masked: bool, memory: nn.Module) -> None:
+        super().__init__()
+        self.team, self.agents, self.size, self.masked = team, agents, size, masked
+        self.memory = memory
+        self.features, self.state = (team, "features"), (team, "memory", "hidden")
+        self.in_keys = [self.features, self.state, "is_init", *([(team, "mask")] if masked else [])]
+        self.out_keys = [self.features, ("next", *self.state)]
+
+    def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
+        """Write features and next state, and return `tensordict`."""
+        features, state = tensordict[self.features], tensordict[self.state]
+        begins = tensordict["is_init"].unsqueeze(-2).expand(*features.shape[:-1], 1)
+        present = [tensordict[self.team, "mask"].unsqueeze(-1)] if self.masked else []
+        after = self.memory(features, state, begins, *present)
+        tensordict[self.features] = tensordict["next", *self.state] = after
+        return tensordict
+
+    def make_tensordict_primer(self) -> TensorDictPrimer:
+        """Return the transform with the spec of the state (see `networks.memory`)."""
+        return memory_primer(self.team, self.agents, {"hidden": (self.size,)})
