@@ -12,6 +12,7 @@ from veca_marl.algos.collection.experience import CollectCfg
 from veca_marl.algos.selfplay.self_play import SelfPlayCfg
 from veca_marl.algos.training.evaluation import EvalCfg
 from veca_marl.algos.training.loggers import LoggerKind, check_installed
+from veca_marl.config.experiment import ExperimentCfg
 from veca_marl.envs.core.game_cfg import GameCfg
 from veca_marl.envs.core.task import TaskCfg
 from veca_marl.envs.core.team import Script, TeamCfg
@@ -74,6 +75,7 @@ class Config:
         collect: How experience is collected.
         eval: When and how policies are evaluated.
         log: Outputs of the run.
+        experiment: The experiment that the run belongs to.
         seed: Seed of all random numbers.
         device: Device of the networks: cpu, cuda, cuda:1, ...
         threads: Torch threads of the learner; None for all cores.
@@ -99,6 +101,7 @@ class Config:
     collect: CollectCfg = field(default_factory=CollectCfg)
     eval: EvalCfg = field(default_factory=EvalCfg)
     log: LogCfg = field(default_factory=LogCfg)
+    experiment: ExperimentCfg = field(default_factory=ExperimentCfg)
     seed: int = 0
     device: str = "cpu"
     threads: int | None = None

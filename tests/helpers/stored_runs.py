@@ -1,0 +1,39 @@
+"""Small run folders, as training leaves them."""
+
+import csv
+import json
+
+import yaml
+
+
+def write_run(folder, config, evaluations, ended=True, seconds_per_frame=0.01, random=-0.5):
+    """Write a run folder.
+
+    Args:
+        folder: The folder.
+        config: The configuration as plain data.
+        evaluations: Pairs of frames and return.
+        ended: Whether the run has ended.
+        seconds_per_frame: Time of collection and learning.
+        random: Return of the random policy.
+    """
+    folder.mkdir(parents=True)
+    (folder / "config.yaml").write_text(yaml.safe_dump(config))
+    (folder / "provenance.json").write_text(json.dumps({"commit": "abc", "packages": {}}))
+    common = {"team": "agents", "episodes": 32}
+    scores = [(0, "random", random), *((at, "policy", score) for at, score in evaluations)]
+    table(
+        folder / "evaluations.csv",
+        [{"frames": f, "player": p, **common, "return": s} for f, p, s in scores],
+    )
+    rate = 1.0 / seconds_per_frame
+    table(folder / "metrics.csv", [{"frames": f, "frames_per_s": rate} for f, _ in evaluations])
+    if ended:
+        (folder / "comparison.txt").write_text("agents: ...\n")
+
+
+def table(path, rows):
+    with path.open("w", newline="") as file:
+        writer = csv.DictWriter(file, rows[0])
+        writer.writeheader()
+        writer.writerows(rows)

@@ -1,0 +1,123 @@
+"""Verdicts on claims."""
+
+import math
+
+import pytest
+
+from veca_marl.config.claims import Above, AboveNumber, Equal, RunsAbove, parse_claim
+from veca_marl.reports.runs import Point, Run
+from veca_marl.reports.verdict import Evidence, Judgement, Verdict, judge, overall
+
+
+def runs(arm, scores, random=0.0, ended=True):
+    return [
+        Run(arm, seed, ended, (Point(100, 1.0, score, 32),), random)
+        for seed, score in enumerate(scores)
+    ]
+
+
+def evidence(planned=3, expert=math.nan, **scores):
+    return Evidence({arm: runs(arm, values) for arm, values in scores.items()}, planned, expert)
+
+
+def verdict(text, given):
+    return judge(parse_claim(text, given.runs), given).verdict
+
+
+@pytest.mark.parametrize(
+    ("text", "claim"),
+    [
+        ("a > b", Above("a", "b")),
+        ("a > random", Above("a", "random")),
+        ("a  >  -1.5", AboveNumber("a", -1.5)),
+        ("9 runs of a > 6", RunsAbove(9, "a", 6.0)),
+        ("a = b +- 0.5", Equal("a", "b", 0.5)),
+    ],
+)
+def test_a_line_of_text_is_a_claim(text, claim):
+    assert parse_claim(text, ["a", "b"]) == claim
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("a >> b", "expected 'ARM > ARM'"),
+        ("a > c", "no arm 'c'; choices: a, b"),
+        ("random > a", "no arm 'random'"),
+        ("a = b +- 0", "the margin must be positive, got 0.0"),
+        ("2 runs of c > 1", "no arm 'c'"),
+    ],
+)
+def test_other_text_is_refused(text, message):
+    with pytest.raises(ValueError, match=message.replace("+", r"\+")):
+        parse_claim(text, ["a", "b"])
+
+
+def test_arms_with_disjoint_scores_are_ordered():
+    given = evidence(a=[6.0, 6.5, 7.0], b=[0.0, 0.5, 0.3])
+    assert verdict("a > b", given) is Verdict.holds
+    assert verdict("b > a", given) is Verdict.does_not_hold
+    judgement = judge(parse_claim("a > b", given.runs), given)
+    assert "probability of improvement 1.00 [1.00, 1.00], 3 and 3 runs" in judgement.reason
+
+
+def test_equal_and_overlapping_arms_are_undecided():
+    assert verdict("a > b", evidence(a=[1.0, 1.0, 1.0], b=[1.0, 1.0, 1.0])) is Verdict.undecided
+    assert verdict("a > b", evidence(a=[1.0, 2.0, 9.0], b=[1.5, 2.5, 3.0])) is Verdict.undecided
+
+
+def test_two_runs_are_too_few():
+    given = evidence(a=[6.0, 7.0], b=[0.0, 1.0, 2.0])
+    assert judge(parse_claim("a > b", given.runs), given) == Judgement(
+        Verdict.undecided, "2 and 3 ended runs; 3 of each are needed"
+    )
+
+
+def test_runs_that_have_not_ended_do_not_count():
+    given = Evidence({"a": [*runs("a", [6, 7]), *runs("a", [8], ended=False)]}, 3)
+    assert verdict("a > 1", given) is Verdict.undecided
+
+
+def test_an_arm_is_compared_with_random_actions_in_its_own_runs():
+    assert verdict("a > random", evidence(a=[1.0, 1.5, 2.0])) is Verdict.holds
+    assert verdict("a > random", evidence(a=[-1.0, -1.5, -2.0])) is Verdict.does_not_hold
+
+
+def test_the_expert_is_a_number_that_may_be_missing():
+    assert verdict("a > expert", evidence(a=[8, 9, 9.5], expert=7.4)) is Verdict.holds
+    assert verdict("a > expert", evidence(a=[6, 6.5, 7], expert=7.4)) is Verdict.does_not_hold
+    assert verdict("a > expert", evidence(a=[8, 9, 9.5])) is Verdict.undecided
+
+
+@pytest.mark.parametrize(
+    ("scores", "expected"),
+    [
+        ([7] * 9 + [1], Verdict.holds),
+        ([7] * 8 + [1] * 2, Verdict.does_not_hold),
+        ([7] * 8 + [1], Verdict.undecided),  # one run is missing
+        ([7] * 7 + [1] * 2, Verdict.does_not_hold),  # the missing one cannot save it
+        ([6.0] * 10, Verdict.does_not_hold),  # at 6 is not above 6
+    ],
+)
+def test_runs_above_a_number_are_counted(scores, expected):
+    assert verdict("9 runs of a > 6", evidence(10, a=scores)) is expected
+
+
+@pytest.mark.parametrize(
+    ("margin", "expected"),
+    [("5.0", Verdict.holds), ("1.0", Verdict.does_not_hold), ("3.0", Verdict.undecided)],
+)
+def test_equality_is_judged_by_the_margin(margin, expected):
+    given = evidence(a=[4.0, 5.0, 6.0], b=[1.0, 2.0, 3.0])
+    assert verdict(f"a = b +- {margin}", given) is expected
+
+
+def test_all_claims_have_to_hold_together():
+    holds, fails, open_ = (
+        Judgement(verdict, "")
+        for verdict in (Verdict.holds, Verdict.does_not_hold, Verdict.undecided)
+    )
+    assert overall([holds, holds]) is Verdict.holds
+    assert overall([holds, open_]) is Verdict.undecided
+    assert overall([holds, open_, fails]) is Verdict.does_not_hold
+    assert overall([]) is Verdict.undecided

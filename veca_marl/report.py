@@ -1,0 +1,156 @@
+"""Report on an experiment: ``python -m veca_marl.report +experiment=audio_ablation``.
+
+Gathers the runs of ``python -m veca_marl.train -m +experiment=...`` and writes ``report.md`` (the
+verdict on each claim, a table of the arms, a table of the runs, what is missing), ``curves.png``
+(interquartile means over seeds with bootstrap intervals) and ``results.csv`` (all evaluations).
+Overrides that the runs were started with are repeated: ``total_frames=1e5``.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from veca_marl.config import ConfigError
+from veca_marl.config.claims import parse_claim
+from veca_marl.config.command_line import CommandLine
+from veca_marl.config.experiment import ExperimentCfg
+from veca_marl.reports.arms import Arm, compose_arms
+from veca_marl.reports.expert import expert_rows
+from veca_marl.reports.figure import check_plotting, draw
+from veca_marl.reports.gather import Found, Row, gather, read_rows, write_rows
+from veca_marl.reports.page import Report, page
+from veca_marl.reports.runs import expert_score, runs_of, team_of
+from veca_marl.reports.summary import curve, summarise
+from veca_marl.reports.verdict import Evidence, judge
+
+FIGURE = "curves.png"
+
+
+@dataclass
+class ReportOptions:
+    """Options of the command.
+
+    Attributes:
+        runs: Folder of the runs; None is ``runs/<name of the experiment>``.
+        to: Folder that the files are written to; None is that of the runs.
+        results: A ``results.csv`` to read in place of runs; its folder is the default of `to`.
+        expert_episodes: Episodes that the expert plays as a baseline; 0 leaves it out.
+    """
+
+    runs: str | None = None
+    to: str | None = None
+    results: str | None = None
+    expert_episodes: int = 32
+
+    def __post_init__(self) -> None:
+        if self.runs is not None and self.results is not None:
+            raise ValueError("runs and results: choose one of both")
+        if self.expert_episodes < 0:
+            raise ValueError(f"expert_episodes must be 0 or more, got {self.expert_episodes}")
+
+
+def make_report(options: ReportOptions, arms: Sequence[Arm], command: str) -> tuple[Report, Path]:
+    """Write the files of a report; return it and their folder.
+
+    Args:
+        options: Where the runs are.
+        arms: All arms of the experiment.
+        command: The command that runs them.
+
+    Raises:
+        ConfigError: If nothing has been evaluated.
+        PlotError: If matplotlib is missing.
+        ValueError: If a file is not what it should be, or the team or metric does not exist.
+        OSError: If a file cannot be read or written.
+    """
+    check_plotting()
+    experiment = arms[0].cfg.experiment
+    found, rows, folder = _read(options, arms, str(experiment.name))
+    if not any(row["player"] == "policy" for row in rows):
+        remarks = [run.remark for run in found[:3]]
+        raise ConfigError(f"no run of {experiment.name} has been evaluated: {'; '.join(remarks)}")
+    report = _report(experiment, command, rows, found)
+    folder.mkdir(parents=True, exist_ok=True)
+    write_rows(folder / "results.csv", rows)
+    curves = {arm.name: curve([r for r in report.runs if r.arm == arm.name]) for arm in arms}
+    drawn = {name: points for name, points in curves.items() if points}
+    title = f"{arms[0].cfg.task.name}: {experiment.name}"
+    draw(folder / FIGURE, drawn, report.baselines, title, f"{experiment.metric} of an episode")
+    (folder / "report.md").write_text(page(report))
+    return report, folder
+
+
+def _read(
+    options: ReportOptions, arms: Sequence[Arm], name: str
+) -> tuple[list[Found], list[Row], Path]:
+    """Return the state of each run, the table of results and the folder of the report."""
+    if options.results is not None:
+        path = Path(options.results)
+        return [], read_rows(path), Path(options.to or path.parent)
+    runs = Path(options.runs or f"runs/{name}")
+    found, rows = gather(runs, {arm.name: arm.plain for arm in arms}, arms[0].cfg.experiment.seeds)
+    if rows:
+        rows += expert_rows(arms[0].cfg, arms[0].name, options.expert_episodes)
+    return found, rows, Path(options.to or runs)
+
+
+def _report(
+    experiment: ExperimentCfg, command: str, rows: Sequence[Row], found: Sequence[Found]
+) -> Report:
+    team = team_of(rows, experiment.team)
+    runs = runs_of(rows, experiment.metric, team)
+    by_arm = {arm: [run for run in runs if run.arm == arm] for arm in experiment.arms}
+    expert = expert_score(rows, experiment.metric, team)
+    evidence = Evidence(by_arm, len(experiment.seeds), expert)
+    random = [run.random for run in runs if not math.isnan(run.random)]
+    return Report(
+        experiment,
+        command,
+        team,
+        [summarise(arm, own, experiment.threshold) for arm, own in by_arm.items()],
+        runs,
+        found,
+        {text: judge(parse_claim(text, by_arm), evidence) for text in experiment.claims},
+        {"random": float(np.mean(random)) if random else math.nan, "expert": expert},
+        _commits(found),
+        FIGURE,
+    )
+
+
+def _commits(found: Sequence[Found]) -> list[str]:
+    """Return the commits of the runs that count, or the versions of installed packages."""
+    commits = set()
+    for run in found:
+        path = run.folder / "provenance.json"
+        if run.counts and path.is_file():
+            stored = json.loads(path.read_text())
+            commits.add(str(stored.get("commit") or stored["packages"]["veca_marl"]))
+    return sorted(commits)
+
+
+def run(options: ReportOptions, overrides: list[str]) -> None:
+    """Write the report; print the verdict, what is missing, and where the files are."""
+    command = f"python -m veca_marl.train -m {' '.join(overrides)}"
+    report, folder = make_report(options, compose_arms(overrides), command)
+    for text, judgement in report.judgements.items():
+        print(f"{text}: {judgement.verdict.value}: {judgement.reason}")
+    for found in report.found:
+        if found.remark:
+            print(f"{found.arm}, seed {found.seed}: {found.remark}")
+    print(f"verdict: {report.verdict}", f"report: {folder / 'report.md'}", sep="\n")
+
+
+def main(words: Sequence[str] | None = None) -> int:
+    """Run the command line; return the exit status."""
+    return CommandLine("report", ReportOptions, str(__doc__), (ValueError, OSError)).run(run, words)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

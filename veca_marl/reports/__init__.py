@@ -1,0 +1,1 @@
+"""Reports on experiments: runs are gathered, compared and drawn."""

@@ -1,0 +1,47 @@
+"""The arms of an experiment, composed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, cast
+
+import yaml
+from omegaconf import OmegaConf
+
+from veca_marl.config import Config, ConfigError, compose_node, to_config
+
+
+@dataclass(frozen=True)
+class Arm:
+    """One arm.
+
+    Attributes:
+        name: Its name.
+        cfg: Its configuration.
+        plain: The same as stored with a run.
+    """
+
+    name: str
+    cfg: Config
+    plain: dict[str, Any]
+
+
+def compose_arms(overrides: Sequence[str]) -> list[Arm]:
+    """Return all arms of the experiment that `overrides` choose.
+
+    Raises:
+        ConfigError: If they choose none, or one without arms.
+    """
+    experiment = compose_node(overrides).experiment
+    if experiment.name is None:
+        raise ConfigError("no experiment with arms: add +experiment=NAME")
+    if not experiment.arms or not experiment.seeds:
+        raise ConfigError(f"experiment {experiment.name} has no arms or no seeds")
+    return [_compose_arm(overrides, str(name), list(own)) for name, own in experiment.arms.items()]
+
+
+def _compose_arm(overrides: Sequence[str], name: str, own: Sequence[str]) -> Arm:
+    node = compose_node([*overrides, f"experiment.arm={name}", *own])
+    plain = yaml.safe_load(OmegaConf.to_yaml(node, resolve=True))
+    return Arm(name, to_config(node), cast(dict[str, Any], plain))

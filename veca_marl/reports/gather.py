@@ -1,0 +1,139 @@
+"""Gathers the evaluations of all runs of an experiment into one table."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from veca_marl.runs.resumable import may_change
+from veca_marl.sweeps.differences import differences
+from veca_marl.sweeps.run_state import RunState, StoredRun, read_run
+
+Row = dict[str, str]
+
+
+@dataclass(frozen=True)
+class Found:
+    """A run that an experiment asks for, and what there is of it.
+
+    Attributes:
+        arm: Its arm.
+        seed: Its seed.
+        folder: Where it is, or would be.
+        state: How far it has come.
+        counts: Whether it has ended with the configuration of the experiment.
+        remark: What a reader has to know; empty for a finished run.
+    """
+
+    arm: str
+    seed: int
+    folder: Path
+    state: RunState
+    counts: bool
+    remark: str
+
+
+def run_folder(runs: Path, arm: str, seed: int) -> Path:
+    """Return the folder of a run of an experiment whose runs lie in `runs`."""
+    return runs / arm / f"seed_{seed}"
+
+
+def gather(
+    runs: Path, asked: Mapping[str, Mapping[str, Any]], seeds: Sequence[int]
+) -> tuple[list[Found], list[Row]]:
+    """Return what there is of each run, and the evaluations of those that fit.
+
+    Runs with another configuration than that of the experiment are left out of the rows.
+
+    Args:
+        runs: Folder of the experiment's runs.
+        asked: Configuration of each arm as plain data.
+        seeds: Seeds of each arm.
+    """
+    found, rows = [], []
+    for arm, config in asked.items():
+        for seed in seeds:
+            run = read_run(run_folder(runs, arm, seed))
+            status, fits = _status(run, arm, {**config, "seed": seed})
+            found.append(status)
+            if fits:
+                rows += _rows(run, status)
+    return found, rows
+
+
+def _status(run: StoredRun, arm: str, asked: Mapping[str, Any]) -> tuple[Found, bool]:
+    state = run.state(asked["total_frames"], asked["max_minutes"])
+    base = (arm, int(asked["seed"]), run.folder, state)
+    if run.config is None:
+        return Found(*base, False, f"missing: no run in {run.folder}"), False
+    differing = [d for d in differences(run.config, asked) if not may_change(d.key)]
+    changed = [str(d) for d in differing if not d.of_version]
+    if changed:
+        return Found(*base, False, f"not counted: {'; '.join(changed)}"), False
+    remark = _remark(run, state, asked)
+    others = [d.key for d in differing]
+    if others:
+        remark = f"{remark}; stored by a version with other keys: {', '.join(others)}".lstrip("; ")
+    return Found(*base, state in (RunState.finished, RunState.cut), remark), True
+
+
+def _remark(run: StoredRun, state: RunState, asked: Mapping[str, Any]) -> str:
+    if state is RunState.finished:
+        return ""
+    reached = f"{run.frames} of {asked['total_frames']} frames"
+    if state is RunState.cut:
+        return f"cut by max_minutes={asked['max_minutes']} at {reached}"
+    return f"unfinished: {reached}; shown, not counted"
+
+
+def _rows(run: StoredRun, status: Found) -> list[Row]:
+    """Return the evaluations of a run with its arm, its seed and the minutes until each."""
+    frames, minutes = learning_minutes(run.rows("metrics"))
+    rows = []
+    for row in run.rows("evaluations"):
+        passed = minutes[np.searchsorted(frames, int(row["frames"]), side="right")]
+        head = {"arm": status.arm, "seed": str(status.seed), "state": status.state.value}
+        rows.append({**head, **row, "minutes": f"{passed:.3f}"})
+    return rows
+
+
+def learning_minutes(metrics: Sequence[Mapping[str, str]]) -> tuple[Any, Any]:
+    """Return frames ``(n,)`` and the minutes ``(n + 1,)`` of collection and learning until them.
+
+    Evaluations are left out, also the time between an interruption and its resumption. Entry
+    ``k`` of the minutes belongs to the first ``k`` batches.
+    """
+    frames = np.array([int(row["frames"]) for row in metrics])
+    rates = np.array([float(row["frames_per_s"]) for row in metrics])
+    seconds = np.diff(frames, prepend=0) / rates
+    return frames, np.concatenate([[0.0], np.cumsum(seconds) / 60.0])
+
+
+def write_rows(path: Path, rows: Sequence[Row]) -> None:
+    """Write rows as CSV; columns that a row lacks are empty."""
+    columns = list(dict.fromkeys(name for row in rows for name in row))
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with path.open("w", newline="") as file:
+        writer = csv.DictWriter(file, columns, lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(rows)
+
+
+def read_rows(path: Path) -> list[Row]:
+    """Return the rows of a file that `write_rows` wrote.
+
+    Raises:
+        ValueError: If a column that a report needs is missing.
+    """
+    with path.open(newline="") as file:
+        reader = csv.DictReader(file)
+        columns = set(reader.fieldnames or ())
+        absent = sorted({"arm", "seed", "frames", "player", "team"} - columns)
+        if absent:
+            raise ValueError(f"{path} has no column {absent[0]!r}; it is no table of results")
+        return list(reader)

@@ -1,0 +1,174 @@
+"""The report as Markdown: verdict, table of arms, table of runs, and what is missing."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+from veca_marl.config.experiment import ExperimentCfg
+from veca_marl.reports.gather import Found
+from veca_marl.reports.runs import Run
+from veca_marl.reports.summary import ArmSummary
+from veca_marl.reports.verdict import Judgement, Verdict, overall
+
+EPISODES_OF_FIGURES = 32
+"""Evaluations with fewer episodes have intervals too wide for a figure."""
+
+
+@dataclass(frozen=True)
+class Report:
+    """Everything that a report states.
+
+    Attributes:
+        experiment: The experiment.
+        command: The command that runs it.
+        team: The team that is compared.
+        summaries: The numbers of each arm.
+        runs: The runs that were evaluated.
+        found: What there is of each planned run; empty if only a table of results was read.
+        judgements: The verdict on each claim, by its text.
+        baselines: Score of each policy that does not learn; NaN if it was not measured.
+        commits: Commits that the runs were made with.
+        figure: Name of the file with the curves.
+    """
+
+    experiment: ExperimentCfg
+    command: str
+    team: str
+    summaries: Sequence[ArmSummary]
+    runs: Sequence[Run]
+    found: Sequence[Found]
+    judgements: Mapping[str, Judgement]
+    baselines: Mapping[str, float]
+    commits: Sequence[str]
+    figure: str
+
+    @property
+    def verdict(self) -> str:
+        """The verdict on all claims in words, such as ``undecided: 3 seeds``."""
+        if not self.judgements:
+            return "no claim is stated as data"
+        verdict = overall(list(self.judgements.values()))
+        if verdict is not Verdict.undecided:
+            return str(verdict.value)
+        counts = sorted({summary.ended for summary in self.summaries})
+        seeds = f"{counts[0]}" if len(counts) == 1 else f"{counts[0]} to {counts[-1]}"
+        return f"{verdict.value}: {seeds} seeds"
+
+
+def page(report: Report) -> str:
+    """Return the Markdown text of a report."""
+    experiment = report.experiment
+    parts = [
+        f"# Report: {experiment.name}",
+        f"**Claim.** {experiment.claim or '(none in words)'}",
+        f"**Verdict.** {report.verdict[0].upper()}{report.verdict[1:]}.",
+        "\n".join(_verdict_lines(report.judgements)),
+        f"![Learning curves of {experiment.name}]({report.figure})",
+        _caption(report),
+        "\n".join(_arm_table(report)),
+        "\n".join(_baseline_lines(report.baselines)),
+        "\n".join(_remark_lines(report)),
+        "\n".join(_run_table(report)),
+        f"Command: `{report.command}`",
+    ]
+    return "\n\n".join(part for part in parts if part) + "\n"
+
+
+def _verdict_lines(judgements: Mapping[str, Judgement]) -> list[str]:
+    return [
+        f"- `{text}` {judgement.verdict.value}: {judgement.reason}"
+        for text, judgement in judgements.items()
+    ]
+
+
+def _caption(report: Report) -> str:
+    return (
+        f"Lines are interquartile means of `{report.experiment.metric}` of team "
+        f"`{report.team}` over runs, areas and brackets 95 % stratified bootstrap intervals over "
+        "runs (Agarwal et al. 2021). Intervals over few runs are too narrow: resampling cannot "
+        "show values that no run has. Minutes are those of collection and learning, without "
+        "evaluations."
+    )
+
+
+def _arm_table(report: Report) -> list[str]:
+    threshold = report.experiment.threshold
+    head = ["arm", "ended runs", "final score"]
+    rows = [
+        [summary.arm, str(summary.ended), _interval(summary.score, *summary.interval)]
+        for summary in report.summaries
+    ]
+    if threshold is not None:
+        head += [f"runs at {threshold:g}", f"median frames to {threshold:g}", "median minutes"]
+        for row, summary in zip(rows, report.summaries, strict=True):
+            row += [
+                f"{summary.reached} of {summary.ended}",
+                _number(summary.frames, 0),
+                _number(summary.minutes, 1),
+            ]
+    return table(head, rows)
+
+
+def _baseline_lines(baselines: Mapping[str, float]) -> list[str]:
+    return [
+        f"Policy `{name}`: {score:.2f}."
+        for name, score in baselines.items()
+        if not math.isnan(score)
+    ]
+
+
+def _remark_lines(report: Report) -> list[str]:
+    """Return what a reader has to know about single runs and about all."""
+    lines = [
+        f"- {found.arm}, seed {found.seed}: {found.remark}"
+        for found in report.found
+        if found.remark
+    ]
+    fewest = min((run.final.episodes for run in report.runs), default=EPISODES_OF_FIGURES)
+    if 0 < fewest < EPISODES_OF_FIGURES:
+        lines.append(
+            f"- final evaluations of {fewest} episodes; figures need at least {EPISODES_OF_FIGURES}"
+        )
+    if len(report.commits) > 1:
+        lines.append(f"- runs of several commits: {', '.join(report.commits)}")
+    elif report.commits:
+        lines.append(f"- commit {report.commits[0]}")
+    return ["**Remarks**", "", *lines] if lines else []
+
+
+def _run_table(report: Report) -> list[str]:
+    rows = [
+        [
+            run.arm,
+            str(run.seed),
+            "yes" if run.ended else "no",
+            str(run.final.frames),
+            f"{run.final.score:.2f}",
+            _number(run.random, 2),
+            _number(run.final.minutes, 1),
+        ]
+        for run in report.runs
+    ]
+    return table(["arm", "seed", "ended", "frames", "score", "random policy", "minutes"], rows)
+
+
+def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> list[str]:
+    """Return the lines of a Markdown table."""
+    lines = [head, ["---"] * len(head), *rows]
+    return [f"| {' | '.join(cells)} |" for cells in lines]
+
+
+def _interval(score: float, low: float, high: float) -> str:
+    if math.isnan(score):
+        return "no ended run"
+    if math.isnan(low):
+        return f"{score:.2f} (one run: no interval)"
+    return f"{score:.2f} [{low:.2f}, {high:.2f}]"
+
+
+def _number(value: float, digits: int) -> str:
+    if math.isnan(value):
+        return ""
+    return "not reached" if math.isinf(value) else f"{value:.{digits}f}"

@@ -1,0 +1,143 @@
+"""The scores of runs over their training, from the rows of a table of results."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from veca_marl.reports.statistics import Scores
+
+ENDED = ("finished", "cut")
+
+
+@dataclass(frozen=True)
+class Point:
+    """One evaluation.
+
+    Attributes:
+        frames: Frames of training before it.
+        minutes: Minutes of collection and learning before it; NaN if not measured.
+        score: Mean of the metric over the episodes.
+        episodes: Number of episodes; 0 if not stored.
+    """
+
+    frames: int
+    minutes: float
+    score: float
+    episodes: int
+
+
+@dataclass(frozen=True)
+class Run:
+    """The evaluations of one run.
+
+    Attributes:
+        arm: Its arm.
+        seed: Its seed.
+        ended: Whether it has ended; otherwise it has no final score.
+        points: Its evaluations in the order of their frames.
+        random: Score of the random policy from the same starts; NaN if not measured.
+    """
+
+    arm: str
+    seed: int
+    ended: bool
+    points: tuple[Point, ...]
+    random: float
+
+    @property
+    def final(self) -> Point:
+        """The last evaluation."""
+        return self.points[-1]
+
+    def reached(self, threshold: float) -> Point | None:
+        """Return the first evaluation with at least this score; None if there is none."""
+        return next((point for point in self.points if point.score >= threshold), None)
+
+
+def runs_of(rows: Sequence[Mapping[str, str]], metric: str, team: str) -> list[Run]:
+    """Return all runs in a table of results that have been evaluated at least once.
+
+    Args:
+        rows: The table.
+        metric: Its column with the score.
+        team: The team that is compared.
+
+    Raises:
+        ValueError: If there is no such column.
+    """
+    own: dict[tuple[str, int], list[Mapping[str, str]]] = {}
+    for row in rows:
+        if row["team"] == team and row["player"] in ("policy", "random"):
+            if metric not in row:
+                raise ValueError(f"experiment.metric={metric}: choices: {', '.join(row)}")
+            own.setdefault((row["arm"], int(row["seed"])), []).append(row)
+    made = [_run(arm, seed, mine, metric) for (arm, seed), mine in own.items()]
+    return [run for run in made if run.points]
+
+
+def _run(arm: str, seed: int, rows: Sequence[Mapping[str, str]], metric: str) -> Run:
+    policy = [row for row in rows if row["player"] == "policy"]
+    by_frames = {int(row["frames"]): _point(row, metric) for row in policy}  # the last of equals
+    random = [_number(row[metric]) for row in rows if row["player"] == "random"]
+    return Run(
+        arm,
+        seed,
+        all(row.get("state", "finished") in ENDED for row in rows),
+        tuple(by_frames[frames] for frames in sorted(by_frames)),
+        random[-1] if random else math.nan,
+    )
+
+
+def _point(row: Mapping[str, str], metric: str) -> Point:
+    return Point(
+        int(row["frames"]),
+        _number(row.get("minutes", "")),
+        _number(row[metric]),
+        int(row.get("episodes") or 0),
+    )
+
+
+def _number(text: str) -> float:
+    return float(text) if text else math.nan
+
+
+def final_scores(runs: Iterable[Run]) -> Scores:
+    """Return the final scores of runs that have ended, ``(runs, 1)``."""
+    return np.array([[run.final.score] for run in runs if run.ended], float).reshape(-1, 1)
+
+
+def random_scores(runs: Iterable[Run]) -> Scores:
+    """Return the scores of the random policy beside runs that have ended, ``(runs, 1)``."""
+    return np.array([[run.random] for run in runs if run.ended], float).reshape(-1, 1)
+
+
+def expert_score(rows: Sequence[Mapping[str, str]], metric: str, team: str) -> float:
+    """Return the mean score of the expert; NaN if it was not measured."""
+    scores = [
+        _number(row.get(metric, ""))
+        for row in rows
+        if (row["player"], row["team"]) == ("expert", team)
+    ]
+    return float(np.mean(scores)) if scores else math.nan
+
+
+def team_of(rows: Sequence[Mapping[str, str]], asked: str | None) -> str:
+    """Return the team that is compared.
+
+    Args:
+        rows: The table of results.
+        asked: The team that the experiment names; None is the only one.
+
+    Raises:
+        ValueError: If there is no such team, or several and none is named.
+    """
+    teams = sorted({row["team"] for row in rows})
+    if asked is None and len(teams) == 1:
+        return teams[0]
+    if asked not in teams:
+        raise ValueError(f"experiment.team={asked}: choices: {', '.join(teams)}")
+    return asked

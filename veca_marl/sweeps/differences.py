@@ -1,0 +1,58 @@
+"""How the configuration of a run on disk differs from the one that is asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+_ABSENT = "absent"
+_IGNORED = ("experiment", "resume")  # claims and seeds of an experiment do not change its runs
+
+
+@dataclass(frozen=True)
+class Difference:
+    """One key with two values.
+
+    Attributes:
+        key: Dotted path.
+        stored: Value of the run; ``absent`` if it has none.
+        asked: Value that is asked for; ``absent`` if there is none.
+    """
+
+    key: str
+    stored: Any
+    asked: Any
+
+    @property
+    def of_version(self) -> bool:
+        """Whether only one of both has the key: it was added or removed between versions."""
+        return _ABSENT in (self.stored, self.asked)
+
+    def __str__(self) -> str:
+        return f"{self.key} is {self.stored} there and {self.asked} here"
+
+
+def differences(stored: Mapping[str, Any], asked: Mapping[str, Any]) -> list[Difference]:
+    """Return all keys with different values, in alphabetical order.
+
+    Args:
+        stored: Content of ``config.yaml`` of a run as plain data.
+        asked: The resolved configuration as plain data.
+    """
+    one, other = dict(_flat(stored)), dict(_flat(asked))
+    return [
+        Difference(key, one.get(key, _ABSENT), other.get(key, _ABSENT))
+        for key in sorted({*one, *other})
+        if key.partition(".")[0] not in _IGNORED
+        and one.get(key, _ABSENT) != other.get(key, _ABSENT)
+    ]
+
+
+def _flat(node: Mapping[str, Any], path: str = "") -> Iterator[tuple[str, Any]]:
+    for name, value in node.items():
+        key = f"{path}.{name}".lstrip(".")
+        if isinstance(value, Mapping) and value:
+            yield from _flat(value, key)
+        else:
+            yield key, value

@@ -1,0 +1,90 @@
+"""How far a run on disk has come, read from its files alone."""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import dataclass
+from enum import Enum
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+
+class RunState(Enum):
+    """How far a run has come.
+
+    Attributes:
+        missing: There is no run.
+        unfinished: It has begun and not ended: it was interrupted, failed, or goes on.
+        cut: It has ended by ``max_minutes``, before its last frame.
+        finished: It has ended with its last frame.
+    """
+
+    missing = "missing"
+    unfinished = "unfinished"
+    cut = "cut"
+    finished = "finished"
+
+
+@dataclass(frozen=True)
+class StoredRun:
+    """A run on disk.
+
+    Attributes:
+        folder: Its folder.
+        config: Its configuration as plain data; None if there is no run.
+    """
+
+    folder: Path
+    config: dict[str, Any] | None
+
+    @property
+    def frames(self) -> int:
+        """Frames after which it was evaluated last; 0 without an evaluation."""
+        return max((int(row["frames"]) for row in self.rows("evaluations")), default=0)
+
+    def rows(self, kind: str) -> list[dict[str, str]]:
+        """Return the complete rows of ``evaluations.csv`` or ``metrics.csv``; none without a file.
+
+        The last row is incomplete while a run writes it.
+        """
+        path = self.folder / f"{kind}.csv"
+        if not path.is_file():
+            return []
+        with path.open(newline="") as file:
+            return [row for row in csv.DictReader(file) if None not in row.values()]
+
+    def state(self, total_frames: int, max_minutes: float | None) -> RunState:
+        """Return how far it has come on the way to a budget.
+
+        Args:
+            total_frames: Frames that it is to have.
+            max_minutes: Minutes that it may take; None for no limit.
+        """
+        if self.config is None:
+            return RunState.missing
+        if not (self.folder / "comparison.txt").is_file():
+            return RunState.unfinished
+        if self.frames >= total_frames:
+            return RunState.finished
+        stopped = max_minutes is not None and self.config.get("max_minutes") == max_minutes
+        return RunState.cut if stopped else RunState.unfinished
+
+
+def read_run(folder: Path) -> StoredRun:
+    """Return the run in a folder, which may be missing.
+
+    Raises:
+        ValueError: If its ``config.yaml`` cannot be read.
+    """
+    path = folder / "config.yaml"
+    if not path.is_file():
+        return StoredRun(folder, None)
+    try:
+        config = yaml.safe_load(path.read_text())
+    except yaml.YAMLError as error:
+        raise ValueError(f"{path} cannot be read: {' '.join(str(error).split())}") from error
+    if not isinstance(config, dict):
+        raise ValueError(f"{path} holds no configuration")
+    return StoredRun(folder, config)
