@@ -17,7 +17,7 @@ from veca_marl.envs.core.game_cfg import GameCfg
 from veca_marl.envs.core.task import TASKS
 from veca_marl.gymnasium_ids import register_task
 from veca_marl.plugins import load_plugins
-from veca_marl.runs.assembly import make_trainer
+from veca_marl.runs.assembly import decide_precision, make_trainer
 from veca_marl.runs.run_folder import new_run
 from veca_marl.runs.training import TrainingResult, run_training
 
@@ -179,6 +179,7 @@ def train(
     chosen += [] if total_frames is None else [f"total_frames={_integer(total_frames)}"]
     chosen += [f"seed={seed}", *overrides]
     node = compose_node(chosen)
+    decide_precision(node)
     cfg = to_config(node)
     run = None if folder is None else new_run(Path(folder))
     trainer = make_trainer(cfg, run)

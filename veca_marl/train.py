@@ -25,7 +25,7 @@ from veca_marl.algos.collection.workers import WorkerError
 from veca_marl.algos.training.checkpoint import CheckpointError
 from veca_marl.algos.training.loop import Trainer
 from veca_marl.config import Config, ConfigError, conf_dir, one_line, prepare, to_config
-from veca_marl.runs.assembly import make_trainer
+from veca_marl.runs.assembly import decide_precision, make_trainer
 from veca_marl.runs.run_folder import RunFolder, new_run, open_run, remove_if_empty
 from veca_marl.runs.training import TrainingResult, run_training
 
@@ -98,6 +98,8 @@ def set_up(node: DictConfig, path: Path) -> tuple[Config, RunFolder, Trainer]:
         cfg = stored_config(folder, node, list(HydraConfig.get().overrides.task))
         return cfg, folder, make_trainer(cfg, folder)
     folder = new_run(path)
+    for precision in decide_precision(node):
+        print(f"network.precision=auto: {precision.value} on this machine")
     cfg = to_config(node)
     trainer = make_trainer(cfg, folder)
     folder.begin(node, list(HydraConfig.get().overrides.task))

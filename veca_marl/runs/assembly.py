@@ -6,8 +6,9 @@ from dataclasses import dataclass
 from typing import Any, cast
 
 import torch
-from omegaconf import OmegaConf
+from omegaconf import DictConfig, OmegaConf
 
+from veca_marl.algos.networks.precision import Precision
 from veca_marl.algos.selfplay.pool import Pool
 from veca_marl.algos.selfplay.self_play import SelfPlay
 from veca_marl.algos.specs import TeamSpec, team_specs
@@ -23,6 +24,7 @@ from veca_marl.config import Config, ConfigError, one_line
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
 from veca_marl.envs.core.game_cfg import GameCfg
 from veca_marl.plugins import load_plugins
+from veca_marl.runs.allocation import keep_freed_memory
 from veca_marl.runs.run_folder import RunFolder
 
 
@@ -56,6 +58,7 @@ def make_trainer(cfg: Config, folder: RunFolder | None = None) -> Trainer:
         CheckpointError: If a run to continue or to load from does not fit.
     """
     device = find_device(cfg.device)
+    keep_freed_memory()
     if cfg.threads is not None:
         torch.set_num_threads(cfg.threads)
     torch.manual_seed(cfg.seed)
@@ -123,6 +126,27 @@ def read_specs(game: GameCfg) -> dict[str, TeamSpec]:
     specs = team_specs(env)
     env.close()
     return specs
+
+
+def decide_precision(node: DictConfig) -> list[Precision]:
+    """Replace ``precision=auto`` of all networks by what this machine has: the run stores it.
+
+    Args:
+        node: The configuration of a new run; it is changed.
+
+    Returns:
+        What was decided, once for each network.
+
+    Raises:
+        ConfigError: If the device does not exist.
+    """
+    decided = []
+    for algorithm in (node.algo, *node.learner.values()):
+        network = algorithm.get("network")
+        if network is not None and network.get("precision") is Precision.auto:
+            network.precision = Precision.auto.on(find_device(node.device))
+            decided.append(network.precision)
+    return decided
 
 
 def find_device(name: str) -> torch.device:

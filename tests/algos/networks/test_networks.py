@@ -8,7 +8,8 @@ from torchrl.data import Bounded, Composite
 from veca_marl.algos.networks.encoders import make_encoder
 from veca_marl.algos.networks.factory import make_network
 from veca_marl.algos.networks.image_encoder import ImageEncoder, Places, Pooling
-from veca_marl.algos.networks.multisense import MultisenseCfg, Precision, Trunk
+from veca_marl.algos.networks.multisense import MultisenseCfg, Trunk
+from veca_marl.algos.networks.precision import Precision
 from veca_marl.algos.networks.vector_encoder import VectorEncoder, scale_of
 from veca_marl.algos.specs import ArrayLayout, team_specs
 
@@ -49,12 +50,14 @@ def test_image_encoder_has_the_documented_layers():
     assert encoder.features == 32 * 7 * 7
 
 
-def test_encoding_in_blocks_equals_encoding_at_once():
+def test_bytes_are_encoded_as_numbers_from_0_to_1():
     torch.manual_seed(0)
     encoder = ImageEncoder(IMAGE.shape)
-    image = torch.randint(0, 256, (70, *IMAGE.shape), dtype=torch.uint8)
-    whole = encoder.layers(image.flatten(1, 2) / 255.0)
-    torch.testing.assert_close(encoder(image), whole, rtol=1e-5, atol=1e-6)
+    image = torch.randint(0, 256, (3, *IMAGE.shape), dtype=torch.uint8)
+    x = image.flatten(1, 2) / 255.0
+    for layer, stride in zip(encoder.layers[::2], (4, 2, 1), strict=False):
+        x = torch.relu(torch.nn.functional.conv2d(x, layer.weight, layer.bias, stride))
+    torch.testing.assert_close(encoder(image), x.flatten(1), rtol=1e-5, atol=1e-6)
 
 
 @pytest.mark.parametrize(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field
 from enum import Enum
 
@@ -17,15 +16,9 @@ from veca_marl.algos.networks.gru import GatedMemory, TeamMemory
 from veca_marl.algos.networks.image_encoder import Pooling
 from veca_marl.algos.networks.initialisation import orthogonal
 from veca_marl.algos.networks.per_agent import CentralValue, PerAgent
+from veca_marl.algos.networks.precision import Precision, arithmetic
 from veca_marl.algos.sense_encoders import SenseEncoders
 from veca_marl.algos.specs import ArrayLayout, TeamSpec
-
-
-class Precision(Enum):
-    """Arithmetic of the encoder; parameters, heads and losses are always float32."""
-
-    float32 = "float32"
-    bfloat16 = "bfloat16"
 
 
 class Critic(Enum):
@@ -73,7 +66,7 @@ class MultisenseCfg(NetworkCfg):
         trunk_features: Width of the joined layer that both heads read, or the memory.
         memory: Hidden state between the joined layer and the heads.
         memory_features: Length of the hidden state of each agent; both heads read it.
-        precision: Arithmetic of the encoder.
+        precision: Arithmetic of the encoder where it learns.
         critic: Input of the critic.
         parameters: One network for a team, or one for each of its agents.
     """
@@ -88,7 +81,7 @@ class MultisenseCfg(NetworkCfg):
     trunk_features: int = 256
     memory: Memory = Memory.none
     memory_features: int = 256
-    precision: Precision = Precision.float32
+    precision: Precision = Precision.auto
     critic: Critic = Critic.own
     parameters: Parameters = Parameters.shared
 
@@ -135,18 +128,13 @@ class Trunk(nn.Module):
         """Encode and join one tensor per sense, in the order of the spec."""
         first_rank = next(iter(self.ranks.values()))
         leading = observations[0].shape[: observations[0].ndim - first_rank]
-        with self._arithmetic(observations[0].device):
+        with arithmetic(self.precision, observations[0].device):
             parts = [
                 encoder(array.reshape(-1, *array.shape[len(leading) :]))
                 for encoder, array in zip(self.encoders.values(), observations, strict=True)
             ]
             features: Tensor = self.join(torch.cat(parts, dim=-1))
         return features.float().reshape(*leading, -1)
-
-    def _arithmetic(self, device: torch.device) -> AbstractContextManager[object]:
-        if self.precision is Precision.float32:
-            return nullcontext()
-        return torch.autocast(device.type, dtype=torch.bfloat16)
 
 
 class Multisense(NetworkFactory):

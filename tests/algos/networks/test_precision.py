@@ -1,0 +1,86 @@
+"""bfloat16 rounds to 8 significant bits; features and gradients stay within that of float32."""
+
+import pytest
+import torch
+
+from veca_marl.algos.networks.multisense import MultisenseCfg, Trunk
+from veca_marl.algos.networks.precision import Precision, arithmetic, has_bfloat16
+from veca_marl.algos.specs import ArrayLayout
+
+CPU = torch.device("cpu")
+LAYOUTS = {
+    "vision": ArrayLayout((2, 3, 36, 36), "uint8", 0.0, 255.0),
+    "audio": ArrayLayout((2, 20), "float32", -8.0, 3.0),
+}
+ROUNDING = 2.0**-8  # of one number; sums of many products have a smaller relative error
+
+
+@pytest.fixture
+def observations():
+    torch.manual_seed(0)
+    image = torch.randint(0, 256, (16, 1, *LAYOUTS["vision"].shape), dtype=torch.uint8)
+    return image, torch.rand(16, 1, 2, 20) * 11.0 - 8.0
+
+
+def trunk(precision):
+    torch.manual_seed(1)
+    return Trunk(LAYOUTS, MultisenseCfg(precision=precision))
+
+
+def gradient(precision, observations):
+    net = trunk(precision)
+    features = net(*observations)
+    assert features.dtype == torch.float32
+    features.square().sum().backward()
+    assert all(p.grad.dtype == p.dtype == torch.float32 for p in net.parameters())
+    return features.detach(), torch.cat([p.grad.flatten() for p in net.parameters()])
+
+
+def test_features_and_gradients_in_bfloat16_are_those_of_float32_but_for_rounding(observations):
+    exact = gradient(Precision.float32, observations)
+    rounded = gradient(Precision.bfloat16, observations)
+    for one, other in zip(exact, rounded, strict=True):
+        error = (one - other).norm() / one.norm()
+        assert 0.0 < error < 4 * ROUNDING
+
+
+def test_policies_act_in_float32(observations):
+    with torch.no_grad():
+        acting = [trunk(precision)(*observations) for precision in Precision]
+    for features in acting:
+        assert torch.equal(features, acting[0])
+
+
+@pytest.mark.parametrize(
+    ("capabilities", "chosen"),
+    [
+        ({"avx512_bf16": True}, Precision.bfloat16),
+        ({"amx_bf16": True, "avx512_bf16": False}, Precision.bfloat16),
+        ({"avx512_f": True, "avx512_bf16": False}, Precision.float32),
+        ({"neon": True}, Precision.float32),
+    ],
+)
+def test_auto_is_bfloat16_where_the_processor_has_instructions_for_it(
+    capabilities, chosen, monkeypatch
+):
+    monkeypatch.setattr(torch.cpu, "get_capabilities", lambda: capabilities)
+    assert Precision.auto.on(CPU) is chosen
+    assert Precision.float32.on(CPU) is Precision.float32
+    assert Precision.bfloat16.on(CPU) is Precision.bfloat16
+
+
+def test_a_cuda_device_needs_the_instructions_too(monkeypatch):
+    monkeypatch.setattr(torch.cpu, "get_capabilities", lambda: {"amx_bf16": True})
+    for supported in (True, False):
+        monkeypatch.setattr(torch.cuda, "is_bf16_supported", lambda supported=supported, **_: supported)
+        assert has_bfloat16(torch.device("cuda")) is supported
+
+
+def test_autocast_is_on_only_where_gradients_are_computed():
+    with arithmetic(Precision.bfloat16, CPU):
+        assert torch.get_autocast_dtype("cpu") is torch.bfloat16
+        assert torch.is_autocast_enabled("cpu")
+    with torch.no_grad(), arithmetic(Precision.bfloat16, CPU):
+        assert not torch.is_autocast_enabled("cpu")
+    with arithmetic(Precision.float32, CPU):
+        assert not torch.is_autocast_enabled("cpu")
