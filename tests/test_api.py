@@ -4,8 +4,10 @@ import subprocess
 import sys
 
 import pytest
+import torch
 
 import veca_marl
+from veca_marl.algos.networks.precision import Precision
 from veca_marl.config import ConfigError
 from veca_marl.runs.run_folder import RunFolder
 
@@ -25,7 +27,9 @@ def test_train_returns_metrics_and_a_policy_and_stores_the_run(tmp_path):
     )
     assert [row["frames"] for row in result.metrics] == [32, 64]
     assert {row["team"] for row in result.evaluations} == {"agents"}
-    assert RunFolder(tmp_path / "run").typed_config().total_frames == 64
+    stored = RunFolder(tmp_path / "run").typed_config()
+    assert stored.total_frames == 64
+    assert stored.algo.network.precision is Precision.auto.on(torch.device("cpu"))
     env = veca_marl.make("KickTheBall", senses=BLIND, seed=0)
     assert "action" in result.policy(env.reset())["agents"]
     env.close()

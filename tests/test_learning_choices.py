@@ -1,13 +1,16 @@
 """Algorithms, networks and loggers are choices of the configuration, also those of a user."""
 
 import pytest
+import torch
 from first_seen import FirstSeenCfg
 from toy_dqn import ToyDQNCfg, register
 
 from veca_marl.algos.networks.multisense import Critic, MultisenseCfg
+from veca_marl.algos.networks.precision import Precision
 from veca_marl.algos.ppo import PPOCfg
 from veca_marl.algos.training.loggers import LoggerKind
-from veca_marl.config import ConfigError, compose
+from veca_marl.config import ConfigError, compose, compose_node
+from veca_marl.runs.assembly import decide_precision
 from veca_marl.runs.run_folder import RunFolder
 from veca_marl.runs.training import run_training
 
@@ -28,6 +31,16 @@ SMALL = [
     "log=silent",
     "threads=1",
 ]
+
+
+def test_the_arithmetic_of_every_network_is_decided_before_a_run_is_stored(monkeypatch):
+    monkeypatch.setattr(torch.cpu, "get_capabilities", lambda: {"avx512_bf16": True})
+    node = compose_node([KICK, "+algo@learner.agents=mappo"])
+    assert decide_precision(node) == [Precision.bfloat16, Precision.bfloat16]
+    assert node.learner.agents.network.precision is Precision.bfloat16
+    assert decide_precision(node) == [], "a decision is kept"
+    assert decide_precision(compose_node([KICK, "algo.network.precision=float32"])) == []
+    assert decide_precision(compose_node([KICK, "algo=toy_dqn"])) == [], "without such a number"
 
 
 def test_an_algorithm_without_a_file_is_chosen_by_name():

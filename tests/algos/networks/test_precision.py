@@ -72,7 +72,9 @@ def test_auto_is_bfloat16_where_the_processor_has_instructions_for_it(
 def test_a_cuda_device_needs_the_instructions_too(monkeypatch):
     monkeypatch.setattr(torch.cpu, "get_capabilities", lambda: {"amx_bf16": True})
     for supported in (True, False):
-        monkeypatch.setattr(torch.cuda, "is_bf16_supported", lambda supported=supported, **_: supported)
+        monkeypatch.setattr(
+            torch.cuda, "is_bf16_supported", lambda supported=supported, **_: supported
+        )
         assert has_bfloat16(torch.device("cuda")) is supported
 
 
