@@ -25,5 +25,5 @@ def keep_freed_memory() -> bool:
     if platform.libc_ver()[0] != "glibc":
         return False
     library = ctypes.CDLL(None)
-    numbers = ((_M_TRIM_THRESHOLD, _KEPT), (_M_MMAP_THRESHOLD, _LARGEST_ARRAY))
-    return all([library.mallopt(name, value) == 1 for name, value in numbers])
+    kept: bool = library.mallopt(_M_TRIM_THRESHOLD, _KEPT) == 1
+    return kept and library.mallopt(_M_MMAP_THRESHOLD, _LARGEST_ARRAY) == 1

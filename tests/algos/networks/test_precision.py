@@ -69,13 +69,11 @@ def test_auto_is_bfloat16_where_the_processor_has_instructions_for_it(
     assert Precision.bfloat16.on(CPU) is Precision.bfloat16
 
 
-def test_a_cuda_device_needs_the_instructions_too(monkeypatch):
+@pytest.mark.parametrize("supported", [True, False])
+def test_a_cuda_device_needs_the_instructions_too(supported, monkeypatch):
     monkeypatch.setattr(torch.cpu, "get_capabilities", lambda: {"amx_bf16": True})
-    for supported in (True, False):
-        monkeypatch.setattr(
-            torch.cuda, "is_bf16_supported", lambda supported=supported, **_: supported
-        )
-        assert has_bfloat16(torch.device("cuda")) is supported
+    monkeypatch.setattr(torch.cuda, "is_bf16_supported", lambda **_: supported)
+    assert has_bfloat16(torch.device("cuda")) is supported
 
 
 def test_autocast_is_on_only_where_gradients_are_computed():
