@@ -65,9 +65,9 @@ def rows_of(batch):
     return segment_rows(batch, StoredKeys.of("team", SPEC))
 
 
-def replay_of(*batches, capacity=200, steps=3, windows=512):
+def replay_of(*batches, capacity=200, steps=3):
     torch.manual_seed(0)
-    replay = Replay("team", SPEC, ReplayCfg(capacity, warm_up_frames=0), steps, windows)
+    replay = Replay("team", SPEC, ReplayCfg(capacity, warm_up_frames=0), steps)
     for batch in batches:
         replay.extend(batch)
     return replay
@@ -75,7 +75,7 @@ def replay_of(*batches, capacity=200, steps=3, windows=512):
 
 def sample_of(replay):
     """Return (first, last, returns, discount) of the windows of the first agent."""
-    found = transitions(replay.sample(), "team", GAMMA)
+    found = transitions(replay.sample(512), "team", GAMMA)
     arrays = (
         found.first["team", "observation", "time"],
         found.last["team", "observation", "time"],
@@ -120,7 +120,7 @@ def test_a_terminated_window_has_no_value_after_it():
 
 def test_an_agent_that_is_eliminated_ends_alone():
     replay = replay_of(batch_of(worlds=1, steps=4, eliminated=[(0, 1)]))
-    found = transitions(replay.sample(), "team", GAMMA)
+    found = transitions(replay.sample(512), "team", GAMMA)
     time = found.first["team", "observation", "time"][:, 0]
     start = (time == 0.0) & found.counted[:, 0]
     torch.testing.assert_close(found.discount[start][0], torch.tensor([0.125, 0.0]))

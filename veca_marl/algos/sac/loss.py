@@ -84,6 +84,7 @@ class TeamSACLoss(LossModule):
         encoder_gradient: EncoderGradient,
     ) -> None:
         super().__init__()
+        self.in_keys, self.out_keys = [], []  # it reads `Transitions`, not a TensorDict
         self._team, self._action = team, action
         critic = _Critic(network.encoder, network.values)
         self.convert_to_functional(critic, "critic", create_target_params=True)
@@ -93,8 +94,9 @@ class TeamSACLoss(LossModule):
 
     def forward(self, batch: Transitions) -> Losses:
         """Return the losses of a batch."""
+        target = self._target(batch)
         features = self._encode(batch.first)
-        error, value = self._critic_error(batch, features)
+        error, value = self._critic_error(batch.first, features, target)
         if self._encoder_gradient is EncoderGradient.critic:
             policy_features = features.detach()
         else:
@@ -114,11 +116,12 @@ class TeamSACLoss(LossModule):
             },
         )
 
-    def _critic_error(self, batch: Transitions, features: Tensor) -> tuple[Tensor, Tensor]:
+    def _critic_error(
+        self, rows: TensorDictBase, features: Tensor, target: Tensor
+    ) -> tuple[Tensor, Tensor]:
         """Return squared errors summed over critics, and the critics' mean value."""
-        target = self._target(batch)
-        taken = self._action.taken(batch.first)
-        values = self._values(batch.first, features, taken.vector, taken.code)
+        taken = self._action.taken(rows)
+        values = self._values(rows, features, taken.vector, taken.code)
         index = taken.combination.unsqueeze(-1).expand(*values.shape[:-1], 1)
         chosen = values.gather(-1, index).squeeze(-1)
         return (chosen - target).square().sum(0), chosen.mean(0)

@@ -57,8 +57,8 @@ class SAC(Algorithm):
         self._critics = [*trainable(self.network.encoder), *self.network.values.parameters()]
         self._policy = list(self.loss.policy.parameters())
         learnt = [*self._critics, *self._policy, *self.temperatures.parameters()]
-        self.optimizer = torch.optim.Adam(learnt, lr=cfg.learning_rate)
-        self.replay = Replay(team, spec, cfg.replay, cfg.steps, cfg.batch_size)
+        self.optimizer = torch.optim.Adam(learnt, lr=cfg.learning_rate, fused=True)
+        self.replay = Replay(team, spec, cfg.replay, cfg.steps)
         self._warm_up = UniformWarmUp(team, spec).to(device)
         self._explorer = TensorDictSequential(self.network.actor, self._warm_up)
         self._updates, self._due = 0, 0.0
@@ -101,8 +101,8 @@ class SAC(Algorithm):
         Raises:
             FloatingPointError: If the gradient is not finite.
         """
-        windows = self.replay.sample().to(self._device)
-        losses = self.loss(transitions(windows, self.team, self.cfg.gamma))
+        windows = self.replay.sample(self.cfg.batch_size)
+        losses = self.loss(transitions(windows, self.team, self.cfg.gamma).to(self._device))
         self.optimizer.zero_grad()
         (losses.critic + losses.policy + losses.temperature).backward()
         norms = [self._clip(self._critics), self._clip(self._policy)]

@@ -1,0 +1,300 @@
+"""The losses equal TorchRL's where those exist, and integrals of the soft value elsewhere."""
+
+from copy import deepcopy
+
+import pytest
+import torch
+from tensordict import TensorDict
+from tensordict.nn import TensorDictModule
+from torch import nn
+from torch.distributions import Normal
+from torchrl.objectives import DiscreteSACLoss, SACLoss, SoftUpdate, ValueEstimators
+
+from veca_marl.algos.networks.action_values import ActionValuesCfg, ActorCritics
+from veca_marl.algos.networks.factory import NetworkFactory
+from veca_marl.algos.sac.config import Adaptation, EncoderGradient, TemperatureCfg
+from veca_marl.algos.sac.joint_action import JointAction
+from veca_marl.algos.sac.loss import TeamSACLoss
+from veca_marl.algos.sac.temperature import Temperatures
+from veca_marl.algos.sac.windows import Transitions
+from veca_marl.algos.specs import ActionLayout, ArrayLayout, TeamSpec
+
+WIDTH, GAMMA, ALPHA = 4, 0.9, 0.3
+CONTINUOUS = {"action": ActionLayout(discrete=False, size=2)}
+DISCRETE = {"action": ActionLayout(discrete=True, size=3)}
+HYBRID = {"move": ActionLayout(discrete=False, size=1), "voice": ActionLayout(True, 3)}
+LEARNT = TemperatureCfg(ALPHA, Adaptation.automatic)
+
+
+class Scale(nn.Module):
+    """An encoder with one parameter, which is 1."""
+
+    def __init__(self):
+        super().__init__()
+        self.scale = nn.Parameter(torch.ones(()))
+
+    def forward(self, state):
+        return state * self.scale
+
+
+class PlainNetwork(NetworkFactory):
+    """Features are the observation itself."""
+
+    features = WIDTH
+
+    def encoder(self):
+        return TensorDictModule(
+            Scale(),
+            in_keys=[(self.team, "observation", "state")],
+            out_keys=[(self.team, "features")],
+        )
+
+
+class Central(PlainNetwork):
+    central_critic = True
+
+
+def loss_of(actions, gradient=EncoderGradient.both, factory=PlainNetwork, agents=2):
+    """Return the loss of a network with random parameters, and its network."""
+    torch.manual_seed(3)
+    spec = TeamSpec(
+        agents, {"state": ArrayLayout((WIDTH,), "float32", -1.0, 1.0)}, actions, masked=True
+    )
+    network = ActorCritics(factory("agents", spec, None), ActionValuesCfg(hidden=[16]), [8])
+    with torch.no_grad():
+        for name, parameter in network.named_parameters():
+            if "scale" not in name:
+                parameter.copy_(torch.randn_like(parameter) * 0.5)
+    loss = TeamSACLoss(
+        "agents",
+        network,
+        JointAction("agents", actions),
+        Temperatures(actions, LEARNT),
+        gradient,
+    )
+    SoftUpdate(loss, tau=0.5)
+    loss.target_critic_params.apply_(lambda array: array.mul_(0.8))
+    return loss, network
+
+
+def transitions_of(actions, rows=6, agents=2):
+    generator = torch.Generator().manual_seed(5)
+
+    def random(*shape):
+        return torch.rand(rows, agents, *shape, generator=generator) * 2.0 - 1.0
+
+    taken = {
+        part: (random() > 0.0).long() if layout.discrete else random(layout.size)
+        for part, layout in actions.items()
+    }
+    first, last = ({"observation": {"state": random(WIDTH)}} for _ in range(2))
+    first["action"] = taken.get("action", taken)
+    mask = torch.ones(rows, agents, dtype=torch.bool)
+    return Transitions(
+        TensorDict({"agents": first | {"mask": mask}}, (rows,)),
+        TensorDict({"agents": last | {"mask": mask}}, (rows,)),
+        returns=random(),
+        discount=GAMMA * (random() > -0.5),
+        counted=mask,
+    )
+
+
+class Value(nn.Module):
+    """One critic as TorchRL's losses take it."""
+
+    def __init__(self, layers):
+        super().__init__()
+        self.layers = layers
+
+    def forward(self, *inputs):
+        return self.layers(torch.cat(inputs, -1))
+
+
+def torchrl_loss(kind, network, batch, **options):
+    """Return TorchRL's loss with copies of our networks, and its output for `batch`."""
+    actor = deepcopy(network.actor)[1:]
+    reads = [("agents", "features")] + [("agents", "action")] * (kind is SACLoss)
+    name = "state_action_value" if kind is SACLoss else "action_value"
+    critics = [
+        TensorDictModule(Value(deepcopy(critic)), in_keys=reads, out_keys=[("agents", name)])
+        for critic in network.values.critics
+    ]
+    loss = kind(actor, critics, loss_function="l2", alpha_init=ALPHA, **options)
+    keys = {k: ("agents", k) for k in ("action", "reward", "done", "terminated", "value", name)}
+    loss.set_keys(**keys)
+    loss.make_value_estimator(ValueEstimators.TD0, gamma=GAMMA)
+    SoftUpdate(loss, tau=0.5)
+    loss.target_qvalue_network_params.apply_(lambda array: array.mul_(0.8))
+    ended = batch.discount == 0.0
+    step = {
+        "features": batch.last["agents", "observation", "state"],
+        "reward": batch.returns.unsqueeze(-1),
+        "done": ended.unsqueeze(-1),
+        "terminated": ended.unsqueeze(-1),
+    }
+    rows = {
+        "features": batch.first["agents", "observation", "state"],
+        "action": batch.first["agents", "action"],
+    }
+    torch.manual_seed(11)
+    return loss, loss(TensorDict({"agents": rows, "next": {"agents": step}}, batch.first.shape))
+
+
+def assert_same_gradients(ours, theirs):
+    assert len(ours) == len(theirs) > 0
+    for one, other in zip(ours, theirs, strict=True):
+        torch.testing.assert_close(one.grad, other.grad)
+
+
+@pytest.mark.parametrize(
+    ("kind", "actions", "options"),
+    [
+        (SACLoss, CONTINUOUS, {"target_entropy": -2.0}),
+        (
+            DiscreteSACLoss,
+            DISCRETE,
+            {"action_space": "categorical", "num_actions": 3, "target_entropy_weight": 0.3},
+        ),
+    ],
+    ids=["continuous", "discrete"],
+)
+def test_losses_and_gradients_equal_those_of_torchrl(kind, actions, options):
+    batch = transitions_of(actions)
+    loss, network = loss_of(actions)
+    theirs, expected = torchrl_loss(kind, network, batch, **options)
+    torch.manual_seed(11)
+    # their encoder is not in the target either
+    loss.target_critic_params["encoder"].apply_(lambda array: array.fill_(1.0))
+    found = loss(batch)
+    torch.testing.assert_close(found.critic, expected["loss_qvalue"])
+    torch.testing.assert_close(found.policy, expected["loss_actor"])
+    torch.testing.assert_close(found.temperature, expected["loss_alpha"])
+    torch.testing.assert_close(found.measures["entropy"], expected["entropy"])
+
+    (found.critic + found.policy + found.temperature).backward()
+    (expected["loss_qvalue"] + expected["loss_actor"] + expected["loss_alpha"]).backward()
+    policy = list(theirs.actor_network_params.values(True, True))
+    ours = TensorDict.from_module(network.actor[1:]).values(True, True)
+    assert_same_gradients(list(ours), policy)
+    stacked = theirs.qvalue_network_params["module", "layers"]
+    for index, critic in enumerate(network.values.critics):
+        for key, parameter in TensorDict.from_module(critic).items(True, True):
+            torch.testing.assert_close(parameter.grad, stacked[key].grad[index])
+    (log_alpha,) = loss.temperatures.parameters()
+    torch.testing.assert_close(log_alpha.grad, theirs.log_alpha.grad)
+
+
+def soft_value_by_integration(loss, network, state):
+    """Return the soft value of one observation, an integral over the movement on a grid."""
+    rows = TensorDict({"agents": {"features": state}}, state.shape[:-2])
+    for head in network.actor.module[1:-1]:
+        head(rows)
+    parameters = rows["agents", "parameters"]
+    normal = Normal(parameters["move", "loc"], parameters["move", "scale"])
+    grid = torch.linspace(-9.0, 9.0, 20001)
+    density = normal.log_prob(grid).squeeze().exp()
+    log_prob = normal.log_prob(grid).squeeze() - torch.log1p(-torch.tanh(grid).square() + 1e-12)
+    moves = torch.tanh(grid).reshape(-1, 1, 1)
+    values = network.values(state.expand(len(grid), 1, WIDTH), moves).amin(0).squeeze(1)
+    log_choice = parameters["voice", "logits"].squeeze().log_softmax(-1)
+    soft = (log_choice.exp() * (values - ALPHA * log_choice)).sum(-1) - ALPHA * log_prob
+    return torch.trapezoid(density * soft, grid)
+
+
+def test_the_soft_value_of_a_mixed_action_and_its_gradient_equal_an_integral():
+    loss, network = loss_of(HYBRID, agents=1)
+    state = torch.tensor([[[0.4, -0.3, 0.8, -0.6]]])
+    exact = soft_value_by_integration(loss, network, state)
+    policy = list(loss.policy.parameters())
+    gradient = torch.autograd.grad(exact, policy)
+
+    torch.manual_seed(0)
+    many = transitions_of(HYBRID, rows=20_000, agents=1)
+    many.first["agents", "observation", "state"] = state.expand(20_000, 1, WIDTH).clone()
+    found = loss(many)
+    torch.testing.assert_close(-found.policy, exact, atol=0.01, rtol=0.01)
+    sampled = torch.autograd.grad(-found.policy, policy)
+    for one, other in zip(sampled, gradient, strict=True):
+        torch.testing.assert_close(one, other, atol=0.02, rtol=0.02)
+
+
+def test_the_gradient_of_the_entropy_of_choices_is_exact():
+    """TorchRL's `SACLoss` of a composite distribution has (.002, .001, -.001, -.001) here."""
+    actions = {"move": ActionLayout(False, 1), "voice": ActionLayout(True, 4)}
+    loss, network = loss_of(actions, agents=1)
+    layer = network.actor.module[2].module[-1]  # logits of the voice
+    with torch.no_grad():
+        for critic in network.values.critics:
+            critic[-1].weight.zero_()  # all choices have the same value
+            critic[-1].bias.zero_()
+        layer.weight.zero_()
+        layer.bias.copy_(torch.tensor([1.5, 0.0, 0.0, 0.0]))
+    loss(transitions_of(actions, agents=1)).policy.backward()
+    p = layer.bias.softmax(-1).detach()
+    entropy = -(p * p.log()).sum()
+    torch.testing.assert_close(layer.bias.grad, ALPHA * p * (p.log() + entropy))
+
+
+def gradients(loss, of, parts):
+    """Return for each part of the network whether the loss `of` has a gradient there."""
+    for part in parts:
+        part.zero_grad()
+    getattr(loss(transitions_of(HYBRID)), of).backward()
+    return [
+        any(p.grad is not None and bool(p.grad.any()) for p in part.parameters()) for part in parts
+    ]
+
+
+@pytest.mark.parametrize("gradient", EncoderGradient)
+def test_each_loss_trains_its_own_part(gradient):
+    loss, network = loss_of(HYBRID, gradient)
+    parts = [network.encoder, network.actor[1:], network.values]
+    assert gradients(loss, "critic", parts) == [True, False, True]
+    expected = gradient is EncoderGradient.both
+    assert gradients(loss, "policy", parts) == [expected, True, False]
+
+
+def test_entries_that_do_not_count_change_nothing():
+    loss, _ = loss_of(HYBRID, factory=Central)
+    batch = transitions_of(HYBRID)
+    eliminated = (slice(0, 3), 1)
+    for rows in (batch.first, batch.last):
+        rows["agents", "mask"] = rows["agents", "mask"].clone()
+        rows["agents", "mask"][eliminated] = False
+    counted = batch.counted.clone()
+    counted[eliminated] = False
+    found = []
+    for value in (0.0, 50.0):
+        for rows in (batch.first, batch.last):
+            rows["agents", "observation", "state"][eliminated] = value
+        batch.returns[eliminated] = value
+        torch.manual_seed(0)
+        losses = loss(Transitions(**vars(batch) | {"counted": counted}))
+        found.append(torch.stack([losses.critic, losses.policy, losses.temperature]))
+    torch.testing.assert_close(*found)
+
+
+def test_a_central_critic_reads_what_the_others_do_and_an_own_one_does_not():
+    changes = {}
+    for factory in (PlainNetwork, Central):
+        loss, _ = loss_of(HYBRID, factory=factory)
+        found = []
+        for choice in (0, 2):
+            batch = transitions_of(HYBRID)
+            batch.first["agents", "action", "voice"][:, 1] = choice
+            torch.manual_seed(0)
+            alone = batch.counted.clone()
+            alone[:, 1] = False  # the loss of the first agent
+            found.append(loss(Transitions(**vars(batch) | {"counted": alone})).critic)
+        changes[factory] = not torch.equal(*found)
+    assert changes == {PlainNetwork: False, Central: True}
+
+
+def test_a_temperature_rises_where_the_entropy_is_below_its_target():
+    temperatures = Temperatures(HYBRID, LEARNT)
+    low = {part: torch.full((1, 2), -9.0) for part in HYBRID}
+    temperatures.loss(low, torch.ones(1, 2, dtype=torch.bool)).backward()
+    assert all(p.grad < 0.0 for p in temperatures.parameters())
+    torch.testing.assert_close(
+        temperatures.targets, {"move": -1.0, "voice": 0.3 * float(torch.tensor(3.0).log())}
+    )
