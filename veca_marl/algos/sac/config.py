@@ -139,6 +139,8 @@ class SACCfg(AlgorithmCfg):
         for name in ("steps", "batch_size"):
             if getattr(self, name) < 1:
                 raise ValueError(f"algo.{name} must be at least 1, got {getattr(self, name)}")
+        if self.network.recurrent:
+            raise ValueError("algo.network.memory: SAC has no recurrent form yet; choices: none")
         if any(width < 1 for width in self.policy_hidden):
             raise ValueError(
                 f"algo.policy_hidden: widths must be positive, got {list(self.policy_hidden)}"
