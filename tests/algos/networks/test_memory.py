@@ -1,13 +1,17 @@
-"""Policies with hidden state: it is carried through collection, evaluation and tournaments."""
+"""Policies with hidden state: carried through collection, evaluation, video and tournaments."""
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
 import torch
 from fake_env import make_fake_env
 from first_seen import FirstSeenCfg, make_show_once
+from training import FRAMES, SMALL, Interrupt
 
 from veca_marl.algos.collection.experience import CollectCfg, Experience
 from veca_marl.algos.networks.memory import with_memory
+from veca_marl.algos.networks.multisense import Memory
 from veca_marl.algos.ppo import PPOCfg
 from veca_marl.algos.selfplay.pool import Pool
 from veca_marl.algos.selfplay.tournament import play_all
@@ -17,15 +21,18 @@ from veca_marl.algos.training.evaluation import EvalCfg, Exploration, evaluate
 from veca_marl.algos.training.learners import TeamLearners
 from veca_marl.algos.training.loop import Trainer
 from veca_marl.algos.training.progress import Budget
-from veca_marl.algos.training.reporters import MemoryReporter
+from veca_marl.config import compose
+from veca_marl.envs.adapters.torchrl.env import VecaEnv
+from veca_marl.runs.recording import record_episode
 
 CPU = torch.device("cpu")
+GRU = replace(SMALL, memory=Memory.gru, memory_features=16)
 TEAMS = ("red", "blue")
 
 
-def make_learners(**env):
+def make_learners(network=None, **env):
     torch.manual_seed(0)
-    cfg = PPOCfg(network=FirstSeenCfg(), learning_rate=1e-3, gamma=0.5, sequence_steps=8)
+    cfg = PPOCfg(network=network or FirstSeenCfg(), sequence_steps=8)
     return TeamLearners(team_specs(make_show_once(1, 0, **env)), cfg, CPU)
 
 
@@ -60,28 +67,55 @@ def test_a_policy_without_memory_leaves_the_environment_as_it_is(make_ppo):
     assert with_memory(env, lambda td: td) is env
 
 
-def test_a_task_that_needs_memory_is_learnt(tmp_path):
-    reporter = MemoryReporter()
+def make_trainer(folder, reporters=()):
+    torch.manual_seed(0)
     specs = team_specs(make_show_once(1, 0))
-    trainer = Trainer(
+    return Trainer(
         make_env=make_show_once,
-        learners=make_learners(),
-        collect=CollectCfg(0, worlds=8, steps=16),
-        evaluation=EvalCfg(every_frames=10 * 128, episodes=6, worlds=3),
-        budget=Budget(30 * 128),
-        checkpoints=Checkpoints(tmp_path, Identity("Toy", specs), {}),
-        reporters=[reporter],
+        learners=TeamLearners(specs, PPOCfg(network=GRU, sequence_steps=8), CPU),
+        collect=CollectCfg(0, worlds=4, steps=16),
+        evaluation=EvalCfg(every_frames=FRAMES, episodes=2, worlds=2),
+        budget=Budget(3 * FRAMES),
+        checkpoints=Checkpoints(folder, Identity("Toy", specs), {}),
+        reporters=reporters,
         seed=0,
         progress_bar=False,
     )
-    trainer.run()
-    last = reporter.rows["evaluations"][-1]
-    # a policy without memory knows the answer in one step of four, and is right in half the others
-    assert last["return"] > 0.9 * last["length"]
+
+
+def test_a_resumed_run_with_memory_equals_one_without_interruption(tmp_path):
+    whole = make_trainer(tmp_path / "whole")
+    whole.run()
+    with pytest.raises(KeyboardInterrupt):
+        make_trainer(tmp_path / "other", [Interrupt(2 * FRAMES)]).run()
+    resumed = make_trainer(tmp_path / "other")
+    resumed.resume(resumed.checkpoints.latest())
+    assert resumed.progress.frames == FRAMES
+    resumed.run()
+    pairs = zip(
+        whole.learners.policy.parameters(), resumed.learners.policy.parameters(), strict=True
+    )
+    assert all(torch.equal(one, other) for one, other in pairs)
+
+
+def test_a_policy_with_memory_is_recorded(tmp_path):
+    """The video is of a world alone: one game, the state of which is carried there too."""
+    game = compose(["+task=KickTheBall", "task.max_seconds=0.2", "senses/vision=blind"]).game
+    env = VecaEnv(game, 1, 0)
+    learners = TeamLearners(team_specs(env), PPOCfg(network=GRU), CPU)
+    env.close()
+    states = []
+    learners.policy.play.register_forward_pre_hook(
+        lambda module, args: states.append(args[0]["agents", "memory", "hidden"].clone())
+    )
+    record_episode(tmp_path / "video.mp4", game, learners.policy.play, 0)
+    assert not states[0].any()
+    assert len(states) == 5
+    assert all(state.any() for state in states[1:])
 
 
 def test_past_policies_with_memory_play_a_tournament(tmp_path):
-    learners = make_learners(teams=TEAMS)
+    learners = make_learners(GRU, teams=TEAMS)
     pool = Pool(tmp_path)
     for team in TEAMS:
         pool.store(team, 0, learners.algorithms[team].actor.state_dict())
@@ -93,7 +127,7 @@ def test_past_policies_with_memory_play_a_tournament(tmp_path):
 
 def test_evaluation_begins_without_memory():
     """Two evaluations in a row are equal: nothing is left of the first one."""
-    learners = make_learners()
+    learners = make_learners(GRU)
     env = make_show_once(3, 0)
     returns = [
         evaluate(env, learners.policy.play, 6, 1, Exploration.deterministic)["agents"].returns
