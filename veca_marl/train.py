@@ -17,47 +17,50 @@ from typing import Any, NoReturn
 import hydra
 from hydra.core.hydra_config import HydraConfig
 from hydra.errors import HydraException
-from omegaconf import DictConfig, OmegaConf
+from omegaconf import DictConfig
 from omegaconf.errors import OmegaConfBaseException
 
 from veca_marl import api
 from veca_marl.algos.collection.workers import WorkerError
+from veca_marl.algos.files import WriteError
 from veca_marl.algos.training.checkpoint import CheckpointError
+from veca_marl.algos.training.finite import NotFiniteError
 from veca_marl.algos.training.loop import Trainer
 from veca_marl.config import Config, ConfigError, conf_dir, one_line, prepare, to_config
+from veca_marl.config.stored import change
 from veca_marl.runs.assembly import decide_precision, make_trainer
+from veca_marl.runs.resumable import RESUMABLE, may_change
 from veca_marl.runs.run_folder import RunFolder, new_run, open_run, remove_if_empty
 from veca_marl.runs.training import TrainingResult, run_training
 
 _COMMAND = "python -m veca_marl.train"
 _DISK_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
-RESUMABLE = ("resume", "total_frames", "max_minutes", "device", "threads")
+_CONFIGURATION_ERRORS = (ConfigError, CheckpointError, WriteError)
+_FAILURES = (WorkerError, NotFiniteError, CheckpointError, WriteError)
 
 
-def stored_config(folder: RunFolder, asked: DictConfig, overrides: list[str]) -> Config:
+def stored_config(folder: RunFolder, overrides: list[str]) -> Config:
     """Return the configuration of an earlier run, with the changes that resuming allows.
 
     Args:
         folder: The earlier run.
-        asked: The configuration composed from this command line.
         overrides: The overrides of this command line.
 
     Raises:
         ConfigError: If another key is to be changed, or the run is one of another task.
     """
-    task = OmegaConf.load(folder.config).task.name
-    names = {text.partition("=")[0]: text.partition("=")[2] for text in overrides}
-    if names.pop("+task", task) != task:
-        raise ConfigError(f"{folder.path} is a run of {task}, not of {asked.task.name}")
-    changed = sorted(set(names) - set(RESUMABLE))
+    node = folder.typed_config()
+    asked = dict(text.partition("=")[::2] for text in overrides)
+    task = asked.pop("+task", node.task.name)
+    if task != node.task.name:
+        raise ConfigError(f"{folder.path} is a run of {node.task.name}, not of {task}")
+    changed = sorted(key for key in asked if not may_change(key))
     if changed:
         raise ConfigError(
             f"a resumed run keeps its configuration: cannot change {', '.join(changed)}; "
             f"choices: {', '.join(RESUMABLE)}"
         )
-    node = folder.typed_config()
-    for name in names:
-        node[name] = asked[name]
+    change(node, [text for text in overrides if not text.startswith("+task=")], RESUMABLE)
     return to_config(node)
 
 
@@ -67,7 +70,7 @@ def run(node: DictConfig) -> None:
     path = Path(HydraConfig.get().runtime.output_dir)
     try:
         cfg, folder, trainer = set_up(node, path)
-    except (ConfigError, CheckpointError) as error:
+    except _CONFIGURATION_ERRORS as error:
         remove_if_empty(path)
         give_up(error)
     try:
@@ -76,15 +79,14 @@ def run(node: DictConfig) -> None:
     except KeyboardInterrupt:
         print(f"\ninterrupted; {_continue(path)}", file=sys.stderr)
         raise SystemExit(130) from None
-    except CheckpointError as error:
-        give_up(error)
-    except WorkerError as error:
+    except _FAILURES as error:
         print(f"error: {one_line(error)}; {_continue(path)}", file=sys.stderr)
         raise SystemExit(1) from error
     except OSError as error:
         if error.errno not in _DISK_FULL:
             raise
-        give_up(ConfigError(f"{error}; make room and continue with resume={path}"))
+        print(f"error: {error}; make room; {_continue(path)}", file=sys.stderr)
+        raise SystemExit(1) from error
 
 
 def _continue(path: Path) -> str:
@@ -95,8 +97,11 @@ def set_up(node: DictConfig, path: Path) -> tuple[Config, RunFolder, Trainer]:
     """Return what starts or continues the run in `path`; a new folder is written last."""
     if node.resume is not None:
         folder = open_run(path, "resume=")
-        cfg = stored_config(folder, node, list(HydraConfig.get().overrides.task))
-        return cfg, folder, make_trainer(cfg, folder)
+        overrides = list(HydraConfig.get().overrides.task)
+        cfg = stored_config(folder, overrides)
+        trainer = make_trainer(cfg, folder)
+        folder.begin_again(overrides, trainer.progress.frames)
+        return cfg, folder, trainer
     folder = new_run(path)
     for precision in decide_precision(node):
         print(f"network.precision=auto: {precision.value} on this machine")

@@ -18,6 +18,9 @@ class Interrupt:
         if kind == "metrics" and frames == self.frames:
             raise KeyboardInterrupt
 
+    def sync(self):
+        pass
+
     def close(self):
         pass
 

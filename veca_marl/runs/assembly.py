@@ -25,6 +25,7 @@ from veca_marl.envs.adapters.torchrl.env import VecaEnv
 from veca_marl.envs.core.game_cfg import GameCfg
 from veca_marl.plugins import load_plugins
 from veca_marl.runs.allocation import keep_freed_memory
+from veca_marl.runs.resumable import RESUMABLE
 from veca_marl.runs.run_folder import RunFolder
 
 
@@ -79,7 +80,9 @@ def make_trainer(cfg: Config, folder: RunFolder | None = None) -> Trainer:
         if folder is None:
             raise ConfigError("self_play.teams: past policies are stored in the folder of a run")
         trainer.matchmaking = SelfPlay(cfg.self_play, trainer.learners, Pool(folder.pool), cfg.seed)
-    if cfg.resume is not None:
+    if cfg.resume is None or checkpoints.empty:  # it was killed before its first checkpoint
+        init_teams(trainer.learners, cfg.init_from, cfg.init_encoders)
+    else:
         trainer.resume(checkpoints.latest())
     return trainer
 
@@ -93,6 +96,7 @@ def _make_checkpoints(
         Identity(cfg.task.name, specs),
         cast(dict[str, Any], plain),
         cfg.log.keep_checkpoints,
+        RESUMABLE,
     )
 
 
@@ -100,17 +104,14 @@ def make_learners(cfg: Config, specs: dict[str, TeamSpec], device: torch.device)
     """Return the algorithms of all teams; teams with an opponent from another run are frozen.
 
     Raises:
-        CheckpointError: If an opponent, or what a team starts from, cannot be loaded.
+        CheckpointError: If an opponent cannot be loaded.
         ConfigError: If an algorithm cannot be made as configured.
     """
     actors = {team: load_actor(path, team, specs[team]) for team, path in cfg.frozen.items()}
     try:
-        learners = TeamLearners(specs, cfg.algo, device, cfg.learner, actors)
+        return TeamLearners(specs, cfg.algo, device, cfg.learner, actors)
     except ValueError as error:
         raise ConfigError(one_line(error)) from error
-    if cfg.resume is None:
-        init_teams(learners, cfg.init_from, cfg.init_encoders)
-    return learners
 
 
 def read_specs(game: GameCfg) -> dict[str, TeamSpec]:

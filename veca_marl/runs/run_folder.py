@@ -6,11 +6,13 @@ import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import cast
+from typing import Any
 
 from omegaconf import DictConfig, OmegaConf
+from yaml import YAMLError
 
-from veca_marl.config import ConfigError
+from veca_marl.algos.files import write_atomically
+from veca_marl.config import ConfigError, one_line
 from veca_marl.config.stored import body_names, typed
 from veca_marl.runs.provenance import provenance
 
@@ -52,28 +54,57 @@ class RunFolder:
 
     def begin(self, node: DictConfig, overrides: Sequence[str]) -> None:
         """Create the folder with the configuration and the provenance of the run."""
-        self.path.mkdir(parents=True, exist_ok=True)
         content = {**provenance(overrides), "bodies": body_names(node)}
-        self.provenance.write_text(json.dumps(content, indent=2) + "\n")
-        self.config.write_text(OmegaConf.to_yaml(node, resolve=True))
+        self._write_json(self.provenance, content)
+        write_atomically(self.config, OmegaConf.to_yaml(node, resolve=True))  # last: it is a run
+
+    def begin_again(self, overrides: Sequence[str], frames: int) -> None:
+        """Add the provenance of a resumed run, which continues after so many frames."""
+        content = self._read_provenance()
+        again = {"frames": frames, **provenance(overrides)}
+        content.setdefault("resumed", []).append(again)
+        self._write_json(self.provenance, content)
 
     def typed_config(self) -> DictConfig:
         """Return the configuration stored with the run, with the types that it had.
 
         Raises:
-            ConfigError: If it was stored by a version with another configuration.
+            ConfigError: If it cannot be read, or was stored by a version with another one.
         """
-        bodies = json.loads(self.provenance.read_text()).get("bodies")
+        bodies = self._read_provenance().get("bodies")
         if bodies is None:
             raise ConfigError(f"{self.path} was stored by an older version; train it again")
         try:
-            return typed(cast(DictConfig, OmegaConf.load(self.config)), bodies)
+            stored = OmegaConf.load(self.config)
+        except (OSError, YAMLError, UnicodeDecodeError) as error:
+            raise _damaged(self.config, error) from error
+        if not isinstance(stored, DictConfig) or OmegaConf.select(stored, "task.name") is None:
+            raise ConfigError(f"{self.config} is damaged: it names no task")
+        try:
+            return typed(stored, bodies)
         except ConfigError as error:
             raise ConfigError(f"{self.config}: {error}") from error
 
+    def _read_provenance(self) -> dict[str, Any]:
+        try:
+            content = json.loads(self.provenance.read_text())
+        except (OSError, ValueError) as error:
+            raise _damaged(self.provenance, error) from error
+        if not isinstance(content, dict):
+            raise ConfigError(f"{self.provenance} is damaged: it is no table")
+        return content
+
+    @staticmethod
+    def _write_json(path: Path, content: dict[str, Any]) -> None:
+        write_atomically(path, json.dumps(content, indent=2) + "\n")
+
     def write(self, name: str, text: str) -> None:
         """Write a small text file."""
-        (self.path / name).write_text(text + "\n")
+        write_atomically(self.path / name, text + "\n")
+
+
+def _damaged(path: Path, error: Exception) -> ConfigError:
+    return ConfigError(f"{path} is damaged or cannot be read: {one_line(error)}")
 
 
 def new_run(path: Path) -> RunFolder:

@@ -131,7 +131,7 @@ def test_a_checkpoint_of_another_format_raises_an_error(make, tmp_path):
     make("other", batches=1).run()
     path = Checkpoints(tmp_path / "other" / "checkpoints", None, {}).latest()
     torch.save(torch.load(path, weights_only=True) | {"format": 1}, path)
-    with pytest.raises(CheckpointError, match="not a checkpoint of this version"):
+    with pytest.raises(CheckpointError, match="has format 1, this version reads format 3"):
         load_actor(path, "blue", team_specs(make_env(1, 0))["blue"])
 
 

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import io
-import os
 from pathlib import Path
 from typing import Any
 
 import torch
 
-from veca_marl.algos.training.checkpoint import CheckpointError
+from veca_marl.algos.files import WriteError, write_atomically
+from veca_marl.algos.training.checkpoint import CheckpointError, load_file
 
 
 class Pool:
@@ -28,17 +28,12 @@ class Pool:
         Raises:
             CheckpointError: If it cannot be written.
         """
-        path = self._path(team, frames)
         content = io.BytesIO()
         torch.save(actor, content)
-        temporary = path.with_suffix(".tmp")
         try:
-            self.folder.mkdir(parents=True, exist_ok=True)
-            temporary.write_bytes(content.getbuffer())
-            os.replace(temporary, path)
-        except OSError as error:
-            temporary.unlink(missing_ok=True)
-            raise CheckpointError(f"cannot write {path}: {error}") from error
+            write_atomically(self._path(team, frames), content.getbuffer())
+        except WriteError as error:
+            raise CheckpointError(str(error)) from error
 
     def members(self, team: str, until: int | None = None) -> list[int]:
         """Return the frames after which policies of a team were stored, in ascending order.
@@ -51,8 +46,13 @@ class Pool:
         return sorted(frames for frames in found if until is None or frames <= until)
 
     def load(self, team: str, frames: int) -> dict[str, Any]:
-        """Return the state of an actor."""
-        state: dict[str, Any] = torch.load(self._path(team, frames), weights_only=True)
+        """Return the state of an actor.
+
+        Raises:
+            CheckpointError: If the file cannot be read.
+        """
+        path = self._path(team, frames)
+        state: dict[str, Any] = load_file(path, torch.device("cpu"))
         return state
 
     def _path(self, team: str, frames: int) -> Path:

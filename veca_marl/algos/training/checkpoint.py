@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import io
-import os
 import pickle
 import signal
 import threading
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,11 +14,16 @@ from typing import Any
 
 import torch
 
+from veca_marl.algos.files import WriteError, write_atomically
 from veca_marl.algos.specs import TeamSpec
 
 # 3: actions have named parts, and each team an algorithm of its own
 _FORMAT = 3
+_KEYS = {"identity", "config", "algorithms", "state"}
 _CPU = torch.device("cpu")
+_ABSENT = "absent"
+# what torch.load raises for files that are cut off or have other content
+_UNREADABLE = (RuntimeError, EOFError, pickle.UnpicklingError, ValueError, KeyError, TypeError)
 
 
 class CheckpointError(RuntimeError):
@@ -52,15 +56,21 @@ class Checkpoints:
     Args:
         folder: Where they are; created at the first save. None keeps nothing.
         identity: What they belong to.
-        config: The run's configuration as plain data, for the reader.
+        config: The run's configuration as plain data.
         keep_last: Number of the latest that are kept, beside the best one.
+        may_change: Keys of `config` in which a checkpoint that is loaded may differ from it.
     """
 
     def __init__(
-        self, folder: Path | None, identity: Identity, config: dict[str, Any], keep_last: int = 3
+        self,
+        folder: Path | None,
+        identity: Identity,
+        config: dict[str, Any],
+        keep_last: int = 3,
+        may_change: Collection[str] = (),
     ) -> None:
         self.folder, self.identity, self.config = folder, identity, config
-        self.keep_last = keep_last
+        self.keep_last, self.may_change = keep_last, may_change
 
     def save(
         self,
@@ -96,12 +106,58 @@ class Checkpoints:
         with _interrupts_wait():
             file = io.BytesIO()
             torch.save(content, file)
-            self._write(file.getbuffer(), path)
-            if best:
+            if best:  # first: a run that is killed in between writes both again
                 self._write(file.getbuffer(), self.folder / "best.pt")
+            self._write(file.getbuffer(), path)
+        self.remove_old()
+        return path
+
+    def load(self, path: Path, device: torch.device) -> dict[str, Any]:
+        """Return the state in one of the checkpoints, from which the run is to continue.
+
+        Raises:
+            CheckpointError: If it cannot be read, or belongs to another task, other specs or
+                another configuration.
+        """
+        try:
+            content = read_checkpoint(path, device)
+        except CheckpointError as error:
+            earlier = [file for file in self._files() if file < path]
+            if not earlier:
+                raise
+            raise CheckpointError(
+                f"{error}; remove it to continue from {earlier[-1].name}"
+            ) from error
+        _check_identity(path, content["identity"], self.identity.to_dict())
+        self._check_config(path, content["config"])
+        state: dict[str, Any] = content["state"]
+        return state
+
+    def _check_config(self, path: Path, stored: dict[str, Any]) -> None:
+        """Check that the configuration is the stored one; keys of newer versions are ignored."""
+        differing = [
+            f"{name} was {before}, is {now}"
+            for name, before, now in _differences(stored, self.config)
+            if before != _ABSENT and name.partition(".")[0] not in self.may_change
+        ]
+        if differing:
+            raise CheckpointError(
+                f"{path} is of another configuration: {'; '.join(differing)}; "
+                f"a resumed run may change {', '.join(self.may_change) or 'nothing'}"
+            )
+
+    @property
+    def empty(self) -> bool:
+        """Whether there is no checkpoint."""
+        return not self._files()
+
+    def remove_old(self) -> None:
+        """Remove checkpoints that are too old, and temporary files of killed processes."""
         for old in self._files()[: -self.keep_last]:
             old.unlink()
-        return path
+        if self.folder is not None:
+            for unfinished in self.folder.glob(".*.tmp"):
+                unfinished.unlink()
 
     def latest(self) -> Path:
         """Return the newest checkpoint.
@@ -118,49 +174,40 @@ class Checkpoints:
         return [] if self.folder is None else sorted(self.folder.glob("frames_*.pt"))
 
     def _write(self, content: memoryview, path: Path) -> None:
-        temporary = path.with_suffix(".tmp")
         try:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            with temporary.open("wb") as file:
-                file.write(content)
-                file.flush()
-                os.fsync(file.fileno())
-            os.replace(temporary, path)
-        except OSError as error:
-            temporary.unlink(missing_ok=True)
+            write_atomically(path, content)
+        except WriteError as error:
             kept = self._files()
-            raise CheckpointError(
-                f"cannot write {path}: {error}; "
-                f"the last intact checkpoint is {kept[-1] if kept else 'none'}"
-            ) from error
+            last = kept[-1] if kept else "none"
+            raise CheckpointError(f"{error}; the last intact checkpoint is {last}") from error
+
+
+_DELAYED = [
+    getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGCHLD") if name in dir(signal)
+]
 
 
 @contextmanager
 def _interrupts_wait() -> Iterator[None]:
-    """Delay Ctrl-C until the block is done; inside it torch would raise another error."""
+    """Delay what signals raise until the block is done; inside it torch would raise another error.
+
+    They are Ctrl-C, the request to end, and the end of a worker process.
+    """
     if threading.current_thread() is not threading.main_thread():
         yield  # only the main thread receives signals
         return
     received: list[int] = []
-    previous = signal.signal(signal.SIGINT, lambda number, _: received.append(number))
+    previous = {number: signal.getsignal(number) for number in _DELAYED}
+    delayed = {number: action for number, action in previous.items() if callable(action)}
+    for number in delayed:
+        signal.signal(number, lambda number, _: received.append(number))
     try:
         yield
     finally:
-        signal.signal(signal.SIGINT, previous)
-    if received:
-        signal.raise_signal(received[0])
-
-
-def load_checkpoint(path: Path, identity: Identity, device: torch.device) -> dict[str, Any]:
-    """Return the state that `Checkpoints.save` was given.
-
-    Raises:
-        CheckpointError: If the file cannot be read, or belongs to another task or other specs.
-    """
-    content = read_checkpoint(path, device)
-    _check_identity(path, content["identity"], identity.to_dict())
-    state: dict[str, Any] = content["state"]
-    return state
+        for number, action in delayed.items():
+            signal.signal(number, action)
+    for number in received:
+        signal.raise_signal(number)
 
 
 def read_checkpoint(path: Path, device: torch.device = _CPU) -> dict[str, Any]:
@@ -169,13 +216,32 @@ def read_checkpoint(path: Path, device: torch.device = _CPU) -> dict[str, Any]:
     Raises:
         CheckpointError: If it cannot be read, or is not a checkpoint of this version.
     """
-    try:
-        content = torch.load(path, map_location=device, weights_only=True)
-    except (OSError, RuntimeError, EOFError, pickle.UnpicklingError) as error:
-        raise CheckpointError(f"cannot read the checkpoint {path}: {error}") from error
-    if not isinstance(content, dict) or content.get("format") != _FORMAT:
-        raise CheckpointError(f"{path} is not a checkpoint of this version (format {_FORMAT})")
+    content = load_file(path, device)
+    if not isinstance(content, dict) or "format" not in content:
+        raise CheckpointError(f"{path} is not a checkpoint of a run")
+    if content["format"] != _FORMAT:
+        raise CheckpointError(
+            f"{path} has format {content['format']}, this version reads format {_FORMAT}"
+        )
+    missing = sorted(_KEYS - set(content))
+    if missing:
+        raise CheckpointError(f"{path} is incomplete: no {', '.join(missing)}")
     return content
+
+
+def load_file(path: Path, device: torch.device) -> Any:
+    """Return the tensors and plain data in a file that `torch.save` wrote.
+
+    Raises:
+        CheckpointError: If it cannot be read.
+    """
+    try:
+        return torch.load(path, map_location=device, weights_only=True)
+    except FileNotFoundError as error:
+        raise CheckpointError(f"{path} does not exist") from error
+    except (OSError, *_UNREADABLE) as error:
+        reason = str(error).partition("\n")[0] or type(error).__name__
+        raise CheckpointError(f"cannot read {path} (cut off or no checkpoint): {reason}") from error
 
 
 def _check_identity(path: Path, stored: dict[str, Any], wanted: dict[str, Any]) -> None:
@@ -203,7 +269,7 @@ def _differences(one: Any, other: Any, name: str = "") -> list[tuple[str, Any, A
             found
             for key in sorted({*one, *other})
             for found in _differences(
-                one.get(key, "absent"), other.get(key, "absent"), f"{name}.{key}".lstrip(".")
+                one.get(key, _ABSENT), other.get(key, _ABSENT), f"{name}.{key}".lstrip(".")
             )
         ]
     return [] if one == other else [(name, one, other)]

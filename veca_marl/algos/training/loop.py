@@ -24,10 +24,11 @@ from tqdm import tqdm
 from veca_marl.algos.collection.experience import CollectCfg, Experience
 from veca_marl.algos.plain import to_plain
 from veca_marl.algos.specs import EnvFactory
-from veca_marl.algos.training.checkpoint import Checkpoints, load_checkpoint
+from veca_marl.algos.training.checkpoint import Checkpoints
 from veca_marl.algos.training.comparison import comparison_line, score_rows
 from veca_marl.algos.training.episodes import TrainingEpisodes
 from veca_marl.algos.training.evaluation import EvalCfg, RandomTeams, Scores, evaluate
+from veca_marl.algos.training.finite import check_batch, check_scores, check_state
 from veca_marl.algos.training.learners import Policy, TeamLearners
 from veca_marl.algos.training.matchmaking import AllLearn, Matchmaking
 from veca_marl.algos.training.progress import Budget, Progress, stage_seed
@@ -76,7 +77,8 @@ class Trainer:
 
     def resume(self, path: Path) -> None:
         """Continue learning and progress from the checkpoint at `path`."""
-        state = load_checkpoint(path, self.checkpoints.identity, self.learners.device)
+        state = self.checkpoints.load(path, self.learners.device)
+        self.checkpoints.remove_old()
         self.learners.load_state_dict(state["algorithm"])
         self.policy.take_over(self.learners.policy)
         self.progress = Progress(**state["progress"])
@@ -166,6 +168,7 @@ class Trainer:
         before = self._clock.elapsed()
         with timeit("collect"):
             batch = experience.collect()
+            check_batch(batch, list(self.learners.algorithms), self.progress.frames)
         with timeit("learn"):
             measured = self.learners.learn(batch)
         with timeit("transfer"):
@@ -215,17 +218,22 @@ class Trainer:
             "actors": self.learners.actor_states(),
             "progress": asdict(self.progress),
         }
+        check_state(state["algorithm"], self.progress.frames)
+        for reporter in self.reporters:
+            reporter.sync()
         numbers = {team: to_plain(cfg) for team, cfg in self.learners.cfgs.items()}
         self.checkpoints.save(state, self.progress.frames, best, numbers)
 
     def _evaluate(self, env: EnvBase, policy: nn.Module | None = None) -> dict[str, Scores]:
-        return evaluate(
+        scores = evaluate(
             env,
             policy or self.policy.play,
             self.evaluation.episodes,
             stage_seed(self.seed, _EVALUATION_STAGE),
             self.evaluation.exploration,
         )
+        check_scores(scores)
+        return scores
 
     def _report_scores(self, player: str, scores: dict[str, Scores]) -> None:
         for row in score_rows(player, scores):

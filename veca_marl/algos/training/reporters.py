@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import csv
+import io
 import math
 import os
 from collections import defaultdict
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any, Protocol
 
 from torchrl.record.loggers import Logger
+
+from veca_marl.algos.files import naming, write_atomically
 
 Row = Mapping[str, float | int | str]
 
@@ -26,6 +29,10 @@ class Reporter(Protocol):
             frames: See above.
             row: Name to value; words tell rows of one kind and one number of frames apart.
         """
+        ...
+
+    def sync(self) -> None:
+        """Let the rows so far survive a power cut: a checkpoint that follows them is written."""
         ...
 
     def close(self) -> None:
@@ -47,6 +54,9 @@ class MemoryReporter:
         """See `Reporter`."""
         self.rows[kind].append({"frames": frames, **row})
 
+    def sync(self) -> None:
+        """See `Reporter`; nothing is stored."""
+
     def close(self) -> None:
         """See `Reporter`; nothing is pending."""
 
@@ -60,23 +70,33 @@ class CsvReporter:
     Args:
         folder: Folder of the files.
         resumed_frames: Rows after so many frames are dropped; all of them at 0.
+
+    Raises:
+        WriteError: If a file cannot be written; `write` raises it too.
     """
+
+    KINDS = ("metrics", "evaluations")
 
     def __init__(self, folder: Path, resumed_frames: int = 0) -> None:
         self._folder = folder
-        for path in folder.glob("*.csv"):
-            _drop_rows_after(path, resumed_frames)
+        for kind in self.KINDS:
+            _drop_rows_after(folder / f"{kind}.csv", resumed_frames)
 
     def write(self, kind: str, frames: int, row: Row) -> None:
         """Append `row` to ``<kind>.csv``; not-a-number is left blank."""
         path = self._folder / f"{kind}.csv"
         full = {"frames": frames, **row}
         new = not path.exists()
-        with path.open("a", newline="") as file:
-            writer = csv.DictWriter(file, full.keys())
-            if new:
-                writer.writeheader()
-            writer.writerow({name: _cell(value) for name, value in full.items()})
+        row_text = _table(full.keys(), [{k: _cell(v) for k, v in full.items()}], header=new)
+        with naming(path), path.open("a", newline="") as file:
+            file.write(row_text)
+
+    def sync(self) -> None:
+        """See `Reporter`."""
+        for path in (self._folder / f"{kind}.csv" for kind in self.KINDS):
+            if path.exists():
+                with naming(path), path.open("a") as file:
+                    os.fsync(file.fileno())
 
     def close(self) -> None:
         """See `Reporter`; nothing is pending: each row is written at once."""
@@ -99,6 +119,9 @@ class LoggerReporter:
             if not isinstance(value, str) and math.isfinite(value):
                 self._logger.log_scalar("/".join([kind, *words, name]), float(value), step=frames)
 
+    def sync(self) -> None:
+        """See `Reporter`; the logger decides when it writes."""
+
     def close(self) -> None:
         """Write pending points."""
         self._logger.close()
@@ -110,14 +133,23 @@ def _cell(value: float | int | str) -> str | int:
     return value
 
 
-def _drop_rows_after(path: Path, frames: int) -> None:
-    with path.open(newline="") as file:
-        reader = csv.DictReader(file)
-        columns = reader.fieldnames or []
-        kept = [row for row in reader if frames and int(row["frames"]) <= frames]
-    temporary = path.with_suffix(".tmp")
-    with temporary.open("w", newline="") as file:
-        writer = csv.DictWriter(file, columns)
+def _table(columns: Iterable[str], rows: Iterable[Mapping[str, Any]], header: bool) -> str:
+    text = io.StringIO(newline="")
+    writer = csv.DictWriter(text, list(columns))
+    if header:
         writer.writeheader()
-        writer.writerows(kept)
-    os.replace(temporary, path)
+    writer.writerows(rows)
+    return text.getvalue()
+
+
+def _drop_rows_after(path: Path, frames: int) -> None:
+    """Keep the rows up to `frames`, without a row that was cut off while it was written."""
+    if not path.exists():
+        return
+    whole = path.read_text().rpartition("\n")[0].splitlines()
+    reader = csv.DictReader(whole)
+    kept = [row for row in reader if frames and int(row["frames"]) <= frames]
+    if kept:
+        write_atomically(path, _table(reader.fieldnames or [], kept, header=True))
+    else:
+        path.unlink()  # the next row writes the header

@@ -1,0 +1,106 @@
+"""Checks for NaN and infinity: in experience before it is learnt from, returns, parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+import torch
+from tensordict import TensorDictBase
+
+from veca_marl.algos.training.evaluation import Scores
+
+
+class NotFiniteError(RuntimeError):
+    """A reward, an observation, an action, a return or a parameter is NaN or infinite."""
+
+
+def check_batch(batch: TensorDictBase, teams: list[str], frames: int) -> None:
+    """Check rewards, reward terms, observations and actions of some experience.
+
+    Args:
+        batch: Experience ``(worlds, steps)``.
+        teams: The teams whose arrays are checked.
+        frames: Training frames before the batch.
+
+    Raises:
+        NotFiniteError: With team, term or sense, world and step of the earliest value.
+    """
+    found = [
+        (*_first(array), order, team, name, array)
+        for team in teams
+        for order, (name, array) in enumerate(_arrays(batch, team))
+        if array.is_floating_point() and not torch.isfinite(array).all()
+    ]
+    if found:
+        step, world, _, team, name, array = min(found, key=lambda entry: entry[:3])
+        values = array[world, step]
+        raise NotFiniteError(
+            f"team {team!r}: {name} is {values[~values.isfinite()][0].item()} in world {world} "
+            f"at step {step} of the batch after {frames} frames"
+        )
+
+
+def _arrays(batch: TensorDictBase, team: str) -> Iterator[tuple[str, torch.Tensor]]:
+    """Return names and arrays ``(worlds, steps, ...)``, causes before their consequences."""
+    for part, label in ((batch, "sense"), (batch["next"], "next observation of sense")):
+        for name, array in sorted(part[team, "observation"].items()):
+            yield f"{label} {name!r}", array
+    action = batch[team, "action"]
+    parts = action.items() if isinstance(action, TensorDictBase) else [("action", action)]
+    for name, array in parts:
+        yield f"action {name!r}", array
+    info = batch["next", team].get("info", None)
+    for name, array in sorted(info.items()) if info is not None else ():
+        yield f"reward term {name!r}", array
+    yield "reward", batch["next", team, "reward"]
+
+
+def _first(array: torch.Tensor) -> tuple[int, int]:
+    """Return step and world of the earliest value that is not finite."""
+    wrong = ~array.isfinite().flatten(2).all(-1)
+    step, world = wrong.T.nonzero()[0].tolist()
+    return step, world
+
+
+def check_scores(scores: Mapping[str, Scores]) -> None:
+    """Check the returns and the reward terms of an evaluation.
+
+    Raises:
+        NotFiniteError: With team, term and episode.
+    """
+    for team, score in scores.items():
+        for name, sums in {**score.terms, "return": score.returns}.items():
+            wrong = np.flatnonzero(~np.isfinite(sums))
+            if len(wrong):
+                raise NotFiniteError(
+                    f"team {team!r}: {name!r} is {sums[wrong[0]]} in episode {wrong[0]} "
+                    "of the evaluation"
+                )
+
+
+def check_state(state: Mapping[str, Any], frames: int) -> None:
+    """Check that no number of what was learnt is NaN.
+
+    Args:
+        state: Nested tensors and plain data by team.
+        frames: Training frames so far.
+
+    Raises:
+        NotFiniteError: With the team and the name of the tensor.
+    """
+    for name, tensor in _tensors(state):
+        if tensor.is_floating_point() and tensor.isnan().any():
+            raise NotFiniteError(f"{name} is NaN after {frames} frames: learning has diverged")
+
+
+def _tensors(state: Any, name: str = "") -> Iterator[tuple[str, torch.Tensor]]:
+    if isinstance(state, torch.Tensor):
+        yield name, state
+    elif isinstance(state, Mapping):
+        for key, entry in state.items():
+            yield from _tensors(entry, f"{name}.{key}".lstrip("."))
+    elif isinstance(state, list | tuple):
+        for index, entry in enumerate(state):
+            yield from _tensors(entry, f"{name}[{index}]")
