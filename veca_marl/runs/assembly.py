@@ -65,9 +65,14 @@ def make_trainer(cfg: Config, folder: RunFolder | None = None) -> Trainer:
     torch.manual_seed(cfg.seed)
     specs = read_specs(cfg.game)
     checkpoints = _make_checkpoints(cfg, folder, specs)
+    learners = make_learners(cfg, specs, device)
+    # a run that was killed before its first checkpoint starts from the beginning
+    continued = cfg.resume is not None and not checkpoints.empty
+    if not continued:
+        init_teams(learners, cfg.init_from, cfg.init_encoders)
     trainer = Trainer(
         make_env=GameFactory(cfg.game, tuple(cfg.plugins)),
-        learners=make_learners(cfg, specs, device),
+        learners=learners,
         collect=cfg.collect,
         evaluation=cfg.eval,
         budget=Budget(cfg.total_frames, cfg.max_minutes),
@@ -79,10 +84,8 @@ def make_trainer(cfg: Config, folder: RunFolder | None = None) -> Trainer:
     if cfg.self_play.teams:
         if folder is None:
             raise ConfigError("self_play.teams: past policies are stored in the folder of a run")
-        trainer.matchmaking = SelfPlay(cfg.self_play, trainer.learners, Pool(folder.pool), cfg.seed)
-    if cfg.resume is None or checkpoints.empty:  # it was killed before its first checkpoint
-        init_teams(trainer.learners, cfg.init_from, cfg.init_encoders)
-    else:
+        trainer.matchmaking = SelfPlay(cfg.self_play, learners, Pool(folder.pool), cfg.seed)
+    if continued:
         trainer.resume(checkpoints.latest())
     return trainer
 

@@ -244,6 +244,16 @@ def load_file(path: Path, device: torch.device) -> Any:
         raise CheckpointError(f"cannot read {path} (cut off or no checkpoint): {reason}") from error
 
 
+@contextmanager
+def naming_checkpoint(path: Path) -> Iterator[None]:
+    """Raise `CheckpointError` where a state that is loaded inside the block does not fit."""
+    try:
+        yield
+    except (RuntimeError, KeyError, TypeError, ValueError) as error:
+        reason = " ".join(str(error).split())
+        raise CheckpointError(f"{path} does not fit: {type(error).__name__}: {reason}") from error
+
+
 def _check_identity(path: Path, stored: dict[str, Any], wanted: dict[str, Any]) -> None:
     if stored["task"] != wanted["task"]:
         raise CheckpointError(f"{path} is of task {stored['task']}, wanted: {wanted['task']}")

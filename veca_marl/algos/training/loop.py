@@ -24,7 +24,7 @@ from tqdm import tqdm
 from veca_marl.algos.collection.experience import CollectCfg, Experience
 from veca_marl.algos.plain import to_plain
 from veca_marl.algos.specs import EnvFactory
-from veca_marl.algos.training.checkpoint import Checkpoints
+from veca_marl.algos.training.checkpoint import Checkpoints, naming_checkpoint
 from veca_marl.algos.training.comparison import comparison_line, score_rows
 from veca_marl.algos.training.episodes import TrainingEpisodes
 from veca_marl.algos.training.evaluation import EvalCfg, RandomTeams, Scores, evaluate
@@ -79,9 +79,10 @@ class Trainer:
         """Continue learning and progress from the checkpoint at `path`."""
         state = self.checkpoints.load(path, self.learners.device)
         self.checkpoints.remove_old()
-        self.learners.load_state_dict(state["algorithm"])
+        with naming_checkpoint(path):
+            self.learners.load_state_dict(state["algorithm"])
+            self.progress = Progress(**state["progress"])
         self.policy.take_over(self.learners.policy)
-        self.progress = Progress(**state["progress"])
         self._resumed_frames = self.progress.frames
 
     def run(self) -> list[str]:

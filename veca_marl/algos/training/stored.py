@@ -21,6 +21,7 @@ from veca_marl.algos.sense_encoders import sense_encoders
 from veca_marl.algos.specs import TeamSpec
 from veca_marl.algos.training.checkpoint import (
     CheckpointError,
+    naming_checkpoint,
     read_checkpoint,
     spec_differences,
 )
@@ -38,7 +39,8 @@ def load_actor(path: Path, team: str, spec: TeamSpec) -> TensorDictModuleBase:
         CheckpointError: If there is no such checkpoint, or it does not hold this team.
     """
     algorithm, content = _make(path, team, spec)
-    algorithm.actor.load_state_dict(content["state"]["actors"][team])
+    with naming_checkpoint(path):
+        algorithm.actor.load_state_dict(content["state"]["actors"][team])
     return algorithm.actor.requires_grad_(False)
 
 
@@ -54,7 +56,8 @@ def load_algorithm(path: Path, team: str, spec: TeamSpec) -> Algorithm:
         CheckpointError: See `load_actor`.
     """
     algorithm, content = _make(path, team, spec)
-    algorithm.load_state_dict(content["state"]["algorithm"][team])
+    with naming_checkpoint(path):
+        algorithm.load_state_dict(content["state"]["algorithm"][team])
     return algorithm
 
 
@@ -72,7 +75,8 @@ def load_encoders(path: Path, team: str) -> dict[str, list[nn.Module]]:
         CheckpointError: If there is no such checkpoint, or it does not hold this team.
     """
     algorithm, content = _make(path, team, None)
-    algorithm.actor.load_state_dict(content["state"]["actors"][team])
+    with naming_checkpoint(path):
+        algorithm.actor.load_state_dict(content["state"]["actors"][team])
     return sense_encoders(algorithm.actor)
 
 

@@ -1,0 +1,203 @@
+"""Damaged, incomplete and changed run folders: one clear sentence, and nothing is lost."""
+
+import json
+import shutil
+
+import pytest
+import torch
+from omegaconf import OmegaConf
+
+from veca_marl import api
+from veca_marl.algos.training.checkpoint import CheckpointError
+from veca_marl.config import ConfigError
+from veca_marl.evaluate import main as evaluate
+from veca_marl.runs.assembly import make_trainer
+from veca_marl.runs.run_folder import RunFolder, open_run
+from veca_marl.tournament import main as tournament
+from veca_marl.train import stored_config
+
+FRAMES = 8
+CHOICES = [
+    "collect=one_process",
+    "collect.worlds=1",
+    "collect.steps=4",
+    "eval.every_frames=4",
+    "eval.episodes=1",
+    "eval.worlds=1",
+    "log=silent",
+    "threads=1",
+    "algo.epochs=1",
+    "task.max_seconds=0.2",
+]
+SENSES = {"vision": "blind", "touch": "numb"}
+
+
+@pytest.fixture(scope="module")
+def complete(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("broken") / "complete"
+    api.train("KickTheBall", total_frames=FRAMES, senses=SENSES, folder=folder, overrides=CHOICES)
+    return folder
+
+
+@pytest.fixture
+def run(complete, tmp_path):
+    return RunFolder(shutil.copytree(complete, tmp_path / "run"))
+
+
+def latest(run):
+    return sorted(run.checkpoints.glob("frames_*.pt"))[-1]
+
+
+def cut_off(path):
+    path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
+
+
+def change_config(run, key, value):
+    node = OmegaConf.load(run.config)
+    assert OmegaConf.select(node, key) != value
+    OmegaConf.update(node, key, value)
+    OmegaConf.save(node, run.config)
+
+
+def change_checkpoint(run, **entries):
+    content = torch.load(latest(run), weights_only=True) | entries
+    torch.save({key: value for key, value in content.items() if value is not None}, latest(run))
+
+
+def change_provenance(run):
+    content = json.loads(run.provenance.read_text())
+    del content["bodies"]
+    run.provenance.write_text(json.dumps(content))
+
+
+def remove_checkpoints(run):
+    shutil.rmtree(run.checkpoints)
+
+
+FOLDERS = {
+    "configuration missing": (lambda r: r.config.unlink(), r"run holds no run \(no config.yaml\)"),
+    "configuration empty": (lambda r: r.config.write_text(""), "config.yaml is damaged: it names"),
+    "configuration is no YAML": (
+        lambda r: r.config.write_text("task: [KickTheBall"),
+        "config.yaml is damaged or cannot be read: .*expected",
+    ),
+    "unknown task": (lambda r: change_config(r, "task.name", "Chess"), "unknown task 'Chess'"),
+    "unknown key": (lambda r: change_config(r, "algo.clip_it", 3), "config.yaml: .*'algo.clip_it'"),
+    "provenance missing": (lambda r: r.provenance.unlink(), "provenance.json is damaged or cannot"),
+    "provenance cut off": (lambda r: cut_off(r.provenance), "provenance.json is damaged or cannot"),
+    "older version": (change_provenance, "was stored by an older version; train it again"),
+}
+CHECKPOINTS = {
+    "checkpoint cut off": (lambda r: cut_off(latest(r)), r"cannot read .*0008\.pt \(cut off"),
+    "checkpoint empty": (lambda r: latest(r).write_bytes(b""), r"cannot read .*0008\.pt \(cut off"),
+    "another format": (
+        lambda r: change_checkpoint(r, format=2),
+        "has format 2, this version",
+    ),
+    "another file": (lambda r: torch.save({"x": 1}, latest(r)), "is not a checkpoint of a run"),
+    "entry missing": (lambda r: change_checkpoint(r, state=None), "is incomplete: no state"),
+    "other content": (lambda r: change_checkpoint(r, state={"x": 1}), "does not fit: KeyError"),
+}
+RESUMED = {
+    "another algorithm": (
+        lambda r: change_config(r, "algo.clip", 0.7),
+        r"another configuration: algo.clip was 0.2, is 0.7; a resumed run may change resume, .*log",
+    ),
+    "another seed": (
+        lambda r: change_config(r, "seed", 9),
+        "configuration: seed was 0, is 9",
+    ),
+    "another task": (
+        lambda r: change_config(r, "task.name", "MoveToTarget"),
+        "stored configuration: unknown key 'task",
+    ),
+}
+
+
+def files(run):
+    return {p: p.read_bytes() for p in run.path.rglob("*") if p.is_file()}
+
+
+def resume(run, *overrides):
+    cfg = stored_config(open_run(run.path), [f"resume={run.path}", *overrides])
+    return make_trainer(cfg, run)
+
+
+def cases(*tables):
+    table = {name: case for part in tables for name, case in part.items()}
+    return pytest.mark.parametrize(("damage", "message"), table.values(), ids=table)
+
+
+@cases(FOLDERS, CHECKPOINTS, RESUMED)
+def test_a_run_that_cannot_be_resumed_is_unchanged(run, damage, message):
+    damage(run)
+    before = files(run)
+    with pytest.raises((ConfigError, CheckpointError), match=message):
+        resume(run)
+    assert files(run) == before
+
+
+NO_CHECKPOINT = {"no checkpoint": (remove_checkpoints, "neither a checkpoint nor the folder of a")}
+
+
+@cases(FOLDERS, {name: CHECKPOINTS[name] for name in ("checkpoint cut off",)}, NO_CHECKPOINT)
+def test_evaluate_ends_in_one_line(run, capsys, damage, message):
+    damage(run)
+    before = files(run)
+    assert evaluate([f"run={run.path}", "episodes=1"]) == 2
+    check_one_line(capsys, message)
+    assert files(run) == before
+
+
+@cases(FOLDERS)
+def test_tournament_ends_in_one_line(run, capsys, damage, message):
+    damage(run)
+    assert tournament([f"run={run.path}", "episodes=1"]) == 2
+    check_one_line(capsys, message)
+
+
+def check_one_line(capsys, message):
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith("error: ")
+    with pytest.raises(ConfigError, match=message):
+        raise ConfigError(line)
+
+
+def test_the_checkpoint_before_a_damaged_one_is_named(run):
+    cut_off(latest(run))
+    with pytest.raises(CheckpointError, match=r"remove it to continue from frames_0+4\.pt"):
+        resume(run)
+    latest(run).unlink()
+    assert resume(run).progress.frames == 4
+
+
+def test_a_run_that_was_killed_before_its_first_checkpoint_starts_at_frame_0(run):
+    remove_checkpoints(run)
+    assert resume(run).progress.frames == 0
+
+
+def test_what_has_no_influence_on_the_result_can_be_changed(run):
+    asked = ["log=csv", "log.video=false", "total_frames=1e3", "max_minutes=3", "threads=2"]
+    cfg = stored_config(run, asked)
+    assert cfg.log.progress_bar
+    assert not cfg.log.video
+    assert (cfg.total_frames, cfg.max_minutes, cfg.threads) == (1000, 3.0, 2)
+    assert resume(run, *asked, "device=cpu", "threads=1").progress.frames == FRAMES
+
+
+@pytest.mark.parametrize(
+    ("override", "message"),
+    [
+        ("seed=3", "cannot change seed; choices: resume, total_frames, max_minutes, device, thr"),
+        ("algo=mappo", "cannot change algo; choices"),
+        ("senses/audio=mono", "cannot change senses/audio; choices"),
+        ("+task=TurnBaby", "is a run of KickTheBall, not of TurnBaby"),
+        ("device=tpu", "device=tpu is not on this machine; choices: cpu"),
+        ("total_frames=0", "total_frames must be"),
+    ],
+)
+def test_other_changes_are_refused(run, override, message):
+    before = files(run)
+    with pytest.raises(ConfigError, match=message):
+        resume(run, override)
+    assert files(run) == before
