@@ -3,8 +3,12 @@
 import csv
 
 from veca_marl.algos.networks.multisense import MultisenseCfg
+from veca_marl.algos.networks.precision import Precision
 
-SMALL = MultisenseCfg(channels=[4, 8, 8], vector_features=16, trunk_features=32)
+# float32: tests compare losses with formulas
+SMALL = MultisenseCfg(
+    channels=[4, 8, 8], vector_features=16, trunk_features=32, precision=Precision.float32
+)
 FRAMES = 64  # of a batch
 
 

@@ -8,7 +8,6 @@ import torch
 from tensordict import TensorDictBase
 from tensordict.nn import TensorDictModuleBase
 from torch import nn
-from torchrl.data import LazyTensorStorage, SamplerWithoutReplacement, TensorDictReplayBuffer
 from torchrl.objectives import KLAdaptiveLR
 
 from veca_marl.algos.algorithm import Algorithm
@@ -23,6 +22,7 @@ from veca_marl.algos.ppo.advantages import advantages
 from veca_marl.algos.ppo.config import PPOCfg, check_sequences
 from veca_marl.algos.ppo.entropy import entropy_weights
 from veca_marl.algos.ppo.losses import VALID, TeamPPOLoss
+from veca_marl.algos.ppo.minibatches import minibatches
 from veca_marl.algos.ppo.value_normalisation import NormalisedCritic, ValueNormalisation
 from veca_marl.algos.sense_encoders import copy_parameters
 from veca_marl.algos.specs import TeamSpec
@@ -62,7 +62,7 @@ class PPO(Algorithm):
         self.loss = _make_loss(team, self.network, cfg, weights).to(device)
         if self.normalised_critic is not None:
             self.loss.value_norm = self.normalised_critic.statistics
-        self.optimizer = torch.optim.Adam(trainable(self.network), lr=cfg.learning_rate)
+        self.optimizer = torch.optim.Adam(trainable(self.network), lr=cfg.learning_rate, fused=True)
         self.schedule = KLAdaptiveLR(
             self.optimizer,
             target_kl=cfg.target_kl,
@@ -72,7 +72,6 @@ class PPO(Algorithm):
         )
         self._recurrent = memory_of(self.network.actor) is not None
         self._batch_keys = _batch_keys(self.network, team, spec.masked)
-        self._memory: TensorDictReplayBuffer | None = None
 
     @property
     def actor(self) -> TensorDictModuleBase:
@@ -114,24 +113,12 @@ class PPO(Algorithm):
             self.normalised_critic.update(
                 targets[rows[self.team, "mask"]] if self._masked else targets.flatten(0, -2)
             )
-        memory = self._fill_memory(rows)
         measured: list[dict[str, float]] = []
         for _ in range(self.cfg.epochs):
-            epoch = [self.step(minibatch) for minibatch in memory]
+            epoch = [self.step(minibatch) for minibatch in minibatches(rows, self.cfg.minibatches)]
             self.schedule.step(_mean(epoch)["kl"])
             measured += epoch
         return _mean(measured) | {"learning_rate": self.schedule.get_last_lr()[0]}
-
-    def _fill_memory(self, rows: TensorDictBase) -> TensorDictReplayBuffer:
-        if self._memory is None:
-            self._memory = TensorDictReplayBuffer(
-                storage=LazyTensorStorage(len(rows), device=rows.device),
-                sampler=SamplerWithoutReplacement(drop_last=True),
-                batch_size=len(rows) // self.cfg.minibatches,
-            )
-        self._memory.empty()
-        self._memory.extend(rows)
-        return self._memory
 
     def step(self, minibatch: TensorDictBase) -> dict[str, float]:
         """Take one gradient step and return what was measured.
