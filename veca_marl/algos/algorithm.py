@@ -14,7 +14,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any
 
 import torch
 from tensordict import TensorDictBase
@@ -23,6 +23,7 @@ from torch import nn
 
 from veca_marl.algos.sense_encoders import copy_encoders, copy_parameters
 from veca_marl.algos.specs import TeamSpec
+from veca_marl.algos.storage import StorageNeeded
 from veca_marl.registry import Registry, origin
 
 
@@ -53,7 +54,7 @@ class Algorithm(ABC):
             seeded from (seed, stage) by the training loop.
     """
 
-    exact_resume: ClassVar[bool]
+    exact_resume: bool
 
     @property
     @abstractmethod
@@ -78,6 +79,11 @@ class Algorithm(ABC):
     @abstractmethod
     def measures(self) -> Sequence[str]:
         """Names of the numbers that `learn` returns, the same for each batch."""
+
+    @property
+    def storage_needed(self) -> StorageNeeded:
+        """Memory and disk space that learning takes beside the parameters; none by default."""
+        return StorageNeeded()
 
     @abstractmethod
     def learn(self, batch: TensorDictBase) -> dict[str, float]:

@@ -64,6 +64,18 @@ class TemperatureCfg:
             )
 
 
+class Storage(Enum):
+    """Where a replay buffer is.
+
+    Attributes:
+        memory: In memory.
+        memmap: In memory-mapped files, which are removed at the end of the run.
+    """
+
+    memory = "memory"
+    memmap = "memmap"
+
+
 @dataclass
 class ReplayCfg:
     """The replay buffer.
@@ -72,10 +84,19 @@ class ReplayCfg:
         capacity: Number of observations that are stored; the oldest are overwritten. Each end of an
             episode or of a batch takes one more than there are frames.
         warm_up_frames: Frames before the first update; the actions are uniformly random until then.
+        storage: Where it is.
+        folder: Folder for memory-mapped files; None for the system's temporary folder.
+        in_checkpoint: Whether checkpoints contain it. Then a resumed run equals an uninterrupted
+            one bit for bit, and each checkpoint takes as much disk space as the buffer, and
+            saving it twice its memory. Otherwise a resumed run collects `warm_up_frames` with its
+            policy before it goes on learning.
     """
 
     capacity: int = 50_000
     warm_up_frames: int = 2_000
+    storage: Storage = Storage.memory
+    folder: str | None = None
+    in_checkpoint: bool = False
 
     def __post_init__(self) -> None:
         if self.warm_up_frames < 0:

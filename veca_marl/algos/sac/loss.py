@@ -84,7 +84,8 @@ class TeamSACLoss(LossModule):
         encoder_gradient: EncoderGradient,
     ) -> None:
         super().__init__()
-        self.in_keys, self.out_keys = [], []  # it reads `Transitions`, not a TensorDict
+        self.in_keys: list[str] = []  # it reads `Transitions`, not a TensorDict
+        self.out_keys: list[str] = []
         self._team, self._action = team, action
         critic = _Critic(network.encoder, network.values)
         self.convert_to_functional(critic, "critic", create_target_params=True)

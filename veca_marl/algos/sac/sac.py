@@ -19,11 +19,12 @@ from veca_marl.algos.networks.factory import check_same_network, trainable
 from veca_marl.algos.sac.config import SACCfg
 from veca_marl.algos.sac.joint_action import JointAction
 from veca_marl.algos.sac.loss import TeamSACLoss
-from veca_marl.algos.sac.replay import Replay
+from veca_marl.algos.sac.replay import Replay, storage_needed
 from veca_marl.algos.sac.temperature import Temperatures
 from veca_marl.algos.sac.windows import transitions
 from veca_marl.algos.sense_encoders import copy_parameters
 from veca_marl.algos.specs import PLAIN, TeamSpec
+from veca_marl.algos.storage import StorageNeeded
 
 
 class SAC(Algorithm):
@@ -36,12 +37,14 @@ class SAC(Algorithm):
         spec: Its arrays.
         cfg: The numbers.
         device: Where it learns.
+
+    Attributes:
+        exact_resume: Whether checkpoints contain the replay buffer, see `ReplayCfg`.
     """
 
-    exact_resume = False
-
     def __init__(self, team: str, spec: TeamSpec, cfg: SACCfg, device: torch.device) -> None:
-        self.team, self.cfg, self._device = team, cfg, device
+        self.team, self.cfg, self._spec, self._device = team, cfg, spec, device
+        self.exact_resume = cfg.replay.in_checkpoint
         self.network = make_actor_critics(
             team, spec, cfg.network, cfg.critic, list(cfg.policy_hidden)
         ).to(device)
@@ -77,6 +80,11 @@ class SAC(Algorithm):
     def measures(self) -> list[str]:
         """See `Algorithm`."""
         return [*_MEASURES, *(_name(part) for part in self.temperatures.targets), *_COUNTS]
+
+    @property
+    def storage_needed(self) -> StorageNeeded:
+        """See `Algorithm`: the replay buffer."""
+        return storage_needed(self._spec, self.cfg.replay)
 
     def learn(self, batch: TensorDictBase) -> dict[str, float]:
         """See `Algorithm`: store the batch and make the updates that are due."""

@@ -34,6 +34,12 @@ class StoredKeys:
     state: tuple[Key, ...]
     action: tuple[Key, ...]
 
+    @property
+    def all(self) -> tuple[Key, ...]:
+        """Everything that is stored, without `END`."""
+        outcome = ((self.team, "reward"), (self.team, "terminated"))
+        return (*self.state, *self.action, *outcome)
+
     @classmethod
     def of(cls, team: str, spec: TeamSpec) -> StoredKeys:
         """Return the keys of a team with these arrays."""
