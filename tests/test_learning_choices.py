@@ -106,3 +106,9 @@ def test_a_body_with_a_voice_is_trained(body):
     """Its action has two parts, move and voice."""
     result = run_training(compose([*SMALL, f"body={body}"]))
     assert result.metrics[-1]["agents/kl"] >= 0.0
+
+
+def test_a_replay_buffer_that_does_not_fit_is_refused_before_the_run():
+    message = r"the replay buffers take \d+\.\d+ GB of memory.*change algo.replay.capacity"
+    with pytest.raises(ConfigError, match=message):
+        run_training(compose([*SMALL, "algo=sac", "algo.replay.capacity=10_000_000_000"]))

@@ -120,6 +120,8 @@ def give_up(error: Exception) -> NoReturn:
 def main() -> None:
     """Run the command line; errors of it end in one line and exit status 2."""
     os.environ["HYDRA_FULL_ERROR"] = "1"  # Hydra raises exceptions instead of printing them
+    logging.basicConfig(format="%(message)s")
+    logging.getLogger("veca_marl").setLevel(logging.INFO)
     logging.getLogger("torchrl").setLevel(logging.WARNING)
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # schedulers stop jobs with SIGTERM
     try:

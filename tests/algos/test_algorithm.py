@@ -1,5 +1,7 @@
 """What the interface of an algorithm promises, for each one: on-policy, with and without replay."""
 
+from dataclasses import replace
+
 import pytest
 import torch
 from fake_env import make_fake_env
@@ -44,6 +46,7 @@ ALL = {
     "forgetful_dqn": ForgetfulDQNCfg(),
 }
 every_algorithm = pytest.mark.parametrize("cfg", ALL.values(), ids=ALL.keys())
+SAC_WITH_REPLAY = replace(ALL["sac"], replay=ReplayCfg(300, 64, in_checkpoint=True))
 
 
 def specs_of(teams=("agents",)):
@@ -96,7 +99,7 @@ def test_it_learns_and_is_evaluated(make_trainer, cfg):
         assert all(row[f"agents/{name}"] == row[f"agents/{name}"] for name in algorithm.measures)
 
 
-@every_algorithm
+@pytest.mark.parametrize("cfg", [*ALL.values(), SAC_WITH_REPLAY], ids=[*ALL, "sac_with_replay"])
 def test_resuming_is_exact_if_the_algorithm_says_so(make_trainer, tmp_path, cfg):
     whole = make_trainer("whole", cfg, 6)
     whole.run()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from dataclasses import dataclass
 from typing import Any, cast
 
@@ -12,6 +13,7 @@ from veca_marl.algos.networks.precision import Precision
 from veca_marl.algos.selfplay.pool import Pool
 from veca_marl.algos.selfplay.self_play import SelfPlay
 from veca_marl.algos.specs import TeamSpec, team_specs
+from veca_marl.algos.storage import check_storage
 from veca_marl.algos.training.checkpoint import Checkpoints, Identity
 from veca_marl.algos.training.learners import TeamLearners
 from veca_marl.algos.training.loggers import make_reporter
@@ -27,6 +29,8 @@ from veca_marl.plugins import load_plugins
 from veca_marl.runs.allocation import keep_freed_memory
 from veca_marl.runs.resumable import RESUMABLE
 from veca_marl.runs.run_folder import RunFolder
+
+_LOG = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -55,7 +59,8 @@ def make_trainer(cfg: Config, folder: RunFolder | None = None) -> Trainer:
         folder: Folder of the run; None stores nothing.
 
     Raises:
-        ConfigError: If the device does not exist or no world can be made.
+        ConfigError: If the device does not exist, no world can be made, or what learning stores
+            does not fit.
         CheckpointError: If a run to continue or to load from does not fit.
     """
     device = find_device(cfg.device)
@@ -64,6 +69,8 @@ def make_trainer(cfg: Config, folder: RunFolder | None = None) -> Trainer:
         torch.set_num_threads(cfg.threads)
     torch.manual_seed(cfg.seed)
     specs = read_specs(cfg.game)
+    learners = make_learners(cfg, specs, device)
+    _log_storage(learners)
     checkpoints = _make_checkpoints(cfg, folder, specs)
     learners = make_learners(cfg, specs, device)
     # a run that was killed before its first checkpoint starts from the beginning
@@ -88,6 +95,16 @@ def make_trainer(cfg: Config, folder: RunFolder | None = None) -> Trainer:
     if continued:
         trainer.resume(checkpoints.latest())
     return trainer
+
+
+def _log_storage(learners: TeamLearners) -> None:
+    """Log the memory and disk space that learning takes; refuse what does not fit."""
+    try:
+        lines = check_storage(learners.storage_needed)
+    except ValueError as error:
+        raise ConfigError(one_line(error)) from error
+    for line in lines:
+        _LOG.info(line)
 
 
 def _make_checkpoints(

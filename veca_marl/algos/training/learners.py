@@ -13,6 +13,7 @@ from torch import nn
 
 from veca_marl.algos.algorithm import Algorithm, AlgorithmCfg, make_algorithm
 from veca_marl.algos.specs import TeamSpec
+from veca_marl.algos.storage import StorageNeeded
 
 
 class Policy(nn.Module):
@@ -103,6 +104,11 @@ class TeamLearners:
     def exact_resume(self) -> bool:
         """Whether a resumed run continues bit for bit: only if every algorithm does."""
         return all(algorithm.exact_resume for algorithm in self.algorithms.values())
+
+    @property
+    def storage_needed(self) -> dict[str, StorageNeeded]:
+        """Team to what its algorithm stores beside its parameters."""
+        return {team: each.storage_needed for team, each in self.algorithms.items()}
 
     def learn(self, batch: TensorDictBase) -> dict[str, dict[str, float]]:
         """Learn from one batch ``(worlds, steps)``; return the measures of each team.
