@@ -21,6 +21,7 @@ from omegaconf import DictConfig
 from omegaconf.errors import OmegaConfBaseException
 
 from veca_marl import api
+from veca_marl.algos.collection.parent import end_with_parent
 from veca_marl.algos.collection.workers import WorkerError
 from veca_marl.algos.files import WriteError
 from veca_marl.algos.training.checkpoint import CheckpointError
@@ -32,6 +33,8 @@ from veca_marl.runs.assembly import decide_precision, make_trainer
 from veca_marl.runs.resumable import RESUMABLE, may_change
 from veca_marl.runs.run_folder import RunFolder, new_run, open_run, remove_if_empty
 from veca_marl.runs.training import TrainingResult, run_training
+from veca_marl.sweeps.plans import SweepError
+from veca_marl.sweeps.processes import PARENT
 
 _COMMAND = "python -m veca_marl.train"
 _DISK_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
@@ -124,11 +127,15 @@ def main() -> None:
     logging.getLogger("veca_marl").setLevel(logging.INFO)
     logging.getLogger("torchrl").setLevel(logging.WARNING)
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # schedulers stop jobs with SIGTERM
+    if PARENT in os.environ:  # a run of a sweep ends with it
+        end_with_parent(int(os.environ.pop(PARENT)))
     try:
         sys.argv[1:] = prepare(sys.argv[1:])
         run()
-    except (ConfigError, HydraException, OmegaConfBaseException) as error:
+    except (ConfigError, SweepError, HydraException, OmegaConfBaseException) as error:
         give_up(error)
+    except KeyboardInterrupt:  # a sweep; `run` handles that of a single run
+        raise SystemExit(130) from None
 
 
 class _CallableModule(ModuleType):

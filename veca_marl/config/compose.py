@@ -149,6 +149,25 @@ def _run_folder(resume: str | None, task: str | None, now: str) -> str:
     return f"runs/{task}/{now}"
 
 
+def _sweep_folder(experiment: str | None) -> str:
+    """Return the folder of the runs of an experiment, or of other sweeps."""
+    return "runs/sweeps" if experiment is None else f"runs/{experiment}"
+
+
+def _job_folder(arm: str | None, overrides: str, seed: int) -> str:
+    """Return the folder of a run within that of its sweep.
+
+    Args:
+        arm: Arm of an experiment; None for a sweep without one.
+        overrides: The overrides that tell the runs of a sweep apart.
+        seed: Seed of the run.
+    """
+    name = arm or overrides.replace("/", ".").replace("+", "") or "default"
+    return f"{name}/seed_{seed}"
+
+
 register_schemas()
 register_search_path()
 OmegaConf.register_new_resolver("run_folder", _run_folder, replace=True)
+OmegaConf.register_new_resolver("sweep_folder", _sweep_folder, replace=True)
+OmegaConf.register_new_resolver("job_folder", _job_folder, replace=True)

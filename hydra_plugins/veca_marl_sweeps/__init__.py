@@ -1,0 +1,123 @@
+"""Hydra's plug-ins of this project: a sweeper over the arms of an experiment, and a launcher.
+
+Hydra instantiates sweepers and launchers from the namespace `hydra_plugins` alone. It imports this
+module in every Hydra application of the environment, so that nothing slow is imported here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import yaml
+from hydra._internal.core_plugins.basic_sweeper import BasicSweeper
+from hydra.core.config_store import ConfigStore
+from hydra.core.utils import JobReturn, JobStatus, setup_globals
+from hydra.plugins.launcher import Launcher
+from hydra.types import HydraContext, TaskFunction
+from omegaconf import DictConfig, OmegaConf, open_dict
+
+from veca_marl.sweeps.cores import default_jobs, usable_cores
+from veca_marl.sweeps.plans import Job, SweepError
+from veca_marl.sweeps.sweep import run_sweep
+
+
+class ArmSweeper(BasicSweeper):
+    """Runs every arm of an experiment with every seed, and Hydra's sweeps without an experiment.
+
+    A configuration with ``experiment.arms`` is run once for each arm and each of
+    ``experiment.seeds``; a run has the overrides of its arm and ``experiment.arm=<name>``.
+    ``experiment.arm=hrtf,mono`` chooses arms.
+    """
+
+    def sweep(self, arguments: list[str]) -> Any:
+        """See `Sweeper`."""
+        assert self.config is not None
+        if self.config.experiment.arms:
+            names = [text.lstrip("+").partition("=")[0] for text in arguments]
+            if "seed" in names:
+                raise SweepError("seed: an experiment has experiment.seeds=[...]")
+        return super().sweep(arguments)
+
+    def _parse_config(self) -> list[str]:
+        """Return the parameters that are swept, as the base class does, with arms and seeds."""
+        assert self.config is not None
+        experiment = self.config.experiment
+        swept: list[str] = super()._parse_config()
+        if experiment.arms:
+            swept.append(f"experiment.arm={','.join(experiment.arms)}")
+            swept.append(f"seed={','.join(map(str, experiment.seeds))}")
+        return swept
+
+    def get_job_batch(self) -> Sequence[Sequence[str]]:
+        """Return the overrides of each run, those of its arm included."""
+        return [self._with_arm(job) for job in super().get_job_batch()]
+
+    def _with_arm(self, job: Sequence[str]) -> list[str]:
+        assert self.config is not None
+        arms = self.config.experiment.arms
+        chosen = [text.partition("=")[2] for text in job if text.startswith("experiment.arm=")]
+        for arm in chosen:
+            if arm not in arms:
+                raise SweepError(f"experiment.arm={arm}: choices: {', '.join(arms)}")
+        return [*job, *(text for arm in chosen for text in arms[arm])]
+
+
+class ProcessLauncher(Launcher):
+    """Runs each job in a process of its own, several at a time; see `veca_marl.sweeps`.
+
+    Args:
+        jobs: Number of runs at a time; None is as many as the cores can run at once.
+    """
+
+    def __init__(self, jobs: int | None = None) -> None:
+        if jobs is not None and jobs < 1:
+            raise SweepError(f"hydra.launcher.jobs must be at least 1, got {jobs}")
+        self._jobs = jobs
+
+    def setup(
+        self, *, hydra_context: HydraContext, task_function: TaskFunction, config: DictConfig
+    ) -> None:
+        """See `Launcher`; the task function is not used, each job is a command."""
+        self._context, self._config = hydra_context, config
+
+    def launch(
+        self, job_overrides: Sequence[Sequence[str]], initial_job_idx: int
+    ) -> Sequence[JobReturn]:
+        """See `Launcher`.
+
+        Raises:
+            SweepError: If a folder holds a run of another configuration, two jobs have the same
+                folder, or some jobs failed.
+        """
+        setup_globals()
+        jobs = [
+            self._job(list(overrides), initial_job_idx + number)
+            for number, overrides in enumerate(job_overrides)
+        ]
+        cores = usable_cores()
+        at_once = self._jobs or default_jobs([job.asked for job in jobs], cores)
+        run_sweep(jobs, at_once, max(1, cores // at_once))
+        return [JobReturn(job.overrides, status=JobStatus.COMPLETED) for job in jobs]
+
+    def _job(self, overrides: list[str], number: int) -> Job:
+        config = self._context.config_loader.load_sweep_config(self._config, overrides)
+        with open_dict(config):
+            config.hydra.job.id = config.hydra.job.num = number
+        sweep, name = Path(str(config.hydra.sweep.dir)), str(config.hydra.sweep.subdir)
+        shared = [text for text in self._config.hydra.overrides.hydra if "searchpath" in text]
+        with open_dict(config):
+            del config["hydra"]
+        asked = yaml.safe_load(OmegaConf.to_yaml(config, resolve=True))
+        return Job(name, sweep / name, [*shared, *overrides], asked)
+
+
+def _store(group: str, name: str, plugin: type, fields: dict[str, Any]) -> None:
+    """Store the fields of a plug-in; a dataclass cannot be made while Hydra loads this module."""
+    node = {"_target_": f"{__name__}.{plugin.__name__}", **fields}
+    ConfigStore.instance().store(group=group, name=name, node=node, provider="veca_marl")
+
+
+_store("hydra/sweeper", "arms", ArmSweeper, {"max_batch_size": None, "params": {}})
+_store("hydra/launcher", "processes", ProcessLauncher, {"jobs": None})

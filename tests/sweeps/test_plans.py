@@ -1,0 +1,102 @@
+"""What a sweep does for a run, by what lies in its folder."""
+
+import pytest
+from hydra.core.override_parser.overrides_parser import OverridesParser
+from stored_runs import write_run
+
+from veca_marl.sweeps.cores import cores_of, default_jobs
+from veca_marl.sweeps.differences import differences
+from veca_marl.sweeps.plans import Action, Job, SweepError, plan
+
+CONFIG = {
+    "task": {"name": "KickTheBall", "weights": {"kick": 1.0}},
+    "total_frames": 200,
+    "max_minutes": None,
+    "device": "cpu",
+    "threads": None,
+    "log": {"video": True},
+    "experiment": {"name": "x", "arm": "a", "claims": []},
+    "seed": 0,
+    "collect": {"processes": 2, "threads": 1},
+}
+
+
+def job(folder, **changes):
+    return Job("a/seed_0", folder, ["+experiment=x", "seed=0"], {**CONFIG, **changes})
+
+
+def test_a_missing_run_is_started_in_its_folder(tmp_path):
+    folder = tmp_path / "it's, a=folder"
+    made = plan(job(folder))
+    assert made.action is Action.start
+    assert made.arguments[:4] == ("-m", "veca_marl.train", "+experiment=x", "seed=0")
+    parsed = OverridesParser.create().parse_override(made.arguments[4])
+    assert (parsed.key_or_group, parsed.value()) == ("hydra.run.dir", str(folder))
+
+
+def test_a_run_that_has_ended_is_skipped(tmp_path):
+    write_run(tmp_path / "run", CONFIG, [(100, 1.0), (200, 2.0)])
+    assert plan(job(tmp_path / "run")).action is Action.skip
+
+
+def test_a_run_that_was_interrupted_is_continued(tmp_path):
+    write_run(tmp_path / "run", CONFIG, [(100, 1.0)], ended=False)
+    made = plan(job(tmp_path / "run"))
+    assert made.action is Action.resume
+    resume, quiet = made.arguments[2:]
+    assert resume == f"resume='{tmp_path / 'run'}'"
+    assert quiet == "log.progress_bar=false"
+
+
+def test_a_run_that_has_ended_is_continued_on_a_larger_budget(tmp_path):
+    write_run(tmp_path / "run", CONFIG, [(200, 1.0)])
+    made = plan(job(tmp_path / "run", total_frames=400, max_minutes=3.0, device="cuda"))
+    assert made.action is Action.resume
+    assert made.arguments[4:] == ("device=cuda", "max_minutes=3.0", "total_frames=400")
+
+
+def test_a_run_that_its_time_limit_ended_is_continued_without_the_limit(tmp_path):
+    write_run(tmp_path / "run", {**CONFIG, "max_minutes": 1.0}, [(100, 1.0)])
+    assert plan(job(tmp_path / "run", max_minutes=1.0)).action is Action.skip
+    made = plan(job(tmp_path / "run"))
+    assert made.action is Action.resume
+    assert made.arguments[4:] == ("max_minutes=null",)
+
+
+def test_a_run_of_another_configuration_is_refused_with_the_difference(tmp_path):
+    write_run(tmp_path / "run", CONFIG, [(200, 1.0)])
+    other = {"name": "KickTheBall", "weights": {"kick": 2.0}}
+    expected = r"another configuration: task.weights.kick is 1.0 there and 2.0 here. Choose another"
+    with pytest.raises(SweepError, match=expected):
+        plan(job(tmp_path / "run", task=other, seed=0))
+
+
+def test_claims_outputs_and_new_keys_make_no_other_configuration(tmp_path):
+    write_run(tmp_path / "run", CONFIG, [(200, 1.0)])
+    changes = {"experiment": {"name": "x", "claims": ["a > 1"]}, "log": {"video": False}, "new": 1}
+    assert plan(job(tmp_path / "run", **changes)).action is Action.skip
+
+
+def test_a_configuration_that_cannot_be_read_is_named(tmp_path):
+    (tmp_path / "config.yaml").write_text("a: [")
+    with pytest.raises(SweepError, match=r"config.yaml cannot be read"):
+        plan(job(tmp_path))
+    (tmp_path / "config.yaml").write_text("")
+    with pytest.raises(SweepError, match=r"config.yaml holds no configuration"):
+        plan(job(tmp_path))
+
+
+def test_differences_are_dotted_keys_with_both_values():
+    found = differences({"a": {"b": 1, "c": {}}, "d": [1]}, {"a": {"b": 2}, "d": [1], "e": 0})
+    assert [(d.key, d.stored, d.asked) for d in found] == [
+        ("a.b", 1, 2), ("a.c", {}, "absent"), ("e", "absent", 0),
+    ]  # fmt: skip
+    assert [d.of_version for d in found] == [False, True, True]
+
+
+def test_runs_at_a_time_fill_the_cores():
+    small = {**CONFIG, "collect": {"processes": 0, "threads": 1}, "threads": 1}
+    assert (cores_of(CONFIG), cores_of(small), cores_of({**small, "threads": 4})) == (2, 1, 4)
+    assert default_jobs([CONFIG] * 9, 16) == 8
+    assert default_jobs([small] * 9, 16) == 9
+    assert default_jobs([CONFIG, small], 1) == 1
