@@ -72,8 +72,6 @@ class ProcessLauncher(Launcher):
     """
 
     def __init__(self, jobs: int | None = None) -> None:
-        if jobs is not None and jobs < 1:
-            raise SweepError(f"hydra.launcher.jobs must be at least 1, got {jobs}")
         self._jobs = jobs
 
     def setup(
@@ -88,9 +86,11 @@ class ProcessLauncher(Launcher):
         """See `Launcher`.
 
         Raises:
-            SweepError: If a folder holds a run of another configuration, two jobs have the same
-                folder, or some jobs failed.
+            SweepError: If `jobs` is not positive, a folder holds a run of another configuration,
+                two jobs have the same folder, or some jobs failed.
         """
+        if self._jobs is not None and self._jobs < 1:
+            raise SweepError(f"hydra.launcher.jobs must be at least 1, got {self._jobs}")
         setup_globals()
         jobs = [
             self._job(list(overrides), initial_job_idx + number)

@@ -94,6 +94,11 @@ def test_differences_are_dotted_keys_with_both_values():
     assert [d.of_version for d in found] == [False, True, True]
 
 
+def test_what_a_run_has_decided_itself_does_not_differ():
+    assert not differences({"precision": "bfloat16"}, {"precision": "auto"})
+    assert differences({"precision": "auto"}, {"precision": "bfloat16"})
+
+
 def test_runs_at_a_time_fill_the_cores():
     small = {**CONFIG, "collect": {"processes": 0, "threads": 1}, "threads": 1}
     assert (cores_of(CONFIG), cores_of(small), cores_of({**small, "threads": 4})) == (2, 1, 4)

@@ -21,7 +21,7 @@ def cores_of(config: Mapping[str, Any]) -> int:
     a number of threads uses what is left.
     """
     collect = config["collect"]
-    return max(1, collect["processes"] * collect["threads"], config["threads"] or 1)
+    return int(max(1, collect["processes"] * collect["threads"], config["threads"] or 1))
 
 
 def default_jobs(configs: list[Mapping[str, Any]], cores: int) -> int:

@@ -8,6 +8,7 @@ from typing import Any
 
 _ABSENT = "absent"
 _IGNORED = ("experiment", "resume")  # claims and seeds of an experiment do not change its runs
+_DECIDED = "auto"  # such a value is decided when a run starts, and the run stores the decision
 
 
 @dataclass(frozen=True)
@@ -36,6 +37,8 @@ class Difference:
 def differences(stored: Mapping[str, Any], asked: Mapping[str, Any]) -> list[Difference]:
     """Return all keys with different values, in alphabetical order.
 
+    A value ``auto`` that is asked for differs from no other value.
+
     Args:
         stored: Content of ``config.yaml`` of a run as plain data.
         asked: The resolved configuration as plain data.
@@ -45,7 +48,7 @@ def differences(stored: Mapping[str, Any], asked: Mapping[str, Any]) -> list[Dif
         Difference(key, one.get(key, _ABSENT), other.get(key, _ABSENT))
         for key in sorted({*one, *other})
         if key.partition(".")[0] not in _IGNORED
-        and one.get(key, _ABSENT) != other.get(key, _ABSENT)
+        and other.get(key, _ABSENT) not in (one.get(key, _ABSENT), _DECIDED)
     ]
 
 
