@@ -50,6 +50,10 @@ apidoc_modules = [
         "max_depth": 1,
     }
 ]
+autodoc_use_type_comments = False  # there are none; looking for them parses every source
+if tags.has("written_pages"):  # noqa: F821  Sphinx defines it: -t written_pages leaves out the API
+    apidoc_modules = []
+    exclude_patterns.append("api")  # of an earlier build
 
 
 def copy_pages(_: Sphinx) -> None:

@@ -6,6 +6,7 @@ from itertools import count
 import numpy as np
 import pytest
 import torch
+from composed import compose
 
 from veca_marl.bench.command import main
 from veca_marl.bench.free_play import free_play
@@ -13,7 +14,7 @@ from veca_marl.bench.references import as_visual_shapes, busy_room, measure_ears
 from veca_marl.bench.rollouts import measure_rollouts
 from veca_marl.bench.skin_costs import touched_child
 from veca_marl.bench.stopwatch import Probes, Stopwatch
-from veca_marl.config import compose, conf_dir
+from veca_marl.config import conf_dir
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
 from veca_marl.envs.core.task import TASKS
 from veca_marl.sim.physics import PlaygroundCfg, pybullet

@@ -1,9 +1,9 @@
-import subprocess
-import sys
 from itertools import chain
 
+import hydra
 import pytest
 import yaml
+from hydra.core.hydra_config import HydraConfig
 from omegaconf import OmegaConf
 
 from veca_marl.config import Config, ConfigError, compose, compose_node, conf_dir
@@ -133,25 +133,19 @@ def test_node_and_dataclasses_agree():
     )
 
 
-def test_compose_works_inside_a_running_hydra_application(tmp_path):
-    app = tmp_path / "app.py"
-    app.write_text(
-        "import hydra\n"
-        "from hydra.core.hydra_config import HydraConfig\n"
-        "from veca_marl.config import compose\n"
-        "@hydra.main(version_base='1.3', config_path=None)\n"
-        "def main(cfg):\n"
-        "    inner = compose(['+task=KickTheBall', 'seed=3'])\n"
-        "    print(inner.seed, cfg.x, HydraConfig.get().job.name)\n"
-        "main()\n"
-    )
-    done = subprocess.run(
-        [sys.executable, str(app), "+x=7", f"hydra.run.dir={tmp_path}"],
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    assert done.stdout.split()[-3:] == ["3", "7", "app"]
+def test_compose_works_inside_a_running_hydra_application(tmp_path, monkeypatch):
+    seen = []
+
+    @hydra.main(version_base="1.3", config_path=str(tmp_path))
+    def application(cfg):
+        inner = compose([KICK, "seed=3"])
+        seen.extend([inner.seed, cfg.x, HydraConfig.get().job.name])
+
+    quiet = ["hydra/job_logging=none", "hydra/hydra_logging=none", "hydra.output_subdir=null"]
+    words = ["+x=7", "hydra.job.name=outer", f"hydra.run.dir={tmp_path}", *quiet]
+    monkeypatch.setattr("sys.argv", ["application", *words])
+    application()
+    assert seen == [3, 7, "outer"]
 
 
 def test_configuration_survives_the_file_of_a_run(tmp_path):

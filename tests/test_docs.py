@@ -1,5 +1,9 @@
 """The site builds, and its generated pages are those of the code and data of this commit."""
 
+import importlib
+import inspect
+import io
+import pkgutil
 import re
 import subprocess
 import sys
@@ -12,6 +16,8 @@ from docs_pages.docstrings import entries, prose
 from docs_pages.observation_page import MEANINGS, all_specs
 from docs_pages.pictures import perception_picture, task_picture, touch_picture
 from docs_pages.task_pages import built_in_tasks, task_page
+from docutils.core import publish_doctree
+from sphinx.ext import napoleon
 
 import veca_marl
 from veca_marl.conf_dir import conf_dir
@@ -26,12 +32,59 @@ def read(name):
     return (DOCS / name).read_text(encoding="utf-8")
 
 
-def test_the_site_builds_without_a_warning(tmp_path):
-    command = [sys.executable, "-m", "sphinx", "-q", "--fail-on-warning", "--keep-going"]
-    command += ["-b", "html", "-d", tmp_path / "doctrees", DOCS, tmp_path / "html"]
+def build_site(folder, *options):
+    """Return the warnings of a build of the site."""
+    command = [sys.executable, "-m", "sphinx", "-q", "--keep-going", *options, "-b", "html"]
+    command += ["-d", folder / "doctrees", DOCS, folder / "html"]
     build = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert build.returncode == 0, build.stderr
+    assert (folder / "html" / "index.html").exists(), build.stderr
+    return build.stderr.splitlines()
+
+
+@pytest.mark.slow  # most of the time is spent on the API reference
+def test_the_site_builds_without_a_warning(tmp_path):
+    assert build_site(tmp_path) == []
     assert (tmp_path / "html" / "api" / "veca_marl.html").exists()
+
+
+def test_the_written_pages_build_without_a_warning(tmp_path):
+    warnings = build_site(tmp_path, "-t", "written_pages")
+    (missing,) = warnings
+    assert "index.md" in missing
+    assert "'api/modules'" in missing
+
+
+MODULES = sorted(
+    module.name
+    for module in pkgutil.walk_packages(veca_marl.__path__, "veca_marl.")
+    if not module.name.endswith("__main__")
+)
+
+
+def docstrings(module):
+    """Yield the docstrings of a module, and of its classes, functions, methods and properties."""
+    yield module.__doc__
+    for thing in vars(module).values():
+        if getattr(thing, "__module__", None) == module.__name__ and callable(thing):
+            yield thing.__doc__
+            members = vars(thing).values() if inspect.isclass(thing) else ()
+            yield from (m.__doc__ for m in members if inspect.isfunction(m) or type(m) is property)
+
+
+def as_restructured_text(docstring):
+    """Return a docstring as the API reference reads it, see docs/conf.py."""
+    sections = [("Terms", "params_style"), ("Observations", "params_style")]
+    style = napoleon.Config(napoleon_use_ivar=True, napoleon_custom_sections=sections)
+    return str(napoleon.GoogleDocstring(inspect.cleandoc(docstring or ""), style))
+
+
+def test_docstrings_are_valid_restructured_text():
+    """Quicker than the API reference, see test_the_site_builds_without_a_warning."""
+    for module in map(importlib.import_module, MODULES):
+        texts = [".. default-role:: code", *map(as_restructured_text, docstrings(module))]
+        warnings = io.StringIO()
+        publish_doctree("\n\n".join(texts), settings_overrides={"warning_stream": warnings})
+        assert not warnings.getvalue(), module.__name__
 
 
 @pytest.mark.parametrize("name", built_in_tasks())

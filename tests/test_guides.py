@@ -9,9 +9,9 @@ from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
+from composed import compose
 
 from veca_marl.bench.options import BenchOptions
-from veca_marl.config import compose
 from veca_marl.config.command_line import CommandLine
 
 ROOT = Path(__file__).resolve().parent.parent

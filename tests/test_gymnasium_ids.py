@@ -52,8 +52,3 @@ def test_a_task_that_is_registered_later_gets_an_id():
         assert gymnasium.spec("veca_marl/LaterTask-v0").kwargs == {"task": "LaterTask"}
     finally:
         del TASKS["LaterTask"], gymnasium.registry["veca_marl/LaterTask-v0"]
-
-
-def test_an_id_with_its_module_needs_no_import():
-    env = "gymnasium.make('veca_marl:veca_marl/KickTheBall-v0', disable_env_checker=True)"
-    assert in_a_fresh_process(f"import gymnasium; print({env}.spec.id)") == ID

@@ -106,36 +106,32 @@ def test_a_plugin_is_loaded_once(example):
     assert list(PLUGINS) == ["veca_marl_beacon"]
 
 
-@pytest.fixture(scope="module")
-def installed(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("installed")
+@pytest.fixture
+def installed(tmp_path):
+    """The environment of a process in which the example is installed."""
+    folder = tmp_path / "installed"
     pip = [sys.executable, "-m", "pip", "install", "--quiet", "--no-deps", "--no-build-isolation"]
     subprocess.run([*pip, "--target", str(folder), str(EXAMPLE)], check=True)
     return {**os.environ, "PYTHONPATH": f"{folder}{os.pathsep}{ROOT}"}
 
 
-def run(*arguments, env, cwd):
-    command = [sys.executable, *arguments]
-    return subprocess.run(command, env=env, cwd=cwd, capture_output=True, text=True, check=False)
-
-
-def test_an_installed_plugin_trains(installed, tmp_path):
-    arguments = ["-m", "veca_marl.train", BEACON, "senses/vision=short_sighted", *SHORT]
-    done = run(*arguments, f"hydra.run.dir={tmp_path / 'run'}", env=installed, cwd=tmp_path)
-    assert done.returncode == 0, done.stderr
-    assert len((tmp_path / "run" / "metrics.csv").read_text().splitlines()) == 3
-
-
-def test_an_installed_plugin_needs_no_naming(installed, tmp_path):
-    code = (
-        "import veca_marl, gymnasium;"
+def test_an_installed_plugin_needs_no_naming_and_trains(installed, tmp_path):
+    """In one process: its task is listed, is made by Gymnasium, and is trained by the command."""
+    program = (
+        "import sys, veca_marl, gymnasium;"
         "assert 'FindBeacon' in veca_marl.list_tasks();"
         "env = gymnasium.make('veca_marl/FindBeacon-v0', senses={'vision': 'blind'});"
-        "env.reset(seed=0); print(env.step(env.action_space.sample())[1])"
+        "env.reset(seed=0); print(env.step(env.action_space.sample())[1]);"
+        "from veca_marl.train import main; main()"
     )
-    done = run("-c", code, env=installed, cwd=tmp_path)
+    words = [BEACON, "senses/vision=short_sighted", *SHORT, f"hydra.run.dir={tmp_path / 'run'}"]
+    command = [sys.executable, "-c", program, *words]
+    done = subprocess.run(
+        command, env=installed, cwd=tmp_path, capture_output=True, text=True, check=False
+    )
     assert done.returncode == 0, done.stderr
-    assert float(done.stdout) < 0.6
+    assert float(done.stdout.splitlines()[0]) < 0.6
+    assert len((tmp_path / "run" / "metrics.csv").read_text().splitlines()) == 3
 
 
 def test_a_worker_process_loads_the_plugins_that_a_game_needs(outside):
@@ -146,17 +142,9 @@ def test_a_worker_process_loads_the_plugins_that_a_game_needs(outside):
     write_package(outside, "plain_plugin", task_text("PlainTask"))
     cfg = compose(["plugins=[plain_plugin]", "+task=PlainTask"])
     pickled = pickle.dumps(GameFactory(cfg.game, tuple(cfg.plugins)))
-    code = (
-        "import pickle, sys; env = pickle.loads(sys.stdin.buffer.read())(1, 0);"
-        "print(env.rollout(2).shape)"
-    )
-    path = os.pathsep.join([str(outside), str(ROOT)])
-    done = subprocess.run(
-        [sys.executable, "-c", code],
-        input=pickled,
-        env={**os.environ, "PYTHONPATH": path},
-        capture_output=True,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr.decode()
-    assert b"torch.Size([1, 2])" in done.stdout
+    del TASKS["PlainTask"], PLUGINS["plain_plugin"], sys.modules["plain_plugin"]
+    factory = pickle.loads(pickled)
+    assert "plain_plugin" not in sys.modules
+    env = factory(1, 0)
+    assert env.rollout(2).shape == (1, 2)
+    env.close()

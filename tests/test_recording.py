@@ -3,9 +3,9 @@
 import av
 import numpy as np
 import pytest
+from composed import compose
 
 from veca_marl.algos.training.evaluation import random_policy
-from veca_marl.config import compose
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
 from veca_marl.runs.recording import record_episode
 

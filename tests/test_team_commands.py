@@ -4,9 +4,8 @@ import csv
 import json
 import re
 import shutil
-import subprocess
-import sys
 
+import commands
 import pytest
 import torch
 
@@ -31,9 +30,7 @@ SMALL = [
 
 
 def train(folder, name, *arguments):
-    run = f"hydra.run.dir={folder / name}"
-    command = [sys.executable, "-m", "veca_marl.train", *TASK, *SMALL, run, *arguments]
-    return subprocess.run(command, cwd=folder, capture_output=True, text=True)
+    return commands.train(folder, *TASK, *SMALL, f"hydra.run.dir={folder / name}", *arguments)
 
 
 def rows(path):
@@ -50,8 +47,7 @@ def actors(run, team):
 def played(tmp_path_factory):
     folder = tmp_path_factory.mktemp("self_play")
     turns = ["self_play.teams=[red,blue]", "eval.every_frames=32", "total_frames=128"]
-    done = train(folder, "run", *turns, "+algo@learner.blue=mappo", "learner.blue.epochs=1")
-    assert done.returncode == 0, done.stderr
+    assert train(folder, "run", *turns, "+algo@learner.blue=mappo", "learner.blue.epochs=1") == 0
     return folder
 
 
@@ -83,14 +79,14 @@ def test_a_tournament_writes_the_matches_the_ratings_and_the_picture(played, cap
 
 
 def test_a_policy_of_another_run_is_an_opponent(played, tmp_path, capsys):
-    done = train(tmp_path, "run", f"opponent.blue={played / 'run'}", "total_frames=32")
-    assert done.returncode == 0, done.stderr
+    assert train(tmp_path, "run", f"opponent.blue={played / 'run'}", "total_frames=32") == 0
     with (tmp_path / "run" / "metrics.csv").open() as file:
         columns = next(csv.reader(file))
     assert "red/policy_loss" in columns
     assert not [name for name in columns if name.startswith("blue/") and "loss" in name]
     evaluated = {row["team"] for row in rows(tmp_path / "run" / "evaluations.csv")}
     assert evaluated == {"red", "blue"}
+    capsys.readouterr()
     # a run without self-play has no past policies
     assert tournament([f"run={tmp_path / 'run'}"]) == 2
     assert "self_play.teams" in capsys.readouterr().err
@@ -98,8 +94,7 @@ def test_a_policy_of_another_run_is_an_opponent(played, tmp_path, capsys):
 
 def test_a_team_starts_from_the_parameters_of_another_run(played, tmp_path):
     first = [f"init_from.red={played / 'run'}", "opponent.blue=idle", "algo.learning_rate=1e-6"]
-    done = train(tmp_path, "run", *first, "total_frames=32", "log.keep_checkpoints=9")
-    assert done.returncode == 0, done.stderr
+    assert train(tmp_path, "run", *first, "total_frames=32", "log.keep_checkpoints=9") == 0
     started = tmp_path / "run" / "checkpoints" / "frames_000000000000.pt"
     begun = torch.load(started, weights_only=True)["state"]["algorithm"]["red"]
     learnt = actors(played / "run", "red")
@@ -110,9 +105,7 @@ def test_a_team_starts_from_the_parameters_of_another_run(played, tmp_path):
     # resumed, it continues from its own checkpoint, also without the other run
     config = tmp_path / "run" / "config.yaml"
     config.write_text(config.read_text().replace(str(played / "run"), str(tmp_path / "gone")))
-    again = [sys.executable, "-m", "veca_marl.train", f"resume={tmp_path / 'run'}"]
-    done = subprocess.run([*again, "total_frames=64"], cwd=tmp_path, capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
+    assert commands.train(tmp_path, f"resume={tmp_path / 'run'}", "total_frames=64") == 0
 
 
 @pytest.mark.parametrize(

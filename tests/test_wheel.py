@@ -37,12 +37,6 @@ def python(wheel, tmp_path_factory):
     return python
 
 
-def run(python, *arguments, cwd):
-    env = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
-    command = [str(python), *arguments]
-    return subprocess.run(command, cwd=cwd, env=env, capture_output=True, text=True, check=False)
-
-
 def test_the_wheel_contains_every_configuration_file(wheel):
     names = zipfile.ZipFile(wheel).namelist()
     expected = {p.relative_to(conf_dir()).as_posix() for p in conf_dir().rglob("*.yaml")}
@@ -51,24 +45,32 @@ def test_the_wheel_contains_every_configuration_file(wheel):
     assert not [n for n in names if n.startswith(("tests/", "conf/", "experiments/"))]
 
 
-def test_list_tasks_and_make_work_outside_the_checkout(python, tmp_path):
-    code = (
-        "import veca_marl; print(veca_marl.__file__);"
-        "print(*veca_marl.list_tasks());"
-        "env = veca_marl.make('KickTheBall', senses={'vision': 'blind'}, seed=0);"
-        "print(env.rollout(3).shape)"
+PROGRAM = """
+import gymnasium, runpy, sys
+env = gymnasium.make("veca_marl:veca_marl/KickTheBall-v0", senses={"vision": "blind"})
+env.reset(seed=0)
+import veca_marl
+print(veca_marl.__file__)
+print(*veca_marl.list_tasks())
+print(veca_marl.make("KickTheBall", senses={"vision": "blind"}, seed=0).rollout(3).shape)
+runpy.run_path(sys.argv[0], run_name="__main__")
+"""
+
+
+def test_it_makes_environments_and_trains_outside_the_checkout(python, tmp_path):
+    """In one process: a Gymnasium id with its module, `make`, and the console script."""
+    script = python.parent / "veca-train"
+    words = [str(script), *SMALL, "hydra.run.dir=run"]
+    program = f"import sys; sys.argv = {words!r}\n{PROGRAM}"
+    env = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
+    command = [str(python), "-W", "ignore", "-c", program]
+    done = subprocess.run(
+        command, cwd=tmp_path, env=env, capture_output=True, text=True, check=False
     )
-    done = run(python, "-c", code, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
-    where, tasks, shape = done.stdout.splitlines()
+    where, tasks, shape, *_ = done.stdout.splitlines()
     assert Path(where).is_relative_to(python.parent.parent)
     assert "KickTheBall" in tasks.split()
     assert shape == "torch.Size([1, 3])"
-
-
-def test_the_console_script_trains_outside_the_checkout(python, tmp_path):
-    script = python.parent / "veca-train"
-    done = run(python, str(script), *SMALL, "hydra.run.dir=run", cwd=tmp_path)
-    assert done.returncode == 0, done.stderr
     assert (tmp_path / "run" / "metrics.csv").is_file()
     assert list((tmp_path / "run" / "checkpoints").iterdir())

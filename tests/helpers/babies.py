@@ -4,8 +4,8 @@ from contextlib import contextmanager
 
 import numpy as np
 import pytest
+from composed import compose
 
-from veca_marl.config import compose
 from veca_marl.envs.core.game import Game
 
 BODIES = ("mitten_limbs", "mitten_position")

@@ -1,8 +1,8 @@
 """Helpers for the tests of the tasks with blocks."""
 
 import numpy as np
+from composed import compose
 
-from veca_marl.config import compose
 from veca_marl.envs.core.game import Game
 
 

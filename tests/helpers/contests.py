@@ -1,8 +1,8 @@
 """Games of two teams without vision and touch, for the tests of PushOut and Soccer."""
 
 import numpy as np
+from composed import compose
 
-from veca_marl.config import compose
 from veca_marl.envs.core.game import Game
 from veca_marl.envs.core.team import Script
 

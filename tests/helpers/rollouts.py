@@ -9,8 +9,8 @@ from dataclasses import replace
 
 import numpy as np
 import torch
+from composed import compose
 
-from veca_marl.config import compose
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
 from veca_marl.envs.core.actions import random_action
 from veca_marl.envs.core.episodes import Episodes
@@ -97,9 +97,16 @@ def returns(cfg, episodes, script, seed=0):
     return np.array(found)
 
 
+def digests(tasks, steps, seed):
+    """Return for each task its name and the digest of a rollout in one world."""
+    found = []
+    for task in tasks:
+        env = VecaEnv(game_cfg(task), worlds=1, seed=0)
+        found.append(f"{task} {digest(play(env, steps, seed))}")
+        env.close()
+    return found
+
+
 if __name__ == "__main__":
     n_steps, start, *names = sys.argv[1:]
-    for name in names:
-        fresh = VecaEnv(game_cfg(name), worlds=2, seed=0)
-        print(name, digest(play(fresh, int(n_steps), int(start))))  # noqa: T201  its answer
-        fresh.close()
+    print(*digests(names, int(n_steps), int(start)), sep="\n")  # noqa: T201  its answer

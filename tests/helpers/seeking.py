@@ -2,7 +2,8 @@
 
 import math
 
-from veca_marl.config import compose
+from composed import compose
+
 from veca_marl.sim.body.walker import Walker, WalkerCfg
 from veca_marl.sim.physics import PlaygroundCfg, PropCfg, PropShape, RoomCfg, World
 

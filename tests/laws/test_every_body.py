@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from composed import compose
 from gymnasium import spaces
 from pettingzoo.test import parallel_api_test
 from rollouts import digest, play
@@ -11,7 +12,7 @@ from torchrl.collectors import RandomPolicy
 from torchrl.envs import SerialEnv, check_env_specs
 
 from veca_marl.bench.free_play import free_play
-from veca_marl.config import compose, conf_dir
+from veca_marl.config import conf_dir
 from veca_marl.envs.adapters.gymnasium import VecaGymEnv
 from veca_marl.envs.adapters.pettingzoo import VecaParallelEnv
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
@@ -55,12 +56,18 @@ def adapted_cfg(cfg, request):
     return cfg
 
 
-@pytest.fixture
-def game(cfg):
+@pytest.fixture(scope="module")
+def built_game(cfg):
     game = Game(cfg)
-    game.reset(np.random.default_rng(0))
     yield game
     game.close()
+
+
+@pytest.fixture
+def game(built_game):
+    """The game at the start of an episode, whatever was played before."""
+    built_game.reset(np.random.default_rng(0))
+    return built_game
 
 
 def move(game, rng, steps):

@@ -68,7 +68,8 @@ def test_separate_networks_have_parameters_for_each_agent(make_ppo):
 @pytest.mark.parametrize(
     ("critic", "parameters"),
     [
-        (Critic.own, Parameters.shared),
+        # the default is learnt by tests/algos/ppo/test_ppo.py
+        pytest.param(Critic.own, Parameters.shared, marks=pytest.mark.slow),
         pytest.param(Critic.own, Parameters.separate, marks=pytest.mark.slow),
         pytest.param(Critic.central, Parameters.shared, marks=pytest.mark.slow),
         (Critic.central, Parameters.separate),

@@ -5,13 +5,13 @@ from functools import partial
 import numpy as np
 import pytest
 import torch
+from composed import compose
 from tensordict import TensorDict
 from torch import multiprocessing
 from torchrl.collectors import MultiSyncCollector
 from torchrl.envs import ParallelEnv, check_env_specs
 
 from veca_marl.api import make
-from veca_marl.config import compose
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
 
 CHEAP = ("playground=simple", "senses/vision=blind")

@@ -5,6 +5,7 @@ from functools import partial
 import pytest
 import torch
 import torchrl
+from composed import compose
 from duels import duel
 from knockouts import knockout
 from tensordict import LazyStackedTensorDict, NonTensorData, TensorDictBase
@@ -13,7 +14,6 @@ from torchrl.data import Unbounded
 from torchrl.envs import ParallelEnv, SerialEnv
 from torchrl.envs.utils import _StepMDP
 
-from veca_marl.config import compose
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
 from veca_marl.envs.adapters.torchrl.fast_step import NextState
 

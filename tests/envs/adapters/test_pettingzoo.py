@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from composed import compose
 from duels import STEPS, duel
 from gymnasium import spaces
 from pettingzoo.test import api_test, parallel_api_test, parallel_seed_test
@@ -9,7 +10,6 @@ from pettingzoo.utils import parallel_to_aec
 
 from veca_marl.api import parallel_env
 from veca_marl.bench.free_play import free_play
-from veca_marl.config import compose
 from veca_marl.envs.adapters.pettingzoo import VecaParallelEnv
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
 

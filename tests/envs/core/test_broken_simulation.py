@@ -6,9 +6,9 @@ import math
 import numpy as np
 import pytest
 import torch
+from composed import compose
 
 from veca_marl.bench.free_play import free_play
-from veca_marl.config import compose
 from veca_marl.envs.adapters.pettingzoo import VecaParallelEnv
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
 from veca_marl.envs.core.game import Game

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 import torch
+from composed import compose
 from duels import STEPS, duel
 
-from veca_marl.config import compose
 from veca_marl.envs.adapters.gymnasium import VecaGymEnv
 from veca_marl.envs.adapters.pettingzoo import VecaParallelEnv
 from veca_marl.envs.adapters.torchrl.env import VecaEnv

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
+from composed import compose
 
-from veca_marl.config import compose
 from veca_marl.envs.core.game import Game, player_names
 from veca_marl.envs.core.task import TASKS, Player, Task, TaskCfg, Team, find_task, register, terms
 from veca_marl.sim.body.walker import Walker

@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 import torch
 from batches import batch_and_singles, play_and_compare
+from composed import compose
 from knockouts import knockout
 from torchrl.collectors import Collector
 from torchrl.envs import SerialEnv, check_env_specs
 
-from veca_marl.config import ConfigError, compose
+from veca_marl.config import ConfigError
 from veca_marl.envs.adapters.pettingzoo import VecaParallelEnv
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
 from veca_marl.envs.adapters.torchrl.scripted import ExpertPolicy

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
+from composed import compose
 
-from veca_marl.config import compose
 from veca_marl.envs.core.game import Game
 
 

@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 from babies import zero_action
+from composed import compose
 
-from veca_marl.config import compose
 from veca_marl.envs.core.game import Game
 from veca_marl.envs.experts.control.locomotion import locomotion_of
 from veca_marl.envs.experts.control.path_following import PathFollower

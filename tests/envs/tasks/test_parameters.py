@@ -1,8 +1,8 @@
 """Impossible parameters of tasks, and bodies that a task cannot use, are errors that name them."""
 
 import pytest
+from composed import compose
 
-from veca_marl.config import compose
 from veca_marl.envs.core.game import Game
 
 HUMANOID_TASKS = (

@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 import pytest
+from composed import compose
 
-from veca_marl.config import compose
 from veca_marl.envs.core.game import Game
 from veca_marl.sim.geometry import heading_rad
 

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
+from composed import compose
 from walking import ball, empty_world
 
-from veca_marl.config import compose
 from veca_marl.sim.body import BODIES, Body, BodyCfg, VoiceKind, make_body, register_body
 from veca_marl.sim.body.humanoid import HumanoidCfg
 from veca_marl.sim.body.walker import Walker, WalkerCfg

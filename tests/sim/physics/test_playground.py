@@ -4,9 +4,10 @@ import math
 
 import numpy as np
 import pytest
+from composed import compose
 from walking import ball, let_pass, walker_in
 
-from veca_marl.config import compose, conf_dir
+from veca_marl.config import conf_dir
 from veca_marl.sim.physics import PlaygroundCfg, RoomCfg, World
 
 SHIPPED = sorted(path.stem for path in (conf_dir() / "playground").glob("*.yaml"))

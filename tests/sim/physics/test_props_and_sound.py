@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 import pytest
+from composed import compose
 
-from veca_marl.config import compose
 from veca_marl.sim.geometry import Pose
 from veca_marl.sim.hearing import MonoReceiver
 from veca_marl.sim.physics import PropCfg, PropShape, World

@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from composed import compose
 from walking import STEP_S, ball, box, empty_world, film, let_pass, walker_in, wall
 
-from veca_marl.config import compose
 from veca_marl.sim.physics import ClockCfg, World, pybullet
 from veca_marl.sim.sound import SoundCfg
 

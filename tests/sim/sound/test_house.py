@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 import scipy.signal
+from composed import compose
 from listening import RATE, STEP, make_receiver, ratio_db
 from listening import render as render_field
 
-from veca_marl.config import compose
 from veca_marl.sim.body.walker import Walker, WalkerCfg
 from veca_marl.sim.geometry import Pose
 from veca_marl.sim.hearing import AudioCfg, AudioSense

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
+from composed import compose
 from stand_in_worlds import SceneWorld
 from touching import SPREAD, Named, Stage, of_bone
 
-from veca_marl.config import compose
 from veca_marl.sim.body.walker import Walker, WalkerCfg
 from veca_marl.sim.geometry import Geom, Scene, Shape
 from veca_marl.sim.physics import PlaygroundCfg, World
