@@ -8,6 +8,7 @@ from tensorboard.backend.event_processing.event_accumulator import EventAccumula
 from tensordict import TensorDict
 from torchrl import timeit
 
+from veca_marl.algos.files import WriteError
 from veca_marl.algos.training.episodes import TrainingEpisodes
 from veca_marl.algos.training.loggers import LoggerKind, check_installed, make_reporter
 from veca_marl.algos.training.reporters import CsvReporter
@@ -53,6 +54,37 @@ def test_csv_has_one_row_per_write_and_blanks_for_nan(tmp_path):
         {"frames": "10", "a/return": "", "a/kl": "0.25"},
         {"frames": "20", "a/return": "1.5", "a/kl": "1e-09"},
     ]
+
+
+def test_a_row_that_was_cut_off_is_dropped(tmp_path):
+    """'frames' of the cut row reads 3, which is a smaller number than that of the checkpoint."""
+    path = tmp_path / "metrics.csv"
+    path.write_text("frames,a/return\n10,1.5\n20,2.5\n3")
+    CsvReporter(tmp_path, resumed_frames=20).write("metrics", 30, {"a/return": 3.5})
+    assert [row["frames"] for row in rows_of(path)] == ["10", "20", "30"]
+    assert rows_of(path)[-1]["a/return"] == "3.5"
+
+
+@pytest.mark.parametrize("text", ["", "fra", "frames,a/ret", "frames,a/return\n"])
+def test_a_header_that_was_cut_off_is_written_again(tmp_path, text):
+    path = tmp_path / "metrics.csv"
+    path.write_text(text)
+    CsvReporter(tmp_path, resumed_frames=0).write("metrics", 10, {"a/return": 1.5})
+    assert rows_of(path) == [{"frames": "10", "a/return": "1.5"}]
+
+
+def test_tables_of_other_commands_are_left_alone(tmp_path):
+    other = tmp_path / "cross_play.csv"
+    other.write_text("red_frames,blue_frames\n10,10\n")
+    CsvReporter(tmp_path, resumed_frames=20)
+    assert other.read_text() == "red_frames,blue_frames\n10,10\n"
+
+
+def test_a_full_disk_is_reported_with_the_file_and_the_space(tmp_path):
+    reporter = CsvReporter(tmp_path)
+    (tmp_path / "metrics.csv").symlink_to("/dev/full")
+    with pytest.raises(WriteError, match=r"cannot write .*metrics.csv: No space left .* MB free"):
+        reporter.write("metrics", 10, {"a/return": 1.5})
 
 
 def test_resumed_csv_drops_later_rows(tmp_path):

@@ -1,0 +1,97 @@
+"""NaN and infinity end a run before they are learnt from."""
+
+import math
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+import pytest
+import torch
+from fake_env import FakeEnv
+from killed_runs import make_trainer
+from training import FRAMES
+
+from veca_marl.algos.training.evaluation import Scores
+from veca_marl.algos.training.finite import (
+    NotFiniteError,
+    check_batch,
+    check_scores,
+    check_state,
+)
+
+WORLD, STEP = 2, 5
+
+
+def batch(**env):
+    return FakeEnv(4, agents=2, **env).rollout(8, break_when_any_done=False)
+
+
+def set_value(data, key, value):
+    data[key][WORLD, STEP, 1, ...] = value
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "message"),
+    [
+        (("next", "agents", "reward"), math.nan, "reward is nan"),
+        (("next", "agents", "info", "right"), math.inf, "reward term 'right' is inf"),
+        (("agents", "observation", "audio"), -math.inf, "sense 'audio' is -inf"),
+        (("next", "agents", "observation", "audio"), math.nan, "next observation of sense 'audio'"),
+        (("agents", "action"), math.nan, "action 'action' is nan"),
+    ],
+)
+def test_a_value_is_named_with_team_world_and_step(key, value, message):
+    data = batch()
+    check_batch(data, ["agents"], 0)
+    set_value(data, key, value)
+    with pytest.raises(NotFiniteError, match=f"team 'agents': {message}.*world 2 at step 5.* 640 "):
+        check_batch(data, ["agents"], 640)
+
+
+def test_parts_of_an_action_are_named():
+    data = batch(hybrid=True)
+    set_value(data, ("agents", "action", "move"), math.nan)
+    with pytest.raises(NotFiniteError, match="action 'move' is nan"):
+        check_batch(data, ["agents"], 0)
+
+
+def test_the_term_is_named_before_the_reward_that_contains_it():
+    data = batch()
+    set_value(data, ("next", "agents", "reward"), math.nan)
+    set_value(data, ("next", "agents", "info", "right"), math.nan)
+    with pytest.raises(NotFiniteError, match="reward term 'right'"):
+        check_batch(data, ["agents"], 0)
+
+
+def test_scores_and_states_are_checked():
+    good = Scores(np.zeros(3), np.ones(3), {"goal": np.zeros(3)})
+    check_scores({"red": good})
+    bad = replace(good, terms={"goal": np.array([0.0, math.nan, 0.0])})
+    with pytest.raises(NotFiniteError, match="team 'red': 'goal' is nan in episode 1"):
+        check_scores({"red": bad})
+    state = {"red": {"network": {"0.weight": torch.zeros(2)}, "optimizer": [{"step": 3}]}}
+    check_state(state, 0)
+    state["red"]["network"]["0.weight"][1] = math.nan
+    with pytest.raises(NotFiniteError, match=r"red.network.0.weight is NaN after 128 frames"):
+        check_state(state, 128)
+
+
+class BrokenRewards(FakeEnv):
+    """The reward of world 1 is NaN in the second episode of a training stage."""
+
+    def _step(self, td):
+        out = super()._step(td)
+        if self.batch_size[0] == 4 and self.episodes[1] == 1:
+            out["agents", "reward"][1] = math.nan
+        return out
+
+
+def test_a_run_with_a_nan_reward_ends_before_it_learns_from_it(tmp_path):
+    trainer = make_trainer(tmp_path)
+    trainer.make_env = partial(BrokenRewards, senses=("audio",))
+    before = [p.clone() for p in trainer.learners.policy.parameters()]
+    with pytest.raises(NotFiniteError, match=r"reward is nan in world 1 at step \d+ of the batch"):
+        trainer.run()
+    assert all(map(torch.equal, before, trainer.learners.policy.parameters()))
+    assert trainer.progress.frames < FRAMES
+    assert trainer.checkpoints.latest().name == "frames_000000000000.pt"
