@@ -133,6 +133,10 @@ def test_an_existing_run_is_not_overwritten(smoke):
             "error: device=tpu is not on this machine; choices: cpu",
         ),
         (["resume=nowhere"], "error: resume="),
+        (
+            ["+task=KickTheBall", "hydra.run.dir=/dev/null/run"],
+            "error: cannot create /dev/null/run: Not a directory",
+        ),
     ],
 )
 def test_a_wrong_command_ends_in_one_line_and_leaves_nothing(tmp_path, arguments, message):

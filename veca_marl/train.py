@@ -37,6 +37,7 @@ from veca_marl.sweeps.plans import SweepError
 from veca_marl.sweeps.processes import PARENT
 
 _COMMAND = "python -m veca_marl.train"
+_NO_FOLDER = (errno.EACCES, errno.EPERM, errno.EROFS, errno.ENOTDIR)
 _DISK_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 _CONFIGURATION_ERRORS = (ConfigError, CheckpointError, WriteError)
 _FAILURES = (WorkerError, NotFiniteError, CheckpointError, WriteError)
@@ -136,6 +137,10 @@ def main() -> None:
         give_up(error)
     except KeyboardInterrupt:  # a sweep; `run` handles that of a single run
         raise SystemExit(130) from None
+    except OSError as error:
+        if error.errno not in _NO_FOLDER or Path(error.filename or ".").exists():
+            raise
+        give_up(ConfigError(f"cannot create {error.filename}: {error.strerror}"))
 
 
 class _CallableModule(ModuleType):

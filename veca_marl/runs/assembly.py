@@ -72,7 +72,6 @@ def make_trainer(cfg: Config, folder: RunFolder | None = None) -> Trainer:
     learners = make_learners(cfg, specs, device)
     _log_storage(learners)
     checkpoints = _make_checkpoints(cfg, folder, specs)
-    learners = make_learners(cfg, specs, device)
     # a run that was killed before its first checkpoint starts from the beginning
     continued = cfg.resume is not None and not checkpoints.empty
     if not continued:

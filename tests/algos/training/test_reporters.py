@@ -73,6 +73,15 @@ def test_a_header_that_was_cut_off_is_written_again(tmp_path, text):
     assert rows_of(path) == [{"frames": "10", "a/return": "1.5"}]
 
 
+@pytest.mark.parametrize("text", ["10,1.5\n20,2.5\n", "frames,a/return\nx,1.5\n"])
+def test_a_damaged_table_is_named_and_kept(tmp_path, text):
+    path = tmp_path / "metrics.csv"
+    path.write_text(text)
+    with pytest.raises(WriteError, match=r"metrics.csv is damaged .*: move it away to continue"):
+        CsvReporter(tmp_path, resumed_frames=20)
+    assert path.read_text() == text
+
+
 def test_tables_of_other_commands_are_left_alone(tmp_path):
     other = tmp_path / "cross_play.csv"
     other.write_text("red_frames,blue_frames\n10,10\n")

@@ -13,7 +13,7 @@ from typing import Any, Protocol
 
 from torchrl.record.loggers import Logger
 
-from veca_marl.algos.files import naming, write_atomically
+from veca_marl.algos.files import WriteError, naming, write_atomically
 
 Row = Mapping[str, float | int | str]
 
@@ -146,9 +146,11 @@ def _drop_rows_after(path: Path, frames: int) -> None:
     """Keep the rows up to `frames`, without a row that was cut off while it was written."""
     if not path.exists():
         return
-    whole = path.read_text().rpartition("\n")[0].splitlines()
-    reader = csv.DictReader(whole)
-    kept = [row for row in reader if frames and int(row["frames"]) <= frames]
+    reader = csv.DictReader(path.read_text().rpartition("\n")[0].splitlines())
+    try:
+        kept = [row for row in reader if frames and int(row["frames"]) <= frames]
+    except (KeyError, TypeError, ValueError) as error:
+        raise WriteError(f"{path} is damaged ({error!r}): move it away to continue") from error
     if kept:
         write_atomically(path, _table(reader.fieldnames or [], kept, header=True))
     else:

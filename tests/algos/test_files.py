@@ -1,0 +1,72 @@
+"""Files are complete or absent, and errors name them."""
+
+import os
+import resource
+from contextlib import contextmanager
+
+import pytest
+
+from veca_marl.algos import files
+from veca_marl.algos.files import WriteError, temporary_of, write_atomically
+
+
+@contextmanager
+def full_disk():
+    """Limit files to 100 bytes: writes fail as on a full disk."""
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (100, limits[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+
+
+def test_content_is_written_and_replaced(tmp_path):
+    path = tmp_path / "new" / "run.txt"
+    for content in ("müde", b"\x00\xff", memoryview(b"view")):
+        write_atomically(path, content)
+        assert path.read_bytes() == (content.encode() if content == "müde" else bytes(content))
+    assert list(path.parent.iterdir()) == [path]
+
+
+def test_a_full_disk_leaves_the_file_and_no_temporary_one(tmp_path):
+    path = tmp_path / "run.txt"
+    write_atomically(path, "before")
+    message = r"cannot write .*run.txt: File too large \([\d,.]+ MB free, 1.0 MB needed\)"
+    with pytest.raises(WriteError, match=message), full_disk():
+        write_atomically(path, b"x" * 1_000_000)
+    assert path.read_text() == "before"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_folder_that_cannot_be_created_is_named(tmp_path):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(WriteError, match=r"cannot write .*file/run.txt: (Not a dir|File exists)"):
+        write_atomically(tmp_path / "file" / "run.txt", "content")
+
+
+def test_a_folder_without_permission_is_named(tmp_path, monkeypatch):
+    def refused(*_):
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(files.os, "replace", refused)
+    with pytest.raises(WriteError, match=r"run.txt: Permission denied \(.* free"):
+        write_atomically(tmp_path / "run.txt", "content")
+    assert not list(tmp_path.iterdir())
+
+
+def test_the_content_is_on_the_disk_before_it_replaces_the_file(tmp_path, monkeypatch):
+    calls = []
+    for name in ("fsync", "replace"):
+        real = getattr(os, name)
+        monkeypatch.setattr(files.os, name, lambda *a, n=name, r=real: (calls.append(n), r(*a))[1])
+    write_atomically(tmp_path / "run.txt", "content")
+    assert calls == ["fsync", "replace", "fsync"]  # the last one is that of the folder
+
+
+def test_what_a_killed_process_left_is_overwritten(tmp_path):
+    path = tmp_path / "run.txt"
+    temporary_of(path).write_text("half of the con")
+    write_atomically(path, "content")
+    assert path.read_text() == "content"
+    assert list(tmp_path.iterdir()) == [path]
