@@ -1,10 +1,14 @@
 """bfloat16 rounds to 8 significant bits; features and gradients stay within that of float32."""
 
+from copy import deepcopy
+
 import pytest
 import torch
+from fake_env import FakeEnv
+from torchrl.envs import ExplorationType, set_exploration_type
 
 from veca_marl.algos.networks.multisense import MultisenseCfg, Trunk
-from veca_marl.algos.networks.precision import Precision, arithmetic, has_bfloat16
+from veca_marl.algos.networks.precision import Precision, for_acting, has_bfloat16
 from veca_marl.algos.specs import ArrayLayout
 
 CPU = torch.device("cpu")
@@ -44,11 +48,29 @@ def test_features_and_gradients_in_bfloat16_are_those_of_float32_but_for_roundin
         assert 0.0 < error < 4 * ROUNDING
 
 
-def test_policies_act_in_float32(observations):
-    with torch.no_grad():
-        acting = [trunk(precision)(*observations) for precision in Precision]
+def test_copies_that_act_compute_in_float32(observations):
+    acting = [for_acting(deepcopy(trunk(precision)))(*observations) for precision in Precision]
     for features in acting:
         assert torch.equal(features, acting[0])
+    learning = trunk(Precision.bfloat16)
+    for_acting(deepcopy(learning))
+    assert (learning(*observations) != acting[0]).any(), "the original keeps its arithmetic"
+
+
+def test_rounding_is_far_below_the_divergence_that_steers_the_learning_rate(make_ppo):
+    """The batch is collected in float32 and learnt from in bfloat16."""
+    network = MultisenseCfg(precision=Precision.bfloat16)
+    learners = make_ppo(network=network, image=36)
+    ppo, env = learners.algorithms["agents"], FakeEnv(4, image=36)
+    with torch.no_grad():  # the policy depends on what it sees, as after learning
+        for head in ppo.network.actor[1].parameters():
+            head.mul_(300.0)
+    with torch.no_grad(), set_exploration_type(ExplorationType.RANDOM):
+        batch = env.rollout(32, learners.policy.copy().collect, break_when_any_done=False)
+    assert batch["agents", "loc"].std() > 0.3
+    out = ppo.loss(ppo.prepare(batch))
+    assert 0.0 < out["kl_approx"] < 0.01 * ppo.cfg.target_kl
+    assert out["clip_fraction"] == 0.0
 
 
 @pytest.mark.parametrize(
@@ -74,13 +96,3 @@ def test_a_cuda_device_needs_the_instructions_too(supported, monkeypatch):
     monkeypatch.setattr(torch.cpu, "get_capabilities", lambda: {"amx_bf16": True})
     monkeypatch.setattr(torch.cuda, "is_bf16_supported", lambda **_: supported)
     assert has_bfloat16(torch.device("cuda")) is supported
-
-
-def test_autocast_is_on_only_where_gradients_are_computed():
-    with arithmetic(Precision.bfloat16, CPU):
-        assert torch.get_autocast_dtype("cpu") is torch.bfloat16
-        assert torch.is_autocast_enabled("cpu")
-    with torch.no_grad(), arithmetic(Precision.bfloat16, CPU):
-        assert not torch.is_autocast_enabled("cpu")
-    with arithmetic(Precision.float32, CPU):
-        assert not torch.is_autocast_enabled("cpu")

@@ -16,7 +16,7 @@ from veca_marl.algos.networks.gru import GatedMemory, TeamMemory
 from veca_marl.algos.networks.image_encoder import Pooling
 from veca_marl.algos.networks.initialisation import orthogonal
 from veca_marl.algos.networks.per_agent import CentralValue, PerAgent
-from veca_marl.algos.networks.precision import Precision, arithmetic
+from veca_marl.algos.networks.precision import Arithmetic, Precision
 from veca_marl.algos.sense_encoders import SenseEncoders
 from veca_marl.algos.specs import ArrayLayout, TeamSpec
 
@@ -66,7 +66,7 @@ class MultisenseCfg(NetworkCfg):
         trunk_features: Width of the joined layer that both heads read, or the memory.
         memory: Hidden state between the joined layer and the heads.
         memory_features: Length of the hidden state of each agent; both heads read it.
-        precision: Arithmetic of the encoder where it learns.
+        precision: Arithmetic of the encoder that learns; policies act in float32.
         critic: Input of the critic.
         parameters: One network for a team, or one for each of its agents.
     """
@@ -122,13 +122,13 @@ class Trunk(nn.Module):
         self.encoders = SenseEncoders(encoders)
         joined = sum(encoder.features for encoder in encoders.values())
         self.join = nn.Sequential(orthogonal(nn.Linear(joined, cfg.trunk_features)), nn.ReLU())
-        self.precision = cfg.precision
+        self.arithmetic = Arithmetic(cfg.precision)
 
     def forward(self, *observations: Tensor) -> Tensor:
         """Encode and join one tensor per sense, in the order of the spec."""
         first_rank = next(iter(self.ranks.values()))
         leading = observations[0].shape[: observations[0].ndim - first_rank]
-        with arithmetic(self.precision, observations[0].device):
+        with self.arithmetic.context(observations[0].device):
             parts = [
                 encoder(array.reshape(-1, *array.shape[len(leading) :]))
                 for encoder, array in zip(self.encoders.values(), observations, strict=True)

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from contextlib import AbstractContextManager, nullcontext
 from enum import Enum
+from typing import TypeVar
 
 import torch
+from torch import nn
 
 # oneDNN's convolutions with these instructions are twice as fast as in float32; without them
 # bfloat16 is emulated. Other processors have bfloat16 instructions too; they were not measured.
@@ -13,10 +15,9 @@ _INSTRUCTIONS = ("avx512_bf16", "amx_bf16")
 
 
 class Precision(Enum):
-    """Arithmetic of the encoder where it learns; parameters, heads and losses are float32.
+    """Arithmetic of an encoder that learns; parameters, heads and losses are float32.
 
-    Policies act in float32: a few observations are as fast in it, and autocast would convert all
-    weights at each step.
+    Copies of a policy that act compute in float32, see `for_acting`.
 
     Attributes:
         auto: ``bfloat16`` if the processor, and the device where that is another one, have
@@ -45,8 +46,34 @@ def has_bfloat16(device: torch.device) -> bool:
     return device.type != "cuda" or torch.cuda.is_bf16_supported(including_emulation=False)
 
 
-def arithmetic(precision: Precision, device: torch.device) -> AbstractContextManager[object]:
-    """Return the context of an encoder: autocast where it learns in bfloat16."""
-    if torch.is_grad_enabled() and precision.on(device) is Precision.bfloat16:
-        return torch.autocast(device.type, dtype=torch.bfloat16)
-    return nullcontext()
+class Arithmetic(nn.Module):
+    """The arithmetic of an encoder; it has no parameters.
+
+    Args:
+        precision: Which it is.
+    """
+
+    def __init__(self, precision: Precision) -> None:
+        super().__init__()
+        self.precision = precision
+
+    def context(self, device: torch.device) -> AbstractContextManager[object]:
+        """Return the context in which the encoder computes on `device`: autocast for bfloat16."""
+        if self.precision.on(device) is Precision.bfloat16:
+            return torch.autocast(device.type, dtype=torch.bfloat16)
+        return nullcontext()
+
+
+M = TypeVar("M", bound=nn.Module)
+
+
+def for_acting(policy: M) -> M:
+    """Let the encoders of `policy` compute in float32, and return it.
+
+    The few observations of a step are encoded as quickly in float32: in bfloat16 all weights are
+    rounded at each call, since autocast keeps rounded ones for the backward pass alone.
+    """
+    for module in policy.modules():
+        if isinstance(module, Arithmetic):
+            module.precision = Precision.float32
+    return policy

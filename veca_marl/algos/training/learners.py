@@ -12,6 +12,7 @@ from tensordict.nn import TensorDictModuleBase, TensorDictSequential
 from torch import nn
 
 from veca_marl.algos.algorithm import Algorithm, AlgorithmCfg, make_algorithm
+from veca_marl.algos.networks.precision import for_acting
 from veca_marl.algos.specs import TeamSpec
 from veca_marl.algos.storage import StorageNeeded
 
@@ -40,8 +41,8 @@ class Policy(nn.Module):
         self.collect = TensorDictSequential(*explorers.values())
 
     def copy(self) -> Policy:
-        """Return an independent copy on the CPU."""
-        return deepcopy(self).to("cpu")
+        """Return an independent copy that acts on the CPU."""
+        return for_acting(deepcopy(self).to("cpu"))
 
     @torch.no_grad()
     def take_over(self, other: Policy) -> None:

@@ -16,6 +16,7 @@ from veca_marl.algos.algorithm import (
     make_algorithm,
 )
 from veca_marl.algos.networks.factory import NETWORKS, NetworkCfg
+from veca_marl.algos.networks.precision import for_acting
 from veca_marl.algos.plain import from_plain
 from veca_marl.algos.sense_encoders import sense_encoders
 from veca_marl.algos.specs import TeamSpec
@@ -41,7 +42,7 @@ def load_actor(path: Path, team: str, spec: TeamSpec) -> TensorDictModuleBase:
     algorithm, content = _make(path, team, spec)
     with naming_checkpoint(path):
         algorithm.actor.load_state_dict(content["state"]["actors"][team])
-    return algorithm.actor.requires_grad_(False)
+    return for_acting(algorithm.actor.requires_grad_(False))
 
 
 def load_algorithm(path: Path, team: str, spec: TeamSpec) -> Algorithm:
