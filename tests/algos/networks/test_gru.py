@@ -29,6 +29,7 @@ def window():
     present[0, 2:4, 1] = present[2, 4:, 0] = False
     features = torch.randn(ROWS, TIME, AGENTS, INPUTS, requires_grad=True)
     states = torch.randn(ROWS, TIME, AGENTS, SIZE)
+    states[0, 4, 1] = 0.0  # as stored after an elimination
     return features, states, begins.expand(-1, -1, AGENTS, 1), present
 
 
@@ -50,7 +51,7 @@ def unrolled(memory, features, states, begins, present):
         for agent in range(AGENTS):
             h = states[row, 0, agent]
             for t in range(TIME):
-                h = torch.zeros(SIZE) if begins[row, t, agent] else h
+                h = states[row, t, agent] if begins[row, t, agent] else h
                 h = cell(weights, features[row, t, agent], h)
                 h = h if present[row, t, agent] else torch.zeros(SIZE)
                 out.append(h)
@@ -78,6 +79,7 @@ def test_single_steps_equal_the_sequence(memory, window):
         sequence = memory(*window)
     state = states[:, 0]
     for t in range(TIME):
+        state = torch.where(begins[:, t], states[:, t], state)
         state = memory(features[:, t], state, begins[:, t], present[:, t])
         torch.testing.assert_close(state, sequence[:, t])
 

@@ -13,6 +13,7 @@ from training import SMALL
 
 from veca_marl.algos.collection.experience import CollectCfg, Experience
 from veca_marl.algos.networks.multisense import Critic, Memory, Parameters
+from veca_marl.algos.networks.precision import Precision
 from veca_marl.algos.ppo import PPO, PPOCfg
 from veca_marl.algos.ppo.advantages import advantages
 from veca_marl.algos.specs import team_specs
@@ -20,7 +21,7 @@ from veca_marl.algos.training.evaluation import Exploration, evaluate
 from veca_marl.algos.training.learners import TeamLearners
 
 CPU = torch.device("cpu")
-GRU = replace(SMALL, memory=Memory.gru, memory_features=16)
+GRU = replace(SMALL, memory=Memory.gru, memory_features=16, precision=Precision.float32)
 STEPS, WORLDS = 16, 6
 
 
@@ -58,7 +59,9 @@ def test_features_of_a_stored_sequence_equal_the_collected_ones(recurrent):
     assert rows.batch_size == (WORLDS * STEPS // 8, 8)
     assert rows["is_init"][:, 1:].any(), "episodes must begin inside a sequence"
     assert rows["agents", "memory", "hidden"][:, 0].abs().max() > 0.0
-    rows["agents", "memory", "hidden"][:, 1:] = 9.0  # only the first is read
+    within = ~rows["is_init"].squeeze(-1)
+    within[:, 0] = False
+    rows["agents", "memory", "hidden"][within] = 9.0  # only the first of an episode is read
     with torch.no_grad(), set_recurrent_mode(True):
         again = ppo.network.encoder(rows)["agents", "features"]
     features = batch["agents", "features"].reshape(again.shape)

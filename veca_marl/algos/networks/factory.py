@@ -73,7 +73,8 @@ class NetworkFactory(ABC):
         where an episode begins, writes the new state under ``("next", team, "memory", name)`` and
         has a method ``make_tensordict_primer``, which returns `networks.memory.memory_primer`.
         In TorchRL's recurrent mode (`torchrl.modules.set_recurrent_mode`) its input is
-        ``(rows, time)``: it unrolls each row from the state at the row's first step.
+        ``(rows, time)``: it unrolls each row from the state that is stored at its first step, and
+        from the stored one where an episode begins.
         """
 
     def per_agent(self, make: Callable[[], nn.Module], ranks: Sequence[int] = (1,)) -> nn.Module:

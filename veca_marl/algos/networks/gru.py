@@ -42,15 +42,15 @@ class GatedMemory(nn.Module):
     ) -> Tensor:
         """Return the states after the steps, ``(..., agents, size)``.
 
-        In TorchRL's recurrent mode the leading dimensions are ``(rows, time)``: `state` is read at
-        the first step of each row only, and gradients flow through the whole row. Otherwise every
-        entry is a step by itself.
+        In TorchRL's recurrent mode the leading dimensions are ``(rows, time)``: the stored state is
+        read at the first step of each row and where an episode begins (as by TorchRL's modules),
+        and gradients flow through the steps between. Otherwise every entry is a step by itself.
 
         Args:
             features: ``(..., agents, inputs)``.
-            state: State before each step, ``(..., agents, size)``.
-            begins: Whether the step is the first of its episode, so that the state before it is
-                zero. ``(..., agents, 1)``.
+            state: Stored state before each step, ``(..., agents, size)``; zeros where an episode
+                begins.
+            begins: Whether the step is the first of its episode. ``(..., agents, 1)``.
             present: Whether the agent is not eliminated; if it is, the state after the step is
                 zero. ``(..., agents, 1)``; None if agents are never eliminated.
         """
@@ -58,7 +58,7 @@ class GatedMemory(nn.Module):
             resets = begins if present is None else begins | _returns(present)
             after = self._sequences(features, state, resets)
         else:
-            after = self._steps(features, state.masked_fill(begins, 0.0))
+            after = self._steps(features, state)
         return after if present is None else after.masked_fill(~present, 0.0)
 
     def _steps(self, features: Tensor, before: Tensor) -> Tensor:
@@ -68,11 +68,13 @@ class GatedMemory(nn.Module):
     def _sequences(self, features: Tensor, state: Tensor, resets: Tensor) -> Tensor:
         """Unroll pieces of time in which no state is reset; most sequences are one piece."""
         time, agents = features.shape[1:3]
-        features, resets = (x.transpose(0, 1).flatten(1, 2) for x in (features, resets))
-        before, pieces = state[:, 0].flatten(0, 1)[None], []
+        features, state, resets = (
+            x.transpose(0, 1).flatten(1, 2) for x in (features, state, resets)
+        )
         starts = [t for t, reset in enumerate(resets.flatten(1).any(1).tolist()) if reset or t == 0]
+        before, pieces = state[:1], []
         for start, end in pairwise([*starts, time]):
-            before = before.masked_fill(resets[start], 0.0)
+            before = torch.where(resets[start], state[start], before)
             piece, before = self.gru(features[start:end], before)
             pieces.append(piece)
         states: Tensor = torch.cat(pieces).unflatten(1, (-1, agents)).transpose(0, 1)
