@@ -10,13 +10,16 @@ from timed_batches import SPEC, batch_of
 
 from veca_marl.algos.sac.config import ReplayCfg, Storage
 from veca_marl.algos.sac.replay import Replay, storage_needed
+from veca_marl.algos.sac.segments import StoredKeys
+from veca_marl.algos.sac.windows import Span
 from veca_marl.algos.specs import ArrayLayout
 
+KEYS = StoredKeys.of("team", SPEC)
 CFG = ReplayCfg(capacity=50, warm_up_frames=10, in_checkpoint=True)
 
 
 def replay_of(cfg, batches):
-    replay = Replay("team", SPEC, cfg, steps=3)
+    replay = Replay(KEYS, cfg, Span(0, 1, 3))
     for i in range(batches):
         replay.extend(batch_of(start=10.0 * i))
     return replay
@@ -38,7 +41,7 @@ def restored(replay):
     file = io.BytesIO()
     torch.save(replay.state_dict(), file)
     file.seek(0)
-    copy = Replay("team", SPEC, replay.cfg, steps=3)
+    copy = Replay(KEYS, replay.cfg, Span(0, 1, 3))
     copy.load_state_dict(torch.load(file, weights_only=True))
     return copy
 

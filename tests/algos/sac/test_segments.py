@@ -7,19 +7,20 @@ from timed_batches import SPEC, batch_of
 from veca_marl.algos.sac.config import ReplayCfg
 from veca_marl.algos.sac.replay import Replay
 from veca_marl.algos.sac.segments import END, StoredKeys, segment_rows
-from veca_marl.algos.sac.windows import transitions
+from veca_marl.algos.sac.windows import Span, transitions
 from veca_marl.algos.specs import ActionLayout, ArrayLayout, TeamSpec
 
 GAMMA = 0.5
+KEYS = StoredKeys.of("team", SPEC)
 
 
 def rows_of(batch):
-    return segment_rows(batch, StoredKeys.of("team", SPEC))
+    return segment_rows(batch, KEYS)
 
 
 def replay_of(*batches, capacity=200, steps=3):
     torch.manual_seed(0)
-    replay = Replay("team", SPEC, ReplayCfg(capacity, warm_up_frames=0), steps)
+    replay = Replay(KEYS, ReplayCfg(capacity, warm_up_frames=0), Span(0, 1, steps))
     for batch in batches:
         replay.extend(batch)
     return replay

@@ -9,7 +9,7 @@ worlds alone.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 
 from torch import nn
 from torchrl.data import Composite, Unbounded
@@ -39,13 +39,21 @@ def memory_of(policy: object) -> Compose | None:
     Args:
         policy: A module; any other callable has no hidden state.
     """
-    primers = get_primers_from_module(policy, warn=False) if isinstance(policy, nn.Module) else None
+    primers = _primers_of(policy)
     if primers is None:
         return None
     for primer in _flat(primers):
-        if isinstance(primer, TensorDictPrimer):
-            primer.reset_key = "_reset"  # worlds are reset as a whole, not team by team
+        primer.reset_key = "_reset"  # worlds are reset as a whole, not team by team
     return Compose(InitTracker(), primers)
+
+
+def memory_size(policy: object) -> int:
+    """Return the number of floats in the hidden states of all agents of one world."""
+    primers = _primers_of(policy)
+    if primers is None:
+        return 0
+    states = [spec for primer in _flat(primers) for spec in primer.primers.values(True, True)]
+    return sum(spec.shape.numel() for spec in states)
 
 
 def with_memory(env: EnvBase, policy: object) -> EnvBase:
@@ -58,5 +66,13 @@ def with_transform(env: EnvBase, transform: Compose | None) -> EnvBase:
     return env if transform is None else TransformedEnv(env, transform.clone())
 
 
-def _flat(transform: Transform) -> Iterable[Transform]:
-    return list(transform) if isinstance(transform, Compose) else [transform]
+def _primers_of(policy: object) -> Transform | None:
+    if not isinstance(policy, nn.Module):
+        return None
+    primers: Transform | None = get_primers_from_module(policy, warn=False)
+    return primers
+
+
+def _flat(transform: Transform) -> list[TensorDictPrimer]:
+    transforms = list(transform) if isinstance(transform, Compose) else [transform]
+    return [each for each in transforms if isinstance(each, TensorDictPrimer)]

@@ -127,6 +127,11 @@ class SACCfg(AlgorithmCfg):
             (n-step returns; without correction for the policy that acted).
         learning_rate: Step size of Adam, for all parameters.
         batch_size: Frames in an update; those at which a batch or an episode ended are left out.
+        sequence_steps: Consecutive steps through which gradients of a network with hidden state
+            flow; an update has ``batch_size / sequence_steps`` such sequences. Not used without
+            hidden state.
+        burn_in: Steps before each sequence through which the stored hidden state is brought up to
+            date without gradient; not used without hidden state.
         max_gradient_norm: The gradients of critics with encoder, and of policy heads, are each
             scaled down to this norm.
         tau: Share of the critics' parameters in the moving average that gives the targets (0.005:
@@ -145,6 +150,8 @@ class SACCfg(AlgorithmCfg):
     steps: int = 1
     learning_rate: float = 2.5e-4
     batch_size: int = 64
+    sequence_steps: int = 16
+    burn_in: int = 8
     max_gradient_norm: float = 5.0
     tau: float = 0.005
     updates_per_frame: float = 0.125
@@ -157,11 +164,16 @@ class SACCfg(AlgorithmCfg):
         for name in ("learning_rate", "max_gradient_norm", "updates_per_frame"):
             if not getattr(self, name) > 0.0:
                 raise ValueError(f"algo.{name} must be positive, got {getattr(self, name)}")
-        for name in ("steps", "batch_size"):
+        for name in ("steps", "batch_size", "sequence_steps"):
             if getattr(self, name) < 1:
                 raise ValueError(f"algo.{name} must be at least 1, got {getattr(self, name)}")
-        if self.network.recurrent:
-            raise ValueError("algo.network.memory: SAC has no recurrent form yet; choices: none")
+        if self.burn_in < 0:
+            raise ValueError(f"algo.burn_in must be 0 or more, got {self.burn_in}")
+        if self.network.recurrent and self.batch_size % self.sequence_steps:
+            raise ValueError(
+                f"algo.sequence_steps={self.sequence_steps} must divide algo.batch_size, "
+                f"got {self.batch_size}"
+            )
         if any(width < 1 for width in self.policy_hidden):
             raise ValueError(
                 f"algo.policy_hidden: widths must be positive, got {list(self.policy_hidden)}"

@@ -14,6 +14,7 @@ from veca_marl.algos.networks.action_values import ActionValues, ActorCritics, m
 from veca_marl.algos.sac.config import EncoderGradient
 from veca_marl.algos.sac.joint_action import JointAction, Proposed
 from veca_marl.algos.sac.masks import masked_mean
+from veca_marl.algos.sac.readers import FeatureReader, StepReader
 from veca_marl.algos.sac.temperature import Temperatures
 from veca_marl.algos.sac.windows import Transitions
 
@@ -69,6 +70,7 @@ class TeamSACLoss(LossModule):
         action: How its action is joined.
         temperatures: Weights of the entropy.
         encoder_gradient: Which loss trains the encoder.
+        reader: Computes features of observations.
     """
 
     critic: _Critic
@@ -82,6 +84,7 @@ class TeamSACLoss(LossModule):
         action: JointAction,
         temperatures: Temperatures,
         encoder_gradient: EncoderGradient,
+        reader: FeatureReader | None = None,
     ) -> None:
         super().__init__()
         self.in_keys: list[str] = []  # it reads `Transitions`, not a TensorDict
@@ -92,11 +95,12 @@ class TeamSACLoss(LossModule):
         self.policy = network.actor[1:]  # heads and distribution, without the encoder
         self.temperatures = temperatures
         self._encoder_gradient = encoder_gradient
+        self._reader = reader or StepReader(team)
 
     def forward(self, batch: Transitions) -> Losses:
         """Return the losses of a batch."""
-        target = self._target(batch)
-        features = self._encode(batch.first)
+        features, after = self._reader.online(self.critic.encoder, batch)
+        target = self._target(batch, after)
         error, value = self._critic_error(batch.first, features, target)
         if self._encoder_gradient is EncoderGradient.critic:
             policy_features = features.detach()
@@ -128,11 +132,17 @@ class TeamSACLoss(LossModule):
         return (chosen - target).square().sum(0), chosen.mean(0)
 
     @torch.no_grad()
-    def _target(self, batch: Transitions) -> Tensor:
-        """Return the values ``(B, agents)`` that the critics should give."""
-        proposed = self._propose(self._encode(batch.last))
+    def _target(self, batch: Transitions, after: Tensor) -> Tensor:
+        """Return the values ``(B, agents)`` that the critics should give.
+
+        Args:
+            batch: The batch.
+            after: Features after the rewards, which the policy reads.
+        """
+        proposed = self._propose(after)
         with self.target_critic_params.to_module(self.critic):
-            value = self._soft_value(batch.last, self._encode(batch.last), proposed)
+            features = self._reader.after(self.critic.encoder, batch)
+            value = self._soft_value(batch.last, features, proposed)
         return batch.returns + batch.discount * value
 
     def _soft_value(self, rows: TensorDictBase, features: Tensor, proposed: Proposed) -> Tensor:
@@ -147,16 +157,10 @@ class TeamSACLoss(LossModule):
         """Return ``(critics, B, agents, combinations)``."""
         others = None
         if self.critic.values.central and code is not None:
-            mask = rows[self._team].get("mask", None)
+            mask = rows.get((self._team, "mask"), None)
             others = mean_of_others(torch.cat([features, code], -1), mask)
         values: Tensor = self.critic.values(features, vector, others)
         return values
-
-    def _encode(self, rows: TensorDictBase) -> Tensor:
-        encoder = self.critic.encoder
-        encoded = encoder(rows.select(*encoder.in_keys))
-        features: Tensor = encoded[self._team, "features"]
-        return features
 
     def _propose(self, features: Tensor) -> Proposed:
         state = TensorDict({}, features.shape[:-2])

@@ -16,8 +16,8 @@ from torchrl.data import LazyMemmapStorage, LazyTensorStorage, TensorDictReplayB
 from torchrl.data.replay_buffers import Sequence
 
 from veca_marl.algos.sac.config import ReplayCfg, Storage
-from veca_marl.algos.sac.segments import END, Key, StoredKeys, segment_rows
-from veca_marl.algos.sac.windows import Windows
+from veca_marl.algos.sac.segments import END, PLACE, Key, StoredKeys, segment_rows
+from veca_marl.algos.sac.windows import VALID, Span, Windows
 from veca_marl.algos.specs import TeamSpec
 from veca_marl.algos.storage import StorageNeeded, state_bytes
 
@@ -30,22 +30,22 @@ class Replay:
     `TensorDictReplayBuffer.sample`, and of a window only the observations that are needed.
 
     Args:
-        team: Name of the team.
-        spec: Its arrays.
+        keys: What is stored.
         cfg: Size.
-        steps: Steps of a window.
+        span: Rows of a window.
 
     Attributes:
         frames: Frames that were ever added.
     """
 
-    def __init__(self, team: str, spec: TeamSpec, cfg: ReplayCfg, steps: int) -> None:
+    def __init__(self, keys: StoredKeys, cfg: ReplayCfg, span: Span) -> None:
         self.cfg, self.frames = cfg, 0
-        self._keys = StoredKeys.of(team, spec)
+        self._keys, self._span = keys, span
         self._rows_written = 0
         self._buffer: TensorDictReplayBuffer | None = None  # made with the first rows
-        # one row more than steps: the observation that follows the last one
-        self._unit = Sequence(length=1, bootstrap=steps, done_key=END)
+        self._unit = Sequence(
+            length=span.length, bootstrap=span.steps, burn_in=span.burn_in, done_key=END
+        )
 
     def __len__(self) -> int:
         """Return the number of rows."""
@@ -89,18 +89,41 @@ class Replay:
         return (ages + self._rows_written * full) % self.cfg.capacity
 
     def sample(self, windows: int) -> Windows:
-        """Return uniformly drawn windows."""
-        drawn = self._places(torch.randint(len(self), (windows,)))
-        index, info = self._unit.expand(drawn, {}, self._storage)
-        index = index.view(windows, -1)
-        keys, steps = self._keys, index[:, :-1]
+        """Return the windows of uniformly drawn rows.
+
+        Segments are divided into parts of ``span.length`` steps. The steps of a window that are
+        learnt from are the part in which the row is, so that all steps are drawn equally often.
+        """
+        keys, span = self._keys, self._span
+        index, valid = self._window_rows(windows)
+        first, last = (index[:, rows].flatten() for rows in (span.learnt, span.following))
+        steps = span.targets(index[:, :-1])
+        known = () if keys.memory else keys.observation
         return Windows(
-            first=self._rows((*keys.state, *keys.action), index[:, 0]),
-            last=self._rows(keys.state, index[:, -1]),
+            first=self._rows((*known, *keys.mask, *keys.action), first),
+            last=self._rows((*known, *keys.mask), last),
             reward=self._column((keys.team, "reward"), steps).squeeze(-1),
             terminated=self._column((keys.team, "terminated"), steps).squeeze(-1),
-            took_place=info["validity_mask"].view(windows, -1)[:, 1:],
+            took_place=span.targets(valid[:, 1:]),
+            sequences=self._sequences(index, valid) if keys.memory else None,
         )
+
+    def _window_rows(self, windows: int) -> tuple[Tensor, Tensor]:
+        """Return places in the ring ``(windows, rows)``, and whether they are in one segment."""
+        ages = torch.randint(len(self), (windows,))
+        within = self._column(PLACE, self._places(ages)) % self._span.length
+        starts = self._places((ages - within).clamp_min(0))
+        index, info = self._unit.expand(starts, {}, self._storage)
+        valid: Tensor = info["validity_mask"]
+        return index.view(windows, -1), valid.view(windows, -1)
+
+    def _sequences(self, index: Tensor, valid: Tensor) -> TensorDict:
+        """Return all rows of windows; the stored state is read in the first valid one."""
+        rows = self._rows(self._keys.state, index)
+        begins = valid.clone()
+        begins[:, 1:] &= ~valid[:, :-1]
+        rows[VALID], rows["is_init"] = valid, begins.unsqueeze(-1)
+        return rows
 
     def _rows(self, keys: Iterable[Key | str], index: Tensor) -> TensorDict:
         rows = TensorDict({}, index.shape)
@@ -117,9 +140,7 @@ class Replay:
         """Return how much was added, and the rows from the oldest on if they are to be kept."""
         rows = None
         if self.cfg.in_checkpoint and len(self):
-            rows = self._rows(
-                [*self._keys.all, END], self._places(torch.arange(len(self)))
-            ).to_dict()
+            rows = self._rows(self._keys.all, self._places(torch.arange(len(self)))).to_dict()
         return {"frames": self.frames, "rows": rows}
 
     def load_state_dict(self, state: dict[str, Any]) -> None:
@@ -130,9 +151,15 @@ class Replay:
             self._write(TensorDict(state["rows"], [len(state["rows"][END])]))
 
 
-def storage_needed(spec: TeamSpec, cfg: ReplayCfg) -> StorageNeeded:
-    """Return what the replay buffer of a team takes."""
-    size = cfg.capacity * state_bytes(spec)
+def storage_needed(spec: TeamSpec, cfg: ReplayCfg, memory: int = 0) -> StorageNeeded:
+    """Return what the replay buffer of a team takes.
+
+    Args:
+        spec: Its arrays.
+        cfg: Size of the buffer.
+        memory: Length of all hidden states of the team.
+    """
+    size = cfg.capacity * (state_bytes(spec) + 4 * memory)
     copies = 2 * size if cfg.in_checkpoint else 0
     settings = "algo.replay.capacity, algo.replay.storage=memmap, algo.replay.in_checkpoint"
     if cfg.storage is Storage.memory:

@@ -16,12 +16,15 @@ from veca_marl.algos.algorithm import Algorithm
 from veca_marl.algos.networks.action_values import make_actor_critics
 from veca_marl.algos.networks.exploration import UniformWarmUp
 from veca_marl.algos.networks.factory import check_same_network, trainable
+from veca_marl.algos.networks.memory import memory_size
 from veca_marl.algos.sac.config import SACCfg
 from veca_marl.algos.sac.joint_action import JointAction
 from veca_marl.algos.sac.loss import TeamSACLoss
+from veca_marl.algos.sac.readers import make_reader, memory_keys
 from veca_marl.algos.sac.replay import Replay, storage_needed
+from veca_marl.algos.sac.segments import StoredKeys
 from veca_marl.algos.sac.temperature import Temperatures
-from veca_marl.algos.sac.windows import transitions
+from veca_marl.algos.sac.windows import Span, transitions
 from veca_marl.algos.sense_encoders import copy_parameters
 from veca_marl.algos.specs import PLAIN, TeamSpec
 from veca_marl.algos.storage import StorageNeeded
@@ -48,6 +51,8 @@ class SAC(Algorithm):
         self.network = make_actor_critics(
             team, spec, cfg.network, cfg.critic, list(cfg.policy_hidden)
         ).to(device)
+        memory = memory_keys(self.network.encoder, team)
+        span = _span(cfg, recurrent=bool(memory))
         self.temperatures = Temperatures(spec.actions, cfg.temperature).to(device)
         self.loss = TeamSACLoss(
             team,
@@ -55,13 +60,15 @@ class SAC(Algorithm):
             JointAction(team, spec.actions),
             self.temperatures,
             cfg.encoder_gradient,
+            make_reader(team, memory, span),
         ).to(device)
         self.targets = SoftUpdate(self.loss, tau=cfg.tau)
         self._critics = [*trainable(self.network.encoder), *self.network.values.parameters()]
         self._policy = list(self.loss.policy.parameters())
         learnt = [*self._critics, *self._policy, *self.temperatures.parameters()]
         self.optimizer = torch.optim.Adam(learnt, lr=cfg.learning_rate, fused=True)
-        self.replay = Replay(team, spec, cfg.replay, cfg.steps)
+        self.replay = Replay(StoredKeys.of(team, spec, memory), cfg.replay, span)
+        self._windows = cfg.batch_size // span.length
         self._warm_up = UniformWarmUp(team, spec).to(device)
         self._explorer = TensorDictSequential(self.network.actor, self._warm_up)
         self._updates, self._due = 0, 0.0
@@ -84,7 +91,7 @@ class SAC(Algorithm):
     @property
     def storage_needed(self) -> StorageNeeded:
         """See `Algorithm`: the replay buffer."""
-        return storage_needed(self._spec, self.cfg.replay)
+        return storage_needed(self._spec, self.cfg.replay, memory_size(self.network.encoder))
 
     def learn(self, batch: TensorDictBase) -> dict[str, float]:
         """See `Algorithm`: store the batch and make the updates that are due."""
@@ -109,7 +116,7 @@ class SAC(Algorithm):
         Raises:
             FloatingPointError: If the gradient is not finite.
         """
-        windows = self.replay.sample(self.cfg.batch_size)
+        windows = self.replay.sample(self._windows)
         losses = self.loss(transitions(windows, self.team, self.cfg.gamma).to(self._device))
         self.optimizer.zero_grad()
         (losses.critic + losses.policy + losses.temperature).backward()
@@ -189,6 +196,13 @@ _MEASURES = (
     "policy_gradient_norm",
 )
 _COUNTS = ("updates", "updates_per_frame", "replay_rows")
+
+
+def _span(cfg: SACCfg, recurrent: bool) -> Span:
+    """Return the rows of a window: single steps for networks without hidden state."""
+    if not recurrent:
+        return Span(0, 1, cfg.steps)
+    return Span(cfg.burn_in, cfg.sequence_steps, cfg.steps)
 
 
 def _name(part: str) -> str:

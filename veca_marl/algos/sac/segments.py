@@ -12,10 +12,12 @@ from dataclasses import dataclass
 
 import torch
 from tensordict import TensorDict, TensorDictBase
+from torch import Tensor
 
 from veca_marl.algos.specs import TeamSpec, action_key
 
 END = "end"  # True for the last row of a segment, which has no action
+PLACE = "place"  # number of the row in its segment, from 0
 
 Key = tuple[str, ...]
 
@@ -26,27 +28,36 @@ class StoredKeys:
 
     Attributes:
         team: Name of the team.
-        state: Observations and mask.
+        observation: Observations.
+        mask: The mask, where agents can be eliminated.
+        memory: Hidden states.
         action: Parts of the action; zeros in the last row of a segment.
     """
 
     team: str
-    state: tuple[Key, ...]
+    observation: tuple[Key, ...]
+    mask: tuple[Key, ...]
+    memory: tuple[Key, ...]
     action: tuple[Key, ...]
 
     @property
-    def all(self) -> tuple[Key, ...]:
-        """Everything that is stored, without `END`."""
+    def state(self) -> tuple[Key, ...]:
+        """What a row has before its action."""
+        return (*self.observation, *self.mask, *self.memory)
+
+    @property
+    def all(self) -> tuple[Key | str, ...]:
+        """Everything that is stored."""
         outcome = ((self.team, "reward"), (self.team, "terminated"))
-        return (*self.state, *self.action, *outcome)
+        return (*self.state, *self.action, *outcome, END, PLACE)
 
     @classmethod
-    def of(cls, team: str, spec: TeamSpec) -> StoredKeys:
-        """Return the keys of a team with these arrays."""
-        observations: list[Key] = [(team, "observation", name) for name in spec.observations]
-        mask: list[Key] = [(team, "mask")] if spec.masked else []
+    def of(cls, team: str, spec: TeamSpec, memory: tuple[Key, ...] = ()) -> StoredKeys:
+        """Return the keys of a team with these arrays and these hidden states."""
+        observations = tuple((team, "observation", name) for name in spec.observations)
+        mask: tuple[Key, ...] = ((team, "mask"),) if spec.masked else ()
         actions = tuple(action_key(team, part) for part in spec.actions)
-        return cls(team, (*observations, *mask), actions)
+        return cls(team, observations, mask, memory, actions)
 
 
 def segment_rows(batch: TensorDictBase, keys: StoredKeys) -> TensorDict:
@@ -58,7 +69,7 @@ def segment_rows(batch: TensorDictBase, keys: StoredKeys) -> TensorDict:
 
     Returns:
         The keys given, ``(team, "reward")`` and ``(team, "terminated")`` of the step that begins
-        in the row, and `END`.
+        in the row, `END` and `PLACE`.
     """
     cut = batch["next", "done"].squeeze(-1).clone()
     cut[:, -1] = True
@@ -69,7 +80,15 @@ def segment_rows(batch: TensorDictBase, keys: StoredKeys) -> TensorDict:
     rows = steps.new_empty(len(steps) + len(finals))
     rows[places] = steps
     rows[places[cut] + 1] = finals
+    rows[PLACE] = _places(rows[END])
     return rows
+
+
+def _places(end: Tensor) -> Tensor:
+    """Return the number of each row in its segment, counted from 0."""
+    rows = torch.arange(len(end))
+    first = torch.cat([torch.ones(1, dtype=torch.bool), end[:-1]])
+    return rows - (rows * first).cummax(0).values
 
 
 def _steps(batch: TensorDictBase, keys: StoredKeys) -> TensorDictBase:
