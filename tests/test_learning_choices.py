@@ -5,11 +5,12 @@ import torch
 from first_seen import FirstSeenCfg
 from toy_dqn import ToyDQNCfg, register
 
+from veca_marl.algos.intrinsic import ForwardModelCfg, IntrinsicCfg, RNDCfg
 from veca_marl.algos.networks.multisense import Critic, MultisenseCfg
 from veca_marl.algos.networks.precision import Precision
 from veca_marl.algos.ppo import PPOCfg
 from veca_marl.algos.training.loggers import LoggerKind
-from veca_marl.config import ConfigError, compose, compose_node
+from veca_marl.config import ConfigError, compose, compose_node, to_config
 from veca_marl.runs.assembly import decide_precision
 from veca_marl.runs.run_folder import RunFolder
 from veca_marl.runs.training import run_training
@@ -112,3 +113,27 @@ def test_a_replay_buffer_that_does_not_fit_is_refused_before_the_run():
     message = r"the replay buffers take \d+\.\d+ GB of memory.*change algo.replay.capacity"
     with pytest.raises(ConfigError, match=message):
         run_training(compose([*SMALL, "algo=sac", "algo.replay.capacity=10_000_000_000"]))
+
+
+def test_intrinsic_rewards_are_chosen_by_name_also_for_a_team():
+    push = "+task=PushOut1v1"
+    assert compose([push]).intrinsic == IntrinsicCfg()
+    chosen = compose([push, "intrinsic=forward", "intrinsic.senses=[vision]"])
+    assert chosen.intrinsic == ForwardModelCfg(senses=["vision"])
+    own = compose([push, "+intrinsic@team_intrinsic.red=rnd", "team_intrinsic.red.cells=7"])
+    assert (own.intrinsic, own.team_intrinsic) == (IntrinsicCfg(), {"red": RNDCfg(cells=7)})
+    with pytest.raises(ConfigError, match=r"unknown intrinsic 'rdn' \(did you mean rnd\?\)"):
+        compose([push, "intrinsic=rdn"])
+    with pytest.raises(ConfigError, match=r"team_intrinsic: no \['green'\] in PushOut1v1"):
+        compose([push, "+intrinsic@team_intrinsic.green=rnd"])
+
+
+def test_a_run_with_intrinsic_rewards_is_stored_with_their_type(tmp_path):
+    """Every part of the action and every sense of a task are read by the forward model."""
+    overrides = [*SMALL, "intrinsic=forward", "body=walker_voice"]
+    folder = RunFolder(tmp_path)
+    folder.begin(compose_node(overrides), overrides)
+    result = run_training(to_config(folder.typed_config()), folder)
+    row = result.metrics[-1]
+    assert row["agents/intrinsic_return"] != row["agents/return"]
+    assert row["agents/intrinsic_loss"] > 0.0

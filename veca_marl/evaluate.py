@@ -108,6 +108,7 @@ def _configuration(checkpoint: Path, overrides: Sequence[str]) -> Config:
     node = folder.typed_config()
     # nothing is learnt here
     node.self_play, node.learner, node.init_from, node.init_encoders = SelfPlayCfg(), {}, {}, {}
+    node.team_intrinsic = {}
     change(node, overrides)
     return to_config(node)
 

@@ -9,6 +9,7 @@ from omegaconf import MISSING
 
 from veca_marl.algos.algorithm import AlgorithmCfg
 from veca_marl.algos.collection.experience import CollectCfg
+from veca_marl.algos.intrinsic import IntrinsicCfg
 from veca_marl.algos.selfplay.self_play import SelfPlayCfg
 from veca_marl.algos.training.evaluation import EvalCfg
 from veca_marl.algos.training.loggers import LoggerKind, check_installed
@@ -71,6 +72,8 @@ class Config:
             where the sense has the same shape: ``init_encoders.attacker.vision=runs/...``.
         algo: The learning algorithm and its parameters.
         learner: The algorithm of single teams: ``+algo@learner.attacker=mappo``.
+        intrinsic: Intrinsic rewards of all teams that learn: ``intrinsic=rnd``.
+        team_intrinsic: Intrinsic rewards of single teams: ``+intrinsic@team_intrinsic.red=none``.
         self_play: Teams that learn against past policies of each other.
         collect: How experience is collected.
         eval: When and how policies are evaluated.
@@ -97,6 +100,8 @@ class Config:
     init_encoders: dict[str, dict[str, str]] = field(default_factory=dict)
     algo: AlgorithmCfg = MISSING
     learner: dict[str, AlgorithmCfg] = field(default_factory=dict)
+    intrinsic: IntrinsicCfg = MISSING
+    team_intrinsic: dict[str, IntrinsicCfg] = field(default_factory=dict)
     self_play: SelfPlayCfg = field(default_factory=SelfPlayCfg)
     collect: CollectCfg = field(default_factory=CollectCfg)
     eval: EvalCfg = field(default_factory=EvalCfg)
@@ -150,6 +155,7 @@ class Config:
             ("learner", self.learner, learn),
             ("init_from", self.init_from, learn),
             ("init_encoders", self.init_encoders, learn),
+            ("team_intrinsic", self.team_intrinsic, learn),
             ("self_play.teams", self.self_play.teams, learn),
         ):
             unknown = sorted(set(asked) - set(choices))

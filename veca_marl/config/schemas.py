@@ -12,6 +12,7 @@ from hydra.core.config_store import ConfigStore
 from omegaconf import MISSING, OmegaConf
 
 from veca_marl.algos.algorithm import ALGORITHMS
+from veca_marl.algos.intrinsic.intrinsic_reward import INTRINSICS, NONE, IntrinsicCfg
 from veca_marl.algos.networks.factory import NETWORKS
 from veca_marl.config.root import Config
 from veca_marl.config.search_path import conf_dirs
@@ -19,15 +20,17 @@ from veca_marl.envs.core.task import TASKS
 from veca_marl.sim.body import BODIES, BodyCfg
 
 # keys of the root that have the names of teams as their keys
-_BY_TEAM = ("team", "opponent", "init_from", "init_encoders", "learner")
+_BY_TEAM = ("team", "opponent", "init_from", "init_encoders", "learner", "team_intrinsic")
 
 
 def register_schemas() -> None:
     """Store the schemas of the root and of all registered entries, present and later ones."""
     store = ConfigStore.instance()
     store.store(name="schema", node=root_schema())
+    _store_named("intrinsic", NONE, IntrinsicCfg)
     ALGORITHMS.listen(_store_algorithm)
     NETWORKS.listen(_store_network)
+    INTRINSICS.listen(_store_intrinsic)
     BODIES.listen(_store_body)
     TASKS.listen(_store_task_schema)
 
@@ -74,13 +77,23 @@ def _store_network(name: str) -> None:
     ConfigStore.instance().store(group="algo/network", name=name, node=NETWORKS[name].cfg_type)
 
 
+def _store_intrinsic(name: str) -> None:
+    """Store the schema of an intrinsic reward; without a file it can be chosen as well."""
+    _store_named("intrinsic", name, INTRINSICS[name].cfg_type)
+
+
 def _store_body(name: str) -> None:
-    """Store the schema of a body; without a file ``body/<name>.yaml`` it can be chosen as well."""
+    """Store the schema of a body; without a file it can be chosen as well."""
+    _store_named("body", name, BODIES[name].cfg_type)
+
+
+def _store_named(group: str, name: str, cfg_type: type) -> None:
+    """Store a schema, and an entry of the group if there is no file ``<group>/<name>.yaml``."""
     store = ConfigStore.instance()
-    store.store(group="schema/body", name=name, node=BODIES[name].cfg_type)
-    if not any((folder / "body" / f"{name}.yaml").is_file() for folder in conf_dirs()):
-        entry = {"defaults": [{"/schema/body@_here_": name}, "_self_"]}
-        store.store(group="body", name=name, node=entry)
+    store.store(group=f"schema/{group}", name=name, node=cfg_type)
+    if not any((folder / group / f"{name}.yaml").is_file() for folder in conf_dirs()):
+        entry = {"defaults": [{f"/schema/{group}@_here_": name}, "_self_"]}
+        store.store(group=group, name=name, node=entry)
 
 
 def _store_task_schema(name: str) -> None:

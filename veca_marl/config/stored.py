@@ -10,6 +10,7 @@ from omegaconf import DictConfig, OmegaConf, open_dict
 from omegaconf.errors import OmegaConfBaseException
 
 from veca_marl.algos.algorithm import ALGORITHMS
+from veca_marl.algos.intrinsic.intrinsic_reward import INTRINSICS, NONE, IntrinsicCfg
 from veca_marl.algos.networks.factory import NETWORKS
 from veca_marl.config.compose import compose_node, load_config_plugins
 from veca_marl.config.errors import ConfigError, one_line
@@ -54,6 +55,9 @@ def typed(stored: DictConfig, bodies: Mapping[str, str]) -> DictConfig:
         node.algo = _algorithm(stored.algo)
         for team, algo in stored.learner.items():
             node.learner[team] = _algorithm(algo)
+        node.intrinsic = _intrinsic(stored.intrinsic)
+        for team, intrinsic in stored.team_intrinsic.items():
+            node.team_intrinsic[team] = _intrinsic(intrinsic)
         for team in stored.team:
             node.team[team] = OmegaConf.structured(TeamCfg)
         for key, name in bodies.items():
@@ -68,6 +72,11 @@ def _algorithm(stored: DictConfig) -> Any:
     if "network" in node:
         node.network = OmegaConf.structured(NETWORKS.find(stored.network.name).cfg_type)
     return node
+
+
+def _intrinsic(stored: DictConfig) -> Any:
+    none = stored.name == NONE
+    return OmegaConf.structured(IntrinsicCfg if none else INTRINSICS.find(stored.name).cfg_type)
 
 
 def change(node: DictConfig, overrides: Sequence[str], allowed: Sequence[str] = GAME_KEYS) -> None:

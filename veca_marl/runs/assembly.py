@@ -127,8 +127,9 @@ def make_learners(cfg: Config, specs: dict[str, TeamSpec], device: torch.device)
         ConfigError: If an algorithm cannot be made as configured.
     """
     actors = {team: load_actor(path, team, specs[team]) for team, path in cfg.frozen.items()}
+    intrinsic = {team: cfg.team_intrinsic.get(team, cfg.intrinsic) for team in specs}
     try:
-        return TeamLearners(specs, cfg.algo, device, cfg.learner, actors)
+        return TeamLearners(specs, cfg.algo, device, cfg.learner, actors, intrinsic)
     except ValueError as error:
         raise ConfigError(one_line(error)) from error
 

@@ -9,7 +9,7 @@ import torch
 from tensordict import TensorDict, TensorDictBase
 
 from veca_marl.algos.intrinsic.intrinsic_reward import IntrinsicCfg, make_intrinsic
-from veca_marl.algos.intrinsic.prediction_error import counted_steps
+from veca_marl.algos.intrinsic.prediction import counted_steps
 from veca_marl.algos.intrinsic.return_scale import ReturnScale
 from veca_marl.algos.specs import TeamSpec
 
@@ -26,9 +26,7 @@ class Bonus:
         device: Where its model learns.
     """
 
-    def __init__(
-        self, team: str, spec: TeamSpec, cfg: IntrinsicCfg, device: torch.device
-    ) -> None:
+    def __init__(self, team: str, spec: TeamSpec, cfg: IntrinsicCfg, device: torch.device) -> None:
         self.team, self.cfg = team, cfg
         self.source = make_intrinsic(team, spec, cfg, device)
         self.scale = ReturnScale(cfg.gamma)

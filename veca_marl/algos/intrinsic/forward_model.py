@@ -12,18 +12,18 @@ from torchrl.modules import MLP
 
 from veca_marl.algos.intrinsic.embedding import Embedding
 from veca_marl.algos.intrinsic.intrinsic_reward import register_intrinsic
-from veca_marl.algos.intrinsic.prediction_error import PredictionError, PredictionErrorCfg
+from veca_marl.algos.intrinsic.prediction import PredictionReward, PredictionRewardCfg
 from veca_marl.algos.specs import TeamSpec, action_key
 
 
 @dataclass
-class ForwardModelCfg(PredictionErrorCfg):
+class ForwardModelCfg(PredictionRewardCfg):
     """Numbers of the forward model."""
 
     name: str = "forward"
 
 
-class ForwardModel(PredictionError):
+class ForwardModel(PredictionReward):
     """Error of a learnt network that predicts the next observation from observation and action.
 
     Observations are embedded by a fixed random network (Burda et al. 2019, "Large-scale study of
@@ -34,27 +34,38 @@ class ForwardModel(PredictionError):
     """
 
     def make_model(self, widths: dict[str, int]) -> nn.Module:
-        """See `PredictionError`."""
+        """See `PredictionReward`."""
         size, hidden = self.cfg.features, self.cfg.hidden
         actions = sum(layout.size for layout in self.spec.actions.values())
         embedding = Embedding(widths, size).requires_grad_(False)
-        change = MLP(size + actions, size, num_cells=[hidden, hidden])
-        return nn.ModuleDict({"embedding": embedding, "change": change})
+        return _Prediction(embedding, MLP(size + actions, size, num_cells=[hidden, hidden]))
 
     def rows(self, batch: TensorDictBase, counted: Tensor) -> TensorDict:
-        """See `PredictionError`: observations before and after the steps, and actions."""
+        """See `PredictionReward`: observations before and after the steps, and actions."""
         after = self.read(batch["next"], counted)
         actions = joined_actions(batch, self.team, self.spec)[counted].to(after.device)
         before = self.read(batch, counted)
         return TensorDict({"before": before, "action": actions, "after": after}, [len(after)])
 
     def errors(self, rows: TensorDict) -> Tensor:
-        """See `PredictionError`."""
-        before, after = (
-            self.model["embedding"](self.senses(rows[name])) for name in ("before", "after")
-        )
-        change = self.model["change"](torch.cat([before, rows["action"]], dim=-1))
-        errors: Tensor = (before + change - after).square().mean(-1)
+        """See `PredictionReward`."""
+        before, after = (self.senses(rows[name]) for name in ("before", "after"))
+        errors: Tensor = self.model(before, rows["action"], after)
+        return errors
+
+
+class _Prediction(nn.Module):
+    """Squared error of the predicted change of the embedding."""
+
+    def __init__(self, embedding: Embedding, change: nn.Module) -> None:
+        super().__init__()
+        self.embedding, self.change = embedding, change
+
+    def forward(self, before: Tensor, action: Tensor, after: Tensor) -> Tensor:
+        """Return errors ``(n,)``."""
+        start, end = self.embedding(before), self.embedding(after)
+        change = self.change(torch.cat([start, action], dim=-1))
+        errors: Tensor = (start + change - end).square().mean(-1)
         return errors
 
 

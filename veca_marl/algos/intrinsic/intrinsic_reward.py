@@ -26,16 +26,17 @@ NONE = "none"  # the name of no intrinsic reward
 
 @dataclass
 class IntrinsicCfg:
-    """What a team's reward is increased by; without a name, nothing.
+    """Numbers of an intrinsic reward; the name ``none`` stands for the rewards of the task alone.
 
     Attributes:
         name: Name of the intrinsic reward in the registry, or ``none``.
-        coefficient: Weight of the normalised intrinsic reward beside the reward of the task.
+        coefficient: Weight of the normalised intrinsic reward beside the reward of the task (0.5:
+            the ratio of Burda et al. 2019, who clip rewards of the task to [-1, 1]).
         gamma: Discount of the returns that the intrinsic reward is normalised by.
     """
 
     name: str = NONE
-    coefficient: float = 0.1
+    coefficient: float = 0.5
     gamma: float = 0.99
 
     def __post_init__(self) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import torch
 from tensordict import TensorDictBase
@@ -82,19 +82,18 @@ class NormalisedSenses(nn.Module):
         """Add vectors ``(n, D)`` to the statistics."""
         if not len(vectors):
             return
-        for statistics, part in zip(self.statistics.values(), self._split(vectors), strict=True):
+        for statistics, part in self._parts(vectors):
             statistics.update(part)
 
     def forward(self, vectors: Tensor) -> Tensor:
         """Normalise and clip vectors ``(n, D)``."""
-        parts = [
-            statistics.normalize(part)
-            for statistics, part in zip(self.statistics.values(), self._split(vectors), strict=True)
-        ]
+        parts = [statistics.normalize(part) for statistics, part in self._parts(vectors)]
         return torch.cat(parts, dim=-1).clamp(-_CLIP, _CLIP)
 
-    def _split(self, vectors: Tensor) -> Sequence[Tensor]:
-        return vectors.split(list(self.widths.values()), dim=-1)
+    def _parts(self, vectors: Tensor) -> Iterator[tuple[RunningMeanStd, Tensor]]:
+        """Return the statistics and the vectors of each sense."""
+        statistics = list(self.statistics.values())
+        return zip(statistics, vectors.split(list(self.widths.values()), dim=-1), strict=True)
 
 
 def _window(layout: ArrayLayout, cells: int) -> int:
@@ -122,4 +121,5 @@ def _pooled(images: Tensor, window: int) -> Tensor:
 
 def _stacked(images: Tensor) -> Tensor:
     """Return ``(n, channels, height, width)``: eyes and colours are channels."""
-    return images.reshape(len(images), -1, *images.shape[-2:])
+    channels = math.prod(images.shape[1:-2])
+    return images.reshape(len(images), channels, *images.shape[-2:])

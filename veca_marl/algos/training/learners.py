@@ -12,6 +12,8 @@ from tensordict.nn import TensorDictModuleBase, TensorDictSequential
 from torch import nn
 
 from veca_marl.algos.algorithm import Algorithm, AlgorithmCfg, make_algorithm
+from veca_marl.algos.intrinsic.bonus import Bonus
+from veca_marl.algos.intrinsic.intrinsic_reward import NONE, IntrinsicCfg
 from veca_marl.algos.networks.precision import for_acting
 from veca_marl.algos.specs import TeamSpec
 from veca_marl.algos.storage import StorageNeeded
@@ -64,11 +66,13 @@ class TeamLearners:
         device: Where networks are and learn.
         own: Numbers of teams with other ones.
         frozen: Policies of teams that do not learn.
+        intrinsic: Team to its intrinsic reward; ``none`` for a team that is not in it.
 
     Attributes:
         algorithms: Team to its algorithm, without frozen teams.
         frozen: Team to its policy.
         learning: Teams that learn from the next batches, a subset of `algorithms`.
+        bonuses: Team to its intrinsic rewards, for teams that have any.
         policy: Acts for all teams; changes with every gradient step.
     """
 
@@ -79,6 +83,7 @@ class TeamLearners:
         device: torch.device,
         own: Mapping[str, AlgorithmCfg] | None = None,
         frozen: Mapping[str, TensorDictModuleBase] | None = None,
+        intrinsic: Mapping[str, IntrinsicCfg] | None = None,
     ) -> None:
         self.device, self.specs = device, dict(specs)
         own, frozen = own or {}, frozen or {}
@@ -89,6 +94,11 @@ class TeamLearners:
             for team, numbers in self.cfgs.items()
         }
         self.learning = list(self.algorithms)
+        self.bonuses = {  # made last, so that algorithms start alike with and without
+            team: Bonus(team, specs[team], numbers, device)
+            for team, numbers in (intrinsic or {}).items()
+            if team in self.algorithms and numbers.name != NONE
+        }
         self.policy = self._make_policy()
 
     def _make_policy(self) -> Policy:
@@ -114,12 +124,19 @@ class TeamLearners:
     def learn(self, batch: TensorDictBase) -> dict[str, dict[str, float]]:
         """Learn from one batch ``(worlds, steps)``; return the measures of each team.
 
-        Teams that do not learn at present have measures that are not a number.
+        Teams that do not learn at present have measures that are not a number. The rewards in
+        `batch` stay those of the task; see `Bonus.add`.
         """
-        return {
-            team: algorithm.learn(batch) if team in self.learning else algorithm.idle()
-            for team, algorithm in self.algorithms.items()
-        }
+        return {team: self._learn(team, batch) for team in self.algorithms}
+
+    def _learn(self, team: str, batch: TensorDictBase) -> dict[str, float]:
+        algorithm, bonus = self.algorithms[team], self.bonuses.get(team)
+        if team not in self.learning:
+            return algorithm.idle() | ({} if bonus is None else bonus.idle(batch))
+        if bonus is None:
+            return algorithm.learn(batch)
+        mixed, measured = bonus.add(batch)
+        return algorithm.learn(mixed) | measured
 
     def actor_states(self) -> dict[str, dict[str, Any]]:
         """Return what a file for playing contains, by team."""
@@ -133,3 +150,12 @@ class TeamLearners:
         """Continue from `state_dict`."""
         for team, algorithm in self.algorithms.items():
             algorithm.load_state_dict(state[team])
+
+    def intrinsic_state(self) -> dict[str, Any]:
+        """Return the state of the intrinsic rewards by team."""
+        return {team: bonus.state_dict() for team, bonus in self.bonuses.items()}
+
+    def load_intrinsic_state(self, state: dict[str, Any]) -> None:
+        """Continue from `intrinsic_state`."""
+        for team, bonus in self.bonuses.items():
+            bonus.load_state_dict(state[team])

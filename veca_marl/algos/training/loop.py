@@ -81,6 +81,7 @@ class Trainer:
         self.checkpoints.remove_old()
         with naming_checkpoint(path):
             self.learners.load_state_dict(state["algorithm"])
+            self.learners.load_intrinsic_state(state["intrinsic"])
             self.progress = Progress(**state["progress"])
         self.policy.take_over(self.learners.policy)
         self._resumed_frames = self.progress.frames
@@ -216,6 +217,7 @@ class Trainer:
     def _save(self, best: bool) -> None:
         state = {
             "algorithm": self.learners.state_dict(),
+            "intrinsic": self.learners.intrinsic_state(),
             "actors": self.learners.actor_states(),
             "progress": asdict(self.progress),
         }

@@ -18,7 +18,7 @@ from veca_marl.algos.specs import TeamSpec
 
 
 @dataclass
-class PredictionErrorCfg(IntrinsicCfg):
+class PredictionRewardCfg(IntrinsicCfg):
     """Numbers of a prediction error.
 
     Attributes:
@@ -52,7 +52,7 @@ class PredictionErrorCfg(IntrinsicCfg):
             raise ValueError(f"intrinsic.learning_rate must be positive, got {self.learning_rate}")
 
 
-class PredictionError(IntrinsicReward):
+class PredictionReward(IntrinsicReward):
     """Rewards that are squared errors of a predictor; agents of a team share it.
 
     A step counts if the agent is present before and after it; other steps have reward 0 and are
@@ -66,7 +66,7 @@ class PredictionError(IntrinsicReward):
     """
 
     def __init__(
-        self, team: str, spec: TeamSpec, cfg: PredictionErrorCfg, device: torch.device
+        self, team: str, spec: TeamSpec, cfg: PredictionRewardCfg, device: torch.device
     ) -> None:
         self.team, self.spec, self.cfg, self._device = team, spec, cfg, device
         layouts = {name: spec.observations[name] for name in chosen_senses(spec, cfg.senses)}
