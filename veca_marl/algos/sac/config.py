@@ -137,6 +137,7 @@ class SACCfg(AlgorithmCfg):
         tau: Share of the critics' parameters in the moving average that gives the targets (0.005:
             Haarnoja et al. 2018).
         updates_per_frame: Updates for each frame that is collected.
+        random_shift: Largest random shift of images in pixels, the same for both eyes; 0 for none.
     """
 
     name: str = "sac"
@@ -155,6 +156,7 @@ class SACCfg(AlgorithmCfg):
     max_gradient_norm: float = 5.0
     tau: float = 0.005
     updates_per_frame: float = 0.125
+    random_shift: int = 0
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.gamma <= 1.0:
@@ -164,6 +166,8 @@ class SACCfg(AlgorithmCfg):
         for name in ("learning_rate", "max_gradient_norm", "updates_per_frame"):
             if not getattr(self, name) > 0.0:
                 raise ValueError(f"algo.{name} must be positive, got {getattr(self, name)}")
+        if self.random_shift < 0:
+            raise ValueError(f"algo.random_shift must be 0 or more, got {self.random_shift}")
         for name in ("steps", "batch_size", "sequence_steps"):
             if getattr(self, name) < 1:
                 raise ValueError(f"algo.{name} must be at least 1, got {getattr(self, name)}")

@@ -20,6 +20,7 @@ from veca_marl.algos.networks.memory import memory_size
 from veca_marl.algos.sac.config import SACCfg
 from veca_marl.algos.sac.joint_action import JointAction
 from veca_marl.algos.sac.loss import TeamSACLoss
+from veca_marl.algos.sac.random_shift import RandomShift
 from veca_marl.algos.sac.readers import make_reader, memory_keys
 from veca_marl.algos.sac.replay import Replay, storage_needed
 from veca_marl.algos.sac.segments import StoredKeys
@@ -69,6 +70,7 @@ class SAC(Algorithm):
         self.optimizer = torch.optim.Adam(learnt, lr=cfg.learning_rate, fused=True)
         self.replay = Replay(StoredKeys.of(team, spec, memory), cfg.replay, span)
         self._windows = cfg.batch_size // span.length
+        self._shift = RandomShift(team, spec, cfg.random_shift)
         self._warm_up = UniformWarmUp(team, spec).to(device)
         self._explorer = TensorDictSequential(self.network.actor, self._warm_up)
         self._updates, self._due = 0, 0.0
@@ -117,6 +119,7 @@ class SAC(Algorithm):
             FloatingPointError: If the gradient is not finite.
         """
         windows = self.replay.sample(self._windows)
+        self._shift(*windows.observed)
         losses = self.loss(transitions(windows, self.team, self.cfg.gamma).to(self._device))
         self.optimizer.zero_grad()
         (losses.critic + losses.policy + losses.temperature).backward()

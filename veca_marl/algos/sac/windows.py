@@ -66,6 +66,11 @@ class Windows:
     took_place: Tensor
     sequences: TensorDictBase | None = None
 
+    @property
+    def observed(self) -> tuple[TensorDictBase, ...]:
+        """Rows with observations, each of batch size ``(windows, ...)``."""
+        return (self.first, self.last) if self.sequences is None else (self.sequences,)
+
 
 @dataclass(frozen=True)
 class Transitions:
