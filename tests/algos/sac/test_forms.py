@@ -1,0 +1,49 @@
+"""SAC and its presets learn from every form of observations, actions and teams."""
+
+import math
+
+import pytest
+import torch
+from random_batches import random_batch
+
+from veca_marl.algos.algorithm import make_algorithm
+from veca_marl.algos.networks.multisense import Critic, Parameters
+from veca_marl.algos.sac.config import ReplayCfg
+from veca_marl.algos.specs import ActionLayout, ArrayLayout, TeamSpec
+from veca_marl.config import compose
+
+EYES = ArrayLayout((2, 3, 16, 16), "uint8", 0.0, 255.0)
+EARS = ArrayLayout((2, 10), "float32", -8.0, 3.0)
+ANGLES = ArrayLayout((12,), "float32", -math.inf, math.inf)
+VECTOR, CHOICE = ActionLayout(False, 3), ActionLayout(True, 5)
+FORMS = {
+    "walker": TeamSpec(1, {"audio": EARS, "vision": EYES}, {"action": VECTOR}),
+    "discrete": TeamSpec(2, {"vision": EYES}, {"action": CHOICE}, masked=True),
+    "voice": TeamSpec(3, {"audio": EARS}, {"joints": VECTOR, "voice": CHOICE}, masked=True),
+    "two_choices": TeamSpec(2, {"p": ANGLES}, {"move": ActionLayout(True, 7), "voice": CHOICE}),
+    "two_vectors": TeamSpec(1, {"p": ANGLES}, {"arms": VECTOR, "legs": ActionLayout(False, 1)}),
+}
+
+
+@pytest.fixture(scope="module", params=["sac", "sac_fast"])
+def numbers(request):
+    """A preset with a small replay buffer and updates from the first batch on."""
+    cfg = compose(["+task=KickTheBall", f"algo={request.param}"]).algo
+    cfg.replay, cfg.batch_size = ReplayCfg(64, warm_up_frames=1), 8
+    return cfg
+
+
+@pytest.mark.parametrize("critic", Critic)
+@pytest.mark.parametrize("parameters", Parameters)
+@pytest.mark.parametrize("form", FORMS)
+def test_it_learns_from_every_form(numbers, form, parameters, critic):
+    torch.manual_seed(0)
+    numbers.network.parameters, numbers.network.critic = parameters, critic
+    learner = make_algorithm("team", FORMS[form], numbers, torch.device("cpu"))
+    before = {name: p.clone() for name, p in learner.network.named_parameters()}
+    measured = learner.learn(random_batch({"team": FORMS[form]}))
+    assert list(measured) == list(learner.measures)
+    assert all(math.isfinite(value) for value in measured.values())
+    assert measured["updates"] == 2.0
+    unchanged = [n for n, p in learner.network.named_parameters() if torch.equal(p, before[n])]
+    assert unchanged == []
