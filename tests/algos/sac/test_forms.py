@@ -33,11 +33,16 @@ def numbers(request):
     return cfg
 
 
-@pytest.mark.parametrize("critic", Critic)
-@pytest.mark.parametrize("parameters", Parameters)
-@pytest.mark.parametrize("form", FORMS)
-def test_it_learns_from_every_form(numbers, form, parameters, critic):
+SHARED, SEPARATE = (Parameters.shared, Critic.own), (Parameters.separate, Critic.central)
+
+
+@pytest.mark.parametrize(
+    ("form", "network"),
+    [*((form, SHARED) for form in FORMS), ("voice", SEPARATE), ("two_choices", SEPARATE)],
+)
+def test_it_learns_from_every_form(numbers, form, network):
     torch.manual_seed(0)
+    parameters, critic = network
     numbers.network.parameters, numbers.network.critic = parameters, critic
     learner = make_algorithm("team", FORMS[form], numbers, torch.device("cpu"))
     before = {name: p.clone() for name, p in learner.network.named_parameters()}
