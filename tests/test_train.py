@@ -1,18 +1,24 @@
 """The command line of `train`."""
 
 import csv
+import os
+import random
+import shutil
 import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import pytest
 import torch
 import yaml
+from killed_runs import assert_equal
 
 from veca_marl.config import ConfigError
 from veca_marl.runs.assembly import find_device
 
+KILLS = int(os.environ.get("VECA_TEST_KILLS", "4"))
 SMOKE = ["+experiment=smoke", "log=silent", "device=cpu", "threads=1"]
 
 
@@ -146,3 +152,94 @@ def test_a_wrong_command_ends_in_one_line_and_leaves_nothing(tmp_path, arguments
     assert line.startswith(message)
     assert not [path for path in tmp_path.rglob("*") if path.is_file()]
     assert not list(tmp_path.glob("runs/*/*"))
+
+
+def comparable(run):
+    """Return what a finished run has stored, without what depends on the clock and the command."""
+    tables = {
+        name: [{k: v for k, v in row.items() if k != "frames_per_s"} for row in rows(run / name)]
+        for name in ("metrics.csv", "evaluations.csv")
+    }
+    states = {
+        path.name: torch.load(path, weights_only=True)["state"]
+        for path in run.glob("checkpoints/*.pt")
+    }
+    return tables | states | {"comparison": (run / "comparison.txt").read_text()}
+
+
+WITH_VIDEO = [*SMOKE, "log.video=true", "log.logger=[csv,tensorboard]"]
+
+
+def start_or_continue(folder):
+    """Start the run in `folder`, or continue it, as its user would."""
+    run = folder / "run"
+    known = (run / "config.yaml").exists()
+    arguments = [f"resume={run}"] if known else [*WITH_VIDEO, "hydra.run.dir=run"]
+    return subprocess.Popen(command(*arguments), cwd=folder, stderr=subprocess.PIPE, text=True)
+
+
+@pytest.mark.slow
+def test_a_run_killed_at_random_moments_stores_the_same(smoke, tmp_path):
+    """From the creation of the folder to the video; `smoke` is the run that is not interrupted."""
+    whole, _ = smoke
+    begin = time.monotonic()
+    assert start_or_continue(tmp_path).wait() == 0
+    duration, rng = time.monotonic() - begin, random.Random(0)
+    for _ in range(KILLS):
+        if (tmp_path / "run" / "comparison.txt").exists():
+            assert_equal(comparable(tmp_path / "run"), comparable(whole))
+            shutil.rmtree(tmp_path / "run")
+        running = start_or_continue(tmp_path)
+        try:
+            running.wait(rng.uniform(0.2, 1.1) * duration)
+        except subprocess.TimeoutExpired:
+            running.kill()
+            running.wait()
+    last = start_or_continue(tmp_path)
+    assert last.wait() == 0, last.stderr.read()
+    assert_equal(comparable(tmp_path / "run"), comparable(whole))
+    assert (tmp_path / "run" / "videos" / "final.mp4").exists()
+    assert not list((tmp_path / "run").rglob("*.tmp"))
+
+
+def workers_of(pid):
+    """Return the forked children of a process; they have its command line."""
+    own = Path(f"/proc/{pid}/cmdline").read_bytes()
+    found = map(int, Path(f"/proc/{pid}/task/{pid}/children").read_text().split())
+    return [child for child in found if Path(f"/proc/{child}/cmdline").read_bytes() == own]
+
+
+def is_running(pid):
+    return Path(f"/proc/{pid}").exists()
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
+def test_a_killed_worker_ends_the_command_with_its_name(tmp_path):
+    arguments = [
+        *SMOKE,
+        "collect=workers8",
+        "collect.worlds=1",
+        "collect.steps=32",
+        "total_frames=1e5",
+    ]
+    running = subprocess.Popen(
+        command(*arguments, "hydra.run.dir=run"), cwd=tmp_path, stderr=subprocess.PIPE, text=True
+    )
+    deadline = time.monotonic() + 300
+    while not list(tmp_path.glob("run/checkpoints/frames_*128.pt")) and time.monotonic() < deadline:
+        assert running.poll() is None, running.stderr.read()
+        time.sleep(0.05)
+    workers = workers_of(running.pid)
+    assert len(workers) == 2
+    os.kill(workers[1], signal.SIGKILL)
+    begin = time.monotonic()
+    _, errors = running.communicate(timeout=60)
+    assert time.monotonic() - begin < 20
+    assert running.returncode == 1
+    (line,) = errors.strip().splitlines()
+    assert line.startswith("error: worker process 1 (of 0 to 1) was killed by SIGKILL")
+    assert f"continue with: python -m veca_marl.train resume={tmp_path / 'run'}" in line
+    assert not any(map(is_running, workers))
+    done = train(tmp_path, f"resume={tmp_path / 'run'}", "total_frames=256", "log.video=false")
+    assert done.returncode == 0, done.stderr

@@ -65,8 +65,8 @@ def run_training(
             with timeit("video"):
                 record_episode(folder.video, cfg.game, trainer.policy.play, cfg.seed)
     if folder is not None:
-        folder.write("comparison.txt", "\n".join(comparison))
         folder.write("timing.txt", trainer.timing())
+        folder.write("comparison.txt", "\n".join(comparison))  # last: the run is complete
     return TrainingResult(
         memory.rows["metrics"],
         memory.rows["evaluations"],

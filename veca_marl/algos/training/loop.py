@@ -117,7 +117,7 @@ class Trainer:
         notes = []
         if not self._has_best:
             notes.append(
-                "no best.pt: several teams learn, and the mean of their returns says nothing of "
+                "no best.pt: several teams learn, and the mean of their returns does not measure "
                 "their skill (it is 0 in a zero-sum game); the latest checkpoints are kept"
             )
         if self._resumed_frames and not self.learners.exact_resume:
