@@ -31,6 +31,7 @@ class FakeEnv(EnvBase):
         image=16,
     ):
         super().__init__(batch_size=torch.Size([worlds]))
+        self.first_world = 0
         self.horizon, self.senses, self.image = horizon, senses, image
         self.discrete, self.hybrid = discrete, hybrid
         self.group_map = {t: [f"{t}_{i}" for i in range(agents)] for t in teams}
@@ -102,7 +103,9 @@ class FakeEnv(EnvBase):
         for i in rows:
             self.clock[i] = 0
             self.episodes[i] += 1  # an episode depends on (seed, world, episode) alone
-            self.rngs[i] = np.random.default_rng([self.seed_of_episodes, i, self.episodes[i]])
+            self.rngs[i] = np.random.default_rng(
+                [self.seed_of_episodes, self.first_world + i, self.episodes[i]]
+            )
             self._draw(i)
         zero = torch.zeros(self.batch_size[0], self.agents, 1)
         return TensorDict({t: self._team(zero) for t in self.group_map}, self.batch_size)

@@ -25,10 +25,29 @@ def oracle(td):
 
 def test_scores_are_sums_over_whole_episodes():
     scores = evaluate(FakeEnv(3, horizon=6), oracle, 7, 0, DETERMINISTIC)["agents"]
-    assert scores.returns.shape == (9,)  # 7 rounded up: 3 episodes in each of 3 worlds
+    assert scores.returns.shape == (7,)
     assert (scores.returns == 6).all()
     assert (scores.lengths == 6).all()
     assert (scores.terms["right"] == 6).all()
+
+
+class Drifting(FakeEnv):
+    """The reward depends on the number of the episode through its states."""
+
+    def _step(self, td):
+        out = super()._step(td)
+        out["agents", "reward"] += torch.from_numpy(self.state).unsqueeze(-1) * 1.0
+        return out
+
+
+@pytest.mark.parametrize("worlds", [1, 3, 4, 8])
+def test_the_result_does_not_depend_on_the_number_of_worlds(worlds):
+    whole = evaluate(Drifting(7), oracle, 7, 5, DETERMINISTIC)["agents"]
+    split = evaluate(Drifting(worlds), oracle, 7, 5, DETERMINISTIC)["agents"]
+    assert len(set(whole.returns)) > 2
+    np.testing.assert_array_equal(whole.returns, split.returns)
+    part = evaluate(Drifting(worlds), oracle, 3, 5, DETERMINISTIC, first=4)["agents"]
+    np.testing.assert_array_equal(whole.returns[4:], part.returns)
 
 
 def test_the_result_depends_on_the_seed_alone():
@@ -98,6 +117,14 @@ def test_comparison_line_names_team_means_and_intervals():
     assert line.startswith("red: return of policy 4.000 [-8.706, 16.706], random 0.000")
     assert "difference 4.000" in line
     assert "\n" not in line
+
+
+def test_the_last_evaluation_has_four_times_as_many_episodes_or_what_is_asked_for():
+    assert EvalCfg().last_episodes == 32
+    assert EvalCfg(episodes=2).last_episodes == 8
+    assert EvalCfg(final_episodes=100).last_episodes == 100
+    with pytest.raises(ValueError, match=r"eval.final_episodes must be at least eval.episodes=8"):
+        EvalCfg(final_episodes=7)
 
 
 @pytest.mark.parametrize("wrong", [{"every_frames": 0}, {"episodes": 0}, {"worlds": 0}])

@@ -22,7 +22,7 @@ def make_trainer(tmp_path, make_ppo):
             make_env=make_fake_env,
             learners=make_ppo(seed=seed),
             collect=CollectCfg(processes, worlds=4 // max(processes, 1), steps=16),
-            evaluation=EvalCfg(every_frames=2 * FRAMES, episodes=4, worlds=2),
+            evaluation=EvalCfg(every_frames=2 * FRAMES, episodes=2, final_episodes=4, worlds=2),
             budget=Budget(batches * FRAMES, **kwargs),
             checkpoints=Checkpoints(folder / "checkpoints", identity, {}),
             reporters=[CsvReporter(folder)] if reporters is None else reporters,
@@ -102,6 +102,7 @@ def test_a_run_writes_a_row_per_batch_and_per_evaluation(make_trainer, tmp_path)
         ("policy", 4 * FRAMES),
         ("policy", 5 * FRAMES),
     ]
+    assert [int(row["episodes"]) for row in evaluations] == [4, 2, 2, 4]
     assert trainer.checkpoints.latest().name == f"frames_{5 * FRAMES:012d}.pt"
     parts = [row.split()[0] for row in trainer.timing().splitlines()]
     assert {"collect", "learn", "transfer", "evaluate", "checkpoint"} < set(parts)
@@ -111,7 +112,7 @@ def test_time_limit_stops_at_a_checkpoint(make_trainer):
     trainer = make_trainer("run", 1000, max_minutes=1e-9)
     trainer.run()
     assert trainer.progress.frames == 0
-    trainer = make_trainer("other", 1000, max_minutes=0.01)
+    trainer = make_trainer("other", 1000, max_minutes=0.02)
     trainer.run()
     assert 0 < trainer.progress.frames < 1000 * FRAMES
     assert trainer.progress.frames % (2 * FRAMES) == 0

@@ -80,7 +80,7 @@ class Experience:
             self._collector = Collector(make, policy, **common)
         else:
             threads = torch.get_num_threads()
-            with _workers_ignore_interrupts(), _start_method(start_method()):
+            with workers_ignore_interrupts(), _start_method(start_method()):
                 self._collector = SupervisedCollector(
                     [make] * cfg.processes,
                     policy,
@@ -118,7 +118,7 @@ def _make_env(make_env: EnvFactory, worlds: int, memory: Compose | None) -> EnvB
 
 
 @contextmanager
-def _workers_ignore_interrupts() -> Iterator[None]:
+def workers_ignore_interrupts() -> Iterator[None]:
     """Let workers made inside the block ignore Ctrl-C: this process receives it and ends them."""
     inherited = {signal.SIGINT: signal.SIG_IGN, signal.SIGTERM: signal.SIG_DFL}
     previous = {number: signal.signal(number, action) for number, action in inherited.items()}

@@ -34,45 +34,36 @@ def _agent_mean(array: object) -> NDArray[np.float64]:
 
 
 class EpisodeTally:
-    """Sums of `team_measures` over the first `quota` episodes of each world.
+    """Sums of `team_measures` over the first episode of each of the first worlds.
 
     Args:
         teams: Names of the teams.
         worlds: Number of worlds.
-        quota: Episodes of each world that count.
+        count: Number of worlds that count.
     """
 
-    def __init__(self, teams: list[str], worlds: int, quota: int) -> None:
-        self.teams, self.quota = teams, quota
-        self._open: dict[tuple[str, str], NDArray[np.float64]] = {}
-        self._finished: dict[tuple[str, str], list[list[float]]] = {}
-        self._episodes = np.zeros(worlds, dtype=np.int64)
+    def __init__(self, teams: list[str], worlds: int, count: int) -> None:
+        self.teams, self.count = teams, count
+        self._sums: dict[tuple[str, str], NDArray[np.float64]] = {}
+        self._open = np.ones(worlds, dtype=np.bool_)
 
     @property
     def complete(self) -> bool:
-        """Whether every world has finished its episodes."""
-        return bool((self._episodes >= self.quota).all())
+        """Whether the episode of every world that counts has ended."""
+        return not self._open[: self.count].any()
 
     def add(self, step: TensorDictBase) -> None:
         """Add one step ``(worlds,)``, the ``next`` part of a frame."""
-        ended = np.flatnonzero(step["done"].squeeze(-1).numpy())
         for team in self.teams:
             for name, values in team_measures(step, team).items():
-                key = (team, name)
-                sums = self._open.setdefault(key, np.zeros(len(self._episodes)))
-                sums += values
-                lists = self._finished.setdefault(key, [[] for _ in self._episodes])
-                for world in ended:
-                    lists[world].append(float(sums[world]))
-                sums[ended] = 0.0
-        self._episodes[ended] += 1
+                sums = self._sums.setdefault((team, name), np.zeros(len(values)))
+                sums[self._open] += values[self._open]
+        self._open &= ~step["done"].squeeze(-1).numpy()
 
     def sums(self, team: str) -> dict[str, NDArray[np.float64]]:
-        """Return for each measure the sums ``(worlds * quota,)``, world by world."""
+        """Return for each measure the sums ``(count,)``."""
         return {
-            name: np.array([sums[: self.quota] for sums in lists]).ravel()
-            for (owner, name), lists in self._finished.items()
-            if owner == team
+            name: sums[: self.count] for (owner, name), sums in self._sums.items() if owner == team
         }
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
 
@@ -12,11 +12,12 @@ from numpy.typing import NDArray
 from tensordict import TensorDictBase
 from torch import nn
 from torchrl.data import Composite
-from torchrl.envs import EnvBase, ExplorationType, set_exploration_type
+from torchrl.envs import EnvBase, ExplorationType, TransformedEnv, set_exploration_type
 from torchrl.envs.utils import RandomPolicy
 
 from veca_marl.algos.networks.memory import with_memory
 from veca_marl.algos.training.episodes import EpisodeTally
+from veca_marl.algos.training.progress import stage_seed
 
 ActionPolicy = Callable[[TensorDictBase], TensorDictBase]
 
@@ -43,20 +44,34 @@ class EvalCfg:
             training worlds start new episodes after each, so that a run resumed from the
             checkpoint continues exactly.
         episodes: Episodes of an evaluation; each evaluation has the same starts.
-        worlds: Worlds that play them at the same time.
+        final_episodes: Episodes of the last evaluation of a run and of the random policy it is
+            compared with, the same as those of other evaluations and more; None is four times
+            `episodes`.
+        worlds: Worlds that play them at the same time, in all worker processes together.
         exploration: ``deterministic`` takes the most likely actions, ``stochastic`` samples as
             collection does.
     """
 
     every_frames: int = 20480
     episodes: int = 8
-    worlds: int = 4
+    final_episodes: int | None = None
+    worlds: int = 8
     exploration: Exploration = Exploration.deterministic
 
     def __post_init__(self) -> None:
         for name in ("every_frames", "episodes", "worlds"):
             if getattr(self, name) < 1:
                 raise ValueError(f"eval.{name} must be at least 1, got {getattr(self, name)}")
+        if self.final_episodes is not None and self.final_episodes < self.episodes:
+            raise ValueError(
+                f"eval.final_episodes must be at least eval.episodes={self.episodes}, "
+                f"got {self.final_episodes}"
+            )
+
+    @property
+    def last_episodes(self) -> int:
+        """Episodes of the last evaluation."""
+        return 4 * self.episodes if self.final_episodes is None else self.final_episodes
 
 
 @dataclass(frozen=True)
@@ -75,29 +90,79 @@ class Scores:
 
 
 def evaluate(
-    env: EnvBase, policy: ActionPolicy, episodes: int, seed: int, exploration: Exploration
+    env: EnvBase,
+    policy: ActionPolicy,
+    episodes: int,
+    seed: int,
+    exploration: Exploration,
+    first: int = 0,
 ) -> dict[str, Scores]:
-    """Play whole episodes and return each team's scores, in an order that depends on `env` alone.
+    """Play whole episodes and return each team's scores, in the order of their numbers.
 
-    Every world plays equally many, so that short episodes are not preferred; `episodes` is
-    rounded up to a multiple of the worlds. The result depends on the arguments alone. Worlds are
-    seeded anew: episode k of world w starts alike for every policy.
+    The start of an episode depends on `seed` and its number alone, for every policy and for any
+    number of worlds (where the environment has a `first_world`, as `VecaEnv`; with other
+    environments it depends on the number of worlds too). Samples of a policy are drawn for all
+    worlds at once: they depend on the number of worlds.
+
+    Args:
+        env: The environment. Its worlds play as many episodes at the same time.
+        policy: Writes the actions of all teams.
+        episodes: Number of episodes.
+        seed: Seed of the starts and of the samples.
+        exploration: Whether actions are sampled.
+        first: Number of the first episode.
     """
-    torch.manual_seed(seed)
-    env.set_seed(seed)
     worlds = env.batch_size[0]
-    tally = EpisodeTally(list(env.group_map), worlds, quota=-(-episodes // worlds))
-    playing = with_memory(env, policy)
+    tallies = []
     with torch.no_grad(), set_exploration_type(_TYPES[exploration]):
-        state = playing.reset()
-        while not tally.complete:
-            played, state = playing.step_and_maybe_reset(policy(state))
-            tally.add(played["next"])
-    return {team: _scores(tally.sums(team)) for team in env.group_map}
+        for number in range(first, first + episodes, worlds):
+            _seed(env, seed, number)
+            count = min(worlds, first + episodes - number)
+            tallies.append(_play_one_each(env, policy, count))
+    return {team: _joined([tally.sums(team) for tally in tallies]) for team in env.group_map}
 
 
-def _scores(sums: dict[str, NDArray[np.float64]]) -> Scores:
+def _seed(env: EnvBase, seed: int, first: int) -> None:
+    """Let world w begin episode `first` + w, and seed the samples."""
+    base = env
+    while isinstance(base, TransformedEnv):
+        base = base.base_env
+    numbered = hasattr(base, "first_world")
+    if numbered:
+        base.first_world = first
+    env.set_seed(seed if numbered else stage_seed(seed, first))
+    torch.manual_seed(stage_seed(seed, first))
+
+
+def _play_one_each(env: EnvBase, policy: ActionPolicy, count: int) -> EpisodeTally:
+    """Play an episode in each of the first `count` worlds."""
+    playing = with_memory(env, policy)
+    tally = EpisodeTally(list(env.group_map), env.batch_size[0], count)
+    state = playing.reset()
+    while not tally.complete:
+        played, state = playing.step_and_maybe_reset(policy(state))
+        tally.add(played["next"])
+    return tally
+
+
+def _joined(parts: Sequence[dict[str, NDArray[np.float64]]]) -> Scores:
+    sums = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
     return Scores(sums.pop("return"), sums.pop("length"), sums)
+
+
+def joined_scores(parts: Sequence[Mapping[str, Scores]]) -> dict[str, Scores]:
+    """Return the scores of all episodes of several evaluations, one after the other."""
+    return {
+        team: Scores(
+            np.concatenate([part[team].returns for part in parts]),
+            np.concatenate([part[team].lengths for part in parts]),
+            {
+                name: np.concatenate([part[team].terms[name] for part in parts])
+                for name in scores.terms
+            },
+        )
+        for team, scores in parts[0].items()
+    }
 
 
 class RandomTeams(nn.Module):

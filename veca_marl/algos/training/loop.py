@@ -11,14 +11,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from contextlib import closing
+from contextlib import ExitStack, closing
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
-from torch import nn
 from torchrl import timeit
-from torchrl.envs import EnvBase
 from tqdm import tqdm
 
 from veca_marl.algos.collection.experience import CollectCfg, Experience
@@ -27,7 +25,8 @@ from veca_marl.algos.specs import EnvFactory
 from veca_marl.algos.training.checkpoint import Checkpoints, naming_checkpoint
 from veca_marl.algos.training.comparison import comparison_line, score_rows
 from veca_marl.algos.training.episodes import TrainingEpisodes
-from veca_marl.algos.training.evaluation import EvalCfg, RandomTeams, Scores, evaluate
+from veca_marl.algos.training.evaluation import EvalCfg, Scores
+from veca_marl.algos.training.evaluators import Evaluator, Players, Request, make_evaluator
 from veca_marl.algos.training.finite import check_batch, check_scores, check_state
 from veca_marl.algos.training.learners import Policy, TeamLearners
 from veca_marl.algos.training.matchmaking import AllLearn, Matchmaking
@@ -69,6 +68,7 @@ class Trainer:
     matchmaking: Matchmaking = field(default_factory=AllLearn)
     progress: Progress = field(default_factory=Progress)
     _resumed_frames: int = 0
+    _evaluator: Evaluator = field(init=False)
 
     def __post_init__(self) -> None:
         self.policy: Policy = self.learners.policy.copy()
@@ -96,22 +96,25 @@ class Trainer:
         fresh = self.progress.frames == 0
         if fresh:
             self._save(best=False)  # an interruption at any time finds a checkpoint
-        with timeit("build"):
-            eval_env = self.make_env(self.evaluation.worlds, 0)
-            experience = Experience(self.make_env, self.policy.collect, self.collect)
-        with closing(eval_env), closing(experience):
-            with timeit("evaluate"):
-                baseline = self._evaluate(eval_env, self._baseline(eval_env))
+        with ExitStack() as pending:
+            with timeit("build"):
+                self._evaluator = pending.enter_context(closing(self._make_evaluator()))
+                experience = Experience(self.make_env, self.policy.collect, self.collect)
+                pending.enter_context(closing(experience))
+            baseline = self._evaluate("random", self.evaluation.last_episodes)
             if fresh:
                 self._report_scores("random", baseline)
-            scores = self._train(experience, eval_env) or self._evaluate(eval_env)
+            scores = self._train(experience)
+            if scores is None:
+                scores = self._evaluate("policy", self.evaluation.last_episodes)
         compared = [comparison_line(t, scores[t], baseline[t]) for t in self.learners.algorithms]
         return [*compared, *self._notes()]
 
-    def _baseline(self, env: EnvBase) -> RandomTeams:
-        """Return random actions for the teams that learn, against the opponents they learn with."""
-        frozen = [self.policy.actors[team] for team in self.learners.frozen]
-        return RandomTeams(env, list(self.learners.algorithms), frozen)
+    def _make_evaluator(self) -> Evaluator:
+        players = Players(self.policy, tuple(self.learners.algorithms))
+        return make_evaluator(
+            self.make_env, players, self.collect.processes, self.evaluation.worlds
+        )
 
     def _notes(self) -> list[str]:
         notes = []
@@ -129,7 +132,7 @@ class Trainer:
         """Whether the mean return measures progress: one team learns, its opponents stay."""
         return len(self.learners.algorithms) == 1
 
-    def _train(self, experience: Experience, eval_env: EnvBase) -> dict[str, Scores] | None:
+    def _train(self, experience: Experience) -> dict[str, Scores] | None:
         """Go through all stages and return the scores of the last, if there was one."""
         scores = None
         iterations = self.budget.iterations(self.collect.frames)
@@ -139,13 +142,17 @@ class Trainer:
             unit=" frames",
             disable=not self.progress_bar,
         ) as bar:
-            while self.progress.iteration < iterations and not self._out_of_time():
+            finished = self._is_finished()
+            while not finished:
                 self._run_stage(experience, bar, iterations)
-                scores = self._end_stage(eval_env)
+                finished = self._is_finished()
+                scores = self._end_stage(finished)
         return scores
 
-    def _out_of_time(self) -> bool:
-        return self.budget.is_spent(self._clock.elapsed())
+    def _is_finished(self) -> bool:
+        """Whether the frames, or the time, of the budget are spent."""
+        iterations = self.budget.iterations(self.collect.frames)
+        return self.progress.iteration >= iterations or self.budget.is_spent(self._clock.elapsed())
 
     def timing(self) -> str:
         """Return a table of where the time went."""
@@ -193,10 +200,10 @@ class Trainer:
         self.matchmaking.load_opponent(self.policy)
         experience.update_policy()
 
-    def _end_stage(self, eval_env: EnvBase) -> dict[str, Scores]:
+    def _end_stage(self, last: bool) -> dict[str, Scores]:
         self.policy.take_over(self.learners.policy)
-        with timeit("evaluate"):
-            scores = self._evaluate(eval_env)
+        cfg = self.evaluation
+        scores = self._evaluate("policy", cfg.last_episodes if last else cfg.episodes)
         self._report_scores("policy", scores)
         best = self._is_best(scores)
         self.progress.stage += 1
@@ -209,7 +216,7 @@ class Trainer:
         if not self._has_best:
             return False
         (team,) = self.learners.algorithms
-        mean = float(scores[team].returns.mean())
+        mean = float(scores[team].returns[: self.evaluation.episodes].mean())
         best = mean > self.progress.best_return
         self.progress.best_return = max(mean, self.progress.best_return)
         return best
@@ -227,16 +234,18 @@ class Trainer:
         numbers = {team: to_plain(cfg) for team, cfg in self.learners.cfgs.items()}
         self.checkpoints.save(state, self.progress.frames, best, numbers)
 
-    def _evaluate(self, env: EnvBase, policy: nn.Module | None = None) -> dict[str, Scores]:
-        scores = evaluate(
-            env,
-            policy or self.policy.play,
-            self.evaluation.episodes,
-            stage_seed(self.seed, _EVALUATION_STAGE),
-            self.evaluation.exploration,
-        )
+    def _evaluate(self, player: str, episodes: int) -> dict[str, Scores]:
+        with timeit("evaluate"):
+            scores = self._evaluator.play(
+                Request(player, episodes, self.evaluation_seed, self.evaluation.exploration)
+            )
         check_scores(scores)
         return scores
+
+    @property
+    def evaluation_seed(self) -> int:
+        """Seed of the episodes of all evaluations."""
+        return stage_seed(self.seed, _EVALUATION_STAGE)
 
     def _report_scores(self, player: str, scores: dict[str, Scores]) -> None:
         for row in score_rows(player, scores):

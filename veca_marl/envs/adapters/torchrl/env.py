@@ -46,6 +46,7 @@ class VecaEnv(FastStepEnv):
         cfg: The configuration of the games.
         games: The games, one per world.
         episodes: The numbers and generators of the episodes, one per world.
+        first_world: Number of the first world; a change takes effect with the next `set_seed`.
         spectators: Renderers for people, one per world.
 
     Args:
@@ -75,7 +76,7 @@ class VecaEnv(FastStepEnv):
         announce_compilation()
         super().__init__(fast_step, torch.Size([worlds]))
         self.cfg = cfg
-        self._first_world = first_world
+        self.first_world = first_world
         self.games = [Game(cfg) for _ in range(worlds)]
         self._teams = [team.name for team in cfg.teams if team.name not in cfg.script]
         self._eliminates = self.games[0].task.eliminates
@@ -99,7 +100,7 @@ class VecaEnv(FastStepEnv):
     def _set_seed(self, seed: int | None) -> None:
         seed = fresh_seed() if seed is None else seed
         self.episodes = [
-            Episodes(seed, self._first_world + world) for world in range(len(self.games))
+            Episodes(seed, self.first_world + world) for world in range(len(self.games))
         ]
 
     def _reset(

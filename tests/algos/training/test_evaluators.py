@@ -1,0 +1,83 @@
+"""Evaluations in several processes give what one process gives."""
+
+import os
+import signal
+from contextlib import closing
+
+import numpy as np
+import pytest
+import torch
+from fake_env import FakeEnv, make_fake_env
+
+from veca_marl.algos.collection.workers import WorkerError
+from veca_marl.algos.training.evaluation import Exploration
+from veca_marl.algos.training.evaluators import Players, Request, make_evaluator
+
+SEVEN = Request("policy", 7, 5, Exploration.deterministic)
+
+
+@pytest.fixture
+def policy(make_ppo):
+    policy = make_ppo().policy.copy()
+    with torch.no_grad():  # the toy's policy: act with the sign of what is heard
+        for parameter in policy.parameters():
+            parameter.mul_(1.5)
+    return policy
+
+
+def returns(processes, policy, *requests, make_env=make_fake_env):
+    players = Players(policy, ("agents",))
+    with closing(make_evaluator(make_env, players, processes, 4)) as evaluator:
+        return [evaluator.play(request)["agents"].returns for request in requests]
+
+
+def test_several_processes_play_the_same_episodes_in_the_same_order(policy):
+    random = Request("random", 7, 5, Exploration.deterministic)
+    alone, by_chance = returns(0, policy, SEVEN, random)
+    together, drawn = returns(2, policy, SEVEN, random)
+    assert len(set(alone)) > 1
+    np.testing.assert_array_equal(alone, together)
+    assert len(drawn) == len(by_chance) == 7
+    assert (drawn != together).any()
+
+
+def test_new_parameters_reach_the_processes(policy):
+    players = Players(policy, ("agents",))
+    with closing(make_evaluator(make_fake_env, players, 2, 4)) as evaluator:
+        before = evaluator.play(SEVEN)["agents"].returns
+        with torch.no_grad():
+            for parameter in policy.parameters():
+                parameter.neg_()
+        after = evaluator.play(SEVEN)["agents"].returns
+    assert (before != after).any()
+    np.testing.assert_array_equal(after, returns(0, policy, SEVEN)[0])
+
+
+class Failing(FakeEnv):
+    def _step(self, td):
+        raise ArithmeticError("a force is not finite")
+
+
+def make_failing(worlds, seed):
+    return Failing(worlds, seed)
+
+
+class Killed(FakeEnv):
+    def _step(self, td):
+        os.kill(os.getpid(), signal.SIGKILL)
+
+
+def make_killed(worlds, seed):
+    return Killed(worlds, seed)
+
+
+@pytest.mark.parametrize(
+    ("make_env", "message"),
+    [
+        (make_failing, "evaluation process 0: ArithmeticError: a force is not finite"),
+        (make_killed, "evaluation process 0 ended with status -9"),
+    ],
+)
+def test_a_process_that_fails_ends_the_evaluation(policy, make_env, message):
+    with pytest.raises(WorkerError, match=message):
+        returns(2, policy, SEVEN, make_env=make_env)

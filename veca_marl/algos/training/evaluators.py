@@ -1,0 +1,213 @@
+"""Evaluations in this process, or in several that play parts of the episodes at the same time."""
+
+from __future__ import annotations
+
+import os
+import signal
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from multiprocessing.connection import Connection, wait
+from typing import Any, Protocol
+
+import torch
+from torch import multiprocessing, nn
+from torchrl.envs import EnvBase
+
+from veca_marl.algos.collection.experience import start_method, workers_ignore_interrupts
+from veca_marl.algos.collection.parent import end_with_parent
+from veca_marl.algos.collection.workers import WorkerError
+from veca_marl.algos.specs import EnvFactory
+from veca_marl.algos.training.evaluation import (
+    Exploration,
+    RandomTeams,
+    Scores,
+    evaluate,
+    joined_scores,
+)
+from veca_marl.algos.training.learners import Policy
+
+
+@dataclass(frozen=True)
+class Request:
+    """Episodes to play.
+
+    Attributes:
+        player: Name of the policy.
+        episodes: Number of episodes.
+        seed: See `evaluate`.
+        exploration: See `evaluate`.
+        first: Number of the first episode.
+    """
+
+    player: str
+    episodes: int
+    seed: int
+    exploration: Exploration
+    first: int = 0
+
+
+@dataclass(frozen=True)
+class Players:
+    """Makes the policies that a run evaluates.
+
+    Attributes:
+        policy: The policy of all teams.
+        learning: Teams that learn: they act at random in the baseline, the others as ever.
+    """
+
+    policy: Policy
+    learning: tuple[str, ...]
+
+    def __call__(self, env: EnvBase) -> dict[str, nn.Module]:
+        """Return ``policy`` and ``random``."""
+        others = [actor for t, actor in self.policy.actors.items() if t not in self.learning]
+        return {
+            "policy": self.policy.play,
+            "random": RandomTeams(env, self.learning, others),
+        }
+
+
+class Evaluator(Protocol):
+    """Plays episodes with policies that it knows by name."""
+
+    def play(self, request: Request) -> dict[str, Scores]:
+        """Return each team's scores."""
+        ...
+
+    def close(self) -> None:
+        """Close the worlds."""
+        ...
+
+
+class LocalEvaluator:
+    """Plays in worlds of this process.
+
+    Args:
+        make_env: Makes the worlds.
+        players: Makes the policies for an environment.
+        worlds: Number of worlds.
+    """
+
+    def __init__(self, make_env: EnvFactory, players: Players, worlds: int) -> None:
+        self._env = make_env(worlds, 0)
+        self._players = players(self._env)
+
+    def play(self, request: Request) -> dict[str, Scores]:
+        """See `Evaluator`."""
+        return evaluate(
+            self._env,
+            self._players[request.player],
+            request.episodes,
+            request.seed,
+            request.exploration,
+            request.first,
+        )
+
+    def close(self) -> None:
+        """See `Evaluator`."""
+        self._env.close()
+
+
+class ParallelEvaluator:
+    """Plays equal parts of the episodes in several processes.
+
+    The parameters and buffers of the policies are in shared memory: a change in this process
+    reaches the others.
+
+    Args:
+        make_env: Makes the worlds.
+        players: Makes the policies for an environment, in each process.
+        processes: Number of processes.
+        worlds: Number of worlds of all processes, rounded up to equal numbers.
+
+    Raises:
+        WorkerError: If a process ends, from every method.
+    """
+
+    def __init__(
+        self,
+        make_env: EnvFactory,
+        players: Players,
+        processes: int,
+        worlds: int,
+    ) -> None:
+        players.policy.share_memory()
+        context = multiprocessing.get_context(start_method())
+        self._processes, self._connections = [], []
+        with workers_ignore_interrupts():
+            for _ in range(processes):
+                here, there = context.Pipe()
+                arguments = (there, os.getpid(), make_env, players, -(-worlds // processes))
+                process = context.Process(target=_serve, args=arguments, daemon=True)
+                process.start()
+                there.close()
+                self._processes.append(process)
+                self._connections.append(here)
+
+    def play(self, request: Request) -> dict[str, Scores]:
+        """See `Evaluator`."""
+        parts = _split(request, len(self._connections))
+        for connection, part in zip(self._connections, parts, strict=False):
+            connection.send(part)
+        return joined_scores([self._receive(index) for index in range(len(parts))])
+
+    def _receive(self, index: int) -> dict[str, Scores]:
+        process, connection = self._processes[index], self._connections[index]
+        wait([connection, process.sentinel])
+        if not connection.poll():
+            process.join()
+            raise WorkerError(f"evaluation process {index} ended with status {process.exitcode}")
+        answer = connection.recv()
+        if isinstance(answer, str):
+            raise WorkerError(f"evaluation process {index}: {answer}")
+        scores: dict[str, Scores] = answer
+        return scores
+
+    def close(self) -> None:
+        """End the processes."""
+        for process, connection in zip(self._processes, self._connections, strict=True):
+            connection.close()
+            process.terminate()
+            process.join()
+
+
+def _split(request: Request, parts: int) -> list[Request]:
+    """Return requests for consecutive episodes, as equal in number as possible, none empty."""
+    bounds = [request.episodes * i // parts for i in range(parts + 1)]
+    return [
+        replace(request, episodes=high - low, first=request.first + low)
+        for low, high in pairwise(bounds)
+        if low < high
+    ]
+
+
+def _serve(connection: Connection[Any, Any], parent: int, *arguments: Any) -> None:
+    """Answer requests with scores, or with the text of an exception, until this process ends."""
+    end_with_parent(parent)
+    if hasattr(signal, "SIGCHLD"):
+        signal.signal(signal.SIGCHLD, signal.SIG_DFL)  # the parent's handler is for its workers
+    torch.set_num_threads(1)
+    try:
+        evaluator = LocalEvaluator(*arguments)
+        while True:
+            connection.send(evaluator.play(connection.recv()))
+    except EOFError:  # the other end was closed
+        return
+    except Exception as error:
+        connection.send(f"{type(error).__name__}: {error}")
+
+
+def make_evaluator(
+    make_env: EnvFactory, players: Players, processes: int, worlds: int
+) -> Evaluator:
+    """Return what plays in so many processes, in this one if there are none.
+
+    Args:
+        make_env: Makes the worlds.
+        players: Makes the policies for an environment.
+        processes: Number of worker processes.
+        worlds: Number of worlds of all processes.
+    """
+    if processes == 0:
+        return LocalEvaluator(make_env, players, worlds)
+    return ParallelEvaluator(make_env, players, min(processes, worlds), worlds)
