@@ -69,7 +69,8 @@ class PixelConv2d(nn.Conv2d):
         device = pixels.device.type
         autocast = torch.is_autocast_enabled(device)
         dtype = torch.get_autocast_dtype(device) if autocast else self.weight.dtype
-        return self._conv_forward(pixels.to(dtype), self.weight / 255.0, self.bias)
+        maps: Tensor = self._conv_forward(pixels.to(dtype), self.weight / 255.0, self.bias)
+        return maps
 
 
 class ImageEncoder(nn.Module):

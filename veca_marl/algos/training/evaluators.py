@@ -132,7 +132,7 @@ class ParallelEvaluator:
         worlds: int,
     ) -> None:
         players.policy.share_memory()
-        context = multiprocessing.get_context(start_method())
+        context: Any = multiprocessing.get_context(start_method())
         self._processes, self._connections = [], []
         with workers_ignore_interrupts():
             for _ in range(processes):
