@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from multiprocessing.connection import Connection, wait
@@ -147,21 +149,34 @@ class ParallelEvaluator:
     def play(self, request: Request) -> dict[str, Scores]:
         """See `Evaluator`."""
         parts = _split(request, len(self._connections))
-        for connection, part in zip(self._connections, parts, strict=False):
-            connection.send(part)
+        for index, part in enumerate(parts):
+            with self._worker_errors(index):
+                self._connections[index].send(part)
         return joined_scores([self._receive(index) for index in range(len(parts))])
 
     def _receive(self, index: int) -> dict[str, Scores]:
         process, connection = self._processes[index], self._connections[index]
-        wait([connection, process.sentinel])
-        if not connection.poll():
-            process.join()
-            raise WorkerError(f"evaluation process {index} ended with status {process.exitcode}")
-        answer = connection.recv()
+        with self._worker_errors(index):
+            wait([connection, process.sentinel])
+            if not connection.poll():
+                raise EOFError
+            answer = connection.recv()
         if isinstance(answer, str):
             raise WorkerError(f"evaluation process {index}: {answer}")
         scores: dict[str, Scores] = answer
         return scores
+
+    @contextmanager
+    def _worker_errors(self, index: int) -> Iterator[None]:
+        """Raise `WorkerError` in place of the error of a pipe whose other end is closed."""
+        try:
+            yield
+        except (EOFError, BrokenPipeError, ConnectionResetError) as error:
+            process = self._processes[index]
+            process.join()
+            raise WorkerError(
+                f"evaluation process {index} ended with status {process.exitcode}"
+            ) from error
 
     def close(self) -> None:
         """End the processes."""
