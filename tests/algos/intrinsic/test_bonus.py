@@ -22,6 +22,8 @@ from veca_marl.algos.intrinsic import (
 from veca_marl.algos.intrinsic.bonus import Bonus
 from veca_marl.algos.intrinsic.return_scale import ReturnScale
 from veca_marl.algos.ppo import PPOCfg
+from veca_marl.algos.sac import SACCfg
+from veca_marl.algos.sac.config import ReplayCfg
 from veca_marl.algos.specs import team_specs
 from veca_marl.algos.training.checkpoint import Checkpoints, Identity
 from veca_marl.algos.training.evaluation import EvalCfg
@@ -142,7 +144,12 @@ def test_algorithms_start_alike_with_and_without_intrinsic_rewards():
     assert all(torch.equal(a, b) for a, b in pairs)
 
 
-@pytest.mark.parametrize("algo", [PPOCfg(network=SMALL), ToyDQNCfg()], ids=["ppo", "replay"])
+SMALL_SAC = SACCfg(
+    network=SMALL, batch_size=16, replay=ReplayCfg(capacity=512, warm_up_frames=FRAMES)
+)
+
+
+@pytest.mark.parametrize("algo", [PPOCfg(network=SMALL), SMALL_SAC], ids=["ppo", "sac"])
 def test_returns_are_logged_apart(make_trainer, algo):
     memory = MemoryReporter()
     intrinsic = {"red": RNDCfg(), "blue": IntrinsicCfg()}

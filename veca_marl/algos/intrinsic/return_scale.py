@@ -55,4 +55,4 @@ class ReturnScale:
     def load_state_dict(self, state: dict[str, Any]) -> None:
         """Continue from `state_dict`."""
         self._statistics.load_state_dict(state["statistics"])
-        self._sums = state["sums"]
+        self._sums = state["sums"].cpu()
