@@ -17,7 +17,15 @@ from veca_marl.sim.senses import SensesCfg
 KICK = "+task=KickTheBall"
 PUSH = "+task=PushOut1v1"
 SENSES = ("audio", "proprioception", "touch", "vision")
-GROUPS = ["algo", "body", "collect", "log", "playground", *(f"senses/{name}" for name in SENSES)]
+GROUPS = [
+    "algo",
+    "body",
+    "collect",
+    "intrinsic",
+    "log",
+    "playground",
+    *(f"senses/{name}" for name in SENSES),
+]
 PRESETS = [(g, path.stem) for g in GROUPS for path in sorted((conf_dir() / g).glob("*.yaml"))]
 EXPERIMENTS = sorted(path.stem for path in (conf_dir() / "experiment").glob("*.yaml"))
 
