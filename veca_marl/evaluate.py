@@ -18,6 +18,7 @@ import torch
 from omegaconf import MISSING
 from tensordict.nn import TensorDictSequential
 
+from veca_marl.algos.files import WriteError, write_atomically
 from veca_marl.algos.selfplay.self_play import SelfPlayCfg
 from veca_marl.algos.specs import team_specs
 from veca_marl.algos.training.checkpoint import CheckpointError
@@ -30,6 +31,7 @@ from veca_marl.config.stored import change
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
 from veca_marl.runs.run_folder import open_run
 
+_ERRORS = (CheckpointError, WriteError)
 Table = dict[str, dict[str, Scores]]
 """Scores by player (policy, random) and team."""
 
@@ -160,13 +162,13 @@ def run(options: EvaluateOptions, overrides: list[str]) -> None:
     for team, scores in table["policy"].items():
         print(comparison_line(team, scores, table["random"][team]))
     if options.evaluate.json is not None:
-        Path(options.evaluate.json).write_text(json.dumps(rows, indent=2) + "\n")
+        write_atomically(Path(options.evaluate.json), json.dumps(rows, indent=2) + "\n")
 
 
 def main(words: Sequence[str] | None = None) -> int:
     """Run the command line; return the exit status."""
     description = str(__doc__)
-    return CommandLine("evaluate", EvaluateOptions, description, (CheckpointError,)).run(run, words)
+    return CommandLine("evaluate", EvaluateOptions, description, _ERRORS).run(run, words)
 
 
 if __name__ == "__main__":

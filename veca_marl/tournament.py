@@ -8,14 +8,17 @@ from __future__ import annotations
 
 import csv
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TextIO
 
 import numpy as np
 import torch
 from omegaconf import MISSING
 
+from veca_marl.algos.files import WriteError, naming
 from veca_marl.algos.selfplay.pool import Pool
 from veca_marl.algos.selfplay.tournament import Match, Rating, play_all, rate, table_of_points
 from veca_marl.algos.training.checkpoint import CheckpointError
@@ -117,16 +120,22 @@ def spread(frames: Sequence[int], count: int) -> list[int]:
 def write_results(path: Path, matches: list[Match], ratings: list[Rating]) -> None:
     """Write the matches and the ratings as CSV into a folder."""
     first, second = matches[0].members
-    with (path / "cross_play.csv").open("w", newline="") as file:
+    with _created(path / "cross_play.csv") as file:
         writer = csv.writer(file)
         columns = [f"{first}_frames", f"{second}_frames", "episodes"]
         writer.writerow([*columns, f"{first}_wins", f"{second}_wins", "ahead"])
         for m in matches:
             writer.writerow([*m.members.values(), m.episodes, *m.wins.values(), f"{m.ahead:.6g}"])
-    with (path / "elo.csv").open("w", newline="") as file:
+    with _created(path / "elo.csv") as file:
         writer = csv.writer(file)
         writer.writerow(["team", "frames", "elo"])
         writer.writerows([r.team, r.frames, f"{r.elo:.1f}"] for r in ratings)
+
+
+@contextmanager
+def _created(path: Path) -> Iterator[TextIO]:
+    with naming(path), path.open("w", newline="") as file:
+        yield file
 
 
 def draw_matrix(path: Path, matches: list[Match]) -> None:
@@ -171,7 +180,7 @@ def run(options: TournamentOptions, overrides: list[str]) -> None:
 
 def main(words: Sequence[str] | None = None) -> int:
     """Run the command line; return the exit status."""
-    errors = (CheckpointError, ModuleNotFoundError)
+    errors = (CheckpointError, WriteError, ModuleNotFoundError)
     return CommandLine("tournament", TournamentOptions, str(__doc__), errors).run(run, words)
 
 

@@ -82,7 +82,9 @@ def test_the_opponent_plays_its_past_policy(make):
     assert matches.past_frames in (0, 2 * FRAMES, 4 * FRAMES, 6 * FRAMES)
     trainer.policy.take_over(trainer.learners.policy)
     matches.load_opponent(trainer.policy)
-    past = matches.pool.load("blue", matches.past_frames)
+    past = torch.load(
+        matches.pool.folder / f"blue_{matches.past_frames:012d}.pt", weights_only=True
+    )
     for name, array in trainer.policy.actors["blue"].state_dict().items():
         torch.testing.assert_close(array, past[name])
     now = trainer.learners.policy.actors["red"].state_dict()
@@ -156,3 +158,25 @@ def test_self_play_needs_teams_that_learn(make_ppo, tmp_path):
     algorithm = make_ppo(teams=TEAMS)
     with pytest.raises(ValueError, match=r"\['green'\] do not learn; there are \['blue', 'red'\]"):
         SelfPlay(SelfPlayCfg(["red", "green"]), algorithm, Pool(tmp_path), 0)
+
+
+@pytest.mark.parametrize(
+    ("damage", "message"),
+    [
+        (lambda path: path.write_bytes(path.read_bytes()[:99]), r"cannot read .*blue_0{12}.pt"),
+        (lambda path: torch.save({"x": torch.zeros(1)}, path), r"blue_0{12}.pt does not fit: Runt"),
+        (lambda path: path.unlink(), r"blue_0{12}.pt does not exist"),
+    ],
+)
+def test_past_policies_that_cannot_be_loaded_are_named(make, damage, message):
+    trainer = make("run", latest=0.0)
+    matches = trainer.matchmaking
+    matches.begin_stage(0, 0)
+    damage(matches.pool.folder / f"blue_{0:012d}.pt")
+    with pytest.raises(CheckpointError, match=message):
+        matches.load_opponent(trainer.policy)
+
+
+def test_a_pool_that_was_removed_is_named(make):
+    with pytest.raises(CheckpointError, match=r"pool holds no past policy of 'blue'"):
+        make("run", latest=0.0).matchmaking.begin_stage(2, 2 * FRAMES)

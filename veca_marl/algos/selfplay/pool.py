@@ -7,9 +7,10 @@ from pathlib import Path
 from typing import Any
 
 import torch
+from torch import nn
 
 from veca_marl.algos.files import WriteError, write_atomically
-from veca_marl.algos.training.checkpoint import CheckpointError, load_file
+from veca_marl.algos.training.checkpoint import CheckpointError, load_file, naming_checkpoint
 
 
 class Pool:
@@ -45,15 +46,16 @@ class Pool:
         found = (int(path.stem.rpartition("_")[2]) for path in self.folder.glob(f"{team}_*.pt"))
         return sorted(frames for frames in found if until is None or frames <= until)
 
-    def load(self, team: str, frames: int) -> dict[str, Any]:
-        """Return the state of an actor.
+    def load_into(self, actor: nn.Module, team: str, frames: int) -> None:
+        """Load the state of a past policy into an actor.
 
         Raises:
-            CheckpointError: If the file cannot be read.
+            CheckpointError: If the file cannot be read, or holds another network.
         """
         path = self._path(team, frames)
-        state: dict[str, Any] = load_file(path, torch.device("cpu"))
-        return state
+        state = load_file(path, torch.device("cpu"))
+        with naming_checkpoint(path):
+            actor.load_state_dict(state)
 
     def _path(self, team: str, frames: int) -> Path:
         return self.folder / f"{team}_{frames:012d}.pt"

@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from veca_marl.algos.selfplay.pool import Pool
+from veca_marl.algos.training.checkpoint import CheckpointError
 from veca_marl.algos.training.learners import Policy, TeamLearners
 
 _DRAWS = 7  # the random stream of the matches differs from those of the stages
@@ -77,14 +78,16 @@ class SelfPlay:
         self._learners.learning = [self.turn, *self._others]
         rng = np.random.default_rng([self._seed, stage, _DRAWS])
         members = self.pool.members(self.opponent, frames)
+        if not members:
+            raise CheckpointError(f"{self.pool.folder} holds no past policy of {self.opponent!r}")
         latest = rng.random() < self.cfg.latest
         self.past_frames = None if latest else int(rng.choice(members))
 
     def load_opponent(self, policy: Policy) -> None:
         """See `Matchmaking`."""
         if self.past_frames is not None:
-            state = self.pool.load(self.opponent, self.past_frames)
-            policy.actors[self.opponent].load_state_dict(state)
+            actor = policy.actors[self.opponent]
+            self.pool.load_into(actor, self.opponent, self.past_frames)
 
     def end_stage(self, frames: int) -> None:
         """See `Matchmaking`."""

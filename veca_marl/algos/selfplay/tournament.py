@@ -70,9 +70,9 @@ def play_all(
     first, second = members
     matches = []
     for one in members[first]:
-        policy.actors[first].load_state_dict(pool.load(first, one))
+        pool.load_into(policy.actors[first], first, one)
         for other in members[second]:
-            policy.actors[second].load_state_dict(pool.load(second, other))
+            pool.load_into(policy.actors[second], second, other)
             scores = evaluate(env, policy.play, episodes, seed, Exploration.stochastic)
             matches.append(_judge({first: one, second: other}, scores, draw_margin))
     return matches
