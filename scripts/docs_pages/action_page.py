@@ -23,6 +23,8 @@ a value outside its range is an error that names the part, the value and the cho
 | TorchRL shape | `(worlds, agents, n)`, discrete `(worlds, agents)` | the same for each part |
 | Gymnasium, PettingZoo | the space of the part: `Box` or `Discrete` | `Dict` of such spaces |
 | policy of PPO | one distribution | a distribution per part, sampled independently |
+| weight of PPO's entropy bonus | `algo.entropy_coefficient=0.01` | the same, or one per part: \
+`algo.entropy_coefficient={move:0.003,voice:0.03}` |
 
 ## Bodies
 """
