@@ -15,6 +15,8 @@ from veca_marl.algos.sac.config import ReplayCfg
 from veca_marl.config import compose
 from veca_marl.runs.assembly import read_specs
 
+PRESETS = ("sac", "sac_fast", "crossq")
+
 
 @pytest.fixture(scope="module")
 def specs(task, kind):
@@ -22,7 +24,7 @@ def specs(task, kind):
 
 
 @pytest.mark.slow  # makes a world of every task
-@pytest.mark.parametrize("preset", ["sac", "sac_fast"])
+@pytest.mark.parametrize("preset", PRESETS)
 def test_it_learns_from_batches_of_every_task(specs, preset, numbers):
     torch.manual_seed(0)
     batch = random_batch(specs)
@@ -38,7 +40,7 @@ def test_it_learns_from_batches_of_every_task(specs, preset, numbers):
 def numbers():
     """The presets with a small replay buffer and updates from the first batch on."""
     found = {}
-    for preset in ("sac", "sac_fast"):
+    for preset in PRESETS:
         cfg = compose(["+task=KickTheBall", f"algo={preset}"]).algo
         cfg.replay, cfg.batch_size = ReplayCfg(64, warm_up_frames=1), 4
         found[preset] = cfg

@@ -25,7 +25,7 @@ FORMS = {
 }
 
 
-@pytest.fixture(scope="module", params=["sac", "sac_fast"])
+@pytest.fixture(scope="module", params=["sac", "sac_fast", "crossq"])
 def numbers(request):
     """A preset with a small replay buffer and updates from the first batch on."""
     cfg = compose(["+task=KickTheBall", f"algo={request.param}"]).algo

@@ -8,13 +8,18 @@ from tensordict import TensorDict
 from tensordict.nn import TensorDictModule
 from torch import nn
 from torch.distributions import Normal
-from torchrl.objectives import DiscreteSACLoss, SACLoss, SoftUpdate, ValueEstimators
+from torchrl.objectives import CrossQLoss, DiscreteSACLoss, SACLoss, SoftUpdate, ValueEstimators
 
-from veca_marl.algos.networks.action_values import ActionValuesCfg, ActorCritics
+from veca_marl.algos.networks.action_values import (
+    ActionValuesCfg,
+    ActorCritics,
+    BatchRenorm,
+    Normalisation,
+)
 from veca_marl.algos.networks.factory import NetworkFactory
 from veca_marl.algos.sac.config import Adaptation, EncoderGradient, TemperatureCfg
 from veca_marl.algos.sac.joint_action import JointAction
-from veca_marl.algos.sac.loss import TeamSACLoss
+from veca_marl.algos.sac.loss import TeamCrossQLoss, TeamSACLoss
 from veca_marl.algos.sac.temperature import Temperatures
 from veca_marl.algos.sac.windows import Transitions
 from veca_marl.algos.specs import ActionLayout, ArrayLayout, TeamSpec
@@ -23,6 +28,8 @@ WIDTH, GAMMA, ALPHA = 4, 0.9, 0.3
 CONTINUOUS = {"action": ActionLayout(discrete=False, size=2)}
 DISCRETE = {"action": ActionLayout(discrete=True, size=3)}
 HYBRID = {"move": ActionLayout(discrete=False, size=1), "voice": ActionLayout(True, 3)}
+CRITIC = ActionValuesCfg(hidden=[16])
+RENORMALISED = ActionValuesCfg(hidden=[16], normalisation=Normalisation.batch_renorm)
 LEARNT = TemperatureCfg(ALPHA, Adaptation.automatic)
 
 
@@ -54,26 +61,34 @@ class Central(PlainNetwork):
     central_critic = True
 
 
-def loss_of(actions, gradient=EncoderGradient.both, factory=PlainNetwork, agents=2):
+def loss_of(
+    actions,
+    gradient=EncoderGradient.both,
+    factory=PlainNetwork,
+    agents=2,
+    kind=TeamSACLoss,
+    critic=CRITIC,
+):
     """Return the loss of a network with random parameters, and its network."""
     torch.manual_seed(3)
     spec = TeamSpec(
         agents, {"state": ArrayLayout((WIDTH,), "float32", -1.0, 1.0)}, actions, masked=True
     )
-    network = ActorCritics(factory("agents", spec, None), ActionValuesCfg(hidden=[16]), [8])
+    network = ActorCritics(factory("agents", spec, None), critic, [8])
     with torch.no_grad():
         for name, parameter in network.named_parameters():
             if "scale" not in name:
                 parameter.copy_(torch.randn_like(parameter) * 0.5)
-    loss = TeamSACLoss(
+    loss = kind(
         "agents",
         network,
         JointAction("agents", actions),
         Temperatures(actions, LEARNT),
         gradient,
     )
-    SoftUpdate(loss, tau=0.5)
-    loss.target_critic_params.apply_(lambda array: array.mul_(0.8))
+    if loss.averages:
+        SoftUpdate(loss, tau=0.5)
+        loss.target_critic_params.apply_(lambda array: array.mul_(0.8))
     return loss, network
 
 
@@ -113,18 +128,20 @@ class Value(nn.Module):
 def torchrl_loss(kind, network, batch, **options):
     """Return TorchRL's loss with copies of our networks, and its output for `batch`."""
     actor = deepcopy(network.actor)[1:]
-    reads = [("agents", "features")] + [("agents", "action")] * (kind is SACLoss)
-    name = "state_action_value" if kind is SACLoss else "action_value"
+    choices = kind is DiscreteSACLoss
+    reads = [("agents", "features"), *([] if choices else [("agents", "action")])]
+    name = "action_value" if choices else "state_action_value"
     critics = [
         TensorDictModule(Value(deepcopy(critic)), in_keys=reads, out_keys=[("agents", name)])
         for critic in network.values.critics
     ]
     loss = kind(actor, critics, loss_function="l2", alpha_init=ALPHA, **options)
-    keys = {k: ("agents", k) for k in ("action", "reward", "done", "terminated", "value", name)}
-    loss.set_keys(**keys)
+    keys = {k: ("agents", k) for k in ("action", "reward", "done", "terminated", name)}
+    loss.set_keys(**keys, **({} if kind is CrossQLoss else {"value": ("agents", "value")}))
     loss.make_value_estimator(ValueEstimators.TD0, gamma=GAMMA)
-    SoftUpdate(loss, tau=0.5)
-    loss.target_qvalue_network_params.apply_(lambda array: array.mul_(0.8))
+    if kind is not CrossQLoss:
+        SoftUpdate(loss, tau=0.5)
+        loss.target_qvalue_network_params.apply_(lambda array: array.mul_(0.8))
     ended = batch.discount == 0.0
     step = {
         "features": batch.last["agents", "observation", "state"],
@@ -150,21 +167,23 @@ def assert_same_gradients(ours, theirs):
     ("kind", "actions", "options"),
     [
         (SACLoss, CONTINUOUS, {"target_entropy": -2.0}),
+        (CrossQLoss, CONTINUOUS, {"target_entropy": -2.0}),
         (
             DiscreteSACLoss,
             DISCRETE,
             {"action_space": "categorical", "num_actions": 3, "target_entropy_weight": 0.3},
         ),
     ],
-    ids=["continuous", "discrete"],
+    ids=["continuous", "crossq", "discrete"],
 )
 def test_losses_and_gradients_equal_those_of_torchrl(kind, actions, options):
     batch = transitions_of(actions)
-    loss, network = loss_of(actions)
+    own = {"kind": TeamCrossQLoss, "critic": RENORMALISED} if kind is CrossQLoss else {}
+    loss, network = loss_of(actions, **own)
     theirs, expected = torchrl_loss(kind, network, batch, **options)
     torch.manual_seed(11)
-    # their encoder is not in the target either
-    loss.target_critic_params["encoder"].apply_(lambda array: array.fill_(1.0))
+    if loss.averages:  # their encoder is not in the target
+        loss.target_critic_params["encoder"].apply_(lambda array: array.fill_(1.0))
     found = loss(batch)
     torch.testing.assert_close(found.critic, expected["loss_qvalue"])
     torch.testing.assert_close(found.policy, expected["loss_actor"])
@@ -178,8 +197,9 @@ def test_losses_and_gradients_equal_those_of_torchrl(kind, actions, options):
     assert_same_gradients(list(ours), policy)
     stacked = theirs.qvalue_network_params["module", "layers"]
     for index, critic in enumerate(network.values.critics):
-        for key, parameter in TensorDict.from_module(critic).items(True, True):
-            torch.testing.assert_close(parameter.grad, stacked[key].grad[index])
+        for name, parameter in critic.named_parameters():
+            expected_grad = stacked[tuple(name.split("."))].grad[index]
+            torch.testing.assert_close(parameter.grad, expected_grad)
     (log_alpha,) = loss.temperatures.parameters()
     torch.testing.assert_close(log_alpha.grad, theirs.log_alpha.grad)
 
@@ -298,3 +318,19 @@ def test_a_temperature_rises_where_the_entropy_is_below_its_target():
     torch.testing.assert_close(
         temperatures.targets, {"move": -1.0, "voice": 0.3 * float(torch.tensor(3.0).log())}
     )
+
+
+def test_batch_renormalisation_corrects_fully_after_its_warm_up_and_not_more():
+    """TorchRL's own count goes on, and doubles the correction after twice the warm-up."""
+    torch.manual_seed(0)
+    layer = BatchRenorm(3)
+    layer.layer.warmup_steps = 5
+    layer.layer.running_mean.fill_(1.0)
+    for _ in range(12):
+        x = torch.randn(4, 2, 3) + 1.0
+        found = layer(x)
+    # with the statistics of the whole history; those of one batch have been cancelled
+    history = (layer.layer.running_mean, layer.layer.running_var)
+    expected = (x - history[0]) / (history[1] + layer.layer.eps).sqrt()
+    torch.testing.assert_close(found, expected, atol=0.1, rtol=0.1)
+    assert int(layer.layer.num_batches_tracked) == 5

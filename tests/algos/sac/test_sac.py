@@ -7,8 +7,9 @@ import torch
 from fake_env import FakeEnv
 from training import SMALL
 
+from veca_marl.algos.networks.action_values import ActionValuesCfg, Normalisation
 from veca_marl.algos.networks.multisense import Critic, MultisenseCfg, Parameters
-from veca_marl.algos.sac.config import ReplayCfg, SACCfg
+from veca_marl.algos.sac.config import ReplayCfg, SACCfg, Targets
 
 FORMS = {"continuous": {}, "discrete": {"discrete": True}, "hybrid": {"hybrid": True}}
 
@@ -43,6 +44,16 @@ def test_teams_learn_with_every_kind_of_parameters_and_critic(
     for seed in range(8):
         algorithm.learn(collect(algorithm, seed=seed, **team))
     assert return_of(algorithm.actor, **team) > 0.8
+
+
+def test_it_learns_without_target_networks(make_sac, collect):
+    critic = ActionValuesCfg(hidden=[32], normalisation=Normalisation.batch_renorm)
+    changes = {"targets": Targets.same, "critic": critic, "updates_per_frame": 0.3}
+    algorithm = make_sac(changes=changes, hybrid=True)
+    assert "target" not in algorithm.state_dict()
+    for seed in range(8):
+        algorithm.learn(collect(algorithm, seed=seed, hybrid=True))
+    assert return_of(algorithm.actor, hybrid=True) > 0.8
 
 
 def test_updates_follow_the_frames_and_begin_after_the_warm_up(make_sac, collect):
@@ -83,6 +94,11 @@ def test_a_gradient_that_is_not_finite_is_reported(make_sac, collect):
         ({"tau": 0.0}, r"algo.tau must be in \(0, 0.5\], got 0.0"),
         ({"batch_size": 0}, "algo.batch_size must be at least 1, got 0"),
         ({"learning_rate": -1.0}, "algo.learning_rate must be positive, got -1.0"),
+        ({"random_shift": -1}, "algo.random_shift must be 0 or more, got -1"),
+        (
+            {"critic": ActionValuesCfg(normalisation=Normalisation.batch_renorm)},
+            "batch_renorm needs algo.targets=same",
+        ),
         ({"policy_hidden": [0]}, r"algo.policy_hidden: widths must be positive, got \[0\]"),
     ],
 )

@@ -9,6 +9,7 @@ from functools import partial
 
 import torch
 from torch import Tensor, nn
+from torchrl.modules import BatchRenorm1d
 
 from veca_marl.algos.networks.factory import (
     NetworkCfg,
@@ -26,15 +27,38 @@ class Normalisation(Enum):
     Attributes:
         none: No normalisation.
         layer: Layer normalisation (Ba et al. 2016).
+        batch_renorm: Batch renormalisation (Ioffe 2017), for critics without target networks.
     """
 
     none = "none"
     layer = "layer"
+    batch_renorm = "batch_renorm"
+
+
+class BatchRenorm(nn.Module):
+    """TorchRL's `BatchRenorm1d` for inputs ``(..., features)``.
+
+    Args:
+        features: Width of the input.
+    """
+
+    def __init__(self, features: int) -> None:
+        super().__init__()
+        self.layer = BatchRenorm1d(features)
+
+    def forward(self, x: Tensor) -> Tensor:
+        """Normalise over all dimensions but the last."""
+        normalised: Tensor = self.layer(x.flatten(0, -2)).view_as(x)
+        # TorchRL 0.14 counts on, and corrects twice as much after twice the steps of its warm-up
+        count = self.layer.num_batches_tracked
+        count.copy_(count.clamp(max=self.layer.warmup_steps))
+        return normalised
 
 
 _LAYERS: dict[Normalisation, type[nn.Module] | None] = {
     Normalisation.none: None,
     Normalisation.layer: nn.LayerNorm,
+    Normalisation.batch_renorm: BatchRenorm,
 }
 
 

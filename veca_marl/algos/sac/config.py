@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 
 from veca_marl.algos.algorithm import AlgorithmCfg
-from veca_marl.algos.networks.action_values import ActionValuesCfg
+from veca_marl.algos.networks.action_values import ActionValuesCfg, Normalisation
 from veca_marl.algos.networks.factory import NetworkCfg
 from veca_marl.algos.networks.multisense import MultisenseCfg
 
@@ -22,6 +22,20 @@ class EncoderGradient(Enum):
 
     both = "both"
     critic = "critic"
+
+
+class Targets(Enum):
+    """The critics that give the targets.
+
+    Attributes:
+        average: A moving average of the critics.
+        same: The critics themselves, which read both ends of a window in one batch (CrossQ,
+            Bhatt et al. 2024, "CrossQ: batch normalization in deep reinforcement learning for
+            greater sample efficiency and simplicity").
+    """
+
+    average = "average"
+    same = "same"
 
 
 class Adaptation(Enum):
@@ -134,6 +148,7 @@ class SACCfg(AlgorithmCfg):
             date without gradient; not used without hidden state.
         max_gradient_norm: The gradients of critics with encoder, and of policy heads, are each
             scaled down to this norm.
+        targets: Which critics give the targets.
         tau: Share of the critics' parameters in the moving average that gives the targets (0.005:
             Haarnoja et al. 2018).
         updates_per_frame: Updates for each frame that is collected.
@@ -154,6 +169,7 @@ class SACCfg(AlgorithmCfg):
     sequence_steps: int = 16
     burn_in: int = 8
     max_gradient_norm: float = 5.0
+    targets: Targets = Targets.average
     tau: float = 0.005
     updates_per_frame: float = 0.125
     random_shift: int = 0
@@ -166,6 +182,12 @@ class SACCfg(AlgorithmCfg):
         for name in ("learning_rate", "max_gradient_norm", "updates_per_frame"):
             if not getattr(self, name) > 0.0:
                 raise ValueError(f"algo.{name} must be positive, got {getattr(self, name)}")
+        renormalised = self.critic.normalisation is Normalisation.batch_renorm
+        if renormalised and self.targets is Targets.average:
+            raise ValueError(
+                "algo.critic.normalisation=batch_renorm needs algo.targets=same: a moving average "
+                "of the critics has no statistics of its own inputs"
+            )
         if self.random_shift < 0:
             raise ValueError(f"algo.random_shift must be 0 or more, got {self.random_shift}")
         for name in ("steps", "batch_size", "sequence_steps"):

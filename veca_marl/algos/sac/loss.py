@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import torch
 from tensordict import TensorDict, TensorDictBase, TensorDictParams
@@ -12,7 +13,7 @@ from torchrl.objectives.common import LossModule
 
 from veca_marl.algos.networks.action_values import ActionValues, ActorCritics, mean_of_others
 from veca_marl.algos.sac.config import EncoderGradient
-from veca_marl.algos.sac.joint_action import JointAction, Proposed
+from veca_marl.algos.sac.joint_action import JointAction, Proposed, Taken
 from veca_marl.algos.sac.masks import masked_mean
 from veca_marl.algos.sac.readers import FeatureReader, StepReader
 from veca_marl.algos.sac.temperature import Temperatures
@@ -71,8 +72,12 @@ class TeamSACLoss(LossModule):
         temperatures: Weights of the entropy.
         encoder_gradient: Which loss trains the encoder.
         reader: Computes features of observations.
+
+    Attributes:
+        averages: Whether a moving average of the critics gives the targets.
     """
 
+    averages: ClassVar[bool] = True
     critic: _Critic
     critic_params: TensorDictParams
     target_critic_params: TensorDictParams
@@ -91,7 +96,7 @@ class TeamSACLoss(LossModule):
         self.out_keys: list[str] = []
         self._team, self._action = team, action
         critic = _Critic(network.encoder, network.values)
-        self.convert_to_functional(critic, "critic", create_target_params=True)
+        self.convert_to_functional(critic, "critic", create_target_params=self.averages)
         self.policy = network.actor[1:]  # heads and distribution, without the encoder
         self.temperatures = temperatures
         self._encoder_gradient = encoder_gradient
@@ -100,15 +105,14 @@ class TeamSACLoss(LossModule):
     def forward(self, batch: Transitions) -> Losses:
         """Return the losses of a batch."""
         features, after = self._reader.online(self.critic.encoder, batch)
-        target = self._target(batch, after)
-        error, value = self._critic_error(batch.first, features, target)
+        values, target = self._regression(batch, features, after)
+        error = (values - target).square().sum(0)
         if self._encoder_gradient is EncoderGradient.critic:
             policy_features = features.detach()
         else:
             policy_features = features
         proposed = self._propose(policy_features)
-        with self.critic_params.data.to_module(self.critic):  # no gradient to the critics
-            soft_value = self._soft_value(batch.first, features.detach(), proposed)
+        soft_value = self._evaluate(batch.first, features.detach(), proposed)
         counted = batch.counted
         entropy = sum(proposed.entropies.values(), torch.zeros(()))
         return Losses(
@@ -116,53 +120,100 @@ class TeamSACLoss(LossModule):
             policy=-masked_mean(soft_value, counted),
             temperature=self.temperatures.loss(proposed.entropies, counted),
             measures={
-                "value": masked_mean(value.detach(), counted),
+                "value": masked_mean(values.detach().mean(0), counted),
                 "entropy": masked_mean(entropy.detach(), counted),
             },
         )
 
-    def _critic_error(
-        self, rows: TensorDictBase, features: Tensor, target: Tensor
+    def _regression(
+        self, batch: Transitions, features: Tensor, after: Tensor
     ) -> tuple[Tensor, Tensor]:
-        """Return squared errors summed over critics, and the critics' mean value."""
-        taken = self._action.taken(rows)
-        values = self._values(rows, features, taken.vector, taken.code)
-        index = taken.combination.unsqueeze(-1).expand(*values.shape[:-1], 1)
-        chosen = values.gather(-1, index).squeeze(-1)
-        return (chosen - target).square().sum(0), chosen.mean(0)
-
-    @torch.no_grad()
-    def _target(self, batch: Transitions, after: Tensor) -> Tensor:
-        """Return the values ``(B, agents)`` that the critics should give.
+        """Return the values of the actions taken, and what they should be.
 
         Args:
             batch: The batch.
+            features: Features before the rewards.
             after: Features after the rewards, which the policy reads.
+
+        Returns:
+            Values ``(critics, B, agents)`` with gradient, targets ``(B, agents)`` without.
         """
+        taken = self._action.taken(batch.first)
+        values = self.critic.values(*self._inputs(batch.first, features, taken.vector, taken.code))
+        return _chosen(values, taken), self._target(batch, after)
+
+    @torch.no_grad()
+    def _target(self, batch: Transitions, after: Tensor) -> Tensor:
         proposed = self._propose(after)
         with self.target_critic_params.to_module(self.critic):
             features = self._reader.after(self.critic.encoder, batch)
-            value = self._soft_value(batch.last, features, proposed)
-        return batch.returns + batch.discount * value
+            values = self.critic.values(*self._proposed_inputs(batch.last, features, proposed))
+        return batch.returns + batch.discount * self._soft_value(values, proposed)
 
-    def _soft_value(self, rows: TensorDictBase, features: Tensor, proposed: Proposed) -> Tensor:
-        code = self._action.sample_code(proposed) if self.critic.values.central else None
-        values = self._values(rows, features, proposed.vector, code).amin(0)
-        expected = (proposed.probabilities * values).sum(-1)
+    def _evaluate(self, rows: TensorDictBase, features: Tensor, proposed: Proposed) -> Tensor:
+        """Return the soft value of proposed actions, without gradient to the critics."""
+        inputs = self._proposed_inputs(rows, features, proposed)
+        with self.critic_params.data.to_module(self.critic):
+            self.critic.values.eval()  # batch normalisation uses its running statistics
+            values = self.critic.values(*inputs)
+            self.critic.values.train()
+        return self._soft_value(values, proposed)
+
+    def _soft_value(self, values: Tensor, proposed: Proposed) -> Tensor:
+        """Return the soft value ``(B, agents)`` from ``(critics, B, agents, combinations)``."""
+        expected = (proposed.probabilities * values.amin(0)).sum(-1)
         return expected + self.temperatures.bonus(proposed.entropies)
 
-    def _values(
+    def _proposed_inputs(
+        self, rows: TensorDictBase, features: Tensor, proposed: Proposed
+    ) -> tuple[Tensor, ...]:
+        code = self._action.sample_code(proposed) if self.critic.values.central else None
+        return self._inputs(rows, features, proposed.vector, code)
+
+    def _inputs(
         self, rows: TensorDictBase, features: Tensor, vector: Tensor, code: Tensor | None
-    ) -> Tensor:
-        """Return ``(critics, B, agents, combinations)``."""
-        others = None
-        if self.critic.values.central and code is not None:
-            mask = rows.get((self._team, "mask"), None)
-            others = mean_of_others(torch.cat([features, code], -1), mask)
-        values: Tensor = self.critic.values(features, vector, others)
-        return values
+    ) -> tuple[Tensor, ...]:
+        """Return what `ActionValues` reads."""
+        if not self.critic.values.central or code is None:
+            return features, vector
+        mask = rows.get((self._team, "mask"), None)
+        return features, vector, mean_of_others(torch.cat([features, code], -1), mask)
 
     def _propose(self, features: Tensor) -> Proposed:
         state = TensorDict({}, features.shape[:-2])
         state[self._team, "features"] = features
         return self._action.propose(self.policy.get_dist(state))
+
+
+class TeamCrossQLoss(TeamSACLoss):
+    """SAC whose critics give their own targets.
+
+    The critics read both ends of each window in one batch, so that their batch normalisation
+    sees actions of the replay buffer and of the policy in the same proportion.
+
+    Source: Bhatt et al. 2024, "CrossQ: batch normalization in deep reinforcement learning for
+    greater sample efficiency and simplicity". For continuous actions it equals TorchRL's
+    `CrossQLoss`.
+    """
+
+    averages = False
+
+    def _regression(
+        self, batch: Transitions, features: Tensor, after: Tensor
+    ) -> tuple[Tensor, Tensor]:
+        """See `TeamSACLoss`."""
+        taken = self._action.taken(batch.first)
+        with torch.no_grad():
+            proposed = self._propose(after)
+        first = self._inputs(batch.first, features, taken.vector, taken.code)
+        last = self._proposed_inputs(batch.last, after, proposed)
+        joined = [torch.cat(pair) for pair in zip(first, last, strict=True)]
+        values, following = self.critic.values(*joined).chunk(2, dim=1)
+        soft_value = self._soft_value(following.detach(), proposed)
+        return _chosen(values, taken), batch.returns + batch.discount * soft_value
+
+
+def _chosen(values: Tensor, taken: Taken) -> Tensor:
+    """Return the values ``(critics, B, agents)`` of the combinations that were taken."""
+    index = taken.combination.unsqueeze(-1).expand(*values.shape[:-1], 1)
+    return values.gather(-1, index).squeeze(-1)

@@ -17,9 +17,9 @@ from veca_marl.algos.networks.action_values import make_actor_critics
 from veca_marl.algos.networks.exploration import UniformWarmUp
 from veca_marl.algos.networks.factory import check_same_network, trainable
 from veca_marl.algos.networks.memory import memory_size
-from veca_marl.algos.sac.config import SACCfg
+from veca_marl.algos.sac.config import SACCfg, Targets
 from veca_marl.algos.sac.joint_action import JointAction
-from veca_marl.algos.sac.loss import TeamSACLoss
+from veca_marl.algos.sac.loss import TeamCrossQLoss, TeamSACLoss
 from veca_marl.algos.sac.random_shift import RandomShift
 from veca_marl.algos.sac.readers import make_reader, memory_keys
 from veca_marl.algos.sac.replay import Replay, storage_needed
@@ -55,7 +55,7 @@ class SAC(Algorithm):
         memory = memory_keys(self.network.encoder, team)
         span = _span(cfg, recurrent=bool(memory))
         self.temperatures = Temperatures(spec.actions, cfg.temperature).to(device)
-        self.loss = TeamSACLoss(
+        self.loss = _LOSSES[cfg.targets](
             team,
             self.network,
             JointAction(team, spec.actions),
@@ -63,7 +63,7 @@ class SAC(Algorithm):
             cfg.encoder_gradient,
             make_reader(team, memory, span),
         ).to(device)
-        self.targets = SoftUpdate(self.loss, tau=cfg.tau)
+        self.targets = SoftUpdate(self.loss, tau=cfg.tau) if self.loss.averages else None
         self._critics = [*trainable(self.network.encoder), *self.network.values.parameters()]
         self._policy = list(self.loss.policy.parameters())
         learnt = [*self._critics, *self._policy, *self.temperatures.parameters()]
@@ -125,7 +125,8 @@ class SAC(Algorithm):
         (losses.critic + losses.policy + losses.temperature).backward()
         norms = [self._clip(self._critics), self._clip(self._policy)]
         self.optimizer.step()
-        self.targets.step()
+        if self.targets is not None:
+            self.targets.step()
         numbers = losses.measures | {"critic_loss": losses.critic, "policy_loss": losses.policy}
         measured = {name: float(number.detach()) for name, number in numbers.items()}
         return measured | {"critic_gradient_norm": norms[0], "policy_gradient_norm": norms[1]}
@@ -161,9 +162,9 @@ class SAC(Algorithm):
         self._updates, self._due = state["updates"], state["due"]
 
     def _parts(self) -> dict[str, Any]:
-        return {
+        target = {"target": self.loss.target_critic_params} if self.loss.averages else {}
+        return target | {
             "network": self.network,
-            "target": self.loss.target_critic_params,
             "temperatures": self.temperatures,
             "warm_up": self._warm_up,
             "optimizer": self.optimizer,
@@ -187,9 +188,11 @@ class SAC(Algorithm):
 
     def _reset_targets(self) -> None:
         """Make the target networks equal to the critics."""
-        self.loss.target_critic_params.data.copy_(self.loss.critic_params.data)
+        if self.loss.averages:
+            self.loss.target_critic_params.data.copy_(self.loss.critic_params.data)
 
 
+_LOSSES = {Targets.average: TeamSACLoss, Targets.same: TeamCrossQLoss}
 _MEASURES = (
     "critic_loss",
     "policy_loss",
