@@ -188,7 +188,9 @@ def test_senses_are_all_but_proprioception_unless_they_are_named():
     assert list(make("rnd", SPEC, senses=["proprioception"]).senses.widths) == ["proprioception"]
     alone = TeamSpec(1, {"proprioception": SPEC.observations["proprioception"]}, VECTOR.actions)
     assert list(make("rnd", alone).senses.widths) == ["proprioception"]
-    with pytest.raises(ValueError, match=r"no smell; choices: proprioception, vision, touch"):
+    with pytest.raises(
+        ValueError, match=r"team 'team' has no smell; choices: proprioception, vision, touch"
+    ):
         make("rnd", SPEC, senses=["smell"])
 
 

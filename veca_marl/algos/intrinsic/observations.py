@@ -18,11 +18,12 @@ _PROPRIOCEPTION = "proprioception"
 _BLOCK = 64  # rows that are pooled at a time: their floats fit the cache
 
 
-def chosen_senses(spec: TeamSpec, senses: Sequence[str]) -> list[str]:
+def chosen_senses(team: str, spec: TeamSpec, senses: Sequence[str]) -> list[str]:
     """Return the senses that an intrinsic reward reads.
 
     Args:
-        spec: Arrays of the team.
+        team: Name of the team, for the error message.
+        spec: Its arrays.
         senses: Names; none for all senses but proprioception, or for proprioception if the team
             has no other sense. Every movement changes proprioception, so that its novelty
             rewards movements of the body instead of what they cause.
@@ -33,7 +34,7 @@ def chosen_senses(spec: TeamSpec, senses: Sequence[str]) -> list[str]:
     unknown = sorted(set(senses) - set(spec.observations))
     if unknown:
         raise ValueError(
-            f"intrinsic.senses: there is no {', '.join(unknown)}; "
+            f"intrinsic.senses: team {team!r} has no {', '.join(unknown)}; "
             f"choices: {', '.join(spec.observations)}"
         )
     others = [name for name in spec.observations if name != _PROPRIOCEPTION]

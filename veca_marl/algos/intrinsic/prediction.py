@@ -69,7 +69,8 @@ class PredictionReward(IntrinsicReward):
         self, team: str, spec: TeamSpec, cfg: PredictionRewardCfg, device: torch.device
     ) -> None:
         self.team, self.spec, self.cfg, self._device = team, spec, cfg, device
-        layouts = {name: spec.observations[name] for name in chosen_senses(spec, cfg.senses)}
+        chosen = chosen_senses(team, spec, cfg.senses)
+        layouts = {name: spec.observations[name] for name in chosen}
         self.senses = NormalisedSenses(layouts, cfg.cells)
         self.model = self.make_model(self.senses.widths).to(device)
         self.senses.to(device)
