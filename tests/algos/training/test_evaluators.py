@@ -1,7 +1,9 @@
 """Evaluations in several processes give what one process gives."""
 
+import multiprocessing
 import os
 import signal
+import time
 from contextlib import closing
 
 import numpy as np
@@ -53,6 +55,20 @@ def test_new_parameters_reach_the_processes(policy):
     np.testing.assert_array_equal(after, returns(0, policy, SEVEN)[0])
 
 
+def test_a_process_that_is_killed_is_noticed_at_once(policy):
+    def wait():
+        for _ in range(100):
+            time.sleep(0.1)
+
+    players = Players(policy, ("agents",))
+    with closing(make_evaluator(make_fake_env, players, 2, 4)) as evaluator:
+        evaluator.play(SEVEN)
+        multiprocessing.active_children()[0].kill()
+        with pytest.raises(WorkerError, match=r"evaluation process [01] was killed by SIGKILL"):
+            wait()
+    assert not multiprocessing.active_children()
+
+
 class Failing(FakeEnv):
     def _step(self, td):
         raise ArithmeticError("a force is not finite")
@@ -74,8 +90,8 @@ def make_killed(worlds, seed):
 @pytest.mark.parametrize(
     ("make_env", "message"),
     [
-        (make_failing, "evaluation process 0: ArithmeticError: a force is not finite"),
-        (make_killed, "evaluation process 0 ended with status -9"),
+        (make_failing, "evaluation process [01]: ArithmeticError: a force is not finite"),
+        (make_killed, "evaluation process [01] was killed by SIGKILL"),
     ],
 )
 def test_a_process_that_fails_ends_the_evaluation(policy, make_env, message):

@@ -57,7 +57,7 @@ class SupervisedCollector(MultiSyncCollector):
 
     def __init__(self, make_envs: Sequence[Callable[[], Any]], policy: Any, **kwargs: Any) -> None:
         self._exceptions: SimpleQueue[tuple[int, str]] = multiprocessing.SimpleQueue()
-        self._restore_handler = _call_when_a_child_ends(self.check)
+        self._restore_handler = call_when_a_child_ends(self.check)
         schemes = {"policy": _SupervisedWeights()} if isinstance(policy, nn.Module) else {}
         try:
             super().__init__(
@@ -90,7 +90,7 @@ class SupervisedCollector(MultiSyncCollector):
             raise WorkerError(self._failure)
 
     def _find_failure(self) -> str:
-        ended = {i: _end_of(p) for i, p in enumerate(self.procs) if _has_ended(p)}
+        ended = {i: end_of(p) for i, p in enumerate(self.procs) if _has_ended(p)}
         raised = self._raised() if ended else {}
         return "; ".join(self._sentence(i, ended[i], raised) for i in ended)
 
@@ -193,11 +193,21 @@ def _start_worker(parent: int) -> None:
     end_with_parent(parent)
 
 
-def _call_when_a_child_ends(call: Callable[[], None]) -> Callable[[], None]:
-    """Call a function in the main thread when a child process ends; return what revokes it."""
+def call_when_a_child_ends(call: Callable[[], None]) -> Callable[[], None]:
+    """Call a function in the main thread when a child process ends; return what revokes it.
+
+    What was to be called before is called too.
+    """
     if not hasattr(signal, "SIGCHLD") or threading.current_thread() is not threading.main_thread():
         return lambda: None
-    previous = signal.signal(signal.SIGCHLD, lambda *_: call())
+    previous: Any = None
+
+    def handle(number: int, frame: Any) -> None:
+        call()
+        if callable(previous):
+            previous(number, frame)
+
+    previous = signal.signal(signal.SIGCHLD, handle)
 
     def restore() -> None:
         nonlocal previous
@@ -222,7 +232,8 @@ def _is_running(process: BaseProcess) -> bool:
         return False
 
 
-def _end_of(process: BaseProcess) -> str:
+def end_of(process: BaseProcess) -> str:
+    """Return how a process has ended, as the rest of a sentence."""
     code = process.exitcode or 0
     if code >= 0:
         return f"ended with exit code {code}"

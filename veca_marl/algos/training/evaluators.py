@@ -17,7 +17,7 @@ from torchrl.envs import EnvBase
 
 from veca_marl.algos.collection.experience import start_method, workers_ignore_interrupts
 from veca_marl.algos.collection.parent import end_with_parent
-from veca_marl.algos.collection.workers import WorkerError
+from veca_marl.algos.collection.workers import WorkerError, call_when_a_child_ends, end_of
 from veca_marl.algos.specs import EnvFactory
 from veca_marl.algos.training.evaluation import (
     Exploration,
@@ -145,6 +145,15 @@ class ParallelEvaluator:
                 there.close()
                 self._processes.append(process)
                 self._connections.append(here)
+        self._expected = True  # whether all processes should run
+        self._restore_handler = call_when_a_child_ends(self.check)
+
+    def check(self) -> None:
+        """Raise `WorkerError` if a process has ended; called as soon as one does."""
+        for index, process in enumerate(self._processes):
+            if self._expected and process.exitcode is not None:
+                self._expected = False
+                raise WorkerError(f"evaluation process {index} {end_of(process)}")
 
     def play(self, request: Request) -> dict[str, Scores]:
         """See `Evaluator`."""
@@ -162,6 +171,7 @@ class ParallelEvaluator:
                 raise EOFError
             answer = connection.recv()
         if isinstance(answer, str):
+            self._expected = False
             raise WorkerError(f"evaluation process {index}: {answer}")
         scores: dict[str, Scores] = answer
         return scores
@@ -171,15 +181,15 @@ class ParallelEvaluator:
         """Raise `WorkerError` in place of the error of a pipe whose other end is closed."""
         try:
             yield
-        except (EOFError, BrokenPipeError, ConnectionResetError) as error:
-            process = self._processes[index]
-            process.join()
-            raise WorkerError(
-                f"evaluation process {index} ended with status {process.exitcode}"
-            ) from error
+        except (EOFError, BrokenPipeError, ConnectionResetError):
+            self._processes[index].join()
+            self.check()
+            raise
 
     def close(self) -> None:
         """End the processes."""
+        self._expected = False
+        self._restore_handler()
         for process, connection in zip(self._processes, self._connections, strict=True):
             connection.close()
             process.terminate()
