@@ -5,7 +5,7 @@ BIN    := $(VENV)/bin
 ARGS   ?=
 CORES  ?= 2
 
-.PHONY: help train test test-all lint types format bench docs pages clean
+.PHONY: help train test test-all checks lint types kernels format bench docs pages clean
 
 help:
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/'
@@ -32,10 +32,16 @@ lint: $(VENV)/installed-test ## style, formatting and the import contracts
 types: $(VENV)/installed-test ## mypy --strict on the whole package
 	$(BIN)/mypy
 
-test: lint types ## lint, types, import contracts and the quick tests
+kernels: $(VENV)/installed-test ## compile the kernels of the simulator into the user's cache
+	$(BIN)/python scripts/compile_kernels.py
+
+checks: $(VENV)/installed-test
+	$(MAKE) --jobs $(CORES) lint types kernels
+
+test: checks ## lint, types, import contracts and the quick tests
 	$(BIN)/pytest -n $(CORES) -m "not slow" --durations=20 $(ARGS)
 
-test-all: lint types ## everything, the slow tests too
+test-all: checks ## everything, the slow tests too
 	$(BIN)/pytest -n $(CORES) --durations=20 $(ARGS)
 
 format: $(VENV)/installed-test ## format and fix with ruff

@@ -1,4 +1,4 @@
-from itertools import chain
+from itertools import chain, zip_longest
 
 import hydra
 import pytest
@@ -27,6 +27,8 @@ GROUPS = [
     *(f"senses/{name}" for name in SENSES),
 ]
 PRESETS = [(g, path.stem) for g in GROUPS for path in sorted((conf_dir() / g).glob("*.yaml"))]
+# the first preset of each group together, the second ones, ...: fewer compositions than presets
+TOGETHER = zip_longest(*([f"{g}={p}" for g, p in PRESETS if g == group] for group in GROUPS))
 EXPERIMENTS = sorted(path.stem for path in (conf_dir() / "experiment").glob("*.yaml"))
 
 
@@ -41,9 +43,9 @@ def test_every_task_has_a_file_and_every_file_a_task():
     assert {path.stem for path in (conf_dir() / "task").glob("*.yaml")} == set(TASKS)
 
 
-@pytest.mark.parametrize(("group", "preset"), PRESETS)
-def test_every_preset_composes(group, preset):
-    assert isinstance(compose([KICK, f"{group}={preset}"]), Config)
+@pytest.mark.parametrize("choices", [list(filter(None, row)) for row in TOGETHER], ids=" ".join)
+def test_every_preset_composes(choices):
+    assert isinstance(compose([KICK, *choices]), Config)
 
 
 @pytest.mark.parametrize("name", EXPERIMENTS)

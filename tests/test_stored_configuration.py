@@ -1,5 +1,7 @@
 """The configuration stored with a run is read with its types, without today's defaults."""
 
+from itertools import zip_longest
+
 import pytest
 from omegaconf import OmegaConf
 
@@ -10,9 +12,10 @@ from veca_marl.sim.hearing import AudioQuality
 
 BODIES = sorted(path.stem for path in (conf_dir() / "body").glob("*.yaml"))
 EXPERIMENTS = sorted(path.stem for path in (conf_dir() / "experiment").glob("*.yaml"))
+assert len(BODIES) <= len(TASKS)
 CHOICES = [
-    *([f"+task={name}"] for name in sorted(TASKS)),
-    *(["+task=KickTheBall", f"body={name}"] for name in BODIES),
+    # each body with another task: every task and every body once
+    *([f"+task={t}", *([f"body={b}"] if b else [])] for t, b in zip_longest(sorted(TASKS), BODIES)),
     *([f"+experiment={name}"] for name in EXPERIMENTS),
     ["+task=PushOut1v1", "+body@team.red.body=mitten", "+algo@learner.blue=mappo"],
 ]

@@ -95,12 +95,12 @@ class TaskCfg:
         Raises:
             ValueError: If the duration is not positive or a weight is not finite.
         """
-        self._check_positive("max_seconds")
+        self.check_positive("max_seconds")
         bad = {name: value for name, value in self.weights.items() if not math.isfinite(value)}
         if bad:
             raise ValueError(f"task.weights: {bad} must be finite numbers")
 
-    def _check_positive(self, *names: str) -> None:
+    def check_positive(self, *names: str) -> None:
         """Raise `ValueError` if a field is zero, negative or not finite."""
         for name in names:
             value = getattr(self, name)

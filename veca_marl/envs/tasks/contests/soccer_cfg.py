@@ -43,7 +43,7 @@ class SoccerCfg(TaskCfg):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        self._check_positive("radius_m", "mass_kg", "goal_from_wall_m", "kick_rest_s")
+        self.check_positive("radius_m", "mass_kg", "goal_from_wall_m", "kick_rest_s")
         for name in ("goal_width_m", "goal_height_m"):
             if not 2.0 * (self.radius_m + POST_M) < getattr(self, name) < math.inf:
                 raise ValueError(

@@ -33,7 +33,7 @@ class CrawlBabyCfg(StartCfg):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        self._check_positive("top_mps")
+        self.check_positive("top_mps")
 
 
 @register

@@ -32,7 +32,7 @@ class RunBabyCfg(StartCfg):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        self._check_positive("top_mps")
+        self.check_positive("top_mps")
         if not 0.0 <= self.fallen_m <= 0.5:
             raise ValueError(f"task.fallen_m={self.fallen_m} must be in [0, 0.5]")
 

@@ -33,7 +33,7 @@ class SitBabyCfg(StartCfg):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        self._check_positive("torso_m", "head_m")
+        self.check_positive("torso_m", "head_m")
         shares = self.starts.values()
         if not all(0.0 <= share < math.inf for share in shares) or sum(shares) == 0.0:
             raise ValueError(f"task.starts={self.starts} must be shares: 0 or more, not all 0")

@@ -56,7 +56,7 @@ class MultiAgentNavCfg(TaskCfg):
         if not isinstance(self.muted, Muted):
             choices = [choice.name for choice in Muted]
             raise ValueError(f"task.muted={self.muted!r}; choices: {choices}")
-        self._check_positive("radius_m", "reach_m")
+        self.check_positive("radius_m", "reach_m")
 
 
 @register

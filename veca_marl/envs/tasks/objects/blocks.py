@@ -31,7 +31,7 @@ class BlocksCfg(TaskCfg):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        self._check_positive("edge_m", "mass_kg", "friction")
+        self.check_positive("edge_m", "mass_kg", "friction")
         if self.edge_m > _HAND_SPAN_M:
             raise ValueError(
                 f"task.edge_m={self.edge_m}: a child's hands span at most {_HAND_SPAN_M} m"

@@ -39,7 +39,7 @@ class ToyCfg(TaskCfg):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        self._check_positive("edge_m", "mass_kg", "friction", "near_m")
+        self.check_positive("edge_m", "mass_kg", "friction", "near_m")
         if self.edge_m > _HAND_SPAN_M:
             raise ValueError(f"task.edge_m={self.edge_m}: hands span at most {_HAND_SPAN_M} m")
         near, far = self.ahead_m

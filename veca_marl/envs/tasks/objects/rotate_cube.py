@@ -44,7 +44,7 @@ class RotateCubeCfg(TaskCfg):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        self._check_positive("edge_m", "mass_kg", "friction")
+        self.check_positive("edge_m", "mass_kg", "friction")
         if not self.edge_m < self.lost_m < math.inf:
             raise ValueError(f"task.lost_m={self.lost_m} must be above task.edge_m={self.edge_m}")
         if not 0.0 <= self.start_deg <= 45.0:
