@@ -8,7 +8,8 @@ from torchrl.data import Categorical
 from torchrl.envs import ExplorationType, check_env_specs, set_exploration_type
 from training import SMALL
 
-from veca_marl.algos.networks.multisense import Critic, MultisenseCfg
+from veca_marl.algos.networks.memory import with_memory
+from veca_marl.algos.networks.multisense import Critic, Memory, MultisenseCfg
 from veca_marl.algos.ppo import PPO, PPOCfg
 from veca_marl.algos.ppo.losses import VALID, explained_variance
 from veca_marl.algos.ppo.value_normalisation import ValueNormalisation
@@ -32,14 +33,14 @@ class LeavingEnv(FakeEnv):
 
 @pytest.fixture(params=list(Critic))
 def leaving(request):
-    def make(hybrid=False, **numbers):
+    def make(hybrid=False, memory=Memory.none, **numbers):
         env = LeavingEnv(8, hybrid=hybrid)
         torch.manual_seed(0)
-        network = MultisenseCfg(**{**vars(SMALL), "critic": request.param})
-        cfg = PPOCfg(network=network, **numbers)
+        network = MultisenseCfg(**{**vars(SMALL), "critic": request.param, "memory": memory})
+        cfg = PPOCfg(network=network, sequence_steps=8, **numbers)
         ppo = PPO("agents", team_specs(env)["agents"], cfg, torch.device("cpu"))
         with torch.no_grad(), set_exploration_type(ExplorationType.RANDOM):
-            batch = env.rollout(16, ppo.actor, break_when_any_done=False)
+            batch = with_memory(env, ppo.actor).rollout(16, ppo.actor, break_when_any_done=False)
         return ppo, batch
 
     return make
@@ -76,8 +77,13 @@ def test_the_toy_with_a_mask_keeps_the_contract_of_torchrl():
 
 @pytest.mark.parametrize(
     "options",
-    [{}, {"hybrid": True}, {"value_normalisation": ValueNormalisation.popart}],
-    ids=["one_part", "two_parts", "popart"],
+    [
+        {},
+        {"hybrid": True},
+        {"value_normalisation": ValueNormalisation.popart},
+        {"memory": Memory.gru},
+    ],
+    ids=["one_part", "two_parts", "popart", "gru"],
 )
 def test_masked_rows_change_neither_gradient_nor_measures(leaving, options):
     ppo, batch = leaving(**options)

@@ -173,6 +173,19 @@ def test_a_task_that_needs_memory_is_learnt_with_a_gru_and_not_without():
     assert abs(trained_return(Memory.none, 4)) < 0.3
 
 
+def test_a_restored_buffer_has_the_hidden_states():
+    sac, _, _ = sampled()
+    sac.replay.cfg = replace(sac.replay.cfg, in_checkpoint=True)
+    other, _, _ = sampled()
+    other.replay.load_state_dict(sac.replay.state_dict())
+    drawn = []
+    for each in (sac, other):
+        torch.manual_seed(5)
+        drawn.append(each.replay.sample(8).sequences)
+    assert drawn[0][HIDDEN].any()
+    assert (drawn[0] == drawn[1]).all()
+
+
 def test_hidden_states_count_as_stored_bytes():
     sac, _, _ = sampled()
     without = storage_needed(team_specs(make_env(1, 0))["agents"], sac.cfg.replay)

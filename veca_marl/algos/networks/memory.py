@@ -57,7 +57,7 @@ def memory_size(policy: object) -> int:
 
 
 def with_memory(env: EnvBase, policy: object) -> EnvBase:
-    """Return `env` with what `policy` needs to remember; `env` itself if it has no hidden state."""
+    """Return `env` with the transform that carries the state of `policy`, if it has one."""
     return with_transform(env, memory_of(policy))
 
 
