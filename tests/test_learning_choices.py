@@ -10,8 +10,9 @@ from veca_marl.algos.networks.multisense import Critic, MultisenseCfg
 from veca_marl.algos.networks.precision import Precision
 from veca_marl.algos.ppo import PPOCfg
 from veca_marl.algos.training.loggers import LoggerKind
+from veca_marl.algos.training.stored import load_actor
 from veca_marl.config import ConfigError, compose, compose_node, to_config
-from veca_marl.runs.assembly import decide_precision
+from veca_marl.runs.assembly import decide_precision, read_specs
 from veca_marl.runs.run_folder import RunFolder
 from veca_marl.runs.training import run_training
 
@@ -107,6 +108,15 @@ def test_a_body_with_a_voice_is_trained(body):
     """Its action has two parts, move and voice."""
     result = run_training(compose([*SMALL, f"body={body}"]))
     assert result.metrics[-1]["agents/kl"] >= 0.0
+
+
+def test_an_action_of_two_parts_is_learnt_from_a_replay_buffer(tmp_path):
+    small = ["algo.replay.capacity=100", "algo.replay.warm_up_frames=20", "algo.batch_size=8"]
+    cfg = compose([*SMALL, "algo=sac_fast", "body=walker_voice", *small])
+    row = run_training(cfg, RunFolder(tmp_path)).metrics[-1]
+    assert row["agents/updates"] == 8.0
+    assert {"agents/alpha_move", "agents/alpha_voice"} <= row.keys()
+    assert load_actor(tmp_path, "agents", read_specs(cfg.game)["agents"]).out_keys
 
 
 def test_a_replay_buffer_that_does_not_fit_is_refused_before_the_run():

@@ -174,8 +174,9 @@ def test_teams_may_learn_by_different_algorithms(make_trainer):
     assert [line.split(":")[0] for line in lines] == ["red", "blue", "no best.pt"]
 
 
-def test_self_play_is_for_every_algorithm(make_trainer, tmp_path):
-    trainer = make_trainer("run", ToyDQNCfg(), 6, teams=("red", "blue"))
+@pytest.mark.parametrize("name", ["sac", "toy_dqn"])
+def test_self_play_is_for_every_algorithm(make_trainer, tmp_path, name):
+    trainer = make_trainer("run", ALL[name], 6, teams=("red", "blue"))
     pool = Pool(tmp_path / "run" / "pool")
     trainer.matchmaking = SelfPlay(SelfPlayCfg(["red", "blue"], 0.0), trainer.learners, pool, 0)
     trainer.run()
