@@ -24,10 +24,10 @@ from veca_marl.config.experiment import ExperimentCfg
 from veca_marl.reports.arms import Arm, compose_arms
 from veca_marl.reports.expert import expert_rows
 from veca_marl.reports.figure import check_plotting, draw
-from veca_marl.reports.gather import Found, Row, gather, read_rows, write_rows
+from veca_marl.reports.gather import Found, Row, found_in, gather, read_rows, write_rows
 from veca_marl.reports.page import Report, page
 from veca_marl.reports.runs import expert_score, runs_of, team_of
-from veca_marl.reports.summary import curve, summarise
+from veca_marl.reports.summary import summarise
 from veca_marl.reports.verdict import Evidence, judge
 
 FIGURE = "curves.png"
@@ -79,8 +79,8 @@ def make_report(options: ReportOptions, arms: Sequence[Arm], command: str) -> tu
     report = _report(experiment, command, rows, found)
     folder.mkdir(parents=True, exist_ok=True)
     write_rows(folder / "results.csv", rows)
-    curves = {arm.name: curve([r for r in report.runs if r.arm == arm.name]) for arm in arms}
-    drawn = {name: points for name, points in curves.items() if points}
+    by_arm = {arm.name: [run for run in report.runs if run.arm == arm.name] for arm in arms}
+    drawn = {name: runs for name, runs in by_arm.items() if runs}
     title = f"{arms[0].cfg.task.name}: {experiment.name}"
     draw(folder / FIGURE, drawn, report.baselines, title, f"{experiment.metric} of an episode")
     (folder / "report.md").write_text(page(report))
@@ -91,11 +91,14 @@ def _read(
     options: ReportOptions, arms: Sequence[Arm], name: str
 ) -> tuple[list[Found], list[Row], Path]:
     """Return the state of each run, the table of results and the folder of the report."""
+    seeds = arms[0].cfg.experiment.seeds
     if options.results is not None:
         path = Path(options.results)
-        return [], read_rows(path), Path(options.to or path.parent)
+        rows = read_rows(path)
+        found = found_in(rows, [arm.name for arm in arms], seeds)
+        return found, rows, Path(options.to or path.parent)
     runs = Path(options.runs or f"runs/{name}")
-    found, rows = gather(runs, {arm.name: arm.plain for arm in arms}, arms[0].cfg.experiment.seeds)
+    found, rows = gather(runs, {arm.name: arm.plain for arm in arms}, seeds)
     if rows:
         rows += expert_rows(arms[0].cfg, arms[0].name, options.expert_episodes)
     return found, rows, Path(options.to or runs)
@@ -128,8 +131,8 @@ def _commits(found: Sequence[Found]) -> list[str]:
     """Return the commits of the runs that count, or the versions of installed packages."""
     commits = set()
     for run in found:
-        path = run.folder / "provenance.json"
-        if run.counts and path.is_file():
+        path = None if run.folder is None else run.folder / "provenance.json"
+        if run.counts and path is not None and path.is_file():
             stored = json.loads(path.read_text())
             commits.add(str(stored.get("commit") or stored["packages"]["veca_marl"]))
     return sorted(commits)

@@ -54,9 +54,9 @@ def test_complete_runs_give_verdict_table_and_figure(tmp_path, arms, run):
     assert "verdict: holds" in printed
     page = (tmp_path / "report.md").read_text()
     assert "**Verdict.** Holds." in page
-    assert "| hrtf | 3 | 6.50 [6.00, 7.00] | 3 of 3 | 200 | 0.0 |" in page
-    assert "| mono | 3 | 0.23 [0.00, 0.50] | 0 of 3 | not reached | not reached |" in page
-    assert "Policy `random`: -0.50." in page
+    assert "| hrtf | 3 | 6.50 [6.00, 7.00] | -0.50 | 3 of 3 | 200 | 0.0 |" in page
+    assert "| mono | 3 | 0.23 [0.00, 0.50] | -0.50 | 0 of 3 | not reached | not reached |" in page
+    assert "lines in the figure: random -0.50." in page
     assert "`hrtf > mono` holds: difference 6.27 [" in page
     assert (tmp_path / "curves.png").read_bytes().startswith(b"\x89PNG")
 
@@ -72,6 +72,13 @@ def test_the_table_of_results_gives_the_same_report(tmp_path, arms, run):
     assert [line for line in without_commit if line] == [
         line for line in lines(tmp_path / "second") if line
     ]
+
+
+def test_runs_that_a_table_of_results_lacks_are_named(tmp_path, arms, run):
+    write_all(tmp_path, arms, [("mono", 2)])
+    run(f"runs={tmp_path}")
+    _, printed, _ = run(f"results={tmp_path / 'results.csv'}")
+    assert "mono, seed 2: missing in the table of results" in printed
 
 
 def lines(folder):

@@ -69,13 +69,15 @@ def test_equal_and_overlapping_arms_are_undecided():
 def test_two_runs_are_too_few():
     given = evidence(a=[6.0, 7.0], b=[0.0, 1.0, 2.0])
     assert judge(parse_claim("a > b", given.runs), given) == Judgement(
-        Verdict.undecided, "2 and 3 ended runs; 3 of each are needed"
+        Verdict.undecided, "2 and 3 ended runs; 3 of an arm are needed"
     )
 
 
 def test_runs_that_have_not_ended_do_not_count():
     given = Evidence({"a": [*runs("a", [6, 7]), *runs("a", [8], ended=False)]}, 3)
-    assert verdict("a > 1", given) is Verdict.undecided
+    assert judge(AboveNumber("a", 1.0), given) == Judgement(
+        Verdict.undecided, "2 ended runs; 3 of an arm are needed"
+    )
 
 
 def test_an_arm_is_compared_with_random_actions_in_its_own_runs():

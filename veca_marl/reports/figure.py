@@ -8,7 +8,8 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from veca_marl.reports.summary import CurvePoint
+from veca_marl.reports.runs import Run
+from veca_marl.reports.summary import curve
 
 _SIZE_INCHES = (5.5, 3.8)  # of one panel
 _DPI = 120
@@ -30,18 +31,19 @@ def check_plotting() -> None:
 
 def draw(
     path: Path,
-    curves: Mapping[str, Sequence[CurvePoint]],
+    arms: Mapping[str, Sequence[Run]],
     baselines: Mapping[str, float],
     title: str,
     label: str,
 ) -> None:
-    """Write the figure: interquartile means with their intervals, over frames and over minutes.
+    """Write the figure: scores over frames and over minutes.
 
-    The panel over minutes is left out where minutes were not measured.
+    Thick lines are interquartile means with their intervals, thin ones single runs. The panel over
+    minutes is left out where minutes were not measured.
 
     Args:
         path: The PNG file.
-        curves: Points of each arm.
+        arms: Runs of each arm.
         baselines: Score of each policy that does not learn; NaN is not drawn.
         title: Title of the figure.
         label: Label of the vertical axis.
@@ -50,13 +52,14 @@ def draw(
     from matplotlib.figure import Figure
 
     axes_names = ["frames"]
-    if all(not math.isnan(point.minutes) for points in curves.values() for point in points):
+    points = [point for runs in arms.values() for run in runs for point in run.points]
+    if not any(math.isnan(point.minutes) for point in points):
         axes_names.append("minutes")
     width, height = _SIZE_INCHES
     figure = Figure(figsize=(width * len(axes_names), height), layout="constrained")
     panels = figure.subplots(1, len(axes_names), squeeze=False, sharey=True)[0]
     for axis, name in zip(panels, axes_names, strict=True):
-        _draw_panel(axis, name, curves, baselines)
+        _draw_panel(axis, name, arms, baselines)
     panels[0].set_ylabel(label)
     panels[0].legend(frameon=False)
     figure.suptitle(title)
@@ -65,18 +68,27 @@ def draw(
 
 
 def _draw_panel(
-    axis: Any,
-    name: str,
-    curves: Mapping[str, Sequence[CurvePoint]],
-    baselines: Mapping[str, float],
+    axis: Any, name: str, arms: Mapping[str, Sequence[Run]], baselines: Mapping[str, float]
 ) -> None:
-    for arm, points in curves.items():
-        x = [getattr(point, name) for point in points]
-        (line,) = axis.plot(x, [point.score for point in points], label=arm)
-        low, high = zip(*(point.interval for point in points), strict=True)
-        axis.fill_between(x, low, high, color=line.get_color(), alpha=0.2, lw=0)
+    for arm, runs in arms.items():
+        colour = _draw_curve(axis, name, arm, runs)
+        for run in runs:
+            x = [getattr(point, name) for point in run.points]
+            axis.plot(x, [point.score for point in run.points], color=colour, lw=0.6, alpha=0.5)
     for style, (policy, score) in zip((":", "--"), baselines.items(), strict=False):
         if not math.isnan(score):
             axis.axhline(score, color="grey", ls=style, label=policy)
+    axis.margins(y=0.08)
     axis.set_xlabel("frames of experience" if name == "frames" else "minutes of training")
     axis.set_xlim(0, None)
+
+
+def _draw_curve(axis: Any, name: str, arm: str, runs: Sequence[Run]) -> Any:
+    """Draw the interquartile mean of an arm and its interval; return the colour of the line."""
+    points = curve(runs)
+    x = [getattr(point, name) for point in points]
+    (line,) = axis.plot(x, [point.score for point in points], label=arm, lw=2.0)
+    low, high = zip(*(point.interval for point in points), strict=True)
+    colour = line.get_color()
+    axis.fill_between(x, low, high, color=colour, alpha=0.2, lw=0)
+    return colour

@@ -24,7 +24,7 @@ class Found:
     Attributes:
         arm: Its arm.
         seed: Its seed.
-        folder: Where it is, or would be.
+        folder: Where it is, or would be; None in a table of results.
         state: How far it has come.
         counts: Whether it has ended with the configuration of the experiment.
         remark: What a reader has to know; empty for a finished run.
@@ -32,7 +32,7 @@ class Found:
 
     arm: str
     seed: int
-    folder: Path
+    folder: Path | None
     state: RunState
     counts: bool
     remark: str
@@ -112,6 +112,29 @@ def learning_minutes(metrics: Sequence[Mapping[str, str]]) -> tuple[Any, Any]:
     rates = np.array([float(row["frames_per_s"]) for row in metrics])
     seconds = np.diff(frames, prepend=0) / rates
     return frames, np.concatenate([[0.0], np.cumsum(seconds) / 60.0])
+
+
+def found_in(rows: Sequence[Row], arms: Sequence[str], seeds: Sequence[int]) -> list[Found]:
+    """Return what a table of results holds of each run of an experiment.
+
+    Args:
+        rows: The table, which `gather` made at an earlier time.
+        arms: The arms.
+        seeds: Seeds of each arm.
+    """
+    states = {(row["arm"], row["seed"]): row.get("state") or "finished" for row in rows}
+    return [
+        _found_in(arm, seed, states.get((arm, str(seed)), "missing"))
+        for arm in arms
+        for seed in seeds
+    ]
+
+
+def _found_in(arm: str, seed: int, name: str) -> Found:
+    state = RunState(name)
+    remark = "" if state is RunState.finished else f"{name} in the table of results"
+    counts = state in (RunState.finished, RunState.cut)
+    return Found(arm, seed, None, state, counts, remark)
 
 
 def write_rows(path: Path, rows: Sequence[Row]) -> None:

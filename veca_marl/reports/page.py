@@ -85,9 +85,9 @@ def _verdict_lines(judgements: Mapping[str, Judgement]) -> list[str]:
 
 def _caption(report: Report) -> str:
     return (
-        f"Lines are interquartile means of `{report.experiment.metric}` of team "
+        f"Thick lines are interquartile means of `{report.experiment.metric}` of team "
         f"`{report.team}` over runs, areas and brackets 95 % stratified bootstrap intervals over "
-        "runs (Agarwal et al. 2021). Intervals over few runs are too narrow: resampling cannot "
+        "runs (Agarwal et al. 2021), thin lines single runs. Intervals over few runs are too narrow: resampling cannot "
         "show values that no run has. Minutes are those of collection and learning, without "
         "evaluations."
     )
@@ -95,9 +95,14 @@ def _caption(report: Report) -> str:
 
 def _arm_table(report: Report) -> list[str]:
     threshold = report.experiment.threshold
-    head = ["arm", "ended runs", "final score"]
+    head = ["arm", "ended runs", "final score", "random policy"]
     rows = [
-        [summary.arm, str(summary.ended), _interval(summary.score, *summary.interval)]
+        [
+            summary.arm,
+            str(summary.ended),
+            _interval(summary.score, *summary.interval),
+            _number(summary.random, 2),
+        ]
         for summary in report.summaries
     ]
     if threshold is not None:
@@ -112,11 +117,8 @@ def _arm_table(report: Report) -> list[str]:
 
 
 def _baseline_lines(baselines: Mapping[str, float]) -> list[str]:
-    return [
-        f"Policy `{name}`: {score:.2f}."
-        for name, score in baselines.items()
-        if not math.isnan(score)
-    ]
+    known = [f"{name} {score:.2f}" for name, score in baselines.items() if not math.isnan(score)]
+    return [f"Policies that do not learn, as lines in the figure: {', '.join(known)}."]
 
 
 def _remark_lines(report: Report) -> list[str]:

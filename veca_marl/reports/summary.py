@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from veca_marl.reports.runs import Run, final_scores
+from veca_marl.reports.runs import Run, final_scores, random_scores
 from veca_marl.reports.statistics import Interval, bootstrap_interval, interquartile_mean
 
 _SEED = 0
@@ -46,6 +46,7 @@ class ArmSummary:
         frames: Median frames until the threshold; infinite if fewer than half reached it, NaN
             without a threshold.
         minutes: Median minutes of collection and learning until the threshold, likewise.
+        random: Mean score of the random policy beside the ended runs; NaN if not measured.
     """
 
     arm: str
@@ -55,6 +56,7 @@ class ArmSummary:
     reached: int
     frames: float
     minutes: float
+    random: float
 
 
 def curve(runs: Sequence[Run]) -> list[CurvePoint]:
@@ -79,7 +81,7 @@ def summarise(arm: str, runs: Sequence[Run], threshold: float | None) -> ArmSumm
     """Return the numbers of an arm; runs that have not ended are left out."""
     ended = [run for run in runs if run.ended]
     if not ended:
-        return ArmSummary(arm, 0, math.nan, (math.nan, math.nan), 0, math.nan, math.nan)
+        return ArmSummary(arm, 0, math.nan, (math.nan, math.nan), 0, *[math.nan] * 3)
     scores = final_scores(ended)
     interval = bootstrap_interval(interquartile_mean, [scores], np.random.default_rng(_SEED))
     passed = [None if threshold is None else run.reached(threshold) for run in ended]
@@ -93,6 +95,7 @@ def summarise(arm: str, runs: Sequence[Run], threshold: float | None) -> ArmSumm
         len(reached),
         _median([*(float(point.frames) for point in reached), *late]),
         _median([*(point.minutes for point in reached), *late]),
+        float(random_scores(ended).mean()),
     )
 
 

@@ -106,7 +106,7 @@ def _constant(number: float) -> Scores:
 
 def _judge_above(one: Scores, other: Scores, number: str | None = None) -> Judgement:
     """Judge whether `one` is above `other`; a `number` names a score without spread."""
-    if (few := _too_few(one, other)) is not None:
+    if (few := _too_few(one, *([other] if number is None else []))) is not None:
         return few
     interval = _difference_interval(one, other)
     if number is None:
@@ -142,12 +142,12 @@ def _judge_count(claim: RunsAbove, evidence: Evidence) -> Judgement:
     return Judgement(Verdict.does_not_hold if impossible else Verdict.undecided, reason)
 
 
-def _too_few(one: Scores, other: Scores) -> Judgement | None:
-    counts = len(one), len(other)
+def _too_few(*arms: Scores) -> Judgement | None:
+    counts = [len(scores) for scores in arms]
     if min(counts) >= MIN_RUNS:
         return None
-    runs = " and ".join(map(str, dict.fromkeys(counts)))
-    return Judgement(Verdict.undecided, f"{runs} ended runs; {MIN_RUNS} of each are needed")
+    runs = " and ".join(map(str, counts))
+    return Judgement(Verdict.undecided, f"{runs} ended runs; {MIN_RUNS} of an arm are needed")
 
 
 def _difference_interval(one: Scores, other: Scores) -> Interval:
