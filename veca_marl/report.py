@@ -25,7 +25,7 @@ from veca_marl.reports.arms import Arm, compose_arms
 from veca_marl.reports.expert import expert_rows
 from veca_marl.reports.figure import check_plotting, draw
 from veca_marl.reports.gather import Found, Row, found_in, gather, read_rows, write_rows
-from veca_marl.reports.page import Report, page
+from veca_marl.reports.page import Report, page, remarks
 from veca_marl.reports.runs import expert_score, runs_of, team_of
 from veca_marl.reports.summary import summarise
 from veca_marl.reports.verdict import Evidence, judge
@@ -144,10 +144,8 @@ def run(options: ReportOptions, overrides: list[str]) -> None:
     report, folder = make_report(options, compose_arms(overrides), command)
     for text, judgement in report.judgements.items():
         print(f"{text}: {judgement.verdict.value}: {judgement.reason}")
-    for found in report.found:
-        if found.remark:
-            print(f"{found.arm}, seed {found.seed}: {found.remark}")
-    print(f"verdict: {report.verdict}", f"report: {folder / 'report.md'}", sep="\n")
+    ends = [f"verdict: {report.verdict}", f"report: {folder / 'report.md'}"]
+    print(*remarks(report.found), *ends, sep="\n")
 
 
 def main(words: Sequence[str] | None = None) -> int:

@@ -8,8 +8,10 @@ from stored_runs import write_run
 from veca_marl import report
 from veca_marl.reports import figure
 from veca_marl.reports.arms import compose_arms
-from veca_marl.reports.gather import gather, run_folder
+from veca_marl.reports.gather import Found, gather, run_folder
+from veca_marl.reports.page import remarks
 from veca_marl.reports.runs import runs_of, team_of
+from veca_marl.sweeps.run_state import RunState
 
 EXPERIMENT = ["+experiment=audio_ablation", "total_frames=200"]
 RETURNS = {"hrtf": (6.0, 6.5, 7.0), "stereo": (5.0, 5.5, 6.0), "mono": (0.0, 0.5, 0.2)}
@@ -79,6 +81,17 @@ def test_runs_that_a_table_of_results_lacks_are_named(tmp_path, arms, run):
     run(f"runs={tmp_path}")
     _, printed, _ = run(f"results={tmp_path / 'results.csv'}")
     assert "mono, seed 2: missing in the table of results" in printed
+
+
+def test_equal_remarks_are_one_line():
+    found = [
+        Found(arm, seed, None, RunState.missing, False, remark)
+        for arm, seed, remark in (("a", 0, "x"), ("a", 1, "x"), ("b", 0, "x"), ("b", 1, ""))
+    ]
+    assert remarks([*found, Found("b", 2, None, RunState.cut, True, "y")]) == [
+        "a, seeds 0, 1; b, seed 0: x",
+        "b, seed 2: y",
+    ]
 
 
 def lines(folder):

@@ -87,9 +87,9 @@ def _caption(report: Report) -> str:
     return (
         f"Thick lines are interquartile means of `{report.experiment.metric}` of team "
         f"`{report.team}` over runs, areas and brackets 95 % stratified bootstrap intervals over "
-        "runs (Agarwal et al. 2021), thin lines single runs. Intervals over few runs are too narrow: resampling cannot "
-        "show values that no run has. Minutes are those of collection and learning, without "
-        "evaluations."
+        "runs (Agarwal et al. 2021), thin lines single runs. Intervals over few runs are too "
+        "narrow: resampling cannot show values that no run has. Minutes are those of collection "
+        "and learning, without evaluations."
     )
 
 
@@ -123,11 +123,7 @@ def _baseline_lines(baselines: Mapping[str, float]) -> list[str]:
 
 def _remark_lines(report: Report) -> list[str]:
     """Return what a reader has to know about single runs and about all."""
-    lines = [
-        f"- {found.arm}, seed {found.seed}: {found.remark}"
-        for found in report.found
-        if found.remark
-    ]
+    lines = [f"- {line}" for line in remarks(report.found)]
     fewest = min((run.final.episodes for run in report.runs), default=EPISODES_OF_FIGURES)
     if 0 < fewest < EPISODES_OF_FIGURES:
         lines.append(
@@ -138,6 +134,22 @@ def _remark_lines(report: Report) -> list[str]:
     elif report.commits:
         lines.append(f"- commit {report.commits[0]}")
     return ["**Remarks**", "", *lines] if lines else []
+
+
+def remarks(found: Sequence[Found]) -> list[str]:
+    """Return a line for each remark, which names all runs that it is about."""
+    seeds: dict[str, dict[str, list[str]]] = {}
+    for run in found:
+        if run.remark:
+            seeds.setdefault(run.remark, {}).setdefault(run.arm, []).append(str(run.seed))
+    return [
+        f"{'; '.join(map(_seeds, *zip(*arms.items(), strict=True)))}: {remark}"
+        for remark, arms in seeds.items()
+    ]
+
+
+def _seeds(arm: str, seeds: Sequence[str]) -> str:
+    return f"{arm}, seed{'s' if len(seeds) > 1 else ''} {', '.join(seeds)}"
 
 
 def _run_table(report: Report) -> list[str]:
