@@ -17,9 +17,9 @@ def elo_ratings(
 ) -> NDArray[np.float64]:
     """Return the ratings under which the results are most likely.
 
-    The model is Elo's: the favourite by d points scores 1 / (1 + 10^(-d / 400)) of a game. Fitted
-    to all games at once (Bradley & Terry 1952) they do not depend on the order of the games, as
-    ratings that are updated game by game do.
+    In Elo's model a player rated d points higher has the expected score 1 / (1 + 10^(-d / 400)).
+    The likelihood of all games is maximised at once (Bradley & Terry 1952), so that the ratings do
+    not depend on the order of the games, as ratings that are updated after each game do.
 
     Args:
         wins: ``(n, n)`` number of games that i won against j; a draw is half a game for each.
@@ -38,11 +38,11 @@ def elo_ratings(
     if not prior_games > 0.0:
         raise ValueError(f"prior_games={prior_games} must be positive")
 
-    def surprise(strengths: NDArray[np.float64]) -> float:
+    def negative_log_likelihood(strengths: NDArray[np.float64]) -> float:
         ahead = strengths[:, None] - strengths[None, :]
         drawn = log_expit(strengths) + log_expit(-strengths)
         return -float((wins * log_expit(ahead)).sum() + 0.5 * prior_games * drawn.sum())
 
-    fitted = minimize(surprise, np.zeros(len(wins)), method="BFGS")
+    fitted = minimize(negative_log_likelihood, np.zeros(len(wins)), method="BFGS")
     strengths: NDArray[np.float64] = fitted.x - fitted.x.mean()
     return mean + POINTS_PER_NEPER * strengths

@@ -74,11 +74,11 @@ def play_all(
         for other in members[second]:
             pool.load_into(policy.actors[second], second, other)
             scores = evaluate(env, policy.play, episodes, seed, Exploration.stochastic)
-            matches.append(_judge({first: one, second: other}, scores, draw_margin))
+            matches.append(_match({first: one, second: other}, scores, draw_margin))
     return matches
 
 
-def _judge(members: dict[str, int], scores: dict[str, Scores], draw_margin: float) -> Match:
+def _match(members: dict[str, int], scores: dict[str, Scores], draw_margin: float) -> Match:
     first, second = members
     ahead = scores[first].returns - scores[second].returns
     wins = {
