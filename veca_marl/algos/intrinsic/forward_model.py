@@ -28,9 +28,9 @@ class ForwardModel(PredictionReward):
 
     Observations are embedded by a fixed random network (Burda et al. 2019, "Large-scale study of
     curiosity-driven learning", random features). The predictor reads the embedded observation and
-    every part of the action (discrete parts one-hot) and gives the change of the embedding. Observations
-    that are random whatever the agent does keep a large error (the noisy-TV problem of that study).
-    TorchRL has no forward model.
+    every part of the action (discrete parts one-hot) and gives the change of the embedding.
+    Observations that are random whatever the agent does keep a large error (the noisy-TV problem
+    of that study). TorchRL has no forward model.
     """
 
     def make_model(self, widths: dict[str, int]) -> nn.Module:
