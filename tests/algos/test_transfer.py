@@ -6,9 +6,12 @@ from fake_env import make_fake_env
 from toy_dqn import ToyDQNCfg, register
 from training import SMALL
 
-from veca_marl.algos.networks.multisense import MultisenseCfg, Parameters
+from veca_marl.algos.intrinsic import RNDCfg
+from veca_marl.algos.networks.memory import with_memory
+from veca_marl.algos.networks.multisense import Memory, MultisenseCfg, Parameters
 from veca_marl.algos.plain import to_plain
 from veca_marl.algos.ppo import PPOCfg
+from veca_marl.algos.ppo.value_normalisation import ValueNormalisation
 from veca_marl.algos.sac import SACCfg
 from veca_marl.algos.sac.config import ReplayCfg
 from veca_marl.algos.sense_encoders import sense_encoders
@@ -159,3 +162,21 @@ def test_a_frozen_sense_without_encoder_is_refused():
 def test_specs_are_restored_from_plain_data():
     for spec in make_learners(teams=("red", "blue")).specs.values():
         assert TeamSpec.from_dict(spec.to_dict()) == spec
+
+
+def test_a_recurrent_network_takes_frozen_encoders_intrinsic_rewards_and_popart(tmp_path):
+    recurrent = network(memory=Memory.gru, frozen=["vision"])
+    popart = ValueNormalisation.popart
+    cfg = PPOCfg(network=recurrent, sequence_steps=8, value_normalisation=popart)
+    torch.manual_seed(2)
+    specs = team_specs(make_fake_env(1, 0, agents=2))
+    here = TeamLearners(specs, cfg, CPU, intrinsic={"agents": RNDCfg()})
+    there = make_learners(seed=1)
+    init_teams(here, {}, {"agents": {"vision": store(there, tmp_path)}})
+    env = with_memory(make_fake_env(4, 0, agents=2), here.policy.collect)
+    with torch.no_grad():
+        batch = env.rollout(16, here.policy.collect, break_when_any_done=False)
+    measures = here.learn(batch)["agents"]
+    assert measures["value_loss"] < 10.0
+    assert measures["intrinsic_loss"] > 0.0
+    assert torch.equal(encoders(here)["vision"][0], encoders(there)["vision"][0])
