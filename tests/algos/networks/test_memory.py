@@ -17,7 +17,7 @@ from veca_marl.algos.selfplay.pool import Pool
 from veca_marl.algos.selfplay.tournament import play_all
 from veca_marl.algos.specs import team_specs
 from veca_marl.algos.training.checkpoint import Checkpoints, Identity
-from veca_marl.algos.training.evaluation import EvalCfg, Exploration, evaluate
+from veca_marl.algos.training.evaluation import EvalCfg, Exploration, RandomTeams, evaluate
 from veca_marl.algos.training.learners import TeamLearners
 from veca_marl.algos.training.loop import Trainer
 from veca_marl.algos.training.progress import Budget
@@ -123,6 +123,27 @@ def test_past_policies_with_memory_play_a_tournament(tmp_path):
     members = {team: [0] for team in TEAMS}
     (match,) = play_all(env, learners.policy.copy(), pool, members, 6, 0.5, 0)
     assert match.episodes == 6
+
+
+def test_a_frozen_policy_with_memory_plays_against_a_learner_without():
+    specs = team_specs(make_show_once(1, 0, teams=TEAMS))
+    frozen = {"blue": make_learners(GRU, teams=TEAMS).algorithms["blue"].actor}
+    learners = TeamLearners(specs, PPOCfg(network=SMALL), CPU, frozen=frozen)
+    experience = Experience(
+        lambda worlds, seed: make_show_once(worlds, seed, teams=TEAMS),
+        learners.policy.copy().collect,
+        CollectCfg(0, worlds=4, steps=16),
+    )
+    experience.restart(0)
+    batch = experience.collect()
+    experience.close()
+    assert set(learners.learn(batch)) == {"red"}
+    later = ~batch["is_init"].squeeze(-1)
+    assert batch["blue", "memory", "hidden"][later].any(-1).all()
+    baseline = RandomTeams(make_show_once(2, 0, teams=TEAMS), ["red"], list(frozen.values()))
+    env = make_show_once(2, 0, teams=TEAMS)
+    scores = evaluate(env, baseline, 4, 1, Exploration.deterministic)
+    assert len(scores["red"].returns) == 4
 
 
 def test_evaluation_begins_without_memory():
