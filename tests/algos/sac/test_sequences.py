@@ -1,6 +1,8 @@
 """SAC of networks with hidden state: windows, burn-in, gradients through time, a memory task."""
 
+import math
 from dataclasses import replace
+from functools import partial
 
 import pytest
 import torch
@@ -11,10 +13,11 @@ from timed_batches import SPEC, batch_of
 from training import SMALL
 
 from veca_marl.algos.collection.experience import CollectCfg, Experience
-from veca_marl.algos.networks.action_values import ActionValuesCfg
-from veca_marl.algos.networks.multisense import Memory, Parameters
+from veca_marl.algos.networks.action_values import ActionValuesCfg, Normalisation
+from veca_marl.algos.networks.memory import with_memory
+from veca_marl.algos.networks.multisense import Critic, Memory, Parameters
 from veca_marl.algos.networks.precision import Precision
-from veca_marl.algos.sac.config import ReplayCfg, SACCfg
+from veca_marl.algos.sac.config import EncoderGradient, ReplayCfg, SACCfg, Targets
 from veca_marl.algos.sac.readers import SequenceReader
 from veca_marl.algos.sac.replay import Replay, storage_needed
 from veca_marl.algos.sac.sac import SAC
@@ -25,6 +28,7 @@ from veca_marl.algos.training.evaluation import Exploration, evaluate
 
 CPU = torch.device("cpu")
 GRU = replace(SMALL, memory=Memory.gru, memory_features=16, precision=Precision.float32)
+WHOLE = {"break_when_any_done": False}
 HIDDEN = ("agents", "memory", "hidden")
 NUMBERS = {
     "critic": ActionValuesCfg(hidden=[32]),
@@ -151,6 +155,34 @@ def test_targets_unroll_the_averaged_parameters():
     _, online = reader.online(sac.loss.critic.encoder, batch)
     assert online.abs().max() > 0.05
     assert after.abs().max() < online.abs().max() / 4
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"random_shift": 2, "encoder_gradient": EncoderGradient.critic, "steps": 3},
+        {
+            "targets": Targets.same,
+            "critic": ActionValuesCfg(hidden=[8], normalisation=Normalisation.batch_renorm),
+        },
+        {"network": replace(GRU, critic=Critic.central, parameters=Parameters.separate)},
+    ],
+    ids=["sac_fast", "crossq", "central"],
+)
+def test_every_option_of_sac_learns_from_sequences(changes):
+    torch.manual_seed(0)
+    env = partial(make_fake_env, horizon=6, agents=2, hybrid=True)
+    few = {"network": GRU, "replay": ReplayCfg(1000, 64), "updates_per_frame": 0.02}
+    numbers = NUMBERS | few | changes
+    sac = SAC("agents", team_specs(env(1, 0))["agents"], SACCfg(**numbers), CPU)
+    memory = {name: p.clone() for name, p in sac.network.named_parameters() if ".gru." in name}
+    with torch.no_grad():
+        batch = with_memory(env(4, 0), sac.explorer).rollout(32, sac.explorer, **WHOLE)
+    sac.learn(batch)
+    assert all(math.isfinite(number) for number in sac.update().values())
+    learnt = dict(sac.network.named_parameters())
+    assert memory
+    assert all((learnt[name] != before).any() for name, before in memory.items())
 
 
 def trained_return(memory, batches):
