@@ -32,6 +32,17 @@ def test_it_is_read_as_it_was_stored(overrides, tmp_path):
     assert to_config(read_again(node, tmp_path / "config.yaml")) == to_config(node)
 
 
+def test_a_run_of_version_0_2_is_read(tmp_path):
+    """It has no intrinsic rewards, and another name for the runs that teams start from."""
+    node = compose_node(["+task=PushOut1v1", "init_from.red=runs/there"])
+    plain = OmegaConf.to_container(node, resolve=True, enum_to_str=True)
+    plain["warm_start"] = plain.pop("init_from")
+    for key in ("intrinsic", "team_intrinsic", "init_encoders"):
+        del plain[key]
+    read = typed(OmegaConf.create(plain), body_names(node))
+    assert to_config(read) == to_config(node)
+
+
 @pytest.fixture
 def stored(tmp_path):
     node = compose_node(

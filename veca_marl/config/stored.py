@@ -49,6 +49,7 @@ def typed(stored: DictConfig, bodies: Mapping[str, str]) -> DictConfig:
         ConfigError: If an entry has no counterpart in this version.
     """
     load_config_plugins(stored.get("plugins", []))
+    stored = _of_this_version(stored)
     try:
         node = root_schema()
         node.task = OmegaConf.structured(find_task(stored.task.name).cfg_type())
@@ -65,6 +66,15 @@ def typed(stored: DictConfig, bodies: Mapping[str, str]) -> DictConfig:
         return cast(DictConfig, OmegaConf.merge(node, stored))
     except (OmegaConfBaseException, ValueError, KeyError) as error:
         raise ConfigError(f"stored configuration: {one_line(error)}") from error
+
+
+def _of_this_version(stored: DictConfig) -> DictConfig:
+    """Return a stored configuration with the keys that were renamed or added since version 0.2."""
+    current = stored.copy()
+    if "warm_start" in current:
+        current.init_from = current.pop("warm_start")
+    added = {"intrinsic": {"name": NONE}, "team_intrinsic": {}}
+    return cast(DictConfig, OmegaConf.merge(added, current))
 
 
 def _algorithm(stored: DictConfig) -> Any:

@@ -81,7 +81,8 @@ class Trainer:
         self.checkpoints.remove_old()
         with naming_checkpoint(path):
             self.learners.load_state_dict(state["algorithm"])
-            self.learners.load_intrinsic_state(state["intrinsic"])
+            # runs of version 0.2 have no intrinsic rewards and no such entry
+            self.learners.load_intrinsic_state(state.get("intrinsic", {}))
             self.progress = Progress(**state["progress"])
         self.policy.take_over(self.learners.policy)
         self._resumed_frames = self.progress.frames
