@@ -5,7 +5,15 @@ import signal
 import pytest
 
 # they take longest: with several test processes they must not be left for the end
-LONGEST = ("first_light.ipynb", "train_in_a_notebook.ipynb", "test_docs.py", "test_wheel.py")
+LONGEST = (
+    "first_light.ipynb",
+    "train_in_a_notebook.ipynb",
+    "test_wheel.py",
+    "test_plugins.py",
+    "test_guides.py",
+    "test_killed_runs.py",
+    "test_broken_runs.py",
+)
 
 
 def pytest_collection_modifyitems(items):

@@ -180,6 +180,6 @@ def kicks_of_expert(audio, episodes):
 
 
 def test_the_expert_needs_both_ears():
-    hrtf, mono = kicks_of_expert("hrtf", 6), kicks_of_expert("mono", 6)
+    hrtf, mono = kicks_of_expert("hrtf", 3), kicks_of_expert("mono", 3)
     assert hrtf.mean() > 2.0
     assert hrtf.mean() > 2.0 * mono.mean()

@@ -267,9 +267,8 @@ def test_the_expert_of_a_joint_level_body_crawls_to_a_visible_object_and_calls()
     game.close()
 
 
-@pytest.mark.parametrize(
-    "body", ["mitten_voice", pytest.param("full_voice", marks=pytest.mark.slow)]
-)
+@pytest.mark.slow  # one room and a wall: the tests before and after it
+@pytest.mark.parametrize("body", ["mitten_voice", "full_voice"])
 def test_the_experts_on_hands_and_knees_solve_a_house(body):
     game = game_of(f"body={body}", "task.max_seconds=90", playground="seven_rooms")
     assert math.isfinite(seconds_needed(game, seed=1))
@@ -338,6 +337,7 @@ def test_muted_agents_depend_on_the_starting_rooms():
     }
 
 
+@pytest.mark.slow  # which agents are muted: test_muted_agents_depend_on_the_starting_rooms
 def test_the_experts_fail_more_often_without_the_voice_of_the_finder():
     """From the same starts; see experiments/calling for the full measurement."""
     times = {}
