@@ -131,6 +131,8 @@ class SupervisedCollector(MultiSyncCollector):
 
     def _raise_worker_error(self, error: BaseException) -> None:
         """Raise `WorkerError` in place of `error` if a worker has ended."""
+        if isinstance(error, WorkerError):  # of this collector, or of another group of processes
+            return
         try:
             self.check()
         except WorkerError as found:
