@@ -1,6 +1,8 @@
 """The benchmark: the stopwatch, the command, free play and the references."""
 
 import json
+import subprocess
+import sys
 from itertools import count
 
 import numpy as np
@@ -10,6 +12,7 @@ from composed import compose
 
 from veca_marl.bench.command import main
 from veca_marl.bench.free_play import free_play
+from veca_marl.bench.learning import _processor_s
 from veca_marl.bench.references import as_visual_shapes, busy_room, measure_ears, tiny_view
 from veca_marl.bench.rollouts import measure_rollouts
 from veca_marl.bench.skin_costs import touched_child
@@ -135,6 +138,32 @@ def test_results_as_tables_and_json(tmp_path, capsys):
     assert (found["machine"]["commit"] or "unknown") in printed.splitlines()[0]
 
 
+def test_learning_is_measured_beside_rollouts(tmp_path, capsys):
+    file = tmp_path / "bench.json"
+    words = ["+task=KickTheBall", "senses/vision=blind", "task.max_seconds=0.4", "threads=1"]
+    words += ["collect=one_process", "collect.worlds=2", "collect.steps=8", "eval.every_frames=16"]
+    words += ["eval.episodes=1", "eval.worlds=1", f"bench.json={file}"]
+    assert main([*QUICK, "bench.learning=true", "bench.stages=2", *words]) == 0
+    found = json.loads(file.read_text())["learning"]
+    assert found["algorithm"] == "ppo"
+    assert {"collect", "learn", "evaluate"} <= set(found["seconds"])
+    speeds = found["frames_per_s"] / found["rollout_per_s"] / found["cores"]
+    assert 0.0 < found["ratio"] < 1.0
+    assert found["ratio"] == pytest.approx(speeds, rel=1.0), "both are medians of the same turns"
+    assert 0.0 < found["processor_ratio"] < 1.0, "learning costs more than a rollout alone"
+    assert f"{found['ratio']:.2f}" in capsys.readouterr().out
+
+
+def test_the_processor_time_of_another_process_is_read():
+    spin = "import time\nwhile time.process_time() < 0.3: pass\nprint(flush=True)\ninput()"
+    process = subprocess.Popen(
+        [sys.executable, "-c", spin], stdin=subprocess.PIPE, stdout=subprocess.PIPE
+    )
+    process.stdout.readline()
+    assert _processor_s(process.pid) == pytest.approx(0.3, abs=0.1)
+    process.communicate(b"\n")
+
+
 @pytest.mark.parametrize("things", [0, 3])
 def test_the_measured_skin_senses_each_prop_and_nothing_else(things):
     world, sense = touched_child(PlaygroundCfg(), things)
@@ -205,6 +234,7 @@ def test_an_experiment_with_a_scripted_opponent_is_measured(capsys):
         (["+task=KickTheBall", "bench.wolds=[1]"], "did you mean worlds?"),
         (["+task=KickTheBall", "bench.json=/nowhere/bench.json"], "/nowhere/bench.json is not in"),
         (["+task=KickTheBall", "bench.loose_props=3"], "need bench.agents"),
+        (["+task=KickTheBall", "bench.learning=true", "bench.agents=[2]"], "is not learnt"),
         (["+task=TurnBaby", "body=walker"], "this task needs a body with joints"),
         (
             ["+task=KickTheBall", "playground=simple", "bench.agents=[99]"],

@@ -2,17 +2,26 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager, nullcontext
+from dataclasses import asdict
 from pathlib import Path
 
 import torch
 
 from veca_marl.bench.free_play import free_play
+from veca_marl.bench.learning import measure_learning
 from veca_marl.bench.machine import machine, machine_line
 from veca_marl.bench.options import BenchCfg, BenchOptions
 from veca_marl.bench.references import measure_references
-from veca_marl.bench.report import as_json, parts_table, references_table, throughput_table
+from veca_marl.bench.report import (
+    as_json,
+    learning_table,
+    parts_table,
+    references_table,
+    throughput_table,
+)
 from veca_marl.bench.rollouts import Rollouts, measure_first_world, measure_rollouts
 from veca_marl.config import ConfigError, compose, one_line
 from veca_marl.config.command_line import CommandLine
@@ -23,6 +32,11 @@ Measure agent steps per second, and the processor time of each part of a step:
 
     python -m veca_marl.bench +task=KickTheBall
     python -m veca_marl.bench +task=TurnBaby bench.agents=[1,2,4] bench.worlds=[1]
+
+or the speed of learning as a share of that of the simulator on all cores:
+
+    python -m veca_marl.bench +task=KickTheBall bench.learning=true
+    python -m veca_marl.bench +task=KickTheBall algo=sac bench.learning=true
 """
 
 
@@ -37,6 +51,9 @@ def bench(options: BenchOptions, overrides: list[str]) -> None:
     Raises:
         ConfigError: If a choice is impossible.
     """
+    if options.bench.learning:
+        bench_learning(options.bench, overrides)
+        return
     cfg, game = options.bench, compose(overrides).game
     torch.set_num_threads(1)
     print(machine_line(), end="\n\n")
@@ -54,6 +71,20 @@ def bench(options: BenchOptions, overrides: list[str]) -> None:
         print(references_table(references))
     if cfg.json is not None:
         Path(cfg.json).write_text(as_json(machine(), first_world_s, runs, references))
+
+
+def bench_learning(cfg: BenchCfg, overrides: list[str]) -> None:
+    """Measure the run that `overrides` describe, print the ratio and write the JSON file.
+
+    Raises:
+        ConfigError: If a choice is impossible.
+    """
+    print(machine_line("elapsed time of all cores"), end="\n\n")
+    learning = measure_learning(compose(overrides), cfg.steps, cfg.stages)
+    print(learning_table(learning))
+    if cfg.json is not None:
+        content = {"machine": machine(), "learning": asdict(learning)}
+        Path(cfg.json).write_text(json.dumps(content, indent=2) + "\n")
 
 
 def _measure(game: GameCfg, cfg: BenchCfg) -> Iterator[Rollouts]:

@@ -26,13 +26,17 @@ def machine() -> dict[str, str | int | float | None]:
     }
 
 
-def machine_line() -> str:
-    """Return the same as text of one line, without the packages."""
+def machine_line(clock: str = "processor time of one thread") -> str:
+    """Return the same as text of one line, without the packages.
+
+    Args:
+        clock: What is measured.
+    """
     found = machine()
     return (
         f"veca_marl {found['veca_marl']}, commit {found['commit'] or 'unknown'}; "
         f"{found['processor']}, {found['cores']} cores, load {found['load']:.1f}; "
-        "processor time of one thread"
+        f"{clock}"
     )
 
 

@@ -19,6 +19,9 @@ class BenchCfg:
         steps: Environment steps of each rollout.
         repeats: Rollouts of each kind; the tables contain medians.
         references: Whether single parts (eye, ears, skin) are measured as well.
+        learning: Whether a run of the algorithm is measured beside rollouts, instead of the tables:
+            the frames per second of learning as a share of cores x rollout.
+        stages: Stages of that run; each takes `eval.every_frames`.
         json: File that the results are written to; None writes none.
     """
 
@@ -29,10 +32,12 @@ class BenchCfg:
     steps: int = 300
     repeats: int = 5
     references: bool = True
+    learning: bool = False
+    stages: int = 3
     json: str | None = None
 
     def __post_init__(self) -> None:
-        for name in ("steps", "repeats"):
+        for name in ("steps", "repeats", "stages"):
             if getattr(self, name) < 1:
                 raise ValueError(f"bench.{name} must be at least 1, got {getattr(self, name)}")
         for name in ("agents", "worlds"):
@@ -44,6 +49,8 @@ class BenchCfg:
             raise ValueError(f"bench.loose_props must be 0 or more, got {self.loose_props}")
         if not self.agents and (self.loose_props or self.senses is not None):
             raise ValueError("bench.loose_props and bench.senses need bench.agents (free play)")
+        if self.learning and self.agents:
+            raise ValueError("bench.agents: free play is not learnt (bench.learning=true)")
         if self.json is not None and not Path(self.json).absolute().parent.is_dir():
             raise ValueError(f"bench.json={self.json} is not in a folder that exists")
         if self.json is not None and Path(self.json).is_dir():

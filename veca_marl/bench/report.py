@@ -6,6 +6,7 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 
+from veca_marl.bench.learning import Learning
 from veca_marl.bench.references import References
 from veca_marl.bench.rollouts import Rollouts
 
@@ -64,6 +65,20 @@ def references_table(references: References) -> str:
         ["skinning of one body", f"{skin.skinning_ms:.3f}"],
     ]
     return f"processor time of single parts:\n{_table(rows)}"
+
+
+def learning_table(learning: Learning) -> str:
+    """Return the answer to: how fast is learning, beside the simulator on all cores?"""
+    rows = [
+        ["algorithm", learning.algorithm],
+        ["rollout, one core, frames/s", f"{learning.rollout_per_s:,.0f}"],
+        ["cores", str(learning.cores)],
+        ["learning with its evaluations, frames/s", f"{learning.frames_per_s:,.0f}"],
+        ["learning / (cores x rollout)", f"{learning.ratio:.2f}"],
+        ["the same of processor times", f"{learning.processor_ratio:.2f}"],
+        *([f"seconds in {part}", f"{s:.1f}"] for part, s in learning.seconds.items()),
+    ]
+    return f"speed of learning:\n{_table(rows)}"
 
 
 def as_json(

@@ -63,7 +63,7 @@ def run_training(
         comparison = trainer.run()
         if folder is not None and cfg.log.video:
             with timeit("video"):
-                record_episode(folder.video, cfg.game, trainer.policy.play, cfg.seed)
+                record_episode(folder.video, cfg.game, trainer.policy.play, trainer.evaluation_seed)
     if folder is not None:
         folder.write("timing.txt", trainer.timing())
         folder.write("comparison.txt", "\n".join(comparison))  # last: the run is complete

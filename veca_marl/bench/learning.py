@@ -1,0 +1,169 @@
+"""Speed of learning, beside that of the simulator: which part of the cores' steps a run makes."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import time
+from dataclasses import dataclass, replace
+from pathlib import Path
+from statistics import median
+
+from torchrl import timeit
+
+from veca_marl.algos.training.reporters import Row
+from veca_marl.bench.rollouts import RandomActions
+from veca_marl.config import Config
+from veca_marl.envs.adapters.torchrl.env import VecaEnv
+from veca_marl.runs.assembly import make_trainer
+
+
+@dataclass
+class Learning:
+    """Speed of a run, measured in turns with rollouts of the same worlds.
+
+    A stage of a run is what `eval.every_frames` frames take: collection, learning, an evaluation of
+    `eval.episodes` and its checkpoint. What occurs once in a run (starting, evaluating the random
+    policy, the longer last evaluation, the video) is not in it.
+
+    Attributes:
+        algorithm: Name of the algorithm.
+        cores: Cores of the machine.
+        rollout_per_s: Frames per second of a rollout with random actions in one thread, with as
+            many worlds as a worker process has; median.
+        frames_per_s: Frames of experience per second of the stages; median.
+        ratio: `frames_per_s` / (`cores` x `rollout_per_s`), of elapsed times; median over turns.
+        processor_ratio: Processor time of a frame in a rollout divided by that in a stage, of all
+            its processes: `ratio` if no core was ever idle. Not a number where the system does not
+            tell the processor time of other processes.
+        seconds: Elapsed seconds of each part of the stages.
+    """
+
+    algorithm: str
+    cores: int
+    rollout_per_s: float
+    frames_per_s: float
+    ratio: float
+    processor_ratio: float
+    seconds: dict[str, float]
+
+
+@dataclass(frozen=True)
+class Cost:
+    """Elapsed and processor time of one frame.
+
+    Attributes:
+        wall_s: Elapsed seconds.
+        processor_s: Seconds of processor time, of all processes.
+    """
+
+    wall_s: float
+    processor_s: float
+
+
+def measure_learning(cfg: Config, steps: int, stages: int) -> Learning:
+    """Measure stages of a run, and a rollout after each.
+
+    The first stage is not counted: it starts processes and fills caches.
+
+    Args:
+        cfg: The configuration of the run; its budget is replaced.
+        steps: Steps of each rollout.
+        stages: Number of stages.
+
+    Raises:
+        ConfigError: If the run is impossible.
+    """
+    log = replace(cfg.log, progress_bar=False)
+    evaluation = replace(cfg.eval, final_episodes=cfg.eval.episodes)
+    frames = (stages + 1) * cfg.eval.every_frames
+    trainer = make_trainer(replace(cfg, log=log, eval=evaluation, total_frames=frames))
+    turns = Turns(cfg, steps)
+    trainer.reporters = [turns]
+    trainer.run()
+    turns.close()
+    return _summary(cfg, turns)
+
+
+class Turns:
+    """A reporter that takes the time of each stage and measures a rollout after it.
+
+    Args:
+        cfg: The configuration of the run.
+        steps: Steps of each rollout.
+
+    Attributes:
+        stages: Cost of a frame in each stage but the first.
+        rollouts: Cost of a frame in the rollout after each of them.
+    """
+
+    def __init__(self, cfg: Config, steps: int) -> None:
+        self.stages: list[Cost] = []
+        self.rollouts: list[Cost] = []
+        self._steps = steps
+        self._env = VecaEnv(cfg.game, cfg.collect.worlds, seed=0)
+        self._actions = RandomActions(self._env, steps)
+        self._rollout()  # fills caches
+        self._frames = 0
+        self._start: Cost | None = None
+
+    def write(self, kind: str, frames: int, row: Row) -> None:
+        """See `Reporter`: a stage ends with the evaluation of its policy."""
+        if kind != "evaluations" or frames == self._frames:
+            return
+        if self._start is None:
+            timeit.erase()
+        else:
+            self.stages.append(_per_frame(self._start, frames - self._frames))
+            self.rollouts.append(self._rollout())
+        self._frames, self._start = frames, _now()
+
+    def _rollout(self) -> Cost:
+        start = _now()
+        self._env.rollout(self._steps, self._actions, break_when_any_done=False)
+        return _per_frame(start, self._steps * self._env.batch_size[0])
+
+    def sync(self) -> None:
+        """See `Reporter`; nothing is stored."""
+
+    def close(self) -> None:
+        """Close the worlds."""
+        self._env.close()
+
+
+def _summary(cfg: Config, turns: Turns) -> Learning:
+    cores = os.cpu_count() or 1
+    pairs = list(zip(turns.rollouts, turns.stages, strict=True))
+    return Learning(
+        algorithm=cfg.algo.name,
+        cores=cores,
+        rollout_per_s=1.0 / median(rollout.wall_s for rollout in turns.rollouts),
+        frames_per_s=1.0 / median(stage.wall_s for stage in turns.stages),
+        ratio=median(rollout.wall_s / stage.wall_s for rollout, stage in pairs) / cores,
+        processor_ratio=median(r.processor_s / s.processor_s for r, s in pairs),
+        seconds={part: s for part, s in timeit.todict(percall=False).items() if s > 0.0},
+    )
+
+
+def _per_frame(start: Cost, frames: int) -> Cost:
+    now = _now()
+    return Cost(
+        (now.wall_s - start.wall_s) / frames, (now.processor_s - start.processor_s) / frames
+    )
+
+
+def _now() -> Cost:
+    children = multiprocessing.active_children()
+    others = sum(_processor_s(child.pid) for child in children if child.pid is not None)
+    return Cost(time.perf_counter(), time.process_time() + others)
+
+
+def _processor_s(process: int) -> float:
+    """Return the processor time of another process so far; not a number without /proc."""
+    file = Path(f"/proc/{process}/stat")
+    if not file.is_file():
+        return float("nan")
+    # proc(5): the name in parentheses may contain spaces; utime and stime are the fields 14 and 15
+    fields = file.read_text().rpartition(")")[2].split()
+    ticks = int(fields[11]) + int(fields[12])
+    return ticks / float(os.sysconf("SC_CLK_TCK"))
