@@ -13,8 +13,8 @@ from av.codec.codec import UnknownCodecError
 from numpy.typing import NDArray
 
 _PEAK = 0.8  # of full scale
-# codec and its options; the first that is available is used. With its default preset x264 takes more
-# processor time than the episode itself, with this one a fifth of it.
+# Codecs and their options; the first that is available is used. The default preset of x264 takes
+# more processor time than the episode itself, this one a fifth of that.
 _VIDEO_CODECS = {"libx264": {"preset": "ultrafast"}, "mpeg4": {}}
 
 
