@@ -140,7 +140,11 @@ def test_a_run_that_cannot_be_resumed_is_unchanged(run, damage, message):
 NO_CHECKPOINT = {"no checkpoint": (remove_checkpoints, "neither a checkpoint nor the folder of a")}
 
 
-@cases(FOLDERS, {name: CHECKPOINTS[name] for name in ("checkpoint cut off",)}, NO_CHECKPOINT)
+@cases(
+    {name: FOLDERS[name] for name in ("configuration empty", "provenance cut off")},
+    {name: CHECKPOINTS[name] for name in ("checkpoint cut off", "other content")},
+    NO_CHECKPOINT,
+)
 def test_evaluate_ends_in_one_line(run, capsys, damage, message):
     damage(run)
     before = files(run)
@@ -149,7 +153,7 @@ def test_evaluate_ends_in_one_line(run, capsys, damage, message):
     assert files(run) == before
 
 
-@cases(FOLDERS)
+@cases({name: FOLDERS[name] for name in ("configuration missing", "older version")})
 def test_tournament_ends_in_one_line(run, capsys, damage, message):
     damage(run)
     assert tournament([f"run={run.path}", "episodes=1"]) == 2
