@@ -5,7 +5,7 @@ import pytest
 from blocks import blocks_game, play, sit, sits
 
 EDGE = 0.06
-EXPERT_SEEDS = (0, 1, 2, 3)
+EXPERT_SEEDS = (0, 1)
 AWAY = (1.0, 1.0, EDGE / 2)
 
 

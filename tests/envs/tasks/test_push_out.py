@@ -75,6 +75,7 @@ def test_exchanged_teams_receive_exchanged_rewards(duel):
     np.testing.assert_allclose(received[0], received[1], atol=1e-9)
 
 
+@pytest.mark.slow  # the test before and the test after it: places and pushes are symmetric
 def test_random_policies_win_equally_often(duel):
     """Of 60 games the red team wins 30 within 2.6 standard deviations."""
     won = sum(

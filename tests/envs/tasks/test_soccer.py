@@ -203,6 +203,7 @@ def test_the_expert_alone_always_scores(alone):
         assert len(outcomes) < 250
 
 
+@pytest.mark.slow  # whole games; test_the_expert_alone_always_scores plays those of the attacker
 def test_the_expert_defender_saves_more_than_an_idle_one(two):
     scored = {
         script: sum(
