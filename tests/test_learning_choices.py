@@ -97,10 +97,13 @@ def test_training_from_python_returns_rows_and_a_policy_and_stores_nothing(tmp_p
 
 
 def test_a_recurrent_policy_is_trained_recorded_and_loaded(tmp_path):
-    cfg = compose([*SMALL, "algo/network=first_seen", "log.video=true", "log.keep_checkpoints=1"])
+    memory = ["algo.network.memory=gru", "algo.sequence_steps=8", "algo.minibatches=2"]
+    cfg = compose([*SMALL, *memory, "log.video=true", "log.keep_checkpoints=1"])
     result = run_training(cfg, RunFolder(tmp_path))
     assert (tmp_path / "videos" / "final.mp4").stat().st_size > 0
     assert result.metrics[-1]["agents/kl"] >= 0.0
+    actor = load_actor(tmp_path, "agents", read_specs(cfg.game)["agents"])
+    assert ("agents", "memory", "hidden") in actor.in_keys
 
 
 @pytest.mark.parametrize("body", ["walker_voice", "walker_discrete_voice"])

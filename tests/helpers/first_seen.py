@@ -40,6 +40,10 @@ def make_show_once(worlds, seed, horizons=(3, 5, 4), **options):
 class FirstSeenCfg(NetworkCfg):
     name: str = "first_seen"
 
+    @property
+    def recurrent(self):
+        return True
+
 
 class Remember(TensorDictModuleBase):
     """Writes the audio of the first step of the episode as features, in every step."""
