@@ -9,15 +9,22 @@ from training import SMALL
 
 from veca_marl.algos.networks.action_values import ActionValuesCfg, Normalisation
 from veca_marl.algos.networks.multisense import Critic, MultisenseCfg, Parameters
-from veca_marl.algos.sac.config import ReplayCfg, SACCfg, Targets
+from veca_marl.algos.sac.config import (
+    Adaptation,
+    EncoderGradient,
+    ReplayCfg,
+    SACCfg,
+    Targets,
+    TemperatureCfg,
+)
 
 FORMS = {"continuous": {}, "discrete": {"discrete": True}, "hybrid": {"hybrid": True}}
 
 
 @torch.no_grad()
-def return_of(policy, **env):
+def return_of(policy, senses=("audio",), **env):
     """Return the mean reward of the policy's most likely actions; a random policy has 0."""
-    played = FakeEnv(8, 7, senses=("audio",), **env).rollout(
+    played = FakeEnv(8, 7, senses=senses, **env).rollout(
         16, policy=policy, break_when_any_done=False
     )
     return float(played["next", "agents", "reward"].mean())
@@ -44,6 +51,27 @@ def test_teams_learn_with_every_kind_of_parameters_and_critic(
     for seed in range(8):
         algorithm.learn(collect(algorithm, seed=seed, **team))
     assert return_of(algorithm.actor, **team) > 0.8
+
+
+def test_it_learns_from_shifted_images_with_an_encoder_trained_by_the_critics(make_sac, collect):
+    changes = {
+        "critic": ActionValuesCfg(hidden=[32], normalisation=Normalisation.layer),
+        "encoder_gradient": EncoderGradient.critic,
+        "temperature": TemperatureCfg(0.1, Adaptation.automatic),
+        # with the few channels of SMALL all units may be inactive on images of one brightness
+        "network": MultisenseCfg(channels=[8, 16, 16], vector_features=16, trunk_features=64),
+        "policy_hidden": [32],
+        "random_shift": 2,
+        "steps": 3,
+        "learning_rate": 5e-3,
+        "updates_per_frame": 0.25,
+    }
+    eyes = {"senses": ("vision",)}
+    algorithm = make_sac(changes=changes, seed=1, **eyes)
+    for seed in range(7):
+        measured = algorithm.learn(collect(algorithm, seed=seed, **eyes))
+    assert return_of(algorithm.actor, **eyes) > 0.9
+    assert measured["alpha"] != 0.1
 
 
 def test_it_learns_without_target_networks(make_sac, collect):
