@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from composed import compose
 
-from veca_marl.algos.training.evaluation import random_policy
+from veca_marl.algos.evaluation.evaluate import random_policy
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
 from veca_marl.runs.recording import record_episode
 

@@ -18,12 +18,12 @@ import torch
 from omegaconf import MISSING
 from tensordict.nn import TensorDictSequential
 
+from veca_marl.algos.evaluation.comparison import comparison_line, interval
+from veca_marl.algos.evaluation.evaluate import Exploration, RandomTeams, Scores, evaluate
 from veca_marl.algos.files import WriteError, write_atomically
 from veca_marl.algos.selfplay.self_play import SelfPlayCfg
 from veca_marl.algos.specs import team_specs
 from veca_marl.algos.training.checkpoint import CheckpointError
-from veca_marl.algos.training.comparison import comparison_line, interval
-from veca_marl.algos.training.evaluation import Exploration, RandomTeams, Scores, evaluate
 from veca_marl.algos.training.stored import load_actor
 from veca_marl.config import Config, ConfigError, one_line, to_config
 from veca_marl.config.command_line import CommandLine

@@ -15,6 +15,7 @@ from veca_marl.algos.algorithm import (
     register_algorithm,
 )
 from veca_marl.algos.collection.experience import CollectCfg, Experience
+from veca_marl.algos.evaluation.evaluate import EvalCfg
 from veca_marl.algos.networks.action_values import ActionValuesCfg
 from veca_marl.algos.ppo import PPO, PPOCfg
 from veca_marl.algos.sac import SACCfg
@@ -23,7 +24,6 @@ from veca_marl.algos.selfplay.pool import Pool
 from veca_marl.algos.selfplay.self_play import SelfPlay, SelfPlayCfg
 from veca_marl.algos.specs import team_specs
 from veca_marl.algos.training.checkpoint import Checkpoints, Identity
-from veca_marl.algos.training.evaluation import EvalCfg
 from veca_marl.algos.training.learners import TeamLearners
 from veca_marl.algos.training.loop import Trainer
 from veca_marl.algos.training.progress import Budget

@@ -9,9 +9,9 @@ from omegaconf import MISSING
 
 from veca_marl.algos.algorithm import AlgorithmCfg
 from veca_marl.algos.collection.experience import CollectCfg
+from veca_marl.algos.evaluation.evaluate import EvalCfg
 from veca_marl.algos.intrinsic import IntrinsicCfg
 from veca_marl.algos.selfplay.self_play import SelfPlayCfg
-from veca_marl.algos.training.evaluation import EvalCfg
 from veca_marl.algos.training.loggers import LoggerKind, check_installed
 from veca_marl.config.experiment import ExperimentCfg
 from veca_marl.envs.core.game_cfg import GameCfg

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from veca_marl.algos.training.comparison import score_rows
-from veca_marl.algos.training.evaluation import Exploration, evaluate
+from veca_marl.algos.evaluation.comparison import score_rows
+from veca_marl.algos.evaluation.evaluate import Exploration, evaluate
 from veca_marl.config import Config
 from veca_marl.envs.adapters.torchrl import ExpertPolicy
 from veca_marl.envs.adapters.torchrl.env import VecaEnv

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from tensordict import TensorDictBase
 from torchrl.envs import ExplorationType, set_exploration_type
 
+from veca_marl.algos.evaluation.evaluate import ActionPolicy
 from veca_marl.algos.networks.memory import with_memory
-from veca_marl.algos.training.evaluation import ActionPolicy
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
 from veca_marl.envs.core.game_cfg import GameCfg
 from veca_marl.runs.video import write_video

@@ -12,6 +12,7 @@ from training import FRAMES, SMALL, Interrupt, read
 
 from veca_marl.algos.algorithm import Algorithm
 from veca_marl.algos.collection.experience import CollectCfg, Experience
+from veca_marl.algos.evaluation.evaluate import EvalCfg
 from veca_marl.algos.intrinsic import (
     ForwardModelCfg,
     IntrinsicCfg,
@@ -26,7 +27,6 @@ from veca_marl.algos.sac import SACCfg
 from veca_marl.algos.sac.config import ReplayCfg
 from veca_marl.algos.specs import team_specs
 from veca_marl.algos.training.checkpoint import Checkpoints, Identity
-from veca_marl.algos.training.evaluation import EvalCfg
 from veca_marl.algos.training.learners import TeamLearners
 from veca_marl.algos.training.loop import Trainer
 from veca_marl.algos.training.progress import Budget

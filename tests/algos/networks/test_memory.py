@@ -10,6 +10,7 @@ from first_seen import FirstSeenCfg, make_show_once
 from training import FRAMES, SMALL, Interrupt
 
 from veca_marl.algos.collection.experience import CollectCfg, Experience
+from veca_marl.algos.evaluation.evaluate import EvalCfg, Exploration, RandomTeams, evaluate
 from veca_marl.algos.networks.memory import with_memory
 from veca_marl.algos.networks.multisense import Memory
 from veca_marl.algos.ppo import PPOCfg
@@ -17,7 +18,6 @@ from veca_marl.algos.selfplay.pool import Pool
 from veca_marl.algos.selfplay.tournament import play_all
 from veca_marl.algos.specs import team_specs
 from veca_marl.algos.training.checkpoint import Checkpoints, Identity
-from veca_marl.algos.training.evaluation import EvalCfg, Exploration, RandomTeams, evaluate
 from veca_marl.algos.training.learners import TeamLearners
 from veca_marl.algos.training.loop import Trainer
 from veca_marl.algos.training.progress import Budget

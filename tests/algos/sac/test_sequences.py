@@ -13,6 +13,7 @@ from timed_batches import SPEC, batch_of
 from training import SMALL
 
 from veca_marl.algos.collection.experience import CollectCfg, Experience
+from veca_marl.algos.evaluation.evaluate import Exploration, evaluate
 from veca_marl.algos.networks.action_values import ActionValuesCfg, Normalisation
 from veca_marl.algos.networks.memory import with_memory
 from veca_marl.algos.networks.multisense import Critic, Memory, Parameters
@@ -24,7 +25,6 @@ from veca_marl.algos.sac.sac import SAC
 from veca_marl.algos.sac.segments import StoredKeys
 from veca_marl.algos.sac.windows import VALID, Span, transitions
 from veca_marl.algos.specs import team_specs
-from veca_marl.algos.training.evaluation import Exploration, evaluate
 
 CPU = torch.device("cpu")
 GRU = replace(SMALL, memory=Memory.gru, memory_features=16, precision=Precision.float32)

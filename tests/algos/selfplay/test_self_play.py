@@ -6,11 +6,11 @@ from fake_env import make_fake_env
 from training import FRAMES, Interrupt, read
 
 from veca_marl.algos.collection.experience import CollectCfg
+from veca_marl.algos.evaluation.evaluate import EvalCfg
 from veca_marl.algos.selfplay.pool import Pool
 from veca_marl.algos.selfplay.self_play import SelfPlay, SelfPlayCfg
 from veca_marl.algos.specs import team_specs
 from veca_marl.algos.training.checkpoint import CheckpointError, Checkpoints, Identity
-from veca_marl.algos.training.evaluation import EvalCfg
 from veca_marl.algos.training.loop import Trainer
 from veca_marl.algos.training.progress import Budget
 from veca_marl.algos.training.reporters import CsvReporter

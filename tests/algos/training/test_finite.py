@@ -11,7 +11,7 @@ from fake_env import FakeEnv
 from killed_runs import make_trainer
 from training import FRAMES
 
-from veca_marl.algos.training.evaluation import Scores
+from veca_marl.algos.evaluation.evaluate import Scores
 from veca_marl.algos.training.finite import (
     NotFiniteError,
     check_batch,

@@ -8,10 +8,10 @@ from torch import nn
 from training import FRAMES, SMALL
 
 from veca_marl.algos.collection.experience import CollectCfg
+from veca_marl.algos.evaluation.evaluate import EvalCfg, Exploration, RandomTeams, evaluate
 from veca_marl.algos.ppo import PPOCfg
 from veca_marl.algos.specs import team_specs
 from veca_marl.algos.training.checkpoint import Checkpoints, Identity
-from veca_marl.algos.training.evaluation import EvalCfg, Exploration, RandomTeams, evaluate
 from veca_marl.algos.training.learners import TeamLearners
 from veca_marl.algos.training.loop import Trainer
 from veca_marl.algos.training.progress import Budget

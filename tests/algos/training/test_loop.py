@@ -4,9 +4,9 @@ from fake_env import make_fake_env
 from training import FRAMES, Interrupt, read
 
 from veca_marl.algos.collection.experience import CollectCfg
+from veca_marl.algos.evaluation.evaluate import EvalCfg
 from veca_marl.algos.specs import team_specs
 from veca_marl.algos.training.checkpoint import Checkpoints, Identity
-from veca_marl.algos.training.evaluation import EvalCfg
 from veca_marl.algos.training.loop import Trainer
 from veca_marl.algos.training.progress import Budget
 from veca_marl.algos.training.reporters import CsvReporter

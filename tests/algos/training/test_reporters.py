@@ -8,8 +8,8 @@ from tensorboard.backend.event_processing.event_accumulator import EventAccumula
 from tensordict import TensorDict
 from torchrl import timeit
 
+from veca_marl.algos.evaluation.episodes import TrainingEpisodes
 from veca_marl.algos.files import WriteError
-from veca_marl.algos.training.episodes import TrainingEpisodes
 from veca_marl.algos.training.loggers import LoggerKind, check_installed, make_reporter
 from veca_marl.algos.training.reporters import CsvReporter
 from veca_marl.algos.training.timing import timing_table

@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 from torchrl.envs import EnvBase
 
+from veca_marl.algos.evaluation.evaluate import Exploration, Scores, evaluate
+from veca_marl.algos.policy import Policy
 from veca_marl.algos.selfplay.elo import elo_ratings
 from veca_marl.algos.selfplay.pool import Pool
-from veca_marl.algos.training.evaluation import Exploration, Scores, evaluate
-from veca_marl.algos.training.learners import Policy
 
 
 @dataclass(frozen=True)

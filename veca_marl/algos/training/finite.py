@@ -9,7 +9,7 @@ import numpy as np
 import torch
 from tensordict import TensorDictBase
 
-from veca_marl.algos.training.evaluation import Scores
+from veca_marl.algos.evaluation.evaluate import Scores
 
 
 class NotFiniteError(RuntimeError):

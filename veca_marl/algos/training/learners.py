@@ -3,58 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from copy import deepcopy
 from typing import Any
 
 import torch
 from tensordict import TensorDictBase
-from tensordict.nn import TensorDictModuleBase, TensorDictSequential
-from torch import nn
+from tensordict.nn import TensorDictModuleBase
 
 from veca_marl.algos.algorithm import Algorithm, AlgorithmCfg, make_algorithm
 from veca_marl.algos.intrinsic.bonus import Bonus
 from veca_marl.algos.intrinsic.intrinsic_reward import NONE, IntrinsicCfg
-from veca_marl.algos.networks.precision import for_acting
+from veca_marl.algos.policy import Policy
 from veca_marl.algos.specs import TeamSpec
 from veca_marl.algos.storage import StorageNeeded
-
-
-class Policy(nn.Module):
-    """What acts for all teams.
-
-    Args:
-        actors: Team to the policy that is evaluated.
-        explorers: Team to the policy that collects; it shares its modules with the actor.
-
-    Attributes:
-        actors: See above.
-        play: Writes the actions of all teams, for evaluation.
-        collect: Writes the actions of all teams, for collection.
-    """
-
-    def __init__(
-        self,
-        actors: Mapping[str, TensorDictModuleBase],
-        explorers: Mapping[str, TensorDictModuleBase],
-    ) -> None:
-        super().__init__()
-        self.actors = nn.ModuleDict(actors)
-        self.play = TensorDictSequential(*actors.values())
-        self.collect = TensorDictSequential(*explorers.values())
-
-    def copy(self) -> Policy:
-        """Return an independent copy that acts on the CPU."""
-        return for_acting(deepcopy(self).to("cpu"))
-
-    @torch.no_grad()
-    def take_over(self, other: Policy) -> None:
-        """Take over parameters and buffers of `other`, a policy of the same structure."""
-        for own, new in zip(_tensors(self), _tensors(other), strict=True):
-            own.copy_(new)
-
-
-def _tensors(module: nn.Module) -> list[torch.Tensor]:
-    return [*module.parameters(), *module.buffers()]
 
 
 class TeamLearners:

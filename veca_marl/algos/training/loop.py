@@ -20,17 +20,19 @@ from torchrl import timeit
 from tqdm import tqdm
 
 from veca_marl.algos.collection.experience import CollectCfg, Experience
+from veca_marl.algos.evaluation.comparison import comparison_line, score_rows
+from veca_marl.algos.evaluation.episodes import TrainingEpisodes
+from veca_marl.algos.evaluation.evaluate import EvalCfg, Scores
+from veca_marl.algos.evaluation.evaluators import Evaluator, Players, Request, make_evaluator
 from veca_marl.algos.plain import to_plain
+from veca_marl.algos.policy import Policy
+from veca_marl.algos.seeds import derived_seed
 from veca_marl.algos.specs import EnvFactory
 from veca_marl.algos.training.checkpoint import Checkpoints, naming_checkpoint
-from veca_marl.algos.training.comparison import comparison_line, score_rows
-from veca_marl.algos.training.episodes import TrainingEpisodes
-from veca_marl.algos.training.evaluation import EvalCfg, Scores
-from veca_marl.algos.training.evaluators import Evaluator, Players, Request, make_evaluator
 from veca_marl.algos.training.finite import check_batch, check_scores, check_state
-from veca_marl.algos.training.learners import Policy, TeamLearners
+from veca_marl.algos.training.learners import TeamLearners
 from veca_marl.algos.training.matchmaking import AllLearn, Matchmaking
-from veca_marl.algos.training.progress import Budget, Progress, stage_seed
+from veca_marl.algos.training.progress import Budget, Progress
 from veca_marl.algos.training.reporters import Reporter
 from veca_marl.algos.training.timing import timing_table
 
@@ -163,7 +165,7 @@ class Trainer:
         self.matchmaking.begin_stage(self.progress.stage, self.progress.frames)
         self._update_policy(experience)
         with timeit("collect"):
-            experience.restart(stage_seed(self.seed, self.progress.stage))
+            experience.restart(derived_seed(self.seed, self.progress.stage))
         episodes = TrainingEpisodes()
         per_stage = math.ceil(self.evaluation.every_frames / self.collect.frames)
         until = min(self.progress.iteration + per_stage, iterations)
@@ -246,7 +248,7 @@ class Trainer:
     @property
     def evaluation_seed(self) -> int:
         """Seed of the episodes of all evaluations."""
-        return stage_seed(self.seed, _EVALUATION_STAGE)
+        return derived_seed(self.seed, _EVALUATION_STAGE)
 
     def _report_scores(self, player: str, scores: dict[str, Scores]) -> None:
         for row in score_rows(player, scores):

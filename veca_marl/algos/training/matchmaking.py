@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Protocol
 
-from veca_marl.algos.training.learners import Policy
+from veca_marl.algos.policy import Policy
 
 
 class Matchmaking(Protocol):

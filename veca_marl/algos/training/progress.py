@@ -5,8 +5,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-import numpy as np
-
 
 @dataclass
 class Budget:
@@ -44,8 +42,3 @@ class Progress:
     iteration: int = 0
     frames: int = 0
     best_return: float = -math.inf
-
-
-def stage_seed(seed: int, stage: int) -> int:
-    """Return an independent 31-bit seed for each pair."""
-    return int(np.random.SeedSequence([seed, stage]).generate_state(1)[0] >> 1)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from veca_marl.algos.training.evaluation import Scores
+from veca_marl.algos.evaluation.evaluate import Scores
 
 
 def interval(values: NDArray[np.float64], confidence: float = 0.95) -> tuple[float, float]:

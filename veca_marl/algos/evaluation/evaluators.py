@@ -18,15 +18,15 @@ from torchrl.envs import EnvBase
 from veca_marl.algos.collection.experience import start_method, workers_ignore_interrupts
 from veca_marl.algos.collection.parent import end_with_parent
 from veca_marl.algos.collection.workers import WorkerError, call_when_a_child_ends, end_of
-from veca_marl.algos.specs import EnvFactory
-from veca_marl.algos.training.evaluation import (
+from veca_marl.algos.evaluation.evaluate import (
     Exploration,
     RandomTeams,
     Scores,
     evaluate,
     joined_scores,
 )
-from veca_marl.algos.training.learners import Policy
+from veca_marl.algos.policy import Policy
+from veca_marl.algos.specs import EnvFactory
 
 
 @dataclass(frozen=True)

@@ -4,8 +4,8 @@ import torch
 from fake_env import FakeEnv
 from scipy import stats
 
-from veca_marl.algos.training.comparison import comparison_line, interval, paired_difference
-from veca_marl.algos.training.evaluation import (
+from veca_marl.algos.evaluation.comparison import comparison_line, interval, paired_difference
+from veca_marl.algos.evaluation.evaluate import (
     EvalCfg,
     Exploration,
     Scores,

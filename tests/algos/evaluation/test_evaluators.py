@@ -12,8 +12,8 @@ import torch
 from fake_env import FakeEnv, make_fake_env
 
 from veca_marl.algos.collection.workers import WorkerError
-from veca_marl.algos.training.evaluation import Exploration
-from veca_marl.algos.training.evaluators import Players, Request, make_evaluator
+from veca_marl.algos.evaluation.evaluate import Exploration
+from veca_marl.algos.evaluation.evaluators import Players, Request, make_evaluator
 
 SEVEN = Request("policy", 7, 5, Exploration.deterministic)
 

@@ -15,9 +15,9 @@ from torchrl.data import Composite
 from torchrl.envs import EnvBase, ExplorationType, TransformedEnv, set_exploration_type
 from torchrl.envs.utils import RandomPolicy
 
+from veca_marl.algos.evaluation.episodes import EpisodeTally
 from veca_marl.algos.networks.memory import with_memory
-from veca_marl.algos.training.episodes import EpisodeTally
-from veca_marl.algos.training.progress import stage_seed
+from veca_marl.algos.seeds import derived_seed
 
 ActionPolicy = Callable[[TensorDictBase], TensorDictBase]
 
@@ -130,8 +130,8 @@ def _seed(env: EnvBase, seed: int, first: int) -> None:
     numbered = hasattr(base, "first_world")
     if numbered:
         base.first_world = first
-    env.set_seed(seed if numbered else stage_seed(seed, first))
-    torch.manual_seed(stage_seed(seed, first))
+    env.set_seed(seed if numbered else derived_seed(seed, first))
+    torch.manual_seed(derived_seed(seed, first))
 
 
 def _play_one_each(env: EnvBase, policy: ActionPolicy, count: int) -> EpisodeTally:

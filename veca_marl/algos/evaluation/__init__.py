@@ -1,0 +1,1 @@
+"""Evaluation of policies: whole episodes in separate worlds, their scores and comparisons."""
