@@ -93,18 +93,18 @@ def test_a_policy_of_another_run_is_an_opponent(played, tmp_path, capsys):
 
 
 def test_a_team_starts_from_the_parameters_of_another_run(played, tmp_path):
-    first = [f"init_from.red={played / 'run'}", "opponent.blue=idle", "algo.learning_rate=1e-6"]
+    other = shutil.copytree(played / "run", tmp_path / "other")
+    first = [f"init_from.red={other}", "opponent.blue=idle", "algo.learning_rate=1e-6"]
     assert train(tmp_path, "run", *first, "total_frames=32", "log.keep_checkpoints=9") == 0
     started = tmp_path / "run" / "checkpoints" / "frames_000000000000.pt"
     begun = torch.load(started, weights_only=True)["state"]["algorithm"]["red"]
-    learnt = actors(played / "run", "red")
+    learnt = actors(other, "red")
     assert begun["network"].keys() == learnt.keys()
     for name, array in learnt.items():
         torch.testing.assert_close(begun["network"][name], array, rtol=0.0, atol=0.0)
     assert not begun["optimizer"]["state"]
     # resumed, it continues from its own checkpoint, also without the other run
-    config = tmp_path / "run" / "config.yaml"
-    config.write_text(config.read_text().replace(str(played / "run"), str(tmp_path / "gone")))
+    shutil.rmtree(other)
     assert commands.train(tmp_path, f"resume={tmp_path / 'run'}", "total_frames=64") == 0
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import signal
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from multiprocessing.connection import Connection, wait
@@ -220,6 +220,14 @@ def _serve(connection: Connection[Any, Any], parent: int, *arguments: Any) -> No
         return
     except Exception as error:
         connection.send(f"{type(error).__name__}: {error}")
+        _wait_for_the_end(connection)  # ending before the text is read would hide it
+
+
+def _wait_for_the_end(connection: Connection[Any, Any]) -> None:
+    """Ignore requests until the other end is closed."""
+    with suppress(EOFError):
+        while True:
+            connection.recv()
 
 
 def make_evaluator(
