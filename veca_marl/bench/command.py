@@ -58,7 +58,8 @@ def bench(options: BenchOptions, overrides: list[str]) -> None:
     torch.set_num_threads(1)
     print(machine_line(), end="\n\n")
     try:
-        first_world_s = measure_first_world(game)
+        with _played(game, _agents(cfg)[0], cfg) as played:
+            first_world_s = measure_first_world(played)
         print(f"first world of this process: {first_world_s:.2f} s", end="\n\n")
         runs = list(_measure(game, cfg))
     except ValueError as error:
@@ -88,10 +89,15 @@ def bench_learning(cfg: BenchCfg, overrides: list[str]) -> None:
 
 
 def _measure(game: GameCfg, cfg: BenchCfg) -> Iterator[Rollouts]:
-    for agents in cfg.agents or [0]:
+    for agents in _agents(cfg):
         with _played(game, agents, cfg) as played:
             for worlds in cfg.worlds:
                 yield measure_rollouts(played, worlds, cfg.steps, cfg.repeats)
+
+
+def _agents(cfg: BenchCfg) -> list[int]:
+    """Return the numbers of agents in free play; 0 stands for the task itself."""
+    return cfg.agents or [0]
 
 
 def _played(game: GameCfg, agents: int, cfg: BenchCfg) -> AbstractContextManager[GameCfg]:
