@@ -40,8 +40,15 @@ def test_a_call_has_its_level_and_begins_and_ends_in_silence(call):
 
 
 @pytest.mark.parametrize(
-    "wrong", [{"begin_hz": 10.0}, {"end_hz": np.nan}, {"length_s": 0.0}, {"level": -1.0}]
+    "wrong",
+    [
+        {"begin_hz": 10.0},
+        {"end_hz": np.nan},
+        {"end_hz": 11_025.0},
+        {"length_s": 0.0},
+        {"level": -1.0},
+    ],
 )
 def test_impossible_calls_are_refused(wrong):
-    with pytest.raises(ValueError, match=r"frequency_hz|length_s|level"):
+    with pytest.raises(ValueError, match=next(iter(wrong))):
         CallCfg(**{"begin_hz": 300.0, "end_hz": 300.0, **wrong})

@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 import scipy.io.wavfile
+import scipy.signal
 from listening import RATE, STEP
 
 from veca_marl.sim.sound import (
@@ -88,22 +89,68 @@ def test_a_looping_clip_starts_at_a_random_position():
     assert len(starts) > 1
 
 
-def test_voice_speaks_in_order_then_falls_silent():
+def spoken(*utterances, n_steps=8):
+    """Speak utterances that are appended at once."""
     voice = Voice(RATE)
-    rng = np.random.default_rng(0)
-    first, second = rng.standard_normal((2, 700))
-    voice.reset(rng)
-    assert not voice.emit(STEP).any()
-    voice.say(first)
-    voice.say(second)
-    spoken = np.concatenate([voice.emit(STEP) for _ in range(3)])
-    alone = Voice(RATE)
-    alone.say(second)
-    assert np.array_equal(spoken[700:1400], alone.emit(700))
-    assert not spoken[1400:].any()
-    voice.say(first)
+    voice.reset(np.random.default_rng(0))
+    for utterance in utterances:
+        voice.say(utterance)
+    return np.concatenate([voice.emit(STEP) for _ in range(n_steps)])
+
+
+def test_voice_speaks_in_order_then_falls_silent():
+    first, second = np.random.default_rng(0).standard_normal((2, 700))
+    heard = spoken(first, second)
+    expected = scipy.signal.sosfilt(waveforms.high_pass(RATE), np.append(first, second))
+    assert np.array_equal(heard[:1400], expected.astype(np.float32))
+    assert not heard[-STEP:].any()
+
+
+def test_a_cleared_voice_emits_only_the_decay_of_the_high_pass():
+    voice = Voice(RATE)
+    voice.say(np.random.default_rng(0).standard_normal(2 * STEP))
+    voice.emit(STEP)
     voice.clear()
+    assert not voice.speaking
+    assert np.abs(voice.emit(4 * STEP)[3 * STEP :]).max() < 1e-6
+    voice.say(np.ones(STEP))
+    voice.reset(np.random.default_rng(0))
     assert not voice.emit(STEP).any()
+
+
+@pytest.mark.parametrize("parts", [2, 7, 40])
+@pytest.mark.parametrize("shape", ["ramp", "constant", "noise", "low tone", "pulse"])
+def test_speech_in_parts_equals_speech_at_once(shape, parts):
+    """The high-pass keeps its state from one part to the next."""
+    time = np.arange(4 * STEP) / RATE
+    waveform = {
+        "ramp": time,
+        "constant": np.ones_like(time),
+        "noise": np.random.default_rng(1).standard_normal(time.size),
+        "low tone": np.sin(2 * np.pi * 60.0 * time),
+        "pulse": (time == 0.0).astype(float),
+    }[shape]
+    assert np.array_equal(spoken(*np.array_split(waveform, parts)), spoken(waveform))
+
+
+def test_speech_appended_step_by_step_equals_speech_at_once():
+    waveform = np.random.default_rng(2).standard_normal(5 * STEP) + 1.0
+    voice, heard = Voice(RATE), []
+    for i in range(8):
+        voice.say(waveform[i * STEP : (i + 1) * STEP])
+        heard.append(voice.emit(STEP))
+    assert np.array_equal(np.concatenate(heard), spoken(waveform))
+
+
+@pytest.mark.parametrize("duration_s", [0.004, 0.5])
+def test_a_looping_file_has_no_transient_at_its_seam(tmp_path, duration_s):
+    """A constant pressure has no sound, also where its repetition begins."""
+    samples = np.full(round(duration_s * RATE), 12_000, np.int16)
+    scipy.io.wavfile.write(tmp_path / "constant.wav", RATE, samples)
+    loop = waveforms.load_wav(tmp_path / "constant.wav", RATE, loop=True)
+    assert loop.size == samples.size
+    assert np.abs(loop).max() < 1e-5
+    assert np.abs(waveforms.load_wav(tmp_path / "constant.wav", RATE)).max() > 0.1
 
 
 def test_voice_filters_out_constant_pressure():
@@ -143,6 +190,9 @@ def test_invalid_wav_files_are_refused(tmp_path):
     (tmp_path / "page.wav").write_text("<html>404</html>")
     with pytest.raises(ValueError, match=r"page\.wav"):
         waveforms.load_wav(tmp_path / "page.wav", RATE)
+    scipy.io.wavfile.write(tmp_path / "empty.wav", RATE, np.zeros(0, np.int16))
+    with pytest.raises(ValueError, match=r"empty\.wav"):
+        waveforms.load_wav(tmp_path / "empty.wav", RATE, loop=True)
     scipy.io.wavfile.write(tmp_path / "mute.wav", RATE, np.zeros(100, np.int16))
     with pytest.raises(ValueError, match="silent"):
         waveforms.load_wav(tmp_path / "mute.wav", RATE, level=0.1)
@@ -153,6 +203,9 @@ def test_invalid_wav_files_are_refused(tmp_path):
     [
         ({"frequency_hz": 20.0}, "at least 80"),
         ({"frequency_hz": np.nan}, "at least 80"),
+        ({"frequency_hz": 11_025.0}, "below 11025"),
+        ({"frequency_hz": 12_000.0, "kind": SoundKind.tone}, "below 11025"),
+        ({"frequency_hz": 1e9}, "below 11025"),
         ({"level": -1.0}, "level"),
         ({"kind": SoundKind.clip}, "needs a path"),
         ({"path": "a.wav"}, "needs a path"),
@@ -164,7 +217,7 @@ def test_impossible_sounds_are_refused(numbers, what):
 
 
 def test_pitch_above_the_band_is_refused():
-    with pytest.raises(ValueError, match="12000 Hz"):
+    with pytest.raises(ValueError, match="frequency_hz=12000"):
         waveforms.tone(12_000.0, 0.1, RATE)
 
 

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-SAMPLE_RATE_HZ = 22_050
-"""Sampling rate of all sound."""
+from veca_marl.sim.sound import SAMPLE_RATE_HZ
 
 
 @dataclass

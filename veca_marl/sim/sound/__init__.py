@@ -17,12 +17,13 @@ from veca_marl.sim.sound.sounds import (
     Voice,
     make_sound,
 )
-from veca_marl.sim.sound.waveforms import Samples, buzz, tone
+from veca_marl.sim.sound.waveforms import SAMPLE_RATE_HZ, Samples, buzz, tone
 
 __all__ = [
     "CALLS",
     "KERNEL_TAPS",
     "NEAR_FIELD_M",
+    "SAMPLE_RATE_HZ",
     "SPEED_OF_SOUND_MPS",
     "Call",
     "CallCfg",

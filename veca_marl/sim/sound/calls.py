@@ -12,7 +12,7 @@ from functools import cache
 
 import numpy as np
 
-from veca_marl.sim.sound.waveforms import Samples, check_level, check_pitch
+from veca_marl.sim.sound.waveforms import SAMPLE_RATE_HZ, Samples, check_level, check_pitch
 
 _HARMONICS = 8
 _TILT = -1.0  # amplitude falls by 6 dB per octave, as a voice at the lips does (Fant 1960)
@@ -24,7 +24,7 @@ class CallCfg:
     """One call as data.
 
     Attributes:
-        begin_hz: Pitch at its beginning, at least 80.
+        begin_hz: Pitch at its beginning, at least 80 and below 11 025, half of the sampling rate.
         end_hz: Pitch at its end.
         length_s: Duration, above 0.02 and at most 5.
         level: Rms pressure at 1 m, in the middle of the call; see `waveforms`.
@@ -37,8 +37,8 @@ class CallCfg:
 
     def __post_init__(self) -> None:
         """Check the numbers."""
-        check_pitch(self.begin_hz)
-        check_pitch(self.end_hz)
+        check_pitch(self.begin_hz, SAMPLE_RATE_HZ, "begin_hz")
+        check_pitch(self.end_hz, SAMPLE_RATE_HZ, "end_hz")
         check_level(self.level)
         if not 2.0 * _FADE_S < self.length_s <= 5.0:
             raise ValueError(f"length_s={self.length_s} must be above {2.0 * _FADE_S}, at most 5")

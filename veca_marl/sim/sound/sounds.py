@@ -12,7 +12,9 @@ import numpy as np
 import scipy.signal
 from numpy.typing import ArrayLike
 
+from veca_marl.sim.geometry import Floats
 from veca_marl.sim.sound.waveforms import (
+    SAMPLE_RATE_HZ,
     Samples,
     buzz,
     check_level,
@@ -21,6 +23,8 @@ from veca_marl.sim.sound.waveforms import (
     load_wav,
     tone,
 )
+
+_NEGLIGIBLE = 1e-12  # pressure, -240 dB: the decay of the high-pass ends here
 
 
 class Sound(Protocol):
@@ -109,11 +113,16 @@ class Noise:
 
 
 class Voice:
-    """A mouth: emits the utterances in its queue, one after the other, else silence."""
+    """A queue of utterances that are played one after the other, silence while it is empty.
 
-    def __init__(self, sample_rate_hz: float = 22_050) -> None:
+    The high-pass runs over all that is emitted, silence included: a waveform that is passed to
+    `say` in parts is emitted like the whole waveform, as long as the queue does not run empty.
+    """
+
+    def __init__(self, sample_rate_hz: float = SAMPLE_RATE_HZ) -> None:
         self._high_pass = high_pass(sample_rate_hz)
-        self._queue: deque[Samples] = deque()
+        self._state = np.zeros((self._high_pass.shape[0], 2))
+        self._queue: deque[Floats] = deque()
 
     def say(self, waveform: ArrayLike) -> None:
         """Append a waveform ``(n,)`` in rms pressure at 1 m, at the sound field's rate.
@@ -121,12 +130,11 @@ class Voice:
         Raises:
             ValueError: If it is not one-dimensional or not finite.
         """
-        samples = np.asarray(waveform, dtype=np.float64)
+        samples = np.array(waveform, dtype=np.float64)
         if samples.ndim != 1 or not np.isfinite(samples).all():
             raise ValueError(f"a waveform must be (n,) finite numbers, got {samples.shape}")
         if samples.size:
-            filtered = scipy.signal.sosfilt(self._high_pass, samples)
-            self._queue.append(filtered.astype(np.float32))
+            self._queue.append(samples)
 
     @property
     def speaking(self) -> bool:
@@ -134,25 +142,39 @@ class Voice:
         return bool(self._queue)
 
     def clear(self) -> None:
-        """Empty the queue."""
+        """Empty the queue; the response of the high-pass to earlier samples still decays."""
         self._queue.clear()
 
     def reset(self, rng: np.random.Generator) -> None:
         """See `Sound`."""
         self.clear()
+        self._state[:] = 0.0
 
     def emit(self, n_samples: int) -> Samples:
         """See `Sound`."""
-        emitted = np.zeros(n_samples, np.float32)
+        if not self._queue and not self._state.any():
+            return np.zeros(n_samples, np.float32)
+        filtered, self._state = scipy.signal.sosfilt(
+            self._high_pass, self._take(n_samples), zi=self._state
+        )
+        if np.abs(self._state).max() < _NEGLIGIBLE:
+            # exact silence: sources that emit zeros cost nothing
+            self._state[:] = 0.0
+        emitted: Samples = filtered.astype(np.float32)
+        return emitted
+
+    def _take(self, n_samples: int) -> Floats:
+        """Remove up to ``n`` samples from the queue; return ``(n,)``, zeros after the last."""
+        taken = np.zeros(n_samples)
         begin = 0
         while self._queue and begin < n_samples:
             utterance = self._queue.popleft()
-            taken = min(utterance.size, n_samples - begin)
-            emitted[begin : begin + taken] = utterance[:taken]
-            begin += taken
-            if taken < utterance.size:
-                self._queue.appendleft(utterance[taken:])
-        return emitted
+            count = min(utterance.size, n_samples - begin)
+            taken[begin : begin + count] = utterance[:count]
+            begin += count
+            if count < utterance.size:
+                self._queue.appendleft(utterance[count:])
+        return taken
 
 
 class SoundKind(Enum):
@@ -172,7 +194,8 @@ class SoundCfg:
 
     Attributes:
         kind: Kind of sound.
-        frequency_hz: Fundamental of a buzz or a tone, at least 80.
+        frequency_hz: Fundamental of a buzz or a tone, at least 80 and below 11 025, half of the
+            sampling rate.
         level: Rms pressure at 1 m; full scale of a WAV file is 1. Not used by a voice.
         path: WAV file of a clip.
         loop: Whether a clip repeats without end.
@@ -186,7 +209,7 @@ class SoundCfg:
 
     def __post_init__(self) -> None:
         """Check the numbers, and that a clip and nothing else has a path."""
-        check_pitch(self.frequency_hz)
+        check_pitch(self.frequency_hz, SAMPLE_RATE_HZ)
         check_level(self.level)
         if (self.path is None) == (self.kind is SoundKind.clip):
             raise ValueError(
@@ -195,14 +218,14 @@ class SoundCfg:
             )
 
 
-def make_sound(cfg: SoundCfg, sample_rate_hz: int = 22_050) -> Sound:
+def make_sound(cfg: SoundCfg, sample_rate_hz: int = SAMPLE_RATE_HZ) -> Sound:
     """Return a new sound with its own state."""
     makers: dict[SoundKind, Callable[[], Sound]] = {
         SoundKind.buzz: lambda: Clip(buzz(cfg.frequency_hz, cfg.level, sample_rate_hz), loop=True),
         SoundKind.tone: lambda: Clip(tone(cfg.frequency_hz, cfg.level, sample_rate_hz), loop=True),
         SoundKind.noise: lambda: Noise(cfg.level, sample_rate_hz),
         SoundKind.clip: lambda: Clip(
-            load_wav(str(cfg.path), sample_rate_hz, cfg.level), loop=cfg.loop
+            load_wav(str(cfg.path), sample_rate_hz, cfg.level, cfg.loop), loop=cfg.loop
         ),
         SoundKind.voice: lambda: Voice(sample_rate_hz),
         SoundKind.silence: Silence,

@@ -1,15 +1,17 @@
 """Waveforms: synthesised harmonic sounds, and WAV files.
 
 The level of a sound is its rms pressure at 1 m in an arbitrary unit; 1.0 is the full scale of a WAV
-file. Every sound is high-passed at `HIGH_PASS_HZ`: real sources emit no constant pressure, and
-image sources with positive reflection coefficients would accumulate it (Allen & Berkley 1979 filter
-the response of the room in the same way).
+file. Read as pascals, 1.0 is 94 dB SPL (20 micropascals are 0 dB). No sound contains frequencies
+well below `HIGH_PASS_HZ`: noise, voices and WAV files are high-passed, buzzes and tones have no
+lower pitch. Real sources emit no constant pressure, and image sources with positive reflection
+coefficients would accumulate it (Allen & Berkley 1979 filter the response of the room in the same
+way).
 """
 
 from __future__ import annotations
 
+import math
 from functools import cache
-from math import gcd
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +21,12 @@ from numpy.typing import NDArray
 
 from veca_marl.sim.geometry import Floats
 
+SAMPLE_RATE_HZ = 22_050
+"""Sampling rate of all sound in a world."""
+
 HIGH_PASS_HZ = 80.0
+# the high-pass decays by 120 dB within 40 ms
+_SETTLING_S = 0.05
 _LOWEST_PITCH_HZ = 80.0
 _BUZZ_SLOPE = -0.5
 _BUZZ_TOP = 0.9
@@ -29,7 +36,7 @@ Samples = NDArray[np.float32]
 
 def tone(frequency_hz: float, level: float, sample_rate_hz: float) -> Samples:
     """Return one second of a pure tone; the frequency is rounded to whole hertz for looping."""
-    return _harmonics(check_pitch(frequency_hz), 1, level, int(sample_rate_hz))
+    return _harmonics(check_pitch(frequency_hz, sample_rate_hz), 1, level, int(sample_rate_hz))
 
 
 def buzz(frequency_hz: float, level: float, sample_rate_hz: float) -> Samples:
@@ -38,7 +45,7 @@ def buzz(frequency_hz: float, level: float, sample_rate_hz: float) -> Samples:
     It is broadband, so that the spectral cues of head and pinna are present up to the highest
     frequency of the observation (5.4 kHz). The frequency is rounded to whole hertz for looping.
     """
-    pitch = check_pitch(frequency_hz)
+    pitch = check_pitch(frequency_hz, sample_rate_hz)
     n_harmonics = max(1, int(_BUZZ_TOP * sample_rate_hz / 2.0 / pitch))
     return _harmonics(pitch, n_harmonics, level, int(sample_rate_hz))
 
@@ -46,11 +53,6 @@ def buzz(frequency_hz: float, level: float, sample_rate_hz: float) -> Samples:
 @cache
 def _harmonics(frequency_hz: int, n_harmonics: int, level: float, sample_rate_hz: int) -> Samples:
     """Return one second, with phases of low peak factor (Schroeder 1970, eq. 11)."""
-    if frequency_hz * n_harmonics >= sample_rate_hz / 2:
-        raise ValueError(
-            f"{n_harmonics} harmonics of {frequency_hz} Hz must lie below half of the sampling "
-            f"rate, {sample_rate_hz} Hz"
-        )
     spectrum = np.zeros(sample_rate_hz // 2 + 1, np.complex128)
     order = np.arange(1, n_harmonics + 1)
     phase = -np.pi * order * (order - 1) / n_harmonics
@@ -62,27 +64,34 @@ def _harmonics(frequency_hz: int, n_harmonics: int, level: float, sample_rate_hz
     return emitted
 
 
-def load_wav(path: str | Path, sample_rate_hz: int, level: float | None = None) -> Samples:
+def load_wav(
+    path: str | Path, sample_rate_hz: int, level: float | None = None, loop: bool = False
+) -> Samples:
     """Read a WAV file as one channel ``(n,)`` at the rate of the sound field, high-passed.
 
     Args:
         path: The file: integers of 8 to 32 bits, or floats.
         sample_rate_hz: Rate of the result.
         level: Rms pressure at 1 m to scale to; None keeps the file's own (full scale is 1).
+        loop: Whether it is to be repeated: the high-pass then begins in its periodic state, so
+            that there is no transient at the seam.
 
     Raises:
-        ValueError: If the file is not a WAV file, or is silent and a level is given.
+        ValueError: If the file is not a WAV file, has no samples, or is silent and a level is
+            given.
     """
     try:
         rate, samples = scipy.io.wavfile.read(path)
     except ValueError as error:
         raise ValueError(f"{path}: cannot be read as a WAV file ({error})") from error
+    if samples.size == 0:
+        raise ValueError(f"{path}: has no samples")
     mono = _full_scale(samples)
     if mono.ndim == 2:
         mono = mono.mean(axis=1)
-    common = gcd(rate, sample_rate_hz)
+    common = math.gcd(rate, sample_rate_hz)
     resampled = scipy.signal.resample_poly(mono, sample_rate_hz // common, rate // common)
-    filtered = scipy.signal.sosfilt(high_pass(sample_rate_hz), resampled)
+    filtered = _high_passed(resampled, sample_rate_hz, loop)
     if level is not None:
         rms = np.sqrt(np.mean(filtered**2))
         if rms == 0.0:
@@ -90,6 +99,14 @@ def load_wav(path: str | Path, sample_rate_hz: int, level: float | None = None) 
         filtered = filtered * (check_level(level) / rms)
     waveform: Samples = filtered.astype(np.float32)
     return waveform
+
+
+def _high_passed(samples: Floats, sample_rate_hz: int, loop: bool) -> Floats:
+    """Return samples ``(n,)`` after the high-pass; for a loop, after earlier repetitions."""
+    earlier = math.ceil(_SETTLING_S * sample_rate_hz / samples.size) if loop else 0
+    repeated = np.tile(samples, 1 + earlier)
+    filtered: Floats = scipy.signal.sosfilt(high_pass(sample_rate_hz), repeated)
+    return filtered[-samples.size :]
 
 
 def _full_scale(samples: NDArray[np.generic]) -> Floats:
@@ -118,8 +135,16 @@ def check_level(level: float) -> float:
     return level
 
 
-def check_pitch(frequency_hz: float) -> int:
-    """Return the frequency in whole hertz; raise `ValueError` if it is not finite or below 80."""
-    if not (np.isfinite(frequency_hz) and frequency_hz >= _LOWEST_PITCH_HZ):
-        raise ValueError(f"frequency_hz must be at least {_LOWEST_PITCH_HZ}, got {frequency_hz}")
+def check_pitch(frequency_hz: float, sample_rate_hz: float, name: str = "frequency_hz") -> int:
+    """Return the frequency in whole hertz.
+
+    Raises:
+        ValueError: If it is below 80 or not below half of the sampling rate.
+    """
+    is_pitch = np.isfinite(frequency_hz) and frequency_hz >= _LOWEST_PITCH_HZ
+    if not is_pitch or round(frequency_hz) >= sample_rate_hz / 2.0:
+        raise ValueError(
+            f"{name}={frequency_hz} must be at least {_LOWEST_PITCH_HZ} and below "
+            f"{sample_rate_hz / 2.0}, half of the sampling rate"
+        )
     return round(frequency_hz)
