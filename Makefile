@@ -5,7 +5,7 @@ BIN    := $(VENV)/bin
 ARGS   ?=
 CORES  ?= 2
 
-.PHONY: help train test test-all checks lint types kernels format bench docs pages clean
+.PHONY: help train test test-all checks lint types kernels format bench fidelity docs pages clean
 
 help:
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/'
@@ -50,6 +50,9 @@ format: $(VENV)/installed-test ## format and fix with ruff
 
 bench: $(VENV)/installed ## agent steps per second, and the time of each part of a step
 	$(BIN)/python -m veca_marl.bench +task=KickTheBall $(ARGS)
+
+fidelity: $(VENV)/installed-test ## measure the laws of physics and senses; rewrite docs/reference/fidelity.md
+	$(BIN)/python -m veca_marl.fidelity to=docs/reference $(ARGS)
 
 docs: $(VENV)/installed-test ## build the documentation site in docs/_build/html
 	$(BIN)/python -m sphinx --fail-on-warning --keep-going -b html docs docs/_build/html $(ARGS)

@@ -1,0 +1,30 @@
+"""The sections of the page, in its order. A module is imported when its section is measured."""
+
+from __future__ import annotations
+
+from importlib import import_module
+
+from veca_marl.fidelity.law import Section
+from veca_marl.registry import unknown
+
+SECTIONS: dict[str, str] = {
+    "rigid_bodies": "veca_marl.fidelity.rigid_bodies",
+}
+"""Module of each section. It has a function ``section() -> Section``."""
+
+
+def check_names(names: list[str]) -> None:
+    """Check that sections exist.
+
+    Raises:
+        ValueError: If one does not; the message lists all.
+    """
+    for name in names:
+        if name not in SECTIONS:
+            raise ValueError(unknown("section", name, list(SECTIONS)))
+
+
+def measure(name: str) -> Section:
+    """Return the measured section with this name."""
+    section: Section = import_module(SECTIONS[name]).section()
+    return section
