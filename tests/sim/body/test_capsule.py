@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from walking import ball, box, empty_world, let_pass, walker_in, wall
 
-from veca_marl.sim.physics import PropCfg, PropShape
+from veca_marl.sim.body.walker import WalkerCfg
+from veca_marl.sim.physics import ClockCfg, PropCfg, PropShape
 
 RADIUS_M = 0.11
 SLACK_M = 0.004
@@ -35,6 +36,33 @@ def test_a_fast_walker_does_not_tunnel():
     for _ in range(100):
         world.step()
         assert depth_in_wall_m(walker, 2.95) < 0.01
+
+
+def test_no_speed_that_is_accepted_tunnels():
+    """At the greatest speed the capsule reaches a thin wall in any phase of its last step."""
+    world = empty_world(wall(position=(1.0, 0.0, 0.0), thickness_m=0.001))
+    limit = RADIUS_M / world.clock.substep_s
+    walker = walker_in(world, walk_speed_mps=limit)
+    walker.walk(limit, 0.0)
+    for start in np.linspace(0.0, 0.11, 23):
+        walker.place((start, 0.0, 0.0))
+        walker.walk(limit, 0.0)
+        let_pass(world, 0.08)
+        assert depth_in_wall_m(walker, 1.0) < 0.01
+
+
+@pytest.mark.parametrize("clock", [ClockCfg(), ClockCfg(substeps=8)])
+def test_speeds_that_would_tunnel_are_refused(clock):
+    limit = RADIUS_M / clock.substep_s
+    world = empty_world(clock=clock)
+    with pytest.raises(ValueError, match=rf"walk_speed_mps=30.*at most {limit:.4g} m/s"):
+        walker_in(world, walk_speed_mps=30.0)
+    walker = walker_in(world, "slow")
+    for speed in (1.01 * limit, -1.01 * limit, math.nan, math.inf):
+        with pytest.raises(ValueError, match=f"at most {limit:.4g} m/s"):
+            walker.walk(speed, 0.0)
+    with pytest.raises(ValueError, match="backward_share=1.5"):
+        WalkerCfg(backward_share=1.5)
 
 
 def test_a_walker_slides_along_a_wall_at_45_degrees():

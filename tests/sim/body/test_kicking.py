@@ -4,7 +4,9 @@ import math
 
 import numpy as np
 import pytest
-from walking import ball, box, empty_world, let_pass, walker_in
+from walking import ball, box, empty_world, let_pass, walker_in, wall
+
+from veca_marl.sim.physics import PropCfg, PropShape
 
 
 @pytest.mark.parametrize("mass_kg", [0.1, 0.5, 2.0])
@@ -51,3 +53,64 @@ def test_the_reach_of_a_kick_is_configured():
             reachable.append(walker.can_kick(world.prop("ball")))
         reach.append(ranges[reachable].max() - walker.radius_m - 0.1)
     assert reach == pytest.approx([0.1, 0.3], abs=0.011)
+
+
+def kicker_before(*props, **numbers):
+    """A walker at the origin, and the ball to be kicked."""
+    world = empty_world(ball(position=(0.3, 0.0, 0.1), radius_m=0.05), *props)
+    return walker_in(world, **numbers), world.prop("ball")
+
+
+def test_a_kick_does_not_pass_through_a_wall():
+    walker, prop = kicker_before(wall(thickness_m=0.1, position=(0.18, 0.0, 0.0)))
+    assert walker.position[0] == 0.0
+    assert not walker.kick(prop)
+    np.testing.assert_array_equal(prop.velocity, 0.0)
+    walker._world.prop("wall").place((5.0, 0.0, 0.0), math.pi / 2)
+    assert walker.kick(prop)
+
+
+@pytest.mark.parametrize(
+    ("between", "reached"),
+    [
+        (box("board", (0.02, 1.0, 0.3), 0.0, (0.16, 0.0, 0.15)), False),
+        (ball("other", 0.04, 0.3, (0.16, 0.0, 0.1)), False),
+        (box("board", (0.02, 1.0, 0.3), 0.0, (0.40, 0.0, 0.15)), True),  # behind the ball
+        (box("board", (0.02, 1.0, 0.3), 0.0, (0.16, 0.56, 0.15)), True),  # beside the line
+        (box("shelf", (0.02, 1.0, 0.3), 0.0, (0.16, 0.0, 0.75)), True),  # above the line
+        (
+            PropCfg(
+                name="mark",
+                shape=PropShape.cylinder,
+                size_m=[1.0, 0.3],
+                position_m=(0.0, 0.0, 0.1),
+                tangible=False,
+            ),
+            True,
+        ),
+    ],
+)
+def test_solid_things_on_the_line_of_contact_prevent_a_kick(between, reached):
+    walker, prop = kicker_before(between)
+    prop.place((0.3, 0.0, 0.1))
+    assert walker.position[0] == 0.0
+    assert walker.can_kick(prop) is reached
+
+
+def test_a_body_on_the_line_of_contact_prevents_a_kick():
+    walker, prop = kicker_before(radius_m=0.05)
+    assert walker.can_kick(prop) is False  # out of reach
+    world = walker._world
+    prop.place((0.24, 0.0, 0.1))
+    assert walker.can_kick(prop) is True
+    walker_in(world, "other", (0.135, 0.09, 0.0), radius_m=0.03)
+    assert walker.can_kick(prop) is True
+    walker_in(world, "third", (0.12, 0.0, 0.0), radius_m=0.02)
+    assert walker.can_kick(prop) is False
+
+
+def test_a_prop_that_touches_the_walker_can_be_kicked():
+    walker, prop = kicker_before()
+    for away_m in (0.16, 0.1, 0.02, 0.0):
+        prop.place((away_m, 0.0, 0.05))
+        assert walker.can_kick(prop), away_m

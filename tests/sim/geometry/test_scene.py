@@ -75,6 +75,16 @@ def test_painting_changes_one_object():
         ball.paint((1.0, 0.0, 2.0))
 
 
+def test_painting_changes_the_triangles_of_one_object(make_child):
+    world, child = make_child()
+    colours = world.scene.surfaces.colours
+    before = colours.copy()
+    world.scene.find(child.name).paint((0.0, 1.0, 0.0))
+    painted = (colours == np.float32([0.0, 1.0, 0.0])).all(axis=1)
+    np.testing.assert_array_equal(painted, world.scene.surfaces.objects == child.object_id)
+    np.testing.assert_array_equal(colours[~painted], before[~painted])
+
+
 @pytest.mark.parametrize(
     ("numbers", "named"),
     [

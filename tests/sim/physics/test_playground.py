@@ -94,6 +94,47 @@ def test_impossible_playgrounds_are_refused():
         PlaygroundCfg(name="early", image_order=-1)
 
 
+@pytest.mark.parametrize(
+    ("numbers", "named"),
+    [
+        ({"image_order": 1000}, r"image_order=1000 .*from 0 \(direct sound\) to 12"),
+        ({"image_order": 1.5}, "image_order=1.5"),
+        ({"image_order": math.inf}, "image_order=inf"),
+        ({"floor_colour": (1.2, 0.5, 0.5)}, r"floor_colour=\(1.2, 0.5, 0.5\) .*in \[0, 1\]"),
+        ({"floor_colour": (0.5, 0.5)}, "floor_colour"),
+        ({"floor_checker_m": -0.5}, "floor_checker_m=-0.5"),
+        ({"floor_size_m": (0.0, 6.0)}, "floor_size_m"),
+        ({"floor_centre_m": (math.nan, 0.0)}, "floor_centre_m"),
+        ({"rooms": [RoomCfg(), RoomCfg(lower_m=(5.0, 0.0, 0.0))]}, r"rooms share.*\['room'\]"),
+        ({"rooms": [RoomCfg(), RoomCfg(name="b")]}, "'room' and 'b' overlap by 93.6 m3"),
+        ({"rooms": [RoomCfg(), RoomCfg(name="b", lower_m=(2.9, 0.0, 0.0))]}, "overlap by"),
+    ],
+)
+def test_numbers_out_of_range_are_refused_by_name(numbers, named):
+    with pytest.raises(ValueError, match=named):
+        PlaygroundCfg(name="odd", **numbers)
+
+
+def test_rooms_may_touch():
+    above = RoomCfg(name="attic", lower_m=(-3.0, -3.0, 2.6))
+    beside = RoomCfg(name="bedroom", lower_m=(3.0, -3.0, 0.0))
+    playground = PlaygroundCfg(name="house", rooms=[RoomCfg(), above, beside])
+    assert len(playground.rooms) == 3
+
+
+@pytest.mark.parametrize(
+    ("numbers", "named"),
+    [
+        ({"colour": (0.5, 0.5, 255.0)}, r"prop 'ball': colour=\(0.5, 0.5, 255.0\)"),
+        ({"colour": (0.5, 0.5, math.nan)}, "colour"),
+        ({"checker_m": -0.1}, "prop 'ball': checker_m=-0.1"),
+    ],
+)
+def test_an_impossible_appearance_of_a_prop_is_refused(numbers, named):
+    with pytest.raises(ValueError, match=named):
+        ball(**numbers)
+
+
 def test_an_impossible_room_on_the_command_line_is_one_line():
     with pytest.raises(ValueError, match="image_order"):
         compose(["+task=KickTheBall", "playground.image_order=-1"])

@@ -11,7 +11,8 @@ from composed import compose
 from walking import STEP_S, ball, box, empty_world, film, let_pass, walker_in, wall
 
 from veca_marl.sim.physics import ClockCfg, World, pybullet
-from veca_marl.sim.sound import SoundCfg
+from veca_marl.sim.sound import SoundCfg, make_sound
+from veca_marl.sim.vision import Camera, look_at
 
 
 def furnished(name="single_room"):
@@ -165,6 +166,36 @@ def test_a_restored_world_equals_a_fresh_one(playground):
         assert np.ptp(films[0][:, world.prop("drum")._row, 0]) > 1e-3  # it was pushed
         world.close()
     used.close()
+
+
+def test_a_reset_restores_colours_and_sounds_of_everything():
+    """The picture and the sound after a reset equal those of a fresh world, byte by byte."""
+
+    def build():
+        world = empty_world(ball(sound=SoundCfg()), box(colour=(0.2, 0.9, 0.1)))
+        walker = walker_in(world)
+        world.freeze()
+        return world, walker
+
+    def observed(world):
+        world.reset(np.random.default_rng(5))
+        world.refresh()
+        world.step()
+        source = world.prop("ball").sound
+        camera_pose = look_at(np.array([-1.0, 0.3, 0.8]), np.array([0.5, 0.0, 0.1]))
+        picture = Camera().render(world.scene, [camera_pose]).rgb
+        return picture, source.history.copy(), world.scene.surfaces.colours.copy()
+
+    fresh, (used, walker) = observed(build()[0]), build()
+    used.reset(np.random.default_rng(0))
+    for name in ("ball", "box", "floor", walker.name):
+        used.scene.find(name).paint((0.1, 0.2, 0.3))
+    source = used.prop("ball").sound
+    source.muted, source.sound, walker.muted = True, make_sound(SoundCfg(frequency_hz=300.0)), True
+    for one, other in zip(observed(used), fresh, strict=True):
+        np.testing.assert_array_equal(one, other)
+    assert fresh[1].any()
+    assert not walker.muted
 
 
 def test_worlds_in_one_process_do_not_disturb_each_other():

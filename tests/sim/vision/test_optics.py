@@ -176,6 +176,7 @@ def test_look_at_has_a_level_horizon():
     ("numbers", "named"),
     [
         ({"width": 0}, "0x84"),
+        ({"width": 84.5}, "84.5x84 must be whole numbers"),
         ({"fov_deg": 180.0}, "180.0"),
         ({"fov_deg": np.nan}, "nan"),
         ({"near_m": 0.0}, "near_m 0.0"),

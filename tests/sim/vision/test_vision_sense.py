@@ -232,6 +232,7 @@ def test_freshly_compiled_kernels_compute_the_same_bytes(tmp_path):
     ("numbers", "named"),
     [
         ({"width": 0}, "0x84"),
+        ({"height": 84.5}, "84x84.5 must be whole numbers"),
         ({"fov_deg": 200.0}, "fov_deg 200.0"),
         ({"eyes": "three"}, "binocular.*monocular"),
         ({"blur_deg": -1.0}, "blur_deg -1.0"),

@@ -78,7 +78,6 @@ class Body(ABC):
             self.name, bone_geoms(self._skeleton, shirt), dressed_skin(self._skeleton, shirt)
         )
         self.object_id = self._drawn.id
-        self._built_colours = scene.geoms.colours[self._drawn.geoms].copy()
 
     # ---- what each kind of body defines
 
@@ -134,13 +133,11 @@ class Body(ABC):
     # ---- calls from the world, see `Mover`
 
     def reset(self) -> None:
-        """Return to the state in which the body was built, at the origin.
+        """Return to the pose in which the body was built, at the origin, looking straight ahead.
 
-        The voice is audible and silent, the eyes look straight ahead, the colours are the first
-        ones. Tasks then put the body in its starting place.
+        `World.reset` restores colours and sounds of everything in the world. Tasks then put the
+        body in its starting place.
         """
-        self.muted = False
-        self._world.scene.geoms.colours[self._drawn.geoms] = self._built_colours
         self.place((0.0, 0.0, 0.0))
 
     # ---- poses and motion

@@ -210,7 +210,9 @@ class SceneObject:
         return self.scene.rotations[self.rows]
 
     def paint(self, colour: tuple[float, float, float]) -> None:
-        """Set the colour ``(red, green, blue)`` in [0, 1] of all its primitives."""
+        """Set the colour ``(red, green, blue)`` in [0, 1] of all its primitives and triangles."""
         check_colour(colour)
-        self.scene.geoms.colours[self.geoms] = colour
+        colours, first = self.scene.surfaces.colours, len(self.scene.geoms.shapes)
+        colours[self.geoms] = colour
+        colours[first + self.triangles.start : first + self.triangles.stop] = colour
         self.scene.version += 1

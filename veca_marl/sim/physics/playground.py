@@ -8,14 +8,22 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from itertools import combinations
 
-from veca_marl.sim.physics.prop_cfg import PropCfg
+from veca_marl.sim.physics.prop_cfg import PropCfg, check_appearance
 from veca_marl.sim.physics.rooms import DoorCfg, RoomCfg
 from veca_marl.sim.sound import House, Room
 from veca_marl.sim.sound.house import TRANSMISSION_LOSS_DB
 
 THICKEST_WALL_M = 0.5
 """The threshold of a door lies within the wall: at most so far from either room."""
+
+SHARED_VOLUME_M3 = 1e-6
+"""Greatest volume that two adjacent rooms may share: rounding errors of their corners."""
+
+GREATEST_IMAGE_ORDER = 12
+"""Greatest `PlaygroundCfg.image_order`: 2625 image sources of each source. Their number grows with
+the third power of the order, and so do the memory and time of every step."""
 
 
 @dataclass
@@ -24,15 +32,16 @@ class PlaygroundCfg:
 
     Attributes:
         name: As on the command line.
-        rooms: Boxes of air; the first is where single-room tasks play. Walls and large boxes
-            between them attenuate sound, see `stops_sound`.
+        rooms: Boxes of air with unique names that do not overlap; the first is where single-room
+            tasks play. Walls and large boxes between them attenuate sound, see `stops_sound`.
         doors: The openings between rooms.
         props: Walls, furniture and toys.
         floor_size_m: Extent of the drawn floor along x and y.
         floor_centre_m: Its middle.
         floor_colour: Red, green, blue in [0, 1].
         floor_checker_m: Edge of the floor's checker pattern.
-        image_order: Greatest number of reflections of a sound; 0 is the direct sound alone.
+        image_order: Greatest number of reflections of a sound, from 0 (the direct sound alone) to
+            `GREATEST_IMAGE_ORDER`.
         transmission_loss_db: Attenuation of a sound from another room by each obstacle.
     """
 
@@ -58,10 +67,44 @@ class PlaygroundCfg:
             raise ValueError(f"playground {self.name!r} has no room")
         self._check_names("props", [prop.name for prop in self.props])
         self._check_names("doors", [door.name for door in self.doors])
+        self._check_rooms()
         self._check_doors()
-        if self.image_order < 0:
+        self._check_floor()
+        self._check_sound()
+
+    def _check_rooms(self) -> None:
+        """Check that no two rooms share a name or a volume."""
+        self._check_names("rooms", [room.name for room in self.rooms])
+        for one, other in combinations(self.rooms, 2):
+            shared_m3 = one.overlap_m3(other)
+            if shared_m3 > SHARED_VOLUME_M3:
+                raise ValueError(
+                    f"playground {self.name!r}: rooms {one.name!r} and {other.name!r} overlap by "
+                    f"{shared_m3:.3g} m3; a point belongs to at most one room"
+                )
+
+    def _check_floor(self) -> None:
+        """Check the numbers of the drawn floor."""
+        if not all(math.isfinite(size) and size > 0.0 for size in self.floor_size_m):
             raise ValueError(
-                f"playground {self.name!r}: image_order={self.image_order} is negative"
+                f"playground {self.name!r}: floor_size_m={tuple(self.floor_size_m)} "
+                "must be two positive lengths"
+            )
+        if not all(math.isfinite(value) for value in self.floor_centre_m):
+            raise ValueError(
+                f"playground {self.name!r}: floor_centre_m={tuple(self.floor_centre_m)} "
+                "must be finite"
+            )
+        start = f"playground {self.name!r}: "
+        check_appearance(start, self.floor_colour, self.floor_checker_m, "floor_")
+
+    def _check_sound(self) -> None:
+        """Check the numbers of the rooms' acoustics."""
+        order = self.image_order
+        if not (0 <= order <= GREATEST_IMAGE_ORDER and order == int(order)):
+            raise ValueError(
+                f"playground {self.name!r}: image_order={order} must be a whole number from 0 "
+                f"(direct sound) to {GREATEST_IMAGE_ORDER}"
             )
         loss_db = self.transmission_loss_db
         if not (math.isfinite(loss_db) and loss_db >= 0.0):
@@ -78,9 +121,6 @@ class PlaygroundCfg:
     def _check_doors(self) -> None:
         """Check that every door lies between two rooms that exist."""
         rooms = {room.name: room for room in self.rooms}
-        if self.doors and len(rooms) < len(self.rooms):
-            names = [room.name for room in self.rooms]
-            raise ValueError(f"playground {self.name!r}: doors need rooms of unique names: {names}")
         for door in self.doors:
             unknown = sorted(set(door.rooms) - set(rooms))
             if unknown:

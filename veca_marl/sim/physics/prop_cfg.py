@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 
@@ -30,6 +31,25 @@ SIZE_NAMES: dict[PropShape, tuple[str, ...]] = {
 }
 
 
+def check_appearance(
+    prefix: str, colour: Sequence[float], checker_m: float, field_prefix: str = ""
+) -> None:
+    """Check a colour and the edge of a checker pattern.
+
+    Raises:
+        ValueError: If the colour is not three numbers in [0, 1], or the edge is negative or not
+            finite; the message begins with `prefix` and the name of the field.
+    """
+    if len(colour) != 3 or not all(0.0 <= channel <= 1.0 for channel in colour):
+        raise ValueError(
+            f"{prefix}{field_prefix}colour={tuple(colour)} must be red, green and blue in [0, 1]"
+        )
+    if not (math.isfinite(checker_m) and checker_m >= 0.0):
+        raise ValueError(
+            f"{prefix}{field_prefix}checker_m={checker_m} must be an edge in metres, or 0 (plain)"
+        )
+
+
 @dataclass
 class PropCfg:
     """One prop.
@@ -49,7 +69,7 @@ class PropCfg:
         restitution: 0 (no rebound) to 1 (rebound at equal speed) on the floor; multiplied as
             well, the floor's is 1.
         colour: Red, green, blue in [0, 1].
-        checker_m: Edge of a checker pattern; 0 is plain.
+        checker_m: Edge of a checker pattern, which is fixed to the prop; 0 is plain.
         transparent: Whether eyes see through it; it does not hinder `is_visible`.
         tangible: Whether it collides, is felt and stops sound; a mark on the floor is only seen.
         sound: What it emits; None for a silent prop.
@@ -73,6 +93,7 @@ class PropCfg:
     def __post_init__(self) -> None:
         """Check the numbers."""
         self._check_shape()
+        self._check_appearance()
         self._check_physics()
         if not self.name:
             raise ValueError(f"a {self.shape.value} without a name; every prop has one")
@@ -94,6 +115,9 @@ class PropCfg:
                 f"prop {self.name!r}: position_m={tuple(self.position_m)}, yaw_deg={self.yaw_deg} "
                 "must be finite"
             )
+
+    def _check_appearance(self) -> None:
+        check_appearance(f"prop {self.name!r}: ", self.colour, self.checker_m)
 
     def _check_physics(self) -> None:
         for quantity in ("mass_kg", "friction", "rolling_friction"):

@@ -48,6 +48,12 @@ class RoomCfg:
         out = np.maximum(np.maximum(low - point, point - low - size), 0.0)
         return float(np.linalg.norm(out))
 
+    def overlap_m3(self, other: RoomCfg) -> float:
+        """Return the volume that two rooms share; rooms that only touch share none."""
+        low = np.maximum(self.lower_m, other.lower_m)
+        upper = [np.add(room.lower_m, room.size_m) for room in (self, other)]
+        return float(np.prod(np.maximum(np.minimum(*upper) - low, 0.0)))
+
     @property
     def middle_m(self) -> Floats:
         """``(3,)`` metres: the middle of the floor."""

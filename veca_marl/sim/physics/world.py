@@ -8,6 +8,7 @@ from collections.abc import Callable
 import numpy as np
 
 from veca_marl.sim.geometry import Scene
+from veca_marl.sim.physics.built_state import BuiltState, built_state
 from veca_marl.sim.physics.bullet import pybullet
 from veca_marl.sim.physics.clock import ClockCfg
 from veca_marl.sim.physics.floor import FLOOR_NAME, add_floor
@@ -55,6 +56,7 @@ class World:
         self.version = 0
         self.step_count = 0
         self._state: int | None = None
+        self._built: BuiltState | None = None
         self._moving: list[Prop] = []
         self._configure_physics()
         self.floor_id = add_floor(self.client, self.scene, playground)
@@ -100,9 +102,13 @@ class World:
         self._set_contact_share()
         pybullet.performCollisionDetection(physicsClientId=self.client)
         self._state = pybullet.saveState(physicsClientId=self.client)
+        self._built = built_state(self.scene, self.sound.sources)
 
     def reset(self, rng: np.random.Generator) -> None:
         """Restore the built state, bit by bit, and restart all sounds.
+
+        This covers poses and velocities, colours (`SceneObject.paint`), and which sound each source
+        emits and whether it is muted.
 
         Args:
             rng: Source of the sounds' phases and noises.
@@ -110,11 +116,12 @@ class World:
         Raises:
             RuntimeError: If the world is not frozen.
         """
-        if self._state is None:
+        if self._state is None or self._built is None:
             raise RuntimeError("freeze() the world before its first reset()")
         self.version += 1
         self._set_contact_share()
         pybullet.restoreState(self._state, physicsClientId=self.client)
+        self._built.restore(self.scene)
         self.sound.reset(rng)
         follow_physics(list(self.props.values()))
         for mover in self.movers:

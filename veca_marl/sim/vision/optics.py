@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from numbers import Integral
 from typing import NamedTuple
 
 import numpy as np
@@ -58,8 +59,11 @@ class Camera:
     lens: Lens = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        if self.width < 1 or self.height < 1:
-            raise ValueError(f"width x height {self.width}x{self.height} must be at least 1x1")
+        whole = isinstance(self.width, Integral) and isinstance(self.height, Integral)
+        if not whole or self.width < 1 or self.height < 1:
+            raise ValueError(
+                f"width x height {self.width}x{self.height} must be whole numbers, at least 1x1"
+            )
         if not 0.0 < self.fov_deg < 170.0:
             raise ValueError(f"fov_deg {self.fov_deg} must be between 0 and 170")
         if not 0.0 < self.near_m < self.far_m < np.inf:

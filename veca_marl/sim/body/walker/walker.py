@@ -18,8 +18,9 @@ from veca_marl.sim.body.base import Body
 from veca_marl.sim.body.body_cfg import BodyCfg
 from veca_marl.sim.body.walker.capsule import Capsule
 from veca_marl.sim.body.walker.gait import Gait
+from veca_marl.sim.body.walker.line_of_contact import is_first_hit
 from veca_marl.sim.body.walker.walk_commands import WALK_ACTIONS
-from veca_marl.sim.body.walker.walker_cfg import WalkerCfg
+from veca_marl.sim.body.walker.walker_cfg import WalkerCfg, greatest_speed_mps
 from veca_marl.sim.body.walker.walker_collisions import walker_collisions
 from veca_marl.sim.geometry import Floats, horizontal_distance
 from veca_marl.sim.physics import Prop, World
@@ -37,6 +38,7 @@ class Walker(Body):
     def __init__(self, name: str, cfg: WalkerCfg, world: World, shirt: int = 0) -> None:
         super().__init__(name, cfg, world, shirt)
         self.cfg = cfg
+        self._greatest_speed_mps = greatest_speed_mps(cfg, world.clock)
         self._walk_action = WALK_ACTIONS[cfg.action]
         self._gait = Gait(self._skeleton)
         self._capsule = Capsule(world.client, cfg.radius_m, cfg.height_m, cfg.push_limit_kg)
@@ -124,14 +126,24 @@ class Walker(Body):
             turn_speed_radps: To the left; negative is to the right.
 
         Raises:
-            ValueError: If a speed is not finite.
+            ValueError: If a speed is not finite, or the walking speed is above
+                `greatest_speed_mps` of its configuration and the world's clock.
         """
-        if not (math.isfinite(walk_speed_mps) and math.isfinite(turn_speed_radps)):
-            raise ValueError(f"cannot walk at {walk_speed_mps} m/s, {turn_speed_radps} rad/s")
+        limit = self._greatest_speed_mps
+        if not (abs(walk_speed_mps) <= limit and math.isfinite(turn_speed_radps)):
+            raise ValueError(
+                f"{self.name}: cannot walk at {walk_speed_mps} m/s, {turn_speed_radps} rad/s; "
+                f"at most {limit:.4g} m/s, further than which a physics step could pass a wall"
+            )
         self._speed_mps, self._turn_radps = walk_speed_mps, turn_speed_radps
 
     def can_kick(self, prop: Prop) -> bool:
-        """Return whether a prop is light enough, near enough, low enough and ahead."""
+        """Return whether a kick would reach a prop.
+
+        The prop is light enough, near enough, low enough and ahead, and nothing solid is on the
+        line of contact: the horizontal line from the capsule towards the prop's centre, at the
+        height of the centre or of `kick_height_m`, whichever is lower.
+        """
         here, there = self.position, prop.position
         gap = horizontal_distance(here, there) - self.radius_m - prop.radius_m
         light = not prop.fixed and prop.cfg.mass_kg <= self.cfg.push_limit_kg
@@ -139,7 +151,10 @@ class Walker(Body):
             return False
         ahead = math.atan2(there[1] - here[1], there[0] - here[0]) - self.yaw_rad
         aside = abs((ahead + math.pi) % (2.0 * math.pi) - math.pi)
-        return aside <= math.radians(self.cfg.kick_angle_deg)
+        if aside > math.radians(self.cfg.kick_angle_deg):
+            return False
+        height_m = min(float(there[2]), self.cfg.kick_height_m)
+        return is_first_hit(self._world.client, prop.body_id, here, there, self.radius_m, height_m)
 
     def kick(self, prop: Prop) -> bool:
         """Kick a prop away from the walker; return False, and do nothing, if it cannot."""

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from veca_marl.sim.body.body_cfg import BodyCfg
 from veca_marl.sim.body.walker.walk_commands import WalkActionKind
+from veca_marl.sim.physics import ClockCfg
 
 
 @dataclass
@@ -14,8 +15,9 @@ class WalkerCfg(BodyCfg):
 
     Attributes:
         action: Continuous velocities or discrete moves.
-        walk_speed_mps: Speed of a full forward action.
-        backward_share: Speed of a full backward action as a fraction of the forward speed.
+        walk_speed_mps: Speed of a full forward action; see `greatest_speed_mps` for its limit.
+        backward_share: Speed of a full backward action as a fraction of the forward speed, in
+            [0, 1].
         turn_speed_degps: Turning speed of a full turn action.
         radius_m: Radius of the capsule in the physics.
         height_m: Height of the capsule.
@@ -51,3 +53,25 @@ class WalkerCfg(BodyCfg):
                 f"body.radius_m={self.radius_m}, body.height_m={self.height_m}: "
                 "the radius must be positive and at most half the height"
             )
+        if self.backward_share > 1.0:
+            raise ValueError(f"body.backward_share={self.backward_share} is not in [0, 1]")
+
+
+def greatest_speed_mps(cfg: WalkerCfg, clock: ClockCfg) -> float:
+    """Return the speed at which a walker moves by its radius in one physics step.
+
+    The capsule is moved to its new position before contacts are resolved. If it moves by at most
+    its radius, its axis is still on the near side of a wall that it touched, however thin, and it
+    is moved back to that side.
+
+    Raises:
+        ValueError: If the configured speed is higher; the message names the limit.
+    """
+    limit = cfg.radius_m / clock.substep_s
+    if cfg.walk_speed_mps > limit:
+        raise ValueError(
+            f"body.walk_speed_mps={cfg.walk_speed_mps} covers more than "
+            f"body.radius_m={cfg.radius_m} in a physics step of {clock.substep_s:.4g} s and could "
+            f"pass through walls: at most {limit:.4g} m/s, or raise clock.substeps"
+        )
+    return limit
