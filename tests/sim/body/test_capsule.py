@@ -61,7 +61,7 @@ def test_speeds_that_would_tunnel_are_refused(clock):
     for speed in (1.01 * limit, -1.01 * limit, math.nan, math.inf):
         with pytest.raises(ValueError, match=f"at most {limit:.4g} m/s"):
             walker.walk(speed, 0.0)
-    with pytest.raises(ValueError, match="backward_share=1.5"):
+    with pytest.raises(ValueError, match=r"backward_share=1\.5"):
         WalkerCfg(backward_share=1.5)
 
 
