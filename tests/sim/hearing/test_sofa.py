@@ -7,7 +7,7 @@ import pytest
 import scipy.signal
 from paths import SHARED
 
-from veca_marl.sim.hearing import SofaError, condition, read_sofa, sofa, sofa_table
+from veca_marl.sim.hearing import SofaError, condition, read_sofa, sofa_table
 from veca_marl.sim.hearing.conditioning import ear_incidence
 from veca_marl.sim.hearing.hrtf import direction_vectors
 from veca_marl.sim.hearing.minimum_phase import minimum_phase
@@ -49,7 +49,10 @@ def sphere_fields(delays_in_field=False):
     }
 
 
-def write(path, fields, kind="spherical", **attributes):
+UNITS = {"spherical": "degree, degree, metre", "cartesian": "metre"}
+
+
+def write(path, fields, kind="spherical", units=None, **attributes):
     attributes = {
         "Conventions": "SOFA",
         "SOFAConventions": "SimpleFreeFieldHRIR",
@@ -62,7 +65,8 @@ def write(path, fields, kind="spherical", **attributes):
         for name, value in fields.items():
             file[name] = value
         if "SourcePosition" in fields:
-            file["SourcePosition"].attrs["Type"] = np.bytes_(kind)
+            stated = {"Type": kind, "Units": UNITS.get(kind, "") if units is None else units}
+            file["SourcePosition"].attrs.update({k: np.bytes_(v) for k, v in stated.items() if v})
     return path
 
 
@@ -150,13 +154,21 @@ def test_pulses_without_a_head_are_refused(fields, tmp_path):
         condition(read_sofa(path), 22_050)
 
 
+def only(fields, directions):
+    """A part of a set: the measurements for which the function of azimuth and elevation holds."""
+    azimuth, elevation, _ = fields["SourcePosition"].T
+    kept = directions(azimuth, elevation)
+    return {
+        **fields,
+        "Data.IR": fields["Data.IR"][kept],
+        "SourcePosition": fields["SourcePosition"][kept],
+    }
+
+
 def broken(fields):
     """Name, fields, attributes and the expected message."""
-    responses = fields["Data.IR"]
+    responses, positions = fields["Data.IR"], fields["SourcePosition"]
     without = {key: value for key, value in fields.items() if key != "Data.IR"}
-    one_side = np.abs(fields["SourcePosition"][:, 0] - 180.0) > 100.0
-    half = {**fields, "Data.IR": responses[one_side]}
-    half["SourcePosition"] = np.abs(fields["SourcePosition"][one_side]) * (0.1, 1.0, 1.0)
     return [
         ("lacks", without, {}, "lacks Data.IR"),
         ("netcdf", fields, {"Conventions": "CF"}, "SOFA"),
@@ -168,18 +180,149 @@ def broken(fields):
         ("few", {**fields, "Data.IR": responses[:3]}, {}, "3 directions"),
         ("count", {**fields, "Data.IR": responses[:-1]}, {}, "SourcePosition has shape"),
         ("slow", {**fields, "Data.SamplingRate": np.array([100.0])}, {}, "sampling rate 100"),
+        (
+            "rates",
+            {**fields, "Data.SamplingRate": np.array([44.1e3, 48e3])},
+            {},
+            "SamplingRate has",
+        ),
         ("delay", {**fields, "Data.Delay": np.zeros((3, 2))}, {}, "Data.Delay has shape"),
-        ("side", half, {}, "one side"),
-        ("text", {**fields, "Data.IR": "none"}, {}, "cannot be read"),
+        ("text", {**fields, "Data.IR": "none"}, {}, "Data.IR is not an array of numbers"),
+        ("untyped", fields, {"kind": "", "units": "degree"}, "SourcePosition has Type ''"),
+        ("unitless", fields, {"units": ""}, "SourcePosition has Type 'spherical' and Units ''"),
+        ("feet", fields, {"units": "degree, degree, foot"}, "Units 'degree, degree, foot'"),
+        (
+            "colatitude",
+            {**fields, "SourcePosition": positions + np.array([0.0, 90.0, 0.0])},
+            {},
+            "elevations up to",
+        ),
+        ("near", {**fields, "SourcePosition": positions * (1, 1, 0)}, {}, "centre of the head"),
+        ("side", only(fields, lambda a, e: a < 170.0), {}, "one side"),
+        (
+            "frontal",
+            only(fields, lambda a, e: np.cos(np.deg2rad(a)) >= -1e-9),
+            {},
+            "90 degrees away",
+        ),
+        ("horizontal", only(fields, lambda a, e: e == 0.0), {}, "90 degrees away"),
+        ("rad", {**fields, "SourcePosition": np.deg2rad(positions)}, {}, "one side"),
     ]
 
 
-@pytest.mark.parametrize("case", range(13))
+@pytest.mark.parametrize("case", range(22))
 def test_errors_of_invalid_files_name_the_file(fields, tmp_path, case):
     name, content, attributes, message = broken(fields)[case]
     path = write(tmp_path / f"{name}.sofa", content, **attributes)
     with pytest.raises(SofaError, match=rf"{name}\.sofa.*{message}"):
         read_sofa(path)
+
+
+def test_angles_in_radians_are_converted(fields, tmp_path):
+    azimuth, elevation, distance = fields["SourcePosition"].T
+    positions = np.stack([np.deg2rad(azimuth), np.deg2rad(elevation), distance], axis=1)
+    content = {**fields, "SourcePosition": positions}
+    path = write(tmp_path / "radians.sofa", content, units="radian, radian, metre")
+    found, expected = read_sofa(path), read_sofa(write(tmp_path / "degrees.sofa", fields))
+    assert np.allclose(found.directions, expected.directions, atol=1e-12)
+
+
+def test_positions_of_a_room_are_converted_to_the_frame_of_the_head(fields, tmp_path):
+    """A head at (1, 2, 3) that lies on its back and faces up, its crown toward -x."""
+    expected = read_sofa(write(tmp_path / "head.sofa", fields))
+    forward, up = np.array([0.0, 0.0, 1.0]), np.array([-1.0, 0.0, 0.0])
+    axes = np.stack([forward, np.cross(up, forward), up], axis=1)
+    in_room = 1.4 * expected.directions @ axes.T + (1.0, 2.0, 3.0)
+    listener = {"Position": [[1.0, 2.0, 3.0]], "View": [2.0 * forward], "Up": [3.0 * up]}
+    # SourcePosition in the order that the reader keeps: one of each direction
+    path = write(
+        tmp_path / "room.sofa",
+        {
+            **fields,
+            "Data.IR": expected.impulse_responses,
+            "SourcePosition": in_room,
+            **{f"Listener{key}": np.array(value) for key, value in listener.items()},
+        },
+        kind="cartesian",
+    )
+    with h5py.File(path, "a") as file:
+        for key in ("ListenerPosition", "ListenerView"):
+            file[key].attrs.update({"Type": "cartesian", "Units": "metre"})
+    found = read_sofa(path)
+    assert np.allclose(found.directions, expected.directions, atol=1e-9)
+    assert found.distance_m == pytest.approx(1.4)
+
+
+def test_of_several_distances_the_longest_is_used(fields, tmp_path):
+    near = fields["SourcePosition"] * (1.0, 1.0, 0.2)
+    content = {
+        **fields,
+        "Data.IR": np.concatenate([0.5 * fields["Data.IR"], fields["Data.IR"]]),
+        "SourcePosition": np.concatenate([near, fields["SourcePosition"]]),
+    }
+    with pytest.warns(UserWarning, match=r"both\.sofa: of 120 measurements the 60"):
+        found = read_sofa(write(tmp_path / "both.sofa", content))
+    expected = read_sofa(write(tmp_path / "far.sofa", fields))
+    assert found.distance_m == pytest.approx(1.4)
+    assert np.array_equal(found.impulse_responses, expected.impulse_responses)
+
+
+def replaced(fields, path, key, create):
+    """A valid file in which one field is created anew by a function of the open file."""
+    write(path, fields)
+    with h5py.File(path, "a") as file:
+        del file[key]
+        create(file, key)
+    return path
+
+
+@pytest.mark.parametrize("key", ["Data.IR", "SourcePosition", "Data.Delay", "Data.SamplingRate"])
+def test_declared_sizes_that_are_not_stored_are_refused_before_allocation(fields, tmp_path, key):
+    """The file declares 3 PiB and has 0.5 MB."""
+    shape = (3 << 44, 2, 4) if key == "Data.IR" else (3 << 45, 4)
+
+    def create(file, name):
+        chunks = (1024, *shape[1:])
+        file.create_dataset(name, shape, "f8", chunks=chunks, maxshape=(None, *shape[1:]))
+
+    path = replaced(fields, tmp_path / "large.sofa", key, create)
+    assert path.stat().st_size < 1_000_000
+    with pytest.raises(SofaError, match=rf"large\.sofa: {key} declares \d+ values"):
+        read_sofa(path)
+
+
+def test_a_moderate_size_that_is_not_stored_is_refused(fields, tmp_path):
+    path = replaced(
+        fields,
+        tmp_path / "hollow.sofa",
+        "Data.IR",
+        lambda file, name: file.create_dataset(name, (60, 2, 65_536), "f8", chunks=(1, 2, 1024)),
+    )
+    with pytest.raises(SofaError, match=r"declares \d+ values but only 0 bytes are stored"):
+        read_sofa(path)
+
+
+def test_links_and_external_data_are_refused(fields, tmp_path):
+    write(tmp_path / "other.sofa", fields)
+    responses = fields["Data.IR"]
+    (tmp_path / "raw.bin").write_bytes(responses.tobytes())
+
+    def virtual(file, name):
+        layout = h5py.VirtualLayout(responses.shape, "f8")
+        layout[:] = h5py.VirtualSource(str(tmp_path / "other.sofa"), name, responses.shape)
+        file.create_virtual_dataset(name, layout)
+
+    def external(file, name):
+        raw = [(str(tmp_path / "raw.bin"), 0, responses.nbytes)]
+        file.create_dataset(name, responses.shape, "f8", external=raw)
+
+    def linked(file, name):
+        file[name] = h5py.ExternalLink(str(tmp_path / "other.sofa"), name)
+
+    for create, message in ((linked, "is a link"), (external, "another"), (virtual, "another")):
+        path = replaced(fields, tmp_path / "linked.sofa", "Data.IR", create)
+        with pytest.raises(SofaError, match=message):
+            read_sofa(path)
 
 
 def test_missing_files_and_files_that_are_not_hdf5_are_refused(tmp_path):
@@ -194,7 +337,7 @@ def test_missing_files_and_files_that_are_not_hdf5_are_refused(tmp_path):
 def test_without_h5py_the_error_names_the_extra(monkeypatch, tmp_path):
     monkeypatch.setitem(__import__("sys").modules, "h5py", None)
     with pytest.raises(ImportError, match=r"veca_marl\[sofa\]"):
-        sofa.read_sofa(tmp_path / "any.sofa")
+        read_sofa(tmp_path / "any.sofa")
 
 
 def test_a_file_of_the_listen_set():

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import gcd
+import math
 
 import numpy as np
 import scipy.signal
@@ -17,6 +17,7 @@ from veca_marl.sim.hearing.spherical_head import sphere_response
 
 # window around the peak: seconds before it, seconds after it, and length of the fade-out
 _BEFORE_PEAK_S, _AFTER_PEAK_S, _FADE_OUT_S = 1.5e-3, 4.0e-3, 2.0e-3
+_SHORT_S = 0.02
 # below the first frequency the response is that of the sphere, above the second the measured one
 _BLEND_HZ = (150.0, 350.0)
 # fraction of the sampling rate above which the anti-aliasing filter would be equalised
@@ -76,7 +77,7 @@ def _resample(measured: MeasuredHead, sample_rate_hz: int) -> Floats:
     rate = round(measured.sample_rate_hz)
     if rate == sample_rate_hz:
         return measured.impulse_responses
-    common = gcd(rate, sample_rate_hz)
+    common = math.gcd(rate, sample_rate_hz)
     resampled: Floats = scipy.signal.resample_poly(
         measured.impulse_responses,
         sample_rate_hz // common,
@@ -89,8 +90,13 @@ def _resample(measured: MeasuredHead, sample_rate_hz: int) -> Floats:
 
 
 def _window(responses: Floats, sample_rate_hz: int) -> Floats:
-    """Keep -1.5 to +6 ms around the peak; the rest of a measurement is reflections and noise."""
+    """Keep -1.5 to +6 ms around each peak; the rest of a measurement is reflections and noise.
+
+    Responses of more than 20 ms are cut where the windows of all of them are over.
+    """
     peak = np.abs(responses).argmax(axis=-1)[..., None]
+    last = int(peak.max()) + math.ceil((_AFTER_PEAK_S + _FADE_OUT_S) * sample_rate_hz)
+    responses = responses[..., : max(last + 1, int(_SHORT_S * sample_rate_hz))]
     since_peak_s = (np.arange(responses.shape[-1]) - peak) / sample_rate_hz
     rise = np.clip((since_peak_s + _BEFORE_PEAK_S) / (0.3 * _BEFORE_PEAK_S), 0.0, 1.0)
     fall = np.clip((since_peak_s - _AFTER_PEAK_S) / _FADE_OUT_S, 0.0, 1.0)
