@@ -46,6 +46,13 @@ def test_inertia_is_that_of_evenly_spread_points(shape):
     np.testing.assert_allclose(found.matrix, expected, atol=0.015 * expected.max())
 
 
+@pytest.mark.parametrize("shape", Shape)
+def test_volume_is_that_of_evenly_spread_points(shape):
+    part = primitive(shape)
+    share = len(points_inside(part)) / 1_000_000
+    assert part.volume == pytest.approx(share * 0.92**3, rel=0.01)
+
+
 def test_joined_parts_have_the_inertia_of_their_points():
     """The inertia of parts from the theorem equals that of many points from the definition."""
     rng = np.random.default_rng(0)

@@ -197,3 +197,16 @@ def test_an_intangible_prop_is_only_seen():
 def test_an_intangible_prop_must_be_fixed():
     with pytest.raises(ValueError, match="mass_kg"):
         PropCfg(name="mark", size_m=[1.0, 1.0, 1.0], mass_kg=1.0, tangible=False)
+
+
+def test_a_movable_wall_is_placed_by_its_foot_and_turns_about_its_centre():
+    cfg = PropCfg(name="wall", shape=PropShape.wall, size_m=[1.0, 0.1, 0.5], mass_kg=2.0)
+    world = empty_world(cfg)
+    world.freeze()
+    thing = world.prop("wall")
+    thing.place((1.0, 2.0, 3.0), 0.7)
+    np.testing.assert_allclose(thing.position, (1.0, 2.0, 3.0), atol=1e-12)
+    low, high = pybullet.getAABB(thing.body_id, physicsClientId=world.client)
+    assert (low[2] + high[2]) / 2 == pytest.approx(3.25, abs=1e-3)
+    world.reset(np.random.default_rng(0))
+    np.testing.assert_allclose(thing.position, cfg.position_m, atol=1e-12)

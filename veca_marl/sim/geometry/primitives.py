@@ -89,6 +89,15 @@ class Primitive:
         """Metres along z: of a cylinder, or between the centres of a capsule's caps; else 0."""
         return self.size[1] if self.shape in (Shape.CYLINDER, Shape.CAPSULE) else 0.0
 
+    @property
+    def volume(self) -> float:
+        """Cubic metres."""
+        if self.shape is Shape.BOX:
+            return float(8.0 * np.prod(self.size))
+        cylinder = math.pi * self.radius**2 * self.length
+        caps = 0.0 if self.shape is Shape.CYLINDER else 4.0 / 3.0 * math.pi * self.radius**3
+        return cylinder + caps
+
     def cap_centres(self) -> tuple[Floats, Floats]:
         """Return the lower and the upper end of the axis, ``(3,)`` metres each, in the frame."""
         centre, rotation = self.pose

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 from veca_marl.sim.sound import SAMPLE_RATE_HZ
 
+_CONTACT_STEP_S = 0.008  # physics step at which `contact_share` is the detection distance
+
 
 @dataclass
 class ClockCfg:
@@ -18,8 +20,9 @@ class ClockCfg:
         substeps: Physics steps per agent step.
         solver_iterations: Iterations of Bullet's constraint solver per physics step.
         contact_share: Distance at which Bullet detects contacts ahead of time, as a share of the
-            size of the smaller of two objects, in (0, 1]. What moves further in one physics step
-            penetrates before its contact is found; 0.1 finds those of a palm-sized object 5 mm
+            size of the smaller of two objects, in (0, 1], at physics steps of 8 ms; in proportion
+            less at shorter steps, in which objects move less. What moves further in one physics
+            step penetrates before its contact is found; 0.1 finds those of a palm-sized object 5 mm
             ahead, at twice the cost of physics.
     """
 
@@ -51,6 +54,15 @@ class ClockCfg:
     def substep_s(self) -> float:
         """Duration of a physics step."""
         return self.step_s / self.substeps
+
+    @property
+    def contact_threshold(self) -> float:
+        """The distance at which Bullet detects contacts, as a share of size, at this time step.
+
+        Bullet stops an object short of a contact ahead of it. At a constant distance it would take
+        a greater part of the speed from it, the shorter the step.
+        """
+        return self.contact_share * min(1.0, self.substep_s / _CONTACT_STEP_S)
 
     @property
     def step_samples(self) -> int:

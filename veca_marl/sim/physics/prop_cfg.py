@@ -61,13 +61,14 @@ class PropCfg:
             distance of its cap centres. Cylinders, capsules and goal posts stand along z.
         position_m: Centre of the shape; for walls and goals the middle of the foot line.
         yaw_deg: Rotation about z.
-        mass_kg: 0 makes it a fixed part of the world.
+        mass_kg: 0 makes it a fixed part of the world. The inertia is that of a homogeneous solid.
         friction: Sliding friction coefficient (Coulomb) on the floor. Bullet multiplies those of
             two objects in contact; the floor's is 1.
         rolling_friction: Lever arm of the resistance to rolling and to spinning on the floor,
             metres.
         restitution: 0 (no rebound) to 1 (rebound at equal speed) on the floor; multiplied as
-            well, the floor's is 1.
+            well, the floor's is 1. Speeds of rebound are within 0.1 of the product times the speed
+            of impact; with a product above 0.8 an object can rebound higher than it was.
         colour: Red, green, blue in [0, 1].
         checker_m: Edge of a checker pattern, which is fixed to the prop; 0 is plain.
         transparent: Whether eyes see through it; it does not hinder `is_visible`.

@@ -7,9 +7,16 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from veca_marl.sim.geometry import Floats, Geom, Scene, quaternion_from_yaw, quaternions_to_matrices
+from veca_marl.sim.geometry import (
+    Floats,
+    Geom,
+    Scene,
+    quaternion_from_yaw,
+    quaternions_to_matrices,
+    rotation_about_vertical,
+)
 from veca_marl.sim.physics.bullet import pybullet
-from veca_marl.sim.physics.collision_shapes import create_collision_shape
+from veca_marl.sim.physics.prop_body import create_prop_body
 from veca_marl.sim.physics.prop_cfg import PropCfg, PropShape
 from veca_marl.sim.physics.prop_shapes import prop_geoms, stops_sound
 from veca_marl.sim.sound import Source
@@ -43,7 +50,8 @@ class Prop:
         shown = scene.add_object(cfg.name, [geoms])
         self.object_id = shown.id
         self._row = shown.rows.start
-        self.body_id = _create_body(cfg, client, geoms)
+        self.body_id, centre = create_prop_body(cfg, client, geoms)
+        self._centre = centre if centre.any() else None
         self.place(cfg.position_m, math.radians(cfg.yaw_deg))
 
     @property
@@ -82,7 +90,7 @@ class Prop:
 
     @property
     def velocity(self) -> Floats:
-        """``(3,)`` m/s, world frame."""
+        """``(3,)`` m/s, world frame, of its centre of mass."""
         linear, _ = pybullet.getBaseVelocity(self.body_id, physicsClientId=self._client)
         return np.array(linear)
 
@@ -103,13 +111,15 @@ class Prop:
         Args:
             position: ``(3,)`` metres.
             yaw_rad: Rotation about z; any other rotation is undone.
-            velocity: ``(3,)`` m/s.
+            velocity: ``(3,)`` m/s, of the centre of mass.
             angular_velocity: ``(3,)`` rad/s.
 
         Raises:
             ValueError: If a number is not finite.
         """
         x, y, z = _three_finite(self.name, "position", position)
+        if self._centre is not None:
+            (x, y, z) = np.array([x, y, z]) + rotation_about_vertical(yaw_rad) @ self._centre
         pybullet.resetBasePositionAndOrientation(
             self.body_id, (x, y, z), quaternion_from_yaw(yaw_rad), physicsClientId=self._client
         )
@@ -164,30 +174,12 @@ def follow_physics(props: Sequence[Prop]) -> None:
     scene.positions[rows] = [position for position, _ in poses]
     scene.rotations[rows] = matrices
     for prop in props:
+        if prop._centre is not None:
+            scene.positions[prop._row] -= scene.rotations[prop._row] @ prop._centre
         if prop.sound is not None:
             prop.sound.position = scene.positions[prop._row]
         if prop._obstacle is not None:
             prop._obstacle.move(scene.positions[prop._row], scene.rotations[prop._row])
-
-
-def _create_body(cfg: PropCfg, client: int, geoms: Sequence[Geom]) -> int:
-    """Create the rigid body of a prop at the origin; return PyBullet's id."""
-    shape = create_collision_shape(client, geoms)
-    body_id: int = pybullet.createMultiBody(cfg.mass_kg, shape, physicsClientId=client)
-    pybullet.changeDynamics(
-        body_id,
-        -1,
-        lateralFriction=cfg.friction,
-        rollingFriction=cfg.rolling_friction,
-        spinningFriction=cfg.rolling_friction,
-        restitution=cfg.restitution,
-        linearDamping=0.0,
-        angularDamping=0.0,  # only friction slows objects down
-        physicsClientId=client,
-    )
-    if not cfg.tangible:
-        pybullet.setCollisionFilterGroupMask(body_id, -1, 0, 0, physicsClientId=client)
-    return body_id
 
 
 def _three_finite(name: str, what: str, vector: Sequence[float] | Floats) -> list[float]:

@@ -171,7 +171,7 @@ class World:
     def _set_contact_share(self) -> None:
         """Set Bullet's detection distance of contacts: it keeps one number for all its clients."""
         pybullet.setPhysicsEngineParameter(
-            contactBreakingThreshold=self.clock.contact_share, physicsClientId=self.client
+            contactBreakingThreshold=self.clock.contact_threshold, physicsClientId=self.client
         )
 
     def _configure_physics(self) -> None:
