@@ -5,6 +5,7 @@ from stand_in_worlds import SoundWorld
 
 from veca_marl.sim.geometry import Pose
 from veca_marl.sim.hearing import AudioCfg, AudioQuality, AudioSense, Window
+from veca_marl.sim.hearing.hrtf import kemar_response
 from veca_marl.sim.sense import check_spec
 from veca_marl.sim.sound import Clip, Noise, SoundField, buzz, tone
 
@@ -117,16 +118,17 @@ def test_a_source_at_one_metre_has_its_own_level():
     assert peak == pytest.approx(np.log10(0.1 * np.sqrt(2) * 512), abs=0.002)
 
 
-def test_stereo_receives_at_the_ears_of_the_body():
+@pytest.mark.parametrize("scale", [1.0, 0.733])
+def test_stereo_receives_at_the_ears_of_a_head_of_that_size(scale):
     """The level at each ear is inversely proportional to its own distance."""
-    scene = Scene(Noise(0.1, RATE), quality=AudioQuality.stereo, waveform=True)
+    scene = Scene(Noise(0.1, RATE), quality=AudioQuality.stereo, waveform=True, head_scale=scale)
     scene.body.rotation = yaw(0.5)
     scene.body.position = np.array([3.0, -1.0, 0.5])
     scene.source.position = (3.2, -0.7, 0.6)
-    distance = [
-        np.linalg.norm(scene.source.position - scene.body.mount(ear).position)
-        for ear in ("ear_left", "ear_right")
-    ]
+    ears = np.array([scene.body.mount(f"ear_{side}").position for side in ("left", "right")])
+    left = scale * kemar_response().head_radius_m * scene.body.rotation[:, 1]
+    at_ears = ears.mean(axis=0) + np.array([left, -left])
+    distance = np.linalg.norm(scene.source.position - at_ears, axis=1)
     heard = np.concatenate([scene.hear(1)["waveform"] for _ in range(8)], axis=1)[:, 500:]
     level = np.sqrt(np.mean(heard**2, axis=1))
     assert level[0] / level[1] == pytest.approx(distance[1] / distance[0], rel=0.01)

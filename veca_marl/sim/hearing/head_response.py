@@ -2,13 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from veca_marl.sim.geometry import Floats
+from veca_marl.sim.hearing.minimum_phase import minimum_phase
+
+SMALLEST_SCALE, LARGEST_SCALE = 0.5, 1.5
+"""Range of scales; the head circumference of a newborn is about 0.6 of an adult's."""
+
+_N_FFT = 2048
+_MIN_MAGNITUDE = 1e-5
 
 
 @dataclass(frozen=True)
@@ -37,6 +45,37 @@ class HeadResponse:
     head_radius_m: float
     licence: str
 
+    def scaled(self, scale: float) -> HeadResponse:
+        """Return the response of a head of another size with the same shape.
+
+        In a medium without losses the wave equation is unchanged if all lengths and times are
+        multiplied by the same number: a feature of the spectrum at frequency f moves to
+        ``f / scale``, delays become ``scale`` times as long. Middlebrooks (1999) scales the
+        responses of one person in this way to resemble those of another.
+
+        Where a scale above 1 needs magnitudes above half of the sampling rate, the last one below
+        it is used.
+
+        Args:
+            scale: Size relative to this head, see `check_scale`; 1 returns the object itself.
+
+        Raises:
+            ValueError: If the scale is out of range.
+        """
+        if check_scale(scale) == 1.0:
+            return self
+        # the response of a larger head is as much longer
+        n_taps = math.ceil(self.filters.shape[-1] * max(1.0, scale))
+        magnitude = np.abs(np.fft.rfft(self.filters, _N_FFT))
+        log_magnitude: Floats = np.log(np.maximum(magnitude, _MIN_MAGNITUDE)).astype(np.float64)
+        moved = np.exp(_read_rows(log_magnitude, scale * np.arange(magnitude.shape[-1])))
+        return replace(
+            self,
+            filters=minimum_phase(moved, n_taps).astype(np.float32),
+            arrival_s=scale * self.arrival_s,
+            head_radius_m=scale * self.head_radius_m,
+        )
+
     def save(self, path: str | Path) -> None:
         """Write an ``.npz`` file with filters in half precision (rounding error below -66 dB)."""
         np.savez_compressed(
@@ -61,3 +100,22 @@ class HeadResponse:
                 head_radius_m=float(file["head_radius_m"]),
                 licence=str(file["licence"]),
             )
+
+
+def check_scale(scale: float) -> float:
+    """Return the scale of a head, or raise `ValueError` if it is not in [0.5, 1.5]."""
+    if not SMALLEST_SCALE <= scale <= LARGEST_SCALE:
+        raise ValueError(
+            f"head_scale={scale} must be from {SMALLEST_SCALE} to {LARGEST_SCALE}; 1 is the "
+            "measured head"
+        )
+    return float(scale)
+
+
+def _read_rows(rows: Floats, positions: Floats) -> Floats:
+    """Interpolate linearly along the last axis; beyond the last column, return the last."""
+    clipped = np.minimum(positions, rows.shape[-1] - 1)
+    below = np.minimum(clipped.astype(np.int64), rows.shape[-1] - 2)
+    share = clipped - below
+    read: Floats = rows[..., below] * (1.0 - share) + rows[..., below + 1] * share
+    return read

@@ -59,8 +59,8 @@ class HrtfTable:
 
 
 @cache
-def kemar_table(sample_rate_hz: int = 22_050) -> HrtfTable:
-    """Return the table of the packaged measurement: KEMAR (Gardner & Martin 1994).
+def kemar_response(sample_rate_hz: int = 22_050) -> HeadResponse:
+    """Return the packaged measurement: KEMAR (Gardner & Martin 1994).
 
     Raises:
         ValueError: If the packaged data have another sampling rate.
@@ -72,14 +72,14 @@ def kemar_table(sample_rate_hz: int = 22_050) -> HrtfTable:
             f"KEMAR is shipped at {response.sample_rate_hz} Hz, got {sample_rate_hz}; "
             "another rate needs the SOFA file"
         )
-    return HrtfTable(response)
+    return response
 
 
 @cache
-def sofa_table(
+def sofa_response(
     path: str, sample_rate_hz: int = 22_050, stated_rate_hz: float | None = None
-) -> HrtfTable:
-    """Return the table of the head in a SOFA file, conditioned for a sampling rate.
+) -> HeadResponse:
+    """Return the response of the head in a SOFA file, conditioned for a sampling rate.
 
     Args:
         path: The file.
@@ -91,7 +91,54 @@ def sofa_table(
         SofaError: If the file cannot be used.
     """
     measured = read_sofa(path, stated_rate_hz)
-    return HrtfTable(condition(measured, sample_rate_hz, licence=f"see {measured.source}"))
+    return condition(measured, sample_rate_hz, licence=f"see {measured.source}")
+
+
+def kemar_table(sample_rate_hz: int = 22_050, head_scale: float = 1.0) -> HrtfTable:
+    """Return the table of `kemar_response`; the same object for the same numbers.
+
+    Args:
+        sample_rate_hz: Sampling rate of the sound field.
+        head_scale: See `HeadResponse.scaled`.
+
+    Raises:
+        ValueError: If the packaged data have another sampling rate, or the scale is out of range.
+    """
+    return _kemar_table(sample_rate_hz, head_scale)
+
+
+@cache
+def _kemar_table(sample_rate_hz: int, head_scale: float) -> HrtfTable:
+    return HrtfTable(kemar_response(sample_rate_hz).scaled(head_scale))
+
+
+def sofa_table(
+    path: str,
+    sample_rate_hz: int = 22_050,
+    stated_rate_hz: float | None = None,
+    head_scale: float = 1.0,
+) -> HrtfTable:
+    """Return the table of `sofa_response`; the same object for the same arguments.
+
+    Args:
+        path: The file.
+        sample_rate_hz: Sampling rate of the sound field.
+        stated_rate_hz: Sampling rate to use instead of the file's own, see `read_sofa`.
+        head_scale: See `HeadResponse.scaled`.
+
+    Raises:
+        ImportError: If h5py is missing.
+        SofaError: If the file cannot be used.
+        ValueError: If the scale is out of range.
+    """
+    return _sofa_table(path, sample_rate_hz, stated_rate_hz, head_scale)
+
+
+@cache
+def _sofa_table(
+    path: str, sample_rate_hz: int, stated_rate_hz: float | None, head_scale: float
+) -> HrtfTable:
+    return HrtfTable(sofa_response(path, sample_rate_hz, stated_rate_hz).scaled(head_scale))
 
 
 def direction_vectors(azimuth_rad: Floats, elevation_rad: Floats) -> Floats:

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from veca_marl.sim.body import Body
 from veca_marl.sim.geometry import Floats, Pose
-from veca_marl.sim.hearing.hrtf import kemar_table, sofa_table
+from veca_marl.sim.hearing.head_response import HeadResponse, check_scale
+from veca_marl.sim.hearing.hrtf import kemar_response, kemar_table, sofa_response, sofa_table
 from veca_marl.sim.hearing.receivers import HrtfReceiver, MonoReceiver, StereoReceiver
 from veca_marl.sim.hearing.spectrum import (
     N_BINS,
@@ -32,9 +33,12 @@ from veca_marl.sim.spec import ArraySpec
 class AudioQuality(Enum):
     """The receiver that turns sound into two ear signals (the three arms of the paper's figure 5).
 
+    All qualities have the same size of head.
+
     Attributes:
         hrtf: A head-related transfer function: level, arrival time and spectrum per direction.
-        stereo: Two omnidirectional receivers at the ears: no head shadow, no pinnae.
+        stereo: Two omnidirectional receivers at the ears of the same head: no head shadow, no
+            pinnae. Their distance is the diameter of the sphere that fits its arrival times.
         mono: One omnidirectional receiver at the centre of the head, repeated for both ears.
     """
 
@@ -53,6 +57,10 @@ class AudioCfg:
         waveform: Whether the samples of each step are observed too.
         sofa_path: SOFA file of a measured head in place of KEMAR. Needs the extra ``[sofa]``.
         sofa_sample_rate_hz: Sampling rate to use instead of the one that the SOFA file states.
+        head_scale: Size of the head relative to the measured one, from 0.5 to 1.5: spectral
+            features are at ``1 / head_scale`` times their frequency, interaural times and the
+            distance of the ears `head_scale` times as long (Middlebrooks 1999). KEMAR is an adult
+            (diameter 0.175 m); 0.733 gives the 0.128 m between the ears of the bodies.
         window: See `Window`.
         noise_floor_db: Level of the receiver's own noise relative to an rms pressure of 1 (-80,
             for example), or None. Its expected power is added, so that nothing becomes random.
@@ -63,10 +71,12 @@ class AudioCfg:
     waveform: bool = False
     sofa_path: str | None = None
     sofa_sample_rate_hz: float | None = None
+    head_scale: float = 1.0
     window: Window = Window.rectangular
     noise_floor_db: float | None = None
 
     def __post_init__(self) -> None:
+        check_scale(self.head_scale)
         if self.sofa_sample_rate_hz is not None and self.sofa_path is None:
             raise ValueError(
                 f"sofa_sample_rate_hz is {self.sofa_sample_rate_hz} but there is no sofa_path"
@@ -96,10 +106,10 @@ class AudioSense(Sense):
         super().__init__(world)
         field = world.sound
         self._body = body
-        self._centre, left, right = _ears_in_head(body)
+        self._centre = _centre_of_ears(body)
         self._steps_in_window = math.ceil(WINDOW_SAMPLES / field.step_samples)
         self._listener = field.add_listener(
-            make_receiver(cfg, left, right, field.sample_rate_hz), self._steps_in_window
+            make_receiver(cfg, field.sample_rate_hz), self._steps_in_window
         )
         self._weights = window_weights(cfg.window)
         self._noise_power = noise_power(cfg.noise_floor_db, self._weights)
@@ -137,23 +147,19 @@ class AudioSense(Sense):
         self._recent[:, -n:] = waveform[:, -size:]
 
 
-def _ears_in_head(body: Body) -> tuple[Floats, Floats, Floats]:
-    """Return the point between the ears in the head frame, and both ears relative to it."""
+def _centre_of_ears(body: Body) -> Floats:
+    """Return the point between the ears in the head frame, ``(3,)`` metres."""
     head = body.mount("head")
     ears = np.stack([body.mount(name).position for name in ("ear_left", "ear_right")])
-    in_head: Floats = (ears - head.position) @ head.rotation
-    centre: Floats = in_head.mean(axis=0)
-    left, right = in_head - centre
-    return centre, left, right
+    centre: Floats = ((ears - head.position) @ head.rotation).mean(axis=0)
+    return centre
 
 
-def make_receiver(cfg: AudioCfg, left: Floats, right: Floats, sample_rate_hz: int) -> Receiver:
+def make_receiver(cfg: AudioCfg, sample_rate_hz: int) -> Receiver:
     """Construct the receiver of a configuration.
 
     Args:
-        cfg: Quality and, for `hrtf`, the head.
-        left: ``(3,)`` metres: the left ear relative to the point between the ears, head frame.
-        right: Likewise the right ear.
+        cfg: Quality and head.
         sample_rate_hz: Sampling rate of the sound field.
 
     Raises:
@@ -164,8 +170,16 @@ def make_receiver(cfg: AudioCfg, left: Floats, right: Floats, sample_rate_hz: in
         case AudioQuality.mono:
             return MonoReceiver()
         case AudioQuality.stereo:
-            return StereoReceiver(left, right)
+            radius_m = cfg.head_scale * _measured_response(cfg, sample_rate_hz).head_radius_m
+            return StereoReceiver((0.0, radius_m, 0.0), (0.0, -radius_m, 0.0))
         case AudioQuality.hrtf if cfg.sofa_path is None:
-            return HrtfReceiver(kemar_table(sample_rate_hz))
+            return HrtfReceiver(kemar_table(sample_rate_hz, cfg.head_scale))
         case AudioQuality.hrtf:
-            return HrtfReceiver(sofa_table(cfg.sofa_path, sample_rate_hz, cfg.sofa_sample_rate_hz))
+            rates_hz = sample_rate_hz, cfg.sofa_sample_rate_hz
+            return HrtfReceiver(sofa_table(cfg.sofa_path, *rates_hz, cfg.head_scale))
+
+
+def _measured_response(cfg: AudioCfg, sample_rate_hz: int) -> HeadResponse:
+    if cfg.sofa_path is None:
+        return kemar_response(sample_rate_hz)
+    return sofa_response(cfg.sofa_path, sample_rate_hz, cfg.sofa_sample_rate_hz)
