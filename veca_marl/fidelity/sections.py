@@ -9,8 +9,8 @@ from veca_marl.registry import unknown
 
 SECTIONS: dict[str, str] = {
     "collisions": "veca_marl.fidelity.collisions",
-    "inertia": "veca_marl.fidelity.inertia",
     "ears": "veca_marl.fidelity.ears",
+    "inertia": "veca_marl.fidelity.inertia",
     "rigid_bodies": "veca_marl.fidelity.rigid_bodies",
 }
 """Module of each section. It has a function ``section() -> Section``."""

@@ -67,8 +67,9 @@ class HeadResponse:
         # the response of a larger head is as much longer
         n_taps = math.ceil(self.filters.shape[-1] * max(1.0, scale))
         magnitude = np.abs(np.fft.rfft(self.filters, _N_FFT))
-        log_magnitude: Floats = np.log(np.maximum(magnitude, _MIN_MAGNITUDE)).astype(np.float64)
-        moved = np.exp(_read_rows(log_magnitude, scale * np.arange(magnitude.shape[-1])))
+        log_magnitude = np.log(np.maximum(magnitude, _MIN_MAGNITUDE))
+        bins: Floats = np.arange(magnitude.shape[-1], dtype=np.float64)
+        moved = np.exp(_read_rows(log_magnitude, np.multiply(scale, bins)))
         return replace(
             self,
             filters=minimum_phase(moved, n_taps).astype(np.float32),
