@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from listening import EAR, RATE, STEP, direction, room, yaw
+from listening import EAR, RATE, STEP, direction, noise, room, yaw
 from stand_in_worlds import SoundWorld
 
 from veca_marl.sim.geometry import Pose
@@ -121,7 +121,8 @@ def test_a_source_at_one_metre_has_its_own_level():
 @pytest.mark.parametrize("scale", [1.0, 0.733])
 def test_stereo_receives_at_the_ears_of_a_head_of_that_size(scale):
     """The level at each ear is inversely proportional to its own distance."""
-    scene = Scene(Noise(0.1, RATE), quality=AudioQuality.stereo, waveform=True, head_scale=scale)
+    sound = Clip(noise(9 * STEP))
+    scene = Scene(sound, quality=AudioQuality.stereo, waveform=True, head_scale=scale)
     scene.body.rotation = yaw(0.5)
     scene.body.position = np.array([3.0, -1.0, 0.5])
     scene.source.position = (3.2, -0.7, 0.6)
