@@ -28,7 +28,8 @@ from paths import HELPERS
 
 from veca_marl.sim.geometry import Pose
 from veca_marl.sim.hearing import StereoReceiver
-from veca_marl.sim.sound import Noise, Silence, SoundField, Voice, acoustics
+from veca_marl.sim.sound import Clip, Noise, Silence, SoundField, Voice
+from veca_marl.sim.sound.rooms import acoustics
 
 QUALITIES = ("hrtf", "stereo", "mono")
 IN_ROOM = {"room": room(), "order": 2}
@@ -314,11 +315,47 @@ def test_sources_outside_the_room_are_heard_as_just_inside(quality):
     assert heard[0].tobytes() == heard[1].tobytes()
 
 
-def test_the_delay_is_limited_to_that_of_the_reach():
-    pulse = np.zeros(8 * STEP, np.float32)
+@pytest.mark.parametrize("quality", QUALITIES)
+def test_sources_are_heard_at_their_distance_up_to_the_reach(quality):
+    """The distance was clipped to 60 m."""
+    pulse = np.zeros(15 * STEP, np.float32)
     pulse[0] = 1.0
-    heard = render_still([pulse], [(500.0, 0.0, 0.0)], STILL, "mono")[0]
-    assert np.abs(heard).argmax() == pytest.approx(60.0 / 343.0 * RATE + LATENCY, abs=1.0)
+    heard = render_still([pulse], [(199.0, 0.0, 0.0)], STILL, quality)[0]
+    assert np.abs(heard).argmax() == pytest.approx(199.0 / 343.0 * RATE + LATENCY, abs=3.0)
+    with pytest.warns(UserWarning, match="500 m is not heard: reach_m=200"):
+        assert not render_still([pulse], [(500.0, 0.0, 0.0)], STILL, quality).any()
+
+
+def test_a_source_that_passes_the_reach_fades_without_a_click():
+    tone = np.sin(2 * np.pi * 300.0 * np.arange(12 * STEP) / RATE)
+    field = SoundField(None, STEP, RATE, reach_m=5.0)
+    source = field.add_source("tone", Clip(tone))
+    listener = field.add_listener(make_receiver("mono"))
+    field.reset(np.random.default_rng(0))
+
+    def hear(step):
+        source.position = (4.8 + 0.03 * step, 0.0, 0.0)
+        field.advance()
+        return listener.render(STILL)[0]
+
+    near = [hear(step) for step in range(7)]
+    with pytest.warns(UserWarning, match="is not heard"):
+        far = [hear(step) for step in range(7, 12)]
+    heard = np.concatenate(near + far)
+    assert heard[: 7 * STEP].any()
+    assert not heard[-4 * STEP :].any()
+    high_pass = scipy.signal.butter(8, 2000.0, "highpass", fs=RATE, output="sos")
+    clicks = scipy.signal.sosfilt(high_pass, heard)[2000:]
+    assert np.abs(clicks).max() < 1e-3 * np.abs(heard).max()
+
+
+def test_large_rooms_have_no_limit():
+    pulse = np.zeros(12 * STEP, np.float32)
+    pulse[0] = 1.0
+    hall = acoustics.Room((0.0, 0.0, 0.0), (120.0, 20.0, 10.0), 0.5)
+    head = Pose(np.array([1.0, 5.0, 2.0]), np.eye(3))
+    heard = render_still([pulse], [(119.0, 5.0, 2.0)], head, "mono", room=hall, order=0)[0]
+    assert np.abs(heard).argmax() == pytest.approx(118.0 / 343.0 * RATE + LATENCY, abs=1.0)
 
 
 def test_every_step_is_rendered_exactly_once():

@@ -1,6 +1,6 @@
 """Receivers: a head-related transfer function, two omnidirectional ears, or one.
 
-All implement `veca_marl.sim.sound.receiver.Receiver`.
+All implement `veca_marl.sim.sound.Receiver`.
 """
 
 from __future__ import annotations
@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from veca_marl.sim.geometry import Floats
 from veca_marl.sim.hearing.hrtf import HrtfTable
-from veca_marl.sim.hearing.receiver_filters import head_related_filters, omnidirectional_filters
-from veca_marl.sim.sound import SPEED_OF_SOUND_MPS, kernel_bank, lead_samples
+from veca_marl.sim.hearing.receiver_filters import head_related_paths, omnidirectional_paths
+from veca_marl.sim.sound import SPEED_OF_SOUND_MPS
 
 
 class HrtfReceiver:
@@ -22,9 +22,16 @@ class HrtfReceiver:
     def __init__(self, table: HrtfTable) -> None:
         self.table = table
         self.n_taps = table.filters.shape[-1]
+        latest_s = float(table.arrival_samples.max()) / table.sample_rate_hz
+        self.extent_m = latest_s * SPEED_OF_SOUND_MPS
 
-    def write_filters(
-        self, arrivals: Floats, gains: Floats, sample_rate_hz: float, out: NDArray[np.float32]
+    def write_paths(
+        self,
+        arrivals: Floats,
+        gains: Floats,
+        sample_rate_hz: float,
+        delays: Floats,
+        filters: NDArray[np.float32],
     ) -> None:
         """See `Receiver`.
 
@@ -37,15 +44,14 @@ class HrtfReceiver:
                 f"sound field {sample_rate_hz} Hz"
             )
         table = self.table
-        head_related_filters(
+        head_related_paths(
             arrivals,
             gains,
             sample_rate_hz / SPEED_OF_SOUND_MPS,
-            lead_samples(sample_rate_hz),
             table.filters,
             table.arrival_samples,
-            kernel_bank(),
-            out,
+            delays,
+            filters,
         )
 
 
@@ -71,12 +77,18 @@ class StereoReceiver:
         self.ears: Floats = np.stack([ear_left, ear_right]).astype(np.float64)
         if self.ears.shape != (2, 3):
             raise ValueError(f"an ear must be three numbers, got {ear_left!r} and {ear_right!r}")
+        self.extent_m = float(np.linalg.norm(self.ears, axis=1).max())
 
-    def write_filters(
-        self, arrivals: Floats, gains: Floats, sample_rate_hz: float, out: NDArray[np.float32]
+    def write_paths(
+        self,
+        arrivals: Floats,
+        gains: Floats,
+        sample_rate_hz: float,
+        delays: Floats,
+        filters: NDArray[np.float32],
     ) -> None:
         """See `Receiver`."""
-        _write_omnidirectional(arrivals, gains, sample_rate_hz, self.ears, out)
+        _write_omnidirectional(arrivals, gains, sample_rate_hz, self.ears, delays, filters)
 
 
 class MonoReceiver:
@@ -84,15 +96,21 @@ class MonoReceiver:
 
     n_channels = 1
     n_taps = 1
+    extent_m = 0.0
 
     def __init__(self) -> None:
         self.ears: Floats = np.zeros((1, 3))
 
-    def write_filters(
-        self, arrivals: Floats, gains: Floats, sample_rate_hz: float, out: NDArray[np.float32]
+    def write_paths(
+        self,
+        arrivals: Floats,
+        gains: Floats,
+        sample_rate_hz: float,
+        delays: Floats,
+        filters: NDArray[np.float32],
     ) -> None:
         """See `Receiver`."""
-        _write_omnidirectional(arrivals, gains, sample_rate_hz, self.ears, out)
+        _write_omnidirectional(arrivals, gains, sample_rate_hz, self.ears, delays, filters)
 
 
 def _write_omnidirectional(
@@ -100,8 +118,8 @@ def _write_omnidirectional(
     gains: Floats,
     sample_rate_hz: float,
     ears: Floats,
-    out: NDArray[np.float32],
+    delays: Floats,
+    filters: NDArray[np.float32],
 ) -> None:
     samples_per_metre = sample_rate_hz / SPEED_OF_SOUND_MPS
-    lead = lead_samples(sample_rate_hz)
-    omnidirectional_filters(arrivals, gains, samples_per_metre, lead, ears, kernel_bank(), out)
+    omnidirectional_paths(arrivals, gains, samples_per_metre, ears, delays, filters)

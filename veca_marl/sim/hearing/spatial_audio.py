@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -55,22 +56,31 @@ def spatial_audio(
     if room is not None:
         _check_inside(room, [head.position, *ears], "the head with its ears")
         _check_inside(room, positions, "every source")
-    n_samples = max((clip.waveform.size for clip in clips), default=0)
-    field = _one_step_field(room, image_order, n_samples, table.sample_rate_hz)
+    field = _field(room, image_order, table.sample_rate_hz, positions, ears)
     for i, (clip, position) in enumerate(zip(clips, positions, strict=True)):
         field.add_source(str(i), clip).position = position
     listener = field.add_listener(HrtfReceiver(table))
-    field.advance()
-    heard = listener.render(Pose(ears.mean(axis=0), head.rotation))
-    return heard[:, field.latency_samples :]
+    n_samples = max((clip.waveform.size for clip in clips), default=0)
+    centre = Pose(ears.mean(axis=0), head.rotation)
+    steps = [np.zeros((2, 0), np.float32)]
+    for _ in range(math.ceil((n_samples + field.latency_samples) / field.step_samples)):
+        field.advance()
+        steps.append(listener.render(centre))
+    heard = np.concatenate(steps, axis=1)
+    return heard[:, field.latency_samples : field.latency_samples + n_samples]
 
 
-def _one_step_field(
-    room: Room | None, image_order: int, n_samples: int, sample_rate_hz: int
+def _field(
+    room: Room | None, image_order: int, sample_rate_hz: int, sources: list[Floats], ears: Floats
 ) -> SoundField:
-    """Return a field with a step as long as all samples and its own latency."""
-    latency = SoundField(sample_rate_hz=sample_rate_hz).latency_samples
-    return SoundField(room, n_samples + latency, sample_rate_hz, image_order)
+    """Return a field in which all sources are heard, whatever their distance."""
+    distances = [float(np.linalg.norm(source - ears.mean(axis=0))) for source in sources]
+    return SoundField(
+        room,
+        sample_rate_hz=sample_rate_hz,
+        image_order=image_order,
+        reach_m=max([1.0, *distances]),
+    )
 
 
 def _point(name: str, value: ArrayLike) -> Floats:

@@ -13,7 +13,7 @@ from itertools import combinations
 from veca_marl.sim.physics.prop_cfg import PropCfg, check_appearance
 from veca_marl.sim.physics.rooms import DoorCfg, RoomCfg
 from veca_marl.sim.sound import House, Room
-from veca_marl.sim.sound.house import TRANSMISSION_LOSS_DB
+from veca_marl.sim.sound.rooms import TRANSMISSION_LOSS_DB
 
 THICKEST_WALL_M = 0.5
 """The threshold of a door lies within the wall: at most so far from either room."""

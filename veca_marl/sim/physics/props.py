@@ -20,7 +20,7 @@ from veca_marl.sim.physics.prop_body import create_prop_body
 from veca_marl.sim.physics.prop_cfg import PropCfg, PropShape
 from veca_marl.sim.physics.prop_shapes import prop_geoms, stops_sound
 from veca_marl.sim.sound import Source
-from veca_marl.sim.sound.obstacles import Obstacles
+from veca_marl.sim.sound.rooms import Obstacles
 
 
 class Prop:

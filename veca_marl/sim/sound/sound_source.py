@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from veca_marl.sim.geometry import Floats
+from veca_marl.sim.sound.propagation.signal_memory import SignalMemory
 from veca_marl.sim.sound.sounds import Sound
 
 
@@ -17,17 +18,18 @@ class Source:
         sound: What it emits; may be exchanged at any time.
         muted: Whether it emits silence in place of its sound, which continues meanwhile.
         teleports: How often it was teleported.
+        memory: The samples that it emitted last.
+        silent_samples: How many samples before the present are exactly zero.
     """
 
-    def __init__(self, name: str, sound: Sound, history_samples: int) -> None:
+    def __init__(self, name: str, sound: Sound, memory_samples: int) -> None:
         self.name = name
         self.sound = sound
         self.muted = False
         self.teleports = 0
+        self.memory = SignalMemory(memory_samples)
+        self.silent_samples = memory_samples
         self._position: Floats = np.zeros(3)
-        self._history_samples = history_samples
-        self._memory: NDArray[np.float32] = np.zeros(history_samples, np.float32)
-        self._silent_samples = history_samples
 
     @property
     def position(self) -> Floats:
@@ -49,39 +51,17 @@ class Source:
         self.position = position
         self.teleports += 1
 
-    @property
-    def history(self) -> NDArray[np.float32]:
-        """``(H,)`` the last samples, newest last: all that can arrive within the present step."""
-        return self._memory[-self._history_samples :]
-
-    @property
-    def audible(self) -> bool:
-        """Whether any sample of its history is not exactly zero."""
-        return self._silent_samples < self._history_samples
-
     def keep(self, memory_samples: int) -> None:
-        """Store at least so many samples from now on; those emitted before count as silence.
-
-        Only listeners that left out steps need more than `history`, see `past`.
-        """
-        added = memory_samples - self._memory.size
-        if added > 0:
-            self._memory = np.concatenate((np.zeros(added, np.float32), self._memory))
-            self._silent_samples += added if not self.audible else 0
-
-    def past(self, age_samples: int) -> NDArray[np.float32]:
-        """Return a view of all stored samples except the newest.
-
-        Args:
-            age_samples: How many of the newest samples to leave out, at least 1.
-        """
-        return self._memory[:-age_samples]
+        """Store at least so many samples from now on; earlier ones count as silence."""
+        if self.silent_samples >= self.memory.n_samples:
+            self.silent_samples = max(self.silent_samples, memory_samples)
+        self.memory.extend(memory_samples)
 
     def reset(self, rng: np.random.Generator) -> None:
         """Clear the stored samples and restart the sound."""
-        if self._silent_samples < self._memory.size:
-            self._memory[:] = 0.0
-        self._silent_samples = self._memory.size
+        if self.silent_samples < self.memory.n_samples:
+            self.memory.clear()
+        self.silent_samples = self.memory.n_samples
         self.sound.reset(rng)
 
     def advance(self, n_samples: int) -> None:
@@ -91,12 +71,11 @@ class Source:
             raise ValueError(
                 f"source {self.name!r}: the sound emitted {emitted.shape}, not ({n_samples},)"
             )
-        if self.muted or not emitted.any():
-            if self._silent_samples >= self._memory.size:
-                return
-            emitted = np.zeros(n_samples, np.float32)
-            self._silent_samples += n_samples
+        if not self.muted and emitted.any():
+            self.silent_samples = 0
+        elif self.silent_samples >= self.memory.n_samples:
+            return  # nothing is stored but silence
         else:
-            self._silent_samples = 0
-        self._memory[:-n_samples] = self._memory[n_samples:]
-        self._memory[-n_samples:] = emitted
+            emitted = np.zeros(n_samples, np.float32)
+            self.silent_samples += n_samples
+        self.memory.append(emitted)

@@ -16,9 +16,9 @@ import numpy as np
 from numba import njit
 
 from veca_marl.sim.geometry import Floats, Pose
-from veca_marl.sim.sound.acoustics import Room
-from veca_marl.sim.sound.obstacles import Obstacles
-from veca_marl.sim.sound.propagation import OneRoom
+from veca_marl.sim.sound.rooms.acoustics import Room
+from veca_marl.sim.sound.rooms.obstacles import Obstacles
+from veca_marl.sim.sound.rooms.surroundings import Arrivals, OneRoom
 
 TRANSMISSION_LOSS_DB = 30.0
 """A limp partition of 15 kg/m2 at 500 Hz by the field-incidence mass law: 20 log10(500 x 15) - 47
@@ -28,12 +28,15 @@ Measurements, SAE 2007-01-2201); 47 is one of those in use, 5 dB below normal in
 attenuate high frequencies more."""
 
 
+_BETWEEN_ROOMS = -1
+
+
 class House:
     """Rooms and the obstacles between them. Serves a `SoundField` as its surroundings.
 
     Attributes:
         size: ``(3,)`` metres, the box round all rooms.
-        spread_m: See `Surroundings`.
+        longest_path_m: See `Surroundings`.
         obstacles: The walls and doors between the rooms; their owners add and move them.
     """
 
@@ -61,8 +64,10 @@ class House:
         self._rooms = [OneRoom(room, image_order) for room in rooms]
         self._lower = np.array([room.lower for room in rooms])
         self._upper = np.array([room.lower + room.size for room in rooms])
-        self.size: Floats = self._upper.max(axis=0) - self._lower.min(axis=0)
-        self.spread_m = max(room.spread_m for room in self._rooms)
+        self._lowest, self._highest = self._lower.min(axis=0), self._upper.max(axis=0)
+        self.size: Floats = self._highest - self._lowest
+        longest_m = [room.longest_path_m for room in self._rooms]
+        self.longest_path_m = max(float(np.linalg.norm(self.size)), *longest_m)
         self._obstacle_gain = 10.0 ** (-transmission_loss_db / 20.0)
 
     def room_of(self, position: Floats) -> int:
@@ -73,14 +78,21 @@ class House:
         """Return how many obstacles the straight line between two points ``(3,)`` passes."""
         return self.obstacles.between(one, other)
 
-    def arrivals(self, source: Floats, head: Pose) -> tuple[Floats, Floats]:
+    def arrivals(self, source: Floats, head: Pose) -> Arrivals:
         """See `Surroundings`."""
         room = self.room_of(head.position)
         if self.room_of(source) == room:
-            return self._rooms[room].arrivals(source, head)
-        direct: Floats = ((source - head.position) @ head.rotation)[None]
-        gain = self._obstacle_gain ** self.obstacles_between(source, head.position)
-        return direct, np.array([gain])
+            inside = self._rooms[room].arrivals(source, head)
+            return Arrivals(inside.vectors, inside.gains, room)
+        source, position = self._clamp(source), self._clamp(head.position)
+        direct: Floats = ((source - position) @ head.rotation)[None]
+        gain = self._obstacle_gain ** self.obstacles_between(source, position)
+        return Arrivals(direct, np.array([gain]), _BETWEEN_ROOMS)
+
+    def _clamp(self, position: Floats) -> Floats:
+        """Return the nearest point in the box round all rooms."""
+        nearest: Floats = np.minimum(np.maximum(position, self._lowest), self._highest)
+        return nearest
 
 
 @njit(cache=True)

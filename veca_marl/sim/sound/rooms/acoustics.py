@@ -53,11 +53,14 @@ class Room:
 
     def clamp(self, position: Floats) -> Floats:
         """Return the point ``(3,)`` if it is inside, else the nearest one 1 cm inside the walls."""
-        margin = np.minimum(_WALL_MARGIN_M, 0.25 * self.size)
-        nearest: Floats = np.minimum(
-            np.maximum(position, self.lower + margin), self.lower + self.size - margin
-        )
+        lowest, highest = self.bounds()
+        nearest: Floats = np.minimum(np.maximum(position, lowest), highest)
         return nearest
+
+    def bounds(self) -> tuple[Floats, Floats]:
+        """Return the least and the greatest coordinates ``(3,)`` of sources and heads inside."""
+        margin = np.minimum(_WALL_MARGIN_M, 0.25 * self.size)
+        return self.lower + margin, self.lower + self.size - margin
 
 
 def _triple(name: str, value: ArrayLike) -> Floats:

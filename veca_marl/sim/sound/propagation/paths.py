@@ -1,0 +1,243 @@
+"""The direct sound and the reflections of one source on their way to one listener."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from veca_marl.sim.geometry import Floats, Pose
+from veca_marl.sim.sound.propagation.fractional_delay import KERNEL_TAPS, read_moving
+from veca_marl.sim.sound.propagation.mixers import Mixer, Response
+from veca_marl.sim.sound.propagation.receiver import Receiver
+from veca_marl.sim.sound.propagation.signal_memory import SignalMemory
+from veca_marl.sim.sound.rooms.acoustics import SPEED_OF_SOUND_MPS
+from veca_marl.sim.sound.rooms.surroundings import Arrivals, Surroundings
+from veca_marl.sim.sound.sound_source import Source
+
+MAX_SPEED_MPS = 50.0
+"""A path whose length changes faster counts as another path: cross-faded, without a chirp."""
+
+
+class Ears:
+    """What all paths to one listener share.
+
+    Attributes:
+        mixer: Filters and adds the sound of all paths.
+        reach_samples: How many of the newest samples of a source can be heard in one step.
+    """
+
+    def __init__(
+        self,
+        receiver: Receiver,
+        surroundings: Surroundings,
+        mixer: Mixer,
+        sample_rate_hz: float,
+        step_samples: int,
+    ) -> None:
+        self.mixer = mixer
+        self._receiver = receiver
+        self._surroundings = surroundings
+        self._sample_rate_hz = sample_rate_hz
+        self.step_samples = step_samples
+        samples_per_metre = sample_rate_hz / SPEED_OF_SOUND_MPS
+        longest = (surroundings.longest_path_m + receiver.extent_m) * samples_per_metre
+        self.reach_samples = self.reach_of(longest)
+        self.max_delay_change = MAX_SPEED_MPS * samples_per_metre * step_samples / sample_rate_hz
+
+    def reach_of(self, delay: float) -> int:
+        """Return how many of the newest samples can be heard in one step at a delay in samples."""
+        return int(np.ceil(delay)) + self.mixer.block_samples + 2 * KERNEL_TAPS
+
+    def arrivals(self, source: Source, head: Pose) -> Arrivals:
+        """Return how a source arrives at the head."""
+        return self._surroundings.arrivals(source.position, head)
+
+    def paths(self, arrivals: Arrivals) -> tuple[Floats, Response]:
+        """Return the delays ``(K, C)`` in samples and the filters of all arrivals."""
+        shape = (len(arrivals.gains), self._receiver.n_channels)
+        delays = np.empty(shape)
+        filters = np.empty((*shape, self._receiver.n_taps), np.float32)
+        self._receiver.write_paths(
+            arrivals.vectors, arrivals.gains, self._sample_rate_hz, delays, filters
+        )
+        return delays, self.mixer.response(filters)
+
+
+class _Paths:
+    """Paths of one source that stay the same paths from step to step.
+
+    Attributes:
+        arrivals: Directions, distances and gains at the end of the last step.
+        delays: ``(K, C)`` samples at that time.
+        response: The filters at that time.
+    """
+
+    def __init__(self, ears: Ears, arrivals: Arrivals) -> None:
+        self._ears = ears
+        self.arrivals = arrivals
+        self.delays, self.response = ears.paths(arrivals)
+        shape = (*self.delays.shape, ears.mixer.block_samples)
+        self._signals: NDArray[np.float32] = np.empty(shape, np.float32)
+
+    @property
+    def reach_samples(self) -> int:
+        """How many of the newest samples of the source can be heard in one step."""
+        return self._ears.reach_of(float(self.delays.max()))
+
+    def begin(self, memory: SignalMemory, n_samples: int, age_samples: int = 0) -> None:
+        """Read the whole block at constant delays.
+
+        Args:
+            memory: The sound of the source.
+            n_samples: How many of its newest samples are heard; earlier ones count as silence.
+            age_samples: How many samples before the newest the block ends.
+        """
+        start = memory.end - min(n_samples, memory.n_samples)
+        self._read(memory, start, self.delays, self._signals.shape[-1], age_samples)
+
+    def start(self) -> None:
+        """Add sound that was never heard before: without a fade, from its beginning."""
+        self._ears.mixer.add(self._signals, self.response, self.response)
+
+    def fade_in(self) -> None:
+        """Add the step, beginning with silence."""
+        self._ears.mixer.add(self._signals, None, self.response)
+
+    def fade_out(self, memory: SignalMemory) -> None:
+        """Add the step at the delays of the last one, ending in silence."""
+        self._read(memory, 0, self.delays, self._ears.step_samples)
+        self._ears.mixer.add(self._signals, self.response, None)
+
+    def follow(
+        self, memory: SignalMemory, arrivals: Arrivals, delays: Floats, response: Response
+    ) -> None:
+        """Add the step with delays and filters that change to those given."""
+        before = self.response
+        self._read(memory, 0, delays, self._ears.step_samples)
+        self.arrivals, self.delays, self.response = arrivals, delays, response
+        self._ears.mixer.add(self._signals, before, response)
+
+    def _read(
+        self,
+        memory: SignalMemory,
+        start: int,
+        delays: Floats,
+        n_samples: int,
+        age_samples: int = 0,
+    ) -> None:
+        start = max(start, memory.end - memory.n_samples)
+        end = memory.end - age_samples
+        _append_read(memory.powers, start, end, self.delays, delays, n_samples, self._signals)
+
+
+class Propagation:
+    """The state of one listener for one source."""
+
+    def __init__(self, source: Source, ears: Ears) -> None:
+        self._source = source
+        self._ears = ears
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget the last position of the source and the sound that was read."""
+        self._paths: _Paths | None = None
+        self._teleports = self._source.teleports
+        # the newest samples that were not heard yet: all
+        self._unheard_samples = self._ears.reach_samples
+
+    def add_step(self, head: Pose) -> bool:
+        """Add the present step to the mixer; return whether anything can be audible."""
+        if self._is_silent():
+            return False
+        arrivals = self._ears.arrivals(self._source, head)
+        if self._paths is None:
+            self._begin(arrivals)
+        elif self._source.teleports != self._teleports or not self._follow(self._paths, arrivals):
+            self._paths.fade_out(self._source.memory)
+            self._paths = _Paths(self._ears, arrivals)
+            self._paths.begin(self._source.memory, self._ears.reach_samples)
+            self._paths.fade_in()
+        self._teleports = self._source.teleports
+        return True
+
+    def add_past_step(self, head: Pose, age_samples: int) -> bool:
+        """Add a step that was left out, as if nothing had moved since; see `Listener.rejoin`.
+
+        Args:
+            head: As in `add_step`.
+            age_samples: How many samples before the present the step ended, at least 1.
+
+        Returns:
+            Whether anything can be audible.
+        """
+        self.reset()
+        if self._source.silent_samples >= self._ears.reach_samples + age_samples:
+            return False
+        self._begin(self._ears.arrivals(self._source, head), age_samples)
+        return True
+
+    def _is_silent(self) -> bool:
+        """Return whether nothing is under way, and drop the paths if so.
+
+        When the sound starts again, its paths start at the position at that time. What was heard
+        before must not be heard again there.
+        """
+        unheard = min(self._unheard_samples + self._ears.step_samples, self._ears.reach_samples)
+        silent = self._source.silent_samples
+        if self._paths is None:
+            self._unheard_samples = unheard
+            return silent >= unheard
+        if silent < self._paths.reach_samples:
+            return False
+        self._paths, self._unheard_samples = None, 0
+        return True
+
+    def _begin(self, arrivals: Arrivals, age_samples: int = 0) -> None:
+        self._paths = _Paths(self._ears, arrivals)
+        self._paths.begin(self._source.memory, self._unheard_samples + age_samples, age_samples)
+        self._paths.start()
+
+    def _follow(self, paths: _Paths, arrivals: Arrivals) -> bool:
+        """Continue with the same paths; return False if these are others or move too fast."""
+        if arrivals.same_as(paths.arrivals):
+            paths.follow(self._source.memory, arrivals, paths.delays, paths.response)
+            return True
+        if arrivals.paths_id != paths.arrivals.paths_id:
+            return False
+        delays, response = self._ears.paths(arrivals)
+        if np.abs(delays - paths.delays).max() > self._ears.max_delay_change:
+            return False
+        paths.follow(self._source.memory, arrivals, delays, response)
+        return True
+
+
+@njit(cache=True, error_model="numpy")
+def _append_read(
+    powers: NDArray[np.float32],
+    start: int,
+    end: int,
+    before: Floats,
+    after: Floats,
+    n_samples: int,
+    signals: NDArray[np.float32],
+) -> None:
+    """Append `n_samples` to the signal of each path and channel, see `read_moving`.
+
+    Args:
+        powers: See `read_moving`.
+        start: Likewise.
+        end: Likewise.
+        before: ``(K, C)`` delays in samples before the first of the new samples.
+        after: ``(K, C)`` delays at the last of them.
+        n_samples: How many to append.
+        signals: ``(K, C, B)``; the oldest samples are dropped.
+    """
+    kept = signals.shape[2] - n_samples
+    for k in range(signals.shape[0]):
+        for channel in range(signals.shape[1]):
+            signal = signals[k, channel]
+            for i in range(kept):
+                signal[i] = signal[i + n_samples]
+            new = signal[kept:]
+            read_moving(powers, start, end, before[k, channel], after[k, channel], new)
