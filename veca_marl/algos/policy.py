@@ -9,6 +9,7 @@ import torch
 from tensordict.nn import TensorDictModuleBase, TensorDictSequential
 from torch import nn
 
+from veca_marl.algos.acting.direct import DirectPolicy
 from veca_marl.algos.networks.precision import for_acting
 
 
@@ -32,12 +33,14 @@ class Policy(nn.Module):
     ) -> None:
         super().__init__()
         self.actors = nn.ModuleDict(actors)
-        self.play = TensorDictSequential(*actors.values())
-        self.collect = TensorDictSequential(*explorers.values())
+        self.play: TensorDictModuleBase = TensorDictSequential(*actors.values())
+        self.collect: TensorDictModuleBase = TensorDictSequential(*explorers.values())
 
     def copy(self) -> Policy:
-        """Return an independent copy that acts on the CPU."""
-        return for_acting(deepcopy(self).to("cpu"))
+        """Return an independent copy that acts on the CPU, by `DirectPolicy`."""
+        copied = for_acting(deepcopy(self).to("cpu"))
+        copied.play, copied.collect = DirectPolicy(copied.play), DirectPolicy(copied.collect)
+        return copied
 
     @torch.no_grad()
     def take_over(self, other: Policy) -> None:

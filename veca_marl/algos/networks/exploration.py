@@ -9,6 +9,7 @@ from torch import Tensor
 from torchrl.envs import ExplorationType
 from torchrl.envs.utils import exploration_type
 
+from veca_marl.algos.acting.keys import Arrays
 from veca_marl.algos.specs import ActionLayout, TeamSpec, action_key
 
 
@@ -36,10 +37,14 @@ class UniformWarmUp(TensorDictModuleBase):
 
     def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
         """Replace the action in place and return `tensordict`."""
+        self.write(tensordict)
+        return tensordict
+
+    def write(self, arrays: Arrays) -> None:
+        """See `acting.modules.WritesArrays`."""
         if bool(self.active) and exploration_type() in (ExplorationType.RANDOM, None):
             for key, layout in self._actions.items():
-                tensordict[key] = _uniform(layout, tensordict[key])
-        return tensordict
+                arrays[key] = _uniform(layout, arrays[key])
 
 
 def _uniform(layout: ActionLayout, like: Tensor) -> Tensor:

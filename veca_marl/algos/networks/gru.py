@@ -11,6 +11,7 @@ from torch import Tensor, nn
 from torchrl.envs import TensorDictPrimer
 from torchrl.modules.tensordict_module.rnn import recurrent_mode
 
+from veca_marl.algos.acting.keys import Arrays
 from veca_marl.algos.networks.memory import memory_primer
 
 
@@ -110,12 +111,16 @@ class TeamMemory(TensorDictModuleBase):
 
     def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
         """Write features and next state, and return `tensordict`."""
-        features, state = tensordict[self.features], tensordict[self.state]
-        begins = tensordict["is_init"].unsqueeze(-2).expand(*features.shape[:-1], 1)
-        present = [tensordict[self.team, "mask"].unsqueeze(-1)] if self.masked else []
-        after = self.memory(features, state, begins, *present)
-        tensordict[self.features] = tensordict["next", *self.state] = after
+        self.write(tensordict)
         return tensordict
+
+    def write(self, arrays: Arrays) -> None:
+        """See `acting.modules.WritesArrays`."""
+        features, state = arrays[self.features], arrays[self.state]
+        begins = arrays["is_init"].unsqueeze(-2).expand(*features.shape[:-1], 1)
+        present = [arrays[self.team, "mask"].unsqueeze(-1)] if self.masked else []
+        after = self.memory(features, state, begins, *present)
+        arrays[self.features] = arrays["next", *self.state] = after
 
     def make_tensordict_primer(self) -> TensorDictPrimer:
         """Return the transform with the spec of the state (see `networks.memory`)."""

@@ -10,6 +10,7 @@ import torch
 from tensordict.nn import TensorDictModule, TensorDictModuleBase, TensorDictSequential
 from torch import Tensor, nn
 
+from veca_marl.algos.acting.modules import ArrayModule
 from veca_marl.algos.networks.encoders import make_encoder
 from veca_marl.algos.networks.factory import NetworkCfg, NetworkFactory, register_network
 from veca_marl.algos.networks.gru import GatedMemory, TeamMemory
@@ -150,7 +151,7 @@ class Multisense(NetworkFactory):
         """Return the encoder of all senses, joined, and the memory after it."""
         layouts = self.spec.observations
         ranks = [len(layout.shape) for layout in layouts.values()]
-        trunk = TensorDictModule(
+        trunk = ArrayModule(
             self.per_agent(lambda: Trunk(layouts, self.cfg), ranks),
             in_keys=[(self.team, "observation", name) for name in layouts],
             out_keys=[(self.team, "features")],

@@ -15,22 +15,19 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from tensordict.nn import (
-    CompositeDistribution,
-    NormalParamExtractor,
-    ProbabilisticTensorDictModule,
-    TensorDictModule,
-)
+from tensordict.nn import CompositeDistribution, NormalParamExtractor
 from torch import nn
 from torch.distributions import Categorical, Distribution
 from torchrl.modules import TanhNormal
 
+from veca_marl.algos.acting.draws import DrawnPart, draw_categorical, draw_tanh_normal
+from veca_marl.algos.acting.modules import ActionDistribution, ArrayModule
 from veca_marl.algos.specs import PLAIN, ActionLayout, action_key
 
 _UNIT = {"low": -1.0, "high": 1.0}
 
 
-def policy_head(team: str, part: str, layout: ActionLayout, layer: nn.Module) -> TensorDictModule:
+def policy_head(team: str, part: str, layout: ActionLayout, layer: nn.Module) -> ArrayModule:
     """Return the module that writes the parameters of one part's distribution.
 
     Args:
@@ -41,20 +38,20 @@ def policy_head(team: str, part: str, layout: ActionLayout, layer: nn.Module) ->
     """
     if not layout.discrete:
         layer = nn.Sequential(layer, NormalParamExtractor())
-    keys = [(*_parameter_node(team, part), name) for name in _parameter_names(layout)]
-    return TensorDictModule(layer, in_keys=[(team, "features")], out_keys=keys)
+    keys = _parameter_keys(team, part, layout)
+    return ArrayModule(layer, in_keys=[(team, "features")], out_keys=keys)
 
 
-def action_distribution(
-    team: str, actions: Mapping[str, ActionLayout]
-) -> ProbabilisticTensorDictModule:
+def action_distribution(team: str, actions: Mapping[str, ActionLayout]) -> ActionDistribution:
     """Return the module that draws an action from the parameters that the heads wrote.
 
     Several parts are independent given the observation: a `CompositeDistribution`.
     """
+    parts = _drawn_parts(team, actions)
     if set(actions) == {PLAIN}:
-        return _plain_distribution(team, actions[PLAIN])
-    return ProbabilisticTensorDictModule(
+        return _plain_distribution(team, actions[PLAIN], parts)
+    return ActionDistribution(
+        parts,
         in_keys={"params": (team, "parameters")},
         out_keys=[action_key(team, part) for part in actions],
         distribution_class=CompositeDistribution,
@@ -63,7 +60,6 @@ def action_distribution(
             "name_map": {part: action_key(team, part) for part in actions},
             "extra_kwargs": {part: _options_of(layout) for part, layout in actions.items()},
         },
-        return_log_prob=True,
     )
 
 
@@ -74,15 +70,35 @@ def log_prob_keys(team: str, actions: Mapping[str, ActionLayout]) -> list[tuple[
     ]
 
 
-def _plain_distribution(team: str, layout: ActionLayout) -> ProbabilisticTensorDictModule:
-    return ProbabilisticTensorDictModule(
+def _drawn_parts(team: str, actions: Mapping[str, ActionLayout]) -> list[DrawnPart]:
+    return [
+        DrawnPart(
+            draw_categorical if layout.discrete else draw_tanh_normal,
+            tuple(_parameter_keys(team, part, layout)),
+            action_key(team, part),
+            log_prob,
+        )
+        for (part, layout), log_prob in zip(
+            actions.items(), log_prob_keys(team, actions), strict=True
+        )
+    ]
+
+
+def _plain_distribution(
+    team: str, layout: ActionLayout, parts: list[DrawnPart]
+) -> ActionDistribution:
+    return ActionDistribution(
+        parts,
         in_keys={name: (team, name) for name in _parameter_names(layout)},
         out_keys=[(team, "action")],
         distribution_class=_class_of(layout),
         distribution_kwargs=_options_of(layout),
-        return_log_prob=True,
         log_prob_key=(team, "action_log_prob"),
     )
+
+
+def _parameter_keys(team: str, part: str, layout: ActionLayout) -> list[tuple[str, ...]]:
+    return [(*_parameter_node(team, part), name) for name in _parameter_names(layout)]
 
 
 def _parameter_node(team: str, part: str) -> tuple[str, ...]:
