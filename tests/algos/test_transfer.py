@@ -137,7 +137,8 @@ def test_target_networks_start_with_the_encoders_of_the_other_run(tmp_path):
     init_teams(here, {}, {"agents": {"vision": store(there, tmp_path)}})
     loss = here.algorithms["agents"].loss
     assert torch.equal(encoders(here)["vision"][0], encoders(there)["vision"][0])
-    assert (loss.critic_params.data == loss.target_critic_params.data).all()
+    pairs = zip(loss.critic.parameters(), loss.target.parameters(), strict=True)
+    assert all(torch.equal(one, other) for one, other in pairs)
 
 
 def test_an_actor_is_copied_between_algorithms_with_the_same_network(tmp_path):

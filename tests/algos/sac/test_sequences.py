@@ -148,10 +148,10 @@ def test_gradients_flow_through_learnt_steps_and_not_through_the_burn_in():
 def test_targets_unroll_the_averaged_parameters():
     """The memory of the target network has parameters of its own."""
     sac, reader, batch = sampled()
-    zeros = sac.loss.target_critic_params.apply(torch.zeros_like)
-    with torch.no_grad(), zeros.to_module(sac.loss.critic):
-        # all gates are 0.5 and candidates are 0
-        after = reader.after(sac.loss.critic.encoder, batch)
+    with torch.no_grad():
+        for parameter in sac.loss.target.parameters():
+            parameter.zero_()  # all gates are 0.5 and candidates are 0
+        after = reader.after(sac.loss.target.encoder, batch)
     _, online = reader.online(sac.loss.critic.encoder, batch)
     assert online.abs().max() > 0.05
     assert after.abs().max() < online.abs().max() / 4

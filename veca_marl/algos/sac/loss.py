@@ -6,13 +6,12 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import torch
-from tensordict import TensorDict, TensorDictBase, TensorDictParams
-from tensordict.nn import TensorDictModuleBase
+from tensordict import TensorDict, TensorDictBase
 from torch import Tensor, nn
-from torchrl.objectives.common import LossModule
 
-from veca_marl.algos.networks.action_values import ActionValues, ActorCritics, mean_of_others
+from veca_marl.algos.networks.action_values import ActorCritics, mean_of_others
 from veca_marl.algos.sac.config import EncoderGradient
+from veca_marl.algos.sac.critic import Critic, constant
 from veca_marl.algos.sac.joint_action import JointAction, Proposed, Taken
 from veca_marl.algos.sac.masks import masked_mean
 from veca_marl.algos.sac.readers import FeatureReader, StepReader
@@ -37,17 +36,7 @@ class Losses:
     measures: dict[str, Tensor]
 
 
-class _Critic(nn.Module):
-    """The modules that have a copy which gives the targets."""
-
-    def __init__(self, encoder: TensorDictModuleBase, values: ActionValues) -> None:
-        super().__init__()
-        self.encoder: TensorDictModuleBase
-        self.values: ActionValues
-        self.encoder, self.values = encoder, values
-
-
-class TeamSACLoss(LossModule):
+class TeamSACLoss(nn.Module):
     """Soft actor-critic with an exact expectation over discrete parts of the action.
 
     The critics read the continuous parts of an action and give a value for each combination k of
@@ -75,12 +64,11 @@ class TeamSACLoss(LossModule):
 
     Attributes:
         averages: Whether a moving average of the critics gives the targets.
+        critic: Encoder and critics.
+        target: Their moving average, or `critic` itself.
     """
 
     averages: ClassVar[bool] = True
-    critic: _Critic
-    critic_params: TensorDictParams
-    target_critic_params: TensorDictParams
 
     def __init__(
         self,
@@ -92,11 +80,9 @@ class TeamSACLoss(LossModule):
         reader: FeatureReader | None = None,
     ) -> None:
         super().__init__()
-        self.in_keys: list[str] = []  # it reads `Transitions`, not a TensorDict
-        self.out_keys: list[str] = []
         self._team, self._action = team, action
-        critic = _Critic(network.encoder, network.values)
-        self.convert_to_functional(critic, "critic", create_target_params=self.averages)
+        self.critic = Critic(network.encoder, network.values)
+        self.target = self.critic.copy() if self.averages else self.critic
         self.policy = network.actor[1:]  # heads and distribution, without the encoder
         self.temperatures = temperatures
         self._encoder_gradient = encoder_gradient
@@ -145,18 +131,15 @@ class TeamSACLoss(LossModule):
     @torch.no_grad()
     def _target(self, batch: Transitions, after: Tensor) -> Tensor:
         proposed = self._propose(after)
-        with self.target_critic_params.to_module(self.critic):
-            features = self._reader.after(self.critic.encoder, batch)
-            values = self.critic.values(*self._proposed_inputs(batch.last, features, proposed))
+        features = self._reader.after(self.target.encoder, batch)
+        values = self.target.values(*self._proposed_inputs(batch.last, features, proposed))
         return batch.returns + batch.discount * self._soft_value(values, proposed)
 
     def _evaluate(self, rows: TensorDictBase, features: Tensor, proposed: Proposed) -> Tensor:
         """Return the soft value of proposed actions, without gradient to the critics."""
         inputs = self._proposed_inputs(rows, features, proposed)
-        with self.critic_params.data.to_module(self.critic):
-            self.critic.values.eval()  # batch normalisation uses its running statistics
+        with constant(self.critic.values):
             values = self.critic.values(*inputs)
-            self.critic.values.train()
         return self._soft_value(values, proposed)
 
     def _soft_value(self, values: Tensor, proposed: Proposed) -> Tensor:

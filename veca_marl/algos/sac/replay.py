@@ -43,6 +43,7 @@ class Replay:
         self._keys, self._span = keys, span
         self._rows_written = 0
         self._buffer: TensorDictReplayBuffer | None = None  # made with the first rows
+        self._table: TensorDictBase = TensorDict({}, [0])
         self._unit = Sequence(
             length=span.length, bootstrap=span.steps, burn_in=span.burn_in, done_key=END
         )
@@ -66,6 +67,7 @@ class Replay:
             self._buffer = TensorDictReplayBuffer(storage=self._make_storage())
         self._buffer.extend(rows)
         self._rows_written += len(rows)
+        self._table = self._storage[:]  # views of all rows; to make them takes longer than to read
 
     def _make_storage(self) -> LazyTensorStorage:
         if self.cfg.storage is Storage.memory:
@@ -132,7 +134,7 @@ class Replay:
         return rows
 
     def _column(self, key: Key | str, index: Tensor) -> Tensor:
-        column: Tensor = self._storage.get(key)
+        column: Tensor = self._table[key]
         rows: Tensor = column.index_select(0, index.flatten()).unflatten(0, index.shape)
         return rows
 

@@ -10,7 +10,6 @@ import torch
 from tensordict import TensorDictBase
 from tensordict.nn import TensorDictModuleBase, TensorDictSequential
 from torch import nn
-from torchrl.objectives import SoftUpdate
 
 from veca_marl.algos.algorithm import Algorithm
 from veca_marl.algos.networks.action_values import make_actor_critics
@@ -63,7 +62,6 @@ class SAC(Algorithm):
             cfg.encoder_gradient,
             make_reader(team, memory, span),
         ).to(device)
-        self.targets = SoftUpdate(self.loss, tau=cfg.tau) if self.loss.averages else None
         self._critics = [*trainable(self.network.encoder), *self.network.values.parameters()]
         self._policy = list(self.loss.policy.parameters())
         learnt = [*self._critics, *self._policy, *self.temperatures.parameters()]
@@ -125,8 +123,7 @@ class SAC(Algorithm):
         (losses.critic + losses.policy + losses.temperature).backward()
         norms = [self._clip(self._critics), self._clip(self._policy)]
         self.optimizer.step()
-        if self.targets is not None:
-            self.targets.step()
+        self._move_target(self.cfg.tau)
         numbers = losses.measures | {"critic_loss": losses.critic, "policy_loss": losses.policy}
         measured = {name: float(number.detach()) for name, number in numbers.items()}
         return measured | {"critic_gradient_norm": norms[0], "policy_gradient_norm": norms[1]}
@@ -162,7 +159,7 @@ class SAC(Algorithm):
         self._updates, self._due = state["updates"], state["due"]
 
     def _parts(self) -> dict[str, Any]:
-        target = {"target": self.loss.target_critic_params} if self.loss.averages else {}
+        target = {"target": self.loss.target} if self.loss.averages else {}
         return target | {
             "network": self.network,
             "temperatures": self.temperatures,
@@ -178,18 +175,18 @@ class SAC(Algorithm):
             copy_parameters(self.network, other.network)
         else:
             super().init_from(other)
-        self._reset_targets()
+        self._move_target(1.0)
         self._warm_up.active.fill_(False)
 
     def init_encoders(self, encoders: Mapping[str, Sequence[nn.Module]]) -> None:
         """See `Algorithm`: actor and critics share the encoders."""
         super().init_encoders(encoders)
-        self._reset_targets()
+        self._move_target(1.0)
 
-    def _reset_targets(self) -> None:
-        """Make the target networks equal to the critics."""
+    def _move_target(self, share: float) -> None:
+        """Move the target networks by `share` of the way to the critics; 1 makes them equal."""
         if self.loss.averages:
-            self.loss.target_critic_params.data.copy_(self.loss.critic_params.data)
+            self.loss.target.approach(self.loss.critic, share)
 
 
 _LOSSES = {Targets.average: TeamSACLoss, Targets.same: TeamCrossQLoss}
