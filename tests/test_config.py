@@ -20,6 +20,7 @@ SENSES = ("audio", "proprioception", "touch", "vision")
 GROUPS = [
     "algo",
     "body",
+    "clock",
     "collect",
     "intrinsic",
     "log",

@@ -127,9 +127,12 @@ def test_duration_of_steps():
     assert world.prop("ball").velocity[2] == pytest.approx(-9.81, rel=1e-3)
 
 
-@pytest.mark.parametrize("wrong", [0, -25, 26, 44100])
-def test_a_clock_must_divide_the_sampling_rate(wrong):
-    with pytest.raises(ValueError, match=str(wrong)):
+@pytest.mark.parametrize(
+    ("wrong", "nearest"),
+    [(0, "1"), (-25, "1"), (26, "25 and 30"), (250, "245 and 294"), (44100, "22050")],
+)
+def test_an_agent_step_must_hold_a_whole_number_of_samples(wrong, nearest):
+    with pytest.raises(ValueError, match=rf"control_rate_hz={wrong}: .* do: {nearest}\. "):
         ClockCfg(control_rate_hz=wrong)
 
 

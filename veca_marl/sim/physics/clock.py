@@ -6,24 +6,30 @@ from dataclasses import dataclass
 
 from veca_marl.sim.sound import SAMPLE_RATE_HZ
 
-_CONTACT_STEP_S = 0.008  # physics step at which `contact_share` is the detection distance
+CONTROL_RATES_HZ = tuple(
+    rate for rate in range(1, SAMPLE_RATE_HZ + 1) if SAMPLE_RATE_HZ % rate == 0
+)
+"""Possible numbers of agent steps per second: the divisors of the sampling rate."""
 
 
 @dataclass
 class ClockCfg:
     """The constant clock: physics, sound and animation advance by it, wall time has no influence.
 
-    The paper's VECATime. 25 Hz divides the sampling rate of sound (22 050 Hz) evenly.
+    The paper's VECATime. An agent step emits a whole number of samples of sound, so that blocks of
+    sound follow each other without gaps: its rate divides 22 050 Hz (`CONTROL_RATES_HZ`). The rate
+    of physics is any multiple of it: 25 Hz times 10 are the 250 Hz (4 ms) of the paper's data,
+    although 250 Hz is no possible rate of agent steps; the nearest is 245 Hz (4.08 ms).
 
     Attributes:
-        control_rate_hz: Agent steps per second; must divide 22 050.
+        control_rate_hz: Agent steps per second; one of `CONTROL_RATES_HZ`.
         substeps: Physics steps per agent step.
         solver_iterations: Iterations of Bullet's constraint solver per physics step.
         contact_share: Distance at which Bullet detects contacts ahead of time, as a share of the
-            size of the smaller of two objects, in (0, 1], at physics steps of 8 ms; in proportion
-            less at shorter steps, in which objects move less. What moves further in one physics
-            step penetrates before its contact is found; 0.1 finds those of a palm-sized object 5 mm
-            ahead, at twice the cost of physics.
+            size of the smaller of two objects, in (0, 1]. What moves further in one physics step
+            penetrates before its contact is found; 0.1 finds those of a palm-sized object 5 mm
+            ahead, at twice the cost of physics. Contacts of movable props with restitution are
+            detected proportionally less far ahead at physics steps below 8 ms.
     """
 
     control_rate_hz: int = 25
@@ -32,11 +38,9 @@ class ClockCfg:
     contact_share: float = 0.02
 
     def __post_init__(self) -> None:
-        """Accept only rates at which an agent step is a whole number of samples."""
-        if self.control_rate_hz <= 0 or SAMPLE_RATE_HZ % self.control_rate_hz:
-            raise ValueError(
-                f"control_rate_hz={self.control_rate_hz} must divide 22050: 10, 15, 18, 21, 25, 30"
-            )
+        """Check the rate and the numbers."""
+        if self.control_rate_hz not in CONTROL_RATES_HZ:
+            raise ValueError(_rate_error(self.control_rate_hz))
         if self.substeps < 1 or self.solver_iterations < 1:
             raise ValueError(
                 f"substeps={self.substeps} and solver_iterations={self.solver_iterations} "
@@ -56,15 +60,18 @@ class ClockCfg:
         return self.step_s / self.substeps
 
     @property
-    def contact_threshold(self) -> float:
-        """The distance at which Bullet detects contacts, as a share of size, at this time step.
-
-        Bullet stops an object short of a contact ahead of it. At a constant distance it would take
-        a greater part of the speed from it, the shorter the step.
-        """
-        return self.contact_share * min(1.0, self.substep_s / _CONTACT_STEP_S)
-
-    @property
     def step_samples(self) -> int:
         """Samples of sound per agent step."""
         return SAMPLE_RATE_HZ // self.control_rate_hz
+
+
+def _rate_error(rate_hz: float) -> str:
+    """Return the message for an impossible rate of agent steps, with the nearest possible ones."""
+    below = [rate for rate in CONTROL_RATES_HZ if rate < rate_hz][-1:]
+    above = [rate for rate in CONTROL_RATES_HZ if rate > rate_hz][:1]
+    nearest = " and ".join(str(rate) for rate in below + above)
+    return (
+        f"control_rate_hz={rate_hz}: an agent step must hold a whole number of samples of sound, "
+        f"that is divide {SAMPLE_RATE_HZ} Hz; the nearest that do: {nearest}. For shorter physics "
+        "steps at a possible rate raise substeps"
+    )

@@ -14,6 +14,7 @@ from veca_marl.sim.physics.clock import ClockCfg
 from veca_marl.sim.physics.floor import FLOOR_NAME, add_floor
 from veca_marl.sim.physics.mover import Mover
 from veca_marl.sim.physics.playground import PlaygroundCfg, make_house
+from veca_marl.sim.physics.prop_body import limit_detection
 from veca_marl.sim.physics.prop_cfg import PropCfg
 from veca_marl.sim.physics.props import Prop, follow_physics
 from veca_marl.sim.sound import SoundField, make_sound
@@ -77,6 +78,7 @@ class World:
         sound = None if cfg.sound is None else make_sound(cfg.sound)
         source = None if sound is None else self.sound.add_source(cfg.name, sound)
         prop = Prop(cfg, self.client, self.scene, source, self.house.obstacles)
+        limit_detection(prop.body_id, cfg, self.client, self.clock)
         self.props[cfg.name] = prop
         if not prop.fixed:
             self._moving.append(prop)
@@ -171,7 +173,7 @@ class World:
     def _set_contact_share(self) -> None:
         """Set Bullet's detection distance of contacts: it keeps one number for all its clients."""
         pybullet.setPhysicsEngineParameter(
-            contactBreakingThreshold=self.clock.contact_threshold, physicsClientId=self.client
+            contactBreakingThreshold=self.clock.contact_share, physicsClientId=self.client
         )
 
     def _configure_physics(self) -> None:
