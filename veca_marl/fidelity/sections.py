@@ -9,9 +9,11 @@ from veca_marl.registry import unknown
 
 SECTIONS: dict[str, str] = {
     "collisions": "veca_marl.fidelity.collisions",
+    "doppler": "veca_marl.fidelity.doppler",
     "ears": "veca_marl.fidelity.ears",
     "inertia": "veca_marl.fidelity.inertia",
     "rigid_bodies": "veca_marl.fidelity.rigid_bodies",
+    "rooms": "veca_marl.fidelity.rooms",
 }
 """Module of each section. It has a function ``section() -> Section``."""
 

@@ -1,11 +1,11 @@
-"""Several rooms with obstacles between them.
+"""Several rooms with obstacles in them and between them.
 
 Image sources are right inside one box. A listener in the room of a source hears it with the
-reflections of that room. A listener in another room hears the direct sound alone, attenuated by
-each obstacle (wall, closed door) that the straight line passes through at that moment. An open
-door is no obstacle, so the direct sound through it is not attenuated. Diffraction round edges is
-not modelled, nor are obstacles inside one room. When a listener changes rooms or the number of
-obstacles changes, the filters are cross-faded over one control step, as all filters are.
+reflections of that room. A listener in another room hears the direct sound alone. Each path is
+attenuated by every obstacle (wall, closed door, wardrobe) that it passes through at that moment. An
+open door is no obstacle, so that the direct sound through it is not attenuated. Diffraction round
+edges and reflections at obstacles are not modelled. When a listener enters another room or an
+obstacle moves into a path, the sound is cross-faded over one control step.
 """
 
 from __future__ import annotations
@@ -83,11 +83,19 @@ class House:
         room = self.room_of(head.position)
         if self.room_of(source) == room:
             inside = self._rooms[room].arrivals(source, head)
-            return Arrivals(inside.vectors, inside.gains, room)
+            gains = self._attenuated(inside.gains, self._rooms[room], source, head.position)
+            return Arrivals(inside.vectors, gains, room)
         source, position = self._clamp(source), self._clamp(head.position)
         direct: Floats = ((source - position) @ head.rotation)[None]
         gain = self._obstacle_gain ** self.obstacles_between(source, position)
         return Arrivals(direct, np.array([gain]), _BETWEEN_ROOMS)
+
+    def _attenuated(self, gains: Floats, one: OneRoom, source: Floats, head: Floats) -> Floats:
+        """Return the gains of all paths in a room after the obstacles in it."""
+        if not len(self.obstacles):
+            return gains
+        counts = one.paths_through(self.obstacles, source, head)
+        return gains * self._obstacle_gain**counts if counts.any() else gains
 
     def _clamp(self, position: Floats) -> Floats:
         """Return the nearest point in the box round all rooms."""

@@ -3,20 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from veca_marl.sim.geometry import Floats
-
-_GRAZE_M = 1e-6
+from veca_marl.sim.sound.rooms.acoustics import Room
+from veca_marl.sim.sound.rooms.blocked_paths import count_crossed, count_crossed_inside
 
 
 class Obstacles:
-    """Boxes between rooms. An owner moves its box by the number that `add` has returned.
-
-    There is nothing to recompute per step: a box costs time only when it is moved, and in the
-    paths that are tested against all boxes anyway.
-    """
+    """Boxes that attenuate sound. An owner moves its box by the number that `add` has returned."""
 
     def __init__(self) -> None:
         self._centres, self._halves = np.zeros((0, 3)), np.zeros((0, 3))
@@ -54,40 +49,22 @@ class Obstacles:
         self._rotations[number] = rotation
 
     def between(self, one: Floats, other: Floats) -> int:
-        """Return how many boxes the straight line between two points ``(3,)`` passes through."""
-        return int(_count_crossed(one, other, self._centres, self._rotations, self._halves))
+        """Return how many boxes the straight line between two points ``(3,)`` passes through.
 
+        Boxes round one of the points do not count.
+        """
+        return int(count_crossed(one, other, self._centres, self._rotations, self._halves))
 
-@njit(cache=True)
-def _count_crossed(
-    one: Floats, other: Floats, centres: Floats, rotations: Floats, halves: Floats
-) -> int:
-    """Count the boxes that a segment passes through (slab test: Kay & Kajiya, SIGGRAPH 1986).
+    def inside(
+        self, room: Room, lattice: NDArray[np.int64], source: Floats, head: Floats
+    ) -> NDArray[np.int64]:
+        """Return how many boxes in a room each path inside it passes, see `count_crossed_inside`.
 
-    Args:
-        one: ``(3,)`` metres, one end of the segment.
-        other: ``(3,)`` metres, its other end.
-        centres: ``(n, 3)`` metres.
-        rotations: ``(n, 3, 3)`` from the axes of the boxes to the world's.
-        halves: ``(n, 3)`` metres.
-    """
-    length = np.sqrt(((other - one) ** 2).sum())
-    count = 0
-    for n in range(len(centres)):
-        enter, leave = 0.0, 1.0
-        for axis in range(3):
-            begin = way = 0.0
-            for k in range(3):
-                begin += (one[k] - centres[n, k]) * rotations[n, k, axis]
-                way += (other[k] - one[k]) * rotations[n, k, axis]
-            half = halves[n, axis]
-            if abs(way) < 1e-12:
-                if abs(begin) > half - _GRAZE_M:
-                    leave = -1.0
-                continue
-            first, second = (-half - begin) / way, (half - begin) / way
-            enter = max(enter, min(first, second))
-            leave = min(leave, max(first, second))
-        if (leave - enter) * length > _GRAZE_M:
-            count += 1
-    return count
+        Args:
+            room: The room.
+            lattice: ``(K, 3)`` reflections of the paths, from `image_lattice`.
+            source: ``(3,)`` metres.
+            head: ``(3,)`` metres.
+        """
+        boxes = self._centres, self._rotations, self._halves
+        return count_crossed_inside(source, head, room.lower, room.size, lattice, *boxes)

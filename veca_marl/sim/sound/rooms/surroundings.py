@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from veca_marl.sim.geometry import Floats, Pose
 from veca_marl.sim.sound.rooms.acoustics import Room, image_gains, image_lattice, image_sources
+from veca_marl.sim.sound.rooms.obstacles import Obstacles
 
 
 @dataclass(frozen=True)
@@ -114,6 +115,13 @@ class OneRoom:
             self._lattice,
         )
         return Arrivals(vectors, self.gains, 0)
+
+    def paths_through(
+        self, obstacles: Obstacles, source: Floats, head: Floats
+    ) -> NDArray[np.int64]:
+        """Return how many obstacles each path passes, ``(K,)``; see `Obstacles.inside`."""
+        room = self.room
+        return obstacles.inside(room, self._lattice, room.clamp(source), room.clamp(head))
 
 
 @njit(cache=True)
