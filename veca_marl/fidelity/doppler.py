@@ -53,9 +53,8 @@ def approaching_source(
         receiver: The ears; the left one is measured.
     """
     seconds = _N_STEPS * STEP_SAMPLES / SAMPLE_RATE_HZ
-    sound = np.sin(
-        2 * np.pi * pitch_hz * np.arange(_N_STEPS * STEP_SAMPLES) / SAMPLE_RATE_HZ
-    ).astype(np.float32)
+    sample = np.arange(_N_STEPS * STEP_SAMPLES)
+    sound: Floats = np.sin(2.0 * np.pi * pitch_hz / SAMPLE_RATE_HZ * sample)
     start_m = _NEAREST_M + max(speed_mps * seconds, 0.0)
     direct = _render(sound, start_m, speed_mps, receiver, image_order=0)
     with_reflection = _render(sound, start_m, speed_mps, receiver, image_order=1)

@@ -42,7 +42,7 @@ def crosses_box(one: Floats, other: Floats, centre: Floats, rotation: Floats, ha
         first, second = (-half[axis] - begin) / way, (half[axis] - begin) / way
         enter = max(enter, min(first, second))
         leave = min(leave, max(first, second))
-    return (leave - enter) * length > _GRAZE_M
+    return bool((leave - enter) * length > _GRAZE_M)
 
 
 @njit(cache=True)
