@@ -190,6 +190,19 @@ def test_the_helper_reward_is_0_while_the_object_is_not_visible(game):
     assert step(game, **{name: (1.0, 0.0)}).terms[name]["ahead"] == 0.0
 
 
+@pytest.mark.parametrize("vision", ["binocular", "blind"])
+def test_players_see_the_target_with_their_own_eyes(vision):
+    """The target is 15 degrees to the side, outside of the images of a narrow preset."""
+    game = game_of(f"senses/vision={vision}", "senses.vision.fov_deg=6")
+    begin(game)
+    put(game, 0, 1.5, yaw_deg=165.0)
+    finder = game.players[0]
+    step(game, **{finder.name: (0.0, 0.0)})
+    assert ("vision" in game.observe(finder)) == (vision == "binocular")
+    assert game.task.sees_target(finder) is (vision == "blind")
+    game.close()
+
+
 def test_the_object_is_visible_through_a_door(game):
     begin(game)
     game.task.target.place((0.5, 0.9, 0.2))

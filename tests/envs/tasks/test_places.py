@@ -8,11 +8,10 @@ import pytest
 from seeking import BALL_M, ball_at, walker_at, wall_across, world_with
 
 from veca_marl.envs.core.task import Player
-from veca_marl.envs.tasks.navigation import helper_reward
 from veca_marl.envs.tasks.navigation.helper_reward import PropVisibility, displacement_to
 from veca_marl.envs.tasks.navigation.places import free_pair, free_place, gap_m
 from veca_marl.sim.physics import RoomCfg
-from veca_marl.sim.vision import Camera, look_at, seen_fraction
+from veca_marl.sim.vision import Camera, VisionCfg, VisionSense, look_at, seen_fraction
 
 STEP_S = 0.04
 AHEAD = np.array([5.0, 0.0, 0.0])
@@ -104,24 +103,52 @@ def test_walls_hide_the_object(world):
     assert [sight.for_player(player) for player in (behind, near, behind)] == [False, True, False]
 
 
-def test_visibility_is_computed_once_per_version_of_the_scene(world, monkeypatch):
-    asked = []
+def player_of(world, **vision):
+    """A player 2 m before the ball that faces past it, with a sense of vision or without any."""
+    body = walker_at(world, 2.0, name="one")
+    if not vision:
+        return Player("one", "team", body)
+    sense = VisionSense(VisionCfg(**vision), body, world)
+    return Player("one", "team", body, {"vision": sense})
 
-    def look(scene, body, thing):
-        asked.append(thing)
-        return True
 
-    monkeypatch.setattr(helper_reward, "is_visible", look)
-    sight, player = PropVisibility(world.scene, world.props["ball"]), Player("one", "team", None)
-    assert sight.for_player(player)
-    assert sight.for_player(player)
-    assert len(asked) == 1
-    world.step()
-    assert sight.for_player(player)
-    assert len(asked) == 2
-    sight.clear()
-    assert sight.for_player(player)
-    assert len(asked) == 3
+def test_visibility_is_that_of_the_players_own_images(world):
+    """Its field of view, its resolution and its open eyes."""
+    player = player_of(world, fov_deg=120.0, width=40, height=40)
+    sight = PropVisibility(world.scene, world.props["ball"])
+    away = world.props["ball"].position - player.body.position
+    ahead = math.atan2(away[1], away[0])
+    for aside_deg, visible in ((0.0, True), (48.0, True), (80.0, False)):
+        player.body.place(player.body.position, ahead + math.radians(aside_deg))
+        world.refresh()
+        assert sight.for_player(player) is visible, aside_deg
+        default = sight.for_player(Player("other", "team", player.body))
+        assert default is (aside_deg == 0.0)
+
+
+def test_visibility_of_what_is_observed_renders_nothing(world, monkeypatch):
+    rendered, render = [], Camera.render
+    monkeypatch.setattr(Camera, "render", lambda *args: rendered.append(args) or render(*args))
+    player = player_of(world, width=30)
+    sight = PropVisibility(world.scene, world.props["ball"])
+    for _ in range(3):
+        world.step()
+        before = len(rendered)
+        seen = sight.for_player(player)
+        player.senses["vision"].read()
+        assert sight.for_player(player) is seen
+        assert len(rendered) == before + 1
+
+
+def test_visibility_without_a_sense_is_rendered_once_per_step(world, monkeypatch):
+    rendered, render = [], Camera.render
+    monkeypatch.setattr(Camera, "render", lambda *args: rendered.append(args) or render(*args))
+    sight, player = PropVisibility(world.scene, world.props["ball"]), player_of(world)
+    for steps in (1, 2):
+        world.step()
+        assert sight.for_player(player) is sight.for_player(player)
+        assert len(rendered) == steps
+    assert rendered[0][0] == Camera()
 
 
 def test_an_eye_in_contact_with_a_wall_does_not_see_through_it():

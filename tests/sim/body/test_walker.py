@@ -263,14 +263,14 @@ def test_objects_in_front_of_the_eyes_are_visible():
     walker, other = walker_in(world), walker_in(world, "other", place=(1.5, 0.3, 0.0))
     world.refresh()
     assert is_visible(world.scene, walker, world.prop("ball"))
-    assert is_visible(world.scene, walker, world.prop("ball"), "eye_right")
+    assert is_visible(world.scene, walker, world.prop("ball"), ["eye_right"])
     assert is_visible(world.scene, walker, other)
     assert not is_visible(world.scene, walker, world.prop("behind"))
     world.prop("ball").place((1.0, 0.0, -0.5))
     world.refresh()
     assert not is_visible(world.scene, walker, world.prop("ball"))
-    with pytest.raises(ValueError, match=r"no eye 'third'.*eye_left"):
-        is_visible(world.scene, walker, other, "third")
+    with pytest.raises(ValueError, match=r"no eyes \['third'\].*eye_left"):
+        is_visible(world.scene, walker, other, ["third"])
 
 
 def test_a_wall_occludes():

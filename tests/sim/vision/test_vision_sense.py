@@ -62,6 +62,28 @@ def test_is_visible_uses_the_camera_of_the_default_sense(monkeypatch):
     assert VisionCfg(width=100, fov_deg=30.0).camera() == Camera(100, 84, 30.0)
 
 
+def test_what_only_one_eye_sees_is_visible():
+    """A ball behind a board that hides it from the left eye, not from the right one."""
+    scene, body = ball_at((2.0, 0.0, 0.0), 0.05), body_before()
+    board = Geom(Shape.BOX, (0.005, 0.01, 0.05), offset=(0.1, EYE_SPACING_M / 2, 0.0))
+    scene.add_object("board", [[board]])
+    scene.update()
+    assert not is_visible(scene, body, Target(0), ["eye_left"])
+    assert is_visible(scene, body, Target(0), ["eye_right"])
+    assert is_visible(scene, body, Target(0))
+    assert eyes(VisionCfg(), body, scene).eyes.is_visible(0)
+    assert not eyes(VisionCfg(eyes=Eyes.monocular), body, scene).eyes.is_visible(0)
+    with pytest.raises(ValueError, match=r"no eyes \[\].*eye_left"):
+        is_visible(scene, body, Target(0), [])
+
+
+def test_visibility_depends_on_the_field_of_view():
+    """A ball 40 degrees to the left is outside of the default image and inside a wide one."""
+    scene, body = ball_at((2.0, 2.0 * math.tan(math.radians(40.0)), 0.0)), body_before()
+    for fov_deg, visible in ((60.0, False), (100.0, True)):
+        assert eyes(VisionCfg(fov_deg=fov_deg), body, scene).eyes.is_visible(0) is visible
+
+
 def test_quality_does_not_change_the_specs():
     cfgs = [
         VisionCfg(),
@@ -146,31 +168,31 @@ def room():
 
 def test_is_visible_through_glass_and_not_through_walls(room):
     sense = eyes(VisionCfg(), body_before(), room)
-    seen = {item.name for item in room.objects if sense.is_visible(item.id)}
+    seen = {item.name for item in room.objects if sense.eyes.is_visible(item.id)}
     assert seen == {"plain", "glazed", "wall", "pane"}
 
 
 def test_is_visible_after_the_wall_has_moved(room):
     sense, walled = eyes(VisionCfg(), body_before(), room), room.find("walled")
-    assert not sense.is_visible(walled.id)
+    assert not sense.eyes.is_visible(walled.id)
     room.find("wall").positions[0] = (0, 0, 10)
     room.update()
-    assert sense.is_visible(walled.id)
+    assert sense.eyes.is_visible(walled.id)
 
 
 def test_is_visible_after_the_eyes_have_turned(room):
     body = body_before()
     sense, back = eyes(VisionCfg(), body, room), room.find("back")
-    assert not sense.is_visible(back.id)
+    assert not sense.eyes.is_visible(back.id)
     body.target = np.array([-2.0, 0.1, 0.0])
-    assert sense.is_visible(back.id)
+    assert sense.eyes.is_visible(back.id)
 
 
 def test_seen_fraction_is_the_fraction_of_pixels(room):
     cfg = VisionCfg(segmentation=True)
     sense, plain = eyes(cfg, body_before(), room), room.find("plain")
     expected = np.mean(sense.read()["segmentation"] == plain.id)
-    assert sense.seen_fraction(plain.id) == pytest.approx(expected)
+    assert sense.eyes.seen_fraction(plain.id) == pytest.approx(expected)
     assert 0.001 < expected < 0.1
 
 
@@ -190,7 +212,7 @@ def test_the_own_head_is_hidden_and_another_head_is_not():
     assert (read["segmentation"] == 0).any()
     scene.add_object("late", [[Geom(Shape.SPHERE, (0.1,))]]).positions[0] = (1.5, -0.3, 0)
     scene.update()
-    assert sense.is_visible(2)
+    assert sense.eyes.is_visible(2)
     assert sense.read()["depth"][mine].min() > 0.4
 
 

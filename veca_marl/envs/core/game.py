@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -85,6 +86,7 @@ class Game:
         """Build the world, the players, the task and the senses."""
         cfg = self.cfg
         self.world = World(cfg.playground, cfg.clock)
+        self.senses: dict[str, dict[str, Sense]] = {}
         self.players = [
             self._make_player(name, team, number if team.shirt is None else team.shirt)
             for number, team in enumerate(cfg.teams)
@@ -93,11 +95,9 @@ class Game:
         self.actors = [player for player in self.players if player.team not in cfg.script]
         self.task = find_task(cfg.task.name)(cfg.task, self.world, self.players)
         self.world.freeze()
-        self.senses = {
-            player.name: self._make_senses(player, team)
-            for team in cfg.teams
-            for player in self.team(team.name)
-        }
+        for team in cfg.teams:
+            for player in self.team(team.name):
+                self.senses[player.name].update(self._make_senses(player, team))
         self.steps = 0
         self.eliminated: frozenset[str] = frozenset()
         self._experts: dict[str, Expert[Any]] = {}
@@ -107,7 +107,8 @@ class Game:
 
     def _make_player(self, name: str, team: Team, shirt: int) -> Player:
         body = make_body(name, self.cfg.body_of(team.name), self.world, shirt)
-        return Player(name, team.name, body)
+        self.senses[name] = {}
+        return Player(name, team.name, body, MappingProxyType(self.senses[name]))
 
     def _make_senses(self, player: Player, team: Team) -> dict[str, Sense]:
         names = self.task.senses if team.senses is None else team.senses

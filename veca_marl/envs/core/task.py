@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from types import MappingProxyType
 from typing import Any, ClassVar, NamedTuple, TypeVar, get_type_hints
 
 import numpy as np
@@ -14,6 +16,7 @@ from veca_marl.sim.body import Body
 from veca_marl.sim.body.humanoid import Humanoid
 from veca_marl.sim.body.walker import Walker
 from veca_marl.sim.physics import World
+from veca_marl.sim.sense import Sense
 
 TaskType = TypeVar("TaskType", bound="type[Task]")
 
@@ -36,11 +39,19 @@ class Team(NamedTuple):
 
 
 class Player(NamedTuple):
-    """One body in one team."""
+    """One body in one team.
+
+    Attributes:
+        name: Unique in its game.
+        team: The name of its team.
+        body: Its body.
+        senses: Its senses by name. They are made after the task: empty while it is built.
+    """
 
     name: str
     team: str
     body: Body
+    senses: Mapping[str, Sense] = MappingProxyType({})
 
 
 def require_walker(player: Player) -> Walker:

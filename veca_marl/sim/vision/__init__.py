@@ -1,12 +1,15 @@
 """Vision: cameras, rasterization, shading, optics of the eye and the sense of vision."""
 
+from veca_marl.sim.vision.eye_views import EyeViews
 from veca_marl.sim.vision.optics import Camera, MeshView, look_at, seen_fraction
 from veca_marl.sim.vision.rendering import Views
-from veca_marl.sim.vision.sense import Eyes, VisionCfg, VisionSense
+from veca_marl.sim.vision.sense import VisionSense
 from veca_marl.sim.vision.visibility import is_visible
+from veca_marl.sim.vision.vision_cfg import Eyes, VisionCfg
 
 __all__ = [
     "Camera",
+    "EyeViews",
     "Eyes",
     "MeshView",
     "Views",

@@ -10,7 +10,7 @@ from veca_marl.envs.core.task import Player
 from veca_marl.sim.body import Body
 from veca_marl.sim.geometry import Floats, Scene
 from veca_marl.sim.physics import Prop
-from veca_marl.sim.vision import is_visible
+from veca_marl.sim.vision import EyeViews, VisionCfg, VisionSense
 
 
 class Displacement(NamedTuple):
@@ -46,7 +46,11 @@ def displacement_to(body: Body, target: Floats, step_s: float) -> Displacement:
 
 
 class PropVisibility:
-    """Visibility of one prop to players, cached for each version of the scene.
+    """Visibility of one prop to players, by the images of their eyes.
+
+    The images are those of a player's sense of vision, with its field of view, resolution and
+    number of open eyes; asking costs no further rendering where the player observes them. Without
+    that sense they are those of two eyes with the defaults of `VisionCfg`.
 
     Args:
         scene: The scene that eyes see.
@@ -55,16 +59,18 @@ class PropVisibility:
 
     def __init__(self, scene: Scene, prop: Prop) -> None:
         self._scene, self._prop = scene, prop
-        self._cache: dict[str, tuple[int, bool]] = {}
-
-    def clear(self) -> None:
-        """Clear the cache."""
-        self._cache.clear()
+        self._without_sense: dict[str, EyeViews] = {}
 
     def for_player(self, player: Player) -> bool:
-        """Return whether the prop is visible to the left eye of a player."""
-        version, seen = self._cache.get(player.name, (-1, False))
-        if version != self._scene.version:
-            seen = is_visible(self._scene, player.body, self._prop)
-            self._cache[player.name] = self._scene.version, seen
-        return seen
+        """Return whether at least one pixel of an open eye of a player shows the prop."""
+        return self._eyes_of(player).is_visible(self._prop.object_id)
+
+    def _eyes_of(self, player: Player) -> EyeViews:
+        sense = player.senses.get("vision")
+        if isinstance(sense, VisionSense):
+            return sense.eyes
+        eyes = self._without_sense.get(player.name)
+        if eyes is None:
+            eyes = EyeViews(self._scene, player.body, VisionCfg().camera())
+            self._without_sense[player.name] = eyes
+        return eyes

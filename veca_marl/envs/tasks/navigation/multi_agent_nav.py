@@ -83,7 +83,7 @@ class MultiAgentNav(Task):
             for all agents. The paper's "all agents receive +1 reward when each agent navigates to
             the object" is read as +1 for each agent that arrives.
         ahead: Displacement forwards during the step, m (negative backwards), while the object is
-            visible to the left eye and the agent has not reached it. In the paper ``Vis a_f``.
+            visible to the agent's eyes and the agent has not reached it. In the paper ``Vis a_f``.
         aside: Displacement to the side on which the object is, m, under the same conditions. In
             the paper ``Vis a_l L``.
     """
@@ -105,7 +105,6 @@ class MultiAgentNav(Task):
         self._newly_arrived = 0
 
     def reset(self, rng: np.random.Generator) -> None:
-        self._visibility.clear()
         self.arrived.clear()
         self._newly_arrived = 0
         order = rng.permutation(len(self.plan.rooms))[: len(self.players)]
@@ -143,5 +142,5 @@ class MultiAgentNav(Task):
         return len(self.arrived) == len(self.players)
 
     def sees_target(self, player: Player) -> bool:
-        """Return whether the object is visible to the left eye of a player."""
+        """Return whether the object is visible to an eye of a player, see `PropVisibility`."""
         return self._visibility.for_player(player)
