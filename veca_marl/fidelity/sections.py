@@ -14,6 +14,7 @@ SECTIONS: dict[str, str] = {
     "inertia": "veca_marl.fidelity.inertia",
     "rigid_bodies": "veca_marl.fidelity.rigid_bodies",
     "rooms": "veca_marl.fidelity.rooms",
+    "vision": "veca_marl.fidelity.vision",
 }
 """Module of each section. It has a function ``section() -> Section``."""
 

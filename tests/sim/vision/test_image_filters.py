@@ -110,6 +110,14 @@ def test_defocus_does_not_change_the_focused_half():
     assert np.ptp(out[0, 100, 120:180, 0]) < 0.7 * np.ptp(images[0, 100, 120:180, 0])
 
 
+def test_fixed_accommodation_replaces_that_of_the_body():
+    images = coloured()
+    body_at_half = Defocus()(images, context_of(3.0, 0.5))
+    np.testing.assert_array_equal(Defocus(0.004, 2.0)(images, context_of(3.0, 7.0)), body_at_half)
+    relaxed = Defocus(0.004, 0.0)(images, context_of(1e6, 0.1))
+    np.testing.assert_array_equal(relaxed, images)
+
+
 def test_a_wider_pupil_defocuses_more():
     images = grating(0.05)
     narrow, wide = (
@@ -171,6 +179,8 @@ def test_newborns_do_not_tell_blue_from_grey():
         (lambda: Blur(-1.0), "-1.0"),
         (lambda: Blur(math.nan), "nan"),
         (lambda: Defocus(0.0), "pupil_m 0.0"),
+        (lambda: Defocus(0.004, -1.0), "accommodation_dpt -1.0"),
+        (lambda: Defocus(0.004, math.inf), "accommodation_dpt inf"),
         (lambda: InfantVision(-1.0), "age_months -1.0"),
         (lambda: Defocus()(coloured(), context_of(1.0, 0.0)), "focal_distance_m 0.0"),
         (lambda: Defocus()(coloured(), context_of(1.0, math.nan)), "focal_distance_m nan"),

@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 from eye_scenes import cast, clutter, random_pose, random_rotations, small_camera
-from tiny_renderer import TinyRenderer
 
+from veca_marl.fidelity.tiny_renderer import TinyRenderer
 from veca_marl.sim.geometry import Geom, Pose, Scene, Shape
 from veca_marl.sim.vision import Camera, look_at
 from veca_marl.sim.vision.optics import view_axes
@@ -103,17 +103,6 @@ def test_the_same_pose_gives_the_same_bytes():
         assert one.tobytes() == two.tobytes()
 
 
-def sampled_at_corners(camera):
-    """The camera with its rays through the lower left corners of the pixels, as TinyRenderer's."""
-    half_pixel = np.float32(camera.lens.tan_y / camera.height)
-    corners = camera.lens._replace(
-        columns=camera.lens.columns - half_pixel, rows=camera.lens.rows - half_pixel
-    )
-    moved = Camera(camera.width, camera.height, camera.fov_deg, camera.near_m, camera.far_m)
-    object.__setattr__(moved, "lens", corners)
-    return moved
-
-
 @pytest.mark.parametrize(
     ("shapes", "agreement"),
     # its boxes are exact; its balls, and more so its cylinders and capsules, are coarse polyhedra
@@ -128,7 +117,7 @@ def test_agrees_with_tiny_renderer(shapes, agreement):
         for _ in range(30):
             eye = rng.uniform((-2.8, -2.8, 0.8), (-2.2, 2.8, 1.8))
             pose = look_at(eye, rng.uniform((-0.5, -0.5, 0.2), (0.5, 0.5, 0.6)))
-            _, surfaces = draw(scene, sampled_at_corners(camera), pose, bounded=True)
+            _, surfaces = draw(scene, camera, pose, bounded=True)
             same.append(np.mean(surfaces == tiny.segment(camera, pose)))
     assert np.mean(same) >= agreement
 

@@ -258,6 +258,11 @@ def test_freshly_compiled_kernels_compute_the_same_bytes(tmp_path):
         ({"fov_deg": 200.0}, "fov_deg 200.0"),
         ({"eyes": "three"}, "binocular.*monocular"),
         ({"blur_deg": -1.0}, "blur_deg -1.0"),
+        ({"pupil_mm": 0.0}, "pupil_mm 0.0"),
+        ({"pupil_mm": 25.0}, "pupil_mm 25.0 must be above 0 and at most 20"),
+        ({"pupil_mm": math.nan}, "pupil_mm nan"),
+        ({"accommodation_dpt": -1.0}, r"accommodation_dpt -1.0 must be from 0 \(infinity\) to 100"),
+        ({"accommodation_dpt": 200.0}, "accommodation_dpt 200.0"),
         ({"infant_age_months": -2.0}, "age_months -2.0"),
     ],
 )

@@ -95,9 +95,9 @@ class Game:
         self.actors = [player for player in self.players if player.team not in cfg.script]
         self.task = find_task(cfg.task.name)(cfg.task, self.world, self.players)
         self.world.freeze()
-        for team in cfg.teams:
-            for player in self.team(team.name):
-                self.senses[player.name].update(self._make_senses(player, team))
+        teams = {team.name: team for team in cfg.teams}
+        for player in self.players:
+            self.senses[player.name].update(self._make_senses(player, teams[player.team]))
         self.steps = 0
         self.eliminated: frozenset[str] = frozenset()
         self._experts: dict[str, Expert[Any]] = {}

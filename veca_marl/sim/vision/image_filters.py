@@ -82,25 +82,32 @@ class Defocus:
     """Blur of surfaces that are not at the focal distance of the eyes.
 
     A thin lens focused at f metres spreads a point at z metres over a disc of the angular diameter
-    ``pupil * |1 / z - 1 / f|`` radians (Smith, "Angular diameter of defocus blur
-    discs", Am. J. Optometry 1982; Strasburger, Bach & Heinrich, "Blur unblurred", i-Perception
-    2018). The disc is approximated by the Gaussian of equal variance, ``(diameter / 4)^2``. Each
-    pixel gathers its neighbours by its own depth, so that a sharp edge in front of a blurred
-    background leaks slightly into it.
+    ``pupil * |1 / z - 1 / f|`` radians (Smith, "Angular diameter of defocus blur discs", Am. J.
+    Optometry 1982; Strasburger, Bach & Heinrich, "Blur unblurred", i-Perception 2018): 1 mm of
+    pupil and 1 dioptre of defocus give 1 milliradian, whatever the resolution. The disc is
+    approximated by the Gaussian of equal variance, ``(diameter / 4)^2``. Each pixel gathers its
+    neighbours by its own depth, so that a sharp edge in front of a blurred background leaks
+    slightly into it.
 
     Attributes:
         pupil_m: Diameter of the pupil. About 4 mm in indoor light (Watson & Yellott, "A unified
             formula for light-adapted pupil size", J. Vision 2012, fig. 1).
+        accommodation_dpt: Fixed accommodation ``1 / f`` in dioptres; None takes the focal distance
+            of the context.
 
     Raises:
-        ValueError: If the pupil is not positive.
+        ValueError: If the pupil is not positive, or the accommodation negative or not finite.
     """
 
     pupil_m: float = 0.004
+    accommodation_dpt: float | None = None
 
     def __post_init__(self) -> None:
         if not 0.0 < self.pupil_m < math.inf:
             raise ValueError(f"pupil_m {self.pupil_m} must be a positive diameter")
+        dioptres = self.accommodation_dpt
+        if dioptres is not None and not 0.0 <= dioptres < math.inf:
+            raise ValueError(f"accommodation_dpt {dioptres} must be finite and not negative")
 
     def __call__(self, images: Images, context: FilterContext) -> Images:
         """Return images that are sharp at the focal distance.
@@ -123,8 +130,11 @@ class Defocus:
     def _variance(self, depth: Depths, context: FilterContext) -> Depths:
         """Return the variance of the blur of each pixel in square pixels."""
         radians_per_pixel = math.radians(context.camera.degrees_per_pixel)
-        defocus_dioptres = np.abs(1.0 / depth - np.float32(1.0 / context.focal_distance_m))
-        sigma = defocus_dioptres * np.float32(self.pupil_m / 4.0 / radians_per_pixel)
+        focus_dpt = 1.0 / context.focal_distance_m
+        if self.accommodation_dpt is not None:
+            focus_dpt = self.accommodation_dpt
+        defocus_dpt = np.abs(1.0 / depth - np.float32(focus_dpt))
+        sigma = defocus_dpt * np.float32(self.pupil_m / 4.0 / radians_per_pixel)
         # an upper bound of an eighth of the image, where hardly any contrast is left
         widest = np.float32(context.camera.height / 8.0)
         variance: Depths = np.square(np.minimum(sigma, widest))

@@ -117,8 +117,9 @@ class Camera:
         views = self._blank(len(poses))
         axes = np.array([view_axes(pose) for pose in poses])
         drawn = _drawn(scene, hidden)
-        render_views(scene.geoms, scene.meshes, scene.surfaces, drawn, axes, self.lens, views)
-        return views
+        tables = scene.geoms, scene.meshes, scene.surfaces
+        glass_ids = render_views(*tables, drawn, axes, self.lens, views)
+        return views._replace(glass_ids=glass_ids)
 
     def render_mesh(self, scene: Scene, item: SceneObject, pose: Pose) -> MeshView:
         """Render the mesh of one object alone, as of the last `Scene.update`.
@@ -147,7 +148,7 @@ class Camera:
             np.empty((*size, 3), np.uint8),
             np.empty(size, np.float32),
             np.empty(size, np.int16),
-            np.empty(size, np.int16),
+            np.empty((0, *size), np.int16),
         )
 
 
@@ -177,7 +178,10 @@ def look_at(position: Floats, target: Floats) -> Pose:
 
 def seen_fraction(views: Views, object_id: int) -> float:
     """Return the fraction of pixels that show an object, also through or as a transparent one."""
-    return float(np.mean((views.ids == object_id) | (views.glass_ids == object_id)))
+    shown = views.ids == object_id
+    for layer in views.glass_ids:
+        shown |= layer == object_id
+    return float(np.mean(shown))
 
 
 def _drawn(scene: Scene, hidden: Bools | None) -> DrawMasks:

@@ -79,16 +79,28 @@ def draw_geoms(
         surfaces: ``(H, W)`` row of the visible primitive, updated likewise.
     """
     for g in range(geoms.shapes.shape[0]):
-        if not drawn[g]:
-            continue
-        ray = local_ray(geoms.positions[g], geoms.rotations[g], view)
-        rectangle = (0, lens.columns.shape[0], 0, lens.rows.shape[0])
-        if bounded:
-            rectangle = _rectangle(geoms.shapes[g], geoms.sizes[g], ray, lens)
-        if rectangle[0] < rectangle[1] and rectangle[2] < rectangle[3]:
-            _draw(
-                geoms.shapes[g], geoms.sizes[g], ray, rectangle, lens, np.int16(g), depth, surfaces
-            )
+        if drawn[g]:
+            draw_geom(geoms, g, view, lens, bounded, depth, surfaces)
+
+
+@njit(cache=True, error_model="numpy")
+def draw_geom(
+    geoms: GeomTable,
+    g: int,
+    view: Floats,
+    lens: Lens,
+    bounded: bool,
+    depth: Depths,
+    surfaces: Surfaces,
+) -> Rectangle:
+    """Draw one primitive as `draw_geoms`; return the pixels that it may have changed."""
+    ray = local_ray(geoms.positions[g], geoms.rotations[g], view)
+    rectangle = (0, lens.columns.shape[0], 0, lens.rows.shape[0])
+    if bounded:
+        rectangle = _rectangle(geoms.shapes[g], geoms.sizes[g], ray, lens)
+    if rectangle[0] < rectangle[1] and rectangle[2] < rectangle[3]:
+        _draw(geoms.shapes[g], geoms.sizes[g], ray, rectangle, lens, np.int16(g), depth, surfaces)
+    return rectangle
 
 
 @njit(cache=True, error_model="numpy")

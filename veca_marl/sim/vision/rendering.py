@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 from veca_marl.sim.geometry import Bools, Floats, GeomTable, MeshTable, SurfaceTable
 from veca_marl.sim.vision.contact_shadows import darken_contact_shadows
@@ -19,13 +20,13 @@ from veca_marl.sim.vision.rasterizer import (
     draw_geoms,
 )
 from veca_marl.sim.vision.shading import (
-    GLASS_OPACITY,
     Images,
     blend_colours,
     fill_sky,
     illuminate,
     to_object_ids,
 )
+from veca_marl.sim.vision.transparency import blend_layers, collect_layers
 
 
 class Views(NamedTuple):
@@ -36,13 +37,14 @@ class Views(NamedTuple):
         depth: ``(V, H, W)`` float32 metres along the optical axis to the nearest opaque surface;
             the camera's `far_m` where there is none.
         ids: ``(V, H, W)`` int16 id of that surface's object; -1 for the sky.
-        glass_ids: ``(V, H, W)`` int16 id of the nearest transparent object in front, or -1.
+        glass_ids: ``(L, V, H, W)`` int16 ids of the transparent objects in front, nearest first,
+            then -1. L is the number of layers in the pixel with most of them; it may be 0.
     """
 
     rgb: Images
     depth: Depths
     ids: Surfaces
-    glass_ids: Surfaces
+    glass_ids: NDArray[np.int16]
 
 
 class DrawMasks(NamedTuple):
@@ -70,7 +72,7 @@ def render_views(
     axes: Floats,
     lens: Lens,
     views: Views,
-) -> None:
+) -> NDArray[np.int16]:
     """Rasterize, light and colour all views.
 
     Args:
@@ -80,16 +82,19 @@ def render_views(
         drawn: Which of them to draw.
         axes: ``(V, 4, 3)`` position, right, up and forward axes of each camera, world frame.
         lens: Parameters of the camera.
-        views: Written.
+        views: Written, except `glass_ids`.
+
+    Returns:
+        ``(L, V, H, W)`` the `Views.glass_ids`.
     """
     first = geoms.shapes.shape[0]
     lights = np.empty(views.depth.shape[1:], np.float32)
     seen = np.empty_like(meshes.vertices)
     has_glass = drawn.glass.any()
+    all_glass = np.empty((0, axes.shape[0], lights.shape[0], lights.shape[1]), np.int16)
     for v in range(axes.shape[0]):
-        view, rgb, depth = axes[v], views.rgb[v], views.depth[v]
-        ids, glass_ids = views.ids[v], views.glass_ids[v]
-        depth[:], ids[:], glass_ids[:] = lens.far, NO_SURFACE, NO_SURFACE
+        view, rgb, depth, ids = axes[v], views.rgb[v], views.depth[v], views.ids[v]
+        depth[:], ids[:] = lens.far, NO_SURFACE
         draw_geoms(geoms, drawn.opaque, view, lens, True, depth, ids)
         draw_meshes(meshes, drawn.triangles, view, lens, True, first, seen, depth, ids)
         illuminate_triangles(meshes, seen, lens, first, ids, lights)
@@ -99,8 +104,32 @@ def render_views(
         blend_colours(surfaces.colours, ids, lights, 1.0, rgb)
         to_object_ids(surfaces.objects, ids)
         if has_glass:
-            glass_depth = depth.copy()
-            draw_geoms(geoms, drawn.glass, view, lens, True, glass_depth, glass_ids)
-            illuminate(geoms, view, lens, glass_depth, glass_ids, lights)
-            blend_colours(surfaces.colours, glass_ids, lights, GLASS_OPACITY, rgb)
-            to_object_ids(surfaces.objects, glass_ids)
+            layers = collect_layers(geoms, drawn.glass, view, lens, depth)
+            blend_layers(geoms, surfaces.colours, layers, view, lens, rgb)
+            all_glass = with_glass(all_glass, v, surfaces.objects, layers.surfaces)
+    return all_glass
+
+
+@njit(cache=True, error_model="numpy")
+def with_glass(
+    all_glass: NDArray[np.int16], v: int, objects: Surfaces, layers: NDArray[np.int16]
+) -> NDArray[np.int16]:
+    """Return the ids of transparent objects in all views, with those of view `v` written.
+
+    Args:
+        all_glass: ``(K, V, H, W)``.
+        v: Index of the view.
+        objects: ``(S,)`` object ids of the surfaces.
+        layers: ``(L, H, W)`` rows of surfaces; replaced by object ids.
+
+    Returns:
+        ``(max(K, L), V, H, W)``; further layers of the other views hold -1.
+    """
+    count, size = layers.shape[0], all_glass.shape
+    if count > size[0]:
+        more = np.full((count - size[0], size[1], size[2], size[3]), NO_SURFACE, np.int16)
+        all_glass = np.concatenate((all_glass, more))
+    for layer in range(count):
+        to_object_ids(objects, layers[layer])
+        all_glass[layer, v] = layers[layer]
+    return all_glass

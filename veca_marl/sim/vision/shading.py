@@ -104,7 +104,7 @@ def illuminate(
             columns, run = lens.columns[first:end], depth[j, first:end]
             _light_run(geoms, g, view, lens.rows[j], columns, run, lights[j, first:end])
             if geoms.checkers[g] > _0:
-                _tile_run(view, lens.rows[j], columns, run, geoms.checkers[g], lights[j, first:end])
+                _tile_run(geoms, g, view, lens.rows[j], columns, run, lights[j, first:end])
 
 
 @njit(cache=True, error_model="numpy")
@@ -163,18 +163,56 @@ def _local_normal(shape: int, size: Lights, point: Vector) -> Vector:
 
 @njit(cache=True, error_model="numpy")
 def _tile_run(
-    view: Floats, y: float, columns: Depths, depth: Depths, edge_m: float, lights: Lights
+    geoms: GeomTable,
+    g: int,
+    view: Floats,
+    y: float,
+    columns: Depths,
+    depth: Depths,
+    lights: Lights,
 ) -> None:
-    """Darken every second cell of a three-dimensional checker pattern in the world frame."""
-    per_m = 1.0 / edge_m
+    """Darken every second cell of a three-dimensional checker pattern in the object's frame."""
+    per_m = 1.0 / geoms.checkers[g]
+    turn, local, at = geoms.rotations[g], geoms.local_rotations[g], geoms.positions[g]
+    x0, y0, z0 = _into_frame(
+        turn, local, view[0, 0] - at[0], view[0, 1] - at[1], view[0, 2] - at[2]
+    )
+    offset = geoms.offsets[g]
+    eye = (x0 + offset[0], y0 + offset[1], z0 + offset[2])
+    right = _into_frame(turn, local, view[1, 0], view[1, 1], view[1, 2])
+    up = _into_frame(turn, local, view[2, 0], view[2, 1], view[2, 2])
+    forward = _into_frame(turn, local, view[3, 0], view[3, 1], view[3, 2])
     for i in range(columns.shape[0]):
         x, t = columns[i], depth[i]
         tile = 0
         for axis in range(3):
-            along = view[3, axis] + x * view[1, axis] + y * view[2, axis]
-            tile += math.floor((view[0, axis] + t * along) * per_m + _TILE_SHIFT)
+            along = forward[axis] + x * right[axis] + y * up[axis]
+            tile += math.floor((eye[axis] + t * along) * per_m + _TILE_SHIFT)
         if tile & 1:
             lights[i] *= single(DARK_TILE)
+
+
+@njit(cache=True, error_model="numpy")
+def _into_frame(
+    rotation: Floats, local: Floats, x: float, y: float, z: float
+) -> tuple[float, float, float]:
+    """Return a world vector in the axes of the frame that a primitive is on.
+
+    Args:
+        rotation: ``(3, 3)`` from the primitive's axes to the world's.
+        local: ``(3, 3)`` from the primitive's axes to the frame's.
+        x: The world vector.
+        y: Likewise.
+        z: Likewise.
+    """
+    a = rotation[0, 0] * x + rotation[1, 0] * y + rotation[2, 0] * z
+    b = rotation[0, 1] * x + rotation[1, 1] * y + rotation[2, 1] * z
+    c = rotation[0, 2] * x + rotation[1, 2] * y + rotation[2, 2] * z
+    return (
+        local[0, 0] * a + local[0, 1] * b + local[0, 2] * c,
+        local[1, 0] * a + local[1, 1] * b + local[1, 2] * c,
+        local[2, 0] * a + local[2, 1] * b + local[2, 2] * c,
+    )
 
 
 @njit(cache=True, error_model="numpy")
