@@ -8,11 +8,12 @@ from pathlib import Path
 from typing import Any
 
 from tensordict.nn import TensorDictModuleBase
-from torchrl import timeit
 
+from veca_marl.algos.collection.workers import WorkerError
 from veca_marl.algos.training.loop import Trainer
 from veca_marl.algos.training.reporters import MemoryReporter
 from veca_marl.config import Config
+from veca_marl.envs.core.game_cfg import GameCfg
 from veca_marl.runs.assembly import make_reporters, make_trainer
 from veca_marl.runs.recording import record_episode
 from veca_marl.runs.run_folder import RunFolder
@@ -39,10 +40,41 @@ class TrainingResult:
     folder: Path | None
 
 
+class LastVideo:
+    """The video of the trained policy, recorded while other processes evaluate it.
+
+    An error does not keep the run from storing its last checkpoint.
+
+    Args:
+        path: The file.
+        game: The game.
+        trainer: Its policy acts.
+    """
+
+    def __init__(self, path: Path, game: GameCfg, trainer: Trainer) -> None:
+        self._path, self._game, self._trainer = path, game, trainer
+        self._error: Exception | None = None
+
+    def record(self) -> None:
+        """Record it; an exception is kept for `check`."""
+        trainer = self._trainer
+        try:
+            record_episode(self._path, self._game, trainer.policy.play, trainer.evaluation_seed)
+        except WorkerError:  # of the evaluation, which ends the run
+            raise
+        except Exception as error:
+            self._error = error
+
+    def check(self) -> None:
+        """Raise the exception of `record`, if there was one."""
+        if self._error is not None:
+            raise self._error
+
+
 def run_training(
     cfg: Config, folder: RunFolder | None = None, trainer: Trainer | None = None
 ) -> TrainingResult:
-    """Train as configured, record the video if asked for, and return the results.
+    """Train as configured, with a video of the last evaluation's first episode, return the results.
 
     Args:
         cfg: The configuration.
@@ -60,10 +92,13 @@ def run_training(
         for reporter in written:
             pending.callback(reporter.close)
         trainer.reporters = [memory, *written]
-        comparison = trainer.run()
+        video = None
         if folder is not None and cfg.log.video:
-            with timeit("video"):
-                record_episode(folder.video, cfg.game, trainer.policy.play, trainer.evaluation_seed)
+            video = LastVideo(folder.video, cfg.game, trainer)
+            trainer.during_last_evaluation = video.record
+        comparison = trainer.run()
+        if video is not None:
+            video.check()
     if folder is not None:
         folder.write("timing.txt", trainer.timing())
         folder.write("comparison.txt", "\n".join(comparison))  # last: the run is complete

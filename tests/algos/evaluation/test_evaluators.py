@@ -5,6 +5,7 @@ import os
 import signal
 import time
 from contextlib import closing
+from functools import partial
 
 import numpy as np
 import pytest
@@ -67,6 +68,28 @@ def test_a_process_that_is_killed_is_noticed_at_once(policy):
         with pytest.raises(WorkerError, match=r"evaluation process [01] was killed by SIGKILL"):
             wait()
     assert not multiprocessing.active_children()
+
+
+class Waiting(FakeEnv):
+    """Begins episodes only after an event."""
+
+    def __init__(self, worlds, seed, event):
+        self.event = event
+        super().__init__(worlds, seed)
+
+    def _reset(self, td=None, **options):
+        if not self.event.wait(20.0):
+            raise TimeoutError("the event has not occurred")
+        return super()._reset(td, **options)
+
+
+@pytest.mark.parametrize("processes", [0, 2])
+def test_other_work_is_done_while_processes_play_and_before_this_one_does(policy, processes):
+    event = multiprocessing.Event()
+    players = Players(policy, ("agents",))
+    make_env = partial(Waiting, event=event)
+    with closing(make_evaluator(make_env, players, processes, 4)) as evaluator:
+        assert len(evaluator.play(SEVEN, event.set)["agents"].returns) == 7
 
 
 class Failing(FakeEnv):

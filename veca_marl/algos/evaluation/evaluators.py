@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -69,11 +69,20 @@ class Players:
         }
 
 
+def nothing() -> None:
+    """Do nothing."""
+
+
 class Evaluator(Protocol):
     """Plays episodes with policies that it knows by name."""
 
-    def play(self, request: Request) -> dict[str, Scores]:
-        """Return each team's scores."""
+    def play(self, request: Request, meanwhile: Callable[[], None] = nothing) -> dict[str, Scores]:
+        """Return each team's scores.
+
+        Args:
+            request: The episodes.
+            meanwhile: Called once: while other processes play, or else before this one does.
+        """
         ...
 
     def close(self) -> None:
@@ -94,8 +103,9 @@ class LocalEvaluator:
         self._env = make_env(worlds, 0)
         self._players = players(self._env)
 
-    def play(self, request: Request) -> dict[str, Scores]:
+    def play(self, request: Request, meanwhile: Callable[[], None] = nothing) -> dict[str, Scores]:
         """See `Evaluator`."""
+        meanwhile()
         return evaluate(
             self._env,
             self._players[request.player],
@@ -155,12 +165,13 @@ class ParallelEvaluator:
                 self._expected = False
                 raise WorkerError(f"evaluation process {index} {end_of(process)}")
 
-    def play(self, request: Request) -> dict[str, Scores]:
+    def play(self, request: Request, meanwhile: Callable[[], None] = nothing) -> dict[str, Scores]:
         """See `Evaluator`."""
         parts = _split(request, len(self._connections))
         for index, part in enumerate(parts):
             with self._worker_errors(index):
                 self._connections[index].send(part)
+        meanwhile()
         return joined_scores([self._receive(index) for index in range(len(parts))])
 
     def _receive(self, index: int) -> dict[str, Scores]:

@@ -10,7 +10,7 @@ interrupted stage had learnt is learnt again.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack, closing
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -23,7 +23,13 @@ from veca_marl.algos.collection.experience import CollectCfg, Experience
 from veca_marl.algos.evaluation.comparison import comparison_line, score_rows
 from veca_marl.algos.evaluation.episodes import TrainingEpisodes
 from veca_marl.algos.evaluation.evaluate import EvalCfg, Scores
-from veca_marl.algos.evaluation.evaluators import Evaluator, Players, Request, make_evaluator
+from veca_marl.algos.evaluation.evaluators import (
+    Evaluator,
+    Players,
+    Request,
+    make_evaluator,
+    nothing,
+)
 from veca_marl.algos.plain import to_plain
 from veca_marl.algos.policy import Policy
 from veca_marl.algos.seeds import derived_seed
@@ -54,6 +60,8 @@ class Trainer:
         seed: Determines all random numbers.
         progress_bar: Whether to show one.
         matchmaking: Which teams learn against which opponents.
+        during_last_evaluation: Called once, while other processes play the last evaluation; it
+            may act with `policy`.
         progress: Where the run stands.
         policy: A copy of the policy on the CPU, which collects and is evaluated.
     """
@@ -68,6 +76,7 @@ class Trainer:
     seed: int
     progress_bar: bool = True
     matchmaking: Matchmaking = field(default_factory=AllLearn)
+    during_last_evaluation: Callable[[], None] = nothing
     progress: Progress = field(default_factory=Progress)
     _resumed_frames: int = 0
     _evaluator: Evaluator = field(init=False)
@@ -109,7 +118,7 @@ class Trainer:
                 self._report_scores("random", baseline)
             scores = self._train(experience)
             if scores is None:
-                scores = self._evaluate("policy", self.evaluation.last_episodes)
+                scores = self._evaluate_last()
         compared = [comparison_line(t, scores[t], baseline[t]) for t in self.learners.algorithms]
         return [*compared, *self._notes()]
 
@@ -205,8 +214,10 @@ class Trainer:
 
     def _end_stage(self, last: bool) -> dict[str, Scores]:
         self.policy.take_over(self.learners.policy)
-        cfg = self.evaluation
-        scores = self._evaluate("policy", cfg.last_episodes if last else cfg.episodes)
+        if last:
+            scores = self._evaluate_last()
+        else:
+            scores = self._evaluate("policy", self.evaluation.episodes)
         self._report_scores("policy", scores)
         best = self._is_best(scores)
         self.progress.stage += 1
@@ -237,11 +248,16 @@ class Trainer:
         numbers = {team: to_plain(cfg) for team, cfg in self.learners.cfgs.items()}
         self.checkpoints.save(state, self.progress.frames, best, numbers)
 
-    def _evaluate(self, player: str, episodes: int) -> dict[str, Scores]:
+    def _evaluate_last(self) -> dict[str, Scores]:
+        episodes = self.evaluation.last_episodes
+        return self._evaluate("policy", episodes, self.during_last_evaluation)
+
+    def _evaluate(
+        self, player: str, episodes: int, meanwhile: Callable[[], None] = nothing
+    ) -> dict[str, Scores]:
+        seed, exploration = self.evaluation_seed, self.evaluation.exploration
         with timeit("evaluate"):
-            scores = self._evaluator.play(
-                Request(player, episodes, self.evaluation_seed, self.evaluation.exploration)
-            )
+            scores = self._evaluator.play(Request(player, episodes, seed, exploration), meanwhile)
         check_scores(scores)
         return scores
 
