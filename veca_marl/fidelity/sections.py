@@ -12,6 +12,7 @@ SECTIONS: dict[str, str] = {
     "doppler": "veca_marl.fidelity.doppler",
     "ears": "veca_marl.fidelity.ears",
     "inertia": "veca_marl.fidelity.inertia",
+    "localisation": "veca_marl.fidelity.localisation",
     "rigid_bodies": "veca_marl.fidelity.rigid_bodies",
     "rooms": "veca_marl.fidelity.rooms",
     "vision": "veca_marl.fidelity.vision",

@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from listening import EAR, RATE, STEP, direction, noise, room, yaw
+from listening import EAR, RATE, STEP, noise, yaw
 from stand_in_worlds import SoundWorld
 
 from veca_marl.sim.geometry import Pose
@@ -166,39 +166,3 @@ def test_invalid_settings_are_refused():
         AudioCfg(noise_floor_db=float("nan"))
     with pytest.raises(ValueError, match="nowhere"):
         Scene(buzz_at(150.0), sofa_path="nowhere.sofa")
-
-
-def scenes(quality, count, seed):
-    """Observations ``(count, 500)`` and directions ``(count, 3)`` of random scenes in a room."""
-    rng = np.random.default_rng(seed)
-    scene = Scene(buzz_at(120.0), box=room(0.5), quality=quality)
-    observations, directions = [], []
-    for _ in range(count):
-        scene.reset(int(rng.integers(1 << 30)))
-        to_source = direction(rng.uniform(-180, 180), rng.uniform(-15, 15))
-        scene.body.rotation = yaw(rng.uniform(-np.pi, np.pi))
-        scene.body.position = np.array([4.0, 3.0, 1.5]) + rng.uniform(-0.5, 0.5, 3)
-        way = rng.uniform(0.6, 2.0) * to_source
-        scene.source.position = scene.body.position + scene.body.rotation @ way
-        observations.append(scene.hear(3)["audio"].ravel())
-        directions.append(to_source)
-    return np.array(observations), np.array(directions)
-
-
-def decode(quality):
-    """Mean cosine of true and decoded direction of held-out scenes, by ridge regression."""
-    heard, directions = scenes(quality, 700, seed=0)
-    test_heard, test_directions = scenes(quality, 150, seed=1)
-    mean, scale = heard.mean(axis=0), heard.std() + 1e-9
-    x, test = (heard - mean) / scale, (test_heard - mean) / scale
-    weights = np.linalg.solve(x.T @ x + 10.0 * np.eye(x.shape[1]), x.T @ directions)
-    found = test @ weights
-    found /= np.linalg.norm(found, axis=1, keepdims=True)
-    return float((found * test_directions).sum(axis=1).mean())
-
-
-def test_only_hrtf_observations_encode_the_direction():
-    cosine = {quality.value: decode(quality) for quality in AudioQuality}
-    assert cosine["hrtf"] > 0.8
-    assert cosine["stereo"] < cosine["hrtf"] - 0.1
-    assert abs(cosine["mono"]) < 0.15
