@@ -138,7 +138,7 @@ def _trained(inputs: torch.Tensor, targets: torch.Tensor) -> torch.nn.Module:
         for batch in torch.randperm(len(inputs)).split(_BATCH):
             loss = torch.nn.functional.mse_loss(network(inputs[batch]), targets[batch])
             optimiser.zero_grad()
-            loss.backward()  # type: ignore[no-untyped-call]
+            loss.backward()
             optimiser.step()
     return network
 

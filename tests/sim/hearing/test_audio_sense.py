@@ -24,12 +24,14 @@ class Dummy:
     def __init__(self):
         self.position = np.zeros(3)
         self.rotation = np.eye(3)
+        self.mouth = (0.08, 0.0, -0.02)
 
     def mount(self, name):
         offset = {
             "head": (0.0, 0.0, 0.0),
             "ear_left": (-0.01, EAR, 0.02),
             "ear_right": (-0.01, -EAR, 0.02),
+            "mouth": self.mouth,
         }[name]
         return Pose(self.position + self.rotation @ np.array(offset), self.rotation)
 
@@ -166,3 +168,22 @@ def test_invalid_settings_are_refused():
         AudioCfg(noise_floor_db=float("nan"))
     with pytest.raises(ValueError, match="nowhere"):
         Scene(buzz_at(150.0), sofa_path="nowhere.sofa")
+
+
+def test_the_own_voice_has_the_level_at_the_distance_of_the_mouth():
+    """Mouth and ears of the body, not a constant, set the least distance."""
+    for depth in (0.08, 0.2):
+        scene = Scene(Clip(noise(9 * STEP)), quality=AudioQuality.mono, waveform=True)
+        ear = np.array([-0.01, EAR, 0.02])
+        mouth = np.array([depth, 0.0, -0.02])
+        scene.body.mouth = mouth
+        scene.sense = AudioSense(
+            AudioCfg(quality=AudioQuality.mono, waveform=True), scene.body, SoundWorld(scene.field)
+        )
+        levels = []
+        for position in (np.array([-0.01, 0.0, 0.02]), np.array([0.99, 0.0, 0.02])):
+            scene.source.position = position
+            scene.reset()
+            heard = np.concatenate([scene.hear(1)["waveform"] for _ in range(8)], axis=1)
+            levels.append(np.sqrt(np.mean(heard[0, 500:] ** 2)))
+        assert levels[0] / levels[1] == pytest.approx(1.0 / np.linalg.norm(mouth - ear), rel=0.02)

@@ -9,6 +9,7 @@ from veca_marl.sim.hearing.head_response import HeadResponse
 from veca_marl.sim.hearing.hrtf import direction_vectors
 from veca_marl.sim.hearing.minimum_phase import minimum_phase
 from veca_marl.sim.hearing.spherical_head import HEAD_RADIUS_M, sphere_response, woodworth_arrival_s
+from veca_marl.sim.hearing.unmeasured import stand_ins
 
 DATA = ROOT / "veca_marl/data/kemar.npz"
 KEMAR_SOFA = SHARED / "data/hrtf/MIT_KEMAR_normal_pinna.sofa"
@@ -31,16 +32,17 @@ def sphere_head(n_taps=128):
         woodworth_arrival_s(incidence),
         RATE,
         HEAD_RADIUS_M,
+        1.4,
         "",
     )
 
 
 def level_db(table, azimuth_deg, elevation_deg=0.0):
-    """Levels of both ears (2, F), interpolated as in the stream."""
+    """Levels of both ears (2, F) at the measured distance, interpolated as in the stream."""
     head = HrtfReceiver(table)
     delays, filters = np.zeros((1, 2)), np.zeros((1, 2, head.n_taps), np.float32)
-    where = direction(azimuth_deg, elevation_deg)[None]
-    head.write_paths(where, np.ones(1), RATE, delays, filters)
+    where = table.measured_at_m * direction(azimuth_deg, elevation_deg)[None]
+    head.write_paths(where, np.full(1, table.measured_at_m), RATE, delays, filters)
     return 20.0 * np.log10(np.abs(np.fft.rfft(filters[0], N_FFT)))
 
 
@@ -113,6 +115,51 @@ def test_arrival_times_below_the_lowest_ring_are_those_of_the_sphere():
     assert table.arrival_samples.min() > -0.5e-3 * RATE
 
 
+def test_the_lowest_ring_has_its_measured_arrival_times():
+    head, table = HeadResponse.load(DATA), kemar_table()
+    row = int((head.directions @ direction(90.0, -40.0)).argmax())
+    assert table.arrival_samples[18, 10] == pytest.approx(RATE * head.arrival_s[row], abs=0.02)
+
+
+def interaural_level_db(azimuth_deg, elevation_deg):
+    left, right = level_db(kemar_table(), azimuth_deg, elevation_deg)[:, band(1000, 5400)]
+    return float((left - right).mean())
+
+
+def test_a_source_under_the_head_has_hardly_any_interaural_difference():
+    """The azimuth is undefined at the nadir; the lateral angle decides."""
+    for azimuth in range(0, 360, 45):
+        assert abs(interaural_level_db(azimuth, -90.0)) < 0.5
+        assert abs(interaural_level_db(azimuth, -80.0)) < 4.0
+    sideways = [interaural_level_db(90.0, elevation) for elevation in (-80, -70, -60, -50, -40)]
+    assert (np.diff(sideways) > 0.0).all()
+
+
+def test_responses_are_continuous_under_the_head():
+    """From the front under the head to the back, in steps of 5 degrees."""
+    path = [(0.0, -e) for e in range(30, 91, 5)] + [(180.0, -e) for e in range(85, 29, -5)]
+    levels = np.stack([level_db(kemar_table(), *place) for place in path])[:, 0, band(500, 5400)]
+    steps = np.sqrt(np.mean(np.diff(levels, axis=0) ** 2, axis=1))
+    assert steps.max() < 2.0
+
+
+@pytest.mark.parametrize("ring_deg", [-10.0, -40.0, -80.0])
+def test_directions_below_a_ring_keep_their_lateral_angle(ring_deg):
+    rng = np.random.default_rng(0)
+    below = rng.standard_normal((2000, 3))
+    below /= np.linalg.norm(below, axis=1, keepdims=True)
+    below = below[below[:, 2] < np.sin(np.deg2rad(ring_deg))]
+    ring, weights = stand_ins(below, np.deg2rad(ring_deg))
+    assert np.allclose(np.linalg.norm(ring, axis=-1), 1.0)
+    assert np.allclose(ring[..., 1], below[:, None, 1])
+    assert np.allclose(ring[..., 2], np.sin(np.deg2rad(ring_deg)))
+    assert np.allclose(weights.sum(axis=-1), 1.0)
+    assert (weights >= 0.0).all()
+    on_ring, alone = stand_ins(ring[:, 1], np.deg2rad(ring_deg))
+    assert np.allclose(on_ring[:, 1], ring[:, 1])
+    assert np.allclose(alone[np.abs(ring[:, 1, 0]) > 1e-3], (0.0, 1.0), atol=1e-6)
+
+
 def test_the_table_is_shared_and_read_only():
     assert kemar_table() is kemar_table()
     with pytest.raises(ValueError, match="read-only"):
@@ -161,4 +208,5 @@ def test_a_saved_head_response_is_loaded_unchanged(tmp_path):
     head.save(tmp_path / "head.npz")
     again = HeadResponse.load(tmp_path / "head.npz")
     assert np.allclose(again.filters, head.filters, atol=1e-3)
-    assert (again.sample_rate_hz, again.head_radius_m) == (RATE, HEAD_RADIUS_M)
+    numbers = (again.sample_rate_hz, again.head_radius_m, again.measured_at_m)
+    assert numbers == (RATE, HEAD_RADIUS_M, 1.4)

@@ -21,7 +21,7 @@ _MIN_MAGNITUDE = 1e-5
 
 @dataclass(frozen=True)
 class HeadResponse:
-    """The response of a head to a distant source, per measured direction and ear.
+    """The response of a head to a source at one distance, per measured direction and ear.
 
     The arrival time is kept apart from the filter, so that neither interpolation between
     directions nor movement causes comb filtering. That minimum phase plus a pure delay cannot be
@@ -35,6 +35,7 @@ class HeadResponse:
             negative at the ear on the side of the source.
         sample_rate_hz: Sampling rate of the filters.
         head_radius_m: Radius of the sphere, the arrival times of which fit best.
+        measured_at_m: Distance of the loudspeaker from the centre of the head.
         licence: Terms and authors of the measurement.
     """
 
@@ -43,6 +44,7 @@ class HeadResponse:
     arrival_s: Floats
     sample_rate_hz: int
     head_radius_m: float
+    measured_at_m: float
     licence: str
 
     def scaled(self, scale: float) -> HeadResponse:
@@ -75,6 +77,7 @@ class HeadResponse:
             filters=minimum_phase(moved, n_taps).astype(np.float32),
             arrival_s=scale * self.arrival_s,
             head_radius_m=scale * self.head_radius_m,
+            measured_at_m=scale * self.measured_at_m,
         )
 
     def save(self, path: str | Path) -> None:
@@ -86,6 +89,7 @@ class HeadResponse:
             arrival_s=self.arrival_s.astype(np.float32),
             sample_rate_hz=self.sample_rate_hz,
             head_radius_m=self.head_radius_m,
+            measured_at_m=self.measured_at_m,
             licence=self.licence,
         )
 
@@ -99,6 +103,7 @@ class HeadResponse:
                 arrival_s=file["arrival_s"].astype(np.float64),
                 sample_rate_hz=int(file["sample_rate_hz"]),
                 head_radius_m=float(file["head_radius_m"]),
+                measured_at_m=float(file["measured_at_m"]),
                 licence=str(file["licence"]),
             )
 

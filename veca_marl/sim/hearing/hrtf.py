@@ -16,15 +16,21 @@ from veca_marl.sim.hearing.head_response import HeadResponse
 from veca_marl.sim.hearing.minimum_phase import minimum_phase
 from veca_marl.sim.hearing.sofa import read_sofa
 from veca_marl.sim.hearing.spherical_head import woodworth_arrival_s
+from veca_marl.sim.hearing.unmeasured import stand_ins
 
 GRID_STEP_DEG = 5
 _N_FFT = 512
 _MIN_MAGNITUDE = 1e-5
 _BATCH = 256
+# directions of the lowest ring are moved up by this angle into the triangles
+_INSIDE_RAD = 1e-6
 
 
 class HrtfTable:
     """Filters and arrival times of a head on a regular grid of azimuths and elevations.
+
+    Below the lowest measured ring the filters are those of the ring with the same lateral angle,
+    see `stand_ins`, and the arrival times are Woodworth's.
 
     Read-only and shared by all listeners of a process.
 
@@ -34,27 +40,36 @@ class HrtfTable:
         arrival_samples: ``(A, E, 2)`` arrival time relative to the head's centre.
         sample_rate_hz: Sampling rate.
         head_radius_m: Radius of the sphere that fits the arrival times.
+        measured_at_m: Distance of the loudspeaker from the centre of the head.
         licence: Terms and authors of the measurement.
     """
 
     def __init__(self, response: HeadResponse, step_deg: int = GRID_STEP_DEG) -> None:
         azimuth = np.deg2rad(np.arange(0, 360, step_deg))
         elevation = np.deg2rad(np.arange(-90, 91, step_deg))
-        # measurements end above the nadir: the filters of the lowest ring are used for all below it
-        lowest = np.arcsin(np.clip(response.directions[:, 2].min(), -1.0, 1.0)) + 1e-6
-        corners, weights = _triangles(
-            response.directions, direction_vectors(azimuth, np.maximum(elevation, lowest))
+        # measurements end above the nadir
+        ring = np.arcsin(np.clip(response.directions[:, 2].min(), -1.0, 1.0))
+        inside = ring + _INSIDE_RAD
+        below = direction_vectors(azimuth, elevation[elevation < ring - _INSIDE_RAD])
+        above = elevation[below.shape[1] :]
+        parts = [
+            _triangles(response.directions, direction_vectors(azimuth, np.maximum(above, inside)))
+        ]
+        if below.size:
+            parts.insert(0, _ring_corners(response.directions, below, inside))
+        self.filters = np.concatenate(
+            [_interpolate_filters(response.filters, *part) for part in parts], axis=1
         )
-        self.filters = _interpolate_filters(response.filters, corners, weights)
-        arrival_s = np.einsum("aek,aekc->aec", weights, response.arrival_s[corners])
-        unmeasured = elevation < lowest
-        incidence = ear_incidence(direction_vectors(azimuth, elevation[unmeasured]))
-        arrival_s[:, unmeasured] = woodworth_arrival_s(incidence, response.head_radius_m)
+        corners, weights = parts[-1]
+        measured_s = np.einsum("aek,aekc->aec", weights, response.arrival_s[corners])
+        below_s = woodworth_arrival_s(ear_incidence(below), response.head_radius_m)
+        arrival_s = np.concatenate([below_s, measured_s], axis=1)
         self.arrival_samples: Floats = arrival_s * response.sample_rate_hz
         self.filters.setflags(write=False)
         self.arrival_samples.setflags(write=False)
         self.sample_rate_hz = response.sample_rate_hz
         self.head_radius_m = response.head_radius_m
+        self.measured_at_m = response.measured_at_m
         self.licence = response.licence
 
 
@@ -151,10 +166,10 @@ def direction_vectors(azimuth_rad: Floats, elevation_rad: Floats) -> Floats:
 
 
 def _triangles(measured: Floats, requested: Floats) -> tuple[NDArray[np.int64], Floats]:
-    """Find the spherical triangle of measured directions around each requested one.
+    """Find the spherical triangle of measured directions around each requested one ``(..., 3)``.
 
     Returns:
-        Indices ``(A, E, 3)`` into the measured directions, and weights that sum to 1.
+        Indices ``(..., 3)`` into the measured directions, and weights that sum to 1.
     """
     nadir = np.array([[0.0, 0.0, -1.0]])
     closed = np.concatenate([measured, nadir])  # the hull must enclose the origin
@@ -173,6 +188,20 @@ def _triangles(measured: Floats, requested: Floats) -> tuple[NDArray[np.int64], 
     weight /= weight.sum(axis=1, keepdims=True)
     shape = (*requested.shape[:-1], 3)
     return corner.reshape(shape).astype(np.int64), weight.reshape(shape)
+
+
+def _ring_corners(
+    measured: Floats, below: Floats, ring_rad: float
+) -> tuple[NDArray[np.int64], Floats]:
+    """Find measured directions on the lowest ring that stand in for directions below it.
+
+    Returns:
+        Indices ``(A, E, 6)`` into the measured directions, and weights that sum to 1.
+    """
+    on_ring, shares = stand_ins(below, ring_rad)
+    corners, weights = _triangles(measured, on_ring)
+    shape = (*below.shape[:2], 6)
+    return corners.reshape(shape), (weights * shares[..., None]).reshape(shape)
 
 
 def _interpolate_filters(

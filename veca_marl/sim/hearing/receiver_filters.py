@@ -7,7 +7,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from veca_marl.sim.geometry import Floats
-from veca_marl.sim.sound import NEAR_FIELD_M
+from veca_marl.sim.hearing.near_field import NEAREST_RADII, near_field_gain
 
 
 @njit(cache=True)
@@ -21,6 +21,7 @@ def omnidirectional_paths(
     gains: Floats,
     samples_per_metre: float,
     ears: Floats,
+    nearest_m: float,
     delays: Floats,
     filters: NDArray[np.float32],
 ) -> None:
@@ -31,6 +32,7 @@ def omnidirectional_paths(
         gains: ``(K,)`` product of the walls' reflection and transmission coefficients of each.
         samples_per_metre: Sampling rate divided by the speed of sound.
         ears: ``(E, 3)`` metres in the head frame.
+        nearest_m: Distance below which the gain is constant.
         delays: ``(K, E)`` samples, overwritten.
         filters: ``(K, E, 1)``, overwritten.
     """
@@ -38,7 +40,7 @@ def omnidirectional_paths(
         for ear in range(ears.shape[0]):
             distance = _length(arrivals[k] - ears[ear])
             delays[k, ear] = distance * samples_per_metre
-            filters[k, ear, 0] = np.float32(gains[k] / max(distance, NEAR_FIELD_M))
+            filters[k, ear, 0] = np.float32(gains[k] / max(distance, nearest_m))
 
 
 @njit(cache=True)
@@ -62,6 +64,8 @@ def head_related_paths(
     samples_per_metre: float,
     table: NDArray[np.float32],
     arrival_samples: Floats,
+    radius_m: float,
+    measured_at_m: float,
     delays: Floats,
     filters: NDArray[np.float32],
 ) -> None:
@@ -73,6 +77,8 @@ def head_related_paths(
         samples_per_metre: Sampling rate divided by the speed of sound.
         table: ``(A, E, 2, T)``, see `HrtfTable.filters`; interpolated bilinearly.
         arrival_samples: ``(A, E, 2)``, see `HrtfTable`.
+        radius_m: Radius of the head.
+        measured_at_m: Distance at which the responses were measured.
         delays: ``(K, 2)`` samples, overwritten.
         filters: ``(K, 2, T)``, overwritten.
     """
@@ -82,10 +88,14 @@ def head_related_paths(
         a0, a1, e0, along, up = _grid_cell(arrivals[k], distance, n_azimuths, n_elevations)
         w00, w10 = (1.0 - along) * (1.0 - up), along * (1.0 - up)
         w01, w11 = (1.0 - along) * up, along * up
-        amplitude = gains[k] / max(distance, NEAR_FIELD_M)
-        c00, c10 = np.float32(amplitude * w00), np.float32(amplitude * w10)
-        c01, c11 = np.float32(amplitude * w01), np.float32(amplitude * w11)
+        limited = max(distance, NEAREST_RADII * radius_m)
+        to_left = arrivals[k, 1] / limited
         for ear in range(n_ears):
+            cosine = to_left if ear == 0 else -to_left
+            near = near_field_gain(radius_m, limited, measured_at_m, cosine)
+            amplitude = gains[k] / limited * near
+            c00, c10 = np.float32(amplitude * w00), np.float32(amplitude * w10)
+            c01, c11 = np.float32(amplitude * w01), np.float32(amplitude * w11)
             interaural = (
                 w00 * arrival_samples[a0, e0, ear]
                 + w10 * arrival_samples[a1, e0, ear]

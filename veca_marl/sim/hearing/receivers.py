@@ -11,11 +11,14 @@ from numpy.typing import ArrayLike, NDArray
 from veca_marl.sim.geometry import Floats
 from veca_marl.sim.hearing.hrtf import HrtfTable
 from veca_marl.sim.hearing.receiver_filters import head_related_paths, omnidirectional_paths
-from veca_marl.sim.sound import SPEED_OF_SOUND_MPS
+from veca_marl.sim.sound import NEAR_FIELD_M, SPEED_OF_SOUND_MPS
 
 
 class HrtfReceiver:
-    """Two ears on a head: each arrival is filtered by the response of its direction."""
+    """Two ears on a head: each arrival is filtered by the response of its direction.
+
+    The level of each ear is corrected for the distance of the source, see `near_field_gain`.
+    """
 
     n_channels = 2
 
@@ -50,6 +53,8 @@ class HrtfReceiver:
             sample_rate_hz / SPEED_OF_SOUND_MPS,
             table.filters,
             table.arrival_samples,
+            table.head_radius_m,
+            table.measured_at_m,
             delays,
             filters,
         )
@@ -64,12 +69,15 @@ class StereoReceiver:
     n_channels = 2
     n_taps = 1
 
-    def __init__(self, ear_left: ArrayLike, ear_right: ArrayLike) -> None:
+    def __init__(
+        self, ear_left: ArrayLike, ear_right: ArrayLike, nearest_m: float = NEAR_FIELD_M
+    ) -> None:
         """Place the ears.
 
         Args:
             ear_left: ``(3,)`` metres in the head frame.
             ear_right: Likewise.
+            nearest_m: Distance below which the gain is constant, positive.
 
         Raises:
             ValueError: If one is not of three numbers.
@@ -78,6 +86,7 @@ class StereoReceiver:
         if self.ears.shape != (2, 3):
             raise ValueError(f"an ear must be three numbers, got {ear_left!r} and {ear_right!r}")
         self.extent_m = float(np.linalg.norm(self.ears, axis=1).max())
+        self._nearest_m = nearest_m
 
     def write_paths(
         self,
@@ -88,7 +97,10 @@ class StereoReceiver:
         filters: NDArray[np.float32],
     ) -> None:
         """See `Receiver`."""
-        _write_omnidirectional(arrivals, gains, sample_rate_hz, self.ears, delays, filters)
+        samples_per_metre = sample_rate_hz / SPEED_OF_SOUND_MPS
+        omnidirectional_paths(
+            arrivals, gains, samples_per_metre, self.ears, self._nearest_m, delays, filters
+        )
 
 
 class MonoReceiver:
@@ -98,8 +110,9 @@ class MonoReceiver:
     n_taps = 1
     extent_m = 0.0
 
-    def __init__(self) -> None:
+    def __init__(self, nearest_m: float = NEAR_FIELD_M) -> None:
         self.ears: Floats = np.zeros((1, 3))
+        self._nearest_m = nearest_m
 
     def write_paths(
         self,
@@ -110,16 +123,7 @@ class MonoReceiver:
         filters: NDArray[np.float32],
     ) -> None:
         """See `Receiver`."""
-        _write_omnidirectional(arrivals, gains, sample_rate_hz, self.ears, delays, filters)
-
-
-def _write_omnidirectional(
-    arrivals: Floats,
-    gains: Floats,
-    sample_rate_hz: float,
-    ears: Floats,
-    delays: Floats,
-    filters: NDArray[np.float32],
-) -> None:
-    samples_per_metre = sample_rate_hz / SPEED_OF_SOUND_MPS
-    omnidirectional_paths(arrivals, gains, samples_per_metre, ears, delays, filters)
+        samples_per_metre = sample_rate_hz / SPEED_OF_SOUND_MPS
+        omnidirectional_paths(
+            arrivals, gains, samples_per_metre, self.ears, self._nearest_m, delays, filters
+        )

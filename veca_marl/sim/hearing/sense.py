@@ -26,7 +26,7 @@ from veca_marl.sim.hearing.spectrum import (
 )
 from veca_marl.sim.physics import World
 from veca_marl.sim.sense import Sense
-from veca_marl.sim.sound import Receiver
+from veca_marl.sim.sound import NEAR_FIELD_M, Receiver
 from veca_marl.sim.spec import ArraySpec
 
 
@@ -106,10 +106,10 @@ class AudioSense(Sense):
         super().__init__(world)
         field = world.sound
         self._body = body
-        self._centre = _centre_of_ears(body)
+        self._centre, nearest_m = _centre_of_ears(body), _mouth_to_ears_m(body)
         self._steps_in_window = math.ceil(WINDOW_SAMPLES / field.step_samples)
         self._listener = field.add_listener(
-            make_receiver(cfg, field.sample_rate_hz), self._steps_in_window
+            make_receiver(cfg, field.sample_rate_hz, nearest_m), self._steps_in_window
         )
         self._weights = window_weights(cfg.window)
         self._noise_power = noise_power(cfg.noise_floor_db, self._weights)
@@ -155,12 +155,21 @@ def _centre_of_ears(body: Body) -> Floats:
     return centre
 
 
-def make_receiver(cfg: AudioCfg, sample_rate_hz: int) -> Receiver:
+def _mouth_to_ears_m(body: Body) -> float:
+    """Return the distance of the mouth from the nearer ear."""
+    mouth = body.mount("mouth").position
+    ears = [body.mount(name).position for name in ("ear_left", "ear_right")]
+    return min(float(np.linalg.norm(ear - mouth)) for ear in ears)
+
+
+def make_receiver(cfg: AudioCfg, sample_rate_hz: int, nearest_m: float = NEAR_FIELD_M) -> Receiver:
     """Construct the receiver of a configuration.
 
     Args:
         cfg: Quality and head.
         sample_rate_hz: Sampling rate of the sound field.
+        nearest_m: Distance below which the gain of receivers without a head is constant; with a
+            head it is `NEAREST_RADII` times its radius.
 
     Raises:
         SofaError: If the SOFA file cannot be used.
@@ -168,10 +177,10 @@ def make_receiver(cfg: AudioCfg, sample_rate_hz: int) -> Receiver:
     """
     match cfg.quality:
         case AudioQuality.mono:
-            return MonoReceiver()
+            return MonoReceiver(nearest_m)
         case AudioQuality.stereo:
             radius_m = cfg.head_scale * _measured_response(cfg, sample_rate_hz).head_radius_m
-            return StereoReceiver((0.0, radius_m, 0.0), (0.0, -radius_m, 0.0))
+            return StereoReceiver((0.0, radius_m, 0.0), (0.0, -radius_m, 0.0), nearest_m)
         case AudioQuality.hrtf if cfg.sofa_path is None:
             return HrtfReceiver(kemar_table(sample_rate_hz, cfg.head_scale))
         case AudioQuality.hrtf:

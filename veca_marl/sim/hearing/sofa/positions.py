@@ -15,6 +15,8 @@ _METRES = ("metre", "metres", "meter", "meters", "m")
 _ANGLES = {"degree": np.pi / 180.0, "degrees": np.pi / 180.0, "radian": 1.0, "radians": 1.0}
 # a set with several distances: those beyond this share of the longest are kept
 _SAME_DISTANCE = 0.95
+# a loudspeaker closer than that touches the head
+_NEAREST_M = 0.2
 
 
 def source_vectors(file: SofaFile, count: int, name: str) -> Floats:
@@ -57,11 +59,14 @@ def far_field(vectors: Floats, name: str) -> tuple[NDArray[np.int64], Floats, fl
         distance in metres.
 
     Raises:
-        SofaError: If a loudspeaker is at the centre of the head.
+        SofaError: If the longest distance is less than 0.2 m.
     """
     distance = np.linalg.norm(vectors, axis=1)
-    if not (distance > 0.0).all():
-        raise SofaError(f"{name}: SourcePosition is at the centre of the head")
+    if not distance.max() >= _NEAREST_M:
+        raise SofaError(
+            f"{name}: the longest distance of a source is {distance.max():.2f} m, must be at least "
+            f"{_NEAREST_M} m from the centre of the head"
+        )
     far = np.flatnonzero(distance >= _SAME_DISTANCE * distance.max())
     if far.size < distance.size:
         warnings.warn(

@@ -15,8 +15,8 @@ from veca_marl.sim.geometry import Floats
 SPEED_OF_SOUND_MPS = 343.0
 """Dry air at 20 degrees Celsius (ISO 9613-1)."""
 
-NEAR_FIELD_M = 0.15
-"""Distance below which the gain is constant (the mouth is this far from the ears)."""
+NEAR_FIELD_M = 0.107
+"""Distance below which the gain is constant: that of the mouth from the ears of the bodies."""
 
 _WALL_MARGIN_M = 0.01
 _DECAY = 24.0 * math.log(10.0) / SPEED_OF_SOUND_MPS

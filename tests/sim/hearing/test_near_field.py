@@ -1,0 +1,58 @@
+"""Near sources: the closed form, the levels at the ears, and the mouth of the bodies."""
+
+import numpy as np
+import pytest
+from scipy.special import eval_legendre
+
+from veca_marl.fidelity.near_field import ALL_HZ, LOW_HZ, errors_db
+from veca_marl.sim.body.mounts import MOUNTS_M
+from veca_marl.sim.hearing import HrtfReceiver, MonoReceiver, kemar_table
+from veca_marl.sim.hearing.near_field import near_field_gain, sphere_gain
+from veca_marl.sim.sound import NEAR_FIELD_M, SAMPLE_RATE_HZ
+
+
+@pytest.mark.parametrize("x", [0.001, 0.1, 0.5, 0.8])
+def test_the_closed_form_is_the_sum_of_the_series(x):
+    m = np.arange(400)
+    for cosine in (-1.0, -0.6, 0.0, 1e-9, 0.3, 1.0):
+        series = ((2 * m + 1) / (m + 1) * x**m * eval_legendre(m, cosine)).sum()
+        assert sphere_gain(x, cosine) == pytest.approx(series, rel=1e-9)
+
+
+def test_distant_sources_have_no_correction():
+    assert near_field_gain(0.09, 1e4, 1e4, 0.7) == 1.0
+    assert near_field_gain(0.09, 1e4, 1.4, 0.0) == pytest.approx(1.0, abs=0.01)
+
+
+@pytest.mark.parametrize("distance_m", [0.12, 0.3, 1.0, 3.0])
+def test_near_levels_are_those_at_a_rigid_sphere(distance_m):
+    """Without a correction the low band is wrong by 14, 3.5, 0.3 and 0.4 dB."""
+    assert np.abs(errors_db(distance_m, LOW_HZ)).max() < 0.8
+    assert np.sqrt((errors_db(distance_m, ALL_HZ) ** 2).mean()) < 2.0
+
+
+def levels(receiver, arrival):
+    delays = np.empty((1, receiver.n_channels))
+    filters = np.empty((1, receiver.n_channels, receiver.n_taps), np.float32)
+    receiver.write_paths(np.array([arrival]), np.ones(1), SAMPLE_RATE_HZ, delays, filters)
+    assert np.isfinite(filters).all()
+    assert (delays >= 0.0).all()
+    return np.linalg.norm(filters[0], axis=1)
+
+
+@pytest.mark.parametrize("arrival", [(0.0, 0.0, 0.0), (0.0, 0.0873, 0.0), (1e-6, -1e-9, 0.05)])
+def test_sources_inside_the_head_are_finite_and_no_louder_than_at_its_surface(arrival):
+    head = HrtfReceiver(kemar_table())
+    nearest = levels(head, (0.0, 1.25 * kemar_table().head_radius_m, 0.0)).max()
+    assert levels(head, arrival).max() <= 1.5 * nearest
+
+
+def test_the_gain_is_constant_within_the_distance_of_the_mouth():
+    """The mouth is 0.107 m from the ears of the bodies."""
+    mouth = np.array(MOUNTS_M["mouth"])
+    for side in ("left", "right"):
+        distance_m = np.linalg.norm(mouth - np.array(MOUNTS_M[f"ear_{side}"]))
+        assert pytest.approx(distance_m, abs=1e-3) == NEAR_FIELD_M
+    mono = MonoReceiver(0.107)
+    assert levels(mono, (0.02, 0.0, 0.0))[0] == pytest.approx(1.0 / 0.107)
+    assert levels(mono, (0.12, 0.0, 0.0))[0] == pytest.approx(1.0 / 0.12)
