@@ -9,7 +9,7 @@ from touching import SPREAD, Stage, dense, of_bone
 
 from veca_marl.sim.body.anatomy import load_skeleton
 from veca_marl.sim.geometry import Shape
-from veca_marl.sim.touch.penetration import adjacent_bones
+from veca_marl.sim.touch.sensed_pairs import unsensed_bones
 
 
 def press_forearm(stage, depth_m, radius=0.04, side="l"):
@@ -158,7 +158,7 @@ def test_two_skins_in_contact_act_as_springs_in_series():
     assert of_bone(stage.read(), "l_forearm").max() == pytest.approx(0.5, abs=0.05)
 
 
-def test_self_contact_is_sensed_except_between_adjacent_bones():
+def test_self_contact_is_sensed_except_between_unsensed_bones():
     skeleton = load_skeleton()
     stage = Stage(np.zeros(82))
     before = stage.read()
@@ -167,7 +167,7 @@ def test_self_contact_is_sensed_except_between_adjacent_bones():
     pose(stage.body, angles)
     pressed = stage.read()
     assert of_bone(pressed, "l_forearm").sum() > of_bone(before, "l_forearm").sum()
-    together = adjacent_bones(skeleton)
+    together = unsensed_bones(skeleton)
     thigh, pelvis, shank = (skeleton.bone(b) for b in ("l_thigh", "pelvis", "l_shank"))
     assert together[thigh, pelvis]
     assert together[thigh, shank]

@@ -65,27 +65,56 @@ def _enclose(spheres: Floats, first: int, end: int, out: Floats, row: int) -> No
 
 
 @njit(cache=True, error_model="numpy")
-def find_candidates(geoms: GeomTable, ignored: Bools, bones: Floats, candidates: Bools) -> None:
+def find_candidates(
+    geoms: GeomTable,
+    ignored: Bools,
+    thickness: Floats,
+    radii: Floats,
+    bones: Floats,
+    candidates: Bools,
+) -> None:
     """Find the pairs of a bone and a primitive that may be in contact.
 
     Args:
         geoms: The scene's primitives.
         ignored: ``(B, G)`` pairs that are never in contact.
+        thickness: ``(B,)`` metres, of the skin on each bone.
+        radii: ``(B + 1,)`` metres, largest receptive field on each bone and, last, on the body.
         bones: ``(B + 1, 4)`` as from `bounding_spheres`.
         candidates: ``(B, G)``, written.
     """
     whole = bones.shape[0] - 1
+    thickest = thickness.max()
     candidates[:] = False
     for g in range(candidates.shape[1]):
-        reach = bounding_radius(geoms.shapes[g], geoms.sizes[g])
+        size, skin = bounding_radius(geoms.shapes[g], geoms.sizes[g]), geoms.skins[g]
+        reach = size + farthest_contact(thickest, skin, radii[whole])
         if not _spheres_overlap(bones, whole, geoms.positions, g, reach):
             continue
         primitive = placed_primitive(geoms, g)
         for bone in range(whole):
-            if not ignored[bone, g] and _spheres_overlap(bones, bone, geoms.positions, g, reach):
+            if ignored[bone, g]:
+                continue
+            margin = farthest_contact(thickness[bone], skin, radii[bone])
+            if _spheres_overlap(bones, bone, geoms.positions, g, size + margin):
                 x, y, z = to_local(primitive, bones, bone)
                 away = distance(primitive[0], primitive[1], x, y, z)
-                candidates[bone, g] = away < bones[bone, 3]
+                candidates[bone, g] = away < bones[bone, 3] + margin
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def farthest_contact(thickness: float, skin: float, radius: float) -> float:
+    """Return the greatest distance of a sensed point of a primitive from the sensing point.
+
+    The column of a taxel starts below the sensing point, at most twice the thickness of its own
+    skin, and ends above it, at most the thickness of the primitive's skin.
+
+    Args:
+        thickness: Metres of skin on the bone.
+        skin: Metres of skin on the primitive.
+        radius: Metres, of the receptive field.
+    """
+    return max(thickness + min(thickness, skin), skin) + radius
 
 
 @njit(cache=True, error_model="numpy", inline="always")

@@ -1,14 +1,32 @@
-"""The penetration model of touch: how deep primitives lie in the flexible skin at each taxel.
+"""The penetration model of touch: how deep primitives are pressed into the skin at each taxel.
 
-A taxel reads ``T = min(1, d / d_max) max(0, -n . g)``: the depth d of its sensing point in a
-primitive, relative to the thickness d_max of its skin, times the component of the primitive's
-outward distance gradient g against the normal n of its triangle (the paper, section on tactile
-perception). T is 1 where the primitive reaches the bone. Of several primitives on one taxel the
-largest reading counts. Only geometry enters and no force of the solver, so that the reading does
-not depend on the time step.
+The skin at a taxel is a column of length t, the thickness d_max, from the base b on the rigid bone
+along the normal n of the taxel's triangle to the sensing point b + t n. A primitive that enters
+from outside displaces all skin outside of it. With e, the distance from b along n to where that
+ray enters the primitive, and a, the angle between n and the primitive's surface normal there,
+
+    C = min((1 - e / t) cos(a)^2, x_e).
+
+For a plane at depth d below the sensing point C is ``d cos(a) / t``, the reading of the paper
+(section on tactile perception): depth relative to d_max times the component of the primitive's
+outward direction against n. Points of the primitive beside the column are sensed by the receptive
+field of radius R. With m, the point of the primitive nearest to b (b itself if it is inside), q,
+its distance from the column, and f, the angle between m - b and n,
+
+    F = x (1 - (1 - x) sin(f)^2) (1 - (q / R)^2)^2   for q < R, else 0.
+
+x, and likewise x_e at the entry of the ray, is the share of the skin that is displaced at m,
+measured against the rigid bone: 1 - h / t with the height h of m above the bone, clipped to
+[0, 1]. As not every triangle faces away from its bone, F is also computed with b moved onto the
+bone once b is inside the primitive. The reading is ``T = max(C, F)``, and of several primitives the
+largest counts. T does not decrease while a convex primitive approaches b, and is 1 where the
+primitive reaches the bone at b. Only geometry enters and no force of the solver, so that the
+reading does not depend on the time step.
 
 A primitive with a skin of its own, such as a bone of another body, is treated as two springs in
-series: its outer surface includes its skin, and d_max is the sum of both thicknesses.
+series: t is the sum of both thicknesses, and heights count from rigid bone to rigid bone. With s,
+the smaller of the two thicknesses, the primitive is its bone with a layer of s, and b lies s inside
+the bone, so that b remains inside of thin bones.
 """
 
 from __future__ import annotations
@@ -19,39 +37,47 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from veca_marl.sim.body.anatomy import Skeleton
-from veca_marl.sim.geometry import (
-    Bools,
-    DistanceAndGradient,
-    Floats,
-    GeomTable,
-    Vector,
-    distance,
-    distance_and_gradient,
-    is_inside,
-)
+from veca_marl.sim.geometry import Bools, Floats, GeomTable, Vector, distance
 from veca_marl.sim.touch.broad_phase import (
     PlacedPrimitive,
     bounding_spheres,
+    farthest_contact,
     find_candidates,
     placed_primitive,
     squared_length,
     to_local,
 )
-from veca_marl.sim.touch.taxels import TaxelTable
+from veca_marl.sim.touch.contact import Column, taxel_reading
+from veca_marl.sim.touch.rigid_bones import RigidBones, place_bone, shrunk
+from veca_marl.sim.touch.taxels import BARYCENTRIC, TaxelTable
 
 
-def adjacent_bones(skeleton: Skeleton) -> Bools:
-    """Return the ``(47, 47)`` symmetric mask of bones that joints keep in contact.
+class Fields(NamedTuple):
+    """The receptive fields of the taxels.
 
-    These are a bone, its parent, its children and the other children of its parent. Contacts
-    between them are not sensed.
+    Attributes:
+        radii: ``(T,)`` metres, of the taxels of each triangle, for all primitives but those of the
+            own body, which are sensed at points.
+        largest: ``(B + 1,)`` metres, the largest on each bone and, last, on the body.
+        body: Id of the own body among the objects of the scene.
     """
-    parents = skeleton.parents
-    near = np.eye(len(parents), dtype=np.bool_) | (parents[:, None] == parents[None, :])
-    child_of: Bools = parents[:, None] == np.arange(len(parents))[None, :]
-    adjacent: Bools = near | child_of | child_of.T
-    return adjacent
+
+    radii: Floats
+    largest: Floats
+    body: int
+
+
+def fields_of(taxels: TaxelTable, share: float, body: int) -> Fields:
+    """Return receptive fields with radii of a share of the gaps between taxels.
+
+    Args:
+        taxels: The taxels.
+        share: Of `TaxelTable.gaps`.
+        body: Id of the own body.
+    """
+    radii = share * taxels.gaps
+    largest = np.maximum.reduceat(radii, taxels.first_triangle[:-1])
+    return Fields(radii, np.append(largest, radii.max()), body)
 
 
 class Workspace(NamedTuple):
@@ -73,10 +99,11 @@ class Workspace(NamedTuple):
 @njit(cache=True, error_model="numpy")
 def read_taxels(
     taxels: TaxelTable,
+    fields: Fields,
     vertices: Floats,
     geoms: GeomTable,
+    own: RigidBones,
     ignored: Bools,
-    barycentric: Floats,
     workspace: Workspace,
     readings: Floats,
 ) -> None:
@@ -84,74 +111,107 @@ def read_taxels(
 
     Args:
         taxels: The taxels of the body.
+        fields: Their receptive fields.
         vertices: ``(V, 3)`` vertices of its skin, metres, world frame.
         geoms: The scene's primitives.
+        own: The rigid bones of the body among them.
         ignored: ``(B, G)`` pairs of bone and primitive that are not sensed.
-        barycentric: ``(6, 3)`` places of the taxels on a triangle.
         workspace: Buffers.
         readings: ``(T, 6)`` in [0, 1], written.
     """
-    patches, bones, candidates, local = workspace
-    bounding_spheres(taxels, vertices, patches, bones)
-    find_candidates(geoms, ignored, bones, candidates)
-    measure_penetration(taxels, vertices, geoms, candidates, patches, barycentric, local, readings)
+    bounding_spheres(taxels, vertices, workspace.patches, workspace.bones)
+    find_candidates(
+        geoms, ignored, taxels.thickness, fields.largest, workspace.bones, workspace.candidates
+    )
+    measure_penetration(taxels, fields, vertices, geoms, own, workspace, readings)
 
 
 @njit(cache=True, error_model="numpy")
 def measure_penetration(
     taxels: TaxelTable,
+    fields: Fields,
     vertices: Floats,
     geoms: GeomTable,
-    candidates: Bools,
-    spheres: Floats,
-    barycentric: Floats,
-    local: Floats,
+    own: RigidBones,
+    workspace: Workspace,
     readings: Floats,
 ) -> None:
-    """Compute the readings of all taxels from the candidate pairs.
-
-    The functions called per triangle take scalars instead of tables of arrays: with tables the
-    loop took four times as long, presumably because numba counts references to each array.
-
-    Args:
-        taxels: The taxels of the body.
-        vertices: ``(V, 3)`` vertices of its skin, metres, world frame.
-        geoms: The scene's primitives.
-        candidates: ``(B, G)`` pairs to examine, see `find_candidates`.
-        spheres: ``(P, 4)`` bounding spheres of the patches, see `bounding_spheres`.
-        barycentric: ``(6, 3)`` places of the taxels on a triangle.
-        local: ``(V, 3)`` buffer.
-        readings: ``(T, 6)`` in [0, 1], written.
-    """
+    """Compute the readings of all taxels from the candidate pairs; see `read_taxels`."""
     readings[:] = 0.0
-    triangles, depths, layers = taxels.triangles, taxels.depths, taxels.layers
-    first_vertex, patches = taxels.first_vertex, taxels.patches
+    candidates = workspace.candidates
     for bone in range(candidates.shape[0]):
         for g in range(candidates.shape[1]):
             if not candidates[bone, g]:
                 continue
-            primitive = placed_primitive(geoms, g)
-            thickness = taxels.thickness[bone] + geoms.skins[g]
+            thickness, skin = taxels.thickness[bone], geoms.skins[g]
+            inset = min(thickness, skin)
+            primitive = _sensed_primitive(geoms, g, skin - inset)
+            count = place_bone(geoms, own, bone, geoms.rotations[g], geoms.positions[g])
+            column = Column(
+                primitive[0], primitive[1], thickness + skin, thickness + inset, inset, count
+            )
+            with_field = geoms.objects[g] != fields.body
+            largest = fields.largest[bone] if with_field else 0.0
+            margin = farthest_contact(thickness, skin, largest)
             for patch in range(taxels.first_patch[bone], taxels.first_patch[bone + 1]):
-                x, y, z = to_local(primitive, spheres, patch)
-                if distance(primitive[0], primitive[1], x, y, z) > spheres[patch, 3]:
+                x, y, z = to_local(primitive, workspace.patches, patch)
+                away = distance(primitive[0], primitive[1], x, y, z)
+                if away > workspace.patches[patch, 3] + margin:
                     continue
-                for i in range(first_vertex[patch], first_vertex[patch + 1]):
-                    v = taxels.vertices[i]
-                    local[v, 0], local[v, 1], local[v, 2] = to_local(primitive, vertices, v)
-                for t in range(patches[patch], patches[patch + 1]):
-                    a = _row(local, triangles[t, 0])
-                    b = _row(local, triangles[t, 1])
-                    c = _row(local, triangles[t, 2])
-                    normal = _unit_normal(a, b, c)
-                    if _is_outside(primitive, a, b, c, normal, layers[t, 0], layers[t, 1]):
-                        continue
-                    for n in range(barycentric.shape[0]):
-                        weights = _row(barycentric, n)
-                        point = _sensing_point(a, b, c, weights, normal, depths[t, n])
-                        reading = _reading(primitive, thickness, point, normal)
-                        if reading > readings[t, n]:
-                            readings[t, n] = reading
+                _read_patch(
+                    taxels,
+                    patch,
+                    fields.radii,
+                    with_field,
+                    vertices,
+                    primitive,
+                    column,
+                    own.placed,
+                    workspace.local,
+                    readings,
+                )
+
+
+@njit(cache=True, error_model="numpy")
+def _sensed_primitive(geoms: GeomTable, g: int, taken_off: float) -> PlacedPrimitive:
+    """Return a row of the table as scalars, with some of its own skin taken off."""
+    shape, size, origin, along_x, along_y, along_z = placed_primitive(geoms, g)
+    return shape, shrunk(shape, size, taken_off), origin, along_x, along_y, along_z
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def _read_patch(
+    taxels: TaxelTable,
+    patch: int,
+    radii: Floats,
+    with_field: bool,
+    vertices: Floats,
+    primitive: PlacedPrimitive,
+    column: Column,
+    placed: Floats,
+    local: Floats,
+    readings: Floats,
+) -> None:
+    """Update the readings of one patch by one primitive.
+
+    The functions called per triangle take scalars instead of tables of arrays: with tables the
+    loop took four times as long, presumably because numba counts references to each array.
+    """
+    triangles, depths, layers = taxels.triangles, taxels.depths, taxels.layers
+    for i in range(taxels.first_vertex[patch], taxels.first_vertex[patch + 1]):
+        v = taxels.vertices[i]
+        local[v, 0], local[v, 1], local[v, 2] = to_local(primitive, vertices, v)
+    for t in range(taxels.patches[patch], taxels.patches[patch + 1]):
+        a = _row(local, triangles[t, 0])
+        b = _row(local, triangles[t, 1])
+        c = _row(local, triangles[t, 2])
+        normal = _unit_normal(a, b, c)
+        radius = radii[t] if with_field else 0.0
+        if _is_outside(column, a, b, c, normal, layers[t, 0], layers[t, 1], radius):
+            continue
+        for n in range(BARYCENTRIC.shape[0]):
+            base = _base(a, b, c, _row(BARYCENTRIC, n), normal, depths[t, n] + column.depth)
+            readings[t, n] = taxel_reading(column, placed, base, normal, radius, readings[t, n])
 
 
 @njit(cache=True, error_model="numpy", inline="always")
@@ -162,18 +222,19 @@ def _row(points: Floats, row: int) -> Vector:
 
 @njit(cache=True, error_model="numpy", inline="always")
 def _is_outside(
-    primitive: PlacedPrimitive,
+    column: Column,
     a: Vector,
     b: Vector,
     c: Vector,
     normal: Vector,
-    depth: float,
+    middle: float,
     spread: float,
+    radius: float,
 ) -> bool:
-    """Return whether all taxels of a triangle certainly lie outside a primitive.
+    """Return whether a primitive certainly lies outside the columns and fields of a triangle.
 
     A bound: the distance of a taxel from the centroid is at most half of that of the farthest
-    corner, see `BARYCENTRIC`.
+    corner, see `BARYCENTRIC`. `middle` and `spread` are the range of the depths of the triangle.
     """
     x, y, z = (a[0] + b[0] + c[0]) / 3.0, (a[1] + b[1] + c[1]) / 3.0, (a[2] + b[2] + c[2]) / 3.0
     farthest = max(
@@ -181,33 +242,22 @@ def _is_outside(
         squared_length(b[0] - x, b[1] - y, b[2] - z),
         squared_length(c[0] - x, c[1] - y, c[2] - z),
     )
+    depth = middle + column.depth - 0.5 * column.length
     x, y, z = x - depth * normal[0], y - depth * normal[1], z - depth * normal[2]
-    beyond = distance(primitive[0], primitive[1], x, y, z)
-    return beyond > 0.0 and beyond * beyond > 0.25 * farthest + spread * spread
+    beyond = distance(column.shape, column.size, x, y, z)
+    along = spread + 0.5 * column.length
+    across = 0.5 * math.sqrt(farthest) + radius
+    return beyond > 0.0 and beyond * beyond > across * across + along * along
 
 
 @njit(cache=True, error_model="numpy", inline="always")
-def _sensing_point(
-    a: Vector, b: Vector, c: Vector, weights: Vector, normal: Vector, depth: float
-) -> Vector:
-    """Return the point of a taxel on the physical skin: `depth` below the mesh."""
+def _base(a: Vector, b: Vector, c: Vector, weights: Vector, normal: Vector, depth: float) -> Vector:
+    """Return the point `depth` below a taxel on the mesh."""
     return (
         weights[0] * a[0] + weights[1] * b[0] + weights[2] * c[0] - depth * normal[0],
         weights[0] * a[1] + weights[1] * b[1] + weights[2] * c[1] - depth * normal[1],
         weights[0] * a[2] + weights[1] * b[2] + weights[2] * c[2] - depth * normal[2],
     )
-
-
-@njit(cache=True, error_model="numpy", inline="always")
-def _reading(primitive: PlacedPrimitive, thickness: float, point: Vector, normal: Vector) -> float:
-    """Return the reading that one primitive causes; negative if the taxel faces away from it."""
-    shape, size, x, y, z = primitive[0], primitive[1], point[0], point[1], point[2]
-    if not is_inside(shape, size, x, y, z):
-        return 0.0
-    gradient: DistanceAndGradient = distance_and_gradient(shape, size, x, y, z)
-    depth = max(-gradient[0], 0.0)
-    against = -(gradient[1] * normal[0] + gradient[2] * normal[1] + gradient[3] * normal[2])
-    return min(depth / thickness, 1.0) * min(against, 1.0)
 
 
 @njit(cache=True, error_model="numpy", inline="always")

@@ -14,9 +14,11 @@ from veca_marl.sim.geometry import Bools, Floats
 from veca_marl.sim.physics import World
 from veca_marl.sim.sense import Sense
 from veca_marl.sim.spec import ArraySpec
-from veca_marl.sim.touch.penetration import Workspace, adjacent_bones, read_taxels
+from veca_marl.sim.touch.penetration import Workspace, fields_of, read_taxels
 from veca_marl.sim.touch.quality import TouchQuality, make_transform
-from veca_marl.sim.touch.taxels import BARYCENTRIC, TAXELS_PER_TRIANGLE, load_taxels
+from veca_marl.sim.touch.rigid_bones import rigid_bones
+from veca_marl.sim.touch.sensed_pairs import unsensed_bones
+from veca_marl.sim.touch.taxels import TAXELS_PER_TRIANGLE, load_taxels
 
 
 @dataclass
@@ -27,11 +29,17 @@ class TouchCfg:
         present: Whether the observation contains the sense.
         quality: See `TouchQuality`.
         binary_above: With `binary`, the reading above which a taxel reads 1, in [0, 1).
+        receptive_field: Radius of the receptive field of a taxel, in [0, 2], relative to the
+            greatest distance of a corner of its triangle from the nearest taxel. 0.5 is 8 to 11 mm
+            on trunk and thighs, 2 to 4 mm on hands and 1 mm on finger tips. With 0 taxels are
+            points, and objects that are smaller than the distance of the taxels are not sensed in
+            most places.
     """
 
     present: bool = True
     quality: TouchQuality = TouchQuality.skin
     binary_above: float = 0.0
+    receptive_field: float = 0.5
 
     def __post_init__(self) -> None:
         if not isinstance(self.quality, TouchQuality):
@@ -39,6 +47,10 @@ class TouchCfg:
             raise ValueError(f"senses.touch.quality={self.quality!r}; choices: {choices}")
         if not 0.0 <= self.binary_above < 1.0:
             raise ValueError(f"senses.touch.binary_above={self.binary_above} must be in [0, 1)")
+        if not 0.0 <= self.receptive_field <= 2.0:
+            raise ValueError(
+                f"senses.touch.receptive_field={self.receptive_field} must be in [0, 2]"
+            )
 
 
 class TouchSense(Sense):
@@ -65,6 +77,8 @@ class TouchSense(Sense):
         self._transform = make_transform(cfg.quality, cfg.binary_above)
         bones = len(self._taxels.thickness)
         self._ignored: Bools = np.zeros((bones, 0), np.bool_)
+        self._fields = fields_of(self._taxels, cfg.receptive_field, body.object_id)
+        self._own = rigid_bones(self._scene.geoms, self._object, bones)
         self._workspace = Workspace(
             patches=np.zeros((len(self._taxels.patches) - 1, 4)),
             bones=np.zeros((bones + 1, 4)),
@@ -94,19 +108,20 @@ class TouchSense(Sense):
         vertices = self._scene.meshes.vertices[self._object.vertices]
         read_taxels(
             self._taxels,
+            self._fields,
             vertices,
             geoms,
+            self._own,
             self._ignored,
-            BARYCENTRIC,
             self._workspace,
             self._readings,
         )
         return self._readings
 
     def _ignored_pairs(self) -> Bools:
-        """Return the mask ``(B, G)`` of intangible primitives and of adjacent bones of the body."""
+        """Return the mask ``(B, G)`` of intangible primitives and unsensed bones of the body."""
         geoms, rows = self._scene.geoms, self._object.rows
         ignored = np.repeat(~geoms.tangible[None], len(self._taxels.thickness), axis=0)
         own = np.flatnonzero(geoms.objects == self._object.id)
-        ignored[:, own] |= adjacent_bones(load_skeleton())[:, geoms.frames[own] - rows.start]
+        ignored[:, own] |= unsensed_bones(load_skeleton())[:, geoms.frames[own] - rows.start]
         return ignored

@@ -57,6 +57,8 @@ class TaxelTable(NamedTuple):
         patches: ``(P + 1,)`` triangles of patch p are patches[p] to patches[p + 1].
         vertices: The vertices of the triangles of each patch, one patch after the other.
         first_vertex: ``(P + 1,)`` those of patch p are ``vertices[first[p] : first[p + 1]]``.
+        gaps: ``(T,)`` metres in the binding pose: greatest distance of a corner of the
+            triangle from the nearest of its taxels, which is a third of the longest median.
         margins: ``(T,)`` metres: greatest distance of a sensing point from its triangle.
         layers: ``(T, 2)`` metres: middle of the range of depths of a triangle, and half of it.
     """
@@ -69,6 +71,7 @@ class TaxelTable(NamedTuple):
     patches: Indices
     vertices: Indices
     first_vertex: Indices
+    gaps: Floats
     margins: Floats
     layers: Floats
 
@@ -82,7 +85,8 @@ def load_taxels() -> TaxelTable:
     starts = [np.arange(*ends, PATCH_TRIANGLES) for ends in pairwise(first_triangle)]
     patches = np.append(np.concatenate(starts), first_triangle[-1])
     own = [np.unique(mesh.triangles[first:end]) for first, end in pairwise(patches)]
-    depths = _depths(mesh)
+    corners = _bound_corners(mesh)
+    depths = _depths(mesh, corners)
     low, high = depths.min(axis=1), depths.max(axis=1)
     return TaxelTable(
         triangles=np.ascontiguousarray(mesh.triangles),
@@ -93,6 +97,8 @@ def load_taxels() -> TaxelTable:
         patches=patches,
         vertices=np.concatenate(own),
         first_vertex=np.cumsum([0, *map(len, own)]),
+        gaps=0.5
+        * np.linalg.norm(corners - corners.mean(axis=1, keepdims=True), axis=2).max(axis=1),
         margins=np.abs(depths).max(axis=1),
         layers=np.stack([(high + low) / 2, (high - low) / 2], axis=1),
     )
@@ -136,13 +142,25 @@ def _normals(corners: Floats) -> Floats:
     return normals
 
 
-def _depths(mesh: Mesh) -> Floats:
+def _bound_corners(mesh: Mesh) -> Floats:
+    """Return the corners ``(T, 3, 3)`` of the triangles in the binding pose, metres."""
+    bound = with_mesh(empty_meshes(), mesh, 0)
+    deform_meshes(bound, *binding_pose(load_skeleton()))
+    corners: Floats = bound.vertices[mesh.triangles]
+    return corners
+
+
+def _gaps(corners: Floats) -> Floats:
+    """Return a third of the longest median ``(T,)`` of triangles ``(T, 3, 3)``."""
+    from_centroid: Floats = np.linalg.norm(corners - corners.mean(axis=1, keepdims=True), axis=2)
+    gaps: Floats = 0.5 * from_centroid.max(axis=1)
+    return gaps
+
+
+def _depths(mesh: Mesh, corners: Floats) -> Floats:
     """Return the depths ``(T, 6)`` of the physical skin below the mesh, in the binding pose."""
     skeleton = load_skeleton()
     positions, rotations = binding_pose(skeleton)
-    bound = with_mesh(empty_meshes(), mesh, 0)
-    deform_meshes(bound, positions, rotations)
-    corners = bound.vertices[mesh.triangles]
     points, normals = _on_triangles(corners), _normals(corners)
     depths = np.zeros(points.shape[:2])
     for index, bone in enumerate(skeleton.bones):

@@ -1,0 +1,130 @@
+"""The reading of one taxel from one primitive: the column of skin and the receptive field.
+
+All lengths are metres in the axes of the primitive. The skin at a taxel is a column of length t
+that starts at the base b on the rigid bone and runs along the normal n of the taxel's triangle.
+For the definition of the reading see `veca_marl.sim.touch.penetration`.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from numba import njit
+
+from veca_marl.sim.geometry import (
+    DistanceAndGradient,
+    Floats,
+    Vector,
+    distance,
+    distance_and_gradient,
+)
+from veca_marl.sim.geometry.ray_entry import entry_distance
+from veca_marl.sim.touch.rigid_bones import distance_to_placed, moved_to_height
+
+
+class Column(NamedTuple):
+    """What the taxels of one bone have in common, compared with one primitive.
+
+    Attributes:
+        shape: The `Shape` of the primitive.
+        size: Its size with `inset` of its own skin on.
+        length: Metres, t: thickness of the skin, of both skins if the primitive has one.
+        depth: Metres from the sensing point down to the base.
+        inset: Metres of the primitive's own skin that count as part of it; columns start that
+            much inside the bone.
+        bones: Number of rows of placed bones, see `place_bone`.
+    """
+
+    shape: int
+    size: Vector
+    length: float
+    depth: float
+    inset: float
+    bones: int
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def taxel_reading(
+    column: Column, placed: Floats, base: Vector, normal: Vector, radius: float, known: float
+) -> float:
+    """Return the reading of a taxel, at least `known`.
+
+    Args:
+        column: The primitive and the skin.
+        placed: The rigid bone below the taxel, see `place_bone`.
+        base: b.
+        normal: n.
+        radius: R, of the receptive field; 0 for a point.
+        known: The largest reading from other primitives.
+    """
+    away = distance(column.shape, column.size, base[0], base[1], base[2])
+    reach = column.length * column.length + radius * radius
+    if away > 0.0 and away * away >= reach:
+        return known
+    if away < column.length:
+        known = _column_reading(column, placed, base, normal, away, known)
+    if known < 1.0 and (away <= 0.0 or radius > 0.0):
+        known = _field_reading(column, placed, base, normal, away, radius, known)
+        if away <= 0.0 and known < 1.0:
+            base = moved_to_height(placed, column.bones, base, -column.inset)
+            away = distance(column.shape, column.size, base[0], base[1], base[2])
+            known = _field_reading(column, placed, base, normal, away, radius, known)
+    return known
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def _pressed_share(column: Column, placed: Floats, x: float, y: float, z: float) -> float:
+    """Return how much of the true skin of the bone is displaced below a point, in [0, 1]."""
+    height = distance_to_placed(placed, column.bones, x, y, z) + column.inset
+    return min(max(1.0 - height / column.length, 0.0), 1.0)
+
+
+@njit(cache=True, error_model="numpy")
+def _column_reading(
+    column: Column, placed: Floats, base: Vector, normal: Vector, away: float, known: float
+) -> float:
+    """Return ``C = min((1 - e / t) cos(a)^2, x_e)`` or, if that is larger, `known`."""
+    (x, y, z), (u, v, w) = base, normal
+    entry = 0.0
+    if away > 0.0:
+        entry = entry_distance(column.shape, column.size, base, normal)
+    share = 1.0 - entry / column.length
+    if share <= known:
+        return known
+    x, y, z = x + entry * u, y + entry * v, z + entry * w
+    slope: DistanceAndGradient = distance_and_gradient(column.shape, column.size, x, y, z)
+    against = max(-(slope[1] * u + slope[2] * v + slope[3] * w), 0.0)
+    share *= min(against * against, 1.0)
+    if share <= known:
+        return known
+    return max(min(share, _pressed_share(column, placed, x, y, z)), known)
+
+
+@njit(cache=True, error_model="numpy")
+def _field_reading(
+    column: Column,
+    placed: Floats,
+    base: Vector,
+    normal: Vector,
+    away: float,
+    radius: float,
+    known: float,
+) -> float:
+    """Return ``F = x (1 - (1 - x) sin(f)^2) (1 - (q / R)^2)^2`` or, if larger, `known`."""
+    (x, y, z), (u, v, w) = base, normal
+    slope: DistanceAndGradient = distance_and_gradient(column.shape, column.size, x, y, z)
+    ahead = -(slope[1] * u + slope[2] * v + slope[3] * w)
+    oblique = 1.0 - min(max(ahead, 0.0), 1.0) ** 2
+    weight = 1.0
+    if away > 0.0:
+        height = away * ahead
+        beyond = height - min(max(height, 0.0), column.length)
+        beside = away * away * max(1.0 - ahead * ahead, 0.0) + beyond * beyond
+        if beside >= radius * radius:
+            return known
+        weight = (1.0 - beside / (radius * radius)) ** 2
+        x, y, z = x - away * slope[1], y - away * slope[2], z - away * slope[3]
+    if weight <= known:
+        return known
+    share = _pressed_share(column, placed, x, y, z)
+    return max(weight * share * (1.0 - (1.0 - share) * oblique), known)
