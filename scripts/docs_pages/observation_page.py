@@ -55,6 +55,12 @@ MEANINGS = {  # key: sense, unit, meaning, how it is requested
         "penetration at each taxel, see [touch](touch.md); [body](body.md) lists the indices",
         "",
     ),
+    "touch_parts": (
+        "touch",
+        "share of the skin's thickness",
+        "means of the 59 parts of the skin, then their maxima, see [touch](touch.md)",
+        "senses.touch.parts=true",
+    ),
     "proprioception": (
         "proprioception",
         "rad, rad/s, m/s² and shares",

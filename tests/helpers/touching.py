@@ -62,23 +62,138 @@ def of_bone(readings, name):
 
 
 def dense(stage):
-    """Every taxel against every primitive that its bone can sense, with numpy formulas."""
-    taxels, scene = load_taxels(), stage.scene
-    vertices = scene.meshes.vertices[stage.body.vertices]
-    points, normals = taxel_positions(taxels, vertices)
-    points = points - taxels.depths[..., None] * normals[:, None]
-    bones = np.repeat(np.arange(47), np.diff(taxels.first_triangle))
-    ignored = stage.sense._ignored_pairs()[bones]
-    readings = np.zeros(points.shape[:2])
-    geoms = scene.geoms
-    for g, shape in enumerate(geoms.shapes):
-        local = (points - geoms.positions[g]) @ geoms.rotations[g]
-        depth, outward = _DISTANCES[Shape(shape)](local, geoms.sizes[g].astype(float))
-        against = -np.einsum("tki,ti->tk", outward, normals @ geoms.rotations[g])
-        share = np.clip(-depth / (taxels.thickness[bones] + geoms.skins[g])[:, None], 0.0, 1.0)
-        felt = share * np.clip(against, 0.0, 1.0)
-        readings = np.maximum(readings, np.where(ignored[:, g, None], 0.0, felt))
+    """Every taxel against every primitive that its bone can sense, with numpy formulas.
+
+    The definition of `veca_marl.sim.touch.penetration`, with entries of rays found by bisection and
+    nearest points by clipping.
+    """
+    geoms = stage.scene.geoms
+    ignored = stage.sense._ignored_pairs()
+    readings = np.zeros(load_taxels().depths.shape)
+    for bone in range(47):
+        for g in np.flatnonzero(~ignored[bone]):
+            own = of_index(readings, bone)
+            np.maximum(own, _against(stage, bone, g), out=own)
     return readings
+
+
+def of_index(readings, bone):
+    first = load_taxels().first_triangle
+    return readings[first[bone] : first[bone + 1]]
+
+
+def _against(stage, bone, g):
+    """Readings ``(t, 6)`` of one bone from one primitive alone."""
+    geoms, taxels = stage.scene.geoms, load_taxels()
+    own, other = taxels.thickness[bone], geoms.skins[g]
+    length, inset = own + other, min(own, other)
+    points, normals = taxel_positions(taxels, stage.scene.meshes.vertices[stage.body.vertices])
+    normals = of_index(normals, bone)[:, None]
+    depths = of_index(taxels.depths, bone)[..., None] + own + inset
+    bases = of_index(points, bone) - depths * normals
+    normals = np.broadcast_to(normals, bases.shape)
+    radii = np.zeros(bases.shape[:2])
+    if geoms.objects[g] != stage.body.id:
+        radii += 0.5 * of_index(taxels.gaps, bone)[:, None]
+    thing = _Solid(geoms, g, other - inset)
+    readings = np.zeros(bases.shape[:2])
+    close = thing.distance(bases) < np.hypot(length, radii)
+    if close.any():
+        bones = _bones(stage, bone)
+        readings[close] = _close(
+            thing, bones, length, inset, bases[close], normals[close], radii[close]
+        )
+    return readings
+
+
+def _bones(stage, bone):
+    """The rigid primitives of a bone."""
+    geoms = stage.scene.geoms
+    rows = range(stage.body.geoms.start, stage.body.geoms.stop)
+    frame = stage.body.rows.start + bone
+    rows = [row for row in rows if geoms.frames[row] == frame and geoms.tangible[row]]
+    return [_Solid(geoms, row, geoms.skins[row]) for row in rows]
+
+
+def _close(thing, bones, length, inset, bases, normals, radii):
+    """Readings ``(n,)`` of the taxels near a primitive."""
+
+    def pressed(points):
+        height = np.min([solid.distance(points) for solid in bones], axis=0) + inset
+        return np.clip(1.0 - height / length, 0.0, 1.0)
+
+    def field(bases):
+        away = thing.distance(bases)
+        nearest = np.where((away > 0.0)[..., None], thing.nearest(bases), bases)
+        ahead = -np.sum(thing.outward(bases) * normals, axis=-1)
+        along = np.clip(np.sum((nearest - bases) * normals, axis=-1), 0.0, length)
+        beside = np.linalg.norm(nearest - bases - along[..., None] * normals, axis=-1)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            weight = np.where(beside < radii, (1.0 - (beside / radii) ** 2) ** 2, 0.0)
+        weight[away <= 0.0] = 1.0
+        share = pressed(nearest)
+        return weight * share * (1.0 - (1.0 - share) * (1.0 - np.clip(ahead, 0.0, 1.0) ** 2))
+
+    entry = thing.entry(bases, normals, length)
+    enters = bases + entry[..., None] * normals
+    tilt = np.clip(-np.sum(thing.outward(enters) * normals, axis=-1), 0.0, 1.0)
+    column = np.minimum((1.0 - entry / length) * tilt**2, pressed(enters))
+    readings = np.maximum(np.where(entry < length, column, 0.0), field(bases))
+    heights = np.stack([solid.distance(bases) for solid in bones])
+    outward = np.stack([solid.outward(bases) for solid in bones])
+    first = heights.argmin(axis=0)
+    up = np.take_along_axis(outward, first[None, :, None], 0)[0]
+    moved = bases + (-inset - heights.min(axis=0))[..., None] * up
+    return np.where(thing.distance(bases) <= 0.0, np.maximum(readings, field(moved)), readings)
+
+
+class _Solid:
+    """A primitive of the scene with some of its outer layer taken off."""
+
+    def __init__(self, geoms, g, off):
+        self._position, self._rotation = geoms.positions[g], geoms.rotations[g]
+        self._shape, size = Shape(geoms.shapes[g]), geoms.sizes[g].astype(float)
+        if self._shape is Shape.BOX:
+            self._size = size - off
+        else:
+            cut = 2.0 * off if self._shape is Shape.CYLINDER else 0.0
+            self._size = np.array([size[0] - off, size[1] - cut])
+
+    def distance(self, points):
+        return _DISTANCES[self._shape](self._local(points), self._size)[0]
+
+    def outward(self, points):
+        """Direction from the nearest surface."""
+        return _DISTANCES[self._shape](self._local(points), self._size)[1] @ self._rotation.T
+
+    def nearest(self, points):
+        """The nearest point of the solid."""
+        return points - self.distance(points)[..., None] * self.outward(points)
+
+    def entry(self, points, directions, length):
+        """Where rays enter, 0 for those that start inside and `length` for those that miss.
+
+        The distance along a ray is convex: its minimum by ternary search, the entry by bisection.
+        """
+        low, high = np.zeros(points.shape[:-1]), np.full(points.shape[:-1], float(length))
+
+        def along(way):
+            return self.distance(points + way[..., None] * directions)
+
+        for _ in range(45):
+            third = (high - low) / 3
+            nearer = along(low + third) < along(high - third)
+            low, high = np.where(nearer, low, low + third), np.where(nearer, high - third, high)
+        inner, outer = (low + high) / 2, np.zeros_like(low)
+        misses = along(inner) > 0.0
+        for _ in range(40):
+            middle = (inner + outer) / 2
+            inside = along(middle) <= 0.0
+            inner, outer = np.where(inside, middle, inner), np.where(inside, outer, middle)
+        return np.where(misses, length, np.where(along(np.zeros_like(low)) <= 0.0, 0.0, inner))
+
+    def _local(self, points):
+        return (points - self._position) @ self._rotation
 
 
 def _round(vectors, radius):
@@ -95,24 +210,28 @@ def _capsule(points, size):
     return _round(points - axis[..., None] * np.array([0, 0, 1]), size[0])
 
 
-def _nearest_face(beyond, directions):
-    """Within a convex thing the nearest face, given the depth ``(..., n)`` below each."""
+def _convex(points, nearest, beyond, directions):
+    """Outside by the nearest point, inside by the nearest face: depths ``(..., n)`` below each."""
     face = beyond.argmax(-1)
-    outward = np.take_along_axis(directions, face[..., None, None], -2)[..., 0, :]
-    return beyond.max(-1), outward
+    inward = np.take_along_axis(directions, face[..., None, None], -2)[..., 0, :]
+    inside = beyond.max(-1) <= 0.0
+    away, outward = _round(points - nearest, 0.0)
+    return np.where(inside, beyond.max(-1), away), np.where(inside[..., None], inward, outward)
 
 
 def _box(points, size):
     directions = np.sign(points)[..., None] * np.eye(3)
-    return _nearest_face(np.abs(points) - size, directions)
+    return _convex(points, np.clip(points, -size, size), np.abs(points) - size, directions)
 
 
 def _cylinder(points, size):
     across = np.linalg.norm(points[..., :2], axis=-1)
     side = points * (1, 1, 0) / np.maximum(across, 1e-12)[..., None]
     end = np.sign(points) * (0, 0, 1)
+    nearest = np.minimum(across, size[0])[..., None] * side
+    nearest[..., 2] = np.clip(points[..., 2], -size[1] / 2, size[1] / 2)
     beyond = np.stack([np.abs(points[..., 2]) - size[1] / 2, across - size[0]], -1)
-    return _nearest_face(beyond, np.stack([end, side], -2))
+    return _convex(points, nearest, beyond, np.stack([end, side], -2))
 
 
 _DISTANCES = {

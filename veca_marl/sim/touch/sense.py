@@ -1,4 +1,4 @@
-"""The sense of touch: the readings of 9888 taxels on the skin of a body."""
+"""The sense of touch: the readings of 9888 taxels on the skin of a body, or of its parts."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from veca_marl.sim.geometry import Bools, Floats
 from veca_marl.sim.physics import World
 from veca_marl.sim.sense import Sense
 from veca_marl.sim.spec import ArraySpec
+from veca_marl.sim.touch.parts import PartReadings
 from veca_marl.sim.touch.penetration import Workspace, fields_of, read_taxels
 from veca_marl.sim.touch.quality import TouchQuality, make_transform
 from veca_marl.sim.touch.rigid_bones import rigid_bones
@@ -28,6 +29,9 @@ class TouchCfg:
     Attributes:
         present: Whether the observation contains the sense.
         quality: See `TouchQuality`.
+        taxels: Whether the observation contains `touch`, the readings of all taxels.
+        parts: Whether the observation contains `touch_parts`, mean and maximum of each named part
+            of the skin, computed from the readings that the quality leaves.
         binary_above: With `binary`, the reading above which a taxel reads 1, in [0, 1).
         receptive_field: Radius of the receptive field of a taxel, in [0, 2], relative to the
             greatest distance of a corner of its triangle from the nearest taxel. 0.5 is 8 to 11 mm
@@ -38,6 +42,8 @@ class TouchCfg:
 
     present: bool = True
     quality: TouchQuality = TouchQuality.skin
+    taxels: bool = True
+    parts: bool = False
     binary_above: float = 0.0
     receptive_field: float = 0.5
 
@@ -45,6 +51,11 @@ class TouchCfg:
         if not isinstance(self.quality, TouchQuality):
             choices = [quality.name for quality in TouchQuality]
             raise ValueError(f"senses.touch.quality={self.quality!r}; choices: {choices}")
+        if self.present and not (self.taxels or self.parts):
+            raise ValueError(
+                "senses.touch.taxels=false and senses.touch.parts=false: at least one must be true; "
+                "senses.touch.present=false leaves touch out"
+            )
         if not 0.0 <= self.binary_above < 1.0:
             raise ValueError(f"senses.touch.binary_above={self.binary_above} must be in [0, 1)")
         if not 0.0 <= self.receptive_field <= 2.0:
@@ -60,6 +71,8 @@ class TouchSense(Sense):
         touch: ``(9888,)`` float32 in [0, 1], sorted by bone, six taxels per triangle; see
             `veca_marl.sim.touch.penetration` for the definition of a reading and `taxels_of` for
             the taxels of a bone. Exactly 0 without contact.
+        touch_parts: ``(118,)`` float32 in [0, 1], if requested: the means of the 59 parts of
+            `veca_marl.sim.touch.parts.skin_parts`, then their maxima.
     """
 
     cfg_type = TouchCfg
@@ -86,13 +99,24 @@ class TouchSense(Sense):
             local=np.zeros((self._object.vertices.stop - self._object.vertices.start, 3)),
         )
         self._readings = np.zeros((len(self._taxels.triangles), TAXELS_PER_TRIANGLE))
-        self.specs = {"touch": ArraySpec((self._readings.size,), np.float32, 0.0, 1.0)}
+        self._parts = PartReadings() if cfg.parts else None
+        self._with_taxels = cfg.taxels
+        sizes = {"touch": self._readings.size} if cfg.taxels else {}
+        if self._parts is not None:
+            sizes["touch_parts"] = self._parts.size
+        self.specs = {key: ArraySpec((size,), np.float32, 0.0, 1.0) for key, size in sizes.items()}
         if self._object.triangles.stop - self._object.triangles.start != len(self._readings):
             raise ValueError(f"{body.name} has no skin of {len(self._readings)} triangles")
 
     def compute(self) -> dict[str, NDArray[Any]]:
         """See `Sense`."""
-        return {"touch": self._transform(self.update_taxels()).ravel().astype(np.float32)}
+        readings = self._transform(self.update_taxels())
+        observed: dict[str, NDArray[Any]] = {}
+        if self._with_taxels:
+            observed["touch"] = readings.ravel().astype(np.float32)
+        if self._parts is not None:
+            observed["touch_parts"] = self._parts(readings).astype(np.float32)
+        return observed
 
     def update_taxels(self) -> Floats:
         """Return the present readings of all taxels (the paper's name), whatever the quality.

@@ -115,6 +115,13 @@ def taxels_of(bone_name: str) -> slice:
     return slice(TAXELS_PER_TRIANGLE * int(first[bone]), TAXELS_PER_TRIANGLE * int(first[bone + 1]))
 
 
+def bound_triangles() -> tuple[Floats, Floats]:
+    """Return centroids and outward unit normals of the triangles in the binding pose, ``(T, 3)``."""
+    corners = _bound_corners(load_skin())
+    centroids: Floats = corners.mean(axis=1)
+    return centroids, _normals(corners)
+
+
 def taxel_positions(taxels: TaxelTable, vertices: Floats) -> tuple[Floats, Floats]:
     """Return the positions of the taxels on the mesh and the normals of their triangles.
 
