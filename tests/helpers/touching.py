@@ -67,12 +67,11 @@ def dense(stage):
     The definition of `veca_marl.sim.touch.penetration`, with entries of rays found by bisection and
     nearest points by clipping.
     """
-    geoms = stage.scene.geoms
     ignored = stage.sense._ignored_pairs()
     readings = np.zeros(load_taxels().depths.shape)
     for bone in range(47):
+        own = of_index(readings, bone)
         for g in np.flatnonzero(~ignored[bone]):
-            own = of_index(readings, bone)
             np.maximum(own, _against(stage, bone, g), out=own)
     return readings
 

@@ -16,6 +16,7 @@ SECTIONS: dict[str, str] = {
     "near_field": "veca_marl.fidelity.near_field",
     "rigid_bodies": "veca_marl.fidelity.rigid_bodies",
     "rooms": "veca_marl.fidelity.rooms",
+    "touch": "veca_marl.fidelity.touch",
     "vision": "veca_marl.fidelity.vision",
 }
 """Module of each section. It has a function ``section() -> Section``."""

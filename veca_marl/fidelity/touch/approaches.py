@@ -53,9 +53,12 @@ class Approach:
         skin = FlatSkin(self.skin_m, self.radius * self.skin_m, thing)
         path = rotation(1, 180.0 - self.path_deg) @ _UP
         end = -self.skin_m * _UP - thing.foremost(path)
-        start_m = (self.skin_m + 0.001) / -path[2] + 2.0 * self.width_m
-        away = np.append(np.linspace(start_m, 0.0, steps - 1), -_PAST_M)
-        return np.array([skin.read(end - distance * path) for distance in away])
+        return np.array([skin.read(end - away * path) for away in self.distances_m(steps)])
+
+    def distances_m(self, steps: int) -> Floats:
+        """Return the distances ``(steps,)`` of the foremost point from the bone on the way."""
+        start_m = (self.skin_m + 0.001) / np.cos(np.deg2rad(self.path_deg)) + 2.0 * self.width_m
+        return np.append(np.linspace(start_m, 0.0, steps - 1), -_PAST_M)
 
 
 def size_of(shape: Shape, width_m: float) -> tuple[float, ...]:

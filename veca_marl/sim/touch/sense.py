@@ -53,7 +53,7 @@ class TouchCfg:
             raise ValueError(f"senses.touch.quality={self.quality!r}; choices: {choices}")
         if self.present and not (self.taxels or self.parts):
             raise ValueError(
-                "senses.touch.taxels=false and senses.touch.parts=false: at least one must be true; "
+                "senses.touch.taxels=false and senses.touch.parts=false: one must be true; "
                 "senses.touch.present=false leaves touch out"
             )
         if not 0.0 <= self.binary_above < 1.0:

@@ -116,7 +116,7 @@ def taxels_of(bone_name: str) -> slice:
 
 
 def bound_triangles() -> tuple[Floats, Floats]:
-    """Return centroids and outward unit normals of the triangles in the binding pose, ``(T, 3)``."""
+    """Return centroids and normals ``(T, 3)`` of the triangles in the binding pose."""
     corners = _bound_corners(load_skin())
     centroids: Floats = corners.mean(axis=1)
     return centroids, _normals(corners)

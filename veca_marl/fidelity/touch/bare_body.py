@@ -1,0 +1,144 @@
+"""A body with arms away from the trunk in an otherwise empty scene, and a thing that touches it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import cast
+
+import numpy as np
+
+from veca_marl.sim.body import Body
+from veca_marl.sim.body.anatomy import forward_kinematics, load_skeleton
+from veca_marl.sim.body.appearance import SHIRTS, bone_geoms, dressed_skin
+from veca_marl.sim.geometry import (
+    Floats,
+    Geom,
+    Indices,
+    Scene,
+    Shape,
+    distance_and_gradient,
+    rotation_with_z,
+)
+from veca_marl.sim.physics import World
+from veca_marl.sim.touch import TouchCfg, TouchSense, load_taxels
+
+_ABDUCTION_RAD = 0.8
+_CLEARANCE_M = 0.012  # of poked points from other bones, and of the skin from the mesh
+_STEPS = 8
+
+
+@dataclass
+class _Named:
+    """What `TouchSense` needs to know of a body."""
+
+    name: str
+    object_id: int
+
+
+@dataclass
+class _SceneAlone:
+    """What `TouchSense` needs to know of a world."""
+
+    scene: Scene
+
+    @property
+    def version(self) -> int:
+        """Changes with every update of the scene."""
+        return self.scene.version
+
+
+class BareBody:
+    """The skin of a body that one primitive touches.
+
+    Args:
+        cfg: Settings of touch.
+        shape: Shape of the primitive.
+        size: Its size, metres.
+        skin_m: Thickness of its own skin.
+    """
+
+    def __init__(
+        self, cfg: TouchCfg, shape: Shape, size: tuple[float, ...], skin_m: float = 0.0
+    ) -> None:
+        skeleton = load_skeleton()
+        self._scene = Scene()
+        body = self._scene.add_object(
+            "body", bone_geoms(skeleton, SHIRTS[0]), dressed_skin(skeleton, SHIRTS[0])
+        )
+        angles = np.zeros(len(skeleton.joints))
+        for side in "lr":
+            angles[skeleton.joint(f"{side}_upper_arm", "abduction")] = _ABDUCTION_RAD
+        thing = self._scene.add_object("thing", [[Geom(shape, size, skin_m=skin_m)]])
+        forward_kinematics(skeleton, angles, body.positions, body.rotations)
+        self._body, self._thing = body, thing
+        self._sense = TouchSense(
+            cfg,
+            cast("Body", _Named("body", body.id)),
+            cast("World", _SceneAlone(self._scene)),
+        )
+        self._scene.update()
+        self._corners = self._scene.meshes.vertices[body.vertices][load_taxels().triangles].copy()
+
+    def read(self, centre: Floats, axis: Floats) -> Floats:
+        """Return the readings ``(1648, 6)`` with the primitive at a place.
+
+        Args:
+            centre: ``(3,)`` metres.
+            axis: ``(3,)`` direction of its z axis.
+        """
+        self._thing.positions[0] = centre
+        self._thing.rotations[0] = rotation_with_z(axis)
+        self._scene.update()
+        return self._sense.update_taxels()
+
+    def random_point(
+        self, bones: Sequence[int], rng: np.random.Generator
+    ) -> tuple[int, Floats, Floats]:
+        """Return a random point of the skin that no other bone covers, evenly by area.
+
+        Args:
+            bones: Indices of the bones to choose from.
+            rng: Chooses.
+
+        Returns:
+            The bone, the point ``(3,)`` on its skin and the outward normal, metres.
+        """
+        edges = self._corners[:, 1:] - self._corners[:, :1]
+        area = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1)
+        first = load_taxels().first_triangle
+        owners: Indices = np.repeat(np.arange(len(first) - 1), np.diff(first))
+        area = area * np.isin(owners, bones)
+        while True:
+            triangle = int(rng.choice(len(area), p=area / area.sum()))
+            on_mesh = rng.dirichlet((1.0, 1.0, 1.0)) @ self._corners[triangle]
+            bone = int(owners[triangle])
+            place, normal = self._onto_skin(bone, on_mesh)
+            if np.linalg.norm(place - on_mesh) < _CLEARANCE_M and not self._covered(bone, place):
+                return bone, place, normal
+
+    def _onto_skin(self, bone: int, place: Floats) -> tuple[Floats, Floats]:
+        """Move a point along the gradient of the distance from a bone to its skin."""
+        normal = np.zeros(3)
+        for _ in range(_STEPS):
+            height, normal = self._height(bone, place)
+            place = place - (height - load_skeleton().bones[bone].skin_thickness_m) * normal
+        return place, normal
+
+    def _covered(self, bone: int, place: Floats) -> bool:
+        others = [other for other in range(len(load_skeleton().bones)) if other != bone]
+        return min(self._height(other, place)[0] for other in others) < _CLEARANCE_M
+
+    def _height(self, bone: int, place: Floats) -> tuple[float, Floats]:
+        """Return the distance from a rigid bone and its gradient, world frame."""
+        turn, origin = self._body.rotations[bone], self._body.positions[bone]
+        found = []
+        for part in load_skeleton().bones[bone].colliders:
+            centre, rotation = part.pose
+            axes = turn @ rotation
+            x, y, z = axes.T @ (place - origin - turn @ centre)
+            size = (*part.size, 0.0, 0.0)[:3]
+            away = distance_and_gradient(int(part.shape), size, x, y, z)
+            found.append((away[0], axes @ np.array(away[1:])))
+        nearest: tuple[float, Floats] = min(found, key=lambda entry: entry[0])
+        return nearest
