@@ -9,6 +9,8 @@ from stand_in_worlds import SceneWorld
 from veca_marl.sim.body.anatomy import load_skeleton
 from veca_marl.sim.geometry import Geom, Scene, Shape
 from veca_marl.sim.touch import TouchCfg, TouchSense, load_taxels, taxel_positions
+from veca_marl.sim.touch.hidden_overlaps import overlapping_triangles
+from veca_marl.sim.touch.sensed_pairs import unsensed_primitives
 
 # arms away from the trunk: nothing of the body touches the body
 SPREAD = np.zeros(82)
@@ -35,8 +37,8 @@ class Stage:
             cfg or TouchCfg(), Named("body", self.body.id), SceneWorld(self.scene)
         )
 
-    def add(self, shape, size, position, rotation=None):
-        geom = Geom(Shape[shape], size)
+    def add(self, shape, size, position, rotation=None, skin_m=0.0):
+        geom = Geom(Shape[shape], size, skin_m=skin_m)
         thing = self.scene.add_object(f"{shape} {len(self.scene.objects)}", [[geom]])
         thing.positions[0] = position
         thing.rotations[0] = np.eye(3) if rotation is None else rotation
@@ -67,7 +69,7 @@ def dense(stage):
     The definition of `veca_marl.sim.touch.penetration`, with entries of rays found by bisection and
     nearest points by clipping.
     """
-    ignored = stage.sense._ignored_pairs()
+    ignored = unsensed_primitives(stage.scene.geoms, stage.body)
     readings = np.zeros(load_taxels().depths.shape)
     for bone in range(47):
         own = of_index(readings, bone)
@@ -91,9 +93,9 @@ def _against(stage, bone, g):
     depths = of_index(taxels.depths, bone)[..., None] + own + inset
     bases = of_index(points, bone) - depths * normals
     normals = np.broadcast_to(normals, bases.shape)
-    radii = np.zeros(bases.shape[:2])
-    if geoms.objects[g] != stage.body.id:
-        radii += 0.5 * of_index(taxels.gaps, bone)[:, None]
+    radii = np.repeat(0.5 * of_index(taxels.gaps, bone)[:, None], 6, axis=1)
+    if geoms.objects[g] == stage.body.id:
+        radii[of_index(overlapping_triangles(0.5), bone)] = 0.0
     thing = _Solid(geoms, g, other - inset)
     readings = np.zeros(bases.shape[:2])
     close = thing.distance(bases) < np.hypot(length, radii)

@@ -1,5 +1,6 @@
 """The penetration model: proportionality, superposition, symmetry, and a dense reference."""
 
+import itertools
 import time
 
 import numpy as np
@@ -8,7 +9,9 @@ from skins import add_body, pose, random_angles, random_turn
 from touching import SPREAD, Stage, dense, of_bone
 
 from veca_marl.sim.body.anatomy import load_skeleton
+from veca_marl.sim.body.humanoid.self_collision import may_collide
 from veca_marl.sim.geometry import Shape
+from veca_marl.sim.touch import load_taxels, taxel_positions
 from veca_marl.sim.touch.sensed_pairs import unsensed_bones
 
 
@@ -176,6 +179,48 @@ def test_self_contact_is_sensed_except_at_joints():
     assert not together[thigh, skeleton.bone("r_thigh")]
     assert not together[thigh, skeleton.bone("l_hand")]
     np.testing.assert_array_equal(together, together.T)
+
+
+def test_colliding_thighs_are_sensed_alike_on_both_sides():
+    skeleton = load_skeleton()
+    angles = SPREAD.copy()
+    for side in "lr":
+        angles[skeleton.joint(f"{side}_thigh", "abduction")] = -0.09
+    readings = Stage(angles).read()
+    left, right = of_bone(readings, "l_thigh"), of_bone(readings, "r_thigh")
+    assert left.max() > 0.2
+    np.testing.assert_allclose(left, right[:, [0, 2, 1, 5, 4, 3]], atol=1e-6)
+    apart = [skeleton.bone(f"{side}_upper_arm") for side in "lr"]
+    assert not unsensed_bones(skeleton)[*apart]
+
+
+def test_every_pair_of_bones_that_collides_is_sensed():
+    skeleton = load_skeleton()
+    unsensed = unsensed_bones(skeleton)
+    pairs = itertools.combinations(enumerate(bone.name for bone in skeleton.bones), 2)
+    collide = [(i, j) for (i, a), (j, b) in pairs if may_collide(a, b)]
+    assert len(collide) > 400
+    assert not any(unsensed[pair] for pair in collide)
+
+
+def test_a_finger_in_thick_skin_reads_on_the_side_of_contact_only():
+    """The sum of both skins is more than the whole thickness of the finger."""
+    stage = Stage()
+    bone = stage.bone("l_index_proximal")
+    radius, turn = 0.0033 + 0.0015, stage.body.rotations[bone]
+    for pressed_m in (0.001, 0.004):
+        palmar = (0.0, -(radius + 0.05 - pressed_m), -0.0085)
+        thing = stage.add(
+            "BOX", (0.05, 0.05, 0.05), stage.at("l_index_proximal", palmar), turn, 0.01
+        )
+        readings = of_bone(stage.read(), "l_index_proximal")
+        _, normals = taxel_positions(
+            load_taxels(), stage.scene.meshes.vertices[stage.body.vertices]
+        )
+        facing = of_bone(normals, "l_index_proximal") @ turn[:, 1]
+        assert readings[facing < -0.8].max() == pytest.approx(pressed_m / 0.0115, abs=0.03)
+        assert not readings[facing > 0.5].any()
+        thing.positions[0] += 5.0
 
 
 def test_the_reading_depends_on_the_present_geometry_only():

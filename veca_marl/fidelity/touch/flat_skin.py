@@ -8,7 +8,8 @@ import numpy as np
 
 from veca_marl.sim.geometry import Floats, Geom, Scene, Shape
 from veca_marl.sim.touch import TAXELS_PER_TRIANGLE, TaxelTable
-from veca_marl.sim.touch.penetration import Fields, Workspace, read_taxels
+from veca_marl.sim.touch.penetration import empty_workspace, read_taxels
+from veca_marl.sim.touch.receptive_fields import Fields
 from veca_marl.sim.touch.rigid_bones import rigid_bones
 
 _BONE_M = 0.25  # half edge of the block of bone; exact in single precision
@@ -73,11 +74,9 @@ class FlatSkin:
         self._geoms = scene.geoms
         self._own = rigid_bones(self._geoms, skin, 1)
         self._taxels = _one_triangle(thickness_m)
-        self._fields = Fields(np.array([radius_m]), np.full(2, radius_m), skin.id)
+        self._fields = Fields(np.full((2, 1), radius_m), np.full(2, radius_m), skin.id)
         self._ignored = np.array([[True, False]])
-        self._workspace = Workspace(
-            np.zeros((1, 4)), np.zeros((2, 4)), np.zeros((1, 2), np.bool_), np.zeros((3, 3))
-        )
+        self._workspace = empty_workspace(self._taxels, len(_CORNERS), len(self._geoms.shapes))
         self._readings = np.zeros((1, TAXELS_PER_TRIANGLE))
 
     def read(self, centre: Floats) -> float:

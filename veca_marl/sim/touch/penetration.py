@@ -48,36 +48,9 @@ from veca_marl.sim.touch.broad_phase import (
     to_local,
 )
 from veca_marl.sim.touch.contact import Column, taxel_reading
+from veca_marl.sim.touch.receptive_fields import Fields
 from veca_marl.sim.touch.rigid_bones import RigidBones, place_bone, shrunk
 from veca_marl.sim.touch.taxels import BARYCENTRIC, TaxelTable
-
-
-class Fields(NamedTuple):
-    """The receptive fields of the taxels.
-
-    Attributes:
-        radii: ``(T,)`` metres, of the taxels of each triangle, for all primitives but those of the
-            own body, which are sensed at points.
-        largest: ``(B + 1,)`` metres, the largest on each bone and, last, on the body.
-        body: Id of the own body among the objects of the scene.
-    """
-
-    radii: Floats
-    largest: Floats
-    body: int
-
-
-def fields_of(taxels: TaxelTable, share: float, body: int) -> Fields:
-    """Return receptive fields with radii of a share of the gaps between taxels.
-
-    Args:
-        taxels: The taxels.
-        share: Of `TaxelTable.gaps`.
-        body: Id of the own body.
-    """
-    radii = share * taxels.gaps
-    largest = np.maximum.reduceat(radii, taxels.first_triangle[:-1])
-    return Fields(radii, np.append(largest, radii.max()), body)
 
 
 class Workspace(NamedTuple):
@@ -94,6 +67,17 @@ class Workspace(NamedTuple):
     bones: Floats
     candidates: Bools
     local: Floats
+
+
+def empty_workspace(taxels: TaxelTable, vertices: int, primitives: int) -> Workspace:
+    """Return buffers for a skin with a number of vertices in a scene of some primitives."""
+    bones = len(taxels.thickness)
+    return Workspace(
+        patches=np.zeros((len(taxels.patches) - 1, 4)),
+        bones=np.zeros((bones + 1, 4)),
+        candidates=np.zeros((bones, primitives), np.bool_),
+        local=np.zeros((vertices, 3)),
+    )
 
 
 @njit(cache=True, error_model="numpy")
@@ -150,9 +134,8 @@ def measure_penetration(
             column = Column(
                 primitive[0], primitive[1], thickness + skin, thickness + inset, inset, count
             )
-            with_field = geoms.objects[g] != fields.body
-            largest = fields.largest[bone] if with_field else 0.0
-            margin = farthest_contact(thickness, skin, largest)
+            margin = farthest_contact(thickness, skin, fields.largest[bone])
+            radii = fields.radii[1 if geoms.objects[g] == fields.body else 0]
             for patch in range(taxels.first_patch[bone], taxels.first_patch[bone + 1]):
                 x, y, z = to_local(primitive, workspace.patches, patch)
                 away = distance(primitive[0], primitive[1], x, y, z)
@@ -161,8 +144,7 @@ def measure_penetration(
                 _read_patch(
                     taxels,
                     patch,
-                    fields.radii,
-                    with_field,
+                    radii,
                     vertices,
                     primitive,
                     column,
@@ -184,7 +166,6 @@ def _read_patch(
     taxels: TaxelTable,
     patch: int,
     radii: Floats,
-    with_field: bool,
     vertices: Floats,
     primitive: PlacedPrimitive,
     column: Column,
@@ -206,12 +187,11 @@ def _read_patch(
         b = _row(local, triangles[t, 1])
         c = _row(local, triangles[t, 2])
         normal = _unit_normal(a, b, c)
-        radius = radii[t] if with_field else 0.0
-        if _is_outside(column, a, b, c, normal, layers[t, 0], layers[t, 1], radius):
+        if _is_outside(column, a, b, c, normal, layers[t, 0], layers[t, 1], radii[t]):
             continue
         for n in range(BARYCENTRIC.shape[0]):
             base = _base(a, b, c, _row(BARYCENTRIC, n), normal, depths[t, n] + column.depth)
-            readings[t, n] = taxel_reading(column, placed, base, normal, radius, readings[t, n])
+            readings[t, n] = taxel_reading(column, placed, base, normal, radii[t], readings[t, n])
 
 
 @njit(cache=True, error_model="numpy", inline="always")

@@ -9,16 +9,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veca_marl.sim.body import Body
-from veca_marl.sim.body.anatomy import load_skeleton
 from veca_marl.sim.geometry import Bools, Floats
 from veca_marl.sim.physics import World
 from veca_marl.sim.sense import Sense
 from veca_marl.sim.spec import ArraySpec
+from veca_marl.sim.touch.hidden_overlaps import overlapping_triangles
 from veca_marl.sim.touch.parts import PartReadings
-from veca_marl.sim.touch.penetration import Workspace, fields_of, read_taxels
+from veca_marl.sim.touch.penetration import empty_workspace, read_taxels
 from veca_marl.sim.touch.quality import TouchQuality, make_transform
+from veca_marl.sim.touch.receptive_fields import fields_of
 from veca_marl.sim.touch.rigid_bones import rigid_bones
-from veca_marl.sim.touch.sensed_pairs import unsensed_bones
+from veca_marl.sim.touch.sensed_pairs import unsensed_primitives
 from veca_marl.sim.touch.taxels import TAXELS_PER_TRIANGLE, load_taxels
 
 
@@ -88,16 +89,12 @@ class TouchSense(Sense):
         self._object = world.scene.objects[body.object_id]
         self._taxels = load_taxels()
         self._transform = make_transform(cfg.quality, cfg.binary_above)
-        bones = len(self._taxels.thickness)
+        bones, vertices = len(self._taxels.thickness), self._object.vertices
         self._ignored: Bools = np.zeros((bones, 0), np.bool_)
-        self._fields = fields_of(self._taxels, cfg.receptive_field, body.object_id)
+        points = overlapping_triangles(cfg.receptive_field)
+        self._fields = fields_of(self._taxels, cfg.receptive_field, body.object_id, points)
         self._own = rigid_bones(self._scene.geoms, self._object, bones)
-        self._workspace = Workspace(
-            patches=np.zeros((len(self._taxels.patches) - 1, 4)),
-            bones=np.zeros((bones + 1, 4)),
-            candidates=np.zeros_like(self._ignored),
-            local=np.zeros((self._object.vertices.stop - self._object.vertices.start, 3)),
-        )
+        self._workspace = empty_workspace(self._taxels, vertices.stop - vertices.start, 0)
         self._readings = np.zeros((len(self._taxels.triangles), TAXELS_PER_TRIANGLE))
         self._parts = PartReadings() if cfg.parts else None
         self._with_taxels = cfg.taxels
@@ -127,7 +124,7 @@ class TouchSense(Sense):
         """
         geoms = self._scene.geoms
         if self._ignored.shape[1] != len(geoms.shapes):
-            self._ignored = self._ignored_pairs()
+            self._ignored = unsensed_primitives(geoms, self._object)
             self._workspace = self._workspace._replace(candidates=np.zeros_like(self._ignored))
         vertices = self._scene.meshes.vertices[self._object.vertices]
         read_taxels(
@@ -141,11 +138,3 @@ class TouchSense(Sense):
             self._readings,
         )
         return self._readings
-
-    def _ignored_pairs(self) -> Bools:
-        """Return the mask ``(B, G)`` of intangible primitives and unsensed bones of the body."""
-        geoms, rows = self._scene.geoms, self._object.rows
-        ignored = np.repeat(~geoms.tangible[None], len(self._taxels.thickness), axis=0)
-        own = np.flatnonzero(geoms.objects == self._object.id)
-        ignored[:, own] |= unsensed_bones(load_skeleton())[:, geoms.frames[own] - rows.start]
-        return ignored

@@ -1,12 +1,12 @@
-"""Which bones of a body are sensed by which other bones of it."""
+"""Which primitives are sensed by which bones of a body."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from veca_marl.sim.body.anatomy import Skeleton
+from veca_marl.sim.body.anatomy import Skeleton, load_skeleton
 from veca_marl.sim.body.humanoid.self_collision import may_collide
-from veca_marl.sim.geometry import Bools
+from veca_marl.sim.geometry import Bools, GeomTable, SceneObject
 
 
 def unsensed_bones(skeleton: Skeleton) -> Bools:
@@ -23,3 +23,12 @@ def unsensed_bones(skeleton: Skeleton) -> Bools:
     collide = np.array([[may_collide(a, b) for b in names] for a in names])
     unsensed: Bools = (near | child_of | child_of.T) & ~collide
     return unsensed
+
+
+def unsensed_primitives(geoms: GeomTable, body: SceneObject) -> Bools:
+    """Return the mask ``(47, G)`` of intangible primitives and of unsensed bones of the body."""
+    skeleton = load_skeleton()
+    ignored = np.repeat(~geoms.tangible[None], len(skeleton.bones), axis=0)
+    own = np.flatnonzero(geoms.objects == body.id)
+    ignored[:, own] |= unsensed_bones(skeleton)[:, geoms.frames[own] - body.rows.start]
+    return ignored
