@@ -14,6 +14,7 @@ import pytest
 from docs_pages.body_tables import body_page
 from docs_pages.docstrings import entries, prose
 from docs_pages.observation_page import MEANINGS, all_specs
+from docs_pages.parts_picture import parts_picture
 from docs_pages.pictures import perception_picture, task_picture, touch_picture
 from docs_pages.task_pages import built_in_tasks, task_page
 from docutils.core import publish_doctree
@@ -157,8 +158,9 @@ def test_the_pictures_can_be_drawn(tmp_path):
     task_picture("TurnBaby", tmp_path / "joints.png")
     perception_picture(tmp_path / "perception.png")
     touch_picture(tmp_path / "touch.png")
+    parts_picture(tmp_path / "skin_parts.png")
     assert all(path.stat().st_size > 5000 for path in tmp_path.glob("*.png"))
-    assert len(list(tmp_path.glob("*.png"))) == 4
+    assert len(list(tmp_path.glob("*.png"))) == 5
 
 
 def test_the_changelog_and_the_citation_have_the_version_of_the_package():

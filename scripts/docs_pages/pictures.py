@@ -8,6 +8,7 @@ import matplotlib as mpl
 import numpy as np
 from numpy.typing import NDArray
 
+from docs_pages.parts_picture import parts_picture
 from docs_pages.task_pages import built_in_tasks
 from veca_marl.api import make
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
@@ -29,6 +30,7 @@ def write_pictures(folder: Path) -> None:
     (folder / "tasks").mkdir(parents=True, exist_ok=True)
     perception_picture(folder / "perception.png")
     touch_picture(folder / "touch.png")
+    parts_picture(folder / "skin_parts.png")
     for name in built_in_tasks():
         task_picture(name, folder / "tasks" / f"{name}.png")
 

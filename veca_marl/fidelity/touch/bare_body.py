@@ -1,4 +1,4 @@
-"""A body with arms away from the trunk in an otherwise empty scene, and a thing that touches it."""
+"""A body with arms away from the trunk in an otherwise empty scene, and things that touch it."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from veca_marl.sim.geometry import (
     rotation_with_z,
 )
 from veca_marl.sim.physics import World
-from veca_marl.sim.touch import TouchCfg, TouchSense, load_taxels
+from veca_marl.sim.touch import TouchCfg, TouchSense, load_taxels, taxel_positions
 
 _ABDUCTION_RAD = 0.8
 _CLEARANCE_M = 0.012  # of poked points from other bones, and of the skin from the mesh
@@ -49,17 +49,23 @@ class _SceneAlone:
 
 
 class BareBody:
-    """The skin of a body that one primitive touches.
+    """The skin of a body that primitives touch.
 
     Args:
         cfg: Settings of touch.
-        shape: Shape of the primitive.
-        size: Its size, metres.
-        skin_m: Thickness of its own skin.
+        shape: Shape of the primitives.
+        size: Their size, metres.
+        skin_m: Thickness of their own skin.
+        count: Their number.
     """
 
     def __init__(
-        self, cfg: TouchCfg, shape: Shape, size: tuple[float, ...], skin_m: float = 0.0
+        self,
+        cfg: TouchCfg,
+        shape: Shape,
+        size: tuple[float, ...],
+        skin_m: float = 0.0,
+        count: int = 1,
     ) -> None:
         skeleton = load_skeleton()
         self._scene = Scene()
@@ -69,9 +75,10 @@ class BareBody:
         angles = np.zeros(len(skeleton.joints))
         for side in "lr":
             angles[skeleton.joint(f"{side}_upper_arm", "abduction")] = _ABDUCTION_RAD
-        thing = self._scene.add_object("thing", [[Geom(shape, size, skin_m=skin_m)]])
+        things = [[Geom(shape, size, skin_m=skin_m)] for _ in range(count)]
+        self._things = self._scene.add_object("things", things)
         forward_kinematics(skeleton, angles, body.positions, body.rotations)
-        self._body, self._thing = body, thing
+        self._body = body
         self._sense = TouchSense(
             cfg,
             cast("Body", _Named("body", body.id)),
@@ -80,17 +87,23 @@ class BareBody:
         self._scene.update()
         self._corners = self._scene.meshes.vertices[body.vertices][load_taxels().triangles].copy()
 
-    def read(self, centre: Floats, axis: Floats) -> Floats:
-        """Return the readings ``(1648, 6)`` with the primitive at a place.
+    def read(self, *places: tuple[Floats, Floats]) -> Floats:
+        """Return the readings ``(1648, 6)`` with the primitives at places.
 
         Args:
-            centre: ``(3,)`` metres.
-            axis: ``(3,)`` direction of its z axis.
+            *places: For each primitive the centre ``(3,)``, metres, and the direction ``(3,)`` of
+                its z axis.
         """
-        self._thing.positions[0] = centre
-        self._thing.rotations[0] = rotation_with_z(axis)
+        for thing, (centre, axis) in enumerate(places):
+            self._things.positions[thing] = centre
+            self._things.rotations[thing] = rotation_with_z(axis)
         self._scene.update()
         return self._sense.update_taxels()
+
+    def taxels(self) -> Floats:
+        """Return the places of the taxels on the mesh, ``(1648, 6, 3)`` metres."""
+        vertices = self._scene.meshes.vertices[self._body.vertices]
+        return taxel_positions(load_taxels(), vertices)[0]
 
     def random_point(
         self, bones: Sequence[int], rng: np.random.Generator
@@ -113,12 +126,20 @@ class BareBody:
             triangle = int(rng.choice(len(area), p=area / area.sum()))
             on_mesh = rng.dirichlet((1.0, 1.0, 1.0)) @ self._corners[triangle]
             bone = int(owners[triangle])
-            place, normal = self._onto_skin(bone, on_mesh)
+            place, normal = self.onto_skin(bone, on_mesh)
             if np.linalg.norm(place - on_mesh) < _CLEARANCE_M and not self._covered(bone, place):
                 return bone, place, normal
 
-    def _onto_skin(self, bone: int, place: Floats) -> tuple[Floats, Floats]:
-        """Move a point along the gradient of the distance from a bone to its skin."""
+    def onto_skin(self, bone: int, place: Floats) -> tuple[Floats, Floats]:
+        """Move a point along the gradient of the distance from a bone to its skin.
+
+        Args:
+            bone: Index of the bone.
+            place: ``(3,)`` metres.
+
+        Returns:
+            The point on the skin and the outward normal there.
+        """
         normal = np.zeros(3)
         for _ in range(_STEPS):
             height, normal = self._height(bone, place)

@@ -63,7 +63,7 @@ def noticed_pokes(
     for _ in range(count):
         bone, place, normal = body.random_point(bones, rng)
         skin_m = load_skeleton().bones[bone].skin_thickness_m + FINGERTIP_SKIN_M
-        readings = body.read(place + (length_m - depth * skin_m) * normal, normal)
+        readings = body.read((place + (length_m - depth * skin_m) * normal, normal))
         largest.append(readings.max())
     values = np.array(largest)
     return Noticed(float((values > NOTICED).mean()), float(values.mean()))

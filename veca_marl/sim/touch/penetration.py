@@ -26,7 +26,8 @@ reading does not depend on the time step.
 A primitive with a skin of its own, such as a bone of another body, is treated as two springs in
 series: t is the sum of both thicknesses, and heights count from rigid bone to rigid bone. With s,
 the smaller of the two thicknesses, the primitive is its bone with a layer of s, and b lies s inside
-the bone, so that b remains inside of thin bones.
+the bone, so that b remains inside of thin bones. Other bones of the own body are sensed in the same
+way, see `hidden_overlaps` for an exception.
 """
 
 from __future__ import annotations
