@@ -10,6 +10,7 @@ from veca_marl.fidelity.touch.flat_skin import FlatSkin, Thing
 from veca_marl.fidelity.touch.laws import RADII, plane_error
 from veca_marl.fidelity.touch.pokes import noticed_pokes
 from veca_marl.sim.geometry import Shape
+from veca_marl.sim.touch import TouchCfg
 
 PLANE = Thing(Shape.BOX, (1.0, 1.0, 1.0), np.eye(3))
 
@@ -67,5 +68,5 @@ def test_two_skins_in_contact_read_the_same_share():
 def test_a_fingertip_is_noticed_almost_anywhere_at_a_quarter_of_the_skin(region):
     """At points, without receptive fields, it is noticed in a third of the places."""
     rng = np.random.default_rng(0)
-    assert noticed_pokes(region, 0.25, 60, 0.5, rng).share >= 0.9
+    assert noticed_pokes(region, 0.25, 60, TouchCfg().receptive_field, rng).share >= 0.9
     assert noticed_pokes(region, 0.25, 60, 0.0, rng).share < 0.6

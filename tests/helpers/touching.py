@@ -12,6 +12,7 @@ from veca_marl.sim.touch import TouchCfg, TouchSense, load_taxels, taxel_positio
 from veca_marl.sim.touch.hidden_overlaps import overlapping_triangles
 from veca_marl.sim.touch.sensed_pairs import unsensed_primitives
 
+FIELD = TouchCfg().receptive_field
 # arms away from the trunk: nothing of the body touches the body
 SPREAD = np.zeros(82)
 for _side in "lr":
@@ -93,9 +94,9 @@ def _against(stage, bone, g):
     depths = of_index(taxels.depths, bone)[..., None] + own + inset
     bases = of_index(points, bone) - depths * normals
     normals = np.broadcast_to(normals, bases.shape)
-    radii = np.repeat(0.5 * of_index(taxels.gaps, bone)[:, None], 6, axis=1)
+    radii = np.repeat(FIELD * of_index(taxels.gaps, bone)[:, None], 6, axis=1)
     if geoms.objects[g] == stage.body.id:
-        radii[of_index(overlapping_triangles(0.5), bone)] = 0.0
+        radii[of_index(overlapping_triangles(FIELD), bone)] = 0.0
     thing = _Solid(geoms, g, other - inset)
     readings = np.zeros(bases.shape[:2])
     close = thing.distance(bases) < np.hypot(length, radii)

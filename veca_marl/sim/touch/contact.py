@@ -58,18 +58,39 @@ def taxel_reading(
         known: The largest reading from other primitives.
     """
     away = distance(column.shape, column.size, base[0], base[1], base[2])
-    reach = column.length * column.length + radius * radius
-    if away > 0.0 and away * away >= reach:
+    if away <= 0.0:
+        return max(_reading_around(column, placed, base, normal, radius), known)
+    if away * away >= column.length * column.length + radius * radius:
         return known
     if away < column.length:
-        known = _column_reading(column, placed, base, normal, away, known)
-    if known < 1.0 and (away <= 0.0 or radius > 0.0):
-        known = _field_reading(column, placed, base, normal, away, radius, known)
-        if away <= 0.0 and known < 1.0:
-            base = moved_to_height(placed, column.bones, base, -column.inset)
-            away = distance(column.shape, column.size, base[0], base[1], base[2])
-            known = _field_reading(column, placed, base, normal, away, radius, known)
+        known = _column_reading(column, placed, base, normal, known)
+    if known < 1.0 and radius > 0.0:
+        known = _field_reading(column, placed, base, normal, radius, known)
     return known
+
+
+@njit(cache=True, error_model="numpy")
+def _reading_around(
+    column: Column, placed: Floats, base: Vector, normal: Vector, radius: float
+) -> float:
+    """Return the reading of a taxel with its base inside the primitive.
+
+    The ray enters at b, and b is also the nearest point m. The field is computed once more with b
+    moved onto the bone, where the skin is fully displaced if that point is inside too.
+    """
+    moved = moved_to_height(placed, column.bones, base, -column.inset)
+    if distance(column.shape, column.size, moved[0], moved[1], moved[2]) <= 0.0:
+        return 1.0
+    slope: DistanceAndGradient = distance_and_gradient(
+        column.shape, column.size, base[0], base[1], base[2]
+    )
+    against = -(slope[1] * normal[0] + slope[2] * normal[1] + slope[3] * normal[2])
+    straight = min(max(against, 0.0), 1.0) ** 2
+    share = _pressed_share(column, placed, base[0], base[1], base[2])
+    reading = max(min(straight, share), share * (1.0 - (1.0 - share) * (1.0 - straight)))
+    if radius > 0.0:
+        reading = _field_reading(column, placed, moved, normal, radius, reading)
+    return reading
 
 
 @njit(cache=True, error_model="numpy", inline="always")
@@ -81,13 +102,11 @@ def _pressed_share(column: Column, placed: Floats, x: float, y: float, z: float)
 
 @njit(cache=True, error_model="numpy")
 def _column_reading(
-    column: Column, placed: Floats, base: Vector, normal: Vector, away: float, known: float
+    column: Column, placed: Floats, base: Vector, normal: Vector, known: float
 ) -> float:
     """Return ``C = min((1 - e / t) cos(a)^2, x_e)`` or, if that is larger, `known`."""
     (x, y, z), (u, v, w) = base, normal
-    entry = 0.0
-    if away > 0.0:
-        entry = entry_distance(column.shape, column.size, base, normal)
+    entry = entry_distance(column.shape, column.size, base, normal)
     share = 1.0 - entry / column.length
     if share <= known:
         return known
@@ -102,29 +121,26 @@ def _column_reading(
 
 @njit(cache=True, error_model="numpy")
 def _field_reading(
-    column: Column,
-    placed: Floats,
-    base: Vector,
-    normal: Vector,
-    away: float,
-    radius: float,
-    known: float,
+    column: Column, placed: Floats, base: Vector, normal: Vector, radius: float, known: float
 ) -> float:
-    """Return ``F = x (1 - (1 - x) sin(f)^2) (1 - (q / R)^2)^2`` or, if larger, `known`."""
+    """Return ``F = x (1 - (1 - x) sin(f)^2) (1 - (q / R)^2)^2`` or, if larger, `known`.
+
+    The base has to be outside of the primitive.
+    """
     (x, y, z), (u, v, w) = base, normal
     slope: DistanceAndGradient = distance_and_gradient(column.shape, column.size, x, y, z)
+    away = slope[0]
     ahead = -(slope[1] * u + slope[2] * v + slope[3] * w)
-    oblique = 1.0 - min(max(ahead, 0.0), 1.0) ** 2
-    weight = 1.0
-    if away > 0.0:
-        height = away * ahead
-        beyond = height - min(max(height, 0.0), column.length)
-        beside = away * away * max(1.0 - ahead * ahead, 0.0) + beyond * beyond
-        if beside >= radius * radius:
-            return known
-        weight = (1.0 - beside / (radius * radius)) ** 2
-        x, y, z = x - away * slope[1], y - away * slope[2], z - away * slope[3]
+    height = away * ahead
+    beyond = height - min(max(height, 0.0), column.length)
+    beside = away * away * max(1.0 - ahead * ahead, 0.0) + beyond * beyond
+    if beside >= radius * radius:
+        return known
+    weight = (1.0 - beside / (radius * radius)) ** 2
     if weight <= known:
         return known
-    share = _pressed_share(column, placed, x, y, z)
+    share = _pressed_share(
+        column, placed, x - away * slope[1], y - away * slope[2], z - away * slope[3]
+    )
+    oblique = 1.0 - min(max(ahead, 0.0), 1.0) ** 2
     return max(weight * share * (1.0 - (1.0 - share) * oblique), known)

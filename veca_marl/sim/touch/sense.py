@@ -35,10 +35,10 @@ class TouchCfg:
             of the skin, computed from the readings that the quality leaves.
         binary_above: With `binary`, the reading above which a taxel reads 1, in [0, 1).
         receptive_field: Radius of the receptive field of a taxel, in [0, 2], relative to the
-            greatest distance of a corner of its triangle from the nearest taxel. 0.5 is 8 to 11 mm
-            on trunk and thighs, 2 to 4 mm on hands and 1 mm on finger tips. With 0 taxels are
-            points, and objects that are smaller than the distance of the taxels are not sensed in
-            most places.
+            greatest distance of a corner of its triangle from the nearest taxel. 0.6 is 9 to 12 mm
+            on trunk and thighs, 8 mm on the head, 3 mm on palms and 1.5 mm on finger tips. With 0
+            taxels are points, and objects that are smaller than the distance of the taxels are not
+            sensed in most places.
     """
 
     present: bool = True
@@ -46,7 +46,7 @@ class TouchCfg:
     taxels: bool = True
     parts: bool = False
     binary_above: float = 0.0
-    receptive_field: float = 0.5
+    receptive_field: float = 0.6
 
     def __post_init__(self) -> None:
         if not isinstance(self.quality, TouchQuality):
