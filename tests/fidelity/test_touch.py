@@ -64,9 +64,9 @@ def test_two_skins_in_contact_read_the_same_share():
             assert reading == pytest.approx(min(share, 1.0), abs=1e-4)
 
 
-@pytest.mark.parametrize("region", ["trunk", "head"])
-def test_a_fingertip_is_noticed_almost_anywhere_at_a_quarter_of_the_skin(region):
+@pytest.mark.parametrize("bone", ["chest", "head"])
+def test_a_fingertip_is_noticed_almost_anywhere_at_a_quarter_of_the_skin(bone):
     """At points, without receptive fields, it is noticed in a third of the places."""
     rng = np.random.default_rng(0)
-    assert noticed_pokes(region, 0.25, 60, TouchCfg().receptive_field, rng).share >= 0.9
-    assert noticed_pokes(region, 0.25, 60, 0.0, rng).share < 0.6
+    assert noticed_pokes(bone, 0.25, 60, TouchCfg().receptive_field, rng).share >= 0.9
+    assert noticed_pokes(bone, 0.25, 60, 0.0, rng).share < 0.6

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import cast
 
@@ -14,7 +13,6 @@ from veca_marl.sim.body.appearance import SHIRTS, bone_geoms, dressed_skin
 from veca_marl.sim.geometry import (
     Floats,
     Geom,
-    Indices,
     Scene,
     Shape,
     distance_and_gradient,
@@ -24,8 +22,10 @@ from veca_marl.sim.physics import World
 from veca_marl.sim.touch import TouchCfg, TouchSense, load_taxels, taxel_positions
 
 _ABDUCTION_RAD = 0.8
-_CLEARANCE_M = 0.012  # of poked points from other bones, and of the skin from the mesh
+_CLEARANCE_M = 0.002  # of points from the skin of other bones
+_FARTHEST_M = 0.012  # of the physical skin from the mesh
 _STEPS = 8
+_TRIALS = 1000
 
 
 @dataclass
@@ -105,30 +105,27 @@ class BareBody:
         vertices = self._scene.meshes.vertices[self._body.vertices]
         return taxel_positions(load_taxels(), vertices)[0]
 
-    def random_point(
-        self, bones: Sequence[int], rng: np.random.Generator
-    ) -> tuple[int, Floats, Floats]:
-        """Return a random point of the skin that no other bone covers, evenly by area.
+    def random_point(self, bone: int, rng: np.random.Generator) -> tuple[Floats, Floats]:
+        """Return a random point of the skin of a bone that no other bone covers, evenly by area.
 
         Args:
-            bones: Indices of the bones to choose from.
+            bone: Index of the bone.
             rng: Chooses.
 
         Returns:
-            The bone, the point ``(3,)`` on its skin and the outward normal, metres.
+            The point ``(3,)``, metres, and the outward normal there.
         """
-        edges = self._corners[:, 1:] - self._corners[:, :1]
-        area = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1)
         first = load_taxels().first_triangle
-        owners: Indices = np.repeat(np.arange(len(first) - 1), np.diff(first))
-        area = area * np.isin(owners, bones)
-        while True:
+        corners = self._corners[first[bone] : first[bone + 1]]
+        edges = corners[:, 1:] - corners[:, :1]
+        area = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1)
+        for _ in range(_TRIALS):
             triangle = int(rng.choice(len(area), p=area / area.sum()))
-            on_mesh = rng.dirichlet((1.0, 1.0, 1.0)) @ self._corners[triangle]
-            bone = int(owners[triangle])
+            on_mesh = rng.dirichlet((1.0, 1.0, 1.0)) @ corners[triangle]
             place, normal = self.onto_skin(bone, on_mesh)
-            if np.linalg.norm(place - on_mesh) < _CLEARANCE_M and not self._covered(bone, place):
-                return bone, place, normal
+            if np.linalg.norm(place - on_mesh) < _FARTHEST_M and not self._covered(bone, place):
+                return place, normal
+        raise RuntimeError(f"bone {bone}: no free skin found in {_TRIALS} trials")
 
     def onto_skin(self, bone: int, place: Floats) -> tuple[Floats, Floats]:
         """Move a point along the gradient of the distance from a bone to its skin.
@@ -147,8 +144,12 @@ class BareBody:
         return place, normal
 
     def _covered(self, bone: int, place: Floats) -> bool:
-        others = [other for other in range(len(load_skeleton().bones)) if other != bone]
-        return min(self._height(other, place)[0] for other in others) < _CLEARANCE_M
+        """Return whether a point lies in or close to the skin of another bone."""
+        return any(
+            self._height(index, place)[0] < other.skin_thickness_m + _CLEARANCE_M
+            for index, other in enumerate(load_skeleton().bones)
+            if index != bone
+        )
 
     def _height(self, bone: int, place: Floats) -> tuple[float, Floats]:
         """Return the distance from a rigid bone and its gradient, world frame."""

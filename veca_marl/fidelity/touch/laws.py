@@ -9,7 +9,8 @@ import numpy as np
 from veca_marl.fidelity.law import Curve, Law, Mark, Plot, Section, at_least, at_most
 from veca_marl.fidelity.touch.approaches import SHAPES, Approach, all_approaches, extremes
 from veca_marl.fidelity.touch.flat_skin import FlatSkin, Thing
-from veca_marl.fidelity.touch.pokes import REGIONS, noticed_pokes
+from veca_marl.fidelity.touch.pokes import BONES, noticed_pokes
+from veca_marl.fidelity.touch.two_points import threshold_m
 from veca_marl.sim.geometry import Shape
 from veca_marl.sim.touch import TouchCfg
 
@@ -24,13 +25,30 @@ meets the bone; `docs/reference/touch.md` defines it.
   (the paper's formula), at every depth and for every radius of the receptive field.
 - **Pokes**: a fingertip presses end on at random points of the skin, by a quarter of the thickness
   of both skins. The share with a reading above 0.02 is counted.
+- **Two points**: two balls of 3 mm press by half of the skin. The threshold is the distance at
+  which three quarters of the pairs cause two maxima of the readings with a gap between them.
+  Values of adults: S. Weinstein in "The Skin Senses", ed. D. R. Kenshalo (1968), rounded.
 """
 RADII = (0.5, 1.0, 2.0)
 """Radii of receptive fields as multiples of the thickness of the skin; on the body 0.3 to 1.1."""
 _STEPS = 100
 _POKES = 120
 _DEPTH = 0.25
-_POINTS = "points (receptive_field=0)"
+_LEAST_NOTICED = 0.95
+_PAIRS = 24
+ADULT_MM = {
+    "l_index_distal": 2.5,
+    "l_hand": 10.0,
+    "head": 15.0,
+    "l_forearm": 35.0,
+    "l_upper_arm": 39.0,
+    "spine": 39.0,
+    "l_thigh": 42.0,
+    "l_shank": 45.0,
+    "l_foot": 20.0,
+}
+"""Two-point thresholds of adults, mm: finger, palm, forehead, forearm, upper arm, back, thigh, calf
+and foot (Weinstein 1968, rounded)."""
 
 
 def plane_error(radius: float) -> float:
@@ -63,12 +81,9 @@ def laws() -> Iterator[Law]:
 
 
 def poke_shares(receptive_field: float, count: int) -> dict[str, float]:
-    """Return the share of pokes that is noticed for each region of the body."""
+    """Return the share of pokes that is noticed on each bone."""
     rng = np.random.default_rng(1)
-    return {
-        region: noticed_pokes(region, _DEPTH, count, receptive_field, rng).share
-        for region in REGIONS
-    }
+    return {bone: noticed_pokes(bone, _DEPTH, count, receptive_field, rng).share for bone in BONES}
 
 
 def section() -> Section:
@@ -76,23 +91,44 @@ def section() -> Section:
     shares = poke_shares(TouchCfg().receptive_field, _POKES)
     everything = list(laws())
     everything += [
-        at_least(f"share of noticed pokes, {region}", "", 0.95 if region in _FULL else 0.9, share)
-        for region, share in shares.items()
+        at_least(f"share of noticed pokes, {bone}", "", _LEAST_NOTICED, share)
+        for bone, share in shares.items()
     ]
-    points = poke_shares(0.0, _POKES)
-    pokes = Plot(
-        "Noticed pokes of a fingertip",
-        "region",
-        "share",
-        [
-            Curve("receptive fields", list(shares), list(shares.values()), Mark.bars),
-            Curve(_POINTS, list(points), list(points.values()), Mark.points),
-        ],
+    resolution = two_point_thresholds_mm(_PAIRS)
+    everything.append(
+        at_most(
+            "two-point threshold of the palm over that of the back (adults: 0.26)",
+            "",
+            0.7,
+            resolution["l_hand"] / resolution["spine"],
+        )
     )
-    return Section("Touch", _TEXT, everything, [_over_depth(), pokes])
+    plots = [_over_depth(), _pokes(shares, poke_shares(0.0, _POKES)), _thresholds(resolution)]
+    return Section("Touch", _TEXT, everything, plots)
 
 
-_FULL = ("head", "trunk")  # the goal of 95 % is for these
+def two_point_thresholds_mm(count: int) -> dict[str, float]:
+    """Return the two-point threshold of the bones for which an adult's is known."""
+    rng = np.random.default_rng(2)
+    return {bone: 1000.0 * threshold_m(bone, count, rng) for bone in ADULT_MM}
+
+
+def _pokes(fields: dict[str, float], points: dict[str, float]) -> Plot:
+    """Return the share of noticed pokes over bones."""
+    curves = [
+        Curve("receptive fields", list(fields), list(fields.values()), Mark.bars),
+        Curve("points (receptive_field=0)", list(points), list(points.values()), Mark.points),
+    ]
+    return Plot("Noticed pokes of a fingertip", "bone", "share", curves)
+
+
+def _thresholds(measured: dict[str, float]) -> Plot:
+    """Return the two-point thresholds over bones, beside those of adults."""
+    curves = [
+        Curve("taxels", list(measured), list(measured.values()), Mark.bars),
+        Curve("adults (Weinstein 1968)", list(ADULT_MM), list(ADULT_MM.values()), Mark.points),
+    ]
+    return Plot("Two-point threshold", "bone", "distance (mm)", curves)
 
 
 def _over_depth() -> Plot:

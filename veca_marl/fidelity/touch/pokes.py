@@ -16,17 +16,8 @@ FINGERTIP = (Shape.CAPSULE, (0.0044, 0.004))
 FINGERTIP_SKIN_M = 0.0015
 NOTICED = 0.02
 """Readings above this count as sensed."""
-REGIONS = {
-    "head": ("head",),
-    "trunk": ("pelvis", "spine", "chest"),
-    "upper arm": ("l_upper_arm", "r_upper_arm"),
-    "forearm": ("l_forearm", "r_forearm"),
-    "hand": ("l_hand", "r_hand"),
-    "thigh": ("l_thigh", "r_thigh"),
-    "shank": ("l_shank", "r_shank"),
-    "foot": ("l_foot", "r_foot"),
-}
-"""Bones of each region of the body that is poked."""
+BONES = tuple(bone.name for bone in load_skeleton().bones if not bone.name.startswith("r_"))
+"""Bones that are poked; the right side mirrors the left."""
 
 
 @dataclass(frozen=True)
@@ -43,26 +34,26 @@ class Noticed:
 
 
 def noticed_pokes(
-    region: str, depth: float, count: int, receptive_field: float, rng: np.random.Generator
+    bone: str, depth: float, count: int, receptive_field: float, rng: np.random.Generator
 ) -> Noticed:
-    """Poke random points of the skin of a region with a fingertip, along the normal of the skin.
+    """Poke random points of the skin of a bone with a fingertip, along the normal of the skin.
 
     Points are distributed by area and lie on skin that no other bone covers.
 
     Args:
-        region: See `REGIONS`.
+        bone: Its name.
         depth: Penetration as a share of the thickness of both skins.
         count: Number of pokes.
         receptive_field: See `TouchCfg`.
         rng: Chooses the points.
     """
     body = BareBody(TouchCfg(receptive_field=receptive_field), *FINGERTIP, FINGERTIP_SKIN_M)
-    bones = [load_skeleton().bone(name) for name in REGIONS[region]]
+    index = load_skeleton().bone(bone)
+    skin_m = load_skeleton().bones[index].skin_thickness_m + FINGERTIP_SKIN_M
     length_m = FINGERTIP[1][0] + FINGERTIP[1][1] / 2
     largest = []
     for _ in range(count):
-        bone, place, normal = body.random_point(bones, rng)
-        skin_m = load_skeleton().bones[bone].skin_thickness_m + FINGERTIP_SKIN_M
+        place, normal = body.random_point(index, rng)
         readings = body.read((place + (length_m - depth * skin_m) * normal, normal))
         largest.append(readings.max())
     values = np.array(largest)

@@ -59,25 +59,30 @@ def taxel_reading(
     """
     away = distance(column.shape, column.size, base[0], base[1], base[2])
     if away <= 0.0:
-        return max(_reading_around(column, placed, base, normal, radius), known)
+        if known < 1.0:
+            known = max(_reading_around(column, placed, base, normal, radius, away), known)
+        return known
     if away * away >= column.length * column.length + radius * radius:
         return known
-    if away < column.length:
-        known = _column_reading(column, placed, base, normal, known)
-    if known < 1.0 and radius > 0.0:
+    if radius > 0.0:
         known = _field_reading(column, placed, base, normal, radius, known)
+    if 1.0 - away / column.length > known:  # the ray enters no nearer than the nearest point
+        known = _column_reading(column, placed, base, normal, known)
     return known
 
 
 @njit(cache=True, error_model="numpy")
 def _reading_around(
-    column: Column, placed: Floats, base: Vector, normal: Vector, radius: float
+    column: Column, placed: Floats, base: Vector, normal: Vector, radius: float, away: float
 ) -> float:
     """Return the reading of a taxel with its base inside the primitive.
 
     The ray enters at b, and b is also the nearest point m. The field is computed once more with b
     moved onto the bone, where the skin is fully displaced if that point is inside too.
     """
+    height = distance_to_placed(placed, column.bones, base[0], base[1], base[2])
+    if away + abs(height + column.inset) <= 0.0:  # wherever it is moved to, it is inside
+        return 1.0
     moved = moved_to_height(placed, column.bones, base, -column.inset)
     if distance(column.shape, column.size, moved[0], moved[1], moved[2]) <= 0.0:
         return 1.0
@@ -86,7 +91,7 @@ def _reading_around(
     )
     against = -(slope[1] * normal[0] + slope[2] * normal[1] + slope[3] * normal[2])
     straight = min(max(against, 0.0), 1.0) ** 2
-    share = _pressed_share(column, placed, base[0], base[1], base[2])
+    share = min(max(1.0 - (height + column.inset) / column.length, 0.0), 1.0)
     reading = max(min(straight, share), share * (1.0 - (1.0 - share) * (1.0 - straight)))
     if radius > 0.0:
         reading = _field_reading(column, placed, moved, normal, radius, reading)

@@ -50,7 +50,7 @@ from veca_marl.sim.touch.broad_phase import (
 )
 from veca_marl.sim.touch.contact import Column, taxel_reading
 from veca_marl.sim.touch.receptive_fields import Fields
-from veca_marl.sim.touch.rigid_bones import RigidBones, place_bone, shrunk
+from veca_marl.sim.touch.rigid_bones import RigidBones, is_farther, place_bone, shrunk
 from veca_marl.sim.touch.taxels import BARYCENTRIC, TaxelTable
 
 
@@ -132,6 +132,9 @@ def measure_penetration(
             inset = min(thickness, skin)
             primitive = _sensed_primitive(geoms, g, skin - inset)
             count = place_bone(geoms, own, bone, geoms.rotations[g], geoms.positions[g])
+            reach = thickness + skin - inset  # farther from the bone, no skin is displaced
+            if is_farther(primitive[0], primitive[1], own.placed, count, reach):
+                continue
             column = Column(
                 primitive[0], primitive[1], thickness + skin, thickness + inset, inset, count
             )

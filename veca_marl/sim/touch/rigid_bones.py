@@ -19,7 +19,8 @@ from veca_marl.sim.geometry import (
     distance_and_gradient,
 )
 
-_BOX, _CYLINDER = int(Shape.BOX), int(Shape.CYLINDER)
+_SPHERE, _BOX = int(Shape.SPHERE), int(Shape.BOX)
+_CYLINDER, _CAPSULE = int(Shape.CYLINDER), int(Shape.CAPSULE)
 _FAR_M = 1e9
 # columns of a row of placed bones: shape, size, position, and the three axes
 PLACED_COLUMNS = 16
@@ -105,6 +106,40 @@ def distance_to_placed(placed: Floats, count: int, x: float, y: float, z: float)
         shape, size, (a, b, c) = _local(placed, row, x, y, z)
         nearest = min(nearest, distance(shape, size, a, b, c))
     return nearest
+
+
+@njit(cache=True, error_model="numpy")
+def is_farther(shape: int, size: Vector, placed: Floats, count: int, reach: float) -> bool:
+    """Return whether a primitive is certainly farther than `reach` from the placed ones.
+
+    A lower bound of their distance: the distances of points on the axis of a sphere or capsule,
+    less its radius and less the longest way along the axis to one of the points.
+
+    Args:
+        shape: The `Shape` of the primitive.
+        size: Its size.
+        placed: Primitives in its axes, as from `place_bone`.
+        count: Their number.
+        reach: Metres.
+    """
+    if shape in (_SPHERE, _CAPSULE):
+        quarter = 0.125 * size[1]
+        for i in range(4):
+            z = (2 * i - 3) * quarter
+            if distance_to_placed(placed, count, 0.0, 0.0, z) <= reach + size[0] + quarter:
+                return False
+        return True
+    for row in range(count):
+        q = placed[row]
+        if int(q[0]) not in (_SPHERE, _CAPSULE):
+            return False
+        quarter = 0.125 * q[2]
+        for i in range(4):
+            z = (2 * i - 3) * quarter
+            x, y, z = q[4] + z * q[13], q[5] + z * q[14], q[6] + z * q[15]
+            if distance(shape, size, x, y, z) <= reach + q[1] + quarter:
+                return False
+    return True
 
 
 @njit(cache=True, error_model="numpy")
