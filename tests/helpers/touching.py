@@ -146,7 +146,8 @@ def _close(thing, bones, length, inset, bases, normals, radii):
     first = heights.argmin(axis=0)
     up = np.take_along_axis(outward, first[None, :, None], 0)[0]
     moved = bases + (-inset - heights.min(axis=0))[..., None] * up
-    return np.where(thing.distance(bases) <= 0.0, np.maximum(readings, field(moved)), readings)
+    onto_bone = np.where(thing.distance(moved) <= 0.0, 1.0, field(moved))
+    return np.where(thing.distance(bases) <= 0.0, np.maximum(readings, onto_bone), readings)
 
 
 class _Solid:
