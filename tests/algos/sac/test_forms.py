@@ -46,9 +46,10 @@ def test_it_learns_from_every_form(numbers, form, network):
     numbers.network.parameters, numbers.network.critic = parameters, critic
     learner = make_algorithm("team", FORMS[form], numbers, torch.device("cpu"))
     before = {name: p.clone() for name, p in learner.network.named_parameters()}
-    measured = learner.learn(random_batch({"team": FORMS[form]}))
+    batch = random_batch({"team": FORMS[form]})
+    measured = learner.learn(batch)
     assert list(measured) == list(learner.measures)
     assert all(math.isfinite(value) for value in measured.values())
-    assert measured["updates"] == 2.0
+    assert measured["updates"] == batch.numel() * numbers.updates_per_frame
     unchanged = [n for n, p in learner.network.named_parameters() if torch.equal(p, before[n])]
     assert unchanged == []

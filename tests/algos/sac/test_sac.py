@@ -74,6 +74,27 @@ def test_it_learns_from_shifted_images_with_an_encoder_trained_by_the_critics(ma
     assert measured["alpha"] != 0.1
 
 
+def test_first_values_are_small_against_the_rewards_of_a_step(make_sac, collect):
+    algorithm = make_sac(seed=0)
+    batch = collect(algorithm, seed=0)
+    with torch.no_grad():
+        features = algorithm.network.encoder(batch.flatten(0, 1))["agents", "features"]
+        action = batch["agents", "action"].flatten(0, 1)
+        values = algorithm.network.values(features, action)
+    assert float(values.abs().max()) < 0.05
+    assert float(values.std()) > 0.0
+
+
+def test_temperatures_have_a_step_size_of_their_own(make_sac, collect):
+    temperature = TemperatureCfg(0.1, Adaptation.automatic, learning_rate=0.02)
+    algorithm = make_sac(changes={"temperature": temperature, "updates_per_frame": 0.25})
+    algorithm.learn(collect(algorithm, seed=0))
+    before = {name: p.detach().clone() for name, p in algorithm.temperatures.named_parameters()}
+    algorithm.update()
+    steps = [p - before[name] for name, p in algorithm.temperatures.named_parameters()]
+    assert all(0.005 < float(step.detach().abs()) < 0.04 for step in steps)
+
+
 def test_it_learns_without_target_networks(make_sac, collect):
     critic = ActionValuesCfg(hidden=[32], normalisation=Normalisation.batch_renorm)
     changes = {"targets": Targets.same, "critic": critic, "updates_per_frame": 0.3}

@@ -114,8 +114,15 @@ class ActionValues(nn.Module):
         inputs = factory.features + vector
         if self.central:
             inputs += factory.features + vector + sum(choices)
+        # the first values are close to 0: those of a random layer are far larger than the rewards
+        # of a step, and a moving average of the critics takes long to lose them
         make = partial(
-            perceptron, inputs, cfg.hidden, self.combinations, norm=_LAYERS[cfg.normalisation]
+            perceptron,
+            inputs,
+            cfg.hidden,
+            self.combinations,
+            gain=0.01,
+            norm=_LAYERS[cfg.normalisation],
         )
         self.critics = nn.ModuleList(factory.per_agent(make) for _ in range(cfg.critics))
 

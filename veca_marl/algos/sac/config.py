@@ -62,16 +62,21 @@ class TemperatureCfg:
             dimensions (-1: Haarnoja et al. 2018; the uniform policy on [-1, 1] has 0.69).
         entropy_of_choices: Target entropy of a discrete part as a share of that of the uniform
             policy (ours; Christodoulou 2019 takes 0.98, which is close to a random policy).
+        learning_rate: Step size of Adam for the logarithms of automatic temperatures (ours: larger
+            than that of the networks, because the right temperature is proportional to the rewards
+            of a step, and those of the tasks differ by orders of magnitude).
     """
 
     initial: float = 0.01
     adaptation: Adaptation = Adaptation.fixed
     entropy_per_dimension: float = -1.0
     entropy_of_choices: float = 0.3
+    learning_rate: float = 2e-3
 
     def __post_init__(self) -> None:
-        if not self.initial > 0.0:
-            raise ValueError(f"temperature.initial must be positive, got {self.initial}")
+        for name in ("initial", "learning_rate"):
+            if not getattr(self, name) > 0.0:
+                raise ValueError(f"temperature.{name} must be positive, got {getattr(self, name)}")
         if not 0.0 <= self.entropy_of_choices <= 1.0:
             raise ValueError(
                 f"temperature.entropy_of_choices must be in [0, 1], got {self.entropy_of_choices}"
@@ -139,7 +144,7 @@ class SACCfg(AlgorithmCfg):
         gamma: Discount.
         steps: Number of rewards in a target before the value of the observation that follows
             (n-step returns; without correction for the policy that acted).
-        learning_rate: Step size of Adam, for all parameters.
+        learning_rate: Step size of Adam, for all parameters but the temperatures.
         batch_size: Frames in an update; those at which a batch or an episode ended are left out.
         sequence_steps: Consecutive steps through which gradients of a network with hidden state
             flow; an update has ``batch_size / sequence_steps`` such sequences. Not used without

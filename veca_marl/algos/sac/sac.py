@@ -64,8 +64,12 @@ class SAC(Algorithm):
         ).to(device)
         self._critics = [*trainable(self.network.encoder), *self.network.values.parameters()]
         self._policy = list(self.loss.policy.parameters())
-        learnt = [*self._critics, *self._policy, *self.temperatures.parameters()]
-        self.optimizer = torch.optim.Adam(learnt, lr=cfg.learning_rate, fused=True)
+        temperatures = {
+            "params": list(self.temperatures.parameters()),
+            "lr": cfg.temperature.learning_rate,
+        }
+        networks = {"params": [*self._critics, *self._policy]}
+        self.optimizer = torch.optim.Adam([networks, temperatures], cfg.learning_rate, fused=True)
         self.replay = Replay(StoredKeys.of(team, spec, memory), cfg.replay, span)
         self._windows = cfg.batch_size // span.length
         self._shift = RandomShift(team, spec, cfg.random_shift)
