@@ -10,6 +10,7 @@ import math
 from dataclasses import dataclass, field
 from itertools import combinations
 
+from veca_marl.sim.physics.impacts.cfg import ImpactCfg
 from veca_marl.sim.physics.prop_cfg import PropCfg, check_appearance
 from veca_marl.sim.physics.rooms import DoorCfg, RoomCfg
 from veca_marl.sim.sound import House, Room
@@ -42,7 +43,8 @@ class PlaygroundCfg:
         floor_checker_m: Edge of the floor's checker pattern.
         image_order: Greatest number of reflections of a sound, from 0 (the direct sound alone) to
             `GREATEST_IMAGE_ORDER`.
-        transmission_loss_db: Attenuation of a sound from another room by each obstacle.
+        transmission_loss_db: Attenuation of a sound by each obstacle that its path passes.
+        impacts: Sounds of things that hit each other or the floor.
     """
 
     name: str = ""
@@ -55,6 +57,7 @@ class PlaygroundCfg:
     floor_checker_m: float = 0.5
     image_order: int = 1
     transmission_loss_db: float = TRANSMISSION_LOSS_DB
+    impacts: ImpactCfg = field(default_factory=ImpactCfg)
 
     @property
     def floor_m2(self) -> float:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 
 from veca_marl.sim.sound import SoundCfg
+from veca_marl.sim.sound.impacts import Material
 
 
 class PropShape(Enum):
@@ -74,6 +75,7 @@ class PropCfg:
         transparent: Whether eyes see through it; it does not hinder `is_visible`.
         tangible: Whether it collides, is felt and stops sound; a mark on the floor is only seen.
         sound: What it emits; None for a silent prop.
+        material: How it sounds when it is hit, see `ImpactCfg`; it does not change the mass.
     """
 
     name: str = ""
@@ -90,6 +92,7 @@ class PropCfg:
     transparent: bool = False
     tangible: bool = True
     sound: SoundCfg | None = None
+    material: Material = Material.wood
 
     def __post_init__(self) -> None:
         """Check the numbers."""
@@ -103,6 +106,11 @@ class PropCfg:
         if not isinstance(self.shape, PropShape):
             shapes = [shape.name for shape in PropShape]
             raise ValueError(f"prop {self.name!r}: shape={self.shape!r}; there are {shapes}")
+        if not isinstance(self.material, Material):
+            materials = [material.name for material in Material]
+            raise ValueError(
+                f"prop {self.name!r}: material={self.material!r}; there are {materials}"
+            )
         names = SIZE_NAMES[self.shape]
         if len(self.size_m) != len(names) or not all(
             math.isfinite(size) and size > 0 for size in self.size_m

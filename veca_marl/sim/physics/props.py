@@ -31,6 +31,7 @@ class Prop:
         body_id: PyBullet's id.
         object_id: Its value in segmentation images.
         sound: Its sound source; None for a silent prop.
+        impact: The source of its sound when it is hit; None without sounds of impacts.
     """
 
     def __init__(
@@ -43,6 +44,7 @@ class Prop:
     ) -> None:
         self.cfg = cfg
         self.sound = sound
+        self.impact: Source | None = None
         self._client = client
         self._scene = scene
         geoms = prop_geoms(cfg)
@@ -125,8 +127,9 @@ class Prop:
         )
         self.set_velocity(velocity, angular_velocity)
         follow_physics([self])
-        if self.sound is not None:
-            self.sound.teleport(self.position)
+        for source in (self.sound, self.impact):
+            if source is not None:
+                source.teleport(self.position)
 
     def set_velocity(
         self,
@@ -178,6 +181,8 @@ def follow_physics(props: Sequence[Prop]) -> None:
             scene.positions[prop._row] -= scene.rotations[prop._row] @ prop._centre
         if prop.sound is not None:
             prop.sound.position = scene.positions[prop._row]
+        if prop.impact is not None:
+            prop.impact.position = scene.positions[prop._row]
         if prop._obstacle is not None:
             prop._obstacle.move(scene.positions[prop._row], scene.rotations[prop._row])
 

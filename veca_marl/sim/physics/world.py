@@ -12,6 +12,7 @@ from veca_marl.sim.physics.built_state import BuiltState, built_state
 from veca_marl.sim.physics.bullet import pybullet
 from veca_marl.sim.physics.clock import ClockCfg
 from veca_marl.sim.physics.floor import FLOOR_NAME, add_floor
+from veca_marl.sim.physics.impacts.sounds import ImpactSounds
 from veca_marl.sim.physics.mover import Mover
 from veca_marl.sim.physics.playground import PlaygroundCfg, make_house
 from veca_marl.sim.physics.prop_body import limit_detection
@@ -60,6 +61,10 @@ class World:
         self._built: BuiltState | None = None
         self._moving: list[Prop] = []
         self._configure_physics()
+        self._impacts: ImpactSounds | None = None
+        if playground.impacts.present:
+            self._impacts = ImpactSounds(playground.impacts, self.clock, self.client, self.sound)
+            self.after_substep.append(self._impacts.after_substep)
         self.floor_id = add_floor(self.client, self.scene, playground)
         for prop in playground.props:
             self.add_prop(prop)
@@ -80,6 +85,8 @@ class World:
         prop = Prop(cfg, self.client, self.scene, source, self.house.obstacles)
         limit_detection(prop.body_id, cfg, self.client, self.clock)
         self.props[cfg.name] = prop
+        if self._impacts is not None:
+            self._impacts.add(prop)
         if not prop.fixed:
             self._moving.append(prop)
         return prop
@@ -125,6 +132,8 @@ class World:
         pybullet.restoreState(self._state, physicsClientId=self.client)
         self._built.restore(self.scene)
         self.sound.reset(rng)
+        if self._impacts is not None:
+            self._impacts.reset()
         follow_physics(list(self.props.values()))
         for mover in self.movers:
             mover.reset()

@@ -72,6 +72,7 @@ class Gait:
     Attributes:
         phase: Of the stride, in [0, 1).
         angles: ``(82,)`` rad, as of the last `pose`.
+        landing_mps: Speed at which a foot landed in the last `advance`; 0 if none did.
     """
 
     def __init__(self, skeleton: Skeleton, cfg: GaitCfg | None = None) -> None:
@@ -110,7 +111,7 @@ class Gait:
 
     def reset(self) -> None:
         """Stand still."""
-        self.phase = 0.0
+        self.phase = self.landing_mps = 0.0
         self._speed_mps = self._turn_radps = 0.0
         self._kick_left_s = 0.0
 
@@ -129,7 +130,10 @@ class Gait:
         follow = 1.0 - math.exp(-step_s / self.cfg.settle_s)
         self._speed_mps += follow * (speed_mps - self._speed_mps)
         self._turn_radps += follow * (turn_radps - self._turn_radps)
-        self.phase = (self.phase + _STANCE * step_s / self._stance_s()) % 1.0
+        before = self.phase
+        self.phase = (before + _STANCE * step_s / self._stance_s()) % 1.0
+        landed = (before < _STANCE) != (self.phase < _STANCE)
+        self.landing_mps = self._landing_mps() if landed else 0.0
         if self._kick_left_s > 0.0:
             self._kick_left_s -= step_s
             self.phase = 0.5  # the kicking foot is about to land
@@ -153,6 +157,10 @@ class Gait:
     def _share(self) -> float:
         """Return the length of the stride as a fraction of the full one."""
         return min(1.0, self._pace_mps() / self.cfg.full_stride_mps)
+
+    def _landing_mps(self) -> float:
+        """Return the vertical speed of a foot at the end of its swing."""
+        return math.pi * self.cfg.lift_m * self._share() / self._stance_s()
 
     def _stance_s(self) -> float:
         """Return the duration of the stance."""

@@ -17,6 +17,7 @@ from veca_marl.sim.body.anatomy import Soles, forward_kinematics
 from veca_marl.sim.body.base import Body
 from veca_marl.sim.body.body_cfg import BodyCfg
 from veca_marl.sim.body.walker.capsule import Capsule
+from veca_marl.sim.body.walker.footsteps import Footsteps
 from veca_marl.sim.body.walker.gait import Gait
 from veca_marl.sim.body.walker.line_of_contact import is_first_hit
 from veca_marl.sim.body.walker.walk_commands import WALK_ACTIONS
@@ -43,6 +44,8 @@ class Walker(Body):
         self._gait = Gait(self._skeleton)
         self._capsule = Capsule(world.client, cfg.radius_m, cfg.height_m, cfg.push_limit_kg)
         self._soles = Soles(self._skeleton)
+        mass_kg = sum(bone.mass_kg for bone in self._skeleton.bones)
+        self._footsteps = Footsteps(name, mass_kg, world)
         self.reset()
         walker_collisions(world).add(self)
 
@@ -216,6 +219,7 @@ class Walker(Body):
         self._pelvis_velocity[:] = self._velocity
         self._pelvis_spin[2] = self._turn_radps
         self._mouth.position = self.mount("mouth").position
+        self._footsteps.follow(self.position, self._gait.landing_mps)
 
     def _collect_obstacles(self, distance_m: float) -> None:
         movers = self._world.movers

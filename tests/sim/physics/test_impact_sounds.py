@@ -1,0 +1,121 @@
+"""Sounds of impacts: silent at rest, louder with the impulse, deterministic."""
+
+import numpy as np
+import pytest
+
+from veca_marl.sim.body.walker import Walker, WalkerCfg
+from veca_marl.sim.physics import PlaygroundCfg, World
+from veca_marl.sim.physics.impacts.cfg import ImpactCfg
+from veca_marl.sim.physics.impacts.sounds import prop_modes
+from veca_marl.sim.physics.prop_cfg import PropCfg, PropShape
+from veca_marl.sim.sound.impacts import Material
+
+
+def ball(height_m, material=Material.wood):
+    return PropCfg(
+        "ball", PropShape.sphere, [0.1], (0.0, 0.0, height_m), mass_kg=0.3, material=material
+    )
+
+
+def rod(material=Material.wood, length=0.4, thickness=0.02):
+    size = [length, 0.05, thickness]
+    return PropCfg(
+        "rod", PropShape.box, size, (1.5, 1.5, thickness / 2), mass_kg=0.2, material=material
+    )
+
+
+def world_with(*props, **impacts):
+    impacts.setdefault("present", True)
+    return World(PlaygroundCfg("test", props=list(props), impacts=ImpactCfg(**impacts)))
+
+
+def emitted(world, name, n_steps, act=lambda step: None):
+    """Samples that a source emits after a reset, ``(n_steps, n)``."""
+    samples = []
+    world.reset(np.random.default_rng(0))
+    sound = world.sound.sources[name].sound
+    original = sound.emit
+    sound.emit = lambda n: samples.append(original(n)) or samples[-1]
+    for step in range(n_steps):
+        act(step)
+        world.step()
+    sound.emit = original
+    return np.array(samples)
+
+
+@pytest.fixture
+def dropped():
+    def drop(height_m, n_steps=40, **impacts):
+        world = world_with(ball(height_m), **impacts)
+        world.freeze()
+        heard = emitted(world, "ball.impact", n_steps)
+        again = emitted(world, "ball.impact", n_steps)
+        world.close()
+        assert heard.tobytes() == again.tobytes()
+        return heard
+
+    return drop
+
+
+def test_a_falling_ball_is_heard_when_it_lands_and_not_before_or_when_it_rests(dropped):
+    heard = dropped(0.6, n_steps=100)
+    falls_s = np.sqrt(2.0 * 0.5 / 9.81)
+    first = np.flatnonzero(heard.any(axis=1))[0]
+    assert first == pytest.approx(falls_s / 0.04, abs=1.0)
+    assert not heard[-20:].any()
+
+
+def test_energy_grows_with_the_square_of_the_impulse(dropped):
+    """Twice the speed of impact: four times the energy."""
+    energies = []
+    for height in (0.1 + 0.2, 0.1 + 0.8):
+        heard = dropped(height)
+        first = np.flatnonzero(heard.any(axis=1))[0]
+        energies.append((heard[first : first + 2].astype(float) ** 2).sum())
+    assert energies[1] / energies[0] == pytest.approx(4.0, rel=0.2)
+
+
+def test_things_at_rest_and_rolling_are_silent():
+    world = world_with(ball(0.1), rod())
+    world.freeze()
+    roll = lambda step: world.prop("ball").set_velocity((1, 0, 0), (0, 10, 0)) if step == 5 else 0  # noqa: E731
+    assert not emitted(world, "ball.impact", 30, roll).any()
+    world.close()
+
+
+def test_without_the_option_there_are_no_sources():
+    world = world_with(ball(0.5), present=False)
+    assert not world.sound.sources
+    world.close()
+
+
+def test_material_and_size_determine_pitch_and_decay():
+    wood, metal, longer = (
+        prop_modes(rod()),
+        prop_modes(rod(Material.metal)),
+        prop_modes(rod(length=0.8)),
+    )
+    # Euler & Bernoulli, free ends: 1.028 h / L^2 sqrt(E / rho)
+    theory = 1.028 * 0.02 / 0.4**2 * np.sqrt(1e10 / 600.0)
+    assert wood.frequencies_hz[0] == pytest.approx(theory, rel=1e-3)
+    assert wood.frequencies_hz[1] / wood.frequencies_hz[0] == pytest.approx(2.757, abs=1e-3)
+    assert longer.frequencies_hz[0] == pytest.approx(wood.frequencies_hz[0] / 4.0)
+    assert metal.decay_per_s[0] < 0.2 * wood.decay_per_s[0]
+
+
+def test_a_walker_is_heard_when_it_walks_and_silent_when_it_stands():
+    world = world_with()
+    walker = Walker("child", WalkerCfg(), world)
+    world.freeze()
+    walk = lambda step: walker.walk(0.0 if step >= 50 else 1.0, 0.0)  # noqa: E731
+    heard = emitted(world, "child.steps", 100, walk)
+    world.close()
+    steps = np.flatnonzero(np.abs(heard[:50]).max(axis=1) > 0.01)
+    assert len(steps) >= 8  # a foot lands every 0.2 m
+    assert not heard[-20:].any()
+
+
+@pytest.mark.parametrize("wrong", [{"gain_per_ns": 0.0}, {"min_speed_mps": float("nan")}])
+def test_impossible_numbers_are_refused(wrong):
+    with pytest.raises(ValueError, match=f"impacts.{next(iter(wrong))}"):
+        ImpactCfg(**wrong)

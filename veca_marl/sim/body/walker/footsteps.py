@@ -1,0 +1,63 @@
+"""The sound of a walker's steps."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from veca_marl.sim.geometry import Floats
+from veca_marl.sim.physics import World
+from veca_marl.sim.sound.impacts import (
+    MATERIALS,
+    Material,
+    StruckBody,
+    acceleration_noise,
+    bar_modes,
+)
+
+_FOOT_MASS_SHARE = 0.06
+"""Effective mass of a foot that lands, as a share of the body's: 6.3 % in walking, 5.3 % in running
+(Chi & Schmitt 2005, Mechanical energy and effective foot mass during impact loading)."""
+
+_FLOOR = replace(MATERIALS[Material.wood], loss_tangent=0.1)
+"""Boards that lie on joists lose more than free ones; the value is ours."""
+
+_BOARD_M = (0.6, 0.02)  # length and thickness of a floorboard, which the foot excites
+_SOLE_M = 0.03  # radius of a sphere with the volume of a child's forefoot
+
+
+class Footsteps:
+    """Strikes a floorboard under a walker whenever one of its feet lands."""
+
+    def __init__(self, name: str, mass_kg: float, world: World) -> None:
+        """Add the source of sound of a walker.
+
+        Args:
+            name: Of the walker.
+            mass_kg: Of the walker.
+            world: Its world; nothing is added unless it has sounds of impacts.
+        """
+        impacts = world.playground.impacts
+        self._foot_kg = _FOOT_MASS_SHARE * mass_kg
+        self._min_speed_mps = impacts.min_speed_mps
+        self._board: StruckBody | None = None
+        if impacts.present:
+            sole = MATERIALS[Material.rubber]
+            length, thickness = _BOARD_M
+            modes = bar_modes(length, thickness / 12.0**0.5, _FLOOR)
+            click = acceleration_noise(_SOLE_M, sole.contact_s)
+            rate = world.sound.sample_rate_hz
+            self._board = StruckBody(modes + click, impacts.gain_per_ns, rate)
+            self._source = world.sound.add_source(f"{name}.steps", self._board)
+
+    def follow(self, position: Floats, landing_speed_mps: float) -> None:
+        """Sound at a place on the floor if a foot has landed in this agent step.
+
+        Args:
+            position: ``(3,)`` metres.
+            landing_speed_mps: Speed at which a foot has landed; 0 if none has.
+        """
+        if self._board is None:
+            return
+        self._source.position = position
+        if landing_speed_mps > self._min_speed_mps:
+            self._board.strike(self._foot_kg * landing_speed_mps, 0)

@@ -1,0 +1,1 @@
+"""Sounds of things that hit each other or the floor."""

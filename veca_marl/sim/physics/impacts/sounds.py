@@ -1,0 +1,122 @@
+"""Sounds of things that hit each other or the floor, from the contact impulses of Bullet."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+
+from veca_marl.sim.physics.bullet import pybullet
+from veca_marl.sim.physics.clock import ClockCfg
+from veca_marl.sim.physics.impacts.cfg import ImpactCfg
+from veca_marl.sim.physics.prop_cfg import PropCfg, PropShape
+from veca_marl.sim.physics.props import Prop
+from veca_marl.sim.sound import SoundField
+from veca_marl.sim.sound.impacts import (
+    MATERIALS,
+    Modes,
+    StruckBody,
+    acceleration_noise,
+    bar_modes,
+    sphere_modes,
+)
+
+_GRAVITY_MPS2 = 9.81
+_BODY_A, _BODY_B, _NORMAL_FORCE = 1, 2, 9  # in a contact point of PyBullet
+
+
+class ImpactSounds:
+    """Strikes the movable props of a world when the impulse of a contact rises.
+
+    An impulse that stays the same from one physics step to the next is that of a thing at rest or
+    rolling: it is silent. Fixed props, the floor and bodies do not sound.
+    """
+
+    def __init__(self, cfg: ImpactCfg, clock: ClockCfg, client: int, sound: SoundField) -> None:
+        self._cfg = cfg
+        self._clock = clock
+        self._client = client
+        self._sound = sound
+        self._samples_per_substep = sound.step_samples / clock.substeps
+        self._props: dict[int, Prop] = {}
+        self._struck: dict[int, StruckBody] = {}
+        self._impulses: dict[tuple[int, int], float] = {}
+        self._substep = 0
+
+    def add(self, prop: Prop) -> None:
+        """Let a prop sound when it is hit; nothing happens for fixed props."""
+        if prop.fixed:
+            return
+        body = StruckBody(prop_modes(prop.cfg), self._cfg.gain_per_ns, self._sound.sample_rate_hz)
+        self._props[prop.body_id], self._struck[prop.body_id] = prop, body
+        prop.impact = self._sound.add_source(f"{prop.name}.impact", body)
+
+    def reset(self) -> None:
+        """Forget the contacts of the last physics step."""
+        self._impulses.clear()
+        self._substep = 0
+
+    def after_substep(self) -> None:
+        """Compare the impulses of all contacts with those of the last physics step."""
+        impulses = self._contact_impulses()
+        delay = int(self._substep * self._samples_per_substep)
+        for pair, impulse in impulses.items():
+            rise = impulse - self._impulses.get(pair, 0.0)
+            if rise > self._threshold_ns(pair):
+                self._strike(pair, rise, delay)
+        self._impulses = impulses
+        self._substep = (self._substep + 1) % self._clock.substeps
+
+    def _contact_impulses(self) -> dict[tuple[int, int], float]:
+        impulses: dict[tuple[int, int], float] = {}
+        for point in pybullet.getContactPoints(physicsClientId=self._client):
+            pair = (point[_BODY_A], point[_BODY_B])
+            if pair[0] in self._struck or pair[1] in self._struck:
+                impulse = point[_NORMAL_FORCE] * self._clock.substep_s
+                impulses[pair] = impulses.get(pair, 0.0) + impulse
+        return impulses
+
+    def _threshold_ns(self, pair: Iterable[int]) -> float:
+        """Return the impulse below which a contact of two bodies is silent.
+
+        The weight of a thing that is put down counts as no impact.
+        """
+        masses = [self._props[body].cfg.mass_kg for body in pair if body in self._props]
+        weight = _GRAVITY_MPS2 * self._clock.substep_s
+        return min(masses) * (self._cfg.min_speed_mps + weight)
+
+    def _strike(self, pair: Iterable[int], impulse_ns: float, delay_samples: int) -> None:
+        for body in pair:
+            if body in self._struck:
+                self._struck[body].strike(impulse_ns, delay_samples)
+
+
+def prop_modes(cfg: PropCfg) -> Modes:
+    """Return the modes of a prop by its shape, size and material.
+
+    A sphere rings as a solid sphere, every other shape as a free bar of its greatest length.
+    """
+    material = MATERIALS[cfg.material]
+    click = acceleration_noise(equal_volume_radius_m(cfg), material.contact_s)
+    if cfg.shape is PropShape.sphere:
+        return sphere_modes(cfg.size_m[0], material) + click
+    if cfg.shape in (PropShape.cylinder, PropShape.capsule):
+        radius, length = cfg.size_m
+        if cfg.shape is PropShape.capsule:
+            length += 2.0 * radius
+        return bar_modes(length, 0.5 * radius, material) + click
+    shortest, _, longest = sorted(cfg.size_m)
+    return bar_modes(longest, shortest / math.sqrt(12.0), material) + click
+
+
+def equal_volume_radius_m(cfg: PropCfg) -> float:
+    """Return the radius of the sphere with the volume of a prop."""
+    if cfg.shape is PropShape.sphere:
+        return cfg.size_m[0]
+    if cfg.shape in (PropShape.cylinder, PropShape.capsule):
+        radius, length = cfg.size_m
+        volume = math.pi * radius**2 * length
+        if cfg.shape is PropShape.capsule:
+            volume += 4.0 / 3.0 * math.pi * radius**3
+    else:
+        volume = math.prod(cfg.size_m)
+    return float((volume / (4.0 / 3.0 * math.pi)) ** (1.0 / 3.0))
