@@ -169,18 +169,27 @@ def rebound_laws(substeps: int, restitution: float, ratios: list[float]) -> Iter
     yield between(f"greatest ratio of rebound and impact speed, {at}", "", low, high, max(ratios))
 
 
+def _rebounds(restitution: float) -> tuple[list[Law], Plot]:
+    """Measure falls from all heights at all time steps with one restitution."""
+    theory = [restitution] * len(HEIGHTS_M)
+    laws, curves = [], [Curve("restitution", HEIGHTS_M, theory, Mark.dashes)]
+    for steps in SUBSTEPS:
+        ratios = [rebound_ratio(steps, restitution, height) for height in HEIGHTS_M]
+        laws += rebound_laws(steps, restitution, ratios)
+        curves.append(Curve(f"step {40 / steps:g} ms", HEIGHTS_M, ratios, Mark.points))
+    title = f"Rebound over impact speed, restitution {restitution:g}"
+    return laws, Plot(title, "height of fall (m)", "ratio", curves)
+
+
 def section() -> Section:
     """Return the measured section."""
     laws = [law for shape in _SHAPES for steps in SUBSTEPS for law in impact_laws(steps, shape)]
-    curves = []
+    plots = []
     for restitution in RESTITUTIONS:
-        for steps in SUBSTEPS:
-            ratios = [rebound_ratio(steps, restitution, height) for height in HEIGHTS_M]
-            laws += rebound_laws(steps, restitution, ratios)
-            label = f"restitution {restitution:g}, step {40 / steps:g} ms"
-            curves.append(Curve(label, HEIGHTS_M, ratios, Mark.points))
+        rebounds, plot = _rebounds(restitution)
+        laws += rebounds
+        plots.append(plot)
     for steps in SUBSTEPS:
         name = f"depth of a resting ball, step {40 / steps:g} ms"
         laws.append(between(name, "m", -1e-4, 1e-4, resting_depth(steps)))
-    plot = Plot("Rebound over impact speed", "height of fall (m)", "ratio", curves)
-    return Section("Collisions", _TEXT, laws, [plot])
+    return Section("Collisions", _TEXT, laws, plots)

@@ -10,10 +10,10 @@ from veca_marl.reports.figure import check_plotting
 
 _SIZE_INCHES = (6.5, 4.0)
 _DPI = 100
-_STYLES: dict[Mark, dict[str, str]] = {
+_STYLES: dict[Mark, dict[str, Any]] = {
     Mark.line: {"ls": "-"},
     Mark.dashes: {"ls": "--"},
-    Mark.points: {"ls": "", "marker": "."},
+    Mark.points: {"ls": "", "marker": "o", "ms": 4},
 }
 
 
