@@ -172,7 +172,8 @@ def rebound_laws(substeps: int, restitution: float, ratios: list[float]) -> Iter
 def _rebounds(restitution: float) -> tuple[list[Law], Plot]:
     """Measure falls from all heights at all time steps with one restitution."""
     theory = [restitution] * len(HEIGHTS_M)
-    laws, curves = [], [Curve("restitution", HEIGHTS_M, theory, Mark.dashes)]
+    laws: list[Law] = []
+    curves = [Curve("restitution", HEIGHTS_M, theory, Mark.dashes)]
     for steps in SUBSTEPS:
         ratios = [rebound_ratio(steps, restitution, height) for height in HEIGHTS_M]
         laws += rebound_laws(steps, restitution, ratios)
