@@ -159,8 +159,8 @@ class BareBody:
             centre, rotation = part.pose
             axes = turn @ rotation
             x, y, z = axes.T @ (place - origin - turn @ centre)
-            size = (*part.size, 0.0, 0.0)[:3]
-            away = distance_and_gradient(int(part.shape), size, x, y, z)
+            size = (*part.size, 0.0, 0.0)
+            away = distance_and_gradient(int(part.shape), (size[0], size[1], size[2]), x, y, z)
             found.append((away[0], axes @ np.array(away[1:])))
         nearest: tuple[float, Floats] = min(found, key=lambda entry: entry[0])
         return nearest

@@ -44,5 +44,5 @@ def overlapping_triangles(share: float) -> Bools:
         empty_workspace(taxels, len(vertices), len(scene.geoms.shapes)),
         readings,
     )
-    overlapping: Bools = readings.any(axis=1)
+    overlapping: Bools = readings.max(axis=1) > 0.0
     return overlapping
