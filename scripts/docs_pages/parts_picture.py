@@ -17,7 +17,8 @@ from veca_marl.sim.vision import Camera, look_at
 mpl.use("Agg")
 import matplotlib.pyplot as plt
 
-_AWAY_M, _MIDDLE_M = 1.5, np.array([0.0, 0.0, 0.05])
+_ABOVE_M = 2.0  # above the floor, where there are no contact shadows
+_AWAY_M, _MIDDLE_M = 1.5, np.array([0.0, 0.0, _ABOVE_M + 0.03])
 _WALL_M = 2.5  # white walls in front of and behind the body are the background
 
 
@@ -29,10 +30,13 @@ def parts_picture(path: Path) -> None:
         wall = Geom(Shape.BOX, (0.01, 5.0, 5.0), (way * _WALL_M, 0.0, 0.0), colour=(1.0, 1.0, 1.0))
         scene.add_object(f"wall {way}", [[wall]])
     body.positions[:], body.rotations[:] = binding_pose(skeleton)
+    body.positions[:, 2] += _ABOVE_M
     scene.surfaces.colours[len(scene.geoms.shapes) :] = part_colours()
     scene.update()
-    camera = Camera(360, 420, fov_deg=36.0)
-    views = [look_at(np.array([way * _AWAY_M, 0.0, 0.1]), _MIDDLE_M) for way in (1.0, -1.0)]
+    camera = Camera(360, 420, fov_deg=34.0)
+    views = [
+        look_at(_MIDDLE_M + np.array([way * _AWAY_M, 0.0, 0.05]), _MIDDLE_M) for way in (1.0, -1.0)
+    ]
     plt.imsave(path, np.concatenate(list(camera.render(scene, views).rgb), axis=1))
 
 
