@@ -2,7 +2,7 @@
 
 from veca_marl.sim.body.anatomy.bone_motion import bone_motion
 from veca_marl.sim.body.anatomy.bone_tables import limit_sources, load_skeleton
-from veca_marl.sim.body.anatomy.kinematics import forward_kinematics
+from veca_marl.sim.body.anatomy.kinematics import forward_kinematics, rotate_about_axis
 from veca_marl.sim.body.anatomy.skeleton import Bone, Joint, Skeleton
 from veca_marl.sim.body.anatomy.skin_mesh import binding_pose, load_skin
 from veca_marl.sim.body.anatomy.skin_springs import (
@@ -34,6 +34,7 @@ __all__ = [
     "limit_sources",
     "load_skeleton",
     "load_skin",
+    "rotate_about_axis",
     "skin_layer",
     "skin_spring",
 ]

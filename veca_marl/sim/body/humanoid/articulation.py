@@ -10,17 +10,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veca_marl.sim.body.anatomy import Build, Skeleton, body_files, bone_of
+from veca_marl.sim.body.humanoid.dynamics import BodyDynamics
+from veca_marl.sim.body.humanoid.dynamics.tree import read_tree
 from veca_marl.sim.body.humanoid.self_collision import allow_self_collision
 from veca_marl.sim.geometry import (
     Floats,
     Pose,
     cross,
     matrix_to_quaternion,
-    quaternions_to_matrices,
 )
 from veca_marl.sim.physics import pybullet
 
-_TOP_SPEED = 30.0  # rad/s of a joint and m/s of the body: twice the speed of human limbs
+_TOP_SPEED_RADPS = 30.0  # of a joint: twice the speed of human limbs
+# Bullet clips the speed of each joint without its reaction on the body, which adds momentum: its
+# limit is so high that it never acts
+_BULLET_TOP_SPEED = 1000.0
 _FLAGS = (
     pybullet.URDF_USE_INERTIA_FROM_FILE
     | pybullet.URDF_MAINTAIN_LINK_ORDER
@@ -56,10 +60,11 @@ class Articulation:
     Attributes:
         body_id: Bullet's id.
         moving: ``(n,)`` indices of the joints that move, ascending.
-        angles: ``(82,)`` rad, at the last `read` or `place`.
+        angles: ``(82,)`` rad, at the last `read` or `settle`.
         speeds: ``(82,)`` rad/s.
         strengths_nm: ``(82,)`` N m, the greatest torque of each joint; 0 for fixed joints.
         damping: ``(82,)`` N m s/rad.
+        dynamics: Mass matrix and momentum.
     """
 
     def __init__(self, client: int, skeleton: Skeleton, build: Build) -> None:
@@ -74,16 +79,17 @@ class Articulation:
         found = {names[i[1].decode()]: i for i in infos if i[2] == pybullet.JOINT_REVOLUTE}
         self.moving: NDArray[np.int64] = np.array(sorted(found))
         self._links: list[int] = [found[joint][0] for joint in sorted(found)]
-        self._low = np.array([skeleton.joints[joint].low_rad for joint in self.moving])
-        self._high = np.array([skeleton.joints[joint].high_rad for joint in self.moving])
+        low = np.array([skeleton.joints[joint].low_rad for joint in self.moving])
+        high = np.array([skeleton.joints[joint].high_rad for joint in self.moving])
         count = len(skeleton.joints)
         self.angles, self.speeds = np.zeros(count), np.zeros(count)
         self.strengths_nm, self.damping = np.zeros(count), np.zeros(count)
         self.strengths_nm[self.moving] = [found[joint][10] for joint in self.moving]
         self.damping[self.moving] = [found[joint][6] for joint in self.moving]
         self._base_centre = np.array(self._dynamics(-1)[3])
-        self._turn = np.zeros((1, 3, 3))
+        self.dynamics = BodyDynamics(read_tree(client, self.body_id), low, high, _TOP_SPEED_RADPS)
         self._prepare(infos, {bone.name for bone in skeleton.bones})
+        self.read()
 
     def _prepare(self, infos: list[tuple[Any, ...]], bones: set[str]) -> None:
         """Disable Bullet's motors, limit the joint speeds and choose which links collide."""
@@ -98,7 +104,7 @@ class Articulation:
             -1,
             linearDamping=0.0,
             angularDamping=0.0,
-            maxJointVelocity=_TOP_SPEED,
+            maxJointVelocity=_BULLET_TOP_SPEED,
             physicsClientId=self._client,
         )
         pybullet.setJointMotorControlArray(
@@ -112,33 +118,63 @@ class Articulation:
     # ---- reading
 
     def read(self) -> bool:
-        """Read the joints; return whether all numbers are finite, keep the last ones if not."""
-        states = pybullet.getJointStates(self.body_id, self._links, physicsClientId=self._client)
-        # zip first: an array of tuples costs three times an array of numbers
-        angles, speeds = (np.array(part) for part in list(zip(*states, strict=True))[:2])
-        if not (np.isfinite(angles).all() and np.isfinite(speeds).all()):
+        """Read the state from Bullet; return whether all numbers are finite, keep the last if not.
+
+        Call it after everything but a physics step that changes pose or velocity.
+        """
+        position = self._read()
+        if position is None:
             return False
-        self.angles[self.moving] = angles
-        self.speeds[self.moving] = speeds
+        self.dynamics.begin(position)
+        self._copy_joints()
         return True
 
-    def motion(self) -> Motion:
-        """Read pose and velocity of the pelvis."""
-        centre, quaternion = pybullet.getBasePositionAndOrientation(
+    def settle(self, step_s: float) -> bool:
+        """Read the state after a physics step, apply joint limits and restore the momentum.
+
+        Return whether all numbers are finite; if not, keep the last ones.
+
+        Measured: two thirds of the time of writing the joints is saved in the next physics step,
+        probably because Bullet updates the bounding boxes of all links here instead of there.
+        """
+        if self._read() is None:
+            return False
+        changed = self.dynamics.settle(step_s)
+        self._copy_joints()
+        if changed.size:
+            self._set(changed)
+        state = self.dynamics.state
+        self._set_base(state.position, self.dynamics.solver.quaternion, state.velocity)
+        return True
+
+    def _read(self) -> Floats | None:
+        """Read Bullet's state; return the base's position, or None if a number is not finite."""
+        states = pybullet.getJointStates(self.body_id, self._links, physicsClientId=self._client)
+        position, quaternion = pybullet.getBasePositionAndOrientation(
             self.body_id, physicsClientId=self._client
         )
         velocity, spin = pybullet.getBaseVelocity(self.body_id, physicsClientId=self._client)
-        quaternions_to_matrices(np.array([quaternion]), self._turn)
-        rotation = self._turn[0].copy()
-        lever = rotation @ self._base_centre  # Bullet gives the centre of mass
-        pose = Pose(np.array(centre) - lever, rotation)
-        return Motion(pose, np.array(velocity) - cross(spin, lever), np.array(spin))
+        # zip first: an array of tuples costs three times an array of numbers
+        angles, speeds = list(zip(*states, strict=True))[:2]
+        row = np.array(quaternion + position + spin + velocity + speeds + angles)
+        if not np.isfinite(row).all():
+            return None
+        solver, ends = self.dynamics.solver, 13 + len(speeds)
+        solver.quaternion[:], solver.velocity[:] = row[:4], row[7:ends]
+        solver.angles[:] = row[ends:]
+        return row[4:7]
 
-    def mass_matrix(self) -> Floats:
-        """Return the joint-space inertia ``(6 + n, 6 + n)``: base first, then `moving` joints."""
-        angles = list(self.angles[self.moving])
-        return np.array(
-            pybullet.calculateMassMatrix(self.body_id, angles, physicsClientId=self._client)
+    def _copy_joints(self) -> None:
+        state = self.dynamics.state
+        self.angles[self.moving], self.speeds[self.moving] = state.angles, state.velocity[6:]
+
+    def motion(self) -> Motion:
+        """Return pose and velocity of the pelvis at the last `read` or `settle`."""
+        state = self.dynamics.state
+        rotation, spin = state.rotation.copy(), state.velocity[:3].copy()
+        lever = rotation @ self._base_centre  # Bullet's position is that of the centre of mass
+        return Motion(
+            Pose(state.position - lever, rotation), state.velocity[3:6] - cross(spin, lever), spin
         )
 
     # ---- moving
@@ -157,30 +193,23 @@ class Articulation:
         """Set the pose of the pelvis and all joint angles, at rest."""
         self.angles[self.moving], self.speeds[:] = angles[self.moving], 0.0
         centre = pose.position + pose.rotation @ self._base_centre
-        turn = matrix_to_quaternion(pose.rotation)
-        pybullet.resetBasePositionAndOrientation(
-            self.body_id, centre, turn, physicsClientId=self._client
-        )
-        still = (0.0, 0.0, 0.0)
-        pybullet.resetBaseVelocity(self.body_id, still, still, physicsClientId=self._client)
+        self._set_base(centre, matrix_to_quaternion(pose.rotation), np.zeros(6))
         self._set(np.arange(len(self._links)))
 
-    def hold_limits(self) -> None:
-        """Set joints that passed a limit back to it and keep their velocity. Call after `read`.
+    def set_speeds(self, speeds: Floats) -> None:
+        """Set all joint speeds ``(82,)``, rad/s, with the base as it is."""
+        self.speeds[self.moving] = speeds[self.moving]
+        self._set(np.arange(len(self._links)))
 
-        Bullet detects a limit only once it is passed. At the limit its own constraint is active and
-        removes the velocity with the right reaction on the rest of the body; removing it here would
-        add momentum.
-
-        Measured: two thirds of the cost is saved in the next physics step, probably because Bullet
-        updates the bounding boxes of all links here instead of there.
-        """
-        angles = self.angles[self.moving]
-        held = np.minimum(np.maximum(angles, self._low), self._high)
-        (beyond,) = (held != angles).nonzero()
-        if beyond.size:
-            self.angles[self.moving] = held
-            self._set(beyond)
+    def _set_base(self, position: Floats, quaternion: Floats, velocity: Floats) -> None:
+        """Set position, orientation and ``(6,)`` angular and linear velocity of the base."""
+        pybullet.resetBasePositionAndOrientation(
+            self.body_id, position.tolist(), quaternion.tolist(), physicsClientId=self._client
+        )
+        numbers = velocity.tolist()
+        pybullet.resetBaseVelocity(
+            self.body_id, numbers[3:6], numbers[:3], physicsClientId=self._client
+        )
 
     def _set(self, which: NDArray[np.int64]) -> None:
         joints = self.moving[which]
@@ -215,9 +244,10 @@ def _load(client: int, skeleton: Skeleton, build: Build) -> int:
 
 def damping_number(body: Articulation, step_s: float) -> float:
     """Return ``dt max eig(M^-1 D)``; explicit damping is stable below 2, monotonic up to 1."""
-    matrix = body.mass_matrix()
-    damping = np.zeros(len(matrix))
-    damping[6:] = body.damping[body.moving]
+    rows = np.arange(6, 6 + len(body.moving))
+    # the accelerations for unit torques, one column for each joint
+    units = np.eye(6 + len(rows))[rows]
+    inverse = np.array([body.dynamics.solve_with(np.zeros(len(rows)), unit)[6:] for unit in units])
     # M^-1 D is similar to a symmetric matrix: its eigenvalues are real
-    root = np.sqrt(damping)
-    return step_s * float(np.linalg.eigvalsh(root[:, None] * np.linalg.inv(matrix) * root)[-1])
+    root = np.sqrt(body.damping[body.moving])
+    return step_s * float(np.linalg.eigvalsh(root[:, None] * inverse * root)[-1])

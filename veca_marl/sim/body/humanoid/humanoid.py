@@ -244,10 +244,7 @@ class Humanoid(Body):
         self._mouth.position = self.mount("mouth").position
 
     def _after_substep(self) -> None:
-        if self._finite and self._articulation.read():
-            self._articulation.hold_limits()
-        else:
-            self._finite = False
+        self._finite = self._finite and self._articulation.settle(self._world.clock.substep_s)
 
     def _start(self) -> None:
         """Begin at rest in the present pose."""
@@ -260,11 +257,9 @@ class Humanoid(Body):
         self._mouth.teleport(self.mount("mouth").position)
 
     def _pose_bones(self) -> None:
-        motion = self._articulation.motion()
-        numbers = (motion.pose.position, motion.pose.rotation, *motion[1:])
-        self._finite = self._finite and all(np.isfinite(part).all() for part in numbers)
         if not self._finite:
             return
+        motion = self._articulation.motion()
         positions, rotations = self._frames()
         positions[0], rotations[0] = motion.pose
         self._pelvis_velocity[:], self._pelvis_spin[:] = motion[1:]

@@ -27,13 +27,11 @@ def predicted_angles(
     """
     moving = body.moving
     spring, damping, speeds = stiffness[moving], body.damping[moving], body.speeds[moving]
-    matrix = body.mass_matrix()
-    torques = np.zeros(len(matrix))
     stretch = targets[moving] - body.angles[moving] - horizon_s * speeds
-    torques[6:] = spring * stretch - damping * speeds
-    resistance = np.zeros(len(matrix))
-    resistance[6:] = horizon_s * damping + horizon_s**2 * spring
-    accelerations = np.linalg.solve(matrix + np.diag(resistance), torques)[6:]
+    forces = np.zeros(6 + len(moving))
+    forces[6:] = spring * stretch - damping * speeds
+    resistance = horizon_s * damping + horizon_s**2 * spring
+    accelerations = body.dynamics.solve_with(resistance, forces)[6:]
     angles = body.angles.copy()
     angles[moving] += horizon_s * speeds + horizon_s**2 * accelerations
     return angles

@@ -1,0 +1,129 @@
+"""Mass matrix and velocity-dependent forces of a body."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from veca_marl.sim.body.humanoid.dynamics.small_vectors import add_cross
+from veca_marl.sim.body.humanoid.dynamics.state import LinkArrays
+from veca_marl.sim.body.humanoid.dynamics.tree import LinkTree
+from veca_marl.sim.geometry import Floats
+
+
+@njit(cache=True)
+def _momentum(mass: float, moment: Floats, inertia: Floats, motion: Floats, out: Floats) -> None:
+    """Write a spatial inertia times a spatial velocity."""
+    for i in range(3):
+        out[i] = inertia[i, 0] * motion[0] + inertia[i, 1] * motion[1] + inertia[i, 2] * motion[2]
+        out[3 + i] = mass * motion[3 + i]
+    add_cross(moment, motion[3:], out[:3])
+    add_cross(motion[:3], moment, out[3:])
+
+
+@njit(cache=True)
+def write_mass_matrix(tree: LinkTree, links: LinkArrays, centre: Floats, out: Floats) -> None:
+    """Write the mass matrix ``(6 + n, 6 + n)`` and the centre of mass ``(3,)``.
+
+    Composite-rigid-body algorithm (Featherstone 2008, table 6.2). The base's rows times the
+    generalised velocity are the angular momentum about the reference point and the momentum.
+    """
+    mass, moment, inertia = tree.masses.copy(), links.moments.copy(), links.inertias.copy()
+    force, unit = np.empty(6), np.zeros(6)
+    out[:] = 0.0
+    for link in range(tree.parents.shape[0] - 1, 0, -1):
+        _momentum(mass[link], moment[link], inertia[link], links.hinges[link - 1], force)
+        _write_column(tree, links.hinges, link, force, out)
+        parent = tree.parents[link]
+        mass[parent] += mass[link]
+        for i in range(3):
+            moment[parent, i] += moment[link, i]
+            for j in range(3):
+                inertia[parent, i, j] += inertia[link, i, j]
+    for i in range(6):
+        unit[:] = 0.0
+        unit[i] = 1.0
+        _momentum(mass[0], moment[0], inertia[0], unit, force)
+        out[:6, i] = force
+    for i in range(3):
+        centre[i] = moment[0, i] / mass[0]
+
+
+@njit(cache=True)
+def _write_column(tree: LinkTree, hinges: Floats, link: int, force: Floats, out: Floats) -> None:
+    """Write the column and the row of a hinge: its force on itself, its ancestors and the base."""
+    row, ancestor = 5 + link, link
+    while ancestor > 0:
+        total = 0.0
+        for k in range(6):
+            total += hinges[ancestor - 1, k] * force[k]
+        out[row, 5 + ancestor] = total
+        out[5 + ancestor, row] = total
+        ancestor = tree.parents[ancestor]
+    for k in range(6):
+        out[k, row] = force[k]
+        out[row, k] = force[k]
+
+
+@njit(cache=True)
+def write_bias(tree: LinkTree, links: LinkArrays, velocity: Floats, out: Floats) -> None:
+    """Write the forces ``(6 + n,)`` that keep all generalised velocities constant, without weight.
+
+    Recursive Newton-Euler algorithm (Featherstone 2008, table 5.1):
+    ``mass matrix @ acceleration + bias = generalised forces``.
+    """
+    count = tree.parents.shape[0]
+    motion, change, force = np.zeros((count, 6)), np.zeros((count, 6)), np.zeros((count, 6))
+    motion[0] = velocity[:6]
+    # the base's velocity is that of a point that moves with the base
+    add_cross(motion[0, 3:], motion[0, :3], change[0, 3:])
+    for link in range(count):
+        if link > 0:
+            rate, hinge = velocity[5 + link], links.hinges[link - 1]
+            parent = tree.parents[link]
+            for k in range(6):
+                motion[link, k] = motion[parent, k] + rate * hinge[k]
+                change[link, k] = change[parent, k]
+            _add_motion_cross(motion[link], hinge, rate, change[link])
+        _write_force(tree.masses[link], links.moments[link], links.inertias[link],
+                     motion[link], change[link], force[link])
+    _collect(tree, links.hinges, force, out)
+
+
+@njit(cache=True)
+def _add_motion_cross(motion: Floats, hinge: Floats, rate: float, out: Floats) -> None:
+    """Add the spatial cross product of a velocity and `rate` times a hinge to `out`."""
+    w, u = motion[:3], motion[3:]
+    x, y, z = rate * hinge[0], rate * hinge[1], rate * hinge[2]
+    p, q, r = rate * hinge[3], rate * hinge[4], rate * hinge[5]
+    out[0] += w[1] * z - w[2] * y
+    out[1] += w[2] * x - w[0] * z
+    out[2] += w[0] * y - w[1] * x
+    out[3] += w[1] * r - w[2] * q + u[1] * z - u[2] * y
+    out[4] += w[2] * p - w[0] * r + u[2] * x - u[0] * z
+    out[5] += w[0] * q - w[1] * p + u[0] * y - u[1] * x
+
+
+@njit(cache=True)
+def _write_force(
+    mass: float, moment: Floats, inertia: Floats, motion: Floats, change: Floats, out: Floats
+) -> None:
+    """Write the force on a link: inertia times acceleration plus the change of its momentum."""
+    momentum = np.empty(6)
+    _momentum(mass, moment, inertia, change, out)
+    _momentum(mass, moment, inertia, motion, momentum)
+    add_cross(motion[:3], momentum[:3], out[:3])
+    add_cross(motion[3:], momentum[3:], out[:3])
+    add_cross(motion[:3], momentum[3:], out[3:])
+
+
+@njit(cache=True)
+def _collect(tree: LinkTree, hinges: Floats, force: Floats, out: Floats) -> None:
+    """Project the forces of all links on the hinges and the base."""
+    for link in range(tree.parents.shape[0] - 1, 0, -1):
+        parent, total = tree.parents[link], 0.0
+        for k in range(6):
+            total += hinges[link - 1, k] * force[link, k]
+            force[parent, k] += force[link, k]
+        out[5 + link] = total
+    out[:6] = force[0]
