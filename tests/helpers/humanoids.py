@@ -51,8 +51,8 @@ def remove_gravity(world):
 def set_random_joint_speeds(world, body, speed_radps, seed=0):
     """Set all joint speeds to random numbers."""
     rng = np.random.default_rng(seed)
-    body._articulation.set_speeds(rng.uniform(-speed_radps, speed_radps, 82))
-    assert body._articulation.read()
+    body.articulation.set_speeds(rng.uniform(-speed_radps, speed_radps, 82))
+    assert body.articulation.read()
     world.refresh()
 
 

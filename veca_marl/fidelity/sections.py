@@ -13,6 +13,7 @@ SECTIONS: dict[str, str] = {
     "ears": "veca_marl.fidelity.ears",
     "inertia": "veca_marl.fidelity.inertia",
     "localisation": "veca_marl.fidelity.localisation",
+    "momentum": "veca_marl.fidelity.momentum",
     "near_field": "veca_marl.fidelity.near_field",
     "rigid_bodies": "veca_marl.fidelity.rigid_bodies",
     "rooms": "veca_marl.fidelity.rooms",

@@ -34,7 +34,7 @@ def test_both_details_have_47_bones_and_82_joints(make_child, detail):
     assert body.velocities().shape == body.angular_velocities().shape == (47, 3)
     for read in (body.joint_angles, body.joint_velocities, body.joint_torques):
         assert read().shape == (82,)
-    assert len(body._articulation.moving) == {Detail.full: 82, Detail.mitten: 40}[detail]
+    assert len(body.articulation.moving) == {Detail.full: 82, Detail.mitten: 40}[detail]
     for mount in MOUNTS:
         assert np.isfinite(body.mount(mount).position).all()
 
@@ -99,7 +99,7 @@ def test_fingers_of_a_mitten_are_straight_and_follow_the_hand(make_child):
     np.testing.assert_allclose(
         local, hand.rotation.T @ (finger.position - hand.position), atol=1e-9
     )
-    fingers = np.setdiff1d(np.arange(82), body._articulation.moving)
+    fingers = np.setdiff1d(np.arange(82), body.articulation.moving)
     assert not body.joint_angles()[fingers].any()
     assert not body.joint_torques()[fingers].any()
 

@@ -32,7 +32,7 @@ def watch_limits(world, body):
     seen = []
 
     def note():
-        body._articulation.read()
+        body.articulation.read()
         seen.append(body.joint_angles())
 
     world.after_substep.append(note)
@@ -59,7 +59,7 @@ def test_joints_driven_against_their_limits_stay_there(alone, sign):
     body.act({"joints": np.full(82, sign)})
     for _ in range(50):
         world.step()
-    moving = body._articulation.moving
+    moving = body.articulation.moving
     distance = np.abs(body.joint_angles() - (HIGH if sign > 0 else LOW))[moving]
     # self-collision keeps a few from their limits
     assert np.mean(distance < np.radians(1.0)) > 0.8
@@ -88,7 +88,7 @@ def test_damping_is_stable_in_all_postures(alone):
     rng = np.random.default_rng(0)
     for _ in range(50):
         body.place((0.0, 0.0, 1.0), 0.0, rng.uniform(LOW, HIGH))
-        assert damping_number(body._articulation, world.clock.substep_s) <= 1.0
+        assert damping_number(body.articulation, world.clock.substep_s) <= 1.0
 
 
 def test_too_long_physics_steps_are_refused():

@@ -25,6 +25,8 @@ _TOP_SPEED_RADPS = 30.0  # of a joint: twice the speed of human limbs
 # Bullet clips the speed of each joint without its reaction on the body, which adds momentum: its
 # limit is so high that it never acts
 _BULLET_TOP_SPEED = 1000.0
+STOP_MARGIN_RAD = 0.01  # 0.6 degrees, by which Bullet's stops are inside the joint limits
+_NO_FORCE_NS = 1e-8  # impulse on the whole body in a physics step below which nothing touches it
 _FLAGS = (
     pybullet.URDF_USE_INERTIA_FROM_FILE
     | pybullet.URDF_MAINTAIN_LINK_ORDER
@@ -87,7 +89,9 @@ class Articulation:
         self.strengths_nm[self.moving] = [found[joint][10] for joint in self.moving]
         self.damping[self.moving] = [found[joint][6] for joint in self.moving]
         self._base_centre = np.array(self._dynamics(-1)[3])
+        self._set_stops(low, high)
         self.dynamics = BodyDynamics(read_tree(client, self.body_id), low, high, _TOP_SPEED_RADPS)
+        self._mass_kg = float(self.dynamics.tree.masses.sum())
         self._prepare(infos, {bone.name for bone in skeleton.bones})
         self.read()
 
@@ -115,6 +119,22 @@ class Articulation:
             physicsClientId=self._client,
         )
 
+    def _set_stops(self, low: Floats, high: Floats) -> None:
+        """Let Bullet's own stops act a little before the joint limits of `settle`.
+
+        Bullet detects a limit only once it is passed. A joint that rests at its limit because of
+        `settle` alone would be at Bullet's stop in one step and inside of it in the next one.
+        """
+        margins = np.minimum(STOP_MARGIN_RAD, 0.25 * (high - low))
+        for link, lower, upper in zip(self._links, low + margins, high - margins, strict=True):
+            pybullet.changeDynamics(
+                self.body_id,
+                link,
+                jointLowerLimit=float(lower),
+                jointUpperLimit=float(upper),
+                physicsClientId=self._client,
+            )
+
     # ---- reading
 
     def read(self) -> bool:
@@ -139,13 +159,36 @@ class Articulation:
         """
         if self._read() is None:
             return False
-        changed = self.dynamics.settle(step_s)
+        changed = self.dynamics.settle(step_s, self._external_impulse(step_s))
         self._copy_joints()
         if changed.size:
             self._set(changed)
         state = self.dynamics.state
         self._set_base(state.position, self.dynamics.solver.quaternion, state.velocity)
         return True
+
+    def _external_impulse(self, step_s: float) -> Floats:
+        """Return the impulse ``(6,)`` of weight and contacts in a physics step that has ended.
+
+        Bullet applies the two friction forces of a contact of the body with itself at points that
+        differ by the penetration. The torque that this leaves is removed where no other body is
+        touched; force and contacts are compared first, because lists of contacts take time.
+        """
+        impulse = self.dynamics.external_impulse(step_s)
+        weight = self._weight_impulse(step_s)
+        others = impulse[3:] - weight
+        if others @ others < _NO_FORCE_NS**2 and not self._touches_others():
+            impulse[:3], impulse[3:] = 0.0, weight
+        return impulse
+
+    def _weight_impulse(self, step_s: float) -> Floats:
+        world = pybullet.getPhysicsEngineParameters(physicsClientId=self._client)
+        gravity = [world[f"gravityAcceleration{axis}"] for axis in "XYZ"]
+        return self._mass_kg * step_s * np.array(gravity)
+
+    def _touches_others(self) -> bool:
+        found = pybullet.getContactPoints(bodyA=self.body_id, physicsClientId=self._client)
+        return any(contact[1] != contact[2] for contact in found)
 
     def _read(self) -> Floats | None:
         """Read Bullet's state; return the base's position, or None if a number is not finite."""

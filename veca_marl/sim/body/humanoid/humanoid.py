@@ -44,6 +44,9 @@ _ARMS_OUT = Posture(0.0, {"upper_arm.abduction": 30.0})
 class Humanoid(Body):
     """A body that is moved by its joints. See `Body` for the common methods.
 
+    Attributes:
+        articulation: Its bones in Bullet.
+
     Raises:
         ValueError: If the world's physics steps are too long for the damping of the joints.
     """
@@ -54,15 +57,15 @@ class Humanoid(Body):
         super().__init__(name, cfg, world, shirt)
         self.cfg = cfg
         build = Build(cfg.detail is Detail.full, strength=cfg.strength, friction=cfg.friction)
-        self._articulation = Articulation(world.client, self._skeleton, build)
+        self.articulation = Articulation(world.client, self._skeleton, build)
         self._check_substep(world.clock.substep_s)
         self._control, self._update = JOINT_ACTIONS[cfg.action]
         self._chosen = np.array(chosen_joints(self._skeleton, cfg.joints))
         self._low = np.array([joint.low_rad for joint in self._skeleton.joints])
         self._high = np.array([joint.high_rad for joint in self._skeleton.joints])
         # fixed joints have neither angle nor torque
-        self._moving = np.isin(np.arange(len(self._low)), self._articulation.moving)
-        self._angles, self._speeds = self._articulation.angles, self._articulation.speeds
+        self._moving = np.isin(np.arange(len(self._low)), self.articulation.moving)
+        self._angles, self._speeds = self.articulation.angles, self.articulation.speeds
         self._set_points = np.zeros(len(self._low))
         self._underside = Underside(self._skeleton, self.bone_names, skin=True)
         self._finite = True
@@ -81,7 +84,7 @@ class Humanoid(Body):
     @property
     def body_id(self) -> int:
         """PyBullet's id of the articulated bones."""
-        return self._articulation.body_id
+        return self.articulation.body_id
 
     @property
     def obstacle_ids(self) -> tuple[int, ...]:
@@ -121,7 +124,7 @@ class Humanoid(Body):
     @property
     def joint_strengths_nm(self) -> Floats:
         """``(82,)`` N m: the greatest torque of each joint; 0 for fixed joints."""
-        return self._articulation.strengths_nm.copy()
+        return self.articulation.strengths_nm.copy()
 
     def place(
         self,
@@ -149,7 +152,7 @@ class Humanoid(Body):
         positions[0], rotations[0] = place, pelvis_rotation(attitude, yaw_rad)
         forward_kinematics(self._skeleton, angles, positions, rotations)
         positions[:, 2] += place[2] - self._underside.lowest_m(positions, rotations)
-        self._articulation.place(Pose(positions[0].copy(), rotations[0].copy()), angles)
+        self.articulation.place(Pose(positions[0].copy(), rotations[0].copy()), angles)
         self._start()
 
     def _checked(self, posture: Posture | Floats) -> Floats:
@@ -214,8 +217,8 @@ class Humanoid(Body):
         """
         if horizon_s is None:
             horizon_s = self._world.clock.step_s
-        stiffness = self._articulation.strengths_nm / SATURATION_RAD
-        return predicted_angles(self._articulation, targets, stiffness, horizon_s)
+        stiffness = self.articulation.strengths_nm / SATURATION_RAD
+        return predicted_angles(self.articulation, targets, stiffness, horizon_s)
 
     def posture_angles(self, posture: Posture) -> Floats:
         """Return the ``(82,)`` joint angles of a posture, rad; `encode` takes them."""
@@ -236,7 +239,7 @@ class Humanoid(Body):
             return
         torques = self._control.torques(self._set_points, self._angles, self._low, self._high)
         np.multiply(torques, self._moving, out=self._torques)
-        self._articulation.apply(self._torques * self._articulation.strengths_nm)
+        self.articulation.apply(self._torques * self.articulation.strengths_nm)
 
     def write_frames(self) -> None:
         """Write the poses of the bones and move the voice to the mouth."""
@@ -244,13 +247,13 @@ class Humanoid(Body):
         self._mouth.position = self.mount("mouth").position
 
     def _after_substep(self) -> None:
-        self._finite = self._finite and self._articulation.settle(self._world.clock.substep_s)
+        self._finite = self._finite and self.articulation.settle(self._world.clock.substep_s)
 
     def _start(self) -> None:
         """Begin at rest in the present pose."""
         self._gaze.relax()
         self._torques[:] = 0.0
-        self._finite = self._finite and self._articulation.read()
+        self._finite = self._finite and self.articulation.read()
         holding = self._control.set_points(self._angles, self._angles, self._low, self._high)
         self._set_points[:] = self._update.start(holding)
         self._pose_bones()
@@ -259,14 +262,14 @@ class Humanoid(Body):
     def _pose_bones(self) -> None:
         if not self._finite:
             return
-        motion = self._articulation.motion()
+        motion = self.articulation.motion()
         positions, rotations = self._frames()
         positions[0], rotations[0] = motion.pose
         self._pelvis_velocity[:], self._pelvis_spin[:] = motion[1:]
         forward_kinematics(self._skeleton, self._angles, positions, rotations)
 
     def _check_substep(self, substep_s: float) -> None:
-        number = damping_number(self._articulation, substep_s)
+        number = damping_number(self.articulation, substep_s)
         if number > 1.0:
             raise ValueError(
                 f"{self.name}: physics steps of {substep_s * 1e3:.1f} ms are too long for its "

@@ -6,7 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veca_marl.sim.body.humanoid.dynamics.factorisation import factorise, solve
-from veca_marl.sim.body.humanoid.dynamics.settling import settle, update_bias, update_inertia
+from veca_marl.sim.body.humanoid.dynamics.settling import (
+    settle,
+    update_bias,
+    update_inertia,
+    write_external_impulse,
+    write_momentum,
+)
 from veca_marl.sim.body.humanoid.dynamics.state import (
     BodyState,
     SolverState,
@@ -54,9 +60,23 @@ class BodyDynamics:
         state.angles[:], state.velocity[:] = solver.angles, solver.velocity
         update_inertia(self.tree, state, self._links)
         update_bias(self.tree, state, self._links)
+        write_momentum(state)
 
-    def settle(self, step_s: float) -> NDArray[np.int64]:
+    def external_impulse(self, step_s: float) -> Floats:
+        """Return the impulse ``(6,)`` of external forces in a physics step that has ended.
+
+        N m s about the centre of mass, then N s.
+        """
+        impulse = np.empty(6)
+        write_external_impulse(step_s, self.solver, self.state, impulse)
+        return impulse
+
+    def settle(self, step_s: float, impulse: Floats) -> NDArray[np.int64]:
         """Correct the state after a physics step, see `settling`.
+
+        Args:
+            step_s: Duration of the physics step.
+            impulse: ``(6,)``, that of external forces.
 
         Returns:
             The indices of the hinges whose angle or speed differs from Bullet's.
@@ -67,6 +87,7 @@ class BodyDynamics:
             self._high,
             self._top_speed,
             step_s,
+            impulse,
             self.solver,
             self.state,
             self._links,
@@ -89,11 +110,6 @@ class BodyDynamics:
         factorise(self.tree.previous_rows, matrix)
         solve(self.tree.previous_rows, matrix, found)
         return found
-
-    def momentum(self) -> tuple[Floats, Floats]:
-        """Return momentum, kg m/s, and angular momentum about the centre of mass, N m s."""
-        total = self.state.mass_matrix[:6] @ self.state.velocity
-        return total[3:], total[:3] - np.cross(self.state.centre, total[3:])
 
     def kinetic_energy(self) -> float:
         """Return the kinetic energy, J."""

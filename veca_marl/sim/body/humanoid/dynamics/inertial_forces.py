@@ -85,8 +85,14 @@ def write_bias(tree: LinkTree, links: LinkArrays, velocity: Floats, out: Floats)
                 motion[link, k] = motion[parent, k] + rate * hinge[k]
                 change[link, k] = change[parent, k]
             _add_motion_cross(motion[link], hinge, rate, change[link])
-        _write_force(tree.masses[link], links.moments[link], links.inertias[link],
-                     motion[link], change[link], force[link])
+        _write_force(
+            tree.masses[link],
+            links.moments[link],
+            links.inertias[link],
+            motion[link],
+            change[link],
+            force[link],
+        )
     _collect(tree, links.hinges, force, out)
 
 

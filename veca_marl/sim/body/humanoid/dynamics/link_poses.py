@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from numba import njit
-
 import numpy as np
+from numba import njit
 
 from veca_marl.sim.body.anatomy import rotate_about_axis
 from veca_marl.sim.body.humanoid.dynamics.small_vectors import (
@@ -38,7 +37,9 @@ def locate_links(tree: LinkTree, rotation: Floats, angles: Floats, links: LinkAr
         for i in range(3):
             links.moments[link, i] = tree.masses[link] * centre[i]
         multiply_into(links.rotations[link], tree.inertias[link], turned)
-        _write_inertia(turned, links.rotations[link], tree.masses[link], centre, links.inertias[link])
+        _write_inertia(
+            turned, links.rotations[link], tree.masses[link], centre, links.inertias[link]
+        )
 
 
 @njit(cache=True)

@@ -38,12 +38,39 @@ def update_bias(tree: LinkTree, state: BodyState, links: LinkArrays) -> None:
 
 
 @njit(cache=True)
+def write_momentum(state: BodyState) -> None:
+    """Write the momentum that follows from pose and velocity."""
+    for i in range(6):
+        state.momentum[i] = 0.0
+        for j in range(state.velocity.shape[0]):
+            state.momentum[i] += state.mass_matrix[i, j] * state.velocity[j]
+    add_cross(state.momentum[3:], state.centre, state.momentum[:3])
+
+
+@njit(cache=True)
+def write_external_impulse(
+    step_s: float, solver: SolverState, state: BodyState, impulse: Floats
+) -> None:
+    """Write the impulse ``(6,)`` of all external forces during a physics step.
+
+    It is the base's rows of ``M (v' - v) + dt h``, with mass matrix M and bias h at the pose before
+    the step: N m s about the centre of mass, then N s.
+    """
+    for i in range(6):
+        impulse[i] = step_s * state.bias[i]
+        for j in range(state.velocity.shape[0]):
+            impulse[i] += state.mass_matrix[i, j] * (solver.velocity[j] - state.velocity[j])
+    add_cross(impulse[3:], state.centre, impulse[:3])
+
+
+@njit(cache=True)
 def settle(
     tree: LinkTree,
     low: Floats,
     high: Floats,
     top_speed: float,
     step_s: float,
+    impulse: Floats,
     solver: SolverState,
     state: BodyState,
     links: LinkArrays,
@@ -57,13 +84,16 @@ def settle(
         high: ``(n,)`` rad, upper joint limits.
         top_speed: rad/s, limit of joint speeds.
         step_s: Duration of the physics step.
+        impulse: ``(6,)`` external impulse of the step, from `write_external_impulse`.
         solver: Bullet's state after the step; angles, joint speeds and orientation are overwritten.
         state: The state before the step; overwritten by the one after it.
         links: The links before the step; overwritten.
         changed: ``(n,)``, written: 1 for joints whose angle or speed was changed, else 0.
     """
-    momentum, goal = np.empty(6), np.empty(3)
-    _momentum_after_step(tree, step_s, solver, state, momentum, goal)
+    goal, mass = np.empty(3), np.sum(tree.masses)
+    state.momentum[:] += impulse
+    for i in range(3):
+        goal[i] = state.position[i] + state.centre[i] + step_s * state.momentum[3 + i] / mass
     if _apply_limits(low, high, top_speed, state.mass_matrix, solver, changed):
         _turn_base(state.mass_matrix, solver)
     quaternions_to_matrices(solver.quaternion.reshape(1, 4), state.rotation.reshape(1, 3, 3))
@@ -71,32 +101,8 @@ def settle(
     update_inertia(tree, state, links)
     for i in range(3):
         state.position[i] = goal[i] - state.centre[i]
-    _write_velocity(state, solver.velocity, momentum)
+    _write_velocity(state, solver.velocity)
     update_bias(tree, state, links)
-
-
-@njit(cache=True)
-def _momentum_after_step(
-    tree: LinkTree,
-    step_s: float,
-    solver: SolverState,
-    state: BodyState,
-    momentum: Floats,
-    goal: Floats,
-) -> None:
-    """Write ``(6,)`` angular momentum about the centre of mass and momentum, and that centre.
-
-    With mass matrix M and bias h of the pose before the step, the external impulse is the base's
-    rows of ``M (v' - v) + dt h``, so that the momentum is ``M v' + dt h``.
-    """
-    for i in range(6):
-        momentum[i] = step_s * state.bias[i]
-        for j in range(state.velocity.shape[0]):
-            momentum[i] += state.mass_matrix[i, j] * solver.velocity[j]
-    add_cross(momentum[3:], state.centre, momentum[:3])
-    mass = np.sum(tree.masses)
-    for i in range(3):
-        goal[i] = state.position[i] + state.centre[i] + step_s * momentum[3 + i] / mass
 
 
 @njit(cache=True)
@@ -149,10 +155,10 @@ def _turn_base(mass_matrix: Floats, solver: SolverState) -> None:
 
 
 @njit(cache=True)
-def _write_velocity(state: BodyState, velocity: Floats, momentum: Floats) -> None:
+def _write_velocity(state: BodyState, velocity: Floats) -> None:
     """Write the velocity of the base that gives the body its momentum at the new pose."""
-    base = momentum.copy()
-    add_cross(state.centre, momentum[3:], base[:3])
+    base = state.momentum.copy()
+    add_cross(state.centre, state.momentum[3:], base[:3])
     block = state.mass_matrix[:6, :6].copy()
     for i in range(6):
         for j in range(6, velocity.shape[0]):

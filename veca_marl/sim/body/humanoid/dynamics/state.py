@@ -35,6 +35,7 @@ class BodyState(NamedTuple):
         rotation: ``(3, 3)`` of the base.
         angles: ``(n,)`` rad.
         velocity: ``(6 + n,)`` generalised velocity.
+        momentum: ``(6,)`` angular momentum about the centre of mass, N m s, and momentum, kg m/s.
         centre: ``(3,)`` metres, the centre of mass from the reference point.
         mass_matrix: ``(6 + n, 6 + n)``.
         bias: ``(6 + n,)`` generalised forces that keep the velocity constant, without weight.
@@ -44,6 +45,7 @@ class BodyState(NamedTuple):
     rotation: Floats
     angles: Floats
     velocity: Floats
+    momentum: Floats
     centre: Floats
     mass_matrix: Floats
     bias: Floats
@@ -89,6 +91,7 @@ def empty_state(hinges: int) -> BodyState:
         rotation=np.eye(3),
         angles=np.zeros(hinges),
         velocity=np.zeros(rows),
+        momentum=np.zeros(6),
         centre=np.zeros(3),
         mass_matrix=np.zeros((rows, rows)),
         bias=np.zeros(rows),

@@ -58,8 +58,8 @@ def read_tree(client: int, body_id: int) -> LinkTree:
     links = _links(client, body_id)
     groups = _rigid_groups(links)
     heads = [group[0] for group in groups]
-    number = {link.index: i for i, group in enumerate(groups) for link in group}
-    parents = [-1] + [number[head.parent] for head in heads[1:]]
+    row_of = {link.number: i for i, group in enumerate(groups) for link in group}
+    parents = [-1] + [row_of[head.parent] for head in heads[1:]]
     frames = [head.frame for head in heads]
     merged = [_merged(group) for group in groups]
     relative = [frames[0]] + [
@@ -79,9 +79,9 @@ def read_tree(client: int, body_id: int) -> LinkTree:
 
 
 class _Link(NamedTuple):
-    """A link as Bullet has it: `frame` and `inertial` are in the world, `axis` in `frame`."""
+    """A link in Bullet: `frame` and `inertial` are in the world, `axis` is in `frame`."""
 
-    index: int
+    number: int
     parent: int
     is_hinge: bool
     frame: Pose
@@ -114,14 +114,14 @@ def _links(client: int, body_id: int) -> list[_Link]:
 def _rigid_groups(links: list[_Link]) -> list[list[_Link]]:
     """Return the links that move as one; the first of each group is on a hinge, or is the base."""
     groups: list[list[_Link]] = []
-    number: dict[int, int] = {}
+    row_of: dict[int, int] = {}
     for link in links:
         if link.is_hinge:
-            number[link.index] = len(groups)
+            row_of[link.number] = len(groups)
             groups.append([link])
         else:
-            number[link.index] = number[link.parent]
-            groups[number[link.index]].append(link)
+            row_of[link.number] = row_of[link.parent]
+            groups[row_of[link.number]].append(link)
     return groups
 
 
