@@ -12,6 +12,7 @@ SECTIONS: dict[str, str] = {
     "doppler": "veca_marl.fidelity.doppler",
     "ears": "veca_marl.fidelity.ears",
     "inertia": "veca_marl.fidelity.inertia",
+    "joints": "veca_marl.fidelity.joints",
     "localisation": "veca_marl.fidelity.localisation",
     "momentum": "veca_marl.fidelity.momentum",
     "near_field": "veca_marl.fidelity.near_field",
