@@ -41,9 +41,10 @@ class UnbuildableEnv(FakeEnv):
 def start(make_ppo):
     made = []
 
-    def start(make_env=make_fake_env, steps=STEPS):
+    def start(make_env=make_fake_env, steps=STEPS, **numbers):
         policy = make_ppo(senses=("audio",)).policy.copy()
-        made.append(Experience(make_env, policy.collect, CollectCfg(2, worlds=1, steps=steps)))
+        cfg = CollectCfg(2, worlds=1, steps=steps, **numbers)
+        made.append(Experience(make_env, policy.collect, cfg))
         return made[-1]
 
     yield start
@@ -98,6 +99,29 @@ def test_without_the_signal_every_call_raises_an_error(start, use):
     end(experience)
     with pytest.raises(WorkerError, match=KILLED):
         getattr(experience, use)(*([3] if use == "restart" else []))
+
+
+HANGS = r"process 1 \(of 0 to 1\) did not answer for 2 s \(collect.answer_limit_s\) and was killed"
+
+
+@pytest.mark.parametrize("use", ["update_policy", "restart", "collect"])
+def test_a_worker_that_hangs_is_named_and_killed(start, use):
+    """SIGSTOP stops a process without ending it."""
+    experience = start(only_audio, answer_limit_s=2.0)
+    experience.restart(0)
+    processes = pids(experience)
+    end(experience, number=signal.SIGSTOP)
+    begin = time.monotonic()
+    with pytest.raises(WorkerError, match=HANGS):
+        getattr(experience, use)(*([3] if use == "restart" else []))
+    experience.close()
+    assert time.monotonic() - begin < 12.0
+    check_that_none_is_left(processes)
+
+
+def test_the_time_limit_must_be_positive():
+    with pytest.raises(ValueError, match=r"collect.answer_limit_s must be positive, got 0"):
+        CollectCfg(answer_limit_s=0.0)
 
 
 def test_the_message_of_an_exception_in_a_worker_arrives(start):

@@ -30,12 +30,16 @@ class CollectCfg:
         worlds: Worlds in each process; one call of the policy acts for all of them.
         steps: Steps of each world in a batch.
         threads: Torch threads of each worker process.
+        answer_limit_s: Seconds that a worker process may take for a batch, a reset or new
+            parameters; a run whose workers take longer ends with an error that names them. The
+            default is more than a hundred times the usual duration of a batch.
     """
 
     processes: int = 2
     worlds: int = 4
     steps: int = 128
     threads: int = 1
+    answer_limit_s: float = 600.0
 
     def __post_init__(self) -> None:
         if self.processes < 0:
@@ -43,6 +47,8 @@ class CollectCfg:
         for name in ("worlds", "steps", "threads"):
             if getattr(self, name) < 1:
                 raise ValueError(f"collect.{name} must be at least 1, got {getattr(self, name)}")
+        if not self.answer_limit_s > 0:
+            raise ValueError(f"collect.answer_limit_s must be positive, got {self.answer_limit_s}")
 
     @property
     def all_worlds(self) -> int:
@@ -87,6 +93,7 @@ class Experience:
                     cat_results="stack",
                     num_threads=threads,
                     num_sub_threads=cfg.threads,
+                    answer_limit_s=cfg.answer_limit_s,
                     **common,
                 )
         self._batches: Iterator[TensorDictBase] = iter(self._collector)

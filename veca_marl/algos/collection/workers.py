@@ -7,6 +7,9 @@ killed, it waits forever. `SupervisedCollector` raises `WorkerError` instead, in
   once: also while the main process learns or evaluates.
 - Every wait for a worker checks each second whether all workers are alive. In other threads and on
   Windows, where the signal is not received, this is the only way.
+
+A worker that hangs does not end: every wait has a time limit, after which the workers that have not
+answered are named and all are killed.
 """
 
 from __future__ import annotations
@@ -27,14 +30,14 @@ from torch import multiprocessing, nn
 from torchrl.collectors import Collector, MultiSyncCollector
 from torchrl.weight_update import SharedMemWeightSyncScheme
 
+from veca_marl.algos.collection.answers import CHECK_S, BatchQueue, TimeLimit
 from veca_marl.algos.collection.parent import end_with_parent
 
-_CHECK_S = 1.0
 _MESSAGE_CHARS = 1000  # with a pickle's overhead below what a pipe writes at once (4096 bytes)
 
 
 class WorkerError(RuntimeError):
-    """A worker process ended that should still collect."""
+    """A worker process ended that should still collect, or did not answer in time."""
 
 
 class SupervisedCollector(MultiSyncCollector):
@@ -45,6 +48,7 @@ class SupervisedCollector(MultiSyncCollector):
     Args:
         make_envs: As for `MultiSyncCollector`.
         policy: As for `MultiSyncCollector`.
+        answer_limit_s: Seconds that a worker may take for a batch, a reset or new parameters.
         **kwargs: As for `MultiSyncCollector`.
 
     Raises:
@@ -55,7 +59,14 @@ class SupervisedCollector(MultiSyncCollector):
     _checking = False
     _failure = ""
 
-    def __init__(self, make_envs: Sequence[Callable[[], Any]], policy: Any, **kwargs: Any) -> None:
+    def __init__(
+        self,
+        make_envs: Sequence[Callable[[], Any]],
+        policy: Any,
+        answer_limit_s: float,
+        **kwargs: Any,
+    ) -> None:
+        self._limit_s = answer_limit_s
         self._exceptions: SimpleQueue[tuple[int, str]] = multiprocessing.SimpleQueue()
         self._restore_handler = call_when_a_child_ends(self.check)
         schemes = {"policy": _SupervisedWeights()} if isinstance(policy, nn.Module) else {}
@@ -72,6 +83,21 @@ class SupervisedCollector(MultiSyncCollector):
             self._raise_worker_error(error)
             self.shutdown(raise_on_error=False)
             raise
+        self.queue_out = BatchQueue(self.queue_out, len(self.procs), self.time_limit())
+
+    def time_limit(self) -> TimeLimit:
+        """Return a limit for a wait that begins now; beyond it `WorkerError` is raised."""
+        return TimeLimit(self._limit_s, self._abandon)
+
+    def _abandon(self, silent: list[int]) -> None:
+        """Kill all workers and raise `WorkerError`, which names those that have not answered."""
+        names = " and ".join(str(i) for i in silent)
+        processes = f"worker process{'es' if len(silent) > 1 else ''} {names}"
+        self._failure = (
+            f"{processes} (of 0 to {len(self.procs) - 1}) did not answer for {self._limit_s:g} s "
+            "(collect.answer_limit_s) and was killed"
+        )
+        self.check()
 
     def check(self) -> None:
         """Raise `WorkerError` if a worker has ended; the others are killed."""
@@ -116,6 +142,14 @@ class SupervisedCollector(MultiSyncCollector):
         with self._worker_errors():
             return int(super().set_seed(seed, static_seed))
 
+    def _recv_and_check(self, pipe: Any, *, worker_idx: int, **_: Any) -> Any:
+        """Return the next message of a worker, as the base class does, within the time limit."""
+        limit = self.time_limit()
+        while not pipe.poll(CHECK_S):
+            self.check()
+            limit.check([worker_idx])
+        return pipe.recv()
+
     def reset(self, reset_idx: Sequence[bool] | None = None) -> None:
         """See `MultiSyncCollector`; raises `WorkerError` if a worker has ended."""
         with self._worker_errors():
@@ -150,14 +184,16 @@ class _SupervisedWeights(SharedMemWeightSyncScheme):
     def _wait_for_ack(
         self, worker_ids: int | list[int] | None = None, timeout: float | None = None
     ) -> None:
-        for queue in self._ack_queues.values():
+        for index, queue in self._ack_queues.items():
+            limit = self.context.time_limit()
             while not _received(queue):
                 self.context.check()
+                limit.check([index])
 
 
 def _received(queue: Any) -> bool:
     try:
-        queue.get(timeout=_CHECK_S)
+        queue.get(timeout=CHECK_S)
     except Empty:
         return False
     return True
