@@ -56,6 +56,7 @@ class SupervisedCollector(MultiSyncCollector):
     """
 
     procs: Sequence[BaseProcess] = ()  # torchrl replaces it while it starts them
+    queue_out: Any  # torchrl makes it
     _checking = False
     _failure = ""
 
