@@ -21,10 +21,10 @@ from tensordict import TensorDictBase
 from tensordict.nn import TensorDictModuleBase
 from torch import nn
 
+from veca_marl.algos.choices import ChoiceRegistry
 from veca_marl.algos.sense_encoders import copy_encoders, copy_parameters
 from veca_marl.algos.specs import TeamSpec
 from veca_marl.algos.storage import StorageNeeded
-from veca_marl.registry import Registry, origin
 
 
 @dataclass
@@ -136,20 +136,8 @@ class Algorithm(ABC):
 AlgorithmFactory = Callable[[str, TeamSpec, Any, torch.device], Algorithm]
 
 
-@dataclass(frozen=True)
-class RegisteredAlgorithm:
-    """What the registry knows of an algorithm.
-
-    Attributes:
-        cfg_type: Dataclass of its numbers.
-        factory: Makes it from (team, spec, numbers, device).
-    """
-
-    cfg_type: type[AlgorithmCfg]
-    factory: AlgorithmFactory
-
-
-ALGORITHMS: Registry[RegisteredAlgorithm] = Registry("algorithm")
+ALGORITHMS: ChoiceRegistry[AlgorithmCfg, AlgorithmFactory] = ChoiceRegistry("algorithm", "algo")
+"""Algorithms by name; a factory takes (team, spec, numbers, device)."""
 
 
 def register_algorithm(name: str, cfg_type: type[AlgorithmCfg], factory: AlgorithmFactory) -> None:
@@ -158,28 +146,7 @@ def register_algorithm(name: str, cfg_type: type[AlgorithmCfg], factory: Algorit
     Raises:
         ValueError: If another algorithm has the name, or the default of ``cfg_type.name`` differs.
     """
-    check_entry(ALGORITHMS, name, cfg_type, factory)
-    ALGORITHMS.add(name, RegisteredAlgorithm(cfg_type, factory))
-
-
-def check_entry(
-    registry: Mapping[str, Any], name: str, cfg_type: type, factory: Callable[..., Any]
-) -> None:
-    """Check that an entry of a registry is new, and that its numbers name it by default.
-
-    A definition that is executed again (a notebook cell) is not another one.
-
-    Raises:
-        ValueError: If it is not so.
-    """
-    present = registry.get(name)
-    if present is not None and origin(present.factory) != origin(factory):
-        raise ValueError(
-            f"{name!r} is defined twice: by {origin(present.factory)} and {origin(factory)}"
-        )
-    default = getattr(cfg_type, "name", None)
-    if default != name:
-        raise ValueError(f"{cfg_type.__name__}.name is {default!r} by default, not {name!r}")
+    ALGORITHMS.register(name, cfg_type, factory)
 
 
 def make_algorithm(team: str, spec: TeamSpec, cfg: AlgorithmCfg, device: torch.device) -> Algorithm:
@@ -188,9 +155,4 @@ def make_algorithm(team: str, spec: TeamSpec, cfg: AlgorithmCfg, device: torch.d
     Raises:
         ValueError: If it is unknown, or `cfg` is not of its type.
     """
-    entry = ALGORITHMS.find(cfg.name)
-    if not isinstance(cfg, entry.cfg_type):
-        raise ValueError(
-            f"algo.name={cfg.name} takes {entry.cfg_type.__name__}, got {type(cfg).__name__}"
-        )
-    return entry.factory(team, spec, cfg, device)
+    return ALGORITHMS.factory_of(cfg)(team, spec, cfg, device)

@@ -17,9 +17,8 @@ import torch
 from tensordict import TensorDictBase
 from torch import Tensor
 
-from veca_marl.algos.algorithm import check_entry
+from veca_marl.algos.choices import ChoiceRegistry
 from veca_marl.algos.specs import TeamSpec
-from veca_marl.registry import Registry
 
 NONE = "none"  # the name of no intrinsic reward
 
@@ -83,20 +82,10 @@ class IntrinsicReward(ABC):
 IntrinsicFactory = Callable[[str, TeamSpec, Any, torch.device], IntrinsicReward]
 
 
-@dataclass(frozen=True)
-class RegisteredIntrinsic:
-    """What the registry knows of an intrinsic reward.
-
-    Attributes:
-        cfg_type: Dataclass of its numbers.
-        factory: Makes it from (team, spec, numbers, device).
-    """
-
-    cfg_type: type[IntrinsicCfg]
-    factory: IntrinsicFactory
-
-
-INTRINSICS: Registry[RegisteredIntrinsic] = Registry("intrinsic reward")
+INTRINSICS: ChoiceRegistry[IntrinsicCfg, IntrinsicFactory] = ChoiceRegistry(
+    "intrinsic reward", "intrinsic"
+)
+"""Intrinsic rewards by name; a factory takes (team, spec, numbers, device)."""
 
 
 def register_intrinsic(name: str, cfg_type: type[IntrinsicCfg], factory: IntrinsicFactory) -> None:
@@ -105,8 +94,7 @@ def register_intrinsic(name: str, cfg_type: type[IntrinsicCfg], factory: Intrins
     Raises:
         ValueError: If another one has the name, or the default of ``cfg_type.name`` differs.
     """
-    check_entry(INTRINSICS, name, cfg_type, factory)
-    INTRINSICS.add(name, RegisteredIntrinsic(cfg_type, factory))
+    INTRINSICS.register(name, cfg_type, factory)
 
 
 def make_intrinsic(
@@ -117,9 +105,4 @@ def make_intrinsic(
     Raises:
         ValueError: If it is unknown, or `cfg` is not of its type.
     """
-    entry = INTRINSICS.find(cfg.name)
-    if not isinstance(cfg, entry.cfg_type):
-        raise ValueError(
-            f"intrinsic.name={cfg.name} takes {entry.cfg_type.__name__}, got {type(cfg).__name__}"
-        )
-    return entry.factory(team, spec, cfg, device)
+    return INTRINSICS.factory_of(cfg)(team, spec, cfg, device)

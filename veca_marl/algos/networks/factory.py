@@ -19,12 +19,11 @@ from tensordict.nn import (
 )
 from torch import nn
 
-from veca_marl.algos.algorithm import check_entry
+from veca_marl.algos.choices import ChoiceRegistry
 from veca_marl.algos.networks.initialisation import orthogonal, perceptron
 from veca_marl.algos.networks.policy_heads import action_distribution, policy_head
 from veca_marl.algos.sense_encoders import encoders_of
 from veca_marl.algos.specs import TeamSpec
-from veca_marl.registry import Registry
 
 
 @dataclass
@@ -145,20 +144,8 @@ class TeamNetwork(nn.Module):
 MakeFactory = Callable[[str, TeamSpec, Any], NetworkFactory]
 
 
-@dataclass(frozen=True)
-class RegisteredNetwork:
-    """What the registry knows of a network.
-
-    Attributes:
-        cfg_type: Dataclass of its numbers.
-        factory: Makes its factory from (team, spec, numbers).
-    """
-
-    cfg_type: type[NetworkCfg]
-    factory: MakeFactory
-
-
-NETWORKS: Registry[RegisteredNetwork] = Registry("network")
+NETWORKS: ChoiceRegistry[NetworkCfg, MakeFactory] = ChoiceRegistry("network", "algo.network")
+"""Networks by name; a factory takes (team, spec, numbers)."""
 
 
 def register_network(name: str, cfg_type: type[NetworkCfg], factory: MakeFactory) -> None:
@@ -167,8 +154,7 @@ def register_network(name: str, cfg_type: type[NetworkCfg], factory: MakeFactory
     Raises:
         ValueError: If another network has the name, or the default of ``cfg_type.name`` differs.
     """
-    check_entry(NETWORKS, name, cfg_type, factory)
-    NETWORKS.add(name, RegisteredNetwork(cfg_type, factory))
+    NETWORKS.register(name, cfg_type, factory)
 
 
 def make_network(team: str, spec: TeamSpec, cfg: NetworkCfg) -> TeamNetwork:
@@ -189,9 +175,9 @@ def find_network(team: str, spec: TeamSpec, cfg: NetworkCfg) -> NetworkFactory:
     """Return what makes the parts of a team's network as `cfg` describes it.
 
     Raises:
-        ValueError: If there is no network called ``cfg.name``.
+        ValueError: If there is no network called ``cfg.name``, or `cfg` is not of its type.
     """
-    return NETWORKS.find(cfg.name).factory(team, spec, cfg)
+    return NETWORKS.factory_of(cfg)(team, spec, cfg)
 
 
 def freeze(encoder: nn.Module, cfg: NetworkCfg, team: str) -> None:
