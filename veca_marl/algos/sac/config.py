@@ -88,7 +88,8 @@ class Storage(Enum):
 
     Attributes:
         memory: In memory.
-        memmap: In memory-mapped files, which are removed at the end of the run.
+        memmap: In memory-mapped files, which are removed at the end of the run; those of a run that
+            was killed are removed by the next one in the same folder.
     """
 
     memory = "memory"

@@ -6,7 +6,7 @@ import shutil
 import weakref
 from collections.abc import Iterable
 from pathlib import Path
-from tempfile import gettempdir, mkdtemp
+from tempfile import gettempdir
 from typing import Any
 
 import torch
@@ -16,6 +16,7 @@ from torchrl.data import LazyMemmapStorage, LazyTensorStorage, TensorDictReplayB
 from torchrl.data.replay_buffers import Sequence
 
 from veca_marl.algos.sac.config import ReplayCfg, Storage
+from veca_marl.algos.sac.scratch import make_scratch_folder
 from veca_marl.algos.sac.segments import END, PLACE, Key, StoredKeys, segment_rows
 from veca_marl.algos.sac.windows import VALID, Span, Windows
 from veca_marl.algos.specs import TeamSpec
@@ -72,12 +73,10 @@ class Replay:
     def _make_storage(self) -> LazyTensorStorage:
         if self.cfg.storage is Storage.memory:
             return LazyTensorStorage(self.cfg.capacity)
-        if self.cfg.folder is not None:
-            Path(self.cfg.folder).mkdir(parents=True, exist_ok=True)
-        folder = mkdtemp(prefix="veca_marl_replay_", dir=self.cfg.folder)
+        folder = make_scratch_folder(Path(self.cfg.folder or gettempdir()))
         weakref.finalize(self, shutil.rmtree, folder, ignore_errors=True)
         # TorchRL's own removal of the files would replace the handlers of Ctrl-C and SIGTERM
-        return LazyMemmapStorage(self.cfg.capacity, scratch_dir=folder, auto_cleanup=False)
+        return LazyMemmapStorage(self.cfg.capacity, scratch_dir=str(folder), auto_cleanup=False)
 
     @property
     def _storage(self) -> LazyTensorStorage:
