@@ -106,7 +106,13 @@ class ProcessLauncher(Launcher):
         with open_dict(config):
             config.hydra.job.id = config.hydra.job.num = number
         sweep, name = Path(str(config.hydra.sweep.dir)), str(config.hydra.sweep.subdir)
-        shared = [text for text in self._config.hydra.overrides.hydra if "searchpath" in text]
+        hydra = self._config.hydra
+        shared = [
+            f"--config-dir={source.path}"
+            for source in hydra.runtime.config_sources
+            if source.provider == "command-line"
+        ]
+        shared += [text for text in hydra.overrides.hydra if "searchpath" in text]
         with open_dict(config):
             del config["hydra"]
         asked = yaml.safe_load(OmegaConf.to_yaml(config, resolve=True))

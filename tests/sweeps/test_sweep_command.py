@@ -48,6 +48,15 @@ def test_a_sweep_without_experiment_has_folders_named_by_its_overrides(sweep):
     ]
 
 
+def test_the_jobs_find_presets_in_the_folder_of_config_dir(sweep, tmp_path):
+    own = tmp_path / "own presets"
+    (own / "clock").mkdir(parents=True)
+    (own / "clock" / "slow.yaml").write_text("control_rate_hz: 10\n")
+    (job,), _, _ = sweep("--config-dir", str(own), "+task=KickTheBall", "clock=slow")
+    assert job.asked["clock"]["control_rate_hz"] == 10
+    assert job.overrides[0] == f"--config-dir={own}"
+
+
 @pytest.mark.parametrize(
     ("words", "message"),
     [
