@@ -14,6 +14,7 @@ import pytest
 import torch
 import yaml
 from killed_runs import assert_equal
+from training import TIMES
 
 from veca_marl.config import ConfigError
 from veca_marl.runs.assembly import find_device
@@ -105,7 +106,7 @@ def test_interrupted_and_resumed_equals_uninterrupted(smoke, tmp_path):
 
     def numbers(folder):
         table = rows(folder / "metrics.csv")
-        return [{k: v for k, v in row.items() if k != "frames_per_s"} for row in table]
+        return [{k: v for k, v in row.items() if k not in TIMES} for row in table]
 
     assert numbers(whole) == numbers(run)
 
@@ -157,7 +158,7 @@ def test_a_wrong_command_ends_in_one_line_and_leaves_nothing(tmp_path, arguments
 def comparable(run):
     """Return what a finished run has stored, without what depends on the clock and the command."""
     tables = {
-        name: [{k: v for k, v in row.items() if k != "frames_per_s"} for row in rows(run / name)]
+        name: [{k: v for k, v in row.items() if k not in TIMES} for row in rows(run / name)]
         for name in ("metrics.csv", "evaluations.csv")
     }
     states = {

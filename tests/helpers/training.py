@@ -29,9 +29,11 @@ class Interrupt:
         pass
 
 
+TIMES = ("frames_per_s", "between_s")
+
+
 def read(path):
     """Return the rows of a CSV file without those columns that depend on the clock."""
     with path.open() as file:
-        return [
-            {k: v for k, v in row.items() if k != "frames_per_s"} for row in csv.DictReader(file)
-        ]
+        rows = list(csv.DictReader(file))
+    return [{k: v for k, v in row.items() if k not in TIMES} for row in rows]

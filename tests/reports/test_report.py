@@ -8,7 +8,7 @@ from stored_runs import write_run
 from veca_marl import report
 from veca_marl.reports import figure
 from veca_marl.reports.arms import compose_arms
-from veca_marl.reports.gather import Found, gather, run_folder
+from veca_marl.reports.gather import Found, gather, run_folder, training_minutes
 from veca_marl.reports.page import remarks
 from veca_marl.reports.runs import runs_of, team_of
 from veca_marl.sweeps.run_state import RunState
@@ -138,12 +138,22 @@ def test_a_run_that_ended_on_a_smaller_budget_does_not_count(tmp_path, arms):
     assert found.remark.startswith("unfinished: 100 of 200 frames")
 
 
-def test_minutes_are_those_of_collection_and_learning(tmp_path, arms):
+def test_minutes_of_runs_without_times_between_batches_are_those_of_batches(tmp_path, arms):
     config = {**arms["hrtf"], "seed": 0}
     points = [(100, 1.0), (200, 2.0)]
     write_run(run_folder(tmp_path, "hrtf", 0), config, points, seconds_per_frame=0.6)
     _, rows = gather(tmp_path, {"hrtf": arms["hrtf"]}, [0])
     assert [row["minutes"] for row in rows] == ["0.000", "1.000", "2.000"]
+
+
+def test_minutes_include_earlier_evaluations():
+    rows = [
+        {"frames": "100", "frames_per_s": "10.0", "between_s": "0"},
+        {"frames": "200", "frames_per_s": "10.0", "between_s": "50.0"},
+    ]
+    frames, minutes = training_minutes(rows)
+    assert frames.tolist() == [100, 200]
+    assert minutes.tolist() == pytest.approx([0.0, 10 / 60, 70 / 60])
 
 
 def test_a_half_written_last_row_is_left_out(tmp_path, arms):

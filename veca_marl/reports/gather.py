@@ -93,7 +93,7 @@ def _remark(run: StoredRun, state: RunState, asked: Mapping[str, Any]) -> str:
 
 def _rows(run: StoredRun, status: Found) -> list[Row]:
     """Return the evaluations of a run with its arm, its seed and the minutes until each."""
-    frames, minutes = learning_minutes(run.rows("metrics"))
+    frames, minutes = training_minutes(run.rows("metrics"))
     rows = []
     for row in run.rows("evaluations"):
         passed = minutes[np.searchsorted(frames, int(row["frames"]), side="right")]
@@ -102,15 +102,18 @@ def _rows(run: StoredRun, status: Found) -> list[Row]:
     return rows
 
 
-def learning_minutes(metrics: Sequence[Mapping[str, str]]) -> tuple[Any, Any]:
-    """Return frames ``(n,)`` and the minutes ``(n + 1,)`` of collection and learning until them.
+def training_minutes(metrics: Sequence[Mapping[str, str]]) -> tuple[Any, Any]:
+    """Return frames ``(n,)`` and the minutes ``(n + 1,)`` of training until them.
 
-    Evaluations are left out, also the time between an interruption and its resumption. Entry
-    ``k`` of the minutes belongs to the first ``k`` batches.
+    They include collection, learning, and evaluations between batches; the time between an
+    interruption and its resumption is left out. Runs that were stored without the column
+    ``between_s`` have minutes of collection and learning alone. Entry ``k`` of the minutes belongs
+    to the first ``k`` batches.
     """
     frames = np.array([int(row["frames"]) for row in metrics])
     rates = np.array([float(row["frames_per_s"]) for row in metrics])
-    seconds = np.diff(frames, prepend=0) / rates
+    between = np.array([float(row.get("between_s") or 0.0) for row in metrics])
+    seconds = np.diff(frames, prepend=0) / rates + between
     return frames, np.concatenate([[0.0], np.cumsum(seconds) / 60.0])
 
 

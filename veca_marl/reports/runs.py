@@ -19,7 +19,7 @@ class Point:
 
     Attributes:
         frames: Frames of training before it.
-        minutes: Minutes of collection and learning before it; NaN if not measured.
+        minutes: Minutes of training, with earlier evaluations, before it; NaN if not measured.
         score: Mean of the metric over the episodes.
         episodes: Number of episodes; 0 if not stored.
     """

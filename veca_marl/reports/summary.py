@@ -20,7 +20,7 @@ class CurvePoint:
 
     Attributes:
         frames: Frames of training.
-        minutes: Mean minutes of collection and learning; NaN if not measured.
+        minutes: Mean minutes of training; NaN if not measured.
         score: Interquartile mean.
         interval: Its 95 % bootstrap interval; NaN with one run.
         runs: Number of runs that were evaluated there.
@@ -45,7 +45,7 @@ class ArmSummary:
         reached: Number of ended runs that reached the threshold.
         frames: Median frames until the threshold; infinite if fewer than half reached it, NaN
             without a threshold.
-        minutes: Median minutes of collection and learning until the threshold, likewise.
+        minutes: Median minutes of training until the threshold, likewise.
         random: Mean score of the random policy beside the ended runs; NaN if not measured.
     """
 

@@ -79,6 +79,7 @@ class Trainer:
     during_last_evaluation: Callable[[], None] = nothing
     progress: Progress = field(default_factory=Progress)
     _resumed_frames: int = 0
+    _batch_end_s: float | None = None
     _evaluator: Evaluator = field(init=False)
 
     def __post_init__(self) -> None:
@@ -201,7 +202,11 @@ class Trainer:
             both = episodes.add(batch, team) | measures
             row |= {f"{team}/{name}": value for name, value in both.items()}
         row |= self.matchmaking.measures()
-        row["frames_per_s"] = self.collect.frames / (self._clock.elapsed() - before)
+        now = self._clock.elapsed()
+        row["frames_per_s"] = self.collect.frames / (now - before)
+        # evaluations, checkpoints and restarts since the last batch of this process
+        row["between_s"] = 0.0 if self._batch_end_s is None else before - self._batch_end_s
+        self._batch_end_s = now
         for reporter in self.reporters:
             reporter.write("metrics", self.progress.frames, row)
         return row
