@@ -91,6 +91,17 @@ def extends_into(
 
 
 @njit(cache=True)
+def any_extends_into(
+    centres: Floats, rotations: Floats, halves: Floats, lower: Floats, size: Floats
+) -> bool:
+    """Return whether one of the boxes ``(n, ...)`` reaches into a room, see `extends_into`."""
+    for n in range(len(centres)):
+        if extends_into(centres[n], rotations[n], halves[n], lower, size):
+            return True
+    return False
+
+
+@njit(cache=True)
 def count_crossed_inside(
     source: Floats,
     head: Floats,

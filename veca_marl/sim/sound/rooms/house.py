@@ -92,7 +92,7 @@ class House:
 
     def _attenuated(self, gains: Floats, one: OneRoom, source: Floats, head: Floats) -> Floats:
         """Return the gains of all paths in a room after the obstacles in it."""
-        if not len(self.obstacles):
+        if not self.obstacles.reach_into(one.room):
             return gains
         counts = one.paths_through(self.obstacles, source, head)
         return gains * self._obstacle_gain**counts if counts.any() else gains

@@ -7,7 +7,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from veca_marl.sim.geometry import Floats
 from veca_marl.sim.sound.rooms.acoustics import Room
-from veca_marl.sim.sound.rooms.blocked_paths import count_crossed, count_crossed_inside
+from veca_marl.sim.sound.rooms.blocked_paths import (
+    any_extends_into,
+    count_crossed,
+    count_crossed_inside,
+)
 
 
 class Obstacles:
@@ -54,6 +58,12 @@ class Obstacles:
         Boxes round one of the points do not count.
         """
         return int(count_crossed(one, other, self._centres, self._rotations, self._halves))
+
+    def reach_into(self, room: Room) -> bool:
+        """Return whether any box is inside a room, not only next to it."""
+        return bool(
+            any_extends_into(self._centres, self._rotations, self._halves, room.lower, room.size)
+        )
 
     def inside(
         self, room: Room, lattice: NDArray[np.int64], source: Floats, head: Floats

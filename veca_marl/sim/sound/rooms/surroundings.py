@@ -120,8 +120,10 @@ class OneRoom:
         self, obstacles: Obstacles, source: Floats, head: Floats
     ) -> NDArray[np.int64]:
         """Return how many obstacles each path passes, ``(K,)``; see `Obstacles.inside`."""
-        room = self.room
-        return obstacles.inside(room, self._lattice, room.clamp(source), room.clamp(head))
+        lowest, highest = self._bounds
+        source = np.minimum(np.maximum(source, lowest), highest)
+        head = np.minimum(np.maximum(head, lowest), highest)
+        return obstacles.inside(self.room, self._lattice, source, head)
 
 
 @njit(cache=True)
