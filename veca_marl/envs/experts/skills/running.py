@@ -24,11 +24,11 @@ class RunningPattern:
     frequency_hz: float = 1.88
     hip: float = -3.4
     hip_swing: float = 2.7
-    hip_lift: float = 20.0
+    hip_lift: float = 15.7
     knee: float = 18.6
-    knee_lift: float = 32.2
-    lift_lead_rad: float = 0.34
-    foot: float = 25.9
+    knee_lift: float = 16.5
+    lift_lead_rad: float = 0.52
+    foot: float = 26.3
     foot_swing: float = 19.1
     abduction: float = 11.6
     sway: float = -0.8
@@ -38,9 +38,9 @@ class RunningPattern:
     arm_swing: float = 9.6
     arm_abduction: float = -39.0
     hip_gain: float = 24.1
-    hip_rate_gain: float = -0.7
-    foot_gain: float = -37.0
-    abduction_gain: float = 4.2
+    hip_rate_gain: float = 0.1
+    foot_gain: float = -39.0
+    abduction_gain: float = 2.8
     abduction_rate_gain: float = 4.1
 
 
