@@ -14,7 +14,8 @@ from veca_marl.sim.hearing.spherical_head import woodworth_arrival_s
 from veca_marl.sim.sound import SAMPLE_RATE_HZ, SPEED_OF_SOUND_MPS, Clip, SoundField
 
 _TEXT = """
-Noise from {distance:g} m away, rendered as for an agent, in the free field.
+Noise from {distance:g} m away, rendered as for an agent, in the free field; levels are compared
+at {measured:g} m, the distance at which the head was measured.
 
 - **Interaural time**: lag of the peak of the cross-correlation of both ears, {low:g} to {high:g}
   Hz, against that of the measured responses with their arrival times, and against Woodworth's ray
@@ -37,13 +38,15 @@ _N_FFT = 4096
 _UPSAMPLING = 16
 
 
-def heard_noise(cfg: AudioCfg, azimuth_deg: float, seed: int = 0) -> Floats:
+def heard_noise(
+    cfg: AudioCfg, azimuth_deg: float, seed: int = 0, distance_m: float = DISTANCE_M
+) -> Floats:
     """Return 0.4 s of white noise at both ears ``(2, n)``, from an azimuth to the left."""
     azimuth = np.deg2rad(azimuth_deg)
     field = SoundField(None)
     noise = np.random.default_rng(seed).standard_normal(SAMPLE_RATE_HZ)
     source = field.add_source("noise", Clip(0.1 * noise))
-    source.position = DISTANCE_M * np.array([np.cos(azimuth), np.sin(azimuth), 0.0])
+    source.position = distance_m * np.array([np.cos(azimuth), np.sin(azimuth), 0.0])
     listener = field.add_listener(make_receiver(cfg, SAMPLE_RATE_HZ))
     field.reset(np.random.default_rng(0))
     head, steps = Pose(np.zeros(3), np.eye(3)), []
@@ -124,9 +127,15 @@ def section() -> Section:
         "two points": [two_points_itd_s(azimuth, head.head_radius_m) for azimuth in AZIMUTHS_DEG],
     }
     text = _TEXT.format(
-        distance=DISTANCE_M, low=TIME_BAND_HZ[0], high=TIME_BAND_HZ[1], radius=head.head_radius_m
+        distance=DISTANCE_M,
+        measured=head.measured_at_m,
+        low=TIME_BAND_HZ[0],
+        high=TIME_BAND_HZ[1],
+        radius=head.head_radius_m,
     )
-    levels = _levels(head, rendered)
+    hrtf = AudioCfg(quality=AudioQuality.hrtf)
+    as_measured = [heard_noise(hrtf, a, distance_m=head.measured_at_m) for a in AZIMUTHS_DEG]
+    levels = _levels(head, as_measured)
     laws = [*_time_laws(times), *_level_laws(levels), *_scale_laws()]
     return Section("Two ears", text, laws, [_time_plot(times), _level_plot(levels)])
 
