@@ -79,28 +79,16 @@ def draw_geoms(
         surfaces: ``(H, W)`` row of the visible primitive, updated likewise.
     """
     for g in range(geoms.shapes.shape[0]):
-        if drawn[g]:
-            draw_geom(geoms, g, view, lens, bounded, depth, surfaces)
-
-
-@njit(cache=True, error_model="numpy")
-def draw_geom(
-    geoms: GeomTable,
-    g: int,
-    view: Floats,
-    lens: Lens,
-    bounded: bool,
-    depth: Depths,
-    surfaces: Surfaces,
-) -> Rectangle:
-    """Draw one primitive as `draw_geoms`; return the pixels that it may have changed."""
-    ray = local_ray(geoms.positions[g], geoms.rotations[g], view)
-    rectangle = (0, lens.columns.shape[0], 0, lens.rows.shape[0])
-    if bounded:
-        rectangle = _rectangle(geoms.shapes[g], geoms.sizes[g], ray, lens)
-    if rectangle[0] < rectangle[1] and rectangle[2] < rectangle[3]:
-        _draw(geoms.shapes[g], geoms.sizes[g], ray, rectangle, lens, np.int16(g), depth, surfaces)
-    return rectangle
+        if not drawn[g]:
+            continue
+        ray = local_ray(geoms.positions[g], geoms.rotations[g], view)
+        rectangle = (0, lens.columns.shape[0], 0, lens.rows.shape[0])
+        if bounded:
+            rectangle = bounding_rectangle(geoms.shapes[g], geoms.sizes[g], ray, lens)
+        if rectangle[0] < rectangle[1] and rectangle[2] < rectangle[3]:
+            draw_rectangle(
+                geoms.shapes[g], geoms.sizes[g], ray, rectangle, lens, np.int16(g), depth, surfaces
+            )
 
 
 @njit(cache=True, error_model="numpy")
@@ -127,7 +115,7 @@ def into_local(rotation: Floats, x: float, y: float, z: float) -> Vector:
 
 
 @njit(cache=True, error_model="numpy")
-def _rectangle(shape: int, size: NDArray[np.float32], ray: Ray, lens: Lens) -> Rectangle:
+def bounding_rectangle(shape: int, size: NDArray[np.float32], ray: Ray, lens: Lens) -> Rectangle:
     """Return pixels (first column, last + 1, first row, last + 1) that a primitive may cover."""
     eye, right, up, forward = ray
     centre = (
@@ -173,7 +161,7 @@ def pixel_rectangle(across: Interval, upward: Interval, lens: Lens) -> Rectangle
 
 
 @njit(cache=True, error_model="numpy")
-def _draw(
+def draw_rectangle(
     shape: int,
     size: NDArray[np.float32],
     ray: Ray,

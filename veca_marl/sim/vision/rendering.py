@@ -91,8 +91,9 @@ def render_views(
     lights = np.empty(views.depth.shape[1:], np.float32)
     seen = np.empty_like(meshes.vertices)
     has_glass = drawn.glass.any()
-    all_glass = np.empty((0, axes.shape[0], lights.shape[0], lights.shape[1]), np.int16)
-    for v in range(axes.shape[0]):
+    count, height, width = views.ids.shape
+    all_glass = np.empty((0, count, height, width), np.int16)
+    for v in range(count):
         view, rgb, depth, ids = axes[v], views.rgb[v], views.depth[v], views.ids[v]
         depth[:], ids[:] = lens.far, NO_SURFACE
         draw_geoms(geoms, drawn.opaque, view, lens, True, depth, ids)

@@ -27,6 +27,8 @@ from veca_marl.sim.vision.rasterizer import (
 
 Images: TypeAlias = NDArray[np.uint8]
 Lights: TypeAlias = NDArray[np.float32]
+Point: TypeAlias = tuple[float, float, float]
+FrameRay: TypeAlias = tuple[Point, Point, Point, Point]
 
 SUN = (0.36, 0.26, 0.896)  # unit vector towards the directional light
 AMBIENT = 0.45  # brightness of surfaces parallel to the light
@@ -38,6 +40,7 @@ GLASS_OPACITY = 0.3  # weight of a transparent primitive's own colour
 _SPHERE, _BOX, _CYLINDER = int(Shape.SPHERE), int(Shape.BOX), int(Shape.CYLINDER)
 _0, _1, _HALF, _255 = single(0.0), single(1.0), single(0.5), single(255.0)
 _AMBIENT, _DIRECT, _BOUNCE = single(AMBIENT), single(1.0 - AMBIENT), single(BOUNCE)
+_ORIGIN = (0.0, 0.0, 0.0)
 # offset of the tiles from the origin, so that a face in the plane of tile edges does not flicker
 _TILE_SHIFT = 0.01
 
@@ -93,6 +96,7 @@ def illuminate(
         lights: ``(H, W)``, written where a primitive is visible.
     """
     width = surfaces.shape[1]
+    tiled, ray = -1, (_ORIGIN, _ORIGIN, _ORIGIN, _ORIGIN)  # the last checkered primitive
     for j in range(surfaces.shape[0]):
         end = 0
         while end < width:
@@ -102,15 +106,22 @@ def illuminate(
             if g == NO_SURFACE or g >= geoms.shapes.shape[0]:
                 continue
             columns, run = lens.columns[first:end], depth[j, first:end]
-            _light_run(geoms, g, view, lens.rows[j], columns, run, lights[j, first:end])
+            # its columns, since a call with the table would count references of all of them
+            shape, size = geoms.shapes[g], geoms.sizes[g]
+            pose = geoms.positions[g], geoms.rotations[g]
+            _light_run(shape, size, pose, view, lens.rows[j], columns, run, lights[j, first:end])
             if geoms.checkers[g] > _0:
-                _tile_run(geoms, g, view, lens.rows[j], columns, run, lights[j, first:end])
+                if g != tiled:
+                    tiled, ray = g, _frame_ray(geoms, g, view)
+                edge_m = geoms.checkers[g]
+                _tile_run(ray, lens.rows[j], columns, run, edge_m, lights[j, first:end])
 
 
 @njit(cache=True, error_model="numpy")
 def _light_run(
-    geoms: GeomTable,
-    g: int,
+    shape: int,
+    size: Lights,
+    pose: tuple[Floats, Floats],
     view: Floats,
     y: float,
     columns: Depths,
@@ -118,10 +129,10 @@ def _light_run(
     lights: Lights,
 ) -> None:
     """Compute the brightness of a run of pixels that show one primitive."""
-    eye, right, up, forward = local_ray(geoms.positions[g], geoms.rotations[g], view)
-    sun = into_local(geoms.rotations[g], SUN[0], SUN[1], SUN[2])
+    position, rotation = pose
+    eye, right, up, forward = local_ray(position, rotation, view)
+    sun = into_local(rotation, SUN[0], SUN[1], SUN[2])
     start = (forward[0] + y * up[0], forward[1] + y * up[1], forward[2] + y * up[2])
-    shape, size = geoms.shapes[g], geoms.sizes[g]
     for i in range(columns.shape[0]):
         x, t = columns[i], depth[i]
         point = (
@@ -162,40 +173,43 @@ def _local_normal(shape: int, size: Lights, point: Vector) -> Vector:
 
 
 @njit(cache=True, error_model="numpy")
-def _tile_run(
-    geoms: GeomTable,
-    g: int,
-    view: Floats,
-    y: float,
-    columns: Depths,
-    depth: Depths,
-    lights: Lights,
-) -> None:
-    """Darken every second cell of a three-dimensional checker pattern in the object's frame."""
-    per_m = 1.0 / geoms.checkers[g]
-    turn, local, at = geoms.rotations[g], geoms.local_rotations[g], geoms.positions[g]
-    x0, y0, z0 = _into_frame(
-        turn, local, view[0, 0] - at[0], view[0, 1] - at[1], view[0, 2] - at[2]
+def _frame_ray(geoms: GeomTable, g: int, view: Floats) -> FrameRay:
+    """Return camera position, right, up and forward axes in the frame that a primitive is on."""
+    rotation, local = geoms.rotations[g], geoms.local_rotations[g]
+    position, offset = geoms.positions[g], geoms.offsets[g]
+    x, y, z = _into_frame(
+        rotation,
+        local,
+        view[0, 0] - position[0],
+        view[0, 1] - position[1],
+        view[0, 2] - position[2],
     )
-    offset = geoms.offsets[g]
-    eye = (x0 + offset[0], y0 + offset[1], z0 + offset[2])
-    right = _into_frame(turn, local, view[1, 0], view[1, 1], view[1, 2])
-    up = _into_frame(turn, local, view[2, 0], view[2, 1], view[2, 2])
-    forward = _into_frame(turn, local, view[3, 0], view[3, 1], view[3, 2])
+    return (
+        (x + offset[0], y + offset[1], z + offset[2]),
+        _into_frame(rotation, local, view[1, 0], view[1, 1], view[1, 2]),
+        _into_frame(rotation, local, view[2, 0], view[2, 1], view[2, 2]),
+        _into_frame(rotation, local, view[3, 0], view[3, 1], view[3, 2]),
+    )
+
+
+@njit(cache=True, error_model="numpy")
+def _tile_run(
+    ray: FrameRay, y: float, columns: Depths, depth: Depths, edge_m: float, lights: Lights
+) -> None:
+    """Darken every second cell of a three-dimensional checker pattern in an object's frame."""
+    per_m = 1.0 / edge_m
+    (ex, ey, ez), (rx, ry, rz), (ux, uy, uz), (fx, fy, fz) = ray
     for i in range(columns.shape[0]):
         x, t = columns[i], depth[i]
-        tile = 0
-        for axis in range(3):
-            along = forward[axis] + x * right[axis] + y * up[axis]
-            tile += math.floor((eye[axis] + t * along) * per_m + _TILE_SHIFT)
+        tile = math.floor((ex + t * (fx + x * rx + y * ux)) * per_m + _TILE_SHIFT)
+        tile += math.floor((ey + t * (fy + x * ry + y * uy)) * per_m + _TILE_SHIFT)
+        tile += math.floor((ez + t * (fz + x * rz + y * uz)) * per_m + _TILE_SHIFT)
         if tile & 1:
             lights[i] *= single(DARK_TILE)
 
 
 @njit(cache=True, error_model="numpy")
-def _into_frame(
-    rotation: Floats, local: Floats, x: float, y: float, z: float
-) -> tuple[float, float, float]:
+def _into_frame(rotation: Floats, local: Floats, x: float, y: float, z: float) -> Point:
     """Return a world vector in the axes of the frame that a primitive is on.
 
     Args:

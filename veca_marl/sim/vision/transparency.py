@@ -16,7 +16,15 @@ from numba import njit
 from numpy.typing import NDArray
 
 from veca_marl.sim.geometry import Bools, Floats, GeomTable
-from veca_marl.sim.vision.rasterizer import NO_SURFACE, Depths, Lens, Surfaces, draw_geom
+from veca_marl.sim.vision.rasterizer import (
+    NO_SURFACE,
+    Depths,
+    Lens,
+    Surfaces,
+    bounding_rectangle,
+    draw_rectangle,
+    local_ray,
+)
 from veca_marl.sim.vision.shading import GLASS_OPACITY, Images, blend_colours, illuminate
 
 
@@ -51,12 +59,17 @@ def collect_layers(
     for g in range(geoms.shapes.shape[0]):
         if not drawn[g]:
             continue
-        first, end, top, bottom = draw_geom(geoms, g, view, lens, True, scratch, hit)
+        shape, size, surface = geoms.shapes[g], geoms.sizes[g], np.int16(g)
+        ray = local_ray(geoms.positions[g], geoms.rotations[g], view)
+        rectangle = bounding_rectangle(shape, size, ray, lens)
+        first, end, top, bottom = rectangle
+        if first < end and top < bottom:
+            draw_rectangle(shape, size, ray, rectangle, lens, surface, scratch, hit)
         for j in range(top, bottom):
             for i in range(first, end):
                 if hit[j, i] != g:
                     continue
-                behind, t = _insert(depths, surfaces, j, i, np.int16(g), scratch[j, i])
+                behind, t = _insert(depths, surfaces, j, i, surface, scratch[j, i])
                 scratch[j, i] = depth[j, i]
                 if behind != NO_SURFACE:
                     more_depths, more_surfaces = _layers(1, depth.shape)
