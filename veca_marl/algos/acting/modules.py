@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, Protocol, runtime_checkable
 
+from tensordict import TensorDictBase
 from tensordict.nn import ProbabilisticTensorDictModule, TensorDictModule
 from torchrl.envs import ExplorationType
 from torchrl.envs.utils import exploration_type
@@ -26,15 +27,26 @@ class WritesArrays(Protocol):
 
 
 class ArrayModule(TensorDictModule):
-    """A `TensorDictModule` of which the module maps arrays to an array, or to a tuple of them."""
+    """A `TensorDictModule` of which the module maps arrays to an array, or to a tuple of them.
+
+    `TensorDictModule.forward` converts each array by `TensorDict.from_any`, which searches the
+    path for pandas and takes 0.05 ms where it is not installed.
+    """
+
+    def forward(self, tensordict: TensorDictBase, **options: Any) -> TensorDictBase:
+        """Write the outputs into `tensordict` and return it; for `options` see the base class."""
+        if options:
+            written: TensorDictBase = super().forward(tensordict, **options)
+            return written
+        self.write(tensordict)
+        return tensordict
 
     def write(self, arrays: Arrays) -> None:
         """See `WritesArrays`."""
         written = self.module(*(arrays[key] for key in self.in_keys))
-        if len(self.out_keys) == 1:
-            arrays[self.out_keys[0]] = written
-        else:
-            arrays.update(zip(self.out_keys, written, strict=True))
+        outputs = written if isinstance(written, tuple) else (written,)
+        for key, array in zip(self.out_keys, outputs, strict=True):
+            arrays[key] = array
 
 
 class ActionDistribution(ProbabilisticTensorDictModule):
