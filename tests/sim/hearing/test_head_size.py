@@ -50,19 +50,22 @@ def test_stereo_has_the_distance_between_the_ears_of_the_head(scale):
     assert ears[1] == pytest.approx((0.0, -head.head_radius_m, 0.0))
 
 
-def test_the_arms_have_the_interaural_times_of_one_head():
-    for scale in (1.0, 0.733):
-        radius_m = kemar_response().scaled(scale).head_radius_m
-        stereo = heard_noise(AudioCfg(quality=AudioQuality.stereo, head_scale=scale), 90.0)
-        assert interaural_time_s(stereo) == pytest.approx(
-            two_points_itd_s(90.0, radius_m), abs=3e-6
+@pytest.mark.parametrize("scale", [1.0, 0.733])
+def test_the_arms_have_the_interaural_differences_of_one_head(scale):
+    head = kemar_response().scaled(scale)
+    time_s, filters = measured_at(head, 90.0)
+    stereo, hrtf = (
+        heard_noise(
+            AudioCfg(quality=quality, head_scale=scale), 90.0, distance_m=head.measured_at_m
         )
-        hrtf = heard_noise(AudioCfg(head_scale=scale), 90.0)
-        time_s, filters = measured_at(kemar_response().scaled(scale), 90.0)
-        assert interaural_time_s(hrtf) == pytest.approx(time_s, abs=5e-6)
-        band_hz = (1414.0, 2828.0)
-        expected_db = interaural_level_db(filters, band_hz)
-        assert interaural_level_db(hrtf, band_hz) == pytest.approx(expected_db, abs=0.5)
+        for quality in (AudioQuality.stereo, AudioQuality.hrtf)
+    )
+    two_points_s = two_points_itd_s(90.0, head.head_radius_m)
+    assert interaural_time_s(stereo) == pytest.approx(two_points_s, abs=3e-6)
+    assert interaural_time_s(hrtf) == pytest.approx(time_s, abs=5e-6)
+    band_hz = (1414.0, 2828.0)
+    expected_db = interaural_level_db(filters, band_hz)
+    assert interaural_level_db(hrtf, band_hz) == pytest.approx(expected_db, abs=0.5)
 
 
 @pytest.mark.parametrize("preset", ["hrtf_child", "stereo_child"])
