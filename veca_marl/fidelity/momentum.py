@@ -24,7 +24,7 @@ kinetic energy are sums over the links as Bullet reports them.
 """
 _HEIGHT_M = 20.0
 SPEED_TOLERANCE_MPS = 1e-6
-SPIN_TOLERANCE_NMS = 0.02
+SPIN_TOLERANCE_NMS = 1e-6
 ENERGY_TOLERANCE = 1.02
 
 

@@ -26,7 +26,9 @@ _TOP_SPEED_RADPS = 30.0  # of a joint: twice the speed of human limbs
 # limit is so high that it never acts
 _BULLET_TOP_SPEED = 1000.0
 STOP_MARGIN_RAD = 0.01  # 0.6 degrees, by which Bullet's stops are inside the joint limits
-_NO_FORCE_NS = 1e-8  # impulse on the whole body in a physics step below which nothing touches it
+# impulse on the whole body in a physics step below which contacts with others are looked for; its
+# weight gives 0.8 N s
+_NO_FORCE_NS = 1e-3
 _FLAGS = (
     pybullet.URDF_USE_INERTIA_FROM_FILE
     | pybullet.URDF_MAINTAIN_LINK_ORDER
