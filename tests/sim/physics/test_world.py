@@ -187,7 +187,9 @@ def test_a_reset_restores_colours_and_sounds_of_everything():
         source = world.prop("ball").sound
         camera_pose = look_at(np.array([-1.0, 0.3, 0.8]), np.array([0.5, 0.0, 0.1]))
         picture = Camera().render(world.scene, [camera_pose]).rgb
-        return picture, source.history.copy(), world.scene.surfaces.colours.copy()
+        memory = source.memory
+        emitted = memory.powers[:, memory.end - world.clock.step_samples : memory.end].copy()
+        return picture, emitted, world.scene.surfaces.colours.copy()
 
     fresh, (used, walker) = observed(build()[0]), build()
     used.reset(np.random.default_rng(0))
