@@ -64,12 +64,11 @@ class SAC(Algorithm):
         ).to(device)
         self._critics = [*trainable(self.network.encoder), *self.network.values.parameters()]
         self._policy = list(self.loss.policy.parameters())
-        temperatures = {
-            "params": list(self.temperatures.parameters()),
-            "lr": cfg.temperature.learning_rate,
-        }
-        networks = {"params": [*self._critics, *self._policy]}
-        self.optimizer = torch.optim.Adam([networks, temperatures], cfg.learning_rate, fused=True)
+        groups: list[dict[str, Any]] = [
+            {"params": [*self._critics, *self._policy]},
+            {"params": list(self.temperatures.parameters()), "lr": cfg.temperature.learning_rate},
+        ]
+        self.optimizer = torch.optim.Adam(groups, cfg.learning_rate, fused=True)
         self.replay = Replay(StoredKeys.of(team, spec, memory), cfg.replay, span)
         self._windows = cfg.batch_size // span.length
         self._shift = RandomShift(team, spec, cfg.random_shift)

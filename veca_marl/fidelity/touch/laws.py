@@ -63,7 +63,7 @@ def plane_error(radius: float) -> float:
         skin = FlatSkin(thickness_m, radius * thickness_m, plane)
         for share in np.linspace(0.0, 1.3, 27):
             reading = skin.read(np.array([0.0, 0.0, 1.0 - share * thickness_m]))
-            errors.append(abs(reading - min(share, 1.0)))
+            errors.append(abs(float(reading) - min(float(share), 1.0)))
     return max(errors)
 
 
