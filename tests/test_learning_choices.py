@@ -117,7 +117,7 @@ def test_an_action_of_two_parts_is_learnt_from_a_replay_buffer(tmp_path):
     small = ["algo.replay.capacity=100", "algo.replay.warm_up_frames=20", "algo.batch_size=8"]
     cfg = compose([*SMALL, "algo=sac_fast", "body=walker_voice", *small])
     row = run_training(cfg, RunFolder(tmp_path)).metrics[-1]
-    assert row["agents/updates"] == 8.0
+    assert row["agents/updates"] == 16.0
     assert {"agents/alpha_move", "agents/alpha_voice"} <= row.keys()
     assert load_actor(tmp_path, "agents", read_specs(cfg.game)["agents"]).out_keys
 

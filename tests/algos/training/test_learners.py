@@ -28,7 +28,7 @@ def make_env(worlds, seed):
 class Always(nn.Module):
     """Acts with one sign."""
 
-    in_keys, out_keys = (), (("blue", "action"),)
+    in_keys, out_keys = (("blue", "observation", "audio"),), (("blue", "action"),)
 
     def __init__(self, sign):
         super().__init__()
@@ -71,7 +71,7 @@ def test_a_copy_takes_over_parameters_and_buffers(make_ppo):
         for tensor in [*ppo.policy.parameters(), *ppo.policy.buffers()]:
             tensor.add_(1.0)
     copy.take_over(ppo.policy)
-    mine, other = ppo.policy.state_dict(), copy.state_dict()
+    mine, other = ppo.policy.actors.state_dict(), copy.actors.state_dict()
     assert any(name.endswith("statistic") for name in mine)
     assert all(torch.equal(mine[name], other[name]) for name in mine)
     assert not any(mine[name].data_ptr() == other[name].data_ptr() for name in mine)

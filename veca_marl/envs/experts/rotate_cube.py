@@ -18,19 +18,22 @@ from veca_marl.sim.geometry import Floats, heading_rad
 _GAIN = 0.05  # change of the target angles per step, as a share of the remaining angle
 _MAX_CHANGE_RAD = math.radians(1.5)  # per step; with a larger one the cube slides off
 _JOINTS = (SHOULDER, "r_hand.radial_deviation")
+_TILT_JOINT = "r_upper_arm.flexion"
 
 
 @register_expert("RotateCube")
 class RotateCubeExpert(Expert[RotateCube]):
     """Turns shoulder and wrist until the cube on the palm has reached its target orientation.
 
-    It does not move the fingers. Reads the orientation of the cube and of its target from the
+    Flexion of the upper arm keeps the palm level meanwhile. The fingers do not move. Reads the orientation of the cube and of its target from the
     simulator (privileged).
     """
 
     def __init__(self, task: RotateCube, player: Player) -> None:
         super().__init__(task, player)
-        self._joints = [task.child.joint_names.index(name) for name in _JOINTS]
+        names = task.child.joint_names
+        self._joints = [names.index(name) for name in _JOINTS]
+        self._tilt_joint = names.index(_TILT_JOINT)
 
     def reset(self) -> None:
         """See `Expert.reset`."""
@@ -38,8 +41,15 @@ class RotateCubeExpert(Expert[RotateCube]):
 
     def act(self, observation: Mapping[str, NDArray[Any]]) -> Floats:
         """Return target angles ``(82,)`` in rad."""
-        error_rad = heading_rad(self.task.target @ self.task.cube.rotation.T)
+        turn = self.task.target @ self.task.cube.rotation.T
         # for the right arm of a child on its back, abduction and radial deviation turn to the right
-        change = np.clip(_GAIN * error_rad, -_MAX_CHANGE_RAD, _MAX_CHANGE_RAD)
-        self._angles[self._joints] -= change / len(self._joints)
+        self._angles[self._joints] -= _change(heading_rad(turn)) / len(self._joints)
+        # the arm points to the right (-y): its flexion tilts what lies on the palm about y, by the
+        # angle in the antisymmetric part of a rotation that is small but for the heading
+        self._angles[self._tilt_joint] -= _change((turn[0, 2] - turn[2, 0]) / 2)
         return self._angles
+
+
+def _change(error_rad: float) -> float:
+    """Return the change of target angles in a step."""
+    return float(np.clip(_GAIN * error_rad, -_MAX_CHANGE_RAD, _MAX_CHANGE_RAD))
