@@ -61,10 +61,10 @@ _POSES = {
     ),
 }
 _SPEEDS_RADPS = {"prepare": 10.0, "push": 10.0, "sit": 4.0}
-_DURATION_S = {"lie": 0.4, "prepare": 0.3, "push": 1.1, "sit": 2.0}
+_DURATION_S = {"lie": 0.4, "prepare": 0.5, "push": 1.1, "sit": 2.0}
 _NEXT_STAGE = {"lie": "prepare", "prepare": "push", "push": "sit"}
 _ON_BELLY = 0.7  # cosine of the angle between the front of the chest and straight down
-_FAILED_M = 0.17  # below this height of the top of the chest the attempt has failed
+_FAILED_M = 0.24  # below this height of the top of the chest the attempt has failed
 
 
 class SitUp:
