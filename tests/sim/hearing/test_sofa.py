@@ -225,7 +225,7 @@ def broken(fields):
             "90 degrees away",
         ),
         ("horizontal", only(fields, lambda a, e: e == 0.0), {}, "90 degrees away"),
-        ("rad", {**fields, "SourcePosition": np.deg2rad(positions)}, {}, "longest distance of a source"),
+        ("rad", {**fields, "SourcePosition": np.deg2rad(positions)}, {}, "longest distance of"),
     ]
 
 

@@ -25,8 +25,8 @@ _TILT_JOINT = "r_upper_arm.flexion"
 class RotateCubeExpert(Expert[RotateCube]):
     """Turns shoulder and wrist until the cube on the palm has reached its target orientation.
 
-    Flexion of the upper arm keeps the palm level meanwhile. The fingers do not move. Reads the orientation of the cube and of its target from the
-    simulator (privileged).
+    Flexion of the upper arm keeps the palm level meanwhile. The fingers do not move. Reads the
+    orientation of the cube and of its target from the simulator (privileged).
     """
 
     def __init__(self, task: RotateCube, player: Player) -> None:
