@@ -23,6 +23,7 @@ def test_segmentation_is_that_of_tiny_renderer():
     shares = {name: vision.equal_shares(12, shapes) for name, (shapes, _) in vision.ROOMS.items()}
     broken = [law for law in vision.segmentation_laws(shares) if not law.holds]
     assert not broken
+    assert vision.outside_law(vision.pixels_outside_balls(12)).holds
 
 
 @pytest.mark.parametrize("pupil_mm", vision.PUPILS_MM)

@@ -40,10 +40,12 @@ CAMERAS = 300
 CLEAR_M = 0.3
 ROOMS: dict[str, tuple[tuple[Shape, ...], float]] = {
     "boxes": ((Shape.BOX,), 99.9),
-    "balls": ((Shape.SPHERE,), 98.0),
+    "balls": ((Shape.SPHERE,), 97.0),
     "all shapes": (tuple(Shape), 95.0),
 }
 """Shapes in the rooms that are compared with TinyRenderer, and the least mean share (%)."""
+WALL_ID = 1
+"""Object id of the wall of these rooms; that of the floor is less, those of the shapes are more."""
 _TEXT = f"""
 - **Acuity**: gratings are filtered as a child of that age sees them. The acuity is the frequency at
   which {CONTRAST_AT_LIMIT:.0%} of the contrast is left, compared with the means of Mayer et al.
@@ -54,7 +56,8 @@ _TEXT = f"""
 - **Segmentation**: share of equal pixels with TinyRenderer, Bullet's software renderer, for
   {CAMERAS} random cameras in a room of spheres, boxes, cylinders and capsules, {CLEAR_M} m or more
   away from all of them; also of boxes alone and of balls alone. TinyRenderer draws boxes exactly,
-  balls as polyhedra, cylinders and capsules as coarse polyhedra.
+  balls as polyhedra, cylinders and capsules as coarse polyhedra. The polyhedra of balls are
+  inscribed: no pixel may show a ball in TinyRenderer's image alone.
 - **Defocus**: a thin lens with a pupil of diameter p that is focused at f spreads a point at z over
   a disc of the angular diameter p |1/z - 1/f| (Smith, Am. J. Optometry 1982). The diameter is
   measured by the contrast that a grating loses, with the variance (diameter / 4)^2 of a disc.
@@ -189,21 +192,31 @@ def _free_place(scene: Scene, rng: np.random.Generator) -> Floats:
             return place
 
 
-def equal_shares(cameras: int, shapes: Sequence[Shape]) -> NDArray[np.float64]:
-    """Return the shares of pixels that show the same primitive as TinyRenderer's, by camera."""
+def segmentations(
+    cameras: int, shapes: Sequence[Shape]
+) -> Iterator[tuple[NDArray[np.intp], NDArray[np.intp]]]:
+    """Yield images ``(84, 84)`` of object ids by this renderer and by TinyRenderer, -1 for none."""
     rng = np.random.default_rng(0)
     scene = random_room(rng, shapes)
     camera = Camera(84, 84, 60.0, near_m=0.02, far_m=12.0)
-    shares = []
     with TinyRenderer(scene) as tiny:
         for _ in range(cameras):
             target = rng.uniform((-0.5, -0.5, 0.2), (0.5, 0.5, 0.6))
             pose = look_at(_free_place(scene, rng), target)
-            ours = camera.render(scene, [pose]).ids[0]
             rows = tiny.segment(camera, pose)
             theirs = np.where(rows >= 0, scene.geoms.objects[rows], -1)
-            shares.append(np.mean(ours == theirs))
-    return np.array(shares)
+            yield camera.render(scene, [pose]).ids[0], theirs
+
+
+def equal_shares(cameras: int, shapes: Sequence[Shape]) -> NDArray[np.float64]:
+    """Return the shares of pixels that show the same primitive as TinyRenderer's, by camera."""
+    return np.array([np.mean(ours == theirs) for ours, theirs in segmentations(cameras, shapes)])
+
+
+def pixels_outside_balls(cameras: int) -> int:
+    """Return the number of pixels of all cameras with a ball in TinyRenderer's image alone."""
+    seen = segmentations(cameras, ROOMS["balls"][0])
+    return sum(int(np.sum((theirs > WALL_ID) & (ours <= WALL_ID))) for ours, theirs in seen)
 
 
 def acuity_laws() -> Iterator[tuple[float, float, Law]]:
@@ -239,6 +252,11 @@ def segmentation_laws(shares: dict[str, NDArray[np.float64]]) -> list[Law]:
     ]
 
 
+def outside_law(pixels: int) -> Law:
+    """Return the law of the pixels that show a ball in TinyRenderer's image alone."""
+    return at_most("pixels that show a ball in TinyRenderer's image alone", "", 0.0, float(pixels))
+
+
 PUPILS_MM = (2.0, 4.0, 8.0)
 FOCUS_M = 0.5
 DEPTHS_M = (0.15, 0.25, 0.4, 0.8, 2.0, 10.0)
@@ -261,6 +279,7 @@ def section() -> Section:
     discs = {pupil_mm: defocus_errors(pupil_mm) for pupil_mm in PUPILS_MM}
     laws = [law for _, _, law in acuity]
     laws += [disparity_law(*pairs.T), *segmentation_laws(shares)]
+    laws.append(outside_law(pixels_outside_balls(CAMERAS)))
     laws += [law for _, law in discs.values()]
     plots = [
         _acuity_plot([cpd for _, cpd, _ in acuity]),
