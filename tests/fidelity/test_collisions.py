@@ -2,7 +2,12 @@
 
 import pytest
 
-from veca_marl.fidelity.collisions import impact_laws, rebound_laws, rebound_ratio, resting_depth
+from veca_marl.fidelity.physics.collisions import (
+    impact_laws,
+    rebound_laws,
+    rebound_ratio,
+    resting_depth,
+)
 from veca_marl.sim.physics import PropShape
 
 

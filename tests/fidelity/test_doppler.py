@@ -1,7 +1,7 @@
 import pytest
 from listening import make_receiver
 
-from veca_marl.fidelity.doppler import approaching_source, theory_hz
+from veca_marl.fidelity.hearing.doppler import approaching_source, theory_hz
 
 
 @pytest.mark.parametrize("quality", ["mono", "hrtf"])

@@ -2,7 +2,7 @@
 
 import pytest
 
-from veca_marl.fidelity.inertia import inertia_laws, pendulum_law
+from veca_marl.fidelity.physics.inertia import inertia_laws, pendulum_law
 from veca_marl.sim.physics import PropShape
 
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from veca_marl.fidelity.joints import drive_against_limits, limit_laws, matrix_law
+from veca_marl.fidelity.body.joints import drive_against_limits, limit_laws, matrix_law
 from veca_marl.sim.body.humanoid import Detail
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from veca_marl.fidelity.localisation import ARMS, errors, localisation
+from veca_marl.fidelity.hearing.localisation import ARMS, errors, localisation
 
 
 def test_a_confusion_of_front_and_back_leaves_the_lateral_angle_unchanged():

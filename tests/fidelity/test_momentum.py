@@ -2,7 +2,7 @@
 
 import pytest
 
-from veca_marl.fidelity.momentum import (
+from veca_marl.fidelity.body.momentum import (
     driven_flight,
     energy_laws,
     fall_laws,

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from veca_marl.fidelity import rooms
+from veca_marl.fidelity.hearing import rooms
 from veca_marl.sim.sound import House, Room
 
 ROOM = Room(np.zeros(3), rooms.ROOM_M, rooms.UNEQUAL_WALLS)

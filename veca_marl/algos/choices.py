@@ -1,6 +1,6 @@
 """Registries of what a configuration chooses by name: algorithms, networks, intrinsic rewards.
 
-Each entry is a dataclass of numbers, whose field ``name`` is the entry's name, and a factory.
+Each entry is a dataclass of numbers, with its name in the field ``name``, and a factory.
 """
 
 from __future__ import annotations

@@ -8,18 +8,18 @@ from veca_marl.fidelity.law import Section
 from veca_marl.registry import unknown
 
 SECTIONS: dict[str, str] = {
-    "collisions": "veca_marl.fidelity.collisions",
-    "doppler": "veca_marl.fidelity.doppler",
-    "ears": "veca_marl.fidelity.ears",
-    "inertia": "veca_marl.fidelity.inertia",
-    "joints": "veca_marl.fidelity.joints",
-    "localisation": "veca_marl.fidelity.localisation",
-    "momentum": "veca_marl.fidelity.momentum",
-    "near_field": "veca_marl.fidelity.near_field",
-    "rigid_bodies": "veca_marl.fidelity.rigid_bodies",
-    "rooms": "veca_marl.fidelity.rooms",
+    "collisions": "veca_marl.fidelity.physics.collisions",
+    "doppler": "veca_marl.fidelity.hearing.doppler",
+    "ears": "veca_marl.fidelity.hearing.ears",
+    "inertia": "veca_marl.fidelity.physics.inertia",
+    "joints": "veca_marl.fidelity.body.joints",
+    "localisation": "veca_marl.fidelity.hearing.localisation",
+    "momentum": "veca_marl.fidelity.body.momentum",
+    "near_field": "veca_marl.fidelity.hearing.near_field",
+    "rigid_bodies": "veca_marl.fidelity.physics.rigid_bodies",
+    "rooms": "veca_marl.fidelity.hearing.rooms",
     "touch": "veca_marl.fidelity.touch",
-    "vision": "veca_marl.fidelity.vision",
+    "vision": "veca_marl.fidelity.vision.eyes",
 }
 """Module of each section. It has a function ``section() -> Section``."""
 

@@ -5,7 +5,7 @@ import pytest
 from listening import RATE
 
 from veca_marl.config import compose
-from veca_marl.fidelity.ears import (
+from veca_marl.fidelity.hearing.ears import (
     heard_noise,
     interaural_level_db,
     interaural_time_s,

@@ -78,7 +78,11 @@ def test_energy_grows_with_the_square_of_the_impulse(dropped):
 def test_things_at_rest_and_rolling_are_silent():
     world = world_with(ball(0.1), rod())
     world.freeze()
-    roll = lambda step: world.prop("ball").set_velocity((1, 0, 0), (0, 10, 0)) if step == 5 else 0  # noqa: E731
+
+    def roll(step):
+        if step == 5:
+            world.prop("ball").set_velocity((1, 0, 0), (0, 10, 0))
+
     assert not emitted(world, "ball.impact", 30, roll).any()
     world.close()
 
@@ -107,7 +111,10 @@ def test_a_walker_is_heard_when_it_walks_and_silent_when_it_stands():
     world = world_with()
     walker = Walker("child", WalkerCfg(), world)
     world.freeze()
-    walk = lambda step: walker.walk(0.0 if step >= 50 else 1.0, 0.0)  # noqa: E731
+
+    def walk(step):
+        walker.walk(0.0 if step >= 50 else 1.0, 0.0)
+
     heard = emitted(world, "child.steps", 100, walk)
     world.close()
     steps = np.flatnonzero(np.abs(heard[:50]).max(axis=1) > 0.01)

@@ -19,7 +19,10 @@ def test_doppler(speed):
     sound = np.sin(2 * np.pi * pitch * np.arange(n_steps * STEP) / RATE)
     step_m = speed * STEP / RATE
     near = 1.0 if speed > 0 else 1.0 - step_m * n_steps
-    place = lambda i: ([(near + step_m * (i + 1), 0.0, 0.0)], STILL)  # noqa: E731
+
+    def place(i):
+        return [(near + step_m * (i + 1), 0.0, 0.0)], STILL
+
     heard = render([sound], place, "mono", n_steps=n_steps)[0, 4 * STEP : 20 * STEP]
     spectrum = np.abs(np.fft.rfft(heard * np.hanning(heard.size), 1 << 18))
     found = spectrum.argmax() * RATE / (1 << 18)
@@ -35,7 +38,9 @@ def test_moving_source_equals_an_explicit_time_varying_delay():
         along = speed * (np.asarray(seconds, dtype=float) - n / RATE / 2)
         return np.stack([np.full_like(along, 1.5), along, np.full_like(along, 0.2)], axis=-1)
 
-    place = lambda i: (position([(i + 1) * STEP / RATE]), STILL)  # noqa: E731
+    def place(i):
+        return position([(i + 1) * STEP / RATE]), STILL
+
     heard = render([sound], place, "mono", n_steps=n_steps)[0]
     time = np.arange(1, n + 1) / RATE
     distance = np.linalg.norm(position(time), axis=1)
@@ -51,10 +56,10 @@ def test_moving_source_equals_an_explicit_time_varying_delay():
 def test_moving_and_turning_does_not_click():
     n_steps = 12
     sound = np.sin(2 * np.pi * 300 * np.arange(n_steps * STEP) / RATE)
-    place = lambda i: (  # noqa: E731
-        [(1.5, -0.5 + 0.08 * i, 0.2)],
-        Pose(np.zeros(3), yaw(0.12 * i)),
-    )
+
+    def place(i):
+        return [(1.5, -0.5 + 0.08 * i, 0.2)], Pose(np.zeros(3), yaw(0.12 * i))
+
     heard = render([sound], place, n_steps=n_steps)[:, 3000:]
     high_pass = scipy.signal.butter(8, 2000.0, "highpass", fs=RATE, output="sos")
     clicks = scipy.signal.sosfilt(high_pass, heard, axis=1)[:, 500:]

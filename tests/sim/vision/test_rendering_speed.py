@@ -5,7 +5,7 @@ import time
 import numpy as np
 from eye_scenes import random_rotations
 
-from veca_marl.fidelity.tiny_renderer import TinyRenderer
+from veca_marl.fidelity.vision.tiny_renderer import TinyRenderer
 from veca_marl.sim.geometry import Geom, Scene, Shape
 from veca_marl.sim.vision import Camera, look_at
 

@@ -1,4 +1,4 @@
-"""A policy whose modules are called without a TensorDict between them."""
+"""A policy that calls its modules without a TensorDict between them."""
 
 from __future__ import annotations
 

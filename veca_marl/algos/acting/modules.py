@@ -50,7 +50,7 @@ class ArrayModule(TensorDictModule):
 
 
 class ActionDistribution(ProbabilisticTensorDictModule):
-    """A distribution whose actions are also drawn without making its object.
+    """A distribution from which actions can be drawn without constructing its object.
 
     Args:
         parts: The parts of the action, which are independent given the parameters.

@@ -60,31 +60,24 @@ class HrtfReceiver:
         )
 
 
-class StereoReceiver:
-    """Two omnidirectional receivers at the ears, without a head between them.
+class OmnidirectionalReceivers:
+    """Receivers without a head: each has the delay and the 1/d level of its own distance.
 
-    Each has the delay and the 1/d level of its own distance; head shadow and pinnae are absent.
+    Args:
+        ears: ``(n_channels, 3)`` metres in the head frame.
+        nearest_m: Distance below which the gain is constant, positive.
+
+    Raises:
+        ValueError: If a place is not of three numbers.
     """
 
-    n_channels = 2
     n_taps = 1
 
-    def __init__(
-        self, ear_left: ArrayLike, ear_right: ArrayLike, nearest_m: float = NEAR_FIELD_M
-    ) -> None:
-        """Place the ears.
-
-        Args:
-            ear_left: ``(3,)`` metres in the head frame.
-            ear_right: Likewise.
-            nearest_m: Distance below which the gain is constant, positive.
-
-        Raises:
-            ValueError: If one is not of three numbers.
-        """
-        self.ears: Floats = np.stack([ear_left, ear_right]).astype(np.float64)
-        if self.ears.shape != (2, 3):
-            raise ValueError(f"an ear must be three numbers, got {ear_left!r} and {ear_right!r}")
+    def __init__(self, ears: ArrayLike, nearest_m: float = NEAR_FIELD_M) -> None:
+        self.ears: Floats = np.array(ears, np.float64)
+        if self.ears.ndim != 2 or self.ears.shape[1] != 3:
+            raise ValueError(f"an ear must be three numbers, got {ears!r}")
+        self.n_channels = len(self.ears)
         self.extent_m = float(np.linalg.norm(self.ears, axis=1).max())
         self._nearest_m = nearest_m
 
@@ -103,27 +96,17 @@ class StereoReceiver:
         )
 
 
-class MonoReceiver:
-    """One omnidirectional receiver at the centre of the head: distance but no direction."""
+class StereoReceiver(OmnidirectionalReceivers):
+    """Two receivers at the ears, without a head between them: no head shadow, no pinnae."""
 
-    n_channels = 1
-    n_taps = 1
-    extent_m = 0.0
+    def __init__(
+        self, ear_left: ArrayLike, ear_right: ArrayLike, nearest_m: float = NEAR_FIELD_M
+    ) -> None:
+        super().__init__(np.stack([ear_left, ear_right]), nearest_m)
+
+
+class MonoReceiver(OmnidirectionalReceivers):
+    """One receiver at the centre of the head: distance but no direction."""
 
     def __init__(self, nearest_m: float = NEAR_FIELD_M) -> None:
-        self.ears: Floats = np.zeros((1, 3))
-        self._nearest_m = nearest_m
-
-    def write_paths(
-        self,
-        arrivals: Floats,
-        gains: Floats,
-        sample_rate_hz: float,
-        delays: Floats,
-        filters: NDArray[np.float32],
-    ) -> None:
-        """See `Receiver`."""
-        samples_per_metre = sample_rate_hz / SPEED_OF_SOUND_MPS
-        omnidirectional_paths(
-            arrivals, gains, samples_per_metre, self.ears, self._nearest_m, delays, filters
-        )
+        super().__init__(np.zeros((1, 3)), nearest_m)

@@ -16,7 +16,7 @@ from veca_marl.sim.sound.rooms.surroundings import Arrivals, Surroundings
 from veca_marl.sim.sound.sound_source import Source
 
 MAX_SPEED_MPS = 50.0
-"""A path whose length changes faster counts as another path: cross-faded, without a chirp."""
+"""A path of which the length changes faster is cross-faded as a new path, without Doppler shift."""
 
 
 class Ears:

@@ -79,7 +79,7 @@ class BodyDynamics:
             impulse: ``(6,)``, that of external forces.
 
         Returns:
-            The indices of the hinges whose angle or speed differs from Bullet's.
+            The indices of the hinges with an angle or speed that differs from Bullet's.
         """
         settle(
             self.tree,

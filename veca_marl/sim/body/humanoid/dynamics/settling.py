@@ -88,7 +88,7 @@ def settle(
         solver: Bullet's state after the step; angles, joint speeds and orientation are overwritten.
         state: The state before the step; overwritten by the one after it.
         links: The links before the step; overwritten.
-        changed: ``(n,)``, written: 1 for joints whose angle or speed was changed, else 0.
+        changed: ``(n,)``, written: 1 for joints with a changed angle or speed, else 0.
     """
     goal, mass = np.empty(3), np.sum(tree.masses)
     state.momentum[:] += impulse

@@ -53,7 +53,7 @@ def read_tree(client: int, body_id: int) -> LinkTree:
 
     Args:
         client: The PyBullet client.
-        body_id: A body with all joints at 0 whose base's inertia is diagonal in the base's frame.
+        body_id: A body with all joints at 0; its base's inertia is diagonal in the base's frame.
     """
     links = _links(client, body_id)
     groups = _rigid_groups(links)

@@ -111,7 +111,7 @@ def driven_flight(detail: Detail, seed: int, seconds: float, gravity_mps2: float
 
 
 def unpowered_flight(detail: Detail, seed: int, seconds: float, spread_radps: float) -> Flight:
-    """Let a body fly whose joints start with random speeds, without torques and weight.
+    """Let a body fly from random joint speeds, without torques and weight.
 
     Args:
         detail: Level of detail of the body.

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veca_marl.fidelity.law import Curve, Law, Mark, Plot, Section, at_least, at_most
-from veca_marl.fidelity.tiny_renderer import TinyRenderer
+from veca_marl.fidelity.vision.tiny_renderer import TinyRenderer
 from veca_marl.sim.body import make_body
 from veca_marl.sim.body.mounts import EYES
 from veca_marl.sim.body.walker import WalkerCfg

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from veca_marl.fidelity.arena import SUBSTEPS, make_arena, simulate
 from veca_marl.fidelity.law import Curve, Law, Mark, Plot, Section, equals
+from veca_marl.fidelity.physics.arena import SUBSTEPS, make_arena, simulate
 from veca_marl.sim.physics import GRAVITY_MPS2, PropCfg, PropShape
 
 _TEXT = """

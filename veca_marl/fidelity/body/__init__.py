@@ -1,0 +1,1 @@
+"""Laws of joint-level bodies: momentum, energy, joint limits."""

@@ -1,0 +1,1 @@
+"""Laws of hearing: moving sources, rooms, heads."""

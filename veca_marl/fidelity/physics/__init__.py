@@ -1,0 +1,1 @@
+"""Laws of props: fall, friction, collisions, inertia."""

@@ -1,0 +1,1 @@
+"""Laws of vision: acuity, disparity, segmentation, defocus."""
