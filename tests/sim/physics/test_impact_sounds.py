@@ -7,7 +7,7 @@ from veca_marl.sim.body.walker import Walker, WalkerCfg
 from veca_marl.sim.physics import PlaygroundCfg, World
 from veca_marl.sim.physics.impacts.cfg import ImpactCfg
 from veca_marl.sim.physics.impacts.sounds import prop_modes
-from veca_marl.sim.physics.prop_cfg import PropCfg, PropShape
+from veca_marl.sim.physics.props import PropCfg, PropShape
 from veca_marl.sim.sound.impacts import Material
 
 

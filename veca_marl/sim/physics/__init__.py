@@ -9,8 +9,7 @@ from veca_marl.sim.physics.collision_shapes import (
 )
 from veca_marl.sim.physics.mover import Mover
 from veca_marl.sim.physics.playground import PlaygroundCfg
-from veca_marl.sim.physics.prop_cfg import SIZE_NAMES, PropCfg, PropShape
-from veca_marl.sim.physics.props import Prop
+from veca_marl.sim.physics.props import SIZE_NAMES, Prop, PropCfg, PropShape
 from veca_marl.sim.physics.rooms import DoorCfg, RoomCfg
 from veca_marl.sim.physics.world import GRAVITY_MPS2, World
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from itertools import combinations
 
 from veca_marl.sim.physics.impacts.cfg import ImpactCfg
-from veca_marl.sim.physics.prop_cfg import PropCfg, check_appearance
+from veca_marl.sim.physics.props import PropCfg, check_appearance
 from veca_marl.sim.physics.rooms import DoorCfg, RoomCfg
 from veca_marl.sim.sound import House, Room
 from veca_marl.sim.sound.rooms import TRANSMISSION_LOSS_DB

@@ -15,9 +15,7 @@ from veca_marl.sim.physics.floor import FLOOR_NAME, add_floor
 from veca_marl.sim.physics.impacts.sounds import ImpactSounds
 from veca_marl.sim.physics.mover import Mover
 from veca_marl.sim.physics.playground import PlaygroundCfg, make_house
-from veca_marl.sim.physics.prop_body import limit_detection
-from veca_marl.sim.physics.prop_cfg import PropCfg
-from veca_marl.sim.physics.props import Prop, follow_physics
+from veca_marl.sim.physics.props import Prop, PropCfg, follow_physics, limit_detection
 from veca_marl.sim.sound import SoundField, make_sound
 
 GRAVITY_MPS2 = 9.81

@@ -8,8 +8,7 @@ from collections.abc import Iterable
 from veca_marl.sim.physics.bullet import pybullet
 from veca_marl.sim.physics.clock import ClockCfg
 from veca_marl.sim.physics.impacts.cfg import ImpactCfg
-from veca_marl.sim.physics.prop_cfg import PropCfg, PropShape
-from veca_marl.sim.physics.props import Prop
+from veca_marl.sim.physics.props import Prop, PropCfg, PropShape
 from veca_marl.sim.sound import SoundField
 from veca_marl.sim.sound.impacts import (
     MATERIALS,

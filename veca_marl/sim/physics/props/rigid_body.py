@@ -19,7 +19,7 @@ from veca_marl.sim.geometry import (
 from veca_marl.sim.physics.bullet import pybullet
 from veca_marl.sim.physics.clock import ClockCfg
 from veca_marl.sim.physics.collision_shapes import create_collision_shape
-from veca_marl.sim.physics.prop_cfg import PropCfg, PropShape
+from veca_marl.sim.physics.props.prop_cfg import PropCfg, PropShape
 
 _STEP_S = 0.008  # physics step at which `contact_share` is used as it is
 _EXACT_IN_BULLET = (PropShape.sphere, PropShape.box, PropShape.cylinder)

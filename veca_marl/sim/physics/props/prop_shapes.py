@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from veca_marl.sim.geometry import Geom, Shape
-from veca_marl.sim.physics.prop_cfg import PropCfg, PropShape
+from veca_marl.sim.physics.props.prop_cfg import PropCfg, PropShape
 
 SOUND_OBSTACLE_M = (0.7, 1.0)
 """Least width and height of a box that attenuates sound as a wall does. Sound below 340 Hz, with

@@ -16,9 +16,9 @@ from veca_marl.sim.geometry import (
     rotation_about_vertical,
 )
 from veca_marl.sim.physics.bullet import pybullet
-from veca_marl.sim.physics.prop_body import create_prop_body
-from veca_marl.sim.physics.prop_cfg import PropCfg, PropShape
-from veca_marl.sim.physics.prop_shapes import prop_geoms, stops_sound
+from veca_marl.sim.physics.props.prop_cfg import PropCfg, PropShape
+from veca_marl.sim.physics.props.prop_shapes import prop_geoms, stops_sound
+from veca_marl.sim.physics.props.rigid_body import create_prop_body
 from veca_marl.sim.sound import Source
 from veca_marl.sim.sound.rooms import Obstacles
 

@@ -1,0 +1,15 @@
+"""Props: what they are made from, their shapes, their bodies in Bullet, and where they are."""
+
+from veca_marl.sim.physics.props.prop import Prop, follow_physics
+from veca_marl.sim.physics.props.prop_cfg import SIZE_NAMES, PropCfg, PropShape, check_appearance
+from veca_marl.sim.physics.props.rigid_body import limit_detection
+
+__all__ = [
+    "SIZE_NAMES",
+    "Prop",
+    "PropCfg",
+    "PropShape",
+    "check_appearance",
+    "follow_physics",
+    "limit_detection",
+]
