@@ -1,8 +1,6 @@
 """The benchmark: the stopwatch, the command, free play and the references."""
 
 import json
-import subprocess
-import sys
 from itertools import count
 
 import numpy as np
@@ -12,7 +10,6 @@ from composed import compose
 
 from veca_marl.bench.command import main
 from veca_marl.bench.free_play import free_play
-from veca_marl.bench.learning import _processor_s
 from veca_marl.bench.references import as_visual_shapes, busy_room, measure_ears, tiny_view
 from veca_marl.bench.rollouts import measure_rollouts
 from veca_marl.bench.skin_costs import touched_child
@@ -152,16 +149,6 @@ def test_learning_is_measured_beside_rollouts(tmp_path, capsys):
     assert found["ratio"] == pytest.approx(speeds, rel=1.0), "both are medians of the same turns"
     assert 0.0 < found["processor_ratio"] < 1.0, "learning costs more than a rollout alone"
     assert f"{found['ratio']:.2f}" in capsys.readouterr().out
-
-
-def test_the_processor_time_of_another_process_is_read():
-    spin = "import time\nwhile time.process_time() < 0.3: pass\nprint(flush=True)\ninput()"
-    process = subprocess.Popen(
-        [sys.executable, "-c", spin], stdin=subprocess.PIPE, stdout=subprocess.PIPE
-    )
-    process.stdout.readline()
-    assert _processor_s(process.pid) == pytest.approx(0.3, abs=0.1)
-    process.communicate(b"\n")
 
 
 @pytest.mark.parametrize("things", [0, 3])

@@ -29,7 +29,7 @@ class Interrupt:
         pass
 
 
-TIMES = ("frames_per_s", "between_s")
+TIMES = ("frames_per_s", "between_s", "processor_s")
 
 
 def read(path):

@@ -8,7 +8,7 @@ from stored_runs import write_run
 from veca_marl import report
 from veca_marl.reports import figure
 from veca_marl.reports.arms import compose_arms
-from veca_marl.reports.gather import Found, gather, run_folder, training_minutes
+from veca_marl.reports.gather import Found, gather, run_folder, training_time
 from veca_marl.reports.page import remarks
 from veca_marl.reports.runs import runs_of, team_of
 from veca_marl.sweeps.run_state import RunState
@@ -148,12 +148,13 @@ def test_minutes_of_runs_without_times_between_batches_are_those_of_batches(tmp_
 
 def test_minutes_include_earlier_evaluations():
     rows = [
-        {"frames": "100", "frames_per_s": "10.0", "between_s": "0"},
-        {"frames": "200", "frames_per_s": "10.0", "between_s": "50.0"},
+        {"frames": "100", "frames_per_s": "10.0", "between_s": "0", "processor_s": "30"},
+        {"frames": "200", "frames_per_s": "10.0", "between_s": "50.0", "processor_s": "90"},
     ]
-    frames, minutes = training_minutes(rows)
-    assert frames.tolist() == [100, 200]
-    assert minutes.tolist() == pytest.approx([0.0, 10 / 60, 70 / 60])
+    spent = training_time(rows)
+    assert spent.frames.tolist() == [100, 200]
+    assert spent.minutes.tolist() == pytest.approx([0.0, 10 / 60, 70 / 60])
+    assert spent.core_minutes.tolist() == pytest.approx([0.0, 0.5, 2.0])
 
 
 def test_a_half_written_last_row_is_left_out(tmp_path, arms):

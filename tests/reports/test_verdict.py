@@ -11,7 +11,7 @@ from veca_marl.reports.verdict import Evidence, Judgement, Verdict, judge, overa
 
 def runs(arm, scores, random=0.0, ended=True):
     return [
-        Run(arm, seed, ended, (Point(100, 1.0, score, 32),), random)
+        Run(arm, seed, ended, (Point(100, 1.0, 2.0, score, 32),), random)
         for seed, score in enumerate(scores)
     ]
 

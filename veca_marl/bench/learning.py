@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import multiprocessing
 import os
 import time
 from dataclasses import dataclass, replace
-from pathlib import Path
 from statistics import median
 
 from torchrl import timeit
 
 from veca_marl.algos.training.reporters import Row
+from veca_marl.algos.training.stopwatch import processor_seconds
 from veca_marl.bench.rollouts import RandomActions
 from veca_marl.config import Config
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
@@ -153,17 +152,4 @@ def _per_frame(start: Cost, frames: int) -> Cost:
 
 
 def _now() -> Cost:
-    children = multiprocessing.active_children()
-    others = sum(_processor_s(child.pid) for child in children if child.pid is not None)
-    return Cost(time.perf_counter(), time.process_time() + others)
-
-
-def _processor_s(process: int) -> float:
-    """Return the processor time of another process so far; not a number without /proc."""
-    file = Path(f"/proc/{process}/stat")
-    if not file.is_file():
-        return float("nan")
-    # proc(5): the name in parentheses may contain spaces; utime and stime are the fields 14 and 15
-    fields = file.read_text().rpartition(")")[2].split()
-    ticks = int(fields[11]) + int(fields[12])
-    return ticks / float(os.sysconf("SC_CLK_TCK"))
+    return Cost(time.perf_counter(), processor_seconds())

@@ -13,6 +13,11 @@ from veca_marl.reports.summary import curve
 
 _SIZE_INCHES = (5.5, 3.8)  # of one panel
 _DPI = 120
+_LABELS = {
+    "frames": "frames of experience",
+    "minutes": "minutes of training",
+    "core_minutes": "core-minutes of training",
+}
 
 
 class PlotError(ValueError):
@@ -36,10 +41,10 @@ def draw(
     title: str,
     label: str,
 ) -> None:
-    """Write the figure: scores over frames and over minutes.
+    """Write the figure: scores over frames and over minutes of processor time.
 
-    Thick lines are interquartile means with their intervals, thin ones single runs. The panel over
-    minutes is left out where minutes were not measured.
+    Thick lines are interquartile means with their intervals, thin ones single runs. Where processor
+    times were not measured, elapsed minutes are shown; without those, the panel is left out.
 
     Args:
         path: The PNG file.
@@ -51,10 +56,7 @@ def draw(
     check_plotting()
     from matplotlib.figure import Figure
 
-    axes_names = ["frames"]
-    points = [point for runs in arms.values() for run in runs for point in run.points]
-    if not any(math.isnan(point.minutes) for point in points):
-        axes_names.append("minutes")
+    axes_names = ["frames", *_time_axis(arms)]
     width, height = _SIZE_INCHES
     figure = Figure(figsize=(width * len(axes_names), height), layout="constrained")
     panels = figure.subplots(1, len(axes_names), squeeze=False, sharey=True)[0]
@@ -65,6 +67,15 @@ def draw(
     figure.suptitle(title)
     path.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(path, dpi=_DPI, metadata={"Software": None})
+
+
+def _time_axis(arms: Mapping[str, Sequence[Run]]) -> list[str]:
+    """Return the name of the time that was measured at all points, if there is one."""
+    points = [point for runs in arms.values() for run in runs for point in run.points]
+    for name in ("core_minutes", "minutes"):
+        if not any(math.isnan(getattr(point, name)) for point in points):
+            return [name]
+    return []
 
 
 def _draw_panel(
@@ -79,7 +90,7 @@ def _draw_panel(
         if not math.isnan(score):
             axis.axhline(score, color="grey", ls=style, label=policy)
     axis.margins(y=0.08)
-    axis.set_xlabel("frames of experience" if name == "frames" else "minutes of training")
+    axis.set_xlabel(_LABELS[name])
     axis.set_xlim(0, None)
 
 

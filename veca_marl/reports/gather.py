@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -92,29 +93,55 @@ def _remark(run: StoredRun, state: RunState, asked: Mapping[str, Any]) -> str:
 
 
 def _rows(run: StoredRun, status: Found) -> list[Row]:
-    """Return the evaluations of a run with its arm, its seed and the minutes until each."""
-    frames, minutes = training_minutes(run.rows("metrics"))
+    """Return the evaluations of a run with its arm, its seed and the time until each."""
+    spent = training_time(run.rows("metrics"))
     rows = []
     for row in run.rows("evaluations"):
-        passed = minutes[np.searchsorted(frames, int(row["frames"]), side="right")]
+        after = int(np.searchsorted(spent.frames, int(row["frames"]), side="right"))
         head = {"arm": status.arm, "seed": str(status.seed), "state": status.state.value}
-        rows.append({**head, **row, "minutes": f"{passed:.3f}"})
+        times = {"minutes": _cell(spent.minutes[after])}
+        times["core_minutes"] = _cell(spent.core_minutes[after])
+        rows.append({**head, **row, **times})
     return rows
 
 
-def training_minutes(metrics: Sequence[Mapping[str, str]]) -> tuple[Any, Any]:
-    """Return frames ``(n,)`` and the minutes ``(n + 1,)`` of training until them.
+def _cell(value: float) -> str:
+    return "" if math.isnan(value) else f"{value:.3f}"
 
-    They include collection, learning, and evaluations between batches; the time between an
-    interruption and its resumption is left out. Runs that were stored without the column
-    ``between_s`` have minutes of collection and learning alone. Entry ``k`` of the minutes belongs
-    to the first ``k`` batches.
+
+@dataclass(frozen=True)
+class TrainingTime:
+    """Time of training until each of `n` batches.
+
+    Entry ``k`` of the times belongs to the first ``k`` batches. They include collection, learning,
+    and evaluations between batches.
+
+    Attributes:
+        frames: Frames of training after each batch, ``(n,)``.
+        minutes: Elapsed minutes, ``(n + 1,)``. The time between an interruption and its resumption
+            is left out. Runs that were stored without the column ``between_s`` have minutes of
+            collection and learning alone.
+        core_minutes: Minutes of processor time of all processes, ``(n + 1,)``; NaN where they were
+            not measured.
     """
+
+    frames: Any
+    minutes: Any
+    core_minutes: Any
+
+
+def training_time(metrics: Sequence[Mapping[str, str]]) -> TrainingTime:
+    """Return the time of training, from the rows of ``metrics.csv``."""
     frames = np.array([int(row["frames"]) for row in metrics])
     rates = np.array([float(row["frames_per_s"]) for row in metrics])
     between = np.array([float(row.get("between_s") or 0.0) for row in metrics])
+    processor = np.array([float(row.get("processor_s") or "nan") for row in metrics])
     seconds = np.diff(frames, prepend=0) / rates + between
-    return frames, np.concatenate([[0.0], np.cumsum(seconds) / 60.0])
+    return TrainingTime(frames, _cumulative_minutes(seconds), _cumulative_minutes(processor))
+
+
+def _cumulative_minutes(seconds: Any) -> Any:
+    return np.concatenate([[0.0], np.cumsum(seconds) / 60.0])
 
 
 def found_in(rows: Sequence[Row], arms: Sequence[str], seeds: Sequence[int]) -> list[Found]:

@@ -88,8 +88,8 @@ def _caption(report: Report) -> str:
         f"Thick lines are interquartile means of `{report.experiment.metric}` of team "
         f"`{report.team}` over runs, areas and brackets 95 % stratified bootstrap intervals over "
         "runs (Agarwal et al. 2021), thin lines single runs. Intervals over few runs are too "
-        "narrow: resampling cannot show values that no run has. Minutes are those of collection "
-        "and learning, without evaluations."
+        "narrow: resampling cannot show values that no run has. Minutes are those of collection, "
+        "learning and evaluation; core-minutes are processor time, of all processes together."
     )
 
 
@@ -106,12 +106,14 @@ def _arm_table(report: Report) -> list[str]:
         for summary in report.summaries
     ]
     if threshold is not None:
-        head += [f"runs at {threshold:g}", f"median frames to {threshold:g}", "median minutes"]
+        head += [f"runs at {threshold:g}", f"median frames to {threshold:g}"]
+        head += ["median minutes", "median core-minutes"]
         for row, summary in zip(rows, report.summaries, strict=True):
             row += [
                 f"{summary.reached} of {summary.ended}",
                 _number(summary.frames, 0),
                 _number(summary.minutes, 1),
+                _number(summary.core_minutes, 1),
             ]
     return table(head, rows)
 
@@ -162,10 +164,12 @@ def _run_table(report: Report) -> list[str]:
             f"{run.final.score:.2f}",
             _number(run.random, 2),
             _number(run.final.minutes, 1),
+            _number(run.final.core_minutes, 1),
         ]
         for run in report.runs
     ]
-    return table(["arm", "seed", "ended", "frames", "score", "random policy", "minutes"], rows)
+    head = ["arm", "seed", "ended", "frames", "score", "random policy", "minutes", "core-minutes"]
+    return table(head, rows)
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> list[str]:

@@ -20,12 +20,14 @@ class Point:
     Attributes:
         frames: Frames of training before it.
         minutes: Minutes of training, with earlier evaluations, before it; NaN if not measured.
+        core_minutes: The same of processor time, of all processes.
         score: Mean of the metric over the episodes.
         episodes: Number of episodes; 0 if not stored.
     """
 
     frames: int
     minutes: float
+    core_minutes: float
     score: float
     episodes: int
 
@@ -96,6 +98,7 @@ def _point(row: Mapping[str, str], metric: str) -> Point:
     return Point(
         int(row["frames"]),
         _number(row.get("minutes", "")),
+        _number(row.get("core_minutes", "")),
         _number(row[metric]),
         int(row.get("episodes") or 0),
     )

@@ -21,6 +21,7 @@ class CurvePoint:
     Attributes:
         frames: Frames of training.
         minutes: Mean minutes of training; NaN if not measured.
+        core_minutes: The same of processor time, of all processes.
         score: Interquartile mean.
         interval: Its 95 % bootstrap interval; NaN with one run.
         runs: Number of runs that were evaluated there.
@@ -28,6 +29,7 @@ class CurvePoint:
 
     frames: int
     minutes: float
+    core_minutes: float
     score: float
     interval: Interval
     runs: int
@@ -46,6 +48,7 @@ class ArmSummary:
         frames: Median frames until the threshold; infinite if fewer than half reached it, NaN
             without a threshold.
         minutes: Median minutes of training until the threshold, likewise.
+        core_minutes: The same of processor time, of all processes.
         random: Mean score of the random policy beside the ended runs; NaN if not measured.
     """
 
@@ -56,6 +59,7 @@ class ArmSummary:
     reached: int
     frames: float
     minutes: float
+    core_minutes: float
     random: float
 
 
@@ -71,6 +75,7 @@ def _curve_point(runs: Sequence[Run], frames: int) -> CurvePoint:
     return CurvePoint(
         frames,
         float(np.mean([point.minutes for point in points])),
+        float(np.mean([point.core_minutes for point in points])),
         float(interquartile_mean(scores)),
         bootstrap_interval(interquartile_mean, [scores], np.random.default_rng(_SEED)),
         len(points),
@@ -81,7 +86,7 @@ def summarise(arm: str, runs: Sequence[Run], threshold: float | None) -> ArmSumm
     """Return the numbers of an arm; runs that have not ended are left out."""
     ended = [run for run in runs if run.ended]
     if not ended:
-        return ArmSummary(arm, 0, math.nan, (math.nan, math.nan), 0, *[math.nan] * 3)
+        return ArmSummary(arm, 0, math.nan, (math.nan, math.nan), 0, *[math.nan] * 4)
     scores = final_scores(ended)
     interval = bootstrap_interval(interquartile_mean, [scores], np.random.default_rng(_SEED))
     passed = [None if threshold is None else run.reached(threshold) for run in ended]
@@ -95,6 +100,7 @@ def summarise(arm: str, runs: Sequence[Run], threshold: float | None) -> ArmSumm
         len(reached),
         _median([*(float(point.frames) for point in reached), *late]),
         _median([*(point.minutes for point in reached), *late]),
+        _median([*(point.core_minutes for point in reached), *late]),
         float(random_scores(ended).mean()),
     )
 

@@ -40,6 +40,7 @@ from veca_marl.algos.training.learners import TeamLearners
 from veca_marl.algos.training.matchmaking import AllLearn, Matchmaking
 from veca_marl.algos.training.progress import Budget, Progress
 from veca_marl.algos.training.reporters import Reporter
+from veca_marl.algos.training.stopwatch import Stopwatch
 from veca_marl.algos.training.timing import timing_table
 
 _EVALUATION_STAGE = 2**31 - 1  # in place of a stage number: seeds that no training stage uses
@@ -79,13 +80,13 @@ class Trainer:
     during_last_evaluation: Callable[[], None] = nothing
     progress: Progress = field(default_factory=Progress)
     _resumed_frames: int = 0
-    _batch_end_s: float | None = None
     _evaluator: Evaluator = field(init=False)
 
     def __post_init__(self) -> None:
         self.policy: Policy = self.learners.policy.copy()
         timeit.erase()
         self._clock = timeit("total").start()
+        self._stopwatch = Stopwatch(self._clock.elapsed)
 
     def resume(self, path: Path) -> None:
         """Continue learning and progress from the checkpoint at `path`."""
@@ -187,7 +188,7 @@ class Trainer:
                 bar.set_postfix({k: f"{v:.3g}" for k, v in finished.items()})
 
     def _iterate(self, experience: Experience, episodes: TrainingEpisodes) -> dict[str, float]:
-        before = self._clock.elapsed()
+        self._stopwatch.begin()
         with timeit("collect"):
             batch = experience.collect()
             check_batch(batch, list(self.learners.algorithms), self.progress.frames)
@@ -202,11 +203,7 @@ class Trainer:
             both = episodes.add(batch, team) | measures
             row |= {f"{team}/{name}": value for name, value in both.items()}
         row |= self.matchmaking.measures()
-        now = self._clock.elapsed()
-        row["frames_per_s"] = self.collect.frames / (now - before)
-        # evaluations, checkpoints and restarts since the last batch of this process
-        row["between_s"] = 0.0 if self._batch_end_s is None else before - self._batch_end_s
-        self._batch_end_s = now
+        row |= self._stopwatch.end(self.collect.frames)
         for reporter in self.reporters:
             reporter.write("metrics", self.progress.frames, row)
         return row
