@@ -144,7 +144,9 @@ class SACCfg(AlgorithmCfg):
         replay: The replay buffer.
         gamma: Discount.
         steps: Number of rewards in a target before the value of the observation that follows
-            (n-step returns; without correction for the policy that acted).
+            (n-step returns; without correction for the policy that acted). The original algorithm
+            has 1 (Haarnoja et al. 2018), with which values of rare rewards do not spread in the
+            frames of a default run.
         learning_rate: Step size of Adam, for all parameters but the temperatures.
         batch_size: Frames in an update; those at which a batch or an episode ended are left out.
         sequence_steps: Consecutive steps through which gradients of a network with hidden state
@@ -155,8 +157,8 @@ class SACCfg(AlgorithmCfg):
         max_gradient_norm: The gradients of critics with encoder, and of policy heads, are each
             scaled down to this norm.
         targets: Which critics give the targets.
-        tau: Share of the critics' parameters in the moving average that gives the targets (0.005:
-            Haarnoja et al. 2018).
+        tau: Share of the critics' parameters in the moving average that gives the targets (ours:
+            twice the 0.005 of Haarnoja et al. 2018, because there are fewer updates).
         updates_per_frame: Updates for each frame that is collected.
         random_shift: Largest random shift of images in pixels, the same for both eyes; 0 for none.
     """
@@ -169,14 +171,14 @@ class SACCfg(AlgorithmCfg):
     temperature: TemperatureCfg = field(default_factory=TemperatureCfg)
     replay: ReplayCfg = field(default_factory=ReplayCfg)
     gamma: float = 0.99
-    steps: int = 1
+    steps: int = 5
     learning_rate: float = 2.5e-4
     batch_size: int = 64
     sequence_steps: int = 16
     burn_in: int = 8
     max_gradient_norm: float = 5.0
     targets: Targets = Targets.average
-    tau: float = 0.005
+    tau: float = 0.01
     updates_per_frame: float = 0.125
     random_shift: int = 0
 
