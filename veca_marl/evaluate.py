@@ -18,7 +18,7 @@ import torch
 from omegaconf import MISSING
 from tensordict.nn import TensorDictSequential
 
-from veca_marl.algos.evaluation.comparison import comparison_line, interval
+from veca_marl.algos.evaluation.comparison import comparison_line, interval, solved_rate
 from veca_marl.algos.evaluation.evaluate import Exploration, RandomTeams, Scores, evaluate
 from veca_marl.algos.files import WriteError, write_atomically
 from veca_marl.algos.selfplay.self_play import SelfPlayCfg
@@ -123,7 +123,10 @@ def _make_env(cfg: Config, options: EvaluateOptions) -> VecaEnv:
 
 
 def summary(table: Table) -> list[dict[str, object]]:
-    """Return a row for each player and team: means over the episodes, the return's interval."""
+    """Return a row for each player and team: means over the episodes, the return's interval.
+
+    In a task with a goal, ``solved`` is the share of the episodes that ended with the goal reached.
+    """
     return [
         {
             "player": player,
@@ -132,6 +135,7 @@ def summary(table: Table) -> list[dict[str, object]]:
             "return": float(scores.returns.mean()),
             "interval": interval(scores.returns),
             "length": float(scores.lengths.mean()),
+            **solved_rate(scores),
             **{name: float(values.mean()) for name, values in scores.terms.items()},
         }
         for player, teams in table.items()

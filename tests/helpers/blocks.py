@@ -32,7 +32,7 @@ def play(game, seed):
         for name, value in outcome.terms[player.name].items():
             total[name] = total.get(name, 0.0) + value
         over = outcome.done
-    return total, game.task.solved
+    return total, game.task.solved(game.players[0])
 
 
 def sits(game):

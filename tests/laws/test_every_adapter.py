@@ -12,6 +12,7 @@ from rollouts import game_cfg, play
 from veca_marl.envs.adapters.gymnasium import VecaGymEnv
 from veca_marl.envs.adapters.pettingzoo import VecaParallelEnv
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
+from veca_marl.envs.core.task import SOLVED
 
 STEPS = 15
 SHORT = "task.max_seconds=0.4"  # an episode ends within the steps, and another begins
@@ -56,9 +57,10 @@ def check_observation(observation, row):
 def check_result(reward, terminated, truncated, info, row):
     assert np.float32(reward) == row["reward"].item()
     assert (terminated, truncated) == (row["terminated"].item(), row["truncated"].item())
-    assert {name: np.float32(value) for name, value in info["terms"].items()} == {
-        name: value.item() for name, value in row["info"].items()
-    }
+    expected = {name: value.item() for name, value in row["info"].items()}
+    solved = expected.pop(SOLVED, None)
+    assert {name: np.float32(value) for name, value in info["terms"].items()} == expected
+    assert info.get(SOLVED) is solved
 
 
 def test_pettingzoo_accepts_it(cfg):

@@ -15,11 +15,17 @@ from veca_marl.envs.adapters.torchrl.env import VecaEnv
 from veca_marl.envs.core.actions import random_action
 from veca_marl.envs.core.episodes import Episodes
 from veca_marl.envs.core.game import Game
-from veca_marl.envs.core.task import TASKS
+from veca_marl.envs.core.task import SOLVED, TASKS
 from veca_marl.envs.core.team import Script
 
 STEPS = 25
 WORLDS = 2
+WITHOUT_GOAL = {
+    "CrawlBaby",
+    "KickTheBall",
+    "RunBaby",
+    "SitBaby",
+}  # the longer and the more often the better
 
 
 @pytest.fixture(scope="module")
@@ -140,7 +146,7 @@ def test_the_reward_is_the_weighted_sum_of_the_terms(env, rollout):
     weights = env.games[0].weights
     for team in env.group_map:
         terms = rollout["next", team, "info"]
-        assert set(terms.keys()) == set(weights)
+        assert set(terms.keys()) - {SOLVED} == set(weights)
         expected = sum(weight * terms[name] for name, weight in weights.items())
         torch.testing.assert_close(rollout["next", team, "reward"], expected)
 
@@ -153,6 +159,14 @@ def test_the_docstring_explains_every_term(task):
     explained = TASKS[task].__doc__.split("Terms:")[1]
     for term in TASKS[task].cfg_type()().weights:
         assert f"{term}:" in explained
+
+
+def test_a_task_with_a_goal_reports_whether_it_is_reached(task, env, rollout):
+    has_goal = TASKS[task].has_goal()
+    assert has_goal == (task not in WITHOUT_GOAL)
+    assert has_goal == ("is solved (`solved`)" in " ".join(TASKS[task].__doc__.split()))
+    for team in env.group_map:
+        assert (SOLVED in set(rollout["next", team, "info"].keys())) == has_goal
 
 
 def test_episodes_are_truncated_after_max_seconds(task):

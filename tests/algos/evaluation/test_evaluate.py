@@ -3,13 +3,21 @@ import pytest
 import torch
 from fake_env import FakeEnv
 from scipy import stats
+from tensordict import TensorDict
 
-from veca_marl.algos.evaluation.comparison import comparison_line, interval, paired_difference
+from veca_marl.algos.evaluation.comparison import (
+    comparison_line,
+    interval,
+    paired_difference,
+    score_rows,
+)
+from veca_marl.algos.evaluation.episodes import EpisodeTally, TrainingEpisodes
 from veca_marl.algos.evaluation.evaluate import (
     EvalCfg,
     Exploration,
     Scores,
     evaluate,
+    joined_scores,
     random_policy,
 )
 
@@ -117,6 +125,53 @@ def test_comparison_line_names_team_means_and_intervals():
     assert line.startswith("red: return of policy 4.000 [-8.706, 16.706], random 0.000")
     assert "difference 4.000" in line
     assert "\n" not in line
+
+
+def step_of(done, solved, reward=1.0):
+    """Return the ``next`` part of a frame of several worlds with one agent each."""
+    agents = {
+        "reward": torch.full((len(done), 1, 1), reward),
+        "info": {"solved": torch.tensor(solved).reshape(-1, 1, 1)},
+    }
+    return TensorDict({"done": torch.tensor(done).unsqueeze(-1), "agents": agents}, (len(done),))
+
+
+STEPS = (
+    ([False, False], [True, False]),
+    ([True, False], [False, False]),
+    ([True, True], [True] * 2),
+)
+
+
+def test_an_episode_is_solved_if_the_goal_is_reached_after_its_last_step():
+    tally = EpisodeTally(["agents"], worlds=2, count=2)
+    for done, solved in STEPS:
+        tally.add(step_of(done, solved))
+    assert tally.complete
+    assert tally.sums("agents")["solved"].tolist() == [0.0, 1.0]
+    assert tally.sums("agents")["return"].tolist() == [2.0, 3.0]
+
+
+def test_training_episodes_count_the_share_that_ended_solved():
+    batch = TensorDict({"next": torch.stack([step_of(*step) for step in STEPS], 1)}, (2, 3))
+    means = TrainingEpisodes().add(batch, "agents")
+    assert means["solved"] == pytest.approx(2 / 3)  # of the three ends, two are solved
+    assert np.isnan(TrainingEpisodes().add(batch[:, :1], "agents")["solved"])
+
+
+def test_rates_of_solved_episodes_are_printed_for_a_task_with_a_goal():
+    def scores(*solved):
+        ones = np.ones(len(solved))
+        return Scores(ones, ones, {}, np.array(solved))
+
+    policy, baseline = scores(1.0, 0.0, 1.0, 1.0), scores(0.0, 0.0, 0.0, 1.0)
+    line = comparison_line("red", policy, baseline)
+    assert line.endswith("; solved at the end: policy 75.0 %, random 25.0 %")
+    both = joined_scores([{"red": policy}, {"red": baseline}])
+    (row,) = score_rows("policy", both)
+    assert row["solved"] == 0.5
+    (row,) = score_rows("policy", {"red": Scores(np.ones(2), np.ones(2), {})})
+    assert "solved" not in row
 
 
 def test_the_last_evaluation_has_four_times_as_many_episodes_or_what_is_asked_for():

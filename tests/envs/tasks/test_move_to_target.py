@@ -23,7 +23,7 @@ def test_the_mark_is_beside_the_toy_on_a_random_side(game):
     for seed in range(20):
         game.reset(np.random.default_rng(seed))
         assert 0.08 <= game.task.distance_m <= 0.12
-        assert not game.task.solved
+        assert not game.task.solved(game.players[0])
         sides.append(np.sign(game.task.mark.position[1]))
     assert 3 < sides.count(1.0) < 17
 
@@ -47,7 +47,7 @@ def test_the_mark_has_no_collision(game):
     game.reset(rng)
     game.task.toy.place(game.task.mark.position * (1, 1, 0) + np.array([0.0, 0.0, 0.035]))
     limp(game)
-    assert game.task.solved
+    assert game.task.solved(game.players[0])
     assert game.task.toy.position[2] == pytest.approx(0.035, abs=0.002)
 
 
@@ -59,7 +59,7 @@ def test_the_expert_moves_the_toy_to_the_mark(game):
         while not over:
             row = player.body.encode(game.expert_of(player).act({}))
             over = game.step({"agents": row}).truncated
-        solved += game.task.solved
+        solved += game.task.solved(game.players[0])
     assert solved >= 2
 
 

@@ -48,7 +48,7 @@ def test_a_block_on_top_of_the_other_has_height_1(game):
     other.place((AWAY[0], AWAY[1], 1.5 * EDGE))
     *_, terms = sit(game, 0.6)
     assert terms["height"] == pytest.approx(1.0, abs=0.03)
-    assert game.task.solved
+    assert game.task.solved(game.players[0])
     assert game.reward_of(terms) == pytest.approx(game.world.clock.step_s, rel=0.03)
 
 
@@ -59,7 +59,7 @@ def test_a_raised_block_has_a_height_but_does_not_solve_the_task(game):
     other.place((AWAY[0] + 0.2, AWAY[1], 0.5), velocity=(0.0, 0.0, 1.0))
     *_, terms = sit(game, 0.08)
     assert terms["height"] > 5.0
-    assert not game.task.solved
+    assert not game.task.solved(game.players[0])
 
 
 def test_blocks_side_by_side_are_not_piled_up(game):
@@ -69,7 +69,7 @@ def test_blocks_side_by_side_are_not_piled_up(game):
     other.place((AWAY[0] + EDGE, AWAY[1], EDGE / 2))
     *_, terms = sit(game, 0.4)
     assert abs(terms["height"]) < 0.05
-    assert not game.task.solved
+    assert not game.task.solved(game.players[0])
 
 
 def test_a_touched_pile_is_not_solved(game):
@@ -79,7 +79,7 @@ def test_a_touched_pile_is_not_solved(game):
     one.place((hand[0], hand[1], EDGE / 2))
     other.place((hand[0], hand[1], 1.5 * EDGE))
     for _ in sit(game, 0.04):
-        assert not game.task.solved
+        assert not game.task.solved(game.players[0])
 
 
 def test_the_expert_piles_up(game):

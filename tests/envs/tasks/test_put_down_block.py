@@ -34,7 +34,7 @@ def test_the_tower_stands_while_the_body_sits_still(game):
         assert terms["blue_fell"] == 0.0
         assert terms["height"] == pytest.approx(2.0, abs=0.08)
     assert sits(game)
-    assert not game.task.solved
+    assert not game.task.solved(game.players[0])
 
 
 def test_the_reward_is_negative_until_the_red_block_is_on_the_floor(game):
@@ -44,7 +44,7 @@ def test_the_reward_is_negative_until_the_red_block_is_on_the_floor(game):
     game.task.red.place((1.0, 1.0, EDGE / 2))
     *_, down = sit(game, 0.4)
     assert game.reward_of(down) == pytest.approx(0.0, abs=0.002)
-    assert game.task.solved
+    assert game.task.solved(game.players[0])
 
 
 def test_a_fallen_blue_block_counts_once(game):
@@ -54,7 +54,7 @@ def test_a_fallen_blue_block_counts_once(game):
     assert sum(fell) == 1.0
     game.task.red.place((1.0, 1.0, EDGE / 2))
     list(sit(game, 0.4))
-    assert not game.task.solved
+    assert not game.task.solved(game.players[0])
 
 
 def test_reset_clears_the_fallen_blocks(game):

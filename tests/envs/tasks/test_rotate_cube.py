@@ -51,7 +51,7 @@ def test_the_target_is_a_yaw_of_45_degrees_to_the_left(game):
 
 def test_the_expert_solves_the_task(game):
     progress = play(game, 8.0, by_expert)
-    assert game.task.solved
+    assert game.task.solved(game.players[0])
     assert progress == pytest.approx(math.radians(45.0) - game.task.angle_rad, abs=1e-9)
 
 
@@ -61,4 +61,4 @@ def test_dropping_the_cube_takes_the_progress_back(game):
     game.task.cube.place((1.0, 1.0, 0.02))
     received = [game.step({"agents": limp(game)}).terms["agents"]["progress"] for _ in range(3)]
     assert won + sum(received) == pytest.approx(0.0, abs=1e-9)
-    assert not game.task.solved
+    assert not game.task.solved(game.players[0])

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
+from veca_marl.algos.evaluation.episodes import SOLVED
 from veca_marl.algos.evaluation.evaluate import Scores
 
 
@@ -39,6 +40,8 @@ def paired_difference(
 def score_rows(player: str, scores: Mapping[str, Scores]) -> list[dict[str, float | int | str]]:
     """Return a row for each team: means over the episodes and the interval of the return.
 
+    In a task with a goal, ``solved`` is the share of the episodes that ended with the goal reached.
+
     Args:
         player: Name of the policy, ``policy`` or ``random``.
         scores: Team to its scores.
@@ -55,10 +58,16 @@ def score_rows(player: str, scores: Mapping[str, Scores]) -> list[dict[str, floa
                 "return_low": low,
                 "return_high": high,
                 "length": float(score.lengths.mean()),
+                **solved_rate(score),
                 **{name: float(values.mean()) for name, values in score.terms.items()},
             }
         )
     return rows
+
+
+def solved_rate(scores: Scores) -> dict[str, float]:
+    """Return ``solved``, the share of the episodes that ended solved; empty without a goal."""
+    return {} if scores.solved is None else {SOLVED: float(scores.solved.mean())}
 
 
 def comparison_line(team: str, policy: Scores, baseline: Scores) -> str:
@@ -72,5 +81,12 @@ def comparison_line(team: str, policy: Scores, baseline: Scores) -> str:
     return (
         f"{team}: return of {parts[0]}, {parts[1]}, difference {mean:.3f} "
         f"[{low:.3f}, {high:.3f}] (means of {len(policy.returns)} paired episodes, "
-        "95 % intervals)"
+        f"95 % intervals){_solved_part(policy, baseline)}"
     )
+
+
+def _solved_part(policy: Scores, baseline: Scores) -> str:
+    if policy.solved is None or baseline.solved is None:
+        return ""
+    ours, theirs = 100.0 * policy.solved.mean(), 100.0 * baseline.solved.mean()
+    return f"; solved at the end: policy {ours:.1f} %, random {theirs:.1f} %"

@@ -8,9 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 from tensordict import TensorDictBase
 
+SOLVED = "solved"
+"""Entry of ``(team, "info")`` that is read at the end of an episode; the others are summed."""
+
 
 def team_measures(step: TensorDictBase, team: str) -> dict[str, NDArray[np.float64]]:
-    """Return what is summed over an episode, as means over the team's agents.
+    """Return what is summed over an episode, and `SOLVED`, as means over the team's agents.
 
     Args:
         step: The ``next`` part of some frames.
@@ -18,7 +21,8 @@ def team_measures(step: TensorDictBase, team: str) -> dict[str, NDArray[np.float
 
     Returns:
         ``return`` (the reward), ``length`` (one for each step) and each entry of
-        ``(team, "info")`` (the unweighted reward terms): arrays of the batch shape of `step`.
+        ``(team, "info")`` (the unweighted reward terms; ``solved`` in a task with a goal): arrays
+        of the batch shape of `step`.
     """
     reward = _agent_mean(step[team, "reward"])
     measures = {"return": reward, "length": np.ones_like(reward)}
@@ -35,6 +39,8 @@ def _agent_mean(array: object) -> NDArray[np.float64]:
 
 class EpisodeTally:
     """Sums of `team_measures` over the first episode of each of the first worlds.
+
+    The entry `SOLVED` is not summed: its last value counts.
 
     Args:
         teams: Names of the teams.
@@ -57,7 +63,8 @@ class EpisodeTally:
         for team in self.teams:
             for name, values in team_measures(step, team).items():
                 sums = self._sums.setdefault((team, name), np.zeros(len(values)))
-                sums[self._open] += values[self._open]
+                earlier = 0.0 if name == SOLVED else sums[self._open]
+                sums[self._open] = earlier + values[self._open]
         self._open &= ~step["done"].squeeze(-1).numpy()
 
     def sums(self, team: str) -> dict[str, NDArray[np.float64]]:
@@ -81,15 +88,16 @@ class TrainingEpisodes:
         """Return means over the episodes that ended in `batch` ``(worlds, steps)``.
 
         Returns:
-            ``return``, ``length`` and each reward term, NaN where no episode ended; and
-            ``reward_per_step``, the mean over all steps.
+            ``return``, ``length`` and each reward term, NaN where no episode ended; in a task with
+            a goal ``solved``, the share of the episodes that ended solved; and ``reward_per_step``,
+            the mean over all steps.
         """
         done = batch["next", "done"].squeeze(-1).cpu().numpy()
         measures = team_measures(batch["next"], team)
         means = {"reward_per_step": float(measures["return"].mean())}
         for name, values in measures.items():
-            sums = self._finish((team, name), values, done)
-            means[name] = float(np.mean(sums)) if sums else math.nan
+            ends = values[done] if name == SOLVED else self._finish((team, name), values, done)
+            means[name] = float(np.mean(ends)) if len(ends) else math.nan
         return means
 
     def _finish(

@@ -15,7 +15,7 @@ from torchrl.data import Composite
 from torchrl.envs import EnvBase, ExplorationType, TransformedEnv, set_exploration_type
 from torchrl.envs.utils import RandomPolicy
 
-from veca_marl.algos.evaluation.episodes import EpisodeTally
+from veca_marl.algos.evaluation.episodes import SOLVED, EpisodeTally
 from veca_marl.algos.networks.memory import with_memory
 from veca_marl.algos.seeds import derived_seed
 
@@ -82,11 +82,14 @@ class Scores:
         returns: Undiscounted sum of rewards, mean over the team's agents.
         lengths: Number of steps.
         terms: The same sum for each unweighted term of the reward.
+        solved: Share of the team's agents for which the goal was reached at the end of the episode,
+            in [0, 1]; None if the task has no goal.
     """
 
     returns: NDArray[np.float64]
     lengths: NDArray[np.float64]
     terms: dict[str, NDArray[np.float64]]
+    solved: NDArray[np.float64] | None = None
 
 
 def evaluate(
@@ -147,7 +150,8 @@ def _play_one_each(env: EnvBase, policy: ActionPolicy, count: int) -> EpisodeTal
 
 def _joined(parts: Sequence[dict[str, NDArray[np.float64]]]) -> Scores:
     sums = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
-    return Scores(sums.pop("return"), sums.pop("length"), sums)
+    returns, lengths, solved = sums.pop("return"), sums.pop("length"), sums.pop(SOLVED, None)
+    return Scores(returns, lengths, sums, solved)
 
 
 def joined_scores(parts: Sequence[Mapping[str, Scores]]) -> dict[str, Scores]:
@@ -160,9 +164,15 @@ def joined_scores(parts: Sequence[Mapping[str, Scores]]) -> dict[str, Scores]:
                 name: np.concatenate([part[team].terms[name] for part in parts])
                 for name in scores.terms
             },
+            _joined_solved([part[team].solved for part in parts]),
         )
         for team, scores in parts[0].items()
     }
+
+
+def _joined_solved(parts: Sequence[NDArray[np.float64] | None]) -> NDArray[np.float64] | None:
+    arrays = [part for part in parts if part is not None]
+    return np.concatenate(arrays) if arrays else None
 
 
 class RandomTeams(nn.Module):

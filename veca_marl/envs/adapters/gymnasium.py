@@ -18,7 +18,8 @@ class VecaGymEnv(gymnasium.Env[Observation, Any]):
     """One game of one agent.
 
     Observations are dicts with one array per sense; `info["terms"]` contains the unweighted reward
-    terms by name. The same seed gives the same bytes as in the first world of a `VecaEnv`.
+    terms by name, and `info["solved"]` whether the goal of the task is reached, if it has one. The
+    same seed gives the same bytes as in the first world of a `VecaEnv`.
 
     Args:
         cfg: What to play.
@@ -80,7 +81,7 @@ class VecaGymEnv(gymnasium.Env[Observation, Any]):
             step.rewards[self._agent],
             step.terminated[self._agent],
             step.truncated,
-            {"terms": dict(step.terms[self._agent])},
+            step.info(self._agent),
         )
 
     def render(self) -> NDArray[np.uint8]:

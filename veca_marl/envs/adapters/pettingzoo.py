@@ -21,7 +21,8 @@ class VecaParallelEnv(ParallelEnv[str, Observation, Any]):
     """One game; the agents are its players. An eliminated player is no longer in `agents`.
 
     Observations are dicts with one array per sense; `infos[agent]["terms"]` contains the unweighted
-    reward terms by name. The same seed gives the same bytes as in the first world of a `VecaEnv`.
+    reward terms by name, and `infos[agent]["solved"]` whether the goal of the task is reached, if
+    it has one. The same seed gives the same bytes as in the first world of a `VecaEnv`.
 
     Args:
         cfg: What to play.
@@ -87,7 +88,7 @@ class VecaParallelEnv(ParallelEnv[str, Observation, Any]):
             step.rewards,
             step.terminated,
             dict.fromkeys(names, step.truncated),
-            {name: {"terms": dict(step.terms[name])} for name in names},
+            {name: step.info(name) for name in names},
         )
 
     def render(self) -> NDArray[np.uint8]:

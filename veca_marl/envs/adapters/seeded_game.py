@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from veca_marl.envs.core.episodes import Episodes
 from veca_marl.envs.core.game import Game, Observation
 from veca_marl.envs.core.game_cfg import GameCfg
+from veca_marl.envs.core.task import SOLVED
 from veca_marl.envs.rendering.spectator import Spectator
 from veca_marl.sim.compilation import announce_compilation
 
@@ -30,6 +31,7 @@ class Step(NamedTuple):
         terminated: Whether the episode has ended by the rules.
         truncated: Whether the time is up; the same for all players.
         done: Whether the episode has ended for all players.
+        solved: Whether the goal of the task is reached; empty for a task without a goal.
     """
 
     observations: dict[str, Observation]
@@ -38,6 +40,14 @@ class Step(NamedTuple):
     terminated: dict[str, bool]
     truncated: bool
     done: bool
+    solved: dict[str, bool]
+
+    def info(self, name: str) -> dict[str, Any]:
+        """Return the info of a player: `terms`, and `solved` if the task has a goal."""
+        info: dict[str, Any] = {"terms": dict(self.terms[name])}
+        if name in self.solved:
+            info[SOLVED] = self.solved[name]
+        return info
 
 
 class SeededGame:
@@ -120,6 +130,7 @@ class SeededGame:
             {name: outcome.terminated_for(name) for name in names},
             outcome.truncated,
             outcome.done,
+            {name: outcome.solved[name] for name in names if name in outcome.solved},
         )
 
     @property

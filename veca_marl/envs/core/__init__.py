@@ -5,10 +5,11 @@ from veca_marl.envs.core.episodes import Episodes
 from veca_marl.envs.core.expert import Expert, find_expert, has_expert, register_expert
 from veca_marl.envs.core.game import Game, Observation, Outcome
 from veca_marl.envs.core.game_cfg import GameCfg
-from veca_marl.envs.core.task import Player, Task, TaskCfg, Team, find_task, register, terms
+from veca_marl.envs.core.task import SOLVED, Player, Task, TaskCfg, Team, find_task, register, terms
 from veca_marl.envs.core.team import Script, TeamCfg, TeamSensesCfg
 
 __all__ = [
+    "SOLVED",
     "Episodes",
     "Expert",
     "Game",

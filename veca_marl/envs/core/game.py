@@ -37,12 +37,14 @@ class Outcome(NamedTuple):
         terminated: Whether the episode has ended by the rules.
         truncated: Whether the time is up, or the state of a body is not finite any more.
         eliminated: Names of the players for whom the episode has ended.
+        solved: Whether the goal of the task is reached, by player; empty for a task without a goal.
     """
 
     terms: dict[str, dict[str, float]]
     terminated: bool
     truncated: bool
     eliminated: frozenset[str] = frozenset()
+    solved: Mapping[str, bool] = MappingProxyType({})
 
     @property
     def done(self) -> bool:
@@ -213,7 +215,7 @@ class Game:
             self.eliminated |= {p.name for p in self.players if self.task.is_eliminated(p)}
         terminated = self.task.terminated() or len(self.eliminated) == len(self.players)
         truncated = self.steps >= self.max_steps or self._is_non_finite()
-        return Outcome(terms, terminated, truncated, self.eliminated)
+        return Outcome(terms, terminated, truncated, self.eliminated, self._solved())
 
     def _play_scripts(self) -> None:
         for team, script in self.cfg.script.items():
@@ -252,6 +254,11 @@ class Game:
         if player.name in self.eliminated:
             return dict.fromkeys(self.weights, 0.0)
         return self.task.reward(player)
+
+    def _solved(self) -> dict[str, bool]:
+        if not self.task.has_goal():
+            return {}
+        return {player.name: bool(self.task.solved(player)) for player in self.players}
 
     def _is_non_finite(self) -> bool:
         """Return whether the state of a body is not finite; log which."""

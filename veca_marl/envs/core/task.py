@@ -20,6 +20,9 @@ from veca_marl.sim.sense import Sense
 
 TaskType = TypeVar("TaskType", bound="type[Task]")
 
+SOLVED = "solved"
+"""Name of the entry of `info` that holds the result of `Task.solved`."""
+
 
 class Team(NamedTuple):
     """Players that share specs and a policy; a team is one TorchRL group.
@@ -104,9 +107,12 @@ class TaskCfg:
         """Check the values.
 
         Raises:
-            ValueError: If the duration is not positive or a weight is not finite.
+            ValueError: If the duration is not positive, a weight is not finite, or a term is named
+                as another entry of `info`.
         """
         self.check_positive("max_seconds")
+        if SOLVED in self.weights:
+            raise ValueError(f"task.weights: {SOLVED!r} is the name of another entry of info")
         bad = {name: value for name, value in self.weights.items() if not math.isfinite(value)}
         if bad:
             raise ValueError(f"task.weights: {bad} must be finite numbers")
@@ -183,6 +189,20 @@ class Task(ABC):
     def terminated(self) -> bool:
         """Return whether the game has ended by its rules for all players."""
         return False
+
+    def solved(self, player: Player) -> bool | None:
+        """Return whether the goal of the task is reached for a player at this moment.
+
+        An episode counts as solved if this is True after its last step. A task with a goal
+        overrides this method and returns a bool for every player after every step; a task without
+        one does not, and the result is None.
+        """
+        return None
+
+    @classmethod
+    def has_goal(cls) -> bool:
+        """Return whether the task defines `solved`."""
+        return cls.solved is not Task.solved
 
     def is_eliminated(self, player: Player) -> bool:
         """Return whether the game has ended for one player, in a task that `eliminates`.

@@ -50,7 +50,7 @@ class PileUpBlockExpert(Expert[PileUpBlock]):
     def _script(self) -> Iterator[Floats]:
         carry_m = 1.5 * self.task.cfg.edge_m + _CARRY_CLEARANCE_M
         for block, base in itertools.cycle(itertools.permutations(self.task.blocks)):
-            if self.task.solved:
+            if self.task.solved(self.player):
                 yield from self._carrier.rest()
             yield from self._carrier.carry(block, partial(_on_top_of, base), carry_m)
 
@@ -78,7 +78,7 @@ class PutDownBlockExpert(Expert[PutDownBlock]):
     def _script(self) -> Iterator[Floats]:
         cfg = self.task.cfg
         carry_m = (cfg.blue + 0.5) * cfg.edge_m + _CARRY_CLEARANCE_M
-        while not self.task.solved:
+        while not self.task.solved(self.player):
             yield from self._carrier.carry(self.task.red, self._goal, carry_m, above_m=0.02)
         yield from self._carrier.rest()
 

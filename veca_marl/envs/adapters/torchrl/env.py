@@ -14,6 +14,7 @@ from veca_marl.envs.adapters.torchrl.specs import env_specs
 from veca_marl.envs.core.episodes import Episodes, fresh_seed
 from veca_marl.envs.core.game import Game, Outcome
 from veca_marl.envs.core.game_cfg import GameCfg
+from veca_marl.envs.core.task import SOLVED
 from veca_marl.envs.rendering.spectator import Spectator
 from veca_marl.sim.compilation import announce_compilation
 
@@ -28,6 +29,7 @@ class VecaEnv(FastStepEnv):
         (team, "action", part)         instead, for a body whose action has several parts
         (team, "reward")               (W, n, 1) float32, weighted sum of the reward terms
         (team, "info", term)           (W, n, 1) float32, unweighted reward terms, for logs
+        (team, "info", "solved")       (W, n, 1) bool, in tasks with a goal: whether it is reached
         (team, "done" | "terminated" | "truncated")  (W, n, 1), and the same at the root (W, 1)
         (team, "mask")                 (W, n) bool, in tasks that eliminate: False if eliminated
 
@@ -186,6 +188,8 @@ class VecaEnv(FastStepEnv):
                 arrays[team]["reward"][row] = game.reward_of(terms)
                 for term, value in terms.items():
                     arrays[team]["info"][term][row] = value
+                if outcome.solved:
+                    arrays[team]["info"][SOLVED][row] = outcome.solved[name]
 
     def render(self, world: int = 0) -> NDArray[np.uint8]:
         """Return what the first player perceives beside a view of the room.

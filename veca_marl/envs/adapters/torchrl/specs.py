@@ -10,6 +10,7 @@ from torchrl.data import Bounded, Categorical, Composite, TensorSpec, Unbounded
 
 from veca_marl.envs.core.actions import ActionSpec, from_parts
 from veca_marl.envs.core.game import Game
+from veca_marl.envs.core.task import SOLVED
 from veca_marl.sim.spec import ArraySpec
 
 DONE_KEYS = ("done", "terminated", "truncated")
@@ -39,7 +40,7 @@ def env_specs(game: Game, teams: list[str], worlds: int) -> EnvSpecs:
         batch = (worlds, len(players))
         specs.observation[team] = Composite(
             observation=sense_specs(_senses_of(game, player.name), batch),
-            info=Composite({term: Unbounded((*batch, 1)) for term in game.weights}, shape=batch),
+            info=info_spec(game, batch),
             shape=batch,
         )
         if game.task.eliminates:
@@ -49,6 +50,14 @@ def env_specs(game: Game, teams: list[str], worlds: int) -> EnvSpecs:
         specs.reward[team] = Composite(reward=Unbounded((*batch, 1)), shape=batch)
         specs.done[team] = Composite(done_spec(batch), shape=batch)
     return specs
+
+
+def info_spec(game: Game, batch: tuple[int, ...]) -> Composite:
+    """Return a team's `info`: one leaf per reward term, and `solved` if the task has a goal."""
+    spec = Composite({term: Unbounded((*batch, 1)) for term in game.weights}, shape=batch)
+    if game.task.has_goal():
+        spec[SOLVED] = Categorical(2, shape=(*batch, 1), dtype=torch.bool)
+    return spec
 
 
 def _senses_of(game: Game, player: str) -> dict[str, ArraySpec]:

@@ -87,8 +87,17 @@ class PushOut(Task):
         }
 
     def terminated(self) -> bool:
+        return any(not self._is_in_ring(self._team(name)) for name in self._team_names)
+
+    def solved(self, player: Player) -> bool:
+        """Return whether all opponents are out and the player's own team is not."""
+        ours = self._team(player.team)
+        return self._is_in_ring(ours) and not self._is_in_ring(opponents(player, self.players))
+
+    def _is_in_ring(self, side: list[Player]) -> bool:
+        """Return whether at least one player is in the ring after this step."""
         left = self._playing - self._newly_out
-        return any(all(p.name not in left for p in self._team(name)) for name in self._team_names)
+        return any(player.name in left for player in side)
 
     def opponents_playing(self, player: Player) -> list[Player]:
         """Return the players of the other team that were in the ring before this step."""

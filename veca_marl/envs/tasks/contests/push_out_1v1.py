@@ -12,7 +12,8 @@ class PushOut1v1(PushOut):
 
     They start on opposite sides and face the middle, up to `spread_deg` to the side. A player
     is out when its pelvis is beyond the rim, whether it was pushed or not, and the episode
-    terminates. When the time is over neither has won. The paper (table of tasks in the appendix;
+    terminates. The task is solved (`solved`) for a player that is in the ring when its opponent is
+    out; when the time is over neither has won. The paper (table of tasks in the appendix;
     "Multi-Agent Reinforcement Learning") says "the agent must push other agents out of the ring
     to win", with joint-level actions; the ring, the start and the reward are not in the paper.
     Every term is zero-sum over `push` and `out` together and over `ground`.

@@ -11,10 +11,11 @@ class PushOut2v2(PushOut):
     """Two teams of two players in a ring; a team without players in the ring loses.
 
     The rules of PushOut1v1 apply to each player. An eliminated player stays where it left the
-    ring, and its teammate continues alone. The players of a team start side by side. The paper
-    (table of tasks in the appendix) says "agents must push agents of the opponent team out of the
-    ring to win"; the rest is not in the paper. Rewards of a team are divided by the number of its
-    remaining players, so that the sum over all four players is zero in every step, for `ground`
+    ring, and its teammate continues alone. The task is solved (`solved`) for both players of a team
+    when both opponents are out and the team is not. The players of a team start side by side. The
+    paper (table of tasks in the appendix) says "agents must push agents of the opponent team out of
+    the ring to win"; the rest is not in the paper. Rewards of a team are divided by the number of
+    its remaining players, so that the sum over all four players is zero in every step, for `ground`
     and for `push` and `out` together.
 
     Terms:

@@ -92,6 +92,10 @@ class Soccer(Task):
     def terminated(self) -> bool:
         return self._scored
 
+    def solved(self, player: Player) -> bool:
+        """Return whether a goal is scored; for a defender, whether none is scored."""
+        return self._scored == (player.team == ATTACKER)
+
     def _observe_state(self) -> _State:
         attacker, ball = self.players[0].body, self.ball.position
         way = ball - attacker.position

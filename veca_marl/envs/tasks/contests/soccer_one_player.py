@@ -11,7 +11,8 @@ class SoccerOnePlayer(Soccer):
     """A player starts behind a ball and has to put it into the goal at the end of the room.
 
     Nothing is forbidden. A goal is scored when the centre of the ball passes the goal line from
-    the front, between the posts and under the bar; it terminates the episode. Joint-level bodies
+    the front, between the posts and under the bar; it terminates the episode, and the task is
+    solved (`solved`). Joint-level bodies
     start on hands and knees and push the ball. A ball within reach of a walker's foot
     (`Walker.can_kick`) is kicked automatically, away from the body, at most once per
     `kick_rest_s`. The paper (table of tasks in the appendix) says "put the ball into the goal with

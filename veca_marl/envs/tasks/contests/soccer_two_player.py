@@ -39,10 +39,12 @@ class SoccerTwoPlayer(Soccer):
 
     Nothing is forbidden: the defender may block and tackle, and both may kick and push whatever
     they reach; of two walkers that reach the ball in one step the nearer one kicks. A goal, by
-    either player, terminates the episode. The paper (table of tasks in the appendix) says "the
-    attacker must put the ball into the goal, and the defender must block the ball from the goal
-    with joint-level actions [...] there is no rule"; the numbers and all terms except `goal` are
-    not in the paper. Every term of the defender is minus that of the attacker (zero-sum).
+    either player, terminates the episode. The task is solved (`solved`) for the attacker when a
+    goal is scored, and for the defender as long as none is. The paper (table of tasks in the
+    appendix) says "the attacker must put the ball into the goal, and the defender must block the
+    ball from the goal with joint-level actions [...] there is no rule"; the numbers and all terms
+    except `goal` are not in the paper. Every term of the defender is minus that of the attacker
+    (zero-sum).
 
     Terms:
         goal: 1 for the attacker on the step in which a goal is scored, else 0.

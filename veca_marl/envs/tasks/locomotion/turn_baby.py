@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,10 +19,18 @@ class TurnBabyCfg(StartCfg):
     Attributes:
         spread_deg: Standard deviation of every joint angle at the start about the posture
             `on_back`, in [0, 30].
+        turned_deg: Angle from straight down up to which the fronts of chest and pelvis count as
+            turned over.
     """
 
     max_seconds: float = 8.0
+    turned_deg: float = 45.0
     weights: dict[str, float] = terms(torso=0.025, hip=0.025)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not 0.0 < self.turned_deg < 90.0:
+            raise ValueError(f"task.turned_deg={self.turned_deg} must be between 0 and 90")
 
 
 @register
@@ -31,7 +40,8 @@ class TurnBaby(Task):
     The paper (table of tasks in the appendix; "Joint-level Locomotion & Control") rewards "the
     orientation of its torso and hip" and gives no numbers. This task rewards a front that points
     straight down. An episode lasts `max_seconds` and never terminates. With the default weights
-    its return is -10 on the back and +10 on the belly.
+    its return is -10 on the back and +10 on the belly. The task is solved (`solved`) while the
+    fronts of chest and pelvis point at most `turned_deg` away from straight down.
 
     Terms:
         torso: Cosine of the angle between the front of the chest and straight down, in [-1, 1].
@@ -50,3 +60,8 @@ class TurnBaby(Task):
 
     def reward(self, player: Player) -> dict[str, float]:
         return face_down_cosines(self.body)
+
+    def solved(self, player: Player) -> bool:
+        """Return whether the front of the body points down."""
+        least = math.cos(math.radians(self.cfg.turned_deg))
+        return min(face_down_cosines(self.body).values()) >= least

@@ -12,7 +12,11 @@ import numpy as np
 from veca_marl.envs.core.task import Player, Task, TaskCfg, Team, register, terms
 from veca_marl.envs.tasks.navigation import places
 from veca_marl.envs.tasks.navigation.floor_plan import FloorPlan
-from veca_marl.envs.tasks.navigation.helper_reward import PropVisibility, displacement_to
+from veca_marl.envs.tasks.navigation.helper_reward import (
+    AHEAD_WEIGHT,
+    TURN_WEIGHT,
+    HelperReward,
+)
 from veca_marl.envs.tasks.player_starts import direct_gaze_ahead, place_player
 
 _PASSAGE_M = 0.2  # width that an agent at the object leaves free towards the walls
@@ -47,7 +51,7 @@ class MultiAgentNavCfg(TaskCfg):
     radius_m: float = 0.2
     reach_m: float = 0.4
     muted: Muted = Muted.none
-    weights: dict[str, float] = terms(reached=1.0, ahead=0.05, aside=0.03)
+    weights: dict[str, float] = terms(reached=1.0, ahead=AHEAD_WEIGHT, turn=TURN_WEIGHT)
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -65,13 +69,15 @@ class MultiAgentNav(Task):
 
     An agent sees the object only from its room or through a door, so the agent that finds it
     should call the others. A call is heard from its direction in the next room; a wall attenuates
-    it by 30 dB. The episode terminates when all agents have reached the object.
+    it by 30 dB. The episode terminates when all agents have reached the object; then the task is
+    solved (`solved`) for all of them.
 
     The rooms, the shared reward and the helper reward are those of the paper (table of tasks and
     "Helper Rewards" in the appendix; "Multi-Agent Reinforcement Learning"); sizes and times are
     not in the paper. Departures: the paper's table lists vision, touch and proprioception, but its
-    text has agents come "using auditory perception", so hearing is included here; the helper
-    reward is in metres per step, see `displacement_to`.
+    text has agents come "using auditory perception", so hearing is included here; `ahead` is in
+    metres per step, and `turn` stands for the sideways velocity that walking bodies do not have,
+    see `HelperReward`.
 
     The default `playground=seven_rooms` serves up to 7 agents; `two_rooms`, `three_rooms` and
     `four_rooms` serve as many as their names say. Joint-level bodies start on hands and knees with
@@ -84,8 +90,9 @@ class MultiAgentNav(Task):
             the object" is read as +1 for each agent that arrives.
         ahead: Displacement forwards during the step, m (negative backwards), while the object is
             visible to the agent's eyes and the agent has not reached it. In the paper ``Vis a_f``.
-        aside: Displacement to the side on which the object is, m, under the same conditions. In
-            the paper ``Vis a_l L``.
+        turn: Decrease during the step of the horizontal angle between the agent's forward direction
+            and the direction of the object, rad, under the same conditions and if the object was
+            visible before the step, too. In the paper ``Vis a_l L``.
     """
 
     senses = ("vision", "touch", "proprioception", "audio")
@@ -100,7 +107,7 @@ class MultiAgentNav(Task):
         self.plan = FloorPlan(self.world.playground)
         self._furniture = places.furniture_of(self.world)
         self.target = places.add_target(self.world, self.cfg.radius_m)
-        self._visibility = PropVisibility(self.world.scene, self.target)
+        self._helper = HelperReward(self.world.scene)
         self.arrived: set[str] = set()
         self._newly_arrived = 0
 
@@ -122,6 +129,7 @@ class MultiAgentNav(Task):
             if self.cfg.muted is not Muted.none:
                 player.body.muted = room is home or self.cfg.muted is Muted.all
         direct_gaze_ahead(self.players)
+        self._helper.reset(self.target, self.players)
 
     def after_step(self, rng: np.random.Generator) -> None:
         direct_gaze_ahead(self.players)
@@ -130,17 +138,18 @@ class MultiAgentNav(Task):
             if places.gap_m(player.body.position, self.target) <= self.cfg.reach_m:
                 self.arrived.add(player.name)
         self._newly_arrived = len(self.arrived) - before
+        self._helper.after_step([p for p in self.players if p.name not in self.arrived])
 
     def reward(self, player: Player) -> dict[str, float]:
-        ahead_m = aside_m = 0.0
-        if player.name not in self.arrived and self.sees_target(player):
-            step_s = self.world.clock.step_s
-            ahead_m, aside_m = displacement_to(player.body, self.target.position, step_s)
-        return {"reached": float(self._newly_arrived), "ahead": ahead_m, "aside": aside_m}
+        return {"reached": float(self._newly_arrived), **self._helper.terms(player)}
 
     def terminated(self) -> bool:
         return len(self.arrived) == len(self.players)
 
+    def solved(self, player: Player) -> bool:
+        """Return whether all agents have reached the object."""
+        return self.terminated()
+
     def sees_target(self, player: Player) -> bool:
-        """Return whether the object is visible to an eye of a player, see `PropVisibility`."""
-        return self._visibility.for_player(player)
+        """Return whether the object is visible to an eye of a player."""
+        return self._helper.sees(self.target, player)

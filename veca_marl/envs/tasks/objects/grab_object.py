@@ -94,9 +94,8 @@ class GrabObject(Task):
             return 0.0
         return float(self.toy.position[2]) - self.cfg.edge_m / 2
 
-    @property
-    def solved(self) -> bool:
-        """Whether the toy is lifted with both hands."""
+    def solved(self, player: Player) -> bool:
+        """Return whether the toy is lifted with both hands."""
         return self.held_m >= self.cfg.lifted_m
 
     def _palm_distance_m(self) -> float:

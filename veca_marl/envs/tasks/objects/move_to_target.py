@@ -104,7 +104,6 @@ class MoveToTarget(Task):
         """Horizontal distance between the toy and the mark."""
         return float(np.linalg.norm(horizontal(self.toy.position - self.mark.position)))
 
-    @property
-    def solved(self) -> bool:
-        """Whether the toy is at the mark."""
+    def solved(self, player: Player) -> bool:
+        """Return whether the toy is at the mark."""
         return self.distance_m <= self.cfg.there_m

@@ -81,9 +81,8 @@ class PileUpBlock(Task):
     def reward(self, player: Player) -> dict[str, float]:
         return {"height": sum(height_in_edges(block) for block in self.blocks)}
 
-    @property
-    def solved(self) -> bool:
-        """Whether one block rests on the other and has been released."""
+    def solved(self, player: Player) -> bool:
+        """Return whether one block rests on the other and has been released."""
         return any(
             rests_on(block, base) and is_released(block, self.child)
             for block, base in itertools.permutations(self.blocks)

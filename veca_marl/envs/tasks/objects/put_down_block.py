@@ -105,8 +105,7 @@ class PutDownBlock(Task):
     def reward(self, player: Player) -> dict[str, float]:
         return {"height": height_in_edges(self.red), "blue_fell": float(self._newly_fallen)}
 
-    @property
-    def solved(self) -> bool:
-        """Whether the red block is released on the floor and all blue ones stand."""
+    def solved(self, player: Player) -> bool:
+        """Return whether the red block is released on the floor and all blue ones stand."""
         on_floor = abs(height_in_edges(self.red)) < 0.1 and is_at_rest(self.red)
         return on_floor and is_released(self.red, self.child) and not self._fallen

@@ -123,7 +123,6 @@ class RotateCube(Task):
         """Whether the cube is on the right hand."""
         return math.dist(self.cube.position, self.child.palms()[1]) < self.cfg.lost_m
 
-    @property
-    def solved(self) -> bool:
-        """Whether the cube is on the hand and within `there_deg` of the target."""
+    def solved(self, player: Player) -> bool:
+        """Return whether the cube is on the hand and within `there_deg` of the target."""
         return self.on_hand and self.angle_rad <= math.radians(self.cfg.there_deg)
