@@ -10,6 +10,8 @@ from veca_marl.envs.tasks.locomotion.sit_baby import SitBaby
 from veca_marl.envs.tasks.locomotion.turn_baby import TurnBaby
 from veca_marl.envs.tasks.multimodal.kick_the_ball import KickTheBall
 from veca_marl.envs.tasks.navigation.multi_agent_nav import MultiAgentNav
+from veca_marl.envs.tasks.navigation.object_nav import ObjectNav
+from veca_marl.envs.tasks.navigation.object_phys_nav import ObjectPhysNav
 from veca_marl.envs.tasks.objects.grab_object import GrabObject
 from veca_marl.envs.tasks.objects.move_to_target import MoveToTarget
 from veca_marl.envs.tasks.objects.pile_up_block import PileUpBlock
@@ -22,6 +24,8 @@ __all__ = [
     "KickTheBall",
     "MoveToTarget",
     "MultiAgentNav",
+    "ObjectNav",
+    "ObjectPhysNav",
     "PileUpBlock",
     "PushOut1v1",
     "PushOut2v2",

@@ -8,16 +8,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from veca_marl.sim.geometry import (
-    Bools,
-    Floats,
-    distances_to,
-)
+from veca_marl.envs.tasks.navigation.clearance import clearances_m
+from veca_marl.sim.geometry import Bools, Floats
 from veca_marl.sim.physics import PlaygroundCfg, Prop, World
-from veca_marl.sim.physics.prop_shapes import prop_geoms
 
 CELL_M = 0.1
-_HEIGHTS_M = (0.05, 0.2, 0.35, 0.5, 0.65)  # of a body of 0.78 m; lintels of doors are above
 
 
 class FloorGrid(NamedTuple):
@@ -34,7 +29,7 @@ class FloorGrid(NamedTuple):
     @property
     def centres(self) -> Floats:
         """Centres of all cells, ``(nx, ny, 2)`` metres."""
-        indices = np.stack(np.indices(self.shape), axis=-1)
+        indices = np.moveaxis(np.indices(self.shape), 0, -1)
         centres: Floats = self.lower_m + (indices + 0.5) * CELL_M
         return centres
 
@@ -74,7 +69,7 @@ def free_cells(
     Args:
         grid: The cells.
         world: The world.
-        clear_m: Least distance from the surfaces of props, at heights of 0.05 to 0.65 m.
+        clear_m: Least distance from the surfaces of props, see `clearances_m`.
         passable: Props that do not count.
 
     Returns:
@@ -83,7 +78,7 @@ def free_cells(
     free = np.ones(grid.shape, bool)
     for prop in world.props.values():
         if prop.cfg.tangible and prop not in passable:
-            free &= _distances(grid, prop) >= clear_m
+            free &= clearances_m(prop, grid.centres) >= clear_m
     return free
 
 
@@ -94,14 +89,3 @@ def outside(grid: FloorGrid, discs: Sequence[Detour]) -> Bools:
         away: NDArray[np.float64] = np.linalg.norm(grid.centres - centre[:2], axis=-1)
         free &= away >= radius_m
     return free
-
-
-def _distances(grid: FloorGrid, prop: Prop) -> Floats:
-    """Return the horizontal clearance of all cells from a prop, ``(nx, ny)`` metres."""
-    heights = np.array(_HEIGHTS_M)
-    flat = np.repeat(grid.centres[:, :, None], len(heights), axis=2)
-    points = np.concatenate([flat, np.tile(heights[:, None], (*grid.shape, 1, 1))], axis=-1)
-    own = (points - prop.position) @ prop.rotation
-    distances = [distances_to(geom, own).min(axis=2) for geom in prop_geoms(prop.cfg)]
-    least: Floats = np.min(distances, axis=0)
-    return least

@@ -5,6 +5,7 @@ from __future__ import annotations
 from enum import Enum
 from typing import NamedTuple
 
+from veca_marl.sim.geometry import Floats
 from veca_marl.sim.physics import Prop, PropCfg, PropShape, World
 
 
@@ -49,8 +50,8 @@ class SearchedObject(NamedTuple):
     prop: Prop
     centre_m: float
 
-    def place(self, floor: tuple[float, float, float], yaw_rad: float) -> None:
-        """Stand on a point of the floor, metres."""
+    def place(self, floor: Floats, yaw_rad: float) -> None:
+        """Stand on a point ``(3,)`` of the floor, metres."""
         x, y, z = floor
         self.prop.place((x, y, z + self.centre_m), yaw_rad)
 
