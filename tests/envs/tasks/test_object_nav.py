@@ -38,7 +38,7 @@ def put(game, gap, of=None, facing_deg=180.0):
         prop.place((0.0, 0.0, 0.15) if prop is target else (-2.5, number - 1.0, 0.15))
     x = target.radius_m + REACH_M + gap
     game.players[0].body.place((x, 0.0, 0.0), math.radians(facing_deg))
-    game.world.refresh()
+    walk(game)  # the helper reward compares the states before and after a step
 
 
 def walk(game, forward=0.0, turn=0.0):
@@ -81,7 +81,7 @@ def test_no_two_kinds_look_alike(game):
 
 
 def test_a_playground_without_space_is_an_error_that_names_it():
-    with pytest.raises(ValueError, match="playground 'seven_rooms' leaves no 4 places 9.00 m"):
+    with pytest.raises(ValueError, match=r"playground 'seven_rooms' leaves no 4 places 9.00 m"):
         game_of("playground=seven_rooms", "task.apart_m=9")
 
 
@@ -115,6 +115,13 @@ def test_the_helper_reward_counts_visible_displacement_to_the_target(game):
     assert walk(game, forward=1.0).terms["agents"]["ahead"] == 0.0
     put(game, 1.0, of=game.task.wrong[0], facing_deg=90.0)
     assert walk(game, forward=1.0).terms["agents"]["ahead"] == 0.0
+
+
+@pytest.mark.parametrize(("turn", "expected"), [(1.0, 1.0), (-1.0, -1.0)])
+def test_turning_towards_the_visible_target_is_rewarded(game, turn, expected):
+    put(game, 1.0, facing_deg=160.0)
+    turned_rad = walk(game, turn=turn).terms["agents"]["turn"]
+    assert turned_rad == pytest.approx(expected * math.radians(120.0) * 0.04, rel=0.01)
 
 
 def shuttle_return(game):

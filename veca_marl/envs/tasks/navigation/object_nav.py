@@ -10,7 +10,7 @@ import numpy as np
 
 from veca_marl.envs.core.task import Player, Task, TaskCfg, register, terms
 from veca_marl.envs.tasks.navigation import places
-from veca_marl.envs.tasks.navigation.helper_reward import PropVisibility, displacement_to
+from veca_marl.envs.tasks.navigation.helper_reward import AHEAD_WEIGHT, TURN_WEIGHT, HelperReward
 from veca_marl.envs.tasks.navigation.object_kinds import ObjectKind, add_object
 from veca_marl.envs.tasks.navigation.scattering import Spacing, scattered_places
 from veca_marl.envs.tasks.player_starts import direct_gaze_ahead, place_player
@@ -41,7 +41,7 @@ class ObjectNavCfg(TaskCfg):
     target: ObjectKind = ObjectKind.ball
     reach_m: float = 0.3
     apart_m: float = 1.2
-    weights: dict[str, float] = terms(reached=1.0, wrong=-1.0, ahead=0.05, aside=0.03)
+    weights: dict[str, float] = terms(reached=1.0, wrong=-1.0, ahead=AHEAD_WEIGHT, turn=TURN_WEIGHT)
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -65,7 +65,8 @@ class ObjectNav(Task):
 
     The objects stand at random places of all rooms, at least `apart_m` from each other and from
     the agent's start. The target is recognised by its shape and colour in the images. Reaching
-    the target or a wrong object terminates the episode.
+    the target or a wrong object terminates the episode; the task is solved (`solved`) if it was the
+    target.
 
     Senses, actions, the rewards of +1 and -1 and the helper reward are those of the paper (table
     of tasks and "Helper Rewards" in the appendix). The paper does not state the cue for the
@@ -78,8 +79,9 @@ class ObjectNav(Task):
         wrong: 1 on the step in which another object is reached, and the target is not, else 0.
         ahead: Displacement forwards during the step, m (negative backwards), while the target is
             visible to the agent's eyes. In the paper ``Vis a_f``.
-        aside: Displacement to the side on which the target is, m, under the same condition. In
-            the paper ``Vis a_l L``.
+        turn: Decrease during the step of the horizontal angle between the agent's forward direction
+            and the direction of the target, rad, if the target is visible before and after the
+            step. In the paper ``Vis a_l L``, see `HelperReward`.
     """
 
     senses: ClassVar[tuple[str, ...]] = ("vision",)
@@ -94,7 +96,7 @@ class ObjectNav(Task):
         ]
         self.target = self._objects[self.cfg.objects.index(self.cfg.target)].prop
         self.wrong = [one.prop for one in self._objects if one.prop is not self.target]
-        self._visibility = PropVisibility(self.world.scene, self.target)
+        self._helper = HelperReward(self.world.scene)
         self._reached = self._reached_wrong = False
 
     def reset(self, rng: np.random.Generator) -> None:
@@ -108,29 +110,26 @@ class ObjectNav(Task):
             one.place(floor, rng.uniform(-math.pi, math.pi))
         place_player(self.agent, start, rng.uniform(-math.pi, math.pi))
         direct_gaze_ahead(self.players)
+        self._helper.reset(self.target, self.players)
 
     def after_step(self, rng: np.random.Generator) -> None:
         direct_gaze_ahead(self.players)
         self._reached = self._is_reached(self.target)
         self._reached_wrong = not self._reached and any(map(self._is_reached, self.wrong))
+        self._helper.after_step(self.players)
 
     def reward(self, player: Player) -> dict[str, float]:
-        ahead_m = aside_m = 0.0
-        if self._visibility.for_player(player):
-            step_s = self.world.clock.step_s
-            ahead_m, aside_m = displacement_to(player.body, self.target.position, step_s)
         return {
             "reached": float(self._reached),
             "wrong": float(self._reached_wrong),
-            "ahead": ahead_m,
-            "aside": aside_m,
+            **self._helper.terms(player),
         }
 
     def terminated(self) -> bool:
         return self._reached or self._reached_wrong
 
-    def solved(self, player: Player) -> bool | None:
-        """Return whether the target has been reached, see `Task.solved`."""
+    def solved(self, player: Player) -> bool:
+        """Return whether the target has been reached."""
         return self._reached
 
     def _is_reached(self, prop: Prop) -> bool:

@@ -27,18 +27,20 @@ class ObjectPhysNavCfg(ObjectNavCfg):
 class ObjectPhysNav(ObjectNav):
     """ObjectNav with a body that is controlled by its joints and starts on hands and knees.
 
-    Objects, rewards and the end of an episode are as in ObjectNav; the agent feels and senses its
-    own body as well. The eyes are turned ahead, because on hands and knees the face points to the
-    floor; this is ours. Senses and joint-level actions are those of the paper (table of tasks in
-    the appendix); sizes and times are not in the paper.
+    Objects, rewards and the end of an episode are as in ObjectNav: the task is solved (`solved`)
+    when the target has been reached. The agent feels and senses its own body as well. The eyes are
+    turned ahead, because on hands and knees the face points to the floor; this is ours. Senses and
+    joint-level actions are those of the paper (table of tasks in the appendix); sizes and times are
+    not in the paper.
 
     Terms:
         reached: 1 on the step in which the target is reached, else 0.
         wrong: 1 on the step in which another object is reached, and the target is not, else 0.
         ahead: Displacement forwards during the step, m (negative backwards), while the target is
             visible to the agent's eyes. In the paper ``Vis a_f``.
-        aside: Displacement to the side on which the target is, m, under the same condition. In
-            the paper ``Vis a_l L``.
+        turn: Decrease during the step of the horizontal angle between the agent's forward direction
+            and the direction of the target, rad, if the target is visible before and after the
+            step. In the paper ``Vis a_l L``, see `HelperReward`.
     """
 
     senses = ("vision", "touch", "proprioception")
