@@ -64,7 +64,7 @@ class World:
             self._impacts = ImpactSounds(playground.impacts, self.clock, self.client, self.sound)
             self.after_substep.append(self._impacts.after_substep)
         self.floor_id = add_floor(self.client, self.scene, playground)
-        for prop in playground.props:
+        for prop in playground.built_props():
             self.add_prop(prop)
 
     def add_prop(self, cfg: PropCfg) -> Prop:
