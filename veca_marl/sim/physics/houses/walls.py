@@ -19,16 +19,16 @@ COVERING_M = 0.004
 
 _TOLERANCE_M = 1e-6
 
-_COLOURS = (
-    (0.60, 0.70, 0.85),
-    (0.85, 0.85, 0.80),
-    (0.85, 0.70, 0.70),
-    (0.80, 0.85, 0.70),
-    (0.75, 0.70, 0.80),
-    (0.80, 0.75, 0.65),
-    (0.70, 0.80, 0.78),
-    (0.85, 0.75, 0.72),
-)
+_COLOURS = [
+    [0.60, 0.70, 0.85],
+    [0.85, 0.85, 0.80],
+    [0.85, 0.70, 0.70],
+    [0.80, 0.85, 0.70],
+    [0.75, 0.70, 0.80],
+    [0.80, 0.75, 0.65],
+    [0.70, 0.80, 0.78],
+    [0.85, 0.75, 0.72],
+]
 
 
 @dataclass
@@ -38,12 +38,13 @@ class WallsCfg:
     Attributes:
         thickness_m: Thickness; adjacent rooms have to be so far apart.
         door_height_m: Height of the openings of doors.
-        colours: Colours of the walls in turn, red, green and blue in [0, 1].
+        colours: Colours of the walls in turn, red, green and blue in [0, 1]; empty for eight pale
+            ones.
     """
 
     thickness_m: float = 0.1
     door_height_m: float = 2.0
-    colours: list[list[float]] = field(default_factory=lambda: [list(one) for one in _COLOURS])
+    colours: list[list[float]] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         """Check the numbers."""
@@ -51,8 +52,6 @@ class WallsCfg:
             value = getattr(self, name)
             if not 0.0 < value < float("inf"):
                 raise ValueError(f"walls: {name}={value} must be positive and finite")
-        if not self.colours:
-            raise ValueError("walls: colours must contain a colour")
         for colour in self.colours:
             check_appearance("walls: ", colour, 0.0)
 
@@ -86,7 +85,8 @@ def wall_props(rooms: Sequence[RoomCfg], doors: Sequence[DoorCfg], cfg: WallsCfg
     props: list[PropCfg] = []
     placed: set[str] = set()
     for number, line in enumerate(lines):
-        red, green, blue = cfg.colours[number % len(cfg.colours)]
+        colours = cfg.colours or _COLOURS
+        red, green, blue = colours[number % len(colours)]
         colour = (red, green, blue)
         _check_outside(line, rooms, cfg.thickness_m)
         cut = [door for door in doors if _is_in(door, line)]
