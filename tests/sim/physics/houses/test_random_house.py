@@ -108,7 +108,7 @@ def test_impossible_houses_are_refused_in_the_configuration(numbers, message):
 
 
 def test_only_generated_playgrounds_have_a_seed():
-    with pytest.raises(ValueError, match="unknown key 'playground.seed'"):
+    with pytest.raises(ValueError, match=r"unknown key 'playground\.seed'"):
         compose(["+task=KickTheBall", "playground=house", "playground.seed=7"])
 
 

@@ -49,7 +49,7 @@ def test_rooms_are_separate_without_a_door_and_connected_by_it():
 
 
 def test_rooms_that_are_too_near_for_a_wall_are_refused():
-    with pytest.raises(ValueError, match="'room_0': a wall of 0.1 m round another room"):
+    with pytest.raises(ValueError, match=r"'room_0': a wall of 0\.1 m round another room"):
         row(2, gap_m=0.05)
 
 
@@ -87,7 +87,7 @@ def test_furniture_stands_on_the_floor_within_its_area(kind):
 
 
 def test_an_unknown_piece_is_refused():
-    with pytest.raises(ValueError, match="kind='throne'; choices: .*'armchair'"):
+    with pytest.raises(ValueError, match=r"kind='throne'; choices: .*'armchair'"):
         FurnitureCfg("seat", kind="throne")
 
 
