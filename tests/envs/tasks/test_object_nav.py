@@ -8,7 +8,7 @@ from composed import compose
 
 from veca_marl.envs.core.game import Game
 from veca_marl.envs.core.team import Script
-from veca_marl.envs.tasks.navigation.clearance import clearances_m
+from veca_marl.envs.tasks.navigation.floors.clearance import clearances_m
 from veca_marl.envs.tasks.navigation.object_kinds import ObjectKind
 from veca_marl.envs.tasks.navigation.places import furniture_of
 

@@ -10,11 +10,16 @@ from numpy.typing import NDArray
 from veca_marl.envs.core.expert import Expert, register_expert
 from veca_marl.envs.experts.control.locomotion import locomotion_of
 from veca_marl.envs.experts.control.wall_recovery import WallRecovery
-from veca_marl.envs.tasks.navigation.floor_grid import Detour, floor_grid, free_cells, outside
-from veca_marl.envs.tasks.navigation.grid_paths import PathsTo
+from veca_marl.envs.tasks.navigation.floors.floor_grid import (
+    Detour,
+    floor_grid,
+    free_cells,
+    outside,
+)
+from veca_marl.envs.tasks.navigation.floors.grid_paths import PathsTo
 from veca_marl.envs.tasks.navigation.object_nav import ObjectNav
 
-_MARGIN_M = 0.15  # from the distance at which a wrong object is reached
+_MARGIN_M = 0.15  # at least, from the distance at which a wrong object is reached
 
 
 @register_expert("ObjectNav")
@@ -32,7 +37,7 @@ class ObjectNavExpert(Expert[ObjectNav]):
         grid = floor_grid(task.world.playground)
         clear_m = locomotion.clearances.wall_m
         free = free_cells(grid, task.world, clear_m, passable=(task.target, *task.wrong))
-        around_m = task.cfg.reach_m + _MARGIN_M
+        around_m = task.cfg.reach_m + max(_MARGIN_M, locomotion.clearances.turning_m)
         free &= outside(grid, [Detour(p.position, p.radius_m + around_m) for p in task.wrong])
         self._paths = PathsTo(grid, free, task.target.position)
 

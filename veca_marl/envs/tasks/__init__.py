@@ -9,6 +9,7 @@ from veca_marl.envs.tasks.locomotion.run_baby import RunBaby
 from veca_marl.envs.tasks.locomotion.sit_baby import SitBaby
 from veca_marl.envs.tasks.locomotion.turn_baby import TurnBaby
 from veca_marl.envs.tasks.multimodal.kick_the_ball import KickTheBall
+from veca_marl.envs.tasks.navigation.maze_nav import MazeNav
 from veca_marl.envs.tasks.navigation.multi_agent_nav import MultiAgentNav
 from veca_marl.envs.tasks.navigation.object_nav import ObjectNav
 from veca_marl.envs.tasks.navigation.object_phys_nav import ObjectPhysNav
@@ -22,6 +23,7 @@ __all__ = [
     "CrawlBaby",
     "GrabObject",
     "KickTheBall",
+    "MazeNav",
     "MoveToTarget",
     "MultiAgentNav",
     "ObjectNav",

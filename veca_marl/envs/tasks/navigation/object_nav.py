@@ -10,9 +10,9 @@ import numpy as np
 
 from veca_marl.envs.core.task import Player, Task, TaskCfg, register, terms
 from veca_marl.envs.tasks.navigation import places
+from veca_marl.envs.tasks.navigation.floors.scattering import Spacing, scattered_places
 from veca_marl.envs.tasks.navigation.helper_reward import AHEAD_WEIGHT, TURN_WEIGHT, HelperReward
 from veca_marl.envs.tasks.navigation.object_kinds import ObjectKind, add_object
-from veca_marl.envs.tasks.navigation.scattering import Spacing, scattered_places
 from veca_marl.envs.tasks.player_starts import direct_gaze_ahead, place_player
 from veca_marl.sim.physics import Prop
 

@@ -20,7 +20,7 @@ class ObjectPhysNavCfg(ObjectNavCfg):
 
     max_seconds: float = 60.0
     reach_m: float = 0.5
-    apart_m: float = 1.5
+    apart_m: float = 2.0
 
 
 @register

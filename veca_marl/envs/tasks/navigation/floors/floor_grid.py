@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from veca_marl.envs.tasks.navigation.clearance import clearances_m
+from veca_marl.envs.tasks.navigation.floors.clearance import clearances_m
 from veca_marl.sim.geometry import Bools, Floats
 from veca_marl.sim.physics import PlaygroundCfg, Prop, World
 

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from veca_marl.envs.tasks.navigation.clearance import clearances_m
+from veca_marl.envs.tasks.navigation.floors.clearance import clearances_m
 from veca_marl.sim.geometry import Floats, horizontal_distance
 from veca_marl.sim.physics import DoorCfg, PlaygroundCfg, Prop, RoomCfg
 

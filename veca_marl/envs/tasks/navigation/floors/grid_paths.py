@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
-from veca_marl.envs.tasks.navigation.floor_grid import CELL_M, FloorGrid
+from veca_marl.envs.tasks.navigation.floors.floor_grid import CELL_M, FloorGrid
 from veca_marl.sim.geometry import Bools, Floats
 
 _BLOCKED_COST = 1000.0  # a path crosses blocked cells only where it starts or ends in them
