@@ -118,7 +118,8 @@ def test_a_held_prop_does_not_move_its_holder_and_stays_before_walls():
         assert world.prop("toy").bounds()[1][0] < 0.96
     np.testing.assert_array_equal(walker.position[:2], alone.position[:2])
     do(world, walker, "release")
-    assert np.linalg.norm(world.prop("toy").velocity) < 1.0
+    # it keeps the velocity of the hand and is not expelled from the wall
+    assert np.linalg.norm(world.prop("toy").velocity - walker.velocity) < 0.5
 
 
 @pytest.mark.parametrize(

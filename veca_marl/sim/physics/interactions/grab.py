@@ -6,7 +6,7 @@ from typing import ClassVar
 
 from veca_marl.sim.physics.interactions.interaction import InteractingBody, Interaction
 from veca_marl.sim.physics.interactions.registry import register_interaction
-from veca_marl.sim.physics.props import Prop
+from veca_marl.sim.physics.props.prop import Prop
 
 
 @register_interaction

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from veca_marl.sim.geometry import Floats
 from veca_marl.sim.physics.bullet import pybullet
-from veca_marl.sim.physics.props import Prop
+from veca_marl.sim.physics.props.prop import Prop
 
 
 class Grip:

@@ -6,7 +6,7 @@ from abc import ABC, abstractmethod
 from typing import ClassVar, Protocol
 
 from veca_marl.sim.geometry import Floats
-from veca_marl.sim.physics.props import Prop
+from veca_marl.sim.physics.props.prop import Prop
 
 
 class InteractingBody(Protocol):
