@@ -23,13 +23,14 @@ def check_rooms(playground: PlaygroundCfg, agents: int) -> None:
         raise ValueError(
             f"task.agents={agents} start in rooms of their own, but playground "
             f"{playground.name!r} has {rooms}; choose task.agents of at most {rooms}, or "
-            "playground=two_rooms, three_rooms, four_rooms, seven_rooms"
+            "playground=two_rooms, three_rooms, four_rooms, seven_rooms, house, house2, random_house"
         )
 
 
 def furniture_of(world: World) -> list[Prop]:
-    """Return the props of a world that are no walls."""
-    return [prop for prop in world.props.values() if prop.cfg.shape is not PropShape.wall]
+    """Return the tangible props of a world that are no walls."""
+    props = world.props.values()
+    return [prop for prop in props if prop.cfg.tangible and prop.cfg.shape is not PropShape.wall]
 
 
 def add_target(world: World, radius_m: float) -> Prop:
