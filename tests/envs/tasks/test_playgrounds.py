@@ -7,7 +7,10 @@ from composed import compose
 from veca_marl.config import ConfigError
 from veca_marl.envs.core.game import Game
 
-FURNISHED = ("house", "house2", "random_house")
+FURNISHED = [
+    *(pytest.param(name, marks=pytest.mark.slow) for name in ("house", "random_house")),
+    "house2",
+]
 
 
 def play(task, playground, *overrides, resets=3, steps=2):

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from veca_marl.envs.tasks.navigation.floors.clearance import clearances_m
 from veca_marl.sim.geometry import Floats, horizontal_distance
 from veca_marl.sim.physics import PlaygroundCfg, Prop, PropCfg, PropShape, RoomCfg, World
 
@@ -108,4 +109,9 @@ def free_pair(
 
 
 def _is_clear(place: Floats, props: Sequence[Prop], clear_m: float) -> bool:
-    return all(gap_m(place, prop) >= clear_m for prop in props)
+    return all(_keeps_away(place, prop, clear_m) for prop in props)
+
+
+def _keeps_away(place: Floats, prop: Prop, clear_m: float) -> bool:
+    """Return whether a prop is so far away: by the circle round it, or else by its shape."""
+    return gap_m(place, prop) >= clear_m or float(clearances_m(prop, place[:2])) >= clear_m
