@@ -217,8 +217,8 @@ class Task(ABC):
         """Return the teams; overridden where their sizes depend on the configuration."""
         return cls.teams
 
-    @classmethod
-    def check_playground(cls, cfg: Any, playground: PlaygroundCfg) -> None:  # noqa: B027  optional
+    @classmethod  # noqa: B027  optional
+    def check_playground(cls, cfg: Any, playground: PlaygroundCfg) -> None:
         """Check that the task can be played in a playground, before a world is built.
 
         Raises:

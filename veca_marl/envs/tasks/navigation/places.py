@@ -24,7 +24,8 @@ def check_rooms(playground: PlaygroundCfg, agents: int) -> None:
         raise ValueError(
             f"task.agents={agents} start in rooms of their own, but playground "
             f"{playground.name!r} has {rooms}; choose task.agents of at most {rooms}, or "
-            "playground=two_rooms, three_rooms, four_rooms, seven_rooms, house, house2, random_house"
+            "playground=two_rooms, three_rooms, four_rooms, seven_rooms, house, "
+            "house2 or random_house"
         )
 
 
