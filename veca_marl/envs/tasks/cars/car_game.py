@@ -5,11 +5,13 @@ from __future__ import annotations
 import math
 from abc import abstractmethod
 from dataclasses import dataclass
+from typing import Any, ClassVar
 
 import numpy as np
 
 from veca_marl.envs.core.task import Task, TaskCfg, require_walker
 from veca_marl.envs.tasks.cars.toy_car import Motion, ToyCar
+from veca_marl.envs.tasks.navigation import places
 from veca_marl.envs.tasks.navigation.floors.scattering import Spacing, scattered_places
 from veca_marl.sim.geometry import Floats
 from veca_marl.sim.physics import PlaygroundCfg
@@ -37,31 +39,38 @@ class CarGameCfg(TaskCfg):
 
 
 class CarGame(Task):
-    """A walker and a toy car that drives in the first room of the playground.
+    """A walker and a toy car in one room.
 
     Attributes:
         walker: The body of the player.
         car: The car.
         touched: Whether car and player have touched each other in the last step.
+        interactions: Names of the verbs that can be applied to the car.
     """
 
+    interactions: ClassVar[tuple[str, ...]] = ()
     cfg: CarGameCfg
+
+    @classmethod
+    def check_playground(cls, cfg: Any, playground: PlaygroundCfg) -> None:
+        if len(playground.rooms) > 1:
+            raise ValueError(
+                f"{cls.__name__}: playground {playground.name!r} has {len(playground.rooms)} rooms; "
+                "the car drives in one, so that another is a hiding place: choose "
+                "playground=simple or single_room"
+            )
 
     def build(self) -> None:
         self.walker = require_walker(self.players[0])
-        room = self.world.playground.rooms[0]
-        self._furniture = [p for p in self.world.props.values() if p.cfg.tangible]
+        self._furniture = places.furniture_of(self.world)
         motion = Motion(self.cfg.speed_mps, math.radians(self.cfg.turn_degps))
-        self.car = ToyCar(self.world, room, motion)
+        self.car = ToyCar(self.world, motion, self.interactions)
         self.touched = False
         self.world.after_substep.append(self._notice_contact)
 
     def reset(self, rng: np.random.Generator) -> None:
-        first_room = PlaygroundCfg(
-            name=self.world.playground.name, rooms=[self.car.room], floor_size_m=(1.0, 1.0)
-        )
         spacing = Spacing(_CLEAR_M, self.cfg.apart_m, 0.0)
-        start, place = scattered_places(first_room, self._furniture, 2, spacing, rng)
+        start, place = scattered_places(self.world.playground, self._furniture, 2, spacing, rng)
         self.walker.place(start, rng.uniform(-math.pi, math.pi))
         self.car.reset(place, rng)
         self.touched = False

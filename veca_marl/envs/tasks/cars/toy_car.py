@@ -10,12 +10,12 @@ import numpy as np
 
 from veca_marl.envs.tasks.navigation.floors.clearance import clearances_m
 from veca_marl.sim.geometry import Floats
-from veca_marl.sim.physics import Prop, PropCfg, PropShape, RoomCfg, World
+from veca_marl.sim.physics import Prop, PropCfg, PropShape, World
 
 LENGTH_M, WIDTH_M, HEIGHT_M = 0.34, 0.2, 0.16
 _MASS_KG = 2.0  # below the push limit of walkers: it is pushed away and displaces none
 _COLOUR = (0.95, 0.75, 0.1)
-_ARRIVED_M = 0.25
+_ARRIVED_M = 0.15
 _PATIENCE_S = 4.0  # after which a point that has not been reached is given up
 _DRAWS = 30
 _SLOWEST = 0.2  # share of the speed while it turns
@@ -56,16 +56,16 @@ class ToyCar:
 
     Args:
         world: A world that is not frozen.
-        room: The room in which it drives.
         motion: How it drives.
+        interactions: Names of the verbs that can be applied to it, see `PropCfg.interactions`.
 
     Attributes:
         prop: The car: a box, its front along x.
-        room: The room in which it drives.
+        room: The room in which it drives: the first one of the playground.
     """
 
-    def __init__(self, world: World, room: RoomCfg, motion: Motion) -> None:
-        self.room = room
+    def __init__(self, world: World, motion: Motion, interactions: Sequence[str] = ()) -> None:
+        self.room = world.playground.rooms[0]
         self._motion, self._step_s = motion, world.clock.step_s
         self._obstacles = [p for p in world.props.values() if p.cfg.tangible]
         self.prop = world.add_prop(
@@ -78,8 +78,10 @@ class ToyCar:
                 rolling_friction=0.0,
                 restitution=0.0,
                 colour=_COLOUR,
+                interactions=list(interactions),
             )
         )
+        self._resting_m = self.room.lower_m[2] + HEIGHT_M / 2.0
         self._point = np.zeros(2)
         self._left_s = 0.0
 
@@ -91,9 +93,7 @@ class ToyCar:
 
     def reset(self, place: Floats, rng: np.random.Generator) -> None:
         """Stand at a place of the floor with a random heading."""
-        floor_m = self.room.lower_m[2]
-        position = (place[0], place[1], floor_m + HEIGHT_M / 2.0)
-        self.prop.place(position, rng.uniform(-math.pi, math.pi))
+        self.prop.place((place[0], place[1], self._resting_m), rng.uniform(-math.pi, math.pi))
         self._left_s = 0.0
 
     def drive(self, draw: DrawPoint, rng: np.random.Generator) -> None:
@@ -110,10 +110,8 @@ class ToyCar:
             self._point, self._left_s = self._reachable_point(draw, rng), _PATIENCE_S
         heading = self.heading_rad
         speed, turn = self._motion.towards(self._point, here, heading, self._step_s)
-        falling = min(float(self.prop.velocity[2]), 0.0)
-        self.prop.set_velocity(
-            (speed * math.cos(heading), speed * math.sin(heading), falling), (0.0, 0.0, turn)
-        )
+        ahead = speed * math.cos(heading), speed * math.sin(heading)
+        self.prop.set_velocity((*ahead, self._vertical_mps()), (0.0, 0.0, turn))
 
     def predicted_path(self, steps: int) -> Floats:
         """Return its positions after each of the next steps, if nothing stops it.
@@ -157,10 +155,21 @@ class ToyCar:
         line = here + np.linspace(1.0 / count, 1.0, count)[:, None] * (point - here)
         return is_free(line, self._obstacles)
 
+    def _vertical_mps(self) -> float:
+        """Return the vertical velocity of the next step: down if it falls, up if it has sunk.
+
+        Bullet loses contacts of boxes that slide far in a physics step: without this the car would
+        sink by 2 cm into the floor.
+        """
+        sunk_m = self._resting_m - float(self.prop.position[2])
+        if sunk_m < 0.0:
+            return min(float(self.prop.velocity[2]), 0.0)
+        return sunk_m / self._step_s
+
     def _set_upright(self) -> None:
         if self.prop.rotation[2, 2] < _TIPPED:
             x, y, _ = self.prop.position
-            self.prop.place((x, y, self.room.lower_m[2] + HEIGHT_M / 2.0), self.heading_rad)
+            self.prop.place((x, y, self._resting_m), self.heading_rad)
 
 
 def is_free(points: Floats, obstacles: Sequence[Prop]) -> bool:

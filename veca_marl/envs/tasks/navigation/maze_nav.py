@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -11,7 +12,8 @@ from veca_marl.envs.core.task import Player, Task, TaskCfg, register, require_wa
 from veca_marl.envs.tasks.navigation import places
 from veca_marl.envs.tasks.navigation.mazes.maze import Cell, Maze, random_maze
 from veca_marl.envs.tasks.navigation.mazes.trial_sense import TRIAL, TrialSense
-from veca_marl.envs.tasks.navigation.mazes.walls import MazeWalls
+from veca_marl.envs.tasks.navigation.mazes.walls import MazeWalls, check_maze
+from veca_marl.sim.physics import PlaygroundCfg
 
 _RADIUS_M = 0.15  # of the object
 
@@ -66,6 +68,10 @@ class MazeNav(Task):
 
     senses = ("vision", TRIAL)
     cfg: MazeNavCfg
+
+    @classmethod
+    def check_playground(cls, cfg: Any, playground: PlaygroundCfg) -> None:
+        check_maze(playground, cfg.cells)
 
     def build(self) -> None:
         self.walker = require_walker(self.players[0])

@@ -8,9 +8,8 @@ import math
 import numpy as np
 
 from veca_marl.envs.tasks.navigation.mazes.maze import Cell, Edge, Maze
-from veca_marl.envs.tasks.navigation.places import furniture_of
 from veca_marl.sim.geometry import Floats
-from veca_marl.sim.physics import Prop, PropCfg, PropShape, RoomCfg, World
+from veca_marl.sim.physics import PlaygroundCfg, Prop, PropCfg, PropShape, World
 
 SMALLEST_CELL_M = 0.7
 """Least edge of a cell: the passage for a walker of radius 0.11 m that turns, and half a wall on
@@ -34,9 +33,9 @@ class MazeWalls:
     """
 
     def __init__(self, world: World, cells: int) -> None:
-        _check_room(world)
+        check_maze(world.playground, cells)
         self._room = world.playground.rooms[0]
-        self._cell_m = _checked_cell_m(self._room, cells)
+        self._cell_m = self._room.size_m[0] / cells
         count = (cells - 1) ** 2
         # walls in line meet without overlap: faces in one plane would flicker in the images
         self._walls = [
@@ -76,32 +75,26 @@ def _add_wall(world: World, name: str, length_m: float, hue: float) -> Prop:
     )
 
 
-def _check_room(world: World) -> None:
-    """Check that the playground is one square room without furniture.
+def check_maze(playground: PlaygroundCfg, cells: int) -> None:
+    """Check that a maze can be built in a playground.
 
     Raises:
-        ValueError: If it is not.
+        ValueError: If the playground is not a single square room without furniture, there are fewer
+            than 2 cells along a side, or the cells are too small.
     """
-    playground, furniture = world.playground, furniture_of(world)
-    length_x, length_y, _ = playground.rooms[0].size_m
+    room = playground.rooms[0]
+    length_x, length_y, _ = room.size_m
+    props = [prop for prop in playground.built_props() if prop.tangible]
+    furniture = [prop.name for prop in props if prop.shape is not PropShape.wall]
     if len(playground.rooms) > 1 or furniture or length_x != length_y:
         raise ValueError(
             f"playground {playground.name!r} has {len(playground.rooms)} rooms, the first of "
             f"{length_x} x {length_y} m, and {len(furniture)} pieces of furniture; a maze fills a "
             "single square room without furniture: choose playground=simple"
         )
-
-
-def _checked_cell_m(room: RoomCfg, cells: int) -> float:
-    """Return the edge of a cell.
-
-    Raises:
-        ValueError: If there are fewer than 2 cells along a side, or they are too small.
-    """
-    most = int(room.size_m[0] / SMALLEST_CELL_M)
+    most = int(length_x / SMALLEST_CELL_M)
     if not 2 <= cells <= most:
         raise ValueError(
-            f"task.cells={cells} must be from 2 to {most} in room {room.name!r} of "
-            f"{room.size_m[0]} m: a cell measures {SMALLEST_CELL_M} m or more"
+            f"task.cells={cells} must be from 2 to {most} in room {room.name!r} of {length_x} m: "
+            f"a cell measures {SMALLEST_CELL_M} m or more"
         )
-    return room.size_m[0] / cells
