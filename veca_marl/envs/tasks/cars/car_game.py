@@ -55,8 +55,8 @@ class CarGame(Task):
     def check_playground(cls, cfg: Any, playground: PlaygroundCfg) -> None:
         if len(playground.rooms) > 1:
             raise ValueError(
-                f"{cls.__name__}: playground {playground.name!r} has {len(playground.rooms)} rooms; "
-                "the car drives in one, so that another is a hiding place: choose "
+                f"{cls.__name__}: playground {playground.name!r} has {len(playground.rooms)} "
+                "rooms; the car drives in one, so that another is a hiding place: choose "
                 "playground=simple or single_room"
             )
 

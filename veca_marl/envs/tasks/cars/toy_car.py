@@ -16,7 +16,7 @@ LENGTH_M, WIDTH_M, HEIGHT_M = 0.34, 0.2, 0.16
 _MASS_KG = 2.0  # below the push limit of walkers: it is pushed away and displaces none
 _COLOUR = (0.95, 0.75, 0.1)
 _ARRIVED_M = 0.15
-_PATIENCE_S = 4.0  # after which a point that has not been reached is given up
+_PATIENCE_S = 6.0  # after which a point that has not been reached is given up
 _DRAWS = 30
 _SLOWEST = 0.2  # share of the speed while it turns
 _TIPPED = 0.9  # cosine of the inclination from which the car is set upright
@@ -52,7 +52,7 @@ class ToyCar:
     Its velocity is set at the start of each agent step; collisions are those of the physics. It
     turns towards a point with at most `Motion.turn_radps` and drives with the cosine of the
     bearing, at least 0.2, so that it turns nearly on the spot. A point is reachable if the straight
-    line to it is clear of fixed props; it is replaced when it is reached, or after 4 s.
+    line to it is clear of fixed props; it is replaced when it is reached, or after 6 s.
 
     Args:
         world: A world that is not frozen.
