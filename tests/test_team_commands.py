@@ -17,7 +17,10 @@ from veca_marl.runs.run_folder import RunFolder
 from veca_marl.tournament import main as tournament
 from veca_marl.tournament import spread
 
-TASK = ["+task=PushOut1v1", "task.max_seconds=1", "senses/vision=blind", "senses/touch=numb"]
+TASK = [
+    *("+task=PushOut1v1", "body=walker", "task.max_seconds=1"),
+    *("senses/vision=blind", "senses/touch=numb"),
+]
 SMALL = [
     "collect=one_process",
     "collect.worlds=2",

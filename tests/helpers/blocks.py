@@ -7,8 +7,9 @@ from veca_marl.envs.core.game import Game
 
 
 def blocks_game(task, *overrides):
-    """Return a game without vision, which is expensive."""
-    game = Game(compose([f"+task={task}", "senses/vision=blind", *overrides]).game)
+    """Return a game without vision and touch, which are expensive."""
+    unsensed = ("senses/vision=blind", "senses/touch=numb")
+    game = Game(compose([f"+task={task}", *unsensed, *overrides]).game)
     game.reset(np.random.default_rng(0))
     return game
 

@@ -1,4 +1,4 @@
-"""Games of two teams without vision and touch, for the tests of PushOut and Soccer."""
+"""Games of walkers without vision and touch, for the tests of PushOut and Soccer."""
 
 import numpy as np
 from composed import compose
@@ -6,11 +6,15 @@ from composed import compose
 from veca_marl.envs.core.game import Game
 from veca_marl.envs.core.team import Script
 
+FAST = ("senses/vision=blind", "senses/touch=numb")
+WALKING = ("body=walker", "task.max_seconds=20")
+
 
 def game_of(task, *overrides, seed=0):
-    game = Game(
-        compose([f"+task={task}", "senses/vision=blind", "senses/touch=numb", *overrides]).game
-    )
+    """Return a game of walkers, or of what `overrides` choose."""
+    chosen = {override.partition("=")[0] for override in overrides}
+    walking = [word for word in WALKING if word.partition("=")[0] not in chosen]
+    game = Game(compose([f"+task={task}", *FAST, *walking, *overrides]).game)
     game.reset(np.random.default_rng(seed))
     return game
 

@@ -21,6 +21,8 @@ from veca_marl.sim.body.walker import WalkerCfg
 
 # kinds of actions in a task: those of its own body, and of another one
 KINDS = ("own", "other")
+# tasks of joint-level bodies that walkers can play as well
+CONTESTS = ("PushOut1v1", "PushOut2v2", "SoccerOnePlayer", "SoccerTwoPlayer")
 
 
 def game_cfg(task, kind="own", *overrides):
@@ -28,10 +30,12 @@ def game_cfg(task, kind="own", *overrides):
     own = compose([f"+task={task}", *overrides])
     if kind == "own":
         return own.game
-    return compose([f"+task={task}", f"body={other_body(own.game.body)}", *overrides]).game
+    return compose([f"+task={task}", f"body={other_body(task, own.game.body)}", *overrides]).game
 
 
-def other_body(own):
+def other_body(task, own):
+    if task in CONTESTS:
+        return "walker"
     if not isinstance(own, WalkerCfg):
         return "mitten_position"
     # where players call, the house is silent without voices: the ears would be constant

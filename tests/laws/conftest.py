@@ -8,6 +8,8 @@ from veca_marl.envs.core.task import TASKS
 # tasks that the quick suite plays also with a body that is not their own: walkers, joints, two
 # teams, voices; the slow suite does with all
 WITH_OTHER_BODY = ("KickTheBall", "TurnBaby", "PushOut1v1", "MultiAgentNav")
+# games of several joint-level bodies with eyes and skin, which the quick suite plays with walkers
+WITH_WALKERS = ("PushOut2v2", "SoccerTwoPlayer")
 
 
 def pytest_generate_tests(metafunc):
@@ -20,5 +22,5 @@ def pytest_generate_tests(metafunc):
 
 
 def _pair(task, kind):
-    quick = kind == "own" or task in WITH_OTHER_BODY
+    quick = task in WITH_OTHER_BODY or (kind == "own") != (task in WITH_WALKERS)
     return pytest.param(task, kind, marks=() if quick else pytest.mark.slow)

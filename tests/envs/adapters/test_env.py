@@ -149,7 +149,8 @@ def test_a_masked_world_neither_moves_nor_needs_an_action(env):
 
 
 def test_a_rollout_goes_on_until_all_worlds_are_done():
-    game = compose(["+task=PushOut1v1", "senses/vision=blind", "task.max_seconds=2.0"]).game
+    blind_walkers = ("body=walker", "senses/vision=blind")
+    game = compose(["+task=PushOut1v1", *blind_walkers, "task.max_seconds=2.0"]).game
     env = VecaEnv(game, worlds=4, seed=0)
     state = env.reset()
     for _ in range(10):  # world 0 is 10 steps ahead of the others

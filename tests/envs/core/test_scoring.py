@@ -5,7 +5,6 @@ import pytest
 
 from veca_marl.envs.core.scoring import (
     clipped_share,
-    clipped_speed_mps,
     cosine,
     horizontal,
     rotation_angle_rad,
@@ -40,14 +39,6 @@ def test_horizontal_sets_the_vertical_component_to_zero_in_a_copy():
 @pytest.mark.parametrize(("value", "expected"), [(-1.0, 0.0), (0.5, 0.25), (2.0, 1.0), (3.0, 1.0)])
 def test_clipped_share(value, expected):
     assert clipped_share(value, 2.0) == expected
-
-
-@pytest.mark.parametrize(
-    ("way", "expected"),
-    [(0.1 * EAST, 0.5), (-0.1 * EAST, -0.5), (EAST, 2.0), (-EAST, -2.0), (NORTH, 0.0)],
-)
-def test_clipped_speed(way, expected):
-    assert clipped_speed_mps(way, EAST, time_s=0.2, top_mps=2.0) == pytest.approx(expected)
 
 
 @pytest.mark.parametrize("angle", [0.0, 0.3, -1.2, np.pi])

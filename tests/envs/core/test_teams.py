@@ -175,6 +175,7 @@ def test_the_configuration_has_choices_for_single_teams():
     cfg = compose(
         [
             "+task=SoccerTwoPlayer",
+            "body=walker",
             "+body@team.attacker.body=walker_discrete",
             "+senses/vision@team.attacker.senses.vision=blind",
             "opponent.defender=random",

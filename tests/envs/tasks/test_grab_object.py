@@ -1,10 +1,15 @@
 """GrabObject: reward, start, gaze and expert."""
 
+import math
+
 import numpy as np
+import pybullet
 import pytest
 from composed import compose
 
 from veca_marl.envs.core.game import Game
+from veca_marl.envs.tasks.objects.grasping import both_hands_near, palm_distances_m
+from veca_marl.sim.physics.props.prop import follow_physics
 from veca_marl.sim.vision import is_visible
 
 
@@ -76,6 +81,34 @@ def test_a_toy_away_from_the_hands_is_not_rewarded(game):
     assert game.step({"agents": limp(game)}).terms["agents"]["lift"] == 0.0
 
 
+def test_tipping_the_toy_between_the_hands_is_not_rewarded(game):
+    """Tipped by 30 degrees about an edge on the floor, its centre is 13 mm higher."""
+    game.reset(np.random.default_rng(0))
+    task, toy = game.task, game.task.toy
+    while palm_distances_m(task.child, toy).max() > 0.8 * (task.cfg.edge_m / 2 + task.cfg.near_m):
+        game.step({"agents": by_expert(game)})
+    edge, tilt = task.cfg.edge_m, math.radians(30.0)
+    height = edge / 2 * (math.cos(tilt) + math.sin(tilt))
+    tip(toy, (*toy.position[:2], height), tilt)
+    assert both_hands_near(task.child, toy, task.cfg)
+    assert toy.position[2] > edge / 2 + 0.01
+    assert task.held_m == pytest.approx(0.0, abs=1e-6)
+
+
+def tip(prop, position, pitch_rad):
+    """Place a prop with a pitch, which `Prop.place` does not set."""
+    turn = (0.0, math.sin(pitch_rad / 2), 0.0, math.cos(pitch_rad / 2))
+    pybullet.resetBasePositionAndOrientation(
+        prop.body_id, position, turn, physicsClientId=prop._client
+    )
+    follow_physics([prop])
+
+
+def test_approach_and_effort_have_the_weights_of_the_paper(game):
+    assert game.weights["approach"] == 1.0
+    assert game.weights["effort"] == -0.004
+
+
 def test_approach_is_the_decrease_of_both_palm_distances(game):
     game.reset(np.random.default_rng(0))
     toy, child = game.task.toy.position, game.task.child
@@ -92,7 +125,6 @@ def test_effort_is_the_sum_of_squared_torques(game):
     row = rng.uniform(-1.0, 1.0, 82).astype(np.float32)
     effort = game.step({"agents": row}).terms["agents"]["effort"]
     assert effort == pytest.approx(float(row.astype(float) @ row), rel=1e-6)
-    assert game.weights["effort"] == -0.004  # the paper's
 
 
 def test_the_gaze_follows_the_toy(game):

@@ -8,11 +8,24 @@ from hydra.core.override_parser.overrides_parser import OverridesParser
 from omegaconf import OmegaConf
 
 from veca_marl.envs.core.game import Game
+from veca_marl.sim.body.humanoid import HumanoidCfg
+from veca_marl.sim.body.walker import WalkerCfg
 
 HUMANOID_TASKS = (
     *("TurnBaby", "SitBaby", "CrawlBaby", "RunBaby"),
     *("GrabObject", "MoveToTarget", "PileUpBlock", "PutDownBlock", "RotateCube"),
 )
+CONTESTS = ("PushOut1v1", "PushOut2v2", "SoccerOnePlayer", "SoccerTwoPlayer")
+
+
+@pytest.mark.parametrize("task", HUMANOID_TASKS + CONTESTS)
+def test_tasks_at_joint_level_in_the_paper_have_such_a_body_by_default(task):
+    assert isinstance(compose([f"+task={task}"]).game.body, HumanoidCfg)
+
+
+@pytest.mark.parametrize("name", ["soccer", "memory_soccer", "mappo_ippo", "self_play"])
+def test_experiments_with_walkers_choose_them(name):
+    assert isinstance(compose([f"+experiment={name}"]).game.body, WalkerCfg)
 
 
 def make_game(task, override):
@@ -42,6 +55,11 @@ def make_game(task, override):
         ("CrawlBaby", "top_mps=inf", "top_mps"),
         ("RunBaby", "top_mps=0.0", "top_mps"),
         ("RunBaby", "fallen_m=0.7", "fallen_m"),
+        ("RunBaby", "kneeling_m=0.2", "kneeling_m"),
+        ("TurnBaby", "turned_deg=90", "turned_deg"),
+        ("SitBaby", "upright_deg=90", "upright_deg"),
+        ("SitBaby", "sat=0", "sat=0"),
+        ("SitBaby", "seat_m=0", "seat_m"),
         ("GrabObject", "edge_m=0.2", "edge_m"),
         ("GrabObject", "mass_kg=0.0", "mass_kg"),
         ("GrabObject", "ahead_m=[0.3,0.2]", "ahead_m"),
@@ -57,6 +75,9 @@ def make_game(task, override):
         ("PileUpBlock", "mass_kg=-1.0", "mass_kg=-1.0"),
         ("PileUpBlock", "ahead_m=[0.3,0.2]", "ahead_m"),
         ("PileUpBlock", "aside_m=[0.01,0.2]", "aside_m"),
+        ("PileUpBlock", "blue_ahead_m=[0.3,0.4]", "blue_ahead_m=.* behind the red blocks"),
+        ("PileUpBlock", "blue_aside_m=-1", "blue_aside_m=-1"),
+        ("RotateCube", "clear_m=0", "clear_m"),
         ("PutDownBlock", "blue=0", "blue=0"),
         ("PutDownBlock", "ahead_m=[0.3,0.2]", "ahead_m"),
         ("PutDownBlock", "fallen=1.5", "fallen=1.5"),

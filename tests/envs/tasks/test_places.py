@@ -8,45 +8,63 @@ import pytest
 from seeking import BALL_M, ball_at, walker_at, wall_across, world_with
 
 from veca_marl.envs.core.task import Player
-from veca_marl.envs.tasks.navigation.helper_reward import PropVisibility, displacement_to
+from veca_marl.envs.tasks.navigation.helper_reward import HelperReward, PropVisibility
 from veca_marl.envs.tasks.navigation.places import free_pair, free_place, gap_m
 from veca_marl.sim.physics import RoomCfg
 from veca_marl.sim.vision import Camera, VisionCfg, VisionSense, look_at, seen_fraction
 
-STEP_S = 0.04
 AHEAD = np.array([5.0, 0.0, 0.0])
+BEHIND = -AHEAD
 LEFT, RIGHT = np.array([5.0, 1.0, 0.0]), np.array([5.0, -1.0, 0.0])
 
 
-def mover(velocity, yaw_deg=0.0):
-    yaw = math.radians(yaw_deg)
-    forward = np.array([math.cos(yaw), math.sin(yaw), 0.0])
-    return SimpleNamespace(
-        forward=forward, velocity=np.array([*velocity, 0.0]), position=np.zeros(3)
-    )
+class Sees(HelperReward):
+    """The prop is visible unless it is behind the player."""
+
+    def sees(self, prop, player):
+        return bool((prop.position - player.body.position) @ player.body.forward > 0.0)
+
+
+def helped(target, *poses):
+    """Return the terms of a player at a prop in each step, from poses (x, y, yaw in degrees)."""
+    player = SimpleNamespace(name="one", body=SimpleNamespace())
+    helper, terms = Sees(scene=None), []
+    for x, y, yaw_deg in poses:
+        yaw = math.radians(yaw_deg)
+        player.body.position = np.array([x, y, 0.0])
+        player.body.forward = np.array([math.cos(yaw), math.sin(yaw), 0.0])
+        if not terms:
+            helper.reset(SimpleNamespace(position=np.array(target)), [player])
+        helper.after_step([player])
+        terms.append(helper.terms(player))
+    return [(step["ahead"], math.degrees(step["turn"])) for step in terms[1:]]
 
 
 @pytest.mark.parametrize(
-    ("velocity", "target", "way"),
+    ("target", "pose", "terms"),
     [
-        ((1.0, 0.0), AHEAD, (0.04, 0.0)),
-        ((-1.0, 0.0), AHEAD, (-0.04, 0.0)),
-        ((0.0, 1.0), LEFT, (0.0, 0.04)),
-        ((0.0, 1.0), RIGHT, (0.0, -0.04)),
-        ((0.0, -1.0), RIGHT, (0.0, 0.04)),
-        ((0.0, -1.0), LEFT, (0.0, -0.04)),
-        ((0.5, -2.0), RIGHT, (0.02, 0.08)),
+        (AHEAD, (0.04, 0.0, 0.0), (0.04, 0.0)),
+        (AHEAD, (-0.04, 0.0, 0.0), (-0.04, 0.0)),
+        (AHEAD, (0.0, 0.04, 0.0), (0.0, -math.degrees(math.atan2(0.04, 5.0)))),
+        (LEFT, (0.0, 0.0, 5.0), (0.0, 5.0)),
+        (LEFT, (0.0, 0.0, -5.0), (0.0, -5.0)),
+        (RIGHT, (0.0, 0.0, -5.0), (0.0, 5.0)),
+        (BEHIND, (-0.04, 0.0, 0.0), (0.0, 0.0)),
     ],
 )
-def test_displacements_have_components_ahead_and_to_the_side(velocity, target, way):
-    np.testing.assert_allclose(displacement_to(mover(velocity), target, STEP_S), way, atol=1e-15)
+def test_motion_and_turns_towards_a_visible_prop_are_rewarded(target, pose, terms):
+    assert helped(target, (0.0, 0.0, 0.0), pose) == [pytest.approx(terms, abs=1e-9)]
 
 
-def test_displacements_are_relative_to_the_heading():
-    """After a quarter turn to the left, the front is on the right."""
-    np.testing.assert_allclose(
-        displacement_to(mover((1.0, 0.0), yaw_deg=90.0), AHEAD, STEP_S), (0.0, 0.04), atol=1e-15
-    )
+def test_a_turn_past_the_prop_and_back_adds_up_to_nothing():
+    terms = helped(LEFT, *[(0.0, 0.0, yaw_deg) for yaw_deg in (0.0, 8.0, 16.0, 24.0, 10.0, 0.0)])
+    assert sum(turn for _, turn in terms) == pytest.approx(0.0, abs=1e-9)
+    assert terms[0][1] == pytest.approx(8.0)
+
+
+def test_a_prop_that_comes_into_view_is_not_a_turn():
+    entered = helped(LEFT, (0.0, 0.0, 150.0), (0.0, 0.0, 60.0), (0.0, 0.0, 50.0))
+    assert [turn for _, turn in entered] == pytest.approx([0.0, 10.0])
 
 
 def test_the_gap_is_the_horizontal_distance_to_the_surface():
@@ -99,8 +117,12 @@ def test_walls_hide_the_object(world):
     behind = Player("behind", "team", walker_at(world, name="behind"))
     near = Player("near", "team", walker_at(world, 2.0, name="near"))
     world.refresh()
-    sight = PropVisibility(world.scene, world.props["ball"])
-    assert [sight.for_player(player) for player in (behind, near, behind)] == [False, True, False]
+    sight = PropVisibility(world.scene)
+    assert [sight.of(world.props["ball"], player) for player in (behind, near, behind)] == [
+        False,
+        True,
+        False,
+    ]
 
 
 def player_of(world, **vision):
@@ -115,14 +137,14 @@ def player_of(world, **vision):
 def test_visibility_is_that_of_the_players_own_images(world):
     """Its field of view, its resolution and its open eyes."""
     player = player_of(world, fov_deg=120.0, width=40, height=40)
-    sight = PropVisibility(world.scene, world.props["ball"])
+    sight = PropVisibility(world.scene)
     away = world.props["ball"].position - player.body.position
     ahead = math.atan2(away[1], away[0])
     for aside_deg, visible in ((0.0, True), (48.0, True), (80.0, False)):
         player.body.place(player.body.position, ahead + math.radians(aside_deg))
         world.refresh()
-        assert sight.for_player(player) is visible, aside_deg
-        default = sight.for_player(Player("other", "team", player.body))
+        assert sight.of(world.props["ball"], player) is visible, aside_deg
+        default = sight.of(world.props["ball"], Player("other", "team", player.body))
         assert default is (aside_deg == 0.0)
 
 
@@ -130,23 +152,23 @@ def test_visibility_of_what_is_observed_renders_nothing(world, monkeypatch):
     rendered, render = [], Camera.render
     monkeypatch.setattr(Camera, "render", lambda *args: rendered.append(args) or render(*args))
     player = player_of(world, width=30)
-    sight = PropVisibility(world.scene, world.props["ball"])
+    sight = PropVisibility(world.scene)
     for _ in range(3):
         world.step()
         before = len(rendered)
-        seen = sight.for_player(player)
+        seen = sight.of(world.props["ball"], player)
         player.senses["vision"].read()
-        assert sight.for_player(player) is seen
+        assert sight.of(world.props["ball"], player) is seen
         assert len(rendered) == before + 1
 
 
 def test_visibility_without_a_sense_is_rendered_once_per_step(world, monkeypatch):
     rendered, render = [], Camera.render
     monkeypatch.setattr(Camera, "render", lambda *args: rendered.append(args) or render(*args))
-    sight, player = PropVisibility(world.scene, world.props["ball"]), player_of(world)
+    sight, player = PropVisibility(world.scene), player_of(world)
     for steps in (1, 2):
         world.step()
-        assert sight.for_player(player) is sight.for_player(player)
+        assert sight.of(world.props["ball"], player) is sight.of(world.props["ball"], player)
         assert len(rendered) == steps
     assert rendered[0][0] == Camera()
 

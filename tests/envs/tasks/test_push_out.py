@@ -46,17 +46,53 @@ def push(game, seconds, *rows):
     return outcome
 
 
-@pytest.mark.parametrize("task", ["PushOut1v1", "PushOut2v2"])
-def test_rewards_sum_to_zero_in_every_step(task):
-    game, fallen = game_of(task), 0
-    for outcomes in episodes(game, 3, red="expert", blue="random"):
+def test_rewards_of_a_duel_sum_to_zero_in_every_step(duel):
+    fallen = 0
+    for outcomes in episodes(duel, 3, red="expert", blue="random"):
         for outcome in outcomes:
-            assert total_reward(game, outcome) == pytest.approx(0.0, abs=1e-12)
+            assert total_reward(duel, outcome) == pytest.approx(0.0, abs=1e-12)
             ground = [terms["ground"] for terms in outcome.terms.values()]
             assert sum(ground) == pytest.approx(0.0, abs=1e-12)
             fallen += sum(terms["out"] < 0.0 for terms in outcome.terms.values())
+        assert outcomes[-1].solved == {"red": True, "blue": False}
     assert fallen >= 3
-    game.close()
+
+
+def exits(game, *names):
+    """Take players out of the ring, one after the other; return the returns of all players."""
+    begin(game)
+    total = dict.fromkeys((player.name for player in game.players), 0.0)
+    bodies = {player.name: player.body for player in game.players}
+    for name in names:
+        bodies[name].place(OUTSIDE)
+        (outcome,) = rest(game)
+        for player, terms in outcome.terms.items():
+            total[player] += game.reward_of(terms)
+    return total, outcome
+
+
+def test_pushing_the_own_mate_out_first_has_a_lower_return(four):
+    """With rewards divided among those who remain, it doubled the rewards of the pushes."""
+    fair, end = exits(four, "blue_0", "blue_1")
+    assert end.solved == {"red_0": True, "red_1": True, "blue_0": False, "blue_1": False}
+    alone, end = exits(four, "red_1", "blue_0", "blue_1")
+    assert end.solved["red_0"]
+    assert alone["red_0"] < fair["red_0"] - 0.4
+
+
+def test_leaving_the_ring_early_is_not_cheaper_than_losing_late(four):
+    weight = four.weights["ground"]
+    for names in (("red_0", "red_1"), ("red_1", "red_0")):
+        lost, _ = exits(four, *names)
+        assert lost["red_0"] == pytest.approx(-1.0, abs=2.0 * weight)
+    begin(four)
+    outs = {"red_0": 0.0, "red_1": 0.0}
+    for body in [player.body for player in four.players[:2]]:
+        body.place(OUTSIDE)
+        (outcome,) = rest(four)
+        for name in outs:
+            outs[name] += outcome.terms[name]["out"]
+    assert outs == {"red_0": -1.0, "red_1": -1.0}
 
 
 def test_exchanged_teams_receive_exchanged_rewards(duel):
@@ -165,6 +201,7 @@ def test_an_eliminated_player_stays_out_while_its_teammate_continues(four):
     assert not first.done
     assert first.eliminated == {"red_0"}
     assert first.terms["red_0"]["out"] == -1.0
+    assert first.terms["red_1"]["out"] == -0.5
     assert first.terms["blue_0"]["push"] == first.terms["blue_1"]["push"] == 0.5
     red_0.place(home)
     (second,) = rest(four)
@@ -185,7 +222,7 @@ def test_a_remaining_player_receives_the_reward_of_the_team(four):
     (last,) = rest(four)
     assert last.terminated
     assert last.terms["red_0"]["push"] == 0.5
-    assert last.terms["blue_1"]["out"] == -1.0
+    assert last.terms["blue_1"]["out"] == -0.5
 
 
 def test_the_painted_ring_has_no_collision(duel):

@@ -65,10 +65,15 @@ def test_reset_clears_the_fallen_blocks(game):
     assert sum(terms["blue_fell"] for terms in sit(game, 0.2)) == 0.0
 
 
-def test_knocking_over_one_block_costs_nearly_as_much_as_doing_nothing(game):
-    weights = game.weights
-    rest_s = game.cfg.task.max_seconds
-    assert weights["blue_fell"] < 0.8 * 2.0 * rest_s * weights["height"] / game.world.clock.step_s
+def test_a_collapse_of_the_tower_has_a_lower_return_than_doing_nothing(game):
+    """The red and the upper blue block are swept to the floor at once."""
+    game.reset(np.random.default_rng(0))
+    task = game.task
+    still = 2.0 * game.max_steps * game.weights["height"]
+    for block, aside in ((task.blue[1], -0.5), (task.red, 0.5)):
+        block.place((1.0, aside, EDGE / 2))
+    swept = sum(game.reward_of(terms) for terms in sit(game, 1.0))
+    assert swept < 1.2 * still < 0.0
 
 
 def test_the_expert_puts_the_red_block_down(game):

@@ -55,6 +55,21 @@ def test_the_expert_solves_the_task(game):
     assert progress == pytest.approx(math.radians(45.0) - game.task.angle_rad, abs=1e-9)
 
 
+def test_a_cube_on_the_floor_beside_the_palm_counts_for_nothing(game):
+    """Turned to the target orientation, untouched, 4 cm from the middle of the palm."""
+    game.reset(np.random.default_rng(0))
+    task = game.task
+    palm, half = task.child.palms()[1], task.cfg.edge_m / 2
+    aside = math.sqrt(0.04**2 - (palm[2] - half) ** 2) if abs(palm[2] - half) < 0.04 else 0.0
+    task.cube.place((palm[0] + aside, palm[1], half), heading_rad(task.target))
+    assert math.dist(task.cube.position, palm) < task.cfg.lost_m
+    assert task.angle_rad < 1e-6
+    assert not task.on_hand
+    assert not task.solved(game.players[0])
+    task.after_step(np.random.default_rng(0))
+    assert task.reward(game.players[0])["progress"] == 0.0
+
+
 def test_dropping_the_cube_takes_the_progress_back(game):
     won = play(game, 4.0, by_expert)
     assert won > 0.3

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from babies import child_game, hold, play, put, rest, starts
 
-from veca_marl.sim.body.humanoid.postures import ON_ALL_FOURS, ON_BELLY, STANDING
+from veca_marl.sim.body.humanoid.postures import ON_ALL_FOURS, ON_BELLY, STANDING, Posture
 
 
 @pytest.fixture(scope="module")
@@ -16,7 +16,7 @@ def game():
 def shifted(game, posture, shift_m):
     """Return the term of a step in which the chest has moved forwards by a distance."""
     body = put(game, posture)
-    game.task._position = body.bone("chest").position - shift_m * body.forward
+    game.task._progress.reset(body.bone("chest").position - shift_m * body.forward, body.forward)
     return rest(game).terms["agents"]["forward"]
 
 
@@ -25,19 +25,33 @@ def test_the_speed_is_clipped_at_the_top_speed(game, shift_m, term):
     assert shifted(game, STANDING, shift_m) == pytest.approx(term, abs=0.1)
 
 
+def test_a_fast_motion_backwards_is_not_clipped(game):
+    assert shifted(game, STANDING, -0.2) == pytest.approx(-5.0, abs=0.1)
+
+
 @pytest.mark.parametrize("posture", [ON_ALL_FOURS, ON_BELLY])
 def test_motion_face_down_is_hardly_rewarded(game, posture):
     assert abs(shifted(game, posture, 0.04)) < 0.2
 
 
-@pytest.mark.parametrize(("posture", "over"), [(STANDING, False), (ON_ALL_FOURS, True)])
+UPRIGHT_ON_KNEES = Posture(0.0, {"shank.flexion": 90.0, "foot.dorsiflexion": -45.0})
+
+
+@pytest.mark.parametrize(
+    ("posture", "over"), [(STANDING, False), (ON_ALL_FOURS, True), (UPRIGHT_ON_KNEES, True)]
+)
 def test_a_fall_ends_the_episode(game, posture, over):
     put(game, posture)
     assert rest(game).terminated == over
 
 
+def test_kneeling_upright_is_no_fall_by_the_height_of_the_chest(game):
+    """Otherwise walking on the knees would be running."""
+    assert put(game, UPRIGHT_ON_KNEES).bone("neck").position[2] > game.task.cfg.fallen_m
+
+
 def test_the_termination_by_a_fall_can_be_turned_off():
-    with child_game("RunBaby", "task.fallen_m=0.0") as game:
+    with child_game("RunBaby", "task.fallen_m=0.0", "task.kneeling_m=0.0") as game:
         put(game, ON_BELLY)
         assert not rest(game).terminated
 

@@ -39,24 +39,6 @@ def clipped_share(value: float, whole: float) -> float:
     return float(min(max(value / whole, 0.0), 1.0))
 
 
-def clipped_speed_mps(
-    displacement: Floats, direction: Floats, time_s: float, top_mps: float
-) -> float:
-    """Return the mean speed along a direction, clipped to [-top_mps, top_mps].
-
-    It is computed from a displacement, not from a velocity at one moment, so that a body that
-    oscillates on the spot has no speed.
-
-    Args:
-        displacement: ``(3,)`` metres.
-        direction: ``(3,)``, of length 1; a shorter vector scales the result.
-        time_s: Time of the displacement.
-        top_mps: Limit of the magnitude.
-    """
-    speed_mps = float(displacement @ direction) / time_s
-    return min(max(speed_mps, -top_mps), top_mps)
-
-
 def rotation_angle_rad(a: Floats, b: Floats) -> float:
     """Return the angle in [0, pi] of the rotation between two orientations ``(3, 3)``."""
     cosine_of_angle = (float(np.vdot(a, b)) - 1.0) / 2.0

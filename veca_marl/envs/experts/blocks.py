@@ -28,7 +28,7 @@ _UPRIGHT, _BENT = reaching(20.0, 20.0), reaching(30.0, 22.0)
 
 @register_expert("PileUpBlock")
 class PileUpBlockExpert(Expert[PileUpBlock]):
-    """Presses a block between both palms, carries it over the other one and releases it.
+    """Presses a red block between both palms, carries it over the other one and releases it.
 
     Starts again after losing the block. Reads the poses of the blocks and of its own bones from
     the simulator (privileged).
@@ -49,7 +49,7 @@ class PileUpBlockExpert(Expert[PileUpBlock]):
 
     def _script(self) -> Iterator[Floats]:
         carry_m = 1.5 * self.task.cfg.edge_m + _CARRY_CLEARANCE_M
-        for block, base in itertools.cycle(itertools.permutations(self.task.blocks)):
+        for block, base in itertools.cycle(itertools.permutations(self.task.red)):
             if self.task.solved(self.player):
                 yield from self._carrier.rest()
             yield from self._carrier.carry(block, partial(_on_top_of, base), carry_m)

@@ -76,14 +76,15 @@ class PushOut(Task):
         self._newly_out = {name for name in self._playing if area[name] > 1.0}
 
     def reward(self, player: Player) -> dict[str, float]:
-        ours = [p for p in self._team(player.team) if p.name in self._playing]
+        team = self._team(player.team)
+        ours = [p for p in team if p.name in self._playing]
         theirs = self.opponents_playing(player)
-        pushed_out = sum(other.name in self._newly_out for other in theirs)
-        gained = self._mean_gain(ours) - self._mean_gain(theirs)
+        # its own exit ends the game for a player: it costs as much as that of the whole team
+        lost = len(ours) if player.name in self._newly_out else self._exits(ours)
         return {
-            "push": pushed_out / len(ours),
-            "out": -float(player.name in self._newly_out),
-            "ground": gained / len(ours),
+            "push": self._exits(theirs) / len(team),
+            "out": -lost / len(team),
+            "ground": (self._gain(ours) - self._gain(theirs)) / len(team),
         }
 
     def terminated(self) -> bool:
@@ -109,5 +110,8 @@ class PushOut(Task):
     def _areas(self) -> dict[str, float]:
         return {player.name: self.ring.area_share(player.body) for player in self.players}
 
-    def _mean_gain(self, side: list[Player]) -> float:
-        return sum(self._gained[player.name] for player in side) / len(side)
+    def _exits(self, side: list[Player]) -> int:
+        return sum(player.name in self._newly_out for player in side)
+
+    def _gain(self, side: list[Player]) -> float:
+        return sum(self._gained[player.name] for player in side)

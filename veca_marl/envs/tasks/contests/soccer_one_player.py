@@ -12,12 +12,13 @@ class SoccerOnePlayer(Soccer):
 
     Nothing is forbidden. A goal is scored when the centre of the ball passes the goal line from
     the front, between the posts and under the bar; it terminates the episode, and the task is
-    solved (`solved`). Joint-level bodies
-    start on hands and knees and push the ball. A ball within reach of a walker's foot
-    (`Walker.can_kick`) is kicked automatically, away from the body, at most once per
-    `kick_rest_s`. The paper (table of tasks in the appendix) says "put the ball into the goal with
-    joint-level actions [...] there is no rule"; the numbers and all terms except `goal` are not in
-    the paper.
+    solved (`solved`). The player starts on hands and knees and pushes the ball. The paper (table of
+    tasks in the appendix) says "put the ball into the goal with joint-level actions [...] there is
+    no rule"; the numbers and all terms except `goal` are not in the paper.
+
+    With `body=walker`, a variation that is not in the paper, the player walks; a ball within reach
+    of its foot (`Walker.can_kick`) is kicked automatically, away from the body, at most once per
+    `kick_rest_s`. A walker needs a third of the time (`task.max_seconds=20`).
 
     Terms:
         goal: 1 on the step in which the goal is scored, else 0.

@@ -37,8 +37,9 @@ class SoccerTwoPlayerCfg(SoccerCfg):
 class SoccerTwoPlayer(Soccer):
     """SoccerOnePlayer with a defender between the ball and the goal.
 
-    Nothing is forbidden: the defender may block and tackle, and both may kick and push whatever
-    they reach; of two walkers that reach the ball in one step the nearer one kicks. A goal, by
+    Nothing is forbidden: the defender may block and tackle, and both may push whatever they reach.
+    With `body=walker`, a variation that is not in the paper, they walk and kick; of two walkers
+    that reach the ball in one step the nearer one kicks. A goal, by
     either player, terminates the episode. The task is solved (`solved`) for the attacker when a
     goal is scored, and for the defender as long as none is. The paper (table of tasks in the
     appendix) says "the attacker must put the ball into the goal, and the defender must block the

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from veca_marl.envs.core.scoring import clipped_speed_mps
 from veca_marl.envs.core.task import Player, Task, register, require_humanoid, terms
+from veca_marl.envs.tasks.locomotion.progress import ForwardProgress
 from veca_marl.envs.tasks.locomotion.start_poses import (
     StartCfg,
     face_down_cosines,
@@ -23,7 +23,7 @@ class CrawlBabyCfg(StartCfg):
     Attributes:
         spread_deg: Standard deviation of every joint angle at the start about the posture
             `on_all_fours`, in [0, 30].
-        top_mps: Speed at which the term `forward` is clipped.
+        top_mps: Upper limit of the term `forward`.
     """
 
     max_seconds: float = 8.0
@@ -38,17 +38,20 @@ class CrawlBabyCfg(StartCfg):
 
 @register
 class CrawlBaby(Task):
-    """A joint-level body on hands and knees has to crawl from the edge of the room to its middle.
+    """A joint-level body on hands and knees at the edge of the room has to crawl ahead.
 
     The paper (table of tasks in the appendix; "Joint-level Locomotion & Control") rewards "the
     velocity and the orientation of its torso and hip" and gives no numbers. In this task the
     velocity is that of the pelvis along the heading of the trunk, and the rewarded orientation is
-    face down. The orientation has a small weight, since it is right at the start. An episode
-    lasts `max_seconds` and never terminates. With the default weights, 1 m adds 2.5 to the return.
+    face down. The orientation has a small weight, since it is right at the start. Departure: the
+    velocity counts at most as much as its component along the heading at the start, so that rocking
+    to and fro is not rewarded. An episode lasts `max_seconds` and never terminates. The task has no
+    goal: the farther, the better. With the default weights, 1 m adds 2.5 to the return.
 
     Terms:
-        forward: Mean velocity of the pelvis during the step along the horizontal heading of the
-            trunk, m/s, clipped to [-top_mps, top_mps].
+        forward: Mean speed of the pelvis during the step, m/s: the smaller one of its components
+            along the horizontal heading of the trunk and along that at the start, at most
+            `top_mps`.
         torso: Cosine of the angle between the front of the chest and straight down, in [-1, 1].
         hip: The same for the pelvis.
     """
@@ -59,17 +62,14 @@ class CrawlBaby(Task):
     def build(self) -> None:
         self.body = require_humanoid(self.players[0])
         self.room = self.world.playground.rooms[0]
-        self._position, self._displacement = np.zeros(3), np.zeros(3)
+        self._progress = ForwardProgress(self.world.clock.step_s, self.cfg.top_mps)
 
     def reset(self, rng: np.random.Generator) -> None:
         start_near_edge(self.body, self.room, ON_ALL_FOURS, self.cfg.spread_deg, rng)
-        self._position = self.body.position
+        self._progress.reset(self.body.position, self.body.forward)
 
     def after_step(self, rng: np.random.Generator) -> None:
-        position = self.body.position
-        self._displacement, self._position = position - self._position, position
+        self._progress.update(self.body.position, self.body.forward)
 
     def reward(self, player: Player) -> dict[str, float]:
-        step_s, top_mps = self.world.clock.step_s, self.cfg.top_mps
-        speed_mps = clipped_speed_mps(self._displacement, self.body.forward, step_s, top_mps)
-        return {"forward": speed_mps, **face_down_cosines(self.body)}
+        return {"forward": self._progress.speed_mps, **face_down_cosines(self.body)}

@@ -6,11 +6,13 @@ import math
 from dataclasses import dataclass
 
 from veca_marl.envs.core.task import TaskCfg
+from veca_marl.envs.tasks.objects.clearance import clearance_m
 from veca_marl.sim.body.humanoid import Humanoid
 from veca_marl.sim.physics import Prop, PropCfg, PropShape, World
 
 RED = (0.9, 0.12, 0.1)
 BLUE = (0.15, 0.3, 0.9)
+START_GAP_M = 0.002  # between stacked blocks: Bullet would restore contacts of the last episode
 _REST_MPS = 0.05
 _HAND_SPAN_M = 0.1
 
@@ -61,9 +63,8 @@ def add_block(world: World, cfg: BlocksCfg, name: str, colour: tuple[float, floa
 
 
 def height_in_edges(block: Prop) -> float:
-    """Return the height of a block above its place on the floor, in lengths of its edge."""
-    edge = block.cfg.size_m[0]
-    return float(block.position[2]) / edge - 0.5
+    """Return the height of a block's lowest corner above the floor, in lengths of its edge."""
+    return clearance_m(block) / block.cfg.size_m[0]
 
 
 def rests_on(block: Prop, base: Prop) -> bool:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from veca_marl.envs.core.task import Player, Task, register, require_humanoid, terms
+from veca_marl.envs.tasks.objects.clearance import clearance_m
 from veca_marl.envs.tasks.objects.grasping import (
     ToyCfg,
     add_toy,
@@ -23,12 +24,12 @@ class GrabObjectCfg(ToyCfg):
     """Parameters of GrabObject.
 
     Attributes:
-        lifted_m: Height above the floor at which the task is solved while both hands are near.
+        lifted_m: Clearance above the floor at which the task is solved while both hands are near.
     """
 
     max_seconds: float = 6.0
     lifted_m: float = 0.05
-    weights: dict[str, float] = terms(lift=100.0, approach=10.0, effort=-0.004)
+    weights: dict[str, float] = terms(lift=100.0, approach=1.0, effort=-0.004)
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -43,17 +44,18 @@ class GrabObject(Task):
     From the paper (table of tasks, "Perception/Action" and "Helper Rewards" in the appendix):
     touch is limited to the hands, the eyes look at the object, the reward is the vertical
     displacement "when the object is close enough to each hand", with helper rewards for approach
-    and effort. Departures from the paper: approach and effort are weighted 10 to 0.004 instead of
-    1 to 0.004, and when a hand leaves the toy, the height that was rewarded is subtracted again,
-    so that dropping and lifting the toy repeatedly brings nothing. The other numbers are not in
-    the paper.
+    and effort at weights of 1 and 0.004. Departures from the paper: the displacement is that of the
+    toy's lowest corner, so that tipping the toy on the floor is not rewarded; when a hand leaves
+    the toy, the height that was rewarded is subtracted again, so that dropping and lifting the toy
+    repeatedly adds nothing. The weight of `lift` and the other numbers are not in the paper.
 
     The body is free and can topple. An episode lasts `max_seconds` and never terminates. The task
-    is solved (`solved`) while both hands are near the toy and it is `lifted_m` above the floor.
+    is solved (`solved`) while both hands are near the toy and its lowest corner is `lifted_m` above
+    the floor.
 
     Terms:
-        lift: Increase during the step of the toy's height, m, where the height counts as 0 unless
-            both hands are near.
+        lift: Increase during the step of the height of the toy's lowest corner above the floor, m,
+            where the height counts as 0 unless both hands are near.
         approach: Decrease during the step of the sum of the distances of both palms from the
             centre of the toy, m.
         effort: Sum of the squared torques of all 82 joints, each as a share of its strength.
@@ -89,10 +91,10 @@ class GrabObject(Task):
 
     @property
     def held_m(self) -> float:
-        """Height of the toy above its place on the floor; 0 unless both hands are near."""
+        """Height of the toy's lowest corner above the floor; 0 unless both hands are near."""
         if not both_hands_near(self.child, self.toy, self.cfg):
             return 0.0
-        return float(self.toy.position[2]) - self.cfg.edge_m / 2
+        return clearance_m(self.toy)
 
     def solved(self, player: Player) -> bool:
         """Return whether the toy is lifted with both hands."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from dataclasses import dataclass
 
@@ -10,14 +9,17 @@ import numpy as np
 
 from veca_marl.envs.core.task import Player, Task, register, require_humanoid, terms
 from veca_marl.envs.tasks.objects.blocks import (
+    BLUE,
     RED,
     BlocksCfg,
     add_block,
     height_in_edges,
+    is_at_rest,
     is_released,
     rests_on,
 )
 from veca_marl.sim.body.humanoid.postures import REACHING
+from veca_marl.sim.physics import Prop
 
 
 @dataclass
@@ -25,43 +27,57 @@ class PileUpBlockCfg(BlocksCfg):
     """Parameters of PileUpBlock. The pelvis is at the origin and the body faces +x.
 
     Attributes:
-        ahead_m: Least and greatest distance of a block in front of the pelvis.
-        aside_m: Least and greatest lateral distance; one block is on the left, one on the right.
+        ahead_m: Least and greatest distance of a red block in front of the pelvis.
+        aside_m: Least and greatest lateral distance; one red block is on the left, one on the
+            right.
+        blue_ahead_m: Least and greatest distance of the blue block in front of the pelvis.
+        blue_aside_m: Largest lateral distance of the blue block.
         turn_deg: Largest yaw of a block.
     """
 
     max_seconds: float = 12.0
     ahead_m: tuple[float, float] = (0.22, 0.28)
     aside_m: tuple[float, float] = (0.07, 0.1)
+    blue_ahead_m: tuple[float, float] = (0.34, 0.37)
+    blue_aside_m: float = 0.03
     turn_deg: float = 10.0
-    weights: dict[str, float] = terms(height=0.04)
+    weights: dict[str, float] = terms(height=0.04, lift=1.0)
 
     def __post_init__(self) -> None:
         super().__post_init__()
         for name in ("ahead_m", "aside_m"):
-            near, far = getattr(self, name)
-            if not self.edge_m < near <= far < math.inf:
-                raise ValueError(
-                    f"task.{name}={(near, far)} must be (least, greatest), above task.edge_m"
-                )
+            self._check_span(name, self.edge_m, "at least task.edge_m")
+        self._check_span("blue_ahead_m", self.ahead_m[1] + self.edge_m, "behind the red blocks")
+        if not 0.0 <= self.blue_aside_m < math.inf:
+            raise ValueError(f"task.blue_aside_m={self.blue_aside_m} must be 0 or more")
 
 
 @register
 class PileUpBlock(Task):
-    """A joint-level body sits in front of two red blocks and has to put one on the other.
+    """A joint-level body sits in front of three blocks and has to pile up the red ones.
 
-    The senses, the joint-level action and the reward, "the sum of the y-axis position of red
-    blocks" (the vertical axis), are those of the paper (table of tasks in the appendix); the
-    number of blocks and all numbers are not in the paper. By the paper's rule a block that is held
-    up is rewarded like one that lies on another, and more the higher it is held.
+    One red block is on the left, one on the right, and a blue block is behind them. The height of
+    the blue block is not rewarded; a red block may be put on it.
+
+    The senses and the joint-level action are those of the paper (table of tasks in the appendix).
+    The reward in the paper is "the sum of the y-axis position of red blocks" (the vertical axis):
+    by this rule a block that is held up is rewarded like one that lies on another, and more the
+    higher it is held. Departures: `height` counts red blocks that have been released and rest, and
+    `lift` rewards raising a block once. The number of blocks, the blue one and all numbers are not
+    in the paper.
 
     The body is free and can topple. An episode lasts `max_seconds` and never terminates. The task
-    is solved (`solved`) while one block rests on the other and no part of the body touches it.
+    is solved (`solved`) while a red block rests on another block and no part of the body touches
+    the red one.
 
     Terms:
-        height: Sum of the heights of the red blocks above the floor, in lengths of their edge. Its
-            default weight is the duration of a step in seconds, so that a block on top of another
-            adds 1 per second to the return.
+        height: Sum of the heights above the floor of the lowest corners of the red blocks that are
+            at rest and that no part of the body touches, in lengths of their edge. Its default
+            weight is the duration of a step in seconds, so that a block on top of another adds 1
+            per second to the return.
+        lift: Increase during the step of the sum of the heights of the red blocks, each clipped to
+            [0, 1] edge, held or not. It is the difference of a potential: putting a block down
+            again takes the reward back.
     """
 
     senses = ("vision", "touch", "proprioception")
@@ -69,21 +85,39 @@ class PileUpBlock(Task):
 
     def build(self) -> None:
         self.child = require_humanoid(self.players[0])
-        self.blocks = [add_block(self.world, self.cfg, f"red_{i}", RED) for i in range(2)]
+        self.red = [add_block(self.world, self.cfg, f"red_{i}", RED) for i in range(2)]
+        self.blue = add_block(self.world, self.cfg, "blue", BLUE)
+        self._raised = self._lift = 0.0
 
     def reset(self, rng: np.random.Generator) -> None:
         self.child.place((0.0, 0.0, 0.0), 0.0, REACHING)
-        for block, side in zip(self.blocks, (1.0, -1.0), strict=True):
-            ahead, aside = rng.uniform(*self.cfg.ahead_m), rng.uniform(*self.cfg.aside_m)
-            yaw = math.radians(rng.uniform(-self.cfg.turn_deg, self.cfg.turn_deg))
-            block.place((ahead, side * aside, self.cfg.edge_m / 2), yaw)
+        cfg = self.cfg
+        for red, side in zip(self.red, (1.0, -1.0), strict=True):
+            self._place(red, rng.uniform(*cfg.ahead_m), side * rng.uniform(*cfg.aside_m), rng)
+        aside = rng.uniform(-cfg.blue_aside_m, cfg.blue_aside_m)
+        self._place(self.blue, rng.uniform(*cfg.blue_ahead_m), aside, rng)
+        self._raised, self._lift = self._raised_edges(), 0.0
+
+    def _place(self, block: Prop, ahead: float, aside: float, rng: np.random.Generator) -> None:
+        yaw = math.radians(rng.uniform(-self.cfg.turn_deg, self.cfg.turn_deg))
+        block.place((ahead, aside, self.cfg.edge_m / 2), yaw)
+
+    def after_step(self, rng: np.random.Generator) -> None:
+        raised = self._raised_edges()
+        self._lift, self._raised = raised - self._raised, raised
 
     def reward(self, player: Player) -> dict[str, float]:
-        return {"height": sum(height_in_edges(block) for block in self.blocks)}
+        piled = [b for b in self.red if is_at_rest(b) and is_released(b, self.child)]
+        return {"height": sum(max(height_in_edges(b), 0.0) for b in piled), "lift": self._lift}
+
+    def _raised_edges(self) -> float:
+        return sum(min(max(height_in_edges(block), 0.0), 1.0) for block in self.red)
 
     def solved(self, player: Player) -> bool:
-        """Return whether one block rests on the other and has been released."""
+        """Return whether a red block rests on another block and has been released."""
         return any(
             rests_on(block, base) and is_released(block, self.child)
-            for block, base in itertools.permutations(self.blocks)
+            for block in self.red
+            for base in (*self.red, self.blue)
+            if base is not block
         )

@@ -11,6 +11,7 @@ from veca_marl.envs.core.task import Player, Task, register, require_humanoid, t
 from veca_marl.envs.tasks.objects.blocks import (
     BLUE,
     RED,
+    START_GAP_M,
     BlocksCfg,
     add_block,
     height_in_edges,
@@ -18,8 +19,6 @@ from veca_marl.envs.tasks.objects.blocks import (
     is_released,
 )
 from veca_marl.sim.body.humanoid.postures import REACHING
-
-_GAP_M = 0.002  # between blocks at the start: Bullet would restore contacts of the last episode
 
 
 @dataclass
@@ -40,7 +39,7 @@ class PutDownBlockCfg(BlocksCfg):
     aside_m: tuple[float, float] = (0.05, 0.08)
     turn_deg: float = 10.0
     fallen: float = 0.5
-    weights: dict[str, float] = terms(height=-0.04, blue_fell=-20.0)
+    weights: dict[str, float] = terms(height=-0.04, blue_fell=-30.0)
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -58,7 +57,8 @@ class PutDownBlock(Task):
 
     The senses, the joint-level action and the reward, "the negative sum of the y-axis position of
     red blocks" (the vertical axis) and "a negative reward when the blue blocks fall", are those of
-    the paper (table of tasks in the appendix); the tower and all numbers are not in the paper.
+    the paper (table of tasks in the appendix); the tower and all numbers are not in the paper. A
+    height is that of a block's lowest corner.
 
     The body is free and can topple. An episode lasts `max_seconds` and never terminates. The task
     is solved (`solved`) while the red block rests on the floor, no part of the body touches it and
@@ -69,7 +69,8 @@ class PutDownBlock(Task):
             is minus the duration of a step in seconds, so that the red block on two blue ones
             adds -2 per second to the return.
         blue_fell: Number of blue blocks that have fallen in this step; each falls once. With the
-            default weights one costs nearly as much as leaving the red block on the tower.
+            default weights and duration one costs 30, more than the 24 of a red block that stays on
+            the tower, so that tearing the tower down is worse than doing nothing.
     """
 
     senses = ("vision", "touch", "proprioception")
@@ -90,7 +91,7 @@ class PutDownBlock(Task):
         x = rng.uniform(*self.cfg.ahead_m)
         yaw = math.radians(rng.uniform(-self.cfg.turn_deg, self.cfg.turn_deg))
         for level, block in enumerate((*self.blue, self.red)):
-            block.place((x, y, (level + 0.5) * self.cfg.edge_m + _GAP_M * level), yaw)
+            block.place((x, y, (level + 0.5) * self.cfg.edge_m + START_GAP_M * level), yaw)
         self._fallen, self._newly_fallen = set(), 0
 
     def after_step(self, rng: np.random.Generator) -> None:

@@ -9,6 +9,7 @@ import numpy as np
 
 from veca_marl.envs.core.scoring import rotation_angle_rad
 from veca_marl.envs.core.task import Player, Task, TaskCfg, register, require_humanoid, terms
+from veca_marl.envs.tasks.objects.clearance import clearance_m
 from veca_marl.sim.body.humanoid.postures import OFFERING
 from veca_marl.sim.geometry import rotation_about_vertical
 from veca_marl.sim.physics import PropCfg, PropShape
@@ -29,6 +30,8 @@ class RotateCubeCfg(TaskCfg):
         start_deg: Largest yaw of the cube relative to the hand at the start, in [0, 45].
         lost_m: Distance of the cube's centre from the middle of the palm above which the cube has
             left the hand.
+        clear_m: Height of the cube's lowest corner above the floor below which the cube has left
+            the hand.
         there_deg: Angle from the target up to which the task is solved.
     """
 
@@ -39,12 +42,13 @@ class RotateCubeCfg(TaskCfg):
     turn_deg: float = 45.0
     start_deg: float = 10.0
     lost_m: float = 0.08
+    clear_m: float = 0.005
     there_deg: float = 10.0
     weights: dict[str, float] = terms(progress=1.0)
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        self.check_positive("edge_m", "mass_kg", "friction")
+        self.check_positive("edge_m", "mass_kg", "friction", "clear_m")
         if not self.edge_m < self.lost_m < math.inf:
             raise ValueError(f"task.lost_m={self.lost_m} must be above task.edge_m={self.edge_m}")
         if not 0.0 <= self.start_deg <= 45.0:
@@ -63,7 +67,8 @@ class RotateCube(Task):
     The back of the hand lies on the floor. The senses (without vision), the joint-level action and
     the reward, "the difference in distance between the target orientation and the cube's
     orientation", are those of the paper (table of tasks in the appendix); the posture and all
-    numbers are not in the paper. No sense shows the target, so it is the same in every episode: a
+    numbers are not in the paper, nor that the cube has to stay on the hand: the paper says "using
+    its hand". No sense shows the target, so it is the same in every episode: a
     yaw of 45 degrees from the start, in the world frame. Fingers may rotate the cube on the hand,
     or wrist and arm may rotate the hand with the cube.
 
@@ -72,8 +77,8 @@ class RotateCube(Task):
 
     Terms:
         progress: Decrease during the step of the angle between the cube and its target, rad. While
-            the cube is off the hand the angle counts as at the start, so that dropping the cube
-            takes all progress back.
+            the cube is off the hand (farther than `lost_m` from the palm, or on the floor) the
+            angle counts as at the start, so that dropping the cube takes all progress back.
     """
 
     senses = ("touch", "proprioception")
@@ -120,8 +125,9 @@ class RotateCube(Task):
 
     @property
     def on_hand(self) -> bool:
-        """Whether the cube is on the right hand."""
-        return math.dist(self.cube.position, self.child.palms()[1]) < self.cfg.lost_m
+        """Whether the cube is near the right palm and above the floor."""
+        near = math.dist(self.cube.position, self.child.palms()[1]) < self.cfg.lost_m
+        return near and clearance_m(self.cube) > self.cfg.clear_m
 
     def solved(self, player: Player) -> bool:
         """Return whether the cube is on the hand and within `there_deg` of the target."""

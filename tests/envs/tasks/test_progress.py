@@ -1,0 +1,68 @@
+"""Forward speed: what it rewards, and motions to and fro."""
+
+import math
+
+import numpy as np
+import pytest
+
+from veca_marl.envs.tasks.locomotion.progress import ForwardProgress
+
+STEP_S, TOP_MPS = 0.04, 1.0
+EAST = np.array([1.0, 0.0, 0.0])
+
+
+def facing(yaw_deg, pitch_deg=0.0):
+    yaw, share = math.radians(yaw_deg), math.cos(math.radians(pitch_deg))
+    return share * np.array([math.cos(yaw), math.sin(yaw), 0.0])
+
+
+def speeds(*steps):
+    """Return the speed in each step, from displacements ``(2,)`` m and directions."""
+    progress, position, found = ForwardProgress(STEP_S, TOP_MPS), np.zeros(3), []
+    progress.reset(position, EAST)
+    for (ahead_m, left_m), forward in steps:
+        position = position + np.array([ahead_m, left_m, 0.01])
+        progress.update(position, forward)
+        found.append(progress.speed_mps)
+    return found
+
+
+@pytest.mark.parametrize(
+    ("step", "speed"),
+    [
+        (((0.02, 0.0), facing(0.0)), 0.5),
+        (((0.02, 0.0), facing(60.0)), 0.25),  # sideways to the body
+        (((0.02, 0.0), facing(0.0, 60.0)), 0.25),  # bent over
+        (((0.0, 0.02), facing(90.0)), 0.0),  # across the direction of the start
+        (((-0.02, 0.0), facing(180.0)), -0.5),
+        (((0.2, 0.0), facing(0.0)), TOP_MPS),
+    ],
+)
+def test_the_speed_is_the_smaller_component(step, speed):
+    assert speeds(step) == pytest.approx([speed], abs=1e-9)
+
+
+def test_rocking_slowly_forward_and_fast_backward_is_not_rewarded():
+    """With a symmetric limit, 4 x 15 mm forward and 60 mm back added up to 20 mm a cycle."""
+    cycle = [((0.015, 0.0), facing(0.0))] * 4 + [((-0.06, 0.0), facing(0.0))]
+    assert sum(speeds(*cycle * 10)) <= 1e-9
+
+
+def test_bending_over_on_the_way_back_is_not_rewarded():
+    cycle = [((0.03, 0.0), facing(0.0)), ((-0.03, 0.0), facing(0.0, 89.0))]
+    assert sum(speeds(*cycle * 10)) <= 1e-9
+
+
+def test_swaying_with_the_heading_is_not_rewarded():
+    """To the left facing left, to the right facing right."""
+    cycle = [((0.0, 0.03), facing(40.0)), ((0.0, -0.03), facing(-40.0))]
+    assert sum(speeds(*cycle * 10)) <= 1e-9
+
+
+def test_no_random_cycle_is_rewarded():
+    rng = np.random.default_rng(0)
+    for _ in range(100):
+        ways = rng.normal(0.0, 0.03, (9, 2))
+        ways = [*ways, -ways.sum(axis=0)]
+        turns = [facing(*rng.uniform(-180.0, 180.0, 2)) for _ in ways]
+        assert sum(speeds(*zip(ways, turns, strict=True))) <= 1e-9

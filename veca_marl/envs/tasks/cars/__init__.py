@@ -1,1 +1,0 @@
-"""Tasks with a toy car that drives by itself: DodgeCar."""
