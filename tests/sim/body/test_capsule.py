@@ -29,6 +29,21 @@ def test_a_wall_stops_a_walker(speed):
     np.testing.assert_allclose(walker.velocity, 0.0, atol=1e-6)
 
 
+def test_a_wall_that_is_placed_elsewhere_stops_a_walker_there_and_no_longer_here():
+    world = empty_world(wall(position=(1.0, 0.0, 0.0)))
+    walker, barrier = walker_in(world), world.prop("wall")
+    walker.walk(1.0, 0.0)
+    let_pass(world, 0.4)
+    barrier.place((2.0, 0.0, 0.0), yaw_rad=math.pi / 2.0)
+    let_pass(world, 8.0)
+    assert walker.position[0] == pytest.approx(1.95 - RADIUS_M, abs=SLACK_M)
+    barrier.place((4.0, 0.0, 0.0))  # along the path: the end of 6 m of wall is at x = 1
+    walker.place((0.0, 0.0, 0.0))
+    walker.walk(1.0, 0.0)
+    let_pass(world, 8.0)
+    assert walker.position[0] == pytest.approx(1.0 - RADIUS_M, abs=SLACK_M)
+
+
 def test_a_fast_walker_does_not_tunnel():
     world = empty_world(wall(position=(3.0, 0.0, 0.0)))
     walker = walker_in(world, walk_speed_mps=10.0)

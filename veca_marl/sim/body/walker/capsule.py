@@ -16,7 +16,8 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from veca_marl.sim.geometry import Floats, Primitive, Shape
+from veca_marl.sim.body.walker.obstacle_boxes import ObstacleBoxes
+from veca_marl.sim.geometry import Floats, Primitive, Scene, Shape
 from veca_marl.sim.physics import Prop, create_collision_shape, pybullet
 
 _ROUNDS = 3  # two for the walls of a corner, one spare
@@ -29,6 +30,7 @@ class Capsule:
 
     Args:
         client: The PyBullet client.
+        scene: The scene that shows the props.
         radius_m: Radius.
         height_m: Height of the walker above the floor.
         push_limit_kg: Props up to this mass are pushed.
@@ -37,13 +39,15 @@ class Capsule:
         body_id: PyBullet's id.
     """
 
-    def __init__(self, client: int, radius_m: float, height_m: float, push_limit_kg: float) -> None:
+    def __init__(
+        self, client: int, scene: Scene, radius_m: float, height_m: float, push_limit_kg: float
+    ) -> None:
         self.radius_m = radius_m
         # the lower cap is beneath the floor, with which it does not collide: a rounded lower end
         # would press props into the floor
         length_m = height_m - radius_m
         self.centre_height_m = length_m / 2
-        self._client = client
+        self._client, self._scene = client, scene
         self._push_limit_kg = push_limit_kg
         capsule = Primitive(Shape.CAPSULE, (radius_m, length_m))
         shape = create_collision_shape(client, [capsule])
@@ -51,8 +55,7 @@ class Capsule:
         pybullet.changeDynamics(
             self.body_id, -1, lateralFriction=0.2, restitution=0.0, physicsClientId=client
         )
-        # PyBullet's ids, and how far each reaches beyond the bounding box of its base
-        self._obstacles: list[tuple[int, float]] = []
+        self._obstacles = ObstacleBoxes(client, scene, [], [], _LIMB_REACH_M)
         self._known = (0, 0)
         self._near: list[int] = []
 
@@ -69,13 +72,8 @@ class Capsule:
         """
         if (len(props), len(bodies)) != self._known:
             self._find_obstacles(props, bodies)
-        x, y = position[0], position[1]
-        self._near = []
-        for body_id, beyond_m in self._obstacles:
-            low, high = pybullet.getAABB(body_id, physicsClientId=self._client)
-            reach = self.radius_m + _MARGIN_M + distance_m + beyond_m
-            if low[0] - reach < x < high[0] + reach and low[1] - reach < y < high[1] + reach:
-                self._near.append(body_id)
+        reach_m = self.radius_m + _MARGIN_M + distance_m
+        self._near = self._obstacles.near(position, reach_m)
 
     def resolve_contacts(self, x: float, y: float) -> tuple[float, float]:
         """Set the position and move the capsule out of obstacles; return the new position."""
@@ -123,10 +121,10 @@ class Capsule:
         self._known = len(props), len(bodies)
         limit_kg = self._push_limit_kg
         solid = [p for p in props.values() if p.cfg.tangible]
-        things = [p.body_id for p in solid if p.fixed or p.cfg.mass_kg > limit_kg]
+        things = [p for p in solid if p.fixed or p.cfg.mass_kg > limit_kg]
         heavy = [one for one in bodies if _mass_kg(self._client, one) > limit_kg]
-        self._obstacles = [(one, 0.0) for one in things] + [(one, _LIMB_REACH_M) for one in heavy]
-        for body_id, _ in self._obstacles:
+        self._obstacles = ObstacleBoxes(self._client, self._scene, things, heavy, _LIMB_REACH_M)
+        for body_id in self._obstacles.ids:
             for link in range(-1, pybullet.getNumJoints(body_id, physicsClientId=self._client)):
                 pybullet.setCollisionFilterPair(
                     self.body_id, body_id, -1, link, 0, physicsClientId=self._client

@@ -42,7 +42,9 @@ class Walker(Body):
         self._greatest_speed_mps = greatest_speed_mps(cfg, world.clock)
         self._walk_action = WALK_ACTIONS[cfg.action]
         self._gait = Gait(self._skeleton)
-        self._capsule = Capsule(world.client, cfg.radius_m, cfg.height_m, cfg.push_limit_kg)
+        self._capsule = Capsule(
+            world.client, world.scene, cfg.radius_m, cfg.height_m, cfg.push_limit_kg
+        )
         self._soles = Soles(self._skeleton)
         mass_kg = sum(bone.mass_kg for bone in self._skeleton.bones)
         self._footsteps = Footsteps(name, mass_kg, world)

@@ -1,0 +1,123 @@
+"""Bounding boxes of the obstacles of a walker: which of them it can reach within an agent step."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from veca_marl.sim.geometry import Floats, Scene
+from veca_marl.sim.physics import Prop, pybullet
+
+
+class ObstacleBoxes:
+    """Bounding boxes ``(x, y)`` of things that walkers cannot push.
+
+    Boxes of fixed props are read again only when one of them has been placed elsewhere; in a house
+    they are nearly all of the props.
+
+    Args:
+        client: The PyBullet client.
+        scene: The scene that shows the props.
+        props: Fixed and heavy props.
+        bodies: PyBullet's ids of heavy joint-level bodies.
+        beyond_m: How far these reach beyond the bounding box of their base.
+
+    Attributes:
+        ids: PyBullet's ids of all obstacles, props first.
+    """
+
+    def __init__(
+        self,
+        client: int,
+        scene: Scene,
+        props: Sequence[Prop],
+        bodies: Sequence[int],
+        beyond_m: float,
+    ) -> None:
+        self._client, self._scene = client, scene
+        self.ids = [prop.body_id for prop in props] + list(bodies)
+        self._beyond_m = np.array([0.0] * len(props) + [beyond_m] * len(bodies))
+        self._low, self._high = np.zeros((2, len(self.ids), 2))
+        fixed = [number for number, prop in enumerate(props) if prop.fixed]
+        self._fixed, self._moving = fixed, sorted(set(range(len(self.ids))) - set(fixed))
+        rows = [scene.objects[props[number].object_id].rows for number in fixed]
+        self._frames = np.array([row.start for row in rows], int)
+        self._places, self._turns = np.full((len(fixed), 3), np.nan), np.zeros((len(fixed), 3, 3))
+
+    def near(self, position: Floats, reach_m: float) -> list[int]:
+        """Return PyBullet's ids of the obstacles within a distance along x and y.
+
+        Args:
+            position: ``(2,)`` or ``(3,)`` metres; only the horizontal part counts.
+            reach_m: Metres.
+        """
+        self._read(self._moving)
+        scene = self._scene
+        poses = scene.positions, scene.rotations, self._frames
+        if follow_frames(*poses, self._places, self._turns):
+            self._read(self._fixed)
+        numbers = near_boxes(self._low, self._high, self._beyond_m, position, reach_m)
+        return [self.ids[number] for number in numbers.tolist()]
+
+    def _read(self, numbers: Sequence[int]) -> None:
+        """Read the boxes of some obstacles from Bullet."""
+        for number in numbers:
+            low, high = pybullet.getAABB(self.ids[number], physicsClientId=self._client)
+            self._low[number], self._high[number] = low[:2], high[:2]
+
+
+@njit(cache=True)
+def follow_frames(
+    positions: Floats,
+    rotations: Floats,
+    frames: NDArray[np.int64],
+    places: Floats,
+    turns: Floats,
+) -> bool:
+    """Copy the poses of some frames; return whether one of them has changed.
+
+    Args:
+        positions: ``(F, 3)`` metres, of all frames.
+        rotations: ``(F, 3, 3)``, likewise.
+        frames: ``(n,)`` which of them.
+        places: ``(n, 3)`` metres, their last positions; updated.
+        turns: ``(n, 3, 3)``, their last rotations; updated.
+    """
+    changed = False
+    for n in range(len(frames)):
+        for i in range(3):
+            if places[n, i] != positions[frames[n], i]:
+                places[n, i], changed = positions[frames[n], i], True
+            for j in range(3):
+                if turns[n, i, j] != rotations[frames[n], i, j]:
+                    turns[n, i, j], changed = rotations[frames[n], i, j], True
+    return changed
+
+
+@njit(cache=True)
+def near_boxes(
+    low: Floats, high: Floats, beyond_m: Floats, position: Floats, reach_m: float
+) -> NDArray[np.int64]:
+    """Return the numbers of the boxes within a distance of a point along x and y.
+
+    Args:
+        low: ``(n, 2)`` metres, least corners.
+        high: ``(n, 2)`` metres, greatest corners.
+        beyond_m: ``(n,)`` additional distance of each.
+        position: ``(2,)`` or ``(3,)`` metres.
+        reach_m: The distance.
+    """
+    x, y = position[0], position[1]
+    found = np.empty(len(low), np.int64)
+    count = 0
+    for n in range(len(low)):
+        reach = reach_m + beyond_m[n]
+        near_x = low[n, 0] - reach < x < high[n, 0] + reach
+        near_y = low[n, 1] - reach < y < high[n, 1] + reach
+        if near_x and near_y:
+            found[count] = n
+            count += 1
+    return found[:count]
