@@ -14,6 +14,7 @@ from docs_pages.body_tables import body_page
 from docs_pages.config_page import config_page
 from docs_pages.observation_page import observation_page
 from docs_pages.pictures import write_pictures
+from docs_pages.playground_page import playground_page, write_playground_pictures
 from docs_pages.task_pages import write_task_pages
 
 DOCS = Path(__file__).resolve().parent.parent / "docs"
@@ -21,6 +22,7 @@ PAGES: dict[str, Callable[[], str]] = {
     "reference/actions.md": action_page,
     "reference/configuration.md": config_page,
     "reference/observations.md": observation_page,
+    "reference/playgrounds.md": playground_page,
 }
 
 
@@ -36,6 +38,7 @@ def main() -> None:
     body.write_text(body_page(body.read_text(encoding="utf-8")), encoding="utf-8")
     if pictures:
         write_pictures(DOCS / "images")
+        write_playground_pictures(DOCS / "images" / "playgrounds")
 
 
 if __name__ == "__main__":

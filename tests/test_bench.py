@@ -124,6 +124,7 @@ def test_results_as_tables_and_json(tmp_path, capsys):
         rest = parts["task"] + parts["VecaEnv"] + parts["policy"] + parts["TorchRL"]
         assert run["overhead"] == pytest.approx(rest / sum(parts.values()))
         assert run["agent_steps_per_reference"] > 0
+        assert 0.05 < run["views_per_agent_step"] < 20.0
         assert f"{run['agent_steps_per_s']:,.0f}" in printed
     eye = found["references"]["eye"]
     assert eye["speed_ratio"] == pytest.approx(eye["tiny_ms"] / eye["ours_ms"], rel=0.5)
@@ -180,6 +181,30 @@ def test_an_absent_sense_is_not_measured(tmp_path):
 def test_tasks_with_any_body_and_number_of_agents_are_measured(task, capsys):
     assert main([*ROLLOUTS, f"+task={task}"]) == 0
     assert task in capsys.readouterr().out
+
+
+def test_several_tasks_and_playgrounds_are_one_table(capsys):
+    words = [*ROLLOUTS, "bench.tasks=[KickTheBall]", "bench.playgrounds=[simple,house]"]
+    assert main(words) == 0
+    rows = [line for line in capsys.readouterr().out.splitlines() if line.startswith("| ")]
+    assert [row.split(" | ")[:2] for row in rows[2:]] == [
+        ["| KickTheBall", "`simple`"],
+        ["| KickTheBall", "`house`"],
+    ]
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["bench.tasks=[KickTheBall]", "bench.agents=[2]"], "neither free play nor learning"),
+        (["bench.playgrounds=[house]", "+task=KickTheBall"], "needs bench.tasks"),
+        (["bench.tasks=[Kick]"], "unknown task 'Kick'"),
+        (["bench.tasks=[MultiAgentNav]", "bench.playgrounds=[simple]"], "'simple' has 1"),
+    ],
+)
+def test_impossible_tables_are_refused(words, message, capsys):
+    assert main([*ROLLOUTS, *words]) == 2
+    assert message in capsys.readouterr().err
 
 
 @pytest.mark.slow

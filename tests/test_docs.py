@@ -16,6 +16,7 @@ from docs_pages.docstrings import entries, prose
 from docs_pages.observation_page import MEANINGS, all_specs
 from docs_pages.parts_picture import parts_picture
 from docs_pages.pictures import perception_picture, task_picture, touch_picture
+from docs_pages.playground_page import from_above, playground, playgrounds
 from docs_pages.task_pages import built_in_tasks, task_page
 from docutils.core import publish_doctree
 from sphinx.ext import napoleon
@@ -161,6 +162,15 @@ def test_the_pictures_can_be_drawn(tmp_path):
     parts_picture(tmp_path / "skin_parts.png")
     assert all(path.stat().st_size > 5000 for path in tmp_path.glob("*.png"))
     assert len(list(tmp_path.glob("*.png"))) == 5
+
+
+def test_every_playground_has_a_picture_from_above():
+    for name in playgrounds():
+        assert (DOCS / "images" / "playgrounds" / f"{name}.png").exists(), "run make pages"
+    image = from_above(playground("simple"))
+    floor = image[image.shape[0] // 2, image.shape[1] // 2]
+    wall = image[image.shape[0] // 2, 0]
+    assert (floor != wall).any()
 
 
 def test_the_changelog_and_the_citation_have_the_version_of_the_package():

@@ -76,18 +76,20 @@ def comment(file: Path) -> str:
 def sections(cfg_type: type, path: str) -> Iterator[tuple[str, type]]:
     """Yield the path and the dataclass of every section, the root first.
 
-    A section with several kinds, such as ``body``, is yielded once for each kind.
+    A section with several kinds, such as ``body``, is yielded once for each kind. Its base class is
+    a kind of its own where it is the default, such as that of ``playground``.
     """
-    kinds = [kind for kind in cfg_type.__subclasses__() if is_built_in(kind)]
-    for kind in kinds:
-        yield from sections(kind, path)
-    if kinds:
-        return
     yield path, cfg_type
     hints = get_type_hints(cfg_type)
-    for name in nested(cfg_type):
-        if name != "task":
-            yield from sections(hints[name], f"{path}.{name}".strip("."))
+    for field in dataclasses.fields(cfg_type):
+        if field.name == "task" or field.name not in nested(cfg_type):
+            continue
+        base = hints[field.name]
+        kinds = [kind for kind in base.__subclasses__() if is_built_in(kind)]
+        if not kinds or field.default_factory is base:
+            kinds.insert(0, base)
+        for kind in kinds:
+            yield from sections(kind, f"{path}.{field.name}".strip("."))
 
 
 def nested(cfg_type: type) -> list[str]:

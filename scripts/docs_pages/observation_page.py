@@ -68,6 +68,13 @@ MEANINGS = {  # key: sense, unit, meaning, how it is requested
         "velocity of the head; the layout is in [body](body.md)",
         "",
     ),
+    "trial": (
+        "trial",
+        "shares",
+        "of [MazeNav](../tasks/MazeNav.md): 1 in the last observation of a trial, else 0; elapsed "
+        "share of the trial's time; share of the episode's trials that are over",
+        "",
+    ),
 }
 
 

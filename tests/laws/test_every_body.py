@@ -140,7 +140,7 @@ def test_impossible_places_are_refused(game):
 
 def test_an_action_is_named_parts_of_two_kinds(game):
     for part, spec in game.players[0].body.action_spec.items():
-        assert part in ("move", "joints", "voice")
+        assert part in ("move", "verb", "joints", "voice")
         kind = "discrete" if spec.is_discrete else "continuous"
         bounds = (spec.shape, spec.dtype, spec.low, spec.high)
         expected = {

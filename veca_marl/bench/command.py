@@ -20,18 +20,25 @@ from veca_marl.bench.report import (
     learning_table,
     parts_table,
     references_table,
+    task_table,
     throughput_table,
 )
 from veca_marl.bench.rollouts import Rollouts, measure_first_world, measure_rollouts
 from veca_marl.config import ConfigError, compose, one_line
 from veca_marl.config.command_line import CommandLine
 from veca_marl.envs.core.game_cfg import GameCfg
+from veca_marl.envs.core.task import TASKS
 
 DESCRIPTION = """
 Measure agent steps per second, and the processor time of each part of a step:
 
     python -m veca_marl.bench +task=KickTheBall
     python -m veca_marl.bench +task=TurnBaby bench.agents=[1,2,4] bench.worlds=[1]
+
+or one table of several tasks, ``[all]`` for all, in their own or in other playgrounds:
+
+    python -m veca_marl.bench bench.tasks=[all]
+    python -m veca_marl.bench bench.tasks=[KickTheBall,ObjectNav] bench.playgrounds=[simple,house]
 
 or the speed of learning as a share of that of the simulator on all cores:
 
@@ -54,6 +61,9 @@ def bench(options: BenchOptions, overrides: list[str]) -> None:
     if options.bench.learning:
         bench_learning(options.bench, overrides)
         return
+    if options.bench.tasks:
+        bench_tasks(options.bench, overrides)
+        return
     cfg, game = options.bench, compose(overrides).game
     torch.set_num_threads(1)
     print(machine_line(), end="\n\n")
@@ -72,6 +82,26 @@ def bench(options: BenchOptions, overrides: list[str]) -> None:
         print(references_table(references))
     if cfg.json is not None:
         Path(cfg.json).write_text(as_json(machine(), first_world_s, runs, references))
+
+
+def bench_tasks(cfg: BenchCfg, overrides: Sequence[str]) -> None:
+    """Measure several tasks, print a Markdown table and write the JSON file.
+
+    Raises:
+        ConfigError: If a choice is impossible.
+    """
+    names = sorted(TASKS) if cfg.tasks == ["all"] else cfg.tasks
+    choices = [[f"playground={name}"] for name in cfg.playgrounds] or [[]]
+    games = [
+        compose([f"+task={name}", *choice, *overrides]).game for name in names for choice in choices
+    ]
+    torch.set_num_threads(1)
+    print(machine_line(), end="\n\n")
+    first_world_s = measure_first_world(games[0])
+    runs = [measure_rollouts(game, cfg.worlds[0], cfg.steps, cfg.repeats) for game in games]
+    print(task_table(runs))
+    if cfg.json is not None:
+        Path(cfg.json).write_text(as_json(machine(), first_world_s, runs, None))
 
 
 def bench_learning(cfg: BenchCfg, overrides: list[str]) -> None:

@@ -11,6 +11,9 @@ class BenchCfg:
     """What is measured, and how often.
 
     Attributes:
+        tasks: Tasks that are measured one after the other with their default bodies and senses, in
+            one Markdown table; ``[all]`` for all tasks. Empty: the task of the command line.
+        playgrounds: Playgrounds in which these tasks are measured; empty for that of each task.
         agents: Numbers of agents that move about in the playground of the task without its rules
             (free play), with its senses and bodies. Empty: the task itself is measured.
         worlds: Numbers of worlds in one environment; each is measured.
@@ -25,6 +28,8 @@ class BenchCfg:
         json: File that the results are written to; None writes none.
     """
 
+    tasks: list[str] = field(default_factory=list)
+    playgrounds: list[str] = field(default_factory=list)
     agents: list[int] = field(default_factory=list)
     worlds: list[int] = field(default_factory=lambda: [1, 4])
     loose_props: int = 0
@@ -45,6 +50,10 @@ class BenchCfg:
                 raise ValueError(f"bench.{name} must be at least 1 each, got {getattr(self, name)}")
         if not self.worlds:
             raise ValueError("bench.worlds must contain a number of worlds")
+        if self.playgrounds and not self.tasks:
+            raise ValueError("bench.playgrounds needs bench.tasks; else use playground=NAME")
+        if self.tasks and (self.agents or self.learning):
+            raise ValueError("bench.tasks: measures neither free play nor learning")
         if self.loose_props < 0:
             raise ValueError(f"bench.loose_props must be 0 or more, got {self.loose_props}")
         if not self.agents and (self.loose_props or self.senses is not None):

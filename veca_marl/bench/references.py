@@ -91,6 +91,36 @@ def measure_eye(playground: PlaygroundCfg, repeats: int) -> EyeCost:
     return EyeCost(len(bodies), median(ours_ms), median(tiny_ms), ratio)
 
 
+class ReferenceView:
+    """One TinyRenderer view of 84 x 84 pixels of `busy_room` in a fixed playground.
+
+    The cost of a step divided by that of such a view can be compared between machines.
+
+    Args:
+        playground: The playground, the same for all measurements.
+    """
+
+    def __init__(self, playground: PlaygroundCfg) -> None:
+        world, watcher = busy_room(playground)
+        hidden = world.scene.hidden(watcher.object_id, watcher.own_head_frames)
+        eye, self._camera = watcher.mount("eye_left"), Camera()
+        self._poses = [_turned(eye, 2.0 * math.pi * view / VIEWS) for view in range(VIEWS)]
+        self._client, _ = as_visual_shapes(world.scene, hidden)
+        world.close()
+
+    def run_ms(self) -> float:
+        """Return the milliseconds of processor time of one view, the mean over `VIEWS`."""
+        return thread_ms(self._render) / VIEWS
+
+    def _render(self) -> None:
+        for pose in self._poses:
+            tiny_view(self._client, self._camera, pose)
+
+    def close(self) -> None:
+        """Disconnect from PyBullet."""
+        pybullet.disconnect(self._client)
+
+
 def busy_room(playground: PlaygroundCfg) -> tuple[World, Walker]:
     """Return a world with `N_LOOSE_PROPS` props and 2 walkers, and the walker that observes."""
     world = World(playground)

@@ -13,7 +13,8 @@ from veca_marl.bench.rollouts import Rollouts
 
 def throughput_table(runs: Sequence[Rollouts]) -> str:
     """Return the answer to: how many agent steps per second?"""
-    header = ["task", "playground", "worlds", "agents", "agent steps/s", "elapsed", "per reference"]
+    header = ["task", "playground", "worlds", "agents", "agent steps/s", "elapsed"]
+    header += ["per reference", "views"]
     rows = [
         [
             run.task,
@@ -23,14 +24,34 @@ def throughput_table(runs: Sequence[Rollouts]) -> str:
             f"{run.agent_steps_per_s:,.0f}",
             f"{run.wall_agent_steps_per_s:,.0f}",
             f"{run.agent_steps_per_reference:.2f}",
+            f"{run.views_per_agent_step:.2f}",
         ]
         for run in runs
     ]
     note = (
         "agent steps per second of processor time, per second of elapsed time, and in the time of\n"
-        "the reference workload (comparable between machines):"
+        "the reference workload; cost of an agent step in TinyRenderer views of 84x84; the last\n"
+        "two are comparable between machines:"
     )
     return f"{note}\n{_table([*[header], *rows])}"
+
+
+def task_table(runs: Sequence[Rollouts]) -> str:
+    """Return a Markdown table of tasks: the table of the page on performance."""
+    header = ("task", "playground", "agents", "agent steps/s", "per reference", "views")
+    rows = [
+        (
+            run.task,
+            f"`{run.playground}`",
+            str(run.agents),
+            f"{run.agent_steps_per_s:,.0f}",
+            f"{run.agent_steps_per_reference:.2f}",
+            f"{run.views_per_agent_step:.2f}",
+        )
+        for run in runs
+    ]
+    lines = [header, ("---",) * len(header), *rows]
+    return "\n".join(f"| {' | '.join(cells)} |" for cells in lines)
 
 
 def parts_table(runs: Sequence[Rollouts]) -> str:

@@ -11,7 +11,9 @@ import torch
 from tensordict import TensorDictBase
 
 from veca_marl.bench.calibration import ReferenceWorkload
+from veca_marl.bench.references import ReferenceView
 from veca_marl.bench.stopwatch import Probes, Stopwatch
+from veca_marl.config import compose
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
 from veca_marl.envs.core.game import Game
 from veca_marl.envs.core.game_cfg import GameCfg
@@ -20,6 +22,7 @@ PHYSICS, SOURCES, TASK = "physics", "sound sources", "task"
 ENV, POLICY, TORCHRL = "VecaEnv", "policy", "TorchRL"
 _OVERHEAD = (TASK, ENV, POLICY, TORCHRL)
 _WARM_UP_STEPS = 5
+_REFERENCE_PLAYGROUND = ("+task=KickTheBall", "playground=single_room")
 
 
 @dataclass
@@ -34,6 +37,8 @@ class Rollouts:
         agent_steps_per_s: Agent steps per second of processor time of the one thread.
         agent_steps_per_reference: Agent steps in the processor time of one run of
             `ReferenceWorkload`, measured in turns with the rollouts; comparable between machines.
+        views_per_agent_step: Processor time of an agent step divided by that of a `ReferenceView`,
+            measured in turns with the rollouts likewise.
         wall_agent_steps_per_s: Agent steps per second of elapsed time.
         ms_per_part: Milliseconds of processor time per agent step for each part, with stopwatch.
         overhead: Share of the step that is neither physics nor sound sources nor senses.
@@ -46,6 +51,7 @@ class Rollouts:
     agents: int
     agent_steps_per_s: float
     agent_steps_per_reference: float
+    views_per_agent_step: float
     wall_agent_steps_per_s: float
     ms_per_part: dict[str, float]
     overhead: float
@@ -54,11 +60,12 @@ class Rollouts:
 
 @dataclass
 class _Repeats:
-    """Measurements of the repeats: processor and elapsed seconds, reference, times by part."""
+    """Measurements of the repeats: processor and elapsed seconds, references, times by part."""
 
     cpu_s: list[float]
     wall_s: list[float]
     reference_s: list[float]
+    view_s: list[float]
     parts_ns: list[dict[str, int]]
 
 
@@ -84,6 +91,7 @@ def measure_rollouts(game: GameCfg, worlds: int, steps: int, repeats: int) -> Ro
         for part in measured.parts_ns[0]
     }
     pairs = zip(measured.reference_s, measured.cpu_s, strict=True)
+    views = zip(measured.view_s, measured.cpu_s, strict=True)
     return Rollouts(
         task=game.task.name,
         playground=game.playground.name,
@@ -91,6 +99,7 @@ def measure_rollouts(game: GameCfg, worlds: int, steps: int, repeats: int) -> Ro
         agents=agents,
         agent_steps_per_s=agent_steps / median(measured.cpu_s),
         agent_steps_per_reference=agent_steps * median(ref / cpu for ref, cpu in pairs),
+        views_per_agent_step=median(cpu / view for view, cpu in views) / agent_steps,
         wall_agent_steps_per_s=agent_steps / median(measured.wall_s),
         ms_per_part=parts,
         overhead=sum(parts.get(part, 0.0) for part in _OVERHEAD) / sum(parts.values()),
@@ -100,16 +109,19 @@ def measure_rollouts(game: GameCfg, worlds: int, steps: int, repeats: int) -> Ro
 
 def _repeat(env: VecaEnv, steps: int, repeats: int) -> _Repeats:
     policy, reference = RandomActions(env, steps), ReferenceWorkload()
+    view = ReferenceView(compose(_REFERENCE_PLAYGROUND).game.playground)
     env.rollout(_WARM_UP_STEPS, policy, break_when_any_done=False)
-    measured = _Repeats([], [], [], [])
+    measured = _Repeats([], [], [], [], [])
     for _ in range(repeats):
         wall, cpu = time.perf_counter(), time.thread_time()
         env.rollout(steps, policy, break_when_any_done=False)
         measured.cpu_s.append(time.thread_time() - cpu)
         measured.wall_s.append(time.perf_counter() - wall)
         measured.reference_s.append(1e-3 * reference.run_ms())
+        measured.view_s.append(1e-3 * view.run_ms())
         measured.parts_ns.append(_split(env, policy, steps))
     reference.close()
+    view.close()
     return measured
 
 

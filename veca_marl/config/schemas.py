@@ -18,6 +18,7 @@ from veca_marl.config.root import Config
 from veca_marl.config.search_path import conf_dirs
 from veca_marl.envs.core.task import TASKS
 from veca_marl.sim.body import BODIES, BodyCfg
+from veca_marl.sim.physics import PLAYGROUND_GENERATORS
 
 # keys of the root that have the names of teams as their keys
 _BY_TEAM = ("team", "opponent", "init_from", "init_encoders", "learner", "team_intrinsic")
@@ -32,6 +33,7 @@ def register_schemas() -> None:
     NETWORKS.listen(_store_network)
     INTRINSICS.listen(_store_intrinsic)
     BODIES.listen(_store_body)
+    PLAYGROUND_GENERATORS.listen(_store_playground)
     TASKS.listen(_store_task_schema)
 
 
@@ -85,6 +87,11 @@ def _store_intrinsic(name: str) -> None:
 def _store_body(name: str) -> None:
     """Store the schema of a body; without a file it can be chosen as well."""
     _store_named("body", name, BODIES[name].cfg_type)
+
+
+def _store_playground(name: str) -> None:
+    """Store the schema of a generated playground; without a file it can be chosen as well."""
+    _store_named("playground", name, PLAYGROUND_GENERATORS[name])
 
 
 def _store_named(group: str, name: str, cfg_type: type) -> None:

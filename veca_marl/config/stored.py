@@ -19,6 +19,7 @@ from veca_marl.config.schemas import body_types, root_schema
 from veca_marl.config.search_path import conf_dirs
 from veca_marl.envs.core.task import find_task
 from veca_marl.envs.core.team import TeamCfg
+from veca_marl.sim.physics import PLAYGROUND_GENERATORS
 
 GAME_KEYS = ("body", "clock", "eval", "opponent", "playground", "senses", "task", "team")
 """Keys of the root that can be changed when what a run has learnt is played again."""
@@ -61,6 +62,9 @@ def typed(stored: DictConfig, bodies: Mapping[str, str]) -> DictConfig:
             node.team_intrinsic[team] = _intrinsic(intrinsic)
         for team in stored.team:
             node.team[team] = OmegaConf.structured(TeamCfg)
+        if "generator" in stored.playground:
+            generator = PLAYGROUND_GENERATORS.find(stored.playground.generator)
+            node.playground = OmegaConf.structured(generator)
         for key, name in bodies.items():
             OmegaConf.update(node, key, body_types()[name]())
         return cast(DictConfig, OmegaConf.merge(node, stored))

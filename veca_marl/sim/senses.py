@@ -34,7 +34,7 @@ from veca_marl.sim.hearing import AudioCfg, AudioSense
 from veca_marl.sim.physics import World
 from veca_marl.sim.sense import Sense
 from veca_marl.sim.touch import TouchCfg, TouchSense
-from veca_marl.sim.vision import VisionCfg, VisionSense
+from veca_marl.sim.vision import VisionCfg, VisionSense, open_eyes
 
 
 class SenseClass(Protocol):
@@ -123,7 +123,10 @@ def _from_mapping(name: str, cfg_type: type[Any], given: Any) -> Any:
 
 
 def make_senses(body: Body, names: Sequence[str], cfg: SensesCfg, world: World) -> dict[str, Sense]:
-    """Construct the senses of a body.
+    """Construct the senses of a body, and give it its sight (`Body.sight`).
+
+    Sight has the camera of the sense of vision, also if the body has no such sense. It renders only
+    when it is asked.
 
     Args:
         body: The body that perceives.
@@ -138,6 +141,11 @@ def make_senses(body: Body, names: Sequence[str], cfg: SensesCfg, world: World) 
     senses = {name: SENSES[name](own, body, world) for name, own in settings.items() if own.present}
     if names and not senses:
         raise ValueError(f"no sense is left: at least one of {list(names)} must be present")
+    vision = senses.get("vision")
+    if isinstance(vision, VisionSense):
+        body.sight = vision.eyes
+    else:
+        open_eyes(world.scene, body, cfg.vision.camera())
     return senses
 
 

@@ -44,7 +44,8 @@ def test_a_walker_cannot_leave_it(playground):
         walker.place((0.0, 0.0, 0.0), math.radians(yaw_deg))
         walker.walk(1.0, 0.0)
         let_pass(world, 6.0)
-        assert playground.rooms[0].contains(walker.position, margin_m=0.1)
+        ends = [room.distance_m(walker.position[:2]) for room in playground.rooms]
+        assert min(ends) <= 0.05, "in a room, or in a door between two"
 
 
 def test_a_room_knows_what_is_inside():

@@ -23,7 +23,10 @@ from veca_marl.algos.specs import EnvFactory
 
 @dataclass
 class CollectCfg:
-    """Number of worlds that play at the same time; processes x worlds are the paper's 8 workers.
+    """Number of worlds that play at the same time.
+
+    The defaults are the paper's 8 workers; the default preset, `collect=workers16`, has twice as
+    many worlds and batches of the same size.
 
     Attributes:
         processes: Worker processes; 0 steps the worlds in this one.

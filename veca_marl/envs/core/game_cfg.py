@@ -53,13 +53,22 @@ class GameCfg:
         return self.senses if own is None else own.senses.replace_in(self.senses)
 
     def check(self) -> None:
-        """Check the names of the teams, the scripts and the number of players.
+        """Check the names of the teams, the scripts and the playground.
 
         Raises:
             ValueError: If a team does not exist, all teams are scripted, the task has no expert
-                for a script, or the floor of the playground is too small for all players.
+                for a script, or the playground does not fit.
         """
         self._check_teams([team.name for team in self.teams])
+        self.check_playground()
+
+    def check_playground(self) -> None:
+        """Check that the task and all its players fit into the playground.
+
+        Raises:
+            ValueError: If the task cannot be played there, or the floor is too small.
+        """
+        find_task(self.task.name).check_playground(self.task, self.playground)
         self._check_floor()
 
     def _check_teams(self, names: list[str]) -> None:

@@ -15,7 +15,7 @@ from veca_marl.registry import Registry
 from veca_marl.sim.body import Body
 from veca_marl.sim.body.humanoid import Humanoid
 from veca_marl.sim.body.walker import Walker
-from veca_marl.sim.physics import World
+from veca_marl.sim.physics import PlaygroundCfg, World
 from veca_marl.sim.sense import Sense
 
 TaskType = TypeVar("TaskType", bound="type[Task]")
@@ -216,6 +216,14 @@ class Task(ABC):
     def teams_of(cls, cfg: Any) -> tuple[Team, ...]:
         """Return the teams; overridden where their sizes depend on the configuration."""
         return cls.teams
+
+    @classmethod  # noqa: B027  optional
+    def check_playground(cls, cfg: Any, playground: PlaygroundCfg) -> None:
+        """Check that the task can be played in a playground, before a world is built.
+
+        Raises:
+            ValueError: If not; the message names the value that is impossible and the choices.
+        """
 
     @classmethod
     def cfg_type(cls) -> type[TaskCfg]:

@@ -1,5 +1,6 @@
 """Rules of the tasks that ship with the package. Importing this package registers them."""
 
+from veca_marl.envs.tasks.cars.dodge_car import DodgeCar
 from veca_marl.envs.tasks.contests.push_out_1v1 import PushOut1v1
 from veca_marl.envs.tasks.contests.push_out_2v2 import PushOut2v2
 from veca_marl.envs.tasks.contests.soccer_one_player import SoccerOnePlayer
@@ -9,7 +10,10 @@ from veca_marl.envs.tasks.locomotion.run_baby import RunBaby
 from veca_marl.envs.tasks.locomotion.sit_baby import SitBaby
 from veca_marl.envs.tasks.locomotion.turn_baby import TurnBaby
 from veca_marl.envs.tasks.multimodal.kick_the_ball import KickTheBall
+from veca_marl.envs.tasks.navigation.maze_nav import MazeNav
 from veca_marl.envs.tasks.navigation.multi_agent_nav import MultiAgentNav
+from veca_marl.envs.tasks.navigation.object_nav import ObjectNav
+from veca_marl.envs.tasks.navigation.object_phys_nav import ObjectPhysNav
 from veca_marl.envs.tasks.objects.grab_object import GrabObject
 from veca_marl.envs.tasks.objects.move_to_target import MoveToTarget
 from veca_marl.envs.tasks.objects.pile_up_block import PileUpBlock
@@ -18,10 +22,14 @@ from veca_marl.envs.tasks.objects.rotate_cube import RotateCube
 
 __all__ = [
     "CrawlBaby",
+    "DodgeCar",
     "GrabObject",
     "KickTheBall",
+    "MazeNav",
     "MoveToTarget",
     "MultiAgentNav",
+    "ObjectNav",
+    "ObjectPhysNav",
     "PileUpBlock",
     "PushOut1v1",
     "PushOut2v2",

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any, ClassVar
 
 import numpy as np
@@ -19,6 +19,7 @@ from veca_marl.sim.body.anatomy import bone_motion, load_skeleton
 from veca_marl.sim.body.appearance import SHIRTS, bone_geoms, dressed_skin
 from veca_marl.sim.body.body_cfg import BodyCfg
 from veca_marl.sim.body.mounts import EYES, Gaze, palm_centre, resting_mount
+from veca_marl.sim.body.sight import Sight, Visible, interactable_props
 from veca_marl.sim.body.voice import VOICE, voice_spec
 from veca_marl.sim.geometry import Floats, Pose, cross
 from veca_marl.sim.physics import Prop, World
@@ -48,6 +49,7 @@ class Body(ABC):
         own_head_frames: Indices of the frames (bones) that its own eyes do not see.
         joint_names: The 82 joints, such as `l_forearm.flexion`, in the order of all joint arrays.
         bone_names: The 47 bones, such as `l_forearm`, in the order of all bone arrays.
+        interaction_range_m: See `BodyCfg`.
     """
 
     cfg_type: ClassVar[type[BodyCfg]]
@@ -65,6 +67,8 @@ class Body(ABC):
         self._voice = Voice(world.sound.sample_rate_hz)
         self._mouth = world.sound.add_source(f"{name}.voice", self._voice)
         self._gaze = Gaze(math.radians(cfg.eye_range_deg))
+        self._sight: Sight | None = None
+        self.interaction_range_m = cfg.interaction_range_m
         self.joint_names = tuple(f"{j.bone}.{j.label}" for j in self._skeleton.joints)
         self.bone_names = tuple(bone.name for bone in self._skeleton.bones)
         joints = len(self._skeleton.joints)
@@ -271,6 +275,61 @@ class Body(ABC):
         """Play a call; it is ignored while another sound of this mouth is being played."""
         if call is not Call.none and not self._voice.speaking:
             self._voice.say(call_waveform(CALLS[call], self._world.sound.sample_rate_hz))
+
+    # ---- visible and interactable objects (the paper's API)
+
+    @property
+    def sight(self) -> Sight:
+        """The present images of its eyes; `make_senses` sets it.
+
+        Raises:
+            RuntimeError: If it was not set.
+        """
+        if self._sight is None:
+            raise RuntimeError(
+                f"{self.name} has no eyes yet: make_senses or veca_marl.sim.vision.open_eyes "
+                "gives them to a body"
+            )
+        return self._sight
+
+    @sight.setter
+    def sight(self, sight: Sight) -> None:
+        self._sight = sight
+
+    def is_visible(self, target: Visible, eye: str | None = None) -> bool:
+        """Return whether its eyes see a prop or body, also through transparent objects.
+
+        Args:
+            target: A prop or a body.
+            eye: ``eye_left`` or ``eye_right``; None is either.
+
+        Raises:
+            ValueError: If this is not an open eye.
+        """
+        return self.sight.is_visible(target.object_id, eye)
+
+    def is_interactable(self, prop: Prop) -> bool:
+        """Return whether a prop is among `interactable_objects`."""
+        return bool(self._interactable([prop]))
+
+    def interactable_objects(self) -> list[Prop]:
+        """Return the props that can be interacted with, nearest to the centre of the view first.
+
+        A prop is interactable if it declares an interaction (`PropCfg.interactions`), a pixel of an
+        open eye shows it with no transparent object in front, and its bounding box is nearer to the
+        head than `interaction_range_m`. What the body itself holds is left out.
+        """
+        return self._interactable(self._world.props.values())
+
+    def interactable_object(self) -> Prop | None:
+        """Return the interactable prop nearest to the centre of the view; None if there is none."""
+        objects = self.interactable_objects()
+        return objects[0] if objects else None
+
+    def _interactable(self, props: Iterable[Prop]) -> list[Prop]:
+        others = [prop for prop in props if prop.holder != self.name]
+        head = self.mount("head").position
+        return interactable_props(self.sight, head, others, self.interaction_range_m)
 
     # ---- for subclasses
 

@@ -16,10 +16,13 @@ class BodyCfg:
     Attributes:
         eye_range_deg: Largest rotation of the eyes in the head, to each side and up and down.
         voice: Whether the action has a part `voice` that chooses a call.
+        interaction_range_m: Objects can be interacted with if their distance from the head is
+            smaller. The paper's main text has 1.5 m, its table of functions 2.5 m.
     """
 
     eye_range_deg: float = 50.0
     voice: VoiceKind = VoiceKind.silent
+    interaction_range_m: float = 1.5
 
     def __post_init__(self) -> None:
         """Check that all numbers are finite and not negative."""

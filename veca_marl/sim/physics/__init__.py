@@ -7,23 +7,31 @@ from veca_marl.sim.physics.collision_shapes import (
     shape_arguments,
     urdf_geometry,
 )
+from veca_marl.sim.physics.houses.furniture_cfg import FurnitureCfg, FurnitureKind
+from veca_marl.sim.physics.houses.random_house import RandomHouseCfg
+from veca_marl.sim.physics.houses.walls import WallsCfg
 from veca_marl.sim.physics.mover import Mover
-from veca_marl.sim.physics.playground import PlaygroundCfg
+from veca_marl.sim.physics.playground import PLAYGROUND_GENERATORS, PlaygroundCfg
 from veca_marl.sim.physics.props import SIZE_NAMES, Prop, PropCfg, PropShape
 from veca_marl.sim.physics.rooms import DoorCfg, RoomCfg
 from veca_marl.sim.physics.world import GRAVITY_MPS2, World
 
 __all__ = [
     "GRAVITY_MPS2",
+    "PLAYGROUND_GENERATORS",
     "SIZE_NAMES",
     "ClockCfg",
     "DoorCfg",
+    "FurnitureCfg",
+    "FurnitureKind",
     "Mover",
     "PlaygroundCfg",
     "Prop",
     "PropCfg",
     "PropShape",
+    "RandomHouseCfg",
     "RoomCfg",
+    "WallsCfg",
     "World",
     "create_collision_shape",
     "pybullet",

@@ -10,6 +10,10 @@ import math
 from dataclasses import dataclass, field
 from itertools import combinations
 
+from veca_marl.registry import Registry
+from veca_marl.sim.physics.houses.furniture import furniture_props
+from veca_marl.sim.physics.houses.furniture_cfg import FurnitureCfg
+from veca_marl.sim.physics.houses.walls import WallsCfg, floor_coverings, wall_props
 from veca_marl.sim.physics.impacts.cfg import ImpactCfg
 from veca_marl.sim.physics.props import PropCfg, check_appearance
 from veca_marl.sim.physics.rooms import DoorCfg, RoomCfg
@@ -36,7 +40,10 @@ class PlaygroundCfg:
         rooms: Boxes of air with unique names that do not overlap; the first is where single-room
             tasks play. Walls and large boxes between them attenuate sound, see `stops_sound`.
         doors: The openings between rooms.
-        props: Walls, furniture and toys.
+        walls: How walls are built round the rooms, with openings for the doors; None if the walls
+            are among the props.
+        furniture: Pieces of furniture; their sizes are fixed.
+        props: Everything else: toys, walls where `walls` is None, things of any size.
         floor_size_m: Extent of the drawn floor along x and y.
         floor_centre_m: Its middle.
         floor_colour: Red, green, blue in [0, 1].
@@ -50,6 +57,8 @@ class PlaygroundCfg:
     name: str = ""
     rooms: list[RoomCfg] = field(default_factory=lambda: [RoomCfg()])
     doors: list[DoorCfg] = field(default_factory=list)
+    walls: WallsCfg | None = None
+    furniture: list[FurnitureCfg] = field(default_factory=list)
     props: list[PropCfg] = field(default_factory=list)
     floor_size_m: tuple[float, float] = (6.0, 6.0)
     floor_centre_m: tuple[float, float] = (0.0, 0.0)
@@ -64,11 +73,20 @@ class PlaygroundCfg:
         """Area of the floors of all rooms."""
         return sum(room.size_m[0] * room.size_m[1] for room in self.rooms)
 
+    def built_props(self) -> list[PropCfg]:
+        """Return all props: coverings of floors, walls, furniture, then `props`."""
+        built = floor_coverings(self.rooms)
+        if self.walls is not None:
+            built += wall_props(self.rooms, self.doors, self.walls)
+        for piece in self.furniture:
+            built += furniture_props(piece)
+        return [*built, *self.props]
+
     def __post_init__(self) -> None:
         """Check that there is a room, that names are unique, and the numbers."""
         if not self.rooms:
             raise ValueError(f"playground {self.name!r} has no room")
-        self._check_names("props", [prop.name for prop in self.props])
+        self._check_names("props", [prop.name for prop in self.built_props()])
         self._check_names("doors", [door.name for door in self.doors])
         self._check_rooms()
         self._check_doors()
@@ -138,6 +156,11 @@ class PlaygroundCfg:
                         f"playground {self.name!r}, door {door.name!r}: "
                         f"position_m={tuple(door.position_m)} is {away_m:.2f} m from {name!r}"
                     )
+
+
+PLAYGROUND_GENERATORS: Registry[type[PlaygroundCfg]] = Registry("generator of playgrounds")
+"""Dataclasses that generate the content of a playground from their numbers. A file of
+`conf/playground` names one as its schema, and in its field `generator`."""
 
 
 def make_house(playground: PlaygroundCfg) -> House:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from veca_marl.sim.geometry import Floats
+from veca_marl.sim.physics.props import check_appearance
 
 
 @dataclass
@@ -20,12 +21,14 @@ class RoomCfg:
         size_m: Extent along x, y and z, metres.
         reflection: Pressure reflection coefficient beta of its walls in [0, 1)
             (Allen & Berkley 1979); 0 is a room without echo.
+        floor_colour: Red, green, blue in [0, 1] of its floor; None shows that of the playground.
     """
 
     name: str = "room"
     lower_m: tuple[float, float, float] = (-3.0, -3.0, 0.0)
     size_m: tuple[float, float, float] = (6.0, 6.0, 2.6)
     reflection: float = 0.5
+    floor_colour: tuple[float, float, float] | None = None
 
     def __post_init__(self) -> None:
         """Check that the room has a volume and that sound decays in it."""
@@ -35,6 +38,8 @@ class RoomCfg:
             raise ValueError(f"room {self.name!r}: size_m={tuple(self.size_m)} must be positive")
         if not 0.0 <= self.reflection < 1.0:
             raise ValueError(f"room {self.name!r}: reflection={self.reflection} is not in [0, 1)")
+        if self.floor_colour is not None:
+            check_appearance(f"room {self.name!r}: ", self.floor_colour, 0.0, "floor_")
 
     def contains(self, position: Floats, margin_m: float = 0.0) -> bool:
         """Return whether a point is inside, `margin_m` or more from walls, floor and ceiling."""

@@ -13,6 +13,7 @@ from veca_marl.sim.physics.bullet import pybullet
 from veca_marl.sim.physics.clock import ClockCfg
 from veca_marl.sim.physics.floor import FLOOR_NAME, add_floor
 from veca_marl.sim.physics.impacts.sounds import ImpactSounds
+from veca_marl.sim.physics.interactions.registry import check_interactions
 from veca_marl.sim.physics.mover import Mover
 from veca_marl.sim.physics.playground import PlaygroundCfg, make_house
 from veca_marl.sim.physics.props import Prop, PropCfg, follow_physics, limit_detection
@@ -64,20 +65,21 @@ class World:
             self._impacts = ImpactSounds(playground.impacts, self.clock, self.client, self.sound)
             self.after_substep.append(self._impacts.after_substep)
         self.floor_id = add_floor(self.client, self.scene, playground)
-        for prop in playground.props:
+        for prop in playground.built_props():
             self.add_prop(prop)
 
     def add_prop(self, cfg: PropCfg) -> Prop:
         """Add a prop.
 
         Raises:
-            ValueError: If the name is taken.
+            ValueError: If the name is taken, or an interaction is not registered.
             RuntimeError: If the world is frozen.
         """
         self._check_not_frozen(f"add the prop {cfg.name!r}")
         taken = [FLOOR_NAME, *self.props]
         if cfg.name in taken:
             raise ValueError(f"the name {cfg.name!r} is taken; there are {taken}")
+        check_interactions(f"prop {cfg.name!r}: interactions", cfg.interactions)
         sound = None if cfg.sound is None else make_sound(cfg.sound)
         source = None if sound is None else self.sound.add_source(cfg.name, sound)
         prop = Prop(cfg, self.client, self.scene, source, self.house.obstacles)

@@ -4,7 +4,7 @@ from veca_marl.sim.vision.eye_views import EyeViews
 from veca_marl.sim.vision.optics import Camera, MeshView, look_at, seen_fraction
 from veca_marl.sim.vision.rendering import Views
 from veca_marl.sim.vision.sense import VisionSense
-from veca_marl.sim.vision.visibility import is_visible
+from veca_marl.sim.vision.visibility import is_visible, open_eyes
 from veca_marl.sim.vision.vision_cfg import Eyes, VisionCfg
 
 __all__ = [
@@ -16,6 +16,7 @@ __all__ = [
     "VisionCfg",
     "VisionSense",
     "is_visible",
+    "open_eyes",
     "look_at",
     "seen_fraction",
 ]

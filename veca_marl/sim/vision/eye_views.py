@@ -8,7 +8,7 @@ import numpy as np
 
 from veca_marl.sim.body import Body
 from veca_marl.sim.body.mounts import EYES
-from veca_marl.sim.geometry import Bools, Scene
+from veca_marl.sim.geometry import Bools, Floats, Scene
 from veca_marl.sim.vision.optics import Camera, seen_fraction
 from veca_marl.sim.vision.rendering import Views
 
@@ -42,6 +42,10 @@ class EyeViews:
         self._mounts = tuple(mounts)
         self._hidden: Bools = np.zeros(0, np.bool_)
         self._seen: tuple[bytes, Views] | None = None
+        rows, columns = np.indices((camera.height, camera.width)) + 0.5
+        self._off_centre_px: Floats = np.hypot(
+            rows - camera.height / 2.0, columns - camera.width / 2.0
+        ).ravel()
 
     def views(self) -> Views:
         """Return the present images, one per open eye; do not write into them."""
@@ -57,9 +61,43 @@ class EyeViews:
         """Return the fraction of all pixels that show an object, also through transparent ones."""
         return seen_fraction(self.views(), object_id)
 
-    def is_visible(self, object_id: int) -> bool:
-        """Return whether a pixel of an open eye shows an object, also through transparent ones."""
-        return self.seen_fraction(object_id) > 0.0
+    def is_visible(self, object_id: int, eye: str | None = None) -> bool:
+        """Return whether a pixel shows an object, also through transparent ones.
+
+        Args:
+            object_id: Its id in the scene.
+            eye: One of the open eyes; None is any of them.
+
+        Raises:
+            ValueError: If this is not an open eye.
+        """
+        views = self.views() if eye is None else self._view_of(eye)
+        return seen_fraction(views, object_id) > 0.0
+
+    def front_objects(self) -> dict[int, float]:
+        """Return the ids of all objects that are the foremost ones in at least one pixel.
+
+        Objects that are seen only through transparent ones are left out.
+
+        Returns:
+            The smallest distance from the centre of an image for each, in pixels.
+        """
+        views = self.views()
+        front = views.ids
+        if len(views.glass_ids):
+            nearest = views.glass_ids[0]
+            front = np.where(nearest >= 0, nearest, front)
+        distances = np.full(int(front.max()) + 2, np.inf)  # the last one is that of the sky, -1
+        np.minimum.at(distances, front.ravel(), np.tile(self._off_centre_px, len(front)))
+        return {number: float(d) for number, d in enumerate(distances[:-1]) if d < np.inf}
+
+    def _view_of(self, eye: str) -> Views:
+        """Return the images with that of one eye only."""
+        if eye not in self._mounts:
+            raise ValueError(f"no open eye {eye!r}; choices: {list(self._mounts)}")
+        chosen = slice(index := self._mounts.index(eye), index + 1)
+        rgb, depth, ids, glass_ids = self.views()
+        return Views(rgb[chosen], depth[chosen], ids[chosen], glass_ids[:, chosen])
 
     def _own_head_mask(self) -> Bools:
         """Return the mask of the surfaces of the own head, recomputed when the scene has grown."""

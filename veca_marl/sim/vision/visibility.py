@@ -4,24 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cache
-from typing import Protocol
 
 from veca_marl.sim.body import Body
 from veca_marl.sim.body.mounts import EYES
+from veca_marl.sim.body.sight import Visible
 from veca_marl.sim.geometry import Scene
 from veca_marl.sim.vision.eye_views import EyeViews
 from veca_marl.sim.vision.optics import Camera
 from veca_marl.sim.vision.vision_cfg import VisionCfg
-
-
-class Visible(Protocol):
-    """What `is_visible` can look for: a prop or a body.
-
-    Attributes:
-        object_id: Its id in the scene.
-    """
-
-    object_id: int
 
 
 def is_visible(
@@ -47,6 +37,19 @@ def is_visible(
     """
     camera = default_camera() if camera is None else camera
     return EyeViews(scene, body, camera, eyes).is_visible(target.object_id)
+
+
+def open_eyes(scene: Scene, body: Body, camera: Camera | None = None) -> EyeViews:
+    """Give a body its sight: both eyes open. `make_senses` does so for the bodies of a game.
+
+    Args:
+        scene: The scene of the body.
+        body: The body.
+        camera: The camera of either eye; None is that of `VisionCfg` with its defaults.
+    """
+    eyes = EyeViews(scene, body, default_camera() if camera is None else camera)
+    body.sight = eyes
+    return eyes
 
 
 @cache

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from veca_marl.envs.core.scoring import cosine, horizontal, norm
 from veca_marl.envs.core.task import Player, Task, TaskCfg, register, require_walker, terms
 from veca_marl.envs.tasks.multimodal.rolling_ball import launch_from_side_wall
-from veca_marl.sim.physics import PropCfg, PropShape
+from veca_marl.sim.physics import PlaygroundCfg, PropCfg, PropShape
 from veca_marl.sim.sound import SoundCfg, SoundKind
 
 _START_CLEARANCE_M = 1.5  # from the walls
@@ -73,6 +74,16 @@ class KickTheBall(Task):
 
     senses = ("vision", "audio")
     cfg: KickTheBallCfg
+
+    @classmethod
+    def check_playground(cls, cfg: Any, playground: PlaygroundCfg) -> None:
+        room, least_m = playground.rooms[0], 2.0 * _START_CLEARANCE_M
+        if min(room.size_m[:2]) < least_m:
+            raise ValueError(
+                f"KickTheBall takes place in the first room of a playground; room {room.name!r} of "
+                f"{playground.name!r} has size_m={tuple(room.size_m)}, but needs {least_m} m along "
+                "x and y; choose playground=simple, single_room, house, house2 or random_house"
+            )
 
     def build(self) -> None:
         self.kicker = require_walker(self.players[0])

@@ -1,1 +1,1 @@
-"""Tasks of finding objects in houses: MultiAgentNav."""
+"""Tasks of finding objects: ObjectNav, ObjectPhysNav, MazeNav, MultiAgentNav."""

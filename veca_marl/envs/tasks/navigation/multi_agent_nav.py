@@ -18,6 +18,7 @@ from veca_marl.envs.tasks.navigation.helper_reward import (
     HelperReward,
 )
 from veca_marl.envs.tasks.player_starts import direct_gaze_ahead, place_player
+from veca_marl.sim.physics import PlaygroundCfg
 
 _PASSAGE_M = 0.2  # width that an agent at the object leaves free towards the walls
 
@@ -102,8 +103,11 @@ class MultiAgentNav(Task):
     def teams_of(cls, cfg: Any) -> tuple[Team, ...]:
         return (Team("seekers", cfg.agents),)
 
+    @classmethod
+    def check_playground(cls, cfg: Any, playground: PlaygroundCfg) -> None:
+        places.check_rooms(playground, cfg.agents)
+
     def build(self) -> None:
-        places.check_rooms(self.world.playground, len(self.players))
         self.plan = FloorPlan(self.world.playground)
         self._furniture = places.furniture_of(self.world)
         self.target = places.add_target(self.world, self.cfg.radius_m)

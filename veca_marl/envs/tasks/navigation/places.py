@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from veca_marl.envs.tasks.navigation.floors.clearance import clearances_m
 from veca_marl.sim.geometry import Floats, horizontal_distance
 from veca_marl.sim.physics import PlaygroundCfg, Prop, PropCfg, PropShape, RoomCfg, World
 
@@ -23,13 +24,15 @@ def check_rooms(playground: PlaygroundCfg, agents: int) -> None:
         raise ValueError(
             f"task.agents={agents} start in rooms of their own, but playground "
             f"{playground.name!r} has {rooms}; choose task.agents of at most {rooms}, or "
-            "playground=two_rooms, three_rooms, four_rooms, seven_rooms"
+            "playground=two_rooms, three_rooms, four_rooms, seven_rooms, house, "
+            "house2 or random_house"
         )
 
 
 def furniture_of(world: World) -> list[Prop]:
-    """Return the props of a world that are no walls."""
-    return [prop for prop in world.props.values() if prop.cfg.shape is not PropShape.wall]
+    """Return the tangible props of a world that are no walls."""
+    props = world.props.values()
+    return [prop for prop in props if prop.cfg.tangible and prop.cfg.shape is not PropShape.wall]
 
 
 def add_target(world: World, radius_m: float) -> Prop:
@@ -107,4 +110,9 @@ def free_pair(
 
 
 def _is_clear(place: Floats, props: Sequence[Prop], clear_m: float) -> bool:
-    return all(gap_m(place, prop) >= clear_m for prop in props)
+    return all(_keeps_away(place, prop, clear_m) for prop in props)
+
+
+def _keeps_away(place: Floats, prop: Prop, clear_m: float) -> bool:
+    """Return whether a prop is so far away: by the circle round it, or else by its shape."""
+    return gap_m(place, prop) >= clear_m or float(clearances_m(prop, place[:2])) >= clear_m

@@ -1,7 +1,8 @@
 """The walking body: a capsule in the physics, bones posed by forward kinematics."""
 
-from veca_marl.sim.body.walker.walk_commands import WalkActionKind
+from veca_marl.sim.body.walker.verb_part import Applied
+from veca_marl.sim.body.walker.walk_commands import WalkActionKind, WalkCommand
 from veca_marl.sim.body.walker.walker import Walker
 from veca_marl.sim.body.walker.walker_cfg import WalkerCfg
 
-__all__ = ["WalkActionKind", "Walker", "WalkerCfg"]
+__all__ = ["Applied", "WalkActionKind", "WalkCommand", "Walker", "WalkerCfg"]

@@ -37,6 +37,8 @@ class GaitCfg:
         toe_rad: Plantar flexion in mid-swing.
         arm_swing_rad: Amplitude of the upper arm at full stride.
         elbow_rad: Flexion of the elbows.
+        carry_arm_rad: Flexion of the right upper arm while it carries something.
+        carry_elbow_rad: Flexion of the right elbow then.
         settle_s: Time constant with which the stride follows the speed.
         kick_s: Duration of a kick.
     """
@@ -52,6 +54,8 @@ class GaitCfg:
     toe_rad: float = 0.35
     arm_swing_rad: float = 0.5
     elbow_rad: float = 0.5
+    carry_arm_rad: float = 0.35
+    carry_elbow_rad: float = 1.2
     settle_s: float = 0.08
     kick_s: float = 0.36
 
@@ -73,6 +77,7 @@ class Gait:
         phase: Of the stride, in [0, 1).
         angles: ``(82,)`` rad, as of the last `pose`.
         landing_mps: Speed at which a foot landed in the last `advance`; 0 if none did.
+        carrying: Whether the right hand is held in front of the body.
     """
 
     def __init__(self, skeleton: Skeleton, cfg: GaitCfg | None = None) -> None:
@@ -110,7 +115,8 @@ class Gait:
         return float(low), float(high)
 
     def reset(self) -> None:
-        """Stand still."""
+        """Stand still with empty hands."""
+        self.carrying = False
         self.phase = self.landing_mps = 0.0
         self._speed_mps = self._turn_radps = 0.0
         self._kick_left_s = 0.0
@@ -146,6 +152,9 @@ class Gait:
         else:
             self._step(0)
             self._step(1)
+        if self.carrying:
+            self.angles[self._arm[1]] = self.cfg.carry_arm_rad
+            self.angles[self._elbow[1]] = self.cfg.carry_elbow_rad
         self._turn_neck(self._nod, head_pitch_rad, self.pitch_range_rad)
         self._turn_neck(self._shake, head_yaw_rad, self.yaw_range_rad)
         np.clip(self.angles, self._low, self._high, out=self.angles)

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from enum import Enum
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from veca_marl.sim.physics.interactions import NO_VERB
+from veca_marl.sim.sound import Call
 from veca_marl.sim.spec import ArraySpec, continuous_spec, discrete_spec
 
 # (forward, turn) as fractions of the greatest speeds; turning left is positive
@@ -20,6 +22,22 @@ MOVES: dict[str, tuple[float, float]] = {
     "forward_left": (1.0, 1.0),
     "forward_right": (1.0, -1.0),
 }
+
+
+class WalkCommand(NamedTuple):
+    """What an expert commands a walker to do in the next step.
+
+    Attributes:
+        forward: Walking velocity as a fraction of the greatest, in [-1, 1].
+        turn: Turning velocity likewise, left positive.
+        call: The call; ignored by a body without the action part `voice`.
+        verb: Name of the verb, see `WalkerCfg.verbs`.
+    """
+
+    forward: float
+    turn: float
+    call: Call = Call.none
+    verb: str = NO_VERB
 
 
 class WalkAction(Protocol):

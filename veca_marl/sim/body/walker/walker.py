@@ -19,20 +19,25 @@ from veca_marl.sim.body.body_cfg import BodyCfg
 from veca_marl.sim.body.walker.capsule import Capsule
 from veca_marl.sim.body.walker.footsteps import Footsteps
 from veca_marl.sim.body.walker.gait import Gait
+from veca_marl.sim.body.walker.hand import Hand
 from veca_marl.sim.body.walker.line_of_contact import is_first_hit
-from veca_marl.sim.body.walker.walk_commands import WALK_ACTIONS
+from veca_marl.sim.body.walker.verb_part import VERB, Applied, VerbChoice, verb_spec
+from veca_marl.sim.body.walker.walk_commands import WALK_ACTIONS, WalkCommand
 from veca_marl.sim.body.walker.walker_cfg import WalkerCfg, greatest_speed_mps
 from veca_marl.sim.body.walker.walker_collisions import walker_collisions
 from veca_marl.sim.geometry import Floats, horizontal_distance
 from veca_marl.sim.physics import Prop, World
-from veca_marl.sim.sound import Call
 from veca_marl.sim.spec import ArraySpec
 
 MOVE = "move"  # the part of the action that walks
 
 
 class Walker(Body):
-    """A body that moves at commanded velocities. See `Body` for the common methods."""
+    """A body that moves at commanded velocities. See `Body` for the common methods.
+
+    Attributes:
+        verb_choice: The chosen verb and its result.
+    """
 
     cfg_type: ClassVar[type[BodyCfg]] = WalkerCfg
 
@@ -45,6 +50,8 @@ class Walker(Body):
         self._capsule = Capsule(
             world.client, world.scene, cfg.radius_m, cfg.height_m, cfg.push_limit_kg
         )
+        self._hand = Hand(world.client, name, self._capsule.body_id, cfg.radius_m)
+        self.verb_choice = VerbChoice(cfg.verbs)
         self._soles = Soles(self._skeleton)
         mass_kg = sum(bone.mass_kg for bone in self._skeleton.bones)
         self._footsteps = Footsteps(name, mass_kg, world)
@@ -52,7 +59,7 @@ class Walker(Body):
         walker_collisions(world).add(self)
 
     def _movement_spec(self, cfg: WalkerCfg) -> dict[str, ArraySpec]:
-        return {MOVE: WALK_ACTIONS[cfg.action].spec}
+        return {MOVE: WALK_ACTIONS[cfg.action].spec, **verb_spec(cfg.verbs)}
 
     # ---- position and velocity
 
@@ -77,9 +84,10 @@ class Walker(Body):
         return self.cfg.radius_m
 
     def place(self, position: Floats | tuple[float, float, float], yaw_rad: float = 0.0) -> None:
-        """Stand at a place on the floor, facing `yaw_rad`, looking ahead.
+        """Stand at a place on the floor, facing `yaw_rad`, looking ahead, with empty hands.
 
-        If a wall or a heavy obstacle occupies the place, the walker is moved out of it sideways.
+        A held prop is released where it is. If a wall or a heavy obstacle occupies the place, the
+        walker is moved out of it sideways.
 
         Raises:
             ValueError: If a number is not finite.
@@ -95,6 +103,8 @@ class Walker(Body):
         self._head_pitch_rad = math.radians(self.cfg.head_pitch_deg)
         self._head_yaw_rad = 0.0
         self._gaze.relax()
+        self._hand.drop()
+        self.verb_choice.reset()
         self._gait.reset()
         self._collect_obstacles(0.0)
         self._ground[:] = self._capsule.resolve_contacts(self._ground[0], self._ground[1])
@@ -109,19 +119,28 @@ class Walker(Body):
         forward, turn = self._walk_action.decode(parts[MOVE])
         top_mps = self.cfg.walk_speed_mps * (self.cfg.backward_share if forward < 0.0 else 1.0)
         self.walk(forward * top_mps, turn * math.radians(self.cfg.turn_speed_degps))
+        if VERB in parts:
+            self.verb_choice.choose(int(parts[VERB]))
 
     def rest(self) -> None:
         """Stand still."""
         self.walk(0.0, 0.0)
 
     def encode(self, command: Any) -> dict[str, NDArray[Any]]:
-        """Return the action nearest to a command ``(forward, turn)``, each in [-1, 1].
+        """Return the action nearest to a command.
 
-        A third element is the `Call`; without it no call is chosen.
+        Args:
+            command: A `WalkCommand`, or a tuple of its first elements.
+
+        Raises:
+            ValueError: If the command names a verb that is not in `WalkerCfg.verbs`.
         """
-        forward, turn, *call = command
-        move = self._walk_action.encode(forward, turn)
-        return self._with_voice({MOVE: move}, Call(call[0]) if call else Call.none)
+        forward, turn, call, verb = WalkCommand(*command)
+        parts: dict[str, NDArray[Any]] = {MOVE: self._walk_action.encode(forward, turn)}
+        choice = self.verb_choice.index(verb)
+        if VERB in self.action_spec:
+            parts[VERB] = np.asarray(choice, np.int64)
+        return self._with_voice(parts, call)
 
     def walk(self, walk_speed_mps: float, turn_speed_radps: float) -> None:
         """Walk at constant speeds until the next command.
@@ -151,8 +170,9 @@ class Walker(Body):
         """
         here, there = self.position, prop.position
         gap = horizontal_distance(here, there) - self.radius_m - prop.radius_m
-        light = not prop.fixed and prop.cfg.mass_kg <= self.cfg.push_limit_kg
-        if gap > self.cfg.kick_reach_m or not light or prop.lowest_m > self.cfg.kick_height_m:
+        if gap > self.cfg.kick_reach_m or prop.lowest_m > self.cfg.kick_height_m:
+            return False
+        if not self.is_light(prop) or prop.holder is not None:
             return False
         ahead = math.atan2(there[1] - here[1], there[0] - here[0]) - self.yaw_rad
         aside = abs((ahead + math.pi) % (2.0 * math.pi) - math.pi)
@@ -172,6 +192,50 @@ class Walker(Body):
         prop.set_velocity(speed * away + np.array([0.0, 0.0, 0.2 * speed]))
         self._gait.kick()
         return True
+
+    @property
+    def held(self) -> Prop | None:
+        """The prop in its hand; None if the hand is empty."""
+        return self._hand.prop
+
+    def is_light(self, prop: Prop) -> bool:
+        """Return whether it pushes, kicks and carries a prop: the paper's light objects."""
+        return not prop.fixed and prop.cfg.mass_kg <= self.cfg.push_limit_kg
+
+    def can_grab(self, prop: Prop) -> bool:
+        """Return whether the hand is empty, and a prop is light and held by no body."""
+        return self.held is None and prop.holder is None and self.is_light(prop)
+
+    def grab(self, prop: Prop) -> bool:
+        """Take a prop into the right hand; return False, and do nothing, if it cannot.
+
+        From now on the prop follows the hand, at any distance at which it was before.
+        """
+        if not self.can_grab(prop):
+            return False
+        self._hand.take(prop, self.yaw_rad)
+        self._gait.carrying = True
+        self._pose_bones()
+        self._follow_palm()
+        return True
+
+    def release(self) -> bool:
+        """Release the held prop, which falls; return False if the hand is empty."""
+        if self.held is None:
+            return False
+        self._hand.drop()
+        self._gait.carrying = False
+        return True
+
+    @property
+    def applied_verb(self) -> Applied | None:
+        """The verb of its action that had an effect in the last step; None if there was none."""
+        return self.verb_choice.applied
+
+    @property
+    def verb_was_refused(self) -> bool:
+        """Whether its action chose a verb in the last step that had no effect."""
+        return self.verb_choice.refused
 
     def rotate_up_down_head(self, deg: float) -> None:
         """Pitch the head down (up when negative) by an angle, within the range of the neck."""
@@ -208,6 +272,8 @@ class Walker(Body):
         vx, vy = (x - self._ground[0]) / substep_s, (y - self._ground[1]) / substep_s
         self._ground[:] = x, y
         self._capsule.set_velocity(vx, vy, self._turn_radps)
+        if self.held is not None:
+            self._hand.follow(self._ground, self.yaw_rad, (vx, vy, 0.0))
 
     def write_frames(self) -> None:
         """Pose the bones by the gait and move the voice to the mouth."""
@@ -222,6 +288,14 @@ class Walker(Body):
         self._pelvis_spin[2] = self._turn_radps
         self._mouth.position = self.mount("mouth").position
         self._footsteps.follow(self.position, self._gait.landing_mps)
+        if self.held is not None:
+            self._follow_palm()
+
+    def _follow_palm(self) -> None:
+        """Move the held prop to the present place of the palm."""
+        self._hand.set_palm(self.palms()[1], self._ground, self.yaw_rad)
+        vx, vy, _ = self._velocity
+        self._hand.follow(self._ground, self.yaw_rad, (float(vx), float(vy), 0.0))
 
     def _collect_obstacles(self, distance_m: float) -> None:
         movers = self._world.movers

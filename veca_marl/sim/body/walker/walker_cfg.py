@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from veca_marl.sim.body.body_cfg import BodyCfg
 from veca_marl.sim.body.walker.walk_commands import WalkActionKind
 from veca_marl.sim.physics import ClockCfg
+from veca_marl.sim.physics.interactions import check_interactions
 
 
 @dataclass
@@ -21,13 +22,16 @@ class WalkerCfg(BodyCfg):
         turn_speed_degps: Turning speed of a full turn action.
         radius_m: Radius of the capsule in the physics.
         height_m: Height of the capsule.
-        push_limit_kg: Props up to this mass are pushed; heavier ones stop the walker.
+        push_limit_kg: Props up to this mass are light: they are pushed, kicked and carried. Heavier
+            ones stop the walker.
         kick_reach_m: Largest distance from the capsule's surface to that of a prop it can kick.
         kick_angle_deg: Largest angle between the walker's heading and the direction of the prop.
         kick_height_m: Largest height of the prop's lowest point.
         kick_speed_mps: Speed of a light prop after a kick.
         kick_impulse_ns: Largest impulse of a kick; it limits the speed of heavy props.
         head_pitch_deg: Pitch of the head at the start of an episode; down is positive.
+        verbs: Verbs of the discrete action part `verb`, such as ``[grab, release]``; without
+            verbs there is no such part. See `veca_marl.sim.physics.interactions`.
     """
 
     action: WalkActionKind = WalkActionKind.continuous
@@ -43,9 +47,10 @@ class WalkerCfg(BodyCfg):
     kick_speed_mps: float = 3.0
     kick_impulse_ns: float = 3.0
     head_pitch_deg: float = 12.0
+    verbs: list[str] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        """Check the choices, the numbers, and that the capsule is higher than wide."""
+        """Check the choices, the numbers, the verbs, and that the capsule is higher than wide."""
         self._check_choices(action=WalkActionKind)
         super().__post_init__()
         if not 0.0 < 2.0 * self.radius_m <= self.height_m:
@@ -55,6 +60,7 @@ class WalkerCfg(BodyCfg):
             )
         if self.backward_share > 1.0:
             raise ValueError(f"body.backward_share={self.backward_share} is not in [0, 1]")
+        check_interactions("body.verbs", self.verbs)
 
 
 def greatest_speed_mps(cfg: WalkerCfg, clock: ClockCfg) -> float:

@@ -14,6 +14,7 @@ from typing import Protocol
 import numpy as np
 from numba import njit
 
+from veca_marl.sim.body.walker.verb_part import VerbUser, apply_verbs
 from veca_marl.sim.geometry import Floats
 from veca_marl.sim.physics import World
 
@@ -22,7 +23,7 @@ _ROUNDS = 16
 _TOLERANCE_M = 1e-7
 
 
-class CollidingWalker(Protocol):
+class CollidingWalker(VerbUser, Protocol):
     """What the collision handling needs of a walker."""
 
     def reset(self) -> None:
@@ -77,7 +78,8 @@ class WalkerCollisions:
             walker.reset()
 
     def before_step(self) -> None:
-        """See `Mover`."""
+        """See `Mover`. Verbs are applied before anything moves."""
+        apply_verbs(self._walkers)
         for walker in self._walkers:
             walker.before_step()
 

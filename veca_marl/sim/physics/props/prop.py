@@ -32,6 +32,7 @@ class Prop:
         object_id: Its value in segmentation images.
         sound: Its sound source; None for a silent prop.
         impact: The source of its sound when it is hit; None without sounds of impacts.
+        holder: Name of the body that holds it; None while it is free.
     """
 
     def __init__(
@@ -45,6 +46,7 @@ class Prop:
         self.cfg = cfg
         self.sound = sound
         self.impact: Source | None = None
+        self.holder: str | None = None
         self._client = client
         self._scene = scene
         geoms = prop_geoms(cfg)
@@ -79,6 +81,11 @@ class Prop:
         """Height of its lowest point."""
         low, _ = pybullet.getAABB(self.body_id, physicsClientId=self._client)
         return float(low[2])
+
+    def bounds(self) -> tuple[Floats, Floats]:
+        """Return the lower and the upper corner of its bounding box, each ``(3,)`` metres."""
+        low, high = pybullet.getAABB(self.body_id, physicsClientId=self._client)
+        return np.array(low), np.array(high)
 
     @property
     def position(self) -> Floats:
@@ -119,6 +126,29 @@ class Prop:
         Raises:
             ValueError: If a number is not finite.
         """
+        self.carry(position, yaw_rad, velocity, angular_velocity)
+        for source in (self.sound, self.impact):
+            if source is not None:
+                source.teleport(self.position)
+
+    def carry(
+        self,
+        position: Sequence[float] | Floats,
+        yaw_rad: float,
+        velocity: Sequence[float] | Floats,
+        angular_velocity: Sequence[float] | Floats = (0.0, 0.0, 0.0),
+    ) -> None:
+        """Set pose and velocity as `place` does, as a step of a motion: its sound moves along.
+
+        Args:
+            position: ``(3,)`` metres.
+            yaw_rad: Rotation about z; any other rotation is undone.
+            velocity: ``(3,)`` m/s, of the centre of mass.
+            angular_velocity: ``(3,)`` rad/s.
+
+        Raises:
+            ValueError: If a number is not finite.
+        """
         x, y, z = _three_finite(self.name, "position", position)
         if self._centre is not None:
             (x, y, z) = np.array([x, y, z]) + rotation_about_vertical(yaw_rad) @ self._centre
@@ -127,9 +157,6 @@ class Prop:
         )
         self.set_velocity(velocity, angular_velocity)
         follow_physics([self])
-        for source in (self.sound, self.impact):
-            if source is not None:
-                source.teleport(self.position)
 
     def set_velocity(
         self,

@@ -76,6 +76,8 @@ class PropCfg:
         tangible: Whether it collides, is felt and stops sound; a mark on the floor is only seen.
         sound: What it emits; None for a silent prop.
         material: How it sounds when it is hit, see `ImpactCfg`; it does not change the mass.
+        interactions: Names of the verbs that bodies can apply to it, such as ``[grab]``; see
+            `veca_marl.sim.physics.interactions`.
     """
 
     name: str = ""
@@ -93,6 +95,7 @@ class PropCfg:
     tangible: bool = True
     sound: SoundCfg | None = None
     material: Material = Material.wood
+    interactions: list[str] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         """Check the numbers."""

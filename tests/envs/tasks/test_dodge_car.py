@@ -1,0 +1,197 @@
+"""The toy car, and DodgeCar: driving, contacts, rewards, hiding places, the expert."""
+
+import math
+
+import numpy as np
+import pytest
+from composed import compose
+
+from veca_marl.envs.core.game import Game
+from veca_marl.envs.core.team import Script
+
+SMALL_EYES = ("senses.vision.width=16", "senses.vision.height=16")
+STEP_S = 0.04
+
+
+def game_of(*overrides):
+    game = Game(compose(["+task=DodgeCar", *SMALL_EYES, *overrides]).game)
+    game.reset(np.random.default_rng(0))
+    return game
+
+
+@pytest.fixture(scope="module")
+def game():
+    game = game_of()
+    yield game
+    game.close()
+
+
+def walk(game, forward=0.0, turn=0.0):
+    return game.step({"agents": np.array([forward, turn], np.float32)})
+
+
+def hide(game):
+    """Move the player out of the room."""
+    game.task.walker.place((20.0, 20.0, 0.0))
+
+
+def drive(game, steps):
+    """Return positions and headings of the car without a player in the room."""
+    hide(game)
+    track = []
+    for _ in range(steps):
+        walk(game)
+        track.append([*game.task.car.prop.position, game.task.car.heading_rad])
+    return np.array(track)
+
+
+# ---- the car
+
+
+def test_the_car_drives_round_the_room_at_its_speed():
+    game = game_of("task.aim=0")
+    track = drive(game, 500)
+    speeds = np.linalg.norm(np.diff(track[:, :2], axis=0), axis=1) / STEP_S
+    assert np.quantile(speeds, 0.6) == pytest.approx(1.5, abs=0.05)
+    assert speeds.max() < 1.6
+    assert np.ptp(track[:, :2], axis=0).min() > 3.5
+    assert np.abs(track[:, :2]).max() < 2.85  # no contact with the walls at 3 m
+    np.testing.assert_allclose(track[:, 2], 0.08, atol=0.01)
+    game.close()
+
+
+def test_its_front_points_to_where_it_drives(game):
+    game.reset(np.random.default_rng(3))
+    track = drive(game, 200)
+    way = np.diff(track[:, :2], axis=0)
+    ahead = np.stack([np.cos(track[:-1, 3]), np.sin(track[:-1, 3])], axis=1)
+    fast = np.linalg.norm(way, axis=1) > 0.04
+    cosines = (way * ahead).sum(axis=1)[fast] / np.linalg.norm(way, axis=1)[fast]
+    assert cosines.min() > 0.9
+
+
+def test_it_keeps_away_from_furniture():
+    game = game_of("playground=single_room", "task.aim=0")
+    before = {name: prop.position for name, prop in game.world.props.items() if prop.fixed}
+    driven_m = 0.0
+    for seed in range(3):
+        game.reset(np.random.default_rng(seed))
+        track = drive(game, 250)
+        driven_m += np.linalg.norm(np.diff(track[:, :2], axis=0), axis=1).sum()
+        stool = game.world.props["stool"].position
+        assert math.dist(stool[:2], (-2.4, 1.75)) < 0.02  # it was not pushed
+    assert driven_m > 0.7 * 3 * 250 * STEP_S * 1.5
+    assert all((game.world.props[name].position == place).all() for name, place in before.items())
+    game.close()
+
+
+def test_the_predicted_path_is_the_path_to_the_next_point(game):
+    game.reset(np.random.default_rng(1))
+    hide(game)
+    walk(game)
+    predicted = game.task.car.predicted_path(10)
+    track = drive(game, 10)
+    assert np.linalg.norm(track[:, :2] - predicted, axis=1).max() < 0.1
+
+
+def test_a_car_that_lies_on_its_side_is_set_upright(game):
+    game.reset(np.random.default_rng(0))
+    hide(game)
+    game.task.car.prop.set_velocity((0.0, 0.0, 1.5), (12.0, 0.0, 0.0))
+    game.world.step()
+    for _ in range(8):
+        game.world.step()
+    assert game.task.car.prop.rotation[2, 2] < 0.9
+    walk(game)
+    assert game.task.car.prop.rotation[2, 2] > 0.99
+
+
+def test_the_same_seed_gives_the_same_drive(game):
+    tracks = []
+    for _ in range(2):
+        game.reset(np.random.default_rng(5))
+        tracks.append(drive(game, 100))
+    np.testing.assert_array_equal(*tracks)
+
+
+# ---- rules
+
+
+def test_a_contact_ends_the_episode():
+    game = game_of("task.aim=1")
+    game.task.walker.place((0.0, 0.0, 0.0))
+    game.task.car.prop.place((2.0, 0.0, 0.08), math.pi)
+    outcomes = [walk(game)]
+    while not outcomes[-1].done:
+        outcomes.append(walk(game))
+    *before, last = outcomes
+    assert last.terminated
+    assert last.terms["agents"] == {"hit": 1.0, "survived": 0.0}
+    assert not game.task.solved(game.players[0])
+    assert all(one.terms["agents"] == {"hit": 0.0, "survived": STEP_S} for one in before)
+    assert 1.0 < len(outcomes) * STEP_S < 1.6  # 1.7 m at 1.5 m/s
+    game.close()
+
+
+def test_without_a_contact_the_task_is_solved():
+    game = game_of("task.max_seconds=1")
+    hide(game)
+    outcomes = [walk(game) for _ in range(25)]
+    assert outcomes[-1].truncated
+    assert game.task.solved(game.players[0])
+    game.close()
+
+
+@pytest.mark.parametrize(
+    ("override", "message"),
+    [
+        ("task.aim=1.5", r"task.aim=1.5 must be in \[0, 1\]"),
+        ("task.speed_mps=0", "task.speed_mps"),
+        ("playground=four_rooms", "'four_rooms' has 4 rooms; .* choose playground=simple"),
+        ("body=mitten", "choose body=walker"),
+    ],
+)
+def test_what_cannot_be_played_is_refused(override, message):
+    with pytest.raises(ValueError, match=message):
+        Game(compose(["+task=DodgeCar", override]).game)
+
+
+# ---- policies
+
+
+def episodes(game, policy, seeds, place=None):
+    """Return the share of solved episodes and the mean return."""
+    solved, total = 0, 0.0
+    for seed in seeds:
+        game.reset(np.random.default_rng(seed))
+        if place is not None:
+            game.task.walker.place(place)
+        done = False
+        while not done:
+            game.play_script(game.players[0], policy)
+            outcome = game.advance()
+            total += game.reward_of(outcome.terms["agents"])
+            done = outcome.done
+        solved += bool(game.task.solved(game.players[0]))
+    return solved / len(seeds), total / len(seeds)
+
+
+@pytest.mark.parametrize("place", [None, (-2.85, -2.85, 0.0)])
+def test_standing_still_is_hit_also_in_a_corner(game, place):
+    solved, mean = episodes(game, Script.idle, range(8), place)
+    assert solved <= 0.13
+    assert mean < -0.3
+
+
+def test_the_expert_dodges():
+    game = game_of("task.max_seconds=10")
+    solved, mean = episodes(game, Script.expert, range(100, 103))
+    assert solved == 1.0
+    assert mean == pytest.approx(0.5)
+    game.close()
+
+
+@pytest.mark.slow
+def test_the_expert_dodges_in_most_episodes(game):
+    solved, _ = episodes(game, Script.expert, range(200, 230))
+    assert solved >= 0.9

@@ -1,0 +1,60 @@
+"""Tasks that the paper runs in several playgrounds can be played in all of those that fit."""
+
+import numpy as np
+import pytest
+from composed import compose
+
+from veca_marl.config import ConfigError
+from veca_marl.envs.core.game import Game
+
+FURNISHED = [
+    *(pytest.param(name, marks=pytest.mark.slow) for name in ("house", "random_house")),
+    "house2",
+]
+
+
+def play(task, playground, *overrides, resets=3, steps=2):
+    """Play some steps of some episodes; return the game."""
+    game = Game(compose([f"+task={task}", f"playground={playground}", *overrides]).game)
+    for seed in range(resets):
+        game.reset(np.random.default_rng(seed))
+        for _ in range(steps):
+            for player in game.players:
+                player.body.rest()
+            game.advance()
+    return game
+
+
+@pytest.mark.parametrize("task", ["KickTheBall", "GrabObject", "ObjectNav", "MultiAgentNav"])
+@pytest.mark.parametrize("playground", FURNISHED)
+def test_tasks_of_the_paper_are_played_in_furnished_houses(task, playground):
+    game = play(task, playground)
+    for player in game.players:
+        place = player.body.position
+        room = min(game.cfg.playground.rooms, key=lambda room: room.distance_m(place[:2]))
+        assert room.contains(np.array([*place[:2], 0.1]), margin_m=0.0)
+        for prop in game.world.props.values():
+            assert not prop.touches(getattr(player.body, "body_id", -1)) or not prop.fixed
+    game.close()
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (
+            ["+task=KickTheBall", "playground.rooms=[{name: den, size_m: [2.0, 4.0, 2.6]}]"],
+            r"room 'den' .*needs 3.0 m along x and y; choose playground=simple, .*house2",
+        ),
+        (
+            ["+task=MultiAgentNav", "playground=single_room"],
+            r"playground 'single_room' has 1; .*playground=two_rooms, .*random_house",
+        ),
+        (
+            ["+task=MultiAgentNav", "playground=house", "task.agents=5"],
+            r"task.agents=5 .*'house' has 4",
+        ),
+    ],
+)
+def test_what_does_not_fit_is_refused_in_the_configuration(words, message):
+    with pytest.raises(ConfigError, match=message):
+        compose(words)

@@ -1,0 +1,68 @@
+"""Free floor of a playground as a fine grid, computed from its props, for tests of houses."""
+
+import math
+
+import numpy as np
+from scipy import ndimage
+
+from veca_marl.sim.physics import PropShape
+
+CELL_M = 0.04
+BODY_M = 0.78  # height below which props are in the way
+RADIUS_M = 0.11
+
+
+class FloorMap:
+    """Cells whose centre a disc can occupy, in the rooms and in the openings of doors."""
+
+    def __init__(self, playground, radius_m=RADIUS_M):
+        low = np.min([room.lower_m[:2] for room in playground.rooms], axis=0)
+        high = np.max([np.add(room.lower_m, room.size_m)[:2] for room in playground.rooms], axis=0)
+        axes = [np.arange(a + CELL_M / 2, b, CELL_M) for a, b in zip(low, high, strict=True)]
+        self.low, (self.x, self.y) = low, np.meshgrid(*axes, indexing="ij")
+        self.free = np.zeros(self.x.shape, bool)
+        for room in playground.rooms:
+            self.free |= self.in_box(np.add(room.lower_m, room.size_m), room)
+        for door in playground.doors:
+            half = door.width_m / 2
+            x, y = door.position_m
+            self.free |= (abs(self.x - x) < half) & (abs(self.y - y) < half)
+        for prop in playground.built_props():
+            if is_in_the_way(prop):
+                self.free &= distance(prop, self.x, self.y) >= radius_m
+        self.labels, self.count = ndimage.label(self.free)
+
+    def in_box(self, high, room):
+        x, y, _ = room.lower_m
+        return (self.x > x) & (self.x < high[0]) & (self.y > y) & (self.y < high[1])
+
+    def label(self, point):
+        column, row = ((np.asarray(point)[:2] - self.low) / CELL_M).astype(int)
+        return self.labels[column, row]
+
+
+def is_in_the_way(prop):
+    return prop.tangible and prop.mass_kg == 0.0 and foot_m(prop) < BODY_M
+
+
+def foot_m(prop):
+    height = prop.position_m[2]
+    if prop.shape is PropShape.wall:
+        return height
+    extent = {PropShape.sphere: 0, PropShape.box: 2, PropShape.cylinder: 1, PropShape.capsule: 1}
+    size = prop.size_m[extent[prop.shape]]
+    return height - (size if prop.shape is PropShape.sphere else size / 2)
+
+
+def distance(prop, x, y):
+    """Horizontal distance of points from a box or an upright cylinder; 0 inside."""
+    x, y = x - prop.position_m[0], y - prop.position_m[1]
+    if prop.shape not in (PropShape.wall, PropShape.box):
+        return np.maximum(np.hypot(x, y) - prop.size_m[0], 0.0)
+    c, s = math.cos(math.radians(prop.yaw_deg)), math.sin(math.radians(prop.yaw_deg))
+    along, across = abs(c * x + s * y), abs(c * y - s * x)
+    out = [
+        np.maximum(each - size / 2, 0.0)
+        for each, size in zip((along, across), prop.size_m, strict=False)
+    ]
+    return np.hypot(*out)

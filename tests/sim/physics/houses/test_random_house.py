@@ -1,0 +1,119 @@
+"""Generated houses are valid for every seed: connected, passable, furnished, reproducible."""
+
+import numpy as np
+import pytest
+from composed import compose
+from floor_maps import FloorMap
+
+from veca_marl.sim.physics import RandomHouseCfg, World
+from veca_marl.sim.physics.houses.furnishing import FloorNeeds
+
+QUICK, ALL = range(8), range(8, 200)
+SIZES = [
+    {"room_count": 1, "house_size_m": (3.2, 3.2)},
+    {"room_count": 2, "house_size_m": (6.5, 3.2), "pieces_per_room": (4, 4)},
+    {"room_count": 9, "house_size_m": (9.8, 9.8), "loops": 0.0},
+    {"room_count": 3, "house_size_m": (14.0, 6.0), "loops": 1.0, "door_width_m": 0.7},
+]
+
+
+def check(house):
+    """The laws of a generated house."""
+    floor = FloorMap(house)
+    assert floor.count == 1, "all places that have space for a walker are connected"
+    for room in house.rooms:
+        assert min(room.size_m[:2]) >= house.least_room_m - 1e-9
+        assert floor.in_box(np.add(room.lower_m, room.size_m), room)[floor.free].any()
+    assert len(house.rooms) == house.room_count
+    assert len(house.doors) >= house.room_count - 1
+    assert all(width == house.door_width_m for width in (door.width_m for door in house.doors))
+
+
+@pytest.mark.parametrize(
+    "seeds", [pytest.param(QUICK, id="few"), pytest.param(ALL, id="many", marks=pytest.mark.slow)]
+)
+def test_every_seed_gives_a_house_in_which_a_walker_reaches_everything(seeds):
+    pieces = []
+    for seed in seeds:
+        house = RandomHouseCfg(seed=seed)
+        check(house)
+        pieces.append(len(house.furniture))
+    assert min(pieces) >= 10, "most of the 15 to 25 pieces find a place"
+
+
+@pytest.mark.parametrize("numbers", SIZES, ids=lambda numbers: str(numbers["room_count"]))
+def test_other_sizes_are_valid_too(numbers):
+    for seed in range(3):
+        check(RandomHouseCfg(seed=seed, **numbers))
+
+
+def test_the_first_room_is_the_widest_with_its_middle_at_the_origin_and_free_side_walls():
+    for seed in QUICK:
+        house = RandomHouseCfg(seed=seed)
+        first, *others = house.rooms
+        assert first.name == "living"
+        assert min(first.size_m[:2]) >= max(min(room.size_m[:2]) for room in others)
+        np.testing.assert_allclose(first.middle_m, 0.0, atol=0.01)
+        own = [piece for piece in house.furniture if piece.name.startswith("living_")]
+        assert {abs(piece.yaw_deg) for piece in own} == {90.0}
+
+
+def test_every_room_keeps_an_open_floor():
+    """Two places in each room, clear of everything, for the object and an agent."""
+    needs = FloorNeeds()
+    for seed in QUICK[:3]:
+        house = RandomHouseCfg(seed=seed)
+        floor = FloorMap(house, radius_m=0.8)
+        for room in house.rooms:
+            inside = floor.in_box(np.add(room.lower_m, room.size_m), room) & floor.free
+            places = np.array([floor.x[inside], floor.y[inside]])
+            assert np.linalg.norm(np.ptp(places, axis=1)) >= needs.extent_m - 0.1
+
+
+def test_the_same_seed_gives_the_same_house_and_another_one_differs():
+    assert RandomHouseCfg(seed=3) == RandomHouseCfg(seed=3)
+    assert RandomHouseCfg(seed=3).rooms != RandomHouseCfg(seed=4).rooms
+
+
+def test_the_command_line_chooses_seed_and_size():
+    words = ["+task=KickTheBall", "playground=random_house", "playground.seed=7"]
+    chosen = compose([*words, "playground.room_count=4"]).playground
+    house = RandomHouseCfg(name="random_house", seed=7, room_count=4)
+    assert (chosen.rooms, chosen.doors, chosen.furniture) == (
+        house.rooms,
+        house.doors,
+        house.furniture,
+    )
+
+
+@pytest.mark.parametrize(
+    ("numbers", "message"),
+    [
+        ("seed=-1", "playground.seed=-1"),
+        ("room_count=7", "from 1 to 6: so many rooms of 3.2 m fit into"),
+        ("room_count=0", "room_count=0 must be from 1"),
+        ("house_size_m=[3,9]", "room_count=5 must be from 1 to 0"),
+        ("least_room_m=2", r"least_room_m=2.0 must be at least 2.90"),
+        ("door_width_m=3", r"least_room_m=3.2 must be at least 3.50, for doors of 3.0 m"),
+        ("loops=2", r"loops=2.0 must be in \[0, 1\]"),
+        ("pieces_per_room=[3,1]", r"pieces_per_room=\(3, 1\)"),
+        ("walls=null", "walls of a random house must not be null"),
+        ("rooms=[{name: attic}]", "rooms of a random house cannot be set"),
+        ("generator=other", "generator='other' must be 'random_house'"),
+    ],
+)
+def test_impossible_houses_are_refused_in_the_configuration(numbers, message):
+    with pytest.raises(ValueError, match=message):
+        compose(["+task=KickTheBall", "playground=random_house", f"playground.{numbers}"])
+
+
+def test_only_generated_playgrounds_have_a_seed():
+    with pytest.raises(ValueError, match=r"unknown key 'playground\.seed'"):
+        compose(["+task=KickTheBall", "playground=house", "playground.seed=7"])
+
+
+def test_a_generated_house_becomes_a_world():
+    world = World(RandomHouseCfg(seed=7))
+    assert {"wall_0", "living_plant", "floor_living"} <= set(world.props)
+    assert not world.prop("floor_living").cfg.tangible
+    world.close()

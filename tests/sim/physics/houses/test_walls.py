@@ -1,0 +1,98 @@
+"""Walls that are built from rooms and doors."""
+
+import numpy as np
+import pytest
+from floor_maps import FloorMap
+from seeking import shipped
+
+from veca_marl.sim.physics import (
+    DoorCfg,
+    FurnitureCfg,
+    FurnitureKind,
+    PlaygroundCfg,
+    RoomCfg,
+    WallsCfg,
+)
+from veca_marl.sim.physics.houses.furniture import FURNITURE, furniture_props
+from veca_marl.sim.physics.houses.walls import wall_lines
+
+
+def row(count, gap_m=0.1, **numbers):
+    """Rooms of 3 x 3 m in a row along x."""
+    rooms = [
+        RoomCfg(f"room_{n}", (n * (3.0 + gap_m), 0.0, 0.0), (3.0, 3.0, 2.5)) for n in range(count)
+    ]
+    return PlaygroundCfg(name="row", rooms=rooms, walls=WallsCfg(), **numbers)
+
+
+def test_rooms_in_a_row_share_the_walls_between_them():
+    lines = wall_lines(row(3).rooms, 0.1)
+    across = [line for line in lines if line.axis == 0]
+    along = [line for line in lines if line.axis == 1]
+    np.testing.assert_allclose([line.at_m for line in across], [-0.05, 3.05, 6.15, 9.25])
+    assert [(line.begin_m, line.end_m) for line in along] == [pytest.approx((-0.05, 9.25))] * 2
+
+
+def test_a_door_is_an_opening_with_a_wall_above():
+    door = DoorCfg("door", ("room_0", "room_1"), (3.05, 1.0), 1.0)
+    walls = {prop.name: prop for prop in row(2, doors=[door]).built_props()}
+    assert walls["wall_1_0"].size_m == pytest.approx([0.1, 0.55, 2.5])
+    assert walls["wall_1_1"].size_m == pytest.approx([0.1, 1.55, 2.5])
+    assert walls["wall_over_door"].position_m == pytest.approx((3.05, 1.0, 2.0))
+    assert walls["wall_over_door"].size_m == pytest.approx([0.1, 1.0, 0.5])
+
+
+def test_rooms_are_separate_without_a_door_and_connected_by_it():
+    door = DoorCfg("door", ("room_0", "room_1"), (3.05, 1.0), 1.0)
+    assert FloorMap(row(2)).count == 2
+    assert FloorMap(row(2, doors=[door])).count == 1
+
+
+def test_rooms_that_are_too_near_for_a_wall_are_refused():
+    with pytest.raises(ValueError, match=r"'room_0': a wall of 0\.1 m round another room"):
+        row(2, gap_m=0.05)
+
+
+def test_a_door_beside_the_wall_is_refused():
+    door = DoorCfg("door", ("room_0", "room_1"), (3.2, 1.0), 1.0)
+    with pytest.raises(ValueError, match=r"doors \['door'\] are not in the middle of a wall"):
+        row(2, doors=[door])
+
+
+@pytest.mark.parametrize(
+    "wrong", [{"thickness_m": 0.0}, {"door_height_m": -1.0}, {"colours": [[2.0, 0.0, 0.0]]}]
+)
+def test_impossible_walls_are_refused(wrong):
+    with pytest.raises(ValueError, match=next(iter(wrong)).removesuffix("s")):
+        WallsCfg(**wrong)
+
+
+@pytest.mark.parametrize("kind", FurnitureKind)
+def test_furniture_stands_on_the_floor_within_its_area(kind):
+    piece, cfg = FURNITURE[kind], FurnitureCfg("piece", kind, (2.0, 3.0), 90.0)
+    plain = FurnitureCfg("piece", kind)
+    feet = []
+    for part in furniture_props(plain):
+        x, y, z = part.position_m
+        round_m = part.size_m[0] if part.shape.name != "box" else 0.0
+        half = (round_m, round_m) if round_m else (part.size_m[0] / 2, part.size_m[1] / 2)
+        assert abs(x) + half[0] <= piece.width_m / 2 + 1e-9, part.name
+        assert abs(y) + half[1] <= piece.depth_m / 2 + 1e-9, part.name
+        heights = {"sphere": 2 * part.size_m[0], "box": part.size_m[-1]}
+        feet.append(z - heights.get(part.shape.name, part.size_m[-1]) / 2)
+    assert min(feet) == pytest.approx(0.0)
+    turned, straight = furniture_props(cfg)[-1], furniture_props(plain)[-1]
+    x, y, z = straight.position_m
+    assert turned.position_m == pytest.approx((2.0 - y, 3.0 + x, z))
+
+
+def test_an_unknown_piece_is_refused():
+    with pytest.raises(ValueError, match=r"kind='throne'; choices: .*'armchair'"):
+        FurnitureCfg("seat", kind="throne")
+
+
+@pytest.mark.parametrize("house", ["house", "house2"])
+def test_a_walker_reaches_everything_in_the_furnished_houses(house):
+    playground = shipped(house)
+    assert FloorMap(playground).count == 1
+    assert len(playground.furniture) >= 4 * len(playground.rooms) - 1

@@ -1,0 +1,55 @@
+"""Experts of ObjectNav and ObjectPhysNav: the shortest path round the wrong objects."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from numpy.typing import NDArray
+
+from veca_marl.envs.core.expert import Expert, register_expert
+from veca_marl.envs.experts.control.locomotion import locomotion_of
+from veca_marl.envs.experts.control.wall_recovery import WallRecovery
+from veca_marl.envs.tasks.navigation.floors.floor_grid import (
+    Detour,
+    floor_grid,
+    free_cells,
+    outside,
+)
+from veca_marl.envs.tasks.navigation.floors.grid_paths import PathsTo
+from veca_marl.envs.tasks.navigation.object_nav import ObjectNav
+
+_MARGIN_M = 0.15  # at least, from the distance at which a wrong object is reached
+
+
+@register_expert("ObjectNav")
+class ObjectNavExpert(Expert[ObjectNav]):
+    """Takes the shortest path to the target that keeps away from wrong objects and furniture.
+
+    Reads privileged state: its own position and heading, and the positions of all props.
+    """
+
+    def reset(self) -> None:
+        """See `Expert.reset`."""
+        task, body = self.task, self.player.body
+        locomotion = locomotion_of(self.player, task.world.clock.step_s)
+        self._locomotion = WallRecovery(body, locomotion, task.world.clock.step_s)
+        grid = floor_grid(task.world.playground)
+        clear_m = locomotion.clearances.wall_m
+        free = free_cells(grid, task.world, clear_m, passable=(task.target, *task.wrong))
+        around_m = task.cfg.reach_m + max(_MARGIN_M, locomotion.clearances.turning_m)
+        free &= outside(grid, [Detour(p.position, p.radius_m + around_m) for p in task.wrong])
+        self._paths = PathsTo(grid, free, task.target.position)
+
+    def act(self, observation: Mapping[str, NDArray[Any]]) -> Any:
+        """Return a command for the player's kind of body, see `Expert.act`."""
+        return self._locomotion.to(self._paths.next_point(self.player.body.position))
+
+
+@register_expert("ObjectPhysNav")
+class ObjectPhysNavExpert(ObjectNavExpert):
+    """Crawls on the shortest path to the target that keeps away from wrong objects and furniture.
+
+    Reads privileged state: its own position, heading and joint angles, and the positions of all
+    props. Where the gait gets stuck, the body crawls backwards.
+    """

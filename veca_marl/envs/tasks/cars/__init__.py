@@ -1,0 +1,1 @@
+"""Tasks with a toy car that drives by itself: DodgeCar."""

@@ -1,0 +1,178 @@
+"""A toy car that drives by itself from one random point of a room to the next."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from typing import NamedTuple, TypeAlias
+
+import numpy as np
+
+from veca_marl.envs.tasks.navigation.floors.clearance import clearances_m
+from veca_marl.sim.geometry import Floats
+from veca_marl.sim.physics import Prop, PropCfg, PropShape, World
+
+LENGTH_M, WIDTH_M, HEIGHT_M = 0.34, 0.2, 0.16
+_MASS_KG = 2.0  # below the push limit of walkers: it is pushed away and displaces none
+_COLOUR = (0.95, 0.75, 0.1)
+_ARRIVED_M = 0.15
+_PATIENCE_S = 6.0  # after which a point that has not been reached is given up
+_DRAWS = 30
+_SLOWEST = 0.2  # share of the speed while it turns
+_TIPPED = 0.9  # cosine of the inclination from which the car is set upright
+
+DrawPoint: TypeAlias = Callable[[np.random.Generator], Floats]
+"""Draws a point of the floor, ``(2,)`` or ``(3,)`` metres, to drive to."""
+
+
+class Motion(NamedTuple):
+    """How a car drives.
+
+    Attributes:
+        speed_mps: Speed on a straight line.
+        turn_radps: Greatest turning speed.
+    """
+
+    speed_mps: float
+    turn_radps: float
+
+    def towards(
+        self, point: Floats, place: Floats, heading_rad: float, step_s: float
+    ) -> tuple[float, float]:
+        """Return the speed (m/s) and the turning speed (rad/s) of a step towards a point."""
+        bearing = math.atan2(point[1] - place[1], point[0] - place[0]) - heading_rad
+        bearing = math.remainder(bearing, 2.0 * math.pi)
+        turn = min(max(bearing / step_s, -self.turn_radps), self.turn_radps)
+        return self.speed_mps * max(math.cos(bearing), _SLOWEST), turn
+
+
+class ToyCar:
+    """A car that drives in straight lines between points that it draws.
+
+    Its velocity is set at the start of each agent step; collisions are those of the physics. It
+    turns towards a point with at most `Motion.turn_radps` and drives with the cosine of the
+    bearing, at least 0.2, so that it turns nearly on the spot. A point is reachable if the straight
+    line to it is clear of fixed props; it is replaced when it is reached, or after 6 s.
+
+    Args:
+        world: A world that is not frozen.
+        motion: How it drives.
+        interactions: Names of the verbs that can be applied to it, see `PropCfg.interactions`.
+
+    Attributes:
+        prop: The car: a box, its front along x.
+        room: The room in which it drives: the first one of the playground.
+    """
+
+    def __init__(self, world: World, motion: Motion, interactions: Sequence[str] = ()) -> None:
+        self.room = world.playground.rooms[0]
+        self._motion, self._step_s = motion, world.clock.step_s
+        self._obstacles = [p for p in world.props.values() if p.cfg.tangible]
+        self.prop = world.add_prop(
+            PropCfg(
+                name="toy_car",
+                shape=PropShape.box,
+                size_m=[LENGTH_M, WIDTH_M, HEIGHT_M],
+                mass_kg=_MASS_KG,
+                friction=0.0,  # it rolls: its velocity is that of its drive
+                rolling_friction=0.0,
+                restitution=0.0,
+                colour=_COLOUR,
+                interactions=list(interactions),
+            )
+        )
+        self._resting_m = self.room.lower_m[2] + HEIGHT_M / 2.0
+        self._point = np.zeros(2)
+        self._left_s = 0.0
+
+    @property
+    def heading_rad(self) -> float:
+        """Direction of its front."""
+        x, y = self.prop.rotation[:2, 0]
+        return math.atan2(y, x)
+
+    def reset(self, place: Floats, rng: np.random.Generator) -> None:
+        """Stand at a place of the floor with a random heading."""
+        self.prop.place((place[0], place[1], self._resting_m), rng.uniform(-math.pi, math.pi))
+        self._left_s = 0.0
+
+    def drive(self, draw: DrawPoint, rng: np.random.Generator) -> None:
+        """Set the velocity of the next step. Called before the physics of each step.
+
+        Args:
+            draw: Draws the next point when the car needs one.
+            rng: Random generator of the episode.
+        """
+        self._set_upright()
+        here = self.prop.position
+        self._left_s -= self._step_s
+        if self._left_s <= 0.0 or math.dist(here[:2], self._point) < _ARRIVED_M:
+            self._point, self._left_s = self._reachable_point(draw, rng), _PATIENCE_S
+        heading = self.heading_rad
+        speed, turn = self._motion.towards(self._point, here, heading, self._step_s)
+        ahead = speed * math.cos(heading), speed * math.sin(heading)
+        self.prop.set_velocity((*ahead, self._vertical_mps()), (0.0, 0.0, turn))
+
+    def predicted_path(self, steps: int) -> Floats:
+        """Return its positions after each of the next steps, if nothing stops it.
+
+        It is assumed to stay at its present point when it has reached it.
+
+        Returns:
+            ``(steps, 2)`` metres.
+        """
+        place, heading, path = self.prop.position[:2], self.heading_rad, []
+        for _ in range(steps):
+            if math.dist(place, self._point) >= _ARRIVED_M:
+                speed, turn = self._motion.towards(self._point, place, heading, self._step_s)
+                ahead = np.array([math.cos(heading), math.sin(heading)])
+                place, heading = place + speed * self._step_s * ahead, heading + turn * self._step_s
+            path.append(place)
+        return np.array(path)
+
+    def inside(self, point: Floats) -> Floats:
+        """Return the point ``(2,)`` of the room nearest to a point that the car can stand on."""
+        low, size = np.array(self.room.lower_m[:2]), np.array(self.room.size_m[:2])
+        margin_m = LENGTH_M / 2.0 + 0.05
+        return np.clip(point[:2], low + margin_m, low + size - margin_m)
+
+    def random_point(self, rng: np.random.Generator) -> Floats:
+        """Draw a point of the room, ``(2,)``, on which the car can stand."""
+        return self.inside(self.room.sample_floor(rng, 0.0))
+
+    def _reachable_point(self, draw: DrawPoint, rng: np.random.Generator) -> Floats:
+        """Return a drawn point with a clear way, or the last of 30 draws."""
+        point = self.inside(draw(rng))
+        for _ in range(_DRAWS):
+            if self._is_clear(point):
+                break
+            point = self.inside(draw(rng))
+        return point
+
+    def _is_clear(self, point: Floats) -> bool:
+        here = self.prop.position[:2]
+        count = max(2, math.ceil(math.dist(here, point) / WIDTH_M))
+        line = here + np.linspace(1.0 / count, 1.0, count)[:, None] * (point - here)
+        return is_free(line, self._obstacles)
+
+    def _vertical_mps(self) -> float:
+        """Return the vertical velocity of the next step: down if it falls, up if it has sunk.
+
+        Bullet loses contacts of boxes that slide far in a physics step: without this the car would
+        sink by 2 cm into the floor.
+        """
+        sunk_m = self._resting_m - float(self.prop.position[2])
+        if sunk_m < 0.0:
+            return min(float(self.prop.velocity[2]), 0.0)
+        return sunk_m / self._step_s
+
+    def _set_upright(self) -> None:
+        if self.prop.rotation[2, 2] < _TIPPED:
+            x, y, _ = self.prop.position
+            self.prop.place((x, y, self._resting_m), self.heading_rad)
+
+
+def is_free(points: Floats, obstacles: Sequence[Prop]) -> bool:
+    """Return whether the car can stand on all points ``(n, 2)`` without touching obstacles."""
+    half_m = math.hypot(LENGTH_M, WIDTH_M) / 2.0
+    return all(bool((clearances_m(prop, points) > half_m).all()) for prop in obstacles)

@@ -1,0 +1,1 @@
+"""The floor of a playground: free cells, shortest paths, random places."""

@@ -1,0 +1,133 @@
+"""MazeNav: find an object in a maze, and find it again faster."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from veca_marl.envs.core.task import Player, Task, TaskCfg, register, require_walker, terms
+from veca_marl.envs.tasks.navigation import places
+from veca_marl.envs.tasks.navigation.mazes.maze import Cell, Maze, random_maze
+from veca_marl.envs.tasks.navigation.mazes.trial_sense import TRIAL, TrialSense
+from veca_marl.envs.tasks.navigation.mazes.walls import MazeWalls, check_maze
+from veca_marl.sim.physics import PlaygroundCfg
+
+_RADIUS_M = 0.15  # of the object
+
+
+@dataclass
+class MazeNavCfg(TaskCfg):
+    """Parameters of MazeNav. Of these only the number of trials is in the paper.
+
+    Attributes:
+        cells: Cells along each side of the maze, at least 2; a cell measures at least 0.7 m.
+        trials: Trials in each maze.
+        trial_s: Time after which a trial ends without success.
+        reach_m: Horizontal distance from the pelvis to the surface of the object within which it
+            has been reached.
+    """
+
+    max_seconds: float = 150.0
+    cells: int = 4
+    trials: int = 5
+    trial_s: float = 30.0
+    reach_m: float = 0.3
+    weights: dict[str, float] = terms(reached=1.0)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self.check_positive("trial_s", "reach_m")
+        if self.trials < 1:
+            raise ValueError(f"task.trials={self.trials} must be at least 1")
+
+
+@register
+class MazeNav(Task):
+    """An agent has to find an object in a maze, several times in the same maze.
+
+    Each episode has a new random maze. Its walls, the place of the object and the start stay the
+    same for `trials` trials, so that an agent with a memory can walk straight to the object after
+    the first trial. A trial ends when the object is reached or after `trial_s`; then the next one
+    begins at the start, with a heading drawn anew. The action of the step in which the agent is
+    returned to the start has no effect. The episode terminates after the last trial; the task is
+    solved (`solved`) if all trials have ended at the object.
+
+    The observation `trial` reports the end of a trial, see `TrialSense`;
+    `+senses.extra.trial.present=false` removes it. The task is that of RL^2 (Duan et al. 2016) with
+    five trials in each maze, as the paper states (table of tasks in the appendix). Not in the
+    paper: the size of the maze, the times, the observation `trial`, and that the start is the same
+    in all trials. A maze has one path between any two cells; the path from the start to the object
+    has at least ``cells - 1`` steps.
+
+    Terms:
+        reached: 1 on the step in which the object is reached, else 0.
+    """
+
+    senses = ("vision", TRIAL)
+    cfg: MazeNavCfg
+
+    @classmethod
+    def check_playground(cls, cfg: Any, playground: PlaygroundCfg) -> None:
+        check_maze(playground, cfg.cells)
+
+    def build(self) -> None:
+        self.walker = require_walker(self.players[0])
+        self._walls = MazeWalls(self.world, self.cfg.cells)
+        self.target = places.add_target(self.world, _RADIUS_M)
+        self._start: Cell = (0, 0)
+        self._completed = self._found = 0
+        self._elapsed_s = 0.0
+        self._found_now = self._ended_now = False
+
+    def reset(self, rng: np.random.Generator) -> None:
+        maze = random_maze(self.cfg.cells, rng)
+        self._walls.build(maze, rng)
+        goal, self._start = _draw_goal_and_start(maze, rng)
+        self.target.place(self._walls.middle_of(goal, _RADIUS_M))
+        self._completed = self._found = 0
+        self._begin_trial(rng)
+
+    def before_step(self, rng: np.random.Generator) -> None:
+        if self._ended_now:
+            self._begin_trial(rng)
+
+    def after_step(self, rng: np.random.Generator) -> None:
+        self._elapsed_s += self.world.clock.step_s
+        gap_m = places.gap_m(self.walker.position, self.target)
+        self._found_now = gap_m <= self.cfg.reach_m
+        self._ended_now = self._found_now or self._elapsed_s >= self.cfg.trial_s - 1e-9
+        self._found += self._found_now
+        self._completed += self._ended_now
+        self._show_trial()
+
+    def reward(self, player: Player) -> dict[str, float]:
+        return {"reached": float(self._found_now)}
+
+    def terminated(self) -> bool:
+        return self._completed == self.cfg.trials
+
+    def solved(self, player: Player) -> bool:
+        """Return whether all trials have ended at the object."""
+        return self._found == self.cfg.trials
+
+    def _begin_trial(self, rng: np.random.Generator) -> None:
+        self.walker.place(self._walls.middle_of(self._start), rng.uniform(-math.pi, math.pi))
+        self._elapsed_s = 0.0
+        self._found_now = self._ended_now = False
+
+    def _show_trial(self) -> None:
+        sense = self.players[0].senses.get(TRIAL)
+        if isinstance(sense, TrialSense):
+            elapsed = self._elapsed_s / self.cfg.trial_s
+            sense.show(self._ended_now, elapsed, self._completed / self.cfg.trials)
+
+
+def _draw_goal_and_start(maze: Maze, rng: np.random.Generator) -> tuple[Cell, Cell]:
+    """Draw the cell of the object, and a start that is at least ``size - 1`` cells away from it."""
+    x, y = rng.integers(maze.size, size=2).tolist()
+    steps = maze.steps_from((x, y))
+    far = [cell for cell, count in steps.items() if count >= maze.size - 1]
+    return (x, y), far[int(rng.integers(len(far)))]

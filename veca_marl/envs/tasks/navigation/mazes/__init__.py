@@ -1,0 +1,1 @@
+"""Mazes, their walls, and the observation of trials."""

@@ -1,0 +1,136 @@
+"""ObjectNav: go to the one object among several that is the target."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import ClassVar
+
+import numpy as np
+
+from veca_marl.envs.core.task import Player, Task, TaskCfg, register, terms
+from veca_marl.envs.tasks.navigation import places
+from veca_marl.envs.tasks.navigation.floors.scattering import Spacing, scattered_places
+from veca_marl.envs.tasks.navigation.helper_reward import AHEAD_WEIGHT, TURN_WEIGHT, HelperReward
+from veca_marl.envs.tasks.navigation.object_kinds import ObjectKind, add_object
+from veca_marl.envs.tasks.player_starts import direct_gaze_ahead, place_player
+from veca_marl.sim.physics import Prop
+
+_PASSAGE_M = 0.2  # width that an agent at an object leaves free towards furniture and walls
+_DOOR_M = 0.9  # objects nearer to the middle of a door could block it
+
+
+def _default_objects() -> list[ObjectKind]:
+    return [ObjectKind.ball, ObjectKind.cube, ObjectKind.cylinder]
+
+
+@dataclass
+class ObjectNavCfg(TaskCfg):
+    """Parameters of ObjectNav. None of the numbers but the weights is in the paper.
+
+    Attributes:
+        objects: Kinds of all objects, at least 2, see `ObjectKind`; kinds other than the target
+            may be repeated.
+        target: Kind of the target, once among `objects`. It is the same in all episodes.
+        reach_m: Horizontal distance from the pelvis to the surface of an object within which it
+            has been reached.
+        apart_m: Least distance between the middles of any two objects, and from the start to each.
+    """
+
+    objects: list[ObjectKind] = field(default_factory=_default_objects)
+    target: ObjectKind = ObjectKind.ball
+    reach_m: float = 0.3
+    apart_m: float = 1.2
+    weights: dict[str, float] = terms(reached=1.0, wrong=-1.0, ahead=AHEAD_WEIGHT, turn=TURN_WEIGHT)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self.check_positive("reach_m", "apart_m")
+        kinds = [kind.name for kind in ObjectKind]
+        if not all(isinstance(kind, ObjectKind) for kind in (*self.objects, self.target)):
+            raise ValueError(
+                f"task.objects={self.objects}, task.target={self.target!r}; choices: {kinds}"
+            )
+        if len(self.objects) < 2 or self.objects.count(self.target) != 1:
+            names = [kind.name for kind in self.objects]
+            raise ValueError(
+                f"task.objects={names} must be at least 2 and hold task.target="
+                f"{self.target.name} once; choices: {kinds}"
+            )
+
+
+@register
+class ObjectNav(Task):
+    """An agent has to go to the one of several objects that is the target.
+
+    The objects stand at random places of all rooms, at least `apart_m` from each other and from
+    the agent's start. The target is recognised by its shape and colour in the images. Reaching
+    the target or a wrong object terminates the episode; the task is solved (`solved`) if it was the
+    target.
+
+    Senses, actions, the rewards of +1 and -1 and the helper reward are those of the paper (table
+    of tasks and "Helper Rewards" in the appendix). The paper does not state the cue for the
+    target, the number of objects, the distance at which an object is reached, and when an episode
+    ends; here the target is of one kind, `target`, in all episodes. The helper reward is as in
+    MultiAgentNav.
+
+    Terms:
+        reached: 1 on the step in which the target is reached, else 0.
+        wrong: 1 on the step in which another object is reached, and the target is not, else 0.
+        ahead: Displacement forwards during the step, m (negative backwards), while the target is
+            visible to the agent's eyes. In the paper ``Vis a_f``.
+        turn: Decrease during the step of the horizontal angle between the agent's forward direction
+            and the direction of the target, rad, if the target is visible before and after the
+            step. In the paper ``Vis a_l L``, see `HelperReward`.
+    """
+
+    senses: ClassVar[tuple[str, ...]] = ("vision",)
+    cfg: ObjectNavCfg
+
+    def build(self) -> None:
+        self.agent = self.players[0]
+        self._furniture = places.furniture_of(self.world)
+        self._objects = [
+            add_object(self.world, f"object_{number}_{kind.name}", kind)
+            for number, kind in enumerate(self.cfg.objects)
+        ]
+        self.target = self._objects[self.cfg.objects.index(self.cfg.target)].prop
+        self.wrong = [one.prop for one in self._objects if one.prop is not self.target]
+        self._helper = HelperReward(self.world.scene)
+        self._reached = self._reached_wrong = False
+
+    def reset(self, rng: np.random.Generator) -> None:
+        self._reached = self._reached_wrong = False
+        largest_m = max(one.prop.radius_m for one in self._objects)
+        spacing = Spacing(largest_m + self.cfg.reach_m + _PASSAGE_M, self.cfg.apart_m, _DOOR_M)
+        start, *floors = scattered_places(
+            self.world.playground, self._furniture, 1 + len(self._objects), spacing, rng
+        )
+        for one, floor in zip(self._objects, floors, strict=True):
+            one.place(floor, rng.uniform(-math.pi, math.pi))
+        place_player(self.agent, start, rng.uniform(-math.pi, math.pi))
+        direct_gaze_ahead(self.players)
+        self._helper.reset(self.target, self.players)
+
+    def after_step(self, rng: np.random.Generator) -> None:
+        direct_gaze_ahead(self.players)
+        self._reached = self._is_reached(self.target)
+        self._reached_wrong = not self._reached and any(map(self._is_reached, self.wrong))
+        self._helper.after_step(self.players)
+
+    def reward(self, player: Player) -> dict[str, float]:
+        return {
+            "reached": float(self._reached),
+            "wrong": float(self._reached_wrong),
+            **self._helper.terms(player),
+        }
+
+    def terminated(self) -> bool:
+        return self._reached or self._reached_wrong
+
+    def solved(self, player: Player) -> bool:
+        """Return whether the target has been reached."""
+        return self._reached
+
+    def _is_reached(self, prop: Prop) -> bool:
+        return places.gap_m(self.agent.body.position, prop) <= self.cfg.reach_m
