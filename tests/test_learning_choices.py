@@ -106,11 +106,26 @@ def test_a_recurrent_policy_is_trained_recorded_and_loaded(tmp_path):
     assert ("agents", "memory", "hidden") in actor.in_keys
 
 
-@pytest.mark.parametrize("body", ["walker_voice", "walker_discrete_voice"])
-def test_a_body_with_a_voice_is_trained(body):
-    """Its action has two parts, move and voice."""
+@pytest.mark.parametrize(
+    "body",
+    [
+        "walker_voice",
+        "walker_discrete_voice",
+        pytest.param("walker_verbs", marks=pytest.mark.slow),
+    ],
+)
+def test_a_body_with_two_action_parts_is_trained(body):
+    """The parts are move and voice, or move and verb."""
     result = run_training(compose([*SMALL, f"body={body}"]))
     assert result.metrics[-1]["agents/kl"] >= 0.0
+
+
+@pytest.mark.slow
+def test_verbs_are_learnt_from_a_replay_buffer():
+    small = ["algo.replay.capacity=100", "algo.replay.warm_up_frames=20", "algo.batch_size=8"]
+    row = run_training(compose([*SMALL, "algo=sac_fast", "body=walker_verbs", *small])).metrics[-1]
+    assert {"agents/alpha_move", "agents/alpha_verb"} <= row.keys()
+    assert row["agents/refused_verbs"] > 0.0  # KickTheBall has nothing that declares a verb
 
 
 def test_an_action_of_two_parts_is_learnt_from_a_replay_buffer(tmp_path):

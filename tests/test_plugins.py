@@ -6,12 +6,16 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from veca_marl.config import ConfigError, compose
+from veca_marl.envs.core.game import Game
 from veca_marl.envs.core.task import TASKS
 from veca_marl.plugins import PLUGINS, load_plugins
 from veca_marl.runs.assembly import GameFactory
+from veca_marl.sim.body.walker import WalkCommand
+from veca_marl.sim.physics.interactions import INTERACTIONS
 
 ROOT = Path(__file__).resolve().parent.parent
 EXAMPLE = ROOT / "examples" / "plugin"
@@ -25,9 +29,10 @@ SHORT += ["algo.minibatches=2", "total_frames=128", "eval.episodes=1", "task.max
 def outside(tmp_path, monkeypatch):
     """A folder from which packages can be imported; what they register is removed afterwards."""
     tasks, plugins, modules = set(TASKS), set(PLUGINS), set(sys.modules)
+    verbs = set(INTERACTIONS)
     monkeypatch.syspath_prepend(tmp_path)
     yield tmp_path
-    for registry, before in ((TASKS, tasks), (PLUGINS, plugins)):
+    for registry, before in ((TASKS, tasks), (PLUGINS, plugins), (INTERACTIONS, verbs)):
         for name in set(registry) - before:
             del registry[name]
     for name in set(sys.modules) - modules:
@@ -61,6 +66,26 @@ def test_a_task_without_a_file_and_a_preset_are_found(example):
     assert type(cfg.task).__name__ == "FindBeaconCfg"
     assert (cfg.task.reach_m, cfg.senses.vision.blur_deg) == (0.5, 2.0)
     assert cfg.plugins == ["veca_marl_beacon"]
+
+
+def test_an_interaction_of_a_plugin_is_a_verb_that_a_reset_undoes(example):
+    game = Game(compose([NAME, BEACON, "body=walker_switch"]).game)
+    player = game.players[0]
+    assert player.body.action_spec["verb"].names == ("none", "switch_off")
+    command = WalkCommand(0.0, 0.0, verb="switch_off")
+    for _ in range(2):
+        game.reset(np.random.default_rng(0))
+        beacon = game.task.beacon
+        beacon.place((1.0, 0.0, 0.3))
+        player.body.place((0.0, 0.0, 0.0))
+        game.world.refresh()
+        refused = []
+        for _ in range(2):
+            outcome = game.step({player.name: player.body.encode(command)})
+            refused.append(outcome.bodies[player.name]["refused_verbs"])
+        assert beacon.sound.muted
+        assert refused == [0.0, 1.0]
+    game.close()
 
 
 def test_an_unknown_task_lists_those_of_plugins_too(example):

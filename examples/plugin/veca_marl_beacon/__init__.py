@@ -1,9 +1,11 @@
-"""A plug-in of veca_marl: the task FindBeacon and the preset ``senses/vision=short_sighted``.
+"""A plug-in of veca_marl: a task, an interaction, and presets of vision and of the walking body.
 
-Importing this package registers the task. The preset is a file in the folder `conf` beside this
-one, where Hydra finds it under the same groups as those of veca_marl.
+Importing this package registers the task FindBeacon and the verb `switch_off`. The presets
+``senses/vision=short_sighted`` and ``body=walker_switch`` are files in the folder `conf` beside
+this one, where Hydra finds them under the same groups as those of veca_marl.
 """
 
 from veca_marl_beacon.find_beacon import FindBeacon
+from veca_marl_beacon.switch_off import SwitchOff
 
-__all__ = ["FindBeacon"]
+__all__ = ["FindBeacon", "SwitchOff"]

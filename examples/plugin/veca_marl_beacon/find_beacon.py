@@ -40,6 +40,7 @@ class FindBeacon(Task):
         """See `Task`."""
         buzz = SoundCfg(kind=SoundKind.buzz, level=0.1)
         shape = PropCfg("beacon", PropShape.cylinder, [0.1, 0.6], mass_kg=2.0, sound=buzz)
+        shape.interactions = ["switch_off"]
         self.beacon = self.world.add_prop(shape)
         self.distance_m = self.progress_m = 0.0
 

@@ -17,8 +17,9 @@ def toy(name="toy", position=(0.7, 0.0, 0.05), **more):
     return ball(name, radius_m=0.05, position=position, interactions=["grab"], **more)
 
 
-def seeing(world, name="walker", place=(0.0, 0.0, 0.0), yaw_deg=0.0, **numbers):
-    walker = walker_in(world, name, place, yaw_deg, verbs=VERBS, head_pitch_deg=25.0, **numbers)
+def seeing(world, name="walker", place=(0.0, 0.0, 0.0), yaw_deg=0.0, extra_verbs=()):
+    verbs = [*VERBS, *extra_verbs]
+    walker = walker_in(world, name, place, yaw_deg, verbs=verbs, head_pitch_deg=25.0)
     open_eyes(world.scene, walker, Camera(42, 42))
     return walker
 
@@ -208,3 +209,134 @@ def test_unknown_verbs_are_refused_where_they_are_named():
         empty_world(ball(interactions=["throw"]))
     with pytest.raises(ValueError, match=r"verb 'grab'.*none"):
         walker_in(empty_world()).encode(WalkCommand(0.0, 0.0, verb="grab"))
+
+
+# ---- containers, buttons, and verbs that change how a walker moves
+
+BASKET = ("basket", (0.3, 0.3, 0.02), 0.0, (0.6, 0.0, 0.01))  # a plate: what is put on it stays
+
+
+def plate(**more):
+    name, edges_m, mass_kg, position = BASKET
+    return box(name, edges_m, mass_kg, position, interactions=["put_into"], **more)
+
+
+def test_what_is_put_into_a_container_lies_in_it():
+    world = empty_world(toy(position=(0.5, 0.5, 0.05)), plate())
+    walker = seeing(world, extra_verbs=["put_into"])
+    begin(world)
+    prop, basket = world.prop("toy"), world.prop("basket")
+    assert not do(world, walker, "put_into")  # the hand is empty
+    walker.grab(prop)
+    basket.accepts = lambda one: False
+    assert not do(world, walker, "put_into")
+    assert walker.held is prop
+    basket.accepts = lambda one: one is prop
+    assert do(world, walker, "put_into")
+    assert walker.applied_verb == ("put_into", basket)
+    assert walker.held is None
+    let_pass(world, 0.4)
+    np.testing.assert_allclose(prop.position, [0.6, 0.0, 0.07], atol=0.01)
+
+
+def test_a_prop_that_is_too_wide_for_a_container_is_refused():
+    world = empty_world(ball("toy", 0.2, position=(0.5, 0.7, 0.2)), plate())
+    walker = seeing(world, extra_verbs=["put_into"])
+    begin(world)
+    walker.grab(world.prop("toy"))
+    assert not do(world, walker, "put_into")
+
+
+def test_pressing_moves_nothing_and_is_reported():
+    world = empty_world(
+        box("button", (0.1, 0.1, 0.1), 0.0, (0.6, 0.0, 0.05), interactions=["press"])
+    )
+    walker = seeing(world, extra_verbs=["press"])
+    begin(world)
+    before = world.prop("button").position
+    assert do(world, walker, "press")
+    assert walker.applied_verb == ("press", world.prop("button"))
+    assert walker.info() == {"refused_verbs": 0.0}
+    np.testing.assert_array_equal(world.prop("button").position, before)
+    do(world, walker, "none")
+    assert walker.applied_verb is None
+    do(world, walker, "release")
+    assert walker.info() == {"refused_verbs": 1.0}
+
+
+def platform(height_m=0.15, mass_kg=0.0):
+    return box(
+        "platform",
+        (0.6, 0.6, height_m),
+        mass_kg,
+        (0.6, 0.0, height_m / 2),
+        interactions=["step_on"],
+    )
+
+
+@pytest.mark.parametrize("mass_kg", [0.0, 30.0])
+def test_a_walker_steps_onto_a_low_heavy_prop_and_off_over_its_edge(mass_kg):
+    world = empty_world(platform(mass_kg=mass_kg))
+    walker = seeing(world, extra_verbs=["step_on"])
+    begin(world)
+    standing_m = walker.position[2]
+    assert do(world, walker, "step_on")
+    assert walker.position == pytest.approx([0.6, 0.0, standing_m + 0.15], abs=0.01)
+    do(world, walker, "none", forward=1.0)
+    assert walker.position[2] == pytest.approx(standing_m + 0.15, abs=0.025)
+    for _ in range(12):
+        do(world, walker, "none", forward=1.0)
+    assert walker.position[0] > 1.0
+    assert walker.position[2] == pytest.approx(standing_m, abs=0.025)  # the gait bobs
+    assert world.prop("platform").position[0] == pytest.approx(0.6, abs=1e-3)
+
+
+@pytest.mark.parametrize("prop", [platform(0.3), platform(mass_kg=1.0)], ids=["high", "light"])
+def test_high_and_light_props_are_not_stepped_on(prop):
+    world = empty_world(prop)
+    walker = seeing(world, extra_verbs=["step_on"])
+    begin(world)
+    assert not do(world, walker, "step_on")
+
+
+def test_a_crawling_walker_is_slower_and_passes_below_a_bar_that_stops_an_upright_one():
+    bar = box("bar", (0.1, 3.0, 0.2), 0.0, (0.6, 0.0, 0.5))
+    world = empty_world(bar)
+    walker = seeing(world, extra_verbs=["crawl", "stand_up"])
+    begin(world)
+    for _ in range(25):
+        do(world, walker, "none", forward=1.0)
+    assert walker.position[0] < 0.5
+    assert do(world, walker, "crawl")
+    assert walker.crawls
+    assert not do(world, walker, "crawl")
+    assert walker.bone_positions()[:, 2].max() < 0.45
+    seen_below = False
+    for _ in range(90):
+        do(world, walker, "none", forward=1.0)
+        assert walker.velocity[0] < 0.45
+        if abs(walker.position[0] - 0.5) < 0.05:
+            seen_below = True
+            assert not do(world, walker, "stand_up")
+    assert seen_below
+    assert walker.position[0] > 1.2
+    assert do(world, walker, "stand_up")
+    do(world, walker, "none", forward=1.0)
+    assert walker.position[2] > 0.28
+
+
+def test_a_crawling_walker_uses_no_hand_and_a_reset_lets_it_stand():
+    world = empty_world(toy(), ball(position=(0.3, 0.0, 0.1), interactions=["kick"]))
+    walker = seeing(world, extra_verbs=["crawl"])
+    world.freeze()
+    films = []
+    for _ in range(2):
+        world.reset(np.random.default_rng(0))
+        world.refresh()
+        assert not walker.crawls
+        film = []
+        for verb in ["crawl", "grab", "kick", *["none"] * 10]:
+            assert do(world, walker, verb, forward=1.0, turn=0.3) == (verb == "crawl")
+            film.append(world.scene.positions.tobytes())
+        films.append(film)
+    assert films[0] == films[1]

@@ -32,6 +32,7 @@ class Step(NamedTuple):
         truncated: Whether the time is up; the same for all players.
         done: Whether the episode has ended for all players.
         solved: Whether the goal of the task is reached; empty for a task without a goal.
+        bodies: What the bodies report, see `Body.info`.
     """
 
     observations: dict[str, Observation]
@@ -41,10 +42,11 @@ class Step(NamedTuple):
     truncated: bool
     done: bool
     solved: dict[str, bool]
+    bodies: Mapping[str, Mapping[str, float]]
 
     def info(self, name: str) -> dict[str, Any]:
-        """Return the info of a player: `terms`, and `solved` if the task has a goal."""
-        info: dict[str, Any] = {"terms": dict(self.terms[name])}
+        """Return the info of a player: `terms`, `Body.info`, and `solved` in a task with a goal."""
+        info: dict[str, Any] = {"terms": dict(self.terms[name]), **self.bodies[name]}
         if name in self.solved:
             info[SOLVED] = self.solved[name]
         return info
@@ -131,6 +133,7 @@ class SeededGame:
             outcome.truncated,
             outcome.done,
             {name: outcome.solved[name] for name in names if name in outcome.solved},
+            outcome.bodies,
         )
 
     @property

@@ -38,6 +38,7 @@ class Outcome(NamedTuple):
         truncated: Whether the time is up, or the state of a body is not finite any more.
         eliminated: Names of the players for whom the episode has ended.
         solved: Whether the goal of the task is reached, by player; empty for a task without a goal.
+        bodies: `Body.info` by player; empty for a body that reports nothing.
     """
 
     terms: dict[str, dict[str, float]]
@@ -45,6 +46,7 @@ class Outcome(NamedTuple):
     truncated: bool
     eliminated: frozenset[str] = frozenset()
     solved: Mapping[str, bool] = MappingProxyType({})
+    bodies: Mapping[str, Mapping[str, float]] = MappingProxyType({})
 
     @property
     def done(self) -> bool:
@@ -215,7 +217,8 @@ class Game:
             self.eliminated |= {p.name for p in self.players if self.task.is_eliminated(p)}
         terminated = self.task.terminated() or len(self.eliminated) == len(self.players)
         truncated = self.steps >= self.max_steps or self._is_non_finite()
-        return Outcome(terms, terminated, truncated, self.eliminated, self._solved())
+        bodies = {player.name: player.body.info() for player in self.players}
+        return Outcome(terms, terminated, truncated, self.eliminated, self._solved(), bodies)
 
     def _play_scripts(self) -> None:
         for team, script in self.cfg.script.items():

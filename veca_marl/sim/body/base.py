@@ -86,6 +86,11 @@ class Body(ABC):
     # ---- what each kind of body defines
 
     @property
+    def world(self) -> World:
+        """The world in which it is."""
+        return self._world
+
+    @property
     @abstractmethod
     def body_id(self) -> int:
         """PyBullet's id of what collides: a capsule, or the articulated bones."""
@@ -211,6 +216,10 @@ class Body(ABC):
 
     # ---- actions
 
+    def info(self) -> dict[str, float]:
+        """Return numbers for logs on the last step, by name; the names are always the same."""
+        return {}
+
     def act(self, action: Mapping[str, Any]) -> None:
         """Apply an action: a value for each part of `action_spec`.
 
@@ -246,9 +255,13 @@ class Body(ABC):
         """
         self._gaze.look_toward(point)
 
-    def release_look(self) -> None:
-        """Let the eyes look straight ahead again."""
+    def release_toward_point(self) -> None:
+        """Let the eyes look straight ahead again: the end of `look_toward_point`."""
         self._gaze.point = None
+
+    def release_look(self) -> None:
+        """Let the eyes look straight ahead again; `release_toward_point` by its shorter name."""
+        self.release_toward_point()
 
     def adjust_focal_length(self, focal_distance_m: float) -> None:
         """Adjust the lenses to a distance in metres; ``inf`` is relaxed.

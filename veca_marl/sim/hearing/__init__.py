@@ -5,7 +5,7 @@ from veca_marl.sim.hearing.hrtf import HrtfTable, kemar_table, sofa_table
 from veca_marl.sim.hearing.receivers import HrtfReceiver, MonoReceiver, StereoReceiver
 from veca_marl.sim.hearing.sense import AudioCfg, AudioQuality, AudioSense
 from veca_marl.sim.hearing.sofa import SofaError, read_sofa
-from veca_marl.sim.hearing.spatial_audio import spatial_audio
+from veca_marl.sim.hearing.spatial_audio import get_spatial_audio
 from veca_marl.sim.hearing.spectrum import Window, log_spectrum
 
 __all__ = [
@@ -23,5 +23,5 @@ __all__ = [
     "log_spectrum",
     "read_sofa",
     "sofa_table",
-    "spatial_audio",
+    "get_spatial_audio",
 ]

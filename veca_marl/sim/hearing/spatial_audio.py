@@ -14,7 +14,7 @@ from veca_marl.sim.hearing.receivers import HrtfReceiver
 from veca_marl.sim.sound import Clip, Room, SoundField
 
 
-def spatial_audio(
+def get_spatial_audio(
     head: Pose,
     ear_left: ArrayLike,
     ear_right: ArrayLike,

@@ -1,5 +1,6 @@
 """Touch: taxels, the penetration model and the sense of touch."""
 
+from veca_marl.sim.touch.get_tactile import Tactile, get_tactile
 from veca_marl.sim.touch.parts import Part, skin_parts
 from veca_marl.sim.touch.quality import TouchQuality
 from veca_marl.sim.touch.sense import TouchCfg, TouchSense
@@ -14,10 +15,12 @@ from veca_marl.sim.touch.taxels import (
 __all__ = [
     "TAXELS_PER_TRIANGLE",
     "Part",
+    "Tactile",
     "TaxelTable",
     "TouchCfg",
     "TouchQuality",
     "TouchSense",
+    "get_tactile",
     "load_taxels",
     "skin_parts",
     "taxel_positions",

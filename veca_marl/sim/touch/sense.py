@@ -126,11 +126,10 @@ class TouchSense(Sense):
         if self._ignored.shape[1] != len(geoms.shapes):
             self._ignored = unsensed_primitives(geoms, self._object)
             self._workspace = self._workspace._replace(candidates=np.zeros_like(self._ignored))
-        vertices = self._scene.meshes.vertices[self._object.vertices]
         read_taxels(
             self._taxels,
             self._fields,
-            vertices,
+            self.skin_vertices(),
             geoms,
             self._own,
             self._ignored,
@@ -138,3 +137,8 @@ class TouchSense(Sense):
             self._readings,
         )
         return self._readings
+
+    def skin_vertices(self) -> Floats:
+        """Return the present vertices of the skin, ``(V, 3)`` metres in the world frame."""
+        vertices: Floats = self._scene.meshes.vertices[self._object.vertices]
+        return vertices

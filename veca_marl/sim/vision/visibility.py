@@ -1,14 +1,18 @@
-"""Whether the eyes of a body see a prop or another body, independent of its sense of vision."""
+"""Images and visibility on request, independent of the sense of vision of a body."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cache
 
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
 from veca_marl.sim.body import Body
 from veca_marl.sim.body.mounts import EYES
 from veca_marl.sim.body.sight import Visible
-from veca_marl.sim.geometry import Scene
+from veca_marl.sim.geometry import Pose, Scene
 from veca_marl.sim.vision.eye_views import EyeViews
 from veca_marl.sim.vision.optics import Camera
 from veca_marl.sim.vision.vision_cfg import VisionCfg
@@ -50,6 +54,39 @@ def open_eyes(scene: Scene, body: Body, camera: Camera | None = None) -> EyeView
     eyes = EyeViews(scene, body, default_camera() if camera is None else camera)
     body.sight = eyes
     return eyes
+
+
+def get_image(
+    scene: Scene,
+    camera: Pose,
+    height: int,
+    width: int,
+    grayscale: bool = False,
+    *,
+    owner: Body | None = None,
+    fov_deg: float = VisionCfg.fov_deg,
+) -> NDArray[np.uint8]:
+    """Render the image of a camera (the paper's `getImage`).
+
+    Args:
+        scene: The scene, as of its last `update`.
+        camera: Pose of the camera, which looks along its x axis, such as `Body.mount("eye_left")`.
+        height: Pixels.
+        width: Pixels.
+        grayscale: Whether to return luma (ITU-R BT.601) in place of red, green and blue.
+        owner: The body to which the camera belongs; its head and neck are not shown.
+        fov_deg: Vertical field of view.
+
+    Returns:
+        ``(height, width, 3)`` uint8 RGB, or ``(height, width)``.
+
+    Raises:
+        ValueError: If the size or the field of view is outside of its range, see `Camera`.
+    """
+    hidden = None if owner is None else scene.hidden(owner.object_id, owner.own_head_frames)
+    image = Camera(width, height, fov_deg).render(scene, [camera], hidden).rgb[0]
+    grey: NDArray[np.uint8] = cv2.cvtColor(image, cv2.COLOR_RGB2GRAY) if grayscale else image
+    return grey
 
 
 @cache

@@ -30,6 +30,8 @@ class VecaEnv(FastStepEnv):
         (team, "reward")               (W, n, 1) float32, weighted sum of the reward terms
         (team, "info", term)           (W, n, 1) float32, unweighted reward terms, for logs
         (team, "info", "solved")       (W, n, 1) bool, in tasks with a goal: whether it is reached
+        (team, "info", "refused_verbs")  (W, n, 1) float32, for walkers with verbs: 1 if the verb of
+                                       this step had no effect
         (team, "done" | "terminated" | "truncated")  (W, n, 1), and the same at the root (W, 1)
         (team, "mask")                 (W, n) bool, in tasks that eliminate: False if eliminated
 
@@ -188,6 +190,8 @@ class VecaEnv(FastStepEnv):
                 arrays[team]["reward"][row] = game.reward_of(terms)
                 for term, value in terms.items():
                     arrays[team]["info"][term][row] = value
+                for entry, number in outcome.bodies[name].items():
+                    arrays[team]["info"][entry][row] = number
                 if outcome.solved:
                     arrays[team]["info"][SOLVED][row] = outcome.solved[name]
 

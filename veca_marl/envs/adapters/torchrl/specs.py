@@ -10,7 +10,7 @@ from torchrl.data import Bounded, Categorical, Composite, TensorSpec, Unbounded
 
 from veca_marl.envs.core.actions import ActionSpec, from_parts
 from veca_marl.envs.core.game import Game
-from veca_marl.envs.core.task import SOLVED
+from veca_marl.envs.core.task import SOLVED, Player
 from veca_marl.sim.spec import ArraySpec
 
 DONE_KEYS = ("done", "terminated", "truncated")
@@ -40,7 +40,7 @@ def env_specs(game: Game, teams: list[str], worlds: int) -> EnvSpecs:
         batch = (worlds, len(players))
         specs.observation[team] = Composite(
             observation=sense_specs(_senses_of(game, player.name), batch),
-            info=info_spec(game, batch),
+            info=info_spec(game, player, batch),
             shape=batch,
         )
         if game.task.eliminates:
@@ -52,9 +52,19 @@ def env_specs(game: Game, teams: list[str], worlds: int) -> EnvSpecs:
     return specs
 
 
-def info_spec(game: Game, batch: tuple[int, ...]) -> Composite:
-    """Return a team's `info`: one leaf per reward term, and `solved` if the task has a goal."""
-    spec = Composite({term: Unbounded((*batch, 1)) for term in game.weights}, shape=batch)
+def info_spec(game: Game, player: Player, batch: tuple[int, ...]) -> Composite:
+    """Return a team's `info`.
+
+    It has one leaf per reward term and per entry of `Body.info`, and `solved` if the task has a
+    goal.
+
+    Args:
+        game: The game.
+        player: One of the team.
+        batch: Batch size of the team.
+    """
+    names = (*game.weights, *player.body.info())
+    spec = Composite({name: Unbounded((*batch, 1)) for name in names}, shape=batch)
     if game.task.has_goal():
         spec[SOLVED] = Categorical(2, shape=(*batch, 1), dtype=torch.bool)
     return spec

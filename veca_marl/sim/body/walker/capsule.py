@@ -16,12 +16,15 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+import numpy as np
+
 from veca_marl.sim.body.walker.obstacle_boxes import ObstacleBoxes
-from veca_marl.sim.geometry import Floats, Primitive, Scene, Shape
-from veca_marl.sim.physics import Prop, create_collision_shape, pybullet
+from veca_marl.sim.geometry import Floats, Primitive, Scene, Shape, quaternion_from_yaw
+from veca_marl.sim.physics import Prop, World, create_collision_shape, pybullet
 
 _ROUNDS = 3  # two for the walls of a corner, one spare
 _LIMB_REACH_M = 1.0  # from the pelvis of a joint-level body to its stretched toes
+_PARKED_M = -100.0  # height of a capsule that is not in use
 _MARGIN_M = 0.06  # an obstacle may displace the capsule by so much within one agent step
 
 
@@ -31,30 +34,37 @@ class Capsule:
     Args:
         client: The PyBullet client.
         scene: The scene that shows the props.
-        radius_m: Radius.
-        height_m: Height of the walker above the floor.
+        form: The capsule, in a frame whose x axis is the walker's heading.
+        centre_height_m: Height of its centre above the surface on which the walker is.
         push_limit_kg: Props up to this mass are pushed.
 
     Attributes:
         body_id: PyBullet's id.
+        base_m: Height of the surface on which the walker is; 0 on the floor.
+        yaw_rad: Rotation about the vertical.
+        support_id: PyBullet's id of the prop on which the walker stands, which is no obstacle; -1
+            on the floor.
     """
 
     def __init__(
-        self, client: int, scene: Scene, radius_m: float, height_m: float, push_limit_kg: float
+        self,
+        client: int,
+        scene: Scene,
+        form: Primitive,
+        centre_height_m: float,
+        push_limit_kg: float,
     ) -> None:
-        self.radius_m = radius_m
-        # the lower cap is beneath the floor, with which it does not collide: a rounded lower end
-        # would press props into the floor
-        length_m = height_m - radius_m
-        self.centre_height_m = length_m / 2
+        self._centre_height_m = centre_height_m
+        self.base_m = self.yaw_rad = 0.0
+        self.support_id = -1
         self._client, self._scene = client, scene
         self._push_limit_kg = push_limit_kg
-        capsule = Primitive(Shape.CAPSULE, (radius_m, length_m))
-        shape = create_collision_shape(client, [capsule])
+        shape = create_collision_shape(client, [form])
         self.body_id: int = pybullet.createMultiBody(0, shape, physicsClientId=client)
         pybullet.changeDynamics(
             self.body_id, -1, lateralFriction=0.2, restitution=0.0, physicsClientId=client
         )
+        self._reach_m = _reach_m(form)
         self._obstacles = ObstacleBoxes(client, scene, [], [], _LIMB_REACH_M)
         self._known = (0, 0)
         self._near: list[int] = []
@@ -72,8 +82,8 @@ class Capsule:
         """
         if (len(props), len(bodies)) != self._known:
             self._find_obstacles(props, bodies)
-        reach_m = self.radius_m + _MARGIN_M + distance_m
-        self._near = self._obstacles.near(position, reach_m)
+        near = self._obstacles.near(position, self._reach_m + _MARGIN_M + distance_m)
+        self._near = [body_id for body_id in near if body_id != self.support_id]
 
     def resolve_contacts(self, x: float, y: float) -> tuple[float, float]:
         """Set the position and move the capsule out of obstacles; return the new position."""
@@ -92,12 +102,23 @@ class Capsule:
             self.body_id, (vx, vy, 0.0), (0.0, 0.0, turn_radps), physicsClientId=self._client
         )
 
+    def overlaps(self, x: float, y: float) -> bool:
+        """Move it to a place, and return whether it penetrates an obstacle there."""
+        self._set_position(x, y)
+        return self._depenetration() != (0.0, 0.0)
+
+    def park(self) -> None:
+        """Move it far below the floor, where it collides with nothing."""
+        self._put((0.0, 0.0, _PARKED_M))
+        self.set_velocity(0.0, 0.0, 0.0)
+
     def _set_position(self, x: float, y: float) -> None:
+        self._put((x, y, self.base_m + self._centre_height_m))
+
+    def _put(self, position: tuple[float, float, float]) -> None:
+        orientation = quaternion_from_yaw(self.yaw_rad)
         pybullet.resetBasePositionAndOrientation(
-            self.body_id,
-            (x, y, self.centre_height_m),
-            (0.0, 0.0, 0.0, 1.0),
-            physicsClientId=self._client,
+            self.body_id, position, orientation, physicsClientId=self._client
         )
 
     def _depenetration(self) -> tuple[float, float]:
@@ -129,6 +150,45 @@ class Capsule:
                 pybullet.setCollisionFilterPair(
                     self.body_id, body_id, -1, link, 0, physicsClientId=self._client
                 )
+
+
+def upright_capsule(
+    world: World, radius_m: float, height_m: float, push_limit_kg: float
+) -> Capsule:
+    """Return the capsule of a walker that stands.
+
+    Args:
+        world: The world.
+        radius_m: Radius.
+        height_m: Height of its upper end above the floor.
+        push_limit_kg: Props up to this mass are pushed.
+    """
+    # the lower cap is beneath the floor, with which it does not collide: a rounded lower end would
+    # press props into the floor
+    length_m = height_m - radius_m
+    form = Primitive(Shape.CAPSULE, (radius_m, length_m))
+    return Capsule(world.client, world.scene, form, length_m / 2, push_limit_kg)
+
+
+def lying_capsule(world: World, height_m: float, length_m: float, push_limit_kg: float) -> Capsule:
+    """Return the capsule of a walker that crawls: it lies along the heading.
+
+    Args:
+        world: The world.
+        height_m: Its diameter.
+        length_m: From end to end.
+        push_limit_kg: Props up to this mass are pushed.
+    """
+    size = (height_m / 2.0, length_m - height_m)
+    along_x = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
+    form = Primitive(Shape.CAPSULE, size, rotation=along_x)
+    return Capsule(world.client, world.scene, form, height_m / 2.0, push_limit_kg)
+
+
+def _reach_m(form: Primitive) -> float:
+    """Return the horizontal distance from the centre of a capsule to its farthest point."""
+    ends = form.cap_centres()
+    return float(np.linalg.norm((ends[0] - ends[-1])[:2])) / 2.0 + form.radius
 
 
 def _mass_kg(client: int, body_id: int) -> float:

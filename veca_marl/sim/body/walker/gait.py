@@ -163,13 +163,14 @@ class Gait:
     def _pace_mps(self) -> float:
         return abs(self._speed_mps) + self.cfg.turning_m * abs(self._turn_radps)
 
-    def _share(self) -> float:
-        """Return the length of the stride as a fraction of the full one."""
+    @property
+    def share(self) -> float:
+        """Length of the stride as a fraction of the full one."""
         return min(1.0, self._pace_mps() / self.cfg.full_stride_mps)
 
     def _landing_mps(self) -> float:
         """Return the vertical speed of a foot at the end of its swing."""
-        return math.pi * self.cfg.lift_m * self._share() / self._stance_s()
+        return math.pi * self.cfg.lift_m * self.share / self._stance_s()
 
     def _stance_s(self) -> float:
         """Return the duration of the stance."""
@@ -178,7 +179,7 @@ class Gait:
     def _step(self, side: int) -> None:
         """Move one foot along its trajectory and the arm of the same side in opposition."""
         phase = (self.phase + 0.5 * side) % 1.0
-        share, on_floor = self._share(), phase < _STANCE
+        share, on_floor = self.share, phase < _STANCE
         # from 0.5 at touchdown to -0.5 at lift-off, and back during the swing
         along = 0.5 - phase / _STANCE
         lift = toes = 0.0
@@ -205,7 +206,7 @@ class Gait:
         """
         turned, hip_y_m = self._turn_radps * time_s, self._hip_y_m[side]
         distance_m = self._speed_mps * time_s
-        x = self.cfg.step_centre_m * self._share() - distance_m * math.cos(turned / 2.0)
+        x = self.cfg.step_centre_m * self.share - distance_m * math.cos(turned / 2.0)
         y = hip_y_m - distance_m * math.sin(turned / 2.0)
         c, s = math.cos(turned), math.sin(turned)
         return (c * x + s * y, c * y - s * x - hip_y_m), -turned
@@ -218,7 +219,7 @@ class Gait:
         The law of cosines gives the knee. The hip rotates about y, then x, then z; the rotation
         about z is given, and the other two follow one after the other.
         """
-        share = self._share()
+        share = self.share
         bob = self.cfg.bob_m * math.cos(4.0 * math.pi * self.phase)
         down_m = self.cfg.leg_m - share * (self.cfg.sink_m + bob) - lift_m
         thigh_m, shank_m = self._thigh_m, self._shank_m

@@ -49,8 +49,7 @@ class Hand:
             prop: Any prop that is not held.
             yaw_rad: Heading of the walker.
         """
-        forward = prop.rotation[:, 0]
-        yaw = math.atan2(forward[1], forward[0])
+        yaw = prop.yaw_rad
         prop.carry(prop.position, yaw, (0.0, 0.0, 0.0))  # upright, as it is measured and held
         self._half_width_m = self._measured_half_width_m(prop, yaw_rad)
         self._below_m = float(prop.position[2]) - prop.lowest_m

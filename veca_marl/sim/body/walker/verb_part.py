@@ -12,6 +12,8 @@ from veca_marl.sim.physics.interactions import INTERACTIONS, NO_VERB, Interactin
 from veca_marl.sim.spec import ArraySpec, discrete_spec
 
 VERB = "verb"  # the part's name
+REFUSED = "refused_verbs"
+"""Name of the entry of `info` that counts verbs without effect."""
 
 
 def verb_spec(verbs: Sequence[str]) -> dict[str, ArraySpec]:

@@ -13,19 +13,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veca_marl.sim.body.action import Action
-from veca_marl.sim.body.anatomy import Soles, forward_kinematics
+from veca_marl.sim.body.anatomy import forward_kinematics
 from veca_marl.sim.body.base import Body
 from veca_marl.sim.body.body_cfg import BodyCfg
 from veca_marl.sim.body.walker.capsule import Capsule
+from veca_marl.sim.body.walker.footing import Footing, foot_steps_on, middle
 from veca_marl.sim.body.walker.footsteps import Footsteps
 from veca_marl.sim.body.walker.gait import Gait
 from veca_marl.sim.body.walker.hand import Hand
-from veca_marl.sim.body.walker.line_of_contact import is_first_hit
-from veca_marl.sim.body.walker.verb_part import VERB, Applied, VerbChoice, verb_spec
+from veca_marl.sim.body.walker.kicks import foot_reaches, kicked_velocity
+from veca_marl.sim.body.walker.stances import Stance, make_stances
+from veca_marl.sim.body.walker.verb_part import REFUSED, VERB, Applied, VerbChoice, verb_spec
 from veca_marl.sim.body.walker.walk_commands import WALK_ACTIONS, WalkCommand
 from veca_marl.sim.body.walker.walker_cfg import WalkerCfg, greatest_speed_mps
 from veca_marl.sim.body.walker.walker_collisions import walker_collisions
-from veca_marl.sim.geometry import Floats, horizontal_distance
+from veca_marl.sim.geometry import Floats
 from veca_marl.sim.physics import Prop, World
 from veca_marl.sim.spec import ArraySpec
 
@@ -47,12 +49,11 @@ class Walker(Body):
         self._greatest_speed_mps = greatest_speed_mps(cfg, world.clock)
         self._walk_action = WALK_ACTIONS[cfg.action]
         self._gait = Gait(self._skeleton)
-        self._capsule = Capsule(
-            world.client, world.scene, cfg.radius_m, cfg.height_m, cfg.push_limit_kg
-        )
-        self._hand = Hand(world.client, name, self._capsule.body_id, cfg.radius_m)
+        self._upright, self._on_all_fours = make_stances(self._skeleton, self._gait, cfg, world)
+        self._stance: Stance = self._upright
+        self._hand = Hand(world.client, name, self.body_id, cfg.radius_m)
+        self._footing = Footing(world.client)
         self.verb_choice = VerbChoice(cfg.verbs)
-        self._soles = Soles(self._skeleton)
         mass_kg = sum(bone.mass_kg for bone in self._skeleton.bones)
         self._footsteps = Footsteps(name, mass_kg, world)
         self.reset()
@@ -65,8 +66,12 @@ class Walker(Body):
 
     @property
     def body_id(self) -> int:
-        """PyBullet's id of the capsule."""
+        """PyBullet's id of the capsule in use."""
         return self._capsule.body_id
+
+    @property
+    def _capsule(self) -> Capsule:
+        return self._stance.capsule
 
     @property
     def velocity(self) -> Floats:
@@ -106,6 +111,7 @@ class Walker(Body):
         self._hand.drop()
         self.verb_choice.reset()
         self._gait.reset()
+        self._stand_on_floor()
         self._collect_obstacles(0.0)
         self._ground[:] = self._capsule.resolve_contacts(self._ground[0], self._ground[1])
         self._capsule.set_velocity(0.0, 0.0, 0.0)
@@ -113,12 +119,21 @@ class Walker(Body):
         self._pose_bones()
         self._mouth.teleport(self.mount("mouth").position)
 
+    def info(self) -> dict[str, float]:
+        """Return `refused_verbs`: 1 if a verb without effect was chosen in the last step.
+
+        A walker without the action part `verb` returns nothing.
+        """
+        return {REFUSED: float(self.verb_was_refused)} if self.cfg.verbs else {}
+
     # ---- commands (the paper's animation-based API)
 
     def _move(self, parts: Action) -> None:
         forward, turn = self._walk_action.decode(parts[MOVE])
         top_mps = self.cfg.walk_speed_mps * (self.cfg.backward_share if forward < 0.0 else 1.0)
-        self.walk(forward * top_mps, turn * math.radians(self.cfg.turn_speed_degps))
+        turn_radps = turn * math.radians(self.cfg.turn_speed_degps)
+        share = self._stance.speed_share
+        self.walk(share * forward * top_mps, share * turn_radps)
         if VERB in parts:
             self.verb_choice.choose(int(parts[VERB]))
 
@@ -168,28 +183,15 @@ class Walker(Body):
         line of contact: the horizontal line from the capsule towards the prop's centre, at the
         height of the centre or of `kick_height_m`, whichever is lower.
         """
-        here, there = self.position, prop.position
-        gap = horizontal_distance(here, there) - self.radius_m - prop.radius_m
-        if gap > self.cfg.kick_reach_m or prop.lowest_m > self.cfg.kick_height_m:
+        if not self.is_light(prop) or prop.holder is not None or self.crawls:
             return False
-        if not self.is_light(prop) or prop.holder is not None:
-            return False
-        ahead = math.atan2(there[1] - here[1], there[0] - here[0]) - self.yaw_rad
-        aside = abs((ahead + math.pi) % (2.0 * math.pi) - math.pi)
-        if aside > math.radians(self.cfg.kick_angle_deg):
-            return False
-        height_m = min(float(there[2]), self.cfg.kick_height_m)
-        return is_first_hit(self._world.client, prop.body_id, here, there, self.radius_m, height_m)
+        return foot_reaches(self._world.client, self.cfg, self.position, self.yaw_rad, prop)
 
     def kick(self, prop: Prop) -> bool:
         """Kick a prop away from the walker; return False, and do nothing, if it cannot."""
         if not self.can_kick(prop):
             return False
-        away = prop.position - self.position
-        away[2] = 0.0
-        away /= max(float(np.linalg.norm(away)), 1e-9)
-        speed = min(self.cfg.kick_speed_mps, self.cfg.kick_impulse_ns / prop.cfg.mass_kg)
-        prop.set_velocity(speed * away + np.array([0.0, 0.0, 0.2 * speed]))
+        prop.set_velocity(kicked_velocity(self.cfg, self.position, prop))
         self._gait.kick()
         return True
 
@@ -203,8 +205,9 @@ class Walker(Body):
         return not prop.fixed and prop.cfg.mass_kg <= self.cfg.push_limit_kg
 
     def can_grab(self, prop: Prop) -> bool:
-        """Return whether the hand is empty, and a prop is light and held by no body."""
-        return self.held is None and prop.holder is None and self.is_light(prop)
+        """Return whether a hand is free, and a prop is light and held by no body."""
+        free = self.held is None and self._stance.hands_are_free
+        return free and prop.holder is None and self.is_light(prop)
 
     def grab(self, prop: Prop) -> bool:
         """Take a prop into the right hand; return False, and do nothing, if it cannot.
@@ -226,6 +229,81 @@ class Walker(Body):
         self._hand.drop()
         self._gait.carrying = False
         return True
+
+    def can_step_on(self, prop: Prop) -> bool:
+        """Return whether it stands on the floor and a prop is heavy, low and within reach."""
+        if self._footing.prop is not None or self.crawls or self.is_light(prop):
+            return False
+        return foot_steps_on(self._world.client, self.cfg, self._ground, prop)
+
+    def step_on(self, prop: Prop) -> bool:
+        """Step onto the middle of a prop; return False, and do nothing, if it cannot.
+
+        The walker walks on its surface, and steps down where it walks over an edge.
+        """
+        if not self.can_step_on(prop):
+            return False
+        self._footing.step_on(prop)
+        self._ground[:] = middle(prop)
+        self._capsule.support_id = prop.body_id
+        self._follow_surface()
+        return True
+
+    @property
+    def crawls(self) -> bool:
+        """Whether it is on hands and knees."""
+        return self._stance is self._on_all_fours
+
+    def crawl(self) -> bool:
+        """Go down on hands and knees: lower, slower, and longer.
+
+        Returns:
+            False, without effect, if it crawls already, holds something, stands on a prop, or there
+            is no room for the longer body.
+
+        Raises:
+            RuntimeError: If `WalkerCfg.verbs` does not name `crawl`.
+        """
+        if self._on_all_fours is None:
+            raise RuntimeError(f"{self.name} cannot crawl: body.verbs={self.cfg.verbs}")
+        if self.crawls or self.held is not None or self._footing.prop is not None:
+            return False
+        return self._change_stance(self._on_all_fours)
+
+    def stand_up(self) -> bool:
+        """Stand up; return False, without effect, if it stands or there is no room above it."""
+        return self.crawls and self._change_stance(self._upright)
+
+    def _change_stance(self, stance: Stance) -> bool:
+        """Take a stance where its capsule is free of obstacles; return whether it is."""
+        before, self._stance = self._stance, stance
+        self._collect_obstacles(0.0)
+        self._capsule.yaw_rad = self._capsule_yaw_rad()
+        if self._capsule.overlaps(*self._ground):
+            self._capsule.park()
+            self._stance = before
+            return False
+        before.capsule.park()
+        return True
+
+    def _stand_on_floor(self) -> None:
+        """Stand upright on the floor."""
+        self._footing.leave()
+        self._stance = self._upright
+        self._capsule.base_m, self._capsule.support_id = 0.0, -1
+        if self._on_all_fours is not None:
+            self._on_all_fours.capsule.park()
+
+    def _follow_surface(self) -> None:
+        """Set the height of the capsule to that of the surface under it."""
+        self._footing.follow(*self._ground)
+        self._capsule.base_m = self._footing.height_m
+        if self._footing.prop is None:
+            self._capsule.support_id = -1
+
+    def _capsule_yaw_rad(self) -> float:
+        """Return the rotation of the capsule; an upright one is not rotated."""
+        return self.yaw_rad if self.crawls else 0.0
 
     @property
     def applied_verb(self) -> Applied | None:
@@ -259,6 +337,7 @@ class Walker(Body):
     def proposed_position(self, substep_s: float) -> tuple[float, float]:
         """Turn, and return where it would be after this physics step without obstacles."""
         self.yaw_rad += self._turn_radps * substep_s
+        self._capsule.yaw_rad = self._capsule_yaw_rad()
         distance = self._speed_mps * substep_s
         x, y = self._ground
         return x + distance * math.cos(self.yaw_rad), y + distance * math.sin(self.yaw_rad)
@@ -272,6 +351,8 @@ class Walker(Body):
         vx, vy = (x - self._ground[0]) / substep_s, (y - self._ground[1]) / substep_s
         self._ground[:] = x, y
         self._capsule.set_velocity(vx, vy, self._turn_radps)
+        if self._footing.prop is not None:
+            self._follow_surface()
         if self.held is not None:
             self._hand.follow(self._ground, self.yaw_rad, (vx, vy, 0.0))
 
@@ -303,15 +384,14 @@ class Walker(Body):
         self._capsule.collect_obstacles(self._world.props, bodies, self._ground, distance_m)
 
     def _pose_bones(self) -> None:
-        """Compute all bone poses; shift them vertically so that the lower foot is on the floor."""
+        """Compute all bone poses; shift them vertically so that it touches the surface."""
         positions, rotations = self._drawn.positions, self._drawn.rotations
-        c, s = math.cos(self.yaw_rad), math.sin(self.yaw_rad)
-        positions[0] = self._ground[0], self._ground[1], 0.0
-        rotations[0] = ((c, -s, 0.0), (s, c, 0.0), (0.0, 0.0, 1.0))
-        angles = self._gait.pose(self._head_pitch_rad, self._head_yaw_rad)
+        positions[0], rotations[0] = self._stance.pelvis(self._ground, self.yaw_rad)
+        angles = self._stance.angles(self._head_pitch_rad, self._head_yaw_rad)
         self._angles[:] = angles
         forward_kinematics(self._skeleton, angles, positions, rotations)
-        positions[:, 2] -= self._soles.lowest_m(positions, rotations)
+        lowest_m = self._stance.underside.lowest_m(positions, rotations)
+        positions[:, 2] -= lowest_m - self._footing.height_m
 
 
 def _check_degrees(deg: float) -> None:

@@ -30,6 +30,11 @@ class WalkerCfg(BodyCfg):
         kick_speed_mps: Speed of a light prop after a kick.
         kick_impulse_ns: Largest impulse of a kick; it limits the speed of heavy props.
         head_pitch_deg: Pitch of the head at the start of an episode; down is positive.
+        step_height_m: Height of the highest prop onto which it steps.
+        step_reach_m: Largest distance from the capsule's surface to such a prop.
+        crawl_height_m: Height and width of the body in crawling.
+        crawl_length_m: Its length in crawling, at least its height.
+        crawl_share: Speed of crawling as a fraction of that of walking, in [0, 1].
         verbs: Verbs of the discrete action part `verb`, such as ``[grab, release]``; without
             verbs there is no such part. See `veca_marl.sim.physics.interactions`.
     """
@@ -47,6 +52,11 @@ class WalkerCfg(BodyCfg):
     kick_speed_mps: float = 3.0
     kick_impulse_ns: float = 3.0
     head_pitch_deg: float = 12.0
+    step_height_m: float = 0.2
+    step_reach_m: float = 0.3
+    crawl_height_m: float = 0.36
+    crawl_length_m: float = 0.56
+    crawl_share: float = 0.4
     verbs: list[str] = field(default_factory=list)
 
     def __post_init__(self) -> None:
@@ -58,8 +68,15 @@ class WalkerCfg(BodyCfg):
                 f"body.radius_m={self.radius_m}, body.height_m={self.height_m}: "
                 "the radius must be positive and at most half the height"
             )
-        if self.backward_share > 1.0:
-            raise ValueError(f"body.backward_share={self.backward_share} is not in [0, 1]")
+        if not 0.0 < self.crawl_height_m < self.crawl_length_m:
+            raise ValueError(
+                f"body.crawl_height_m={self.crawl_height_m}, "
+                f"body.crawl_length_m={self.crawl_length_m}: the height must be positive and "
+                "smaller than the length"
+            )
+        for name in ("backward_share", "crawl_share"):
+            if getattr(self, name) > 1.0:
+                raise ValueError(f"body.{name}={getattr(self, name)} is not in [0, 1]")
         check_interactions("body.verbs", self.verbs)
 
 

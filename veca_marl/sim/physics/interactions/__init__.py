@@ -4,6 +4,9 @@ from veca_marl.sim.physics.interactions.grab import Grab, Release
 from veca_marl.sim.physics.interactions.grip import Grip
 from veca_marl.sim.physics.interactions.interaction import InteractingBody, Interaction, Verb
 from veca_marl.sim.physics.interactions.kick import Kick
+from veca_marl.sim.physics.interactions.posture import Crawl, StandUp, StepOn
+from veca_marl.sim.physics.interactions.press import Press
+from veca_marl.sim.physics.interactions.put_into import PutInto
 from veca_marl.sim.physics.interactions.rays import free_path_m, surface_m
 from veca_marl.sim.physics.interactions.registry import (
     INTERACTIONS,
@@ -15,12 +18,17 @@ from veca_marl.sim.physics.interactions.registry import (
 __all__ = [
     "INTERACTIONS",
     "NO_VERB",
+    "Crawl",
     "Grab",
     "Grip",
     "InteractingBody",
     "Interaction",
     "Kick",
+    "Press",
+    "PutInto",
     "Release",
+    "StandUp",
+    "StepOn",
     "Verb",
     "check_interactions",
     "free_path_m",

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import ClassVar, Protocol
+from typing import TYPE_CHECKING, ClassVar, Protocol
 
 from veca_marl.sim.geometry import Floats
 from veca_marl.sim.physics.props.prop import Prop
+
+if TYPE_CHECKING:  # the world checks the names of interactions
+    from veca_marl.sim.physics.world import World
 
 
 class InteractingBody(Protocol):
@@ -17,6 +20,11 @@ class InteractingBody(Protocol):
     """
 
     name: str
+
+    @property
+    def world(self) -> World:
+        """The world in which it is."""
+        ...
 
     @property
     def position(self) -> Floats:
@@ -59,6 +67,22 @@ class InteractingBody(Protocol):
 
     def release(self) -> bool:
         """Release the held prop; return False, without effect, if the hand is empty."""
+        ...
+
+    def can_step_on(self, prop: Prop) -> bool:
+        """Return whether it can step onto a prop."""
+        ...
+
+    def step_on(self, prop: Prop) -> bool:
+        """Step onto a prop; return False, without effect, if it cannot."""
+        ...
+
+    def crawl(self) -> bool:
+        """Go down on hands and knees; return False, without effect, if it cannot."""
+        ...
+
+    def stand_up(self) -> bool:
+        """Stand up; return False, without effect, if it cannot."""
         ...
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -33,6 +33,8 @@ class Prop:
         sound: Its sound source; None for a silent prop.
         impact: The source of its sound when it is hit; None without sounds of impacts.
         holder: Name of the body that holds it; None while it is free.
+        accepts: Whether a body may put a given prop into it (the verb `put_into`); a task may set
+            another function when it builds its props.
     """
 
     def __init__(
@@ -47,6 +49,7 @@ class Prop:
         self.sound = sound
         self.impact: Source | None = None
         self.holder: str | None = None
+        self.accepts: Callable[[Prop], bool] = _anything
         self._client = client
         self._scene = scene
         geoms = prop_geoms(cfg)
@@ -96,6 +99,12 @@ class Prop:
     def rotation(self) -> Floats:
         """``(3, 3)`` rotation to the world frame."""
         return np.array(self._scene.rotations[self._row])
+
+    @property
+    def yaw_rad(self) -> float:
+        """Angle in [-pi, pi] of its x axis about the vertical."""
+        x, y, _ = self._scene.rotations[self._row][:, 0]
+        return math.atan2(y, x)
 
     @property
     def velocity(self) -> Floats:
@@ -212,6 +221,11 @@ def follow_physics(props: Sequence[Prop]) -> None:
             prop.impact.position = scene.positions[prop._row]
         if prop._obstacle is not None:
             prop._obstacle.move(scene.positions[prop._row], scene.rotations[prop._row])
+
+
+def _anything(prop: Prop) -> bool:
+    """Accept all props."""
+    return True
 
 
 def _three_finite(name: str, what: str, vector: Sequence[float] | Floats) -> list[float]:

@@ -1,0 +1,177 @@
+"""The two stances of a walker: upright, and on hands and knees."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar, Protocol
+
+import numpy as np
+
+from veca_marl.sim.body.anatomy import Skeleton, Soles
+from veca_marl.sim.body.anatomy.undersides import Underside
+from veca_marl.sim.body.walker.capsule import Capsule, lying_capsule, upright_capsule
+from veca_marl.sim.body.walker.gait import Gait
+from veca_marl.sim.body.walker.walker_cfg import WalkerCfg
+from veca_marl.sim.geometry import Floats
+from veca_marl.sim.physics import World
+from veca_marl.sim.physics.interactions import Crawl
+
+
+class Stance(Protocol):
+    """How a walker is posed and collides.
+
+    Attributes:
+        capsule: Its capsule in the physics.
+        speed_share: Speeds of full actions as fractions of those in walking.
+        underside: What touches the surface on which it is.
+        hands_are_free: Whether it can hold, kick and step.
+    """
+
+    capsule: Capsule
+    speed_share: float
+    underside: Underside
+    hands_are_free: bool
+
+    def pelvis(self, ground: Floats, yaw_rad: float) -> tuple[Floats, Floats]:
+        """Return position ``(3,)``, at height 0, and rotation ``(3, 3)`` of the pelvis."""
+        ...
+
+    def angles(self, head_pitch_rad: float, head_yaw_rad: float) -> Floats:
+        """Return the ``(82,)`` joint angles at the present phase of the gait."""
+        ...
+
+
+class Upright:
+    """Walks on two legs; see `Stance`.
+
+    Args:
+        skeleton: The table of bones and joints.
+        gait: Gives the angles.
+        capsule: An upright one.
+    """
+
+    speed_share = 1.0
+    hands_are_free = True
+
+    def __init__(self, skeleton: Skeleton, gait: Gait, capsule: Capsule) -> None:
+        self.capsule = capsule
+        self.underside: Underside = Soles(skeleton)
+        self._gait = gait
+
+    def pelvis(self, ground: Floats, yaw_rad: float) -> tuple[Floats, Floats]:
+        """See `Stance`."""
+        c, s = math.cos(yaw_rad), math.sin(yaw_rad)
+        rotation = np.array(((c, -s, 0.0), (s, c, 0.0), (0.0, 0.0, 1.0)))
+        return np.array((ground[0], ground[1], 0.0)), rotation
+
+    def angles(self, head_pitch_rad: float, head_yaw_rad: float) -> Floats:
+        """See `Stance`."""
+        return self._gait.pose(head_pitch_rad, head_yaw_rad)
+
+
+@dataclass(frozen=True)
+class CrawlPose:
+    """Parameters of crawling. The values are ours, chosen by eye.
+
+    Attributes:
+        pitch_deg: Pitch of the pelvis.
+        pelvis_back_m: Distance of the pelvis behind the middle of the body.
+        neck_deg: Extension of neck and head together with which the eyes look ahead.
+        swing_deg: Amplitude of arms and thighs at full stride.
+    """
+
+    pitch_deg: float = 85.0
+    pelvis_back_m: float = 0.12
+    neck_deg: float = 75.0
+    swing_deg: float = 20.0
+
+    joints_deg: ClassVar[dict[tuple[str, str], float]] = {
+        ("thigh", "flexion"): 90.0,
+        ("shank", "flexion"): 95.0,
+        ("foot", "dorsiflexion"): -50.0,
+        ("upper_arm", "flexion"): 85.0,
+        ("hand", "flexion"): -75.0,
+    }
+
+
+class OnAllFours:
+    """Crawls on hands and knees, diagonal limbs together; see `Stance`.
+
+    Args:
+        skeleton: The table of bones and joints.
+        gait: Gives the phase of the stride.
+        capsule: A lying one.
+        speed_share: See `Stance`.
+        pose: Parameters.
+    """
+
+    hands_are_free = False
+
+    def __init__(
+        self,
+        skeleton: Skeleton,
+        gait: Gait,
+        capsule: Capsule,
+        speed_share: float,
+        pose: CrawlPose | None = None,
+    ) -> None:
+        self.capsule, self.speed_share = capsule, speed_share
+        limbs = [f"{side}_{bone}" for side in "lr" for bone in ("hand", "shank", "foot")]
+        self.underside = Underside(skeleton, limbs, skin=False)
+        self._gait, self._pose = gait, pose or CrawlPose()
+        self._low = np.array([joint.low_rad for joint in skeleton.joints])
+        self._high = np.array([joint.high_rad for joint in skeleton.joints])
+        self._rest: Floats = np.zeros(len(skeleton.joints))
+        for (bone, label), degrees in self._pose.joints_deg.items():
+            for side in "lr":
+                self._rest[skeleton.joint(f"{side}_{bone}", label)] = math.radians(degrees)
+        self._diagonals = [
+            [
+                skeleton.joint(f"{leg}_thigh", "flexion"),
+                skeleton.joint(f"{arm}_upper_arm", "flexion"),
+            ]
+            for leg, arm in ("lr", "rl")
+        ]
+        self._nod = [skeleton.joint(bone, "flexion") for bone in ("neck", "head")]
+        self._shake = [skeleton.joint(bone, "rotation") for bone in ("neck", "head")]
+
+    def pelvis(self, ground: Floats, yaw_rad: float) -> tuple[Floats, Floats]:
+        """See `Stance`."""
+        c, s = math.cos(yaw_rad), math.sin(yaw_rad)
+        pitch = math.radians(self._pose.pitch_deg)
+        cp, sp = math.cos(pitch), math.sin(pitch)
+        back = self._pose.pelvis_back_m
+        rotation = np.array([[c * cp, -s, c * sp], [s * cp, c, s * sp], [-sp, 0.0, cp]])
+        return np.array([ground[0] - back * c, ground[1] - back * s, 0.0]), rotation
+
+    def angles(self, head_pitch_rad: float, head_yaw_rad: float) -> Floats:
+        """See `Stance`."""
+        angles = self._rest.copy()
+        swing = math.radians(self._pose.swing_deg) * self._gait.share
+        swing *= math.sin(2.0 * math.pi * self._gait.phase)
+        for joints, sign in zip(self._diagonals, (1.0, -1.0), strict=True):
+            angles[joints] += sign * swing
+        angles[self._nod] = (head_pitch_rad - math.radians(self._pose.neck_deg)) / 2.0
+        angles[self._shake] = head_yaw_rad / 2.0
+        clipped: Floats = np.clip(angles, self._low, self._high)
+        return clipped
+
+
+def make_stances(
+    skeleton: Skeleton, gait: Gait, cfg: WalkerCfg, world: World
+) -> tuple[Stance, Stance | None]:
+    """Return the upright stance, and that on all fours if the verbs of the walker name `crawl`.
+
+    Args:
+        skeleton: The table of bones and joints.
+        gait: The gait of the walker.
+        cfg: Its parameters.
+        world: The world.
+    """
+    upright = upright_capsule(world, cfg.radius_m, cfg.height_m, cfg.push_limit_kg)
+    standing = Upright(skeleton, gait, upright)
+    if Crawl.name not in cfg.verbs:
+        return standing, None
+    lying = lying_capsule(world, cfg.crawl_height_m, cfg.crawl_length_m, cfg.push_limit_kg)
+    return standing, OnAllFours(skeleton, gait, lying, cfg.crawl_share)
