@@ -10,12 +10,14 @@ PAGE = Path(__file__).parent.parent / "docs" / "reference" / "paper_api.md"
 ROW = re.compile(r"^\| ([^|]*) \| `(veca_marl[\w.]+)` \|", re.MULTILINE)
 ROWS = ROW.findall(PAGE.read_text(encoding="utf-8"))
 # both tables of the appendix, in their order
-FUNCTIONS = (
-    "getImage getSpatialAudio getSpatialAudio getTactile getTactile AddObservations walk kick grab "
-    "release adjustFocalLength lookTowardPoint releaseTowardPoint rotateUpDownHead "
-    "rotateLeftRightHead makeSound isVisible isInteractable getInteractableObjects "
-    "getInteractableObject GetVelocity GetAngVelocity GetAngles ApplyTorque updateTaxels"
-).split()
+FUNCTIONS = [
+    *("getImage", "getSpatialAudio", "getSpatialAudio", "getTactile", "getTactile"),
+    *("AddObservations", "walk", "kick", "grab", "release", "adjustFocalLength"),
+    *("lookTowardPoint", "releaseTowardPoint", "rotateUpDownHead", "rotateLeftRightHead"),
+    *("makeSound", "isVisible", "isInteractable", "getInteractableObjects"),
+    *("getInteractableObject", "GetVelocity", "GetAngVelocity", "GetAngles", "ApplyTorque"),
+    "updateTaxels",
+]
 OTHER_NAMES = {  # the paper's name in our spelling, where it is not the translation of the name
     "AddObservations": "compute",
     "getInteractableObjects": "interactable_objects",

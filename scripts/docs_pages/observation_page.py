@@ -95,9 +95,9 @@ def observation_page() -> str:
 TAIL = """`(team, "info", term)`, `(worlds, agents, 1)` float32, holds the unweighted reward terms
 of the last step. In tasks with a goal `(team, "info", "solved")`, `(worlds, agents, 1)` bool, is
 whether the goal is reached after the step. For a body with verbs `(team, "info", "refused_verbs")`,
-`(worlds, agents, 1)` float32, is 1 if the verb of this step had no effect. The info is no part of the observation; policies do not
-read it. In tasks that eliminate agents `(team, "mask")`, `(worlds, agents)` bool, is False for an
-agent that is eliminated.
+`(worlds, agents, 1)` float32, is 1 if the verb of this step had no effect. The info is no part of
+the observation; policies do not read it. In tasks that eliminate agents `(team, "mask")`,
+`(worlds, agents)` bool, is False for an agent that is eliminated.
 """
 
 

@@ -18,8 +18,9 @@ class VecaGymEnv(gymnasium.Env[Observation, Any]):
     """One game of one agent.
 
     Observations are dicts with one array per sense; `info["terms"]` contains the unweighted reward
-    terms by name, and `info["solved"]` whether the goal of the task is reached, if it has one; the entries of
-    `Body.info` are beside them. The same seed gives the same bytes as in the first world of a `VecaEnv`.
+    terms by name, and `info["solved"]` whether the goal of the task is reached, if it has one; the
+    entries of `Body.info` are beside them. The same seed gives the same bytes as in the first world
+    of a `VecaEnv`.
 
     Args:
         cfg: What to play.

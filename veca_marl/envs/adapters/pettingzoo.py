@@ -22,7 +22,8 @@ class VecaParallelEnv(ParallelEnv[str, Observation, Any]):
 
     Observations are dicts with one array per sense; `infos[agent]["terms"]` contains the unweighted
     reward terms by name, and `infos[agent]["solved"]` whether the goal of the task is reached, if
-    it has one; the entries of `Body.info` are beside them. The same seed gives the same bytes as in the first world of a `VecaEnv`.
+    it has one; the entries of `Body.info` are beside them. The same seed gives the same bytes as in
+    the first world of a `VecaEnv`.
 
     Args:
         cfg: What to play.

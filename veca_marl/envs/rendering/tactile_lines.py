@@ -31,6 +31,6 @@ def draw_tactile_lines(
     drawn = np.ascontiguousarray(image).copy()
     ends = camera.project(pose, lines.reshape(-1, 3)).reshape(-1, 2, 3)
     for start, end in ends[(ends[..., 2] > camera.near_m).all(axis=1)]:
-        pixels = [tuple(int(number) for number in np.floor(point[:2])) for point in (start, end)]
-        cv2.line(drawn, *pixels, BLUE)
+        first, last = np.floor(start[:2]).astype(int), np.floor(end[:2]).astype(int)
+        cv2.line(drawn, first.tolist(), last.tolist(), BLUE)
     return drawn

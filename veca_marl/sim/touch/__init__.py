@@ -1,9 +1,9 @@
 """Touch: taxels, the penetration model and the sense of touch."""
 
-from veca_marl.sim.touch.get_tactile import Tactile, get_tactile
 from veca_marl.sim.touch.parts import Part, skin_parts
 from veca_marl.sim.touch.quality import TouchQuality
 from veca_marl.sim.touch.sense import TouchCfg, TouchSense
+from veca_marl.sim.touch.tactile import Tactile, get_tactile
 from veca_marl.sim.touch.taxels import (
     TAXELS_PER_TRIANGLE,
     TaxelTable,

@@ -49,7 +49,8 @@ def kicked_velocity(cfg: WalkerCfg, here: Floats, prop: Prop) -> Floats:
     away[2] = 0.0
     away /= max(float(np.linalg.norm(away)), 1e-9)
     speed = min(cfg.kick_speed_mps, cfg.kick_impulse_ns / prop.cfg.mass_kg)
-    return speed * away + np.array([0.0, 0.0, _LIFT * speed])
+    velocity: Floats = speed * away + np.array([0.0, 0.0, _LIFT * speed])
+    return velocity
 
 
 def is_first_hit(

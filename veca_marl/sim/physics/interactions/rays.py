@@ -42,21 +42,6 @@ def free_path_m(
     return length_m
 
 
-def first_hit_m(client: int, start: Floats, end: Floats) -> float:
-    """Return the distance from `start` to the first solid thing on the way to `end`.
-
-    Args:
-        client: PyBullet's client id.
-        start: ``(3,)`` metres.
-        end: ``(3,)`` metres.
-
-    Returns:
-        Metres; the distance to `end` if nothing is in between.
-    """
-    hits = (hit.distance_m for hit in _hits(client, start, end))
-    return next(hits, float(np.linalg.norm(end - start)))
-
-
 def surface_m(client: int, body_id: int, start: Floats, end: Floats) -> float:
     """Return the distance from `start` to the surface of one body on the way to `end`.
 
