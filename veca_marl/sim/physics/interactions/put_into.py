@@ -13,7 +13,11 @@ from veca_marl.sim.physics.interactions.registry import register_interaction
 from veca_marl.sim.physics.props.prop import Prop
 
 _GAP_M = 0.01  # between the lowest point of the prop and what it falls on, or the rim
-_PLACES = 8  # on the ring inside the rim
+_RIM_M = 0.02  # thickness of the walls of a container
+# corners, middle and edges of a container, as shares of the way from the middle to the rim
+_PLACES = np.array(
+    [(1, 1), (-1, -1), (1, -1), (-1, 1), (0, 0), (1, 0), (-1, 0), (0, 1), (0, -1)], np.float64
+)
 
 
 @register_interaction
@@ -36,11 +40,12 @@ class PutInto(Interaction):
         return held is not None and fits(held, prop) and prop.accepts(held)
 
     def apply(self, body: InteractingBody, prop: Prop) -> None:
-        """Open the hand and place the prop above the container, at rest and upright."""
+        """Open the hand and place the prop above the container, at rest, with its yaw."""
         held = body.held
         if held is not None:
             body.release()
-            held.place(place_above(held, prop, body.world.props.values()), held.yaw_rad)
+            held.place(held.position, prop.yaw_rad)
+            held.place(place_above(held, prop, body.world.props.values()), prop.yaw_rad)
 
 
 def fits(prop: Prop, container: Prop) -> bool:
@@ -52,37 +57,30 @@ def fits(prop: Prop, container: Prop) -> bool:
 def place_above(prop: Prop, container: Prop, others: Iterable[Prop]) -> Floats:
     """Return where a prop is free above a container and what lies in it, ``(3,)`` metres.
 
-    Of the middle and the places on a ring inside the rim, it is the one above the lowest pile.
-    Piles are measured by the bounding boxes of movable props.
+    Of the corners, the middle and the edges of the container it is the place above the lowest pile;
+    of equal ones the first. Piles are measured by the bounding boxes of movable props.
 
     Args:
         prop: Upright, elsewhere.
         container: The container.
         others: All props of the world.
     """
-    low, high = container.bounds()
-    middle, half_m = (low + high) / 2.0, float(np.min((high - low)[:2])) / 2.0
-    ring_m = max(half_m - prop.radius_m, 0.0)
+    (low, high), (own_low, own_high) = container.bounds(), prop.bounds()
+    half = (own_high - own_low)[:2] / 2.0
+    reach = np.maximum((high - low)[:2] / 2.0 - half - _RIM_M, 0.0)
+    places = ((low + high) / 2.0)[:2] + _PLACES * reach
     piles = [p.bounds() for p in others if p not in (prop, container) and not p.fixed]
-    places = [middle[:2], *(middle[:2] + ring_m * way for way in _ring())]
-    heights = [_pile_m(place, prop.radius_m, piles) for place in places]
-    best = int(np.argmin(heights))  # the first of equals: the middle
-    below_m = float(prop.position[2]) - prop.lowest_m
+    heights = [_pile_m(place - half, place + half, piles) for place in places]
+    best = int(np.argmin(heights))
     bottom_m = max(heights[best], float(high[2])) + _GAP_M
-    return np.array([*places[best], bottom_m + below_m])
+    return np.array([*places[best], bottom_m + float(prop.position[2] - own_low[2])])
 
 
-def _ring() -> Floats:
-    """Return unit vectors ``(8, 2)`` in all directions."""
-    angles = np.arange(_PLACES) * 2.0 * np.pi / _PLACES
-    return np.stack([np.cos(angles), np.sin(angles)], axis=1)
-
-
-def _pile_m(place: Floats, radius_m: float, piles: Sequence[tuple[Floats, Floats]]) -> float:
-    """Return the height of the highest box that overlaps the square round a place; 0 if none."""
+def _pile_m(low: Floats, high: Floats, piles: Sequence[tuple[Floats, Floats]]) -> float:
+    """Return the height of the highest box that overlaps a rectangle; 0 if none does."""
     overlapping = [
-        float(high[2])
-        for low, high in piles
-        if (low[:2] < place + radius_m).all() and (high[:2] > place - radius_m).all()
+        float(top[2])
+        for bottom, top in piles
+        if (bottom[:2] < high).all() and (top[:2] > low).all()
     ]
     return max(overlapping, default=0.0)
