@@ -41,6 +41,10 @@ class InteractingBody(Protocol):
         """The prop in its hand; None if the hand is empty."""
         ...
 
+    def interactable_objects(self) -> list[Prop]:
+        """Return the interactable props, nearest to the centre of the view first."""
+        ...
+
     def interactable_object(self) -> Prop | None:
         """Return the interactable prop nearest to the centre of the view."""
         ...
