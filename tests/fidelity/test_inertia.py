@@ -2,11 +2,10 @@
 
 import pytest
 
-from veca_marl.fidelity.physics.inertia import inertia_laws, pendulum_law
-from veca_marl.sim.physics import PropShape
+from veca_marl.fidelity.physics.inertia import SIZES, inertia_laws, pendulum_law
 
 
-@pytest.mark.parametrize("shape", PropShape)
+@pytest.mark.parametrize("shape", SIZES)
 def test_a_prop_has_the_inertia_of_a_homogeneous_solid(shape):
     """Bullet alone gives capsules and goals the inertia of their bounding box."""
     assert not [law for law in inertia_laws(shape) if not law.holds]

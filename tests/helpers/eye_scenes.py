@@ -8,6 +8,7 @@ from veca_marl.sim.geometry import Geom, Pose, Scene, Shape, quaternions_to_matr
 from veca_marl.sim.vision import Camera, look_at
 
 EYE_SPACING_M = 0.04
+SIMPLE = (Shape.SPHERE, Shape.BOX, Shape.CYLINDER, Shape.CAPSULE)
 
 
 def random_size(shape, rng):
@@ -23,7 +24,7 @@ def random_rotations(count, rng):
     return out
 
 
-def clutter(rng, per_shape=6, shapes=tuple(Shape), walls=True):
+def clutter(rng, per_shape=6, shapes=SIMPLE, walls=True):
     """Primitives of every shape in random poses within a room."""
     scene = Scene()
     if walls:

@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 from walking import ball, box, empty_world, let_pass, wall
 
-from veca_marl.sim.physics import SIZE_NAMES, PropCfg, PropShape, pybullet
+from veca_marl.sim.geometry import distances_to
+from veca_marl.sim.physics import SIZE_NAMES, PartCfg, PropCfg, PropShape, pybullet
+from veca_marl.sim.physics.props.prop_shapes import prop_geoms
 from veca_marl.sim.sound import SoundCfg
 
 SIZES = {
@@ -16,11 +18,27 @@ SIZES = {
     PropShape.capsule: [0.2, 0.5],
     PropShape.wall: [2.0, 0.1, 1.0],
     PropShape.goal: [1.2, 0.8, 0.04],
+    PropShape.pyramid: [0.3, 0.4, 0.5],
+    PropShape.sector: [0.3, 0.2],
+    PropShape.doll: [0.6],
+    PropShape.compound: [],
+    PropShape.convex: [],
+}
+PIECES = {
+    PropShape.compound: {
+        "parts": [
+            PartCfg(PropShape.box, [0.4, 0.1, 0.2], rotation_deg=(0.0, 20.0, 30.0)),
+            PartCfg(PropShape.pyramid, [0.2, 0.2, 0.3], (0.1, 0.2, 0.1), (50.0, 0.0, 0.0)),
+        ]
+    },
+    PropShape.convex: {
+        "points_m": [[0.2, 0, 0], [-0.2, 0.1, 0], [0, -0.3, 0.1], [0, 0, 0.4], [0.1, 0.2, 0.3]]
+    },
 }
 
 
 def of(shape, **more):
-    return PropCfg(name="thing", shape=shape, size_m=SIZES[shape], **more)
+    return PropCfg(name="thing", shape=shape, size_m=SIZES[shape], **PIECES.get(shape, {}), **more)
 
 
 @pytest.mark.parametrize("shape", PropShape)
@@ -28,16 +46,13 @@ def test_the_drawn_shape_is_the_collision_shape(shape):
     """Rays of the physics hit exactly where the drawn primitives are."""
     world = empty_world(of(shape, position_m=(0.3, -0.2, 1.0), yaw_deg=33.0))
     world.refresh()
-    geoms = world.scene.find("thing").geoms
     rng = np.random.default_rng(0)
-    table = world.scene.geoms
-    low, high = pybullet.getAABB(world.prop("thing").body_id, physicsClientId=world.client)
+    low, high = world.prop("thing").bounds()
     points = rng.uniform(low, high, (3000, 3))
     inside = np.zeros(len(points), bool)
-    for g in range(geoms.start, geoms.stop):
-        inside |= _inside(table.shapes[g], table.sizes[g], table.positions[g], table.rotations[g])(
-            points
-        )
+    for geom in prop_geoms(world.prop("thing").cfg):
+        own = (points - world.prop("thing").position) @ world.prop("thing").rotation
+        inside |= distances_to(geom, own) < 0.0
     probe = pybullet.createCollisionShape(
         pybullet.GEOM_SPHERE, radius=0.001, physicsClientId=world.client
     )
@@ -53,23 +68,6 @@ def test_the_drawn_shape_is_the_collision_shape(shape):
         solid.append(bool(near) and min(n[8] for n in near) < -0.001)
     assert inside.sum() > 10
     assert np.mean(inside != np.array(solid)) < 0.003
-
-
-def _inside(shape, size, position, rotation):
-    """Say which points are inside a primitive."""
-
-    def check(points):
-        local = (points - position) @ rotation
-        if shape == 0:
-            return np.linalg.norm(local, axis=1) < size[0]
-        if shape == 1:
-            return (np.abs(local) < size).all(axis=1)
-        across, along = np.hypot(local[:, 0], local[:, 1]), np.abs(local[:, 2]) - size[1] / 2
-        if shape == 2:
-            return (across < size[0]) & (along < 0.0)
-        return np.hypot(across, np.maximum(along, 0.0)) < size[0]
-
-    return check
 
 
 @pytest.mark.parametrize("shape", [PropShape.sphere, PropShape.box, PropShape.cylinder])
@@ -133,8 +131,9 @@ def test_returned_positions_are_copies():
 
 @pytest.mark.parametrize("shape", PropShape)
 def test_sizes_are_counted_and_named(shape):
-    for wrong in ([], [*SIZES[shape], 1.0], [-1.0] * len(SIZES[shape]), [math.nan] * 3):
-        with pytest.raises(ValueError, match=SIZE_NAMES[shape][0]) as refusal:
+    some = [-1.0] * (len(SIZES[shape]) or 1)
+    for wrong in ([*SIZES[shape], 1.0], some, [math.nan] * 3):
+        with pytest.raises(ValueError, match=", ".join(SIZE_NAMES[shape]) or "none") as refusal:
             PropCfg(name="thing", shape=shape, size_m=wrong)
         assert "'thing'" in str(refusal.value)
 

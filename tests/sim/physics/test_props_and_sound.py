@@ -8,7 +8,7 @@ from composed import compose
 
 from veca_marl.sim.geometry import Pose
 from veca_marl.sim.hearing import MonoReceiver
-from veca_marl.sim.physics import PropCfg, PropShape, World
+from veca_marl.sim.physics import JointCfg, PartCfg, PropCfg, PropShape, World
 from veca_marl.sim.sound import SoundCfg, SoundKind
 
 THROUGH_WALL_M, THROUGH_DOOR_M = -1.0, 1.7  # y of straight lines from one room to the other
@@ -110,3 +110,25 @@ def test_a_box_that_physics_moves_out_of_the_way_no_longer_attenuates(two_rooms)
 )
 def test_small_and_intangible_things_do_not_attenuate(two_rooms, prop):
     assert two_rooms(prop, y=THROUGH_DOOR_M).level_db() == two_rooms(y=THROUGH_DOOR_M).level_db()
+
+
+def test_the_leaf_of_a_hinged_door_attenuates_until_it_is_opened_or_reset(two_rooms):
+    hinge = JointCfg(anchor_m=(0.0, 0.5, 0.0), range_deg=90.0)
+    rooms = two_rooms(closing_box(position_m=DOOR_M, mass_kg=3.0, joint=hinge), y=THROUGH_DOOR_M)
+    leaf, closed_db = rooms.world.prop("door"), rooms.level_db()
+    leaf.set_opening(1.0)
+    assert rooms.level_db() - closed_db == pytest.approx(LOSS_DB, abs=1.0)
+    leaf.set_opening(0.0)
+    assert rooms.level_db() == pytest.approx(closed_db, abs=1.0)
+    leaf.set_opening(1.0)
+    rooms.reset()
+    assert rooms.level_db() == closed_db
+
+
+def test_a_large_board_of_a_compound_attenuates_as_a_box_does(two_rooms):
+    parts = [PartCfg(PropShape.box, [0.05, 1.0, 2.0]), PartCfg(PropShape.sphere, [0.04])]
+    board = PropCfg("door", PropShape.compound, [], DOOR_M, parts=parts)
+    rooms = two_rooms(board, y=THROUGH_DOOR_M)
+    closed_db = rooms.level_db()
+    rooms.world.prop("door").place((3.05, -20.0, 0.0))
+    assert rooms.level_db() - closed_db == pytest.approx(LOSS_DB, abs=1.0)

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from veca_marl.fidelity.touch.flat_skin import FlatSkin, Thing
-from veca_marl.sim.geometry import Floats, Shape
+from veca_marl.sim.geometry import Floats, Shape, pyramid
 
 SHAPES = (Shape.SPHERE, Shape.BOX, Shape.CYLINDER, Shape.CAPSULE)
 WIDTHS_M = (0.003, 0.005, 0.01, 0.02, 0.04)
@@ -25,7 +25,7 @@ class Approach:
     """A thing that moves on a straight line until its foremost point meets the bone below a taxel.
 
     Attributes:
-        shape: Of the thing.
+        shape: Of the thing; a polyhedron is a pyramid.
         width_m: Its smallest extent, about.
         skin_m: Thickness of the skin.
         path_deg: Angle of its path to the normal of the skin.
@@ -45,6 +45,9 @@ class Approach:
     def thing(self) -> Thing:
         """Return the thing."""
         tilt = rotation(2, self.turn_deg) @ rotation(1, self.tilt_deg)
+        if self.shape is Shape.POLYHEDRON:
+            hull = pyramid(self.width_m, 1.3 * self.width_m, 1.2 * self.width_m)
+            return Thing(self.shape, (), tilt, hull=hull)
         return Thing(self.shape, size_of(self.shape, self.width_m), tilt)
 
     def readings(self, steps: int) -> Floats:

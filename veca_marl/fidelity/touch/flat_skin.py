@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from veca_marl.sim.geometry import Floats, Geom, Scene, Shape
+from veca_marl.sim.geometry import Floats, Geom, Polyhedron, Scene, Shape
 from veca_marl.sim.touch import TAXELS_PER_TRIANGLE, TaxelTable
 from veca_marl.sim.touch.penetration import empty_workspace, read_taxels
 from veca_marl.sim.touch.receptive_fields import Fields
@@ -25,12 +25,14 @@ class Thing:
         size: Metres, as in `Primitive`.
         rotation: ``(3, 3)`` from its axes to those of the skin.
         skin_m: Thickness of its own skin, its outer layer.
+        hull: The polyhedron; None for all other shapes.
     """
 
     shape: Shape
     size: tuple[float, ...]
     rotation: Floats
     skin_m: float = 0.0
+    hull: Polyhedron | None = None
 
     def foremost(self, direction: Floats) -> Floats:
         """Return the point farthest along a direction, ``(3,)`` metres from its centre.
@@ -39,6 +41,10 @@ class Thing:
         """
         local = self.rotation.T @ direction
         local[np.abs(local) < 1e-9] = 0.0
+        if self.hull is not None:
+            heights = self.hull.vertices @ local
+            highest = self.hull.vertices[heights > heights.max() - 1e-9]
+            return self._turned(highest.mean(axis=0))
         if self.shape is Shape.BOX:
             return self._turned(np.sign(local) * np.array(self.size))
         if self.shape is Shape.SPHERE:
@@ -68,7 +74,14 @@ class FlatSkin:
         half = _BONE_M + thickness_m
         block = Geom(Shape.BOX, (half, half, half), (0.0, 0.0, -half), skin_m=thickness_m)
         skin = scene.add_object("skin", [[block]])
-        geom = Geom(thing.shape, thing.size, (0, 0, 0), thing.rotation, skin_m=thing.skin_m)
+        geom = Geom(
+            thing.shape,
+            thing.size,
+            (0, 0, 0),
+            thing.rotation,
+            skin_m=thing.skin_m,
+            hull=thing.hull,
+        )
         scene.add_object("thing", [[geom]])
         scene.update()
         self._geoms = scene.geoms

@@ -38,10 +38,11 @@ Mayer et al., Investigative Ophthalmology & Visual Science 36 (1995) 671-685, ta
 
 CAMERAS = 300
 CLEAR_M = 0.3
+_LENGTHS = {Shape.SPHERE: 1, Shape.BOX: 3, Shape.CYLINDER: 2, Shape.CAPSULE: 2}
 ROOMS: dict[str, tuple[tuple[Shape, ...], float]] = {
     "boxes": ((Shape.BOX,), 99.9),
     "balls": ((Shape.SPHERE,), 97.0),
-    "all shapes": (tuple(Shape), 95.0),
+    "all shapes": (tuple(_LENGTHS), 95.0),
 }
 """Shapes in the rooms that are compared with TinyRenderer, and the least mean share (%)."""
 WALL_ID = 1
@@ -157,9 +158,6 @@ def _direction_deg(camera: Camera, shown: NDArray[np.bool_]) -> float:
     """Return the horizontal direction of the centre of some pixels, right is positive."""
     slopes = camera.lens.columns[np.nonzero(shown)[1]]
     return math.degrees(math.atan(float(slopes.mean())))
-
-
-_LENGTHS = {Shape.SPHERE: 1, Shape.BOX: 3, Shape.CYLINDER: 2, Shape.CAPSULE: 2}
 
 
 def random_room(rng: np.random.Generator, shapes: Sequence[Shape]) -> Scene:

@@ -1,7 +1,8 @@
-"""Shared geometry: primitives, the scene, poses, rotations, distances, rays, meshes."""
+"""Shared geometry: primitives, polyhedra, the scene, poses, rotations, distances, rays, meshes."""
 
 from veca_marl.sim.geometry.inertia import Inertia, joined_inertia, primitive_inertia
 from veca_marl.sim.geometry.meshes import Indices, Mesh, MeshTable, empty_meshes, with_mesh
+from veca_marl.sim.geometry.polyhedra import Polyhedron, convex_hull, pyramid, sector_of_disc
 from veca_marl.sim.geometry.pose import Floats, Pose
 from veca_marl.sim.geometry.primitives import (
     Primitive,
@@ -23,14 +24,29 @@ from veca_marl.sim.geometry.signed_distances import (
     DistanceAndGradient,
     distance,
     distance_and_gradient,
-    distances_to,
     is_inside,
 )
 from veca_marl.sim.geometry.skinning import deform_meshes
+from veca_marl.sim.geometry.solids import (
+    Solid,
+    distances_to,
+    solid_distance,
+    solid_entry,
+    solid_gradient,
+    solid_of,
+)
 from veca_marl.sim.geometry.tables import Bools, Geom, GeomTable, SurfaceTable
 from veca_marl.sim.geometry.vectors import Vector, horizontal_distance, single
 
 __all__ = [
+    "solid_entry",
+    "solid_of",
+    "solid_gradient",
+    "solid_distance",
+    "sector_of_disc",
+    "pyramid",
+    "convex_hull",
+    "Polyhedron",
     "Bools",
     "DistanceAndGradient",
     "Floats",
@@ -45,6 +61,7 @@ __all__ = [
     "Scene",
     "SceneObject",
     "Shape",
+    "Solid",
     "SurfaceTable",
     "Vector",
     "bounding_radius",

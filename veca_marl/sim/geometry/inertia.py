@@ -29,6 +29,10 @@ class Inertia(NamedTuple):
 def primitive_inertia(primitive: Primitive, mass_kg: float) -> Inertia:
     """Return the inertia of a primitive of even density, in the frame that it is on."""
     centre, rotation = primitive.pose
+    if primitive.hull is not None:
+        hull = primitive.hull
+        middle = centre + rotation @ hull.centroid
+        return Inertia(mass_kg, middle, rotation @ hull.inertia(mass_kg) @ rotation.T)
     if primitive.shape is Shape.BOX:
         squares = (2.0 * np.array(primitive.size)) ** 2
         diagonal = mass_kg / 12.0 * np.diag(squares.sum() - squares)

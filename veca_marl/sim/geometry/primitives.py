@@ -1,4 +1,4 @@
-"""Primitive shapes: spheres, boxes, cylinders and capsules, each at a pose on a frame.
+"""Primitive shapes: spheres, boxes, cylinders, capsules and convex polyhedra on a frame.
 
 Bones, props, collision shapes, drawn surfaces and obstacles are all made of these.
 """
@@ -14,6 +14,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
+from veca_marl.sim.geometry.polyhedra.polyhedron import Polyhedron
 from veca_marl.sim.geometry.pose import Floats, Pose
 from veca_marl.sim.geometry.rotations import rotation_with_z
 from veca_marl.sim.geometry.vectors import single
@@ -26,6 +27,7 @@ class Shape(IntEnum):
     BOX = 1
     CYLINDER = 2
     CAPSULE = 3
+    POLYHEDRON = 4
 
 
 SIZE_NAMES: dict[Shape, tuple[str, ...]] = {
@@ -33,6 +35,7 @@ SIZE_NAMES: dict[Shape, tuple[str, ...]] = {
     Shape.BOX: ("half x", "half y", "half z"),
     Shape.CYLINDER: ("radius", "length"),
     Shape.CAPSULE: ("radius", "length"),
+    Shape.POLYHEDRON: (),
 }
 
 
@@ -44,21 +47,29 @@ class Primitive:
         shape: What it is.
         size: Metres. Sphere ``(radius,)``; box half extents ``(x, y, z)``; cylinder and capsule
             ``(radius, length)`` along the local z axis, where the length of a capsule is the
-            distance between the centres of its caps, as in PyBullet and URDF.
-        offset: ``(3,)`` metres from the frame's origin to the primitive's centre.
+            distance between the centres of its caps, as in PyBullet and URDF; polyhedron ``()``.
+        offset: ``(3,)`` metres from the frame's origin to the primitive's centre; of a polyhedron
+            to the origin of its vertices.
         rotation: ``(3, 3)`` from the primitive's axes to the frame's.
+        hull: The polyhedron; None for all other shapes.
 
     Raises:
         ValueError: If a size is not positive, the number of sizes is not that of the shape, the
-            offset is not finite or the rotation is not a rotation.
+            offset is not finite, the rotation is not a rotation, or `hull` does not fit the shape.
     """
 
     shape: Shape
     size: tuple[float, ...]
     offset: ArrayLike = (0.0, 0.0, 0.0)
     rotation: ArrayLike = field(default_factory=lambda: np.eye(3))
+    hull: Polyhedron | None = field(default=None, kw_only=True)
 
     def __post_init__(self) -> None:
+        """Check the numbers."""
+        if (self.hull is None) == (Shape(self.shape) is Shape.POLYHEDRON):
+            raise ValueError(
+                f"{Shape(self.shape).name}: hull={self.hull}; a POLYHEDRON has one, no other shape"
+            )
         names = SIZE_NAMES[Shape(self.shape)]
         if len(self.size) != len(names) or not all(0.0 < s < np.inf for s in self.size):
             raise ValueError(
@@ -79,9 +90,9 @@ class Primitive:
 
     @property
     def radius(self) -> float:
-        """Metres; raises `ValueError` for a box, which has none."""
-        if self.shape is Shape.BOX:
-            raise ValueError("a box has no radius")
+        """Metres; raises `ValueError` for boxes and polyhedra, which have none."""
+        if self.shape in (Shape.BOX, Shape.POLYHEDRON):
+            raise ValueError(f"a {self.shape.name} has no radius")
         return self.size[0]
 
     @property
@@ -92,6 +103,8 @@ class Primitive:
     @property
     def volume(self) -> float:
         """Cubic metres."""
+        if self.hull is not None:
+            return self.hull.volume
         if self.shape is Shape.BOX:
             return float(8.0 * np.prod(self.size))
         cylinder = math.pi * self.radius**2 * self.length
@@ -105,16 +118,21 @@ class Primitive:
         return centre - half, centre + half
 
     def corners(self) -> Floats:
-        """Return the corners of a box, ``(8, 3)`` metres in the frame."""
+        """Return the corners of a box ``(8, 3)`` or polyhedron ``(V, 3)``, metres in the frame."""
+        centre, rotation = self.pose
+        if self.hull is not None:
+            vertices: Floats = centre + self.hull.vertices @ rotation.T
+            return vertices
         if self.shape is not Shape.BOX:
             raise ValueError(f"a {self.shape.name} has no corners")
-        centre, rotation = self.pose
         signs = np.array(np.meshgrid(*[(-1.0, 1.0)] * 3)).reshape(3, -1).T
         corners: Floats = centre + (signs * self.size) @ rotation.T
         return corners
 
     def grown(self, by_m: float) -> Self:
         """Return the same primitive with all of its surface moved outward, corners kept sharp."""
+        if self.hull is not None:
+            return replace(self, hull=self.hull.grown(by_m))
         size = tuple(value + by_m for value in self.size)
         if self.shape is Shape.CYLINDER:
             size = (self.size[0] + by_m, self.size[1] + 2.0 * by_m)
@@ -138,7 +156,7 @@ def _is_rotation(matrix: NDArray[np.float64]) -> bool:
     return bool(np.linalg.det(matrix) > 0.0)
 
 
-_SPHERE, _BOX = int(Shape.SPHERE), int(Shape.BOX)
+_SPHERE, _BOX, _POLYHEDRON = int(Shape.SPHERE), int(Shape.BOX), int(Shape.POLYHEDRON)
 _HALF = single(0.5)
 
 
@@ -149,4 +167,6 @@ def bounding_radius(shape: int, size: NDArray[np.float32]) -> float:
         return float(size[0])
     if shape == _BOX:
         return math.sqrt(size[0] * size[0] + size[1] * size[1] + size[2] * size[2])
+    if shape == _POLYHEDRON:
+        return float(size[2])  # see `polyhedra.table.sizes_of`
     return float(size[0] + _HALF * size[1])

@@ -46,7 +46,7 @@ class Scene:
 
     def __init__(self) -> None:
         self.objects: list[SceneObject] = []
-        self.geoms = geom_table([], 0, 0)
+        self.geoms = geom_table([], 0, 0, 0)
         self.meshes = empty_meshes()
         self.surfaces = SurfaceTable(self.geoms.colours, self.geoms.objects, self.geoms.frames)
         self.version = 0
@@ -79,7 +79,8 @@ class Scene:
         self._check_addition(name, frames, mesh)
         first_row, first_geom = len(self._positions), len(self.geoms.shapes)
         first_vertex, first_triangle = len(self.meshes.vertices), len(self.meshes.triangles)
-        self._add_surfaces(geom_table(frames, len(self.objects), first_row), mesh)
+        first_face = len(self.geoms.faces)
+        self._add_surfaces(geom_table(frames, len(self.objects), first_row, first_face), mesh)
         self._positions = np.concatenate((self._positions, np.zeros((len(frames), 3))))
         self._rotations = np.concatenate((self._rotations, np.tile(np.eye(3), (len(frames), 1, 1))))
         item = SceneObject(

@@ -1,8 +1,8 @@
 """Signed distances to primitives and their gradients, in a primitive's own axes.
 
 Negative inside. Inside and outside they are the exact Euclidean distances (spheres, capsules,
-boxes, cylinders), with a gradient of length 1. The scalar functions are inlined into the loops of
-touch and vision; they work in the precision of their arguments.
+boxes, cylinders; for polyhedra see `solids`), with a gradient of length 1. The scalar functions
+are inlined into the loops of touch and vision; they work in the precision of their arguments.
 """
 
 from __future__ import annotations
@@ -10,33 +10,15 @@ from __future__ import annotations
 import math
 from typing import TypeAlias
 
-import numpy as np
 from numba import njit
 
-from veca_marl.sim.geometry.pose import Floats
-from veca_marl.sim.geometry.primitives import Primitive, Shape
+from veca_marl.sim.geometry.primitives import Shape
 from veca_marl.sim.geometry.vectors import Vector
 
 DistanceAndGradient: TypeAlias = tuple[float, float, float, float]
 
 _SPHERE, _BOX, _CYLINDER = int(Shape.SPHERE), int(Shape.BOX), int(Shape.CYLINDER)
 _TINY_M = 1e-12
-
-
-def distances_to(primitive: Primitive, points: Floats) -> Floats:
-    """Return the signed distances ``(...)`` in metres of points ``(..., 3)`` of the same frame."""
-    centre, rotation = primitive.pose
-    local = np.ascontiguousarray(((points - centre) @ rotation).reshape(-1, 3))
-    out = np.empty(len(local))
-    size = (*primitive.size, 0.0, 0.0)[:3]
-    _write_distances(int(primitive.shape), (size[0], size[1], size[2]), local, out)
-    return out.reshape(points.shape[:-1])
-
-
-@njit(cache=True, error_model="numpy")
-def _write_distances(shape: int, size: Vector, points: Floats, out: Floats) -> None:
-    for i in range(points.shape[0]):
-        out[i] = distance(shape, size, points[i, 0], points[i, 1], points[i, 2])
 
 
 @njit(cache=True, error_model="numpy", inline="always")

@@ -10,6 +10,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from veca_marl.sim.geometry.polyhedra.table import joined_rows, sizes_of
 from veca_marl.sim.geometry.pose import Floats
 from veca_marl.sim.geometry.primitives import Primitive
 
@@ -47,6 +48,8 @@ class Geom(Primitive):
             raise ValueError(f"checker_m {self.checker_m}: must be 0 (plain) or an edge in metres")
         if not 0.0 <= self.skin_m < np.inf:
             raise ValueError(f"skin_m {self.skin_m}: must be 0 (rigid) or a thickness in metres")
+        if self.hull is not None and self.skin_m > 0.0:
+            raise ValueError(f"skin_m {self.skin_m}: a polyhedron has no skin")
 
 
 def check_colour(colour: Sequence[float]) -> None:
@@ -60,7 +63,7 @@ class GeomTable(NamedTuple):
 
     Attributes:
         shapes: ``(G,)`` int32 `Shape`.
-        sizes: ``(G, 3)`` float32 metres, unused entries 0.
+        sizes: ``(G, 3)`` float32 metres, unused entries 0; of a polyhedron see `sizes_of`.
         colours: ``(G, 3)`` float32 in [0, 1].
         checkers: ``(G,)`` float32 metres.
         transparent: ``(G,)`` bool.
@@ -73,6 +76,7 @@ class GeomTable(NamedTuple):
         local_rotations: ``(G, 3, 3)`` from the primitive's axes to the frame's.
         positions: ``(G, 3)`` metres, world frame, as of the last `Scene.update`.
         rotations: ``(G, 3, 3)`` from the primitive's axes to the world's, likewise.
+        faces: ``(N, FACE_COLUMNS)`` the triangles of all polyhedra, see `face_rows`.
     """
 
     shapes: NDArray[np.int32]
@@ -89,6 +93,7 @@ class GeomTable(NamedTuple):
     local_rotations: Floats
     positions: Floats
     rotations: Floats
+    faces: Floats
 
 
 class SurfaceTable(NamedTuple):
@@ -105,20 +110,21 @@ class SurfaceTable(NamedTuple):
     frames: NDArray[np.int64]
 
 
-def geom_table(frames: Sequence[Sequence[Geom]], object_id: int, first_row: int) -> GeomTable:
+def geom_table(
+    frames: Sequence[Sequence[Geom]], object_id: int, first_row: int, first_face: int
+) -> GeomTable:
     """Return the primitives of one object as rows.
 
     Args:
         frames: The primitives on each of its frames.
         object_id: Id of the object.
         first_row: Row of its first frame in the scene's frame table.
+        first_face: Number of triangles of polyhedra that the scene has already.
     """
     geoms = [geom for frame in frames for geom in frame]
     rows = [first_row + row for row, frame in enumerate(frames) for _ in frame]
     n = len(geoms)
-    sizes = np.zeros((n, 3), np.float32)
-    for row, geom in enumerate(geoms):
-        sizes[row, : len(geom.size)] = geom.size
+    sizes = _sizes(geoms, first_face)
     offsets = np.array([geom.offset for geom in geoms], np.float64).reshape(n, 3)
     rotations = np.array([geom.rotation for geom in geoms], np.float64).reshape(n, 3, 3)
     return GeomTable(
@@ -136,7 +142,19 @@ def geom_table(frames: Sequence[Sequence[Geom]], object_id: int, first_row: int)
         local_rotations=rotations,
         positions=offsets.copy(),
         rotations=rotations.copy(),
+        faces=joined_rows([geom.hull for geom in geoms if geom.hull is not None]),
     )
+
+
+def _sizes(geoms: Sequence[Geom], first_face: int) -> NDArray[np.float32]:
+    """Return the sizes of primitives as rows ``(n, 3)``."""
+    sizes = np.zeros((len(geoms), 3), np.float32)
+    for row, geom in enumerate(geoms):
+        sizes[row, : len(geom.size)] = geom.size
+        if geom.hull is not None:
+            sizes[row] = sizes_of(geom.hull, first_face)
+            first_face += len(geom.hull.triangles)
+    return sizes
 
 
 def appended(table: GeomTable, more: GeomTable) -> GeomTable:

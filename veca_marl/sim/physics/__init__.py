@@ -12,11 +12,24 @@ from veca_marl.sim.physics.houses.random_house import RandomHouseCfg
 from veca_marl.sim.physics.houses.walls import WallsCfg
 from veca_marl.sim.physics.mover import Mover
 from veca_marl.sim.physics.playground import PLAYGROUND_GENERATORS, PlaygroundCfg
-from veca_marl.sim.physics.props import SIZE_NAMES, Prop, PropCfg, PropShape
+from veca_marl.sim.physics.props import (
+    SIZE_NAMES,
+    JointCfg,
+    JointKind,
+    LockCfg,
+    PartCfg,
+    Prop,
+    PropCfg,
+    PropShape,
+)
 from veca_marl.sim.physics.rooms import DoorCfg, RoomCfg
 from veca_marl.sim.physics.world import GRAVITY_MPS2, World
 
 __all__ = [
+    "JointCfg",
+    "JointKind",
+    "LockCfg",
+    "PartCfg",
     "GRAVITY_MPS2",
     "PLAYGROUND_GENERATORS",
     "SIZE_NAMES",

@@ -38,7 +38,7 @@ class PlaygroundCfg:
     Attributes:
         name: As on the command line.
         rooms: Boxes of air with unique names that do not overlap; the first is where single-room
-            tasks play. Walls and large boxes between them attenuate sound, see `stops_sound`.
+            tasks play. Walls and large boxes between them attenuate sound, see `sound_obstacles`.
         doors: The openings between rooms.
         walls: How walls are built round the rooms, with openings for the doors; None if the walls
             are among the props.

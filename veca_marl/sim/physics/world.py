@@ -17,6 +17,7 @@ from veca_marl.sim.physics.interactions.registry import check_interactions
 from veca_marl.sim.physics.mover import Mover
 from veca_marl.sim.physics.playground import PlaygroundCfg, make_house
 from veca_marl.sim.physics.props import Prop, PropCfg, follow_physics, limit_detection
+from veca_marl.sim.physics.props.joint import LINK, Joint
 from veca_marl.sim.sound import SoundField, make_sound
 
 GRAVITY_MPS2 = 9.81
@@ -59,6 +60,7 @@ class World:
         self._state: int | None = None
         self._built: BuiltState | None = None
         self._moving: list[Prop] = []
+        self._joints: list[Joint] = []
         self._configure_physics()
         self._impacts: ImpactSounds | None = None
         if playground.impacts.present:
@@ -72,7 +74,8 @@ class World:
         """Add a prop.
 
         Raises:
-            ValueError: If the name is taken, or an interaction is not registered.
+            ValueError: If the name is taken, an interaction is not registered, or the parent of
+                its joint is missing or not fixed.
             RuntimeError: If the world is frozen.
         """
         self._check_not_frozen(f"add the prop {cfg.name!r}")
@@ -80,11 +83,14 @@ class World:
         if cfg.name in taken:
             raise ValueError(f"the name {cfg.name!r} is taken; there are {taken}")
         check_interactions(f"prop {cfg.name!r}: interactions", cfg.interactions)
+        parent = self._joint_parent(cfg)
         sound = None if cfg.sound is None else make_sound(cfg.sound)
         source = None if sound is None else self.sound.add_source(cfg.name, sound)
         prop = Prop(cfg, self.client, self.scene, source, self.house.obstacles)
-        limit_detection(prop.body_id, cfg, self.client, self.clock)
+        limit_detection(prop.body_id, prop.link, cfg, self.client, self.clock)
         self.props[cfg.name] = prop
+        if prop.joint is not None:
+            self._add_joint(prop.body_id, prop.joint, parent)
         if self._impacts is not None:
             self._impacts.add(prop)
         if not prop.fixed:
@@ -134,6 +140,8 @@ class World:
         self.sound.reset(rng)
         if self._impacts is not None:
             self._impacts.reset()
+        for joint in self._joints:
+            joint.reset()
         follow_physics(list(self.props.values()))
         for mover in self.movers:
             mover.reset()
@@ -174,6 +182,32 @@ class World:
         for mover in self.movers:
             mover.write_frames()
         self.scene.update()
+
+    def _joint_parent(self, cfg: PropCfg) -> Prop | None:
+        """Return the fixed prop that a prop is attached to; None for the world."""
+        if cfg.joint is None or not cfg.joint.parent:
+            return None
+        fixed = sorted(name for name, prop in self.props.items() if prop.fixed)
+        if cfg.joint.parent not in fixed:
+            raise ValueError(
+                f"prop {cfg.name!r}: joint.parent={cfg.joint.parent!r} must be a fixed prop that "
+                f"was added before; there are {fixed}"
+            )
+        return self.props[cfg.joint.parent]
+
+    def _add_joint(self, body_id: int, joint: Joint, parent: Prop | None) -> None:
+        """Let a joint act after each physics step; the two props that it joins do not collide."""
+        if not self._joints:
+            self.after_substep.append(self._after_substep_of_joints)
+        self._joints.append(joint)
+        if parent is not None:
+            pybullet.setCollisionFilterPair(
+                parent.body_id, body_id, parent.link, LINK, 0, physicsClientId=self.client
+            )
+
+    def _after_substep_of_joints(self) -> None:
+        for joint in self._joints:
+            joint.after_substep()
 
     def _check_not_frozen(self, what: str) -> None:
         if self._state is not None:

@@ -11,8 +11,18 @@ from typing import TypeAlias
 
 from numba import njit
 
-from veca_marl.sim.geometry import Bools, Floats, GeomTable, Vector, bounding_radius, distance
+from veca_marl.sim.geometry import (
+    Bools,
+    Floats,
+    GeomTable,
+    Shape,
+    Vector,
+    bounding_radius,
+    distance,
+)
 from veca_marl.sim.touch.taxels import TaxelTable
+
+_POLYHEDRON = int(Shape.POLYHEDRON)
 
 # shape, size, position and the three axes of a primitive in the world frame
 PlacedPrimitive: TypeAlias = tuple[int, Vector, Vector, Vector, Vector, Vector]
@@ -97,6 +107,9 @@ def find_candidates(
                 continue
             margin = farthest_contact(thickness[bone], skin, radii[bone])
             if _spheres_overlap(bones, bone, geoms.positions, g, size + margin):
+                if primitive[0] == _POLYHEDRON:
+                    candidates[bone, g] = True
+                    continue
                 x, y, z = to_local(primitive, bones, bone)
                 away = distance(primitive[0], primitive[1], x, y, z)
                 candidates[bone, g] = away < bones[bone, 3] + margin

@@ -14,11 +14,12 @@ from numba import njit
 from veca_marl.sim.geometry import (
     DistanceAndGradient,
     Floats,
+    Solid,
     Vector,
-    distance,
-    distance_and_gradient,
+    solid_distance,
+    solid_entry,
+    solid_gradient,
 )
-from veca_marl.sim.geometry.ray_entry import entry_distance
 from veca_marl.sim.touch.rigid_bones import distance_to_placed, moved_to_height
 
 
@@ -26,8 +27,7 @@ class Column(NamedTuple):
     """What the taxels of one bone have in common, compared with one primitive.
 
     Attributes:
-        shape: The `Shape` of the primitive.
-        size: Its size with `inset` of its own skin on.
+        solid: The primitive with `inset` of its own skin on, see `solid_of`.
         length: Metres, t: thickness of the skin, of both skins if the primitive has one.
         depth: Metres from the sensing point down to the base.
         inset: Metres of the primitive's own skin that count as part of it; columns start that
@@ -35,8 +35,7 @@ class Column(NamedTuple):
         bones: Number of rows of placed bones, see `place_bone`.
     """
 
-    shape: int
-    size: Vector
+    solid: Solid
     length: float
     depth: float
     inset: float
@@ -57,7 +56,7 @@ def taxel_reading(
         radius: R, of the receptive field; 0 for a point.
         known: The largest reading from other primitives.
     """
-    away = distance(column.shape, column.size, base[0], base[1], base[2])
+    away = solid_distance(column.solid, base[0], base[1], base[2])
     if away <= 0.0:
         if known < 1.0:
             known = max(_reading_around(column, placed, base, normal, radius, away), known)
@@ -84,11 +83,9 @@ def _reading_around(
     if away + abs(height + column.inset) <= 0.0:  # wherever it is moved to, it is inside
         return 1.0
     moved = moved_to_height(placed, column.bones, base, -column.inset)
-    if distance(column.shape, column.size, moved[0], moved[1], moved[2]) <= 0.0:
+    if solid_distance(column.solid, moved[0], moved[1], moved[2]) <= 0.0:
         return 1.0
-    slope: DistanceAndGradient = distance_and_gradient(
-        column.shape, column.size, base[0], base[1], base[2]
-    )
+    slope: DistanceAndGradient = solid_gradient(column.solid, base[0], base[1], base[2])
     against = -(slope[1] * normal[0] + slope[2] * normal[1] + slope[3] * normal[2])
     straight = min(max(against, 0.0), 1.0) ** 2
     share = min(max(1.0 - (height + column.inset) / column.length, 0.0), 1.0)
@@ -111,12 +108,12 @@ def _column_reading(
 ) -> float:
     """Return ``C = min((1 - e / t) cos(a)^2, x_e)`` or, if that is larger, `known`."""
     (x, y, z), (u, v, w) = base, normal
-    entry = entry_distance(column.shape, column.size, base, normal)
+    entry = solid_entry(column.solid, base, normal)
     share = 1.0 - entry / column.length
     if share <= known:
         return known
     x, y, z = x + entry * u, y + entry * v, z + entry * w
-    slope: DistanceAndGradient = distance_and_gradient(column.shape, column.size, x, y, z)
+    slope: DistanceAndGradient = solid_gradient(column.solid, x, y, z)
     against = max(-(slope[1] * u + slope[2] * v + slope[3] * w), 0.0)
     share *= min(against * against, 1.0)
     if share <= known:
@@ -133,7 +130,7 @@ def _field_reading(
     The base has to be outside of the primitive.
     """
     (x, y, z), (u, v, w) = base, normal
-    slope: DistanceAndGradient = distance_and_gradient(column.shape, column.size, x, y, z)
+    slope: DistanceAndGradient = solid_gradient(column.solid, x, y, z)
     away = slope[0]
     ahead = -(slope[1] * u + slope[2] * v + slope[3] * w)
     height = away * ahead

@@ -38,7 +38,15 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from veca_marl.sim.geometry import Bools, Floats, GeomTable, Vector, distance
+from veca_marl.sim.geometry import (
+    Bools,
+    Floats,
+    GeomTable,
+    Shape,
+    Vector,
+    solid_distance,
+    solid_of,
+)
 from veca_marl.sim.touch.broad_phase import (
     PlacedPrimitive,
     bounding_spheres,
@@ -52,6 +60,8 @@ from veca_marl.sim.touch.contact import Column, taxel_reading
 from veca_marl.sim.touch.receptive_fields import Fields
 from veca_marl.sim.touch.rigid_bones import RigidBones, is_farther, place_bone, shrunk
 from veca_marl.sim.touch.taxels import BARYCENTRIC, TaxelTable
+
+_POLYHEDRON = int(Shape.POLYHEDRON)
 
 
 class Workspace(NamedTuple):
@@ -81,7 +91,6 @@ def empty_workspace(taxels: TaxelTable, vertices: int, primitives: int) -> Works
     )
 
 
-@njit(cache=True, error_model="numpy")
 def read_taxels(
     taxels: TaxelTable,
     fields: Fields,
@@ -104,11 +113,29 @@ def read_taxels(
         workspace: Buffers.
         readings: ``(T, 6)`` in [0, 1], written.
     """
+    _read_all_but_polyhedra(taxels, fields, vertices, geoms, own, ignored, workspace, readings)
+    if len(geoms.faces):
+        measure_penetration(taxels, fields, vertices, geoms, geoms.faces, own, workspace, readings)
+
+
+@njit(cache=True, error_model="numpy")
+def _read_all_but_polyhedra(
+    taxels: TaxelTable,
+    fields: Fields,
+    vertices: Floats,
+    geoms: GeomTable,
+    own: RigidBones,
+    ignored: Bools,
+    workspace: Workspace,
+    readings: Floats,
+) -> None:
+    """See `read_taxels`. The candidates include polyhedra."""
     bounding_spheres(taxels, vertices, workspace.patches, workspace.bones)
     find_candidates(
         geoms, ignored, taxels.thickness, fields.largest, workspace.bones, workspace.candidates
     )
-    measure_penetration(taxels, fields, vertices, geoms, own, workspace, readings)
+    readings[:] = 0.0
+    measure_penetration(taxels, fields, vertices, geoms, None, own, workspace, readings)
 
 
 @njit(cache=True, error_model="numpy")
@@ -117,32 +144,36 @@ def measure_penetration(
     fields: Fields,
     vertices: Floats,
     geoms: GeomTable,
+    faces: Floats | None,
     own: RigidBones,
     workspace: Workspace,
     readings: Floats,
 ) -> None:
-    """Compute the readings of all taxels from the candidate pairs; see `read_taxels`."""
-    readings[:] = 0.0
+    """Raise the readings of all taxels by the candidate pairs; see `read_taxels`.
+
+    With `faces`, those of `geoms`, the pairs with polyhedra are examined; with None all others.
+    The two are compiled apart, so that polyhedra cost nothing where there are none.
+    """
+    polyhedra = faces is not None
     candidates = workspace.candidates
     for bone in range(candidates.shape[0]):
         for g in range(candidates.shape[1]):
-            if not candidates[bone, g]:
+            if not candidates[bone, g] or (geoms.shapes[g] == _POLYHEDRON) != polyhedra:
                 continue
             thickness, skin = taxels.thickness[bone], geoms.skins[g]
             inset = min(thickness, skin)
             primitive = _sensed_primitive(geoms, g, skin - inset)
             count = place_bone(geoms, own, bone, geoms.rotations[g], geoms.positions[g])
             reach = thickness + skin - inset  # farther from the bone, no skin is displaced
-            if is_farther(primitive[0], primitive[1], own.placed, count, reach):
+            if not polyhedra and is_farther(primitive[0], primitive[1], own.placed, count, reach):
                 continue
-            column = Column(
-                primitive[0], primitive[1], thickness + skin, thickness + inset, inset, count
-            )
+            solid = solid_of(faces, primitive[0], primitive[1])
+            column = Column(solid, thickness + skin, thickness + inset, inset, count)
             margin = farthest_contact(thickness, skin, fields.largest[bone])
             radii = fields.radii[1 if geoms.objects[g] == fields.body else 0]
             for patch in range(taxels.first_patch[bone], taxels.first_patch[bone + 1]):
                 x, y, z = to_local(primitive, workspace.patches, patch)
-                away = distance(primitive[0], primitive[1], x, y, z)
+                away = solid_distance(solid, x, y, z)
                 if away > workspace.patches[patch, 3] + margin:
                     continue
                 _read_patch(
@@ -228,7 +259,7 @@ def _is_outside(
     )
     depth = middle + column.depth - 0.5 * column.length
     x, y, z = x - depth * normal[0], y - depth * normal[1], z - depth * normal[2]
-    beyond = distance(column.shape, column.size, x, y, z)
+    beyond = solid_distance(column.solid, x, y, z)
     along = spread + 0.5 * column.length
     across = 0.5 * math.sqrt(farthest) + radius
     return beyond > 0.0 and beyond * beyond > across * across + along * along

@@ -21,6 +21,7 @@ from veca_marl.sim.geometry import (
 
 _SPHERE, _BOX = int(Shape.SPHERE), int(Shape.BOX)
 _CYLINDER, _CAPSULE = int(Shape.CYLINDER), int(Shape.CAPSULE)
+_POLYHEDRON = int(Shape.POLYHEDRON)
 _FAR_M = 1e9
 # columns of a row of placed bones: shape, size, position, and the three axes
 PLACED_COLUMNS = 16
@@ -57,7 +58,12 @@ def rigid_bones(geoms: GeomTable, body: SceneObject, count: int) -> RigidBones:
 
 @njit(cache=True, error_model="numpy", inline="always")
 def shrunk(shape: int, size: Vector, by: float) -> Vector:
-    """Return the size of a primitive with all of its surface moved inward, cf. `grown`."""
+    """Return the size of a primitive with all of its surface moved inward, cf. `grown`.
+
+    Polyhedra have no skin: their size is returned as it is.
+    """
+    if shape == _POLYHEDRON:
+        return size
     if shape == _BOX:
         return size[0] - by, size[1] - by, size[2] - by
     if shape == _CYLINDER:

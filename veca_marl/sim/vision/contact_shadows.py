@@ -25,6 +25,7 @@ from veca_marl.sim.geometry import (
     distance,
     single,
 )
+from veca_marl.sim.geometry.polyhedra.distances import polyhedron_distance
 from veca_marl.sim.vision.rasterizer import (
     NO_SURFACE,
     Depths,
@@ -45,7 +46,7 @@ LARGEST_M = 1.0  # bounding radius of the largest primitive that casts a shadow
 _FLOOR_TOLERANCE_M = 0.01
 
 _SPHERE, _BOX, _CYLINDER = int(Shape.SPHERE), int(Shape.BOX), int(Shape.CYLINDER)
-_CAPSULE = int(Shape.CAPSULE)
+_CAPSULE, _POLYHEDRON = int(Shape.CAPSULE), int(Shape.POLYHEDRON)
 
 
 @njit(cache=True, error_model="numpy")
@@ -76,7 +77,10 @@ def darken_contact_shadows(
             continue
         around = math.sqrt(reach * reach - height * height)
         rectangle = _floor_rectangle(geoms.positions[g], around, view, lens)
-        _darken(geoms, g, rectangle, view, lens, depth, surfaces, lights)
+        if geoms.shapes[g] == _POLYHEDRON:
+            _darken_below_faces(geoms, g, rectangle, view, lens, depth, surfaces, lights)
+        else:
+            _darken(geoms, g, rectangle, view, lens, depth, surfaces, lights)
 
 
 @njit(cache=True, error_model="numpy")
@@ -131,6 +135,54 @@ def _darken(
 def _vector(array: NDArray[Any]) -> Vector:
     """Return three numbers of an array as scalars, which the compiler knows loops do not change."""
     return array[0], array[1], array[2]
+
+
+@njit(cache=True, error_model="numpy")
+def _darken_below_faces(
+    geoms: GeomTable,
+    g: int,
+    rectangle: Rectangle,
+    view: Floats,
+    lens: Lens,
+    depth: Depths,
+    surfaces: Surfaces,
+    lights: NDArray[np.float32],
+) -> None:
+    """Darken the floor pixels of a rectangle by their distance to one polyhedron."""
+    first, end, top, bottom = rectangle
+    columns, size, turn = lens.columns[first:end], _vector(geoms.sizes[g]), geoms.rotations[g].T
+    frame = _vector(geoms.positions[g]), _vector(turn[0]), _vector(turn[1]), _vector(turn[2])
+    eye = _vector(view[0]), _vector(view[1]), _vector(view[2]), _vector(view[3])
+    for j in range(top, bottom):
+        pixels = columns, depth[j, first:end], surfaces[j, first:end], lights[j, first:end]
+        _darken_row_of_faces(geoms.faces, size, frame, eye, lens.rows[j], g, pixels)
+
+
+@njit(cache=True, error_model="numpy")
+def _darken_row_of_faces(
+    faces: Floats, size: Vector, frame: Ray, eye: Ray, y: float, name: int, pixels: Pixels
+) -> None:
+    """Darken the floor pixels of a row near a polyhedron, see `_darken_row`."""
+    columns, depth, names, lights = pixels
+    origin, ahead, left, upward = frame
+    position, right, up, forward = eye
+    for i in range(columns.shape[0]):
+        x, t = columns[i], depth[i]
+        px = position[0] + t * (forward[0] + x * right[0] + y * up[0])
+        py = position[1] + t * (forward[1] + x * right[1] + y * up[1])
+        pz = position[2] + t * (forward[2] + x * right[2] + y * up[2])
+        if abs(pz) > _FLOOR_TOLERANCE_M or names[i] == NO_SURFACE or names[i] == name:
+            continue
+        dx, dy, dz = px - origin[0], py - origin[1], pz - origin[2]
+        gap = polyhedron_distance(
+            faces,
+            size,
+            ahead[0] * dx + ahead[1] * dy + ahead[2] * dz,
+            left[0] * dx + left[1] * dy + left[2] * dz,
+            upward[0] * dx + upward[1] * dy + upward[2] * dz,
+        )
+        nearness = max(1.0 - max(gap, 0.0) / REACH_M, 0.0)
+        lights[i] *= single(1.0 - DARKNESS * nearness * nearness)
 
 
 @njit(cache=True, error_model="numpy", inline="always")

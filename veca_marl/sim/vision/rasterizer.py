@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from veca_marl.sim.geometry import Bools, Floats, GeomTable, Shape, Vector, bounding_radius, single
 from veca_marl.sim.geometry.intersections import box_row, capsule_row, cylinder_row, sphere_row
+from veca_marl.sim.geometry.polyhedra.intersections import polyhedron_row
 from veca_marl.sim.vision.screen_bounds import Interval, box_intervals, disc_interval, rod_interval
 
 Depths: TypeAlias = NDArray[np.float32]
@@ -32,6 +33,7 @@ Rectangle: TypeAlias = tuple[int, int, int, int]
 NO_SURFACE = -1
 
 _SPHERE, _BOX, _CYLINDER = int(Shape.SPHERE), int(Shape.BOX), int(Shape.CYLINDER)
+_POLYHEDRON = int(Shape.POLYHEDRON)
 # a float32 constant keeps the loops in single precision: twice as many vector lanes
 _HALF = single(0.5)
 
@@ -85,7 +87,14 @@ def draw_geoms(
         rectangle = (0, lens.columns.shape[0], 0, lens.rows.shape[0])
         if bounded:
             rectangle = bounding_rectangle(geoms.shapes[g], geoms.sizes[g], ray, lens)
-        if rectangle[0] < rectangle[1] and rectangle[2] < rectangle[3]:
+        if rectangle[0] >= rectangle[1] or rectangle[2] >= rectangle[3]:
+            continue
+        if geoms.shapes[g] == _POLYHEDRON:
+            first_face = int(geoms.sizes[g, 0])
+            draw_polyhedron(
+                geoms.faces, first_face, ray, rectangle, lens, np.int16(g), depth, surfaces
+            )
+        else:
             draw_rectangle(
                 geoms.shapes[g], geoms.sizes[g], ray, rectangle, lens, np.int16(g), depth, surfaces
             )
@@ -133,6 +142,9 @@ def bounding_rectangle(shape: int, size: NDArray[np.float32], ray: Ray, lens: Le
     elif shape == _SPHERE:
         across = disc_interval(centre[0], centre[2], size[0], tan_x)
         upward = disc_interval(centre[1], centre[2], size[0], tan_y)
+    elif shape == _POLYHEDRON:
+        across = disc_interval(centre[0], centre[2], reach, tan_x)
+        upward = disc_interval(centre[1], centre[2], reach, tan_y)
     else:
         half_length = _HALF * size[1]
         across = rod_interval(
@@ -171,7 +183,10 @@ def draw_rectangle(
     depth: Depths,
     surfaces: Surfaces,
 ) -> None:
-    """Intersect the rays of a rectangle with one primitive and update the buffers."""
+    """Intersect the rays of a rectangle with one primitive and update the buffers.
+
+    For polyhedra see `draw_polyhedron`.
+    """
     eye, right, up, forward = ray
     first, end, top, bottom = rectangle
     columns, near = lens.columns[first:end], lens.near
@@ -192,3 +207,25 @@ def draw_rectangle(
         else:
             half_length = _HALF * size[1]
             capsule_row(size[0], half_length, eye, start, right, columns, near, surface, row, names)
+
+
+@njit(cache=True, error_model="numpy")
+def draw_polyhedron(
+    faces: Floats,
+    first_face: int,
+    ray: Ray,
+    rectangle: Rectangle,
+    lens: Lens,
+    surface: np.int16,
+    depth: Depths,
+    surfaces: Surfaces,
+) -> None:
+    """Intersect the rays of a rectangle with one polyhedron and update the buffers."""
+    eye, right, up, forward = ray
+    first, end, top, bottom = rectangle
+    columns, near = lens.columns[first:end], lens.near
+    for j in range(top, bottom):
+        y = lens.rows[j]
+        start = (forward[0] + y * up[0], forward[1] + y * up[1], forward[2] + y * up[2])
+        row, names = depth[j, first:end], surfaces[j, first:end]
+        polyhedron_row(faces, first_face, eye, start, right, columns, near, surface, row, names)

@@ -12,6 +12,7 @@ from veca_marl.sim.geometry import Bools, Floats, GeomTable, MeshTable, SurfaceT
 from veca_marl.sim.vision.contact_shadows import darken_contact_shadows
 from veca_marl.sim.vision.mesh_culling import draw_meshes
 from veca_marl.sim.vision.mesh_rasterizer import illuminate_triangles
+from veca_marl.sim.vision.polyhedra import illuminate_polyhedra
 from veca_marl.sim.vision.rasterizer import (
     NO_SURFACE,
     Depths,
@@ -100,6 +101,7 @@ def render_views(
         draw_meshes(meshes, drawn.triangles, view, lens, True, first, seen, depth, ids)
         illuminate_triangles(meshes, seen, lens, first, ids, lights)
         illuminate(geoms, view, lens, depth, ids, lights)
+        illuminate_polyhedra(geoms, view, lens, depth, ids, lights)
         darken_contact_shadows(geoms, drawn.casting, view, lens, depth, ids, lights)
         fill_sky(lens, rgb)
         blend_colours(surfaces.colours, ids, lights, 1.0, rgb)

@@ -87,6 +87,8 @@ def illuminate(
 ) -> None:
     """Compute the brightness of the pixels that show primitives.
 
+    That of polyhedra is void, see `illuminate_polyhedra`.
+
     Args:
         geoms: The scene's primitives.
         view: ``(4, 3)`` position, right, up and forward axes of the camera, world frame.
@@ -112,9 +114,9 @@ def illuminate(
             _light_run(shape, size, pose, view, lens.rows[j], columns, run, lights[j, first:end])
             if geoms.checkers[g] > _0:
                 if g != tiled:
-                    tiled, ray = g, _frame_ray(geoms, g, view)
+                    tiled, ray = g, frame_ray(geoms, g, view)
                 edge_m = geoms.checkers[g]
-                _tile_run(ray, lens.rows[j], columns, run, edge_m, lights[j, first:end])
+                tile_run(ray, lens.rows[j], columns, run, edge_m, lights[j, first:end])
 
 
 @njit(cache=True, error_model="numpy")
@@ -173,7 +175,7 @@ def _local_normal(shape: int, size: Lights, point: Vector) -> Vector:
 
 
 @njit(cache=True, error_model="numpy")
-def _frame_ray(geoms: GeomTable, g: int, view: Floats) -> FrameRay:
+def frame_ray(geoms: GeomTable, g: int, view: Floats) -> FrameRay:
     """Return camera position, right, up and forward axes in the frame that a primitive is on."""
     rotation, local = geoms.rotations[g], geoms.local_rotations[g]
     position, offset = geoms.positions[g], geoms.offsets[g]
@@ -193,7 +195,7 @@ def _frame_ray(geoms: GeomTable, g: int, view: Floats) -> FrameRay:
 
 
 @njit(cache=True, error_model="numpy")
-def _tile_run(
+def tile_run(
     ray: FrameRay, y: float, columns: Depths, depth: Depths, edge_m: float, lights: Lights
 ) -> None:
     """Darken every second cell of a three-dimensional checker pattern in an object's frame."""

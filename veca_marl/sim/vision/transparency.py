@@ -15,17 +15,21 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from veca_marl.sim.geometry import Bools, Floats, GeomTable
+from veca_marl.sim.geometry import Bools, Floats, GeomTable, Shape
+from veca_marl.sim.vision.polyhedra import illuminate_polyhedra
 from veca_marl.sim.vision.rasterizer import (
     NO_SURFACE,
     Depths,
     Lens,
     Surfaces,
     bounding_rectangle,
+    draw_polyhedron,
     draw_rectangle,
     local_ray,
 )
 from veca_marl.sim.vision.shading import GLASS_OPACITY, Images, blend_colours, illuminate
+
+_POLYHEDRON = int(Shape.POLYHEDRON)
 
 
 class Layers(NamedTuple):
@@ -63,7 +67,10 @@ def collect_layers(
         ray = local_ray(geoms.positions[g], geoms.rotations[g], view)
         rectangle = bounding_rectangle(shape, size, ray, lens)
         first, end, top, bottom = rectangle
-        if first < end and top < bottom:
+        if first < end and top < bottom and shape == _POLYHEDRON:
+            faces, row = geoms.faces, int(size[0])
+            draw_polyhedron(faces, row, ray, rectangle, lens, surface, scratch, hit)
+        elif first < end and top < bottom:
             draw_rectangle(shape, size, ray, rectangle, lens, surface, scratch, hit)
         for j in range(top, bottom):
             for i in range(first, end):
@@ -124,4 +131,5 @@ def blend_layers(
     for layer in range(layers.surfaces.shape[0] - 1, -1, -1):
         surfaces = layers.surfaces[layer]
         illuminate(geoms, view, lens, layers.depths[layer], surfaces, lights)
+        illuminate_polyhedra(geoms, view, lens, layers.depths[layer], surfaces, lights)
         blend_colours(colours, surfaces, lights, GLASS_OPACITY, rgb)

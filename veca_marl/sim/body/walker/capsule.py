@@ -1,5 +1,8 @@
 """The collision capsule of a walker: light props are pushed, heavy obstacles stop the walker.
 
+Doors and drawers that are light enough are pushed as well, as long as they can move: a leaf that is
+locked, or pushed against its stop, stops the walker.
+
 The paper's collision rule of the animation-based agent: against a light object the agent is
 kinematic and pushes it; against a heavy one the object is kinematic and pushes the agent out.
 The capsule has no mass and its position is set at each physics step. Its velocity is set in Bullet
@@ -15,6 +18,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -66,6 +70,7 @@ class Capsule:
         )
         self._reach_m = _reach_m(form)
         self._obstacles = ObstacleBoxes(client, scene, [], [], _LIMB_REACH_M)
+        self._leaves: list[Prop] = []
         self._known = (0, 0)
         self._near: list[int] = []
 
@@ -124,18 +129,29 @@ class Capsule:
     def _depenetration(self) -> tuple[float, float]:
         """Return the horizontal displacement that ends all penetrations."""
         out_x = out_y = 0.0
-        for body_id in self._near:
-            for contact in pybullet.getClosestPoints(
-                self.body_id, body_id, 0.0, physicsClientId=self._client
-            ):
-                normal, depth = contact[7], -contact[8]
-                length = math.hypot(normal[0], normal[1])
-                if depth > 1e-6 and length > 0.1:
-                    # several points of one face give the same direction: the deepest counts
-                    away_x, away_y = normal[0] / length * depth, normal[1] / length * depth
-                    out_x = _larger(out_x, away_x)
-                    out_y = _larger(out_y, away_y)
+        contacts = [contact for body_id in self._near for contact in self._contacts(body_id)]
+        for leaf in self._leaves:
+            contacts += [
+                contact
+                for contact in self._contacts(leaf.body_id)
+                if not leaf.yields(contact[6], [-axis for axis in contact[7]])
+            ]
+        for contact in contacts:
+            normal, depth = contact[7], -contact[8]
+            length = math.hypot(normal[0], normal[1])
+            if depth > 1e-6 and length > 0.1:
+                # several points of one face give the same direction: the deepest counts
+                away_x, away_y = normal[0] / length * depth, normal[1] / length * depth
+                out_x = _larger(out_x, away_x)
+                out_y = _larger(out_y, away_y)
         return out_x, out_y
+
+    def _contacts(self, body_id: int) -> tuple[tuple[Any, ...], ...]:
+        """Return PyBullet's points of contact with a body; normals point to the capsule."""
+        found: tuple[tuple[Any, ...], ...] = pybullet.getClosestPoints(
+            self.body_id, body_id, 0.0, physicsClientId=self._client
+        )
+        return found
 
     def _find_obstacles(self, props: dict[str, Prop], bodies: Sequence[int]) -> None:
         """Find everything that cannot be pushed and disable Bullet's contacts with it."""
@@ -145,6 +161,7 @@ class Capsule:
         things = [p for p in solid if p.fixed or p.cfg.mass_kg > limit_kg]
         heavy = [one for one in bodies if _mass_kg(self._client, one) > limit_kg]
         self._obstacles = ObstacleBoxes(self._client, self._scene, things, heavy, _LIMB_REACH_M)
+        self._leaves = [p for p in solid if p.joint is not None and p.cfg.mass_kg <= limit_kg]
         for body_id in self._obstacles.ids:
             for link in range(-1, pybullet.getNumJoints(body_id, physicsClientId=self._client)):
                 pybullet.setCollisionFilterPair(

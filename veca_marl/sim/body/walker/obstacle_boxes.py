@@ -39,6 +39,8 @@ class ObstacleBoxes:
     ) -> None:
         self._client, self._scene = client, scene
         self.ids = [prop.body_id for prop in props] + list(bodies)
+        # the links that carry the shapes of each
+        self._links = [prop.links for prop in props] + [range(-1, 0)] * len(bodies)
         self._beyond_m = np.array([0.0] * len(props) + [beyond_m] * len(bodies))
         self._low, self._high = np.zeros((2, len(self.ids), 2))
         fixed = [number for number, prop in enumerate(props) if prop.fixed]
@@ -65,8 +67,18 @@ class ObstacleBoxes:
     def _read(self, numbers: Sequence[int]) -> None:
         """Read the boxes of some obstacles from Bullet."""
         for number in numbers:
-            low, high = pybullet.getAABB(self.ids[number], physicsClientId=self._client)
+            links = iter(self._links[number])
+            low, high = self._box(number, next(links))
             self._low[number], self._high[number] = low[:2], high[:2]
+            for link in links:
+                low, high = self._box(number, link)
+                self._low[number] = np.minimum(self._low[number], low[:2])
+                self._high[number] = np.maximum(self._high[number], high[:2])
+
+    def _box(self, number: int, link: int) -> tuple[Sequence[float], Sequence[float]]:
+        """Return the corners of Bullet's box about one link of an obstacle."""
+        low, high = pybullet.getAABB(self.ids[number], link, physicsClientId=self._client)
+        return low, high
 
 
 @njit(cache=True)

@@ -9,6 +9,7 @@ from veca_marl.sim.physics.bullet import pybullet
 from veca_marl.sim.physics.clock import ClockCfg
 from veca_marl.sim.physics.impacts.cfg import ImpactCfg
 from veca_marl.sim.physics.props import Prop, PropCfg, PropShape
+from veca_marl.sim.physics.props.prop_shapes import bounding_box, prop_geoms
 from veca_marl.sim.sound import SoundField
 from veca_marl.sim.sound.impacts import (
     MATERIALS,
@@ -20,6 +21,7 @@ from veca_marl.sim.sound.impacts import (
 )
 
 _GRAVITY_MPS2 = 9.81
+_EDGES_ARE_SIZES = (PropShape.box, PropShape.wall, PropShape.goal)
 _BODY_A, _BODY_B, _NORMAL_FORCE = 1, 2, 9  # in a contact point of PyBullet
 
 
@@ -103,7 +105,7 @@ def prop_modes(cfg: PropCfg) -> Modes:
         if cfg.shape is PropShape.capsule:
             length += 2.0 * radius
         return bar_modes(length, 0.5 * radius, material) + click
-    shortest, _, longest = sorted(cfg.size_m)
+    shortest, _, longest = sorted(_edges_m(cfg))
     return bar_modes(longest, shortest / math.sqrt(12.0), material) + click
 
 
@@ -116,6 +118,16 @@ def equal_volume_radius_m(cfg: PropCfg) -> float:
         volume = math.pi * radius**2 * length
         if cfg.shape is PropShape.capsule:
             volume += 4.0 / 3.0 * math.pi * radius**3
-    else:
+    elif cfg.shape in _EDGES_ARE_SIZES:
         volume = math.prod(cfg.size_m)
+    else:
+        volume = sum(geom.volume for geom in prop_geoms(cfg))
     return float((volume / (4.0 / 3.0 * math.pi)) ** (1.0 / 3.0))
+
+
+def _edges_m(cfg: PropCfg) -> list[float]:
+    """Return the edges of the box about a prop."""
+    if cfg.shape in _EDGES_ARE_SIZES:
+        return list(cfg.size_m)
+    low, high = bounding_box(prop_geoms(cfg))
+    return [float(edge) for edge in high - low]

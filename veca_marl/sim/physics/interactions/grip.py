@@ -45,6 +45,7 @@ class Grip:
 
     def _set_collision(self, prop: Prop, enabled: int) -> None:
         for body_id in self._body_ids:
-            pybullet.setCollisionFilterPair(
-                body_id, prop.body_id, -1, -1, enabled, physicsClientId=self._client
-            )
+            for link in prop.links:
+                pybullet.setCollisionFilterPair(
+                    body_id, prop.body_id, -1, link, enabled, physicsClientId=self._client
+                )

@@ -4,21 +4,36 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from functools import partial
+from typing import Any
 
 import numpy as np
 
 from veca_marl.sim.geometry import (
     Floats,
     Geom,
+    Pose,
     Scene,
+    matrix_to_quaternion,
     quaternion_from_yaw,
     quaternions_to_matrices,
     rotation_about_vertical,
 )
 from veca_marl.sim.physics.bullet import pybullet
-from veca_marl.sim.physics.props.prop_cfg import PropCfg, PropShape
-from veca_marl.sim.physics.props.prop_shapes import prop_geoms, stops_sound
-from veca_marl.sim.physics.props.rigid_body import create_prop_body
+from veca_marl.sim.physics.props.joint import LINK, Joint
+from veca_marl.sim.physics.props.prop_cfg import PropCfg
+from veca_marl.sim.physics.props.prop_shape import PropShape
+from veca_marl.sim.physics.props.prop_shapes import (
+    bounding_box,
+    horizontal_radius_m,
+    prop_geoms,
+    sound_obstacles,
+)
+from veca_marl.sim.physics.props.rigid_body import (
+    create_attached_body,
+    create_prop_body,
+    is_turned,
+)
 from veca_marl.sim.sound import Source
 from veca_marl.sim.sound.rooms import Obstacles
 
@@ -29,7 +44,10 @@ class Prop:
     Attributes:
         cfg: What it was made from.
         body_id: PyBullet's id.
+        link: PyBullet's index of the link that moves with its frame; -1 is the base.
+        links: The links that carry its shapes, `link` first.
         object_id: Its value in segmentation images.
+        joint: Its hinge or slide; None for a prop that is fixed or free.
         sound: Its sound source; None for a silent prop.
         impact: The source of its sound when it is hit; None without sounds of impacts.
         holder: Name of the body that holds it; None while it is free.
@@ -53,12 +71,17 @@ class Prop:
         self._client = client
         self._scene = scene
         geoms = prop_geoms(cfg)
-        self._obstacle = _Obstacle(geoms[0], obstacles) if stops_sound(cfg) else None
+        self._obstacles = [_Obstacle(box, obstacles) for box in sound_obstacles(cfg, geoms)]
         shown = scene.add_object(cfg.name, [geoms])
         self.object_id = shown.id
         self._row = shown.rows.start
-        self.body_id, centre = create_prop_body(cfg, client, geoms)
-        self._centre = centre if centre.any() else None
+        self._reach_m = horizontal_radius_m(geoms)
+        self._inside = bounding_box(geoms)
+        self.body_id, self.link, self.joint, frame = _create_body(cfg, client, geoms)
+        self.links = range(self.link, pybullet.getNumJoints(self.body_id, physicsClientId=client))
+        self._read_pose = _pose_reader(self.body_id, self.link, client)
+        self._centre = frame.position if frame.position.any() else None
+        self._axes = frame.rotation if is_turned(frame) else None
         self.place(cfg.position_m, math.radians(cfg.yaw_deg))
 
     @property
@@ -73,22 +96,29 @@ class Prop:
 
     @property
     def radius_m(self) -> float:
-        """Horizontal radius of the cylinder round the shape."""
+        """Horizontal radius of the cylinder about the origin of its frame, untilted, in metres."""
         size = self.cfg.size_m
         if self.cfg.shape in (PropShape.box, PropShape.wall):
             return math.hypot(size[0], size[1]) / 2
-        return size[0] / 2 if self.cfg.shape is PropShape.goal else size[0]
+        if self.cfg.shape is PropShape.goal:
+            return size[0] / 2
+        if self.cfg.shape in (PropShape.sphere, PropShape.cylinder, PropShape.capsule):
+            return size[0]
+        return self._reach_m
 
     @property
     def lowest_m(self) -> float:
         """Height of its lowest point."""
-        low, _ = pybullet.getAABB(self.body_id, physicsClientId=self._client)
-        return float(low[2])
+        return float(self.bounds()[0][2])
 
     def bounds(self) -> tuple[Floats, Floats]:
-        """Return the lower and the upper corner of its bounding box, each ``(3,)`` metres."""
-        low, high = pybullet.getAABB(self.body_id, physicsClientId=self._client)
-        return np.array(low), np.array(high)
+        """Return the corners ``(3,)`` of Bullet's box about it, along the axes of the world."""
+        boxes = [
+            pybullet.getAABB(self.body_id, link, physicsClientId=self._client)
+            for link in self.links
+        ]
+        low, high = np.array(boxes).swapaxes(0, 1)
+        return low.min(axis=0), high.max(axis=0)
 
     @property
     def position(self) -> Floats:
@@ -109,8 +139,58 @@ class Prop:
     @property
     def velocity(self) -> Floats:
         """``(3,)`` m/s, world frame, of its centre of mass."""
+        if self.joint is not None:
+            state = pybullet.getLinkState(
+                self.body_id, self.link, computeLinkVelocity=1, physicsClientId=self._client
+            )
+            return np.array(state[6])
         linear, _ = pybullet.getBaseVelocity(self.body_id, physicsClientId=self._client)
         return np.array(linear)
+
+    @property
+    def opening(self) -> float:
+        """How far its joint is open, from 0 (closed) to 1."""
+        return self._joint().opening
+
+    @property
+    def locked(self) -> bool:
+        """Whether it has a joint that is locked."""
+        return self.joint is not None and self.joint.locked
+
+    def set_opening(self, opening: float) -> None:
+        """Put a door or drawer at rest at an opening in [0, 1]; see also `open`."""
+        self._joint().set_opening(opening)
+        follow_physics([self])
+
+    def open(self) -> bool:
+        """Let the motor of its joint open it; return False if it is locked or has no joint."""
+        return self.joint is not None and self.joint.drive(1.0)
+
+    def close(self) -> bool:
+        """Let the motor of its joint close it; return False if it is locked or has no joint."""
+        return self.joint is not None and self.joint.drive(0.0)
+
+    def unlock(self, key: Prop) -> bool:
+        """Unlock its joint with a key; return whether that prop is the key of its lock."""
+        return self.joint is not None and self.joint.unlock(key.name)
+
+    def contains(self, other: Prop) -> bool:
+        """Return whether the centre of another prop is in the box about its own shape.
+
+        This is what a basket or drawer contains: their shapes are walls and a floor.
+        """
+        low, high = self._inside
+        local = self.rotation.T @ (other.position - self.position)
+        return bool((local >= low).all() and (local <= high).all())
+
+    def yields(self, point: Sequence[float], force: Sequence[float]) -> bool:
+        """Return whether a force ``(3,)`` at a point ``(3,)`` of the world could move it.
+
+        False for fixed props, and for doors and drawers that are locked or at their stop.
+        """
+        if self.joint is not None:
+            return self.joint.yields(point, force)
+        return not self.fixed
 
     def touches(self, body_id: int) -> bool:
         """Return whether it was in contact with a body of PyBullet in the last physics step."""
@@ -125,6 +205,9 @@ class Prop:
         angular_velocity: Sequence[float] | Floats = (0.0, 0.0, 0.0),
     ) -> None:
         """Set pose and velocity. Its sound starts at the new place, without a Doppler sweep.
+
+        For a prop with a joint this is the pose of the closed prop: the opening stays as it is,
+        and velocities have no effect.
 
         Args:
             position: ``(3,)`` metres.
@@ -159,10 +242,16 @@ class Prop:
             ValueError: If a number is not finite.
         """
         x, y, z = _three_finite(self.name, "position", position)
-        if self._centre is not None:
-            (x, y, z) = np.array([x, y, z]) + rotation_about_vertical(yaw_rad) @ self._centre
+        quaternion: Sequence[float] = quaternion_from_yaw(yaw_rad)
+        origin = self._centre if self.joint is None else np.asarray(self.joint.cfg.anchor_m)
+        if origin is not None:
+            (x, y, z) = np.array([x, y, z]) + rotation_about_vertical(yaw_rad) @ origin
+        if self._axes is not None and self.joint is None:
+            quaternion = matrix_to_quaternion(
+                rotation_about_vertical(yaw_rad) @ self._axes
+            ).tolist()
         pybullet.resetBasePositionAndOrientation(
-            self.body_id, (x, y, z), quaternion_from_yaw(yaw_rad), physicsClientId=self._client
+            self.body_id, (x, y, z), quaternion, physicsClientId=self._client
         )
         self.set_velocity(velocity, angular_velocity)
         follow_physics([self])
@@ -172,8 +261,11 @@ class Prop:
         velocity: Sequence[float] | Floats,
         angular_velocity: Sequence[float] | Floats = (0.0, 0.0, 0.0),
     ) -> None:
-        """Set the velocity (m/s) and the angular velocity (rad/s). Fixed props stay at rest."""
-        if not self.fixed:
+        """Set the velocity (m/s) and the angular velocity (rad/s).
+
+        Fixed props stay at rest, and so do props with a joint.
+        """
+        if not self.fixed and self.joint is None:
             pybullet.resetBaseVelocity(
                 self.body_id,
                 _three_finite(self.name, "velocity", velocity),
@@ -181,18 +273,25 @@ class Prop:
                 physicsClientId=self._client,
             )
 
+    def _joint(self) -> Joint:
+        if self.joint is None:
+            raise ValueError(f"prop {self.name!r} has no joint")
+        return self.joint
+
 
 class _Obstacle:
-    """The box of a prop among the obstacles of the sound."""
+    """A box of a prop among the obstacles of the sound."""
 
     def __init__(self, box: Geom, obstacles: Obstacles) -> None:
-        self._offset = np.asarray(box.offset)
+        self._offset, self._turn = np.asarray(box.offset), np.asarray(box.rotation)
         self._obstacles = obstacles
         self._number = obstacles.add(box.size)
 
     def move(self, position: Floats, rotation: Floats) -> None:
         """Follow the frame of the prop."""
-        self._obstacles.move(self._number, position + rotation @ self._offset, rotation)
+        self._obstacles.move(
+            self._number, position + rotation @ self._offset, rotation @ self._turn
+        )
 
 
 def follow_physics(props: Sequence[Prop]) -> None:
@@ -202,25 +301,48 @@ def follow_physics(props: Sequence[Prop]) -> None:
     """
     if not props:
         return
-    client, scene = props[0]._client, props[0]._scene
-    poses = [
-        pybullet.getBasePositionAndOrientation(prop.body_id, physicsClientId=client)
-        for prop in props
-    ]
+    scene = props[0]._scene
+    poses = [prop._read_pose() for prop in props]
     rows = np.array([prop._row for prop in props])
     matrices = np.empty((len(props), 3, 3))
-    quaternions_to_matrices(np.array([quaternion for _, quaternion in poses]), matrices)
-    scene.positions[rows] = [position for position, _ in poses]
+    quaternions_to_matrices(np.array([pose[1] for pose in poses]), matrices)
+    scene.positions[rows] = [pose[0] for pose in poses]
     scene.rotations[rows] = matrices
     for prop in props:
+        if prop._axes is not None:
+            scene.rotations[prop._row] = scene.rotations[prop._row] @ prop._axes.T
         if prop._centre is not None:
             scene.positions[prop._row] -= scene.rotations[prop._row] @ prop._centre
         if prop.sound is not None:
             prop.sound.position = scene.positions[prop._row]
         if prop.impact is not None:
             prop.impact.position = scene.positions[prop._row]
-        if prop._obstacle is not None:
-            prop._obstacle.move(scene.positions[prop._row], scene.rotations[prop._row])
+        for obstacle in prop._obstacles:
+            obstacle.move(scene.positions[prop._row], scene.rotations[prop._row])
+
+
+def _create_body(
+    cfg: PropCfg, client: int, geoms: Sequence[Geom]
+) -> tuple[int, int, Joint | None, Pose]:
+    """Create the body of a prop; return its id and link, its joint and its inertial frame."""
+    if cfg.joint is None:
+        body_id, frame = create_prop_body(cfg, client, geoms)
+        return body_id, -1, None, frame
+    body_id, frame = create_attached_body(cfg, cfg.joint, client, geoms)
+    return body_id, LINK, Joint(cfg.joint, body_id, client), frame
+
+
+def _pose_reader(body_id: int, link: int, client: int) -> Callable[[], tuple[Any, ...]]:
+    """Return a function that reads position and quaternion of the inertial frame first."""
+    if link == -1:
+        return partial(pybullet.getBasePositionAndOrientation, body_id, physicsClientId=client)
+    return partial(
+        pybullet.getLinkState,
+        body_id,
+        link,
+        computeForwardKinematics=1,
+        physicsClientId=client,
+    )
 
 
 def _anything(prop: Prop) -> bool:

@@ -3,52 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, field
-from enum import Enum
 
+from veca_marl.sim.physics.props.joint_cfg import JointCfg
+from veca_marl.sim.physics.props.part_cfg import PartCfg
+from veca_marl.sim.physics.props.prop_shape import (
+    PropShape,
+    check_appearance,
+    check_piece,
+    check_shape,
+)
 from veca_marl.sim.sound import SoundCfg
 from veca_marl.sim.sound.impacts import Material
-
-
-class PropShape(Enum):
-    """Shapes of props. `SIZE_NAMES` says what `PropCfg.size_m` means for each."""
-
-    sphere = "sphere"
-    box = "box"
-    cylinder = "cylinder"
-    capsule = "capsule"
-    wall = "wall"
-    goal = "goal"
-
-
-SIZE_NAMES: dict[PropShape, tuple[str, ...]] = {
-    PropShape.sphere: ("radius",),
-    PropShape.box: ("length_x", "length_y", "height"),
-    PropShape.cylinder: ("radius", "height"),
-    PropShape.capsule: ("radius", "length"),
-    PropShape.wall: ("length", "thickness", "height"),
-    PropShape.goal: ("width", "height", "bar_radius"),
-}
-
-
-def check_appearance(
-    prefix: str, colour: Sequence[float], checker_m: float, field_prefix: str = ""
-) -> None:
-    """Check a colour and the edge of a checker pattern.
-
-    Raises:
-        ValueError: If the colour is not three numbers in [0, 1], or the edge is negative or not
-            finite; the message begins with `prefix` and the name of the field.
-    """
-    if len(colour) != 3 or not all(0.0 <= channel <= 1.0 for channel in colour):
-        raise ValueError(
-            f"{prefix}{field_prefix}colour={tuple(colour)} must be red, green and blue in [0, 1]"
-        )
-    if not (math.isfinite(checker_m) and checker_m >= 0.0):
-        raise ValueError(
-            f"{prefix}{field_prefix}checker_m={checker_m} must be an edge in metres, or 0 (plain)"
-        )
 
 
 @dataclass
@@ -59,8 +25,11 @@ class PropCfg:
         name: Unique in its world.
         shape: Its shape.
         size_m: Lengths in metres, see `SIZE_NAMES`: a box has full edge lengths, a capsule the
-            distance of its cap centres. Cylinders, capsules and goal posts stand along z.
-        position_m: Centre of the shape; for walls and goals the middle of the foot line.
+            distance of its cap centres. Cylinders, capsules, goal posts and the flat sides of
+            sectors face along z, the tips of pyramids point up.
+        position_m: Centre of the shape; for walls and goals the middle of the foot line; for
+            sectors the tip at half of the height; for compound and convex props the origin of
+            their parts and points.
         yaw_deg: Rotation about z.
         mass_kg: 0 makes it a fixed part of the world. The inertia is that of a homogeneous solid.
         friction: Sliding friction coefficient (Coulomb) on the floor. Bullet multiplies those of
@@ -75,6 +44,10 @@ class PropCfg:
         transparent: Whether eyes see through it; it does not hinder `is_visible`.
         tangible: Whether it collides, is felt and stops sound; a mark on the floor is only seen.
         sound: What it emits; None for a silent prop.
+        angle_deg: Angle of a sector of a disc, in (0, 180], halved by the x axis.
+        parts: The parts of a compound prop.
+        points_m: Points ``[x, y, z]`` in metres, of which a convex prop is the hull.
+        joint: How it is attached, see `JointCfg`; None for a prop that is fixed or free.
         material: How it sounds when it is hit, see `ImpactCfg`; it does not change the mass.
         interactions: Names of the verbs that bodies can apply to it, such as ``[grab]``; see
             `veca_marl.sim.physics.interactions`.
@@ -96,37 +69,40 @@ class PropCfg:
     sound: SoundCfg | None = None
     material: Material = Material.wood
     interactions: list[str] = field(default_factory=list)
+    angle_deg: float = 90.0
+    parts: list[PartCfg] = field(default_factory=list)
+    points_m: list[list[float]] = field(default_factory=list)
+    joint: JointCfg | None = None
 
     def __post_init__(self) -> None:
         """Check the numbers."""
         self._check_shape()
+        self._check_pieces()
         self._check_appearance()
         self._check_physics()
         if not self.name:
             raise ValueError(f"a {self.shape.value} without a name; every prop has one")
 
     def _check_shape(self) -> None:
-        if not isinstance(self.shape, PropShape):
-            shapes = [shape.name for shape in PropShape]
-            raise ValueError(f"prop {self.name!r}: shape={self.shape!r}; there are {shapes}")
+        check_shape(f"prop {self.name!r}: ", self.shape, self.size_m)
         if not isinstance(self.material, Material):
             materials = [material.name for material in Material]
             raise ValueError(
                 f"prop {self.name!r}: material={self.material!r}; there are {materials}"
-            )
-        names = SIZE_NAMES[self.shape]
-        if len(self.size_m) != len(names) or not all(
-            math.isfinite(size) and size > 0 for size in self.size_m
-        ):
-            raise ValueError(
-                f"prop {self.name!r}: size_m={list(self.size_m)} of a {self.shape.value} "
-                f"must be {len(names)} positive lengths: {', '.join(names)}"
             )
         if not all(math.isfinite(value) for value in (*self.position_m, self.yaw_deg)):
             raise ValueError(
                 f"prop {self.name!r}: position_m={tuple(self.position_m)}, yaw_deg={self.yaw_deg} "
                 "must be finite"
             )
+
+    def _check_pieces(self) -> None:
+        if (self.shape is PropShape.compound) != bool(self.parts):
+            raise ValueError(
+                f"prop {self.name!r}: parts={self.parts} of a {self.shape.name}; "
+                "a compound has at least one part, other shapes have none"
+            )
+        check_piece(f"prop {self.name!r}: ", self.shape, self.angle_deg, self.points_m)
 
     def _check_appearance(self) -> None:
         check_appearance(f"prop {self.name!r}: ", self.colour, self.checker_m)
@@ -142,4 +118,9 @@ class PropCfg:
             raise ValueError(
                 f"prop {self.name!r}: mass_kg={self.mass_kg}, but a prop that is not tangible "
                 "would fall through the floor: it must be fixed (mass_kg=0)"
+            )
+        if self.joint is not None and not (self.mass_kg > 0.0 and self.tangible):
+            raise ValueError(
+                f"prop {self.name!r}: mass_kg={self.mass_kg}, tangible={self.tangible}; a prop "
+                "with a joint needs a positive mass and is tangible"
             )

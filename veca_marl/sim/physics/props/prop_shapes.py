@@ -1,13 +1,26 @@
-"""The primitives that props are made of, and which props stop sound."""
+"""The primitives that props are made of, and which of them stop sound."""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from veca_marl.sim.geometry import Geom, Shape
-from veca_marl.sim.physics.props.prop_cfg import PropCfg, PropShape
+from veca_marl.sim.geometry import (
+    Floats,
+    Geom,
+    Polyhedron,
+    Shape,
+    convex_hull,
+    pyramid,
+    sector_of_disc,
+)
+from veca_marl.sim.physics.props.doll import doll_parts
+from veca_marl.sim.physics.props.part_cfg import PartCfg
+from veca_marl.sim.physics.props.prop_cfg import PropCfg
+from veca_marl.sim.physics.props.prop_shape import PropShape
 
 SOUND_OBSTACLE_M = (0.7, 1.0)
 """Least width and height of a box that attenuates sound as a wall does. Sound below 340 Hz, with
@@ -24,31 +37,119 @@ def prop_geoms(cfg: PropCfg) -> tuple[Geom, ...]:
         "tangible": cfg.tangible,
     }
     match cfg.shape:
-        case PropShape.sphere:
-            return (Geom(Shape.SPHERE, size, **surface),)
-        case PropShape.box:
-            return (Geom(Shape.BOX, tuple(s / 2 for s in size), **surface),)
-        case PropShape.cylinder:
-            return (Geom(Shape.CYLINDER, size, **surface),)
-        case PropShape.capsule:
-            return (Geom(Shape.CAPSULE, size, **surface),)
         case PropShape.wall:
             half = tuple(s / 2 for s in size)
             return (Geom(Shape.BOX, half, offset=(0.0, 0.0, half[2]), **surface),)
         case PropShape.goal:
             return _goal_geoms(size, surface)
+        case PropShape.doll:
+            return _part_geoms(doll_parts(*size), surface)
+        case PropShape.compound:
+            return _part_geoms(cfg.parts, surface)
+        case _:
+            return (_single_geom(cfg, surface),)
 
 
-def stops_sound(cfg: PropCfg) -> bool:
-    """Return whether a prop attenuates sound between rooms: a wall or a large box, such as a door.
+def sound_obstacles(cfg: PropCfg, geoms: Sequence[Geom]) -> list[Geom]:
+    """Return the boxes of a prop that attenuate sound between rooms.
 
-    See `SOUND_OBSTACLE_M`.
+    These are walls and large boxes, such as doors, also as parts of a compound, see
+    `SOUND_OBSTACLE_M`.
     """
-    if cfg.shape is not PropShape.box:
-        return cfg.tangible and cfg.shape is PropShape.wall
-    length_x, length_y, height = cfg.size_m
+    if not cfg.tangible:
+        return []
+    if cfg.shape is PropShape.wall:
+        return list(geoms)
+    return [geom for geom in geoms if geom.shape is Shape.BOX and _is_large(geom)]
+
+
+def horizontal_radius_m(geoms: Sequence[Geom]) -> float:
+    """Return the radius of a vertical cylinder about the origin that contains primitives."""
+    return max(_reach(geom) for geom in geoms)
+
+
+def bounding_box(geoms: Sequence[Geom]) -> tuple[Floats, Floats]:
+    """Return the lower and the upper corner of a box about primitives, along their frame's axes."""
+    low, high = np.full(3, np.inf), np.full(3, -np.inf)
+    for geom in geoms:
+        points, margin = _outline(geom), _roundness(geom)
+        low = np.minimum(low, points.min(axis=0) - margin)
+        high = np.maximum(high, points.max(axis=0) + margin)
+    return low, high
+
+
+def _single_geom(cfg: PropCfg | PartCfg, surface: dict[str, Any]) -> Geom:
+    """Return the primitive of a prop or part of one primitive, about the origin."""
+    size = tuple(cfg.size_m)
+    match cfg.shape:
+        case PropShape.sphere:
+            return Geom(Shape.SPHERE, size, **surface)
+        case PropShape.box:
+            return Geom(Shape.BOX, tuple(s / 2 for s in size), **surface)
+        case PropShape.cylinder:
+            return Geom(Shape.CYLINDER, size, **surface)
+        case PropShape.capsule:
+            return Geom(Shape.CAPSULE, size, **surface)
+        case _:
+            return Geom(Shape.POLYHEDRON, (), hull=_hull(cfg), **surface)
+
+
+def _hull(cfg: PropCfg | PartCfg) -> Polyhedron:
+    """Return the polyhedron of a pyramid, sector or convex piece."""
+    if cfg.shape is PropShape.pyramid:
+        return pyramid(*cfg.size_m)
+    if cfg.shape is PropShape.sector:
+        radius, height = cfg.size_m
+        return sector_of_disc(radius, height, cfg.angle_deg)
+    return convex_hull(cfg.points_m)
+
+
+def _part_geoms(parts: Sequence[PartCfg], surface: dict[str, Any]) -> tuple[Geom, ...]:
+    """Return the primitives of parts at their poses."""
+    geoms = []
+    for part in parts:
+        own = surface if part.colour is None else surface | {"colour": tuple(part.colour)}
+        pose = {
+            "offset": tuple(part.position_m),
+            "rotation": rotation_about_axes(part.rotation_deg),
+        }
+        geoms.append(_single_geom(part, own | pose))
+    return tuple(geoms)
+
+
+def rotation_about_axes(degrees: Sequence[float]) -> Floats:
+    """Return the rotation ``(3, 3)`` about the fixed x, then y, then z axis."""
+    whole = np.eye(3)
+    for axis, angle in enumerate(degrees):
+        cosine, sine = math.cos(math.radians(angle)), math.sin(math.radians(angle))
+        turn, i, j = np.eye(3), (axis + 1) % 3, (axis + 2) % 3
+        turn[i, i] = turn[j, j] = cosine
+        turn[i, j], turn[j, i] = -sine, sine
+        whole = turn @ whole
+    return whole
+
+
+def _is_large(box: Geom) -> bool:
+    """Return whether a box is wide and high enough to attenuate sound."""
+    edges = 2.0 * np.abs(np.asarray(box.rotation)) @ np.array(box.size)
     width_m, height_m = SOUND_OBSTACLE_M
-    return cfg.tangible and max(length_x, length_y) >= width_m and height >= height_m
+    return bool(edges[:2].max() >= width_m and edges[2] >= height_m)
+
+
+def _outline(geom: Geom) -> Floats:
+    """Return points ``(n, 3)`` whose hull, with `_roundness` around it, contains a primitive."""
+    if geom.shape in (Shape.BOX, Shape.POLYHEDRON):
+        return geom.corners()
+    return np.stack(geom.cap_centres())
+
+
+def _roundness(geom: Geom) -> float:
+    return 0.0 if geom.shape in (Shape.BOX, Shape.POLYHEDRON) else geom.radius
+
+
+def _reach(geom: Geom) -> float:
+    points = _outline(geom)
+    return float(np.hypot(points[:, 0], points[:, 1]).max()) + _roundness(geom)
 
 
 def _goal_geoms(size: tuple[float, ...], surface: dict[str, Any]) -> tuple[Geom, ...]:

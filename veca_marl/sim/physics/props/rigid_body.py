@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -14,22 +14,27 @@ from veca_marl.sim.geometry import (
     Pose,
     Primitive,
     joined_inertia,
+    matrix_to_quaternion,
     primitive_inertia,
 )
 from veca_marl.sim.physics.bullet import pybullet
 from veca_marl.sim.physics.clock import ClockCfg
 from veca_marl.sim.physics.collision_shapes import create_collision_shape
-from veca_marl.sim.physics.props.prop_cfg import PropCfg, PropShape
+from veca_marl.sim.physics.props.joint import LINK
+from veca_marl.sim.physics.props.joint_cfg import JointCfg, JointKind
+from veca_marl.sim.physics.props.prop_cfg import PropCfg
+from veca_marl.sim.physics.props.prop_shape import PropShape
 
 _STEP_S = 0.008  # physics step at which `contact_share` is used as it is
+_ROUNDING = 1e-9  # of products of inertia, relative to the moments
+_SEVERAL_LINKS = (PropShape.doll, PropShape.compound)
+_STATIC = 2  # Bullet's collision group of static bodies, which do not collide with each other
+_JOINTS = {JointKind.hinge: pybullet.JOINT_REVOLUTE, JointKind.slide: pybullet.JOINT_PRISMATIC}
 _EXACT_IN_BULLET = (PropShape.sphere, PropShape.box, PropShape.cylinder)
 
 
-def create_prop_body(cfg: PropCfg, client: int, geoms: Sequence[Primitive]) -> tuple[int, Floats]:
+def create_prop_body(cfg: PropCfg, client: int, geoms: Sequence[Primitive]) -> tuple[int, Pose]:
     """Create the rigid body of a prop, with its frame at the origin.
-
-    Bullet uses the inertia of the bounding box for capsules and for several primitives at once, and
-    takes the origin of the frame as the centre of mass. Both are set here.
 
     Args:
         cfg: The prop.
@@ -37,24 +42,181 @@ def create_prop_body(cfg: PropCfg, client: int, geoms: Sequence[Primitive]) -> t
         geoms: Its primitives, in its frame.
 
     Returns:
-        PyBullet's id, and the centre of mass in the frame of the prop, ``(3,)`` metres. Poses of
-        the body in Bullet are those of its centre of mass. A fixed prop has it at the origin.
+        PyBullet's id, and the inertial frame on the frame of the prop, see `inertial_frame`.
     """
     inertia = None if cfg.mass_kg == 0.0 else prop_inertia(geoms, cfg.mass_kg)
-    centre: Floats = np.zeros(3) if inertia is None else inertia.centre
-    if centre.any():
-        geoms = [replace(geom, offset=np.asarray(geom.offset) - centre) for geom in geoms]
-    shape = create_collision_shape(client, geoms)
+    frame, moments = inertial_frame(inertia)
+    shapes = _collision_shapes(cfg, client, [_on_frame(geom, frame) for geom in geoms])
     body_id: int = pybullet.createMultiBody(
-        cfg.mass_kg, shape, basePosition=centre.tolist(), physicsClientId=client
+        cfg.mass_kg,
+        shapes[0],
+        basePosition=frame.position.tolist(),
+        baseOrientation=matrix_to_quaternion(frame.rotation).tolist(),
+        physicsClientId=client,
+        **_links([_welded(shape, parent=-1) for shape in shapes[1:]]),
     )
-    pybullet.changeDynamics(body_id, -1, **_dynamics(cfg, inertia), physicsClientId=client)
+    pybullet.changeDynamics(body_id, -1, **prop_dynamics(cfg, moments), physicsClientId=client)
+    _prepare_links(body_id, 0, len(shapes) - 1, cfg, client)
     if not cfg.tangible:
-        pybullet.setCollisionFilterGroupMask(body_id, -1, 0, 0, physicsClientId=client)
-    return body_id, centre
+        for link in range(-1, len(shapes) - 1):
+            pybullet.setCollisionFilterGroupMask(body_id, link, 0, 0, physicsClientId=client)
+    return body_id, frame
 
 
-def limit_detection(body_id: int, cfg: PropCfg, client: int, clock: ClockCfg) -> None:
+def create_attached_body(
+    cfg: PropCfg, joint: JointCfg, client: int, geoms: Sequence[Primitive]
+) -> tuple[int, Pose]:
+    """Create the body of a prop with a joint: a fixed base without a shape, and one link.
+
+    The base is at the anchor of the joint, with the axes of the closed prop.
+
+    Args:
+        cfg: The prop.
+        joint: Its joint.
+        client: PyBullet's client id.
+        geoms: Its primitives, in its frame.
+
+    Returns:
+        As `create_prop_body`.
+    """
+    frame, moments = inertial_frame(prop_inertia(geoms, cfg.mass_kg))
+    anchor, axis = np.asarray(joint.anchor_m, np.float64), np.asarray(joint.axis, np.float64)
+    at_anchor = Pose(anchor, np.eye(3))
+    shapes = _collision_shapes(cfg, client, [_on_frame(geom, at_anchor) for geom in geoms])
+    leaf = _Link(
+        shapes[0],
+        mass_kg=cfg.mass_kg,
+        centre=frame.position - anchor,
+        axes=frame.rotation,
+        joint=_JOINTS[joint.kind],
+        axis=axis / np.linalg.norm(axis),
+    )
+    body_id: int = pybullet.createMultiBody(
+        baseMass=0.0,
+        basePosition=anchor.tolist(),
+        physicsClientId=client,
+        **_links([leaf, *(_welded(shape, parent=LINK) for shape in shapes[1:])]),
+    )
+    dynamics = prop_dynamics(cfg, moments)
+    if moments is not None:
+        dynamics["localInertiaDiagonal"] = moments.tolist()
+    pybullet.changeDynamics(body_id, LINK, **dynamics, physicsClientId=client)
+    _prepare_links(body_id, LINK + 1, len(shapes), cfg, client)
+    return body_id, frame
+
+
+def inertial_frame(inertia: Inertia | None) -> tuple[Pose, Floats | None]:
+    """Return the pose of the principal axes of inertia, and the moments about them.
+
+    Bullet uses the inertia of the bounding box for capsules, hulls and several primitives at once,
+    and takes the axes of the body as principal axes and their origin as the centre of mass.
+    Poses of the body in Bullet are therefore those of its inertial frame.
+
+    Args:
+        inertia: Of the prop in its frame; None for a fixed prop, whose own frame is returned.
+
+    Returns:
+        The pose, its rotation the identity where the axes of the prop are principal axes, and the
+        moments ``(3,)`` in kg m^2; None for a fixed prop.
+    """
+    if inertia is None:
+        return Pose(np.zeros(3), np.eye(3)), None
+    moments = np.diag(inertia.matrix)
+    if np.abs(inertia.matrix - np.diag(moments)).max() <= _ROUNDING * moments.max():
+        return Pose(inertia.centre, np.eye(3)), moments
+    moments, axes = np.linalg.eigh(inertia.matrix)
+    axes[:, 2] = np.cross(axes[:, 0], axes[:, 1])  # right-handed
+    return Pose(inertia.centre, axes), moments
+
+
+@dataclass(frozen=True, eq=False)
+class _Link:
+    """One link of a multibody, as PyBullet's `createMultiBody` takes it.
+
+    Attributes:
+        shape: Id of its collision shape.
+        parent: Index of the link that it is attached to; -1 is the base.
+        mass_kg: Its mass.
+        centre: ``(3,)`` metres, its inertial frame on its own frame.
+        axes: ``(3, 3)`` rotation of the inertial frame.
+        joint: PyBullet's type of joint.
+        axis: ``(3,)`` axis of the joint.
+    """
+
+    shape: int
+    parent: int = -1
+    mass_kg: float = 0.0
+    centre: Floats = field(default_factory=lambda: np.zeros(3))
+    axes: Floats = field(default_factory=lambda: np.eye(3))
+    joint: int = pybullet.JOINT_FIXED
+    axis: Floats = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
+
+
+def _welded(shape: int, parent: int) -> _Link:
+    """Return a link without mass that is fixed to another: a further shape of the same body.
+
+    A body whose shapes are on different links has one manifold of contacts for each of them, in
+    the order of the links. With several shapes on one link the order depends on earlier episodes,
+    and a reset would not restore the built state bit by bit.
+    """
+    return _Link(shape, parent)
+
+
+def _links(links: Sequence[_Link]) -> dict[str, Any]:
+    """Return the arguments of `createMultiBody` for links that share the frame of their base."""
+    if not links:
+        return {}
+    identity = (0.0, 0.0, 0.0, 1.0)
+    return {
+        "linkMasses": [link.mass_kg for link in links],
+        "linkCollisionShapeIndices": [link.shape for link in links],
+        "linkVisualShapeIndices": [-1] * len(links),
+        "linkPositions": [(0.0, 0.0, 0.0)] * len(links),
+        "linkOrientations": [identity] * len(links),
+        "linkInertialFramePositions": [link.centre.tolist() for link in links],
+        "linkInertialFrameOrientations": [
+            matrix_to_quaternion(link.axes).tolist() for link in links
+        ],
+        "linkParentIndices": [link.parent + 1 for link in links],
+        "linkJointTypes": [link.joint for link in links],
+        "linkJointAxis": [link.axis.tolist() for link in links],
+    }
+
+
+def _collision_shapes(cfg: PropCfg, client: int, geoms: Sequence[Primitive]) -> list[int]:
+    """Return the collision shapes of a prop, one for each link."""
+    if cfg.shape in _SEVERAL_LINKS:
+        return [create_collision_shape(client, [geom]) for geom in geoms]
+    return [create_collision_shape(client, geoms)]
+
+
+def _prepare_links(body_id: int, first: int, end: int, cfg: PropCfg, client: int) -> None:
+    """Set the dynamics of the links `first` to `end` - 1, which have no mass."""
+    for link in range(first, end):
+        pybullet.changeDynamics(body_id, link, **prop_dynamics(cfg, None), physicsClientId=client)
+        if cfg.mass_kg == 0.0:
+            pybullet.setCollisionFilterGroupMask(
+                body_id, link, _STATIC, ~_STATIC, physicsClientId=client
+            )
+
+
+def _on_frame(geom: Primitive, frame: Pose) -> Primitive:
+    """Return a primitive on an inertial frame instead of the frame of the prop."""
+    offset = np.asarray(geom.offset)
+    if frame.position.any():
+        offset = offset - frame.position
+    if is_turned(frame):
+        offset = frame.rotation.T @ offset
+        geom = replace(geom, rotation=frame.rotation.T @ np.asarray(geom.rotation))
+    return replace(geom, offset=offset)
+
+
+def is_turned(frame: Pose) -> bool:
+    """Return whether the rotation of a frame is not exactly the identity."""
+    return not np.array_equal(frame.rotation, np.eye(3))
+
+
+def limit_detection(body_id: int, link: int, cfg: PropCfg, client: int, clock: ClockCfg) -> None:
     """Limit how far ahead a movable prop with restitution has contacts at short physics steps.
 
     Bullet subtracts the distance to a contact over the time step from the speed of rebound: at a
@@ -63,11 +225,11 @@ def limit_detection(body_id: int, cfg: PropCfg, client: int, clock: ClockCfg) ->
     """
     shortening = clock.substep_s / _STEP_S
     if cfg.mass_kg > 0.0 and cfg.restitution > 0.0 and shortening < 1.0:
-        low, high = pybullet.getAABB(body_id, physicsClientId=client)
+        low, high = pybullet.getAABB(body_id, link, physicsClientId=client)
         size = float(np.linalg.norm(np.subtract(high, low))) / 2.0
         pybullet.changeDynamics(
             body_id,
-            -1,
+            link,
             contactProcessingThreshold=clock.contact_share * shortening * size,
             physicsClientId=client,
         )
@@ -88,8 +250,13 @@ def prop_inertia(geoms: Sequence[Primitive], mass_kg: float) -> Inertia:
     return joined_inertia(parts)
 
 
-def _dynamics(cfg: PropCfg, inertia: Inertia | None) -> dict[str, Any]:
-    """Return the arguments of PyBullet's `changeDynamics`."""
+def prop_dynamics(cfg: PropCfg, moments: Floats | None) -> dict[str, Any]:
+    """Return the arguments of PyBullet's `changeDynamics`.
+
+    Args:
+        cfg: The prop.
+        moments: ``(3,)`` kg m^2, principal moments of inertia; None for a fixed prop.
+    """
     arguments: dict[str, Any] = {
         "lateralFriction": cfg.friction,
         "rollingFriction": cfg.rolling_friction,
@@ -98,7 +265,6 @@ def _dynamics(cfg: PropCfg, inertia: Inertia | None) -> dict[str, Any]:
         "linearDamping": 0.0,
         "angularDamping": 0.0,  # only friction slows objects down
     }
-    if inertia is not None and cfg.shape not in _EXACT_IN_BULLET:
-        # all shapes of props are symmetric about two planes: their axes are principal axes
-        arguments["localInertiaDiagonal"] = np.diag(inertia.matrix).tolist()
+    if moments is not None and cfg.shape not in _EXACT_IN_BULLET:
+        arguments["localInertiaDiagonal"] = moments.tolist()
     return arguments

@@ -1,0 +1,163 @@
+"""Compound props: baskets, dolls, mass properties, and the reset with several contacts."""
+
+import math
+
+import numpy as np
+import pytest
+from walking import ball, box, empty_world, film, let_pass
+
+from veca_marl.sim.geometry import joined_inertia, primitive_inertia
+from veca_marl.sim.physics import PartCfg, PropCfg, PropShape, pybullet
+from veca_marl.sim.physics.props.prop_shapes import prop_geoms
+
+
+def basket(mass_kg=0.0, edge_m=0.4, height_m=0.2, thickness_m=0.02):
+    side, up = edge_m / 2.0, height_m / 2.0
+    boards = [PartCfg(PropShape.box, [edge_m, edge_m, thickness_m], (0, 0, thickness_m / 2))]
+    for way in (-1.0, 1.0):
+        boards.append(PartCfg(PropShape.box, [edge_m, thickness_m, height_m], (0, way * side, up)))
+        boards.append(PartCfg(PropShape.box, [thickness_m, edge_m, height_m], (way * side, 0, up)))
+    return PropCfg("basket", PropShape.compound, mass_kg=mass_kg, parts=boards)
+
+
+def lopsided(**more):
+    parts = [
+        PartCfg(PropShape.box, [0.4, 0.1, 0.1]),
+        PartCfg(PropShape.cylinder, [0.05, 0.3], (0.2, 0.1, 0.1), (40.0, 0.0, 20.0)),
+        PartCfg(PropShape.pyramid, [0.1, 0.1, 0.2], (-0.1, -0.1, 0.1), colour=(1.0, 0.0, 0.0)),
+    ]
+    return PropCfg("thing", PropShape.compound, parts=parts, mass_kg=1.5, **more)
+
+
+def test_an_asymmetric_compound_turns_as_its_parts_together():
+    """Bullet's mass, centre and principal moments are those of the parts from the theorem."""
+    world = empty_world(lopsided(position_m=(0.0, 0.0, 5.0), yaw_deg=30.0))
+    prop, geoms = world.prop("thing"), prop_geoms(lopsided())
+    volumes = np.array([geom.volume for geom in geoms])
+    masses = 1.5 * volumes / volumes.sum()
+    frame = geoms[0].pose
+    parts = [
+        (frame._replace(position=np.zeros(3), rotation=np.eye(3)), primitive_inertia(geom, mass))
+        for geom, mass in zip(geoms, masses, strict=True)
+    ]
+    whole = joined_inertia(parts)
+    centre, quaternion = pybullet.getBasePositionAndOrientation(
+        prop.body_id, physicsClientId=world.client
+    )
+    np.testing.assert_allclose(
+        prop.rotation.T @ (np.array(centre) - prop.position), whole.centre, atol=1e-9
+    )
+    axes = np.array(pybullet.getMatrixFromQuaternion(quaternion)).reshape(3, 3)
+    info = pybullet.getDynamicsInfo(prop.body_id, -1, physicsClientId=world.client)
+    matrix = axes @ np.diag(info[2]) @ axes.T
+    np.testing.assert_allclose(prop.rotation.T @ matrix @ prop.rotation, whole.matrix, atol=1e-9)
+    assert info[0] == pytest.approx(1.5)
+
+
+def test_a_compound_that_falls_and_spins_keeps_its_angular_momentum():
+    world = empty_world(lopsided(position_m=(0.0, 0.0, 50.0)))
+    prop = world.prop("thing")
+    prop.set_velocity((0.0, 0.0, 0.0), (3.0, -2.0, 4.0))
+
+    def momentum():
+        _, quaternion = pybullet.getBasePositionAndOrientation(
+            prop.body_id, physicsClientId=world.client
+        )
+        axes = np.array(pybullet.getMatrixFromQuaternion(quaternion)).reshape(3, 3)
+        moments = pybullet.getDynamicsInfo(prop.body_id, -1, physicsClientId=world.client)[2]
+        _, spin = pybullet.getBaseVelocity(prop.body_id, physicsClientId=world.client)
+        return axes @ (np.array(moments) * (axes.T @ np.array(spin)))
+
+    before = momentum()
+    let_pass(world, 1.0)
+    assert np.linalg.norm(momentum() - before) < 0.03 * np.linalg.norm(before)
+
+
+def test_each_part_has_its_pose_and_colour():
+    world = empty_world(lopsided(position_m=(1.0, 2.0, 0.5), yaw_deg=90.0, colour=(0, 0, 1)))
+    world.refresh()
+    table, rows = world.scene.geoms, world.scene.find("thing").geoms
+    np.testing.assert_allclose(table.positions[rows.start + 1], (0.9, 2.2, 0.6), atol=1e-6)
+    np.testing.assert_array_equal(table.colours[rows], [(0, 0, 1), (0, 0, 1), (1, 0, 0)])
+
+
+def test_a_doll_stands_on_its_feet_and_faces_x():
+    doll = PropCfg("doll", PropShape.doll, [0.4], (0.0, 0.0, 0.2), mass_kg=0.5)
+    world = empty_world(doll)
+    let_pass(world, 2.0)
+    prop = world.prop("doll")
+    assert prop.rotation[2, 2] > 0.999
+    assert prop.position[2] == pytest.approx(0.2, abs=0.003)
+    low, high = prop.bounds()
+    assert high[2] - low[2] == pytest.approx(0.4, abs=0.01)
+
+
+def test_a_basket_holds_and_contains_what_falls_into_it():
+    world = empty_world(basket(), ball("inside", 0.05, position=(0.05, 0.02, 0.4)),
+                        ball("beside", 0.05, position=(0.6, 0.0, 0.05)))  # fmt: skip
+    holder = world.prop("basket")
+    assert not holder.contains(world.prop("inside"))
+    let_pass(world, 2.0)
+    inside = world.prop("inside").position
+    assert holder.contains(world.prop("inside"))
+    assert not holder.contains(world.prop("beside"))
+    assert np.abs(inside[:2]).max() < 0.2
+    assert inside[2] == pytest.approx(0.07, abs=0.004)
+    holder.place((0.0, 3.0, 0.0), math.radians(45.0))
+    world.prop("inside").place((0.0, 3.2, 0.1))
+    assert holder.contains(world.prop("inside"))
+
+
+@pytest.mark.parametrize("mass_kg", [0.0, 0.8])
+def test_things_in_a_basket_move_alike_after_every_reset(mass_kg):
+    """Several shapes of one body are in contact at once: each has its own link in Bullet."""
+    places = [(-0.12, 0.1, 0.3), (0.0, 0.01, 0.3), (0.12, -0.08, 0.3)]
+    things = [ball(f"ball {n}", 0.05, position=place) for n, place in enumerate(places)]
+    cube = box("cube", (0.1, 0.1, 0.1), 0.2, (0.05, 0.0, 0.5))
+    doll = PropCfg("doll", PropShape.doll, [0.3], (0.8, 0.0, 0.16), mass_kg=0.5)
+    world = empty_world(basket(mass_kg), *things, doll, cube)
+    world.freeze()
+    paths = []
+    for _ in range(3):
+        world.reset(np.random.default_rng(0))
+        paths.append(film(world, 30))
+    np.testing.assert_array_equal(paths[0], paths[1])
+    np.testing.assert_array_equal(paths[0], paths[2])
+
+
+def test_fraction_pieces_fill_a_disc_without_overlap():
+    angles, turn, pieces = (180.0, 90.0, 60.0, 30.0), 0.0, []
+    for number, angle in enumerate(angles):
+        pieces.append(
+            PropCfg(f"piece {number}", PropShape.sector, [0.3, 0.05], (0, 0, 0.025),
+                    yaw_deg=turn + angle / 2.0, mass_kg=0.1, angle_deg=angle)
+        )  # fmt: skip
+        turn += angle
+    world = empty_world(*pieces)
+    let_pass(world, 1.0)
+    for prop in world.props.values():
+        assert np.hypot(*prop.position[:2]) < 0.006
+        assert prop.position[2] == pytest.approx(0.025, abs=0.002)
+
+
+@pytest.mark.parametrize(
+    ("numbers", "reason"),
+    [
+        ({"shape": PropShape.compound}, "at least one part"),
+        (
+            {"size_m": [1, 1, 1], "parts": [PartCfg(PropShape.sphere, [0.1])]},
+            "other shapes have none",
+        ),
+        ({"shape": PropShape.sector, "size_m": [0.1, 0.1], "angle_deg": 200.0}, "angle_deg=200"),
+        ({"shape": PropShape.convex}, "only convex props"),
+        ({"shape": PropShape.convex, "points_m": [[0, 0, 0]] * 4}, "no volume"),
+    ],
+)
+def test_impossible_pieces_are_refused(numbers, reason):
+    with pytest.raises(ValueError, match=f"'thing': .*{reason}"):
+        PropCfg(**({"name": "thing", "size_m": []} | numbers))
+
+
+def test_parts_are_single_shapes():
+    with pytest.raises(ValueError, match="shape=doll; a part is one of"):
+        PartCfg(PropShape.doll, [0.3])

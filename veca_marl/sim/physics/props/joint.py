@@ -1,0 +1,172 @@
+"""Joints of props in Bullet: doors, drawers and lids that are pushed, driven or locked."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from veca_marl.sim.geometry import Floats
+from veca_marl.sim.physics.bullet import pybullet
+from veca_marl.sim.physics.props.joint_cfg import JointCfg, JointKind
+
+LINK = 0
+"""The link that carries the shape of an attached prop; its base is fixed to the world."""
+
+_ARRIVED = 1e-6  # rad or metres: Bullet's stop at the end of the range leaves a rounding error
+
+
+class Joint:
+    """The hinge or slide of one prop.
+
+    Its coordinate, in rad or metres, is 0 when closed and `JointCfg.range` at opening 1. Bullet
+    solves friction and stops; what the solver leaves beyond a stop is removed after each physics
+    step, so that the range is never exceeded.
+
+    Args:
+        cfg: The joint.
+        body_id: PyBullet's id of the attached prop.
+        client: PyBullet's client id.
+
+    Attributes:
+        cfg: As above.
+        locked: Whether it is locked: it does not move at all.
+    """
+
+    def __init__(self, cfg: JointCfg, body_id: int, client: int) -> None:
+        self.cfg = cfg
+        self._body_id = body_id
+        self._client = client
+        axis = np.asarray(cfg.axis, np.float64)
+        self._axis: Floats = axis / np.linalg.norm(axis)
+        self.locked = False
+        self._held = 0.0
+        self._target: float | None = None
+        self._direction = 1.0
+        pybullet.changeDynamics(
+            body_id,
+            LINK,
+            jointLowerLimit=0.0,
+            jointUpperLimit=cfg.range,
+            jointDamping=0.0,
+            physicsClientId=client,
+        )
+        self._set_coordinate(cfg.opening * cfg.range)
+        self.reset()
+
+    @property
+    def opening(self) -> float:
+        """From 0 (closed) to 1."""
+        return min(max(self._state()[0] / self.cfg.range, 0.0), 1.0)
+
+    @property
+    def speed(self) -> float:
+        """Speed of the coordinate: rad/s or m/s, positive while it opens."""
+        return self._state()[1]
+
+    @property
+    def driven(self) -> bool:
+        """Whether its motor moves it."""
+        return self._target is not None
+
+    def reset(self) -> None:
+        """Return motor and lock to the built state; Bullet restores the coordinate."""
+        self._release_motor()
+        self.locked = self.cfg.lock is not None and self.cfg.lock.locked
+        self._held = self.cfg.opening * self.cfg.range
+
+    def set_opening(self, opening: float) -> None:
+        """Put it at rest at an opening in [0, 1], also if it is locked."""
+        self._held = self._checked(opening) * self.cfg.range
+        self._release_motor()
+        self._set_coordinate(self._held)
+
+    def drive(self, opening: float) -> bool:
+        """Let the motor move it to an opening in [0, 1]; return False if it is locked.
+
+        The motor is limited to `JointCfg.motor`: whatever blocks the way holds it up.
+        """
+        target = self._checked(opening) * self.cfg.range
+        if self.locked:
+            return False
+        self._target = target
+        self._direction = 1.0 if target > self._state()[0] else -1.0
+        speed = self._direction * self.cfg.range / self.cfg.open_s
+        self._set_motor(speed, self.cfg.motor + self.cfg.friction)
+        return True
+
+    def lock(self) -> None:
+        """Lock it where it is."""
+        self._held = min(max(self._state()[0], 0.0), self.cfg.range)
+        self._release_motor()
+        self.locked = True
+
+    def unlock(self, key: str) -> bool:
+        """Unlock it with the prop of a name; return whether that prop is its key."""
+        if self.cfg.lock is None or not key or key != self.cfg.lock.key:
+            return False
+        self.locked = False
+        return True
+
+    def yields(self, point: Sequence[float], force: Sequence[float]) -> bool:
+        """Return whether a force would move it: it is neither locked nor at its stop.
+
+        Args:
+            point: ``(3,)`` metres, where the force acts, world frame.
+            force: ``(3,)`` its direction, of any length.
+        """
+        if self.locked:
+            return False
+        base, quaternion = pybullet.getBasePositionAndOrientation(
+            self._body_id, physicsClientId=self._client
+        )
+        turn = np.array(pybullet.getMatrixFromQuaternion(quaternion)).reshape(3, 3)
+        axis, push = turn @ self._axis, np.asarray(force, np.float64)
+        if self.cfg.kind is JointKind.hinge:
+            push = np.cross(np.subtract(point, base), push)
+        generalised, coordinate = float(axis @ push), self._state()[0]
+        if generalised > 0.0:
+            return coordinate < self.cfg.range
+        return generalised < 0.0 and coordinate > 0.0
+
+    def after_substep(self) -> None:
+        """Hold what is locked, stop at the ends of the range and at the motor's target."""
+        coordinate, speed = self._state()
+        if self.locked:
+            if coordinate != self._held or speed != 0.0:
+                self._set_coordinate(self._held)
+            return
+        target = self._target
+        if target is not None and (coordinate - target) * self._direction > -_ARRIVED:
+            self._set_coordinate(target)
+            self._release_motor()
+        elif not 0.0 <= coordinate <= self.cfg.range:
+            self._set_coordinate(min(max(coordinate, 0.0), self.cfg.range))
+
+    def _state(self) -> tuple[float, float]:
+        """Return coordinate and speed."""
+        state = pybullet.getJointState(self._body_id, LINK, physicsClientId=self._client)
+        return float(state[0]), float(state[1])
+
+    def _set_coordinate(self, coordinate: float) -> None:
+        pybullet.resetJointState(self._body_id, LINK, coordinate, 0.0, physicsClientId=self._client)
+
+    def _release_motor(self) -> None:
+        """Leave only friction: a motor that holds the speed 0 with a limited force."""
+        self._target = None
+        self._set_motor(0.0, self.cfg.friction)
+
+    def _set_motor(self, speed: float, force: float) -> None:
+        pybullet.setJointMotorControl2(
+            self._body_id,
+            LINK,
+            pybullet.VELOCITY_CONTROL,
+            targetVelocity=speed,
+            force=force,
+            physicsClientId=self._client,
+        )
+
+    def _checked(self, opening: float) -> float:
+        if not 0.0 <= opening <= 1.0:
+            raise ValueError(f"opening={opening} is not in [0, 1]")
+        return opening

@@ -1,0 +1,105 @@
+"""Cupboards with a drawer."""
+
+from __future__ import annotations
+
+from veca_marl.sim.physics.props.joint_cfg import JointCfg, JointKind, LockCfg
+from veca_marl.sim.physics.props.part_cfg import PartCfg
+from veca_marl.sim.physics.props.prop_cfg import PropCfg
+from veca_marl.sim.physics.props.prop_shape import PropShape
+
+Colour = tuple[float, float, float]
+
+_BOARD_M = 0.02
+_GAP_M = 0.006
+_METAL: Colour = (0.75, 0.75, 0.78)
+
+
+def cupboard_with_drawer(
+    name: str,
+    position_m: tuple[float, float],
+    yaw_deg: float = 0.0,
+    size_m: tuple[float, float, float] = (0.4, 0.45, 0.5),
+    *,
+    drawer_height_m: float = 0.16,
+    lock: LockCfg | None = None,
+    colour: Colour = (0.55, 0.38, 0.24),
+) -> list[PropCfg]:
+    """Return a fixed cupboard, and the drawer at its top, which slides out to +x.
+
+    The cupboard is a case of boards that is open to +x; below the drawer it is empty. The drawer
+    is called ``name.drawer`` and opens by three quarters of its depth.
+
+    Args:
+        name: Name of the cupboard.
+        position_m: Middle of its floor area.
+        yaw_deg: Rotation about z.
+        size_m: Depth along x, width along y, height.
+        drawer_height_m: Height of the drawer's front.
+        lock: Lock of the drawer.
+        colour: Of its boards.
+    """
+    depth, width, height = size_m
+    case = PropCfg(
+        name=name,
+        shape=PropShape.compound,
+        position_m=(*position_m, 0.0),
+        yaw_deg=yaw_deg,
+        colour=colour,
+        parts=_case(depth, width, height, drawer_height_m),
+    )
+    inner = width - 2.0 * (_BOARD_M + _GAP_M)
+    length = depth - _BOARD_M - _GAP_M
+    middle = height - _BOARD_M - _GAP_M - drawer_height_m / 2.0
+    drawer = PropCfg(
+        name=f"{name}.drawer",
+        shape=PropShape.compound,
+        position_m=(*position_m, middle),
+        yaw_deg=yaw_deg,
+        mass_kg=1.0,
+        colour=colour,
+        parts=_drawer(depth, length, inner, drawer_height_m),
+        joint=JointCfg(
+            JointKind.slide,
+            parent=name,
+            axis=(1.0, 0.0, 0.0),
+            range_m=0.75 * length,
+            friction=1.0,
+            lock=lock,
+        ),
+    )
+    return [case, drawer]
+
+
+def _case(depth: float, width: float, height: float, drawer_height: float) -> list[PartCfg]:
+    """Return top, bottom, sides, back and the board below the drawer."""
+    below = height - 1.5 * _BOARD_M - 2.0 * _GAP_M - drawer_height
+    boards = [
+        PartCfg(PropShape.box, [depth, width, _BOARD_M], (0.0, 0.0, z))
+        for z in (_BOARD_M / 2.0, below, height - _BOARD_M / 2.0)
+    ]
+    for side in (-1.0, 1.0):
+        y = side * (width - _BOARD_M) / 2.0
+        boards.append(PartCfg(PropShape.box, [depth, _BOARD_M, height], (0.0, y, height / 2.0)))
+    back = (-(depth - _BOARD_M) / 2.0, 0.0, height / 2.0)
+    boards.append(PartCfg(PropShape.box, [_BOARD_M, width, height], back))
+    return boards
+
+
+def _drawer(depth: float, length: float, width: float, height: float) -> list[PartCfg]:
+    """Return floor, sides, back, front and handle; the front is flush with the case."""
+    thin, front = _BOARD_M / 2.0, depth / 2.0
+    middle = front - length / 2.0
+    side_height = 0.75 * height
+    low = -height / 2.0
+    parts = [PartCfg(PropShape.box, [length, width, thin], (middle, 0.0, low + thin / 2.0))]
+    for side in (-1.0, 1.0):
+        y = side * (width - thin) / 2.0
+        parts.append(
+            PartCfg(PropShape.box, [length, thin, side_height], (middle, y, low + side_height / 2))
+        )
+    rear = (front - length + thin / 2.0, 0.0, low + side_height / 2.0)
+    parts.append(PartCfg(PropShape.box, [thin, width, side_height], rear))
+    parts.append(PartCfg(PropShape.box, [_BOARD_M, width, height], (front - thin, 0.0, 0.0)))
+    knob = (front + 0.015, 0.0, 0.0)
+    parts.append(PartCfg(PropShape.box, [0.03, 0.1, 0.02], knob, colour=_METAL))
+    return parts

@@ -1,0 +1,99 @@
+"""The shapes of props and what their sizes mean."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from enum import Enum
+
+from veca_marl.sim.geometry import convex_hull
+
+
+class PropShape(Enum):
+    """Shapes of props. `SIZE_NAMES` says what `PropCfg.size_m` means for each."""
+
+    sphere = "sphere"
+    box = "box"
+    cylinder = "cylinder"
+    capsule = "capsule"
+    wall = "wall"
+    goal = "goal"
+    pyramid = "pyramid"
+    sector = "sector"
+    doll = "doll"
+    compound = "compound"
+    convex = "convex"
+
+
+SIZE_NAMES: dict[PropShape, tuple[str, ...]] = {
+    PropShape.sphere: ("radius",),
+    PropShape.box: ("length_x", "length_y", "height"),
+    PropShape.cylinder: ("radius", "height"),
+    PropShape.capsule: ("radius", "length"),
+    PropShape.wall: ("length", "thickness", "height"),
+    PropShape.goal: ("width", "height", "bar_radius"),
+    PropShape.pyramid: ("length_x", "length_y", "height"),
+    PropShape.sector: ("radius", "height"),
+    PropShape.doll: ("height",),
+    PropShape.compound: (),
+    PropShape.convex: (),
+}
+
+
+def check_appearance(
+    prefix: str, colour: Sequence[float], checker_m: float, field_prefix: str = ""
+) -> None:
+    """Check a colour and the edge of a checker pattern.
+
+    Raises:
+        ValueError: If the colour is not three numbers in [0, 1], or the edge is negative or not
+            finite; the message begins with `prefix` and the name of the field.
+    """
+    if len(colour) != 3 or not all(0.0 <= channel <= 1.0 for channel in colour):
+        raise ValueError(
+            f"{prefix}{field_prefix}colour={tuple(colour)} must be red, green and blue in [0, 1]"
+        )
+    if not (math.isfinite(checker_m) and checker_m >= 0.0):
+        raise ValueError(
+            f"{prefix}{field_prefix}checker_m={checker_m} must be an edge in metres, or 0 (plain)"
+        )
+
+
+def check_shape(prefix: str, shape: PropShape, size_m: Sequence[float]) -> None:
+    """Check a shape and its sizes.
+
+    Raises:
+        ValueError: If there is no such shape, or the sizes are not positive or not as many as
+            `SIZE_NAMES` lists; the message begins with `prefix`.
+    """
+    if not isinstance(shape, PropShape):
+        raise ValueError(f"{prefix}shape={shape!r}; there are {[one.name for one in PropShape]}")
+    names = SIZE_NAMES[shape]
+    if len(size_m) != len(names) or not all(math.isfinite(size) and size > 0 for size in size_m):
+        lengths = ", ".join(names) or "none: its size is that of its parts or points"
+        raise ValueError(
+            f"{prefix}size_m={list(size_m)} of a {shape.value} "
+            f"must be {len(names)} positive lengths: {lengths}"
+        )
+
+
+def check_piece(
+    prefix: str, shape: PropShape, angle_deg: float, points_m: Sequence[Sequence[float]]
+) -> None:
+    """Check the angle of a sector and the points of a convex piece.
+
+    Raises:
+        ValueError: If the angle is not in (0, 180], or the points have no hull with a volume; the
+            message begins with `prefix`.
+    """
+    if shape is PropShape.sector and not 0.0 < angle_deg <= 180.0:
+        raise ValueError(f"{prefix}angle_deg={angle_deg} of a sector is not in (0, 180]")
+    if (shape is PropShape.convex) != bool(points_m):
+        raise ValueError(
+            f"{prefix}points_m={points_m} of a {shape.name}; only convex props have points"
+        )
+    if shape is PropShape.convex:
+        try:
+            convex_hull(points_m)
+        except ValueError as error:
+            raise ValueError(f"{prefix}points_m: {error}") from None
