@@ -73,8 +73,9 @@ def combinations(choices):
 
 @pytest.mark.parametrize(("page", "line"), commands("bench"))
 def test_what_the_bench_commands_choose_can_be_chosen(page, line):
-    for _, overrides in CommandLine("bench", BenchOptions, "").jobs(shlex.split(line)):
-        assert compose(overrides).task.name
+    for options, overrides in CommandLine("bench", BenchOptions, "").jobs(shlex.split(line)):
+        for task in options.bench.tasks or [None]:
+            assert compose([*overrides, *([f"+task={task}"] if task else [])]).task.name
 
 
 def test_the_code_of_the_pages_runs(tmp_path):

@@ -258,7 +258,15 @@ def test_the_helper_reward_is_0_after_the_arrival(game):
 
 
 @pytest.mark.parametrize(
-    ("playground", "agents"), [("two_rooms", 2), ("three_rooms", 3), ("seven_rooms", 4)]
+    ("playground", "agents"),
+    [
+        ("two_rooms", 2),
+        ("three_rooms", 3),
+        ("seven_rooms", 4),
+        pytest.param("house", 2, marks=pytest.mark.slow),
+        pytest.param("house2", 3, marks=pytest.mark.slow),
+        pytest.param("random_house", 2, marks=pytest.mark.slow),
+    ],
 )
 def test_the_experts_solve_every_house(playground, agents):
     game = game_of("task.max_seconds=40", agents=agents, playground=playground)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from veca_marl.envs.experts.control.furniture_detours import Detours, StraightWays
 from veca_marl.envs.experts.control.locomotion import Locomotion
 from veca_marl.envs.experts.control.wall_recovery import WallRecovery
 from veca_marl.envs.tasks.navigation.floor_plan import FloorPlan
@@ -22,10 +23,19 @@ class PathFollower:
         locomotion: What moves the body.
         plan: Rooms and doors.
         step_s: Duration of an environment step.
+        detours: Ways between the points of the path.
     """
 
-    def __init__(self, body: Body, locomotion: Locomotion, plan: FloorPlan, step_s: float) -> None:
+    def __init__(
+        self,
+        body: Body,
+        locomotion: Locomotion,
+        plan: FloorPlan,
+        step_s: float,
+        detours: Detours | None = None,
+    ) -> None:
         self._body, self._plan = body, plan
+        self._detours = StraightWays() if detours is None else detours
         self._locomotion = WallRecovery(body, locomotion, step_s)
         self._beyond_door: Floats | None = None
 
@@ -40,7 +50,9 @@ class PathFollower:
 
     def to(self, goal: Floats, call: Call = Call.none) -> Any:
         """Move towards a place anywhere in the house; arguments as in `Locomotion.to`."""
-        return self._locomotion.to(self._waypoint(goal), call)
+        waypoint = self._waypoint(goal)
+        point = self._detours.next_point(self._body.position, waypoint)
+        return self._locomotion.to(point, call)
 
     def turn_left(self, call: Call = Call.none) -> Any:
         """Turn to the left on the spot."""

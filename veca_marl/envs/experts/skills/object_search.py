@@ -7,6 +7,7 @@ from typing import Any
 
 from numpy.typing import NDArray
 
+from veca_marl.envs.experts.control.furniture_detours import detours_in
 from veca_marl.envs.experts.control.locomotion import Locomotion
 from veca_marl.envs.experts.control.path_following import PathFollower
 from veca_marl.envs.experts.perception.call_localization import CallSourceMap
@@ -34,7 +35,8 @@ class ObjectSearch:
     def __init__(self, body: Body, locomotion: Locomotion, plan: FloorPlan, world: World) -> None:
         step_s = world.clock.step_s
         self._body, self._plan = body, plan
-        self._path = PathFollower(body, locomotion, plan, step_s)
+        detours = detours_in(world, locomotion.clearances.wall_m)
+        self._path = PathFollower(body, locomotion, plan, step_s, detours)
         self._calls = CallSourceMap(world)
         self._listen_steps, self._steps = max(1, round(_LISTEN_S / step_s)), 0
         self._found: Floats | None = None
