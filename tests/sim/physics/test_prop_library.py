@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from walking import empty_world, let_pass
+from walking import empty_world, let_pass, wall
 
 from veca_marl.sim.physics import LockCfg
 from veca_marl.sim.physics.props.library import (
@@ -36,13 +36,21 @@ def test_a_toy_stands_still_on_the_floor(kind):
 
 @pytest.mark.parametrize("to_front", [True, False])
 def test_a_door_opens_to_the_side_that_was_asked_for(to_front):
-    world = empty_world(door_leaf("door", (1.0, 0.0), 0.0, 0.9, opens_to_front=to_front))
+    # an opening of 0.9 m in a wall of 0.1 m
+    beside = [
+        wall(f"wall {y}", length_m=1.0, position=(1.0, y, 0.0), yaw_deg=90.0) for y in (-0.95, 0.95)
+    ]
+    leaf = door_leaf("door", (1.0, 0.0), 0.0, 0.9, opens_to_front=to_front)
+    world = empty_world(*beside, leaf)
     leaf = world.prop("door")
     assert_at_rest(world, 0.4)
     leaf.open()
     let_pass(world, 1.2)
     assert leaf.opening == 1.0
     assert (leaf.position[0] > 1.3) if to_front else (leaf.position[0] < 0.7)
+    leaf.close()
+    let_pass(world, 1.2)
+    assert leaf.opening == 0.0
 
 
 def test_a_locked_drawer_opens_with_its_key_and_moves_what_lies_in_it():

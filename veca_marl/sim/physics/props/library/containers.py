@@ -39,6 +39,7 @@ def basket(
         mass_kg=mass_kg,
         colour=colour,
         parts=_open_box(*size_m),
+        interactions=["put_into"],
     )
 
 

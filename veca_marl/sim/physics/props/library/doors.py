@@ -30,9 +30,10 @@ def door_leaf(
     colour: Colour = (0.80, 0.62, 0.42),
     mass_kg: float = DOOR_KG,
 ) -> PropCfg:
-    """Return a hinged leaf that closes an opening in a wall and turns by 95 degrees.
+    """Return a hinged leaf that closes an opening in a wall and turns by 90 degrees.
 
-    Its frame has x through the opening and y along its width; the hinge is at the end in -y.
+    Its frame has x through the opening and y along its width. The hinge is at the end in -y, in
+    the face on the side to which it opens, so that no edge turns into the wall.
 
     Args:
         name: Name of the prop.
@@ -47,10 +48,11 @@ def door_leaf(
     """
     width, height = width_m - 2.0 * _GAP_M, height_m - 2.0 * _GAP_M
     parts = [PartCfg(PropShape.box, [_THICKNESS_M, width, height])]
-    for side in (-1.0, 1.0):
-        place = (side * (_THICKNESS_M / 2.0 + 0.015), width / 2.0 - 0.08, 0.0)
-        at_handle = (place[0], place[1], _HANDLE_HEIGHT_M - height_m / 2.0)
-        parts.append(PartCfg(PropShape.box, [0.03, 0.1, 0.02], at_handle, colour=_METAL))
+    for face in (-1.0, 1.0):
+        out = face * (_THICKNESS_M / 2.0 + 0.015)
+        place = (out, width / 2.0 - 0.08, _HANDLE_HEIGHT_M - height_m / 2.0)
+        parts.append(PartCfg(PropShape.box, [0.03, 0.1, 0.02], place, colour=_METAL))
+    side = 1.0 if opens_to_front else -1.0
     return PropCfg(
         name=name,
         shape=PropShape.compound,
@@ -60,9 +62,9 @@ def door_leaf(
         colour=colour,
         parts=parts,
         joint=JointCfg(
-            axis=(0.0, 0.0, -1.0 if opens_to_front else 1.0),
-            anchor_m=(0.0, -width / 2.0, 0.0),
-            range_deg=95.0,
+            axis=(0.0, 0.0, -side),
+            anchor_m=(side * _THICKNESS_M / 2.0, -width / 2.0, 0.0),
+            range_deg=90.0,
             lock=lock,
         ),
     )
