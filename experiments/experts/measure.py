@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import argparse
 import csv
+import math
 from pathlib import Path
 
 import numpy as np
@@ -25,7 +26,7 @@ from veca_marl.envs.core.team import Script
 HERE = Path(__file__).parent
 COLUMNS = [
     *("task", "body", "seconds", "player", "opponent"),
-    *("episodes", "return", "interval_95", "least", "greatest", "ended"),
+    *("episodes", "return", "interval_95", "least", "greatest", "ended", "solved"),
 ]
 STUDENT_95 = {5: 2.776, 10: 2.262, 20: 2.093, 40: 2.023}  # two-sided quantile of t by episodes
 ALONE = ((Script.expert, None), (Script.random, None))
@@ -36,8 +37,15 @@ AGAINST = (
 )
 
 
-def play(cfg: GameCfg, first: Script, others: Script | None, seed: int) -> tuple[float, bool]:
-    """Return the return of the first team in one episode, and whether it was terminated."""
+def play(
+    cfg: GameCfg, first: Script, others: Script | None, seed: int
+) -> tuple[float, bool, float]:
+    """Return the return of the first team in one episode, and how the episode ended.
+
+    Returns:
+        The return, whether the rules ended the episode, and the share of the team's players for
+        which the goal was reached after the last step (NaN in a task without a goal).
+    """
     game, rng = Game(cfg), np.random.default_rng([2026, seed])
     game.reset(rng)
     ours = game.team(cfg.teams[0].name)
@@ -50,7 +58,8 @@ def play(cfg: GameCfg, first: Script, others: Script | None, seed: int) -> tuple
         total += float(np.mean([game.reward_of(outcome.terms[player.name]) for player in ours]))
         over = outcome.done
     game.close()
-    return total, outcome.terminated
+    solved = [outcome.solved.get(player.name, math.nan) for player in ours]
+    return total, outcome.terminated, float(np.mean(solved))
 
 
 def measure(task: str, body: str, seconds: float | None, episodes: int) -> list[dict[str, object]]:
@@ -62,9 +71,10 @@ def measure(task: str, body: str, seconds: float | None, episodes: int) -> list[
     rows: list[dict[str, object]] = []
     for first, others in ALONE if len(cfg.teams) == 1 else AGAINST:
         played = [play(cfg, first, others, seed) for seed in range(episodes)]
-        total, ended = (np.array(column, float) for column in zip(*played, strict=True))
+        total, ended, solved = (np.array(column, float) for column in zip(*played, strict=True))
         interval = STUDENT_95[episodes] * total.std(ddof=1) / np.sqrt(episodes)
-        numbers = (total.mean(), interval, total.min(), total.max(), ended.mean())
+        ends = (ended.mean(), solved.mean())
+        numbers = (total.mean(), interval, total.min(), total.max(), *ends)
         rounded = [round(float(number), 3) for number in numbers]
         names = (task, body, cfg.task.max_seconds, first.value, others.value if others else "")
         values = (*names, episodes, *rounded)

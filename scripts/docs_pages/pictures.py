@@ -14,6 +14,8 @@ from veca_marl.api import make
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
 from veca_marl.envs.core.game import Game
 from veca_marl.envs.rendering.touch_image import touch_image
+from veca_marl.envs.tasks.contests.push_out import PushOut
+from veca_marl.envs.tasks.contests.soccer import Soccer
 from veca_marl.sim.body.walker import Walker
 from veca_marl.sim.touch import TAXELS_PER_TRIANGLE
 from veca_marl.sim.vision import Camera, look_at
@@ -59,11 +61,11 @@ def task_picture(task: str, path: Path) -> None:
 def viewpoint(game: Game) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return where the camera of a task's picture is, and what it looks at, metres.
 
-    It is near a joint-level body, above a house of several rooms, and otherwise in a corner of the
-    room.
+    It is near a joint-level body except in games on a whole floor, above a house of several rooms,
+    and otherwise in a corner of the room.
     """
     first = game.players[0].body
-    if not isinstance(first, Walker):
+    if not isinstance(first, Walker) and not isinstance(game.task, Soccer | PushOut):
         target = np.array([*first.position[:2], 0.15])
         return target + first.forward * 1.0 + np.array([0.5, 0.9, 0.85]), target
     rooms = game.cfg.playground.rooms
