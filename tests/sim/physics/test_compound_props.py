@@ -4,10 +4,11 @@ import math
 
 import numpy as np
 import pytest
-from walking import ball, box, empty_world, film, let_pass
+from walking import ball, box, empty_world, film, let_pass, walker_in
 
+from veca_marl.config import compose
 from veca_marl.sim.geometry import joined_inertia, primitive_inertia
-from veca_marl.sim.physics import PartCfg, PropCfg, PropShape, pybullet
+from veca_marl.sim.physics import PartCfg, PropCfg, PropShape, World, pybullet
 from veca_marl.sim.physics.props.prop_shapes import prop_geoms
 
 
@@ -110,7 +111,7 @@ def test_a_basket_holds_and_contains_what_falls_into_it():
 
 @pytest.mark.parametrize("mass_kg", [0.0, 0.8])
 def test_things_in_a_basket_move_alike_after_every_reset(mass_kg):
-    """Several shapes of one body are in contact at once: each has its own link in Bullet."""
+    """Several shapes of one body are in contact at once; those of movable ones are on links."""
     places = [(-0.12, 0.1, 0.3), (0.0, 0.01, 0.3), (0.12, -0.08, 0.3)]
     things = [ball(f"ball {n}", 0.05, position=place) for n, place in enumerate(places)]
     cube = box("cube", (0.1, 0.1, 0.1), 0.2, (0.05, 0.0, 0.5))
@@ -161,3 +162,29 @@ def test_impossible_pieces_are_refused(numbers, reason):
 def test_parts_are_single_shapes():
     with pytest.raises(ValueError, match="shape=doll; a part is one of"):
         PartCfg(PropShape.doll, [0.3])
+
+
+def test_compounds_and_joints_can_be_written_in_a_configuration():
+    leaf = (
+        "{name: leaf, shape: compound, mass_kg: 2, "
+        "parts: [{shape: box, size_m: [0.1, 1, 2], colour: [1, 0, 0]}, "
+        "{shape: pyramid, size_m: [0.1, 0.1, 0.1], rotation_deg: [0, 90, 0]}], "
+        "joint: {kind: slide, axis: [0, 1, 0], range_m: 0.4, lock: {key: key}}}"
+    )
+    points = "[[0.0, 0.0, 0.0], [0.1, 0.0, 0.0], [0.0, 0.1, 0.0], [0.0, 0.0, 0.1]]"
+    key = f"{{name: key, shape: convex, points_m: {points}}}"
+    cfg = compose(["+task=KickTheBall", "playground=simple", f"playground.props=[{leaf},{key}]"])
+    world = World(cfg.playground)
+    assert world.prop("leaf").locked
+    assert world.prop("leaf").unlock(world.prop("key"))
+    world.close()
+
+
+def test_a_walker_stops_at_every_part_of_a_fixed_compound():
+    posts = [PartCfg(PropShape.box, [0.1, 0.1, 0.5], (0.0, y, 0.25)) for y in (-2.0, 0.0)]
+    world = empty_world(PropCfg("posts", PropShape.compound, [], (1.0, 0.0, 0.0), parts=posts))
+    walker = walker_in(world)
+    for _ in range(60):
+        walker.act(walker.encode((1.0, 0.0)))
+        world.step()
+    assert walker.position[0] == pytest.approx(1.0 - 0.05 - walker.radius_m, abs=0.003)

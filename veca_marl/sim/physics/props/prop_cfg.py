@@ -46,7 +46,8 @@ class PropCfg:
         sound: What it emits; None for a silent prop.
         angle_deg: Angle of a sector of a disc, in (0, 180], halved by the x axis.
         parts: The parts of a compound prop.
-        points_m: Points ``[x, y, z]`` in metres, of which a convex prop is the hull.
+        points_m: Points ``[x, y, z]`` in metres, of which a convex prop is the hull; in YAML with
+            decimal points (``0.0``).
         joint: How it is attached, see `JointCfg`; None for a prop that is fixed or free.
         material: How it sounds when it is hit, see `ImpactCfg`; it does not change the mass.
         interactions: Names of the verbs that bodies can apply to it, such as ``[grab]``; see

@@ -28,7 +28,6 @@ from veca_marl.sim.physics.props.prop_shape import PropShape
 _STEP_S = 0.008  # physics step at which `contact_share` is used as it is
 _ROUNDING = 1e-9  # of products of inertia, relative to the moments
 _SEVERAL_LINKS = (PropShape.doll, PropShape.compound)
-_STATIC = 2  # Bullet's collision group of static bodies, which do not collide with each other
 _JOINTS = {JointKind.hinge: pybullet.JOINT_REVOLUTE, JointKind.slide: pybullet.JOINT_PRISMATIC}
 _EXACT_IN_BULLET = (PropShape.sphere, PropShape.box, PropShape.cylinder)
 
@@ -58,8 +57,7 @@ def create_prop_body(cfg: PropCfg, client: int, geoms: Sequence[Primitive]) -> t
     pybullet.changeDynamics(body_id, -1, **prop_dynamics(cfg, moments), physicsClientId=client)
     _prepare_links(body_id, 0, len(shapes) - 1, cfg, client)
     if not cfg.tangible:
-        for link in range(-1, len(shapes) - 1):
-            pybullet.setCollisionFilterGroupMask(body_id, link, 0, 0, physicsClientId=client)
+        pybullet.setCollisionFilterGroupMask(body_id, -1, 0, 0, physicsClientId=client)
     return body_id, frame
 
 
@@ -155,9 +153,10 @@ class _Link:
 def _welded(shape: int, parent: int) -> _Link:
     """Return a link without mass that is fixed to another: a further shape of the same body.
 
-    A body whose shapes are on different links has one manifold of contacts for each of them, in
-    the order of the links. With several shapes on one link the order depends on earlier episodes,
-    and a reset would not restore the built state bit by bit.
+    A movable body whose shapes are on different links has one manifold of contacts for each of
+    them, in the order of the links. With several shapes on one link the order depends on earlier
+    episodes, and a reset would not restore the built state bit by bit. Fixed bodies have no such
+    fault, and one link: 30 pieces of furniture of 6 parts take a quarter of the time of 180 boxes.
     """
     return _Link(shape, parent)
 
@@ -184,8 +183,8 @@ def _links(links: Sequence[_Link]) -> dict[str, Any]:
 
 
 def _collision_shapes(cfg: PropCfg, client: int, geoms: Sequence[Primitive]) -> list[int]:
-    """Return the collision shapes of a prop, one for each link."""
-    if cfg.shape in _SEVERAL_LINKS:
+    """Return the collision shapes of a prop, one for each link; see `_welded`."""
+    if cfg.shape in _SEVERAL_LINKS and cfg.mass_kg > 0.0:
         return [create_collision_shape(client, [geom]) for geom in geoms]
     return [create_collision_shape(client, geoms)]
 
@@ -194,10 +193,6 @@ def _prepare_links(body_id: int, first: int, end: int, cfg: PropCfg, client: int
     """Set the dynamics of the links `first` to `end` - 1, which have no mass."""
     for link in range(first, end):
         pybullet.changeDynamics(body_id, link, **prop_dynamics(cfg, None), physicsClientId=client)
-        if cfg.mass_kg == 0.0:
-            pybullet.setCollisionFilterGroupMask(
-                body_id, link, _STATIC, ~_STATIC, physicsClientId=client
-            )
 
 
 def _on_frame(geom: Primitive, frame: Pose) -> Primitive:
