@@ -75,9 +75,15 @@ def test_the_target_is_of_the_configured_kind():
     game.close()
 
 
-def test_no_two_kinds_look_alike(game):
-    seen = {(p.cfg.shape, p.cfg.colour) for p in [game.task.target, *game.task.wrong]}
-    assert len(seen) == len(ObjectKind) == 3
+def test_no_two_kinds_have_a_shape_or_a_colour_in_common_and_all_stand_on_the_floor():
+    game = game_of(f"task.objects={[kind.name for kind in ObjectKind]}")
+    objects = [game.task.target, *game.task.wrong]
+    assert len({prop.cfg.shape for prop in objects}) == len(ObjectKind) == 5
+    assert len({prop.cfg.colour for prop in objects}) == 5
+    for prop in objects:
+        assert prop.lowest_m == pytest.approx(0.0, abs=0.02)
+        assert 0.09 <= prop.radius_m <= 0.25
+    game.close()
 
 
 def test_a_playground_without_space_is_an_error_that_names_it():

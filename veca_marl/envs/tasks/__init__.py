@@ -1,5 +1,6 @@
 """Rules of the tasks that ship with the package. Importing this package registers them."""
 
+from veca_marl.envs.tasks.cars.chase_car import ChaseCar
 from veca_marl.envs.tasks.cars.dodge_car import DodgeCar
 from veca_marl.envs.tasks.contests.push_out_1v1 import PushOut1v1
 from veca_marl.envs.tasks.contests.push_out_2v2 import PushOut2v2
@@ -21,6 +22,7 @@ from veca_marl.envs.tasks.objects.put_down_block import PutDownBlock
 from veca_marl.envs.tasks.objects.rotate_cube import RotateCube
 
 __all__ = [
+    "ChaseCar",
     "CrawlBaby",
     "DodgeCar",
     "GrabObject",

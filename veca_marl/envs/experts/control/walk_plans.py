@@ -34,12 +34,18 @@ class WalkPlans(NamedTuple):
         Returns:
             ``(plans, steps, 2)`` metres.
         """
-        forward, turn = self.commands[..., 0], self.commands[..., 1]
+        forward = self.commands[..., 0]
         speed = cfg.walk_speed_mps * np.where(forward < 0.0, cfg.backward_share, 1.0) * forward
-        yaw = yaw_rad + np.cumsum(turn, axis=1) * np.radians(cfg.turn_speed_degps) * self.step_s
+        yaw = self.headings(yaw_rad, cfg)
         moves = speed[..., None] * np.stack([np.cos(yaw), np.sin(yaw)], axis=-1) * self.step_s
         positions: Floats = np.asarray(start)[:2] + np.cumsum(moves, axis=1)
         return positions
+
+    def headings(self, yaw_rad: float, cfg: WalkerCfg) -> Floats:
+        """Return the headings after each step, ``(plans, steps)`` rad; arguments as above."""
+        turned = np.cumsum(self.commands[..., 1], axis=1) * np.radians(cfg.turn_speed_degps)
+        headings: Floats = yaw_rad + turned * self.step_s
+        return headings
 
 
 def walk_plans(horizon_s: float, step_s: float) -> WalkPlans:

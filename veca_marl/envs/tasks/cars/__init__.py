@@ -1,1 +1,1 @@
-"""Tasks with a toy car that drives by itself: DodgeCar."""
+"""Tasks with a toy car that drives by itself: DodgeCar, ChaseCar."""

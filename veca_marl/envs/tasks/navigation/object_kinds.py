@@ -13,12 +13,16 @@ class ObjectKind(Enum):
     """Kinds of objects, each of one shape and colour.
 
     Attributes:
+        doll: A child in violet clothes.
         ball: A red sphere.
+        pyramid: A yellow pyramid.
         cube: A blue cube.
         cylinder: A green cylinder.
     """
 
+    doll = "doll"
     ball = "ball"
+    pyramid = "pyramid"
     cube = "cube"
     cylinder = "cylinder"
 
@@ -33,7 +37,9 @@ class _Look(NamedTuple):
 
 
 _LOOKS = {
+    ObjectKind.doll: _Look(PropShape.doll, (0.36,), 0.18, (0.55, 0.2, 0.65)),
     ObjectKind.ball: _Look(PropShape.sphere, (0.15,), 0.15, (0.95, 0.15, 0.1)),
+    ObjectKind.pyramid: _Look(PropShape.pyramid, (0.28, 0.28, 0.3), 0.15, (0.95, 0.8, 0.1)),
     ObjectKind.cube: _Look(PropShape.box, (0.25, 0.25, 0.25), 0.125, (0.1, 0.25, 0.9)),
     ObjectKind.cylinder: _Look(PropShape.cylinder, (0.12, 0.3), 0.15, (0.1, 0.7, 0.2)),
 }

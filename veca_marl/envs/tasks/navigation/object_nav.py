@@ -21,7 +21,7 @@ _DOOR_M = 0.9  # objects nearer to the middle of a door could block it
 
 
 def _default_objects() -> list[ObjectKind]:
-    return [ObjectKind.ball, ObjectKind.cube, ObjectKind.cylinder]
+    return [ObjectKind.doll, ObjectKind.ball, ObjectKind.pyramid]
 
 
 @dataclass
@@ -70,9 +70,9 @@ class ObjectNav(Task):
 
     Senses, actions, the rewards of +1 and -1 and the helper reward are those of the paper (table
     of tasks and "Helper Rewards" in the appendix). The paper does not state the cue for the
-    target, the number of objects, the distance at which an object is reached, and when an episode
-    ends; here the target is of one kind, `target`, in all episodes. The helper reward is as in
-    MultiAgentNav.
+    target, the objects, the distance at which one is reached, and when an episode ends. Here the
+    target is of one kind, `target`, in all episodes; the kinds are those that the paper's data sets
+    classify, and further ones. The helper reward is as in MultiAgentNav.
 
     Terms:
         reached: 1 on the step in which the target is reached, else 0.
