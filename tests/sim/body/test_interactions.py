@@ -1,6 +1,7 @@
 """Verbs of walkers: which object they are applied to, what they do, and what is refused."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,6 +9,8 @@ from walking import ball, box, empty_world, let_pass, walker_in, wall
 
 from veca_marl.sim.body.walker import WalkCommand, WalkerCfg
 from veca_marl.sim.physics import PropCfg, PropShape
+from veca_marl.sim.physics.props.joint_cfg import LockCfg
+from veca_marl.sim.physics.props.library import door_leaf
 from veca_marl.sim.vision import Camera, open_eyes
 
 VERBS = ["grab", "release", "kick"]
@@ -360,3 +363,46 @@ def test_a_crawling_walker_uses_no_hand_and_a_reset_lets_it_stand():
             film.append(world.scene.positions.tobytes())
         films.append(film)
     assert films[0] == films[1]
+
+
+# ---- doors and keys
+
+
+def door(lock=None):
+    leaf = door_leaf("door", (1.0, 0.0), 0.0, 0.7, 1.0, opens_to_front=True, lock=lock)
+    return replace(leaf, interactions=["open", "close"])
+
+
+def test_a_door_is_opened_and_closed():
+    world = empty_world(door())
+    walker = seeing(world, extra_verbs=["open", "close"])
+    begin(world)
+    assert not do(world, walker, "close")  # it is closed
+    assert not do(world, walker, "grab")
+    assert do(world, walker, "open")
+    let_pass(world, 3.0)
+    assert world.prop("door").opening > 0.9
+    walker.look_toward_point(world.prop("door").position)
+    world.refresh()
+    assert do(world, walker, "close")
+    let_pass(world, 3.0)
+    assert world.prop("door").opening < 0.1
+
+
+def test_a_locked_door_opens_with_its_key_in_the_hand_only():
+    lock = LockCfg(key="key")
+    world = empty_world(door(lock), toy("key", (0.5, 0.7, 0.05)), toy("other", (0.5, -0.7, 0.05)))
+    walker = seeing(world, extra_verbs=["open"])
+    begin(world)
+    leaf = world.prop("door")
+    assert not do(world, walker, "open")
+    walker.grab(world.prop("other"))
+    assert not do(world, walker, "open")
+    assert leaf.locked
+    walker.release()
+    walker.grab(world.prop("key"))
+    assert do(world, walker, "open")
+    let_pass(world, 2.0)
+    assert (leaf.locked, leaf.opening > 0.5) == (False, True)
+    world.reset(np.random.default_rng(0))
+    assert (leaf.locked, leaf.opening) == (True, pytest.approx(0.0, abs=1e-3))

@@ -183,7 +183,7 @@ class Walker(Body):
         line of contact: the horizontal line from the capsule towards the prop's centre, at the
         height of the centre or of `kick_height_m`, whichever is lower.
         """
-        if not self.is_light(prop) or prop.holder is not None or self.crawls:
+        if self.crawls or not self._is_loose(prop):
             return False
         return foot_reaches(self._world.client, self.cfg, self.position, self.yaw_rad, prop)
 
@@ -205,9 +205,12 @@ class Walker(Body):
         return not prop.fixed and prop.cfg.mass_kg <= self.cfg.push_limit_kg
 
     def can_grab(self, prop: Prop) -> bool:
-        """Return whether a hand is free, and a prop is light and held by no body."""
-        free = self.held is None and self._stance.hands_are_free
-        return free and prop.holder is None and self.is_light(prop)
+        """Return whether a hand is free, and a prop is light, without joint and held by no body."""
+        return self.held is None and self._stance.hands_are_free and self._is_loose(prop)
+
+    def _is_loose(self, prop: Prop) -> bool:
+        """Return whether a prop is light, without joint and held by no body."""
+        return prop.holder is None and prop.joint is None and self.is_light(prop)
 
     def grab(self, prop: Prop) -> bool:
         """Take a prop into the right hand; return False, and do nothing, if it cannot.

@@ -4,6 +4,7 @@ from veca_marl.sim.physics.interactions.grab import Grab, Release
 from veca_marl.sim.physics.interactions.grip import Grip
 from veca_marl.sim.physics.interactions.interaction import InteractingBody, Interaction, Verb
 from veca_marl.sim.physics.interactions.kick import Kick
+from veca_marl.sim.physics.interactions.open_close import Close, Open
 from veca_marl.sim.physics.interactions.posture import Crawl, StandUp, StepOn
 from veca_marl.sim.physics.interactions.press import Press
 from veca_marl.sim.physics.interactions.put_into import PutInto
@@ -18,12 +19,14 @@ from veca_marl.sim.physics.interactions.registry import (
 __all__ = [
     "INTERACTIONS",
     "NO_VERB",
+    "Close",
     "Crawl",
     "Grab",
     "Grip",
     "InteractingBody",
     "Interaction",
     "Kick",
+    "Open",
     "Press",
     "PutInto",
     "Release",
