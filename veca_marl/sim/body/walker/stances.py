@@ -33,6 +33,10 @@ class Stance(Protocol):
     underside: Underside
     hands_are_free: bool
 
+    def turn(self, yaw_rad: float) -> None:
+        """Turn the capsule to a heading."""
+        ...
+
     def pelvis(self, ground: Floats, yaw_rad: float) -> tuple[Floats, Floats]:
         """Return position ``(3,)``, at height 0, and rotation ``(3, 3)`` of the pelvis."""
         ...
@@ -58,6 +62,9 @@ class Upright:
         self.capsule = capsule
         self.underside: Underside = Soles(skeleton)
         self._gait = gait
+
+    def turn(self, yaw_rad: float) -> None:
+        """See `Stance`; an upright capsule is round."""
 
     def pelvis(self, ground: Floats, yaw_rad: float) -> tuple[Floats, Floats]:
         """See `Stance`."""
@@ -135,6 +142,10 @@ class OnAllFours:
         ]
         self._nod = [skeleton.joint(bone, "flexion") for bone in ("neck", "head")]
         self._shake = [skeleton.joint(bone, "rotation") for bone in ("neck", "head")]
+
+    def turn(self, yaw_rad: float) -> None:
+        """See `Stance`."""
+        self.capsule.yaw_rad = yaw_rad
 
     def pelvis(self, ground: Floats, yaw_rad: float) -> tuple[Floats, Floats]:
         """See `Stance`."""

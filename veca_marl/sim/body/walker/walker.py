@@ -281,7 +281,7 @@ class Walker(Body):
         """Take a stance where its capsule is free of obstacles; return whether it is."""
         before, self._stance = self._stance, stance
         self._collect_obstacles(0.0)
-        self._capsule.yaw_rad = self._capsule_yaw_rad()
+        stance.turn(self.yaw_rad)
         if self._capsule.overlaps(*self._ground):
             self._capsule.park()
             self._stance = before
@@ -303,10 +303,6 @@ class Walker(Body):
         self._capsule.base_m = self._footing.height_m
         if self._footing.prop is None:
             self._capsule.support_id = -1
-
-    def _capsule_yaw_rad(self) -> float:
-        """Return the rotation of the capsule; an upright one is not rotated."""
-        return self.yaw_rad if self.crawls else 0.0
 
     @property
     def applied_verb(self) -> Applied | None:
@@ -340,7 +336,7 @@ class Walker(Body):
     def proposed_position(self, substep_s: float) -> tuple[float, float]:
         """Turn, and return where it would be after this physics step without obstacles."""
         self.yaw_rad += self._turn_radps * substep_s
-        self._capsule.yaw_rad = self._capsule_yaw_rad()
+        self._stance.turn(self.yaw_rad)
         distance = self._speed_mps * substep_s
         x, y = self._ground
         return x + distance * math.cos(self.yaw_rad), y + distance * math.sin(self.yaw_rad)
