@@ -81,6 +81,6 @@ def described(spec: ArraySpec) -> tuple[str, str, str, str]:
 
 def elements(spec: ArraySpec) -> str:
     """Return the names of a part's numbers or choices, those of joints as a count."""
-    if len(spec.names) > 10:
+    if len(spec.names) > 10 and not spec.is_discrete:
         return f"{len(spec.names)} joints, `{spec.names[0]}` to `{spec.names[-1]}`"
     return ", ".join(f"`{name}`" for name in spec.names)
