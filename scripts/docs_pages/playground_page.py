@@ -28,6 +28,7 @@ from veca_marl.sim.physics import (
     World,
 )
 from veca_marl.sim.physics.houses.furniture import FURNITURE
+from veca_marl.sim.physics.props.prop_shapes import prop_geoms
 from veca_marl.sim.vision import Camera
 
 mpl.use("Agg")
@@ -124,7 +125,8 @@ def rows() -> list[tuple[str, ...]]:
 def row(name: str, cfg: PlaygroundCfg) -> tuple[str, ...]:
     """Return the numbers of one playground."""
     pieces = len(cfg.furniture) + sum(prop.shape.name != "wall" for prop in cfg.props)
-    numbers = (len(cfg.rooms), len(cfg.doors), pieces, len(cfg.built_props()))
+    primitives = sum(len(prop_geoms(prop)) for prop in cfg.built_props())
+    numbers = (len(cfg.rooms), len(cfg.doors), pieces, primitives)
     return (f"`{name}`", *map(str, numbers))
 
 

@@ -5,7 +5,7 @@ import math
 import numpy as np
 from scipy import ndimage
 
-from veca_marl.sim.physics import PropShape
+from veca_marl.sim.physics import PropCfg, PropShape
 
 CELL_M = 0.04
 BODY_M = 0.78  # height below which props are in the way
@@ -27,7 +27,7 @@ class FloorMap:
             half = door.width_m / 2
             x, y = door.position_m
             self.free |= (abs(self.x - x) < half) & (abs(self.y - y) < half)
-        for prop in playground.built_props():
+        for prop in pieces(playground.built_props()):
             if is_in_the_way(prop):
                 self.free &= distance(prop, self.x, self.y) >= radius_m
         self.labels, self.count = ndimage.label(self.free)
@@ -39,6 +39,27 @@ class FloorMap:
     def label(self, point):
         column, row = ((np.asarray(point)[:2] - self.low) / CELL_M).astype(int)
         return self.labels[column, row]
+
+
+def pieces(props):
+    """Yield the props, and the parts of compounds as props of their own."""
+    for prop in props:
+        if prop.shape is not PropShape.compound:
+            yield prop
+            continue
+        c, s = math.cos(math.radians(prop.yaw_deg)), math.sin(math.radians(prop.yaw_deg))
+        for number, part in enumerate(prop.parts):
+            x, y, z = part.position_m
+            place = np.add(prop.position_m, (c * x - s * y, s * x + c * y, z))
+            yield PropCfg(
+                f"{prop.name}.{number}",
+                part.shape,
+                part.size_m,
+                tuple(place.tolist()),
+                prop.yaw_deg,
+                mass_kg=prop.mass_kg,
+                colour=part.colour or prop.colour,
+            )
 
 
 def is_in_the_way(prop):

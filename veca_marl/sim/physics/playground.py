@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from itertools import combinations
 
 from veca_marl.registry import Registry
-from veca_marl.sim.physics.houses.furniture import furniture_props
+from veca_marl.sim.physics.houses.furniture import furniture_prop
 from veca_marl.sim.physics.houses.furniture_cfg import FurnitureCfg
 from veca_marl.sim.physics.houses.walls import WallsCfg, floor_coverings, wall_props
 from veca_marl.sim.physics.impacts.cfg import ImpactCfg
@@ -78,9 +78,7 @@ class PlaygroundCfg:
         built = floor_coverings(self.rooms)
         if self.walls is not None:
             built += wall_props(self.rooms, self.doors, self.walls)
-        for piece in self.furniture:
-            built += furniture_props(piece)
-        return [*built, *self.props]
+        return [*built, *map(furniture_prop, self.furniture), *self.props]
 
     def __post_init__(self) -> None:
         """Check that there is a room, that names are unique, and the numbers."""

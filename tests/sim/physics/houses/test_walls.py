@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from floor_maps import FloorMap
+from floor_maps import FloorMap, pieces
 from seeking import shipped
 
 from veca_marl.sim.physics import (
@@ -13,7 +13,7 @@ from veca_marl.sim.physics import (
     RoomCfg,
     WallsCfg,
 )
-from veca_marl.sim.physics.houses.furniture import FURNITURE, furniture_props
+from veca_marl.sim.physics.houses.furniture import FURNITURE, furniture_prop
 from veca_marl.sim.physics.houses.walls import wall_lines
 
 
@@ -72,7 +72,7 @@ def test_furniture_stands_on_the_floor_within_its_area(kind):
     piece, cfg = FURNITURE[kind], FurnitureCfg("piece", kind, (2.0, 3.0), 90.0)
     plain = FurnitureCfg("piece", kind)
     feet = []
-    for part in furniture_props(plain):
+    for part in pieces([furniture_prop(plain)]):
         x, y, z = part.position_m
         round_m = part.size_m[0] if part.shape.name != "box" else 0.0
         half = (round_m, round_m) if round_m else (part.size_m[0] / 2, part.size_m[1] / 2)
@@ -81,7 +81,7 @@ def test_furniture_stands_on_the_floor_within_its_area(kind):
         heights = {"sphere": 2 * part.size_m[0], "box": part.size_m[-1]}
         feet.append(z - heights.get(part.shape.name, part.size_m[-1]) / 2)
     assert min(feet) == pytest.approx(0.0)
-    turned, straight = furniture_props(cfg)[-1], furniture_props(plain)[-1]
+    turned, straight = (list(pieces([furniture_prop(one)]))[-1] for one in (cfg, plain))
     x, y, z = straight.position_m
     assert turned.position_m == pytest.approx((2.0 - y, 3.0 + x, z))
 

@@ -6,11 +6,10 @@ back, y from the back to the front, z up, with the origin in the middle of its f
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 from veca_marl.sim.physics.houses.furniture_cfg import FurnitureCfg, FurnitureKind
-from veca_marl.sim.physics.props import PropCfg, PropShape
+from veca_marl.sim.physics.props import PartCfg, PropCfg, PropShape
 
 Colour = tuple[float, float, float]
 
@@ -24,7 +23,6 @@ class Part:
     """One primitive of a piece of furniture.
 
     Attributes:
-        name: Unique in its piece.
         shape: Its shape.
         size_m: As in `PropCfg.size_m`.
         centre_m: Its centre in the frame of the piece.
@@ -32,7 +30,6 @@ class Part:
         colour: Its own colour; None takes that of the piece.
     """
 
-    name: str
     shape: PropShape
     size_m: tuple[float, ...]
     centre_m: tuple[float, float, float]
@@ -56,7 +53,6 @@ class Piece:
 
 
 def _box(
-    name: str,
     size_m: tuple[float, float, float],
     y: float = 0.0,
     foot_m: float = 0.0,
@@ -66,11 +62,10 @@ def _box(
     colour: Colour | None = None,
 ) -> Part:
     """Return a box with its lower face at the height `foot_m`."""
-    return Part(name, _BOX, size_m, (x, y, foot_m + size_m[2] / 2.0), shade, colour)
+    return Part(_BOX, size_m, (x, y, foot_m + size_m[2] / 2.0), shade, colour)
 
 
 def _post(
-    name: str,
     radius_m: float,
     height_m: float,
     foot_m: float = 0.0,
@@ -81,50 +76,48 @@ def _post(
 ) -> Part:
     """Return an upright cylinder with its lower face at the height `foot_m`."""
     centre = (0.0, y, foot_m + height_m / 2.0)
-    return Part(name, _CYLINDER, (radius_m, height_m), centre, shade, colour)
+    return Part(_CYLINDER, (radius_m, height_m), centre, shade, colour)
 
 
 def _block(width_m: float, depth_m: float, height_m: float, *more: Part) -> Piece:
     """Return a piece that is one box on the floor, with some parts on it."""
-    return Piece(width_m, depth_m, (_box("body", (width_m, depth_m, height_m)), *more))
+    return Piece(width_m, depth_m, (_box((width_m, depth_m, height_m)), *more))
 
 
 FURNITURE: dict[FurnitureKind, Piece] = {
     FurnitureKind.armchair: _block(
-        0.7, 0.7, 0.38, _box("back", (0.7, 0.15, 0.4), -0.275, 0.38, shade=0.85)
+        0.7, 0.7, 0.38, _box((0.7, 0.15, 0.4), -0.275, 0.38, shade=0.85)
     ),
     FurnitureKind.bathtub: _block(
-        1.6, 0.7, 0.5, _box("water", (1.4, 0.5, 0.02), 0.0, 0.5, colour=(0.6, 0.8, 0.9))
+        1.6, 0.7, 0.5, _box((1.4, 0.5, 0.02), 0.0, 0.5, colour=(0.6, 0.8, 0.9))
     ),
     FurnitureKind.bed: _block(
-        1.9, 0.9, 0.45, _box("pillow", (0.3, 0.6, 0.12), 0.0, 0.45, x=-0.75, colour=_WHITE)
+        1.9, 0.9, 0.45, _box((0.3, 0.6, 0.12), 0.0, 0.45, x=-0.75, colour=_WHITE)
     ),
     FurnitureKind.chair: Piece(
         0.4,
         0.4,
         (
-            _box("foot", (0.3, 0.3, 0.4), shade=0.7),
-            _box("seat", (0.4, 0.4, 0.05), 0.0, 0.4),
-            _box("back", (0.4, 0.05, 0.4), -0.175, 0.45),
+            _box((0.3, 0.3, 0.4), shade=0.7),
+            _box((0.4, 0.4, 0.05), 0.0, 0.4),
+            _box((0.4, 0.05, 0.4), -0.175, 0.45),
         ),
     ),
     FurnitureKind.cot: _block(
         1.2,
         0.6,
         0.35,
-        _box("head", (0.04, 0.6, 0.4), 0.0, 0.35, x=-0.58, shade=0.8),
-        _box("foot", (0.04, 0.6, 0.4), 0.0, 0.35, x=0.58, shade=0.8),
+        _box((0.04, 0.6, 0.4), 0.0, 0.35, x=-0.58, shade=0.8),
+        _box((0.04, 0.6, 0.4), 0.0, 0.35, x=0.58, shade=0.8),
     ),
-    FurnitureKind.counter: _block(
-        1.6, 0.6, 0.85, _box("top", (1.6, 0.6, 0.04), 0.0, 0.85, colour=_METAL)
-    ),
+    FurnitureKind.counter: _block(1.6, 0.6, 0.85, _box((1.6, 0.6, 0.04), 0.0, 0.85, colour=_METAL)),
     FurnitureKind.desk: Piece(
         1.1,
         0.55,
         (
-            _box("top", (1.1, 0.55, 0.04), 0.0, 0.6),
-            _box("left", (0.04, 0.5, 0.6), x=-0.5, shade=0.75),
-            _box("right", (0.04, 0.5, 0.6), x=0.5, shade=0.75),
+            _box((1.1, 0.55, 0.04), 0.0, 0.6),
+            _box((0.04, 0.5, 0.6), x=-0.5, shade=0.75),
+            _box((0.04, 0.5, 0.6), x=0.5, shade=0.75),
         ),
     ),
     FurnitureKind.dresser: _block(0.9, 0.45, 0.8),
@@ -133,17 +126,16 @@ FURNITURE: dict[FurnitureKind, Piece] = {
         0.36,
         0.36,
         (
-            _post("pole", 0.03, 1.4, colour=_METAL),
-            Part("shade", PropShape.sphere, (0.18,), (0.0, 0.0, 1.5)),
+            _post(0.03, 1.4, colour=_METAL),
+            Part(PropShape.sphere, (0.18,), (0.0, 0.0, 1.5)),
         ),
     ),
     FurnitureKind.plant: Piece(
         0.4,
         0.4,
         (
-            _post("pot", 0.15, 0.3),
+            _post(0.15, 0.3),
             Part(
-                "leaves",
                 PropShape.capsule,
                 (0.2, 0.3),
                 (0.0, 0.0, 0.65),
@@ -155,73 +147,58 @@ FURNITURE: dict[FurnitureKind, Piece] = {
         1.2,
         0.3,
         (
-            _box("body", (1.2, 0.28, 1.4), -0.01),
-            _box("books", (1.0, 0.02, 0.25), 0.14, 0.85, colour=(0.7, 0.25, 0.2)),
-            _box("boxes", (1.0, 0.02, 0.25), 0.14, 0.4, colour=(0.25, 0.4, 0.6)),
+            _box((1.2, 0.28, 1.4), -0.01),
+            _box((1.0, 0.02, 0.25), 0.14, 0.85, colour=(0.7, 0.25, 0.2)),
+            _box((1.0, 0.02, 0.25), 0.14, 0.4, colour=(0.25, 0.4, 0.6)),
         ),
     ),
-    FurnitureKind.sofa: _block(
-        1.6, 0.75, 0.4, _box("back", (1.6, 0.2, 0.4), -0.275, 0.4, shade=0.85)
-    ),
-    FurnitureKind.stool: Piece(0.32, 0.32, (_post("body", 0.16, 0.3),)),
+    FurnitureKind.sofa: _block(1.6, 0.75, 0.4, _box((1.6, 0.2, 0.4), -0.275, 0.4, shade=0.85)),
+    FurnitureKind.stool: Piece(0.32, 0.32, (_post(0.16, 0.3),)),
     FurnitureKind.table: Piece(
         1.2,
         0.8,
         (
-            _box("top", (1.2, 0.8, 0.04), 0.0, 0.66),
-            _box("left", (0.06, 0.7, 0.66), x=-0.5, shade=0.75),
-            _box("right", (0.06, 0.7, 0.66), x=0.5, shade=0.75),
+            _box((1.2, 0.8, 0.04), 0.0, 0.66),
+            _box((0.06, 0.7, 0.66), x=-0.5, shade=0.75),
+            _box((0.06, 0.7, 0.66), x=0.5, shade=0.75),
         ),
     ),
     FurnitureKind.toilet: Piece(
         0.4,
         0.6,
         (
-            _post("bowl", 0.2, 0.38, y=0.1),
-            _box("tank", (0.4, 0.2, 0.75), -0.2),
+            _post(0.2, 0.38, y=0.1),
+            _box((0.4, 0.2, 0.75), -0.2),
         ),
     ),
-    FurnitureKind.toy_chest: _block(
-        0.7, 0.4, 0.36, _box("lid", (0.7, 0.4, 0.04), 0.0, 0.36, shade=0.75)
-    ),
+    FurnitureKind.toy_chest: _block(0.7, 0.4, 0.36, _box((0.7, 0.4, 0.04), 0.0, 0.36, shade=0.75)),
     FurnitureKind.tv_stand: _block(
-        1.2, 0.4, 0.45, _box("screen", (0.9, 0.06, 0.5), -0.1, 0.45, colour=_METAL)
+        1.2, 0.4, 0.45, _box((0.9, 0.06, 0.5), -0.1, 0.45, colour=_METAL)
     ),
     FurnitureKind.wardrobe: _block(1.0, 0.55, 1.9),
     FurnitureKind.washbasin: Piece(
         0.5,
         0.4,
-        (_post("foot", 0.09, 0.6), _box("basin", (0.5, 0.4, 0.15), 0.0, 0.6)),
+        (_post(0.09, 0.6), _box((0.5, 0.4, 0.15), 0.0, 0.6)),
     ),
 }
 
 
-def furniture_props(cfg: FurnitureCfg) -> list[PropCfg]:
-    """Return the props that a piece of furniture is built of.
+def furniture_prop(cfg: FurnitureCfg) -> PropCfg:
+    """Return the prop of a piece of furniture: one fixed compound of all its parts."""
+    x, y = cfg.position_m
+    return PropCfg(
+        name=cfg.name,
+        shape=PropShape.compound,
+        position_m=(x, y, 0.0),
+        yaw_deg=cfg.yaw_deg,
+        colour=cfg.colour,
+        parts=[_part(part, cfg.colour) for part in FURNITURE[cfg.kind].parts],
+    )
 
-    The first has the name of the piece, the others this name, a dot and their own.
-    """
-    yaw = math.radians(cfg.yaw_deg)
-    cosine, sine = math.cos(yaw), math.sin(yaw)
-    props = []
-    for number, part in enumerate(FURNITURE[cfg.kind].parts):
-        x, y, z = part.centre_m
-        place = (
-            cfg.position_m[0] + cosine * x - sine * y,
-            cfg.position_m[1] + sine * x + cosine * y,
-            z,
-        )
-        props.append(
-            PropCfg(
-                name=cfg.name if number == 0 else f"{cfg.name}.{part.name}",
-                shape=part.shape,
-                size_m=list(part.size_m),
-                position_m=place,
-                yaw_deg=cfg.yaw_deg,
-                colour=_colour(part, cfg.colour),
-            )
-        )
-    return props
+
+def _part(part: Part, main: Colour) -> PartCfg:
+    return PartCfg(part.shape, list(part.size_m), part.centre_m, colour=_colour(part, main))
 
 
 def _colour(part: Part, main: Colour) -> Colour:
