@@ -7,7 +7,7 @@ from veca_marl.sim.body.walker import Walker, WalkerCfg
 from veca_marl.sim.physics import PlaygroundCfg, World
 from veca_marl.sim.physics.impacts.cfg import ImpactCfg
 from veca_marl.sim.physics.impacts.sounds import prop_modes
-from veca_marl.sim.physics.props import PropCfg, PropShape
+from veca_marl.sim.physics.props import PartCfg, PropCfg, PropShape
 from veca_marl.sim.sound.impacts import Material
 
 
@@ -126,3 +126,31 @@ def test_a_walker_is_heard_when_it_walks_and_silent_when_it_stands():
 def test_impossible_numbers_are_refused(wrong):
     with pytest.raises(ValueError, match=f"impacts.{next(iter(wrong))}"):
         ImpactCfg(**wrong)
+
+
+@pytest.mark.parametrize(
+    ("shape", "size"),
+    [
+        (PropShape.pyramid, [0.1, 0.1, 0.1]),
+        (PropShape.sector, [0.1, 0.04]),
+        (PropShape.doll, [0.2]),
+    ],
+)
+def test_polyhedra_and_compounds_sound_when_they_land(shape, size):
+    thing = PropCfg("thing", shape, size, (0.0, 0.0, 0.5), mass_kg=0.2)
+    world = world_with(thing)
+    world.freeze()
+    heard = emitted(world, "thing.impact", 25)
+    world.close()
+    assert not heard[:5].any()
+    assert np.abs(heard).max() > 0.0
+    pitches = prop_modes(thing).frequencies_hz
+    small = prop_modes(PropCfg("thing", shape, [0.5 * edge for edge in size])).frequencies_hz
+    np.testing.assert_allclose(small, 2.0 * pitches, rtol=1e-6)
+
+
+def test_a_box_as_a_compound_has_the_modes_of_a_box():
+    part = PartCfg(PropShape.box, [0.4, 0.05, 0.02])
+    one = prop_modes(PropCfg("rod", PropShape.compound, parts=[part]))
+    other = prop_modes(rod())
+    np.testing.assert_allclose(one.frequencies_hz, other.frequencies_hz, rtol=1e-9)

@@ -237,6 +237,15 @@ def test_a_walker_stops_at_a_door_that_is_pushed_against_its_stop():
     assert walker.position[0] < 1.0 - THICKNESS_M / 2.0 - walker.radius_m + 0.002
 
 
+def test_a_walker_can_neither_grab_nor_kick_a_drawer():
+    world = empty_world(CUPBOARD, drawer(), box("cube"))
+    walker = walker_in(world)
+    assert walker.can_grab(world.prop("cube"))
+    assert not walker.can_grab(world.prop("drawer"))
+    world.prop("drawer").place((0.3, 0.0, 0.06))
+    assert not walker.can_kick(world.prop("drawer"))
+
+
 def test_yields_tells_apart_pushes_that_move_and_pushes_against_the_stop():
     world = empty_world(door(), box())
     prop = world.prop("door")
