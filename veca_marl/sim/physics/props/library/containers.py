@@ -75,6 +75,7 @@ def chest(
         yaw_deg=yaw_deg,
         mass_kg=0.8,
         colour=colour,
+        interactions=["open", "close"],
         joint=JointCfg(
             parent=name,
             axis=(0.0, -1.0, 0.0),

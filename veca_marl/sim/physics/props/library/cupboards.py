@@ -58,6 +58,7 @@ def cupboard_with_drawer(
         mass_kg=1.0,
         colour=colour,
         parts=_drawer(depth, length, inner, drawer_height_m),
+        interactions=["open", "close"],
         joint=JointCfg(
             JointKind.slide,
             parent=name,

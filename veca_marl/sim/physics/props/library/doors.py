@@ -61,6 +61,7 @@ def door_leaf(
         mass_kg=mass_kg,
         colour=colour,
         parts=parts,
+        interactions=["open", "close"],
         joint=JointCfg(
             axis=(0.0, 0.0, -side),
             anchor_m=(side * _THICKNESS_M / 2.0, -width / 2.0, 0.0),
