@@ -75,7 +75,7 @@ def measure(task: str, body: str, seconds: float | None, episodes: int) -> list[
         interval = STUDENT_95[episodes] * total.std(ddof=1) / np.sqrt(episodes)
         ends = (ended.mean(), solved.mean())
         numbers = (total.mean(), interval, total.min(), total.max(), *ends)
-        rounded = [round(float(number), 3) for number in numbers]
+        rounded = ["" if math.isnan(number) else round(float(number), 3) for number in numbers]
         names = (task, body, cfg.task.max_seconds, first.value, others.value if others else "")
         values = (*names, episodes, *rounded)
         rows.append(dict(zip(COLUMNS, values, strict=True)))
