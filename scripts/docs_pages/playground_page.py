@@ -20,6 +20,7 @@ from veca_marl.sim.geometry import Pose
 from veca_marl.sim.physics import (
     DoorCfg,
     FurnitureCfg,
+    LeafCfg,
     PlaygroundCfg,
     PropShape,
     RandomHouseCfg,
@@ -98,7 +99,15 @@ def playground_page() -> str:
         lines += [f"## `{name}`\n", comment(conf_dir() / "playground" / f"{name}.yaml"), ""]
         lines += [" ".join(f"![{one}](../images/playgrounds/{one}.png)" for one in pictures), ""]
     lines += [SENSES, "## Fields\n"]
-    for cfg_type in (PlaygroundCfg, RoomCfg, DoorCfg, WallsCfg, FurnitureCfg, RandomHouseCfg):
+    for cfg_type in (
+        PlaygroundCfg,
+        RoomCfg,
+        DoorCfg,
+        LeafCfg,
+        WallsCfg,
+        FurnitureCfg,
+        RandomHouseCfg,
+    ):
         lines += [f"### {cfg_type.__name__}\n", prose(cfg_type), ""]
         lines += [*field_table(cfg_type, leave_out=inherited(cfg_type)), ""]
     lines += ["## Kinds of furniture\n", *table(("kind", "width x depth, m"), furniture_sizes())]

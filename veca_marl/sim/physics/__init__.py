@@ -22,12 +22,13 @@ from veca_marl.sim.physics.props import (
     PropCfg,
     PropShape,
 )
-from veca_marl.sim.physics.rooms import DoorCfg, RoomCfg
+from veca_marl.sim.physics.rooms import DoorCfg, LeafCfg, RoomCfg
 from veca_marl.sim.physics.world import GRAVITY_MPS2, World
 
 __all__ = [
     "JointCfg",
     "JointKind",
+    "LeafCfg",
     "LockCfg",
     "PartCfg",
     "GRAVITY_MPS2",

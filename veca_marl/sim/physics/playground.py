@@ -141,6 +141,11 @@ class PlaygroundCfg:
         """Check that every door lies between two rooms that exist."""
         rooms = {room.name: room for room in self.rooms}
         for door in self.doors:
+            if door.leaf is not None and self.walls is None:
+                raise ValueError(
+                    f"playground {self.name!r}, door {door.name!r}: a leaf needs walls, which are "
+                    "null; without them a leaf is a prop with a joint"
+                )
             unknown = sorted(set(door.rooms) - set(rooms))
             if unknown:
                 raise ValueError(

@@ -104,22 +104,49 @@ class RoomCfg:
 
 
 @dataclass
+class LeafCfg:
+    """The hinged leaf of a door, a prop with the name of the door after ``leaf_``.
+
+    Attributes:
+        opening: Opening at the start of an episode, from 0 (closed) to 1 (95 degrees).
+        opens_to_front: Whether it opens to the side of greater x or y; otherwise to the other.
+        key: Name of the prop that unlocks it; empty for none.
+        locked: Whether it is locked at the start of an episode; a locked leaf does not move.
+        colour: Red, green, blue in [0, 1].
+    """
+
+    opening: float = 1.0
+    opens_to_front: bool = True
+    key: str = ""
+    locked: bool = False
+    colour: tuple[float, float, float] = (0.80, 0.62, 0.42)
+
+    def __post_init__(self) -> None:
+        """Check the opening and the colour."""
+        if not 0.0 <= self.opening <= 1.0:
+            raise ValueError(f"leaf of a door: opening={self.opening} is not in [0, 1]")
+        check_appearance("leaf of a door: ", self.colour, 0.0)
+
+
+@dataclass
 class DoorCfg:
     """An opening in the wall between two rooms, as data for tasks and experts.
 
-    The walls round it are props. A door leaf that opens and closes is a prop in the opening.
+    The walls round it are props, or built by `PlaygroundCfg.walls`.
 
     Attributes:
         name: Unique in its playground.
         rooms: The names of the two rooms it joins.
         position_m: The middle of its threshold, x and y, metres.
         width_m: Its width.
+        leaf: What closes it; None for an opening. It needs `PlaygroundCfg.walls`.
     """
 
     name: str = "door"
     rooms: tuple[str, str] = ("", "")
     position_m: tuple[float, float] = (0.0, 0.0)
     width_m: float = 1.0
+    leaf: LeafCfg | None = None
 
     def __post_init__(self) -> None:
         """Check the numbers and that the rooms are two."""

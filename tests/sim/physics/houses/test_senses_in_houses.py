@@ -6,13 +6,23 @@ from seeking import shipped
 
 from veca_marl.sim.body.walker import Walker, WalkerCfg
 from veca_marl.sim.hearing import AudioCfg, AudioSense
-from veca_marl.sim.physics import PropCfg, PropShape, RandomHouseCfg, World
+from veca_marl.sim.physics import (
+    DoorCfg,
+    LeafCfg,
+    PlaygroundCfg,
+    PropCfg,
+    PropShape,
+    RandomHouseCfg,
+    RoomCfg,
+    World,
+)
 from veca_marl.sim.sound import Call
 from veca_marl.sim.vision import is_visible
 
 MOUTH_M = 0.6
 LOSS_DB = 30.0
 DOOR = (3.05, 1.2)  # of `house`, between the living room and the kitchen
+ACROSS = (np.array([-0.3, -0.3, 0.0]), np.array([0.3, 0.3, 0.0]))  # through any door
 AWAY = (30.0, 30.0, 1.0)
 
 
@@ -106,7 +116,7 @@ def test_doors_are_openings_for_sound_and_the_walls_beside_and_above_are_not(pla
         along = normal[[1, 0, 2]] / 0.2
         for shift, walls in (
             (0.0 * along, 0),
-            ((door.width_m / 2 - 0.01) * along, 0),
+            ((door.width_m / 2 - 0.1) * along, 0),  # beside an open leaf
             ((door.width_m / 2 + 0.01) * along, 1),
             (np.array([0.0, 0.0, 1.6]), 1),
         ):
@@ -114,3 +124,28 @@ def test_doors_are_openings_for_sound_and_the_walls_beside_and_above_are_not(pla
             crossed = world.house.obstacles_between(middle - normal, middle + normal)
             assert crossed == walls, (door.name, shift)
     world.close()
+
+
+def test_the_leaves_of_a_house_are_open_and_close_the_doors_for_sound():
+    world = World(shipped("house2"))
+    world.freeze()
+    world.reset(np.random.default_rng(0))
+    leaves = [door for door in world.playground.doors if door.leaf is not None]
+    assert len(leaves) == 3
+    for door in leaves:
+        leaf = world.prop(f"leaf_{door.name}")
+        assert leaf.opening == pytest.approx(1.0, abs=0.01)
+        ends = [np.array([*door.position_m, MOUTH_M]) + each for each in ACROSS]
+        assert world.house.obstacles_between(*ends) == 0
+        leaf.set_opening(0.0)
+        assert world.house.obstacles_between(*ends) == 1
+    world.close()
+
+
+def test_a_leaf_needs_walls():
+    door = DoorCfg("door", ("a", "b"), (3.05, 1.0), leaf=LeafCfg())
+    rooms = [RoomCfg("a", (0.0, 0.0, 0.0), (3.0, 3.0, 2.5)), RoomCfg("b", (3.1, 0.0, 0.0))]
+    with pytest.raises(ValueError, match="door 'door': a leaf needs walls"):
+        PlaygroundCfg("flat", rooms, [door])
+    with pytest.raises(ValueError, match=r"opening=2 is not in \[0, 1\]"):
+        LeafCfg(opening=2)

@@ -7,11 +7,13 @@ the wall between them. Walls in one line form one wall, which the doors in it di
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 from veca_marl.sim.physics.props import PropCfg, PropShape, check_appearance
-from veca_marl.sim.physics.rooms import DoorCfg, RoomCfg
+from veca_marl.sim.physics.props.joint_cfg import LockCfg
+from veca_marl.sim.physics.props.library.doors import door_leaf
+from veca_marl.sim.physics.rooms import DoorCfg, LeafCfg, RoomCfg
 
 COVERING_M = 0.004
 """Height of the coloured covering of a floor: thinner than what casts contact shadows differently
@@ -75,7 +77,7 @@ class WallLine(NamedTuple):
 
 
 def wall_props(rooms: Sequence[RoomCfg], doors: Sequence[DoorCfg], cfg: WallsCfg) -> list[PropCfg]:
-    """Return the walls round rooms, with openings for doors.
+    """Return the walls round rooms, with openings for doors, and the leaves of doors.
 
     Raises:
         ValueError: If a wall would stand in a room, because two rooms are less than one wall
@@ -92,6 +94,8 @@ def wall_props(rooms: Sequence[RoomCfg], doors: Sequence[DoorCfg], cfg: WallsCfg
         cut = [door for door in doors if _is_in(door, line)]
         placed.update(door.name for door in cut)
         props += _pieces(f"wall_{number}", line, cut, cfg, colour)
+        height_m = min(cfg.door_height_m, line.height_m)
+        props += [_leaf(door, door.leaf, line, height_m) for door in cut if door.leaf is not None]
     missing = sorted({door.name for door in doors} - placed)
     if missing:
         raise ValueError(f"doors {missing} are not in the middle of a wall between rooms")
@@ -197,6 +201,23 @@ def _wall(
         position_m=(line.at_m, middle, foot) if across else (middle, line.at_m, foot),
         colour=colour,
     )
+
+
+def _leaf(door: DoorCfg, leaf: LeafCfg, line: WallLine, height_m: float) -> PropCfg:
+    """Return the leaf of a door; the opening of a wall of constant x leads along x."""
+    has_lock = bool(leaf.key) or leaf.locked
+    prop = door_leaf(
+        f"leaf_{door.name}",
+        door.position_m,
+        0.0 if line.axis == 0 else 90.0,
+        door.width_m,
+        height_m,
+        opens_to_front=leaf.opens_to_front,
+        lock=LockCfg(leaf.key, leaf.locked) if has_lock else None,
+        colour=leaf.colour,
+    )
+    assert prop.joint is not None
+    return replace(prop, joint=replace(prop.joint, opening=leaf.opening))
 
 
 def _check_outside(line: WallLine, rooms: Sequence[RoomCfg], thickness_m: float) -> None:
