@@ -49,8 +49,8 @@ class PutInto(Interaction):
 
 
 def fits(prop: Prop, container: Prop) -> bool:
-    """Return whether a prop is narrower than the bounding box of a container."""
-    low, high = container.bounds()
+    """Return whether a prop is narrower than the box of a container."""
+    low, high = container.box
     return 2.0 * prop.radius_m <= float(np.min((high - low)[:2]))
 
 
@@ -61,26 +61,37 @@ def place_above(prop: Prop, container: Prop, others: Iterable[Prop]) -> Floats:
     of equal ones the first. Piles are measured by the bounding boxes of movable props.
 
     Args:
-        prop: Upright, elsewhere.
-        container: The container.
+        prop: Upright, with the yaw of the container, elsewhere.
+        container: The container, upright.
         others: All props of the world.
     """
-    (low, high), (own_low, own_high) = container.bounds(), prop.bounds()
+    (low, high), (own_low, own_high) = container.box, prop.box
     half = (own_high - own_low)[:2] / 2.0
     reach = np.maximum((high - low)[:2] / 2.0 - half - _RIM_M, 0.0)
     places = ((low + high) / 2.0)[:2] + _PLACES * reach
-    piles = [p.bounds() for p in others if p not in (prop, container) and not p.fixed]
+    piles = [_in_frame(p, container) for p in others if p not in (prop, container) and not p.fixed]
     heights = [_pile_m(place - half, place + half, piles) for place in places]
     best = int(np.argmin(heights))
     bottom_m = max(heights[best], float(high[2])) + _GAP_M
-    return np.array([*places[best], bottom_m + float(prop.position[2] - own_low[2])])
+    middle = (own_low + own_high)[:2] / 2.0
+    local = np.array([*(places[best] - middle), bottom_m - own_low[2]])
+    world: Floats = container.position + container.rotation @ local
+    return world
+
+
+def _in_frame(prop: Prop, container: Prop) -> tuple[Floats, Floats]:
+    """Return the corners of a box about the bounding box of a prop in the container's frame."""
+    low, high = prop.bounds()
+    middle = container.rotation.T @ ((low + high) / 2.0 - container.position)
+    half = np.abs(container.rotation.T) @ ((high - low) / 2.0)
+    return middle - half, middle + half
 
 
 def _pile_m(low: Floats, high: Floats, piles: Sequence[tuple[Floats, Floats]]) -> float:
-    """Return the height of the highest box that overlaps a rectangle; 0 if none does."""
+    """Return the height of the highest box that overlaps a rectangle; minus infinity if none."""
     overlapping = [
         float(top[2])
         for bottom, top in piles
         if (bottom[:2] < high).all() and (top[:2] > low).all()
     ]
-    return max(overlapping, default=0.0)
+    return max(overlapping, default=-np.inf)

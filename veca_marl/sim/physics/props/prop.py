@@ -148,6 +148,11 @@ class Prop:
         return np.array(linear)
 
     @property
+    def box(self) -> tuple[Floats, Floats]:
+        """The corners ``(3,)`` of the box about its shapes, in its own frame, metres."""
+        return self._inside
+
+    @property
     def opening(self) -> float:
         """How far its joint is open, from 0 (closed) to 1."""
         return self._joint().opening
