@@ -22,6 +22,7 @@ class DodgeCarCfg(CarGameCfg):
             get out of the way.
     """
 
+    max_seconds: float = 30.0
     aim: float = 0.6
     aim_from_m: float = 1.2
     weights: dict[str, float] = terms(hit=-1.0, survived=0.05)
@@ -48,8 +49,8 @@ class DodgeCar(CarGame):
 
     Terms:
         hit: 1 on the step in which car and player touch, else 0.
-        survived: Duration of the step, s, if they do not touch, else 0; 20 s give 1 with the
-            default weight.
+        survived: Duration of the step, s, if they do not touch, else 0; 30 s give 1.5 with
+            the default weight.
     """
 
     senses = ("vision",)

@@ -8,11 +8,11 @@ from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
+from veca_marl.envs.tasks.cars.car_parts import HEIGHT_M, LENGTH_M, WIDTH_M, car_parts
 from veca_marl.envs.tasks.navigation.floors.clearance import clearances_m
 from veca_marl.sim.geometry import Floats
 from veca_marl.sim.physics import Prop, PropCfg, PropShape, World
 
-LENGTH_M, WIDTH_M, HEIGHT_M = 0.34, 0.2, 0.16
 _MASS_KG = 2.0  # below the push limit of walkers: it is pushed away and displaces none
 _COLOUR = (0.95, 0.75, 0.1)
 _ARRIVED_M = 0.15
@@ -60,7 +60,7 @@ class ToyCar:
         interactions: Names of the verbs that can be applied to it, see `PropCfg.interactions`.
 
     Attributes:
-        prop: The car: a box, its front along x.
+        prop: The car, its front along x, see `car_parts`.
         room: The room in which it drives: the first one of the playground.
     """
 
@@ -71,8 +71,8 @@ class ToyCar:
         self.prop = world.add_prop(
             PropCfg(
                 name="toy_car",
-                shape=PropShape.box,
-                size_m=[LENGTH_M, WIDTH_M, HEIGHT_M],
+                shape=PropShape.compound,
+                parts=car_parts(),
                 mass_kg=_MASS_KG,
                 friction=0.0,  # it rolls: its velocity is that of its drive
                 rolling_friction=0.0,
@@ -158,8 +158,8 @@ class ToyCar:
     def _vertical_mps(self) -> float:
         """Return the vertical velocity of the next step: down if it falls, up if it has sunk.
 
-        Bullet loses contacts of boxes that slide far in a physics step: without this the car would
-        sink by 2 cm into the floor.
+        Bullet loses contacts of things that slide far in a physics step: without this a car in the
+        form of a box sank by 2 cm into the floor.
         """
         sunk_m = self._resting_m - float(self.prop.position[2])
         if sunk_m < 0.0:
