@@ -14,4 +14,5 @@ import veca_marl.envs.experts.navigation
 import veca_marl.envs.experts.object_navigation
 import veca_marl.envs.experts.push_out
 import veca_marl.envs.experts.rotate_cube
-import veca_marl.envs.experts.soccer  # noqa: F401
+import veca_marl.envs.experts.soccer
+import veca_marl.envs.experts.sorting  # noqa: F401

@@ -20,11 +20,16 @@ from veca_marl.envs.tasks.objects.move_to_target import MoveToTarget
 from veca_marl.envs.tasks.objects.pile_up_block import PileUpBlock
 from veca_marl.envs.tasks.objects.put_down_block import PutDownBlock
 from veca_marl.envs.tasks.objects.rotate_cube import RotateCube
+from veca_marl.envs.tasks.sorting.color_sort import ColorSort
+from veca_marl.envs.tasks.sorting.fill_fraction import FillFraction
+from veca_marl.envs.tasks.sorting.shape_sort import ShapeSort
 
 __all__ = [
     "ChaseCar",
+    "ColorSort",
     "CrawlBaby",
     "DodgeCar",
+    "FillFraction",
     "GrabObject",
     "KickTheBall",
     "MazeNav",
@@ -38,6 +43,7 @@ __all__ = [
     "PutDownBlock",
     "RotateCube",
     "RunBaby",
+    "ShapeSort",
     "SitBaby",
     "SoccerOnePlayer",
     "SoccerTwoPlayer",

@@ -1,0 +1,1 @@
+"""Sorting tasks: things that are grabbed and put where they belong."""

@@ -1,0 +1,153 @@
+"""FillFraction: fill three circles with fraction pieces."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from fractions import Fraction
+from typing import ClassVar
+
+import numpy as np
+
+from veca_marl.envs.core.task import Player, Task, TaskCfg, register, terms
+from veca_marl.envs.tasks.navigation.floors.scattering import Spacing, scattered_places
+from veca_marl.envs.tasks.navigation.places import furniture_of
+from veca_marl.envs.tasks.player_starts import place_player
+from veca_marl.envs.tasks.player_verbs import require_verbs
+from veca_marl.envs.tasks.sorting.circles import (
+    DENOMINATORS,
+    REACH_M,
+    Circle,
+    Piece,
+    add_piece,
+    division,
+)
+from veca_marl.sim.physics import Prop
+
+_PASSAGE_M = 0.3  # from walls and furniture to the rim of a circle: an agent passes
+_DOOR_M = 0.9
+
+
+def _default_pieces() -> list[int]:
+    return [2, 2, 2, 4, 4, 3, 3, 3]
+
+
+@dataclass
+class FillFractionCfg(TaskCfg):
+    """Parameters of FillFraction. Only the number of circles is in the paper.
+
+    Attributes:
+        circles: Number of circles.
+        pieces: The denominators of the pieces: 4 is a quarter of a circle. All of them together
+            must be able to fill all circles.
+        apart_m: Least distance between any two of the pieces, the circles and the start.
+    """
+
+    max_seconds: float = 90.0
+    circles: int = 3
+    pieces: list[int] = field(default_factory=_default_pieces)
+    apart_m: float = 0.75
+    weights: dict[str, float] = terms(filled=1.0, full=1.0)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self.check_positive("apart_m")
+        if self.apart_m < 2.0 * REACH_M:
+            raise ValueError(
+                f"task.apart_m={self.apart_m} must be at least {2.0 * REACH_M:.2f}: "
+                "circles must not overlap"
+            )
+        unknown = sorted(set(self.pieces) - set(DENOMINATORS))
+        if unknown:
+            raise ValueError(f"task.pieces: no {unknown}; choices: {list(DENOMINATORS)}")
+        if self.circles < 1 or division(self.pieces, self.circles) is None:
+            raise ValueError(
+                f"task.pieces={list(self.pieces)} do not fill task.circles={self.circles} circles "
+                "exactly"
+            )
+
+
+@register
+class FillFraction(Task):
+    """An agent has to fill three circles with pieces that are fractions of a circle.
+
+    Circles and pieces lie at random places. The agent grabs a piece with the verb `grab` and puts
+    it into a circle with `put_into`; both are applied to what is nearest to the centre of its view,
+    up to 1.5 m away. The piece is laid beside those that lie there already. A piece that would
+    overfill the circle is refused: the verb has no effect. A piece can be taken out again. The
+    episode terminates when all circles are full; then the task is solved (`solved`).
+
+    Senses, actions (a continuous or discrete `move` and the discrete `verb`), the number of
+    circles, the refusal, and that each piece and a full circle are rewarded are those of the paper
+    (table of tasks in the appendix). The paper does not state the pieces and the amounts. Here the
+    reward for a piece is the fraction that it fills, so that every way to fill the circles has the
+    same return; both rewards are changes of a score of the present state, so that taking pieces out
+    and putting them in again has no return. Pieces are unit fractions, with one colour for each
+    size. The head is pitched 25 degrees down, as in ColorSort.
+
+    Terms:
+        filled: Change of the sum of the filled fractions of all circles.
+        full: Change of the number of full circles.
+    """
+
+    senses: ClassVar[tuple[str, ...]] = ("vision",)
+    cfg: FillFractionCfg
+
+    def build(self) -> None:
+        self.walker = require_verbs(self.players[0], "grab", "put_into")
+        self._furniture = furniture_of(self.world)
+        self.pieces = [
+            add_piece(self.world, f"piece_{number}_of_{denominator}", denominator)
+            for number, denominator in enumerate(self.cfg.pieces)
+        ]
+        self.circles = [
+            Circle(self.world, f"circle_{number}", self.pieces)
+            for number in range(self.cfg.circles)
+        ]
+        self._held: Prop | None = None
+        self._score = self._change = (Fraction(0), 0)
+
+    def reset(self, rng: np.random.Generator) -> None:
+        spacing = Spacing(REACH_M + _PASSAGE_M, self.cfg.apart_m, _DOOR_M)
+        things: list[Circle | Piece] = [*self.circles, *self.pieces]
+        start, *floors = scattered_places(
+            self.world.playground, self._furniture, 1 + len(things), spacing, rng
+        )
+        for thing, floor in zip(things, floors, strict=True):
+            thing.place(floor, rng.uniform(-math.pi, math.pi))
+        place_player(self.players[0], start, rng.uniform(-math.pi, math.pi))
+        self._score = self._change = (Fraction(0), 0)
+
+    def before_step(self, rng: np.random.Generator) -> None:
+        self._held = self.walker.held
+
+    def after_step(self, rng: np.random.Generator) -> None:
+        self._lay_piece()
+        for circle in self.circles:
+            circle.arrange()
+        filled, full = sum((c.filled for c in self.circles), Fraction(0)), self._full()
+        self._change = filled - self._score[0], full - self._score[1]
+        self._score = filled, full
+
+    def reward(self, player: Player) -> dict[str, float]:
+        return {"filled": float(self._change[0]), "full": float(self._change[1])}
+
+    def terminated(self) -> bool:
+        return self._full() == len(self.circles)
+
+    def solved(self, player: Player) -> bool:
+        """Return whether all circles are full."""
+        return self._full() == len(self.circles)
+
+    def _full(self) -> int:
+        """Return the number of full circles."""
+        return sum(circle.filled == 1 for circle in self.circles)
+
+    def _lay_piece(self) -> None:
+        """Lay the piece that was put into a circle in this step into its place."""
+        applied, piece = self.walker.applied_verb, self._held
+        if applied is None or applied.verb != "put_into" or piece is None:
+            return
+        for circle in self.circles:
+            if circle.prop is applied.prop:
+                circle.put(piece)

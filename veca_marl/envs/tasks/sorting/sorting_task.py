@@ -1,0 +1,136 @@
+"""What ColorSort and ShapeSort have in common: toys, baskets, and the score."""
+
+from __future__ import annotations
+
+import math
+from abc import abstractmethod
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from veca_marl.envs.core.task import Player, Task, TaskCfg, terms
+from veca_marl.envs.tasks.navigation.floors.scattering import Spacing, scattered_places
+from veca_marl.envs.tasks.navigation.places import furniture_of
+from veca_marl.envs.tasks.player_starts import place_player
+from veca_marl.envs.tasks.player_verbs import require_verbs
+from veca_marl.envs.tasks.sorting.baskets import REACH_M, Basket
+from veca_marl.envs.tasks.sorting.items import Item
+
+_PASSAGE_M = 0.3  # from walls and furniture to the surface of a basket: an agent passes
+_DOOR_M = 0.9  # baskets nearer to the middle of a door could block it
+
+
+@dataclass
+class SortingCfg(TaskCfg):
+    """Parameters of ColorSort and ShapeSort. None of the numbers is in the paper.
+
+    Attributes:
+        items: Number of toys for each basket, at least 1.
+        apart_m: Least distance between any two of the toys, the baskets and the start.
+    """
+
+    max_seconds: float = 60.0
+    items: int = 2
+    apart_m: float = 0.85
+    weights: dict[str, float] = terms(sorted=1.0, wrong=-0.5)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self.check_positive("apart_m")
+        if self.items < 1:
+            raise ValueError(f"task.items={self.items} must be at least 1")
+        if self.apart_m < 2.0 * REACH_M:
+            raise ValueError(
+                f"task.apart_m={self.apart_m} must be at least {2.0 * REACH_M:.2f}: "
+                "baskets must not overlap"
+            )
+
+    def check_categories(self, field: str, names: Sequence[str], known: Collection[str]) -> None:
+        """Check the names of the categories.
+
+        Raises:
+            ValueError: If one is unknown or named twice, or there are fewer than two.
+        """
+        if not set(names) <= set(known) or len(set(names)) < max(2, len(names)):
+            raise ValueError(
+                f"task.{field}={list(names)} must be at least 2 different ones of {list(known)}"
+            )
+
+
+class SortingTask(Task):
+    """Toys have to be put into the baskets of their categories.
+
+    A subclass defines the categories: it adds the toys and the baskets, and draws the category of
+    each toy for each episode.
+
+    Attributes:
+        items: All toys.
+        baskets: One for each category.
+        category: The category of each toy, an index of `baskets`.
+    """
+
+    senses: ClassVar[tuple[str, ...]] = ("vision",)
+    cfg: SortingCfg
+
+    @abstractmethod
+    def add_items(self) -> list[Item]:
+        """Add the toys to the world."""
+
+    @abstractmethod
+    def add_baskets(self) -> list[Basket]:
+        """Add the baskets to the world, one for each category."""
+
+    @abstractmethod
+    def draw_categories(self, rng: np.random.Generator) -> list[int]:
+        """Give the toys their looks for an episode; return the category of each."""
+
+    def build(self) -> None:
+        self.walker = require_verbs(self.players[0], "grab", "put_into")
+        self._furniture = furniture_of(self.world)
+        self.items = self.add_items()
+        self.baskets = self.add_baskets()
+        self.category = [0] * len(self.items)
+        self._counts = self._changes = (0, 0)
+
+    def reset(self, rng: np.random.Generator) -> None:
+        self.category = self.draw_categories(rng)
+        spacing = Spacing(REACH_M + _PASSAGE_M, self.cfg.apart_m, _DOOR_M)
+        things: list[Basket | Item] = [*self.baskets, *self.items]
+        start, *floors = scattered_places(
+            self.world.playground, self._furniture, 1 + len(things), spacing, rng
+        )
+        for thing, floor in zip(things, floors, strict=True):
+            thing.place(floor, rng.uniform(-math.pi, math.pi))
+        place_player(self.players[0], start, rng.uniform(-math.pi, math.pi))
+        self._counts = self._changes = (0, 0)
+
+    def after_step(self, rng: np.random.Generator) -> None:
+        right, wrong = self._count()
+        self._changes = right - self._counts[0], wrong - self._counts[1]
+        self._counts = right, wrong
+
+    def reward(self, player: Player) -> dict[str, float]:
+        return {"sorted": float(self._changes[0]), "wrong": float(self._changes[1])}
+
+    def terminated(self) -> bool:
+        return self._counts[0] == len(self.items)
+
+    def solved(self, player: Player) -> bool:
+        """Return whether all toys are in their baskets."""
+        return self._counts[0] == len(self.items)
+
+    def is_sorted(self, number: int) -> bool:
+        """Return whether the toy of a number is in its basket."""
+        return self.baskets[self.category[number]].contains(self.items[number].prop)
+
+    def _count(self) -> tuple[int, int]:
+        """Return how many toys are in their baskets, and how many are in others."""
+        right = wrong = 0
+        for item, category in zip(self.items, self.category, strict=True):
+            for number, basket in enumerate(self.baskets):
+                if basket.contains(item.prop):
+                    right += number == category
+                    wrong += number != category
+        return right, wrong
