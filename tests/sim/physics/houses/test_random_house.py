@@ -4,7 +4,10 @@ import numpy as np
 import pytest
 from composed import compose
 from floor_maps import FloorMap
+from omegaconf import OmegaConf
 
+from veca_marl.config import compose_node, to_config
+from veca_marl.config.stored import body_names, typed
 from veca_marl.sim.physics import RandomHouseCfg, World
 from veca_marl.sim.physics.houses.furnishing import FloorNeeds
 
@@ -84,6 +87,15 @@ def test_the_command_line_chooses_seed_and_size():
         house.doors,
         house.furniture,
     )
+
+
+def test_a_stored_run_is_read_with_its_house():
+    words = ["+task=KickTheBall", "playground=random_house", "playground.seed=7"]
+    node = compose_node(words)
+    stored = OmegaConf.create(OmegaConf.to_yaml(node))
+    again = to_config(typed(stored, body_names(node))).playground
+    assert isinstance(again, RandomHouseCfg)
+    assert again.rooms == RandomHouseCfg(seed=7).rooms
 
 
 @pytest.mark.parametrize(
