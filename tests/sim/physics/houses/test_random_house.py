@@ -11,6 +11,7 @@ from veca_marl.config.stored import body_names, typed
 from veca_marl.sim.physics import RandomHouseCfg, World
 from veca_marl.sim.physics.houses.furnishing import FloorNeeds
 
+WIDE_M = 0.15
 QUICK, ALL = range(8), range(8, 200)
 SIZES = [
     {"room_count": 1, "house_size_m": (3.2, 3.2)},
@@ -22,8 +23,11 @@ SIZES = [
 
 def check(house):
     """The laws of a generated house."""
-    floor = FloorMap(house)
-    assert floor.count == 1, "all places that have space for a walker are connected"
+    floor, wide = FloorMap(house), FloorMap(house, radius_m=WIDE_M)
+    reached = set(floor.labels[wide.free])
+    assert len(reached) == 1, "a walker reaches every place with some space round it"
+    assert {floor.label(door.position_m) for door in house.doors} <= reached
+    assert floor.free.sum() - (floor.labels == reached.pop()).sum() <= 5, "cells of 4 cm"
     for room in house.rooms:
         assert min(room.size_m[:2]) >= house.least_room_m - 1e-9
         assert floor.in_box(np.add(room.lower_m, room.size_m), room)[floor.free].any()

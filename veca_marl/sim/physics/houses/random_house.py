@@ -41,10 +41,10 @@ class RandomHouseCfg(PlaygroundCfg):
     """A furnished house that is generated from a seed: the same numbers give the same house.
 
     A rectangle is divided recursively into rooms; a random spanning tree of adjacent rooms, and
-    some more pairs, have doors; furniture stands along the walls. In every room a body with a
-    radius of 0.12 m reaches all places that have space for it, and all doors. The first room is
-    the widest and has furniture at its walls of constant x only, as single-room tasks need it; its
-    middle is the origin.
+    some more pairs, have doors; furniture stands along the walls. A body with a radius of 0.11 m
+    reaches all doors, and every place that is 0.15 m or more away from walls and furniture. The
+    first room is the widest and has furniture at its walls of constant x only, as single-room tasks
+    need it; its middle is the origin.
 
     Attributes:
         rooms: Generated; cannot be set.
