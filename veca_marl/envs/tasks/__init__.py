@@ -6,6 +6,7 @@ from veca_marl.envs.tasks.contests.push_out_1v1 import PushOut1v1
 from veca_marl.envs.tasks.contests.push_out_2v2 import PushOut2v2
 from veca_marl.envs.tasks.contests.soccer_one_player import SoccerOnePlayer
 from veca_marl.envs.tasks.contests.soccer_two_player import SoccerTwoPlayer
+from veca_marl.envs.tasks.escape.babyzumas_revenge import BabyzumasRevenge
 from veca_marl.envs.tasks.locomotion.crawl_baby import CrawlBaby
 from veca_marl.envs.tasks.locomotion.run_baby import RunBaby
 from veca_marl.envs.tasks.locomotion.sit_baby import SitBaby
@@ -25,6 +26,7 @@ from veca_marl.envs.tasks.sorting.fill_fraction import FillFraction
 from veca_marl.envs.tasks.sorting.shape_sort import ShapeSort
 
 __all__ = [
+    "BabyzumasRevenge",
     "ChaseCar",
     "ColorSort",
     "CrawlBaby",

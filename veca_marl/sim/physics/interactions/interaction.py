@@ -117,15 +117,17 @@ class Verb(ABC):
 
 
 class Interaction(Verb):
-    """A verb that is applied to a prop: to `interactable_object()`, if the prop declares the verb.
+    """A verb that is applied to a prop: to the first of `interactable_objects()` that declares it.
+
+    Things that declare other verbs, such as an open drawer, do not hide what lies in them.
 
     A subclass is registered with `register_interaction`. Its effect lasts at most until the world
     is reset if it is made by the public methods of the body and the prop.
     """
 
     def target(self, body: InteractingBody) -> Prop | None:
-        """Return the interactable prop nearest to the centre of the body's view."""
-        return body.interactable_object()
+        """Return the prop nearest to the centre of the view of those that declare the verb."""
+        return next((prop for prop in body.interactable_objects() if self.declared_by(prop)), None)
 
     def attempt(self, body: InteractingBody, target: Prop | None) -> bool:
         """Apply the verb to the target if the prop declares it and `allows` returns True."""

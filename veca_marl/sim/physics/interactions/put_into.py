@@ -30,10 +30,6 @@ class PutInto(Interaction):
 
     name: ClassVar[str] = "put_into"
 
-    def target(self, body: InteractingBody) -> Prop | None:
-        """Return the container nearest to the centre of the view, whatever else is nearer."""
-        return next((p for p in body.interactable_objects() if self.declared_by(p)), None)
-
     def allows(self, body: InteractingBody, prop: Prop) -> bool:
         """Return whether the held prop fits into the container and is accepted by it."""
         held = body.held

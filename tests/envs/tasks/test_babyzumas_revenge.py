@@ -1,0 +1,81 @@
+"""BabyzumasRevenge: the locked door, the key in the drawer, the order of events, the expert."""
+
+import numpy as np
+import pytest
+from composed import compose
+
+from veca_marl.envs.core.game import Game
+from veca_marl.envs.core.team import Script
+
+SMALL = ("senses.vision.width=32", "senses.vision.height=32", "senses.audio.present=false")
+
+
+def game_of(*overrides):
+    game = Game(compose(["+task=BabyzumasRevenge", *SMALL, *overrides]).game)
+    game.reset(np.random.default_rng(0))
+    return game
+
+
+@pytest.fixture(scope="module")
+def game():
+    game = game_of()
+    yield game
+    game.close()
+
+
+def test_the_key_lies_in_the_closed_drawer_and_cannot_be_seen_or_taken(game):
+    for seed in range(5):
+        game.reset(np.random.default_rng(seed))
+        task = game.task
+        assert task.drawer.contains(task.key)
+        assert task.drawer.opening == 0.0
+        assert task.door.locked
+        front = task.cupboard.position + 0.9 * task.cupboard.rotation[:, 0]
+        inward = task.cupboard.position - front
+        task.walker.place(front, np.arctan2(inward[1], inward[0]))
+        game.world.refresh()
+        assert task.drawer in task.walker.interactable_objects()
+        assert task.key not in task.walker.interactable_objects()
+
+
+def test_the_door_opens_with_the_key_in_the_hand_only(game):
+    game.reset(np.random.default_rng(0))
+    task, yaw = game.task, np.arctan2(game.task.out[1], game.task.out[0])
+    task.walker.place([*(task.doorway - 0.9 * task.out[:2]), 0.0], yaw)
+    game.world.refresh()
+
+    def step_with(verb):
+        choice = task.walker.verb_choice.index(verb)
+        action = {"move": np.zeros(2, np.float32), "verb": np.asarray(choice)}
+        return game.step({"agents": action}).terms["agents"]
+
+    step_with("open")
+    assert task.walker.verb_was_refused
+    assert task.door.locked
+    task.walker.grab(task.key)
+    assert step_with("open")["key"] == 1.0
+    total = 0.0
+    for _ in range(40):
+        total += step_with("none")["door"]
+    assert total == 1.0
+    assert task.door.opening > 0.9
+
+
+def test_the_expert_reports_each_event_once_and_only_the_room_is_rewarded(game):
+    game.reset(np.random.default_rng(1))
+    totals, done, reward = dict.fromkeys(game.weights, 0.0), False, 0.0
+    while not done:
+        game.play_script(game.players[0], Script.expert)
+        outcome = game.advance()
+        done = outcome.done
+        reward += game.reward_of(outcome.terms["agents"])
+        for name, value in outcome.terms["agents"].items():
+            totals[name] += value
+    assert game.task.solved(game.players[0])
+    assert totals == {"drawer": 1.0, "key": 1.0, "door": 1.0, "room": 1.0}
+    assert reward == 1.0
+
+
+def test_a_first_room_with_another_number_of_doors_is_refused():
+    with pytest.raises(ValueError, match=r"'simple' has 0; choose playground=two_rooms or three"):
+        game_of("playground=simple")

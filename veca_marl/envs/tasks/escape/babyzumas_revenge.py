@@ -1,0 +1,150 @@
+"""BabyzumasRevenge: take the key from the drawer, open the door, go into the next room."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from veca_marl.envs.core.task import Player, Task, TaskCfg, register, terms
+from veca_marl.envs.tasks.escape.key_drawer import add_key_drawer, draw_place_at_wall
+from veca_marl.envs.tasks.navigation.places import free_place, furniture_of
+from veca_marl.envs.tasks.player_starts import place_player
+from veca_marl.envs.tasks.player_verbs import require_verbs
+from veca_marl.sim.geometry import Floats
+from veca_marl.sim.physics import DoorCfg, LockCfg, PlaygroundCfg, RoomCfg
+from veca_marl.sim.physics.props.library import door_leaf
+from veca_marl.sim.sound import SoundCfg, SoundKind
+
+OPEN = 0.8
+"""Opening from which the drawer and the door count as open."""
+_DOOR_APART_M = 1.3  # of the cupboard from the middle of the door
+_START_CLEAR_M = 0.45  # of the start from walls and things
+_THRESHOLD_M = 0.2  # behind the border of the next room it counts as entered
+
+
+@dataclass
+class BabyzumasRevengeCfg(TaskCfg):
+    """Parameters of BabyzumasRevenge. None of the numbers is in the paper.
+
+    Attributes:
+        loudness: Rms pressure of the sound of the key at 1 m; 0 for a silent key.
+        frequency_hz: Pitch of its sound.
+    """
+
+    max_seconds: float = 60.0
+    loudness: float = 0.05
+    frequency_hz: float = 600.0
+    weights: dict[str, float] = terms(drawer=0.0, key=0.0, door=0.0, room=1.0)
+
+
+@register
+class BabyzumasRevenge(Task):
+    """An agent has to find the key that opens the door to the next room.
+
+    The agent starts in the first room of the playground, whose only door is closed by a locked
+    leaf. A cupboard stands at a wall, at a place drawn for each episode. Its drawer is opened with
+    the verb `open`; the key inside can then be seen and taken with `grab`. With the key in the
+    hand, `open` unlocks and opens the door. A verb is applied to what is nearest to the centre of
+    the view, up to 1.5 m away, of the things that declare it. The episode terminates when the
+    agent is in the next room; then the task is solved (`solved`).
+
+    Senses, actions (a continuous or discrete `move` and the discrete `verb`) and the sequence of
+    interactions are those of the paper (table of tasks in the appendix), which gives it as an
+    example of a first room that has to be cleared; further rooms are not described there. The paper
+    does not state the reward, which is sparse. Here entering the next room is the only reward by
+    default; the other terms report the progress and can be given weights. They cannot be had twice.
+    The key emits a quiet buzz, so that the ears tell where the drawer is: what is to be heard is
+    not stated in the paper either. The head is pitched 25 degrees down, as in ColorSort.
+
+    Terms:
+        drawer: 1 on the step in which the drawer is open for the first time, else 0.
+        key: 1 on the step in which the agent takes the key for the first time, else 0.
+        door: 1 on the step in which the door is open for the first time, else 0.
+        room: 1 on the step in which the agent enters the next room, else 0.
+    """
+
+    senses: ClassVar[tuple[str, ...]] = ("vision", "audio")
+    cfg: BabyzumasRevengeCfg
+
+    @classmethod
+    def check_playground(cls, cfg: Any, playground: PlaygroundCfg) -> None:
+        room, doors = playground.rooms[0], _doors_of_first_room(playground)
+        if len(doors) != 1:
+            raise ValueError(
+                f"BabyzumasRevenge starts in the first room of a playground, which must have one "
+                f"door; room {room.name!r} of {playground.name!r} has {len(doors)}; choose "
+                "playground=two_rooms or three_rooms"
+            )
+
+    def build(self) -> None:
+        self.walker = require_verbs(self.players[0], "grab", "open")
+        playground = self.world.playground
+        self._furniture = furniture_of(self.world)
+        self._room, doorway = playground.rooms[0], _doors_of_first_room(playground)[0]
+        self._next = _room_behind(playground, doorway)
+        self.doorway = np.array(doorway.position_m)
+        self.out = direction_out(self._room, self.doorway)
+        yaw_deg = math.degrees(math.atan2(self.out[1], self.out[0]))
+        leaf = door_leaf(
+            "door_leaf", doorway.position_m, yaw_deg, doorway.width_m, lock=LockCfg("key")
+        )
+        self.door = self.world.add_prop(leaf)
+        sound = SoundCfg(SoundKind.buzz, self.cfg.frequency_hz, self.cfg.loudness)
+        self.cupboard, self.drawer, self.key = self._drawer = add_key_drawer(self.world, sound)
+        self._done: frozenset[str] = frozenset()
+        self._new: frozenset[str] = frozenset()
+
+    def reset(self, rng: np.random.Generator) -> None:
+        place, yaw_rad = draw_place_at_wall(
+            self._room, self._furniture, self.doorway, _DOOR_APART_M, rng
+        )
+        self._drawer.place(place, yaw_rad)
+        things = [*self._furniture, self.cupboard]
+        start = free_place(self._room, things, _START_CLEAR_M, rng)
+        place_player(self.players[0], start, rng.uniform(-math.pi, math.pi))
+        self._done = self._new = frozenset()
+
+    def after_step(self, rng: np.random.Generator) -> None:
+        here = self.walker.position
+        reached = {
+            "drawer": self.drawer.opening >= OPEN,
+            "key": self.walker.held is self.key,
+            "door": self.door.opening >= OPEN,
+            "room": self._next.contains(here, _THRESHOLD_M),
+        }
+        self._new = frozenset(name for name in reached if reached[name]) - self._done
+        self._done |= self._new
+
+    def reward(self, player: Player) -> dict[str, float]:
+        return {name: float(name in self._new) for name in ("drawer", "key", "door", "room")}
+
+    def terminated(self) -> bool:
+        return "room" in self._done
+
+    def solved(self, player: Player) -> bool:
+        """Return whether the agent has entered the next room."""
+        return "room" in self._done
+
+
+def direction_out(room: RoomCfg, place: Floats) -> Floats:
+    """Return the horizontal unit vector ``(3,)`` out of a room at a place ``(2,)`` in its wall."""
+    low = np.array(room.lower_m[:2])
+    away_m = np.abs(np.stack([place - low, place - low - room.size_m[:2]]))
+    far, axis = np.unravel_index(int(np.argmin(away_m)), away_m.shape)
+    out: Floats = np.zeros(3)
+    out[axis] = 1.0 if far else -1.0
+    return out
+
+
+def _doors_of_first_room(playground: PlaygroundCfg) -> list[DoorCfg]:
+    return [door for door in playground.doors if playground.rooms[0].name in door.rooms]
+
+
+def _room_behind(playground: PlaygroundCfg, door: DoorCfg) -> RoomCfg:
+    """Return the room on the other side of a door of the first room."""
+    first = playground.rooms[0].name
+    other = next(name for name in door.rooms if name != first)
+    return next(room for room in playground.rooms if room.name == other)
