@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from fractions import Fraction
 from typing import NamedTuple
 
-from veca_marl.envs.tasks.sorting.items import Colour, place_on_floor
+from veca_marl.envs.tasks.sorting.items import Colour, built_at, place_on_floor
 from veca_marl.sim.geometry import Floats
 from veca_marl.sim.physics import Prop, PropCfg, PropShape, World
 from veca_marl.sim.physics.props.library import fraction_piece
@@ -49,13 +49,13 @@ class Piece(NamedTuple):
         self.prop.place((tip[0], tip[1], z + _PIECE_M / 2.0), yaw_rad)
 
 
-def add_piece(world: World, name: str, denominator: int) -> Piece:
+def add_piece(world: World, number: int, denominator: int) -> Piece:
     """Add a piece of ``1 / denominator`` of a circle to a world that is not frozen yet."""
     fraction = Fraction(1, denominator)
     prop = fraction_piece(
-        name,
+        f"piece_{number}_of_{denominator}",
         float(fraction),
-        (0.0, 0.0),
+        built_at(number, 2.2 * RADIUS_M),
         radius_m=RADIUS_M,
         height_m=_PIECE_M,
         colour=_COLOURS[denominator],

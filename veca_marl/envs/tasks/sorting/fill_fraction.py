@@ -97,7 +97,7 @@ class FillFraction(Task):
         self.walker = require_verbs(self.players[0], "grab", "put_into")
         self._furniture = furniture_of(self.world)
         self.pieces = [
-            add_piece(self.world, f"piece_{number}_of_{denominator}", denominator)
+            add_piece(self.world, number, denominator)
             for number, denominator in enumerate(self.cfg.pieces)
         ]
         self.circles = [

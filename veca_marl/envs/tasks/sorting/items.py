@@ -19,6 +19,8 @@ COLOURS: dict[str, Colour] = {
 }
 """Colours of toys and baskets."""
 
+_ROW = 8  # things in a row in which they are built
+
 
 class Item(NamedTuple):
     """A toy.
@@ -41,11 +43,20 @@ class Item(NamedTuple):
 
 
 def add_items(world: World, kinds: Sequence[ToyKind]) -> list[Item]:
-    """Add toys that can be grabbed to a world that is not frozen yet."""
+    """Add toys that can be grabbed to a world that is not frozen yet.
+
+    They are built apart: Bullet keeps contacts of the built state, and polyhedra that overlap in it
+    would move differently after the first episode.
+    """
     return [
-        Item(world.add_prop(toy(f"toy_{number}_{kind.name}", kind, (0.0, 0.0))), kind)
+        Item(world.add_prop(toy(f"toy_{number}_{kind.name}", kind, built_at(number, 0.2))), kind)
         for number, kind in enumerate(kinds)
     ]
+
+
+def built_at(number: int, spacing_m: float) -> tuple[float, float]:
+    """Return a place ``(x, y)`` of a square grid beside the origin, metres."""
+    return -2.0 + spacing_m * (number % _ROW), 1.0 + spacing_m * (number // _ROW)
 
 
 def place_on_floor(prop: Prop, floor: Floats, yaw_rad: float) -> None:
