@@ -407,3 +407,21 @@ def test_a_locked_door_opens_with_its_key_in_the_hand_only():
     assert (leaf.locked, leaf.opening > 0.5) == (False, True)
     world.reset(np.random.default_rng(0))
     assert (leaf.locked, leaf.opening) == (True, pytest.approx(0.0, abs=1e-3))
+
+
+def test_the_first_crawl_of_a_world_leaves_the_contacts_of_other_things():
+    rolling = ball("rolling", position=(1.5, 0.85, 0.1))
+    world = empty_world(rolling, wall(position=(1.0, 1.0, 0.0), yaw_deg=0.0))
+    walker = seeing(world, extra_verbs=["crawl"])
+    world.freeze()
+    films = []
+    for _ in range(2):
+        world.reset(np.random.default_rng(0))
+        world.prop("rolling").place((1.5, 0.845, 0.1), velocity=(0.8, 0.2, 0.0))
+        world.refresh()
+        film = []
+        for verb in ["none"] * 4 + ["crawl"] + ["none"] * 6:
+            do(world, walker, verb, forward=1.0)
+            film.append(world.scene.positions.tobytes())
+        films.append(film)
+    assert films[0] == films[1]

@@ -292,10 +292,14 @@ class Walker(Body):
     def _stand_on_floor(self) -> None:
         """Stand upright on the floor."""
         self._footing.leave()
+        if self._on_all_fours is not None:
+            # Bullet's contacts with new obstacles are disabled here: in the middle of an episode
+            # that would discard contacts of other things, and episodes would not be repeatable
+            self._stance = self._on_all_fours
+            self._collect_obstacles(0.0)
+            self._capsule.park()
         self._stance = self._upright
         self._capsule.base_m, self._capsule.support_id = 0.0, -1
-        if self._on_all_fours is not None:
-            self._on_all_fours.capsule.park()
 
     def _follow_surface(self) -> None:
         """Set the height of the capsule to that of the surface under it."""
