@@ -293,8 +293,7 @@ class Walker(Body):
         """Stand upright on the floor."""
         self._footing.leave()
         if self._on_all_fours is not None:
-            # Bullet's contacts with new obstacles are disabled here: in the middle of an episode
-            # that would discard contacts of other things, and episodes would not be repeatable
+            # disabling contacts with new obstacles within an episode would alter other contacts
             self._stance = self._on_all_fours
             self._collect_obstacles(0.0)
             self._capsule.park()
