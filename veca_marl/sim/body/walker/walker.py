@@ -120,10 +120,7 @@ class Walker(Body):
         self._mouth.teleport(self.mount("mouth").position)
 
     def info(self) -> dict[str, float]:
-        """Return `refused_verbs`: 1 if a verb without effect was chosen in the last step.
-
-        A walker without the action part `verb` returns nothing.
-        """
+        """Return `refused_verbs`, 1 after a verb without effect; empty for bodies without verbs."""
         return {REFUSED: float(self.verb_was_refused)} if self.cfg.verbs else {}
 
     # ---- commands (the paper's animation-based API)
