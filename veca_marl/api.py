@@ -1,6 +1,7 @@
 """Functions for notebooks and scripts: the choices of the command line as arguments.
 
-`make`, `gym_env` and `parallel_env` make the environment of a task, `train` trains on it.
+`make`, `gym_env` and `parallel_env` make the environment of a task, `train` trains on it,
+`check_task` checks it.
 """
 
 from __future__ import annotations
@@ -8,13 +9,14 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from veca_marl.checks import CheckCfg, TaskReport, check_game
 from veca_marl.config import compose, compose_node, to_config
 from veca_marl.envs.adapters.gymnasium import VecaGymEnv
 from veca_marl.envs.adapters.pettingzoo import VecaParallelEnv
 from veca_marl.envs.adapters.spaces import SensesLayout
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
 from veca_marl.envs.core.game_cfg import GameCfg
-from veca_marl.envs.core.task import TASKS
+from veca_marl.envs.core.task import TASKS, Task
 from veca_marl.gymnasium_ids import register_task
 from veca_marl.plugins import load_plugins
 from veca_marl.runs.assembly import decide_precision, make_trainer
@@ -186,6 +188,50 @@ def train(
     if run is not None:
         run.begin(node, chosen)
     return run_training(cfg, run, trainer)
+
+
+def check_task(
+    task: type[Task] | str,
+    *,
+    playground: str | None = None,
+    body: str | None = None,
+    senses: Mapping[str, str] | None = None,
+    overrides: Sequence[str] = (),
+    plugins: Sequence[str] = (),
+    checks: CheckCfg | None = None,
+) -> TaskReport:
+    """Check a task, for people who write one; ``print(check_task(MyTask))`` shows the results.
+
+    The checks: it builds; TorchRL accepts its specs; the same seed gives the same bytes in new and
+    used worlds, another seed others; starts are inside the rooms, differ, and are neither over nor
+    solved; observations fit their specs and change; rewards are finite and each term is reached;
+    the expert, if there is one, has a higher return than the random policy and solves more
+    episodes; the time of a step.
+
+    Args:
+        task: A registered class, or its name.
+        playground: As for `make`.
+        body: As for `make`.
+        senses: As for `make`.
+        overrides: As for `make`.
+        plugins: As for `make`.
+        checks: How much is played; None is `CheckCfg()`.
+
+    Returns:
+        A result for each check. An exception of the task is a failed result with its type, message
+        and place.
+
+    Raises:
+        ConfigError: If there is no such choice, or the configuration is impossible.
+        ValueError: If the class is not registered.
+    """
+    name = task if isinstance(task, str) else task.__name__
+    if not isinstance(task, str) and TASKS.get(name) is not task:
+        raise ValueError(f"task {name!r} is not registered; decorate the class with @register")
+    cfg = choose(
+        name, playground=playground, body=body, senses=senses, overrides=overrides, plugins=plugins
+    )
+    return check_game(cfg, CheckCfg() if checks is None else checks)
 
 
 def _integer(number: float) -> str:

@@ -1,0 +1,263 @@
+"""`check_task` passes a sound task, and reports each fault of tasks that have one."""
+
+import re
+from contextlib import closing
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+from composed import compose
+
+import veca_marl
+from veca_marl.checks import CheckCfg, Status, check_game
+from veca_marl.checks.random_play import check_random_play
+from veca_marl.checks.returns import check_returns
+from veca_marl.checks.seeding import check_seeding
+from veca_marl.checks.starts import check_starts
+from veca_marl.envs.core.expert import EXPERTS, Expert
+from veca_marl.envs.core.game import Game
+from veca_marl.envs.core.task import TASKS, Task, TaskCfg, terms
+
+CHOSEN = compose(["+task=KickTheBall", "body=walker", "playground=simple"]).game
+QUICK = CheckCfg(starts=5, steps=10, seeding_steps=4, episodes=4)
+
+
+@dataclass
+class EastCfg(TaskCfg):
+    max_seconds: float = 1.0
+    weights: dict[str, float] = terms(progress=1.0, arrived=1.0)
+
+
+class East(Task):
+    """Walk 0.1 m to the east."""
+
+    senses = ("proprioception",)
+    cfg: EastCfg
+
+    def build(self):
+        self.room = self.world.playground.rooms[0]
+
+    def reset(self, rng):
+        self.players[0].body.place(self.room.sample_floor(rng, margin_m=1.0))
+        self.start = self.last = self.now = self.players[0].body.position[0]
+
+    def after_step(self, rng):
+        self.last, self.now = self.now, self.players[0].body.position[0]
+
+    def reward(self, player):
+        return {"progress": self.now - self.last, "arrived": float(self.solved(player))}
+
+    def solved(self, player):
+        return bool(self.now > self.start + 0.1)
+
+
+class EastExpert(Expert):
+    def act(self, observation):
+        x, y = self.player.body.forward[:2]
+        return float(x > 0.5), float(np.clip(-3.0 * np.arctan2(y, x), -1.0, 1.0))
+
+
+class UnseededStart(East):
+    def reset(self, rng):
+        super().reset(np.random.default_rng())
+
+
+class StateOfTheLastEpisode(East):
+    episodes = 0
+
+    def reset(self, rng):
+        super().reset(rng)
+        self.episodes += 1
+
+    def reward(self, player):
+        return {**super().reward(player), "arrived": float(self.episodes)}
+
+
+class FixedStart(East):
+    def reset(self, rng):
+        super().reset(np.random.default_rng(0))
+
+
+class StartOutside(East):
+    def reset(self, rng):
+        super().reset(rng)
+        self.players[0].body.place((50.0, rng.uniform(), 0.0))
+
+
+class EndsAtOnce(East):
+    def terminated(self):
+        return True
+
+
+class SolvedAtOnce(East):
+    def solved(self, player):
+        return True
+
+
+class InfiniteTerm(East):
+    def reward(self, player):
+        return {**super().reward(player), "progress": float("nan")}
+
+
+class TermMissing(East):
+    def reward(self, player):
+        return {"progress": 0.0}
+
+
+class TermOfZeros(East):
+    def reward(self, player):
+        return {**super().reward(player), "arrived": 0.0}
+
+
+class SilentWorld(East):
+    senses = ("audio",)
+
+
+class NoGoal(East):
+    solved = Task.solved
+
+    def reward(self, player):
+        return {"progress": self.now - self.last, "arrived": 1.0}
+
+
+class FailsInReward(East):
+    def reward(self, player):
+        return {"progress": 1.0 / 0, "arrived": 0.0}
+
+
+class FailsInBuild(East):
+    def build(self):
+        raise RuntimeError("no such furniture")
+
+
+class WalksWest(EastExpert):
+    def act(self, observation):
+        x, y = self.player.body.forward[:2]
+        return float(x < -0.5), float(np.clip(-3.0 * np.arctan2(-y, -x), -1.0, 1.0))
+
+
+@pytest.fixture
+def game_of(monkeypatch):
+    """Return the configuration of a task that is registered for this test alone."""
+
+    def chosen(task, expert=None):
+        monkeypatch.setitem(TASKS._entries, task.__name__, task)
+        if expert is not None:
+            monkeypatch.setitem(EXPERTS._entries, task.__name__, expert)
+        return replace(CHOSEN, task=EastCfg(name=task.__name__))
+
+    return chosen
+
+
+def starts(cfg):
+    with closing(Game(cfg)) as game:
+        return list(check_starts(game, 5, seed=0))
+
+
+def random_play(cfg):
+    with closing(Game(cfg)) as game:
+        return list(check_random_play(game, 10, seed=0))
+
+
+def returns(cfg):
+    with closing(Game(cfg)) as game:
+        return list(check_returns(game, 4, seed=0))
+
+
+def seeding(cfg):
+    with closing(Game(cfg)) as used, closing(Game(cfg)) as new:
+        return list(check_seeding(used, new, 4, seed=0))
+
+
+def test_a_sound_task_passes_every_check(game_of):
+    report = check_game(game_of(East, EastExpert), CheckCfg(starts=5, steps=10, episodes=6))
+    assert report.passed, report
+    assert {finding.status for finding in report.findings} == {Status.passed}
+    assert str(report).startswith("East: 12 passed, 0 failed, 0 skipped\npassed  build: players")
+    assert "solved at the end by the expert 100%" in report["goal"].message
+    with pytest.raises(KeyError, match="no check 'beauty'; there are"):
+        report["beauty"]
+
+
+@pytest.mark.parametrize(
+    ("task", "check", "name", "message"),
+    [
+        (UnseededStart, seeding, "seeding", "other bytes in a world that was used .* in a new"),
+        (StateOfTheLastEpisode, seeding, "seeding", "other bytes in a world that was used"),
+        (FixedStart, starts, "starts", "all 5 starts are equal"),
+        (
+            StartOutside,
+            starts,
+            "starts",
+            r"with agents outside the rooms at \(50.00, .* and 2 more",
+        ),
+        (EndsAtOnce, starts, "first step", "episode 0 terminates in its first step"),
+        (SolvedAtOnce, starts, "first step", "episode 0 is solved for agents at its start"),
+        (InfiniteTerm, random_play, "rewards", "term 'progress' of agents is nan"),
+        (InfiniteTerm, returns, "reward terms", "term 'progress' of agents is nan"),
+        (TermMissing, random_play, "rewards", r"agents has the terms \['progress'\], weights"),
+        (TermOfZeros, returns, "reward terms", "term 'arrived' is 0 in all steps of 4 episodes"),
+        (SilentWorld, random_play, "no constant observation", "'audio' of agents is equal in all"),
+    ],
+)
+def test_a_fault_is_reported(game_of, task, check, name, message):
+    found = {finding.check: finding for finding in check(game_of(task))}
+    assert found[name].status is Status.failed
+    assert re.search(message, found[name].message), found[name].message
+
+
+def test_observations_that_do_not_fit_their_specs_are_reported(game_of, monkeypatch):
+    with closing(Game(game_of(East))) as game:
+        (sense,) = game.senses["agents"].values()
+        (key,) = sense.specs
+        good = sense.compute()[key]
+        for wrong, message in (
+            (good[:-1], "specified is"),
+            (good.astype(np.float64), "float64, specified is"),
+            (np.full_like(good, np.nan), "is not finite"),
+        ):
+            monkeypatch.setattr(sense, "compute", lambda wrong=wrong: {key: wrong.copy()})
+            finding = next(check_random_play(game, 2, seed=0))
+            assert finding.status is Status.failed
+            assert message in finding.message
+
+
+def test_an_expert_that_is_worse_than_the_random_policy_is_reported(game_of):
+    _, expert, goal = returns(game_of(East, WalksWest))
+    assert (expert.status, goal.status) == (Status.failed, Status.failed)
+    assert "difference -" in expert.message
+    assert "by the expert 0%" in goal.message
+
+
+def test_checks_of_what_a_task_does_not_have_are_skipped(game_of):
+    assert [f.status for f in returns(game_of(NoGoal))[1:]] == [Status.skipped] * 2
+    goal = returns(game_of(NoGoal, EastExpert))[2]
+    assert goal.status is Status.skipped
+    assert "does not define solved()" in goal.message
+
+
+def test_an_exception_of_the_task_is_reported_with_its_place(game_of):
+    report = check_game(game_of(FailsInReward), QUICK)
+    assert not report.passed
+    assert report["build"].status is Status.passed
+    for name in ("seeding", "first step", "rewards", "reward terms", "expert"):
+        assert report[name].status is Status.failed
+        assert report[name].message.startswith("ZeroDivisionError: float division by zero (")
+        assert "test_check_task.py" in report[name].message
+        assert "in reward)" in report[name].message
+
+
+def test_what_cannot_be_built_is_not_played(game_of):
+    report = check_game(game_of(FailsInBuild), QUICK)
+    assert "RuntimeError: no such furniture" in report["build"].message
+    assert [f.check for f in report.failed] == ["build"]
+    assert {f.status for f in report.findings[1:]} == {Status.skipped}
+
+
+def test_classes_that_are_not_registered_and_impossible_numbers_are_refused():
+    with pytest.raises(ValueError, match="task 'East' is not registered; decorate"):
+        veca_marl.check_task(East)
+    with pytest.raises(ValueError, match="episodes=1 must be at least 2"):
+        CheckCfg(episodes=1)
+    with pytest.raises(ValueError, match="seed=-1 must be 0 or more"):
+        CheckCfg(seed=-1)
