@@ -11,6 +11,7 @@ import torch
 
 from veca_marl.algos.training.checkpoint import CheckpointError
 from veca_marl.config import ConfigError, compose
+from veca_marl.envs.core.benchmark import Benchmark, parameters, start_digests
 from veca_marl.evaluate import main as evaluate
 from veca_marl.runs.assembly import make_trainer
 from veca_marl.runs.run_folder import RunFolder
@@ -170,6 +171,34 @@ def test_a_run_is_evaluated_against_another_opponent(played, tmp_path, capsys):
 )
 def test_a_change_that_does_not_fit_is_refused(played, capsys, override, message):
     assert evaluate([f"run={played / 'run'}", override]) == 2
+    assert message in capsys.readouterr().err
+
+
+def test_frozen_episodes_are_those_of_their_seed(played, tmp_path, capsys, monkeypatch):
+    run, table = f"run={played / 'run'}", tmp_path / "table.json"
+    assert evaluate([run, "episodes=2", "seed=77", f"evaluate.json={table}"]) == 0
+    expected = json.loads(table.read_text())
+    game = compose(TASK).game
+    starts = tuple(start_digests(game, 77, range(2)))
+    frozen = Benchmark("PushOut1v1", 3, 77, parameters(game.task), starts)
+    monkeypatch.setattr("veca_marl.evaluate.find_benchmark", lambda task: frozen)
+    capsys.readouterr()
+    assert evaluate([run, "episodes=benchmark", f"evaluate.json={table}"]) == 0
+    line = capsys.readouterr().out.splitlines()[0]
+    assert line == "benchmark of PushOut1v1, version 3: 2 frozen episodes"
+    assert json.loads(table.read_text()) == [{**row, "benchmark": 3} for row in expected]
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["episodes=benchmark"], "differs in task.max_seconds=1.0 (not "),
+        (["episodes=benchmark", "seed=2"], "seed=2: the benchmark has a seed of its own"),
+        (["episodes=all"], "episodes must be a number or 'benchmark', got 'all'"),
+    ],
+)
+def test_other_games_than_the_benchmark_are_refused(played, capsys, words, message):
+    assert evaluate([f"run={played / 'run'}", *words]) == 2
     assert message in capsys.readouterr().err
 
 

@@ -3,7 +3,7 @@
 The episodes are played on the configuration stored with the run. Other overrides change it:
 ``senses/audio=mono``, ``opponent.defender=expert``, ``task.max_seconds=30``. The policies must fit:
 the same senses in the same shapes, the same actions. The random policy plays the same episodes
-against the same opponents.
+against the same opponents. ``episodes=benchmark`` plays the frozen episodes of the task.
 """
 
 from __future__ import annotations
@@ -29,11 +29,14 @@ from veca_marl.config import Config, ConfigError, one_line, to_config
 from veca_marl.config.command_line import CommandLine
 from veca_marl.config.stored import change
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
+from veca_marl.envs.core.benchmark import Benchmark, find_benchmark
 from veca_marl.runs.run_folder import open_run
 
 _ERRORS = (CheckpointError, WriteError)
 Table = dict[str, dict[str, Scores]]
 """Scores by player (policy, random) and team."""
+BENCHMARK = "benchmark"
+"""Value of ``episodes`` for the frozen episodes of the task."""
 
 
 @dataclass
@@ -56,24 +59,46 @@ class EvaluateOptions:
 
     Attributes:
         run: Folder of a run (its latest checkpoint is used), or a checkpoint in it.
-        episodes: Number of episodes.
-        seed: Seed of the episodes.
+        episodes: Number of episodes, or ``benchmark`` for the frozen episodes of the task; the
+            parameters of the task and all starts must be those of the benchmark.
+        seed: Seed of the episodes; None is 1, or that of the benchmark.
         evaluate: How they are played.
     """
 
     run: str = MISSING
-    episodes: int = 32
-    seed: int = 1
+    episodes: int | str = 32
+    seed: int | None = None
     evaluate: EvaluateCfg = field(default_factory=EvaluateCfg)
 
     def __post_init__(self) -> None:
-        if self.episodes < 1:
+        if isinstance(self.episodes, str):
+            self._check_benchmark()
+        elif self.episodes < 1:
             raise ValueError(f"episodes must be at least 1, got {self.episodes}")
-        if self.seed < 0:
+        if self.seed is not None and self.seed < 0:
             raise ValueError(f"seed must be 0 or more, got {self.seed}")
 
+    def _check_benchmark(self) -> None:
+        if self.episodes != BENCHMARK:
+            raise ValueError(f"episodes must be a number or {BENCHMARK!r}, got {self.episodes!r}")
+        if self.seed is not None:
+            raise ValueError(f"seed={self.seed}: the benchmark has a seed of its own")
 
-def evaluate_run(options: EvaluateOptions, overrides: Sequence[str] = ()) -> Table:
+
+@dataclass(frozen=True)
+class Evaluated:
+    """Scores, and the episodes that they belong to.
+
+    Attributes:
+        table: The scores.
+        benchmark: The frozen episodes that were played; None for others.
+    """
+
+    table: Table
+    benchmark: Benchmark | None
+
+
+def evaluate_run(options: EvaluateOptions, overrides: Sequence[str] = ()) -> Evaluated:
     """Return the scores of each team by its policy, and by a random one in the same episodes.
 
     Args:
@@ -81,13 +106,16 @@ def evaluate_run(options: EvaluateOptions, overrides: Sequence[str] = ()) -> Tab
         overrides: Changes of the stored configuration.
 
     Raises:
-        ConfigError: If there is no run, or a choice is impossible.
+        ConfigError: If there is no run, a choice is impossible, or the starts are not those of the
+            benchmark.
         CheckpointError: If the policies do not fit.
     """
     checkpoint = Path(options.run)
     cfg = _configuration(checkpoint, overrides)
     exploration = options.evaluate.exploration or cfg.eval.exploration
-    env = _make_env(cfg, options)
+    benchmark = _checked_benchmark(cfg) if options.episodes == BENCHMARK else None
+    episodes, seed = _episodes(options, benchmark)
+    env = _make_env(cfg, episodes, seed)
     actors = {
         team: load_actor(cfg.frozen.get(team, checkpoint), team, spec)
         for team, spec in team_specs(env).items()
@@ -98,11 +126,26 @@ def evaluate_run(options: EvaluateOptions, overrides: Sequence[str] = ()) -> Tab
         "random": RandomTeams(env, learnt, [actors[team] for team in cfg.frozen]),
     }
     table = {
-        name: evaluate(env, player, options.episodes, options.seed, exploration)
-        for name, player in players.items()
+        name: evaluate(env, player, episodes, seed, exploration) for name, player in players.items()
     }
     env.close()
-    return table
+    return Evaluated(table, benchmark)
+
+
+def _checked_benchmark(cfg: Config) -> Benchmark:
+    try:
+        benchmark = find_benchmark(cfg.task.name)
+        benchmark.check(cfg.game)
+    except ValueError as error:
+        raise ConfigError(one_line(error)) from error
+    return benchmark
+
+
+def _episodes(options: EvaluateOptions, benchmark: Benchmark | None) -> tuple[int, int]:
+    """Return the number of the episodes and their seed."""
+    if benchmark is not None:
+        return len(benchmark.starts), benchmark.seed
+    return int(options.episodes), 1 if options.seed is None else options.seed
 
 
 def _configuration(checkpoint: Path, overrides: Sequence[str]) -> Config:
@@ -115,9 +158,9 @@ def _configuration(checkpoint: Path, overrides: Sequence[str]) -> Config:
     return to_config(node)
 
 
-def _make_env(cfg: Config, options: EvaluateOptions) -> VecaEnv:
+def _make_env(cfg: Config, episodes: int, seed: int) -> VecaEnv:
     try:
-        return VecaEnv(cfg.game, min(options.episodes, cfg.eval.worlds), options.seed)
+        return VecaEnv(cfg.game, min(episodes, cfg.eval.worlds), seed)
     except ValueError as error:
         raise ConfigError(one_line(error)) from error
 
@@ -160,8 +203,11 @@ def _cell(value: object) -> str:
 def run(options: EvaluateOptions, overrides: list[str]) -> None:
     """Evaluate, print the table and the paired comparison, write the JSON file."""
     torch.set_num_threads(1)
-    table = evaluate_run(options, overrides)
-    rows = summary(table)
+    evaluated = evaluate_run(options, overrides)
+    table, rows = evaluated.table, summary(evaluated.table)
+    if evaluated.benchmark is not None:
+        print(evaluated.benchmark)
+        rows = [{**row, BENCHMARK: evaluated.benchmark.version} for row in rows]
     print(*lines(rows), sep="\n")
     for team, scores in table["policy"].items():
         print(comparison_line(team, scores, table["random"][team]))
