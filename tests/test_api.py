@@ -38,7 +38,7 @@ def test_train_returns_metrics_and_a_policy_and_stores_the_run(tmp_path):
 
 def test_train_stays_a_function_after_the_module_of_the_command_was_imported():
     assert import_module("veca_marl.train") is veca_marl.train
-    with pytest.raises(ConfigError, match="unknown task 'Chess'; choices: CrawlBaby"):
+    with pytest.raises(ConfigError, match="unknown task 'Chess'; choices: BabyzumasRevenge"):
         veca_marl.train("Chess")
 
 

@@ -102,7 +102,7 @@ def test_files_hold_only_what_differs_from_the_dataclasses():
         ([KICK, "playground=hose"], r"unknown playground 'hose'.*; choices: .*single_room"),
         ([KICK, "senses.audio.quality=loud"], r"'loud', expected one of \[hrtf, stereo, mono\]"),
         ([KICK, "algo.clip=-1"], r"algo.clip must be positive, got -1.0"),
-        ([KICK, "task.name=Nim"], r"unknown task 'Nim'.*; choices: CrawlBaby"),
+        ([KICK, "task.name=Nim"], r"unknown task 'Nim'.*; choices: BabyzumasRevenge"),
         ([KICK, "total_frames=0"], r"total_frames must be at least 1, got 0"),
         ([KICK, "algo.minibatches=9999"], r"a batch of \d+ frames cannot be split"),
         ([KICK, "see d=1"], r"see d=1"),

@@ -121,7 +121,7 @@ def all_specs() -> dict[str, ArraySpec]:
     """Return the specification of every key, everything on request switched on."""
     on_request = [f"{row[3]}" for row in MEANINGS.values() if row[3]]
     specs: dict[str, ArraySpec] = {}
-    for task in ("KickTheBall", "TurnBaby"):
+    for task in ("KickTheBall", "TurnBaby", "MazeNav"):
         specs |= game_specs(Game(choose(task, overrides=on_request)))["agents"]
     return specs
 

@@ -13,7 +13,7 @@ from veca_marl.reports.page import remarks
 from veca_marl.reports.runs import runs_of, team_of
 from veca_marl.sweeps.run_state import RunState
 
-EXPERIMENT = ["+experiment=audio_ablation", "total_frames=200"]
+EXPERIMENT = ["+experiment=audio_ablation", "experiment.seeds=[0,1,2]", "total_frames=200"]
 RETURNS = {"hrtf": (6.0, 6.5, 7.0), "stereo": (5.0, 5.5, 6.0), "mono": (0.0, 0.5, 0.2)}
 
 

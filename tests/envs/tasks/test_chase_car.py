@@ -108,7 +108,7 @@ def test_what_cannot_be_played_is_refused(override, message):
 
 def test_both_kinds_of_moves_have_the_verb_beside_them(game):
     assert set(game.players[0].body.action_spec) == {"move", "verb"}
-    discrete = game_of("body=walker_discrete_verbs")
+    discrete = game_of("body.action=discrete")
     spec = discrete.players[0].body.action_spec
     assert spec["move"].is_discrete
     assert spec["verb"].names == ("none", "press")

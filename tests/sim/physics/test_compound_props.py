@@ -8,7 +8,7 @@ from walking import ball, box, empty_world, film, let_pass, walker_in
 
 from veca_marl.config import compose
 from veca_marl.sim.geometry import joined_inertia, primitive_inertia
-from veca_marl.sim.physics import PartCfg, PropCfg, PropShape, World, pybullet
+from veca_marl.sim.physics import PartCfg, PlaygroundCfg, PropCfg, PropShape, World, pybullet
 from veca_marl.sim.physics.props.prop_shapes import prop_geoms
 
 
@@ -188,3 +188,13 @@ def test_a_walker_stops_at_every_part_of_a_fixed_compound():
         walker.act(walker.encode((1.0, 0.0)))
         world.step()
     assert walker.position[0] == pytest.approx(1.0 - 0.05 - walker.radius_m, abs=0.003)
+
+
+@pytest.mark.parametrize("shape", ["pyramid", "doll"])
+def test_building_prints_nothing(shape, capfd):
+    """Without a visual shape Bullet looks for the files of hulls again and warns on the console."""
+    sizes = {"pyramid": [0.1, 0.1, 0.1], "doll": [0.2]}
+    world = World(PlaygroundCfg())
+    world.add_prop(PropCfg(name="thing", shape=PropShape[shape], size_m=sizes[shape], mass_kg=0.1))
+    world.close()
+    assert "annot find" not in capfd.readouterr().out

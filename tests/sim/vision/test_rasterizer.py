@@ -80,7 +80,8 @@ def test_thin_primitives_are_complete_at_a_distance():
 def test_rays_parallel_to_faces_and_axes():
     """Such rays cause divisions by zero."""
     camera = Camera(63, 63)
-    for shape, size in zip(Shape, [(0.2,), (0.2, 0.3, 0.4), (0.2, 0.5), (0.2, 0.5)], strict=True):
+    sizes = [(0.2,), (0.2, 0.3, 0.4), (0.2, 0.5), (0.2, 0.5)]
+    for shape, size in zip(list(Shape)[:4], sizes, strict=True):
         scene = Scene()
         scene.add_object("thing", [[Geom(shape, size)]])
         scene.update()

@@ -42,7 +42,8 @@ def shape_arguments(shape: Shape, size: Sequence[float]) -> dict[str, Any]:
 def create_collision_shape(client: int, primitives: Sequence[Primitive]) -> int:
     """Create one collision shape of one or several primitives on the same frame; return its id.
 
-    Bullet reads hulls from files only when there are several shapes; the files are deleted.
+    Bullet reads hulls from files only when there are several shapes; the files are deleted. A body
+    with such a shape needs a visual shape, see `unused_visual_shape`.
     """
     with tempfile.TemporaryDirectory() as folder:
         arguments = [
@@ -62,6 +63,19 @@ def create_collision_shape(client: int, primitives: Sequence[Primitive]) -> int:
             physicsClientId=client,
         )
     return int(shape)
+
+
+def unused_visual_shape(client: int, primitives: Sequence[Primitive]) -> int:
+    """Return the id of a visual shape for a body with these primitives; -1 if it needs none.
+
+    For a body without one Bullet draws the collision shape itself, and would read the files of
+    hulls again, which are deleted. Its pictures are not used: eyes see the scene.
+    """
+    if not any(part.hull for part in primitives):
+        return -1
+    return int(
+        pybullet.createVisualShape(pybullet.GEOM_SPHERE, radius=0.001, physicsClientId=client)
+    )
 
 
 def _with_file(primitive: Primitive, path: Path) -> dict[str, Any]:

@@ -19,7 +19,7 @@ from veca_marl.sim.geometry import (
 )
 from veca_marl.sim.physics.bullet import pybullet
 from veca_marl.sim.physics.clock import ClockCfg
-from veca_marl.sim.physics.collision_shapes import create_collision_shape
+from veca_marl.sim.physics.collision_shapes import create_collision_shape, unused_visual_shape
 from veca_marl.sim.physics.props.joint import LINK
 from veca_marl.sim.physics.props.joint_cfg import JointCfg, JointKind
 from veca_marl.sim.physics.props.prop_cfg import PropCfg
@@ -46,13 +46,15 @@ def create_prop_body(cfg: PropCfg, client: int, geoms: Sequence[Primitive]) -> t
     inertia = None if cfg.mass_kg == 0.0 else prop_inertia(geoms, cfg.mass_kg)
     frame, moments = inertial_frame(inertia)
     shapes = _collision_shapes(cfg, client, [_on_frame(geom, frame) for geom in geoms])
+    visual = unused_visual_shape(client, geoms)
     body_id: int = pybullet.createMultiBody(
         cfg.mass_kg,
         shapes[0],
+        visual,
         basePosition=frame.position.tolist(),
         baseOrientation=matrix_to_quaternion(frame.rotation).tolist(),
         physicsClientId=client,
-        **_links([_welded(shape, parent=-1) for shape in shapes[1:]]),
+        **_links([_welded(shape, parent=-1) for shape in shapes[1:]], visual),
     )
     pybullet.changeDynamics(body_id, -1, **prop_dynamics(cfg, moments), physicsClientId=client)
     _prepare_links(body_id, 0, len(shapes) - 1, cfg, client)
@@ -81,6 +83,7 @@ def create_attached_body(
     anchor, axis = np.asarray(joint.anchor_m, np.float64), np.asarray(joint.axis, np.float64)
     at_anchor = Pose(anchor, np.eye(3))
     shapes = _collision_shapes(cfg, client, [_on_frame(geom, at_anchor) for geom in geoms])
+    visual = unused_visual_shape(client, geoms)
     leaf = _Link(
         shapes[0],
         mass_kg=cfg.mass_kg,
@@ -93,7 +96,7 @@ def create_attached_body(
         baseMass=0.0,
         basePosition=anchor.tolist(),
         physicsClientId=client,
-        **_links([leaf, *(_welded(shape, parent=LINK) for shape in shapes[1:])]),
+        **_links([leaf, *(_welded(shape, parent=LINK) for shape in shapes[1:])], visual),
     )
     dynamics = prop_dynamics(cfg, moments)
     if moments is not None:
@@ -161,7 +164,7 @@ def _welded(shape: int, parent: int) -> _Link:
     return _Link(shape, parent)
 
 
-def _links(links: Sequence[_Link]) -> dict[str, Any]:
+def _links(links: Sequence[_Link], visual: int) -> dict[str, Any]:
     """Return the arguments of `createMultiBody` for links that share the frame of their base."""
     if not links:
         return {}
@@ -169,7 +172,7 @@ def _links(links: Sequence[_Link]) -> dict[str, Any]:
     return {
         "linkMasses": [link.mass_kg for link in links],
         "linkCollisionShapeIndices": [link.shape for link in links],
-        "linkVisualShapeIndices": [-1] * len(links),
+        "linkVisualShapeIndices": [visual] * len(links),
         "linkPositions": [(0.0, 0.0, 0.0)] * len(links),
         "linkOrientations": [identity] * len(links),
         "linkInertialFramePositions": [link.centre.tolist() for link in links],
