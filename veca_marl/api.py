@@ -203,10 +203,10 @@ def check_task(
     """Check a task, for people who write one; ``print(check_task(MyTask))`` shows the results.
 
     The checks: it builds; TorchRL accepts its specs; the same seed gives the same bytes in new and
-    used worlds, another seed others; starts are inside the rooms, differ, and are neither over nor
-    solved; observations fit their specs and change; rewards are finite and each term is reached;
-    the expert, if there is one, has a higher return than the random policy and solves more
-    episodes; the time of a step.
+    used worlds, another seed others; starts are inside the rooms, differ, are not over, and not
+    some of them are solved; observations fit their specs and change; rewards are finite and each
+    term is reached; the expert, if there is one, has a higher return than the random policy and
+    solves more episodes; the time of a step.
 
     Args:
         task: A registered class, or its name.

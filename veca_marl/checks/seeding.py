@@ -11,6 +11,7 @@ from veca_marl.checks.report import Finding, finding
 from veca_marl.envs.core.actions import random_action
 from veca_marl.envs.core.episodes import Episodes
 from veca_marl.envs.core.game import Game
+from veca_marl.envs.core.starts import start_state
 
 NAMES = ("seeding",)
 
@@ -41,7 +42,7 @@ def check_seeding(used: Game, new: Game, steps: int, seed: int) -> Iterator[Find
 
 
 def digest(game: Game, steps: int, seed: int) -> str:
-    """Return a hash of observations, reward terms and flags of a rollout of random actions."""
+    """Return a hash of poses, observations, terms and flags of a rollout of random actions."""
     total, episodes, rng, done = hashlib.sha256(), Episodes(seed), np.random.default_rng(seed), True
     for _ in range(steps):
         if done:
@@ -55,6 +56,8 @@ def digest(game: Game, steps: int, seed: int) -> str:
 
 
 def _add_observations(total: hashlib._Hash, game: Game) -> None:
+    """Add the poses, which senses need not show, and the observations."""
+    total.update(start_state(game).tobytes())
     for player in game.actors:
         for key, array in sorted(game.observe(player).items()):
             total.update(key.encode())

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -26,21 +26,23 @@ def check_starts(game: Game, starts: int, seed: int) -> Iterator[Finding]:
 
     Yields:
         ``starts``: bodies are inside the rooms, poses are finite, starts differ. ``first step``: no
-        episode ends or is solved by resting for one step.
+        episode ends by resting for one step, and not some of them are solved.
     """
     episodes, states, positions = Episodes(seed), [], []
-    outside, ended = [], []
+    outside, outcomes = [], []
     for number in range(starts):
         game.reset(episodes.next())
         states.append(start_state(game).tobytes())
         positions.append(np.array([player.body.position for player in game.players]))
         outside += _problems(game, number)
-        ended += _ends(_rest(game), number)
+        outcomes.append(_rest(game))
     different = len(set(states))
     if different == 1 and starts > 1:
         outside.append(f"all {starts} starts are equal: reset(rng) draws nothing that has effect")
     yield finding("starts", outside, f"{different} of {starts} differ; {_spread(game, positions)}")
-    yield finding("first step", ended, f"{starts} episodes continue while all players rest")
+    yield finding(
+        "first step", _ends(outcomes), f"{starts} episodes continue while all players rest"
+    )
 
 
 def _problems(game: Game, number: int) -> list[str]:
@@ -61,11 +63,21 @@ def _rest(game: Game) -> Outcome:
     return game.advance()
 
 
-def _ends(outcome: Outcome, number: int) -> list[str]:
-    if outcome.terminated:
-        return [f"episode {number} terminates in its first step"]
-    solved = sorted(name for name, value in outcome.solved.items() if value)
-    return [f"episode {number} is solved for {', '.join(solved)} at its start"] if solved else []
+def _ends(outcomes: Sequence[Outcome]) -> list[str]:
+    """Return the episodes that terminate, and the players for whom some of the starts are solved.
+
+    Where a goal is to avoid something, all starts are solved: that is no fault.
+    """
+    found = [
+        f"episode {n} terminates in its first step" for n, o in enumerate(outcomes) if o.terminated
+    ]
+    for name in outcomes[0].solved:
+        solved = [number for number, outcome in enumerate(outcomes) if outcome.solved[name]]
+        if 0 < len(solved) < len(outcomes):
+            found.append(
+                f"{len(solved)} of {len(outcomes)} episodes are solved for {name} at their start"
+            )
+    return found
 
 
 def _spread(game: Game, positions: list[Floats]) -> str:
