@@ -53,9 +53,19 @@ def differences(stored: Mapping[str, Any], asked: Mapping[str, Any]) -> list[Dif
 
 
 def _flat(node: Mapping[str, Any], path: str = "") -> Iterator[tuple[str, Any]]:
+    """Yield dotted paths and values; mappings in a list have their index as a name.
+
+    The number of a list's elements is a value of its own: an element that only one list has is a
+    difference, unlike a key that another version does not have.
+    """
     for name, value in node.items():
         key = f"{path}.{name}".lstrip(".")
         if isinstance(value, Mapping) and value:
             yield from _flat(value, key)
+            continue
+        if isinstance(value, list):
+            yield f"{key}.number", len(value)
+        if isinstance(value, list) and any(isinstance(each, Mapping) for each in value):
+            yield from _flat({str(index): each for index, each in enumerate(value)}, key)
         else:
             yield key, value

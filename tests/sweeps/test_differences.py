@@ -1,0 +1,29 @@
+"""How the configuration of a stored run is compared with the one that is asked for."""
+
+from veca_marl.sweeps.differences import differences
+
+BALL = {"name": "ball", "mass_kg": 0.3, "size_m": [0.1]}
+BOX = {"name": "box", "mass_kg": 1.0, "size_m": [0.1, 0.2, 0.3]}
+
+
+def props(*cfgs):
+    return {"playground": {"props": list(cfgs)}}
+
+
+def test_equal_configurations_do_not_differ():
+    assert differences(props(BALL, BOX), props(BALL, BOX)) == []
+
+
+def test_a_key_that_another_version_lacks_is_told_from_a_changed_value_in_lists_too():
+    (added,) = differences(props(BALL, BOX), props(BALL, {**BOX, "joint": None}))
+    assert (added.key, added.of_version) == ("playground.props.1.joint", True)
+    (changed,) = differences(props(BALL, BOX), props(BALL, {**BOX, "mass_kg": 2.0}))
+    assert not changed.of_version
+    assert str(changed) == "playground.props.1.mass_kg is 1.0 there and 2.0 here"
+
+
+def test_lists_of_other_lengths_differ():
+    for stored, asked in ((props(), props(BALL)), (props(BALL, BOX), props(BALL))):
+        assert any(not d.of_version for d in differences(stored, asked))
+    lists = {"channels": []}, {"channels": [16]}
+    assert any(not d.of_version for d in differences(*lists))
