@@ -38,6 +38,8 @@ def other_body(task, own):
         return "walker"
     if not isinstance(own, WalkerCfg):
         return "mitten_position"
+    if own.verbs:
+        return "walker_discrete_verbs"
     # where players call, the house is silent without voices: the ears would be constant
     return "walker_discrete" if own.voice is VoiceKind.silent else "walker_discrete_voice"
 

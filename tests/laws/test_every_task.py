@@ -193,7 +193,8 @@ def test_the_group_map_names_every_player_once(env):
 def test_the_expert_has_a_higher_return_than_the_random_policy(task, cfg, kind):
     # between two teams the random policy wins half of its games: its mean needs many of them; so
     # does that of an expert with a body that is not the task's own (PutDownBlock by set-points)
-    single = (6, 3) if kind == "own" else (40, 3)
+    # a random walk reaches the target, or is missed by the car, in some episodes
+    single = (6, 12) if kind == "own" else (40, 12)
     n_expert, n_random = single if len(cfg.teams) == 1 else (10, 40)
     if task in CONTESTS and kind == "own":
         # crawling bodies hardly score at random; their experts need neither eyes nor skin
