@@ -13,7 +13,7 @@ RADIUS_M = 0.11
 
 
 class FloorMap:
-    """Cells whose centre a disc can occupy, in the rooms and in the openings of doors."""
+    """Cells in the centre of which a disc fits, in the rooms and in the openings of doors."""
 
     def __init__(self, playground, radius_m=RADIUS_M):
         low = np.min([room.lower_m[:2] for room in playground.rooms], axis=0)

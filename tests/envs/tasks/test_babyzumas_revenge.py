@@ -2,18 +2,15 @@
 
 import numpy as np
 import pytest
-from composed import compose
+import started
 
-from veca_marl.envs.core.game import Game
 from veca_marl.envs.core.team import Script
 
 SMALL = ("senses.vision.width=32", "senses.vision.height=32", "senses.audio.present=false")
 
 
 def game_of(*overrides):
-    game = Game(compose(["+task=BabyzumasRevenge", *SMALL, *overrides]).game)
-    game.reset(np.random.default_rng(0))
-    return game
+    return started.game_of("BabyzumasRevenge", *SMALL, *overrides)
 
 
 @pytest.fixture(scope="module")

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+import started
 from composed import compose
 
 from veca_marl.envs.core.game import Game
@@ -14,9 +15,7 @@ NUMB = "senses/touch=numb"
 
 
 def game_of(*overrides):
-    game = Game(compose(["+task=ChaseCar", NUMB, *overrides]).game)
-    game.reset(np.random.default_rng(0))
-    return game
+    return started.game_of("ChaseCar", NUMB, *overrides)
 
 
 @pytest.fixture(scope="module")

@@ -4,9 +4,8 @@ import math
 
 import numpy as np
 import pytest
-from composed import compose
+import started
 
-from veca_marl.envs.core.game import Game
 from veca_marl.envs.core.team import Script
 from veca_marl.envs.tasks.sorting.items import COLOURS
 from veca_marl.sim.body.walker import WalkCommand
@@ -15,9 +14,7 @@ SMALL_EYES = ("senses.vision.width=32", "senses.vision.height=32")
 
 
 def game_of(*overrides):
-    game = Game(compose(["+task=ColorSort", *SMALL_EYES, *overrides]).game)
-    game.reset(np.random.default_rng(0))
-    return game
+    return started.game_of("ColorSort", *SMALL_EYES, *overrides)
 
 
 @pytest.fixture(scope="module")

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+import started
 from composed import compose
 
 from veca_marl.envs.core.game import Game
@@ -14,9 +15,7 @@ STEP_S = 0.04
 
 
 def game_of(*overrides):
-    game = Game(compose(["+task=DodgeCar", *SMALL_EYES, *overrides]).game)
-    game.reset(np.random.default_rng(0))
-    return game
+    return started.game_of("DodgeCar", *SMALL_EYES, *overrides)
 
 
 @pytest.fixture(scope="module")

@@ -5,9 +5,8 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from composed import compose
+import started
 
-from veca_marl.envs.core.game import Game
 from veca_marl.envs.core.team import Script
 from veca_marl.envs.tasks.sorting.circles import RADIUS_M, division
 from veca_marl.sim.body.walker import WalkCommand
@@ -16,9 +15,7 @@ SMALL_EYES = ("senses.vision.width=32", "senses.vision.height=32")
 
 
 def game_of(*overrides):
-    game = Game(compose(["+task=FillFraction", *SMALL_EYES, *overrides]).game)
-    game.reset(np.random.default_rng(0))
-    return game
+    return started.game_of("FillFraction", *SMALL_EYES, *overrides)
 
 
 @pytest.fixture(scope="module")

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+import started
 from composed import compose
 
 from veca_marl.envs.core.game import Game
@@ -16,9 +17,7 @@ STAND = {"agents": np.zeros(2, np.float32)}
 
 
 def game_of(*overrides):
-    game = Game(compose(["+task=MazeNav", *SMALL_EYES, *overrides]).game)
-    game.reset(np.random.default_rng(0))
-    return game
+    return started.game_of("MazeNav", *SMALL_EYES, *overrides)
 
 
 @pytest.fixture(scope="module")

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+import started
 from composed import compose
 
 from veca_marl.envs.core.game import Game
@@ -17,9 +18,7 @@ REACH_M = 0.3
 
 
 def game_of(*overrides):
-    game = Game(compose(["+task=ObjectNav", *SMALL_EYES, *overrides]).game)
-    game.reset(np.random.default_rng(0))
-    return game
+    return started.game_of("ObjectNav", *SMALL_EYES, *overrides)
 
 
 @pytest.fixture(scope="module")

@@ -2,9 +2,8 @@
 
 import numpy as np
 import pytest
-from composed import compose
+import started
 
-from veca_marl.envs.core.game import Game
 from veca_marl.envs.core.team import Script
 from veca_marl.envs.tasks.sorting.items import COLOURS
 
@@ -13,9 +12,7 @@ ALL_SHAPES = ("task.shapes=[sphere,cube,pyramid,cylinder,doll]", "task.items=1")
 
 
 def game_of(*overrides):
-    game = Game(compose(["+task=ShapeSort", *SMALL_EYES, *overrides]).game)
-    game.reset(np.random.default_rng(0))
-    return game
+    return started.game_of("ShapeSort", *SMALL_EYES, *overrides)
 
 
 @pytest.fixture(scope="module")

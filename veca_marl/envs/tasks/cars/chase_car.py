@@ -42,7 +42,7 @@ class ChaseCarCfg(CarGameCfg):
 
 @register
 class ChaseCar(CarGame):
-    """A toy car drives away from the player, who has to come near and press it, but not touch it.
+    """A toy car drives away from the player. The player has to come near and press it.
 
     The player presses the car by the choice `press` of the action part `verb`, while the car is
     interactable: visible and within `body.interaction_range_m`, 1 m with the default body. A press

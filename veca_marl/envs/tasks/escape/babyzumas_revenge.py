@@ -44,8 +44,8 @@ class BabyzumasRevengeCfg(TaskCfg):
 class BabyzumasRevenge(Task):
     """An agent has to find the key that opens the door to the next room.
 
-    The agent starts in the first room of the playground, whose only door is closed by a locked
-    leaf. A cupboard stands at a wall, at a place drawn for each episode. Its drawer is opened with
+    The agent starts in the first room of the playground. Its only door is closed by a locked leaf.
+    A cupboard stands at a wall, at a place drawn for each episode. Its drawer is opened with
     the verb `open`; the key inside can then be seen and taken with `grab`. With the key in the
     hand, `open` unlocks and opens the door. A verb is applied to what is nearest to the centre of
     the view, up to 1.5 m away, of the things that declare it. The episode terminates when the

@@ -50,7 +50,7 @@ class KeyDrawer(NamedTuple):
 
 
 def add_key_drawer(world: World, key_sound: SoundCfg) -> KeyDrawer:
-    """Add a cupboard whose drawer can be opened, and a key, to a world that is not frozen yet."""
+    """Add a cupboard with a drawer that opens, and a key, to a world that is not frozen yet."""
     size_m = (_DEPTH_M, _WIDTH_M, _HEIGHT_M)
     case, drawer = cupboard_with_drawer("cupboard", (0.0, 0.0), size_m=size_m)
     return KeyDrawer(

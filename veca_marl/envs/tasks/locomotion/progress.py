@@ -33,7 +33,7 @@ class ForwardProgress:
         Args:
             position: ``(3,)`` metres.
             forward: ``(3,)``, the direction that the body faces; its vertical part is ignored, and
-                a vector whose horizontal part is shorter than 1 scales the speed.
+                a vector with a horizontal part shorter than 1 scales the speed.
         """
         displacement, self._position = horizontal(position - self._position), position
         along = min(float(displacement @ self._start_forward), float(displacement @ forward))

@@ -38,7 +38,7 @@ class Capsule:
     Args:
         client: The PyBullet client.
         scene: The scene that shows the props.
-        form: The capsule, in a frame whose x axis is the walker's heading.
+        form: The capsule, in a frame with the walker's heading as x axis.
         centre_height_m: Height of its centre above the surface on which the walker is.
         push_limit_kg: Props up to this mass are pushed.
 

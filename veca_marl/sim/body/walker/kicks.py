@@ -69,7 +69,7 @@ def is_first_hit(
         height_m: Height of the ray.
 
     Returns:
-        True also if the ray hits nothing, as with a goal whose centre is open, and if `end` is
+        True also if the ray hits nothing, as with the open centre of a goal, and if `end` is
         nearer than `skip_m`.
     """
     length_m, skip_m = horizontal_distance(start, end), skip_m + _CLEARANCE_M

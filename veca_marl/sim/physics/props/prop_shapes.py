@@ -137,7 +137,7 @@ def _is_large(box: Geom) -> bool:
 
 
 def _outline(geom: Geom) -> Floats:
-    """Return points ``(n, 3)`` whose hull, with `_roundness` around it, contains a primitive."""
+    """Return points ``(n, 3)``; their hull, with `_roundness` around it, contains a primitive."""
     if geom.shape in (Shape.BOX, Shape.POLYHEDRON):
         return geom.corners()
     return np.stack(geom.cap_centres())

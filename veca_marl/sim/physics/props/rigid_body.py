@@ -114,7 +114,7 @@ def inertial_frame(inertia: Inertia | None) -> tuple[Pose, Floats | None]:
     Poses of the body in Bullet are therefore those of its inertial frame.
 
     Args:
-        inertia: Of the prop in its frame; None for a fixed prop, whose own frame is returned.
+        inertia: Of the prop in its frame; None for a fixed prop; its own frame is returned.
 
     Returns:
         The pose, its rotation the identity where the axes of the prop are principal axes, and the
@@ -156,7 +156,7 @@ class _Link:
 def _welded(shape: int, parent: int) -> _Link:
     """Return a link without mass that is fixed to another: a further shape of the same body.
 
-    A movable body whose shapes are on different links has one manifold of contacts for each of
+    A movable body with its shapes on different links has one manifold of contacts for each of
     them, in the order of the links. With several shapes on one link the order depends on earlier
     episodes, and a reset would not restore the built state bit by bit. Fixed bodies have no such
     fault, and one link: 30 pieces of furniture of 6 parts take a quarter of the time of 180 boxes.

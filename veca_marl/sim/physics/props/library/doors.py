@@ -10,7 +10,7 @@ from veca_marl.sim.physics.props.prop_shape import PropShape
 Colour = tuple[float, float, float]
 
 DOOR_KG = 3.0
-"""Light enough for a walker, whose limit is 5 kg by default; a real leaf has about 20 kg."""
+"""Light enough for a walker (`push_limit_kg` is 5 by default); a real leaf has about 20 kg."""
 
 _GAP_M = 0.01  # to the frame on either side and to the floor
 _THICKNESS_M = 0.04
