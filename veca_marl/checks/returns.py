@@ -13,6 +13,7 @@ from veca_marl.checks.report import Finding, Status, finding
 from veca_marl.envs.core.episodes import Episodes
 from veca_marl.envs.core.expert import has_expert
 from veca_marl.envs.core.game import Game
+from veca_marl.envs.core.scripted_episodes import first_team, play_to_end
 from veca_marl.envs.core.team import Script
 
 NAMES = ("reward terms", "expert", "goal")
@@ -68,20 +69,12 @@ def _play_all(game: Game, script: Script, episodes: int, seed: int) -> list[_Pla
 
 
 def _play(game: Game, script: Script, rng: np.random.Generator) -> _Played:
-    team = [p for p in game.actors if p.team == game.actors[0].team]
-    others = [p for p in game.actors if p not in team]
-    score, nonzero, problems, done = 0.0, set[str](), list[str](), False
+    team, score, nonzero, problems = first_team(game), 0.0, set[str](), list[str]()
     game.reset(rng)
-    while not done:
-        for player in team:
-            game.play_script(player, script)
-        for player in others:
-            game.play_script(player, Script.random)
-        outcome = game.advance()
+    for outcome in play_to_end(game, script):
         score += float(np.mean([game.reward_of(outcome.terms[p.name]) for p in team]))
         nonzero |= {n for terms in outcome.terms.values() for n, value in terms.items() if value}
         problems += reward_problems(game, outcome)
-        done = outcome.done
     solved = float(np.mean([outcome.solved.get(p.name, False) for p in team]))
     return _Played(score, solved, frozenset(nonzero), tuple(dict.fromkeys(problems)))
 

@@ -9,7 +9,7 @@ parameters of the task, and a digest of each start, by which a change of the tas
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from contextlib import closing
 from dataclasses import asdict, dataclass
 from enum import Enum
@@ -50,15 +50,35 @@ class Benchmark:
         Raises:
             ValueError: If a parameter of the task or a start differs; the message names them.
         """
-        own = parameters(cfg.task)
+        self.check_parameters(cfg.task)
+        self.check_starts(start_digests(cfg, self.seed, range(len(self.starts))))
+
+    def check_parameters(self, cfg: TaskCfg) -> None:
+        """Check that the parameters of a task are those of the benchmark.
+
+        Raises:
+            ValueError: If one differs; the message names them.
+        """
+        own = parameters(cfg)
         differing = sorted(
             name for name in {*own, *self.parameters} if own.get(name) != self.parameters.get(name)
         )
         if differing:
             changes = [f"task.{n}={own.get(n)} (not {self.parameters.get(n)})" for n in differing]
             raise ValueError(f"episodes=benchmark: {self._name} differs in {', '.join(changes)}")
-        found = start_digests(cfg, self.seed, range(len(self.starts)))
-        others = [n for n, (a, b) in enumerate(zip(found, self.starts, strict=True)) if a != b]
+
+    def check_starts(self, found: Sequence[str], first: int = 0) -> None:
+        """Check that episodes start as those of the benchmark.
+
+        Args:
+            found: `start_digest` of consecutive episodes.
+            first: Number of the first of them.
+
+        Raises:
+            ValueError: If a start differs.
+        """
+        stored = self.starts[first : first + len(found)]
+        others = [n for n, (a, b) in enumerate(zip(found, stored, strict=True), first) if a != b]
         if others:
             raise ValueError(
                 f"episodes=benchmark: {len(others)} of {len(found)} starts are not those of "

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
-from typing import Any, Generic, TypeVar
+from typing import Any, ClassVar, Generic, TypeVar
 
 from numpy.typing import NDArray
 
@@ -23,9 +23,13 @@ class Expert(ABC, Generic[TaskT]):
     An expert keeps its own state and draws no random numbers.
 
     Attributes:
+        reads: Names of the senses that `act` reads; the game computes no others for it. None is
+            all senses of the player.
         task: The rules that are played.
         player: The player that the commands are for.
     """
+
+    reads: ClassVar[tuple[str, ...] | None] = None
 
     def __init__(self, task: TaskT, player: Player) -> None:
         self.task, self.player = task, player
@@ -38,7 +42,7 @@ class Expert(ABC, Generic[TaskT]):
         """Return the command for the next step. Called once per step.
 
         Args:
-            observation: The player's observation, by key.
+            observation: What the senses in `reads` observe, by key; more may be in it.
 
         Returns:
             A command that `Body.encode` turns into an action. For a walker, ``(forward, turn)``,

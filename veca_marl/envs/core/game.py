@@ -6,7 +6,7 @@ Every adapter (TorchRL, Gymnasium, PettingZoo) plays its episodes through this c
 from __future__ import annotations
 
 import logging
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
@@ -236,7 +236,8 @@ class Game:
         play_script(script_now, player, self._expert_command, self._episode_rng())
 
     def _expert_command(self, player: Player) -> Any:
-        return self.expert_of(player).act(self.observe(player))
+        expert = self.expert_of(player)
+        return expert.act(self.observe(player, expert.reads))
 
     def expert_of(self, player: Player) -> Expert[Any]:
         """Return the expert of a player. It is made at the first call and reset with the game.
@@ -279,11 +280,17 @@ class Game:
     def _non_finite_bodies(self) -> list[str]:
         return [player.name for player in self.players if not player.body.is_finite]
 
-    def observe(self, player: Player) -> Observation:
-        """Read all senses of a player; within one step, every call returns the same values."""
+    def observe(self, player: Player, names: Collection[str] | None = None) -> Observation:
+        """Read senses of a player; within one step, every call returns the same values.
+
+        Args:
+            player: The player.
+            names: Names of the senses to read, of those that the player has; None is all.
+        """
         observation: Observation = {}
-        for sense in self.senses[player.name].values():
-            observation.update(sense.read())
+        for name, sense in self.senses[player.name].items():
+            if names is None or name in names:
+                observation.update(sense.read())
         return observation
 
     def reward_of(self, terms: Mapping[str, float]) -> float:

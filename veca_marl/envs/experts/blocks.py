@@ -34,6 +34,8 @@ class PileUpBlockExpert(Expert[PileUpBlock]):
     the simulator (privileged).
     """
 
+    reads = ()
+
     def __init__(self, task: PileUpBlock, player: Player) -> None:
         super().__init__(task, player)
         self._carrier = Carrier(task.child, squeeze_m=0.025, carrying_m=0.005, thumbs_m=0.005)
@@ -61,6 +63,8 @@ class PutDownBlockExpert(Expert[PutDownBlock]):
 
     Reads the poses of the blocks and of its own bones from the simulator (privileged).
     """
+
+    reads = ()
 
     def __init__(self, task: PutDownBlock, player: Player) -> None:
         super().__init__(task, player)

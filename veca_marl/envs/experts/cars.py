@@ -38,6 +38,8 @@ class CarExpert(Expert[CarGameT]):
     to, and the room.
     """
 
+    reads = ()
+
     def reset(self) -> None:
         """See `Expert.reset`."""
         self._plans = walk_plans(_HORIZON_S, self.task.world.clock.step_s)

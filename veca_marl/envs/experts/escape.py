@@ -26,6 +26,8 @@ class BabyzumasRevengeExpert(Expert[BabyzumasRevenge]):
     drawer and door are open, and what its verbs would be applied to.
     """
 
+    reads = ()
+
     def reset(self) -> None:
         """See `Expert.reset`."""
         self._handling = Handling(self.task.walker, self.task.world)

@@ -28,6 +28,8 @@ class GrabObjectExpert(Expert[GrabObject]):
     Reads the poses of the toy and of its own bones from the simulator (privileged).
     """
 
+    reads = ()
+
     def __init__(self, task: GrabObject, player: Player) -> None:
         super().__init__(task, player)
         self._carrier = Carrier(task.child, upright=UPRIGHT, bent=BENT)
@@ -50,6 +52,8 @@ class MoveToTargetExpert(Expert[MoveToTarget]):
     Starts again after losing the toy. Reads the poses of the toy, the mark and its own bones from
     the simulator (privileged).
     """
+
+    reads = ()
 
     def __init__(self, task: MoveToTarget, player: Player) -> None:
         super().__init__(task, player)

@@ -22,6 +22,8 @@ class KickTheBallExpert(Expert[KickTheBall]):
     Reads the observation ``audio`` only; it uses no privileged state.
     """
 
+    reads = ("audio",)
+
     def act(self, observation: Mapping[str, NDArray[Any]]) -> tuple[float, float]:
         """Return (forward, turn), see `Expert.act`."""
         left, right = observation["audio"].mean(axis=-1)

@@ -22,6 +22,8 @@ class MazeNavExpert(Expert[MazeNav]):
     Reads privileged state: its own position and heading, the walls and the position of the object.
     """
 
+    reads = ()
+
     def reset(self) -> None:
         """See `Expert.reset`."""
         task, walker = self.task, self.task.walker

@@ -27,6 +27,8 @@ class SkillExpert(Expert[Task]):
         skill_type: The skill.
     """
 
+    reads = ()
+
     skill_type: ClassVar[type[TurnOver | SitUp | Running]]
 
     def __init__(self, task: Task, player: Player) -> None:
@@ -68,6 +70,8 @@ class CrawlBabyExpert(Expert[CrawlBaby]):
 
     Reads position and heading from the simulator (privileged).
     """
+
+    reads = ()
 
     def reset(self) -> None:
         """Take the heading at the start as the direction to crawl in."""

@@ -27,6 +27,8 @@ class MultiAgentNavExpert(Expert[MultiAgentNav]):
     visible. A crawling body needs up to a minute where a walker needs ten seconds.
     """
 
+    reads = ("audio",)
+
     def reset(self) -> None:
         """See `Expert.reset`."""
         body, world = self.player.body, self.task.world

@@ -29,6 +29,8 @@ class ObjectNavExpert(Expert[ObjectNav]):
     Reads privileged state: its own position and heading, and the positions of all props.
     """
 
+    reads = ()
+
     def reset(self) -> None:
         """See `Expert.reset`."""
         task, body = self.task, self.player.body

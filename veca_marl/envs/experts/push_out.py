@@ -24,6 +24,8 @@ class PushOutExpert(Expert[PushOut]):
     the positions and headings of all players from the simulator (privileged).
     """
 
+    reads = ()
+
     def reset(self) -> None:
         """See `Expert.reset`."""
         self._locomotion = locomotion_of(self.player, self.task.world.clock.step_s)

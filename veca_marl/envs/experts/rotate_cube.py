@@ -29,6 +29,8 @@ class RotateCubeExpert(Expert[RotateCube]):
     orientation of the cube and of its target from the simulator (privileged).
     """
 
+    reads = ()
+
     def __init__(self, task: RotateCube, player: Player) -> None:
         super().__init__(task, player)
         names = task.child.joint_names

@@ -22,6 +22,8 @@ class SoccerExpert(Expert[Soccer]):
     Reads the positions of the ball and of the players from the simulator (privileged).
     """
 
+    reads = ()
+
     def reset(self) -> None:
         """See `Expert.reset`."""
         step_s = self.task.world.clock.step_s

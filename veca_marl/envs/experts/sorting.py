@@ -24,6 +24,8 @@ TaskT = TypeVar("TaskT", bound=Task)
 class PuttingExpert(Expert[TaskT]):
     """Takes the nearest thing to the container where it belongs, one after the other."""
 
+    reads = ()
+
     def reset(self) -> None:
         """See `Expert.reset`."""
         self._handling = Handling(self.walker, self.task.world)

@@ -1,0 +1,127 @@
+"""The table of experts: what is played, stored, continued and refused."""
+
+import csv
+
+import pytest
+from scipy import stats
+
+from veca_marl.algos.evaluation.comparison import share_interval
+from veca_marl.envs.core.benchmark import SEED
+from veca_marl.envs.core.episodes import Episodes
+from veca_marl.envs.core.expert import Expert, find_expert
+from veca_marl.envs.core.game import Game
+from veca_marl.envs.core.team import Script
+from veca_marl.experts_table.command import main
+from veca_marl.experts_table.play import Played, game_cfg
+from veca_marl.experts_table.table import markdown
+
+SHORT = ("tasks=[DodgeCar]", "frozen=false", "task.max_seconds=0.4")
+
+
+def rows_of(folder, task="DodgeCar"):
+    with (folder / f"{task}.csv").open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def played(policy="expert", solved=1.0, score=1.0, episode=0):
+    return Played(policy, episode, score, solved, 100, 2, 0.5, "c", 1, "0123456789-dirty")
+
+
+@pytest.mark.parametrize(("successes", "trials"), [(0, 10), (3, 20), (95, 100), (100, 100)])
+def test_the_interval_of_a_share_is_that_of_wilson(successes, trials):
+    expected = stats.binomtest(successes, trials).proportion_ci(method="wilson")
+    assert share_interval(successes, trials) == pytest.approx((expected.low, expected.high))
+
+
+def test_a_second_call_plays_the_missing_episodes_only(tmp_path):
+    words = [*SHORT, f"to={tmp_path}"]
+    assert main([*words, "episodes=1"]) == 0
+    first = rows_of(tmp_path)
+    assert [(row["policy"], row["episode"]) for row in first] == [("expert", "0"), ("random", "0")]
+    with (tmp_path / "DodgeCar.csv").open("a") as file:
+        file.write("expert,1,0.3")  # a process was killed while it wrote
+    assert main([*words, "episodes=2"]) == 0
+    both = rows_of(tmp_path)
+    assert both[:2] == first
+    assert [row["episode"] for row in both[2:]] == ["1", "1"]
+    assert "| DodgeCar | expert | 2 (version 0) |" in (tmp_path / "table.md").read_text()
+
+
+@pytest.mark.slow
+def test_two_processes_play_the_same_episodes(tmp_path):
+    alone, together = tmp_path / "alone", tmp_path / "together"
+    assert main([*SHORT, f"to={alone}", "episodes=2"]) == 0
+    assert main([*SHORT, f"to={together}", "episodes=2", "processes=2"]) == 0
+
+    def scores(folder):
+        return {(row["policy"], row["episode"]): row["score"] for row in rows_of(folder)}
+
+    assert scores(alone) == scores(together)
+
+
+def test_the_stored_return_is_that_of_the_frozen_episode(tmp_path):
+    assert main([*SHORT, f"to={tmp_path}", "episodes=1"]) == 0
+    game = Game(game_cfg("DodgeCar", SHORT[2:]))
+    game.reset(Episodes(SEED, 0).next())
+    total, done = 0.0, False
+    while not done:
+        game.play_script(game.players[0], Script.expert)
+        outcome = game.advance()
+        total, done = total + game.reward_of(outcome.terms["agents"]), outcome.done
+    assert float(rows_of(tmp_path)[0]["score"]) == total
+    assert rows_of(tmp_path)[0]["steps"] == "10"
+    game.close()
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["tasks=[Dodge]"], "Dodge"),
+        (["tasks=[DodgeCar]", "episodes=101"], "episodes must be from 0 to 100, got 101"),
+        (["processes=0"], "processes must be at least 1, got 0"),
+        (["tasks=[DodgeCar]", "task.aim=0.5"], "task.aim=0.5 (not 0.6)"),
+        (["tasks=[DodgeCar]", "playground=single_room"], "starts are not those of the benchmark"),
+        (["tasks=[SoccerTwoPlayer]", "opponent.defender=runs/x"], "runs/x"),
+    ],
+)
+def test_what_cannot_be_played_is_refused(tmp_path, capsys, words, message):
+    assert main([*words, f"to={tmp_path}"]) == 2
+    assert message in capsys.readouterr().err
+    assert not (tmp_path / "table.md").exists()
+
+
+def test_episodes_of_another_configuration_are_not_mixed(tmp_path, capsys):
+    words = [*SHORT, f"to={tmp_path}", "episodes=1"]
+    assert main(words) == 0
+    assert main([*words, "task.aim=0.5"]) == 2
+    assert "episodes of another configuration: choose another folder" in capsys.readouterr().err
+
+
+def test_the_table_has_rates_with_intervals_and_marks_low_ones():
+    episodes = [played(solved=float(n < 15), score=n, episode=n) for n in range(20)]
+    episodes += [played("random", float(n < 5), -1.0, n) for n in range(20)]
+    table = markdown({"Walk": episodes, "Aimless": [played(solved=None)]}, {"Walk": "falls"})
+    head, _, aimless, expert, random, *_ = table.splitlines()
+    assert head.startswith("| task | policy | episodes | return | solved |")
+    assert "| no goal | 400 | 0123456-dirty |" in aimless
+    assert "| 20 (version 1) | 9.50 [6.73, 12.27] | 75% [53%, 89%] | 400 |" in expert
+    assert expert.endswith("| below 95%; falls |")
+    assert random.endswith("| above 20% |")
+
+
+def test_the_game_computes_only_the_senses_that_an_expert_reads(monkeypatch):
+    game = Game(game_cfg("KickTheBall", ()))
+    game.reset(Episodes(SEED, 0).next())
+    player, seen = game.players[0], []
+    expert = find_expert("KickTheBall")
+
+    def act(self: Expert, observation):
+        seen.append(set(observation))
+        return (0.0, 0.0)
+
+    monkeypatch.setattr(expert, "act", act)
+    game.play_script(player, Script.expert)
+    monkeypatch.setattr(expert, "reads", None)
+    game.play_script(player, Script.expert)
+    assert seen == [{"audio"}, {"audio", "vision"}]
+    game.close()

@@ -1,0 +1,102 @@
+"""The command: plays the episodes that are missing and writes the table."""
+
+from __future__ import annotations
+
+import csv
+import sys
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from veca_marl.algos.files import WriteError, write_atomically
+from veca_marl.config import ConfigError, one_line, prepare
+from veca_marl.config.command_line import CommandLine
+from veca_marl.envs.core.benchmark import find_benchmark
+from veca_marl.envs.core.expert import has_expert
+from veca_marl.envs.core.task import TASKS
+from veca_marl.envs.core.team import Script
+from veca_marl.experts_table.episode_file import EpisodeFile
+from veca_marl.experts_table.options import TableOptions
+from veca_marl.experts_table.play import Job, Played, digest, game_cfg
+from veca_marl.experts_table.processes import play_all
+from veca_marl.experts_table.table import markdown
+from veca_marl.runs.provenance import checkout_commit
+
+DESCRIPTION = """
+Let the expert and the random policy play the frozen episodes of every task, and write a table of
+returns, success rates and speeds:
+
+    python -m veca_marl.experts_table to=runs/experts
+    python -m veca_marl.experts_table tasks=[DodgeCar,ObjectNav] episodes=20 processes=4
+
+The players of other teams act at random (``opponent.TEAM=expert`` for others). Each episode is
+stored when it ends: a second call with the same folder plays those that are missing. A file
+``remarks.csv`` in it (columns task, remark) adds remarks to the rows of experts.
+"""
+TABLE, REMARKS = "table.md", "remarks.csv"
+
+
+def main(words: Sequence[str] | None = None) -> int:
+    """Run the command line; return the exit status."""
+    return CommandLine("experts_table", TableOptions, DESCRIPTION, (WriteError,)).run(run, words)
+
+
+def run(options: TableOptions, overrides: list[str]) -> None:
+    """Play the missing episodes, write the table and print it.
+
+    Raises:
+        ConfigError: If a choice is impossible, or stored episodes are of another configuration.
+    """
+    folder = Path(options.to)
+    try:
+        prepare(overrides)  # loads plug-ins with tasks of their own
+        jobs = list(_missing(options, folder, overrides))
+        for number, (job, played) in enumerate(
+            play_all(jobs, options.processes, checkout_commit() or ""), 1
+        ):
+            _file(folder, job.task).add(played)
+            _report(f"{number}/{len(jobs)} {job.task} {played.policy} {job.episode}", played)
+        table = markdown(_stored(folder), _remarks(folder))
+    except ValueError as error:
+        raise ConfigError(one_line(error)) from error
+    write_atomically(folder / TABLE, table)
+    print(table)
+
+
+def _missing(options: TableOptions, folder: Path, overrides: Sequence[str]) -> Iterator[Job]:
+    """Return the episodes that are not stored, task by task."""
+    for task in sorted(TASKS) if options.tasks == ["all"] else options.tasks:
+        cfg, file = game_cfg(task, overrides), _file(folder, task)
+        if options.frozen:
+            find_benchmark(task).check_parameters(cfg.task)
+        stored = file.read()
+        file.check(stored, digest(cfg))
+        done = {(one.policy, one.episode) for one in stored}
+        policies = [Script.expert, Script.random] if has_expert(task) else [Script.random]
+        yield from (
+            Job(task, tuple(overrides), policy, number, options.frozen)
+            for policy in policies
+            for number in range(options.episodes)
+            if (policy.value, number) not in done
+        )
+
+
+def _stored(folder: Path) -> dict[str, list[Played]]:
+    files = {path.stem: EpisodeFile(path) for path in sorted(folder.glob("*.csv"))}
+    return {task: file.read() for task, file in files.items() if task in TASKS}
+
+
+def _file(folder: Path, task: str) -> EpisodeFile:
+    return EpisodeFile(folder / f"{task}.csv")
+
+
+def _remarks(folder: Path) -> dict[str, str]:
+    path = folder / REMARKS
+    if not path.exists():
+        return {}
+    with path.open(newline="", encoding="utf-8") as file:
+        return {row["task"]: row["remark"] for row in csv.DictReader(file)}
+
+
+def _report(label: str, played: Played) -> None:
+    solved = "" if played.solved is None else f" solved {played.solved:g}"
+    sys.stderr.write(f"{label}: return {played.score:.3f}{solved}, {played.steps} steps\n")

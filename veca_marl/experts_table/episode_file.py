@@ -1,0 +1,95 @@
+"""The file of the episodes of one task, to which a line is added when an episode ends."""
+
+from __future__ import annotations
+
+import csv
+import os
+from collections.abc import Iterable
+from dataclasses import asdict, fields
+from io import StringIO
+from pathlib import Path
+
+from veca_marl.algos.files import naming
+from veca_marl.experts_table.play import Played
+
+_COLUMNS = [field.name for field in fields(Played)]
+
+
+class EpisodeFile:
+    """Episodes of one task as CSV. A process that is killed loses the running episode only.
+
+    Args:
+        path: The file; it may be missing.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+
+    def read(self) -> list[Played]:
+        """Return the stored episodes; an incomplete last line is left out.
+
+        Raises:
+            ValueError: If the file has other columns or a value that is none of its column.
+        """
+        if not self._path.exists():
+            return []
+        complete, _, _ = self._path.read_text(encoding="utf-8").rpartition("\n")
+        reader = csv.DictReader(StringIO(complete))
+        if reader.fieldnames is not None and reader.fieldnames != _COLUMNS:
+            raise ValueError(f"{self._path} has the columns {reader.fieldnames}, not {_COLUMNS}")
+        try:
+            return [_played(row) for row in reader]
+        except (TypeError, ValueError) as error:
+            raise ValueError(f"{self._path}, line {reader.line_num}: {error}") from error
+
+    def check(self, stored: Iterable[Played], configuration: str) -> None:
+        """Check that stored episodes are of one configuration.
+
+        Raises:
+            ValueError: If they are of another one; the message names what to do.
+        """
+        if any(row.configuration != configuration for row in stored):
+            raise ValueError(
+                f"{self._path} has episodes of another configuration: choose another folder "
+                "(to=FOLDER) or delete the file"
+            )
+
+    def add(self, played: Played) -> None:
+        """Add an episode and write it to the disk.
+
+        Raises:
+            WriteError: If the file cannot be written.
+        """
+        with naming(self._path):
+            self._path.parent.mkdir(parents=True, exist_ok=True)
+            self._cut_incomplete_line()
+            with self._path.open("a", newline="", encoding="utf-8") as file:
+                writer = csv.DictWriter(file, _COLUMNS, lineterminator="\n")
+                if file.tell() == 0:
+                    writer.writeheader()
+                writer.writerow(asdict(played))
+                file.flush()
+                os.fsync(file.fileno())
+
+    def _cut_incomplete_line(self) -> None:
+        if not self._path.exists():
+            return
+        content = self._path.read_bytes()
+        complete = content.rfind(b"\n") + 1
+        if complete < len(content):
+            os.truncate(self._path, complete)
+
+
+def _played(row: dict[str, str]) -> Played:
+    return Played(
+        policy=row["policy"],
+        episode=int(row["episode"]),
+        score=float(row["score"]),
+        solved=float(row["solved"]) if row["solved"] else None,
+        steps=int(row["steps"]),
+        agents=int(row["agents"]),
+        processor_s=float(row["processor_s"]),
+        configuration=row["configuration"],
+        version=int(row["version"]),
+        commit=row["commit"],
+    )

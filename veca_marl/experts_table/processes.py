@@ -1,0 +1,66 @@
+"""Episodes in several processes at the same time."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from multiprocessing import get_context
+from multiprocessing.connection import Connection, wait
+
+from veca_marl.experts_table.play import Job, Played, play_in_order
+
+
+def play_all(jobs: Sequence[Job], processes: int, commit: str) -> Iterator[tuple[Job, Played]]:
+    """Play episodes and yield each when it has ended, those of several processes in any order.
+
+    Args:
+        jobs: The episodes; those of one task follow each other.
+        processes: Number of processes. With 1 the episodes are played in this one.
+        commit: Commit of the code.
+
+    Raises:
+        ValueError: If a start is not the frozen one.
+        RuntimeError: If a process ends before its episodes are played.
+    """
+    if processes == 1:
+        yield from play_in_order(jobs, commit)
+        return
+    context = get_context("spawn")  # this process may have threads, which a fork would break
+    running = {}
+    for share in (jobs[n::processes] for n in range(processes)):
+        here, there = context.Pipe(duplex=False)
+        process = context.Process(target=_play_share, args=(share, commit, there), daemon=True)
+        process.start()
+        there.close()
+        running[here] = process
+    try:
+        yield from _received(list(running))
+    finally:
+        for process in running.values():
+            process.terminate()
+            process.join()
+
+
+def _play_share(share: Sequence[Job], commit: str, results: Connection) -> None:
+    """Play in a process of its own and send each episode, then None, or else the error."""
+    try:
+        for played in play_in_order(share, commit):
+            results.send(played)
+        results.send(None)
+    except ValueError as error:
+        results.send(error)
+
+
+def _received(connections: list[Connection]) -> Iterator[tuple[Job, Played]]:
+    while connections:
+        for connection in wait(connections):
+            assert isinstance(connection, Connection)
+            try:
+                message = connection.recv()
+            except EOFError:
+                raise RuntimeError("a process that plays episodes was killed") from None
+            if isinstance(message, ValueError):
+                raise message
+            if message is None:
+                connections.remove(connection)
+            else:
+                yield message
