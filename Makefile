@@ -38,6 +38,9 @@ kernels: $(VENV)/installed-test ## compile the kernels of the simulator into the
 checks: $(VENV)/installed-test
 	$(MAKE) --jobs $(CORES) lint types kernels
 
+# test processes share compiled modules, also where the environment forbids to write them
+test test-all: export PYTHONDONTWRITEBYTECODE :=
+
 test: checks ## lint, types, import contracts and the quick tests
 	$(BIN)/pytest -n $(CORES) -m "not slow" --durations=20 $(ARGS)
 

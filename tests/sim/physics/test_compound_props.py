@@ -1,6 +1,7 @@
 """Compound props: baskets, dolls, mass properties, and the reset with several contacts."""
 
 import math
+import tempfile
 
 import numpy as np
 import pytest
@@ -198,3 +199,13 @@ def test_building_prints_nothing(shape, capfd):
     world.add_prop(PropCfg(name="thing", shape=PropShape[shape], size_m=sizes[shape], mass_kg=0.1))
     world.close()
     assert "annot find" not in capfd.readouterr().out
+
+
+@pytest.mark.parametrize(("shape", "folders"), [("box", 0), ("pyramid", 1)])
+def test_only_hulls_are_written_to_a_folder(shape, folders, monkeypatch):
+    made, make = [], tempfile.TemporaryDirectory
+    monkeypatch.setattr(tempfile, "TemporaryDirectory", lambda: made.append(1) or make())
+    world = empty_world()
+    world.add_prop(PropCfg("thing", PropShape[shape], [0.1, 0.1, 0.1], mass_kg=0.1))
+    world.close()
+    assert len(made) == folders

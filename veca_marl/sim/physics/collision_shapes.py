@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -45,10 +46,8 @@ def create_collision_shape(client: int, primitives: Sequence[Primitive]) -> int:
     Bullet reads hulls from files only when there are several shapes; the files are deleted. A body
     with such a shape needs a visual shape, see `unused_visual_shape`.
     """
-    with tempfile.TemporaryDirectory() as folder:
-        arguments = [
-            _with_file(part, Path(folder) / f"{i}.obj") for i, part in enumerate(primitives)
-        ]
+    with _folder_of_hulls(primitives) as folder:
+        arguments = [_with_file(part, folder / f"{i}.obj") for i, part in enumerate(primitives)]
         shape = pybullet.createCollisionShapeArray(
             shapeTypes=[each["shapeType"] for each in arguments],
             radii=[each.get("radius", 0.0) for each in arguments],
@@ -63,6 +62,20 @@ def create_collision_shape(client: int, primitives: Sequence[Primitive]) -> int:
             physicsClientId=client,
         )
     return int(shape)
+
+
+@contextmanager
+def _folder_of_hulls(primitives: Sequence[Primitive]) -> Iterator[Path]:
+    """Make a folder for the files of hulls and delete it afterwards.
+
+    Without hulls no folder is made: most primitives have none, and making one takes longer than
+    creating the shape. The path is not used then.
+    """
+    if any(part.hull for part in primitives):
+        with tempfile.TemporaryDirectory() as folder:
+            yield Path(folder)
+    else:
+        yield Path()
 
 
 def unused_visual_shape(client: int, primitives: Sequence[Primitive]) -> int:

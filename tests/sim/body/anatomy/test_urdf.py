@@ -216,7 +216,13 @@ def test_hulls_of_a_mitten_reach_as_far_as_what_is_in_them():
         points = [line.split()[1:] for line in content.splitlines() if line.startswith("v")]
         got = (ways @ np.array(points, float).T).max(axis=1) + MARGIN_M
         # Bullet rounds the corners of boxes by its margin, by 0.73 mm at most
-    np.testing.assert_allclose(got, expected, atol=8e-4, err_msg=link)
+        np.testing.assert_allclose(got, expected, atol=8e-4, err_msg=link)
+
+
+def test_bodies_of_equal_builds_share_their_files():
+    files = body_files(SKELETON, Build(strength=0.5))
+    assert body_files(SKELETON, Build(strength=0.5)) is files
+    assert body_files(SKELETON, Build(strength=0.6)).urdf != files.urdf
 
 
 def test_only_hands_feet_and_fingers_are_soft(robots):

@@ -66,9 +66,11 @@ class Joint:
     torque_nm: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Skeleton:
     """All bones and joints, and the same as arrays for compiled loops.
+
+    Two skeletons are equal only if they are the same object, so that a skeleton can be hashed.
 
     Attributes:
         bones: The 47 bones, parents before their children.

@@ -13,7 +13,9 @@ of a link are replaced by their hull, and the thumb has a hull of its own.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -78,13 +80,15 @@ class BodyFiles(NamedTuple):
     """
 
     urdf: str
-    hulls: dict[str, str]
+    hulls: Mapping[str, str]
 
 
+@lru_cache(maxsize=8)  # worlds have bodies of few builds, and the text takes half of the loading
 def body_files(skeleton: Skeleton, build: Build) -> BodyFiles:
     """Return the body as a URDF robot.
 
-    Joints are named ``<bone>.<label>`` as in the table, links as their bones.
+    Joints are named ``<bone>.<label>`` as in the table, links as their bones. Repeated calls with
+    the same skeleton and an equal build return the same object.
     """
     writer = _Writer(skeleton, build)
     parts = [writer.bone(i) for i in range(len(skeleton.bones)) if not writer.is_fixed(i)]
