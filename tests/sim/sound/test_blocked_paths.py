@@ -31,7 +31,7 @@ def random_scene(seed):
 
 def counts(source, head, box):
     boxes = (part[None] for part in box)
-    return count_crossed_inside(source, head, ROOM.lower, ROOM.size, LATTICE, *boxes)
+    return count_crossed_inside(source, head, ROOM.bounds(), ROOM.lower, ROOM.size, LATTICE, *boxes)
 
 
 @pytest.mark.parametrize("seed", range(8))

@@ -28,7 +28,7 @@ class Mixer(Protocol):
     block_samples: int
 
     def response(self, filters: NDArray[np.float32]) -> Response:
-        """Return filters ``(K, C, T)`` in the form that `add` takes."""
+        """Return filters ``(K, C, block_samples)``, zero after their taps, as `add` takes them."""
         ...
 
     def add(self, signals: Signals, before: Response | None, after: Response | None) -> None:
@@ -39,6 +39,19 @@ class Mixer(Protocol):
             before: Filters at the beginning of the step; None for paths that begin in it. The same
                 object as `after` where nothing changes.
             after: Filters at the end of the step; None for paths that end in it.
+        """
+        ...
+
+    def add_changed(self, blocks: Signals, before: Response) -> Response:
+        """Filter the signals of some paths by filters that change to new ones, and add them.
+
+        Args:
+            blocks: ``(2, K, C, block_samples)``: the signals, and the filters at the end of the
+                step in the form that `response` takes.
+            before: Filters at the beginning of the step.
+
+        Returns:
+            The filters at the end of the step.
         """
         ...
 
@@ -75,6 +88,12 @@ class GainMixer:
             self._sum,
         )
 
+    def add_changed(self, blocks: Signals, before: Response) -> Response:
+        """See `Mixer`."""
+        after = self.response(blocks[1])
+        _add_faded(blocks[0], before, after, self._sum)
+        return after
+
     def finish(self) -> Signals:
         """See `Mixer`."""
         mixed, self._sum = self._sum, np.zeros_like(self._sum)
@@ -94,7 +113,7 @@ class SpectralMixer:
 
     def response(self, filters: NDArray[np.float32]) -> Response:
         """See `Mixer`."""
-        spectra: NDArray[np.complex64] = scipy.fft.rfft(filters, self.block_samples)
+        spectra: NDArray[np.complex64] = scipy.fft.rfft(filters)
         return spectra
 
     def add(self, signals: Signals, before: Response | None, after: Response | None) -> None:
@@ -109,6 +128,18 @@ class SpectralMixer:
             _add_products(spectra, before, old)
         if after is not None:
             _add_products(spectra, after, new)
+
+    def add_changed(self, blocks: Signals, before: Response) -> Response:
+        """See `Mixer`."""
+        # one call: its overhead is that of three transforms
+        spectra: NDArray[np.complex64]
+        after: NDArray[np.complex64]
+        spectra, after = scipy.fft.rfft(blocks)
+        _, old, new = self._sums
+        _add_products(spectra, before, old)
+        _add_products(spectra, after, new)
+        self._faded = True
+        return after
 
     def finish(self) -> Signals:
         """See `Mixer`."""

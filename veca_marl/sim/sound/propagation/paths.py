@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from veca_marl.sim.geometry import Floats, Pose
 from veca_marl.sim.sound.propagation.fractional_delay import KERNEL_TAPS, read_moving
-from veca_marl.sim.sound.propagation.mixers import Mixer, Response
+from veca_marl.sim.sound.propagation.mixers import Mixer
 from veca_marl.sim.sound.propagation.receiver import Receiver
 from veca_marl.sim.sound.propagation.signal_memory import SignalMemory
 from veca_marl.sim.sound.rooms.acoustics import SPEED_OF_SOUND_MPS
@@ -53,15 +53,15 @@ class Ears:
         """Return how a source arrives at the head."""
         return self._surroundings.arrivals(source.position, head)
 
-    def paths(self, arrivals: Arrivals) -> tuple[Floats, Response]:
-        """Return the delays ``(K, C)`` in samples and the filters of all arrivals."""
+    def paths(self, arrivals: Arrivals) -> tuple[Floats, NDArray[np.float32]]:
+        """Return delays ``(K, C)`` in samples and filters ``(K, C, T)`` of all arrivals."""
         shape = (len(arrivals.gains), self._receiver.n_channels)
         delays = np.empty(shape)
         filters = np.empty((*shape, self._receiver.n_taps), np.float32)
         self._receiver.write_paths(
             arrivals.vectors, arrivals.gains, self._sample_rate_hz, delays, filters
         )
-        return delays, self.mixer.response(filters)
+        return delays, filters
 
 
 class _Paths:
@@ -70,20 +70,23 @@ class _Paths:
     Attributes:
         arrivals: Directions, distances and gains at the end of the last step.
         delays: ``(K, C)`` samples at that time.
-        response: The filters at that time.
+        reach_samples: How many of the newest samples of the source can be heard in one step.
     """
 
     def __init__(self, ears: Ears, arrivals: Arrivals) -> None:
         self._ears = ears
-        self.arrivals = arrivals
-        self.delays, self.response = ears.paths(arrivals)
-        shape = (*self.delays.shape, ears.mixer.block_samples)
-        self._signals: NDArray[np.float32] = np.empty(shape, np.float32)
+        delays, filters = ears.paths(arrivals)
+        self._place(arrivals, delays)
+        # signals, and filters with zeros after their taps: transformed together
+        self._blocks = np.zeros((2, *delays.shape, ears.mixer.block_samples), np.float32)
+        self._signals: NDArray[np.float32] = self._blocks[0]
+        self._filters: NDArray[np.float32] = self._blocks[1, ..., : filters.shape[-1]]
+        self._filters[:] = filters
+        self._response = ears.mixer.response(self._blocks[1])
 
-    @property
-    def reach_samples(self) -> int:
-        """How many of the newest samples of the source can be heard in one step."""
-        return self._ears.reach_of(float(self.delays.max()))
+    def _place(self, arrivals: Arrivals, delays: Floats) -> None:
+        self.arrivals, self.delays = arrivals, delays
+        self.reach_samples = self._ears.reach_of(float(delays.max()))
 
     def begin(self, memory: SignalMemory, n_samples: int, age_samples: int = 0) -> None:
         """Read the whole block at constant delays.
@@ -98,25 +101,34 @@ class _Paths:
 
     def start(self) -> None:
         """Add sound that was never heard before: without a fade, from its beginning."""
-        self._ears.mixer.add(self._signals, self.response, self.response)
+        self._ears.mixer.add(self._signals, self._response, self._response)
 
     def fade_in(self) -> None:
         """Add the step, beginning with silence."""
-        self._ears.mixer.add(self._signals, None, self.response)
+        self._ears.mixer.add(self._signals, None, self._response)
 
     def fade_out(self, memory: SignalMemory) -> None:
         """Add the step at the delays of the last one, ending in silence."""
         self._read(memory, 0, self.delays, self._ears.step_samples)
-        self._ears.mixer.add(self._signals, self.response, None)
+        self._ears.mixer.add(self._signals, self._response, None)
 
-    def follow(
-        self, memory: SignalMemory, arrivals: Arrivals, delays: Floats, response: Response
+    def stay(self, memory: SignalMemory) -> None:
+        """Add the step with the delays and filters of the last one."""
+        self._read(memory, 0, self.delays, self._ears.step_samples)
+        self._ears.mixer.add(self._signals, self._response, self._response)
+
+    def move(
+        self,
+        memory: SignalMemory,
+        arrivals: Arrivals,
+        delays: Floats,
+        filters: NDArray[np.float32],
     ) -> None:
-        """Add the step with delays and filters that change to those given."""
-        before = self.response
+        """Add the step with delays and filters that change to those given, see `Ears.paths`."""
         self._read(memory, 0, delays, self._ears.step_samples)
-        self.arrivals, self.delays, self.response = arrivals, delays, response
-        self._ears.mixer.add(self._signals, before, response)
+        self._place(arrivals, delays)
+        self._filters[:] = filters
+        self._response = self._ears.mixer.add_changed(self._blocks, self._response)
 
     def _read(
         self,
@@ -201,14 +213,14 @@ class Propagation:
     def _follow(self, paths: _Paths, arrivals: Arrivals) -> bool:
         """Continue with the same paths; return False if these are others or move too fast."""
         if arrivals.same_as(paths.arrivals):
-            paths.follow(self._source.memory, arrivals, paths.delays, paths.response)
+            paths.stay(self._source.memory)
             return True
         if arrivals.paths_id != paths.arrivals.paths_id:
             return False
-        delays, response = self._ears.paths(arrivals)
+        delays, filters = self._ears.paths(arrivals)
         if np.abs(delays - paths.delays).max() > self._ears.max_delay_change:
             return False
-        paths.follow(self._source.memory, arrivals, delays, response)
+        paths.move(self._source.memory, arrivals, delays, filters)
         return True
 
 

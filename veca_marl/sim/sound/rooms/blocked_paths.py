@@ -28,9 +28,9 @@ def crosses_box(one: Floats, other: Floats, centre: Floats, rotation: Floats, ha
         rotation: ``(3, 3)`` from the axes of the box to the world's.
         half: ``(3,)`` metres, half of its edges.
     """
-    length = np.sqrt(((other - one) ** 2).sum())
-    enter, leave = 0.0, 1.0
+    enter, leave, square = 0.0, 1.0, 0.0
     for axis in range(3):
+        square += (other[axis] - one[axis]) ** 2
         begin = way = 0.0
         for k in range(3):
             begin += (one[k] - centre[k]) * rotation[k, axis]
@@ -42,7 +42,7 @@ def crosses_box(one: Floats, other: Floats, centre: Floats, rotation: Floats, ha
         first, second = (-half[axis] - begin) / way, (half[axis] - begin) / way
         enter = max(enter, min(first, second))
         leave = min(leave, max(first, second))
-    return bool((leave - enter) * length > _GRAZE_M)
+    return bool((leave - enter) * np.sqrt(square) > _GRAZE_M)
 
 
 @njit(cache=True)
@@ -105,6 +105,7 @@ def any_extends_into(
 def count_crossed_inside(
     source: Floats,
     head: Floats,
+    bounds: tuple[Floats, Floats],
     lower: Floats,
     size: Floats,
     lattice: NDArray[np.int64],
@@ -118,8 +119,9 @@ def count_crossed_inside(
     the head, are left out.
 
     Args:
-        source: ``(3,)`` metres in the room.
-        head: ``(3,)`` metres in the room.
+        source: ``(3,)`` metres, moved to the nearest point within the bounds.
+        head: ``(3,)`` metres, likewise.
+        bounds: Least and greatest coordinates ``(3,)`` of sources and heads, see `Room.bounds`.
         lower: ``(3,)`` metres, the room's lower corner.
         size: ``(3,)`` metres.
         lattice: ``(K, 3)`` from `image_lattice`.
@@ -130,36 +132,54 @@ def count_crossed_inside(
     Returns:
         ``(K,)``.
     """
+    begin, end = _within(source, bounds), _within(head, bounds)
+    corners = np.empty((len(lattice), 2 + np.abs(lattice).sum(axis=1).max(), 3))
+    n_corners = np.empty(len(lattice), np.int64)
+    for k in range(len(lattice)):
+        n_corners[k] = _write_folded_path(begin, end, lower, size, lattice[k], corners[k])
     counts = np.zeros(len(lattice), np.int64)
     for n in range(len(centres)):
         box = centres[n], rotations[n], halves[n]
         if not extends_into(*box, lower, size):
             continue
-        if contains_point(source, *box) or contains_point(head, *box):
+        if contains_point(begin, *box) or contains_point(end, *box):
             continue
         for k in range(len(lattice)):
-            counts[k] += _folded_path_crosses(source, head, lower, size, lattice[k], box)
+            counts[k] += _polygon_crosses(corners[k, : n_corners[k]], *box)
     return counts
 
 
 @njit(cache=True)
-def _folded_path_crosses(
+def _within(point: Floats, bounds: tuple[Floats, Floats]) -> Floats:
+    """Return the nearest point ``(3,)`` within bounds."""
+    nearest = np.empty(3)
+    for axis in range(3):
+        nearest[axis] = min(max(point[axis], bounds[0][axis]), bounds[1][axis])
+    return nearest
+
+
+@njit(cache=True)
+def _write_folded_path(
     source: Floats,
     head: Floats,
     lower: Floats,
     size: Floats,
     reflections: NDArray[np.int64],
-    box: tuple[Floats, Floats, Floats],
-) -> bool:
-    """Return whether one path from a source to a head, folded at the walls, passes a box.
+    corners: Floats,
+) -> int:
+    """Write the corners of one path from a head to a source, folded at the walls.
 
     Args:
-        source: See `count_crossed_inside`.
-        head: Likewise.
-        lower: Likewise.
+        source: ``(3,)`` metres in the room.
+        head: ``(3,)`` metres in the room.
+        lower: See `count_crossed_inside`.
         size: Likewise.
         reflections: ``(3,)`` one row of `image_lattice`.
-        box: Centre, rotation and half edges.
+        corners: ``(n, 3)`` metres, overwritten: the head, points on walls, the source. There are
+            2 more of them than reflections.
+
+    Returns:
+        The number of corners.
     """
     start, way = np.empty(3), np.empty(3)  # of the unfolded line, in the room's coordinates
     for axis in range(3):
@@ -168,26 +188,53 @@ def _folded_path_crosses(
         start[axis] = head[axis] - lower[axis]
         image = n * size[axis] + (inside if n % 2 == 0 else size[axis] - inside)
         way[axis] = image - start[axis]
+        corners[0, axis] = head[axis]
     cell = np.zeros(3, np.int64)  # copy of the room that the line is in
-    share, one, other = 0.0, head.copy(), np.empty(3)
-    for _ in range(1 + np.abs(reflections).sum()):
-        until, crossed = 1.0, -1
+    last = len(corners) - 1
+    for corner in range(1, last + 1):
+        share, crossed = _next_wall(start, way, size, cell, reflections)
         for axis in range(3):
-            if cell[axis] == reflections[axis]:
-                continue
-            wall = (cell[axis] + (1 if way[axis] > 0.0 else 0)) * size[axis]
-            at = (wall - start[axis]) / way[axis]
-            if crossed < 0 or at < until:
-                until, crossed = at, axis
-        for axis in range(3):
-            along = start[axis] + until * way[axis] - cell[axis] * size[axis]
+            along = start[axis] + share * way[axis] - cell[axis] * size[axis]
             mirrored = along if cell[axis] % 2 == 0 else size[axis] - along
-            other[axis] = lower[axis] + mirrored
-        if until > share and crosses_box(one, other, *box):
-            return True
+            corners[corner, axis] = lower[axis] + mirrored
         if crossed < 0:
-            return False
+            return corner + 1
         cell[crossed] += 1 if way[crossed] > 0.0 else -1
-        share = until
-        one[:] = other
+    return last + 1
+
+
+@njit(cache=True)
+def _next_wall(
+    start: Floats,
+    way: Floats,
+    size: Floats,
+    cell: NDArray[np.int64],
+    reflections: NDArray[np.int64],
+) -> tuple[float, int]:
+    """Return the share of a line up to the next wall, and its axis: 1 and -1 if there is none.
+
+    Args:
+        start: ``(3,)`` metres, begin of the line in the coordinates of the room.
+        way: ``(3,)`` metres, from there to its end.
+        size: ``(3,)`` metres, the room's.
+        cell: ``(3,)`` copy of the room that the line is in.
+        reflections: ``(3,)`` copy of the room in which it ends.
+    """
+    share, crossed = 1.0, -1
+    for axis in range(3):
+        if cell[axis] == reflections[axis]:
+            continue
+        wall = (cell[axis] + (1 if way[axis] > 0.0 else 0)) * size[axis]
+        at = (wall - start[axis]) / way[axis]
+        if crossed < 0 or at < share:
+            share, crossed = at, axis
+    return share, crossed
+
+
+@njit(cache=True)
+def _polygon_crosses(corners: Floats, centre: Floats, rotation: Floats, half: Floats) -> bool:
+    """Return whether a segment between corners ``(n, 3)`` passes a box, see `crosses_box`."""
+    for n in range(len(corners) - 1):
+        if crosses_box(corners[n], corners[n + 1], centre, rotation, half):
+            return True
     return False

@@ -66,15 +66,21 @@ class Obstacles:
         )
 
     def inside(
-        self, room: Room, lattice: NDArray[np.int64], source: Floats, head: Floats
+        self,
+        room: Room,
+        bounds: tuple[Floats, Floats],
+        lattice: NDArray[np.int64],
+        source: Floats,
+        head: Floats,
     ) -> NDArray[np.int64]:
         """Return how many boxes in a room each path inside it passes, see `count_crossed_inside`.
 
         Args:
             room: The room.
+            bounds: Its `Room.bounds`.
             lattice: ``(K, 3)`` reflections of the paths, from `image_lattice`.
             source: ``(3,)`` metres.
             head: ``(3,)`` metres.
         """
         boxes = self._centres, self._rotations, self._halves
-        return count_crossed_inside(source, head, room.lower, room.size, lattice, *boxes)
+        return count_crossed_inside(source, head, bounds, room.lower, room.size, lattice, *boxes)

@@ -120,10 +120,7 @@ class OneRoom:
         self, obstacles: Obstacles, source: Floats, head: Floats
     ) -> NDArray[np.int64]:
         """Return how many obstacles each path passes, ``(K,)``; see `Obstacles.inside`."""
-        lowest, highest = self._bounds
-        source = np.minimum(np.maximum(source, lowest), highest)
-        head = np.minimum(np.maximum(head, lowest), highest)
-        return obstacles.inside(self.room, self._lattice, source, head)
+        return obstacles.inside(self.room, self._bounds, self._lattice, source, head)
 
 
 @njit(cache=True)
