@@ -224,6 +224,9 @@ class World:
         pybullet.setPhysicsEngineParameter(
             fixedTimeStep=self.clock.substep_s,
             numSolverIterations=self.clock.solver_iterations,
+            # Bullet would stop earlier for all bodies that it solves together; which these are
+            # depends on contacts of the last episode, and so would the last digits of this one
+            solverResidualThreshold=0.0,
             # without it a restored world drifts away from a fresh one
             deterministicOverlappingPairs=1,
             physicsClientId=self.client,
