@@ -13,6 +13,7 @@ from veca_marl.algos.training.checkpoint import CheckpointError
 from veca_marl.config import ConfigError, compose
 from veca_marl.envs.core.benchmark import Benchmark, parameters, start_digests
 from veca_marl.evaluate import main as evaluate
+from veca_marl.play.command import main as play
 from veca_marl.runs.assembly import make_trainer
 from veca_marl.runs.run_folder import RunFolder
 from veca_marl.tournament import main as tournament
@@ -64,6 +65,14 @@ def test_past_policies_of_both_teams_are_stored(played):
     # only the critic of blue observes the whole team
     central, own = (actors(played / "run", team) for team in ("blue", "red"))
     assert central.keys() != own.keys() or any(central[k].shape != own[k].shape for k in own)
+
+
+def test_a_run_is_played_into_a_video(played, tmp_path, capsys):
+    video = tmp_path / "run.mp4"
+    assert play([f"policy={played / 'run'}", f"video={video}", "opponent.blue=random"]) == 0
+    assert video.stat().st_size > 1000
+    assert play([f"policy={played}", f"video={video}"]) == 2
+    assert "policy=" in capsys.readouterr().err
 
 
 def test_a_tournament_writes_the_matches_the_ratings_and_the_picture(played, capsys):

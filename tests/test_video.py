@@ -97,7 +97,7 @@ def test_a_failure_keeps_the_earlier_video(tmp_path, monkeypatch):
     def fail(*_):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("veca_marl.runs.video._video_frames", fail)
+    monkeypatch.setattr("veca_marl.runs.video.VideoFile.add_picture", fail)
     with pytest.raises(OSError, match="No space left"):
         write_video(path, film(9), None, FPS, RATE)
     assert [p.name for p in tmp_path.iterdir()] == ["film.mp4"]

@@ -21,16 +21,13 @@ from tensordict.nn import TensorDictSequential
 from veca_marl.algos.evaluation.comparison import comparison_line, interval, solved_rate
 from veca_marl.algos.evaluation.evaluate import Exploration, RandomTeams, Scores, evaluate
 from veca_marl.algos.files import WriteError, write_atomically
-from veca_marl.algos.selfplay.self_play import SelfPlayCfg
 from veca_marl.algos.specs import team_specs
 from veca_marl.algos.training.checkpoint import CheckpointError
-from veca_marl.algos.training.stored import load_actor
-from veca_marl.config import Config, ConfigError, one_line, to_config
+from veca_marl.config import Config, ConfigError, one_line
 from veca_marl.config.command_line import CommandLine
-from veca_marl.config.stored import change
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
 from veca_marl.envs.core.benchmark import Benchmark, find_benchmark
-from veca_marl.runs.run_folder import open_run
+from veca_marl.runs.stored_policies import stored_actors, stored_configuration
 
 _ERRORS = (CheckpointError, WriteError)
 Table = dict[str, dict[str, Scores]]
@@ -111,15 +108,12 @@ def evaluate_run(options: EvaluateOptions, overrides: Sequence[str] = ()) -> Eva
         CheckpointError: If the policies do not fit.
     """
     checkpoint = Path(options.run)
-    cfg = _configuration(checkpoint, overrides)
+    cfg = stored_configuration(checkpoint, overrides, "run=")
     exploration = options.evaluate.exploration or cfg.eval.exploration
     benchmark = _checked_benchmark(cfg) if options.episodes == BENCHMARK else None
     episodes, seed = _episodes(options, benchmark)
     env = _make_env(cfg, episodes, seed)
-    actors = {
-        team: load_actor(cfg.frozen.get(team, checkpoint), team, spec)
-        for team, spec in team_specs(env).items()
-    }
+    actors = stored_actors(cfg, checkpoint, team_specs(env))
     learnt = [team for team in actors if team not in cfg.frozen]
     players = {
         "policy": TensorDictSequential(*actors.values()),
@@ -146,16 +140,6 @@ def _episodes(options: EvaluateOptions, benchmark: Benchmark | None) -> tuple[in
     if benchmark is not None:
         return len(benchmark.starts), benchmark.seed
     return int(options.episodes), 1 if options.seed is None else options.seed
-
-
-def _configuration(checkpoint: Path, overrides: Sequence[str]) -> Config:
-    folder = open_run(checkpoint.parent.parent if checkpoint.is_file() else checkpoint, "run=")
-    node = folder.typed_config()
-    # nothing is learnt here
-    node.self_play, node.learner, node.init_from, node.init_encoders = SelfPlayCfg(), {}, {}, {}
-    node.team_intrinsic = {}
-    change(node, overrides)
-    return to_config(node)
 
 
 def _make_env(cfg: Config, episodes: int, seed: int) -> VecaEnv:

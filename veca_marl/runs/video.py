@@ -41,22 +41,69 @@ def write_video(
         ValueError: If frames or waveform are not as described.
     """
     _check(frames, waveform)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(f".{path.name}.tmp")
-    try:
-        with av.open(str(temporary), "w", format="mp4") as container:
-            pictures = _add_pictures(container, frames[0].shape, fps)
-            sound = None if waveform is None else _add_sound(container, sample_rate_hz)
-            for frame in _video_frames(frames):
-                container.mux(pictures.encode(frame))
-            container.mux(pictures.encode(None))
-            if sound is not None and waveform is not None:
-                for block in _audio_frames(waveform, sample_rate_hz):
-                    container.mux(sound.encode(block))
-                container.mux(sound.encode(None))
-        os.replace(temporary, path)
-    finally:
-        temporary.unlink(missing_ok=True)
+    rate_hz = None if waveform is None else sample_rate_hz
+    with VideoFile(path, frames[0].shape[:2], fps, rate_hz) as file:
+        for picture in frames:
+            file.add_picture(picture)
+        if waveform is not None:
+            file.add_sound(waveform)
+
+
+class VideoFile:
+    """An MP4 file that is written picture by picture, as a context manager.
+
+    The file is complete, or does not exist if the block was left by an exception.
+
+    Args:
+        path: The file; missing folders are created.
+        size: Height and width of the pictures, both even.
+        fps: Frames per second.
+        sample_rate_hz: Samples per second of the sound; None for a video without sound.
+    """
+
+    def __init__(
+        self, path: Path, size: tuple[int, ...], fps: int, sample_rate_hz: int | None
+    ) -> None:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        self._path, self._temporary = path, path.with_name(f".{path.name}.tmp")
+        self._container = av.open(str(self._temporary), "w", format="mp4")
+        self._pictures = _add_pictures(self._container, size, fps)
+        self._sample_rate_hz = sample_rate_hz
+        if sample_rate_hz is not None:
+            self._sound = _add_sound(self._container, sample_rate_hz)
+
+    def __enter__(self) -> VideoFile:
+        """Return the file."""
+        return self
+
+    def add_picture(self, picture: NDArray[np.uint8]) -> None:
+        """Append a picture ``(height, width, 3)`` uint8."""
+        frame = av.VideoFrame.from_ndarray(np.ascontiguousarray(picture), format="rgb24")
+        self._container.mux(self._pictures.encode(frame))
+
+    def add_sound(self, waveform: NDArray[np.float32]) -> None:
+        """Add the whole sound ``(2, samples)``, scaled to a fixed peak; call it at most once.
+
+        Raises:
+            ValueError: If the file was made without sound.
+        """
+        if self._sample_rate_hz is None:
+            raise ValueError(f"{self._path} was begun without sound")
+        for block in _audio_frames(waveform, self._sample_rate_hz):
+            self._container.mux(self._sound.encode(block))
+
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        """Complete the file; remove it after an exception."""
+        try:
+            if kind is None:
+                self._container.mux(self._pictures.encode(None))
+                if self._sample_rate_hz is not None:
+                    self._container.mux(self._sound.encode(None))
+            self._container.close()
+            if kind is None:
+                os.replace(self._temporary, self._path)
+        finally:
+            self._temporary.unlink(missing_ok=True)
 
 
 def _check(frames: Sequence[NDArray[np.uint8]], waveform: NDArray[np.float32] | None) -> None:
@@ -102,11 +149,6 @@ def _add_sound(container: av.container.OutputContainer, sample_rate_hz: int) -> 
     stream.layout = "stereo"
     stream.bit_rate = 128_000
     return stream
-
-
-def _video_frames(frames: Sequence[NDArray[np.uint8]]) -> Iterator[av.VideoFrame]:
-    for picture in frames:
-        yield av.VideoFrame.from_ndarray(np.ascontiguousarray(picture), format="rgb24")
 
 
 def _audio_frames(

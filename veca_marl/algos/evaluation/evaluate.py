@@ -29,10 +29,11 @@ class Exploration(Enum):
     stochastic = "stochastic"
 
 
-_TYPES = {
+EXPLORATION_TYPES = {
     Exploration.deterministic: ExplorationType.DETERMINISTIC,
     Exploration.stochastic: ExplorationType.RANDOM,
 }
+"""TorchRL's name of each."""
 
 
 @dataclass
@@ -117,7 +118,7 @@ def evaluate(
     """
     worlds = env.batch_size[0]
     tallies = []
-    with torch.no_grad(), set_exploration_type(_TYPES[exploration]):
+    with torch.no_grad(), set_exploration_type(EXPLORATION_TYPES[exploration]):
         for number in range(first, first + episodes, worlds):
             _seed(env, seed, number)
             count = min(worlds, first + episodes - number)

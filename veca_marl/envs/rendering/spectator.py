@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veca_marl.envs.core.game import Game, Observation
+from veca_marl.envs.rendering.room_view import RoomView
 from veca_marl.envs.rendering.touch_image import touch_image
 from veca_marl.sim.touch import TAXELS_PER_TRIANGLE
-from veca_marl.sim.vision import Camera, look_at
 
 FRAME_HEIGHT = 252
 ROOM_WIDTH = 336
@@ -26,24 +26,11 @@ class Spectator:
 
     def __init__(self, game: Game) -> None:
         self._game = game
-        self._camera = Camera(ROOM_WIDTH, FRAME_HEIGHT, fov_deg=60.0)
-        room = game.cfg.playground.rooms[0]
-        low, size = np.array(room.lower_m), np.array(room.size_m)
-        self._centre = low + size * (0.5, 0.5, 0.0)
-        # inside the room, in an upper corner, where no wall hides the players
-        self._eye = low + size * (0.04, 0.04, 0.92)
+        self._view = RoomView(game, ROOM_WIDTH, FRAME_HEIGHT)
 
     def room(self) -> NDArray[np.uint8]:
-        """Return the first room from an upper corner, ``(252, 336, 3)`` uint8.
-
-        The camera looks at the point halfway between the centre of the floor and the mean position
-        of the players.
-        """
-        players = [player.body.position for player in self._game.players]
-        target = 0.5 * self._centre + 0.5 * np.mean(players, axis=0)
-        pose = look_at(self._eye, target)
-        image: NDArray[np.uint8] = self._camera.render(self._game.world.scene, [pose]).rgb[0].copy()
-        return image
+        """Return the room of the first actor, ``(252, 336, 3)`` uint8, see `RoomView`."""
+        return self._view.image()
 
     def frame(self, observation: Observation) -> NDArray[np.uint8]:
         """Return one video frame: left eye, right eye, touched skin, room.

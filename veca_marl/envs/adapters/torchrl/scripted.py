@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from typing import Any
 
 import numpy as np
@@ -13,9 +14,50 @@ from torch import nn
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
 from veca_marl.envs.core.actions import from_parts
 from veca_marl.envs.core.expert import find_expert
+from veca_marl.envs.core.game import Game, Observation
+from veca_marl.envs.core.task import Player
 
 
-class ExpertPolicy(nn.Module):
+class CommandPolicy(nn.Module, ABC):
+    """Plays all teams of an environment by commands that the bodies encode as actions.
+
+    Args:
+        env: The environment it plays in.
+    """
+
+    def __init__(self, env: VecaEnv) -> None:
+        super().__init__()
+        self._env = env
+
+    @abstractmethod
+    def command(self, game: Game, player: Player, observation: Observation) -> Any:
+        """Return the command of a player for the next step, see `Body.encode`."""
+
+    def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
+        """Write `(team, "action")`, or its parts, for every team; return the same TensorDict."""
+        for team in self._env.group_map:
+            seen = tensordict[team, "observation"]
+            rows = [
+                [
+                    player.body.encode(
+                        self.command(
+                            game,
+                            player,
+                            {
+                                name: array.numpy(force=True)
+                                for name, array in seen[world, index].items()
+                            },
+                        )
+                    )
+                    for index, player in enumerate(game.team(team))
+                ]
+                for world, game in enumerate(self._env.games)
+            ]
+            tensordict[team, "action"] = _stacked(rows, tensordict.batch_size)
+        return tensordict
+
+
+class ExpertPolicy(CommandPolicy):
     """Plays all teams of an environment by the experts of its task.
 
     Args:
@@ -26,30 +68,12 @@ class ExpertPolicy(nn.Module):
     """
 
     def __init__(self, env: VecaEnv) -> None:
-        super().__init__()
+        super().__init__(env)
         find_expert(env.cfg.task.name)
-        self._env = env
 
-    def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
-        """Write `(team, "action")`, or its parts, for every team; return the same TensorDict."""
-        for team in self._env.group_map:
-            seen = tensordict[team, "observation"]
-            rows = [
-                [
-                    player.body.encode(
-                        game.expert_of(player).act(
-                            {
-                                name: array.numpy(force=True)
-                                for name, array in seen[world, index].items()
-                            }
-                        )
-                    )
-                    for index, player in enumerate(game.team(team))
-                ]
-                for world, game in enumerate(self._env.games)
-            ]
-            tensordict[team, "action"] = _stacked(rows, tensordict.batch_size)
-        return tensordict
+    def command(self, game: Game, player: Player, observation: Observation) -> Any:
+        """Return the command of the player's expert."""
+        return game.expert_of(player).act(observation)
 
 
 def _stacked(

@@ -1,0 +1,73 @@
+"""`python -m veca_marl.play ... video=FILE`: episodes as a video."""
+
+import av
+import numpy as np
+import pytest
+from composed import compose
+
+from veca_marl.algos.evaluation.evaluate import Exploration
+from veca_marl.envs.adapters.torchrl.scripted import ExpertPolicy
+from veca_marl.play.command import main
+from veca_marl.play.screen import HEIGHT, WIDTH
+from veca_marl.play.session import Session
+
+TASK = ["+task=KickTheBall", "playground=simple", "task.max_seconds=0.4"]
+
+
+def play(path, *arguments):
+    return main([*TASK, f"video={path}", *arguments])
+
+
+def pictures_and_streams(path):
+    with av.open(str(path)) as container:
+        pictures = [f.to_ndarray(format="rgb24") for f in container.decode(video=0)]
+        return pictures, [stream.type for stream in container.streams]
+
+
+def test_two_episodes_of_the_expert(tmp_path, capsys):
+    path = tmp_path / "new" / "kick.mp4"
+    assert play(path, "episodes=2") == 0
+    pictures, streams = pictures_and_streams(path)
+    assert len(pictures) == 2 * 10, "one picture per step"
+    assert pictures[0].shape == (HEIGHT, WIDTH, 3)
+    assert streams == ["video", "audio"]
+    printed = capsys.readouterr().out
+    assert "episode 0: return" in printed
+    assert "episode 1: return" in printed
+
+
+def test_a_deaf_agent_has_a_video_without_sound(tmp_path):
+    assert play(tmp_path / "deaf.mp4", "policy=random", "senses/audio=deaf") == 0
+    assert pictures_and_streams(tmp_path / "deaf.mp4")[1] == ["video"]
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        (["policy=champion"], "policy=champion: choices: expert, random"),
+        (["episodes=0"], "episodes must be at least 1"),
+        (["video=kick.avi"], "must end in .mp4"),
+    ],
+)
+def test_wrong_options_end_in_one_line(tmp_path, capsys, wrong, message):
+    assert play(tmp_path / "a.mp4", *wrong) == 2
+    assert message in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_session_sums_the_weighted_terms_of_each_episode():
+    session = Session(compose(TASK).game, ExpertPolicy, 1, Exploration.deterministic)
+    sums = []
+    for episode in (0, 1, 0):
+        moment, total = session.begin(episode), 0.0
+        assert moment.steps == 0
+        while not moment.done:
+            moment = session.step()
+            total += sum(moment.terms.values())
+        assert moment.steps == 10
+        assert sum(moment.sums.values()) == pytest.approx(total)
+        sums.append(total)
+    session.close()
+    assert sums[0] == sums[2], "an episode is repeated by its number"
+    assert sums[0] != sums[1]
+    assert np.isfinite(sums).all()

@@ -1,0 +1,131 @@
+"""A game as it is played by a policy, step by step, for the first actor's panels."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import torch
+from numpy.typing import NDArray
+from tensordict import TensorDictBase
+from torchrl.envs import set_exploration_type
+from torchrl.envs.utils import step_mdp
+
+from veca_marl.algos.evaluation.evaluate import EXPLORATION_TYPES, ActionPolicy, Exploration
+from veca_marl.algos.networks.memory import with_memory
+from veca_marl.envs.adapters.torchrl.env import VecaEnv
+from veca_marl.envs.core.game import Game
+from veca_marl.envs.core.game_cfg import GameCfg
+from veca_marl.envs.core.task import SOLVED
+
+PolicyMaker = Callable[[VecaEnv], ActionPolicy]
+
+
+@dataclass
+class Moment:
+    """What one step gave to the first actor.
+
+    Attributes:
+        observation: Its observation after the step.
+        steps: Steps since the start of the episode; 0 is the start.
+        terms: Parts of the reward of this step, weights included.
+        sums: Their sums since the start of the episode.
+        solved: Whether the goal is reached; None for a task without a goal.
+        done: Whether the episode has ended.
+    """
+
+    observation: dict[str, NDArray[Any]]
+    steps: int = 0
+    terms: dict[str, float] = field(default_factory=dict)
+    sums: dict[str, float] = field(default_factory=dict)
+    solved: bool | None = None
+    done: bool = False
+
+
+class Session:
+    """One world, in which a policy plays all actors, one episode after another.
+
+    Attributes:
+        env: The world; with the samples of the ears where the actors hear.
+        game: The game in it.
+        policy: The policy.
+
+    Args:
+        cfg: What to play.
+        make_policy: Returns the policy for the environment.
+        seed: Seed of the episodes and of random actions.
+        exploration: Whether the policy takes the mode of its distribution or a sample.
+
+    Raises:
+        ValueError: If the game or the policy is impossible.
+    """
+
+    def __init__(
+        self, cfg: GameCfg, make_policy: PolicyMaker, seed: int, exploration: Exploration
+    ) -> None:
+        self.env = VecaEnv(_with_waveform(cfg), 1, seed)
+        self.game: Game = self.env.games[0]
+        self.policy = make_policy(self.env)
+        self._playing = with_memory(self.env, self.policy)
+        self._exploration = EXPLORATION_TYPES[exploration]
+        self._team = next(iter(self.env.group_map))
+        torch.manual_seed(seed)
+
+    @property
+    def step_s(self) -> float:
+        """Length of a step in seconds."""
+        return self.env.cfg.clock.step_s
+
+    @property
+    def steps_per_s(self) -> int:
+        """Steps per second of simulated time."""
+        return self.env.cfg.clock.control_rate_hz
+
+    @property
+    def hears(self) -> bool:
+        """Whether moments have the samples of the ears, `waveform`."""
+        return "waveform" in list(self.env.observation_spec[self._team, "observation"].keys())
+
+    def begin(self, episode: int) -> Moment:
+        """Begin the episode of a number, from 0 on; return its start."""
+        self._state: TensorDictBase = self._playing.reset(episode=episode)
+        weights = self.game.weights
+        self._moment = Moment(self._observation(self._state))
+        self._moment.terms = dict.fromkeys(weights, 0.0)
+        self._moment.sums = dict.fromkeys(weights, 0.0)
+        return self._moment
+
+    def step(self) -> Moment:
+        """Play one step of the present episode."""
+        with torch.no_grad(), set_exploration_type(self._exploration):
+            played = self._playing.step(self.policy(self._state))
+        self._state = step_mdp(played)
+        self._moment = self._next_moment(played["next"])
+        return self._moment
+
+    def _next_moment(self, step: TensorDictBase) -> Moment:
+        info = {name: float(value[0, 0]) for name, value in step[self._team, "info"].items()}
+        terms = {name: weight * info[name] for name, weight in self.game.weights.items()}
+        before = self._moment
+        return Moment(
+            self._observation(step),
+            before.steps + 1,
+            terms,
+            {name: before.sums[name] + value for name, value in terms.items()},
+            bool(info[SOLVED]) if SOLVED in info else None,
+            bool(step["done"].all()),
+        )
+
+    def _observation(self, step: TensorDictBase) -> dict[str, NDArray[Any]]:
+        senses = step[self._team, "observation"].items()
+        return {name: array[0, 0].numpy(force=True).copy() for name, array in senses}
+
+    def close(self) -> None:
+        """Release the world."""
+        self.env.close()
+
+
+def _with_waveform(cfg: GameCfg) -> GameCfg:
+    audio = replace(cfg.senses.audio, waveform=True)
+    return replace(cfg, senses=replace(cfg.senses, audio=audio))
