@@ -18,6 +18,8 @@ from veca_marl.sim.sound.sound_source import Source
 MAX_SPEED_MPS = 50.0
 """A path of which the length changes faster is cross-faded as a new path, without Doppler shift."""
 
+Place = tuple[int, int, bytes, bytes, bytes]
+
 
 class Ears:
     """What all paths to one listener share.
@@ -52,6 +54,16 @@ class Ears:
     def arrivals(self, source: Source, head: Pose) -> Arrivals:
         """Return how a source arrives at the head."""
         return self._surroundings.arrivals(source.position, head)
+
+    def place(self, source: Source, head: Pose) -> Place:
+        """Return what the arrivals of a source at the head depend on: equal, they are equal."""
+        return (
+            self._surroundings.changes,
+            source.teleports,
+            source.position.tobytes(),
+            head.position.tobytes(),
+            head.rotation.tobytes(),
+        )
 
     def paths(self, arrivals: Arrivals) -> tuple[Floats, NDArray[np.float32]]:
         """Return delays ``(K, C)`` in samples and filters ``(K, C, T)`` of all arrivals."""
@@ -154,6 +166,7 @@ class Propagation:
     def reset(self) -> None:
         """Forget the last position of the source and the sound that was read."""
         self._paths: _Paths | None = None
+        self._place: Place | None = None
         self._teleports = self._source.teleports
         # the newest samples that were not heard yet: all
         self._unheard_samples = self._ears.reach_samples
@@ -162,6 +175,11 @@ class Propagation:
         """Add the present step to the mixer; return whether anything can be audible."""
         if self._is_silent():
             return False
+        place = self._ears.place(self._source, head)
+        if self._paths is not None and place == self._place:
+            self._paths.stay(self._source.memory)
+            return True
+        self._place = place
         arrivals = self._ears.arrivals(self._source, head)
         if self._paths is None:
             self._begin(arrivals)

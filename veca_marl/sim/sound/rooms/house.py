@@ -70,6 +70,11 @@ class House:
         self.longest_path_m = max(float(np.linalg.norm(self.size)), *longest_m)
         self._obstacle_gain = 10.0 ** (-transmission_loss_db / 20.0)
 
+    @property
+    def changes(self) -> int:
+        """See `Surroundings`: the obstacles that were added or moved."""
+        return self.obstacles.changes
+
     def room_of(self, position: Floats) -> int:
         """Return the number of the room that contains a point ``(3,)``, or else of the nearest."""
         return int(nearest_box(position, self._lower, self._upper))

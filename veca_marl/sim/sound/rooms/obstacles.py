@@ -15,9 +15,14 @@ from veca_marl.sim.sound.rooms.blocked_paths import (
 
 
 class Obstacles:
-    """Boxes that attenuate sound. An owner moves its box by the number that `add` has returned."""
+    """Boxes that attenuate sound. An owner moves its box by the number that `add` has returned.
+
+    Attributes:
+        changes: How many times a box was added or moved.
+    """
 
     def __init__(self) -> None:
+        self.changes = 0
         self._centres, self._halves = np.zeros((0, 3)), np.zeros((0, 3))
         self._rotations = np.zeros((0, 3, 3))
 
@@ -39,6 +44,7 @@ class Obstacles:
         self._halves = np.vstack([self._halves, halves])
         self._centres = np.vstack([self._centres, np.zeros(3)])
         self._rotations = np.concatenate([self._rotations, np.eye(3)[None]])
+        self.changes += 1
         return len(self._halves) - 1
 
     def move(self, number: int, centre: ArrayLike, rotation: ArrayLike) -> None:
@@ -51,6 +57,7 @@ class Obstacles:
         """
         self._centres[number] = centre
         self._rotations[number] = rotation
+        self.changes += 1
 
     def between(self, one: Floats, other: Floats) -> int:
         """Return how many boxes the straight line between two points ``(3,)`` passes through.

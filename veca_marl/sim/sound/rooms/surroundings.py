@@ -44,9 +44,15 @@ class Surroundings(Protocol):
 
     Attributes:
         longest_path_m: Upper bound of the length of all paths.
+        changes: Number of changes that may change the arrivals of the same source at the same head.
     """
 
     longest_path_m: float
+
+    @property
+    def changes(self) -> int:
+        """See above."""
+        ...
 
     def arrivals(self, source: Floats, head: Pose) -> Arrivals:
         """Return how a source at ``(3,)`` metres arrives at a head."""
@@ -55,6 +61,8 @@ class Surroundings(Protocol):
 
 class FreeField:
     """No walls: the direct sound alone."""
+
+    changes = 0  # see `Surroundings`
 
     def __init__(self, reach_m: float) -> None:
         """Create a free field.
@@ -92,6 +100,8 @@ class OneRoom:
         gains: ``(K,)`` pressure gains by the walls: 1 for the direct sound, then of each image.
         longest_path_m: See `Surroundings`.
     """
+
+    changes = 0  # see `Surroundings`
 
     def __init__(self, room: Room, image_order: int) -> None:
         self.room = room
