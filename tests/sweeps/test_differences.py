@@ -1,6 +1,6 @@
 """How the configuration of a stored run is compared with the one that is asked for."""
 
-from veca_marl.sweeps.differences import differences
+from veca_marl.sweeps.differences import differences, key_patterns
 
 BALL = {"name": "ball", "mass_kg": 0.3, "size_m": [0.1]}
 BOX = {"name": "box", "mass_kg": 1.0, "size_m": [0.1, 0.2, 0.3]}
@@ -27,3 +27,13 @@ def test_lists_of_other_lengths_differ():
         assert any(not d.of_version for d in differences(stored, asked))
     lists = {"channels": []}, {"channels": [16]}
     assert any(not d.of_version for d in differences(*lists))
+
+
+def test_elements_of_a_list_are_named_by_one_pattern():
+    keys = [
+        "playground.props.0.joint",
+        "playground.props.12.joint",
+        "playground.props.1.parts.number",
+        "seed",
+    ]
+    assert key_patterns(keys) == ["playground.props.*.joint", "playground.props.*.parts", "seed"]

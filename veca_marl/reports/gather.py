@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from veca_marl.runs.resumable import may_change
-from veca_marl.sweeps.differences import differences
+from veca_marl.sweeps.differences import differences, key_patterns
 from veca_marl.sweeps.run_state import RunState, StoredRun, read_run
 
 Row = dict[str, str]
@@ -77,7 +77,7 @@ def _status(run: StoredRun, arm: str, asked: Mapping[str, Any]) -> tuple[Found, 
     if changed:
         return Found(*base, False, f"not counted: {'; '.join(changed)}"), False
     remark = _remark(run, state, asked)
-    others = [d.key for d in differing]
+    others = key_patterns(d.key for d in differing)
     if others:
         remark = f"{remark}; stored by a version with other keys: {', '.join(others)}".lstrip("; ")
     return Found(*base, state in (RunState.finished, RunState.cut), remark), True

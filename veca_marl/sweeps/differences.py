@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+import re
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 _ABSENT = "absent"
+_NUMBER = "number"  # of the elements of a list
 _IGNORED = ("experiment", "resume")  # claims and seeds of an experiment do not change its runs
 _DECIDED = "auto"  # such a value is decided when a run starts, and the run stores the decision
 
@@ -52,6 +54,12 @@ def differences(stored: Mapping[str, Any], asked: Mapping[str, Any]) -> list[Dif
     ]
 
 
+def key_patterns(keys: Iterable[str]) -> list[str]:
+    """Return the distinct keys with ``*`` in place of the index of a list's element."""
+    plain = (key.removesuffix(f".{_NUMBER}") for key in keys)
+    return sorted({re.sub(r"\.\d+(?=\.|$)", ".*", key) for key in plain})
+
+
 def _flat(node: Mapping[str, Any], path: str = "") -> Iterator[tuple[str, Any]]:
     """Yield dotted paths and values; mappings in a list have their index as a name.
 
@@ -64,7 +72,7 @@ def _flat(node: Mapping[str, Any], path: str = "") -> Iterator[tuple[str, Any]]:
             yield from _flat(value, key)
             continue
         if isinstance(value, list):
-            yield f"{key}.number", len(value)
+            yield f"{key}.{_NUMBER}", len(value)
         if isinstance(value, list) and any(isinstance(each, Mapping) for each in value):
             yield from _flat({str(index): each for index, each in enumerate(value)}, key)
         else:
