@@ -1,18 +1,21 @@
-"""Watch a game: ``python -m veca_marl.play +task=KickTheBall policy=expert video=kick.mp4``.
+"""Play or watch a game: ``python -m veca_marl.play +task=KickTheBall``.
 
-The picture shows the room, both eyes, the spectra at both ears, the touched skin and the terms of
-the reward of the first agent; the sound is that at its ears. ``policy`` is expert, random, the
-folder of a run or a checkpoint in it; a run is played on its stored configuration.
+A window opens (extra ``[play]``) in which keys steer the first agent if it walks; with
+``policy=expert``, ``policy=random`` or ``policy=runs/...`` that policy plays. With
+``video=FILE.mp4`` no window opens, and whole episodes are written into a video. The picture shows
+the room, both eyes, the spectra at both ears, the touched skin and the terms of the reward of the
+first agent; the sound is that at its ears. A run is played on its stored configuration.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from importlib import import_module
 from pathlib import Path
+from types import ModuleType
 
 import torch
-from omegaconf import MISSING
 
 from veca_marl.algos.evaluation.evaluate import Exploration
 from veca_marl.algos.files import WriteError, naming
@@ -20,10 +23,12 @@ from veca_marl.algos.training.checkpoint import CheckpointError
 from veca_marl.config import ConfigError, one_line
 from veca_marl.config.command_line import CommandLine
 from veca_marl.play.film import film
-from veca_marl.play.policies import EXPERT, Choice, choose
+from veca_marl.play.policies import EXPERT, KEYBOARD, Choice, choose
 from veca_marl.play.session import Session
+from veca_marl.play.steering.keyboard import Keyboard
+from veca_marl.play.steering.steered import SteeredPolicy
 
-_ERRORS = (CheckpointError, WriteError)
+_ERRORS = (CheckpointError, WriteError, ModuleNotFoundError)
 
 
 @dataclass
@@ -33,9 +38,11 @@ class PlayCfg:
     Attributes:
         exploration: Whether policies take the mode of their distribution or a sample; None is as in
             the run (`eval.exploration`).
+        sound: Whether the sound at the ears is played while the window is open.
     """
 
     exploration: Exploration | None = None
+    sound: bool = True
 
 
 @dataclass
@@ -43,40 +50,79 @@ class PlayOptions:
     """Options of the command.
 
     Attributes:
-        policy: What plays: expert, random, the folder of a run, or a checkpoint in it.
-        video: The MP4 file that is written.
-        episodes: Number of episodes in the video.
+        policy: What plays: keyboard, expert, random, the folder of a run, or a checkpoint in it.
+            None is the keyboard in a window and the expert in a video.
+        video: MP4 file to write; None opens a window.
+        episodes: Number of episodes; None is one in a video, and any number in a window.
         seed: Seed of the episodes.
         play: How it is played.
     """
 
-    policy: str = EXPERT
-    video: str = MISSING
-    episodes: int = 1
+    policy: str | None = None
+    video: str | None = None
+    episodes: int | None = None
     seed: int = 1
     play: PlayCfg = field(default_factory=PlayCfg)
 
     def __post_init__(self) -> None:
-        if self.episodes < 1:
+        if self.episodes is not None and self.episodes < 1:
             raise ValueError(f"episodes must be at least 1, got {self.episodes}")
         if self.seed < 0:
             raise ValueError(f"seed must be 0 or more, got {self.seed}")
-        if not self.video.endswith(".mp4"):
+        if self.video is not None and not self.video.endswith(".mp4"):
             raise ValueError(f"video={self.video}: must end in .mp4")
+        if self.video is not None and self.policy == KEYBOARD:
+            raise ValueError(f"policy={KEYBOARD} needs a window; leave out video={self.video}")
 
 
 def run(options: PlayOptions, overrides: list[str]) -> None:
-    """Play, and write the video."""
+    """Play in a window, or write a video."""
     torch.set_num_threads(1)
-    choice = choose(options.policy, overrides)
-    session = _session(choice, options)
-    path = Path(options.video)
+    if options.video is None:
+        _play(options, overrides)
+    else:
+        _film(options, overrides, Path(options.video))
+
+
+def _film(options: PlayOptions, overrides: list[str], path: Path) -> None:
+    policy = options.policy or EXPERT
+    session = _session(choose(policy, overrides), options)
     with naming(path):
-        returns = film(path, session, options.episodes, f"policy: {options.policy}")
+        returns = film(path, session, options.episodes or 1, f"policy: {policy}")
     session.close()
     for episode, total in enumerate(returns):
         print(f"episode {episode}: return {total:.3f}")
     print(f"{path}: {len(returns)} episodes")
+
+
+def _play(options: PlayOptions, overrides: list[str]) -> None:
+    window = _import_window()
+    policy, keyboard = options.policy or KEYBOARD, Keyboard()
+    choice = choose(policy, overrides, lambda env: SteeredPolicy(env, keyboard))
+    session = _session(choice, options)
+    steers = keyboard if policy == KEYBOARD else None
+    try:
+        with window.Window(session, f"policy: {policy}", steers, options.play.sound) as opened:
+            opened.run(options.episodes)
+    except window.NoDisplayError as error:
+        raise ConfigError(str(error)) from error
+    finally:
+        session.close()
+
+
+def _import_window() -> ModuleType:
+    """Return the module of the window, which needs pygame.
+
+    Raises:
+        ModuleNotFoundError: Without the extra ``[play]``.
+    """
+    try:
+        return import_module("veca_marl.play.window.window")
+    except ModuleNotFoundError as error:
+        raise ModuleNotFoundError(
+            "a window needs pygame: pip install 'veca_marl[play]'; video=FILE.mp4 needs none",
+            name=error.name,
+        ) from error
 
 
 def _session(choice: Choice, options: PlayOptions) -> Session:

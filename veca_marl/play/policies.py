@@ -1,8 +1,8 @@
-"""Which policy plays: the expert, the random policy, or that of a run."""
+"""Which policy plays: the keyboard, the expert, the random policy, or that of a run."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,14 +12,14 @@ from torch import nn
 from veca_marl.algos.evaluation.evaluate import Exploration, RandomTeams
 from veca_marl.algos.training.stored import load_actor
 from veca_marl.config import Config, ConfigError, compose, one_line
-from veca_marl.envs.adapters.torchrl.env import VecaEnv
 from veca_marl.envs.adapters.torchrl.scripted import ExpertPolicy
 from veca_marl.envs.core.expert import find_expert
 from veca_marl.play.session import PolicyMaker
 from veca_marl.runs.assembly import read_specs
 from veca_marl.runs.stored_policies import stored_actors, stored_configuration
 
-EXPERT, RANDOM = "expert", "random"
+KEYBOARD, EXPERT, RANDOM = "keyboard", "expert", "random"
+_NAMES = f"{KEYBOARD}, {EXPERT}, {RANDOM}"
 
 
 @dataclass(frozen=True)
@@ -51,12 +51,13 @@ class InTurn(nn.Module):
         return tensordict
 
 
-def choose(policy: str, overrides: Sequence[str]) -> Choice:
+def choose(policy: str, overrides: Sequence[str], keyboard: PolicyMaker | None = None) -> Choice:
     """Return what a policy plays.
 
     Args:
-        policy: ``expert``, ``random``, the folder of a run, or a checkpoint in it.
+        policy: ``keyboard``, ``expert``, ``random``, the folder of a run, or a checkpoint in it.
         overrides: The configuration, such as ``+task=KickTheBall``; of a run, changes of its own.
+        keyboard: Returns the policy that is called ``keyboard``; None if there are no keys.
 
     Raises:
         ConfigError: If there is no such policy, or the configuration is impossible.
@@ -66,11 +67,13 @@ def choose(policy: str, overrides: Sequence[str]) -> Choice:
         cfg = compose(overrides)
         _require_expert(cfg)
         return _with_opponents(cfg, ExpertPolicy)
+    if policy == KEYBOARD and keyboard is not None:
+        return _with_opponents(compose(overrides), keyboard)
     if policy == RANDOM:
         cfg = compose(overrides)
         return _with_opponents(cfg, lambda env: RandomTeams(env, list(env.group_map)))
     if not Path(policy).exists():
-        raise ConfigError(f"policy={policy}: choices: {EXPERT}, {RANDOM}, a run, a checkpoint")
+        raise ConfigError(f"policy={policy}: choices: {_NAMES}, a run, a checkpoint")
     return _stored(Path(policy), overrides)
 
 
@@ -87,7 +90,7 @@ def _stored(path: Path, overrides: Sequence[str]) -> Choice:
     return Choice(cfg, lambda env: InTurn(list(actors.values())), cfg.eval.exploration)
 
 
-def _with_opponents(cfg: Config, make: Callable[[VecaEnv], nn.Module]) -> Choice:
+def _with_opponents(cfg: Config, make: PolicyMaker) -> Choice:
     """Return a choice in which `opponent.TEAM=RUN` play their own policies."""
     specs = read_specs(cfg.game) if cfg.frozen else {}
     actors = {team: load_actor(path, team, specs[team]) for team, path in cfg.frozen.items()}

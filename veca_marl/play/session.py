@@ -9,17 +9,18 @@ from typing import Any
 import torch
 from numpy.typing import NDArray
 from tensordict import TensorDictBase
+from torch import nn
 from torchrl.envs import set_exploration_type
 from torchrl.envs.utils import step_mdp
 
-from veca_marl.algos.evaluation.evaluate import EXPLORATION_TYPES, ActionPolicy, Exploration
+from veca_marl.algos.evaluation.evaluate import EXPLORATION_TYPES, Exploration
 from veca_marl.algos.networks.memory import with_memory
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
 from veca_marl.envs.core.game import Game
 from veca_marl.envs.core.game_cfg import GameCfg
 from veca_marl.envs.core.task import SOLVED
 
-PolicyMaker = Callable[[VecaEnv], ActionPolicy]
+PolicyMaker = Callable[[VecaEnv], nn.Module]
 
 
 @dataclass

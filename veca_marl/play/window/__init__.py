@@ -1,0 +1,1 @@
+"""The window and the loudspeaker. They need the extra ``[play]`` (pygame-ce)."""
