@@ -17,6 +17,7 @@ from veca_marl.checks.starts import check_starts
 from veca_marl.envs.core.expert import EXPERTS, Expert
 from veca_marl.envs.core.game import Game
 from veca_marl.envs.core.task import TASKS, Task, TaskCfg, terms
+from veca_marl.sim.physics import PropCfg, PropShape
 
 CHOSEN = compose(["+task=KickTheBall", "body=walker", "playground=simple"]).game
 QUICK = CheckCfg(starts=5, steps=10, seeding_steps=4, episodes=4)
@@ -82,6 +83,16 @@ class StartOutside(East):
     def reset(self, rng):
         super().reset(rng)
         self.players[0].body.place((50.0, rng.uniform(), 0.0))
+
+
+class StartsInAThing(East):
+    def build(self):
+        super().build()
+        self.crate = self.world.add_prop(PropCfg("crate", PropShape.box, [0.3, 0.3, 0.3]))
+
+    def reset(self, rng):
+        super().reset(rng)
+        self.crate.place(self.players[0].body.position * (1.0, 1.0, 0.0) + (0.0, 0.1, 0.15))
 
 
 class EndsAtOnce(East):
@@ -196,6 +207,7 @@ def test_a_sound_task_passes_every_check(game_of):
             "starts",
             r"with agents outside the rooms at \(50.00, .* and 2 more",
         ),
+        (StartsInAThing, starts, "starts", "where agents and crate overlap by 1[5-7]. mm"),
         (EndsAtOnce, starts, "first step", "episode 0 terminates in its first step"),
         (SomeSolvedAtOnce, starts, "first step", "[1-4] of 5 episodes are solved for agents at"),
         (InfiniteTerm, random_play, "rewards", "term 'progress' of agents is nan"),

@@ -80,11 +80,17 @@ def _play(game: Game, steps: int, seed: int) -> _Seen:
 
 def _observe(game: Game, seen: _Seen) -> dict[str, Observation]:
     """Return the observations of all actors; note those that do not fit."""
-    observations = {player.name: game.observe(player) for player in game.actors}
-    for name, observation in observations.items():
-        specs = {k: s for sense in game.senses[name].values() for k, s in sense.specs.items()}
-        _add_problems(seen.specs, [f"{name}: {text}" for text in _misfits(observation, specs)])
-    return observations
+    _add_problems(seen.specs, observation_problems(game))
+    return {player.name: game.observe(player) for player in game.actors}
+
+
+def observation_problems(game: Game) -> Iterator[str]:
+    """Yield the observations of all actors that do not fit their specifications."""
+    for player in game.actors:
+        senses = game.senses[player.name].values()
+        specs = {key: spec for sense in senses for key, spec in sense.specs.items()}
+        observation = game.observe(player)
+        yield from (f"{player.name}: {text}" for text in _misfits(observation, specs))
 
 
 def _misfits(observation: Observation, specs: Mapping[str, ArraySpec]) -> Iterator[str]:

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from veca_marl.checks.overlaps import overlaps
 from veca_marl.checks.report import Finding, finding
 from veca_marl.envs.core.episodes import Episodes
 from veca_marl.envs.core.game import Game, Outcome
@@ -25,7 +26,8 @@ def check_starts(game: Game, starts: int, seed: int) -> Iterator[Finding]:
         seed: Seed of the episodes.
 
     Yields:
-        ``starts``: bodies are inside the rooms, poses are finite, starts differ. ``first step``: no
+        ``starts``: bodies are inside the rooms, poses are finite, nothing penetrates another thing
+        by more than `GREATEST_OVERLAP_M`, starts differ. ``first step``: no
         episode ends by resting for one step, and not some of them are solved.
     """
     episodes, states, positions = Episodes(seed), [], []
@@ -54,7 +56,7 @@ def _problems(game: Game, number: int) -> list[str]:
         if min(room.distance_m((x, y)) for room in game.world.playground.rooms) > 0.0:
             place = f"({x:.2f}, {y:.2f})"
             found.append(f"episode {number} starts with {player.name} outside the rooms at {place}")
-    return found
+    return found + [f"episode {number} starts where {text}" for text in overlaps(game)]
 
 
 def _rest(game: Game) -> Outcome:

@@ -43,7 +43,7 @@ def test_the_orientation_terms_are_greatest_face_down(game):
 
 def test_it_starts_on_hands_and_knees_with_the_room_ahead(game):
     for body in starts(game, 12):
-        assert game.task.room.contains(body.position + 4.5 * body.forward)
+        assert game.world.playground.rooms[0].contains(body.position + 4.5 * body.forward)
         assert body.bone("neck").position[2] > 0.2
         assert np.linalg.norm(body.velocities(), axis=1).max() == 0.0
 

@@ -58,7 +58,7 @@ def test_the_termination_by_a_fall_can_be_turned_off():
 
 def test_it_starts_standing_with_the_room_ahead(game):
     for body in starts(game, 8):
-        assert game.task.room.contains(body.position + 4.5 * body.forward)
+        assert game.world.playground.rooms[0].contains(body.position + 4.5 * body.forward)
         assert body.bone("neck").position[2] > 0.58
         angles = body.joint_angles()
         for _ in range(12):

@@ -203,10 +203,11 @@ def test_a_reset_restores_colours_and_sounds_of_everything():
     assert not walker.muted
 
 
-def test_boxes_that_collide_move_as_in_the_first_episode_whatever_collided_before():
+@pytest.mark.parametrize("spacing_m", [0.0, 0.125], ids=["overlapping", "apart"])
+def test_boxes_that_collide_move_as_in_the_first_episode_whatever_collided_before(spacing_m):
     """Bullet's solver must not stop earlier for some boxes because of the contacts of others."""
     world = empty_world()
-    places = [(0.125 * i, 0.0, 0.06) for i in range(6)]
+    places = [(spacing_m * i, 0.0, 0.06) for i in range(6)]
     edges_m = (0.12, 0.12, 0.12)
     boxes = [world.add_prop(box(f"box_{i}", edges_m, 0.2, p)) for i, p in enumerate(places)]
     world.freeze()
@@ -221,7 +222,7 @@ def test_boxes_that_collide_move_as_in_the_first_episode_whatever_collided_befor
         return film(world, steps=40)
 
     first = played(1)
-    for other in range(2, 6):
+    for other in range(2, 5):
         played(other)
         np.testing.assert_array_equal(played(1), first)
     world.close()

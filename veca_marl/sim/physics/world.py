@@ -21,6 +21,7 @@ from veca_marl.sim.physics.props.joint import LINK, Joint
 from veca_marl.sim.sound import SoundField, make_sound
 
 GRAVITY_MPS2 = 9.81
+_CONTACT_DISTANCE = 8  # entry of Bullet's contact points
 
 
 class World:
@@ -167,6 +168,20 @@ class World:
         self.sound.advance()
         self.step_count += 1
         self.version += 1
+
+    def overlap_m(self, one: int, other: int) -> float:
+        """Return how deep two bodies penetrate each other where they are now, in metres.
+
+        Args:
+            one: PyBullet's id of a body.
+            other: That of another, or of the same one: parts of it that collide with each other.
+
+        Returns:
+            The greatest depth; 0 if they are apart, or if Bullet does not let them collide.
+        """
+        pybullet.performCollisionDetection(physicsClientId=self.client)
+        contacts = pybullet.getContactPoints(one, other, physicsClientId=self.client)
+        return max((-contact[_CONTACT_DISTANCE] for contact in contacts), default=0.0)
 
     def close(self) -> None:
         """Disconnect from PyBullet. Closing twice is harmless.

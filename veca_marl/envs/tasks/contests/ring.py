@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from itertools import combinations
 
 import numpy as np
 
@@ -18,6 +19,7 @@ Colour = tuple[float, float, float]
 _RIM_M = 0.06
 _CLAY, _ROPE = (0.80, 0.62, 0.36), (0.97, 0.97, 0.92)
 _TEAM_SPACING_RAD = math.radians(60.0)  # between players of a team at the start
+_MOST_DRAWS = 200
 
 
 class Ring:
@@ -40,6 +42,7 @@ class Ring:
         low, size = np.array(room.lower_m[:2]), np.array(room.size_m[:2])
         self.middle: Floats = low + size / 2.0
         self.radius_m = radius_m
+        self._world = world
         if size.min() / 2.0 < radius_m:
             raise ValueError(
                 f"task.radius_m={radius_m}: the ring does not fit into the room "
@@ -66,19 +69,36 @@ class Ring:
     ) -> None:
         """Place a team side by side on one side of the ring, facing the middle.
 
+        The headings are drawn again while players of the team penetrate each other.
+
         Args:
             players: The players of the team.
             side_rad: Direction of the team, seen from the middle.
             start_share: Distance from the middle as a share of the radius.
             spread_deg: Largest deviation of the heading from the direction of the middle.
             rng: Random generator of the episode.
+
+        Raises:
+            ValueError: If they still do after `_MOST_DRAWS`.
         """
-        distance_m = start_share * self.radius_m
-        for number, player in enumerate(players):
-            angle_rad = side_rad + _TEAM_SPACING_RAD * (number - (len(players) - 1) / 2.0)
-            place = self.middle + _polar_point(angle_rad, distance_m)
-            deviation_rad = math.radians(rng.uniform(-spread_deg, spread_deg))
-            place_player(player, place, angle_rad + math.pi + deviation_rad)
+        middle_rank = (len(players) - 1) / 2.0
+        angles_rad = [side_rad + _TEAM_SPACING_RAD * (n - middle_rank) for n in range(len(players))]
+        for _ in range(_MOST_DRAWS):
+            for player, angle_rad in zip(players, angles_rad, strict=True):
+                place = self.middle + _polar_point(angle_rad, start_share * self.radius_m)
+                deviation_rad = math.radians(rng.uniform(-spread_deg, spread_deg))
+                place_player(player, place, angle_rad + math.pi + deviation_rad)
+            if not self._overlap(players):
+                return
+        raise ValueError(
+            f"task.start_share={start_share} of task.radius_m={self.radius_m}: players of a team "
+            f"overlap in each of {_MOST_DRAWS} starts; choose a greater one"
+        )
+
+    def _overlap(self, players: Sequence[Player]) -> bool:
+        """Return whether two players penetrate each other."""
+        pairs = combinations([player.body.body_id for player in players], 2)
+        return any(self._world.overlap_m(*pair) > 0.0 for pair in pairs)
 
 
 def _polar_point(direction_rad: float, distance_m: float = 1.0) -> Floats:

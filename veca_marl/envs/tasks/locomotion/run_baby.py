@@ -69,11 +69,10 @@ class RunBaby(Task):
 
     def build(self) -> None:
         self.body = require_humanoid(self.players[0])
-        self.room = self.world.playground.rooms[0]
         self._progress = ForwardProgress(self.world.clock.step_s, self.cfg.top_mps)
 
     def reset(self, rng: np.random.Generator) -> None:
-        start_near_edge(self.body, self.room, STANDING, self.cfg.spread_deg, rng)
+        start_near_edge(self.world, self.body, STANDING, self.cfg.spread_deg, rng)
         self._progress.reset(self.body.bone("chest").position, self.body.forward)
 
     def after_step(self, rng: np.random.Generator) -> None:

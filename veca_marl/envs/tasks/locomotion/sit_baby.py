@@ -78,11 +78,10 @@ class SitBaby(Task):
 
     def build(self) -> None:
         self.body = require_humanoid(self.players[0])
-        self.room = self.world.playground.rooms[0]
 
     def reset(self, rng: np.random.Generator) -> None:
         posture = draw_posture(self.cfg.starts, rng)
-        start_anywhere(self.body, self.room, posture, self.cfg.spread_deg, rng)
+        start_anywhere(self.world, self.body, posture, self.cfg.spread_deg, rng)
 
     def reward(self, player: Player) -> dict[str, float]:
         torso = clipped_share(self.body.bone("neck").position[2], self.cfg.torso_m)

@@ -10,9 +10,12 @@ import numpy as np
 from veca_marl.envs.core.task import TaskCfg
 from veca_marl.sim.body.humanoid import Humanoid
 from veca_marl.sim.body.humanoid.postures import POSTURES, Posture
-from veca_marl.sim.physics import RoomCfg
+from veca_marl.sim.geometry import Floats
+from veca_marl.sim.physics import World
 
 _WALL_CLEARANCE_M = 1.0
+_GREATEST_OVERLAP_M = 0.005  # the skin of hands and feet yields as much
+_MOST_DRAWS = 200
 
 
 @dataclass
@@ -41,20 +44,54 @@ def draw_posture(weights: dict[str, float], rng: np.random.Generator) -> Posture
 
 
 def start_anywhere(
-    body: Humanoid, room: RoomCfg, posture: Posture, spread_deg: float, rng: np.random.Generator
+    world: World, body: Humanoid, posture: Posture, spread_deg: float, rng: np.random.Generator
 ) -> None:
-    """Place a body in a posture with noise, at a random position and heading in a room."""
-    position = room.sample_floor(rng, margin_m=_WALL_CLEARANCE_M)
+    """Place a body in a posture with noise, anywhere in the first room with a random heading.
+
+    The noise is drawn again while limbs penetrate each other.
+    """
+    position = world.playground.rooms[0].sample_floor(rng, margin_m=_WALL_CLEARANCE_M)
     noisy = body.perturb(posture, spread_deg, rng)
-    body.place(position, rng.uniform(-math.pi, math.pi), noisy)
+    heading_rad = rng.uniform(-math.pi, math.pi)
+    body.place(position, heading_rad, noisy)
+    _separate_limbs(world, body, position, heading_rad, posture, spread_deg, rng)
 
 
 def start_near_edge(
-    body: Humanoid, room: RoomCfg, posture: Posture, spread_deg: float, rng: np.random.Generator
+    world: World, body: Humanoid, posture: Posture, spread_deg: float, rng: np.random.Generator
 ) -> None:
-    """Place a body in a posture with noise, near the edge of a room and facing its middle."""
+    """Place a body in a posture with noise, near the edge of the first room, facing its middle.
+
+    The noise is drawn again while limbs penetrate each other.
+    """
+    room = world.playground.rooms[0]
     position, heading_rad = room.sample_start(rng, margin_m=_WALL_CLEARANCE_M)
     body.place(position, heading_rad, body.perturb(posture, spread_deg, rng))
+    _separate_limbs(world, body, position, heading_rad, posture, spread_deg, rng)
+
+
+def _separate_limbs(
+    world: World,
+    body: Humanoid,
+    position: Floats,
+    heading_rad: float,
+    posture: Posture,
+    spread_deg: float,
+    rng: np.random.Generator,
+) -> None:
+    """Draw the noise of a posture again while limbs of a body penetrate each other.
+
+    Raises:
+        ValueError: If they still do after `_MOST_DRAWS`.
+    """
+    for _ in range(_MOST_DRAWS):
+        if world.overlap_m(body.body_id, body.body_id) <= _GREATEST_OVERLAP_M:
+            return
+        body.place(position, heading_rad, body.perturb(posture, spread_deg, rng))
+    raise ValueError(
+        f"task.spread_deg={spread_deg}: limbs of {body.name} overlap in each of {_MOST_DRAWS} "
+        "starts; choose a smaller one"
+    )
 
 
 def face_down_cosines(body: Humanoid) -> dict[str, float]:

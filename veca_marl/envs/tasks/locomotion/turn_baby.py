@@ -53,10 +53,9 @@ class TurnBaby(Task):
 
     def build(self) -> None:
         self.body = require_humanoid(self.players[0])
-        self.room = self.world.playground.rooms[0]
 
     def reset(self, rng: np.random.Generator) -> None:
-        start_anywhere(self.body, self.room, ON_BACK, self.cfg.spread_deg, rng)
+        start_anywhere(self.world, self.body, ON_BACK, self.cfg.spread_deg, rng)
 
     def reward(self, player: Player) -> dict[str, float]:
         return face_down_cosines(self.body)

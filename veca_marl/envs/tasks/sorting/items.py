@@ -43,11 +43,7 @@ class Item(NamedTuple):
 
 
 def add_items(world: World, kinds: Sequence[ToyKind]) -> list[Item]:
-    """Add toys that can be grabbed to a world that is not frozen yet.
-
-    They are built apart: Bullet keeps contacts of the built state, and polyhedra that overlap in it
-    would move differently after the first episode.
-    """
+    """Add toys that can be grabbed to a world that is not frozen yet, apart from each other."""
     return [
         Item(world.add_prop(toy(f"toy_{number}_{kind.name}", kind, built_at(number, 0.2))), kind)
         for number, kind in enumerate(kinds)
