@@ -12,8 +12,13 @@ from veca_marl.envs.adapters.torchrl.env import VecaEnv
 
 def batch_and_singles(cfg, worlds, seed):
     """Return a `VecaEnv` of some worlds and TorchRL's `SerialEnv` of each of them alone."""
+    return VecaEnv(cfg, worlds, seed), single_worlds(cfg, worlds, seed)
+
+
+def single_worlds(cfg, worlds, seed):
+    """Return TorchRL's `SerialEnv` of the worlds of a batch, each of them alone."""
     alone = [partial(VecaEnv, cfg, 1, seed, first_world=world) for world in range(worlds)]
-    return VecaEnv(cfg, worlds, seed), SerialEnv(worlds, alone)
+    return SerialEnv(worlds, alone)
 
 
 def leaves(tensordict):

@@ -3,7 +3,8 @@
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
-from veca_marl.config import compose
+from composed import compose
+
 from veca_marl.envs.core.expert import EXPERTS, Expert
 from veca_marl.envs.core.task import TASKS, Task, TaskCfg, Team, terms
 

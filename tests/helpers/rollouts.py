@@ -19,6 +19,8 @@ from veca_marl.envs.core.team import Script
 from veca_marl.sim.body import VoiceKind
 from veca_marl.sim.body.walker import WalkerCfg
 
+# episodes of 10 steps
+SHORT, EPISODE = "task.max_seconds=0.4", 10
 # kinds of actions in a task: those of its own body, and of another one
 KINDS = ("own", "other")
 # tasks of joint-level bodies that walkers can play as well

@@ -1,8 +1,13 @@
-"""The laws of every task are tested with each task and each kind of action."""
+"""The laws of every task are tested with each task and each kind of action.
+
+All laws of a task share one environment, which a session builds once: a law seeds it first.
+"""
 
 import pytest
-from rollouts import KINDS
+from rollouts import KINDS, SHORT, game_cfg, play
 
+from veca_marl.envs.adapters.torchrl.env import VecaEnv
+from veca_marl.envs.core.game import Game
 from veca_marl.envs.core.task import TASKS
 
 # tasks that the quick suite plays also with a body that is not their own: walkers, joints, two
@@ -10,17 +15,44 @@ from veca_marl.envs.core.task import TASKS
 WITH_OTHER_BODY = ("KickTheBall", "TurnBaby", "PushOut1v1", "MultiAgentNav")
 # games of several joint-level bodies with eyes and skin, which the quick suite plays with walkers
 WITH_WALKERS = ("PushOut2v2", "SoccerTwoPlayer")
+WORLDS, STEPS = 2, 25
 
 
 def pytest_generate_tests(metafunc):
     """Give a test each task, and each kind of action if it depends on `kind`."""
     if "kind" in metafunc.fixturenames:
         pairs = [_pair(task, kind) for task in sorted(TASKS) for kind in KINDS]
-        metafunc.parametrize(("task", "kind"), pairs, scope="module")
+        metafunc.parametrize(("task", "kind"), pairs, scope="session")
     elif "task" in metafunc.fixturenames:
-        metafunc.parametrize("task", sorted(TASKS), scope="module")
+        metafunc.parametrize("task", sorted(TASKS), scope="session")
 
 
 def _pair(task, kind):
     quick = task in WITH_OTHER_BODY or (kind == "own") != (task in WITH_WALKERS)
     return pytest.param(task, kind, marks=() if quick else pytest.mark.slow)
+
+
+@pytest.fixture(scope="session")
+def cfg(task, kind):
+    """The game with short episodes."""
+    return game_cfg(task, kind, SHORT)
+
+
+@pytest.fixture(scope="session")
+def env(cfg):
+    env = VecaEnv(cfg, WORLDS, seed=0)
+    yield env
+    env.close()
+
+
+@pytest.fixture(scope="session")
+def rollout(env):
+    return play(env, STEPS, seed=1)
+
+
+@pytest.fixture(scope="session")
+def own_game(task):
+    """The game of a task with its own body; a law resets it first."""
+    game = Game(game_cfg(task))
+    yield game
+    game.close()

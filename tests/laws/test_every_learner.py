@@ -7,12 +7,12 @@ import math
 
 import pytest
 import torch
+from composed import compose
 from random_batches import random_batch
 from rollouts import game_cfg
 
 from veca_marl.algos.algorithm import make_algorithm
 from veca_marl.algos.sac.config import ReplayCfg
-from veca_marl.config import compose
 from veca_marl.runs.assembly import read_specs
 
 PRESETS = ("sac", "sac_fast", "crossq")

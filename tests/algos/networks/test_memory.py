@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
+from composed import compose
 from fake_env import make_fake_env
 from first_seen import FirstSeenCfg, make_show_once
 from training import FRAMES, SMALL, Interrupt
@@ -21,7 +22,6 @@ from veca_marl.algos.training.checkpoint import Checkpoints, Identity
 from veca_marl.algos.training.learners import TeamLearners
 from veca_marl.algos.training.loop import Trainer
 from veca_marl.algos.training.progress import Budget
-from veca_marl.config import compose
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
 from veca_marl.runs.recording import record_episode
 

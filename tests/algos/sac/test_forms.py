@@ -4,13 +4,13 @@ import math
 
 import pytest
 import torch
+from composed import compose
 from random_batches import random_batch
 
 from veca_marl.algos.algorithm import make_algorithm
 from veca_marl.algos.networks.multisense import Critic, Parameters
 from veca_marl.algos.sac.config import ReplayCfg
 from veca_marl.algos.specs import ActionLayout, ArrayLayout, TeamSpec
-from veca_marl.config import compose
 
 EYES = ArrayLayout((2, 3, 16, 16), "uint8", 0.0, 255.0)
 EARS = ArrayLayout((2, 10), "float32", -8.0, 3.0)

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+from composed import compose
 from listening import RATE
 
-from veca_marl.config import compose
 from veca_marl.fidelity.hearing.ears import (
     heard_noise,
     interaural_level_db,

@@ -5,9 +5,9 @@ import tempfile
 
 import numpy as np
 import pytest
+from composed import compose
 from walking import ball, box, empty_world, film, let_pass, walker_in
 
-from veca_marl.config import compose
 from veca_marl.sim.geometry import joined_inertia, primitive_inertia
 from veca_marl.sim.physics import PartCfg, PlaygroundCfg, PropCfg, PropShape, World, pybullet
 from veca_marl.sim.physics.props.prop_shapes import prop_geoms

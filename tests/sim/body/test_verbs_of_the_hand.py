@@ -1,0 +1,154 @@
+"""Grabbing, releasing, kicking and pressing, and what is refused."""
+
+import math
+
+import numpy as np
+import pytest
+from verbs import begin, do, seeing, toy
+from walking import ball, box, empty_world, let_pass, walker_in, wall
+
+from veca_marl.sim.body.walker import WalkCommand, WalkerCfg
+
+
+def test_a_grabbed_prop_follows_the_hand_and_falls_when_released():
+    world = empty_world(toy())
+    walker = seeing(world)
+    begin(world)
+    prop = world.prop("toy")
+    assert do(world, walker, "grab")
+    assert walker.applied_verb == ("grab", prop)
+    assert (walker.held, prop.holder) == (prop, "walker")
+    for _ in range(20):
+        do(world, walker, "none", forward=1.0, turn=0.5)
+        palm = walker.palms()[1]
+        assert np.linalg.norm(prop.position - palm) == pytest.approx(0.048, abs=0.003)
+    assert walker.interactable_object() is None  # what the hand holds is no object of a verb
+    assert do(world, walker, "release")
+    assert (walker.held, prop.holder) == (None, None)
+    let_pass(world, 0.6)
+    assert prop.position[2] == pytest.approx(0.05, abs=0.01)
+
+
+def test_a_held_prop_does_not_move_its_holder_and_stays_before_walls():
+    world = empty_world(toy(), wall(position=(1.0, 0.0, 0.0)))
+    free = empty_world(wall(position=(1.0, 0.0, 0.0)))
+    alone = walker_in(free)
+    walker = seeing(world)
+    begin(world)
+    do(world, walker, "grab")
+    free.step()
+    for turn in [0.0] * 40 + [1.0] * 40:
+        do(world, walker, "none", forward=1.0, turn=turn)
+        alone.act(alone.encode((1.0, turn)))
+        free.step()
+        assert world.prop("toy").bounds()[1][0] < 0.96
+    np.testing.assert_array_equal(walker.position[:2], alone.position[:2])
+    hand_mps = walker.velocity
+    do(world, walker, "release")
+    # it keeps the velocity of the hand, falls, and is not expelled from the wall
+    assert np.linalg.norm(world.prop("toy").velocity - hand_mps) < 0.5
+
+
+@pytest.mark.parametrize(
+    "prop",
+    [
+        ball(position=(0.6, 0.0, 0.1)),
+        ball(position=(0.6, 0.0, 0.1), mass_kg=8.0, interactions=["grab"]),
+        box(position=(0.6, 0.0, 0.15), mass_kg=0.0, interactions=["grab"]),
+        box(position=(0.6, 0.0, 0.15), interactions=["kick"]),
+    ],
+    ids=["undeclared", "heavy", "fixed", "another_verb"],
+)
+def test_a_verb_on_the_wrong_thing_changes_nothing(prop):
+    world, untouched = empty_world(prop), empty_world(prop)
+    walker, other = seeing(world), seeing(untouched)
+    begin(world)
+    begin(untouched)
+    assert not do(world, walker, "grab")
+    do(untouched, other, "none")
+    np.testing.assert_array_equal(world.scene.positions, untouched.scene.positions)
+
+
+def test_release_with_empty_hands_and_a_second_grab_are_refused():
+    world = empty_world(toy(), toy("second", (0.7, 0.2, 0.05)))
+    walker = seeing(world)
+    begin(world)
+    assert not do(world, walker, "release")
+    assert do(world, walker, "grab")
+    assert not do(world, walker, "grab")
+    assert walker.held is world.prop("toy")
+
+
+@pytest.mark.parametrize("order", [("near", "far"), ("far", "near")])
+def test_of_two_that_grab_at_once_the_nearer_gets_it_and_keeps_it(order):
+    places = {"near": ((0.0, 0.0, 0.0), 0.0), "far": ((1.6, 0.0, 0.0), 180.0)}
+    world = empty_world(toy())
+    walkers = {name: seeing(world, name, *places[name]) for name in order}
+    begin(world)
+    for name, walker in walkers.items():
+        place, yaw_deg = places[name]
+        walker.place(place, math.radians(yaw_deg))
+    world.refresh()
+    for walker in walkers.values():
+        walker.act(walker.encode(WalkCommand(0.0, 0.0, verb="grab")))
+    world.step()
+    assert world.prop("toy").holder == "near"
+    assert walkers["far"].verb_was_refused
+    assert not do(world, walkers["far"], "grab")
+
+
+def test_a_reset_releases_and_equal_actions_give_equal_bytes():
+    world = empty_world(toy(), ball("other", position=(0.7, 0.3, 0.1)))
+    walker = seeing(world)
+    world.freeze()
+    films = []
+    for _ in range(3):
+        world.reset(np.random.default_rng(0))
+        assert walker.held is None
+        assert world.prop("toy").holder is None
+        world.refresh()
+        film = []
+        for verb in ["grab", *["none"] * 8, "release", *["none"] * 6, "kick", "grab", "none"]:
+            do(world, walker, verb, forward=0.6, turn=0.3)
+            film.append(world.scene.positions.tobytes())
+        films.append(film)
+    assert films[0] == films[1] == films[2]
+
+
+def test_a_kick_is_a_verb_too():
+    world = empty_world(ball(position=(0.3, 0.0, 0.1), interactions=["kick"]))
+    walker = seeing(world)
+    walker.rotate_up_down_head(25.0)
+    begin(world)
+    walker.rotate_up_down_head(25.0)
+    world.refresh()
+    assert do(world, walker, "kick")
+    assert world.prop("ball").velocity[0] > 1.0
+
+
+def test_unknown_verbs_are_refused_where_they_are_named():
+    with pytest.raises(ValueError, match=r"body.verbs: .*'grap'.*did you mean grab"):
+        WalkerCfg(verbs=["grap"])
+    with pytest.raises(ValueError, match="once"):
+        WalkerCfg(verbs=["grab", "grab"])
+    with pytest.raises(ValueError, match=r"prop 'ball': interactions: .*'throw'"):
+        empty_world(ball(interactions=["throw"]))
+    with pytest.raises(ValueError, match=r"verb 'grab'.*none"):
+        walker_in(empty_world()).encode(WalkCommand(0.0, 0.0, verb="grab"))
+
+
+def test_pressing_moves_nothing_and_is_reported():
+    world = empty_world(
+        box("button", (0.1, 0.1, 0.1), 0.0, (0.6, 0.0, 0.05), interactions=["press"])
+    )
+    walker = seeing(world, extra_verbs=["press"])
+    begin(world)
+    before = world.prop("button").position
+    assert do(world, walker, "press")
+    assert walker.applied_verb == ("press", world.prop("button"))
+    assert walker.info() == {"refused_verbs": 0.0}
+    np.testing.assert_array_equal(world.prop("button").position, before)
+    do(world, walker, "none")
+    assert walker.applied_verb is None
+    do(world, walker, "release")
+    assert walker.info() == {"refused_verbs": 1.0}
