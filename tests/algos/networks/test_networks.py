@@ -5,12 +5,17 @@ import torch
 from fake_env import FakeEnv
 from torchrl.data import Bounded, Composite
 
-from veca_marl.algos.networks.encoders import make_encoder
+from veca_marl.algos.networks.encoders import (
+    ImageEncoder,
+    Places,
+    Pooling,
+    VectorEncoder,
+    make_encoder,
+    scale_of,
+)
 from veca_marl.algos.networks.factory import make_network
-from veca_marl.algos.networks.image_encoder import ImageEncoder, Places, Pooling
 from veca_marl.algos.networks.multisense import MultisenseCfg, Trunk
 from veca_marl.algos.networks.precision import Precision
-from veca_marl.algos.networks.vector_encoder import VectorEncoder, scale_of
 from veca_marl.algos.specs import ArrayLayout, team_specs
 
 IMAGE = ArrayLayout((2, 3, 84, 84), "uint8", 0.0, 255.0)

@@ -9,9 +9,9 @@ import torch
 from timed_batches import SPEC, batch_of
 
 from veca_marl.algos.sac.config import ReplayCfg, Storage
-from veca_marl.algos.sac.replay import Replay, storage_needed
-from veca_marl.algos.sac.segments import StoredKeys
-from veca_marl.algos.sac.windows import Span
+from veca_marl.algos.sac.replay.buffer import Replay, storage_needed
+from veca_marl.algos.sac.replay.segments import StoredKeys
+from veca_marl.algos.sac.replay.windows import Span
 from veca_marl.algos.specs import ArrayLayout
 
 KEYS = StoredKeys.of("team", SPEC)

@@ -20,10 +20,10 @@ from veca_marl.algos.networks.multisense import Critic, Memory, Parameters
 from veca_marl.algos.networks.precision import Precision
 from veca_marl.algos.sac.config import EncoderGradient, ReplayCfg, SACCfg, Targets
 from veca_marl.algos.sac.readers import SequenceReader
-from veca_marl.algos.sac.replay import Replay, storage_needed
+from veca_marl.algos.sac.replay.buffer import Replay, storage_needed
+from veca_marl.algos.sac.replay.segments import StoredKeys
+from veca_marl.algos.sac.replay.windows import VALID, Span, transitions
 from veca_marl.algos.sac.sac import SAC
-from veca_marl.algos.sac.segments import StoredKeys
-from veca_marl.algos.sac.windows import VALID, Span, transitions
 from veca_marl.algos.specs import team_specs
 
 CPU = torch.device("cpu")

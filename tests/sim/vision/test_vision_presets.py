@@ -8,7 +8,7 @@ from composed import compose
 from eye_scenes import FakeBody, clutter
 from stand_in_worlds import SceneWorld
 
-from veca_marl.algos.networks.image_encoder import ImageEncoder
+from veca_marl.algos.networks.encoders import ImageEncoder
 from veca_marl.config import conf_dir
 from veca_marl.sim.vision import VisionSense
 from veca_marl.sim.vision.image_filters import Defocus

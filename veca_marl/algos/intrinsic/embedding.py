@@ -7,8 +7,8 @@ import math
 import torch
 from torch import Tensor, nn
 
+from veca_marl.algos.networks.encoders import VectorEncoder
 from veca_marl.algos.networks.initialisation import orthogonal
-from veca_marl.algos.networks.vector_encoder import VectorEncoder
 from veca_marl.algos.specs import ArrayLayout
 
 

@@ -11,11 +11,10 @@ from tensordict.nn import TensorDictModule, TensorDictModuleBase, TensorDictSequ
 from torch import Tensor, nn
 
 from veca_marl.algos.acting.modules import ArrayModule
-from veca_marl.algos.networks.encoders import make_encoder
+from veca_marl.algos.networks.encoders import Pooling, make_encoder
 from veca_marl.algos.networks.factory import NetworkCfg, NetworkFactory, register_network
-from veca_marl.algos.networks.gru import GatedMemory, TeamMemory
-from veca_marl.algos.networks.image_encoder import Pooling
 from veca_marl.algos.networks.initialisation import orthogonal
+from veca_marl.algos.networks.memory.gru import GatedMemory, TeamMemory
 from veca_marl.algos.networks.per_agent import CentralValue, PerAgent
 from veca_marl.algos.networks.precision import Arithmetic, Precision
 from veca_marl.algos.sense_encoders import SenseEncoders

@@ -15,8 +15,8 @@ from veca_marl.algos.sac.critic import Critic, constant
 from veca_marl.algos.sac.joint_action import JointAction, Proposed, Taken
 from veca_marl.algos.sac.masks import masked_mean
 from veca_marl.algos.sac.readers import FeatureReader, StepReader
+from veca_marl.algos.sac.replay.windows import Transitions
 from veca_marl.algos.sac.temperature import Temperatures
-from veca_marl.algos.sac.windows import Transitions
 
 
 @dataclass(frozen=True)

@@ -13,8 +13,8 @@ from tensordict.nn import TensorDictModuleBase
 from torch import Tensor
 from torchrl.modules import set_recurrent_mode
 
-from veca_marl.algos.sac.segments import Key
-from veca_marl.algos.sac.windows import VALID, Span, Transitions
+from veca_marl.algos.sac.replay.segments import Key
+from veca_marl.algos.sac.replay.windows import VALID, Span, Transitions
 
 
 class FeatureReader(Protocol):

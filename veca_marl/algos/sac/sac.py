@@ -21,10 +21,10 @@ from veca_marl.algos.sac.joint_action import JointAction
 from veca_marl.algos.sac.loss import TeamCrossQLoss, TeamSACLoss
 from veca_marl.algos.sac.random_shift import RandomShift
 from veca_marl.algos.sac.readers import make_reader, memory_keys
-from veca_marl.algos.sac.replay import Replay, storage_needed
-from veca_marl.algos.sac.segments import StoredKeys
+from veca_marl.algos.sac.replay.buffer import Replay, storage_needed
+from veca_marl.algos.sac.replay.segments import StoredKeys
+from veca_marl.algos.sac.replay.windows import Span, transitions
 from veca_marl.algos.sac.temperature import Temperatures
-from veca_marl.algos.sac.windows import Span, transitions
 from veca_marl.algos.sense_encoders import copy_parameters
 from veca_marl.algos.specs import PLAIN, TeamSpec
 from veca_marl.algos.storage import StorageNeeded

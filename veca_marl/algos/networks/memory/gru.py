@@ -12,7 +12,7 @@ from torchrl.envs import TensorDictPrimer
 from torchrl.modules.tensordict_module.rnn import recurrent_mode
 
 from veca_marl.algos.acting.keys import Arrays
-from veca_marl.algos.networks.memory import memory_primer
+from veca_marl.algos.networks.memory.hidden_state import memory_primer
 
 
 class GatedMemory(nn.Module):

@@ -16,9 +16,9 @@ from torchrl.data import LazyMemmapStorage, LazyTensorStorage, TensorDictReplayB
 from torchrl.data.replay_buffers import Sequence
 
 from veca_marl.algos.sac.config import ReplayCfg, Storage
-from veca_marl.algos.sac.scratch import make_scratch_folder
-from veca_marl.algos.sac.segments import END, PLACE, Key, StoredKeys, segment_rows
-from veca_marl.algos.sac.windows import VALID, Span, Windows
+from veca_marl.algos.sac.replay.scratch import make_scratch_folder
+from veca_marl.algos.sac.replay.segments import END, PLACE, Key, StoredKeys, segment_rows
+from veca_marl.algos.sac.replay.windows import VALID, Span, Windows
 from veca_marl.algos.specs import TeamSpec
 from veca_marl.algos.storage import StorageNeeded, state_bytes
 

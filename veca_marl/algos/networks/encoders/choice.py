@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from veca_marl.algos.networks.image_encoder import ImageEncoder, Pooling
-from veca_marl.algos.networks.vector_encoder import VectorEncoder
+from veca_marl.algos.networks.encoders.image import ImageEncoder, Pooling
+from veca_marl.algos.networks.encoders.vector import VectorEncoder
 from veca_marl.algos.specs import ArrayLayout
 
 
