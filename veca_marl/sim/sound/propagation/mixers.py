@@ -42,16 +42,13 @@ class Mixer(Protocol):
         """
         ...
 
-    def add_changed(self, blocks: Signals, before: Response) -> Response:
+    def add_changed(self, blocks: Signals, response: Response) -> None:
         """Filter the signals of some paths by filters that change to new ones, and add them.
 
         Args:
             blocks: ``(2, K, C, block_samples)``: the signals, and the filters at the end of the
                 step in the form that `response` takes.
-            before: Filters at the beginning of the step.
-
-        Returns:
-            The filters at the end of the step.
+            response: Filters at the beginning of the step; overwritten by those at its end.
         """
         ...
 
@@ -88,11 +85,11 @@ class GainMixer:
             self._sum,
         )
 
-    def add_changed(self, blocks: Signals, before: Response) -> Response:
+    def add_changed(self, blocks: Signals, response: Response) -> None:
         """See `Mixer`."""
         after = self.response(blocks[1])
-        _add_faded(blocks[0], before, after, self._sum)
-        return after
+        _add_faded(blocks[0], response, after, self._sum)
+        response[:] = after
 
     def finish(self) -> Signals:
         """See `Mixer`."""
@@ -129,17 +126,13 @@ class SpectralMixer:
         if after is not None:
             _add_products(spectra, after, new)
 
-    def add_changed(self, blocks: Signals, before: Response) -> Response:
+    def add_changed(self, blocks: Signals, response: Response) -> None:
         """See `Mixer`."""
         # one call: its overhead is that of three transforms
-        spectra: NDArray[np.complex64]
-        after: NDArray[np.complex64]
         spectra, after = scipy.fft.rfft(blocks)
         _, old, new = self._sums
-        _add_products(spectra, before, old)
-        _add_products(spectra, after, new)
+        _add_changed_products(spectra, response, after, old, new)
         self._faded = True
-        return after
 
     def finish(self) -> Signals:
         """See `Mixer`."""
@@ -165,6 +158,28 @@ def _add_products(
             signal, response, total = spectra[k, channel], filters[k, channel], out[channel]
             for f in range(total.shape[0]):
                 total[f] += signal[f] * response[f]
+
+
+@njit(cache=True, error_model="numpy")
+def _add_changed_products(
+    spectra: NDArray[np.complex64],
+    before: NDArray[np.complex64],
+    after: NDArray[np.complex64],
+    old: NDArray[np.complex64],
+    new: NDArray[np.complex64],
+) -> None:
+    """Add ``spectra * before`` to `old` and ``spectra * after`` to `new`; see `_add_products`.
+
+    `before` is overwritten by `after`.
+    """
+    for k in range(spectra.shape[0]):
+        for channel in range(spectra.shape[1]):
+            signal, first, last = spectra[k, channel], before[k, channel], after[k, channel]
+            total_old, total_new = old[channel], new[channel]
+            for f in range(signal.shape[0]):
+                total_old[f] += signal[f] * first[f]
+                total_new[f] += signal[f] * last[f]
+                first[f] = last[f]
 
 
 @njit(cache=True, error_model="numpy")

@@ -46,6 +46,7 @@ class Ears:
         longest = (surroundings.longest_path_m + receiver.extent_m) * samples_per_metre
         self.reach_samples = self.reach_of(longest)
         self.max_delay_change = MAX_SPEED_MPS * samples_per_metre * step_samples / sample_rate_hz
+        self._blocks: dict[int, NDArray[np.float32]] = {}
 
     def reach_of(self, delay: float) -> int:
         """Return how many of the newest samples can be heard in one step at a delay in samples."""
@@ -75,6 +76,17 @@ class Ears:
         )
         return delays, filters
 
+    def blocks(self, n_paths: int) -> NDArray[np.float32]:
+        """Return a buffer ``(2, K, C, block_samples)`` for signals and filters of K paths.
+
+        Sources with equal numbers of paths use the same one, in turns: with a buffer each, those of
+        several listeners would not fit into the cache. Filters are zero after their taps.
+        """
+        if n_paths not in self._blocks:
+            shape = (2, n_paths, self._receiver.n_channels, self.mixer.block_samples)
+            self._blocks[n_paths] = np.zeros(shape, np.float32)
+        return self._blocks[n_paths]
+
 
 class _Paths:
     """Paths of one source that stay the same paths from step to step.
@@ -89,12 +101,14 @@ class _Paths:
         self._ears = ears
         delays, filters = ears.paths(arrivals)
         self._place(arrivals, delays)
-        # signals, and filters with zeros after their taps: transformed together
-        self._blocks = np.zeros((2, *delays.shape, ears.mixer.block_samples), np.float32)
+        self._blocks = ears.blocks(len(delays))
         self._signals: NDArray[np.float32] = self._blocks[0]
         self._filters: NDArray[np.float32] = self._blocks[1, ..., : filters.shape[-1]]
         self._filters[:] = filters
         self._response = ears.mixer.response(self._blocks[1])
+        # the end of the signals of the last step, with which the block of the next one begins
+        kept = ears.mixer.block_samples - ears.step_samples
+        self._ends: NDArray[np.float32] = np.empty((*delays.shape, kept), np.float32)
 
     def _place(self, arrivals: Arrivals, delays: Floats) -> None:
         self.arrivals, self.delays = arrivals, delays
@@ -140,7 +154,7 @@ class _Paths:
         self._read(memory, 0, delays, self._ears.step_samples)
         self._place(arrivals, delays)
         self._filters[:] = filters
-        self._response = self._ears.mixer.add_changed(self._blocks, self._response)
+        self._ears.mixer.add_changed(self._blocks, self._response)
 
     def _read(
         self,
@@ -152,7 +166,9 @@ class _Paths:
     ) -> None:
         start = max(start, memory.end - memory.n_samples)
         end = memory.end - age_samples
-        _append_read(memory.powers, start, end, self.delays, delays, n_samples, self._signals)
+        _read_block(
+            memory.powers, start, end, self.delays, delays, n_samples, self._ends, self._signals
+        )
 
 
 class Propagation:
@@ -243,16 +259,17 @@ class Propagation:
 
 
 @njit(cache=True, error_model="numpy")
-def _append_read(
+def _read_block(
     powers: NDArray[np.float32],
     start: int,
     end: int,
     before: Floats,
     after: Floats,
     n_samples: int,
+    ends: NDArray[np.float32],
     signals: NDArray[np.float32],
 ) -> None:
-    """Append `n_samples` to the signal of each path and channel, see `read_moving`.
+    """Write the blocks of all paths and channels, with `n_samples` new samples each.
 
     Args:
         powers: See `read_moving`.
@@ -260,14 +277,19 @@ def _append_read(
         end: Likewise.
         before: ``(K, C)`` delays in samples before the first of the new samples.
         after: ``(K, C)`` delays at the last of them.
-        n_samples: How many to append.
-        signals: ``(K, C, B)``; the oldest samples are dropped.
+        n_samples: B - E, or B.
+        ends: ``(K, C, E)`` last samples of the blocks of the last step; overwritten by those of
+            these blocks.
+        signals: ``(K, C, B)``, overwritten: earlier samples, if there is room, and the new ones.
     """
     kept = signals.shape[2] - n_samples
     for k in range(signals.shape[0]):
         for channel in range(signals.shape[1]):
-            signal = signals[k, channel]
+            signal, last = signals[k, channel], ends[k, channel]
             for i in range(kept):
-                signal[i] = signal[i + n_samples]
+                signal[i] = last[i]
             new = signal[kept:]
             read_moving(powers, start, end, before[k, channel], after[k, channel], new)
+            first = signal.shape[0] - last.shape[0]
+            for i in range(last.shape[0]):
+                last[i] = signal[first + i]
