@@ -56,7 +56,7 @@ class TurnBabyExpert(SkillExpert):
 
 @register_expert("SitBaby")
 class SitBabyExpert(SkillExpert):
-    """Turns to the belly, pushes up on the hands and sits back on the heels; see `SitUp`.
+    """Turns to the belly, pushes up on the hands, sits back on the heels and rises; see `SitUp`.
 
     Reads the pose of the trunk from the simulator (privileged).
     """

@@ -1,16 +1,26 @@
-"""Sitting up from the back: turn to the belly, push up on the hands, sit back on the heels.
+"""Sitting up from the back: turn to the belly, push up on the hands, sit back on the heels, rise.
 
 A random search found no sit-up straight from the back, since trunk and head outweigh the legs.
 """
 
 from __future__ import annotations
 
+import math
+
 from veca_marl.envs.experts.control.key_poses import KeyPoses
+from veca_marl.envs.experts.control.seated_balance import SeatedBalance
 from veca_marl.envs.experts.skills.turn_over import TurnOver
 from veca_marl.sim.body.humanoid import Humanoid, JointCommand
 from veca_marl.sim.body.humanoid.postures import Posture
 
-# set by hand, then improved by a random search, as those of `turn_over`
+_KNEELING = {
+    "thigh.abduction": 20,
+    "thigh.internal_rotation": -7,
+    "shank.flexion": 148,
+    "foot.dorsiflexion": -52,
+    "upper_arm.internal_rotation": 11,
+}
+# set by hand; those up to "push" then improved by a random search, as those of `turn_over`
 _POSES = {
     # on the belly: hands beside the shoulders, knees bent
     "prepare": Posture(
@@ -43,32 +53,47 @@ _POSES = {
             "foot.dorsiflexion": -43,
         }
     ),
-    # hips on the heels, supported by straight arms, head up
+    # hips on the heels, trunk bent forwards by 50 degrees, supported by straight arms
     "sit": Posture(
         joints_deg={
-            "upper_arm.flexion": 52,
-            "upper_arm.internal_rotation": 11,
-            "hand.flexion": -52,
-            "thigh.flexion": 107,
-            "thigh.abduction": 20,
-            "thigh.internal_rotation": -7,
-            "shank.flexion": 148,
+            **_KNEELING,
+            "thigh.flexion": 120,
+            "spine.flexion": -15,
             "chest.flexion": -10,
             "neck.flexion": -38,
-            "head.flexion": -23,
-            "foot.dorsiflexion": -52,
+            "head.flexion": -20,
+            "upper_arm.flexion": 52,
+            "hand.flexion": -52,
+        }
+    ),
+    # the trunk upright on the heels, the arms hanging forwards
+    "rise": Posture(
+        joints_deg={
+            **_KNEELING,
+            "thigh.flexion": 72,
+            "spine.flexion": -10,
+            "chest.flexion": -8,
+            "neck.flexion": -20,
+            "upper_arm.flexion": 45,
+            "forearm.flexion": 15,
         }
     ),
 }
-_SPEEDS_RADPS = {"prepare": 10.0, "push": 10.0, "sit": 4.0}
-_DURATION_S = {"lie": 0.4, "prepare": 0.5, "push": 1.1, "sit": 2.0}
-_NEXT_STAGE = {"lie": "prepare", "prepare": "push", "push": "sit"}
+_SPEEDS_RADPS = {"prepare": 10.0, "push": 10.0, "sit": 4.0, "rise": 2.0}
+_DURATION_S = {"lie": 0.4, "prepare": 0.5, "push": 1.1, "sit": 1.0, "rise": 1.5}
+_NEXT_STAGE = {"lie": "prepare", "prepare": "push", "push": "sit", "sit": "rise"}
 _ON_BELLY = 0.7  # cosine of the angle between the front of the chest and straight down
-_FAILED_M = 0.24  # below this height of the top of the chest the attempt has failed
+_FAILED_M = 0.12  # below this height of the top of the chest the attempt has failed
+_BENT_AT_FIRST, _RISING_S = 0.8, 0.5  # share of the bend at the start; time from bent to upright
+_ON_HEELS_RAD = math.radians(45.0)  # from the vertical; a thigh that is steeper has left the heel
 
 
 class SitUp:
     """Target angles of a body that sits up, in stages; it starts again after a failed attempt.
+
+    While it rises, gravity compensation (`SeatedBalance`) moves trunk and hips from bent to
+    upright, and back as long as the thighs have left the heels: the extension of the hips then
+    lifts the pelvis instead of the trunk.
 
     Args:
         body: The body.
@@ -79,7 +104,8 @@ class SitUp:
         self._body, self._step_s = body, step_s
         self._turn = TurnOver(body, step_s)
         self._key_poses = KeyPoses(body, _POSES, step_s)
-        self._stage, self._elapsed_s = "lie", 0.0
+        self._balance = SeatedBalance(body, upright=_POSES["rise"], bent=_POSES["sit"])
+        self._stage, self._elapsed_s, self._bend = "lie", 0.0, _BENT_AT_FIRST
         self.reset()
 
     def reset(self) -> None:
@@ -90,14 +116,27 @@ class SitUp:
     def command(self) -> JointCommand:
         """Return the target angles of the next step."""
         self._elapsed_s += self._step_s
+        command = self._stage_command()
+        self._advance_stage()
+        return command
+
+    def _stage_command(self) -> JointCommand:
         if self._stage == "lie":
             if not self._body.bone("chest").forward[2] < -_ON_BELLY:
                 self._elapsed_s = 0.0
-            targets = self._turn.command()
-        else:
-            targets = self._key_poses.toward(self._stage, _SPEEDS_RADPS[self._stage])
-        self._advance_stage()
-        return JointCommand(targets, horizon_s=0.0)
+            return JointCommand(self._turn.command(), horizon_s=0.0)
+        targets = self._key_poses.toward(self._stage, _SPEEDS_RADPS[self._stage])
+        if self._stage != "rise":
+            return JointCommand(targets, horizon_s=0.0)
+        change = self._step_s / _RISING_S
+        bend = self._bend - change if self._is_on_heels() else self._bend + change
+        self._bend = min(max(bend, 0.0), 1.0)
+        return JointCommand(self._balance.hold(targets, self._bend), horizon_s=self._step_s)
+
+    def _is_on_heels(self) -> bool:
+        """Return whether the left thigh is near the horizontal, its knee in front of the hip."""
+        way = self._body.bone("l_shank").position - self._body.bone("l_thigh").position
+        return math.atan2(way @ self._body.forward, -way[2]) > _ON_HEELS_RAD
 
     def _advance_stage(self) -> None:
         late = self._elapsed_s >= _DURATION_S[self._stage]
@@ -110,3 +149,6 @@ class SitUp:
         self._stage, self._elapsed_s = stage, 0.0
         if stage == "prepare":
             self._key_poses.reset()
+        if stage == "rise":
+            self._balance.reset()
+            self._bend = _BENT_AT_FIRST
