@@ -37,3 +37,20 @@ def read(path):
     with path.open() as file:
         rows = list(csv.DictReader(file))
     return [{k: v for k, v in row.items() if k not in TIMES} for row in rows]
+
+
+def rewards_until(enough, learn, batches):
+    """Learn from one batch after another, until the reward is high enough or all are used.
+
+    Args:
+        enough: Mean reward that ends learning.
+        learn: Plays and learns from a batch; returns its mean reward.
+        batches: How many batches there are at most.
+
+    Returns:
+        The mean reward of each batch.
+    """
+    rewards = []
+    while len(rewards) < batches and not (rewards and rewards[-1] > enough):
+        rewards.append(learn())
+    return rewards

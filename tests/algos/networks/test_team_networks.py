@@ -4,7 +4,7 @@ import pytest
 import torch
 from fake_env import FakeEnv
 from torchrl.envs import ExplorationType, set_exploration_type
-from training import SMALL
+from training import SMALL, rewards_until
 
 from veca_marl.algos.networks.multisense import Critic, MultisenseCfg, Parameters
 
@@ -79,11 +79,13 @@ def test_every_combination_learns_the_toy(make_ppo, critic, parameters):
     network = sized(critic=critic, parameters=parameters)
     ppo = make_ppo(network=network, agents=2, senses=("audio",))
     env = FakeEnv(8, agents=2, senses=("audio",))
-    rewards = []
-    for _ in range(25):
+
+    def learn():
         with torch.no_grad(), set_exploration_type(ExplorationType.RANDOM):
             batch = env.rollout(32, ppo.policy.collect, break_when_any_done=False)
         ppo.learn(batch)
-        rewards.append(batch["next", "agents", "reward"].mean().item())
+        return batch["next", "agents", "reward"].mean().item()
+
+    rewards = rewards_until(0.7, learn, batches=25)
     assert rewards[0] < 0.3
     assert rewards[-1] > 0.7
