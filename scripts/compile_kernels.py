@@ -8,8 +8,17 @@ from __future__ import annotations
 
 from veca_marl.api import make
 
-TASKS = ("KickTheBall", "TurnBaby", "PushOut2v2", "MultiAgentNav")
-"""They have walkers and joints, skin, furniture, several agents, and a house with voices."""
+TASKS = (
+    "KickTheBall",
+    "TurnBaby",
+    "PushOut2v2",
+    "MultiAgentNav",
+    "ObjectPhysNav",
+    "BabyzumasRevenge",
+    "ShapeSort",
+)
+"""They have walkers and joints, skin, furniture, several agents, a house with voices, verbs, doors,
+and polyhedra for the eyes and the skin."""
 
 
 def main() -> None:
