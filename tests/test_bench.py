@@ -191,6 +191,24 @@ def test_several_tasks_and_playgrounds_are_one_table(capsys):
         ["| KickTheBall", "`simple`"],
         ["| KickTheBall", "`house`"],
     ]
+    for row, most in zip(rows[2:], (0.8, 1.2), strict=True):
+        views, goal = row.strip(" |").split(" | ")[-2:]
+        assert goal == f"{most}: {'met' if float(views) <= most else 'missed'}"
+
+
+def test_of_all_tasks_those_are_measured_that_fit_a_playground(capsys, monkeypatch):
+    monkeypatch.setattr("veca_marl.bench.command.TASKS", ("MultiAgentNav", "ObjectNav"))
+    words = [*ROLLOUTS, "bench.tasks=[all]", "bench.playgrounds=[simple]"]
+    assert main(words) == 0
+    printed = capsys.readouterr().out
+    assert "left out: MultiAgentNav" in printed
+    assert "| ObjectNav | `simple`" in printed
+    assert "| MultiAgentNav" not in printed
+
+
+def test_only_walkers_have_a_goal_in_views():
+    game = compose(["+task=TurnBaby", "senses/touch=numb"]).game
+    assert measure_rollouts(game, worlds=1, steps=2, repeats=1).most_views_per_agent_step is None
 
 
 @pytest.mark.parametrize(
@@ -199,6 +217,7 @@ def test_several_tasks_and_playgrounds_are_one_table(capsys):
         (["bench.tasks=[KickTheBall]", "bench.agents=[2]"], "neither free play nor learning"),
         (["bench.playgrounds=[house]", "+task=KickTheBall"], "needs bench.tasks"),
         (["bench.tasks=[Kick]"], "unknown task 'Kick'"),
+        (["bench.tasks=[all]", "bench.playgrounds=[garden]"], "single_room"),
         (["bench.tasks=[MultiAgentNav]", "bench.playgrounds=[simple]"], "'simple' has 1"),
     ],
 )

@@ -38,7 +38,7 @@ def throughput_table(runs: Sequence[Rollouts]) -> str:
 
 def task_table(runs: Sequence[Rollouts]) -> str:
     """Return a Markdown table of tasks: the table of the page on performance."""
-    header = ("task", "playground", "agents", "agent steps/s", "per reference", "views")
+    header = ("task", "playground", "agents", "agent steps/s", "per reference", "views", "goal")
     rows = [
         (
             run.task,
@@ -47,11 +47,20 @@ def task_table(runs: Sequence[Rollouts]) -> str:
             f"{run.agent_steps_per_s:,.0f}",
             f"{run.agent_steps_per_reference:.2f}",
             f"{run.views_per_agent_step:.2f}",
+            _goal(run),
         )
         for run in runs
     ]
     lines = [header, ("---",) * len(header), *rows]
     return "\n".join(f"| {' | '.join(cells)} |" for cells in lines)
+
+
+def _goal(run: Rollouts) -> str:
+    """Return the greatest number of views and whether it holds; nothing without a goal."""
+    most = run.most_views_per_agent_step
+    if most is None:
+        return ""
+    return f"{most:.1f}: {'met' if run.views_per_agent_step <= most else 'missed'}"
 
 
 def parts_table(runs: Sequence[Rollouts]) -> str:

@@ -17,11 +17,15 @@ from veca_marl.config import compose
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
 from veca_marl.envs.core.game import Game
 from veca_marl.envs.core.game_cfg import GameCfg
+from veca_marl.sim.body.walker import Walker
 
 PHYSICS, SOURCES, TASK = "physics", "sound sources", "task"
 ENV, POLICY, TORCHRL = "VecaEnv", "policy", "TorchRL"
 _OVERHEAD = (TASK, ENV, POLICY, TORCHRL)
 _WARM_UP_STEPS = 5
+MOST_VIEWS_IN_A_ROOM, MOST_VIEWS_IN_A_HOUSE = 0.8, 1.2
+"""Goals for the cost of an agent step of walkers, in views by TinyRenderer."""
+
 _REFERENCE_PLAYGROUND = ("+task=KickTheBall", "playground=single_room")
 
 
@@ -39,6 +43,7 @@ class Rollouts:
             `ReferenceWorkload`, measured in turns with the rollouts; comparable between machines.
         views_per_agent_step: Processor time of an agent step divided by that of a `ReferenceView`,
             measured in turns with the rollouts likewise.
+        most_views_per_agent_step: The goal for it; None for joint-level bodies.
         wall_agent_steps_per_s: Agent steps per second of elapsed time.
         ms_per_part: Milliseconds of processor time per agent step for each part, with stopwatch.
         overhead: Share of the step that is neither physics nor sound sources nor senses.
@@ -52,6 +57,7 @@ class Rollouts:
     agent_steps_per_s: float
     agent_steps_per_reference: float
     views_per_agent_step: float
+    most_views_per_agent_step: float | None
     wall_agent_steps_per_s: float
     ms_per_part: dict[str, float]
     overhead: float
@@ -82,7 +88,7 @@ def measure_rollouts(game: GameCfg, worlds: int, steps: int, repeats: int) -> Ro
         ValueError: If no world can be made from `game`.
     """
     env = VecaEnv(game, worlds, seed=0)
-    agents = len(env.games[0].players)
+    agents, most_views = len(env.games[0].players), _most_views(env.games[0])
     measured = _repeat(env, steps, repeats)
     env.close()
     agent_steps = steps * worlds * agents
@@ -100,11 +106,20 @@ def measure_rollouts(game: GameCfg, worlds: int, steps: int, repeats: int) -> Ro
         agent_steps_per_s=agent_steps / median(measured.cpu_s),
         agent_steps_per_reference=agent_steps * median(ref / cpu for ref, cpu in pairs),
         views_per_agent_step=median(cpu / view for view, cpu in views) / agent_steps,
+        most_views_per_agent_step=most_views,
         wall_agent_steps_per_s=agent_steps / median(measured.wall_s),
         ms_per_part=parts,
         overhead=sum(parts.get(part, 0.0) for part in _OVERHEAD) / sum(parts.values()),
         build_s=_build_s(game),
     )
+
+
+def _most_views(game: Game) -> float | None:
+    """Return the goal for the cost of an agent step in views; None for joint-level bodies."""
+    if not all(isinstance(player.body, Walker) for player in game.players):
+        return None
+    in_a_room = len(game.world.playground.rooms) == 1
+    return MOST_VIEWS_IN_A_ROOM if in_a_room else MOST_VIEWS_IN_A_HOUSE
 
 
 def _repeat(env: VecaEnv, steps: int, repeats: int) -> _Repeats:
