@@ -8,14 +8,16 @@ import pytest
 import torch
 from composed import compose
 
-from veca_marl.bench.command import main
+from veca_marl.bench.command import chosen_games, main
 from veca_marl.bench.free_play import free_play
+from veca_marl.bench.options import BenchCfg
 from veca_marl.bench.references import as_visual_shapes, busy_room, measure_ears, tiny_view
-from veca_marl.bench.rollouts import measure_rollouts
+from veca_marl.bench.rollouts import measure_rollouts, most_views
 from veca_marl.bench.skin_costs import touched_child
 from veca_marl.bench.stopwatch import Probes, Stopwatch
 from veca_marl.config import conf_dir
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
+from veca_marl.envs.core.game import Game
 from veca_marl.envs.core.task import TASKS
 from veca_marl.sim.physics import PlaygroundCfg, pybullet
 from veca_marl.sim.vision import Camera
@@ -198,17 +200,22 @@ def test_several_tasks_and_playgrounds_are_one_table(capsys):
 
 def test_of_all_tasks_those_are_measured_that_fit_a_playground(capsys, monkeypatch):
     monkeypatch.setattr("veca_marl.bench.command.TASKS", ("MultiAgentNav", "ObjectNav"))
-    words = [*ROLLOUTS, "bench.tasks=[all]", "bench.playgrounds=[simple]"]
-    assert main(words) == 0
-    printed = capsys.readouterr().out
-    assert "left out: MultiAgentNav" in printed
-    assert "| ObjectNav | `simple`" in printed
-    assert "| MultiAgentNav" not in printed
+    games = chosen_games(BenchCfg(tasks=["all"], playgrounds=["simple", "house"]), [])
+    assert [(game.task.name, game.playground.name) for game in games] == [
+        ("MultiAgentNav", "house"),
+        ("ObjectNav", "simple"),
+        ("ObjectNav", "house"),
+    ]
+    assert "left out: MultiAgentNav in simple: task.agents=2 start" in capsys.readouterr().out
 
 
-def test_only_walkers_have_a_goal_in_views():
-    game = compose(["+task=TurnBaby", "senses/touch=numb"]).game
-    assert measure_rollouts(game, worlds=1, steps=2, repeats=1).most_views_per_agent_step is None
+@pytest.mark.parametrize(
+    ("task", "most"), [("TurnBaby", None), ("ObjectNav", 0.8), ("BabyzumasRevenge", 1.2)]
+)
+def test_walkers_have_a_goal_in_views_that_is_greater_in_several_rooms(task, most):
+    game = Game(compose([f"+task={task}"]).game)
+    assert most_views(game) == most
+    game.close()
 
 
 @pytest.mark.parametrize(

@@ -22,13 +22,6 @@ WARM_STEPS = 4000  # until caches are full and the greatest number of contacts h
 MOST_GROWTH_MB = 16.0
 
 
-@pytest.fixture(scope="module")
-def game(task):
-    game = Game(game_cfg(task))
-    yield game
-    game.close()
-
-
 def check_starts(game, seeds):
     """Begin an episode from each seed."""
     found = {}
@@ -75,21 +68,21 @@ def check_refusals(game):
     np.testing.assert_array_equal(body.bone_positions(), before)
 
 
-def test_some_starts_and_rude_steps(game):
-    check_starts(game, range(SOME_STARTS))
-    play_rudely(game, SOME_STEPS, period=2, observed_every=10)
-    check_refusals(game)
+def test_some_starts_and_rude_steps(own_game):
+    check_starts(own_game, range(SOME_STARTS))
+    play_rudely(own_game, SOME_STEPS, period=2, observed_every=10)
+    check_refusals(own_game)
 
 
 @pytest.mark.slow
-def test_a_thousand_seeds_start(game):
-    check_starts(game, range(STARTS))
+def test_a_thousand_seeds_start(own_game):
+    check_starts(own_game, range(STARTS))
 
 
 @pytest.mark.slow
-def test_20_000_rude_steps_leave_the_world_as_it_was(game, task):
-    warm_mb, end_mb = play_rudely(game, STEPS)
+def test_20_000_rude_steps_leave_the_world_as_it_was(own_game, task):
+    warm_mb, end_mb = play_rudely(own_game, STEPS)
     assert end_mb - warm_mb < MOST_GROWTH_MB
     new = Game(game_cfg(task))
-    assert digest(game, CHECKED_STEPS, seed=5) == digest(new, CHECKED_STEPS, seed=5)
+    assert digest(own_game, CHECKED_STEPS, seed=5) == digest(new, CHECKED_STEPS, seed=5)
     new.close()

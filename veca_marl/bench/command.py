@@ -92,7 +92,7 @@ def bench_tasks(cfg: BenchCfg, overrides: Sequence[str]) -> None:
     Raises:
         ConfigError: If a choice is impossible.
     """
-    games = list(_chosen_games(cfg, overrides))
+    games = list(chosen_games(cfg, overrides))
     torch.set_num_threads(1)
     print(machine_line(), end="\n\n")
     first_world_s = measure_first_world(games[0])
@@ -102,7 +102,7 @@ def bench_tasks(cfg: BenchCfg, overrides: Sequence[str]) -> None:
         Path(cfg.json).write_text(as_json(machine(), first_world_s, runs, None))
 
 
-def _chosen_games(cfg: BenchCfg, overrides: Sequence[str]) -> Iterator[GameCfg]:
+def chosen_games(cfg: BenchCfg, overrides: Sequence[str]) -> Iterator[GameCfg]:
     """Yield the game of each task in each playground; of ``[all]`` tasks those that fit.
 
     Raises:
@@ -113,13 +113,13 @@ def _chosen_games(cfg: BenchCfg, overrides: Sequence[str]) -> Iterator[GameCfg]:
     for place in places:
         compose([f"+task={_FITS_EVERYWHERE}", *place, *overrides])
     for name in sorted(TASKS) if everything else cfg.tasks:
-        for place in places:
+        for number, place in enumerate(places):
             try:
                 yield compose([f"+task={name}", *place, *overrides]).game
             except ConfigError as error:
                 if not (everything and place):
                     raise
-                print(f"left out: {one_line(error)}")
+                print(f"left out: {name} in {cfg.playgrounds[number]}: {one_line(error)}")
 
 
 def bench_learning(cfg: BenchCfg, overrides: list[str]) -> None:

@@ -88,7 +88,7 @@ def measure_rollouts(game: GameCfg, worlds: int, steps: int, repeats: int) -> Ro
         ValueError: If no world can be made from `game`.
     """
     env = VecaEnv(game, worlds, seed=0)
-    agents, most_views = len(env.games[0].players), _most_views(env.games[0])
+    agents, goal = len(env.games[0].players), most_views(env.games[0])
     measured = _repeat(env, steps, repeats)
     env.close()
     agent_steps = steps * worlds * agents
@@ -106,7 +106,7 @@ def measure_rollouts(game: GameCfg, worlds: int, steps: int, repeats: int) -> Ro
         agent_steps_per_s=agent_steps / median(measured.cpu_s),
         agent_steps_per_reference=agent_steps * median(ref / cpu for ref, cpu in pairs),
         views_per_agent_step=median(cpu / view for view, cpu in views) / agent_steps,
-        most_views_per_agent_step=most_views,
+        most_views_per_agent_step=goal,
         wall_agent_steps_per_s=agent_steps / median(measured.wall_s),
         ms_per_part=parts,
         overhead=sum(parts.get(part, 0.0) for part in _OVERHEAD) / sum(parts.values()),
@@ -114,8 +114,8 @@ def measure_rollouts(game: GameCfg, worlds: int, steps: int, repeats: int) -> Ro
     )
 
 
-def _most_views(game: Game) -> float | None:
-    """Return the goal for the cost of an agent step in views; None for joint-level bodies."""
+def most_views(game: Game) -> float | None:
+    """Return the greatest cost of an agent step in views; None for joint-level bodies."""
     if not all(isinstance(player.body, Walker) for player in game.players):
         return None
     in_a_room = len(game.world.playground.rooms) == 1

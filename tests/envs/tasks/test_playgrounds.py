@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from composed import compose
 
+from veca_marl.checks.overlaps import overlaps
 from veca_marl.config import ConfigError
 from veca_marl.envs.core.game import Game
 
@@ -58,3 +59,12 @@ def test_tasks_of_the_paper_are_played_in_furnished_houses(task, playground):
 def test_what_does_not_fit_is_refused_in_the_configuration(words, message):
     with pytest.raises(ConfigError, match=message):
         compose(words)
+
+
+@pytest.mark.parametrize("task", ["CrawlBaby", "TurnBaby"])
+def test_bodies_on_the_floor_start_beside_furniture(task):
+    game = Game(compose([f"+task={task}", "playground=single_room"]).game)
+    for seed in range(15):
+        game.reset(np.random.default_rng(seed))
+        assert not overlaps(game), seed
+    game.close()

@@ -21,7 +21,7 @@ from veca_marl.sim.physics.props.joint import LINK, Joint
 from veca_marl.sim.sound import SoundField, make_sound
 
 GRAVITY_MPS2 = 9.81
-_CONTACT_DISTANCE = 8  # entry of Bullet's contact points
+_CONTACT_BODY, _CONTACT_DISTANCE = 2, 8  # entries of Bullet's contact points
 
 
 class World:
@@ -182,6 +182,13 @@ class World:
         pybullet.performCollisionDetection(physicsClientId=self.client)
         contacts = pybullet.getContactPoints(one, other, physicsClientId=self.client)
         return max((-contact[_CONTACT_DISTANCE] for contact in contacts), default=0.0)
+
+    def touches_props(self, body_id: int) -> bool:
+        """Return whether a body touches or penetrates a prop where it is now."""
+        pybullet.performCollisionDetection(physicsClientId=self.client)
+        contacts = pybullet.getContactPoints(body_id, physicsClientId=self.client)
+        touched = {contact[_CONTACT_BODY] for contact in contacts if contact[_CONTACT_DISTANCE] < 0}
+        return any(prop.body_id in touched for prop in self.props.values())
 
     def close(self) -> None:
         """Disconnect from PyBullet. Closing twice is harmless.

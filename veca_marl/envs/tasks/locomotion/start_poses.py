@@ -48,13 +48,20 @@ def start_anywhere(
 ) -> None:
     """Place a body in a posture with noise, anywhere in the first room with a random heading.
 
-    The noise is drawn again while limbs penetrate each other.
+    Noise is drawn again while limbs penetrate each other, everything while furniture is touched.
+
+    Raises:
+        ValueError: If one of them is so in each of `_MOST_DRAWS` draws.
     """
-    position = world.playground.rooms[0].sample_floor(rng, margin_m=_WALL_CLEARANCE_M)
-    noisy = body.perturb(posture, spread_deg, rng)
-    heading_rad = rng.uniform(-math.pi, math.pi)
-    body.place(position, heading_rad, noisy)
-    _separate_limbs(world, body, position, heading_rad, posture, spread_deg, rng)
+    for _ in range(_MOST_DRAWS):
+        position = world.playground.rooms[0].sample_floor(rng, margin_m=_WALL_CLEARANCE_M)
+        noisy = body.perturb(posture, spread_deg, rng)
+        heading_rad = rng.uniform(-math.pi, math.pi)
+        body.place(position, heading_rad, noisy)
+        _separate_limbs(world, body, position, heading_rad, posture, spread_deg, rng)
+        if not world.touches_props(body.body_id):
+            return
+    raise ValueError(_no_place(world))
 
 
 def start_near_edge(
@@ -62,12 +69,26 @@ def start_near_edge(
 ) -> None:
     """Place a body in a posture with noise, near the edge of the first room, facing its middle.
 
-    The noise is drawn again while limbs penetrate each other.
+    Noise is drawn again while limbs penetrate each other, everything while furniture is touched.
+
+    Raises:
+        ValueError: If one of them is so in each of `_MOST_DRAWS` draws.
     """
-    room = world.playground.rooms[0]
-    position, heading_rad = room.sample_start(rng, margin_m=_WALL_CLEARANCE_M)
-    body.place(position, heading_rad, body.perturb(posture, spread_deg, rng))
-    _separate_limbs(world, body, position, heading_rad, posture, spread_deg, rng)
+    for _ in range(_MOST_DRAWS):
+        room = world.playground.rooms[0]
+        position, heading_rad = room.sample_start(rng, margin_m=_WALL_CLEARANCE_M)
+        body.place(position, heading_rad, body.perturb(posture, spread_deg, rng))
+        _separate_limbs(world, body, position, heading_rad, posture, spread_deg, rng)
+        if not world.touches_props(body.body_id):
+            return
+    raise ValueError(_no_place(world))
+
+
+def _no_place(world: World) -> str:
+    return (
+        f"playground {world.playground.name!r}: no place for the body on the floor of room "
+        f"{world.playground.rooms[0].name!r} in {_MOST_DRAWS} draws; choose playground=simple"
+    )
 
 
 def _separate_limbs(
