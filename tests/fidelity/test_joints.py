@@ -2,13 +2,18 @@
 
 import pytest
 
-from veca_marl.fidelity.body.joints import drive_against_limits, limit_laws, matrix_law
+from veca_marl.fidelity.body.joints import drive_against_limits, inertia_law, limit_laws, matrix_law
 from veca_marl.sim.body.humanoid import Detail
 
 
 @pytest.mark.parametrize("detail", Detail)
 def test_the_mass_matrix_is_that_of_bullet(detail):
     assert matrix_law(detail, 3).holds
+
+
+@pytest.mark.parametrize("detail", Detail)
+def test_the_inertia_about_the_long_axis_is_that_of_the_bones_but_for_a_seventh(detail):
+    assert inertia_law(detail).holds
 
 
 def test_no_joint_passes_a_limit():

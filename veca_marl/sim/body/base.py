@@ -186,7 +186,10 @@ class Body(ABC):
         return self._speeds.copy()
 
     def joint_torques(self) -> Floats:
-        """Return the motor torques, ``(82,)`` in [-1, 1] of each joint's greatest torque."""
+        """Return the motor torques, ``(82,)`` in [-1, 1] of each joint's greatest torque.
+
+        They are those at the start of the last physics step. Joint damping is not part of them.
+        """
         return self._torques.copy()
 
     def velocities(self) -> Floats:

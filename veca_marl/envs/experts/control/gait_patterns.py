@@ -69,39 +69,39 @@ class GaitPattern:
 
 # result of experiments/crawl/search.py
 CRAWL = GaitPattern(
-    frequency_hz=1.67,
+    frequency_hz=1.81,
     leg=LimbPattern(
         {
-            "thigh.flexion": JointSwing(88.8, 35.8, -20.5, -6.0),
-            "thigh.abduction": JointSwing(-6.0, -20.9, 39.9, 0.1),
-            "shank.flexion": JointSwing(113.9, 6.2, 3.7, -14.4),
-            "foot.dorsiflexion": JointSwing(-49.8, -6.2, -0.4, 20.0),
+            "thigh.flexion": JointSwing(96.9, 36.1, -25.0, -6.0),
+            "thigh.abduction": JointSwing(4.7, -18.3, 37.4, 0.1),
+            "shank.flexion": JointSwing(123.7, 10.5, 6.2, -14.4),
+            "foot.dorsiflexion": JointSwing(-51.7, -3.2, 16.7, 20.0),
         },
-        lead_rad=0.42,
+        lead_rad=0.48,
         shortening=-0.53,
     ),
     arm=LimbPattern(
         {
-            "upper_arm.flexion": JointSwing(62.6, -31.3, -24.9, 1.0),
-            "upper_arm.abduction": JointSwing(60.0, -1.2, 23.4, 34.4),
-            "forearm.flexion": JointSwing(-2.6, -13.3, 59.4, 7.8),
-            "hand.flexion": JointSwing(-65.6, -3.2, 31.1, -5.1),
+            "upper_arm.flexion": JointSwing(66.1, -34.6, -28.1, 1.0),
+            "upper_arm.abduction": JointSwing(65.0, -3.3, 31.4, 34.4),
+            "forearm.flexion": JointSwing(2.3, -19.1, 66.2, 7.8),
+            "hand.flexion": JointSwing(-63.3, 3.2, 24.8, -5.1),
         },
-        lead_rad=2.70,
+        lead_rad=3.1,
         shortening=0.04,
     ),
-    bend_lead_rad=0.82,
+    bend_lead_rad=0.79,
     trunk={
-        "head.flexion": -31.8,
-        "neck.flexion": -66.5,
-        "spine.flexion": 25.2,
+        "head.flexion": -26.0,
+        "neck.flexion": -69.2,
+        "spine.flexion": 28.2,
     },
     sway={
-        "chest.lateral": 25.6,
-        "chest.rotation": 8.7,
-        "spine.lateral": -0.6,
+        "chest.lateral": 26.8,
+        "chest.rotation": 15.9,
+        "spine.lateral": -2.6,
     },
-    sway_lead_rad=0.36,
+    sway_lead_rad=0.06,
     twist={
         "chest.lateral": -2.5,
         "chest.rotation": 25.5,

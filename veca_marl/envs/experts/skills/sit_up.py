@@ -124,10 +124,10 @@ class SitUp:
         if self._stage == "lie":
             if not self._body.bone("chest").forward[2] < -_ON_BELLY:
                 self._elapsed_s = 0.0
-            return JointCommand(self._turn.command(), horizon_s=0.0)
+            return JointCommand(self._turn.command(), horizon_s=0.5 * self._step_s)
         targets = self._key_poses.toward(self._stage, _SPEEDS_RADPS[self._stage])
         if self._stage != "rise":
-            return JointCommand(targets, horizon_s=0.0)
+            return JointCommand(targets, horizon_s=0.5 * self._step_s)
         change = self._step_s / _RISING_S
         bend = self._bend - change if self._is_on_heels() else self._bend + change
         self._bend = min(max(bend, 0.0), 1.0)

@@ -66,7 +66,7 @@ _POSES = {
     ),
     "rest": ON_BACK,
 }
-_SPEED_RADPS = 9.0
+_SPEED_RADPS = 12.0
 # cosines of the angle between the front of the trunk and straight down
 _ON_SIDE, _NEARLY_OVER, _FALLEN_BACK = -0.2, 0.55, -0.5
 _SWING_S, _REST_S = 2.0, 0.5  # longest swing, rest after it

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veca_marl.sim.body.anatomy import Build, Skeleton, body_files, bone_of
-from veca_marl.sim.body.humanoid.dynamics import BodyDynamics
+from veca_marl.sim.body.humanoid.dynamics import NEW_JOINTS, SETTLED, BodyDynamics, JointLimits
 from veca_marl.sim.body.humanoid.dynamics.tree import read_tree
 from veca_marl.sim.body.humanoid.self_collision import allow_self_collision
 from veca_marl.sim.geometry import (
@@ -25,10 +25,7 @@ _TOP_SPEED_RADPS = 30.0  # of a joint: twice the speed of human limbs
 # Bullet clips the speed of each joint without its reaction on the body, which adds momentum: its
 # limit is so high that it never acts
 _BULLET_TOP_SPEED = 1000.0
-STOP_MARGIN_RAD = 0.01  # 0.6 degrees, by which Bullet's stops are inside the joint limits
-# impulse on the whole body in a physics step below which contacts with others are looked for; its
-# weight gives 0.8 N s
-_NO_FORCE_NS = 1e-3
+_STOP_DISTANCE_RAD = 0.05  # 3 degrees, by which Bullet's stops are outside the joint limits
 _FLAGS = (
     pybullet.URDF_USE_INERTIA_FROM_FILE
     | pybullet.URDF_MAINTAIN_LINK_ORDER
@@ -91,8 +88,10 @@ class Articulation:
         self.strengths_nm[self.moving] = [found[joint][10] for joint in self.moving]
         self.damping[self.moving] = [found[joint][6] for joint in self.moving]
         self._base_centre = np.array(self._dynamics(-1)[3])
-        self._set_stops(low, high)
-        self.dynamics = BodyDynamics(read_tree(client, self.body_id), low, high, _TOP_SPEED_RADPS)
+        self._release(low, high)
+        limits = JointLimits(low, high, _TOP_SPEED_RADPS)
+        tree = read_tree(client, self.body_id)
+        self.dynamics = BodyDynamics(tree, limits, self.damping[self.moving])
         self._mass_kg = float(self.dynamics.tree.masses.sum())
         self._prepare(infos, {bone.name for bone in skeleton.bones})
         self.read()
@@ -121,19 +120,19 @@ class Articulation:
             physicsClientId=self._client,
         )
 
-    def _set_stops(self, low: Floats, high: Floats) -> None:
-        """Let Bullet's own stops act a little before the joint limits of `settle`.
+    def _release(self, low: Floats, high: Floats) -> None:
+        """Disable Bullet's joint damping and move its joint stops outside the limits.
 
-        Bullet detects a limit only once it is passed. A joint that rests at its limit because of
-        `settle` alone would be at Bullet's stop in one step and inside of it in the next one.
+        The torques contain both, see `apply`. Bullet detects a limit only once it is passed: joints
+        that rest at one of its stops vibrate.
         """
-        margins = np.minimum(STOP_MARGIN_RAD, 0.25 * (high - low))
-        for link, lower, upper in zip(self._links, low + margins, high - margins, strict=True):
+        for link, lower, upper in zip(self._links, low, high, strict=True):
             pybullet.changeDynamics(
                 self.body_id,
                 link,
-                jointLowerLimit=float(lower),
-                jointUpperLimit=float(upper),
+                jointLowerLimit=float(lower) - _STOP_DISTANCE_RAD,
+                jointUpperLimit=float(upper) + _STOP_DISTANCE_RAD,
+                jointDamping=0.0,
                 physicsClientId=self._client,
             )
 
@@ -144,10 +143,9 @@ class Articulation:
 
         Call it after everything but a physics step that changes pose or velocity.
         """
-        position = self._read()
-        if position is None:
+        if not self._read():
             return False
-        self.dynamics.begin(position)
+        self.dynamics.begin()
         self._copy_joints()
         return True
 
@@ -155,45 +153,31 @@ class Articulation:
         """Read the state after a physics step, apply joint limits and restore the momentum.
 
         Return whether all numbers are finite; if not, keep the last ones.
-
-        Measured: two thirds of the time of writing the joints is saved in the next physics step,
-        probably because Bullet updates the bounding boxes of all links here instead of there.
         """
-        if self._read() is None:
+        if not self._read():
             return False
-        changed = self.dynamics.settle(step_s, self._external_impulse(step_s))
+        result = self.dynamics.settle(step_s, self._weight(), self._touches_others)
         self._copy_joints()
-        if changed.size:
-            self._set(changed)
         state = self.dynamics.state
-        self._set_base(state.position, self.dynamics.solver.quaternion, state.velocity)
+        if result == NEW_JOINTS:
+            self._set_joints()
+        if result != SETTLED:
+            self._set_pose(state.position, self.dynamics.solver.quaternion)
+        self._set_velocity(state.velocity)
         return True
 
-    def _external_impulse(self, step_s: float) -> Floats:
-        """Return the impulse ``(6,)`` of weight and contacts in a physics step that has ended.
-
-        Bullet applies the two friction forces of a contact of the body with itself at points that
-        differ by the penetration. The torque that this leaves is removed where no other body is
-        touched; force and contacts are compared first, because lists of contacts take time.
-        """
-        impulse = self.dynamics.external_impulse(step_s)
-        weight = self._weight_impulse(step_s)
-        others = impulse[3:] - weight
-        if others @ others < _NO_FORCE_NS**2 and not self._touches_others():
-            impulse[:3], impulse[3:] = 0.0, weight
-        return impulse
-
-    def _weight_impulse(self, step_s: float) -> Floats:
+    def _weight(self) -> Floats:
+        """Return the weight ``(3,)``, N, with the present gravity of the client."""
         world = pybullet.getPhysicsEngineParameters(physicsClientId=self._client)
         gravity = [world[f"gravityAcceleration{axis}"] for axis in "XYZ"]
-        return self._mass_kg * step_s * np.array(gravity)
+        return self._mass_kg * np.array(gravity)
 
     def _touches_others(self) -> bool:
         found = pybullet.getContactPoints(bodyA=self.body_id, physicsClientId=self._client)
         return any(contact[1] != contact[2] for contact in found)
 
-    def _read(self) -> Floats | None:
-        """Read Bullet's state; return the base's position, or None if a number is not finite."""
+    def _read(self) -> bool:
+        """Read Bullet's state; return whether all numbers are finite, keep the last if not."""
         states = pybullet.getJointStates(self.body_id, self._links, physicsClientId=self._client)
         position, quaternion = pybullet.getBasePositionAndOrientation(
             self.body_id, physicsClientId=self._client
@@ -201,13 +185,13 @@ class Articulation:
         velocity, spin = pybullet.getBaseVelocity(self.body_id, physicsClientId=self._client)
         # zip first: an array of tuples costs three times an array of numbers
         angles, speeds = list(zip(*states, strict=True))[:2]
-        row = np.array(quaternion + position + spin + velocity + speeds + angles)
+        row = np.array(position + quaternion + spin + velocity + speeds + angles)
         if not np.isfinite(row).all():
-            return None
+            return False
         solver, ends = self.dynamics.solver, 13 + len(speeds)
-        solver.quaternion[:], solver.velocity[:] = row[:4], row[7:ends]
-        solver.angles[:] = row[ends:]
-        return row[4:7]
+        solver.position[:], solver.quaternion[:] = row[:3], row[3:7]
+        solver.velocity[:], solver.angles[:] = row[7:ends], row[ends:]
+        return True
 
     def _copy_joints(self) -> None:
         state = self.dynamics.state
@@ -224,13 +208,21 @@ class Articulation:
 
     # ---- moving
 
-    def apply(self, torques_nm: Floats) -> None:
-        """Apply torques ``(82,)``, N m, in the next physics step only."""
+    def apply(self, torques_nm: Floats, stiffness: Floats, step_s: float) -> None:
+        """Apply motor torques and joint damping in the next physics step only.
+
+        Args:
+            torques_nm: ``(82,)`` N m, at the present angles.
+            stiffness: ``(82,)`` N m/rad, by which the torques decrease with the angle.
+            step_s: Duration of the physics step.
+        """
+        forces = self.dynamics.forces
+        forces.drive[:], forces.stiffness[:] = torques_nm[self.moving], stiffness[self.moving]
         pybullet.setJointMotorControlArray(
             self.body_id,
             self._links,
             pybullet.TORQUE_CONTROL,
-            forces=torques_nm[self.moving].tolist(),
+            forces=self.dynamics.torques(step_s).tolist(),
             physicsClientId=self._client,
         )
 
@@ -238,31 +230,35 @@ class Articulation:
         """Set the pose of the pelvis and all joint angles, at rest."""
         self.angles[self.moving], self.speeds[:] = angles[self.moving], 0.0
         centre = pose.position + pose.rotation @ self._base_centre
-        self._set_base(centre, matrix_to_quaternion(pose.rotation), np.zeros(6))
-        self._set(np.arange(len(self._links)))
+        self._set_pose(centre, matrix_to_quaternion(pose.rotation))
+        self._set_velocity(np.zeros(6))
+        self._set_joints()
 
     def set_speeds(self, speeds: Floats) -> None:
         """Set all joint speeds ``(82,)``, rad/s, with the base as it is."""
         self.speeds[self.moving] = speeds[self.moving]
-        self._set(np.arange(len(self._links)))
+        self._set_joints()
 
-    def _set_base(self, position: Floats, quaternion: Floats, velocity: Floats) -> None:
-        """Set position, orientation and ``(6,)`` angular and linear velocity of the base."""
+    def _set_pose(self, position: Floats, quaternion: Floats) -> None:
+        """Set position and orientation of the base; Bullet sets its velocity to 0."""
         pybullet.resetBasePositionAndOrientation(
             self.body_id, position.tolist(), quaternion.tolist(), physicsClientId=self._client
         )
-        numbers = velocity.tolist()
+
+    def _set_velocity(self, velocity: Floats) -> None:
+        """Set angular and linear velocity ``(6,)`` of the base; more numbers are ignored."""
+        numbers = velocity[:6].tolist()
         pybullet.resetBaseVelocity(
-            self.body_id, numbers[3:6], numbers[:3], physicsClientId=self._client
+            self.body_id, numbers[3:], numbers[:3], physicsClientId=self._client
         )
 
-    def _set(self, which: NDArray[np.int64]) -> None:
-        joints = self.moving[which]
+    def _set_joints(self) -> None:
+        """Set all joints to `angles` and `speeds`."""
         pybullet.resetJointStatesMultiDof(
             self.body_id,
-            [self._links[index] for index in which],
-            self.angles[joints, None].tolist(),
-            self.speeds[joints, None].tolist(),
+            self._links,
+            self.angles[self.moving, None].tolist(),
+            self.speeds[self.moving, None].tolist(),
             physicsClientId=self._client,
         )
 
@@ -285,14 +281,3 @@ def _load(client: int, skeleton: Skeleton, build: Build) -> int:
         pybullet.setPhysicsEngineParameter(enableFileCaching=0, physicsClientId=client)
         body_id: int = pybullet.loadURDF(str(path), flags=_FLAGS, physicsClientId=client)
     return body_id
-
-
-def damping_number(body: Articulation, step_s: float) -> float:
-    """Return ``dt max eig(M^-1 D)``; explicit damping is stable below 2, monotonic up to 1."""
-    rows = np.arange(6, 6 + len(body.moving))
-    # the accelerations for unit torques, one column for each joint
-    units = np.eye(6 + len(rows))[rows]
-    inverse = np.array([body.dynamics.solve_with(np.zeros(len(rows)), unit)[6:] for unit in units])
-    # M^-1 D is similar to a symmetric matrix: its eigenvalues are real
-    root = np.sqrt(body.damping[body.moving])
-    return step_s * float(np.linalg.eigvalsh(root[:, None] * inverse * root)[-1])

@@ -12,7 +12,7 @@ from veca_marl.sim.body.action import Action, checked_action
 from veca_marl.sim.body.anatomy import Build, Underside, forward_kinematics
 from veca_marl.sim.body.base import Body
 from veca_marl.sim.body.body_cfg import BodyCfg
-from veca_marl.sim.body.humanoid.articulation import Articulation, damping_number
+from veca_marl.sim.body.humanoid.articulation import Articulation
 from veca_marl.sim.body.humanoid.humanoid_cfg import Detail, HumanoidCfg
 from veca_marl.sim.body.humanoid.joint_control import (
     JOINT_ACTIONS,
@@ -37,6 +37,8 @@ from veca_marl.sim.spec import ArraySpec, continuous_spec
 
 JOINTS = "joints"  # the part of the action that moves
 
+# physics step up to which contacts of light limbs have been found stable; joint damping is implicit
+LONGEST_STEP_S = 0.010
 _UNPLACED_M = 100.0  # distance from the origin at which bodies are before the first reset
 _ARMS_OUT = Posture(0.0, {"upper_arm.abduction": 30.0})
 
@@ -48,7 +50,7 @@ class Humanoid(Body):
         articulation: Its bones in Bullet.
 
     Raises:
-        ValueError: If the world's physics steps are too long for the damping of the joints.
+        ValueError: If the world's physics steps are longer than `LONGEST_STEP_S`.
     """
 
     cfg_type: ClassVar[type[BodyCfg]] = HumanoidCfg
@@ -56,9 +58,9 @@ class Humanoid(Body):
     def __init__(self, name: str, cfg: HumanoidCfg, world: World, shirt: int = 0) -> None:
         super().__init__(name, cfg, world, shirt)
         self.cfg = cfg
+        _check_substep(name, world.clock.substep_s)
         build = Build(cfg.detail is Detail.full, strength=cfg.strength, friction=cfg.friction)
         self.articulation = Articulation(world.client, self._skeleton, build)
-        self._check_substep(world.clock.substep_s)
         self._control, self._update = JOINT_ACTIONS[cfg.action]
         self._chosen = np.array(chosen_joints(self._skeleton, cfg.joints))
         self._low = np.array([joint.low_rad for joint in self._skeleton.joints])
@@ -209,7 +211,7 @@ class Humanoid(Body):
     def predict_angles(self, targets: Floats, horizon_s: float | None = None) -> Floats:
         """Return the ``(82,)`` angles (rad) after the position control has acted for a while.
 
-        Contacts and weight are neglected, see `predicted_angles`.
+        Weight and contact forces are constant, see `predicted_angles`.
 
         Args:
             targets: ``(82,)`` rad.
@@ -239,7 +241,9 @@ class Humanoid(Body):
             return
         torques = self._control.torques(self._set_points, self._angles, self._low, self._high)
         np.multiply(torques, self._moving, out=self._torques)
-        self.articulation.apply(self._torques * self.articulation.strengths_nm)
+        strengths = self.articulation.strengths_nm
+        stiffness = self._control.stiffness(torques) * strengths
+        self.articulation.apply(self._torques * strengths, stiffness, substep_s)
 
     def write_frames(self) -> None:
         """Write the poses of the bones and move the voice to the mouth."""
@@ -268,10 +272,12 @@ class Humanoid(Body):
         self._pelvis_velocity[:], self._pelvis_spin[:] = motion[1:]
         forward_kinematics(self._skeleton, self._angles, positions, rotations)
 
-    def _check_substep(self, substep_s: float) -> None:
-        number = damping_number(self.articulation, substep_s)
-        if number > 1.0:
-            raise ValueError(
-                f"{self.name}: physics steps of {substep_s * 1e3:.1f} ms are too long for its "
-                f"joints' damping; at most {substep_s / number * 1e3:.1f} ms: raise clock.substeps"
-            )
+
+def _check_substep(name: str, substep_s: float) -> None:
+    """Raise `ValueError` if physics steps are too long for a joint-level body."""
+    # a step of 40 ms in 4 parts is not above 10 ms
+    if substep_s > LONGEST_STEP_S + 1e-9:
+        raise ValueError(
+            f"{name}: physics steps of {substep_s * 1e3:.1f} ms are too long for the contacts of a "
+            f"joint-level body; at most {LONGEST_STEP_S * 1e3:.0f} ms: raise clock.substeps"
+        )

@@ -46,6 +46,14 @@ class JointControl(Protocol):
         """
         ...
 
+    def stiffness(self, torques: Floats) -> Floats:
+        """Return by how much torques decrease with the angle, ``(n,)`` 1/rad.
+
+        Args:
+            torques: ``(n,)`` the normalised torques at the present angles.
+        """
+        ...
+
     def set_points(self, targets: Floats, angles: Floats, low: Floats, high: Floats) -> Floats:
         """Return the set-points ``(n,)`` that move the joints to target angles.
 
@@ -59,7 +67,7 @@ class JointControl(Protocol):
 
 
 # Angle error at which the proportional control reaches the greatest torque. The joint's own damping
-# is the only damping: more would make the explicit integration unstable.
+# is the only damping.
 SATURATION_RAD = 0.25
 
 
@@ -75,6 +83,10 @@ class TorqueControl:
         """Return the set-points."""
         return set_points
 
+    def stiffness(self, torques: Floats) -> Floats:
+        """Return zeros: the torques do not depend on the angles."""
+        return np.zeros(len(torques))
+
     def set_points(self, targets: Floats, angles: Floats, low: Floats, high: Floats) -> Floats:
         """Return the torques of a proportional control at the predicted angles."""
         return _proportional(targets, angles)
@@ -87,6 +99,10 @@ class PositionControl:
         """Return the torques of a proportional control to the target angles."""
         targets = np.where(set_points >= 0.0, set_points * high, -set_points * low)
         return _proportional(targets, angles)
+
+    def stiffness(self, torques: Floats) -> Floats:
+        """Return the gain of the proportional control, or 0 where the torque is saturated."""
+        return np.where(np.abs(torques) < 1.0, 1.0 / SATURATION_RAD, 0.0)
 
     def set_points(self, targets: Floats, angles: Floats, low: Floats, high: Floats) -> Floats:
         """Return the targets as fractions of the joint limits."""

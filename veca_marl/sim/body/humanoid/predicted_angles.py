@@ -3,7 +3,9 @@
 A torque command is constant for one agent step (40 ms). A proportional controller as stiff as the
 joints are strong, evaluated with the angles at the start of the step, is unstable; evaluated with
 the predicted angles at its end it is stable at any stiffness: "stable PD control", Tan, Liu & Turk
-2011, IEEE Computer Graphics and Applications 31(4).
+2011, IEEE Computer Graphics and Applications 31(4). The prediction contains weight and contact
+forces: without them the stiffness at rest would be K / (1 + h K / D) instead of K, with stiffness K,
+damping D and horizon h, a fourth of it at one agent step.
 """
 
 from __future__ import annotations
@@ -17,7 +19,9 @@ from veca_marl.sim.geometry import Floats
 def predicted_angles(
     body: Articulation, targets: Floats, stiffness: Floats, horizon_s: float
 ) -> Floats:
-    """Return the joint angles ``(82,)``, rad, after springs have acted, without contact and weight.
+    """Return the joint angles ``(82,)``, rad, after springs have acted.
+
+    Weight and contact forces are those that are predicted for the next physics step.
 
     Args:
         body: The body, with the state of the last `read`.
@@ -28,8 +32,8 @@ def predicted_angles(
     moving = body.moving
     spring, damping, speeds = stiffness[moving], body.damping[moving], body.speeds[moving]
     stretch = targets[moving] - body.angles[moving] - horizon_s * speeds
-    forces = np.zeros(6 + len(moving))
-    forces[6:] = spring * stretch - damping * speeds
+    forces = body.dynamics.forces.predicted - body.dynamics.state.bias
+    forces[6:] += spring * stretch - damping * speeds
     resistance = horizon_s * damping + horizon_s**2 * spring
     accelerations = body.dynamics.solve_with(resistance, forces)[6:]
     angles = body.angles.copy()

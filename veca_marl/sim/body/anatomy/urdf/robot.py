@@ -38,9 +38,10 @@ from veca_marl.sim.body.anatomy.urdf.shapes import (
     rigid_shapes,
     soft_shapes,
 )
-from veca_marl.sim.geometry import Inertia, Pose, joined_inertia
+from veca_marl.sim.geometry import Floats, Inertia, Pose, joined_inertia
 
 SKIN_SUFFIX, THUMB_SUFFIX = "__skin", "__thumb"
+_TIPS = ("forearm", "hand", "foot", "neck", "head")  # bones with light links or short levers
 _LIGHT_SHARE = 0.01  # of the mass of its bone, for each link that is not a bone
 _IDENTITY = Pose(np.zeros(3), np.eye(3))
 
@@ -53,15 +54,21 @@ class Build:
         fingers: Whether the fingers move; if not, they are straight and fixed to the hand.
         strength: Factor of the torques in the table.
         free_speed_radps: Speed at which the damping of a joint equals its full torque.
-        rotor_s: A link's added inertia over the damping of its joints: Bullet damps explicitly,
-            which is stable (``dt max eig(M^-1 D) <= 1``) up to a time step of about a third of it.
+        finger_rotor_s: Ratio of the isotropic inertia that is added to each link of a finger to the
+            damping of its joints. Contacts act on the inertia alone, dampers in the next step:
+            without it light links oscillate at contacts.
+        tip_rotor_s: The same for forearms, hands, feet, neck and head.
+        auxiliary_share: Moment of inertia of each auxiliary link of a bone with several hinges, as
+            a share of the least one of the bone; the bone has the remainder.
         friction: Lateral friction of the skin.
     """
 
     fingers: bool = True
     strength: float = 1.0
     free_speed_radps: float = 20.0
-    rotor_s: float = 0.0215
+    finger_rotor_s: float = 0.004
+    tip_rotor_s: float = 0.001
+    auxiliary_share: float = 0.3
     friction: float = 0.8
 
 
@@ -115,10 +122,23 @@ class _Writer:
         layers, light = self._layers(bone, members), _LIGHT_SHARE * bone.mass_kg
         links = max(bone.joint_count - 1, 0) + len(layers) - 1
         whole = joined_inertia([(pose, part.inertia()) for part, pose in members])
-        own = whole._replace(mass_kg=whole.mass_kg - links * light)
-        text = self._hinges(bone, light)
+        auxiliary = max(bone.joint_count - 1, 0)
+        moment = self._auxiliary_moment(whole.matrix, auxiliary)
+        remainder = whole.matrix - auxiliary * moment * np.eye(3)
+        own = whole._replace(mass_kg=whole.mass_kg - links * light, matrix=remainder)
+        text = self._hinges(bone, light, moment)
         text += self._link(layers[0], own, self._rotor(bone), bone)
         return text + "".join(self._fixed(layer, light, bone) for layer in layers[1:])
+
+    def _auxiliary_moment(self, matrix: Floats, links: int) -> float:
+        """Return the moment of inertia of each auxiliary link of a bone, kg m^2.
+
+        The remainder must satisfy the triangle inequality of moments: otherwise Bullet sets all
+        moments of the bone to 0.
+        """
+        moments = np.linalg.eigvalsh(matrix)
+        slack = 0.9 * (moments[0] + moments[1] - moments[2]) / max(links, 1)
+        return float(min(self._build.auxiliary_share * moments[0], slack))
 
     def _layers(self, bone: Bone, members: list[tuple[Bone, Pose]]) -> list[Layer]:
         """Return the links of a bone that have shapes; the first is the bone itself."""
@@ -166,7 +186,7 @@ class _Writer:
                 poses[child] = Pose(place, up.rotation @ bones[child].rest_rotation)
         return [(bones[member], pose) for member, pose in poses.items()]
 
-    def _hinges(self, bone: Bone, light_kg: float) -> str:
+    def _hinges(self, bone: Bone, light_kg: float, moment: float) -> str:
         if bone.parent < 0:
             return ""
         parent, origin = self._skeleton.bones[bone.parent].name, origin_element(_rest(bone))
@@ -176,7 +196,8 @@ class _Writer:
             child = bone.name if last else f"{bone.name}__{step}"
             if not last:
                 empty = Layer(child, (), soft=False)
-                text += self._link(empty, _point_mass(light_kg), self._rotor(bone))
+                speck = _point_mass(light_kg)._replace(matrix=moment * np.eye(3))
+                text += self._link(empty, speck, self._rotor(bone))
             joint = self._skeleton.joints[bone.first_joint + step]
             text += (
                 f'<joint name="{joint.bone}.{joint.label}" type="revolute">'
@@ -201,11 +222,12 @@ class _Writer:
 
     def _rotor(self, bone: Bone) -> float:
         """Return the inertia added to the links of a bone, as of the rotors of motors, kg m^2."""
+        if not (is_finger(bone) or bone.name.endswith(_TIPS)):
+            return 0.0
         joints = self._skeleton.joints[bone.first_joint : bone.first_joint + bone.joint_count]
-        if not joints:  # the pelvis: as the spine, which reacts on it
-            joints = self._skeleton.joints[:1]
         damping = max(map(self._torque, joints)) / self._build.free_speed_radps
-        return damping * self._build.rotor_s
+        time_s = self._build.finger_rotor_s if is_finger(bone) else self._build.tip_rotor_s
+        return damping * time_s
 
     def _torque(self, joint: Joint) -> float:
         return self._build.strength * joint.torque_nm

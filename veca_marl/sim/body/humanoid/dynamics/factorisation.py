@@ -1,4 +1,8 @@
-"""Factorisation of mass matrices of trees without fill-in."""
+"""Factorisation of mass matrices of trees without fill-in.
+
+A mass matrix is zero where two rows are on different branches of the tree. Its lower half is stored
+without these zeros: element d of row i is that of column ``paths[i, d]``, see `LinkTree`.
+"""
 
 from __future__ import annotations
 
@@ -8,43 +12,61 @@ from numpy.typing import NDArray
 
 from veca_marl.sim.geometry import Floats
 
+Indices = NDArray[np.int64]
+
 
 @njit(cache=True)
-def factorise(previous_rows: NDArray[np.int64], matrix: Floats) -> None:
+def factorise(depths: Indices, paths: Indices, matrix: Floats) -> None:
     """Replace the lower half of a matrix M by L with ``M = L^T L`` (Featherstone 2008, table 6.3).
 
     Args:
-        previous_rows: ``(m,)``, see `LinkTree`.
-        matrix: ``(m, m)`` symmetric, positive definite, with the sparsity of a mass matrix.
+        depths: ``(m,)``, see `LinkTree`.
+        paths: ``(m, depth)``.
+        matrix: ``(m, depth)`` lower half of a positive definite matrix.
     """
-    for k in range(previous_rows.shape[0] - 1, -1, -1):
-        root = np.sqrt(matrix[k, k])
-        matrix[k, k] = root
-        i = previous_rows[k]
-        while i >= 0:
-            matrix[k, i] /= root
-            i = previous_rows[i]
-        i = previous_rows[k]
-        while i >= 0:
-            share, j = matrix[k, i], i
-            while j >= 0:
-                matrix[i, j] -= share * matrix[k, j]
-                j = previous_rows[j]
-            i = previous_rows[i]
+    for k in range(depths.shape[0] - 1, -1, -1):
+        last = depths[k] - 1
+        root = np.sqrt(matrix[k, last])
+        matrix[k, last] = root
+        for d in range(last):
+            matrix[k, d] /= root
+        for d in range(last):
+            share, row = matrix[k, d], paths[k, d]
+            for e in range(d + 1):
+                matrix[row, e] -= share * matrix[k, e]
 
 
 @njit(cache=True)
-def solve(previous_rows: NDArray[np.int64], factor: Floats, x: Floats) -> None:
+def solve(depths: Indices, paths: Indices, factor: Floats, x: Floats) -> None:
     """Replace the right side ``(m,)`` by the solution, with the factor from `factorise`."""
-    for i in range(previous_rows.shape[0] - 1, -1, -1):
-        x[i] /= factor[i, i]
-        j = previous_rows[i]
-        while j >= 0:
-            x[j] -= factor[i, j] * x[i]
-            j = previous_rows[j]
-    for i in range(previous_rows.shape[0]):
-        j = previous_rows[i]
-        while j >= 0:
-            x[i] -= factor[i, j] * x[j]
-            j = previous_rows[j]
-        x[i] /= factor[i, i]
+    for i in range(depths.shape[0] - 1, -1, -1):
+        last = depths[i] - 1
+        x[i] /= factor[i, last]
+        for d in range(last):
+            x[paths[i, d]] -= factor[i, d] * x[i]
+    for i in range(depths.shape[0]):
+        last = depths[i] - 1
+        for d in range(last):
+            x[i] -= factor[i, d] * x[paths[i, d]]
+        x[i] /= factor[i, last]
+
+
+@njit(cache=True)
+def add_product(depths: Indices, paths: Indices, matrix: Floats, x: Floats, out: Floats) -> None:
+    """Add the product of a matrix and a vector ``(m,)`` to `out`."""
+    for i in range(depths.shape[0]):
+        last = depths[i] - 1
+        out[i] += matrix[i, last] * x[i]
+        for d in range(last):
+            column = paths[i, d]
+            out[i] += matrix[i, d] * x[column]
+            out[column] += matrix[i, d] * x[i]
+
+
+def dense(depths: Indices, paths: Indices, matrix: Floats) -> Floats:
+    """Return a stored matrix as an array ``(m, m)``."""
+    full = np.zeros((len(depths), len(depths)))
+    for row, depth in enumerate(depths):
+        columns = paths[row, :depth]
+        full[row, columns] = full[columns, row] = matrix[row, :depth]
+    return full

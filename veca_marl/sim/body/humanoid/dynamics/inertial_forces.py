@@ -23,17 +23,16 @@ def _momentum(mass: float, moment: Floats, inertia: Floats, motion: Floats, out:
 
 @njit(cache=True)
 def write_mass_matrix(tree: LinkTree, links: LinkArrays, centre: Floats, out: Floats) -> None:
-    """Write the mass matrix ``(6 + n, 6 + n)`` and the centre of mass ``(3,)``.
+    """Write the mass matrix, stored as in `factorisation`, and the centre of mass ``(3,)``.
 
     Composite-rigid-body algorithm (Featherstone 2008, table 6.2). The base's rows times the
     generalised velocity are the angular momentum about the reference point and the momentum.
     """
     mass, moment, inertia = tree.masses.copy(), links.moments.copy(), links.inertias.copy()
     force, unit = np.empty(6), np.zeros(6)
-    out[:] = 0.0
     for link in range(tree.parents.shape[0] - 1, 0, -1):
         _momentum(mass[link], moment[link], inertia[link], links.hinges[link - 1], force)
-        _write_column(tree, links.hinges, link, force, out)
+        _write_row(tree, links.hinges, link, force, out)
         parent = tree.parents[link]
         mass[parent] += mass[link]
         for i in range(3):
@@ -44,25 +43,22 @@ def write_mass_matrix(tree: LinkTree, links: LinkArrays, centre: Floats, out: Fl
         unit[:] = 0.0
         unit[i] = 1.0
         _momentum(mass[0], moment[0], inertia[0], unit, force)
-        out[:6, i] = force
+        out[i, : i + 1] = force[: i + 1]
     for i in range(3):
         centre[i] = moment[0, i] / mass[0]
 
 
 @njit(cache=True)
-def _write_column(tree: LinkTree, hinges: Floats, link: int, force: Floats, out: Floats) -> None:
-    """Write the column and the row of a hinge: its force on itself, its ancestors and the base."""
-    row, ancestor = 5 + link, link
-    while ancestor > 0:
-        total = 0.0
-        for k in range(6):
-            total += hinges[ancestor - 1, k] * force[k]
-        out[row, 5 + ancestor] = total
-        out[5 + ancestor, row] = total
-        ancestor = tree.parents[ancestor]
+def _write_row(tree: LinkTree, hinges: Floats, link: int, force: Floats, out: Floats) -> None:
+    """Write the row of a hinge: its force on the base, its ancestors and itself."""
+    row = 5 + link
     for k in range(6):
-        out[k, row] = force[k]
         out[row, k] = force[k]
+    for d in range(6, tree.depths[row]):
+        hinge, total = tree.paths[row, d] - 6, 0.0
+        for k in range(6):
+            total += hinges[hinge, k] * force[k]
+        out[row, d] = total
 
 
 @njit(cache=True)

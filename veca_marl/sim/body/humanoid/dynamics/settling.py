@@ -15,134 +15,160 @@ import math
 import numpy as np
 from numba import njit
 
-from veca_marl.sim.body.humanoid.dynamics.factorisation import factorise, solve
+from veca_marl.sim.body.humanoid.dynamics.external_forces import predict, write_external_forces
+from veca_marl.sim.body.humanoid.dynamics.factorisation import add_product, factorise, solve
+from veca_marl.sim.body.humanoid.dynamics.implicit_torques import write_speeds
 from veca_marl.sim.body.humanoid.dynamics.inertial_forces import write_bias, write_mass_matrix
 from veca_marl.sim.body.humanoid.dynamics.link_poses import locate_links
 from veca_marl.sim.body.humanoid.dynamics.small_vectors import add_cross
-from veca_marl.sim.body.humanoid.dynamics.state import BodyState, LinkArrays, SolverState
+from veca_marl.sim.body.humanoid.dynamics.state import (
+    BodyState,
+    JointForces,
+    JointLimits,
+    LinkArrays,
+    SolverState,
+)
 from veca_marl.sim.body.humanoid.dynamics.tree import LinkTree
 from veca_marl.sim.geometry import Floats, quaternions_to_matrices
 
+# impulse on the whole body in a physics step below which nothing may touch it; its weight gives
+# 0.8 N s
+_NO_FORCE_NS = 1e-3
+_SAME_PLACE_M = 1e-7  # distance from Bullet's position of the base below which Bullet keeps it
+
+# what is known of contacts with other bodies
+UNKNOWN, TOUCHED, FREE = 0, 1, 2
+# results of `settle`
+SETTLED, NEW_POSE, NEW_JOINTS, UNDECIDED = 0, 1, 2, 3
+
 
 @njit(cache=True)
-def update_inertia(tree: LinkTree, state: BodyState, links: LinkArrays) -> None:
-    """Write what follows from the pose: links, mass matrix and centre of mass."""
+def begin(
+    tree: LinkTree, solver: SolverState, state: BodyState, links: LinkArrays, forces: JointForces
+) -> None:
+    """Take over Bullet's state; the forces of earlier steps are set to 0."""
+    state.position[:] = solver.position
+    quaternions_to_matrices(solver.quaternion.reshape(1, 4), state.rotation.reshape(1, 3, 3))
+    state.angles[:], state.velocity[:] = solver.angles, solver.velocity
     locate_links(tree, state.rotation, state.angles, links)
     write_mass_matrix(tree, links, state.centre, state.mass_matrix)
-
-
-@njit(cache=True)
-def update_bias(tree: LinkTree, state: BodyState, links: LinkArrays) -> None:
-    """Write what follows from pose and velocity: the bias forces."""
     write_bias(tree, links, state.velocity, state.bias)
-
-
-@njit(cache=True)
-def write_momentum(state: BodyState) -> None:
-    """Write the momentum that follows from pose and velocity."""
-    for i in range(6):
-        state.momentum[i] = 0.0
-        for j in range(state.velocity.shape[0]):
-            state.momentum[i] += state.mass_matrix[i, j] * state.velocity[j]
+    forces.scratch[:] = 0.0
+    add_product(tree.depths, tree.paths, state.mass_matrix, state.velocity, forces.scratch)
+    state.momentum[:] = forces.scratch[:6]
     add_cross(state.momentum[3:], state.centre, state.momentum[:3])
-
-
-@njit(cache=True)
-def write_external_impulse(
-    step_s: float, solver: SolverState, state: BodyState, impulse: Floats
-) -> None:
-    """Write the impulse ``(6,)`` of all external forces during a physics step.
-
-    It is the base's rows of ``M (v' - v) + dt h``, with mass matrix M and bias h at the pose before
-    the step: N m s about the centre of mass, then N s.
-    """
-    for i in range(6):
-        impulse[i] = step_s * state.bias[i]
-        for j in range(state.velocity.shape[0]):
-            impulse[i] += state.mass_matrix[i, j] * (solver.velocity[j] - state.velocity[j])
-    add_cross(impulse[3:], state.centre, impulse[:3])
+    forces.predicted[:], forces.before[:] = 0.0, 0.0
+    forces.torques[:], forces.held[:] = 0.0, 0.0
 
 
 @njit(cache=True)
 def settle(
     tree: LinkTree,
-    low: Floats,
-    high: Floats,
-    top_speed: float,
+    limits: JointLimits,
     step_s: float,
-    impulse: Floats,
+    weight: Floats,
+    contact: int,
     solver: SolverState,
     state: BodyState,
     links: LinkArrays,
-    changed: Floats,
-) -> None:
+    forces: JointForces,
+) -> int:
     """Apply joint limits to the state after a step and give the base the momentum that it has.
 
     Args:
         tree: The tree of n hinges.
-        low: ``(n,)`` rad, lower joint limits.
-        high: ``(n,)`` rad, upper joint limits.
-        top_speed: rad/s, limit of joint speeds.
+        limits: Limits of angles and speeds.
         step_s: Duration of the physics step.
-        impulse: ``(6,)`` external impulse of the step, from `write_external_impulse`.
+        weight: ``(3,)`` N, weight of the body.
+        contact: `TOUCHED` or `FREE` if it is known whether another body is touched, or `UNKNOWN`.
         solver: Bullet's state after the step; angles, joint speeds and orientation are overwritten.
         state: The state before the step; overwritten by the one after it.
         links: The links before the step; overwritten.
-        changed: ``(n,)``, written: 1 for joints with a changed angle or speed, else 0.
+        forces: `torques` are read, `external` and `predicted` are written.
+
+    Returns:
+        `UNDECIDED` if `contact` is `UNKNOWN` and the external force is no more than the weight: the
+        state is unchanged then, and contacts have to be looked for. Otherwise which part of the new state
+        differs from Bullet's, apart from the velocity of the base: none (`SETTLED`), the pose of
+        the base (`NEW_POSE`), or that and joints (`NEW_JOINTS`).
     """
     goal, mass = np.empty(3), np.sum(tree.masses)
-    state.momentum[:] += impulse
+    write_external_forces(tree, step_s, solver, state, forces)
+    if not _add_impulse(step_s, weight, contact, forces.external, state):
+        return UNDECIDED
+    reacts = write_speeds(tree, step_s, solver, state, forces)
+    predict(forces)
     for i in range(3):
         goal[i] = state.position[i] + state.centre[i] + step_s * state.momentum[3 + i] / mass
-    if _apply_limits(low, high, top_speed, state.mass_matrix, solver, changed):
-        _turn_base(state.mass_matrix, solver)
+    result, turned = _apply_limits(limits, state.mass_matrix, solver)
+    if reacts:
+        result = NEW_JOINTS
+    if turned:
+        _turn_base(tree, state.mass_matrix, solver)
     quaternions_to_matrices(solver.quaternion.reshape(1, 4), state.rotation.reshape(1, 3, 3))
     state.angles[:] = solver.angles
-    update_inertia(tree, state, links)
+    locate_links(tree, state.rotation, state.angles, links)
+    write_mass_matrix(tree, links, state.centre, state.mass_matrix)
     for i in range(3):
         state.position[i] = goal[i] - state.centre[i]
-    _write_velocity(state, solver.velocity)
-    update_bias(tree, state, links)
+        if abs(state.position[i] - solver.position[i]) > _SAME_PLACE_M:
+            result = max(result, NEW_POSE)
+    _write_velocity(tree, state, solver.velocity)
+    write_bias(tree, links, state.velocity, state.bias)
+    return result
+
+
+@njit(cache=True)
+def _add_impulse(
+    step_s: float, weight: Floats, contact: int, external: Floats, state: BodyState
+) -> bool:
+    """Add the impulse of external forces to the momentum; return false if contacts are unknown.
+
+    Bullet applies the two friction forces of a contact of the body with itself at points that
+    differ by the penetration. The torque that this leaves is dropped where no other body is touched.
+    """
+    impulse, square = np.zeros(6), 0.0
+    for i in range(3):
+        impulse[3 + i] = step_s * weight[i]
+        square += (step_s * (external[3 + i] - weight[i])) ** 2
+    if contact == UNKNOWN and square < _NO_FORCE_NS**2:
+        return False
+    if contact != FREE:
+        impulse[:] = step_s * external[:6]
+        add_cross(impulse[3:], state.centre, impulse[:3])
+    state.momentum[:] += impulse
+    return True
 
 
 @njit(cache=True)
 def _apply_limits(
-    low: Floats,
-    high: Floats,
-    top_speed: float,
-    mass_matrix: Floats,
-    solver: SolverState,
-    changed: Floats,
-) -> bool:
-    """Clip angles and joint speeds; return whether an angle was changed.
+    limits: JointLimits, mass_matrix: Floats, solver: SolverState
+) -> tuple[int, bool]:
+    """Clip angles and joint speeds; return `NEW_JOINTS` if any was, and whether an angle was.
 
     For each change of an angle the impulse that an internal motor would leave on the base is added
     to the base's turn.
     """
-    moved = False
+    result, turned = SETTLED, False
     solver.turn[:] = 0.0
-    for joint in range(low.shape[0]):
-        angle = min(max(solver.angles[joint], low[joint]), high[joint])
-        speed = min(max(solver.velocity[6 + joint], -top_speed), top_speed)
-        changed[joint] = 0.0
+    for joint in range(limits.low.shape[0]):
+        angle = min(max(solver.angles[joint], limits.low[joint]), limits.high[joint])
+        speed = min(max(solver.velocity[6 + joint], -limits.speed), limits.speed)
         if speed != solver.velocity[6 + joint]:
             solver.velocity[6 + joint] = speed
-            changed[joint] = 1.0
+            result = NEW_JOINTS
         if angle != solver.angles[joint]:
             for i in range(6):
-                solver.turn[i] -= mass_matrix[i, 6 + joint] * (angle - solver.angles[joint])
+                solver.turn[i] -= mass_matrix[6 + joint, i] * (angle - solver.angles[joint])
             solver.angles[joint] = angle
-            changed[joint] = 1.0
-            moved = True
-    return moved
+            result, turned = NEW_JOINTS, True
+    return result, turned
 
 
 @njit(cache=True)
-def _turn_base(mass_matrix: Floats, solver: SolverState) -> None:
+def _turn_base(tree: LinkTree, mass_matrix: Floats, solver: SolverState) -> None:
     """Rotate the base by as much as it reacts on the changes of angles."""
-    block = mass_matrix[:6, :6].copy()
-    factorise(np.arange(-1, 5), block)
-    solve(np.arange(-1, 5), block, solver.turn)
+    _solve_base(tree, mass_matrix, solver.turn)
     turn, q = solver.turn, solver.quaternion
     angle = math.sqrt(turn[0] ** 2 + turn[1] ** 2 + turn[2] ** 2)
     share = 0.5 if angle < 1e-9 else math.sin(0.5 * angle) / angle
@@ -155,15 +181,21 @@ def _turn_base(mass_matrix: Floats, solver: SolverState) -> None:
 
 
 @njit(cache=True)
-def _write_velocity(state: BodyState, velocity: Floats) -> None:
+def _solve_base(tree: LinkTree, mass_matrix: Floats, x: Floats) -> None:
+    """Replace a right side ``(6,)`` by the solution with the base's block of the mass matrix."""
+    block = mass_matrix[:6].copy()
+    factorise(tree.depths[:6], tree.paths[:6], block)
+    solve(tree.depths[:6], tree.paths[:6], block, x)
+
+
+@njit(cache=True)
+def _write_velocity(tree: LinkTree, state: BodyState, velocity: Floats) -> None:
     """Write the velocity of the base that gives the body its momentum at the new pose."""
     base = state.momentum.copy()
     add_cross(state.centre, state.momentum[3:], base[:3])
-    block = state.mass_matrix[:6, :6].copy()
-    for i in range(6):
-        for j in range(6, velocity.shape[0]):
-            base[i] -= state.mass_matrix[i, j] * velocity[j]
-    factorise(np.arange(-1, 5), block)
-    solve(np.arange(-1, 5), block, base)
+    for j in range(6, velocity.shape[0]):
+        for i in range(6):
+            base[i] -= state.mass_matrix[j, i] * velocity[j]
+    _solve_base(tree, state.mass_matrix, base)
     state.velocity[:6] = base
     state.velocity[6:] = velocity[6:]

@@ -37,7 +37,7 @@ class BodyState(NamedTuple):
         velocity: ``(6 + n,)`` generalised velocity.
         momentum: ``(6,)`` angular momentum about the centre of mass, N m s, and momentum, kg m/s.
         centre: ``(3,)`` metres, the centre of mass from the reference point.
-        mass_matrix: ``(6 + n, 6 + n)``.
+        mass_matrix: ``(6 + n, depth)``, stored as in `factorisation`.
         bias: ``(6 + n,)`` generalised forces that keep the velocity constant, without weight.
     """
 
@@ -55,12 +55,14 @@ class SolverState(NamedTuple):
     """What Bullet has after a physics step.
 
     Attributes:
+        position: ``(3,)`` metres, the base's centre of mass.
         quaternion: ``(4,)`` (x, y, z, w), orientation of the base.
         angles: ``(n,)`` rad.
         velocity: ``(6 + n,)`` generalised velocity.
         turn: ``(6,)`` scratch of `settle`.
     """
 
+    position: Floats
     quaternion: Floats
     angles: Floats
     velocity: Floats
@@ -69,7 +71,7 @@ class SolverState(NamedTuple):
 
 def empty_solver_state(hinges: int) -> SolverState:
     """Return arrays for Bullet's state."""
-    return SolverState(np.zeros(4), np.zeros(hinges), np.zeros(6 + hinges), np.zeros(6))
+    return SolverState(*(np.zeros(count) for count in (3, 4, hinges, 6 + hinges, 6)))
 
 
 def empty_links(hinges: int) -> LinkArrays:
@@ -83,8 +85,8 @@ def empty_links(hinges: int) -> LinkArrays:
     )
 
 
-def empty_state(hinges: int) -> BodyState:
-    """Return arrays for the state of a body."""
+def empty_state(hinges: int, depth: int) -> BodyState:
+    """Return arrays for the state of a body; `depth` is that of its tree's paths."""
     rows = 6 + hinges
     return BodyState(
         position=np.zeros(3),
@@ -93,6 +95,71 @@ def empty_state(hinges: int) -> BodyState:
         velocity=np.zeros(rows),
         momentum=np.zeros(6),
         centre=np.zeros(3),
-        mass_matrix=np.zeros((rows, rows)),
+        mass_matrix=np.zeros((rows, depth)),
         bias=np.zeros(rows),
+    )
+
+
+class JointLimits(NamedTuple):
+    """Limits of the joints.
+
+    Attributes:
+        low: ``(n,)`` rad, lower limits.
+        high: ``(n,)`` rad, upper limits.
+        speed: rad/s, greatest speed of all joints.
+    """
+
+    low: Floats
+    high: Floats
+    speed: float
+
+
+class JointForces(NamedTuple):
+    """Forces on a body of n hinges. All are written in place.
+
+    Attributes:
+        drive: ``(n,)`` N m, torques of the motors at the start of a step.
+        stiffness: ``(n,)`` N m/rad, by which these decrease with the angle.
+        damping: ``(n,)`` N m s/rad.
+        torques: ``(n,)`` N m, what Bullet applies in the step.
+        external: ``(6 + n,)`` generalised forces of weight and contacts in the last step.
+        before: ``(6 + n,)`` those of the step before it.
+        predicted: ``(6 + n,)`` those that are predicted for the next step.
+        held: ``(n,)`` 1 or -1 for joints that are held at their upper or lower limit, else 0.
+        accelerations: ``(6 + n,)`` predicted generalised accelerations.
+        matrix: ``(6 + n, depth)`` scratch, stored as in `factorisation`.
+        scratch: ``(6 + n,)``.
+    """
+
+    drive: Floats
+    stiffness: Floats
+    damping: Floats
+    torques: Floats
+    external: Floats
+    before: Floats
+    predicted: Floats
+    held: Floats
+    accelerations: Floats
+    matrix: Floats
+    scratch: Floats
+
+
+def empty_forces(hinges: int, depth: int) -> JointForces:
+    """Return arrays of zeros; `depth` is that of the tree's paths."""
+    rows = 6 + hinges
+    drive, stiffness, damping, torques, held = (np.zeros(hinges) for _ in range(5))
+    external, before, predicted, accelerations, scratch = (np.zeros(rows) for _ in range(5))
+    matrix = np.zeros((rows, depth))
+    return JointForces(
+        drive,
+        stiffness,
+        damping,
+        torques,
+        external,
+        before,
+        predicted,
+        held,
+        accelerations,
+        matrix,
+        scratch,
     )

@@ -23,8 +23,9 @@ class LinkTree(NamedTuple):
 
     Attributes:
         parents: ``(n + 1,)`` parent link; -1 for the base.
-        previous_rows: ``(6 + n,)`` for each row of the mass matrix the next row on the way to the
-            base, -1 at its end.
+        depths: ``(6 + n,)`` number of rows on the way from row 0 of the mass matrix to each row,
+            both included.
+        paths: ``(6 + n, depth)`` those rows in this order; -1 after the row itself.
         positions: ``(n + 1, 3)`` metres, the joint's position in the parent's frame.
         rotations: ``(n + 1, 3, 3)`` orientation in the parent's frame at angle 0.
         axes: ``(n + 1, 3)`` axis of the joint in the link's frame.
@@ -34,7 +35,8 @@ class LinkTree(NamedTuple):
     """
 
     parents: NDArray[np.int64]
-    previous_rows: NDArray[np.int64]
+    depths: NDArray[np.int64]
+    paths: NDArray[np.int64]
     positions: Floats
     rotations: Floats
     axes: Floats
@@ -66,9 +68,11 @@ def read_tree(client: int, body_id: int) -> LinkTree:
         _seen_from(frames[parent], frame)
         for parent, frame in zip(parents[1:], frames[1:], strict=True)
     ]
+    depths, paths = _paths(parents)
     return LinkTree(
         parents=np.array(parents),
-        previous_rows=np.array([-1, 0, 1, 2, 3, 4] + [5 + parent for parent in parents[1:]]),
+        depths=depths,
+        paths=paths,
         positions=np.array([pose.position for pose in relative]),
         rotations=np.array([pose.rotation for pose in relative]),
         axes=np.array([head.axis for head in heads]),
@@ -76,6 +80,18 @@ def read_tree(client: int, body_id: int) -> LinkTree:
         centres=np.array([whole.centre for whole in merged]),
         inertias=np.array([whole.matrix for whole in merged]),
     )
+
+
+def _paths(parents: list[int]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return `depths` and `paths` of a tree: the base has rows 0 to 5, link i has row i + 5."""
+    rows = [list(range(i + 1)) for i in range(6)]
+    for link, parent in enumerate(parents[1:], 1):
+        rows.append([*rows[5 + parent], 5 + link])
+    depths = np.array([len(row) for row in rows])
+    paths = np.full((len(rows), int(depths.max())), -1)
+    for row, path in zip(rows, paths, strict=True):
+        path[: len(row)] = row
+    return depths, paths
 
 
 class _Link(NamedTuple):

@@ -1,0 +1,149 @@
+"""Joint torques with which Bullet's explicit step has the result of an implicit one.
+
+Joint damping is large relative to the inertia of light links: an explicit damping torque would be
+unstable at physics steps of 8 ms. The torques here are those of springs and dampers at the end of
+the step, see `write_torques`.
+"""
+
+from __future__ import annotations
+
+from numba import njit
+
+from veca_marl.sim.body.humanoid.dynamics.factorisation import factorise, solve
+from veca_marl.sim.body.humanoid.dynamics.state import (
+    BodyState,
+    JointForces,
+    JointLimits,
+    SolverState,
+)
+from veca_marl.sim.body.humanoid.dynamics.tree import LinkTree
+
+# inertia of the damper that holds a joint at its limit, relative to the joint's own
+_STOP_INERTIA = 1e6
+_REVISIONS = 2  # of the set of held joints
+# joints are held this far inside their limits, so that rounding does not take them beyond
+_INSET_RAD = 1e-6
+_SAME_SPEED_RADPS = 1e-4  # difference of joint speeds below which Bullet's are kept
+
+
+@njit(cache=True)
+def write_torques(
+    tree: LinkTree, limits: JointLimits, step_s: float, state: BodyState, forces: JointForces
+) -> None:
+    """Write the joint torques of the next physics step to `forces.torques`.
+
+    With mass matrix M, bias h, motor torques u, damping D, stiffness K of the motors and the
+    external forces f that are predicted, accelerations a solve
+    ``(M + dt D + dt^2 K) a = u + f - h - (D + dt K) v``, and the torques are
+    ``u - (D + dt K) (v + dt a)``. A joint that would pass a limit is held by a damper that is stiff
+    enough to give it the speed with which it reaches the limit. The joints that need it are found
+    by revision, which starts from those of the last step.
+
+    Args:
+        tree: The tree of n hinges.
+        limits: Limits of angles.
+        step_s: Duration dt of the physics step.
+        state: The state at its start.
+        forces: `drive`, `damping`, `stiffness` and `predicted` are read, the rest is written.
+    """
+    for revision in range(_REVISIONS + 1):
+        _accelerate(tree, limits, step_s, state, forces)
+        if revision == _REVISIONS or not _revise(limits, step_s, state, forces):
+            break
+    for k in range(limits.low.shape[0]):
+        i = 6 + k
+        speed = state.velocity[i] + step_s * forces.accelerations[i]
+        forces.torques[k] = forces.drive[k] - _resistance(k, step_s, forces) * speed
+        if forces.held[k] != 0.0:
+            stop = _stop_acceleration(k, limits, step_s, state, forces)
+            share = _STOP_INERTIA * state.mass_matrix[i, tree.depths[i] - 1]
+            forces.torques[k] -= share * (forces.accelerations[i] - stop)
+
+
+@njit(cache=True)
+def _resistance(k: int, step_s: float, forces: JointForces) -> float:
+    """Return by how much the torque of a joint decreases with its speed, N m s/rad."""
+    total: float = forces.damping[k] + step_s * forces.stiffness[k]
+    return total
+
+
+@njit(cache=True)
+def _accelerate(
+    tree: LinkTree, limits: JointLimits, step_s: float, state: BodyState, forces: JointForces
+) -> None:
+    """Write the accelerations for the present set of held joints."""
+    matrix, right = forces.matrix, forces.accelerations
+    for i in range(right.shape[0]):
+        right[i] = forces.predicted[i] - state.bias[i]
+        for d in range(tree.depths[i]):
+            matrix[i, d] = state.mass_matrix[i, d]
+    for k in range(limits.low.shape[0]):
+        i, last = 6 + k, tree.depths[6 + k] - 1
+        resistance = _resistance(k, step_s, forces)
+        right[i] += forces.drive[k] - resistance * state.velocity[i]
+        if forces.held[k] != 0.0:
+            share = _STOP_INERTIA * matrix[i, last]
+            matrix[i, last] += share
+            right[i] += share * _stop_acceleration(k, limits, step_s, state, forces)
+        matrix[i, last] += step_s * resistance
+    factorise(tree.depths, tree.paths, matrix)
+    solve(tree.depths, tree.paths, matrix, right)
+
+
+@njit(cache=True)
+def _stop_acceleration(
+    k: int, limits: JointLimits, step_s: float, state: BodyState, forces: JointForces
+) -> float:
+    """Return the acceleration with which a joint reaches its limit at the end of the step."""
+    stop = limits.high[k] - _INSET_RAD if forces.held[k] > 0.0 else limits.low[k] + _INSET_RAD
+    speed: float = (stop - state.angles[k]) / step_s - state.velocity[6 + k]
+    return speed / step_s
+
+
+@njit(cache=True)
+def _revise(limits: JointLimits, step_s: float, state: BodyState, forces: JointForces) -> bool:
+    """Hold joints that would pass a limit, release those that pull; return whether any changed."""
+    changed = False
+    for k in range(limits.low.shape[0]):
+        acceleration = forces.accelerations[6 + k]
+        angle = state.angles[k] + step_s * (state.velocity[6 + k] + step_s * acceleration)
+        if forces.held[k] == 0.0:
+            if angle > limits.high[k] - _INSET_RAD:
+                forces.held[k], changed = 1.0, True
+            elif angle < limits.low[k] + _INSET_RAD:
+                forces.held[k], changed = -1.0, True
+        else:
+            stop = _stop_acceleration(k, limits, step_s, state, forces)
+            if forces.held[k] * (acceleration - stop) < 0.0:
+                forces.held[k], changed = 0.0, True
+    return changed
+
+
+@njit(cache=True)
+def write_speeds(
+    tree: LinkTree, step_s: float, solver: SolverState, state: BodyState, forces: JointForces
+) -> bool:
+    """Write the joint speeds after a step to `solver.velocity`; return whether they differ.
+
+    Bullet's torques are those for the external forces that were predicted. Springs and dampers also
+    react on the difference f' - f from the forces that acted: the accelerations of the implicit
+    step are ``a + (M + dt D + dt^2 K)^-1 (f' - f)``, where Bullet has ``a + M^-1 (f' - f)``.
+
+    Args:
+        tree: The tree of n hinges.
+        step_s: Duration dt of the step.
+        solver: Bullet's state after the step.
+        state: The state before the step.
+        forces: As `write_torques` left them, with `external`, the forces that acted.
+    """
+    for i in range(forces.scratch.shape[0]):
+        forces.scratch[i] = forces.external[i] - forces.predicted[i]
+    solve(tree.depths, tree.paths, forces.matrix, forces.scratch)
+    differs = False
+    for i in range(6, forces.scratch.shape[0]):
+        speed = state.velocity[i] + step_s * (forces.accelerations[i] + forces.scratch[i])
+        is_held = forces.stiffness[i - 6] > 0.0
+        if is_held and abs(speed) < abs(solver.velocity[i]) - _SAME_SPEED_RADPS:
+            solver.velocity[i] = speed
+            differs = True
+    return differs
