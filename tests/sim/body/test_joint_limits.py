@@ -61,8 +61,8 @@ def test_joints_driven_against_their_limits_stay_there(alone, sign):
         world.step()
     moving = body.articulation.moving
     distance = np.abs(body.joint_angles() - (HIGH if sign > 0 else LOW))[moving]
-    # self-collision keeps a few from their limits
-    assert np.mean(distance < np.radians(1.0)) > 0.8
+    # legs and arms that collide keep some joints from their limits
+    assert np.mean(distance < np.radians(1.0)) > 0.7
     assert (body.joint_angles() <= HIGH).all()
     assert (body.joint_angles() >= LOW).all()
 
@@ -101,6 +101,8 @@ def test_damping_takes_energy_at_any_step(alone, step_s):
 
 def test_too_long_physics_steps_are_refused():
     world = empty_world(clock=ClockCfg(substeps=3))
-    with pytest.raises(ValueError, match=r"steps of 13.3 ms are too long for the contacts .* raise clock.substeps"):
+    with pytest.raises(
+        ValueError, match=r"steps of 13.3 ms are too long for the contacts .* raise clock.substeps"
+    ):
         Humanoid("child", HumanoidCfg(), world)
     world.close()

@@ -4,13 +4,11 @@ A torque command is constant for one agent step (40 ms). A proportional controll
 joints are strong, evaluated with the angles at the start of the step, is unstable; evaluated with
 the predicted angles at its end it is stable at any stiffness: "stable PD control", Tan, Liu & Turk
 2011, IEEE Computer Graphics and Applications 31(4). The prediction contains weight and contact
-forces: without them the stiffness at rest would be K / (1 + h K / D) instead of K, with stiffness K,
-damping D and horizon h, a fourth of it at one agent step.
+forces: without them the stiffness at rest would be K / (1 + h K / D) instead of K, with stiffness
+K, damping D and horizon h; that is a fourth of K for a horizon of one agent step.
 """
 
 from __future__ import annotations
-
-import numpy as np
 
 from veca_marl.sim.body.humanoid.articulation import Articulation
 from veca_marl.sim.geometry import Floats

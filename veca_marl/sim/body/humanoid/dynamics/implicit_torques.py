@@ -123,11 +123,14 @@ def _revise(limits: JointLimits, step_s: float, state: BodyState, forces: JointF
 def write_speeds(
     tree: LinkTree, step_s: float, solver: SolverState, state: BodyState, forces: JointForces
 ) -> bool:
-    """Write the joint speeds after a step to `solver.velocity`; return whether they differ.
+    """Write speeds of sprung joints after a step to `solver.velocity`; return whether they differ.
 
     Bullet's torques are those for the external forces that were predicted. Springs and dampers also
     react on the difference f' - f from the forces that acted: the accelerations of the implicit
-    step are ``a + (M + dt D + dt^2 K)^-1 (f' - f)``, where Bullet has ``a + M^-1 (f' - f)``.
+    step are ``a + (M + dt D + dt^2 K)^-1 (f' - f)``, where Bullet has ``a + M^-1 (f' - f)``. The
+    lower one of the two speeds is taken. Bullet omits a contact point for one step when it has
+    drifted, which accelerates light links strongly without this. Joints without stiffness keep
+    Bullet's speeds: the correction makes limp bodies less calm (measured, see the page of bodies).
 
     Args:
         tree: The tree of n hinges.

@@ -88,9 +88,9 @@ def settle(
 
     Returns:
         `UNDECIDED` if `contact` is `UNKNOWN` and the external force is no more than the weight: the
-        state is unchanged then, and contacts have to be looked for. Otherwise which part of the new state
-        differs from Bullet's, apart from the velocity of the base: none (`SETTLED`), the pose of
-        the base (`NEW_POSE`), or that and joints (`NEW_JOINTS`).
+        state is unchanged then, and contacts have to be looked for. Otherwise which part of the new
+        state differs from Bullet's, apart from the velocity of the base: none (`SETTLED`), the pose
+        of the base (`NEW_POSE`), or that and joints (`NEW_JOINTS`).
     """
     goal, mass = np.empty(3), np.sum(tree.masses)
     write_external_forces(tree, step_s, solver, state, forces)
@@ -125,7 +125,7 @@ def _add_impulse(
     """Add the impulse of external forces to the momentum; return false if contacts are unknown.
 
     Bullet applies the two friction forces of a contact of the body with itself at points that
-    differ by the penetration. The torque that this leaves is dropped where no other body is touched.
+    differ by the penetration. The torque that remains is dropped where no other body is touched.
     """
     impulse, square = np.zeros(6), 0.0
     for i in range(3):
