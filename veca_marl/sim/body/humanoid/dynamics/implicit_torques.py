@@ -22,7 +22,7 @@ from veca_marl.sim.body.humanoid.dynamics.tree import LinkTree
 _STOP_INERTIA = 1e6
 _REVISIONS = 2  # of the set of held joints
 # joints are held this far inside their limits, so that rounding does not take them beyond
-_INSET_RAD = 1e-6
+_INSET_RAD = 1e-4
 _SAME_SPEED_RADPS = 1e-4  # difference of joint speeds below which Bullet's are kept
 
 

@@ -34,7 +34,7 @@ from veca_marl.sim.geometry import Floats, quaternions_to_matrices
 # impulse on the whole body in a physics step below which nothing may touch it; its weight gives
 # 0.8 N s
 _NO_FORCE_NS = 1e-3
-_SAME_PLACE_M = 1e-7  # distance from Bullet's position of the base below which Bullet keeps it
+_SAME_PLACE_M = 5e-7  # distance from Bullet's position of the base below which Bullet keeps it
 
 # what is known of contacts with other bodies
 UNKNOWN, TOUCHED, FREE = 0, 1, 2
