@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veca_marl.sim.body.anatomy import Build, Skeleton, body_files, bone_of
-from veca_marl.sim.body.humanoid.dynamics import NEW_JOINTS, SETTLED, BodyDynamics, JointLimits
+from veca_marl.sim.body.humanoid.dynamics import NEW_POSE, BodyDynamics, JointLimits
 from veca_marl.sim.body.humanoid.dynamics.tree import read_tree
 from veca_marl.sim.body.humanoid.self_collision import allow_self_collision
 from veca_marl.sim.geometry import (
@@ -93,6 +93,7 @@ class Articulation:
         tree = read_tree(client, self.body_id)
         self.dynamics = BodyDynamics(tree, limits, self.damping[self.moving])
         self._mass_kg = float(self.dynamics.tree.masses.sum())
+        self._weight = np.zeros(3)  # N
         self._prepare(infos, {bone.name for bone in skeleton.bones})
         self.read()
 
@@ -145,7 +146,8 @@ class Articulation:
         """
         if not self._read():
             return False
-        self.dynamics.begin()
+        self.read_gravity()
+        self.dynamics.begin(self._weight)
         self._copy_joints()
         return True
 
@@ -156,21 +158,22 @@ class Articulation:
         """
         if not self._read():
             return False
-        result = self.dynamics.settle(step_s, self._weight(), self._touches_others)
+        result = self.dynamics.settle(step_s, self._weight, self._touches_others)
         self._copy_joints()
-        state = self.dynamics.state
-        if result == NEW_JOINTS:
-            self._set_joints()
-        if result != SETTLED:
-            self._set_pose(state.position, self.dynamics.solver.quaternion)
+        state, solver = self.dynamics.state, self.dynamics.solver
+        changed = solver.changed.nonzero()[0]
+        if len(changed):
+            self._set_joints(changed)
+        if result == NEW_POSE:
+            self._set_pose(state.position, solver.quaternion)
         self._set_velocity(state.velocity)
         return True
 
-    def _weight(self) -> Floats:
-        """Return the weight ``(3,)``, N, with the present gravity of the client."""
+    def read_gravity(self) -> None:
+        """Read the client's gravity; call it before each agent step."""
         world = pybullet.getPhysicsEngineParameters(physicsClientId=self._client)
         gravity = [world[f"gravityAcceleration{axis}"] for axis in "XYZ"]
-        return self._mass_kg * np.array(gravity)
+        self._weight = self._mass_kg * np.array(gravity)
 
     def _touches_others(self) -> bool:
         found = pybullet.getContactPoints(bodyA=self.body_id, physicsClientId=self._client)
@@ -188,9 +191,7 @@ class Articulation:
         row = np.array(position + quaternion + spin + velocity + speeds + angles)
         if not np.isfinite(row).all():
             return False
-        solver, ends = self.dynamics.solver, 13 + len(speeds)
-        solver.position[:], solver.quaternion[:] = row[:3], row[3:7]
-        solver.velocity[:], solver.angles[:] = row[7:ends], row[ends:]
+        self.dynamics.solver.numbers[:] = row
         return True
 
     def _copy_joints(self) -> None:
@@ -232,12 +233,12 @@ class Articulation:
         centre = pose.position + pose.rotation @ self._base_centre
         self._set_pose(centre, matrix_to_quaternion(pose.rotation))
         self._set_velocity(np.zeros(6))
-        self._set_joints()
+        self._set_joints(np.arange(len(self.moving)))
 
     def set_speeds(self, speeds: Floats) -> None:
         """Set all joint speeds ``(82,)``, rad/s, with the base as it is."""
         self.speeds[self.moving] = speeds[self.moving]
-        self._set_joints()
+        self._set_joints(np.arange(len(self.moving)))
 
     def _set_pose(self, position: Floats, quaternion: Floats) -> None:
         """Set position and orientation of the base; Bullet sets its velocity to 0."""
@@ -252,13 +253,14 @@ class Articulation:
             self.body_id, numbers[3:], numbers[:3], physicsClientId=self._client
         )
 
-    def _set_joints(self) -> None:
-        """Set all joints to `angles` and `speeds`."""
+    def _set_joints(self, chosen: NDArray[np.int64]) -> None:
+        """Set chosen rows of `moving` to `angles` and `speeds`."""
+        joints = self.moving[chosen, None]
         pybullet.resetJointStatesMultiDof(
             self.body_id,
-            self._links,
-            self.angles[self.moving, None].tolist(),
-            self.speeds[self.moving, None].tolist(),
+            [self._links[row] for row in chosen],
+            self.angles[joints].tolist(),
+            self.speeds[joints].tolist(),
             physicsClientId=self._client,
         )
 

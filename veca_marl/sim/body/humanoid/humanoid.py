@@ -233,7 +233,8 @@ class Humanoid(Body):
     # ---- calls from the world, see `Mover`
 
     def before_step(self) -> None:
-        """Do nothing: Bullet finds all contacts of this body."""
+        """Read the gravity, which the physics steps of this agent step need."""
+        self.articulation.read_gravity()
 
     def before_substep(self, substep_s: float) -> None:
         """Apply the torques of one physics step."""

@@ -55,9 +55,13 @@ class BodyDynamics:
         self.forces.damping[:] = damping
         self._links = empty_links(tree.hinges)
 
-    def begin(self) -> None:
-        """Take over Bullet's state as it is."""
-        begin(self.tree, self.solver, self.state, self._links, self.forces)
+    def begin(self, weight: Floats) -> None:
+        """Take over Bullet's state as it is.
+
+        Args:
+            weight: ``(3,)`` N, weight of the body.
+        """
+        begin(self.tree, weight, self.solver, self.state, self._links, self.forces)
 
     def torques(self, step_s: float) -> Floats:
         """Return the joint torques ``(n,)``, N m, of a physics step, see `implicit_torques`."""
@@ -74,7 +78,8 @@ class BodyDynamics:
                 is no more than the weight, because lists of contacts take time.
 
         Returns:
-            What differs from Bullet's state: `SETTLED`, `NEW_POSE` or `NEW_JOINTS`.
+            `NEW_POSE` if the pose of the base differs from Bullet's, else `SETTLED`; the joints that
+            differ are in `solver.changed`.
         """
         result = self._settle(step_s, weight, UNKNOWN)
         if result == UNDECIDED:

@@ -7,6 +7,7 @@ the step, see `write_torques`.
 
 from __future__ import annotations
 
+import numpy as np
 from numba import njit
 
 from veca_marl.sim.body.humanoid.dynamics.factorisation import factorise, solve
@@ -122,8 +123,8 @@ def _revise(limits: JointLimits, step_s: float, state: BodyState, forces: JointF
 @njit(cache=True)
 def write_speeds(
     tree: LinkTree, step_s: float, solver: SolverState, state: BodyState, forces: JointForces
-) -> bool:
-    """Write speeds of sprung joints after a step to `solver.velocity`; return whether they differ.
+) -> None:
+    """Write speeds of sprung joints after a step to `solver.velocity` and `solver.changed`.
 
     Bullet's torques are those for the external forces that were predicted. Springs and dampers also
     react on the difference f' - f from the forces that acted: the accelerations of the implicit
@@ -139,14 +140,14 @@ def write_speeds(
         state: The state before the step.
         forces: As `write_torques` left them, with `external`, the forces that acted.
     """
+    if not np.any(forces.stiffness > 0.0):
+        return
     for i in range(forces.scratch.shape[0]):
         forces.scratch[i] = forces.external[i] - forces.predicted[i]
     solve(tree.depths, tree.paths, forces.matrix, forces.scratch)
-    differs = False
     for i in range(6, forces.scratch.shape[0]):
         speed = state.velocity[i] + step_s * (forces.accelerations[i] + forces.scratch[i])
         is_held = forces.stiffness[i - 6] > 0.0
         if is_held and abs(speed) < abs(solver.velocity[i]) - _SAME_SPEED_RADPS:
             solver.velocity[i] = speed
-            differs = True
-    return differs
+            solver.changed[i - 6] = True

@@ -18,7 +18,11 @@ from numba import njit
 from veca_marl.sim.body.humanoid.dynamics.external_forces import predict, write_external_forces
 from veca_marl.sim.body.humanoid.dynamics.factorisation import add_product, factorise, solve
 from veca_marl.sim.body.humanoid.dynamics.implicit_torques import write_speeds
-from veca_marl.sim.body.humanoid.dynamics.inertial_forces import write_bias, write_mass_matrix
+from veca_marl.sim.body.humanoid.dynamics.inertial_forces import (
+    write_bias,
+    write_mass_matrix,
+    write_weight,
+)
 from veca_marl.sim.body.humanoid.dynamics.link_poses import locate_links
 from veca_marl.sim.body.humanoid.dynamics.small_vectors import add_cross
 from veca_marl.sim.body.humanoid.dynamics.state import (
@@ -39,14 +43,23 @@ _SAME_PLACE_M = 5e-7  # distance from Bullet's position of the base below which 
 # what is known of contacts with other bodies
 UNKNOWN, TOUCHED, FREE = 0, 1, 2
 # results of `settle`
-SETTLED, NEW_POSE, NEW_JOINTS, UNDECIDED = 0, 1, 2, 3
+SETTLED, NEW_POSE, UNDECIDED = 0, 1, 2
 
 
 @njit(cache=True)
 def begin(
-    tree: LinkTree, solver: SolverState, state: BodyState, links: LinkArrays, forces: JointForces
+    tree: LinkTree,
+    weight: Floats,
+    solver: SolverState,
+    state: BodyState,
+    links: LinkArrays,
+    forces: JointForces,
 ) -> None:
-    """Take over Bullet's state; the forces of earlier steps are set to 0."""
+    """Take over Bullet's state, and predict the external forces as if the base were supported.
+
+    Contacts are not known yet. The weight of all links acts on the joints and none on the base, so
+    that motors of limbs that are in the air hold their weight from the first physics step on.
+    """
     state.position[:] = solver.position
     quaternions_to_matrices(solver.quaternion.reshape(1, 4), state.rotation.reshape(1, 3, 3))
     state.angles[:], state.velocity[:] = solver.angles, solver.velocity
@@ -57,7 +70,9 @@ def begin(
     add_product(tree.depths, tree.paths, state.mass_matrix, state.velocity, forces.scratch)
     state.momentum[:] = forces.scratch[:6]
     add_cross(state.momentum[3:], state.centre, state.momentum[:3])
-    forces.predicted[:], forces.before[:] = 0.0, 0.0
+    write_weight(tree, links, weight / np.sum(tree.masses), forces.predicted)
+    forces.predicted[:6] = 0.0
+    forces.before[:] = forces.predicted
     forces.torques[:], forces.held[:] = 0.0, 0.0
 
 
@@ -81,30 +96,31 @@ def settle(
         step_s: Duration of the physics step.
         weight: ``(3,)`` N, weight of the body.
         contact: `TOUCHED` or `FREE` if it is known whether another body is touched, or `UNKNOWN`.
-        solver: Bullet's state after the step; angles, joint speeds and orientation are overwritten.
+        solver: Bullet's state after the step; angles, joint speeds and orientation are overwritten,
+            `changed` is written.
         state: The state before the step; overwritten by the one after it.
         links: The links before the step; overwritten.
         forces: `torques` are read, `external` and `predicted` are written.
 
     Returns:
         `UNDECIDED` if `contact` is `UNKNOWN` and the external force is no more than the weight: the
-        state is unchanged then, and contacts have to be looked for. Otherwise which part of the new
-        state differs from Bullet's, apart from the velocity of the base: none (`SETTLED`), the pose
-        of the base (`NEW_POSE`), or that and joints (`NEW_JOINTS`).
+        state is unchanged then, and contacts have to be looked for. Otherwise whether the pose of
+        the base differs from Bullet's: `NEW_POSE` or `SETTLED`. Its velocity always differs;
+        `solver.changed` has the joints that differ.
     """
     goal, mass = np.empty(3), np.sum(tree.masses)
     write_external_forces(tree, step_s, solver, state, forces)
     if not _add_impulse(step_s, weight, contact, forces.external, state):
         return UNDECIDED
-    reacts = write_speeds(tree, step_s, solver, state, forces)
+    solver.changed[:] = False
+    write_speeds(tree, step_s, solver, state, forces)
     predict(forces)
     for i in range(3):
         goal[i] = state.position[i] + state.centre[i] + step_s * state.momentum[3 + i] / mass
-    result, turned = _apply_limits(limits, state.mass_matrix, solver)
-    if reacts:
-        result = NEW_JOINTS
-    if turned:
+    result = SETTLED
+    if _apply_limits(limits, state.mass_matrix, solver):
         _turn_base(tree, state.mass_matrix, solver)
+        result = NEW_POSE
     quaternions_to_matrices(solver.quaternion.reshape(1, 4), state.rotation.reshape(1, 3, 3))
     state.angles[:] = solver.angles
     locate_links(tree, state.rotation, state.angles, links)
@@ -112,7 +128,7 @@ def settle(
     for i in range(3):
         state.position[i] = goal[i] - state.centre[i]
         if abs(state.position[i] - solver.position[i]) > _SAME_PLACE_M:
-            result = max(result, NEW_POSE)
+            result = NEW_POSE
     _write_velocity(tree, state, solver.velocity)
     write_bias(tree, links, state.velocity, state.bias)
     return result
@@ -141,28 +157,26 @@ def _add_impulse(
 
 
 @njit(cache=True)
-def _apply_limits(
-    limits: JointLimits, mass_matrix: Floats, solver: SolverState
-) -> tuple[int, bool]:
-    """Clip angles and joint speeds; return `NEW_JOINTS` if any was, and whether an angle was.
+def _apply_limits(limits: JointLimits, mass_matrix: Floats, solver: SolverState) -> bool:
+    """Clip angles and joint speeds; return whether an angle was clipped.
 
     For each change of an angle the impulse that an internal motor would leave on the base is added
     to the base's turn.
     """
-    result, turned = SETTLED, False
+    turned = False
     solver.turn[:] = 0.0
     for joint in range(limits.low.shape[0]):
         angle = min(max(solver.angles[joint], limits.low[joint]), limits.high[joint])
         speed = min(max(solver.velocity[6 + joint], -limits.speed), limits.speed)
         if speed != solver.velocity[6 + joint]:
             solver.velocity[6 + joint] = speed
-            result = NEW_JOINTS
+            solver.changed[joint] = True
         if angle != solver.angles[joint]:
             for i in range(6):
                 solver.turn[i] -= mass_matrix[6 + joint, i] * (angle - solver.angles[joint])
             solver.angles[joint] = angle
-            result, turned = NEW_JOINTS, True
-    return result, turned
+            solver.changed[joint], turned = True, True
+    return turned
 
 
 @njit(cache=True)

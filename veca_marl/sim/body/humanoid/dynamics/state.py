@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from veca_marl.sim.geometry import Floats
 
@@ -52,26 +53,32 @@ class BodyState(NamedTuple):
 
 
 class SolverState(NamedTuple):
-    """What Bullet has after a physics step.
+    """What Bullet has after a physics step. All but the last two are views of `numbers`.
 
     Attributes:
+        numbers: ``(13 + 2 n,)``, all that Bullet has: the arrays below, one after the other.
         position: ``(3,)`` metres, the base's centre of mass.
         quaternion: ``(4,)`` (x, y, z, w), orientation of the base.
-        angles: ``(n,)`` rad.
         velocity: ``(6 + n,)`` generalised velocity.
+        angles: ``(n,)`` rad.
+        changed: ``(n,)`` whether `settle` changed angle or speed of a joint.
         turn: ``(6,)`` scratch of `settle`.
     """
 
+    numbers: Floats
     position: Floats
     quaternion: Floats
-    angles: Floats
     velocity: Floats
+    angles: Floats
+    changed: NDArray[np.bool_]
     turn: Floats
 
 
 def empty_solver_state(hinges: int) -> SolverState:
     """Return arrays for Bullet's state."""
-    return SolverState(*(np.zeros(count) for count in (3, 4, hinges, 6 + hinges, 6)))
+    numbers = np.zeros(13 + 2 * hinges)
+    views = np.split(numbers, np.cumsum([3, 4, 6 + hinges]))
+    return SolverState(numbers, *views, changed=np.zeros(hinges, np.bool_), turn=np.zeros(6))
 
 
 def empty_links(hinges: int) -> LinkArrays:
