@@ -41,7 +41,8 @@ def test_the_start_is_at_rest(game):
     game.reset(np.random.default_rng(3))
     before = game.task.toy.position
     posture = game.task.child.joint_angles()
-    for _ in range(12):
+    # later the trunk has bent so far that the hands reach the floor beside the toy
+    for _ in range(8):
         game.step({"agents": game.players[0].body.encode(posture)})
     assert np.linalg.norm(game.task.toy.position - before) < 0.003
     # its trunk bends under gravity, but the body does not slide or jump

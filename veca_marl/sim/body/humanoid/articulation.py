@@ -94,6 +94,7 @@ class Articulation:
         self.dynamics = BodyDynamics(tree, limits, self.damping[self.moving])
         self._mass_kg = float(self.dynamics.tree.masses.sum())
         self._weight = np.zeros(3)  # N
+        self.read_gravity()
         self._prepare(infos, {bone.name for bone in skeleton.bones})
         self.read()
 
@@ -146,8 +147,7 @@ class Articulation:
         """
         if not self._read():
             return False
-        self.read_gravity()
-        self.dynamics.begin(self._weight)
+        self.dynamics.begin()
         self._copy_joints()
         return True
 

@@ -55,13 +55,9 @@ class BodyDynamics:
         self.forces.damping[:] = damping
         self._links = empty_links(tree.hinges)
 
-    def begin(self, weight: Floats) -> None:
-        """Take over Bullet's state as it is.
-
-        Args:
-            weight: ``(3,)`` N, weight of the body.
-        """
-        begin(self.tree, weight, self.solver, self.state, self._links, self.forces)
+    def begin(self) -> None:
+        """Take over Bullet's state as it is."""
+        begin(self.tree, self.solver, self.state, self._links, self.forces)
 
     def torques(self, step_s: float) -> Floats:
         """Return the joint torques ``(n,)``, N m, of a physics step, see `implicit_torques`."""

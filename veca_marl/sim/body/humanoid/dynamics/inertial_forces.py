@@ -93,17 +93,6 @@ def write_bias(tree: LinkTree, links: LinkArrays, velocity: Floats, out: Floats)
 
 
 @njit(cache=True)
-def write_weight(tree: LinkTree, links: LinkArrays, gravity: Floats, out: Floats) -> None:
-    """Write the generalised forces ``(6 + n,)`` of a uniform gravity ``(3,)``, m/s^2."""
-    force = np.zeros((tree.parents.shape[0], 6))
-    for link in range(tree.parents.shape[0]):
-        add_cross(links.moments[link], gravity, force[link, :3])
-        for k in range(3):
-            force[link, 3 + k] = tree.masses[link] * gravity[k]
-    _collect(tree, links.hinges, force, out)
-
-
-@njit(cache=True)
 def _add_motion_cross(motion: Floats, hinge: Floats, rate: float, out: Floats) -> None:
     """Add the spatial cross product of a velocity and `rate` times a hinge to `out`."""
     w, u = motion[:3], motion[3:]

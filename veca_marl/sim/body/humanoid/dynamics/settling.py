@@ -18,11 +18,7 @@ from numba import njit
 from veca_marl.sim.body.humanoid.dynamics.external_forces import predict, write_external_forces
 from veca_marl.sim.body.humanoid.dynamics.factorisation import add_product, factorise, solve
 from veca_marl.sim.body.humanoid.dynamics.implicit_torques import write_speeds
-from veca_marl.sim.body.humanoid.dynamics.inertial_forces import (
-    write_bias,
-    write_mass_matrix,
-    write_weight,
-)
+from veca_marl.sim.body.humanoid.dynamics.inertial_forces import write_bias, write_mass_matrix
 from veca_marl.sim.body.humanoid.dynamics.link_poses import locate_links
 from veca_marl.sim.body.humanoid.dynamics.small_vectors import add_cross
 from veca_marl.sim.body.humanoid.dynamics.state import (
@@ -48,18 +44,9 @@ SETTLED, NEW_POSE, UNDECIDED = 0, 1, 2
 
 @njit(cache=True)
 def begin(
-    tree: LinkTree,
-    weight: Floats,
-    solver: SolverState,
-    state: BodyState,
-    links: LinkArrays,
-    forces: JointForces,
+    tree: LinkTree, solver: SolverState, state: BodyState, links: LinkArrays, forces: JointForces
 ) -> None:
-    """Take over Bullet's state, and predict the external forces as if the base were supported.
-
-    Contacts are not known yet. The weight of all links acts on the joints and none on the base, so
-    that motors of limbs that are in the air hold their weight from the first physics step on.
-    """
+    """Take over Bullet's state; the forces of earlier steps are set to 0."""
     state.position[:] = solver.position
     quaternions_to_matrices(solver.quaternion.reshape(1, 4), state.rotation.reshape(1, 3, 3))
     state.angles[:], state.velocity[:] = solver.angles, solver.velocity
@@ -70,9 +57,7 @@ def begin(
     add_product(tree.depths, tree.paths, state.mass_matrix, state.velocity, forces.scratch)
     state.momentum[:] = forces.scratch[:6]
     add_cross(state.momentum[3:], state.centre, state.momentum[:3])
-    write_weight(tree, links, weight / np.sum(tree.masses), forces.predicted)
-    forces.predicted[:6] = 0.0
-    forces.before[:] = forces.predicted
+    forces.predicted[:], forces.before[:] = 0.0, 0.0
     forces.torques[:], forces.held[:] = 0.0, 0.0
 
 
