@@ -74,7 +74,7 @@ class BodyDynamics:
                 is no more than the weight, because lists of contacts take time.
 
         Returns:
-            `NEW_POSE` if the pose of the base differs from Bullet's, else `SETTLED`; the joints that
+            `NEW_POSE` if the pose of the base differs from Bullet's, else `SETTLED`. Joints that
             differ are in `solver.changed`.
         """
         result = self._settle(step_s, weight, UNKNOWN)
