@@ -77,8 +77,9 @@ class SolverState(NamedTuple):
 def empty_solver_state(hinges: int) -> SolverState:
     """Return arrays for Bullet's state."""
     numbers = np.zeros(13 + 2 * hinges)
-    views = np.split(numbers, np.cumsum([3, 4, 6 + hinges]))
-    return SolverState(numbers, *views, changed=np.zeros(hinges, np.bool_), turn=np.zeros(6))
+    position, quaternion, velocity, angles = np.split(numbers, np.cumsum([3, 4, 6 + hinges]))
+    changed, turn = np.zeros(hinges, np.bool_), np.zeros(6)
+    return SolverState(numbers, position, quaternion, velocity, angles, changed, turn)
 
 
 def empty_links(hinges: int) -> LinkArrays:
