@@ -33,7 +33,7 @@ def test_the_tower_stands_while_the_body_sits_still(game):
     for terms in sit(game, 0.4):
         assert terms["blue_fell"] == 0.0
         # it falls through gaps of 0.07 edges, and hands that sink may touch it
-        assert terms["height"] == pytest.approx(2.0, abs=0.12)
+        assert terms["height"] == pytest.approx(2.0, abs=0.15)
     assert sits(game)
     assert not game.task.solved(game.players[0])
 

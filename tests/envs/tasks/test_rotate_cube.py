@@ -40,7 +40,7 @@ def test_the_cube_rests_on_the_hand(game):
         assert game.task.on_hand
         # the fingers sink under its weight and turn it by 16 degrees, away from the target
         assert math.radians(-20.0) < progress < math.radians(5.0)
-        assert np.linalg.norm(game.task.cube.velocity) < 0.02
+        assert np.linalg.norm(game.task.cube.velocity) < 0.05
 
 
 def test_the_target_is_a_yaw_of_45_degrees_to_the_left(game):
