@@ -51,6 +51,18 @@ def test_tasks_of_the_paper_are_played_in_furnished_houses(task, playground):
             r"playground 'single_room' has 1; .*playground=two_rooms, .*random_house",
         ),
         (
+            ["+task=SoccerOnePlayer", "playground=seven_rooms"],
+            r"'seven_rooms': 4.4 m of task.ball_from_goal_m .* do not fit .*playground=simple",
+        ),
+        (
+            ["+task=SoccerTwoPlayer", "playground=single_room"],
+            r"'single_room': 'bed' stands between the goal .*; choose playground=simple",
+        ),
+        (
+            ["+task=PushOut1v1", "playground=seven_rooms", "task.radius_m=1.6"],
+            r"'seven_rooms': task.radius_m=1.6: the ring does not fit .*playground=simple",
+        ),
+        (
             ["+task=MultiAgentNav", "playground=house", "task.agents=5"],
             r"task.agents=5 .*'house' has 4",
         ),

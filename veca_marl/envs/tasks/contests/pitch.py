@@ -8,11 +8,40 @@ import numpy as np
 
 from veca_marl.envs.tasks.contests.soccer_cfg import POST_M, SoccerCfg
 from veca_marl.sim.geometry import Floats
-from veca_marl.sim.physics import Prop, PropCfg, PropShape, World
+from veca_marl.sim.physics import PlaygroundCfg, Prop, PropCfg, PropShape, World
 
 _BOARD_M = (0.06, 0.3)  # thickness and height
+_CLEAR_AT_THE_END_M, _CLEAR_AT_THE_SIDES_M = 0.3, 0.6
 _CORNER_M = 0.5  # length along both walls that the board across a corner cuts off
 _WHITE, _YELLOW, _ORANGE = (0.95, 0.95, 0.95), (0.95, 0.75, 0.1), (1.0, 0.4, 0.05)
+
+
+def check_start_area(cfg: SoccerCfg, playground: PlaygroundCfg) -> None:
+    """Check that the start is clear of the boards, and that nothing is in front of the goal.
+
+    Raises:
+        ValueError: If it does not fit into the first room, or a prop has its middle there.
+    """
+    room = playground.rooms[0]
+    length_m = cfg.ball_from_goal_m[1] + cfg.attacker_from_ball_m[1]
+    width_m = 2.0 * cfg.aside_m
+    free_m = room.size_m[0] - cfg.goal_from_wall_m - _CLEAR_AT_THE_END_M
+    if length_m > free_m or width_m > room.size_m[1] - _CLEAR_AT_THE_SIDES_M:
+        raise ValueError(
+            f"playground {playground.name!r}: {length_m:g} m of task.ball_from_goal_m and "
+            f"task.attacker_from_ball_m, {width_m:g} m of task.aside_m do not fit into room "
+            f"{room.name!r} of {room.size_m[0]:g} x {room.size_m[1]:g} m; choose smaller ones, or "
+            "playground=simple"
+        )
+    x, y, _ = room.middle_m
+    goal_x = x + room.size_m[0] / 2.0 - cfg.goal_from_wall_m
+    for prop in playground.built_props():
+        along_m, aside_m = goal_x - prop.position_m[0], abs(prop.position_m[1] - y)
+        if prop.tangible and 0.0 <= along_m <= length_m and aside_m <= cfg.aside_m:
+            raise ValueError(
+                f"playground {playground.name!r}: {prop.name!r} stands between the goal and the "
+                "start of the attacker; choose playground=simple"
+            )
 
 
 class Pitch:
@@ -31,7 +60,7 @@ class Pitch:
     """
 
     def __init__(self, world: World, cfg: SoccerCfg) -> None:
-        self._room = room = world.playground.rooms[0]
+        room = world.playground.rooms[0]
         low, size = np.array(room.lower_m), np.array(room.size_m)
         self._cfg, self.goal_width_m = cfg, cfg.goal_width_m
         self.goal: Floats = low + np.array([size[0] - cfg.goal_from_wall_m, size[1] / 2.0, 0.0])
@@ -40,23 +69,6 @@ class Pitch:
         self.ball = self._add_ball(world)
         self._add_goal(world)
         self._add_boards(world)
-
-    def check_start_area(self, length_m: float, width_m: float) -> None:
-        """Check that the area of the start is clear of the boards.
-
-        Args:
-            length_m: Length in front of the goal.
-            width_m: Width, symmetric to the middle of the goal.
-
-        Raises:
-            ValueError: If it does not fit.
-        """
-        size = self.high - self.low
-        if not (length_m <= size[0] - 0.3 and width_m <= size[1] - 0.6):
-            raise ValueError(
-                f"task: {length_m} m of ball_from_goal_m and attacker_from_ball_m, {width_m} m of "
-                f"aside_m do not fit into room {self._room.name!r} of {self._room.size_m[:2]} m"
-            )
 
     def scores(self, before: Floats, after: Floats) -> bool:
         """Return whether the centre of the ball has passed the goal line inside the goal.

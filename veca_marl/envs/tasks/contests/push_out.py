@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from veca_marl.envs.core.task import Player, Task, TaskCfg, terms
 from veca_marl.envs.tasks.contests.opponents import opponents
-from veca_marl.envs.tasks.contests.ring import Ring
+from veca_marl.envs.tasks.contests.ring import Ring, check_ring
 from veca_marl.envs.tasks.player_starts import direct_gaze_ahead
+from veca_marl.sim.physics import PlaygroundCfg
 
 
 @dataclass
@@ -45,6 +47,10 @@ class PushOut(Task):
 
     senses = ("vision", "touch", "proprioception")
     cfg: PushOutCfg
+
+    @classmethod
+    def check_playground(cls, cfg: Any, playground: PlaygroundCfg) -> None:
+        check_ring(cfg.radius_m, playground)
 
     def build(self) -> None:
         self.ring = Ring(self.world, self.cfg.radius_m)

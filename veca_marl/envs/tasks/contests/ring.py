@@ -12,7 +12,7 @@ from veca_marl.envs.core.task import Player
 from veca_marl.envs.tasks.player_starts import place_player
 from veca_marl.sim.body import Body
 from veca_marl.sim.geometry import Floats
-from veca_marl.sim.physics import PropCfg, PropShape, World
+from veca_marl.sim.physics import PlaygroundCfg, PropCfg, PropShape, World
 
 Colour = tuple[float, float, float]
 
@@ -20,6 +20,21 @@ _RIM_M = 0.06
 _CLAY, _ROPE = (0.80, 0.62, 0.36), (0.97, 0.97, 0.92)
 _TEAM_SPACING_RAD = math.radians(60.0)  # between players of a team at the start
 _MOST_DRAWS = 200
+
+
+def check_ring(radius_m: float, playground: PlaygroundCfg) -> None:
+    """Check that a ring fits into the first room.
+
+    Raises:
+        ValueError: If it does not.
+    """
+    room = playground.rooms[0]
+    if min(room.size_m[:2]) / 2.0 < radius_m:
+        raise ValueError(
+            f"playground {playground.name!r}: task.radius_m={radius_m}: the ring does not fit into "
+            f"the room {room.name!r} of {room.size_m[0]:g} x {room.size_m[1]:g} m; choose a "
+            "smaller one, or playground=simple or single_room"
+        )
 
 
 class Ring:
@@ -32,9 +47,6 @@ class Ring:
     Attributes:
         middle: Middle, ``(2,)`` metres.
         radius_m: The same.
-
-    Raises:
-        ValueError: If the ring does not fit into the room.
     """
 
     def __init__(self, world: World, radius_m: float) -> None:
@@ -43,11 +55,6 @@ class Ring:
         self.middle: Floats = low + size / 2.0
         self.radius_m = radius_m
         self._world = world
-        if size.min() / 2.0 < radius_m:
-            raise ValueError(
-                f"task.radius_m={radius_m}: the ring does not fit into the room "
-                f"{room.name!r} of {size[0]} x {size[1]} m"
-            )
         _add_painted_disc(world, "rim", self.middle, radius_m, 0.004, _ROPE)
         _add_painted_disc(world, "clay", self.middle, radius_m - _RIM_M, 0.006, _CLAY)
 

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from veca_marl.envs.core.scoring import horizontal_angle_rad
 from veca_marl.envs.core.task import Player, Task
 from veca_marl.envs.tasks.contests.kicking import AutomaticKicks
-from veca_marl.envs.tasks.contests.pitch import Pitch
+from veca_marl.envs.tasks.contests.pitch import Pitch, check_start_area
 from veca_marl.envs.tasks.contests.soccer_cfg import SoccerCfg
 from veca_marl.envs.tasks.player_starts import direct_gaze_ahead, place_player
 from veca_marl.sim.geometry import Floats, horizontal_distance
+from veca_marl.sim.physics import PlaygroundCfg
 
 ATTACKER, DEFENDER = "attacker", "defender"
 
@@ -42,13 +44,13 @@ class Soccer(Task):
     senses = ("vision", "touch", "proprioception")
     cfg: SoccerCfg
 
+    @classmethod
+    def check_playground(cls, cfg: Any, playground: PlaygroundCfg) -> None:
+        check_start_area(cfg, playground)
+
     def build(self) -> None:
         self.pitch = Pitch(self.world, self.cfg)
         self.ball, self.goal = self.pitch.ball, self.pitch.goal
-        self.pitch.check_start_area(
-            self.cfg.ball_from_goal_m[1] + self.cfg.attacker_from_ball_m[1],
-            2.0 * self.cfg.aside_m,
-        )
         self._kicks = AutomaticKicks(self.players, self.ball, self.cfg.kick_rest_s)
         self._terms: dict[str, float] = {}
         self._scored = False
