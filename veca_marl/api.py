@@ -19,6 +19,7 @@ from veca_marl.envs.core.game_cfg import GameCfg
 from veca_marl.envs.core.task import TASKS, Task
 from veca_marl.gymnasium_ids import register_task
 from veca_marl.plugins import load_plugins
+from veca_marl.registry import unknown
 from veca_marl.runs.assembly import decide_precision, make_trainer
 from veca_marl.runs.run_folder import new_run
 from veca_marl.runs.training import TrainingResult, run_training
@@ -26,17 +27,23 @@ from veca_marl.runs.training import TrainingResult, run_training
 TASKS.listen(register_task)
 
 
-def list_tasks(plugins: Sequence[str] = ()) -> list[str]:
-    """Return the names that `make` takes, with the tasks of plug-ins.
+def list_tasks(plugins: Sequence[str] = (), suite: str = "veca") -> list[str]:
+    """Return the names that `make` takes of one suite, with the tasks of plug-ins.
 
     Args:
         plugins: Packages beside the installed plug-ins, see `veca_marl.plugins`.
+        suite: `veca` for the 24 tasks of the paper and those of plug-ins that name no other suite,
+            `babybench` for SelfTouch and HandRegard, or a suite that a plug-in names.
 
     Raises:
         PluginError: If a plug-in cannot be loaded.
+        ValueError: If there is no such suite; the message lists those there are.
     """
     load_plugins(plugins)
-    return sorted(TASKS)
+    suites = {task.suite for task in TASKS.values()}
+    if suite not in suites:
+        raise ValueError(unknown("suite", suite, sorted(suites)))
+    return sorted(name for name, task in TASKS.items() if task.suite == suite)
 
 
 def make(

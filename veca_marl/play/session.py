@@ -30,6 +30,7 @@ class Moment:
     Attributes:
         observation: Its observation after the step.
         steps: Steps since the start of the episode; 0 is the start.
+        unweighted: The reward terms of this step, as the task returns them.
         terms: Parts of the reward of this step, weights included.
         sums: Their sums since the start of the episode.
         solved: Whether the goal is reached; None for a task without a goal.
@@ -38,6 +39,7 @@ class Moment:
 
     observation: dict[str, NDArray[Any]]
     steps: int = 0
+    unweighted: dict[str, float] = field(default_factory=dict)
     terms: dict[str, float] = field(default_factory=dict)
     sums: dict[str, float] = field(default_factory=dict)
     solved: bool | None = None
@@ -93,6 +95,7 @@ class Session:
         self._state: TensorDictBase = self._playing.reset(episode=episode)
         weights = self.game.weights
         self._moment = Moment(self._observation(self._state))
+        self._moment.unweighted = dict.fromkeys(weights, 0.0)
         self._moment.terms = dict.fromkeys(weights, 0.0)
         self._moment.sums = dict.fromkeys(weights, 0.0)
         return self._moment
@@ -112,6 +115,7 @@ class Session:
         return Moment(
             self._observation(step),
             before.steps + 1,
+            {name: info[name] for name in terms},
             terms,
             {name: before.sums[name] + value for name, value in terms.items()},
             bool(info[SOLVED]) if SOLVED in info else None,

@@ -143,6 +143,7 @@ class Task(ABC):
         teams: The teams, see also `teams_of`.
         senses: Senses of the players.
         eliminates: Whether the game can end for single players, see `is_eliminated`.
+        suite: Name of the collection of tasks that it belongs to, see `veca_marl.list_tasks`.
         cfg: Parameters of the task. Subclasses annotate it with their own dataclass.
         world: The world.
         players: All players, team by team.
@@ -151,6 +152,7 @@ class Task(ABC):
     teams: ClassVar[tuple[Team, ...]] = (Team("agents"),)
     senses: ClassVar[tuple[str, ...]] = ()
     eliminates: ClassVar[bool] = False
+    suite: ClassVar[str] = "veca"
     cfg: TaskCfg
 
     def __init__(self, cfg: TaskCfg, world: World, players: list[Player]) -> None:

@@ -6,6 +6,7 @@ experts share. Tasks do not import this package.
 
 import veca_marl.envs.experts.blocks
 import veca_marl.envs.experts.cars
+import veca_marl.envs.experts.developmental
 import veca_marl.envs.experts.escape
 import veca_marl.envs.experts.grasping
 import veca_marl.envs.experts.kick_the_ball

@@ -6,6 +6,8 @@ from veca_marl.envs.tasks.contests.push_out_1v1 import PushOut1v1
 from veca_marl.envs.tasks.contests.push_out_2v2 import PushOut2v2
 from veca_marl.envs.tasks.contests.soccer_one_player import SoccerOnePlayer
 from veca_marl.envs.tasks.contests.soccer_two_player import SoccerTwoPlayer
+from veca_marl.envs.tasks.developmental.hand_regard import HandRegard
+from veca_marl.envs.tasks.developmental.self_touch import SelfTouch
 from veca_marl.envs.tasks.escape.babyzumas_revenge import BabyzumasRevenge
 from veca_marl.envs.tasks.locomotion.crawl_baby import CrawlBaby
 from veca_marl.envs.tasks.locomotion.run_baby import RunBaby
@@ -33,6 +35,7 @@ __all__ = [
     "DodgeCar",
     "FillFraction",
     "GrabObject",
+    "HandRegard",
     "KickTheBall",
     "MazeNav",
     "MoveToTarget",
@@ -45,6 +48,7 @@ __all__ = [
     "PutDownBlock",
     "RotateCube",
     "RunBaby",
+    "SelfTouch",
     "ShapeSort",
     "SitBaby",
     "SoccerOnePlayer",

@@ -38,6 +38,9 @@ class Palms(NamedTuple):
 class ArmKinematics:
     """Forward and inverse kinematics of the arms of a body.
 
+    Attributes:
+        joints: Indices of the joints of both arms and hands without fingers.
+
     Args:
         body: The body.
     """
@@ -47,13 +50,13 @@ class ArmKinematics:
         self._skeleton: Skeleton = load_skeleton()
         bones = self._skeleton.bones
         arms = [self._skeleton.bone(f"{side}_{bone}") for side in _SIDES for bone in _ARM]
-        self._joints = [
+        self.joints = [
             bones[arm].first_joint + joint
             for arm in arms
             for joint in range(bones[arm].joint_count)
         ]
         self._hands = [self._skeleton.bone(f"{side}_hand") for side in _SIDES]
-        joints = [self._skeleton.joints[joint] for joint in self._joints]
+        joints = [self._skeleton.joints[joint] for joint in self.joints]
         self._low = np.array([joint.low_rad for joint in joints])
         self._high = np.array([joint.high_rad for joint in joints])
 
@@ -72,14 +75,14 @@ class ArmKinematics:
             iterations: Number of Gauss-Newton steps.
         """
         trial = self._body.joint_angles()
-        trial[self._joints] = angles[self._joints]
-        low = np.maximum(angles[self._joints] - _MAX_CHANGE_RAD, self._low)
-        high = np.minimum(angles[self._joints] + _MAX_CHANGE_RAD, self._high)
+        trial[self.joints] = angles[self.joints]
+        low = np.maximum(angles[self.joints] - _MAX_CHANGE_RAD, self._low)
+        high = np.minimum(angles[self.joints] + _MAX_CHANGE_RAD, self._high)
         for _ in range(iterations):
             change = self._gauss_newton(trial, palms)
-            trial[self._joints] = np.clip(trial[self._joints] + change, low, high)
+            trial[self.joints] = np.clip(trial[self.joints] + change, low, high)
         reached = angles.copy()
-        reached[self._joints] = trial[self._joints]
+        reached[self.joints] = trial[self.joints]
         return reached
 
     def _gauss_newton(self, angles: Floats, palms: Palms) -> Floats:
@@ -91,12 +94,12 @@ class ArmKinematics:
             return _difference(self._palms(positions, rotations), palms)
 
         here = error(angles)
-        jacobian = np.empty((len(here), len(self._joints)))
-        for column, joint in enumerate(self._joints):
+        jacobian = np.empty((len(here), len(self.joints)))
+        for column, joint in enumerate(self.joints):
             shifted = angles.copy()
             shifted[joint] += _DIFFERENCE_RAD
             jacobian[:, column] = (error(shifted) - here) / _DIFFERENCE_RAD
-        normal = jacobian.T @ jacobian + _DAMPING**2 * np.eye(len(self._joints))
+        normal = jacobian.T @ jacobian + _DAMPING**2 * np.eye(len(self.joints))
         return np.asarray(np.linalg.solve(normal, -jacobian.T @ here), np.float64)
 
     def _palms(self, positions: Floats, rotations: Floats) -> Palms:

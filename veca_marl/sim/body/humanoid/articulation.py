@@ -60,6 +60,7 @@ class Articulation:
 
     Attributes:
         body_id: Bullet's id.
+        bones_of_links: Name of the bone of each link with a collider.
         moving: ``(n,)`` indices of the joints that move, ascending.
         angles: ``(82,)`` rad, at the last `read` or `settle`.
         speeds: ``(82,)`` rad/s.
@@ -105,6 +106,7 @@ class Articulation:
             bone = bone_of(info[12].decode())
             if bone in bones:
                 colliders.append((info[0], bone))
+        self.bones_of_links = dict(colliders)
         allow_self_collision(self._client, self.body_id, colliders)
         pybullet.changeDynamics(
             self.body_id,

@@ -31,6 +31,7 @@ from veca_marl.sim.body.humanoid.postures import (
     posture_angles,
 )
 from veca_marl.sim.body.humanoid.predicted_angles import predicted_angles
+from veca_marl.sim.body.humanoid.self_contacts import self_contacts
 from veca_marl.sim.geometry import Floats, Pose, heading_rad
 from veca_marl.sim.physics import World
 from veca_marl.sim.spec import ArraySpec, continuous_spec
@@ -165,6 +166,14 @@ class Humanoid(Body):
             raise ValueError(f"{self.name}: angles {angles.shape}, not {self._low.shape}")
         check_angles(self._skeleton, angles)
         return angles
+
+    def self_contacts(self) -> set[tuple[str, str]]:
+        """Return the pairs of its bones that touched each other in the last physics step.
+
+        Names are in alphabetical order. Bones of one limb do not collide, nor do upper arms and
+        thighs with the trunk.
+        """
+        return self_contacts(self._world.client, self.body_id, self.articulation.bones_of_links)
 
     # ---- commands
 

@@ -1,0 +1,1 @@
+"""Rules of developmental benchmarks that are not in the VECA paper: SelfTouch, HandRegard."""

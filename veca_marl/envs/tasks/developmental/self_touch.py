@@ -1,0 +1,82 @@
+"""SelfTouch: touch one's own body with both hands."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from veca_marl.envs.core.task import Player, Task, register, require_humanoid, terms
+from veca_marl.envs.tasks.developmental.regions import HANDS, regions_of, touched_regions
+from veca_marl.envs.tasks.locomotion.start_poses import StartCfg, start_anywhere
+from veca_marl.sim.body.humanoid.postures import ON_BACK
+
+
+@dataclass
+class SelfTouchCfg(StartCfg):
+    """Parameters of SelfTouch.
+
+    Attributes:
+        max_seconds: 1000 steps of the default clock, as in BabyBench.
+        spread_deg: Standard deviation of every joint angle at the start about lying on the back, in
+            [0, 30].
+    """
+
+    max_seconds: float = 40.0
+    weights: dict[str, float] = terms(left_hand=0.5, right_hand=0.5)
+
+
+@register
+class SelfTouch(Task):
+    """A joint-level body lies on its back and touches as many regions of itself as possible.
+
+    Not in the VECA paper: the self-touch task of BabyBench 2025 (suite `babybench`). As there, the
+    score is the number of distinct regions that the left hand has touched plus that of the right
+    hand, divided by the greatest possible number; with the default weights the return is the score
+    of the episode, in [0, 1]. BabyBench itself gives no reward, its agents learn by intrinsic
+    rewards: `task.weights.left_hand=0 task.weights.right_hand=0 intrinsic=rnd`. Contacts of the
+    physics count, at the end of each step. An episode lasts 1000 steps and never terminates.
+
+    Departures from BabyBench, whose body is MIMo:
+    - Regions are the 14 bones that a hand can touch: pelvis, spine, chest, neck, head, upper arm,
+      forearm and hand of the other side, both thighs, shanks and feet. MIMo's are 34 geoms for
+      each hand: one each for hip, lower body, head, eyes, upper arms, lower arms and upper legs,
+      two each for palm, fingers, lower legs and toes, three each for upper body and feet. They
+      include the own arm and the own fingers, which a hand cannot reach. Scores of the two bodies
+      therefore differ by more than the policies.
+    - A hand touches with palm and fingers, in MIMo with the palm alone.
+    - A step lasts 40 ms (1000 steps are 40 s), in MIMo 5 ms (5 s).
+    - The body starts on its back with random joint angles about that posture; MIMo starts on its
+      back and makes ten steps of random actions.
+    - Torques drive the 40 joints of trunk and limbs of a mitten; MIMo's mitten has 44 joints, of
+      which those of feet and eyes are locked.
+
+    Terms:
+        left_hand: Regions that the left hand touches for the first time in this episode, as a share
+            of 14.
+        right_hand: The same for the right hand.
+    """
+
+    suite = "babybench"
+    senses = ("touch", "proprioception")
+    cfg: SelfTouchCfg
+
+    def build(self) -> None:
+        self.body = require_humanoid(self.players[0])
+        self._forget()
+
+    def _forget(self) -> None:
+        self.touched: dict[str, set[str]] = {hand: set() for hand in HANDS}
+        self._new = dict.fromkeys(HANDS, 0)
+
+    def reset(self, rng: np.random.Generator) -> None:
+        start_anywhere(self.world, self.body, ON_BACK, self.cfg.spread_deg, rng)
+        self._forget()
+
+    def after_step(self, rng: np.random.Generator) -> None:
+        for hand, regions in touched_regions(self.body).items():
+            self._new[hand] = len(regions - self.touched[hand])
+            self.touched[hand] |= regions
+
+    def reward(self, player: Player) -> dict[str, float]:
+        return {hand: self._new[hand] / len(regions_of(side)) for hand, side in HANDS.items()}
