@@ -8,10 +8,10 @@ from __future__ import annotations
 import math
 
 from veca_marl.envs.experts.control.key_poses import KeyPoses
-from veca_marl.envs.experts.control.seated_balance import SeatedBalance
 from veca_marl.envs.experts.skills.turn_over import TurnOver
 from veca_marl.sim.body.humanoid import Humanoid, JointCommand
 from veca_marl.sim.body.humanoid.postures import Posture
+from veca_marl.sim.geometry import Floats
 
 _KNEELING = {
     "thigh.abduction": 20,
@@ -79,21 +79,28 @@ _POSES = {
         }
     ),
 }
-_SPEEDS_RADPS = {"prepare": 10.0, "push": 10.0, "sit": 4.0, "rise": 2.0}
+_SPEEDS_RADPS = {"prepare": 10.0, "push": 10.0, "sit": 4.0}
 _DURATION_S = {"lie": 0.4, "prepare": 0.5, "push": 1.1, "sit": 1.0, "rise": 1.5}
 _NEXT_STAGE = {"lie": "prepare", "prepare": "push", "push": "sit", "sit": "rise"}
 _ON_BELLY = 0.7  # cosine of the angle between the front of the chest and straight down
 _FAILED_M = 0.12  # below this height of the top of the chest the attempt has failed
+_HORIZON = 0.5  # before rising: prediction of the joint angles in agent steps; 1 damps more
 _BENT_AT_FIRST, _RISING_S = 0.8, 0.5  # share of the bend at the start; time from bent to upright
+_TRUNK = [
+    f"{bone}.{label}"
+    for bone in ("spine", "chest", "neck", "head")
+    for label in ("flexion", "lateral")
+]
+_DAMPING_S = 0.03  # damping of the trunk: change of the target angles per joint velocity
 _ON_HEELS_RAD = math.radians(45.0)  # from the vertical; a thigh that is steeper has left the heel
 
 
 class SitUp:
     """Target angles of a body that sits up, in stages; it starts again after a failed attempt.
 
-    While it rises, gravity compensation (`SeatedBalance`) moves trunk and hips from bent to
-    upright, and back as long as the thighs have left the heels: the extension of the hips then
-    lifts the pelvis instead of the trunk.
+    While it rises, trunk and hips move to the upright posture as long as the thighs are on the
+    heels, else back to the bent one: the extension of the hips then lifts the pelvis instead of the
+    trunk.
 
     Args:
         body: The body.
@@ -104,7 +111,8 @@ class SitUp:
         self._body, self._step_s = body, step_s
         self._turn = TurnOver(body, step_s)
         self._key_poses = KeyPoses(body, _POSES, step_s)
-        self._balance = SeatedBalance(body, upright=_POSES["rise"], bent=_POSES["sit"])
+        self._upright, self._bent = (body.posture_angles(_POSES[name]) for name in ("rise", "sit"))
+        self._trunk = [body.joint_names.index(name) for name in _TRUNK]
         self._stage, self._elapsed_s, self._bend = "lie", 0.0, _BENT_AT_FIRST
         self.reset()
 
@@ -121,17 +129,23 @@ class SitUp:
         return command
 
     def _stage_command(self) -> JointCommand:
+        if self._stage == "rise":
+            return JointCommand(self._rising(), self._step_s)
         if self._stage == "lie":
             if not self._body.bone("chest").forward[2] < -_ON_BELLY:
                 self._elapsed_s = 0.0
-            return JointCommand(self._turn.command(), horizon_s=0.5 * self._step_s)
+            return JointCommand(self._turn.command(), _HORIZON * self._step_s)
         targets = self._key_poses.toward(self._stage, _SPEEDS_RADPS[self._stage])
-        if self._stage != "rise":
-            return JointCommand(targets, horizon_s=0.5 * self._step_s)
+        return JointCommand(targets, _HORIZON * self._step_s)
+
+    def _rising(self) -> Floats:
+        """Return target angles between the bent posture and the upright one, ``(82,)`` rad."""
         change = self._step_s / _RISING_S
         bend = self._bend - change if self._is_on_heels() else self._bend + change
         self._bend = min(max(bend, 0.0), 1.0)
-        return JointCommand(self._balance.hold(targets, self._bend), horizon_s=self._step_s)
+        targets = self._upright + self._bend * (self._bent - self._upright)
+        targets[self._trunk] -= _DAMPING_S * self._body.joint_velocities()[self._trunk]
+        return targets
 
     def _is_on_heels(self) -> bool:
         """Return whether the left thigh is near the horizontal, its knee in front of the hip."""
@@ -147,8 +161,6 @@ class SitUp:
 
     def _begin(self, stage: str) -> None:
         self._stage, self._elapsed_s = stage, 0.0
+        self._bend = _BENT_AT_FIRST
         if stage == "prepare":
             self._key_poses.reset()
-        if stage == "rise":
-            self._balance.reset()
-            self._bend = _BENT_AT_FIRST
