@@ -138,7 +138,6 @@ def test_a_touched_pile_is_not_solved(game):
         assert not game.task.solved(game.players[0])
 
 
-@pytest.mark.xfail(reason="the expert was tuned with larger moments of inertia", strict=False)
 def test_the_expert_piles_up(game):
     heights, solved = [], 0
     for seed in EXPERT_SEEDS:

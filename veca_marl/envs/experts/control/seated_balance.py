@@ -15,7 +15,9 @@ _LEGS = ("thigh", "shank", "foot")
 _SIDES = ("l", "r")
 _LEANS = ("flexion", "lateral")
 _DAMPING_S = 0.03  # damping of the trunk: change of the target angles per joint velocity
-_INTEGRAL_GAIN = 0.03  # share of the remaining error that is added to the targets per call
+# Share of the remaining error that is added to the targets per call; targets act with the full
+# stiffness of the joints, so that a greater share makes trunk and arms oscillate.
+_INTEGRAL_GAIN = 0.01
 _DIFFERENCE_RAD = 1e-4  # step of the finite differences
 
 
