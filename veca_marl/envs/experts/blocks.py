@@ -38,7 +38,9 @@ class PileUpBlockExpert(Expert[PileUpBlock]):
 
     def __init__(self, task: PileUpBlock, player: Player) -> None:
         super().__init__(task, player)
-        self._carrier = Carrier(task.child, squeeze_m=0.025, carrying_m=0.005, thumbs_m=0.005)
+        self._carrier = Carrier(
+            task.child, squeeze_m=0.025, carrying_m=0.005, thumbs_m=0.005, posture_gain=0.01
+        )
 
     def reset(self) -> None:
         """See `Expert.reset`."""

@@ -32,7 +32,7 @@ class GrabObjectExpert(Expert[GrabObject]):
 
     def __init__(self, task: GrabObject, player: Player) -> None:
         super().__init__(task, player)
-        self._carrier = Carrier(task.child, upright=UPRIGHT, bent=BENT)
+        self._carrier = Carrier(task.child, upright=UPRIGHT, bent=BENT, posture_gain=0.01)
 
     def reset(self) -> None:
         """See `Expert.reset`."""

@@ -15,9 +15,6 @@ _LEGS = ("thigh", "shank", "foot")
 _SIDES = ("l", "r")
 _LEANS = ("flexion", "lateral")
 _DAMPING_S = 0.03  # damping of the trunk: change of the target angles per joint velocity
-# Share of the remaining error that is added to the targets per call; targets act with the full
-# stiffness of the joints, so that a greater share makes trunk and arms oscillate.
-_INTEGRAL_GAIN = 0.01
 _DIFFERENCE_RAD = 1e-4  # step of the finite differences
 
 
@@ -33,9 +30,12 @@ class SeatedBalance:
         body: The body that sits.
         upright: The upright posture.
         bent: The posture with the trunk bent forwards.
+        integral_gain: Share of the remaining error that is added to the targets per call.
     """
 
-    def __init__(self, body: Humanoid, upright: Posture, bent: Posture) -> None:
+    def __init__(
+        self, body: Humanoid, upright: Posture, bent: Posture, integral_gain: float = 0.03
+    ) -> None:
         self._body, self._skeleton = body, load_skeleton()
         self.upright, self._bent = body.posture_angles(upright), body.posture_angles(bent)
         bones = self._skeleton.bones
@@ -47,6 +47,7 @@ class SeatedBalance:
         self._trunk = [joint(bone, label) for label in _LEANS for bone in _TRUNK]
         self._hips = [joint(f"{side}_thigh", "flexion") for side in _SIDES]
         self._bending = [*self._trunk[: len(_TRUNK)], *self._hips]
+        self._integral_gain = integral_gain
         self._integral = np.zeros(len(self._bending))
 
     def reset(self) -> None:
@@ -64,7 +65,7 @@ class SeatedBalance:
         held = np.where(way == 0.0, targets, self.upright + bend * way)
         error = (held - self._body.joint_angles())[self._bending]
         self._integral = np.clip(
-            self._integral + _INTEGRAL_GAIN * error, -SATURATION_RAD, SATURATION_RAD
+            self._integral + self._integral_gain * error, -SATURATION_RAD, SATURATION_RAD
         )
         held[self._bending] += self._integral
         held[[*self._trunk, *self._hips]] += self._deflection()

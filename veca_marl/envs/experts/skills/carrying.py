@@ -56,6 +56,8 @@ class Carrier:
         clear_m: Distance between each open palm and the block.
         upright: Posture while the hands are up.
         bent: Posture while the hands are down.
+        posture_gain: Integral gain of the trunk, see `SeatedBalance`; a small one lets the trunk
+            follow slowly, a large one makes it oscillate while the hands are high.
     """
 
     def __init__(
@@ -67,8 +69,10 @@ class Carrier:
         clear_m: float = 0.022,
         upright: Posture = REACHING,
         bent: Posture = REACHING_DOWN,
+        posture_gain: float = 0.03,
     ) -> None:
-        self._hands, self._seat = ArmKinematics(body), SeatedBalance(body, upright, bent)
+        self._hands = ArmKinematics(body)
+        self._seat = SeatedBalance(body, upright, bent, posture_gain)
         self._squeeze_m, self._clear_m = squeeze_m, clear_m
         self._carrying_m, self._thumbs = carrying_m, thumbs_m * _UP
         self.reset()
