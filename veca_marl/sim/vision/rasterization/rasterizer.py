@@ -23,7 +23,12 @@ from numpy.typing import NDArray
 from veca_marl.sim.geometry import Bools, Floats, GeomTable, Shape, Vector, bounding_radius, single
 from veca_marl.sim.geometry.intersections import box_row, capsule_row, cylinder_row, sphere_row
 from veca_marl.sim.geometry.polyhedra.intersections import polyhedron_row
-from veca_marl.sim.vision.screen_bounds import Interval, box_intervals, disc_interval, rod_interval
+from veca_marl.sim.vision.rasterization.screen_bounds import (
+    Interval,
+    box_intervals,
+    disc_interval,
+    rod_interval,
+)
 
 Depths: TypeAlias = NDArray[np.float32]
 Surfaces: TypeAlias = NDArray[np.int16]

@@ -26,7 +26,7 @@ from veca_marl.sim.geometry import (
     single,
 )
 from veca_marl.sim.geometry.polyhedra.distances import polyhedron_distance
-from veca_marl.sim.vision.rasterizer import (
+from veca_marl.sim.vision.rasterization.rasterizer import (
     NO_SURFACE,
     Depths,
     Lens,
@@ -35,7 +35,7 @@ from veca_marl.sim.vision.rasterizer import (
     Surfaces,
     pixel_rectangle,
 )
-from veca_marl.sim.vision.screen_bounds import box_intervals
+from veca_marl.sim.vision.rasterization.screen_bounds import box_intervals
 
 # slopes, depths, surfaces and lights of one row
 Pixels: TypeAlias = tuple[Depths, Depths, Surfaces, NDArray[np.float32]]
@@ -77,10 +77,7 @@ def darken_contact_shadows(
             continue
         around = math.sqrt(reach * reach - height * height)
         rectangle = _floor_rectangle(geoms.positions[g], around, view, lens)
-        if geoms.shapes[g] == _POLYHEDRON:
-            _darken_below_faces(geoms, g, rectangle, view, lens, depth, surfaces, lights)
-        else:
-            _darken(geoms, g, rectangle, view, lens, depth, surfaces, lights)
+        _darken(geoms, g, rectangle, view, lens, depth, surfaces, lights)
 
 
 @njit(cache=True, error_model="numpy")
@@ -127,6 +124,8 @@ def _darken(
             _darken_row(_BOX, size, frame, eye, lens.rows[j], g, pixels)
         elif shape == _CYLINDER:
             _darken_row(_CYLINDER, size, frame, eye, lens.rows[j], g, pixels)
+        elif shape == _POLYHEDRON:
+            _darken_row_of_faces(geoms.faces, size, frame, eye, lens.rows[j], g, pixels)
         else:
             _darken_row(_CAPSULE, size, frame, eye, lens.rows[j], g, pixels)
 
@@ -135,27 +134,6 @@ def _darken(
 def _vector(array: NDArray[Any]) -> Vector:
     """Return three numbers of an array as scalars, which the compiler knows loops do not change."""
     return array[0], array[1], array[2]
-
-
-@njit(cache=True, error_model="numpy")
-def _darken_below_faces(
-    geoms: GeomTable,
-    g: int,
-    rectangle: Rectangle,
-    view: Floats,
-    lens: Lens,
-    depth: Depths,
-    surfaces: Surfaces,
-    lights: NDArray[np.float32],
-) -> None:
-    """Darken the floor pixels of a rectangle by their distance to one polyhedron."""
-    first, end, top, bottom = rectangle
-    columns, size, turn = lens.columns[first:end], _vector(geoms.sizes[g]), geoms.rotations[g].T
-    frame = _vector(geoms.positions[g]), _vector(turn[0]), _vector(turn[1]), _vector(turn[2])
-    eye = _vector(view[0]), _vector(view[1]), _vector(view[2]), _vector(view[3])
-    for j in range(top, bottom):
-        pixels = columns, depth[j, first:end], surfaces[j, first:end], lights[j, first:end]
-        _darken_row_of_faces(geoms.faces, size, frame, eye, lens.rows[j], g, pixels)
 
 
 @njit(cache=True, error_model="numpy")

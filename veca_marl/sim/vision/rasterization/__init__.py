@@ -1,0 +1,1 @@
+"""Rasterization and deferred shading of primitives, polyhedra and meshes in compiled loops."""
