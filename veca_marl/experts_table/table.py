@@ -26,9 +26,10 @@ def markdown(tasks: Mapping[str, Sequence[Played]], remarks: Mapping[str, str]) 
         for policy in dict.fromkeys(one.policy for one in episodes)
     ]
     lines = [_line(_HEAD), _line(["---"] * len(_HEAD)), *map(_line, rows)]
-    return "\n".join([*lines, "", _EXPLANATION, ""])
+    return "\n".join([_TITLE, "", *lines, "", _EXPLANATION, ""])
 
 
+_TITLE = "# Experts on the frozen episodes"
 _EXPLANATION = (
     "Frozen episodes, the first ones where there are fewer than 100. Return: mean and 95 % "
     "interval by Student's t. Solved: share of the episodes that ended with the goal reached, and "
