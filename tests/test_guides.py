@@ -13,6 +13,7 @@ from composed import compose
 
 from veca_marl.bench.options import BenchOptions
 from veca_marl.config.command_line import CommandLine
+from veca_marl.envs.core.task import TASKS
 
 ROOT = Path(__file__).resolve().parent.parent
 DOCS = ROOT / "docs"
@@ -74,7 +75,8 @@ def combinations(choices):
 @pytest.mark.parametrize(("page", "line"), commands("bench"))
 def test_what_the_bench_commands_choose_can_be_chosen(page, line):
     for options, overrides in CommandLine("bench", BenchOptions, "").jobs(shlex.split(line)):
-        for task in options.bench.tasks or [None]:
+        tasks = TASKS if options.bench.tasks == ["all"] else options.bench.tasks
+        for task in tasks or [None]:
             assert compose([*overrides, *([f"+task={task}"] if task else [])]).task.name
 
 

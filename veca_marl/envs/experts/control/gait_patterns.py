@@ -67,28 +67,29 @@ class GaitPattern:
     full_turn_rad: float
 
 
-# result of experiments/crawl/search.py
+# result of experiments/crawl/search.py, continued by an evolution strategy after the joint dynamics
+# had changed
 CRAWL = GaitPattern(
     frequency_hz=1.81,
     leg=LimbPattern(
         {
-            "thigh.flexion": JointSwing(96.9, 36.1, -25.0, -6.0),
-            "thigh.abduction": JointSwing(4.7, -18.3, 37.4, 0.1),
-            "shank.flexion": JointSwing(123.7, 10.5, 6.2, -14.4),
-            "foot.dorsiflexion": JointSwing(-51.7, -3.2, 16.7, 20.0),
+            "thigh.flexion": JointSwing(96.9, 36.1, -25.0, -4.7),
+            "thigh.abduction": JointSwing(4.7, -18.3, 37.4, -11.2),
+            "shank.flexion": JointSwing(123.7, 10.5, 6.2, -20.0),
+            "foot.dorsiflexion": JointSwing(-51.7, -3.2, 16.7, 18.8),
         },
         lead_rad=0.48,
-        shortening=-0.53,
+        shortening=-0.97,
     ),
     arm=LimbPattern(
         {
-            "upper_arm.flexion": JointSwing(66.1, -34.6, -28.1, 1.0),
-            "upper_arm.abduction": JointSwing(65.0, -3.3, 31.4, 34.4),
-            "forearm.flexion": JointSwing(2.3, -19.1, 66.2, 7.8),
-            "hand.flexion": JointSwing(-63.3, 3.2, 24.8, -5.1),
+            "upper_arm.flexion": JointSwing(66.1, -34.6, -28.1, -1.0),
+            "upper_arm.abduction": JointSwing(65.0, -3.3, 31.4, 33.8),
+            "forearm.flexion": JointSwing(2.3, -19.1, 66.2, 20.6),
+            "hand.flexion": JointSwing(-63.3, 3.2, 24.8, -12.2),
         },
         lead_rad=3.1,
-        shortening=0.04,
+        shortening=0.34,
     ),
     bend_lead_rad=0.79,
     trunk={
@@ -103,50 +104,50 @@ CRAWL = GaitPattern(
     },
     sway_lead_rad=0.06,
     twist={
-        "chest.lateral": -2.5,
-        "chest.rotation": 25.5,
-        "spine.lateral": -33.0,
-        "spine.rotation": 43.6,
+        "chest.lateral": -2.9,
+        "chest.rotation": 19.5,
+        "spine.lateral": -40.4,
+        "spine.rotation": 34.9,
     },
-    steering_s=0.31,
-    full_turn_rad=0.66,
+    steering_s=0.22,
+    full_turn_rad=0.67,
 )
 
-# result of experiments/crawl/search.py; it does not steer
+# likewise; it does not steer
 BACK = GaitPattern(
-    frequency_hz=2.04,
+    frequency_hz=2.17,
     leg=LimbPattern(
         {
-            "thigh.flexion": JointSwing(136.7, -1.3, -82.7),
-            "thigh.abduction": JointSwing(-1.3, -8.2, -11.4),
-            "shank.flexion": JointSwing(126.1, -46.4, 36.9),
-            "foot.dorsiflexion": JointSwing(-50.4, -21.7, -3.0),
+            "thigh.flexion": JointSwing(142.8, 1.4, -64.0),
+            "thigh.abduction": JointSwing(8.3, -39.6, -18.0),
+            "shank.flexion": JointSwing(138.1, -46.9, 17.8),
+            "foot.dorsiflexion": JointSwing(-46.2, -7.9, 7.5),
         },
-        lead_rad=-0.11,
+        lead_rad=0.01,
         shortening=0.0,
     ),
     arm=LimbPattern(
         {
-            "upper_arm.flexion": JointSwing(81.0, -34.9, -30.3),
-            "upper_arm.abduction": JointSwing(66.0, 15.2, 20.8),
-            "forearm.flexion": JointSwing(7.0, 13.2, 86.5),
-            "hand.flexion": JointSwing(-59.1, -28.3, 33.7),
+            "upper_arm.flexion": JointSwing(96.4, -52.6, -65.9),
+            "upper_arm.abduction": JointSwing(53.8, 1.3, 36.9),
+            "forearm.flexion": JointSwing(9.3, -5.0, 78.0),
+            "hand.flexion": JointSwing(-72.5, -37.5, 35.0),
         },
-        lead_rad=2.26,
+        lead_rad=1.93,
         shortening=0.0,
     ),
-    bend_lead_rad=0.08,
+    bend_lead_rad=-0.59,
     trunk={
-        "head.flexion": -60.1,
-        "neck.flexion": -86.3,
-        "spine.flexion": 7.1,
+        "head.flexion": -64.8,
+        "neck.flexion": -73.7,
+        "spine.flexion": -6.1,
     },
     sway={
-        "chest.lateral": 63.7,
-        "chest.rotation": 6.8,
-        "spine.lateral": 12.3,
+        "chest.lateral": 55.2,
+        "chest.rotation": 4.2,
+        "spine.lateral": -9.9,
     },
-    sway_lead_rad=-0.05,
+    sway_lead_rad=-0.36,
     twist={},
     steering_s=0.31,
     full_turn_rad=0.66,

@@ -60,6 +60,7 @@ class HandRegard(Task):
     weights to 0 and choose `intrinsic=rnd`. An episode lasts 1000 steps and never terminates.
 
     Departures from BabyBench, whose body is MIMo:
+
     - A step lasts 40 ms (1000 steps are 40 s), in MIMo 5 ms (5 s).
     - The body starts on its back with random joint angles about that posture; MIMo starts on its
       back and makes ten steps of random actions.

@@ -38,6 +38,7 @@ class SelfTouch(Task):
     physics count, at the end of each step. An episode lasts 1000 steps and never terminates.
 
     Departures from BabyBench, whose body is MIMo:
+
     - Regions are the 14 bones that a hand can touch: pelvis, spine, chest, neck, head, upper arm,
       forearm and hand of the other side, both thighs, shanks and feet. MIMo's are 34 geoms for
       each hand: one each for hip, lower body, head, eyes, upper arms, lower arms and upper legs,
