@@ -45,7 +45,7 @@ def test_fingers_belong_to_the_hand():
 
 
 class Touching:
-    """A body whose contacts are given."""
+    """A body with given contacts."""
 
     def __init__(self, *pairs):
         self._pairs = set(pairs)

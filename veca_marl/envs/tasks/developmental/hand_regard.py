@@ -59,7 +59,7 @@ class HandRegard(Task):
     [0, 1]. BabyBench itself gives no reward, its agents learn by intrinsic rewards: set the four
     weights to 0 and choose `intrinsic=rnd`. An episode lasts 1000 steps and never terminates.
 
-    Departures from BabyBench, whose body is MIMo:
+    Departures from BabyBench and its body, MIMo:
 
     - A step lasts 40 ms (1000 steps are 40 s), in MIMo 5 ms (5 s).
     - The body starts on its back with random joint angles about that posture; MIMo starts on its

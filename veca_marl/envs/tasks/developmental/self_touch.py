@@ -37,7 +37,7 @@ class SelfTouch(Task):
     rewards: `task.weights.left_hand=0 task.weights.right_hand=0 intrinsic=rnd`. Contacts of the
     physics count, at the end of each step. An episode lasts 1000 steps and never terminates.
 
-    Departures from BabyBench, whose body is MIMo:
+    Departures from BabyBench and its body, MIMo:
 
     - Regions are the 14 bones that a hand can touch: pelvis, spine, chest, neck, head, upper arm,
       forearm and hand of the other side, both thighs, shanks and feet. MIMo's are 34 geoms for
