@@ -38,7 +38,12 @@ def test_advantages_equal_the_recursion(make_ppo, agents, terminated):
 
 
 @pytest.mark.parametrize(
-    ("discrete", "teams"), [(False, ("agents",)), (True, ("red", "blue"))], ids=["one", "two"]
+    ("discrete", "teams"),
+    [
+        (False, ("agents",)),
+        pytest.param(True, ("red", "blue"), marks=pytest.mark.slow),
+    ],
+    ids=["one", "two"],
 )
 def test_toy_is_learnt(make_ppo, discrete, teams):
     env = {"discrete": discrete, "teams": teams}
