@@ -12,6 +12,7 @@ from docs_pages.parts_picture import parts_picture
 from docs_pages.task_pages import built_in_tasks
 from veca_marl.api import make
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
+from veca_marl.envs.adapters.torchrl.scripted import ExpertPolicy
 from veca_marl.envs.core.game import Game
 from veca_marl.envs.rendering.touch_image import touch_image
 from veca_marl.envs.tasks.contests.push_out import PushOut
@@ -25,6 +26,8 @@ import matplotlib.pyplot as plt
 
 BIN_HZ = 22050 / 1024
 _ABOVE_FLOOR = np.array([0.0, 0.0, 0.1])
+# steps of the expert before the picture, of tasks with the same start as another one
+_EXPERT_STEPS = {"HandRegard": 60, "SelfTouch": 60}
 
 
 def write_pictures(folder: Path) -> None:
@@ -47,6 +50,8 @@ def started(task: str, seed: int) -> tuple[VecaEnv, Game]:
 def task_picture(task: str, path: Path) -> None:
     """Draw the start of an episode from inside the room, above the agents."""
     env, game = started(task, seed=1)
+    if task in _EXPERT_STEPS:
+        env.rollout(_EXPERT_STEPS[task], policy=ExpertPolicy(env))
     if isinstance(game.players[0].body, Walker):
         for _ in range(25):  # one second, in which the ball of KickTheBall appears
             for player in game.players:
