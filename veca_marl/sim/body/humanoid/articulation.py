@@ -12,7 +12,10 @@ from numpy.typing import NDArray
 from veca_marl.sim.body.anatomy import Build, Skeleton, body_files, bone_of
 from veca_marl.sim.body.humanoid.dynamics import NEW_POSE, BodyDynamics, JointLimits
 from veca_marl.sim.body.humanoid.dynamics.tree import read_tree
-from veca_marl.sim.body.humanoid.self_collision import allow_self_collision
+from veca_marl.sim.body.humanoid.self_collision import (
+    allow_self_collision,
+    exclude_from_collisions,
+)
 from veca_marl.sim.geometry import (
     Floats,
     Pose,
@@ -107,6 +110,8 @@ class Articulation:
             if bone in bones:
                 colliders.append((info[0], bone))
         self.bones_of_links = dict(colliders)
+        shapeless = [info[0] for info in infos if info[0] not in self.bones_of_links]
+        exclude_from_collisions(self._client, self.body_id, shapeless)
         allow_self_collision(self._client, self.body_id, colliders)
         pybullet.changeDynamics(
             self.body_id,
@@ -163,11 +168,13 @@ class Articulation:
         result = self.dynamics.settle(step_s, self._weight, self._touches_others)
         self._copy_joints()
         state, solver = self.dynamics.state, self.dynamics.solver
+        # after each command Bullet updates the bounding boxes that have moved: all of them after the
+        # first one, so that joints, which move few boxes, come after the pose of the base
+        if result == NEW_POSE:
+            self._set_pose(state.position, solver.quaternion)
         changed = solver.changed.nonzero()[0]
         if len(changed):
             self._set_joints(changed)
-        if result == NEW_POSE:
-            self._set_pose(state.position, solver.quaternion)
         self._set_velocity(state.velocity)
         return True
 

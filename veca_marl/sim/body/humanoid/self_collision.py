@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from veca_marl.sim.physics import pybullet
 
@@ -43,3 +43,18 @@ def allow_self_collision(client: int, body_id: int, links: Sequence[tuple[int, s
     for (a, bone_a), (b, bone_b) in itertools.combinations(links, 2):
         if not may_collide(bone_a, bone_b):
             pybullet.setCollisionFilterPair(body_id, body_id, a, b, 0, physicsClientId=client)
+
+
+def exclude_from_collisions(client: int, body_id: int, links: Iterable[int]) -> None:
+    """Exclude links without shapes from collision detection.
+
+    Bullet gives such a link an empty shape with a bounding box of twice the detection distance,
+    and keeps a pair of objects for each box that overlaps it.
+
+    Args:
+        client: The PyBullet client.
+        body_id: A body.
+        links: Indices of its links without shapes.
+    """
+    for link in links:
+        pybullet.setCollisionFilterGroupMask(body_id, link, 0, 0, physicsClientId=client)
