@@ -45,9 +45,9 @@ def fly(world, bodies, inset_rad, torque, seed=0):
     inset = np.minimum(inset_rad, 0.5 * (high - low))
     angles = bodies[0].posture_angles(SPREAD) + rng.uniform(-0.05, 0.05, len(low))
     angles, torques = np.clip(angles, low + inset, high - inset), rng.uniform(-torque, torque, 82)
-    for body, map_joints, side in zip(bodies, (np.array, mirrored_joints), (1.0, -1.0), strict=True):
-        body.place((0.0, 5.0 * side, 20.0), 0.3 * side, map_joints(angles))
-        body.act({"joints": map_joints(torques)})
+    for body, joint_map, side in zip(bodies, (np.array, mirrored_joints), (1.0, -1.0), strict=True):
+        body.place((0.0, 5.0 * side, 20.0), 0.3 * side, joint_map(angles))
+        body.act({"joints": joint_map(torques)})
     world.refresh()
     world.step()
 

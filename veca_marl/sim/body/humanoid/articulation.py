@@ -168,8 +168,8 @@ class Articulation:
         result = self.dynamics.settle(step_s, self._weight, self._touches_others)
         self._copy_joints()
         state, solver = self.dynamics.state, self.dynamics.solver
-        # each command updates the bounding boxes that moved since the last update; the first updates
-        # all of them. Joints come after the base because they move few of them.
+        # each command updates the bounding boxes that have moved, the first one all of them; joints
+        # come after the base because they move few of them
         if result == NEW_POSE:
             self._set_pose(state.position, solver.quaternion)
         changed = solver.changed.nonzero()[0]
