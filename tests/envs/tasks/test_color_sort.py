@@ -50,6 +50,23 @@ def command(game, verb):
     return body.applied_verb is not None
 
 
+def test_all_toys_in_baskets_are_counted(game):
+    """Anywhere in a basket, up to its corners, and beside it; against the test of every pair."""
+    game.reset(np.random.default_rng(0))
+    task, counts = game.task, []
+    for x in (-0.21, -0.199, 0.0, 0.199, 0.21):
+        for y in (-0.199, 0.1, 0.21):
+            for item, basket in zip(task.items, [*task.baskets] * 2, strict=True):
+                middle = basket.prop.position
+                item.prop.place((middle[0] + x, middle[1] + y, 0.1))
+            inside = [[b.contains(item.prop) for b in task.baskets] for item in task.items]
+            right = sum(row[c] for row, c in zip(inside, task.category, strict=True))
+            task.after_step(np.random.default_rng(0))
+            assert task._counts == (right, np.sum(inside) - right)
+            counts.append(np.sum(inside))
+    assert set(counts) == {0, 6}
+
+
 # ---- placement
 
 

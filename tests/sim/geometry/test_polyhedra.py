@@ -17,7 +17,12 @@ from veca_marl.sim.geometry import (
     pyramid,
     sector_of_disc,
 )
-from veca_marl.sim.geometry.polyhedra.distances import polyhedron_entry, polyhedron_gradient
+from veca_marl.sim.geometry.polyhedra.distances import (
+    limited_distance,
+    polyhedron_distance,
+    polyhedron_entry,
+    polyhedron_gradient,
+)
 from veca_marl.sim.geometry.polyhedra.polyhedron import MAX_TRIANGLES
 from veca_marl.sim.geometry.polyhedra.table import face_rows, sizes_of
 
@@ -83,6 +88,21 @@ def test_distances_are_exact_and_gradients_are_theirs(name):
         assert here == pytest.approx(distance, abs=1e-15)
         assert np.linalg.norm(slope) == pytest.approx(1.0, abs=1e-9)
         assert there - here == pytest.approx(step, rel=1e-3)
+
+
+@pytest.mark.parametrize("name", HULLS)
+def test_limited_distances_are_the_same_numbers_up_to_the_limit(name):
+    hull, rng, limit = HULLS[name], np.random.default_rng(4), 0.12
+    faces, size = face_rows(hull), tuple(np.float32(sizes_of(hull, 0)))
+    near = 0
+    for point in rng.uniform(-0.7, 0.7, (2000, 3)):
+        exact, found = (
+            polyhedron_distance(faces, size, *point),
+            limited_distance(faces, size, *point, limit),
+        )
+        assert found == exact if exact <= limit else found > limit
+        near += exact <= limit
+    assert 50 < near < 1500
 
 
 @pytest.mark.parametrize("name", HULLS)

@@ -9,9 +9,9 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 
 from veca_marl.envs.tasks.cars.car_parts import HEIGHT_M, LENGTH_M, WIDTH_M, car_parts
-from veca_marl.envs.tasks.navigation.floors.clearance import clearances_m
+from veca_marl.envs.tasks.navigation.floors.clearance import Clearances
 from veca_marl.sim.geometry import Floats
-from veca_marl.sim.physics import Prop, PropCfg, PropShape, World
+from veca_marl.sim.physics import PropCfg, PropShape, World
 
 _MASS_KG = 2.0  # below the push limit of walkers: it is pushed away and displaces none
 _COLOUR = (0.95, 0.75, 0.1)
@@ -19,6 +19,7 @@ _ARRIVED_M = 0.15
 _PATIENCE_S = 6.0  # after which a point that has not been reached is given up
 _DRAWS = 30
 _SLOWEST = 0.2  # share of the speed while it turns
+_HALF_M = math.hypot(LENGTH_M, WIDTH_M) / 2.0  # of its diagonal
 _TIPPED = 0.9  # cosine of the inclination from which the car is set upright
 
 DrawPoint: TypeAlias = Callable[[np.random.Generator], Floats]
@@ -143,17 +144,18 @@ class ToyCar:
     def _reachable_point(self, draw: DrawPoint, rng: np.random.Generator) -> Floats:
         """Return a drawn point with a clear way, or the last of 30 draws."""
         point = self.inside(draw(rng))
+        clearances = Clearances(self._obstacles)
         for _ in range(_DRAWS):
-            if self._is_clear(point):
+            if self._is_clear(point, clearances):
                 break
             point = self.inside(draw(rng))
         return point
 
-    def _is_clear(self, point: Floats) -> bool:
+    def _is_clear(self, point: Floats, clearances: Clearances) -> bool:
         here = self.prop.position[:2]
         count = max(2, math.ceil(math.dist(here, point) / WIDTH_M))
         line = here + np.linspace(1.0 / count, 1.0, count)[:, None] * (point - here)
-        return is_free(line, self._obstacles)
+        return clearances.all_at_least(line, _HALF_M)
 
     def _vertical_mps(self) -> float:
         """Return the vertical velocity of the next step: down if it falls, up if it has sunk.
@@ -170,9 +172,3 @@ class ToyCar:
         if self.prop.rotation[2, 2] < _TIPPED:
             x, y, _ = self.prop.position
             self.prop.place((x, y, self._resting_m), self.heading_rad)
-
-
-def is_free(points: Floats, obstacles: Sequence[Prop]) -> bool:
-    """Return whether the car can stand on all points ``(n, 2)`` without touching obstacles."""
-    half_m = math.hypot(LENGTH_M, WIDTH_M) / 2.0
-    return all(bool((clearances_m(prop, points) > half_m).all()) for prop in obstacles)

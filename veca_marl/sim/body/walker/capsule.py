@@ -22,6 +22,7 @@ from typing import Any
 
 import numpy as np
 
+from veca_marl.sim.body.walker.leaves import Leaves
 from veca_marl.sim.body.walker.obstacle_boxes import ObstacleBoxes
 from veca_marl.sim.geometry import Floats, Primitive, Scene, Shape, quaternion_from_yaw
 from veca_marl.sim.physics import Prop, World, create_collision_shape, pybullet
@@ -70,9 +71,10 @@ class Capsule:
         )
         self._reach_m = _reach_m(form)
         self._obstacles = ObstacleBoxes(client, scene, [], [], _LIMB_REACH_M)
-        self._leaves: list[Prop] = []
+        self._leaves = Leaves(client, [])
         self._known = (0, 0)
         self._near: list[int] = []
+        self._near_leaves: list[Prop] = []
 
     def collect_obstacles(
         self, props: dict[str, Prop], bodies: Sequence[int], position: Floats, distance_m: float
@@ -87,8 +89,10 @@ class Capsule:
         """
         if (len(props), len(bodies)) != self._known:
             self._find_obstacles(props, bodies)
-        near = self._obstacles.near(position, self._reach_m + _MARGIN_M + distance_m)
+        reach_m = self._reach_m + _MARGIN_M + distance_m
+        near = self._obstacles.near(position, reach_m)
         self._near = [body_id for body_id in near if body_id != self.support_id]
+        self._near_leaves = self._leaves.near(position, reach_m)
 
     def resolve_contacts(self, x: float, y: float) -> tuple[float, float]:
         """Set the position and move the capsule out of obstacles; return the new position."""
@@ -130,7 +134,7 @@ class Capsule:
         """Return the horizontal displacement that ends all penetrations."""
         out_x = out_y = 0.0
         contacts = [contact for body_id in self._near for contact in self._contacts(body_id)]
-        for leaf in self._leaves:
+        for leaf in self._near_leaves:
             contacts += [
                 contact
                 for contact in self._contacts(leaf.body_id)
@@ -161,7 +165,8 @@ class Capsule:
         things = [p for p in solid if p.fixed or p.cfg.mass_kg > limit_kg]
         heavy = [one for one in bodies if _mass_kg(self._client, one) > limit_kg]
         self._obstacles = ObstacleBoxes(self._client, self._scene, things, heavy, _LIMB_REACH_M)
-        self._leaves = [p for p in solid if p.joint is not None and p.cfg.mass_kg <= limit_kg]
+        light = [p for p in solid if p.joint is not None and p.cfg.mass_kg <= limit_kg]
+        self._leaves = Leaves(self._client, light)
         for body_id in self._obstacles.ids:
             for link in range(-1, pybullet.getNumJoints(body_id, physicsClientId=self._client)):
                 pybullet.setCollisionFilterPair(

@@ -19,6 +19,7 @@ from veca_marl.sim.geometry.vectors import Vector
 NO_ENTRY_M = 1e9  # as in `ray_entry`
 _PARALLEL = 1e-12
 _TINY_M = 1e-9
+_ROUNDING_M = 1e-6  # bounding radii are stored in single precision
 _FAR_M = 1e9
 _PLANES = int(PLANES_COLUMN)
 
@@ -40,6 +41,25 @@ def polyhedron_distance(faces: Floats, size: Vector, x: float, y: float, z: floa
     """Return the signed distance of a point, metres; negative inside."""
     highest, _ = nearest_plane(faces, size, x, y, z)
     if highest <= 0.0:
+        return highest
+    a, b, c = _nearest_point(faces, size, x, y, z)
+    return math.sqrt((x - a) ** 2 + (y - b) ** 2 + (z - c) ** 2)
+
+
+@njit(cache=True, error_model="numpy")
+def limited_distance(
+    faces: Floats, size: Vector, x: float, y: float, z: float, limit_m: float
+) -> float:
+    """Return the signed distance of a point, or a number above a limit if it is above that limit.
+
+    Far from the polyhedron this is much faster than `polyhedron_distance`: the distances to its
+    bounding sphere and to its planes are lower bounds.
+    """
+    reach = size[2] + limit_m + _ROUNDING_M
+    if x * x + y * y + z * z > reach * reach:
+        return 2.0 * limit_m
+    highest, _ = nearest_plane(faces, size, x, y, z)
+    if highest <= 0.0 or highest > limit_m:
         return highest
     a, b, c = _nearest_point(faces, size, x, y, z)
     return math.sqrt((x - a) ** 2 + (y - b) ** 2 + (z - c) ** 2)

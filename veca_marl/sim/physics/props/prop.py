@@ -46,6 +46,9 @@ class Prop:
         body_id: PyBullet's id.
         link: PyBullet's index of the link that moves with its frame; -1 is the base.
         links: The links that carry its shapes, `link` first.
+        geoms: Its primitives, in its own frame.
+        reach_m: Horizontal radius of the cylinder about the origin of its frame that contains them
+            while it is not tilted.
         object_id: Its value in segmentation images.
         joint: Its hinge or slide; None for a prop that is fixed or free.
         sound: Its sound source; None for a silent prop.
@@ -70,12 +73,12 @@ class Prop:
         self.accepts: Callable[[Prop], bool] = _anything
         self._client = client
         self._scene = scene
-        geoms = prop_geoms(cfg)
+        self.geoms = geoms = prop_geoms(cfg)
         self._obstacles = [_Obstacle(box, obstacles) for box in sound_obstacles(cfg, geoms)]
         shown = scene.add_object(cfg.name, [geoms])
         self.object_id = shown.id
         self._row = shown.rows.start
-        self._reach_m = horizontal_radius_m(geoms)
+        self.reach_m = horizontal_radius_m(geoms)
         self._inside = bounding_box(geoms)
         self.body_id, self.link, self.joint, frame = _create_body(cfg, client, geoms)
         self.links = range(self.link, pybullet.getNumJoints(self.body_id, physicsClientId=client))
@@ -104,7 +107,7 @@ class Prop:
             return size[0] / 2
         if self.cfg.shape in (PropShape.sphere, PropShape.cylinder, PropShape.capsule):
             return size[0]
-        return self._reach_m
+        return self.reach_m
 
     @property
     def lowest_m(self) -> float:

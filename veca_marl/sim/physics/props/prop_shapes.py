@@ -18,6 +18,7 @@ from veca_marl.sim.geometry import (
     sector_of_disc,
 )
 from veca_marl.sim.physics.props.doll import doll_parts
+from veca_marl.sim.physics.props.joint_cfg import JointCfg, JointKind
 from veca_marl.sim.physics.props.part_cfg import PartCfg
 from veca_marl.sim.physics.props.prop_cfg import PropCfg
 from veca_marl.sim.physics.props.prop_shape import PropShape
@@ -66,6 +67,27 @@ def sound_obstacles(cfg: PropCfg, geoms: Sequence[Geom]) -> list[Geom]:
 def horizontal_radius_m(geoms: Sequence[Geom]) -> float:
     """Return the radius of a vertical cylinder about the origin that contains primitives."""
     return max(_reach(geom) for geom in geoms)
+
+
+def swept_radius_m(geoms: Sequence[Geom], joint: JointCfg) -> float:
+    """Return the horizontal distance from the anchor of a joint within which a prop always is.
+
+    Args:
+        geoms: The primitives of the prop, in its frame.
+        joint: Its joint.
+
+    Returns:
+        Metres, for all openings. The distance is exact for a hinge about the vertical and an upper
+        bound for all other joints.
+    """
+    upright = joint.kind is JointKind.hinge and not any(joint.axis[:2])
+    axes = slice(2) if upright else slice(3)
+    anchor = np.asarray(joint.anchor_m)
+    reach_m = max(
+        float(np.linalg.norm((_outline(geom) - anchor)[:, axes], axis=1).max()) + _roundness(geom)
+        for geom in geoms
+    )
+    return reach_m if joint.kind is JointKind.hinge else reach_m + joint.range_m
 
 
 def bounding_box(geoms: Sequence[Geom]) -> tuple[Floats, Floats]:

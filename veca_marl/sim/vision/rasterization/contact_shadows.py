@@ -25,7 +25,7 @@ from veca_marl.sim.geometry import (
     distance,
     single,
 )
-from veca_marl.sim.geometry.polyhedra.distances import polyhedron_distance
+from veca_marl.sim.geometry.polyhedra.distances import limited_distance
 from veca_marl.sim.vision.rasterization.rasterizer import (
     NO_SURFACE,
     Depths,
@@ -152,13 +152,16 @@ def _darken_row_of_faces(
         if abs(pz) > _FLOOR_TOLERANCE_M or names[i] == NO_SURFACE or names[i] == name:
             continue
         dx, dy, dz = px - origin[0], py - origin[1], pz - origin[2]
-        gap = polyhedron_distance(
+        gap = limited_distance(
             faces,
             size,
             ahead[0] * dx + ahead[1] * dy + ahead[2] * dz,
             left[0] * dx + left[1] * dy + left[2] * dz,
             upward[0] * dx + upward[1] * dy + upward[2] * dz,
+            REACH_M,
         )
+        if gap >= REACH_M:
+            continue
         nearness = max(1.0 - max(gap, 0.0) / REACH_M, 0.0)
         lights[i] *= single(1.0 - DARKNESS * nearness * nearness)
 

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from veca_marl.sim.geometry import Bools, Floats, GeomTable, Shape, Vector, bounding_radius, single
 from veca_marl.sim.geometry.intersections import box_row, capsule_row, cylinder_row, sphere_row
-from veca_marl.sim.geometry.polyhedra.intersections import polyhedron_row
+from veca_marl.sim.geometry.polyhedra.intersections import heights_above, polyhedron_row
 from veca_marl.sim.vision.rasterization.screen_bounds import (
     Interval,
     box_intervals,
@@ -229,8 +229,9 @@ def draw_polyhedron(
     eye, right, up, forward = ray
     first, end, top, bottom = rectangle
     columns, near = lens.columns[first:end], lens.near
+    heights = heights_above(faces, first_face, eye)
     for j in range(top, bottom):
         y = lens.rows[j]
         start = (forward[0] + y * up[0], forward[1] + y * up[1], forward[2] + y * up[2])
         row, names = depth[j, first:end], surfaces[j, first:end]
-        polyhedron_row(faces, first_face, eye, start, right, columns, near, surface, row, names)
+        polyhedron_row(faces, first_face, heights, start, right, columns, near, surface, row, names)

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from veca_marl.envs.tasks.navigation.floors.clearance import clearances_m
+from veca_marl.envs.tasks.navigation.floors.clearance import Clearances
 from veca_marl.sim.geometry import Floats, horizontal_distance
 from veca_marl.sim.physics import DoorCfg, PlaygroundCfg, Prop, RoomCfg
 
@@ -53,11 +53,12 @@ def scattered_places(
         ValueError: If none of 20 attempts succeeds; the message names the playground.
     """
     rooms = _wide_rooms(playground.rooms, spacing.clear_m)
+    clearances = Clearances(furniture)
     for _ in range(_RESTARTS if rooms else 0):
         found: list[Floats] = []
         for _ in range(_DRAWS):
             place = _random_place(rooms, spacing.clear_m, rng)
-            if _keeps(place, found, furniture, playground.doors, spacing):
+            if _keeps(place, found, clearances, playground.doors, spacing):
                 found.append(place)
             if len(found) == count:
                 return found
@@ -83,12 +84,12 @@ def _random_place(rooms: Sequence[RoomCfg], clear_m: float, rng: np.random.Gener
 def _keeps(
     place: Floats,
     others: Sequence[Floats],
-    furniture: Sequence[Prop],
+    furniture: Clearances,
     doors: Sequence[DoorCfg],
     spacing: Spacing,
 ) -> bool:
     return (
         all(horizontal_distance(place, other) >= spacing.apart_m for other in others)
         and all(math.dist(place[:2], door.position_m) >= spacing.door_m for door in doors)
-        and all(clearances_m(prop, place[:2]) >= spacing.clear_m for prop in furniture)
+        and furniture.all_at_least(place[:2], spacing.clear_m)
     )
