@@ -196,8 +196,8 @@ class _Writer:
             child = bone.name if last else f"{bone.name}__{step}"
             if not last:
                 empty = Layer(child, (), soft=False)
-                speck = _point_mass(light_kg)._replace(matrix=moment * np.eye(3))
-                text += self._link(empty, speck, self._rotor(bone))
+                inertia = _point_mass(light_kg)._replace(matrix=moment * np.eye(3))
+                text += self._link(empty, inertia, self._rotor(bone))
             joint = self._skeleton.joints[bone.first_joint + step]
             text += (
                 f'<joint name="{joint.bone}.{joint.label}" type="revolute">'
@@ -214,8 +214,8 @@ class _Writer:
     def _fixed(self, layer: Layer, light_kg: float, bone: Bone) -> str:
         """Return a light link that is fixed to that of the bone."""
         name, centre = layer.link, layer.shapes[0].pose.position
-        speck = _point_mass(light_kg)._replace(centre=centre)
-        return self._link(layer, speck, 1e-7, bone) + (
+        inertia = _point_mass(light_kg)._replace(centre=centre)
+        return self._link(layer, inertia, 1e-7, bone) + (
             f'<joint name="{name}" type="fixed"><parent link="{bone.name}"/>'
             f'<child link="{name}"/></joint>\n'
         )

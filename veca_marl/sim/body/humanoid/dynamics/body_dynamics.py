@@ -70,8 +70,8 @@ class BodyDynamics:
         Args:
             step_s: Duration of the physics step.
             weight: ``(3,)`` N, weight of the body.
-            touches_others: Tells whether the body touches others; called only if the external force
-                is no more than the weight, because lists of contacts take time.
+            touches_others: Returns whether the body touches others; called only if the external
+                force is no more than the weight, because lists of contacts take time.
 
         Returns:
             `NEW_POSE` if the pose of the base differs from Bullet's, else `SETTLED`. Joints that
