@@ -147,6 +147,22 @@ def test_the_action_may_leave_out_the_fingers(make_child):
     assert (body.joint_torques() != 0.0).sum() == 40
 
 
+def test_the_action_may_move_the_arms_alone(make_child):
+    """All other joints are held at the angles at which the body was placed."""
+    world, body = make_child(action=JointActionKind.increment, joints=JointChoice.arms)
+    remove_gravity(world)
+    body.place((0.0, 0.0, 2.0), 0.0, POSTURES["sitting"])
+    before = body.joint_angles()
+    body.act({"joints": np.full(14, 0.5)})
+    let_pass(world, 0.4)
+    moved = np.abs(body.joint_angles() - before)
+    bones = [name.partition(".")[0] for name in body.joint_names]
+    arms = np.array([bone.endswith(("_upper_arm", "_forearm", "_hand")) for bone in bones])
+    assert body.action_spec["joints"].names == tuple(np.array(body.joint_names)[arms])
+    assert moved[arms].min() > 0.01
+    assert moved[~arms].max() < 0.05
+
+
 @pytest.mark.parametrize(
     ("row", "message"),
     [

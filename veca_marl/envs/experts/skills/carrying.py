@@ -23,7 +23,9 @@ _RETREAT = 0.10 * _UP  # the hands leave a block upwards by this distance
 _SIDES = np.array([1.0, -1.0])
 _INTEGRAL_GAIN, _MAX_INTEGRAL_M = 0.03, 0.02
 _ARRIVED_M = 0.008
-_PLACED_M = 0.005
+# how near a carried block has to come to its target: lifted, above the goal, and before release
+_LIFTED_M, _ABOVE_M, _PLACED_M = 0.02, 0.007, 0.005
+_LIFT_STEPS, _TRANSFER_STEPS, _LOWER_STEPS = 75, 110, 75
 _HIGH_M, _LOW_M = 0.10, 0.04  # heights of the palms at which the body sits upright and bent
 
 
@@ -41,8 +43,9 @@ class Grip(NamedTuple):
     yaw_rad: float = 0.0
 
 
-# resting place of the hands, wider than anything that is piled up; the body sits at the origin
-_HOME = Grip(np.array([0.19, 0.0, 0.11]), 0.40)
+# resting place of the hands, beside the legs: the trunk turns slowly by up to 20 degrees while it
+# sits, and the hands must not touch what has been piled up
+_HOME = Grip(np.array([0.10, 0.0, 0.14]), 0.50)
 
 
 class Carrier:
@@ -134,8 +137,13 @@ class Carrier:
         yield from self._until(lambda: Grip(block.position + self._thumbs, wide, yaw), 40)
         yield from self._for(Grip(block.position + self._thumbs, tight, yaw), 16)
         lifted = block.position * (1, 1, 0) + over_m * _UP
-        for place in (lambda: lifted, lambda: to() * (1, 1, 0) + over_m * _UP, to):
-            yield from self._bring(block, place, tight, yaw, 75)
+        for place, near_m, steps in (
+            (lambda: lifted, _LIFTED_M, _LIFT_STEPS),
+            (lambda: to() * (1, 1, 0) + over_m * _UP, _ABOVE_M, _TRANSFER_STEPS),
+            (to, _PLACED_M, _LOWER_STEPS),
+        ):
+            held = Grip(block.position, tight, yaw)
+            yield from self._bring(block, place, held, near_m, steps)
             if not self._holds(block):
                 break
         here = self._hands.palms().points.mean(axis=0)
@@ -168,14 +176,14 @@ class Carrier:
             yield self.move(goal)
 
     def _bring(
-        self, block: Prop, to: Callable[[], Floats], gap_m: float, yaw_rad: float, steps: int
+        self, block: Prop, to: Callable[[], Floats], grip: Grip, near_m: float, steps: int
     ) -> Iterator[Floats]:
-        """Move the palms until the block between them has reached its target."""
+        """Move the palms until the block between them is near its target."""
         for _ in range(steps):
-            if not self._holds(block) or np.abs(to() - block.position).max() < _PLACED_M:
+            if not self._holds(block) or np.abs(to() - block.position).max() < near_m:
                 return
             slip = self._hands.palms().points.mean(axis=0) - block.position
-            yield self.move(Grip(to() + slip, gap_m, yaw_rad), self._carrying_m)
+            yield self.move(grip._replace(centre=to() + slip), self._carrying_m)
 
 
 def _palms(grip: Grip) -> Palms:

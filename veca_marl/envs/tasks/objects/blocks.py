@@ -1,4 +1,8 @@
-"""The blocks of PileUpBlock and PutDownBlock, and relations between them."""
+"""The blocks of PileUpBlock and PutDownBlock, and relations between them.
+
+Piles need more iterations of Bullet's solver (`ClockCfg.solver_iterations`) than its default: see
+the presets of both tasks.
+"""
 
 from __future__ import annotations
 
@@ -68,10 +72,9 @@ def height_in_edges(block: Prop) -> float:
 
 
 def rests_on(block: Prop, base: Prop) -> bool:
-    """Return whether a block rests on top of another one."""
-    way, edge = block.position - base.position, block.cfg.size_m[0]
-    on_top = way[2] > 0.9 * edge and math.hypot(way[0], way[1]) < 0.75 * edge
-    return bool(on_top) and block.touches(base.body_id) and is_at_rest(block)
+    """Return whether a block is at rest on top of another one, also if it lies on a third, too."""
+    above = block.position[2] - base.position[2] > 0.9 * block.cfg.size_m[0]
+    return bool(above) and block.touches(base.body_id) and is_at_rest(block)
 
 
 def is_at_rest(block: Prop) -> bool:

@@ -68,7 +68,8 @@ class PileUpBlock(Task):
 
     The body is free and can topple. An episode lasts `max_seconds` and never terminates. The task
     is solved (`solved`) while a red block rests on another block and no part of the body touches
-    the red one.
+    the red one. Bullet solves contacts with 30 iterations (`clock.solver_iterations`): with the
+    default of 10 a block that lies on another one creeps by 1 mm/s.
 
     Terms:
         height: Sum of the heights above the floor of the lowest corners of the red blocks that are

@@ -62,7 +62,8 @@ class PutDownBlock(Task):
 
     The body is free and can topple. An episode lasts `max_seconds` and never terminates. The task
     is solved (`solved`) while the red block rests on the floor, no part of the body touches it and
-    no blue block has fallen.
+    no blue block has fallen. Bullet solves contacts with 30 iterations
+    (`clock.solver_iterations`), as in PileUpBlock.
 
     Terms:
         height: Height of the red block above the floor, in lengths of its edge. Its default weight

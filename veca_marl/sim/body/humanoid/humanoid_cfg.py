@@ -24,7 +24,8 @@ class HumanoidCfg(BodyCfg):
         detail: `full` moves 82 joints; `mitten` moves 40 at a little over half the cost. Actions,
             senses and names are the same: the mitten ignores the actions of its fingers.
         action: Normalised torques, target angles, or increments of target angles.
-        joints: Which joints the action moves: all 82, or the 40 that are not in fingers.
+        joints: Which joints the action moves: all 82, the 40 that are not in fingers, or the 14 of
+            both arms.
         strength: Fraction of the torques in the table of joints, above 0 and at most 1.
         friction: Lateral friction of the skin.
     """

@@ -202,16 +202,33 @@ JOINT_ACTIONS: dict[JointActionKind, JointAction] = {
 
 
 class JointChoice(Enum):
-    """Which joints an action moves; the others have no torque, or 0 as their target angle."""
+    """Which joints an action moves.
+
+    The others have no torque; as targets they have the angle 0 (`position`), or the angles at which
+    the body was placed (`increment`).
+
+    Attributes:
+        all: All 82.
+        limbs: The 40 that are not in fingers.
+        arms: The 14 of both arms, from the shoulders to the wrists.
+    """
 
     all = "all"
     limbs = "limbs"
+    arms = "arms"
+
+
+_ARM = ("_upper_arm", "_forearm", "_hand")
 
 
 def chosen_joints(skeleton: Skeleton, choice: JointChoice) -> list[int]:
-    """Return the indices of all 82 joints, or of the 40 that are not in fingers."""
-    joints = range(len(skeleton.joints))
-    if choice is JointChoice.all:
-        return list(joints)
+    """Return the indices of the joints of a choice, in ascending order."""
     bones = {bone.name: bone for bone in skeleton.bones}
-    return [i for i in joints if not is_finger(bones[skeleton.joints[i].bone])]
+    owners = [bones[joint.bone] for joint in skeleton.joints]
+    match choice:
+        case JointChoice.all:
+            return list(range(len(owners)))
+        case JointChoice.limbs:
+            return [index for index, bone in enumerate(owners) if not is_finger(bone)]
+        case JointChoice.arms:
+            return [index for index, bone in enumerate(owners) if bone.name.endswith(_ARM)]
