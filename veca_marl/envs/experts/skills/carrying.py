@@ -152,11 +152,15 @@ class Carrier:
         yield from self._until(lambda: Grip(here + _RETREAT, wide, yaw), 30)
 
     def rest(self) -> Iterator[Floats]:
-        """Yield target angles, endlessly: move the hands around objects to their resting place."""
-        over = self._hands.palms().points.mean(axis=0)
-        yield from self._for(Grip(over, _HOME.gap_m), 15)
-        back = _HOME.centre * (1, 1, 0) + over * (0, 0, 1)
-        yield from self._until(lambda: Grip(back, _HOME.gap_m), 25)
+        """Yield target angles, endlessly: move the hands around objects to their resting place.
+
+        They move back before they open: beside an object that was put down others may stand.
+        """
+        points = self._hands.palms().points
+        middle, gap = points.mean(axis=0), float(np.linalg.norm(points[0] - points[1]))
+        back = middle * (0, 1, 1) + _HOME.centre * (1, 0, 0)
+        yield from self._until(lambda: Grip(back, gap), 25)
+        yield from self._for(Grip(back, _HOME.gap_m), 15)
         while True:
             yield self.move(_HOME)
 
