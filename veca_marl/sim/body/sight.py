@@ -6,6 +6,7 @@ its sight, see `Body.sight`.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping
 from typing import Protocol
 
@@ -13,6 +14,8 @@ import numpy as np
 
 from veca_marl.sim.geometry import Floats
 from veca_marl.sim.physics import Prop
+
+_BOX_MARGIN_M = 0.3  # more than the margins of Bullet's boxes and the motion of a prop in a step
 
 
 class Visible(Protocol):
@@ -65,12 +68,29 @@ def interactable_props(
         props: Those to choose from.
         range_m: The distance to the bounding box of a prop must be smaller.
     """
-    near = [p for p in props if p.cfg.interactions and distance_m(p, eyes) < range_m]
+    near = [
+        prop
+        for prop in props
+        if prop.cfg.interactions
+        and _may_be_nearer(prop, eyes, range_m)
+        and distance_m(prop, eyes) < range_m
+    ]
     if not near:
         return []
     front = sight.front_objects()
     seen = [prop for prop in near if prop.object_id in front]
     return sorted(seen, key=lambda prop: front[prop.object_id])
+
+
+def _may_be_nearer(prop: Prop, point: Floats, range_m: float) -> bool:
+    """Return False for a prop of which the bounding box is certainly farther from a point.
+
+    This takes a tenth of the time of `distance_m`, and most props of a house are far away. The
+    corners of a box along the world's axes are at most sqrt(3) times as far from the origin of the
+    prop's frame as its own points.
+    """
+    reach_m = math.sqrt(3.0) * prop.extent_m + _BOX_MARGIN_M
+    return math.dist(prop.position, point) < range_m + reach_m
 
 
 def distance_m(prop: Prop, point: Floats) -> float:

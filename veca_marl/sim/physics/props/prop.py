@@ -49,6 +49,7 @@ class Prop:
         geoms: Its primitives, in its own frame.
         reach_m: Horizontal radius of the cylinder about the origin of its frame that contains them
             while it is not tilted.
+        extent_m: Greatest distance of a corner of the box about them from that origin.
         object_id: Its value in segmentation images.
         joint: Its hinge or slide; None for a prop that is fixed or free.
         sound: Its sound source; None for a silent prop.
@@ -80,6 +81,7 @@ class Prop:
         self._row = shown.rows.start
         self.reach_m = horizontal_radius_m(geoms)
         self._inside = bounding_box(geoms)
+        self.extent_m = float(np.linalg.norm(np.abs(self._inside).max(axis=0)))
         self.body_id, self.link, self.joint, frame = _create_body(cfg, client, geoms)
         self.links = range(self.link, pybullet.getNumJoints(self.body_id, physicsClientId=client))
         self._read_pose = _pose_reader(self.body_id, self.link, client)
@@ -309,24 +311,24 @@ def follow_physics(props: Sequence[Prop]) -> None:
     """
     if not props:
         return
-    scene = props[0]._scene
+    positions, rotations = props[0]._scene.positions, props[0]._scene.rotations
     poses = [prop._read_pose() for prop in props]
-    rows = np.array([prop._row for prop in props])
+    rows = [prop._row for prop in props]
     matrices = np.empty((len(props), 3, 3))
     quaternions_to_matrices(np.array([pose[1] for pose in poses]), matrices)
-    scene.positions[rows] = [pose[0] for pose in poses]
-    scene.rotations[rows] = matrices
-    for prop in props:
+    positions[rows] = [pose[0] for pose in poses]
+    rotations[rows] = matrices
+    for row, prop in zip(rows, props, strict=True):
         if prop._axes is not None:
-            scene.rotations[prop._row] = scene.rotations[prop._row] @ prop._axes.T
+            rotations[row] = rotations[row] @ prop._axes.T
         if prop._centre is not None:
-            scene.positions[prop._row] -= scene.rotations[prop._row] @ prop._centre
+            positions[row] -= rotations[row] @ prop._centre
         if prop.sound is not None:
-            prop.sound.position = scene.positions[prop._row]
+            prop.sound.position = positions[row]
         if prop.impact is not None:
-            prop.impact.position = scene.positions[prop._row]
+            prop.impact.position = positions[row]
         for obstacle in prop._obstacles:
-            obstacle.move(scene.positions[prop._row], scene.rotations[prop._row])
+            obstacle.move(positions[row], rotations[row])
 
 
 def _create_body(
