@@ -125,7 +125,8 @@ class FillFraction(Task):
         self._lay_piece()
         for circle in self.circles:
             circle.arrange()
-        filled, full = sum((c.filled for c in self.circles), Fraction(0)), self._full()
+        shares = [circle.filled for circle in self.circles]
+        filled, full = sum(shares, Fraction(0)), shares.count(Fraction(1))
         self._change = filled - self._score[0], full - self._score[1]
         self._score = filled, full
 
@@ -133,15 +134,11 @@ class FillFraction(Task):
         return {"filled": float(self._change[0]), "full": float(self._change[1])}
 
     def terminated(self) -> bool:
-        return self._full() == len(self.circles)
+        return self.solved(self.players[0])
 
     def solved(self, player: Player) -> bool:
-        """Return whether all circles are full."""
-        return self._full() == len(self.circles)
-
-    def _full(self) -> int:
-        """Return the number of full circles."""
-        return sum(circle.filled == 1 for circle in self.circles)
+        """Return whether all circles were full at the end of the last step."""
+        return self._score[1] == len(self.circles)
 
     def _lay_piece(self) -> None:
         """Lay the piece that was put into a circle in this step into its place."""
