@@ -1,8 +1,10 @@
 """Bodies that nothing touches keep their momentum and gain no energy."""
 
+import numpy as np
 import pytest
 
 from veca_marl.fidelity.body.momentum import (
+    Flight,
     driven_flight,
     energy_laws,
     fall_laws,
@@ -26,3 +28,11 @@ def test_the_centre_of_mass_falls_as_a_stone_does(detail):
 def test_an_unpowered_body_gains_no_energy():
     flights = [unpowered_flight(Detail.mitten, 0, 1.0, 3.0)]
     assert not [law for law in energy_laws(Detail.mitten, flights) if not law.holds]
+
+
+def test_a_rise_after_a_loss_of_energy_breaks_the_law():
+    """The energy stays below the first value."""
+    flight = Flight(*np.zeros((3, 4)), np.array([1.0, 0.5, 0.52, 0.4]))
+    (law,) = energy_laws(Detail.mitten, [flight])
+    assert law.measured == pytest.approx(0.04)
+    assert not law.holds

@@ -1,7 +1,7 @@
 """Doppler effect of the direct sound and of reflections.
 
-A source approaches a listener, and a wall reflects its sound from behind. The direct sound is heard
-higher, the reflection lower: its image source recedes.
+A source moves towards a listener or away from it, and a wall reflects its sound from behind. The
+image source moves in the opposite direction: one of the sounds is heard higher, the other lower.
 """
 
 from __future__ import annotations
@@ -14,12 +14,13 @@ import scipy.signal
 
 from veca_marl.fidelity.law import Curve, Law, Mark, Plot, Section, at_most
 from veca_marl.sim.geometry import Floats, Pose
-from veca_marl.sim.hearing import HrtfReceiver, MonoReceiver, kemar_table
+from veca_marl.sim.hearing import HrtfReceiver, MonoReceiver, StereoReceiver, kemar_table
 from veca_marl.sim.sound import SPEED_OF_SOUND_MPS, Clip, Receiver, Room, SoundField
 
 SAMPLE_RATE_HZ = 22_050
 STEP_SAMPLES = 882
-SPEEDS_MPS = (0.5, 1.0, 2.0, 3.0)
+SPEEDS_MPS = (-3.0, -1.0, -0.5, 0.5, 1.0, 2.0, 3.0)
+"""Speeds towards the listener."""
 PITCHES_HZ = (500.0, 1000.0, 2000.0)
 
 _N_STEPS = 16
@@ -94,6 +95,17 @@ def _measure(heard: Floats, distance_m: Floats) -> HeardTone:
     )
 
 
+def receivers() -> dict[str, Receiver]:
+    """Return a receiver of each quality of hearing."""
+    head = kemar_table()
+    ear_m = head.head_radius_m
+    return {
+        "hrtf": HrtfReceiver(head),
+        "stereo": StereoReceiver((0.0, ear_m, 0.0), (0.0, -ear_m, 0.0)),
+        "mono": MonoReceiver(),
+    }
+
+
 def theory_hz(speed_mps: float, pitch_hz: float) -> float:
     """Return the frequency at which a source is heard that approaches at a speed."""
     return pitch_hz / (1.0 - speed_mps / SPEED_OF_SOUND_MPS)
@@ -102,14 +114,15 @@ def theory_hz(speed_mps: float, pitch_hz: float) -> float:
 def section() -> Section:
     """Measure the Doppler effect for the page."""
     text = (
-        "A source approaches from straight ahead, a wall reflects its sound from behind; with HRTF "
-        "and with one omnidirectional receiver. Frequency from the phase of the analytic signal, "
-        "against `f / (1 - v / c)` for the direct sound and `f / (1 + v / c)` for the reflection. "
+        "A source straight ahead approaches at v or recedes (v < 0), a wall reflects its sound "
+        "from behind; with HRTF, with two omnidirectional receivers and with one. Frequency from "
+        "the phase of the analytic signal at the left ear, against `f / (1 - v / c)` for the "
+        "direct sound and `f / (1 + v / c)` for the reflection. "
         "The simulator uses the distance at the time of arrival; the rest is of order `(v / c)^2`."
     )
     laws: list[Law] = []
     plots: list[Plot] = []
-    for name, receiver in (("hrtf", HrtfReceiver(kemar_table())), ("mono", MonoReceiver())):
+    for name, receiver in receivers().items():
         tones = {
             (speed, pitch): approaching_source(speed, pitch, receiver)
             for pitch in PITCHES_HZ

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 import scipy.signal
 
-from veca_marl.fidelity.law import Curve, Law, Mark, Plot, Section, at_most, between
+from veca_marl.fidelity.law import Curve, Law, Mark, Plot, Section, at_most, between, equals
 from veca_marl.sim.geometry import Floats, Pose
 from veca_marl.sim.hearing import MonoReceiver
 from veca_marl.sim.sound import SPEED_OF_SOUND_MPS, Clip, House, Room, SoundField
@@ -21,6 +21,10 @@ UNEQUAL_WALLS = (0.9, 0.4, 0.7, 0.5, 0.3, 0.8)
 SOURCE = (2.1, 3.7, 1.2)
 HEAD = (5.3, 2.2, 1.6)
 REVERBERANT = (((6.0, 5.0, 3.0), 0.8), ((6.0, 5.0, 3.0), 0.9), ((10.0, 8.0, 4.0), 0.8))
+REVERBERANT_SOURCE, REVERBERANT_HEAD = (1.3, 2.1, 1.1), (3.9, 3.2, 1.7)
+REFERENCE_S = (0.30705, 0.67060, 0.48014)
+"""Reverberation times of the rooms `REVERBERANT` by another program, pyroomacoustics 0.10.1
+(Scheibler et al. 2018). `tests/fidelity/test_rooms.py` computes them."""
 
 _LOW_PASS = 0.49
 _MAX_ORDER = 60
@@ -134,21 +138,36 @@ def decay_time(response: Floats) -> float:
 
 def reverberation(size_m: Sequence[float], beta: float) -> tuple[float, float, float]:
     """Return the reverberation time of a room in s: measured, after Eyring, after Sabine."""
-    eyring = acoustics.eyring_decay_time(size_m, beta)
-    n_samples = int(1.2 * eyring * SAMPLE_RATE_HZ)
-    order = math.ceil(n_samples / SAMPLE_RATE_HZ * SPEED_OF_SOUND_MPS / min(size_m))
+    order, n_samples = extent(size_m, beta)
     response = acoustics.room_impulse_response(
-        (1.3, 2.1, 1.1),
-        (3.9, 3.2, 1.7),
+        REVERBERANT_SOURCE,
+        REVERBERANT_HEAD,
         Room(np.zeros(3), size_m, beta),
-        min(order, _MAX_ORDER),
+        order,
         SAMPLE_RATE_HZ,
         n_samples,
     )
-    # positive reflection coefficients accumulate constant pressure (Allen & Berkley 1979)
+    return (
+        reverberation_time(response),
+        acoustics.eyring_decay_time(size_m, beta),
+        acoustics.sabine_decay_time(size_m, beta),
+    )
+
+
+def extent(size_m: Sequence[float], beta: float) -> tuple[int, int]:
+    """Return the order of the image sources and the number of samples of an impulse response."""
+    n_samples = int(1.2 * acoustics.eyring_decay_time(size_m, beta) * SAMPLE_RATE_HZ)
+    order = math.ceil(n_samples / SAMPLE_RATE_HZ * SPEED_OF_SOUND_MPS / min(size_m))
+    return min(order, _MAX_ORDER), n_samples
+
+
+def reverberation_time(response: Floats) -> float:
+    """Return the reverberation time in s of an impulse response, above 100 Hz.
+
+    Positive reflection coefficients accumulate constant pressure (Allen & Berkley 1979).
+    """
     high_pass = scipy.signal.butter(2, 100.0, "highpass", fs=SAMPLE_RATE_HZ, output="sos")
-    measured = decay_time(scipy.signal.sosfilt(high_pass, response))
-    return measured, eyring, acoustics.sabine_decay_time(size_m, beta)
+    return decay_time(scipy.signal.sosfilt(high_pass, response))
 
 
 def level_over_distance(distances_m: Sequence[float]) -> list[float]:
@@ -209,8 +228,9 @@ def section() -> Section:
         "Image sources (Allen & Berkley 1979) against repeated mirroring in single walls; the "
         "streamed sound against exact delays in float64; reverberation time from the backward "
         "integrated impulse response (T20) against Sabine and Eyring, which differ: an image "
-        "model of a rectangular room is not diffuse. Energy against the diffuse field, exchange "
-        "of source and receiver, and level over distance in the free field."
+        "model of a rectangular room is not diffuse, and against another program with image "
+        "sources, pyroomacoustics 0.10.1 (Scheibler et al. 2018). Energy against the diffuse "
+        "field, exchange of source and receiver, and level over distance in the free field."
     )
     room = Room(np.zeros(3), ROOM_M, UNEQUAL_WALLS)
     distances = [0.25 * 2.0**i for i in range(9)]
@@ -232,9 +252,8 @@ def section() -> Section:
         ),
     ]  # fmt: skip
     times = [reverberation(size, beta) for size, beta in REVERBERANT]
-    laws += [
-        _reverberation_law(*case, *time) for case, time in zip(REVERBERANT, times, strict=True)
-    ]
+    for case, time, reference_s in zip(REVERBERANT, times, REFERENCE_S, strict=True):
+        laws += [_reverberation_law(*case, *time), reference_law(*case, time[0], reference_s)]
     return Section(
         "Rooms", text, laws, [_decay_plot(times), _distance_plot(distances, levels, theory)]
     )
@@ -243,11 +262,20 @@ def section() -> Section:
 def _reverberation_law(
     size: Sequence[float], beta: float, measured: float, eyring: float, sabine: float
 ) -> Law:
-    name = f"reverberation time, {' x '.join(f'{s:g}' for s in size)} m, beta {beta:g}"
     return between(
-        f"{name}: between 0.9 Eyring ({eyring:.2f}) and 1.15 Sabine ({sabine:.2f})",
+        f"{_name(size, beta)}: between 0.9 Eyring ({eyring:.2f}) and 1.15 Sabine ({sabine:.2f})",
         "s", 0.9 * eyring, 1.15 * sabine, measured,
     )  # fmt: skip
+
+
+def reference_law(size: Sequence[float], beta: float, measured: float, reference_s: float) -> Law:
+    """Return the law that a reverberation time is within 1 % of that of another program."""
+    name = f"{_name(size, beta)}: pyroomacoustics"
+    return equals(name, "s", reference_s, measured, 0.01 * reference_s)
+
+
+def _name(size: Sequence[float], beta: float) -> str:
+    return f"reverberation time, {' x '.join(f'{s:g}' for s in size)} m, beta {beta:g}"
 
 
 def _decay_plot(times: Sequence[tuple[float, float, float]]) -> Plot:
@@ -258,6 +286,7 @@ def _decay_plot(times: Sequence[tuple[float, float, float]]) -> Plot:
             (("measured", Mark.bars), ("Eyring", Mark.points), ("Sabine", Mark.points))
         )
     ]
+    curves.append(Curve("pyroomacoustics", rooms, REFERENCE_S, Mark.points))
     return Plot("Reverberation time", "room and reflection coefficient", "T20 (s)", curves)
 
 

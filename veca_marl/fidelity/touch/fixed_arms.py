@@ -1,0 +1,198 @@
+"""A body with fixed arms, and balls that press on its skin, at any physics step.
+
+Touch readings depend on geometry alone, solver forces on the physics step.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from veca_marl.sim.body.anatomy import load_skeleton
+from veca_marl.sim.body.humanoid import Humanoid, HumanoidCfg
+from veca_marl.sim.body.humanoid.postures import Posture
+from veca_marl.sim.geometry import Floats
+from veca_marl.sim.physics import (
+    GRAVITY_MPS2,
+    ClockCfg,
+    PlaygroundCfg,
+    Prop,
+    PropCfg,
+    PropShape,
+    RoomCfg,
+    World,
+    pybullet,
+)
+from veca_marl.sim.touch import TouchCfg, TouchSense, load_taxels
+
+_FIXING_N = 1e5
+_ITERATIONS = 300  # of Bullet's solver
+_ASIDE_M = 20.0
+# flat hands with the thumb out of the ball's path
+_POSTURE: dict[str, float] = {
+    "upper_arm.abduction": 45.0,
+    "thumb_metacarpal.flexion": -20.0,
+    "thumb_metacarpal.abduction": -10.0,
+    **{f"{finger}_proximal.flexion": -40.0 for finger in ("index", "middle", "ring", "little")},
+}
+
+
+@dataclass(frozen=True)
+class Spot:
+    """A place on an arm: a point on the surface of a bone and the outward normal, in its frame."""
+
+    bone: str
+    point_m: tuple[float, float, float]
+    outward: tuple[float, float, float]
+
+
+# on the surface of the box and of the capsule that are these bones in the table of bones
+PALM = Spot("l_hand", (0.0, -0.006, -0.0265), (0.0, -1.0, 0.0))
+RIGHT_PALM = Spot("r_hand", (0.0, 0.006, -0.0265), (0.0, 1.0, 0.0))
+FOREARM = Spot("l_forearm", (0.0135, 0.0, -0.0475), (1.0, 0.0, 0.0))
+
+
+@dataclass(frozen=True)
+class Ball:
+    """A ball that falls onto the skin."""
+
+    mass_kg: float = 0.2
+    radius_m: float = 0.05
+
+
+@dataclass(frozen=True)
+class Press:
+    """Readings and solver forces after every physics step.
+
+    Attributes:
+        touch: ``(n,)`` the largest reading on the bone.
+        force_n: ``(n,)`` normal forces between ball and body.
+        readings: ``(1648, 6)`` all taxels, at the end.
+    """
+
+    touch: Floats
+    force_n: Floats
+    readings: Floats
+
+
+class FixedArms:
+    """A body with fixed arm bones, and balls that press on them.
+
+    Only the balls have weight, and they move along the normal only, so that they touch the same
+    point of the skin for every time step.
+
+    Args:
+        clock: The clock, which contains the time step.
+        balls: The balls, used one after the other or together.
+    """
+
+    def __init__(self, clock: ClockCfg, *balls: Ball) -> None:
+        room = RoomCfg(lower_m=(-50.0, -5.0, 0.0), size_m=(100.0, 10.0, 5.0))
+        playground = PlaygroundCfg(name="empty", rooms=[room], props=[], image_order=0)
+        self.world = World(playground, clock)
+        # with the default number the constraint of a hand yields at 8 ms under a ball of 1.5 kg
+        pybullet.setPhysicsEngineParameter(
+            numSolverIterations=_ITERATIONS, physicsClientId=self.world.client
+        )
+        self._body = Humanoid("child", HumanoidCfg(), self.world)
+        self._props = {ball: self.world.add_prop(_prop(ball)) for ball in balls}
+        self._sense = TouchSense(TouchCfg(), self._body, self.world)
+        self.world.freeze()
+
+    def press(
+        self, seconds: float, fall_m: float, *pressed: tuple[Spot, Ball], watch: bool = True
+    ) -> list[Press]:
+        """Let balls fall onto spots; return readings and forces of each if `watch` is set."""
+        world, body = self.world, self._body
+        world.reset(np.random.default_rng(0))
+        body.place((0.0, 0.0, 1.0), 0.0, Posture(0.0, _POSTURE))
+        for i, prop in enumerate(self._props.values()):
+            prop.place((_ASIDE_M + i, 0.0, 1.0))
+        pybullet.setGravity(0.0, 0.0, 0.0, physicsClientId=world.client)
+        constraints = [self._fix(spot.bone) for spot, _ in pressed]
+        falls = [_Fall(self, spot, self._props[ball], ball, fall_m) for spot, ball in pressed]
+        world.after_substep.extend(fall.note if watch else fall.accelerate for fall in falls)
+        for _ in range(round(seconds * world.clock.control_rate_hz)):
+            world.step()
+        del world.after_substep[-len(falls) :]
+        for constraint in constraints:
+            pybullet.removeConstraint(constraint, physicsClientId=world.client)
+        readings = self.read().copy()
+        return [Press(np.array(f.touch), np.array(f.force_n), readings) for f in falls]
+
+    def read(self) -> Floats:
+        """Return the present readings of all taxels."""
+        self.world.refresh()
+        return self._sense.update_taxels()
+
+    def pose(self, spot: Spot) -> tuple[Floats, Floats]:
+        """Return the position of a spot and the outward normal, world frame."""
+        bone = self._body.bone(spot.bone)
+        out = bone.rotation @ np.array(spot.outward)
+        return bone.position + bone.rotation @ np.array(spot.point_m), out
+
+    def force_n(self, prop: Prop) -> float:
+        """Return the normal forces between a ball and the body."""
+        points = pybullet.getContactPoints(
+            prop.body_id, self._body.body_id, physicsClientId=self.world.client
+        )
+        return math.fsum(point[9] for point in points)
+
+    def _fix(self, bone: str) -> int:
+        """Fix a bone in its present pose."""
+        client, body_id = self.world.client, self._body.body_id
+        names = [
+            pybullet.getJointInfo(body_id, link, physicsClientId=client)[12].decode()
+            for link in range(pybullet.getNumJoints(body_id, physicsClientId=client))
+        ]
+        link = names.index(bone)
+        state = pybullet.getLinkState(body_id, link, 0, 1, physicsClientId=client)
+        ends = ((0.0, 0.0, 0.0), state[0], (0.0, 0.0, 0.0, 1.0), state[1])
+        constraint = pybullet.createConstraint(
+            body_id, link, -1, -1, pybullet.JOINT_FIXED, (0, 0, 0), *ends, physicsClientId=client
+        )
+        pybullet.changeConstraint(constraint, maxForce=_FIXING_N, physicsClientId=client)
+        return int(constraint)
+
+
+class _Fall:
+    """One ball above one spot."""
+
+    def __init__(self, arms: FixedArms, spot: Spot, prop: Prop, ball: Ball, fall_m: float) -> None:
+        self._arms, self._prop = arms, prop
+        self.touch: list[float] = []
+        self.force_n: list[float] = []
+        bone = load_skeleton().bone(spot.bone)
+        first = load_taxels().first_triangle
+        self._triangles = slice(first[bone], first[bone + 1])
+        self._point, self._out = arms.pose(spot)
+        skin_m = load_skeleton().bones[bone].skin_thickness_m
+        prop.place(self._point + (skin_m + ball.radius_m + fall_m) * self._out)
+        self.accelerate()
+
+    def note(self) -> None:
+        """Record readings and forces after a physics step."""
+        self.force_n.append(self._arms.force_n(self._prop))
+        self.touch.append(float(self._arms.read()[self._triangles].max()))
+        self.accelerate()
+
+    def accelerate(self) -> None:
+        """Accelerate the ball towards the skin by g, and constrain it to the normal."""
+        world, body_id = self._arms.world, self._prop.body_id
+        velocity, _ = pybullet.getBaseVelocity(body_id, physicsClientId=world.client)
+        along = np.dot(velocity, self._out) - GRAVITY_MPS2 * world.clock.substep_s
+        centre, turn = pybullet.getBasePositionAndOrientation(body_id, physicsClientId=world.client)
+        on_normal = self._point + np.dot(centre - self._point, self._out) * self._out
+        pybullet.resetBasePositionAndOrientation(
+            body_id, on_normal, turn, physicsClientId=world.client
+        )
+        pybullet.resetBaseVelocity(
+            body_id, along * self._out, (0.0, 0.0, 0.0), physicsClientId=world.client
+        )
+
+
+def _prop(ball: Ball) -> PropCfg:
+    name = f"ball of {ball.mass_kg} kg and {ball.radius_m} m"
+    return PropCfg(name, PropShape.sphere, [ball.radius_m], mass_kg=ball.mass_kg, restitution=0.0)
