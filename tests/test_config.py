@@ -97,7 +97,7 @@ def test_files_hold_only_what_differs_from_the_dataclasses():
         ([KICK, "task.weights.kik=1"], r"unknown key 'task.weights.kik' .*choices: approach, kick"),
         (
             [KICK, "senses/audio=off"],
-            r"unknown senses/audio 'off'; choices: deaf, hrtf, hrtf_child, mono, ster",
+            r"unknown senses/audio 'off'; choices: deaf, hrtf, hrtf_child, hrtf_impacts, mono",
         ),
         ([KICK, "playground=hose"], r"unknown playground 'hose'.*; choices: .*single_room"),
         ([KICK, "senses.audio.quality=loud"], r"'loud', expected one of \[hrtf, stereo, mono\]"),

@@ -1,7 +1,10 @@
 """Sounds of impacts: silent at rest, louder with the impulse, deterministic."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from composed import compose
 
 from veca_marl.sim.body.walker import Walker, WalkerCfg
 from veca_marl.sim.physics import PlaygroundCfg, World
@@ -91,6 +94,17 @@ def test_without_the_option_there_are_no_sources():
     world = world_with(ball(0.5), present=False)
     assert not world.sound.sources
     world.close()
+
+
+def test_a_preset_of_hearing_turns_them_on_in_any_playground():
+    plain, loud = (
+        compose(["+task=KickTheBall", f"senses/audio={preset}"])
+        for preset in ("hrtf", "hrtf_impacts")
+    )
+    assert not plain.playground.impacts.present
+    assert loud.playground.impacts.present
+    assert loud.senses.audio == plain.senses.audio
+    assert replace(loud.playground, impacts=ImpactCfg()) == plain.playground
 
 
 def test_material_and_size_determine_pitch_and_decay():
