@@ -17,7 +17,7 @@ from veca_marl.envs.tasks.objects.grab_object import GrabObject
 from veca_marl.envs.tasks.objects.move_to_target import MoveToTarget
 from veca_marl.sim.geometry import Floats
 
-_LIFT_M = 0.08
+_LIFT_M = 0.10
 _CARRY_CLEARANCE_M = 0.03
 
 
