@@ -66,7 +66,7 @@ def test_it_starts_standing_with_the_room_ahead(game):
         assert not outcome.terminated
 
 
-@pytest.mark.parametrize(("body", "way_m"), [("mitten_limbs", 0.15), ("mitten_position", 0.05)])
+@pytest.mark.parametrize(("body", "way_m"), [("mitten_limbs", 0.25), ("mitten_position", 0.25)])
 def test_the_expert_runs_forwards(body, way_m):
     rng = np.random.default_rng(3)
     with child_game("RunBaby", f"body={body}") as game:

@@ -18,30 +18,30 @@ class RunningPattern:
     """Parameters of the gait: angles in degrees, gains in degrees per radian of inclination.
 
     Inclination is the horizontal part of the chest's up axis, forwards or to the left. The values
-    were set by hand and then improved by a random search for the distance covered before a fall.
+    were set by hand and then improved by random searches for the distance covered before a fall.
     """
 
-    frequency_hz: float = 1.88
-    hip: float = -3.4
-    hip_swing: float = 2.7
-    hip_lift: float = 15.7
-    knee: float = 18.6
-    knee_lift: float = 16.5
-    lift_lead_rad: float = 0.52
-    foot: float = 26.3
-    foot_swing: float = 19.1
-    abduction: float = 11.6
-    sway: float = -0.8
-    sway_lead_rad: float = -0.66
-    spine: float = -8.9
-    arm: float = -2.9
-    arm_swing: float = 9.6
-    arm_abduction: float = -39.0
-    hip_gain: float = 24.1
-    hip_rate_gain: float = 0.1
-    foot_gain: float = -39.0
-    abduction_gain: float = 2.8
-    abduction_rate_gain: float = 4.1
+    frequency_hz: float = 2.18
+    hip: float = -1.59
+    hip_swing: float = -0.32
+    hip_lift: float = 10.33
+    knee: float = 9.75
+    knee_lift: float = 11.55
+    lift_lead_rad: float = 0.6
+    foot: float = 26.4
+    foot_swing: float = 17.82
+    abduction: float = 12.12
+    sway: float = 1.17
+    sway_lead_rad: float = -0.31
+    spine: float = -14.51
+    arm: float = -0.87
+    arm_swing: float = 20.35
+    arm_abduction: float = -58.87
+    hip_gain: float = 22.95
+    hip_rate_gain: float = -4.18
+    foot_gain: float = -32.23
+    abduction_gain: float = -1.71
+    abduction_rate_gain: float = 3.33
 
 
 class Running:
@@ -81,7 +81,7 @@ class Running:
             )
             for name, angle in limbs.items():
                 degrees[self._index[side + name]] = angle
-        return JointCommand(np.radians(degrees), horizon_s=0.0)
+        return JointCommand(np.radians(degrees), self._step_s)
 
     def _chest_inclination(self) -> Floats:
         """Return the inclination of the chest forwards and to the left, ``(2,)``."""
