@@ -110,6 +110,19 @@ class World:
         self._check_not_frozen("attach a body")
         self.movers.append(mover)
 
+    def require_solver_iterations(self, count: int) -> None:
+        """Let Bullet's solver make at least a number of iterations per physics step.
+
+        Raises:
+            RuntimeError: If the world is frozen.
+        """
+        self._check_not_frozen("change its solver")
+        current = pybullet.getPhysicsEngineParameters(physicsClientId=self.client)
+        pybullet.setPhysicsEngineParameter(
+            numSolverIterations=max(count, current["numSolverIterations"]),
+            physicsClientId=self.client,
+        )
+
     def freeze(self) -> None:
         """Save the built state, to which `reset` returns. Nothing can be added afterwards."""
         self._check_not_frozen("freeze it again")
