@@ -40,9 +40,9 @@ JOINTS = "joints"  # the part of the action that moves
 
 # physics step up to which contacts of light limbs have been found stable; joint damping is implicit
 LONGEST_STEP_S = 0.010
-# With 10 iterations the contact velocities of a body on its hands are not 0 after a physics step: the
-# hands of one that holds target angles slide together at 16 mm/s until it falls. Bodies under torque
-# control and `mitten` bodies have the iterations of the clock.
+# With 10 iterations the contact velocities of a body on its hands are not 0 after a physics step:
+# the hands of one that holds target angles slide together at 16 mm/s until it falls. `mitten`
+# bodies and those under torque control have the iterations of the clock.
 HOLDING_ITERATIONS = 20
 _UNPLACED_M = 100.0  # distance from the origin at which bodies are before the first reset
 _ARMS_OUT = Posture(0.0, {"upper_arm.abduction": 30.0})
