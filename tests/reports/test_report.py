@@ -14,6 +14,8 @@ from veca_marl.reports.runs import runs_of, team_of
 from veca_marl.sweeps.run_state import RunState
 
 EXPERIMENT = ["+experiment=audio_ablation", "experiment.seeds=[0,1,2]", "total_frames=200"]
+# without the numbers of frames that these arms have in the file
+EXPERIMENT += [f"experiment.arms.{name}=['senses/audio={name}']" for name in ("stereo", "mono")]
 RETURNS = {"hrtf": (6.0, 6.5, 7.0), "stereo": (5.0, 5.5, 6.0), "mono": (0.0, 0.5, 0.2)}
 
 
