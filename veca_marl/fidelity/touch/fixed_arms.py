@@ -93,9 +93,7 @@ class FixedArms:
         playground = PlaygroundCfg(name="empty", rooms=[room], props=[], image_order=0)
         self.world = World(playground, clock)
         # with the default number the constraint of a hand yields at 8 ms under a ball of 1.5 kg
-        pybullet.setPhysicsEngineParameter(
-            numSolverIterations=_ITERATIONS, physicsClientId=self.world.client
-        )
+        self.world.require_solver_iterations(_ITERATIONS)
         self._body = Humanoid("child", HumanoidCfg(), self.world)
         self._props = {ball: self.world.add_prop(_prop(ball)) for ball in balls}
         self._sense = TouchSense(TouchCfg(), self._body, self.world)
@@ -126,6 +124,11 @@ class FixedArms:
         """Return the present readings of all taxels."""
         self.world.refresh()
         return self._sense.update_taxels()
+
+    def largest(self, bone: str) -> float:
+        """Return the largest of the present readings on a bone."""
+        index, first = load_skeleton().bone(bone), load_taxels().first_triangle
+        return float(self.read()[first[index] : first[index + 1]].max())
 
     def pose(self, spot: Spot) -> tuple[Floats, Floats]:
         """Return the position of a spot and the outward normal, world frame."""
@@ -161,21 +164,19 @@ class _Fall:
     """One ball above one spot."""
 
     def __init__(self, arms: FixedArms, spot: Spot, prop: Prop, ball: Ball, fall_m: float) -> None:
-        self._arms, self._prop = arms, prop
+        self._arms, self._prop, self._bone = arms, prop, spot.bone
         self.touch: list[float] = []
         self.force_n: list[float] = []
-        bone = load_skeleton().bone(spot.bone)
-        first = load_taxels().first_triangle
-        self._triangles = slice(first[bone], first[bone + 1])
         self._point, self._out = arms.pose(spot)
-        skin_m = load_skeleton().bones[bone].skin_thickness_m
+        skeleton = load_skeleton()
+        skin_m = skeleton.bones[skeleton.bone(spot.bone)].skin_thickness_m
         prop.place(self._point + (skin_m + ball.radius_m + fall_m) * self._out)
         self.accelerate()
 
     def note(self) -> None:
         """Record readings and forces after a physics step."""
         self.force_n.append(self._arms.force_n(self._prop))
-        self.touch.append(float(self._arms.read()[self._triangles].max()))
+        self.touch.append(self._arms.largest(self._bone))
         self.accelerate()
 
     def accelerate(self) -> None:

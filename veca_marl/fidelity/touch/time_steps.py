@@ -8,10 +8,8 @@ import numpy as np
 
 from veca_marl.fidelity.law import Curve, Law, Mark, Plot, at_most
 from veca_marl.fidelity.touch.fixed_arms import FOREARM, PALM, Ball, FixedArms, Spot
-from veca_marl.sim.body.anatomy import load_skeleton
 from veca_marl.sim.geometry import Floats
 from veca_marl.sim.physics import ClockCfg
-from veca_marl.sim.touch import load_taxels
 
 MASSES_KG = (0.05, 0.2, 0.5, 1.5)
 SPOTS = {"palm": PALM, "forearm": FOREARM}
@@ -45,8 +43,7 @@ def readings_at_rest(clocks: Sequence[ClockCfg]) -> dict[str, Floats]:
 
 def _at_rest(arms: FixedArms, spot: Spot, ball: Ball) -> float:
     arms.press(_AT_REST_AFTER_S, 0.0, (spot, ball), watch=False)
-    bone, first = load_skeleton().bone(spot.bone), load_taxels().first_triangle
-    return float(arms.read()[first[bone] : first[bone + 1]].max())
+    return arms.largest(spot.bone)
 
 
 def peaks(

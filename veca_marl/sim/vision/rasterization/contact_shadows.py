@@ -136,30 +136,41 @@ def _vector(array: NDArray[Any]) -> Vector:
     return array[0], array[1], array[2]
 
 
+@njit(cache=True, error_model="numpy", inline="always")
+def _visible_point(eye: Ray, x: float, y: float, depth: float) -> Vector:
+    """Return the point that a pixel shows, world frame; x and y are the slopes of its ray."""
+    position, right, up, forward = eye
+    return (
+        position[0] + depth * (forward[0] + x * right[0] + y * up[0]),
+        position[1] + depth * (forward[1] + x * right[1] + y * up[1]),
+        position[2] + depth * (forward[2] + x * right[2] + y * up[2]),
+    )
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def _in_frame(frame: Ray, point: Vector) -> Vector:
+    """Return a point in the frame of a primitive: its position and its three axes."""
+    origin, ahead, left, upward = frame
+    dx, dy, dz = point[0] - origin[0], point[1] - origin[1], point[2] - origin[2]
+    return (
+        ahead[0] * dx + ahead[1] * dy + ahead[2] * dz,
+        left[0] * dx + left[1] * dy + left[2] * dz,
+        upward[0] * dx + upward[1] * dy + upward[2] * dz,
+    )
+
+
 @njit(cache=True, error_model="numpy")
 def _darken_row_of_faces(
     faces: Floats, size: Vector, frame: Ray, eye: Ray, y: float, name: int, pixels: Pixels
 ) -> None:
     """Darken the floor pixels of a row near a polyhedron, see `_darken_row`."""
     columns, depth, names, lights = pixels
-    origin, ahead, left, upward = frame
-    position, right, up, forward = eye
     for i in range(columns.shape[0]):
-        x, t = columns[i], depth[i]
-        px = position[0] + t * (forward[0] + x * right[0] + y * up[0])
-        py = position[1] + t * (forward[1] + x * right[1] + y * up[1])
-        pz = position[2] + t * (forward[2] + x * right[2] + y * up[2])
-        if abs(pz) > _FLOOR_TOLERANCE_M or names[i] == NO_SURFACE or names[i] == name:
+        point = _visible_point(eye, columns[i], y, depth[i])
+        if abs(point[2]) > _FLOOR_TOLERANCE_M or names[i] == NO_SURFACE or names[i] == name:
             continue
-        dx, dy, dz = px - origin[0], py - origin[1], pz - origin[2]
-        gap = limited_distance(
-            faces,
-            size,
-            ahead[0] * dx + ahead[1] * dy + ahead[2] * dz,
-            left[0] * dx + left[1] * dy + left[2] * dz,
-            upward[0] * dx + upward[1] * dy + upward[2] * dz,
-            REACH_M,
-        )
+        local = _in_frame(frame, point)
+        gap = limited_distance(faces, size, local[0], local[1], local[2], REACH_M)
         if gap >= REACH_M:
             continue
         nearness = max(1.0 - max(gap, 0.0) / REACH_M, 0.0)
@@ -178,22 +189,12 @@ def _darken_row(
 ) -> None:
     """Darken the floor pixels of a row; the frame is a primitive's position and its three axes."""
     columns, depth, names, lights = pixels
-    origin, ahead, left, upward = frame
-    position, right, up, forward = eye
     for i in range(columns.shape[0]):
-        x, t = columns[i], depth[i]
-        px = position[0] + t * (forward[0] + x * right[0] + y * up[0])
-        py = position[1] + t * (forward[1] + x * right[1] + y * up[1])
-        pz = position[2] + t * (forward[2] + x * right[2] + y * up[2])
-        dx, dy, dz = px - origin[0], py - origin[1], pz - origin[2]
-        local = (
-            single(ahead[0] * dx + ahead[1] * dy + ahead[2] * dz),
-            single(left[0] * dx + left[1] * dy + left[2] * dz),
-            single(upward[0] * dx + upward[1] * dy + upward[2] * dz),
-        )
-        gap = distance(shape, size, local[0], local[1], local[2])
+        point = _visible_point(eye, columns[i], y, depth[i])
+        local = _in_frame(frame, point)
+        gap = distance(shape, size, single(local[0]), single(local[1]), single(local[2]))
         gap = gap if gap > 0.0 else 0.0
         nearness = 1.0 - gap / REACH_M
-        no_floor = abs(pz) > _FLOOR_TOLERANCE_M or names[i] == NO_SURFACE or names[i] == name
+        no_floor = abs(point[2]) > _FLOOR_TOLERANCE_M or names[i] == NO_SURFACE or names[i] == name
         nearness = 0.0 if no_floor or nearness < 0.0 else nearness
         lights[i] *= single(1.0 - DARKNESS * nearness * nearness)
