@@ -156,8 +156,7 @@ def measure_ears(playground: PlaygroundCfg, steps: int) -> float:
     for step in range(steps):
         angle = 0.05 * step
         source.position = (2.0 * math.cos(angle), 2.0 * math.sin(angle), 0.15)
-        walker.yaw_rad = -0.5 * angle
-        walker.write_frames()
+        walker.place((0.0, 0.0, 0.0), yaw_rad=-0.5 * angle)
         costs.append(thread_ms(hear))
     world.close()
     return median(costs)

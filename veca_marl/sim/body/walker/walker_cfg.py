@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from veca_marl.sim.body.body_cfg import BodyCfg
-from veca_marl.sim.body.walker.walk_commands import WalkActionKind
+from veca_marl.sim.body.walker.actions.walk_commands import WalkActionKind
 from veca_marl.sim.physics import ClockCfg
 from veca_marl.sim.physics.interactions import check_interactions
 

@@ -22,8 +22,8 @@ from typing import Any
 
 import numpy as np
 
-from veca_marl.sim.body.walker.leaves import Leaves
-from veca_marl.sim.body.walker.obstacle_boxes import ObstacleBoxes
+from veca_marl.sim.body.walker.collisions.leaves import Leaves
+from veca_marl.sim.body.walker.collisions.obstacle_boxes import ObstacleBoxes
 from veca_marl.sim.geometry import Floats, Primitive, Scene, Shape, quaternion_from_yaw
 from veca_marl.sim.physics import Prop, World, create_collision_shape, pybullet
 

@@ -14,17 +14,17 @@ from typing import Protocol
 import numpy as np
 from numba import njit
 
-from veca_marl.sim.body.walker.verb_part import VerbUser, apply_verbs
+from veca_marl.sim.body.walker.actions.verb_part import VerbUser, apply_verbs
 from veca_marl.sim.geometry import Floats
 from veca_marl.sim.physics import World
 
-# a pair of which a wall stops one walker closes half of its overlap in each round
+# when a wall stops one walker of a pair, each round removes half of the remaining overlap
 _ROUNDS = 16
 _TOLERANCE_M = 1e-7
 
 
 class CollidingWalker(VerbUser, Protocol):
-    """What the collision handling needs of a walker."""
+    """The interface of a walker that the collision handling uses."""
 
     def reset(self) -> None:
         """See `Mover`."""
@@ -44,7 +44,7 @@ class CollidingWalker(VerbUser, Protocol):
         ...
 
     def proposed_position(self, substep_s: float) -> tuple[float, float]:
-        """Return where it would be after this physics step without obstacles, metres."""
+        """Turn; return the position after this physics step without obstacles, metres."""
         ...
 
     def resolve_contacts(self, x: float, y: float) -> tuple[float, float]:
@@ -52,12 +52,12 @@ class CollidingWalker(VerbUser, Protocol):
         ...
 
     def set_position(self, x: float, y: float, substep_s: float) -> None:
-        """Take a position at the end of this physics step."""
+        """Set the position at the end of this physics step."""
         ...
 
 
 class WalkerCollisions:
-    """Moves all walkers of one world; the world knows this object in their place."""
+    """Moves all walkers of one world; the world attaches this object instead of each walker."""
 
     def __init__(self) -> None:
         self._walkers: list[CollidingWalker] = []
@@ -131,12 +131,7 @@ def separate(positions: Floats, radii: Floats, corrections: Floats) -> bool:
     """
     n = len(positions)
     corrections[:] = 0.0
-    counts = np.zeros(n)
-    for i in range(n):
-        for j in range(i):
-            if _overlap(positions, radii, i, j) > _TOLERANCE_M:
-                counts[i] += 1.0
-                counts[j] += 1.0
+    counts = _overlap_counts(positions, radii)
     for i in range(n):
         for j in range(i):
             overlap = _overlap(positions, radii, i, j)
@@ -152,6 +147,18 @@ def separate(positions: Floats, radii: Floats, corrections: Floats) -> bool:
             corrections[j, 0] -= dx * share
             corrections[j, 1] -= dy * share
     return bool(counts.any())
+
+
+@njit(cache=True)
+def _overlap_counts(positions: Floats, radii: Floats) -> Floats:
+    """Return for each disc how many others it overlaps, ``(n,)``."""
+    counts = np.zeros(len(positions))
+    for i in range(len(positions)):
+        for j in range(i):
+            if _overlap(positions, radii, i, j) > _TOLERANCE_M:
+                counts[i] += 1.0
+                counts[j] += 1.0
+    return counts
 
 
 @njit(cache=True)

@@ -10,8 +10,8 @@ import numpy as np
 
 from veca_marl.sim.body.anatomy import Skeleton, Soles
 from veca_marl.sim.body.anatomy.undersides import Underside
-from veca_marl.sim.body.walker.capsule import Capsule, lying_capsule, upright_capsule
-from veca_marl.sim.body.walker.gait import Gait
+from veca_marl.sim.body.walker.animation.gait import Gait
+from veca_marl.sim.body.walker.collisions.capsule import Capsule, lying_capsule, upright_capsule
 from veca_marl.sim.body.walker.walker_cfg import WalkerCfg
 from veca_marl.sim.geometry import Floats
 from veca_marl.sim.physics import World
@@ -19,12 +19,12 @@ from veca_marl.sim.physics.interactions import Crawl
 
 
 class Stance(Protocol):
-    """How a walker is posed and collides.
+    """Pose and collision capsule of a walker.
 
     Attributes:
         capsule: Its capsule in the physics.
         speed_share: Speeds of full actions as fractions of those in walking.
-        underside: What touches the surface on which it is.
+        underside: The bones that touch the surface.
         hands_are_free: Whether it can hold, kick and step.
     """
 
@@ -129,10 +129,7 @@ class OnAllFours:
         self._gait, self._pose = gait, pose or CrawlPose()
         self._low = np.array([joint.low_rad for joint in skeleton.joints])
         self._high = np.array([joint.high_rad for joint in skeleton.joints])
-        self._rest: Floats = np.zeros(len(skeleton.joints))
-        for (bone, label), degrees in self._pose.joints_deg.items():
-            for side in "lr":
-                self._rest[skeleton.joint(f"{side}_{bone}", label)] = math.radians(degrees)
+        self._rest = _resting_angles(skeleton, self._pose)
         self._diagonals = [
             [
                 skeleton.joint(f"{leg}_thigh", "flexion"),
@@ -167,6 +164,15 @@ class OnAllFours:
         angles[self._shake] = head_yaw_rad / 2.0
         clipped: Floats = np.clip(angles, self._low, self._high)
         return clipped
+
+
+def _resting_angles(skeleton: Skeleton, pose: CrawlPose) -> Floats:
+    """Return the joint angles ``(J,)`` in rad of crawling without the swing of the limbs."""
+    angles = np.zeros(len(skeleton.joints))
+    for (bone, label), degrees in pose.joints_deg.items():
+        for side in "lr":
+            angles[skeleton.joint(f"{side}_{bone}", label)] = math.radians(degrees)
+    return angles
 
 
 def make_stances(

@@ -95,12 +95,16 @@ class Gait:
         self._shake = (joint("neck", "rotation"), joint("head", "rotation"))
         self._low = np.array([j.low_rad for j in skeleton.joints])
         self._high = np.array([j.high_rad for j in skeleton.joints])
+        self._measure_legs(skeleton)
+        self.angles: Floats = np.zeros(len(skeleton.joints))
+        self.reset()
+
+    def _measure_legs(self, skeleton: Skeleton) -> None:
+        """Read the positions of the hips and the lengths of thigh and shank."""
         origins = skeleton.origins
         self._hip_y_m = tuple(float(origins[skeleton.bone(f"{s}_thigh"), 1]) for s in "lr")
         self._thigh_m = -float(origins[skeleton.bone("l_shank"), 2])
         self._shank_m = -float(origins[skeleton.bone("l_foot"), 2])
-        self.angles: Floats = np.zeros(len(skeleton.joints))
-        self.reset()
 
     @property
     def pitch_range_rad(self) -> tuple[float, float]:

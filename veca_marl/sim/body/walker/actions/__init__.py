@@ -1,0 +1,1 @@
+"""The parts of a walker's action: velocities or moves, and verbs."""

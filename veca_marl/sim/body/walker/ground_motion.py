@@ -1,0 +1,151 @@
+"""The motion of a walker over floor and props: position, heading, stance and contacts."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from veca_marl.sim.body.base import Body
+from veca_marl.sim.body.walker.animation.stances import Stance
+from veca_marl.sim.body.walker.collisions.capsule import Capsule
+from veca_marl.sim.body.walker.collisions.footing import Footing, middle
+from veca_marl.sim.geometry import Floats
+from veca_marl.sim.physics import Prop, World
+
+
+class GroundMotion:
+    """Moves the capsule of one walker at commanded speeds and keeps it out of obstacles.
+
+    Args:
+        world: The world.
+        upright: The stance in which an episode starts.
+        on_all_fours: The stance of crawling; None for a walker that does not crawl.
+
+    Attributes:
+        stance: The stance at present; its capsule is the one that collides.
+        footing: What the walker stands on.
+        ground: ``(2,)`` metres, position on the floor plan.
+        yaw_rad: Heading.
+        velocity: ``(3,)`` m/s, mean over the last agent step, after contacts.
+        speed_mps: Commanded speed, forward.
+        turn_radps: Commanded turning speed, left is positive.
+    """
+
+    def __init__(self, world: World, upright: Stance, on_all_fours: Stance | None) -> None:
+        self._world = world
+        self._upright, self._on_all_fours = upright, on_all_fours
+        self.stance = upright
+        self.footing = Footing(world.client)
+        self.ground: Floats = np.zeros(2)
+        self.velocity: Floats = np.zeros(3)
+        self.yaw_rad = self.speed_mps = self.turn_radps = 0.0
+
+    @property
+    def capsule(self) -> Capsule:
+        """The capsule of the present stance."""
+        return self.stance.capsule
+
+    @property
+    def can_crawl(self) -> bool:
+        """Whether the walker has the stance of crawling."""
+        return self._on_all_fours is not None
+
+    @property
+    def crawls(self) -> bool:
+        """Whether the walker is on hands and knees."""
+        return self.stance is self._on_all_fours
+
+    def start(self, x: float, y: float, yaw_rad: float) -> None:
+        """Stand upright, at rest, at the position on the floor nearest to ``(x, y)`` that is free.
+
+        Args:
+            x: Metres.
+            y: Metres.
+            yaw_rad: Heading.
+        """
+        self.ground, self.velocity = np.array([x, y]), np.zeros(3)
+        self.yaw_rad = yaw_rad
+        self.speed_mps = self.turn_radps = 0.0
+        self._stand_on_floor()
+        self._collect_obstacles(0.0)
+        self.ground[:] = self.capsule.resolve_contacts(self.ground[0], self.ground[1])
+        self.capsule.set_velocity(0.0, 0.0, 0.0)
+        self._step_start = self.ground.copy()
+
+    def before_step(self) -> None:
+        """Collect the obstacles that can be reached within this agent step."""
+        self._step_start = self.ground.copy()
+        self._collect_obstacles(abs(self.speed_mps) * self._world.clock.step_s)
+
+    def proposed_position(self, substep_s: float) -> tuple[float, float]:
+        """Turn; return the position after this physics step without obstacles, metres."""
+        self.yaw_rad += self.turn_radps * substep_s
+        self.stance.turn(self.yaw_rad)
+        distance = self.speed_mps * substep_s
+        x, y = self.ground
+        return x + distance * math.cos(self.yaw_rad), y + distance * math.sin(self.yaw_rad)
+
+    def set_position(self, x: float, y: float, substep_s: float) -> tuple[float, float]:
+        """Set the position at the end of a physics step; return the velocity (x, y) in m/s."""
+        vx, vy = (x - self.ground[0]) / substep_s, (y - self.ground[1]) / substep_s
+        self.ground[:] = x, y
+        self.capsule.set_velocity(vx, vy, self.turn_radps)
+        if self.footing.prop is not None:
+            self._update_surface()
+        return vx, vy
+
+    def after_step(self) -> None:
+        """Compute the mean velocity over this agent step."""
+        self.velocity[:2] = (self.ground - self._step_start) / self._world.clock.step_s
+
+    def step_on(self, prop: Prop) -> None:
+        """Stand on the middle of a prop, which is no obstacle from now on."""
+        self.footing.step_on(prop)
+        self.ground[:] = middle(prop)
+        self.capsule.support_id = prop.body_id
+        self._update_surface()
+
+    def crawl(self) -> bool:
+        """Go down on hands and knees; return False, without effect, where there is no room."""
+        return self._on_all_fours is not None and self._change_stance(self._on_all_fours)
+
+    def stand_up(self) -> bool:
+        """Stand upright; return False, without effect, where there is no room."""
+        return self._change_stance(self._upright)
+
+    def _change_stance(self, stance: Stance) -> bool:
+        """Change the stance if its capsule is free of obstacles; return whether it is."""
+        before, self.stance = self.stance, stance
+        self._collect_obstacles(0.0)
+        stance.turn(self.yaw_rad)
+        if self.capsule.overlaps(*self.ground):
+            self.capsule.park()
+            self.stance = before
+            return False
+        before.capsule.park()
+        return True
+
+    def _stand_on_floor(self) -> None:
+        """Stand upright on the floor."""
+        self.footing.leave()
+        if self._on_all_fours is not None:
+            # disabling contacts with new obstacles within an episode would alter other contacts
+            self.stance = self._on_all_fours
+            self._collect_obstacles(0.0)
+            self.capsule.park()
+        self.stance = self._upright
+        self.capsule.base_m, self.capsule.support_id = 0.0, -1
+
+    def _update_surface(self) -> None:
+        """Set the height of the capsule to that of the surface under it."""
+        self.footing.follow(*self.ground)
+        self.capsule.base_m = self.footing.height_m
+        if self.footing.prop is None:
+            self.capsule.support_id = -1
+
+    def _collect_obstacles(self, distance_m: float) -> None:
+        """Collect the obstacles within a distance, joint-level bodies among them."""
+        movers = self._world.movers
+        bodies = [id_ for mover in movers if isinstance(mover, Body) for id_ in mover.obstacle_ids]
+        self.capsule.collect_obstacles(self._world.props, bodies, self.ground, distance_m)

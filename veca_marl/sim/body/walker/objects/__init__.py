@@ -1,0 +1,1 @@
+"""What a walker does with props: hold one in the hand, and kick."""
