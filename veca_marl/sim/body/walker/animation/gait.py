@@ -77,6 +77,8 @@ class Gait:
         phase: Of the stride, in [0, 1).
         angles: ``(82,)`` rad, as of the last `pose`.
         landing_mps: Speed at which a foot landed in the last `advance`; 0 if none did.
+        pitch_range_rad: Range of the head's pitch (down is positive): neck and head together.
+        yaw_range_rad: Range of its yaw (left is positive), likewise.
         carrying: Whether the right hand is held in front of the body.
     """
 
@@ -95,6 +97,8 @@ class Gait:
         self._shake = (joint("neck", "rotation"), joint("head", "rotation"))
         self._low = np.array([j.low_rad for j in skeleton.joints])
         self._high = np.array([j.high_rad for j in skeleton.joints])
+        self.pitch_range_rad = self._range_rad(self._nod)
+        self.yaw_range_rad = self._range_rad(self._shake)
         self._measure_legs(skeleton)
         self.angles: Floats = np.zeros(len(skeleton.joints))
         self.reset()
@@ -106,16 +110,9 @@ class Gait:
         self._thigh_m = -float(origins[skeleton.bone("l_shank"), 2])
         self._shank_m = -float(origins[skeleton.bone("l_foot"), 2])
 
-    @property
-    def pitch_range_rad(self) -> tuple[float, float]:
-        """Range of the head's pitch (down is positive): neck and head together."""
-        low, high = self._low[list(self._nod)].sum(), self._high[list(self._nod)].sum()
-        return float(low), float(high)
-
-    @property
-    def yaw_range_rad(self) -> tuple[float, float]:
-        """Range of the head's yaw (left is positive): neck and head together."""
-        low, high = self._low[list(self._shake)].sum(), self._high[list(self._shake)].sum()
+    def _range_rad(self, joints: tuple[int, ...]) -> tuple[float, float]:
+        """Return the sums of the least and of the greatest angles of some joints."""
+        low, high = self._low[list(joints)].sum(), self._high[list(joints)].sum()
         return float(low), float(high)
 
     def reset(self) -> None:
