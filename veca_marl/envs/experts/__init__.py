@@ -1,20 +1,23 @@
 """Scripted policies of the tasks. Importing this package registers them; see `core.expert`.
 
-One module per task or family of tasks lies here. `control`, `perception` and `skills` hold what
-experts share. Tasks do not import this package.
+The expert of a task is in the package of the same name as that of the task in `envs.tasks`.
+`control`, `perception` and `skills` contain what experts share. Tasks do not import this package.
 """
 
-import veca_marl.envs.experts.blocks
-import veca_marl.envs.experts.cars
-import veca_marl.envs.experts.developmental
-import veca_marl.envs.experts.escape
-import veca_marl.envs.experts.grasping
-import veca_marl.envs.experts.kick_the_ball
-import veca_marl.envs.experts.maze_navigation
-import veca_marl.envs.experts.motor_skills
-import veca_marl.envs.experts.navigation
-import veca_marl.envs.experts.object_navigation
-import veca_marl.envs.experts.push_out
-import veca_marl.envs.experts.rotate_cube
-import veca_marl.envs.experts.soccer
-import veca_marl.envs.experts.sorting  # noqa: F401
+import veca_marl.envs.experts.cars.chase_car
+import veca_marl.envs.experts.cars.dodge_car
+import veca_marl.envs.experts.contests.push_out
+import veca_marl.envs.experts.contests.soccer
+import veca_marl.envs.experts.developmental.hand_regard
+import veca_marl.envs.experts.developmental.self_touch
+import veca_marl.envs.experts.escape.babyzumas_revenge
+import veca_marl.envs.experts.locomotion.motor_skills
+import veca_marl.envs.experts.multimodal.kick_the_ball
+import veca_marl.envs.experts.navigation.maze_nav
+import veca_marl.envs.experts.navigation.multi_agent_nav
+import veca_marl.envs.experts.navigation.object_nav
+import veca_marl.envs.experts.objects.blocks
+import veca_marl.envs.experts.objects.grasping
+import veca_marl.envs.experts.objects.rotate_cube
+import veca_marl.envs.experts.sorting.fill_fraction
+import veca_marl.envs.experts.sorting.sorting_task  # noqa: F401

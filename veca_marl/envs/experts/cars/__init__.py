@@ -1,0 +1,1 @@
+"""Experts of the tasks with a toy car: DodgeCar, ChaseCar."""

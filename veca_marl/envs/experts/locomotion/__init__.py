@@ -1,0 +1,1 @@
+"""Experts of motor skills: TurnBaby, SitBaby, CrawlBaby, RunBaby."""

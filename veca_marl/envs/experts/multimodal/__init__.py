@@ -1,0 +1,1 @@
+"""Expert of KickTheBall."""

@@ -1,0 +1,1 @@
+"""Experts of ObjectNav, ObjectPhysNav, MazeNav, MultiAgentNav."""

@@ -1,0 +1,1 @@
+"""Experts of the tasks with objects: grasping, moving, rotating, piling up, putting down."""

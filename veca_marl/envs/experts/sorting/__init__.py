@@ -1,0 +1,1 @@
+"""Experts of ColorSort, ShapeSort, FillFraction."""
