@@ -66,7 +66,7 @@ class Build:
     fingers: bool = True
     strength: float = 1.0
     free_speed_radps: float = 20.0
-    finger_rotor_s: float = 0.004
+    finger_rotor_s: float = 0.006
     tip_rotor_s: float = 0.001
     auxiliary_share: float = 0.3
     friction: float = 0.8
