@@ -64,6 +64,49 @@ def test_a_full_body_holds_itself_on_all_fours():
     assert errors.max() < 19.0
 
 
+def mitten_on_all_fours(world, seed):
+    """Return a `mitten` that holds the angles of its start; those of seed 0 are not perturbed."""
+    body = Humanoid(
+        "child", HumanoidCfg(detail=Detail.mitten, action=JointActionKind.position), world
+    )
+    rng, posture, yaw = np.random.default_rng(seed), POSTURES["on_all_fours"], 0.0
+    if seed:
+        posture, yaw = body.perturb(posture, 2.0, rng), float(rng.uniform(-3.0, 3.0))
+    body.place((0.0, 0.0, 0.0), yaw, posture)
+    body.act(body.encode(body.posture_angles(posture)))
+    return body
+
+
+def test_the_hands_of_a_mitten_on_all_fours_do_not_slide_together():
+    # a wrist whose angle is set back at its limit in each physics step moves the palm inward
+    world = empty_world()
+    body = mitten_on_all_fours(world, 0)
+    hands = [body.bone_names.index(name) for name in ("l_hand", "r_hand")]
+    distances_m = []
+    for _ in range(50):
+        world.step()
+        distances_m.append(np.linalg.norm(np.diff(body.bone_positions()[hands], axis=0)))
+    world.close()
+    assert abs(distances_m[49] - distances_m[24]) < 0.005  # between 1 s and 2 s
+
+
+@pytest.mark.slow
+def test_a_mitten_stays_on_all_fours_for_8_s_from_nine_of_ten_starts():
+    standing = 0
+    for seed in range(10):
+        world = empty_world()
+        body = mitten_on_all_fours(world, seed)
+        lowest_m = 0.7 * body.position[2]
+        for _ in range(200):
+            world.step()
+            if body.position[2] < lowest_m:
+                break
+        else:
+            standing += 1
+        world.close()
+    assert standing >= 9
+
+
 @pytest.mark.parametrize(
     ("detail", "action", "iterations"),
     [

@@ -13,6 +13,8 @@ from walking import empty_world
 
 from veca_marl.sim.body.anatomy import load_skeleton
 from veca_marl.sim.body.humanoid import Detail, Humanoid, HumanoidCfg
+from veca_marl.sim.body.humanoid.humanoid import HOLDING_MARGIN_RAD
+from veca_marl.sim.body.humanoid.joint_control import JointActionKind
 from veca_marl.sim.physics import ClockCfg
 
 LOW = np.array([joint.low_rad for joint in load_skeleton().joints])
@@ -81,6 +83,42 @@ def test_reaching_the_limits_adds_no_energy_without_gravity(alone, speed_radps):
         reached += int((gaps <= 2e-4).sum())
     assert reached > 30
     assert (np.diff(energies) <= 0.0).all()
+
+
+@pytest.fixture
+def held():
+    world = empty_world()
+    cfg = HumanoidCfg(detail=Detail.mitten, action=JointActionKind.position)
+    body = Humanoid("child", cfg, world)
+    remove_gravity(world)
+    body.place((0.0, 0.0, 2.0), 0.0, np.zeros(82))
+    yield world, body
+    world.close()
+
+
+def test_joints_without_fingers_that_hold_angles_start_at_limits_and_return_slowly(held):
+    world, body = held
+    knees = [body.joint_names.index(f"{side}_shank.flexion") for side in "lr"]
+    fastest = []
+    world.after_substep.append(lambda: fastest.append(np.abs(body.joint_velocities()).max()))
+    body.act(body.encode(np.zeros(82)))
+    world.step()
+    assert (body.joint_angles()[knees] > LOW[knees] + HOLDING_MARGIN_RAD - 1e-4).all()
+    assert max(fastest) < 1.1  # 2.5 rad/s if they returned in one physics step
+
+
+def test_joints_that_hold_angles_beyond_their_margin_stay_within_their_limits(held):
+    world, body = held
+    seen, rng = watch_limits(world, body), np.random.default_rng(0)
+    for _ in range(25):
+        body.act({"joints": rng.choice([-1.0, 1.0], 82)})
+        world.step()
+    seen = np.array(seen)
+    assert (seen >= LOW).all()
+    assert (seen <= HIGH).all()
+    moving = body.articulation.moving
+    gaps = np.minimum(seen - LOW, HIGH - seen)[:, moving].min(0)
+    assert (gaps < HOLDING_MARGIN_RAD + 1e-3).sum() > 15
 
 
 @pytest.mark.parametrize("step_s", [0.008, 0.020])

@@ -60,6 +60,7 @@ class Articulation:
         client: The PyBullet client.
         skeleton: The table of bones and joints.
         build: Which joints move, and their strength and friction.
+        limit_margin_rad: Distance from their limits at which joints are stopped.
 
     Attributes:
         body_id: Bullet's id.
@@ -72,7 +73,9 @@ class Articulation:
         dynamics: Mass matrix and momentum.
     """
 
-    def __init__(self, client: int, skeleton: Skeleton, build: Build) -> None:
+    def __init__(
+        self, client: int, skeleton: Skeleton, build: Build, limit_margin_rad: float
+    ) -> None:
         self._client = client
         self.body_id = _load(client, skeleton, build)
         names = {f"{j.bone}.{j.label}": i for i, j in enumerate(skeleton.joints)}
@@ -93,7 +96,7 @@ class Articulation:
         self.damping[self.moving] = [found[joint][6] for joint in self.moving]
         self._base_centre = np.array(self._dynamics(-1)[3])
         self._release(low, high)
-        limits = JointLimits(low, high, _TOP_SPEED_RADPS)
+        limits = JointLimits(low, high, _TOP_SPEED_RADPS, limit_margin_rad)
         tree = read_tree(client, self.body_id)
         self.dynamics = BodyDynamics(tree, limits, self.damping[self.moving])
         self._mass_kg = float(self.dynamics.tree.masses.sum())

@@ -44,6 +44,13 @@ LONGEST_STEP_S = 0.010
 # the hands of one that holds target angles slide together at 16 mm/s until it falls. `mitten`
 # bodies and those under torque control have the iterations of the clock.
 HOLDING_ITERATIONS = 20
+# distance from their limits at which joints are stopped
+LIMIT_MARGIN_RAD = 1e-4
+# The same for `mitten` bodies that hold target angles. On all fours contacts push the wrists
+# outward by 0.005 to 0.01 rad per physics step. Beyond the limit their angles would be clipped,
+# which moves the palms inward against friction. With this margin fingers vibrate, and the gait of
+# torque-driven bodies moves them backwards less.
+HOLDING_MARGIN_RAD = 0.02
 _UNPLACED_M = 100.0  # distance from the origin at which bodies are before the first reset
 _ARMS_OUT = Posture(0.0, {"upper_arm.abduction": 30.0})
 
@@ -67,7 +74,8 @@ class Humanoid(Body):
         build = Build(cfg.detail is Detail.full, strength=cfg.strength, friction=cfg.friction)
         if cfg.detail is Detail.full and cfg.action is not JointActionKind.torque:
             world.require_solver_iterations(HOLDING_ITERATIONS)
-        self.articulation = Articulation(world.client, self._skeleton, build)
+        margin_rad = _limit_margin_rad(cfg)
+        self.articulation = Articulation(world.client, self._skeleton, build, margin_rad)
         self._control, self._update = JOINT_ACTIONS[cfg.action]
         self._chosen = np.array(chosen_joints(self._skeleton, cfg.joints))
         self._low = np.array([joint.low_rad for joint in self._skeleton.joints])
@@ -297,3 +305,9 @@ def _check_substep(name: str, substep_s: float) -> None:
             f"{name}: physics steps of {substep_s * 1e3:.1f} ms are too long for the contacts of a "
             f"joint-level body; at most {LONGEST_STEP_S * 1e3:.0f} ms: raise clock.substeps"
         )
+
+
+def _limit_margin_rad(cfg: HumanoidCfg) -> float:
+    """Return the distance from their limits at which the joints of a body are stopped, rad."""
+    holds = cfg.action is not JointActionKind.torque
+    return HOLDING_MARGIN_RAD if holds and cfg.detail is Detail.mitten else LIMIT_MARGIN_RAD

@@ -22,8 +22,9 @@ from veca_marl.sim.body.humanoid.dynamics.tree import LinkTree
 # inertia of the damper that holds a joint at its limit, relative to the joint's own
 _STOP_INERTIA = 1e6
 _REVISIONS = 2  # of the set of held joints
-# joints are held this far inside their limits, so that rounding does not take them beyond
-_INSET_RAD = 1e-4
+# greatest speed at which a joint inside the margin of a limit is returned: bodies with straight
+# knees and elbows start there
+_RETURN_SPEED_RADPS = 1.0
 _SAME_SPEED_RADPS = 1e-4  # difference of joint speeds below which Bullet's are kept
 
 
@@ -36,9 +37,9 @@ def write_torques(
     With mass matrix M, bias h, motor torques u, damping D, stiffness K of the motors and the
     external forces f that are predicted, accelerations a solve
     ``(M + dt D + dt^2 K) a = u + f - h - (D + dt K) v``, and the torques are
-    ``u - (D + dt K) (v + dt a)``. A joint that would pass a limit is held by a damper that is stiff
-    enough to give it the speed with which it reaches the limit. The joints that need it are found
-    by revision, which starts from those of the last step.
+    ``u - (D + dt K) (v + dt a)``. A joint that would enter the margin of a limit is held by a
+    damper that is stiff enough to give it the speed with which it reaches the margin. The joints
+    that need it are found by revision, which starts from those of the last step.
 
     Args:
         tree: The tree of n hinges.
@@ -95,23 +96,31 @@ def _accelerate(
 def _stop_acceleration(
     k: int, limits: JointLimits, step_s: float, state: BodyState, forces: JointForces
 ) -> float:
-    """Return the acceleration with which a joint reaches its limit at the end of the step."""
-    stop = limits.high[k] - _INSET_RAD if forces.held[k] > 0.0 else limits.low[k] + _INSET_RAD
-    speed: float = (stop - state.angles[k]) / step_s - state.velocity[6 + k]
-    return speed / step_s
+    """Return the acceleration with which a held joint reaches its margin at the end of the step.
+
+    Contacts push joints into the margin. They are returned at no more than `_RETURN_SPEED_RADPS`.
+    """
+    if forces.held[k] > 0.0:
+        stop = limits.high[k] - limits.margin
+        speed = max((stop - state.angles[k]) / step_s, -_RETURN_SPEED_RADPS)
+    else:
+        stop = limits.low[k] + limits.margin
+        speed = min((stop - state.angles[k]) / step_s, _RETURN_SPEED_RADPS)
+    change: float = speed - state.velocity[6 + k]
+    return change / step_s
 
 
 @njit(cache=True)
 def _revise(limits: JointLimits, step_s: float, state: BodyState, forces: JointForces) -> bool:
-    """Hold joints that would pass a limit, release those that pull; return whether any changed."""
+    """Hold joints that would enter a margin, release those that pull; return if any changed."""
     changed = False
     for k in range(limits.low.shape[0]):
         acceleration = forces.accelerations[6 + k]
         angle = state.angles[k] + step_s * (state.velocity[6 + k] + step_s * acceleration)
         if forces.held[k] == 0.0:
-            if angle > limits.high[k] - _INSET_RAD:
+            if angle > limits.high[k] - limits.margin:
                 forces.held[k], changed = 1.0, True
-            elif angle < limits.low[k] + _INSET_RAD:
+            elif angle < limits.low[k] + limits.margin:
                 forces.held[k], changed = -1.0, True
         else:
             stop = _stop_acceleration(k, limits, step_s, state, forces)

@@ -115,11 +115,13 @@ class JointLimits(NamedTuple):
         low: ``(n,)`` rad, lower limits.
         high: ``(n,)`` rad, upper limits.
         speed: rad/s, greatest speed of all joints.
+        margin: rad, joints are stopped this far inside `low` and `high`.
     """
 
     low: Floats
     high: Floats
     speed: float
+    margin: float
 
 
 class JointForces(NamedTuple):
