@@ -10,7 +10,7 @@ from listening import render as render_field
 from veca_marl.sim.body.walker import Walker, WalkerCfg
 from veca_marl.sim.geometry import Pose
 from veca_marl.sim.hearing import AudioCfg, AudioSense
-from veca_marl.sim.physics import World
+from veca_marl.sim.physics import JointCfg, PropCfg, PropShape, World
 from veca_marl.sim.sound import Call, Clip, House, Room, SoundField
 
 WEST = Room((-3.0, -3.0, 0.0), (6.0, 6.0, 2.6), 0.5)
@@ -18,6 +18,14 @@ EAST = Room((3.1, -3.0, 0.0), (5.0, 6.0, 2.6), 0.4)
 BETWEEN = ((3.05, 0.0, 1.3), np.eye(3), (0.05, 3.0, 1.3))
 NOISE = np.random.default_rng(0).standard_normal(12 * STEP).astype(np.float32)
 LOSS_DB = 30.0
+DOOR = PropCfg(
+    "door",
+    PropShape.box,
+    [0.04, 0.9, 2.0],
+    (1.5, 0.0, 1.05),
+    mass_kg=1.0,
+    joint=JointCfg(axis=(0.0, 0.0, -1.0), anchor_m=(0.02, -0.45, 0.0), range_deg=100.0),
+)
 
 
 def house(*walls, loss_db=LOSS_DB, order=1):
@@ -180,7 +188,7 @@ def test_a_moving_obstacle_is_heard_while_source_and_listener_are_at_rest():
 
 def test_arrivals_that_are_computed_again_or_reused_give_the_same_bytes():
     heard = []
-    for moves_each_step in (False, True):
+    for changes_each_step in (False, True):
         rooms = house(BETWEEN)
         field = SoundField(rooms, STEP, RATE)
         source = field.add_source("noise", Clip(NOISE, loop=True))
@@ -190,8 +198,8 @@ def test_arrivals_that_are_computed_again_or_reused_give_the_same_bytes():
             source.position = (1.0, 0.5 + 0.02 * (step // 4), 1.0)
             if step == 9:
                 source.teleport(source.position)
-            if moves_each_step:  # the wall stays where it is, but its arrivals are not reused
-                rooms.obstacles.move(0, *BETWEEN[:2])
+            if changes_each_step:  # the wall stays where it is, but arrivals are not reused
+                rooms.obstacles.changes += 1
             field.advance()
             head = pose(-1.0 + 0.02 * (step // 6), 0.0, 1.0)
             if step == 12:
@@ -201,6 +209,42 @@ def test_arrivals_that_are_computed_again_or_reused_give_the_same_bytes():
             heard.append(listener.render(head))
     alike = len(heard) // 2
     assert np.array_equal(np.stack(heard[:alike]), np.stack(heard[alike:]))
+
+
+def test_an_obstacle_that_is_set_to_its_own_pose_is_no_change():
+    obstacles = house(BETWEEN).obstacles
+    before = obstacles.changes
+    obstacles.move(0, *BETWEEN[:2])
+    assert obstacles.changes == before
+    turned = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    for centre, rotation in ((BETWEEN[0], turned), ((3.05, 0.1, 1.3), turned)):
+        obstacles.move(0, centre, rotation)
+        before += 1
+        assert obstacles.changes == before
+
+
+def test_arrivals_are_computed_once_while_doors_and_everything_else_are_at_rest(monkeypatch):
+    world = World(compose(["+task=KickTheBall", "playground=two_rooms"]).playground)
+    world.add_prop(DOOR)
+    listener = Walker("listener", WalkerCfg(), world)
+    ears = AudioSense(AudioCfg(), listener, world)
+    source = world.sound.add_source("noise", Clip(NOISE, loop=True))
+    world.freeze()
+    world.reset(np.random.default_rng(0))
+    ears.reset()
+    source.teleport((0.5, 0.5, 1.0))
+    calls = []
+    arrivals = House.arrivals
+    monkeypatch.setattr(House, "arrivals", lambda *args: calls.append(1) or arrivals(*args))
+    for _ in range(6):
+        world.step()
+        ears.compute()
+    assert len(calls) == 1
+    world.prop("door").set_opening(0.5)
+    world.step()
+    ears.compute()
+    assert len(calls) == 2
+    world.close()
 
 
 @pytest.mark.parametrize("half", [(1.0, 1.0), (1.0, 0.0, 1.0), (1.0, np.nan, 1.0)])

@@ -18,7 +18,7 @@ class Obstacles:
     """Boxes that attenuate sound. An owner moves its box by the number that `add` has returned.
 
     Attributes:
-        changes: How many times a box was added or moved.
+        changes: How many times a box was added, or moved to another pose.
     """
 
     def __init__(self) -> None:
@@ -48,15 +48,19 @@ class Obstacles:
         return len(self._halves) - 1
 
     def move(self, number: int, centre: ArrayLike, rotation: ArrayLike) -> None:
-        """Set the pose of a box.
+        """Set the pose of a box. The pose that it has already is not counted as a change.
 
         Args:
             number: As returned by `add`.
             centre: ``(3,)`` metres, world frame.
             rotation: ``(3, 3)`` from the axes of the box to the world's.
         """
-        self._centres[number] = centre
-        self._rotations[number] = rotation
+        pose = np.asarray(centre, np.float64), np.asarray(rotation, np.float64)
+        # bytes are compared faster than arrays
+        stored = self._centres[number].tobytes() + self._rotations[number].tobytes()
+        if stored == pose[0].tobytes() + pose[1].tobytes():
+            return
+        self._centres[number], self._rotations[number] = pose
         self.changes += 1
 
     def between(self, one: Floats, other: Floats) -> int:
