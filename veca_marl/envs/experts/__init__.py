@@ -16,8 +16,10 @@ import veca_marl.envs.experts.multimodal.kick_the_ball
 import veca_marl.envs.experts.navigation.maze_nav
 import veca_marl.envs.experts.navigation.multi_agent_nav
 import veca_marl.envs.experts.navigation.object_nav
-import veca_marl.envs.experts.objects.blocks
-import veca_marl.envs.experts.objects.grasping
+import veca_marl.envs.experts.objects.grab_object
+import veca_marl.envs.experts.objects.move_to_target
+import veca_marl.envs.experts.objects.pile_up_block
+import veca_marl.envs.experts.objects.put_down_block
 import veca_marl.envs.experts.objects.rotate_cube
 import veca_marl.envs.experts.sorting.fill_fraction
 import veca_marl.envs.experts.sorting.sorting_task  # noqa: F401

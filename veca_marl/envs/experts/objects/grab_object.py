@@ -1,0 +1,31 @@
+"""Expert of GrabObject: lift the toy between both palms."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from veca_marl.envs.core.expert import register_expert
+from veca_marl.envs.core.task import Player
+from veca_marl.envs.experts.objects.carrying_expert import CarryingExpert
+from veca_marl.envs.experts.skills.carrying import Carrier
+from veca_marl.envs.experts.skills.lifting import BENT, UPRIGHT, lift
+from veca_marl.envs.tasks.objects.grab_object import GrabObject
+from veca_marl.sim.geometry import Floats
+
+_LIFT_M = 0.10
+
+
+@register_expert("GrabObject")
+class GrabObjectExpert(CarryingExpert[GrabObject]):
+    """Presses the toy between both palms and lifts it; starts again after losing it.
+
+    Reads the poses of the toy and of its own bones from the simulator (privileged).
+    """
+
+    def __init__(self, task: GrabObject, player: Player) -> None:
+        carrier = Carrier(task.child, upright=UPRIGHT, bent=BENT, posture_gain=0.01)
+        super().__init__(task, player, carrier)
+
+    def _script(self) -> Iterator[Floats]:
+        height_m = self.task.cfg.edge_m / 2 + _LIFT_M
+        return lift(self.task.child, self._carrier, self.task.toy, height_m)

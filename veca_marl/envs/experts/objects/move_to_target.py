@@ -1,0 +1,42 @@
+"""Expert of MoveToTarget: carry the toy to the mark."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from veca_marl.envs.core.expert import register_expert
+from veca_marl.envs.core.scoring import horizontal
+from veca_marl.envs.core.task import Player
+from veca_marl.envs.experts.objects.carrying_expert import CarryingExpert
+from veca_marl.envs.experts.skills.carrying import Carrier
+from veca_marl.envs.tasks.objects.move_to_target import MoveToTarget
+from veca_marl.sim.geometry import Floats
+
+_CLEARANCE_M = 0.03  # of the carried toy above the floor
+
+
+@register_expert("MoveToTarget")
+class MoveToTargetExpert(CarryingExpert[MoveToTarget]):
+    """Presses the toy between both palms, carries it over the mark and releases it.
+
+    Starts again after losing the toy. Reads the poses of the toy, the mark and its own bones from
+    the simulator (privileged).
+    """
+
+    def __init__(self, task: MoveToTarget, player: Player) -> None:
+        super().__init__(task, player, Carrier(task.child))
+
+    def _script(self) -> Iterator[Floats]:
+        cfg = self.task.cfg
+        carry_m = cfg.edge_m / 2 + _CLEARANCE_M
+        while not self.task.distance_m < 0.5 * cfg.there_m:
+            yield from self._carrier.carry(self.task.toy, self._goal, carry_m)
+        yield from self._carrier.rest()
+
+    def _goal(self) -> Floats:
+        """Return the centre of a toy that lies on the mark, ``(3,)`` metres."""
+        height = np.array([0.0, 0.0, self.task.cfg.edge_m / 2])
+        goal: Floats = horizontal(self.task.mark.position) + height
+        return goal

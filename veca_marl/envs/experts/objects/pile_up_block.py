@@ -1,0 +1,47 @@
+"""Expert of PileUpBlock: carry a red block over the other one."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+from functools import partial
+
+import numpy as np
+
+from veca_marl.envs.core.expert import register_expert
+from veca_marl.envs.core.task import Player
+from veca_marl.envs.experts.objects.carrying_expert import CarryingExpert
+from veca_marl.envs.experts.skills.carrying import Carrier
+from veca_marl.envs.tasks.objects.pile_up_block import PileUpBlock
+from veca_marl.sim.geometry import Floats
+from veca_marl.sim.physics import Prop
+
+_CLEARANCE_M = 0.02  # of the carried block above the other one
+
+
+@register_expert("PileUpBlock")
+class PileUpBlockExpert(CarryingExpert[PileUpBlock]):
+    """Presses a red block between both palms, carries it over the other one and releases it.
+
+    Starts again after losing the block. Reads the poses of the blocks and of its own bones from
+    the simulator (privileged).
+    """
+
+    def __init__(self, task: PileUpBlock, player: Player) -> None:
+        carrier = Carrier(
+            task.child, squeeze_m=0.025, carrying_m=0.005, thumbs_m=0.005, posture_gain=0.01
+        )
+        super().__init__(task, player, carrier)
+
+    def _script(self) -> Iterator[Floats]:
+        carry_m = 1.5 * self.task.cfg.edge_m + _CLEARANCE_M
+        for block, base in itertools.cycle(itertools.permutations(self.task.red)):
+            if self.task.solved(self.player):
+                yield from self._carrier.rest()
+            yield from self._carrier.carry(block, partial(_on_top_of, base), carry_m)
+
+
+def _on_top_of(base: Prop) -> Floats:
+    """Return the centre of a block that lies on another one, ``(3,)`` metres."""
+    x, y, z = base.position
+    return np.array([x, y, z + base.cfg.size_m[0]])
