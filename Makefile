@@ -40,6 +40,8 @@ checks: $(VENV)/installed-test
 
 # test processes share compiled modules, also where the environment forbids to write them
 test test-all: export PYTHONDONTWRITEBYTECODE :=
+# one test process per core: more threads would wait for each other
+test test-all: export OMP_NUM_THREADS := 1
 
 test: checks ## lint, types, import contracts and the quick tests
 	$(BIN)/pytest -n $(CORES) -m "not slow" --durations=20 $(ARGS)
