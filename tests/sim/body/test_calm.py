@@ -78,7 +78,7 @@ def mitten_on_all_fours(world, seed):
 
 
 def test_the_hands_of_a_mitten_on_all_fours_do_not_slide_together():
-    # a wrist whose angle is set back at its limit in each physics step moves the palm inward
+    # clipping the angle of a wrist at its limit in each physics step moves the palm inward
     world = empty_world()
     body = mitten_on_all_fours(world, 0)
     hands = [body.bone_names.index(name) for name in ("l_hand", "r_hand")]
