@@ -125,6 +125,15 @@ def test_agents_of_a_team_share_one_policy():
     torch.testing.assert_close(features[:, 0], features[:, 1])
 
 
+@pytest.mark.parametrize("scale", [0.3, 1.0])
+def test_first_actions_have_the_configured_standard_deviation(scale):
+    torch.manual_seed(0)
+    env, net = network(MultisenseCfg(initial_scale=scale))
+    first = net.actor(env.reset())["agents", "scale"]
+    # the gain of the last layer is 0.01
+    torch.testing.assert_close(first, torch.full_like(first, scale), rtol=0.1, atol=0.0)
+
+
 def test_unsupported_actions_raise_an_error_with_the_choices():
     env = FakeEnv(worlds=1)
     wide = Bounded(-2.0, 2.0, shape=(1, 1, 2))
@@ -135,7 +144,12 @@ def test_unsupported_actions_raise_an_error_with_the_choices():
 
 @pytest.mark.parametrize(
     ("kwargs", "message"),
-    [({"channels": [1, 2]}, "need 3 numbers"), ({"trunk_features": 0}, "must be positive")],
+    [
+        ({"channels": [1, 2]}, "need 3 numbers"),
+        ({"trunk_features": 0}, "must be positive"),
+        ({"initial_scale": 0.0}, "initial_scale must be finite and above 0.01, got 0.0"),
+        ({"initial_scale": math.inf}, "initial_scale must be finite and above 0.01, got inf"),
+    ],
 )
 def test_invalid_sizes_raise_an_error(kwargs, message):
     with pytest.raises(ValueError, match=message):

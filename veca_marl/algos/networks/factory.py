@@ -7,6 +7,7 @@ then chosen by ``algo/network=NAME`` on the command line.
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -21,7 +22,11 @@ from torch import nn
 
 from veca_marl.algos.choices import ChoiceRegistry
 from veca_marl.algos.networks.initialisation import orthogonal, perceptron
-from veca_marl.algos.networks.policy_heads import action_distribution, policy_head
+from veca_marl.algos.networks.policy_heads import (
+    SMALLEST_SCALE,
+    action_distribution,
+    policy_head,
+)
 from veca_marl.algos.sense_encoders import encoders_of
 from veca_marl.algos.specs import TeamSpec
 
@@ -33,6 +38,9 @@ class NetworkCfg:
     Attributes:
         name: Name of the network in the registry.
         frozen: Senses with encoders that keep their parameters, see `init_encoders`.
+        initial_scale: Standard deviation of continuous actions before the first update, before
+            tanh maps them to [-1, 1]: with 1 they are nearly uniform, with 0.3 nearly normal.
+            Greater than 0.01.
         not_parameters: Fields that a network with the same parameters may have differently.
     """
 
@@ -40,6 +48,14 @@ class NetworkCfg:
 
     name: str = ""
     frozen: list[str] = field(default_factory=list)
+    initial_scale: float = 1.0
+
+    def __post_init__(self) -> None:
+        if not SMALLEST_SCALE < self.initial_scale < math.inf:
+            raise ValueError(
+                f"network.initial_scale must be finite and above {SMALLEST_SCALE}, "
+                f"got {self.initial_scale}"
+            )
 
     @property
     def recurrent(self) -> bool:
@@ -99,8 +115,11 @@ class NetworkFactory(ABC):
             encoder: Writes the features.
             hidden: Widths of hidden layers in each head.
         """
+        scale = self.cfg.initial_scale
         heads = [
-            policy_head(self.team, part, layout, self.policy_layer(layout.parameters, hidden))
+            policy_head(
+                self.team, part, layout, self.policy_layer(layout.parameters, hidden), scale
+            )
             for part, layout in self.spec.actions.items()
         ]
         return ProbabilisticTensorDictSequential(

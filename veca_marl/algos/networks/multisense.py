@@ -86,6 +86,7 @@ class MultisenseCfg(NetworkCfg):
     parameters: Parameters = Parameters.shared
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         if len(self.channels) != 3:
             raise ValueError(f"network.channels: need 3 numbers, got {list(self.channels)}")
         sizes = (self.vector_features, self.trunk_features, self.memory_features)

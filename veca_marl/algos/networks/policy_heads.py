@@ -25,9 +25,13 @@ from veca_marl.algos.acting.modules import ActionDistribution, ArrayModule
 from veca_marl.algos.specs import PLAIN, ActionLayout, action_key
 
 _UNIT = {"low": -1.0, "high": 1.0}
+SMALLEST_SCALE = 0.01
+"""Lower bound of the scales that TensorDict's ``biased_softplus`` gives."""
 
 
-def policy_head(team: str, part: str, layout: ActionLayout, layer: nn.Module) -> ArrayModule:
+def policy_head(
+    team: str, part: str, layout: ActionLayout, layer: nn.Module, initial_scale: float = 1.0
+) -> ArrayModule:
     """Return the module that writes the parameters of one part's distribution.
 
     Args:
@@ -35,9 +39,12 @@ def policy_head(team: str, part: str, layout: ActionLayout, layer: nn.Module) ->
         part: Name of the part.
         layout: Its layout.
         layer: Maps features ``(..., agents, F)`` to ``(..., agents, layout.parameters)``.
+        initial_scale: Standard deviation, before tanh, where `layer` returns 0; greater than
+            `SMALLEST_SCALE`.
     """
     if not layout.discrete:
-        layer = nn.Sequential(layer, NormalParamExtractor())
+        mapping = f"biased_softplus_{initial_scale}"
+        layer = nn.Sequential(layer, NormalParamExtractor(scale_mapping=mapping))
     keys = _parameter_keys(team, part, layout)
     return ArrayModule(layer, in_keys=[(team, "features")], out_keys=keys)
 
