@@ -77,12 +77,16 @@ def test_a_collapse_of_the_tower_has_a_lower_return_than_doing_nothing(game):
     assert swept < 1.2 * still < 0.0
 
 
-def test_the_expert_puts_the_red_block_down(game):
-    results = [play(game, seed) for seed in EXPERT_SEEDS]
-    # it solves about half of all starts: 13 of 28
-    assert sum(solved for _, solved in results) >= 1
+def test_the_expert_puts_the_red_block_down_and_leaves_the_tower_in_place(game):
+    results, moved = [], []
+    for seed in EXPERT_SEEDS:
+        game.reset(np.random.default_rng(seed))
+        before = game.task.blue[1].position
+        results.append(play(game, seed))
+        moved.append(np.linalg.norm(game.task.blue[1].position - before))
+    assert sum(solved for _, solved in results) >= 2
     # a body that does nothing has twice this height
     assert np.median([total["height"] for total, _ in results]) < game.max_steps
-    for total, solved in results:
-        assert solved == (total["blue_fell"] == 0.0)  # it only fails by knocking over the tower
+    assert sum(total["blue_fell"] == 0.0 for total, _ in results) >= 2
+    assert np.median(moved) < EDGE / 2
     assert sits(game)

@@ -64,17 +64,21 @@ class ArmKinematics:
         """Return the present poses of the palms."""
         return self._palms(self._body.bone_positions(), self._body.bone_rotations())
 
-    def reach(self, angles: Floats, palms: Palms, iterations: int = 4) -> Floats:
+    def reach(
+        self, angles: Floats, palms: Palms, iterations: int = 4, trunk: Floats | None = None
+    ) -> Floats:
         """Return joint angles ``(82,)`` rad with those of the arms replaced by a solution.
 
-        The pose of the trunk is the present one. Changes are limited to 0.12 rad per joint.
+        The pose of the pelvis is the present one. Changes are limited to 0.12 rad per joint.
 
         Args:
             angles: ``(82,)`` rad; the solver starts from those of the arms.
             palms: Target poses; unreachable ones are approached.
             iterations: Number of Gauss-Newton steps.
+            trunk: ``(82,)`` rad, the joint angles of the trunk for which the arms are solved; the
+                present ones by default.
         """
-        trial = self._body.joint_angles()
+        trial = self._body.joint_angles() if trunk is None else trunk.copy()
         trial[self.joints] = angles[self.joints]
         low = np.maximum(angles[self.joints] - _MAX_CHANGE_RAD, self._low)
         high = np.minimum(angles[self.joints] + _MAX_CHANGE_RAD, self._high)

@@ -1,4 +1,4 @@
-"""What the experts that carry a thing between both palms have in common."""
+"""Base class of the experts that hold a thing between both palms."""
 
 from __future__ import annotations
 
@@ -10,28 +10,28 @@ from numpy.typing import NDArray
 
 from veca_marl.envs.core.expert import Expert, TaskT
 from veca_marl.envs.core.task import Player
-from veca_marl.envs.experts.skills.carrying import Carrier
+from veca_marl.envs.experts.skills.palm_motion import PalmMotion
 from veca_marl.sim.geometry import Floats
 
 
 class CarryingExpert(Expert[TaskT]):
-    """Commands the joints by a sequence of target angles that starts anew in each episode.
+    """Commands the joints by a sequence of target angles that starts with each episode.
 
     Args:
         task: The rules that are played.
         player: The player that the commands are for.
-        carrier: Controller of both hands.
+        palms: Controller of both hands.
     """
 
     reads = ()
 
-    def __init__(self, task: TaskT, player: Player, carrier: Carrier) -> None:
+    def __init__(self, task: TaskT, player: Player, palms: PalmMotion) -> None:
         super().__init__(task, player)
-        self._carrier = carrier
+        self._palms = palms
 
     def reset(self) -> None:
         """See `Expert.reset`."""
-        self._carrier.reset()
+        self._palms.reset()
         self._commands = self._script()
 
     def act(self, observation: Mapping[str, NDArray[Any]]) -> Floats:

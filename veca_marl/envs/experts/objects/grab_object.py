@@ -7,8 +7,8 @@ from collections.abc import Iterator
 from veca_marl.envs.core.expert import register_expert
 from veca_marl.envs.core.task import Player
 from veca_marl.envs.experts.objects.carrying_expert import CarryingExpert
-from veca_marl.envs.experts.skills.carrying import Carrier
 from veca_marl.envs.experts.skills.lifting import BENT, UPRIGHT, lift
+from veca_marl.envs.experts.skills.palm_motion import PalmMotion
 from veca_marl.envs.tasks.objects.grab_object import GrabObject
 from veca_marl.sim.geometry import Floats
 
@@ -23,9 +23,9 @@ class GrabObjectExpert(CarryingExpert[GrabObject]):
     """
 
     def __init__(self, task: GrabObject, player: Player) -> None:
-        carrier = Carrier(task.child, upright=UPRIGHT, bent=BENT, posture_gain=0.01)
-        super().__init__(task, player, carrier)
+        palms = PalmMotion(task.child, UPRIGHT, BENT, posture_gain=0.01)
+        super().__init__(task, player, palms)
 
     def _script(self) -> Iterator[Floats]:
         height_m = self.task.cfg.edge_m / 2 + _LIFT_M
-        return lift(self.task.child, self._carrier, self.task.toy, height_m)
+        return lift(self.task.child, self._palms, self.task.toy, height_m)

@@ -10,7 +10,8 @@ from veca_marl.envs.core.expert import register_expert
 from veca_marl.envs.core.scoring import horizontal
 from veca_marl.envs.core.task import Player
 from veca_marl.envs.experts.objects.carrying_expert import CarryingExpert
-from veca_marl.envs.experts.skills.carrying import Carrier
+from veca_marl.envs.experts.skills.carrying import CarryCfg, carry, return_to_rest
+from veca_marl.envs.experts.skills.palm_motion import PalmMotion
 from veca_marl.envs.tasks.objects.move_to_target import MoveToTarget
 from veca_marl.sim.geometry import Floats
 
@@ -26,14 +27,14 @@ class MoveToTargetExpert(CarryingExpert[MoveToTarget]):
     """
 
     def __init__(self, task: MoveToTarget, player: Player) -> None:
-        super().__init__(task, player, Carrier(task.child))
+        super().__init__(task, player, PalmMotion(task.child))
 
     def _script(self) -> Iterator[Floats]:
         cfg = self.task.cfg
-        carry_m = cfg.edge_m / 2 + _CLEARANCE_M
+        height_m = cfg.edge_m / 2 + _CLEARANCE_M
         while not self.task.distance_m < 0.5 * cfg.there_m:
-            yield from self._carrier.carry(self.task.toy, self._goal, carry_m)
-        yield from self._carrier.rest()
+            yield from carry(self._palms, self.task.toy, self._goal, height_m, CarryCfg())
+        yield from return_to_rest(self._palms)
 
     def _goal(self) -> Floats:
         """Return the centre of a toy that lies on the mark, ``(3,)`` metres."""

@@ -11,12 +11,14 @@ import numpy as np
 from veca_marl.envs.core.expert import register_expert
 from veca_marl.envs.core.task import Player
 from veca_marl.envs.experts.objects.carrying_expert import CarryingExpert
-from veca_marl.envs.experts.skills.carrying import Carrier
+from veca_marl.envs.experts.skills.carrying import CarryCfg, carry, return_to_rest
+from veca_marl.envs.experts.skills.palm_motion import PalmMotion
 from veca_marl.envs.tasks.objects.pile_up_block import PileUpBlock
 from veca_marl.sim.geometry import Floats
 from veca_marl.sim.physics import Prop
 
-_CLEARANCE_M = 0.02  # of the carried block above the other one
+_CLEARANCE_M = 0.035  # of the carried block above the other one
+_CARRY = CarryCfg(squeeze_m=0.025, speed_m=0.005, thumbs_m=0.005)
 
 
 @register_expert("PileUpBlock")
@@ -28,17 +30,14 @@ class PileUpBlockExpert(CarryingExpert[PileUpBlock]):
     """
 
     def __init__(self, task: PileUpBlock, player: Player) -> None:
-        carrier = Carrier(
-            task.child, squeeze_m=0.025, carrying_m=0.005, thumbs_m=0.005, posture_gain=0.01
-        )
-        super().__init__(task, player, carrier)
+        super().__init__(task, player, PalmMotion(task.child, posture_gain=0.01))
 
     def _script(self) -> Iterator[Floats]:
-        carry_m = 1.5 * self.task.cfg.edge_m + _CLEARANCE_M
+        height_m = 1.5 * self.task.cfg.edge_m + _CLEARANCE_M
         for block, base in itertools.cycle(itertools.permutations(self.task.red)):
             if self.task.solved(self.player):
-                yield from self._carrier.rest()
-            yield from self._carrier.carry(block, partial(_on_top_of, base), carry_m)
+                yield from return_to_rest(self._palms)
+            yield from carry(self._palms, block, partial(_on_top_of, base), height_m, _CARRY)
 
 
 def _on_top_of(base: Prop) -> Floats:

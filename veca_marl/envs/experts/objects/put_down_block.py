@@ -10,13 +10,16 @@ import numpy as np
 from veca_marl.envs.core.expert import register_expert
 from veca_marl.envs.core.task import Player
 from veca_marl.envs.experts.objects.carrying_expert import CarryingExpert
-from veca_marl.envs.experts.skills.carrying import Carrier
+from veca_marl.envs.experts.skills.carrying import CarryCfg, carry, return_to_rest
+from veca_marl.envs.experts.skills.palm_motion import PalmMotion
 from veca_marl.envs.tasks.objects.put_down_block import PutDownBlock
 from veca_marl.sim.body.humanoid.postures import reaching
 from veca_marl.sim.geometry import Floats
 
-_CLEARANCE_M = 0.02  # of the carried block above the tower
-_ASIDE_M = 0.09  # distance of its goal from the sagittal plane of the child
+# a weak grip: with a force of 10 N the palms push the tower forwards by 20 mm
+_CARRY = CarryCfg(squeeze_m=0.012, above_m=0.02, over_m=(0.03, 0.02, 0.03))
+_CLEARANCE_M = 0.035  # of the carried block above the tower
+_ASIDE_M = 0.11  # distance of its goal from the sagittal plane of the child
 # of the postures that were tried, these knock over the fewest towers
 _UPRIGHT, _BENT = reaching(20.0, 20.0), reaching(30.0, 22.0)
 
@@ -29,14 +32,14 @@ class PutDownBlockExpert(CarryingExpert[PutDownBlock]):
     """
 
     def __init__(self, task: PutDownBlock, player: Player) -> None:
-        super().__init__(task, player, Carrier(task.child, upright=_UPRIGHT, bent=_BENT))
+        super().__init__(task, player, PalmMotion(task.child, _UPRIGHT, _BENT, posture_gain=0.01))
 
     def _script(self) -> Iterator[Floats]:
         cfg = self.task.cfg
-        carry_m = (cfg.blue + 0.5) * cfg.edge_m + _CLEARANCE_M
+        height_m = (cfg.blue + 0.5) * cfg.edge_m + _CLEARANCE_M
         while not self.task.solved(self.player):
-            yield from self._carrier.carry(self.task.red, self._goal, carry_m, above_m=0.02)
-        yield from self._carrier.rest()
+            yield from carry(self._palms, self.task.red, self._goal, height_m, _CARRY)
+        yield from return_to_rest(self._palms)
 
     def _goal(self) -> Floats:
         """Return a place on the floor on the other side of the child, ``(3,)`` metres."""

@@ -6,7 +6,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from veca_marl.envs.experts.skills.carrying import Carrier, Grip, quarter_yaw
+from veca_marl.envs.experts.skills.carrying import quarter_yaw
+from veca_marl.envs.experts.skills.palm_motion import Grip, PalmMotion
 from veca_marl.sim.body.humanoid import Humanoid
 from veca_marl.sim.body.humanoid.postures import reaching
 from veca_marl.sim.geometry import Floats
@@ -25,14 +26,14 @@ _LOST_M = 0.06  # distance from the middle between the palms at which the cube c
 _APPROACH_STEPS, _LOWER_STEPS, _CLOSE_STEPS, _OPEN_STEPS = 35, 30, 20, 12
 
 
-def lift(child: Humanoid, carrier: Carrier, toy: Prop, height_m: float) -> Iterator[Floats]:
+def lift(child: Humanoid, palms: PalmMotion, toy: Prop, height_m: float) -> Iterator[Floats]:
     """Yield target angles ``(82,)`` rad, one array per step: grip, lift and hold a cube.
 
     The sequence never ends; it starts again when the cube is lost.
 
     Args:
         child: The body that lifts.
-        carrier: Controller of its hands.
+        palms: Controller of its hands.
         toy: The cube.
         height_m: Height to which the palms lift it.
     """
@@ -43,17 +44,17 @@ def lift(child: Humanoid, carrier: Carrier, toy: Prop, height_m: float) -> Itera
         for offset, steps in ((_ABOVE, _APPROACH_STEPS), (_GRIP_OFFSET, _LOWER_STEPS)):
             for _ in range(steps):
                 goal = Grip(toy.position + offset, wide, yaw)
-                yield carrier.move(goal)
-                if carrier.is_at(goal):
+                yield palms.move(goal)
+                if palms.is_at(goal):
                     break
         place = toy.position + _GRIP_OFFSET
         for _ in range(_CLOSE_STEPS):
-            yield carrier.move(Grip(place, tight, yaw))
+            yield palms.move(Grip(place, tight, yaw))
         up = np.array([place[0], place[1], height_m])
         while slip_m(child, toy) < _LOST_M:
-            yield carrier.move(Grip(up, tight, yaw), _LIFT_SPEED_M)
+            yield palms.move(Grip(up, tight, yaw), _LIFT_SPEED_M)
         for _ in range(_OPEN_STEPS):
-            yield carrier.move(Grip(child.palms().mean(axis=0), wide, yaw))
+            yield palms.move(Grip(child.palms().mean(axis=0), wide, yaw))
 
 
 def slip_m(child: Humanoid, toy: Prop) -> float:

@@ -1,0 +1,153 @@
+"""Motion of both palms of a sitting body, as a pair with a common middle and a distance."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from veca_marl.envs.experts.control.arm_kinematics import ArmKinematics, Palms
+from veca_marl.envs.experts.control.seated_balance import SeatedBalance
+from veca_marl.envs.experts.control.trunk_twist import TrunkTwist
+from veca_marl.sim.body.humanoid import Humanoid
+from veca_marl.sim.body.humanoid.postures import REACHING, REACHING_DOWN, Posture
+from veca_marl.sim.geometry import Floats
+
+_SPEED_M = 0.010  # largest motion of the middle between the palms, per step
+_CLOSING_M = 0.006  # largest change of the distance between the palms, per step
+_FINGER_PITCH_RAD = math.radians(20.0)  # downwards
+_UP = np.array([0.0, 0.0, 1.0])
+_SIDES = np.array([1.0, -1.0])
+_INTEGRAL_GAIN, _MAX_INTEGRAL_M = 0.03, 0.02
+_ARRIVED_M = 0.008
+_HIGH_M, _LOW_M = 0.10, 0.04  # heights of the palms at which the body sits upright and bent
+_BENDING = 0.1  # largest change of the bend per step; faster, the palms rise or sink by 40 mm
+
+
+class Grip(NamedTuple):
+    """Target poses of both palms, on opposite sides of a point.
+
+    Attributes:
+        centre: Middle between the palms, ``(3,)`` metres.
+        gap_m: Distance between the palms.
+        yaw_rad: Yaw of the line between them; at 0 the left palm is at +y.
+    """
+
+    centre: Floats
+    gap_m: float
+    yaw_rad: float = 0.0
+
+
+class PalmMotion:
+    """Controller of both hands of a body that sits at the origin and faces +x.
+
+    Args:
+        body: The body.
+        upright: Posture while the hands are up.
+        bent: Posture while the hands are down.
+        posture_gain: Integral gain of the trunk, see `SeatedBalance`.
+    """
+
+    def __init__(
+        self,
+        body: Humanoid,
+        upright: Posture = REACHING,
+        bent: Posture = REACHING_DOWN,
+        posture_gain: float = 0.03,
+    ) -> None:
+        self._hands = ArmKinematics(body)
+        self._twist = TrunkTwist(body)
+        self._seat = SeatedBalance(body, upright, bent, posture_gain)
+        self.reset()
+
+    def reset(self) -> None:
+        """Start from the present pose of the palms, with the trunk upright."""
+        self._seat.reset()
+        self._twist.reset()
+        self._targets = self._seat.upright.copy()
+        self._integral = np.zeros(3)
+        self._held: Grip | None = None
+        self._bend = 0.0
+
+    @property
+    def middle(self) -> Floats:
+        """The point between the palms, ``(3,)`` metres."""
+        middle: Floats = self._hands.palms().points.mean(axis=0)
+        return middle
+
+    @property
+    def gap_m(self) -> float:
+        """The distance between the palms."""
+        left, right = self._hands.palms().points
+        return math.dist(left, right)
+
+    def move(self, goal: Grip, speed_m: float = _SPEED_M) -> Floats:
+        """Return target angles ``(82,)`` rad of a motion toward a grip. One call per step.
+
+        Args:
+            goal: The grip to move to.
+            speed_m: Largest motion of the middle between the palms.
+        """
+        held = self._held or Grip(self.middle, self.gap_m)
+        centre = held.centre + np.clip(goal.centre - held.centre, -speed_m, speed_m)
+        gap = held.gap_m + float(np.clip(goal.gap_m - held.gap_m, -_CLOSING_M, _CLOSING_M))
+        self._held = Grip(centre, gap, goal.yaw_rad)
+        wanted = self._corrected(_palms(self._held))
+        trunk = self._twist.filtered_angles()
+        self._targets = self._hands.reach(self._targets, wanted, iterations=3, trunk=trunk)
+        return self._seat.hold(self._targets, self._bend_toward(centre[2]))
+
+    def is_at(self, goal: Grip) -> bool:
+        """Return whether the middle between the palms has reached that of a grip."""
+        return bool(np.abs(self.middle - goal.centre).max() < _ARRIVED_M)
+
+    def until_at(self, goal: Callable[[], Grip], steps: int, settled: int = 1) -> Iterator[Floats]:
+        """Yield target angles until the palms are at the goal.
+
+        Args:
+            goal: Returns the grip to move to.
+            steps: Largest number of steps.
+            settled: Number of consecutive steps for which they have to be there.
+        """
+        there = 0
+        for _ in range(steps):
+            yield self.move(goal())
+            there = there + 1 if self.is_at(goal()) else 0
+            if there == settled:
+                return
+
+    def for_steps(self, goal: Grip, steps: int) -> Iterator[Floats]:
+        """Yield target angles of a motion toward a grip for a number of steps."""
+        for _ in range(steps):
+            yield self.move(goal)
+
+    def _corrected(self, palms: Palms) -> Palms:
+        """Return palm poses shifted by an integral of the error of the middle between them.
+
+        There is no correction of the distance between them: its compliance sets the grip force.
+        """
+        error = (palms.points - self._hands.palms().points).mean(axis=0)
+        self._integral = np.clip(
+            self._integral + _INTEGRAL_GAIN * error, -_MAX_INTEGRAL_M, _MAX_INTEGRAL_M
+        )
+        return palms._replace(points=palms.points + self._integral)
+
+    def _bend_toward(self, height_m: float) -> float:
+        """Return the bend of the trunk, in [0, 1], on its way to that for a height of the palms."""
+        goal = min(max((_HIGH_M - height_m) / (_HIGH_M - _LOW_M), 0.0), 1.0)
+        self._bend += min(max(goal - self._bend, -_BENDING), _BENDING)
+        return self._bend
+
+
+def _palms(grip: Grip) -> Palms:
+    """Return the palm poses of a grip; the fingers point ahead and down."""
+    c, s = math.cos(grip.yaw_rad), math.sin(grip.yaw_rad)
+    across, ahead = np.array([-s, c, 0.0]), np.array([c, s, 0.0])
+    fingers = math.cos(_FINGER_PITCH_RAD) * ahead - math.sin(_FINGER_PITCH_RAD) * _UP
+    return Palms(
+        points=grip.centre + np.outer(_SIDES, across) * grip.gap_m / 2,
+        normals=-np.outer(_SIDES, across),
+        fingers=np.stack([fingers, fingers]),
+    )
