@@ -17,8 +17,6 @@ _THICKNESS_M = 0.0095  # from the middle of the hand to the skin of the palm
 _INWARD = np.array([[0.0, -1.0, 0.0], [0.0, 1.0, 0.0]])  # normals of the palms, hand frames
 _DIFFERENCE_RAD = 1e-4  # step of the finite differences
 _DAMPING = 0.03
-_MAX_CHANGE_RAD = 0.12  # of a joint angle per call
-_DIRECTION_M = 0.06  # weight of an error of direction, metres per radian
 
 
 class Palms(NamedTuple):
@@ -43,10 +41,15 @@ class ArmKinematics:
 
     Args:
         body: The body.
+        max_change_rad: Largest change of a joint angle per call of `reach`.
+        direction_m: Weight of an error of direction, metres per radian.
     """
 
-    def __init__(self, body: Humanoid) -> None:
+    def __init__(
+        self, body: Humanoid, max_change_rad: float = 0.12, direction_m: float = 0.06
+    ) -> None:
         self._body = body
+        self._max_change_rad, self._direction_m = max_change_rad, direction_m
         self._skeleton: Skeleton = load_skeleton()
         bones = self._skeleton.bones
         arms = [self._skeleton.bone(f"{side}_{bone}") for side in _SIDES for bone in _ARM]
@@ -69,7 +72,7 @@ class ArmKinematics:
     ) -> Floats:
         """Return joint angles ``(82,)`` rad with those of the arms replaced by a solution.
 
-        The pose of the pelvis is the present one. Changes are limited to 0.12 rad per joint.
+        The pose of the pelvis is the present one.
 
         Args:
             angles: ``(82,)`` rad; the solver starts from those of the arms.
@@ -80,8 +83,8 @@ class ArmKinematics:
         """
         trial = self._body.joint_angles() if trunk is None else trunk.copy()
         trial[self.joints] = angles[self.joints]
-        low = np.maximum(angles[self.joints] - _MAX_CHANGE_RAD, self._low)
-        high = np.minimum(angles[self.joints] + _MAX_CHANGE_RAD, self._high)
+        low = np.maximum(angles[self.joints] - self._max_change_rad, self._low)
+        high = np.minimum(angles[self.joints] + self._max_change_rad, self._high)
         for _ in range(iterations):
             change = self._gauss_newton(trial, palms)
             trial[self.joints] = np.clip(trial[self.joints] + change, low, high)
@@ -95,7 +98,7 @@ class ArmKinematics:
 
         def error(trial: Floats) -> Floats:
             forward_kinematics(self._skeleton, trial, positions, rotations)
-            return _difference(self._palms(positions, rotations), palms)
+            return _difference(self._palms(positions, rotations), palms, self._direction_m)
 
         here = error(angles)
         jacobian = np.empty((len(here), len(self.joints)))
@@ -114,12 +117,12 @@ class ArmKinematics:
         return Palms(points, normals, fingers)
 
 
-def _difference(palms: Palms, wanted: Palms) -> Floats:
-    """Return the errors of palm poses, ``(18,)`` metres."""
+def _difference(palms: Palms, wanted: Palms, direction_m: float) -> Floats:
+    """Return the errors of palm poses, ``(18,)`` metres; those of directions are weighted."""
     return np.concatenate(
         [
             (palms.points - wanted.points).ravel(),
-            _DIRECTION_M * (palms.normals - wanted.normals).ravel(),
-            _DIRECTION_M * (palms.fingers - wanted.fingers).ravel(),
+            direction_m * (palms.normals - wanted.normals).ravel(),
+            direction_m * (palms.fingers - wanted.fingers).ravel(),
         ]
     )

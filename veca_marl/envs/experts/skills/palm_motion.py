@@ -20,6 +20,9 @@ _CLOSING_M = 0.006  # largest change of the distance between the palms, per step
 _FINGER_PITCH_RAD = math.radians(20.0)  # downwards
 _UP = np.array([0.0, 0.0, 1.0])
 _SIDES = np.array([1.0, -1.0])
+# Of the inverse kinematics. An arm that is pulled back from near full extension needs fast changes
+# of its joints; where they are limited more, or directions weigh more, the hand sinks by 60 mm.
+_MAX_CHANGE_RAD, _DIRECTION_M = 0.25, 0.03
 _INTEGRAL_GAIN, _MAX_INTEGRAL_M = 0.03, 0.02
 _ARRIVED_M = 0.008
 _HIGH_M, _LOW_M = 0.10, 0.04  # heights of the palms at which the body sits upright and bent
@@ -57,7 +60,7 @@ class PalmMotion:
         bent: Posture = REACHING_DOWN,
         posture_gain: float = 0.03,
     ) -> None:
-        self._hands = ArmKinematics(body)
+        self._hands = ArmKinematics(body, _MAX_CHANGE_RAD, _DIRECTION_M)
         self._twist = TrunkTwist(body)
         self._seat = SeatedBalance(body, upright, bent, posture_gain)
         self.reset()

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 
 from veca_marl.envs.experts.control.key_poses import KeyPoses
+from veca_marl.envs.experts.control.seated_balance import SeatedBalance
 from veca_marl.envs.experts.skills.turn_over import TurnOver
 from veca_marl.sim.body.humanoid import Humanoid, JointCommand
 from veca_marl.sim.body.humanoid.postures import Posture
@@ -70,7 +71,7 @@ _POSES = {
     "rise": Posture(
         joints_deg={
             **_KNEELING,
-            "thigh.flexion": 72,
+            "thigh.flexion": 108,
             "spine.flexion": -10,
             "chest.flexion": -8,
             "neck.flexion": -20,
@@ -86,12 +87,6 @@ _ON_BELLY = 0.7  # cosine of the angle between the front of the chest and straig
 _FAILED_M = 0.12  # below this height of the top of the chest the attempt has failed
 _HORIZON = 0.5  # before rising: prediction of the joint angles in agent steps; 1 damps more
 _BENT_AT_FIRST, _RISING_S = 0.8, 0.5  # share of the bend at the start; time from bent to upright
-_TRUNK = [
-    f"{bone}.{label}"
-    for bone in ("spine", "chest", "neck", "head")
-    for label in ("flexion", "lateral")
-]
-_DAMPING_S = 0.03  # damping of the trunk: change of the target angles per joint velocity
 _ON_HEELS_RAD = math.radians(45.0)  # from the vertical; a thigh that is steeper has left the heel
 
 
@@ -100,7 +95,8 @@ class SitUp:
 
     While it rises, trunk and hips move to the upright posture as long as the thighs are on the
     heels, else back to the bent one: the extension of the hips then lifts the pelvis instead of the
-    trunk.
+    trunk. `SeatedBalance` holds the trunk against its weight; without it the upright trunk leans
+    forward within two seconds and begins to rise again, or falls onto its back.
 
     Args:
         body: The body.
@@ -111,8 +107,7 @@ class SitUp:
         self._body, self._step_s = body, step_s
         self._turn = TurnOver(body, step_s)
         self._key_poses = KeyPoses(body, _POSES, step_s)
-        self._upright, self._bent = (body.posture_angles(_POSES[name]) for name in ("rise", "sit"))
-        self._trunk = [body.joint_names.index(name) for name in _TRUNK]
+        self._balance = SeatedBalance(body, _POSES["rise"], _POSES["sit"], integral_gain=0.0)
         self._stage, self._elapsed_s, self._bend = "lie", 0.0, _BENT_AT_FIRST
         self.reset()
 
@@ -143,9 +138,7 @@ class SitUp:
         change = self._step_s / _RISING_S
         bend = self._bend - change if self._is_on_heels() else self._bend + change
         self._bend = min(max(bend, 0.0), 1.0)
-        targets = self._upright + self._bend * (self._bent - self._upright)
-        targets[self._trunk] -= _DAMPING_S * self._body.joint_velocities()[self._trunk]
-        return targets
+        return self._balance.hold(self._balance.upright, self._bend)
 
     def _is_on_heels(self) -> bool:
         """Return whether the left thigh is near the horizontal, its knee in front of the hip."""
