@@ -18,7 +18,9 @@ _UP = np.array([0.0, 0.0, 1.0])
 # palms that close too high lose the cube, and one that sinks while it is moved hits others
 _SETTLED = 5
 _RETREAT = 0.10 * _UP  # the hands leave a cube upwards by this distance
-_HIGH_STEPS, _ABOVE_STEPS, _DOWN_STEPS, _CLOSE_STEPS = 20, 50, 40, 16
+_HIGH_STEPS, _ABOVE_STEPS, _DOWN_STEPS = 20, 50, 40
+_CLOSE_STEPS, _MOST_CLOSE_STEPS = 16, 32
+_SKIN_M = 0.008  # the palms' distance from a cube between them with a light grip
 _LIFT_STEPS, _TRANSFER_STEPS, _LOWER_STEPS = 40, 110, 45
 _OPEN_STEPS, _RETREAT_STEPS, _BACK_STEPS, _SPREAD_STEPS = 16, 30, 25, 15
 # Largest errors of a lifted cube and of one that is put down. Only the height counts: a cube that
@@ -123,10 +125,17 @@ def _grip(palms: PalmMotion, cube: Prop, yaw: float, cfg: CarryCfg) -> Iterator[
     yield from palms.until_at(
         lambda: Grip(cube.position + thumbs, wide, yaw), _DOWN_STEPS, _SETTLED
     )
-    place = cube.position
-    for _ in range(_CLOSE_STEPS):
-        pushed = cube.position - place
-        yield palms.move(Grip(place + thumbs - pushed, tight, yaw))
+    yield from _close(palms, cube, Grip(cube.position + thumbs, tight, yaw))
+
+
+def _close(palms: PalmMotion, cube: Prop, grip: Grip) -> Iterator[Floats]:
+    """Close the hands until both press on the cube, which they push forwards."""
+    place, touching_m = cube.position, cube.cfg.size_m[0] + _SKIN_M
+    for step in range(_MOST_CLOSE_STEPS):
+        pushed = (cube.position - place) * (1, 0, 0)
+        yield palms.move(grip._replace(centre=grip.centre - pushed))
+        if step >= _CLOSE_STEPS and palms.gap_m < touching_m:
+            return
 
 
 def _bring(
