@@ -19,7 +19,7 @@ from veca_marl.sim.physics import Prop
 
 _CLEARANCE_M = 0.035  # of the carried block above the other one
 # high palms, since thumbs that press on the rear edge tilt the block by 20 to 40 degrees
-_CARRY = CarryCfg(squeeze_m=0.025, speed_m=0.005, thumbs_m=0.012)
+_CARRY = CarryCfg(squeeze_m=0.025, speed_m=0.005, thumbs_m=0.012, levelling=0.1)
 
 
 @register_expert("PileUpBlock")

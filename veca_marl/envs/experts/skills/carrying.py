@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -19,13 +19,14 @@ _UP = np.array([0.0, 0.0, 1.0])
 _SETTLED = 5
 _RETREAT = 0.10 * _UP  # the hands leave a cube upwards by this distance
 _HIGH_STEPS, _ABOVE_STEPS, _DOWN_STEPS = 20, 50, 40
-_CLOSE_STEPS, _MOST_CLOSE_STEPS = 16, 32
+_CLOSE_STEPS, _MOST_CLOSE_STEPS = 22, 36
 _SKIN_M = 0.008  # the palms' distance from a cube between them with a light grip
 _LIFT_STEPS, _TRANSFER_STEPS, _LOWER_STEPS = 40, 110, 45
 _OPEN_STEPS, _RETREAT_STEPS, _BACK_STEPS, _SPREAD_STEPS = 16, 30, 25, 15
 # Largest errors of a lifted cube and of one that is put down. Only the height counts: a cube that
 # is moved sideways before it is lifted drags the one below it.
 _LIFTED_M, _PLACED_M = np.array([np.inf, np.inf, 0.012]), np.array([np.inf, np.inf, 0.004])
+_PITCH_RAD = math.radians(-30.0), math.radians(60.0)  # of the fingers while a cube is levelled
 # resting place of the hands, beside the legs: the trunk turns slowly by up to 20 degrees while it
 # sits, and the hands must not touch what has been piled up
 _HOME = Grip(np.array([0.10, 0.0, 0.14]), 0.50)
@@ -43,6 +44,8 @@ class CarryCfg:
         above_m: Height above the cube from which the hands approach.
         over_m: Largest error above the target in each direction, metres, before the cube is
             lowered.
+        levelling: Change of the fingers' pitch per step, as a share of the forward tilt of the
+            cube.
     """
 
     squeeze_m: float = 0.02
@@ -51,6 +54,7 @@ class CarryCfg:
     clear_m: float = 0.022
     above_m: float = 0.1
     over_m: tuple[float, float, float] = (0.007, 0.007, 0.02)
+    levelling: float = 0.0
 
 
 class _Way(NamedTuple):
@@ -92,8 +96,9 @@ def carry(
         _Way(lambda: _at_height(to(), height_m), np.array(cfg.over_m), _TRANSFER_STEPS),
         _Way(to, _PLACED_M, _LOWER_STEPS),
     ):
-        yield from _bring(palms, cube, way, tight, cfg.speed_m)
-    yield from _release(palms, Grip(palms.middle, cube.cfg.size_m[0] + 4 * cfg.clear_m, yaw))
+        tight = yield from _bring(palms, cube, way, tight, cfg)
+    wide_m = cube.cfg.size_m[0] + 4 * cfg.clear_m
+    yield from _release(palms, tight._replace(centre=palms.middle, gap_m=wide_m))
 
 
 def return_to_rest(palms: PalmMotion) -> Iterator[Floats]:
@@ -139,17 +144,30 @@ def _close(palms: PalmMotion, cube: Prop, grip: Grip) -> Iterator[Floats]:
 
 
 def _bring(
-    palms: PalmMotion, cube: Prop, way: _Way, grip: Grip, speed_m: float
-) -> Iterator[Floats]:
-    """Move the palms until the cube between them is at its target, or lost."""
+    palms: PalmMotion, cube: Prop, way: _Way, grip: Grip, cfg: CarryCfg
+) -> Generator[Floats, None, Grip]:
+    """Move the palms until the cube between them is at its target, or lost; return the grip."""
     there = 0
     for _ in range(way.steps):
         slip = palms.middle - cube.position
         lost = np.abs(slip).max() >= cube.cfg.size_m[0] / 2
         there = there + 1 if (np.abs(way.to() - cube.position) < way.near_m).all() else 0
         if lost or there == way.settled:
-            return
-        yield palms.move(grip._replace(centre=way.to() + slip), speed_m)
+            break
+        level_rad = grip.pitch_rad - cfg.levelling * _forward_tilt_rad(cube, grip.yaw_rad)
+        grip = grip._replace(
+            centre=way.to() + slip, pitch_rad=float(np.clip(level_rad, *_PITCH_RAD))
+        )
+        yield palms.move(grip, cfg.speed_m)
+    return grip
+
+
+def _forward_tilt_rad(cube: Prop, yaw_rad: float) -> float:
+    """Return the angle by which the top of a cube leans toward a heading, modulo a quarter turn."""
+    axes = cube.rotation.T
+    up = axes[np.abs(axes[:, 2]).argmax()]
+    up = up * math.copysign(1.0, up[2])
+    return math.atan2(up[0] * math.cos(yaw_rad) + up[1] * math.sin(yaw_rad), up[2])
 
 
 def _release(palms: PalmMotion, opened: Grip) -> Iterator[Floats]:

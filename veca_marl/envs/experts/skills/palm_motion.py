@@ -17,7 +17,7 @@ from veca_marl.sim.geometry import Floats
 
 _SPEED_M = 0.010  # largest motion of the middle between the palms, per step
 _CLOSING_M = 0.006  # largest change of the distance between the palms, per step
-_FINGER_PITCH_RAD = math.radians(20.0)  # downwards
+FINGER_PITCH_RAD = math.radians(20.0)  # downwards, unless a cube is levelled
 _UP = np.array([0.0, 0.0, 1.0])
 _SIDES = np.array([1.0, -1.0])
 # Of the inverse kinematics. An arm that is pulled back from near full extension needs fast changes
@@ -36,11 +36,13 @@ class Grip(NamedTuple):
         centre: Middle between the palms, ``(3,)`` metres.
         gap_m: Distance between the palms.
         yaw_rad: Yaw of the line between them; at 0 the left palm is at +y.
+        pitch_rad: Pitch of the fingers, downwards from the horizontal.
     """
 
     centre: Floats
     gap_m: float
     yaw_rad: float = 0.0
+    pitch_rad: float = FINGER_PITCH_RAD
 
 
 class PalmMotion:
@@ -96,7 +98,7 @@ class PalmMotion:
         held = self._held or Grip(self.middle, self.gap_m)
         centre = held.centre + np.clip(goal.centre - held.centre, -speed_m, speed_m)
         gap = held.gap_m + float(np.clip(goal.gap_m - held.gap_m, -_CLOSING_M, _CLOSING_M))
-        self._held = Grip(centre, gap, goal.yaw_rad)
+        self._held = Grip(centre, gap, goal.yaw_rad, goal.pitch_rad)
         wanted = self._corrected(_palms(self._held))
         trunk = self._twist.filtered_angles()
         self._targets = self._hands.reach(self._targets, wanted, iterations=3, trunk=trunk)
@@ -148,7 +150,7 @@ def _palms(grip: Grip) -> Palms:
     """Return the palm poses of a grip; the fingers point ahead and down."""
     c, s = math.cos(grip.yaw_rad), math.sin(grip.yaw_rad)
     across, ahead = np.array([-s, c, 0.0]), np.array([c, s, 0.0])
-    fingers = math.cos(_FINGER_PITCH_RAD) * ahead - math.sin(_FINGER_PITCH_RAD) * _UP
+    fingers = math.cos(grip.pitch_rad) * ahead - math.sin(grip.pitch_rad) * _UP
     return Palms(
         points=grip.centre + np.outer(_SIDES, across) * grip.gap_m / 2,
         normals=-np.outer(_SIDES, across),
