@@ -1,4 +1,4 @@
-"""Turning from the back to the belly over the left side."""
+"""Turning from the back to the belly over the left side, then over the right one."""
 
 from __future__ import annotations
 
@@ -72,8 +72,31 @@ _ON_SIDE, _NEARLY_OVER, _FALLEN_BACK = -0.2, 0.55, -0.5
 _SWING_S, _REST_S = 2.0, 0.5  # longest swing, rest after it
 
 
+_MIDLINE_BONES = ("spine", "chest", "neck", "head")
+_MIDLINE = ("lateral", "rotation")  # joints of the trunk with opposite angles in a mirror image
+
+
+def mirrored(posture: Posture) -> Posture:
+    """Return the mirror image of a posture."""
+    return Posture(posture.pitch_deg, dict(map(_mirrored, posture.joints_deg.items())))
+
+
+def _mirrored(joint: tuple[str, float]) -> tuple[str, float]:
+    name, angle = joint
+    if name.startswith(("l_", "r_")):
+        return ("r_" if name.startswith("l_") else "l_") + name[2:], angle
+    bone, _, label = name.partition(".")
+    return name, -angle if bone in _MIDLINE_BONES and label in _MIDLINE else angle
+
+
+_MIRRORED = {name: mirrored(posture) for name, posture in _POSES.items()}
+
+
 class TurnOver:
     """Target angles of a body that turns over; it starts again after falling back.
+
+    The first attempt is over the left side. After a swing that did not turn the body the next one
+    is over the other side: the same swing from the same place would fail again.
 
     Args:
         body: The body.
@@ -82,20 +105,27 @@ class TurnOver:
 
     def __init__(self, body: Humanoid, step_s: float) -> None:
         self._body, self._step_s = body, step_s
-        self._key_poses = KeyPoses(body, _POSES, step_s)
+        self._sides = [KeyPoses(body, _POSES, step_s), KeyPoses(body, _MIRRORED, step_s)]
         self.reset()
 
     def reset(self) -> None:
         """Start with a swing."""
-        self._key_poses.reset()
+        self._start(0)
         self._pose, self._elapsed_s = "swing", 0.0
 
     def command(self) -> Floats:
         """Return the target angles of the next step, ``(82,)`` rad."""
         chosen = self._choose()
+        if self._pose == "rest" and chosen == "swing":
+            self._start(1 - self._side)
         self._elapsed_s = self._elapsed_s + self._step_s if chosen == self._pose else 0.0
         self._pose = chosen
-        return self._key_poses.toward(chosen, _SPEED_RADPS)
+        return self._sides[self._side].toward(chosen, _SPEED_RADPS)
+
+    def _start(self, side: int) -> None:
+        """Move over a side from the present joint angles: 0 is the left one, 1 the right one."""
+        self._side = side
+        self._sides[side].reset()
 
     def _choose(self) -> str:
         """Return the name of the key pose to move to."""
