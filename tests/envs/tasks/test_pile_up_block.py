@@ -5,7 +5,8 @@ import pytest
 from blocks import blocks_game, play, sit, sits
 
 EDGE = 0.06
-EXPERT_SEEDS = (0, 2)
+# at which the expert succeeds; its share of successes is that of the frozen episodes
+EXPERT_SEEDS = (2, 3)
 AWAY = (1.0, 1.0, EDGE / 2)
 
 
@@ -97,11 +98,14 @@ def test_holding_blocks_up_has_a_lower_return_than_piling_them_up(game):
     player = game.players[0]
     game.reset(np.random.default_rng(EXPERT_SEEDS[0]))
     lifted = []
-    while not lifted or not game.task.solved(player):
+    for _ in range(game.max_steps):
         terms = game.step({player.name: player.body.encode(game.expert_of(player).act({}))}).terms
         held = [red for red in game.task.red if player.body.touches(red)]
         if any(red.position[2] > 1.5 * EDGE for red in held):
             lifted.append(terms[player.name])
+        if game.task.solved(player):
+            break
+    assert game.task.solved(player)
     assert len(lifted) > 10
     assert sum(terms["height"] for terms in lifted[:10]) == 0.0
     # both blocks in the hands, for ever, against one block on the other for three seconds
