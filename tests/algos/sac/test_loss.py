@@ -16,7 +16,7 @@ from veca_marl.algos.networks.action_values import (
     BatchRenorm,
     Normalisation,
 )
-from veca_marl.algos.networks.factory import NetworkFactory
+from veca_marl.algos.networks.factory import NetworkCfg, NetworkFactory
 from veca_marl.algos.sac.config import Adaptation, EncoderGradient, TemperatureCfg
 from veca_marl.algos.sac.joint_action import JointAction
 from veca_marl.algos.sac.loss import TeamCrossQLoss, TeamSACLoss
@@ -74,7 +74,7 @@ def loss_of(
     spec = TeamSpec(
         agents, {"state": ArrayLayout((WIDTH,), "float32", -1.0, 1.0)}, actions, masked=True
     )
-    network = ActorCritics(factory("agents", spec, None), critic, [8])
+    network = ActorCritics(factory("agents", spec, NetworkCfg()), critic, [8])
     with torch.no_grad():
         for name, parameter in network.named_parameters():
             if "scale" not in name:
