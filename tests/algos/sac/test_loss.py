@@ -1,6 +1,7 @@
 """The losses equal TorchRL's where those exist, and integrals of the soft value elsewhere."""
 
 from copy import deepcopy
+from dataclasses import replace
 
 import pytest
 import torch
@@ -320,6 +321,24 @@ def test_a_temperature_rises_where_the_entropy_is_below_its_target():
     torch.testing.assert_close(
         temperatures.targets, {"move": -1.0, "voice": 0.3 * float(torch.tensor(3.0).log())}
     )
+
+
+def test_a_learnt_temperature_stays_above_its_minimum():
+    cfg = replace(LEARNT, minimum=0.5 * ALPHA)
+    temperatures = Temperatures(HYBRID, cfg)
+    optimizer = torch.optim.SGD(temperatures.parameters(), lr=1.0)
+    high = {part: torch.full((1, 2), 9.0) for part in HYBRID}
+    temperatures.loss(high, torch.ones(1, 2, dtype=torch.bool)).backward()
+    optimizer.step()
+    assert all(alpha < 0.5 * ALPHA for alpha in temperatures.alphas().values())
+    temperatures.project()
+    assert temperatures.alphas() == {part: pytest.approx(0.5 * ALPHA) for part in HYBRID}
+
+
+@pytest.mark.parametrize("minimum", [-1.0, 2.0 * ALPHA])
+def test_a_minimum_above_the_initial_temperature_is_refused(minimum):
+    with pytest.raises(ValueError, match=r"temperature\.minimum"):
+        replace(LEARNT, minimum=minimum)
 
 
 def test_batch_renormalisation_corrects_fully_after_its_warm_up_and_not_more():

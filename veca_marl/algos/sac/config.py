@@ -65,6 +65,8 @@ class TemperatureCfg:
         learning_rate: Step size of Adam for the logarithms of automatic temperatures (ours: larger
             than that of the networks, because the right temperature is proportional to the rewards
             of a step, and those of the tasks differ by orders of magnitude).
+        minimum: Lower bound of automatic temperatures. Without one, a policy whose entropy is above
+            its target before it has found a reward is trained without exploration from then on.
     """
 
     initial: float = 0.01
@@ -72,11 +74,17 @@ class TemperatureCfg:
     entropy_per_dimension: float = -1.0
     entropy_of_choices: float = 0.3
     learning_rate: float = 2e-3
+    minimum: float = 0.0
 
     def __post_init__(self) -> None:
         for name in ("initial", "learning_rate"):
             if not getattr(self, name) > 0.0:
                 raise ValueError(f"temperature.{name} must be positive, got {getattr(self, name)}")
+        if not 0.0 <= self.minimum <= self.initial:
+            raise ValueError(
+                f"temperature.minimum must be from 0 to temperature.initial ({self.initial}), got "
+                f"{self.minimum}"
+            )
         if not 0.0 <= self.entropy_of_choices <= 1.0:
             raise ValueError(
                 f"temperature.entropy_of_choices must be in [0, 1], got {self.entropy_of_choices}"

@@ -126,6 +126,7 @@ class SAC(Algorithm):
         (losses.critic + losses.policy + losses.temperature).backward()
         norms = [self._clip(self._critics), self._clip(self._policy)]
         self.optimizer.step()
+        self.temperatures.project()
         self._move_target(self.cfg.tau)
         numbers = losses.measures | {"critic_loss": losses.critic, "policy_loss": losses.policy}
         measured = {name: float(number.detach()) for name, number in numbers.items()}

@@ -28,6 +28,7 @@ class Temperatures(nn.Module):
         super().__init__()
         self.targets = {part: _target(layout, cfg) for part, layout in actions.items()}
         learnt = cfg.adaptation is Adaptation.automatic
+        self._least = math.log(cfg.minimum) if cfg.minimum > 0.0 else -math.inf
         self._logs = nn.ParameterDict(
             {
                 part: nn.Parameter(torch.tensor(math.log(cfg.initial)), requires_grad=learnt)
@@ -38,6 +39,12 @@ class Temperatures(nn.Module):
     def alphas(self) -> dict[str, Tensor]:
         """Return the temperature of each part, without gradient."""
         return {part: log.detach().exp() for part, log in self._logs.items()}
+
+    @torch.no_grad()
+    def project(self) -> None:
+        """Raise temperatures below the minimum to it; to be called after each gradient step."""
+        for log in self._logs.values():
+            log.clamp_(min=self._least)
 
     def bonus(self, entropies: Mapping[str, Tensor]) -> Tensor:
         """Return the sum of entropies, weighted by their temperatures."""
