@@ -151,6 +151,7 @@ def test_learning_is_measured_beside_rollouts(tmp_path, capsys):
     assert 0.0 < found["ratio"] < 1.0
     assert found["ratio"] == pytest.approx(speeds, rel=1.0), "both are medians of the same turns"
     assert 0.0 < found["processor_ratio"] < 1.0, "learning costs more than a rollout alone"
+    assert 0.0 < found["ratio_at_once"] < 1.0, "one process learns, all cores roll out"
     assert f"{found['ratio']:.2f}" in capsys.readouterr().out
 
 

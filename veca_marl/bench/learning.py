@@ -5,16 +5,18 @@ from __future__ import annotations
 import os
 import time
 from dataclasses import dataclass, replace
+from functools import partial
 from statistics import median
 
 from torchrl import timeit
 
 from veca_marl.algos.training.reporters import Row
 from veca_marl.algos.training.stopwatch import processor_seconds
+from veca_marl.bench.all_cores import SimultaneousRollouts
 from veca_marl.bench.rollouts import RandomActions
 from veca_marl.config import Config
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
-from veca_marl.runs.assembly import make_trainer
+from veca_marl.runs.assembly import GameFactory, make_trainer
 
 
 @dataclass
@@ -30,8 +32,11 @@ class Learning:
         cores: Cores of the machine.
         rollout_per_s: Frames per second of a rollout with random actions in one thread, with as
             many worlds as a worker process has; median.
+        rollouts_per_s: Those of one such rollout per core at the same time; median.
         frames_per_s: Frames of experience per second of the stages; median.
         ratio: `frames_per_s` / (`cores` x `rollout_per_s`), of elapsed times; median over turns.
+        ratio_at_once: `frames_per_s` / `rollouts_per_s`, likewise: 1 if learning and evaluating
+            were free, also on cores that are slower together than alone.
         processor_ratio: Processor time of a frame in a rollout divided by that in a stage, of all
             its processes: `ratio` if no core was ever idle. Not a number where the system does not
             tell the processor time of other processes.
@@ -41,8 +46,10 @@ class Learning:
     algorithm: str
     cores: int
     rollout_per_s: float
+    rollouts_per_s: float
     frames_per_s: float
     ratio: float
+    ratio_at_once: float
     processor_ratio: float
     seconds: dict[str, float]
 
@@ -94,15 +101,20 @@ class Turns:
     Attributes:
         stages: Cost of a frame in each stage but the first.
         rollouts: Cost of a frame in the rollout after each of them.
+        at_once: Frames per second of the rollouts on all cores after each of them.
     """
 
     def __init__(self, cfg: Config, steps: int) -> None:
         self.stages: list[Cost] = []
         self.rollouts: list[Cost] = []
+        self.at_once: list[float] = []
         self._steps = steps
         self._env = VecaEnv(cfg.game, cfg.collect.worlds, seed=0)
         self._actions = RandomActions(self._env, steps)
         self._rollout()  # fills caches
+        make_game = GameFactory(cfg.game, tuple(cfg.plugins))
+        make_env = partial(make_game, cfg.collect.worlds, seed=0)
+        self._all_cores = SimultaneousRollouts(make_env, steps, _cores())
         self._frames = 0
         self._start: Cost | None = None
 
@@ -115,6 +127,7 @@ class Turns:
         else:
             self.stages.append(_per_frame(self._start, frames - self._frames))
             self.rollouts.append(self._rollout())
+            self.at_once.append(self._all_cores.frames_per_s())
         self._frames, self._start = frames, _now()
 
     def _rollout(self) -> Cost:
@@ -128,17 +141,27 @@ class Turns:
     def close(self) -> None:
         """Close the worlds."""
         self._env.close()
+        self._all_cores.close()
+
+
+def _cores() -> int:
+    return os.cpu_count() or 1
 
 
 def _summary(cfg: Config, turns: Turns) -> Learning:
-    cores = os.cpu_count() or 1
+    cores = _cores()
     pairs = list(zip(turns.rollouts, turns.stages, strict=True))
     return Learning(
         algorithm=cfg.algo.name,
         cores=cores,
         rollout_per_s=1.0 / median(rollout.wall_s for rollout in turns.rollouts),
+        rollouts_per_s=median(turns.at_once),
         frames_per_s=1.0 / median(stage.wall_s for stage in turns.stages),
         ratio=median(rollout.wall_s / stage.wall_s for rollout, stage in pairs) / cores,
+        ratio_at_once=median(
+            1.0 / (stage.wall_s * rate)
+            for stage, rate in zip(turns.stages, turns.at_once, strict=True)
+        ),
         processor_ratio=median(r.processor_s / s.processor_s for r, s in pairs),
         seconds={part: s for part, s in timeit.todict(percall=False).items() if s > 0.0},
     )

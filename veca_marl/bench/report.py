@@ -103,9 +103,11 @@ def learning_table(learning: Learning) -> str:
         ["algorithm", learning.algorithm],
         ["rollout, one core, frames/s", f"{learning.rollout_per_s:,.0f}"],
         ["cores", str(learning.cores)],
+        ["rollouts on all cores at once, frames/s", f"{learning.rollouts_per_s:,.0f}"],
         ["learning with its evaluations, frames/s", f"{learning.frames_per_s:,.0f}"],
         ["learning / (cores x rollout)", f"{learning.ratio:.2f}"],
-        ["the same of processor times", f"{learning.processor_ratio:.2f}"],
+        ["learning / rollouts on all cores at once", f"{learning.ratio_at_once:.2f}"],
+        ["processor time of a frame, rollout / learning", f"{learning.processor_ratio:.2f}"],
         *([f"seconds in {part}", f"{s:.1f}"] for part, s in learning.seconds.items()),
     ]
     return f"speed of learning:\n{_table(rows)}"
