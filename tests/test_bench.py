@@ -1,13 +1,16 @@
 """The benchmark: the stopwatch, the command, free play and the references."""
 
 import json
+from functools import partial
 from itertools import count
+from multiprocessing import active_children
 
 import numpy as np
 import pytest
 import torch
 from composed import compose
 
+from veca_marl.bench.all_cores import SimultaneousRollouts
 from veca_marl.bench.command import chosen_games, main
 from veca_marl.bench.free_play import free_play
 from veca_marl.bench.options import BenchCfg
@@ -153,6 +156,18 @@ def test_learning_is_measured_beside_rollouts(tmp_path, capsys):
     assert 0.0 < found["processor_ratio"] < 1.0, "learning costs more than a rollout alone"
     assert 0.0 < found["ratio_at_once"] < 1.0, "one process learns, all cores roll out"
     assert f"{found['ratio']:.2f}" in capsys.readouterr().out
+
+
+def test_rollouts_at_once_name_a_process_that_was_killed():
+    game = compose(["+task=KickTheBall", "senses/vision=blind"]).game
+    before = set(active_children())
+    rollouts = SimultaneousRollouts(partial(VecaEnv, game, 1, seed=0), steps=2, processes=1)
+    assert rollouts.frames_per_s() > 0.0
+    for process in set(active_children()) - before:
+        process.kill()
+        process.join()
+    with pytest.raises(RuntimeError, match="process that measures rollouts has ended"):
+        rollouts.frames_per_s()
 
 
 @pytest.mark.parametrize("things", [0, 3])

@@ -336,7 +336,7 @@ def test_a_learnt_temperature_stays_above_its_minimum():
 
 
 @pytest.mark.parametrize("minimum", [-1.0, 2.0 * ALPHA])
-def test_a_minimum_above_the_initial_temperature_is_refused(minimum):
+def test_an_impossible_minimum_of_the_temperature_is_refused(minimum):
     with pytest.raises(ValueError, match=r"temperature\.minimum"):
         replace(LEARNT, minimum=minimum)
 

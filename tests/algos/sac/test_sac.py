@@ -95,6 +95,19 @@ def test_temperatures_have_a_step_size_of_their_own(make_sac, collect):
     assert all(0.005 < float(step.detach().abs()) < 0.04 for step in steps)
 
 
+def test_updates_do_not_lower_temperatures_below_their_minimum(make_sac, collect):
+    alphas = {}
+    for minimum in (0.0, 0.1):
+        temperature = TemperatureCfg(
+            0.1, Adaptation.automatic, entropy_per_dimension=-9.0, minimum=minimum
+        )
+        algorithm = make_sac(changes={"temperature": temperature, "updates_per_frame": 0.25})
+        algorithm.learn(collect(algorithm, seed=0))
+        alphas[minimum] = list(algorithm.temperatures.alphas().values())
+    assert all(float(alpha) < 0.0999 for alpha in alphas[0.0])
+    assert all(float(alpha) == pytest.approx(0.1) for alpha in alphas[0.1])
+
+
 def test_it_learns_without_target_networks(make_sac, collect):
     critic = ActionValuesCfg(hidden=[32], normalisation=Normalisation.batch_renorm)
     changes = {"targets": Targets.same, "critic": critic, "updates_per_frame": 0.3}

@@ -65,8 +65,8 @@ class TemperatureCfg:
         learning_rate: Step size of Adam for the logarithms of automatic temperatures (ours: larger
             than that of the networks, because the right temperature is proportional to the rewards
             of a step, and those of the tasks differ by orders of magnitude).
-        minimum: Lower bound of automatic temperatures. Without one, a policy whose entropy is above
-            its target before it has found a reward is trained without exploration from then on.
+        minimum: Lower bound of automatic temperatures. Without one they fall as long as the entropy
+            is above its target, also before a reward has been found.
     """
 
     initial: float = 0.01
