@@ -7,6 +7,7 @@ from listening import RATE, STEP
 from veca_marl.sim.sound import (
     Clip,
     Noise,
+    Pulses,
     Silence,
     SoundCfg,
     SoundKind,
@@ -65,6 +66,51 @@ def test_noise_is_white_above_the_high_pass():
     high = spectrum[(hertz > 5000) & (hertz < 10000)].mean()
     assert high / middle == pytest.approx(1.0, abs=0.05)
     assert low < 1e-2 * middle
+
+
+@pytest.mark.parametrize("kind", [SoundKind.buzz, SoundKind.noise])
+def test_pulses_are_the_sound_with_exact_silence_between_them(kind):
+    pulsed = SoundCfg(kind, level=0.3, pulse_s=0.1, pause_s=0.3)
+    samples = emit(make_sound(pulsed), 100).reshape(-1, round(0.4 * RATE))  # a pulse in each row
+    heard = np.any(samples != 0.0, axis=0)
+    assert abs(heard.sum() - 0.1 * RATE) <= 2
+    np.testing.assert_array_equal(samples[:, ~heard], 0.0)
+    begin = np.flatnonzero(heard & ~np.roll(heard, 1))[0]
+    pulses = np.roll(samples, -begin, axis=1)[:, : round(0.1 * RATE)]
+    ramp = round(0.005 * RATE)
+    assert rms(pulses[:, ramp:-ramp]) == pytest.approx(0.3, rel=0.05)
+    assert rms(pulses[:, :20]) < 0.06 * 0.3
+
+
+def test_pulses_have_no_clicks():
+    beeps = SoundCfg(SoundKind.tone, frequency_hz=2000.0, level=1.0, pulse_s=0.1, pause_s=0.1)
+    spectrum = np.abs(np.fft.rfft(emit(make_sound(beeps), 50)))
+    frequency = np.fft.rfftfreq(2 * (len(spectrum) - 1), 1.0 / RATE)
+    far = np.abs(frequency - 2000.0) > 1000.0
+    assert (spectrum[far] ** 2).sum() < 1e-5 * (spectrum**2).sum()
+
+
+def test_pulses_do_not_depend_on_the_length_of_a_step():
+    sound = make_sound(SoundCfg(SoundKind.buzz, pulse_s=0.05, pause_s=0.02))
+    whole = emit(sound, 10)
+    sound.reset(np.random.default_rng(0))
+    np.testing.assert_array_equal([sound.emit(1)[0] for _ in range(200)], whole[:200])
+
+
+@pytest.mark.parametrize(
+    ("pulse_s", "pause_s"),
+    [(0.0, 1.0), (np.inf, 1.0), (0.2, -1.0), (0.2, np.inf), (np.nan, 1.0)],
+)
+def test_impossible_pulses_are_refused(pulse_s, pause_s):
+    with pytest.raises(ValueError, match=f"pulse_s={pulse_s} .* pause_s={pause_s}"):
+        SoundCfg(pulse_s=pulse_s, pause_s=pause_s)
+    with pytest.raises(ValueError, match="pulse_s"):
+        Pulses(Silence(), pulse_s, pause_s)
+
+
+def test_a_voice_has_no_pulses():
+    with pytest.raises(ValueError, match=r"voice with pause_s=0\.5"):
+        SoundCfg(SoundKind.voice, pause_s=0.5)
 
 
 def test_noise_must_be_reset_before_it_emits():

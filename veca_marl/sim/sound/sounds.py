@@ -1,11 +1,9 @@
-"""The sounds that sources emit, and their configuration. Levels are those of `waveforms`."""
+"""The sounds that sources emit. Levels are those of `waveforms`."""
 
 from __future__ import annotations
 
+import math
 from collections import deque
-from collections.abc import Callable
-from dataclasses import dataclass
-from enum import Enum
 from typing import Protocol
 
 import numpy as np
@@ -16,14 +14,11 @@ from veca_marl.sim.geometry import Floats
 from veca_marl.sim.sound.waveforms import (
     SAMPLE_RATE_HZ,
     Samples,
-    buzz,
     check_level,
-    check_pitch,
     high_pass,
-    load_wav,
-    tone,
 )
 
+_RAMP_S = 0.005  # usual in psychoacoustics
 _NEGLIGIBLE = 1e-12  # pressure, -240 dB: the decay of the high-pass ends here
 
 
@@ -112,6 +107,44 @@ class Noise:
         return emitted
 
 
+class Pulses:
+    """Another sound in pulses with silence between them, such as the beeps of an alarm.
+
+    A pulse begins and ends with half of a period of a cosine: cutting a sound off would add clicks.
+
+    Args:
+        sound: The sound; it continues during the pauses, unheard.
+        pulse_s: Duration of a pulse.
+        pause_s: Duration of the silence after it.
+        sample_rate_hz: Rate of the sound field.
+
+    Raises:
+        ValueError: If a duration is not positive and finite, or a pulse is shorter than its ramps,
+            10 ms.
+    """
+
+    def __init__(
+        self, sound: Sound, pulse_s: float, pause_s: float, sample_rate_hz: float = SAMPLE_RATE_HZ
+    ) -> None:
+        check_pulses(pulse_s, pause_s)
+        ramp = round(_RAMP_S * sample_rate_hz)
+        rise = 0.5 - 0.5 * np.cos(np.pi * (np.arange(ramp) + 0.5) / ramp)
+        level = np.ones(round(pulse_s * sample_rate_hz))
+        level[:ramp], level[-ramp:] = rise, rise[::-1]
+        pause = np.zeros(max(1, round(pause_s * sample_rate_hz)))
+        self._sound = sound
+        self._level = Clip(np.concatenate([level, pause]), loop=True)
+
+    def reset(self, rng: np.random.Generator) -> None:
+        """See `Sound`. The first pulse begins at a random time."""
+        self._sound.reset(rng)
+        self._level.reset(rng)
+
+    def emit(self, n_samples: int) -> Samples:
+        """See `Sound`."""
+        return self._sound.emit(n_samples) * self._level.emit(n_samples)
+
+
 class Voice:
     """A queue of utterances that are played one after the other, silence while it is empty.
 
@@ -177,57 +210,11 @@ class Voice:
         return taken
 
 
-class SoundKind(Enum):
-    """Kinds of sounds."""
-
-    buzz = "buzz"
-    tone = "tone"
-    noise = "noise"
-    clip = "clip"
-    voice = "voice"
-    silence = "silence"
-
-
-@dataclass
-class SoundCfg:
-    """A sound as data.
-
-    Attributes:
-        kind: Kind of sound.
-        frequency_hz: Fundamental of a buzz or a tone, at least 80 and below 11 025, half of the
-            sampling rate.
-        level: Rms pressure at 1 m; full scale of a WAV file is 1. Not used by a voice.
-        path: WAV file of a clip.
-        loop: Whether a clip repeats without end.
-    """
-
-    kind: SoundKind = SoundKind.buzz
-    frequency_hz: float = 150.0
-    level: float = 0.1
-    path: str | None = None
-    loop: bool = True
-
-    def __post_init__(self) -> None:
-        """Check the numbers, and that a clip and nothing else has a path."""
-        check_pitch(self.frequency_hz, SAMPLE_RATE_HZ)
-        check_level(self.level)
-        if (self.path is None) == (self.kind is SoundKind.clip):
-            raise ValueError(
-                f"sound of kind {self.kind.value} with path={self.path!r}: a clip needs a path, "
-                "other kinds must not have one"
-            )
-
-
-def make_sound(cfg: SoundCfg, sample_rate_hz: int = SAMPLE_RATE_HZ) -> Sound:
-    """Return a new sound with its own state."""
-    makers: dict[SoundKind, Callable[[], Sound]] = {
-        SoundKind.buzz: lambda: Clip(buzz(cfg.frequency_hz, cfg.level, sample_rate_hz), loop=True),
-        SoundKind.tone: lambda: Clip(tone(cfg.frequency_hz, cfg.level, sample_rate_hz), loop=True),
-        SoundKind.noise: lambda: Noise(cfg.level, sample_rate_hz),
-        SoundKind.clip: lambda: Clip(
-            load_wav(str(cfg.path), sample_rate_hz, cfg.level, cfg.loop), loop=cfg.loop
-        ),
-        SoundKind.voice: lambda: Voice(sample_rate_hz),
-        SoundKind.silence: Silence,
-    }
-    return makers[cfg.kind]()
+def check_pulses(pulse_s: float, pause_s: float) -> None:
+    """Raise `ValueError` if pulses of these durations cannot be made, see `Pulses`."""
+    least_s = 2.0 * _RAMP_S
+    if not (least_s <= pulse_s < math.inf and 0.0 < pause_s < math.inf):
+        raise ValueError(
+            f"pulse_s={pulse_s} must be finite and at least {least_s}, the duration of its ramps, "
+            f"and pause_s={pause_s} finite and positive"
+        )

@@ -29,6 +29,8 @@ class KickTheBallCfg(TaskCfg):
         life_s: Time after which a ball that has not been kicked is replaced.
         rest_s: Time after which a kicked ball is replaced.
         loudness: Level of the ball's sound, see `SoundCfg`.
+        pulse_s: Duration of a pulse of its sound, if there are pauses.
+        pause_s: Silence between pulses: an agent then needs memory; 0 is a continuous sound.
         walking_mps: Speed of the player below which the term `approach` is 0.
     """
 
@@ -39,6 +41,8 @@ class KickTheBallCfg(TaskCfg):
     life_s: float = 6.0
     rest_s: float = 0.4
     loudness: float = 0.1
+    pulse_s: float = 0.2
+    pause_s: float = 0.0
     walking_mps: float = 0.35
     weights: dict[str, float] = terms(kick=1.0, approach=0.01)
 
@@ -50,6 +54,13 @@ class KickTheBallCfg(TaskCfg):
         for name in ("life_s", "rest_s"):
             if not getattr(self, name) > 0.0:
                 raise ValueError(f"task.{name}={getattr(self, name)} must be positive")
+        self.sound()
+
+    def sound(self) -> SoundCfg:
+        """Return the sound of the ball."""
+        return SoundCfg(
+            SoundKind.buzz, level=self.loudness, pulse_s=self.pulse_s, pause_s=self.pause_s
+        )
 
 
 @register
@@ -95,7 +106,7 @@ class KickTheBall(Task):
                 size_m=[self.cfg.radius_m],
                 mass_kg=self.cfg.mass_kg,
                 colour=(0.95, 0.15, 0.1),
-                sound=SoundCfg(kind=SoundKind.buzz, level=self.cfg.loudness),
+                sound=self.cfg.sound(),
             )
         )
         self._kicked = self._kicked_now = False
