@@ -183,3 +183,16 @@ def test_the_expert_needs_both_ears():
     hrtf, mono = kicks_of_expert("hrtf", 3), kicks_of_expert("mono", 3)
     assert hrtf.mean() > 2.0
     assert hrtf.mean() > 2.0 * mono.mean()
+
+
+def test_a_beeping_ball_is_heard_for_its_share_of_the_time():
+    game = game_of("senses/vision=blind", "task.pulse_s=0.2", "task.pause_s=0.6")
+    source = game.world.sound.sources["ball"]
+    heard = [source.silent_samples == 0 for _ in stand(game, 8.0)]  # ten periods
+    game.close()
+    assert 0.25 <= np.mean(heard) <= 0.31  # a step in which a pulse begins or ends counts
+
+
+def test_impossible_beeps_are_refused():
+    with pytest.raises(ValueError, match=r"pause_s=-1\.0"):
+        compose(["+task=KickTheBall", "task.pause_s=-1.0"])
