@@ -1,8 +1,10 @@
 """The site builds, and its generated pages are those of the code and data of this commit."""
 
+import ast
 import importlib
 import inspect
 import io
+import itertools
 import pkgutil
 import re
 import subprocess
@@ -87,6 +89,27 @@ def test_docstrings_are_valid_restructured_text():
         warnings = io.StringIO()
         publish_doctree("\n\n".join(texts), settings_overrides={"warning_stream": warnings})
         assert not warnings.getvalue(), module.__name__
+
+
+def docstrings_of_attributes(tree):
+    """Yield the strings below assignments, which Sphinx reads as their docstrings."""
+    for node in ast.walk(tree):
+        body = getattr(node, "body", None)
+        for above, below in itertools.pairwise(body if isinstance(body, list) else []):
+            match above, below:
+                case (ast.Assign() | ast.AnnAssign(), ast.Expr(ast.Constant(str(docstring)))):
+                    yield docstring
+
+
+def test_no_docstring_of_an_attribute_has_a_colon_in_its_first_line():
+    """The style reads what is before the colon as a type, and its words as references."""
+    found = [
+        (path.name, docstring)
+        for path in Path(veca_marl.__file__).parent.rglob("*.py")
+        for docstring in docstrings_of_attributes(ast.parse(path.read_text(encoding="utf-8")))
+        if ":" in docstring.splitlines()[0]
+    ]
+    assert found == []
 
 
 @pytest.mark.parametrize("name", built_in_tasks())

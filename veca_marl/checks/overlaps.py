@@ -10,7 +10,7 @@ from veca_marl.sim.body.walker import Walker
 from veca_marl.sim.physics import World, pybullet
 
 GREATEST_OVERLAP_M = 0.005
-"""Depth up to which contacts are no overlap: skin yields by less, and so do resting props."""
+"""Depth up to which contacts are no overlap; skin yields by less, and so do resting props."""
 
 _BODY_A, _BODY_B, _DISTANCE = 1, 2, 8  # entries of Bullet's contact points
 

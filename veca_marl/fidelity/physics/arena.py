@@ -9,7 +9,7 @@ import numpy as np
 from veca_marl.sim.physics import ClockCfg, PlaygroundCfg, PropCfg, RoomCfg, World
 
 SUBSTEPS = (5, 10, 20, 40)
-"""Physics steps per agent step of 40 ms: steps of 8, 4, 2 and 1 ms."""
+"""Physics steps per agent step of 40 ms, for steps of 8, 4, 2 and 1 ms."""
 _SIZE_M = 100.0
 _HEIGHT_M = 50.0
 

@@ -61,8 +61,8 @@ ADULT_MM = {
     "l_shank": 45.0,
     "l_foot": 20.0,
 }
-"""Two-point thresholds of adults, mm: finger, palm, forehead, forearm, upper arm, back, thigh, calf
-and foot (Weinstein 1968, rounded)."""
+"""Two-point thresholds of adults in mm, of finger, palm, forehead, forearm, upper arm, back, thigh,
+calf and foot (Weinstein 1968, rounded)."""
 
 
 def plane_error(radius: float) -> float:

@@ -14,7 +14,7 @@ from veca_marl.sim.physics import ClockCfg
 MASSES_KG = (0.05, 0.2, 0.5, 1.5)
 SPOTS = {"palm": PALM, "forearm": FOREARM}
 DEFAULT_SHARE, LARGE_SHARE = 0.02, 0.1
-"""Values of `ClockCfg.contact_share`: how early Bullet detects a contact."""
+"""Values of `ClockCfg.contact_share`, which is how early Bullet detects a contact."""
 SLOW_FALL_M = 0.002
 _SUBSTEPS = (5, 10, 20, 40)
 _AT_REST_AFTER_S = 0.8

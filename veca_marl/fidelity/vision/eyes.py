@@ -33,7 +33,7 @@ TELLER_CPD: dict[float, float] = {
     36.0: 21.81,
     48.0: 24.81,
 }
-"""Mean monocular grating acuity (cycles per degree) by age in months on the Teller Acuity Cards:
+"""Mean monocular grating acuity (cycles per degree) by age in months on the Teller Acuity Cards,
 Mayer et al., Investigative Ophthalmology & Visual Science 36 (1995) 671-685, table 2."""
 
 CAMERAS = 300

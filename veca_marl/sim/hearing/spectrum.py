@@ -14,7 +14,7 @@ MAGNITUDE_FLOOR = 1e-8
 """Added to each magnitude before the logarithm, as in the paper's code."""
 
 SILENCE = -8.0
-"""``log10(MAGNITUDE_FLOOR)``: the observed value of exact silence."""
+"""``log10(MAGNITUDE_FLOOR)``, the observed value of exact silence."""
 
 
 class Window(Enum):

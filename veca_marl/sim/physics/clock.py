@@ -9,7 +9,7 @@ from veca_marl.sim.sound import SAMPLE_RATE_HZ
 CONTROL_RATES_HZ = tuple(
     rate for rate in range(1, SAMPLE_RATE_HZ + 1) if SAMPLE_RATE_HZ % rate == 0
 )
-"""Possible numbers of agent steps per second: the divisors of the sampling rate."""
+"""Possible numbers of agent steps per second, the divisors of the sampling rate."""
 
 
 @dataclass

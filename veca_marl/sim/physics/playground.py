@@ -21,14 +21,14 @@ from veca_marl.sim.sound import House, Room
 from veca_marl.sim.sound.rooms import TRANSMISSION_LOSS_DB
 
 THICKEST_WALL_M = 0.5
-"""The threshold of a door lies within the wall: at most so far from either room."""
+"""The threshold of a door lies within the wall, at most so far from either room."""
 
 SHARED_VOLUME_M3 = 1e-6
-"""Greatest volume that two adjacent rooms may share: rounding errors of their corners."""
+"""Greatest volume that two adjacent rooms may share, for rounding errors of their corners."""
 
 GREATEST_IMAGE_ORDER = 12
-"""Greatest `PlaygroundCfg.image_order`: 2625 image sources of each source. Their number grows with
-the third power of the order, and so do the memory and time of every step."""
+"""Greatest `PlaygroundCfg.image_order`, which makes 2625 image sources of each source. Their number
+grows with the third power of the order, and so do the memory and time of every step."""
 
 
 @dataclass

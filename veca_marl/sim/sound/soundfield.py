@@ -18,7 +18,7 @@ from veca_marl.sim.sound.sounds import Sound
 __all__ = ["Listener", "SoundField", "Source"]
 
 REACH_M = 200.0
-"""Reach of the free field: there a source of level 1 has an rms pressure of 0.005 (-46 dB)."""
+"""Reach of the free field, where a source of level 1 has an rms pressure of 0.005 (-46 dB)."""
 
 
 class SoundField:

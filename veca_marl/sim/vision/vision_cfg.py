@@ -10,10 +10,10 @@ from veca_marl.sim.vision.infant_vision import InfantVision
 from veca_marl.sim.vision.optics import Camera
 
 WIDEST_PUPIL_MM = 20.0
-"""Greatest pupil: about the diameter of the eyeball."""
+"""Greatest pupil, about the diameter of the eyeball."""
 
 STRONGEST_ACCOMMODATION_DPT = 100.0
-"""Greatest accommodation: focus at 1 cm."""
+"""Greatest accommodation, focus at 1 cm."""
 
 
 class Eyes(Enum):

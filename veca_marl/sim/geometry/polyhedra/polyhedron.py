@@ -11,7 +11,7 @@ from scipy.spatial import ConvexHull, HalfspaceIntersection, QhullError
 from veca_marl.sim.geometry.pose import Floats
 
 MAX_TRIANGLES = 128
-"""Drawing and touch examine every face: more than this belongs into several props."""
+"""Drawing and touch examine every face; more than this belongs into several props."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,7 +9,7 @@ import numpy as np
 from veca_marl.sim.geometry.polyhedra.polyhedron import Polyhedron, convex_hull
 
 ARC_STEP_DEG = 12.0
-"""Greatest angle of one straight edge of an arc: the edge is 0.6 % of the radius inside the arc."""
+"""Greatest angle of one straight edge of an arc; the edge is 0.6 % of the radius inside the arc."""
 
 
 def pyramid(length_x: float, length_y: float, height: float) -> Polyhedron:

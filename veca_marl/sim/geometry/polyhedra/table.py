@@ -10,8 +10,8 @@ from veca_marl.sim.geometry.polyhedra.polyhedron import Polyhedron
 from veca_marl.sim.geometry.pose import Floats
 
 FACE_COLUMNS = 14
-"""Columns of a row: outward normal (3), offset of the plane, three corners (9), and in the first
-row of a polyhedron the number of its planes."""
+"""Columns of a row, which are outward normal (3), offset of the plane, three corners (9), and, in
+the first row of a polyhedron, the number of its planes."""
 
 PLANES_COLUMN = 13
 

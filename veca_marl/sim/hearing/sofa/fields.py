@@ -15,7 +15,7 @@ from veca_marl.sim.geometry import Floats
 from veca_marl.sim.hearing.sofa.measured_head import SofaError
 
 MOST_VALUES = 1 << 26
-"""Largest number of values of one field: 512 MiB of float64, four times the largest known set."""
+"""Largest number of values of one field, 512 MiB of float64, four times the largest known set."""
 
 # deflate, the compression of netCDF, reaches at most 1032 to 1
 _STRONGEST_COMPRESSION = 1100

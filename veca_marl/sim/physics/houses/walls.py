@@ -16,7 +16,7 @@ from veca_marl.sim.physics.props.library.doors import door_leaf
 from veca_marl.sim.physics.rooms import DoorCfg, LeafCfg, RoomCfg
 
 COVERING_M = 0.004
-"""Height of the coloured covering of a floor: thinner than what casts contact shadows differently
+"""Height of the coloured covering of a floor, thinner than what casts contact shadows differently
 (0.01 m), thick enough that depths of single precision tell it from the floor below."""
 
 _TOLERANCE_M = 1e-6

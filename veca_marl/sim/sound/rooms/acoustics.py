@@ -16,7 +16,7 @@ SPEED_OF_SOUND_MPS = 343.0
 """Dry air at 20 degrees Celsius (ISO 9613-1)."""
 
 NEAR_FIELD_M = 0.107
-"""Distance below which the gain is constant: that of the mouth from the ears of the bodies."""
+"""Distance below which the gain is constant, that of the mouth from the ears of the bodies."""
 
 _WALL_MARGIN_M = 0.01
 _DECAY = 24.0 * math.log(10.0) / SPEED_OF_SOUND_MPS

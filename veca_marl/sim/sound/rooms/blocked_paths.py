@@ -14,7 +14,7 @@ from veca_marl.sim.geometry import Floats
 
 _GRAZE_M = 1e-6
 _INSIDE_M = 1e-3
-"""A box counts as inside a room if it extends into it by more than this: walls touch the room."""
+"""A box counts as inside a room if it extends into it by more than this; walls touch the room."""
 
 
 @njit(cache=True)

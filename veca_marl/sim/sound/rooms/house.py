@@ -21,7 +21,7 @@ from veca_marl.sim.sound.rooms.obstacles import Obstacles
 from veca_marl.sim.sound.rooms.surroundings import Arrivals, OneRoom
 
 TRANSMISSION_LOSS_DB = 30.0
-"""A limp partition of 15 kg/m2 at 500 Hz by the field-incidence mass law: 20 log10(500 x 15) - 47
+"""A limp partition of 15 kg/m2 at 500 Hz by the field-incidence mass law, 20 log10(500 x 15) - 47
 = 30.5 dB. Authors differ in its constant (Ebbitt & Hansen 2007, Mass Law - Calculations and
 Measurements, SAE 2007-01-2201); 47 is one of those in use, 5 dB below normal incidence, which is
 20 log10(pi f m / (rho c)) with rho c = 415 kg/(m2 s). The same at all frequencies: real walls

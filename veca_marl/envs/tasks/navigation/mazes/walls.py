@@ -12,7 +12,7 @@ from veca_marl.sim.geometry import Floats
 from veca_marl.sim.physics import PlaygroundCfg, Prop, PropCfg, PropShape, World
 
 SMALLEST_CELL_M = 0.7
-"""Least edge of a cell: the passage for a walker of radius 0.11 m that turns, and half a wall on
+"""Least edge of a cell, the passage for a walker of radius 0.11 m that turns, and half a wall on
 either side. An object in the middle of a cell cannot be reached from beyond its walls."""
 _THICKNESS_M, _HEIGHT_M = 0.1, 1.0
 _SATURATION, _VALUE = 0.45, 0.85

@@ -15,7 +15,7 @@ from veca_marl.sim.sound.impacts import (
 )
 
 _FOOT_MASS_SHARE = 0.06
-"""Effective mass of a foot that lands, as a share of the body's: 6.3 % in walking, 5.3 % in running
+"""Effective mass of a foot that lands, as a share of the body's, 6.3 % in walking, 5.3 % in running
 (Chi & Schmitt 2005, Mechanical energy and effective foot mass during impact loading)."""
 
 _FLOOR = replace(MATERIALS[Material.wood], loss_tangent=0.1)
