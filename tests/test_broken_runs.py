@@ -9,12 +9,12 @@ from omegaconf import OmegaConf
 
 from veca_marl import api
 from veca_marl.algos.training.checkpoint import CheckpointError
-from veca_marl.config import ConfigError
+from veca_marl.config import ConfigError, to_config
 from veca_marl.evaluate import main as evaluate
 from veca_marl.runs.assembly import make_trainer
 from veca_marl.runs.run_folder import RunFolder, open_run
 from veca_marl.tournament import main as tournament
-from veca_marl.train import stored_config
+from veca_marl.train import stored_node
 
 FRAMES = 8
 CHOICES = [
@@ -119,7 +119,7 @@ def files(run):
 
 
 def resume(run, *overrides):
-    cfg = stored_config(open_run(run.path), [f"resume={run.path}", *overrides])
+    cfg = to_config(stored_node(open_run(run.path), [f"resume={run.path}", *overrides]))
     return make_trainer(cfg, run)
 
 
@@ -182,11 +182,25 @@ def test_a_run_that_was_killed_before_its_first_checkpoint_starts_at_frame_0(run
 
 def test_what_has_no_influence_on_the_result_can_be_changed(run):
     asked = ["log=csv", "log.video=false", "total_frames=1e3", "max_minutes=3", "threads=2"]
-    cfg = stored_config(run, asked)
+    cfg = to_config(stored_node(run, asked))
     assert cfg.log.progress_bar
     assert not cfg.log.video
     assert (cfg.total_frames, cfg.max_minutes, cfg.threads) == (1000, 3.0, 2)
     assert resume(run, *asked, "device=cpu", "threads=1").progress.frames == FRAMES
+
+
+def test_changed_budgets_are_kept_when_a_run_is_continued_once_more(run):
+    asked = [f"resume={run.path}", "total_frames=1000", "max_minutes=3", "log.video=false"]
+    run.begin_again(stored_node(run, asked), asked, FRAMES)
+    again = stored_node(run, [])
+    assert (again.total_frames, again.max_minutes, again.log.video) == (1000, 3.0, False)
+    assert again.resume is None
+    assert resume(run).progress.frames == FRAMES
+
+
+def test_training_from_python_does_not_ignore_a_run_to_be_resumed(run):
+    with pytest.raises(ConfigError, match=r"resume=.*begins a new run; continue one with"):
+        api.train("KickTheBall", overrides=[f"resume={run.path}"])
 
 
 @pytest.mark.parametrize(

@@ -130,7 +130,7 @@ def test_an_existing_run_is_not_overwritten(smoke):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ([], "error: no task: add +task=NAME; choices: CrawlBaby, GrabObject, KickTheBall"),
+        ([], "error: no task: add +task=NAME; choices: BabyzumasRevenge, ChaseCar, ColorSort"),
         (["task=KickTheBall"], "error: task has no default to replace: write +task=KickTheBall"),
         (["+task=KickTheBal"], "error: unknown task 'KickTheBal' (did you mean KickTheBall?)"),
         (["+task=KickTheBall", "sede=1"], "error: unknown key 'sede' (did you mean seed?)"),
@@ -140,6 +140,7 @@ def test_an_existing_run_is_not_overwritten(smoke):
             "error: device=tpu is not on this machine; choices: cpu",
         ),
         (["resume=nowhere"], "error: resume="),
+        ([f"resume={__file__}"], f"error: resume={__file__} is a file; give the folder of a run"),
         (
             ["+task=KickTheBall", "hydra.run.dir=/dev/null/run"],
             "error: cannot create /dev/null/run: Not a directory",
@@ -153,6 +154,16 @@ def test_a_wrong_command_ends_in_one_line_and_leaves_nothing(tmp_path, arguments
     assert line.startswith(message)
     assert not [path for path in tmp_path.rglob("*") if path.is_file()]
     assert not list(tmp_path.glob("runs/*/*"))
+
+
+def test_logged_lines_and_diverged_learning_are_seen(tmp_path):
+    sac = ["algo=sac", "algo.replay={capacity: 2000, warm_up_frames: 16}", "algo.batch_size=16"]
+    done = train(tmp_path, *SMOKE, *sac, "algo.learning_rate=1e12", "hydra.run.dir=run")
+    assert done.returncode == 1
+    assert "replay: 0." in done.stderr  # the memory that it takes
+    *_, last = done.stderr.strip().splitlines()
+    assert "error: team 'agents': the gradient is" in last
+    assert last.endswith(f"continue with: python -m veca_marl.train resume={tmp_path}/run")
 
 
 def comparable(run):

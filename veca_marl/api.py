@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from veca_marl.checks import CheckCfg, TaskReport, check_game
-from veca_marl.config import compose, compose_node, to_config
+from veca_marl.config import ConfigError, compose, compose_node, to_config
 from veca_marl.envs.adapters.gymnasium import VecaGymEnv
 from veca_marl.envs.adapters.pettingzoo import VecaParallelEnv
 from veca_marl.envs.adapters.spaces import SensesLayout
@@ -181,13 +181,19 @@ def train(
         The rows of the metrics and of the evaluations, and the policy.
 
     Raises:
-        ConfigError: If there is no such choice, or there is a run in `folder`.
+        ConfigError: If there is no such choice, there is a run in `folder`, or a run is to be
+            resumed.
         CheckpointError: If something cannot be loaded or stored.
     """
     chosen = _choices(task, playground, body, senses, plugins)
     chosen += [] if total_frames is None else [f"total_frames={_integer(total_frames)}"]
     chosen += [f"seed={seed}", *overrides]
     node = compose_node(chosen)
+    if node.resume is not None:
+        raise ConfigError(
+            f"resume={node.resume}: `train` begins a new run; continue one with "
+            f"python -m veca_marl.train resume={node.resume}"
+        )
     decide_precision(node)
     cfg = to_config(node)
     run = None if folder is None else new_run(Path(folder))

@@ -105,7 +105,9 @@ def _play(
     learners = make_learners(cfg, read_specs(cfg.game), torch.device("cpu"))
     env = VecaEnv(cfg.game, min(options.episodes, cfg.eval.worlds), cfg.seed)
     margin = options.tournament.draw_margin
-    matches = play_all(env, learners.policy, pool, chosen, options.episodes, margin, cfg.seed)
+    matches = play_all(
+        env, learners.policy.copy(), pool, chosen, options.episodes, margin, cfg.seed
+    )
     env.close()
     return matches
 

@@ -40,10 +40,10 @@ _COMMAND = "python -m veca_marl.train"
 _NO_FOLDER = (errno.EACCES, errno.EPERM, errno.EROFS, errno.ENOTDIR)
 _DISK_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 _CONFIGURATION_ERRORS = (ConfigError, CheckpointError, WriteError)
-_FAILURES = (WorkerError, NotFiniteError, CheckpointError, WriteError)
+_FAILURES = (WorkerError, NotFiniteError, FloatingPointError, CheckpointError, WriteError)
 
 
-def stored_config(folder: RunFolder, overrides: list[str]) -> Config:
+def stored_node(folder: RunFolder, overrides: list[str]) -> DictConfig:
     """Return the configuration of an earlier run, with the changes that resuming allows.
 
     Args:
@@ -65,7 +65,7 @@ def stored_config(folder: RunFolder, overrides: list[str]) -> Config:
             f"choices: {', '.join(RESUMABLE)}"
         )
     change(node, [text for text in overrides if not text.startswith("+task=")], RESUMABLE)
-    return to_config(node)
+    return node
 
 
 @hydra.main(version_base="1.3", config_path=str(conf_dir()), config_name="config")
@@ -102,9 +102,10 @@ def set_up(node: DictConfig, path: Path) -> tuple[Config, RunFolder, Trainer]:
     if node.resume is not None:
         folder = open_run(path, "resume=")
         overrides = list(HydraConfig.get().overrides.task)
-        cfg = stored_config(folder, overrides)
+        stored = stored_node(folder, overrides)
+        cfg = to_config(stored)
         trainer = make_trainer(cfg, folder)
-        folder.begin_again(overrides, trainer.progress.frames)
+        folder.begin_again(stored, overrides, trainer.progress.frames)
         return cfg, folder, trainer
     folder = new_run(path)
     for precision in decide_precision(node):
@@ -138,7 +139,7 @@ def main() -> None:
     except KeyboardInterrupt:  # a sweep; `run` handles that of a single run
         raise SystemExit(130) from None
     except OSError as error:
-        if error.errno not in _NO_FOLDER or Path(error.filename or ".").exists():
+        if error.errno not in _NO_FOLDER + _DISK_FULL or Path(error.filename or ".").exists():
             raise
         give_up(ConfigError(f"cannot create {error.filename}: {error.strerror}"))
 

@@ -10,8 +10,6 @@ import torch
 
 from veca_marl.train import main
 
-NO_LOG_FILES = ["hydra/job_logging=none", "hydra/hydra_logging=none"]
-
 
 @contextmanager
 def settings_of_the_process():
@@ -31,7 +29,7 @@ def train(folder, *arguments):
     with pytest.MonkeyPatch.context() as patch, settings_of_the_process():
         patch.chdir(folder)
         patch.setenv("HYDRA_FULL_ERROR", "1")  # `main` sets it
-        patch.setattr(sys, "argv", ["veca_marl.train", *arguments, *NO_LOG_FILES])
+        patch.setattr(sys, "argv", ["veca_marl.train", *arguments])
         try:
             main()
         except SystemExit as end:

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import fields, is_dataclass
+from pathlib import Path
 from typing import Any, cast
 
 import hydra
@@ -144,6 +145,8 @@ def _own_hydra() -> Iterator[None]:
 def _run_folder(resume: str | None, task: str | None, now: str) -> str:
     """Return the folder of a run, which Hydra creates."""
     if resume is not None:
+        if Path(resume).is_file():
+            raise ConfigError(f"resume={resume} is a file; give the folder of a run")
         return resume
     if task is None:
         raise ConfigError(no_task())

@@ -58,12 +58,24 @@ class RunFolder:
         self._write_json(self.provenance, content)
         write_atomically(self.config, OmegaConf.to_yaml(node, resolve=True))  # last: it is a run
 
-    def begin_again(self, overrides: Sequence[str], frames: int) -> None:
-        """Add the provenance of a resumed run, which continues after so many frames."""
+    def begin_again(self, node: DictConfig, overrides: Sequence[str], frames: int) -> None:
+        """Store how a run is continued.
+
+        The configuration is written anew: resuming the run once more without overrides keeps its
+        budgets, and what reads the folder knows them.
+
+        Args:
+            node: The configuration from now on.
+            overrides: Those of the command line.
+            frames: Number of frames after which the run continues.
+        """
         content = self._read_provenance()
         again = {"frames": frames, **provenance(overrides)}
         content.setdefault("resumed", []).append(again)
         self._write_json(self.provenance, content)
+        stored = node.copy()
+        stored.resume = None
+        write_atomically(self.config, OmegaConf.to_yaml(stored, resolve=True))
 
     def typed_config(self) -> DictConfig:
         """Return the configuration stored with the run, with the types that it had.

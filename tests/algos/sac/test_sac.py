@@ -141,6 +141,18 @@ def test_actions_are_uniform_until_the_first_update(make_sac, collect):
     assert share[1] < 0.1
 
 
+def test_a_policy_that_was_learnt_before_acts_while_the_buffer_is_filled(make_sac, collect):
+    changes = {"replay": ReplayCfg(1024, warm_up_frames=100)}
+    earlier, continued, copied = (make_sac(changes=changes, seed=seed) for seed in range(3))
+    for seed in range(2):
+        earlier.learn(collect(earlier, seed=seed))
+    continued.load_state_dict(earlier.state_dict())
+    copied.init_from(earlier)
+    for algorithm in (continued, copied):
+        algorithm.learn(collect(algorithm))  # 64 frames: the buffer is not ready
+        assert not algorithm.state_dict()["warm_up"]["active"]
+
+
 def test_a_gradient_that_is_not_finite_is_reported(make_sac, collect):
     algorithm = make_sac()
     batch = collect(algorithm)

@@ -101,7 +101,10 @@ class SAC(Algorithm):
         self.replay.extend(batch)
         measured = [self.update() for _ in range(self._take_due(batch.numel()))]
         self._updates += len(measured)
-        self._warm_up.active.fill_(not self.replay.ready)
+        if self.replay.ready:
+            # never switched on again: a run that continues, or starts from another one, fills an
+            # empty buffer with its policy
+            self._warm_up.active.fill_(False)
         return _mean(measured) | self._alphas() | self._counts()
 
     def _take_due(self, frames: int) -> int:
