@@ -55,3 +55,8 @@ def test_the_table_has_every_function_of_the_paper_under_its_name():
         if match:
             words = re.sub(r"(?<!^)([A-Z])", r"_\1", match[1]).lower()
             assert path.rpartition(".")[2] == OTHER_NAMES.get(match[1], words)
+
+
+def test_the_table_has_the_actions_of_the_main_text():
+    listed = {path.rpartition(".")[2] for _, path in ROWS}
+    assert {"grab", "open", "step_on", "crawl"} <= listed

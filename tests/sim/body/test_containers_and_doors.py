@@ -85,6 +85,19 @@ def test_a_door_is_opened_and_closed():
     assert world.prop("door").opening < 0.1
 
 
+def test_methods_open_and_close_as_the_verbs_do():
+    world = empty_world(door(), toy())
+    walker = seeing(world)
+    begin(world)
+    leaf = world.prop("door")
+    assert not walker.close(leaf)  # it is closed
+    assert not walker.open(world.prop("toy"))
+    assert walker.open(leaf)
+    let_pass(world, 3.0)
+    assert leaf.opening > 0.9
+    assert walker.close(leaf)
+
+
 def test_a_locked_door_opens_with_its_key_in_the_hand_only():
     lock = LockCfg(key="key")
     world = empty_world(door(lock), toy("key", (0.5, 0.7, 0.05)), toy("other", (0.5, -0.7, 0.05)))

@@ -72,7 +72,7 @@ class FillFraction(Task):
     """An agent has to fill three circles with pieces that are fractions of a circle.
 
     Circles and pieces lie at random places. The agent grabs a piece with the verb `grab` and puts
-    it into a circle with `put_into`; both are applied to what is nearest to the centre of its view,
+    it into a circle with `put_into`: the piece, or the circle, nearest to the centre of its view,
     up to 1.5 m away. The piece is laid beside those that lie there already. A piece that would
     overfill the circle is refused: the verb has no effect. A piece can be taken out again. The
     episode terminates when all circles are full; then the task is solved (`solved`).

@@ -34,6 +34,7 @@ from veca_marl.sim.body.walker.objects.handling import ObjectHandling
 from veca_marl.sim.body.walker.walker_cfg import WalkerCfg, greatest_speed_mps
 from veca_marl.sim.geometry import Floats
 from veca_marl.sim.physics import Prop, World
+from veca_marl.sim.physics.interactions import Close, Open
 from veca_marl.sim.spec import ArraySpec
 
 MOVE = "move"  # the part of the action that walks
@@ -211,6 +212,19 @@ class Walker(Body):
     def release(self) -> bool:
         """Release the held prop, which falls; return False if the hand is empty."""
         return self._handling.release()
+
+    def open(self, prop: Prop) -> bool:
+        """Open a door, drawer or lid, as the verb `open` does, at any distance.
+
+        Returns:
+            False, without effect, if it does not declare the interaction `open`, is open, or is
+            locked and its key is not in the hand.
+        """
+        return Open().attempt(self, prop)
+
+    def close(self, prop: Prop) -> bool:
+        """Close a door, drawer or lid, as the verb `close` does; see `open`."""
+        return Close().attempt(self, prop)
 
     def can_step_on(self, prop: Prop) -> bool:
         """Return whether it stands on the floor and a prop is heavy, low and within reach."""
