@@ -7,10 +7,12 @@ import pytest
 import started
 from composed import compose
 
+from veca_marl.config import ConfigError
 from veca_marl.envs.core.game import Game
 from veca_marl.envs.core.team import Script
 from veca_marl.envs.tasks.navigation.floors.clearance import clearances_m
 from veca_marl.envs.tasks.navigation.mazes.maze import random_maze
+from veca_marl.envs.tasks.navigation.places import gap_m
 
 SMALL_EYES = ("senses.vision.width=16", "senses.vision.height=16")
 STAND = {"agents": np.zeros(2, np.float32)}
@@ -34,6 +36,30 @@ def trial_of(game):
 def put_at_the_object(game):
     x, y, _ = game.task.target.position
     game.task.walker.place((x + 0.3, y, 0.0))
+
+
+# ---- the object is not reached through walls
+
+
+@pytest.mark.parametrize(("cells", "limit_m"), [(2, 1.51), (4, 0.76), (8, 0.385)])
+def test_a_body_beyond_a_wall_does_not_reach_the_object(cells, limit_m):
+    """The limit is the gap to the object of a walker that touches the other side of a wall."""
+    with pytest.raises(ConfigError, match=rf"below {limit_m} with task.cells={cells}"):
+        compose(["+task=MazeNav", f"task.cells={cells}", f"task.reach_m={limit_m + 1e-9}"])
+    game = game_of(f"task.cells={cells}", f"task.reach_m={limit_m - 1e-3}")
+    target, wall = game.task.target, game.world.prop("maze_wall_0")
+    x, y, _ = target.position
+    half_m = 3.0 / cells
+    wall.place((x + half_m, y, 0.0), math.pi / 2.0)
+    game.task.walker.place((x + half_m + wall.cfg.size_m[1] / 2.0 + 0.11, y, 0.0))
+    assert gap_m(game.task.walker.position, target) == pytest.approx(limit_m)
+    assert clearances_m(wall, game.task.walker.position[:2]) == pytest.approx(0.11)
+    game.close()
+
+
+def test_a_thinner_body_needs_a_smaller_reach():
+    with pytest.raises(ValueError, match=r"below 0\.71 .* body of radius 0\.06 m"):
+        game_of("task.reach_m=0.75", "body.radius_m=0.06")
 
 
 # ---- mazes
@@ -100,6 +126,7 @@ def test_a_placed_wall_stops_the_walker_and_hides_what_is_behind_it():
         ("task.cells=9", r"task.cells=9 must be from 2 to 8"),
         ("playground=single_room", "'single_room' .* furniture; .* choose playground=simple"),
         ("playground=four_rooms", "'four_rooms' has 4 rooms"),
+        ("task.reach_m=0.77", r"task.reach_m=0.77 must be below 0.76 with task.cells=4"),
         ("task.trials=0", "task.trials=0 must be at least 1"),
         ("task.trial_s=0", "task.trial_s"),
         ("body=mitten", "choose body=walker"),

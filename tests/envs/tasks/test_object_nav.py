@@ -87,7 +87,7 @@ def test_no_two_kinds_have_a_shape_or_a_colour_in_common_and_all_stand_on_the_fl
 
 def test_a_playground_without_space_is_an_error_that_names_it():
     with pytest.raises(ValueError, match=r"playground 'seven_rooms' leaves no 4 places 9.00 m"):
-        game_of("playground=seven_rooms", "task.apart_m=9")
+        compose(["+task=ObjectNav", "playground=seven_rooms", "task.apart_m=9"])
 
 
 # ---- rewards and the end of an episode

@@ -124,6 +124,13 @@ class TaskCfg:
             if not 0.0 < value < math.inf:
                 raise ValueError(f"task.{name}={value} must be a positive number")
 
+    def check_not_negative(self, *names: str) -> None:
+        """Raise `ValueError` if a field is negative or not finite."""
+        for name in names:
+            value = getattr(self, name)
+            if not 0.0 <= value < math.inf:
+                raise ValueError(f"task.{name}={value} must be 0 or more")
+
     def _check_span(self, name: str, lowest: float, condition: str) -> None:
         """Raise `ValueError` if a field is no pair (least, greatest) of at least `lowest`."""
         least, greatest = getattr(self, name)

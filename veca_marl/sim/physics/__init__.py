@@ -18,9 +18,11 @@ from veca_marl.sim.physics.props import (
     JointKind,
     LockCfg,
     PartCfg,
+    PlannedProp,
     Prop,
     PropCfg,
     PropShape,
+    StandingProp,
 )
 from veca_marl.sim.physics.rooms import DoorCfg, LeafCfg, RoomCfg
 from veca_marl.sim.physics.world import GRAVITY_MPS2, World
@@ -39,12 +41,14 @@ __all__ = [
     "FurnitureCfg",
     "FurnitureKind",
     "Mover",
+    "PlannedProp",
     "PlaygroundCfg",
     "Prop",
     "PropCfg",
     "PropShape",
     "RandomHouseCfg",
     "RoomCfg",
+    "StandingProp",
     "WallsCfg",
     "World",
     "create_collision_shape",

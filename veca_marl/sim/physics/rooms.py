@@ -60,6 +60,11 @@ class RoomCfg:
         return float(np.prod(np.maximum(np.minimum(*upper) - low, 0.0)))
 
     @property
+    def extent(self) -> str:
+        """Its length and width for messages, such as ``6 x 4.5 m``."""
+        return f"{self.size_m[0]:g} x {self.size_m[1]:g} m"
+
+    @property
     def middle_m(self) -> Floats:
         """``(3,)`` metres: the middle of the floor."""
         x, y = np.array(self.lower_m[:2]) + np.array(self.size_m[:2]) / 2.0

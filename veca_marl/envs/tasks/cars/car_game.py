@@ -13,6 +13,7 @@ from veca_marl.envs.core.task import Task, TaskCfg, require_walker
 from veca_marl.envs.tasks.cars.toy_car import Motion, ToyCar
 from veca_marl.envs.tasks.navigation import places
 from veca_marl.envs.tasks.navigation.floors.scattering import Spacing, scattered_places
+from veca_marl.envs.tasks.navigation.placement_check import check_placement
 from veca_marl.sim.geometry import Floats
 from veca_marl.sim.physics import PlaygroundCfg
 
@@ -59,6 +60,12 @@ class CarGame(Task):
                 "rooms; the car drives in one, so that another is a hiding place: choose "
                 "playground=simple or single_room"
             )
+        furniture, spacing = places.planned_furniture(playground), _spacing(cfg)
+        check_placement(
+            lambda rng: scattered_places(playground, furniture, 2, spacing, rng),
+            f"{cls.__name__} with task.apart_m={cfg.apart_m:g}",
+            "a smaller one, or a larger room, such as playground=simple",
+        )
 
     def build(self) -> None:
         self.walker = require_walker(self.players[0])
@@ -69,7 +76,7 @@ class CarGame(Task):
         self.world.after_substep.append(self._notice_contact)
 
     def reset(self, rng: np.random.Generator) -> None:
-        spacing = Spacing(_CLEAR_M, self.cfg.apart_m, 0.0)
+        spacing = _spacing(self.cfg)
         start, place = scattered_places(self.world.playground, self._furniture, 2, spacing, rng)
         self.walker.place(start, rng.uniform(-math.pi, math.pi))
         self.car.reset(place, rng)
@@ -89,3 +96,7 @@ class CarGame(Task):
     def _notice_contact(self) -> None:
         """Store a contact of any physics step: a car that bounces off is gone after the last."""
         self.touched = self.touched or self.walker.touches(self.car.prop)
+
+
+def _spacing(cfg: CarGameCfg) -> Spacing:
+    return Spacing(_CLEAR_M, cfg.apart_m, 0.0)

@@ -9,8 +9,13 @@ from typing import Any, ClassVar
 import numpy as np
 
 from veca_marl.envs.core.task import Player, Task, TaskCfg, register, terms
-from veca_marl.envs.tasks.escape.key_drawer import add_key_drawer, draw_place_at_wall
-from veca_marl.envs.tasks.navigation.places import free_place, furniture_of
+from veca_marl.envs.tasks.escape.key_drawer import (
+    add_key_drawer,
+    draw_place_at_wall,
+    planned_cupboard,
+)
+from veca_marl.envs.tasks.navigation.placement_check import check_placement
+from veca_marl.envs.tasks.navigation.places import free_place, furniture_of, planned_furniture
 from veca_marl.envs.tasks.player_starts import place_player
 from veca_marl.envs.tasks.player_verbs import require_verbs
 from veca_marl.sim.geometry import Floats
@@ -38,6 +43,15 @@ class BabyzumasRevengeCfg(TaskCfg):
     loudness: float = 0.05
     frequency_hz: float = 600.0
     weights: dict[str, float] = terms(drawer=0.0, key=0.0, door=0.0, room=1.0)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self.check_not_negative("loudness")
+        self.sound()
+
+    def sound(self) -> SoundCfg:
+        """Return the sound of the key."""
+        return SoundCfg(SoundKind.buzz, self.frequency_hz, self.loudness)
 
 
 @register
@@ -78,6 +92,11 @@ class BabyzumasRevenge(Task):
                 f"door; room {room.name!r} of {playground.name!r} has {len(doors)}; choose "
                 "playground=two_rooms or three_rooms"
             )
+        check_placement(
+            lambda rng: _try_start(playground, rng),
+            f"BabyzumasRevenge in playground {playground.name!r}",
+            "a larger first room with less furniture, such as playground=two_rooms",
+        )
 
     def build(self) -> None:
         self.walker = require_verbs(self.players[0], "grab", "open")
@@ -92,8 +111,9 @@ class BabyzumasRevenge(Task):
             "door_leaf", doorway.position_m, yaw_deg, doorway.width_m, lock=LockCfg("key")
         )
         self.door = self.world.add_prop(leaf)
-        sound = SoundCfg(SoundKind.buzz, self.cfg.frequency_hz, self.cfg.loudness)
-        self.cupboard, self.drawer, self.key = self._drawer = add_key_drawer(self.world, sound)
+        self.cupboard, self.drawer, self.key = self._drawer = add_key_drawer(
+            self.world, self.cfg.sound()
+        )
         self._done: frozenset[str] = frozenset()
         self._new: frozenset[str] = frozenset()
 
@@ -137,6 +157,15 @@ def direction_out(room: RoomCfg, place: Floats) -> Floats:
     out: Floats = np.zeros(3)
     out[axis] = 1.0 if far else -1.0
     return out
+
+
+def _try_start(playground: PlaygroundCfg, rng: np.random.Generator) -> None:
+    """Draw the places of the cupboard and of the agent as at the start of an episode."""
+    room, furniture = playground.rooms[0], planned_furniture(playground)
+    doorway = np.array(_doors_of_first_room(playground)[0].position_m)
+    cupboard = planned_cupboard()
+    cupboard.place(*draw_place_at_wall(room, furniture, doorway, _DOOR_APART_M, rng))
+    free_place(room, [*furniture, cupboard], _START_CLEAR_M, rng)
 
 
 def _doors_of_first_room(playground: PlaygroundCfg) -> list[DoorCfg]:

@@ -11,7 +11,7 @@ import numpy as np
 
 from veca_marl.envs.tasks.navigation.floors.clearance import clearances_m
 from veca_marl.sim.geometry import Floats, rotation_about_vertical
-from veca_marl.sim.physics import Prop, RoomCfg, World
+from veca_marl.sim.physics import PlannedProp, Prop, PropCfg, RoomCfg, StandingProp, World
 from veca_marl.sim.physics.props.library import cupboard_with_drawer, key
 from veca_marl.sim.sound import SoundCfg
 
@@ -51,8 +51,7 @@ class KeyDrawer(NamedTuple):
 
 def add_key_drawer(world: World, key_sound: SoundCfg) -> KeyDrawer:
     """Add a cupboard with a drawer that opens, and a key, to a world that is not frozen yet."""
-    size_m = (_DEPTH_M, _WIDTH_M, _HEIGHT_M)
-    case, drawer = cupboard_with_drawer("cupboard", (0.0, 0.0), size_m=size_m)
+    case, drawer = _cupboard()
     return KeyDrawer(
         world.add_prop(case),
         world.add_prop(drawer),
@@ -60,9 +59,19 @@ def add_key_drawer(world: World, key_sound: SoundCfg) -> KeyDrawer:
     )
 
 
+def planned_cupboard() -> PlannedProp:
+    """Return the cupboard of `add_key_drawer` without a world, for trials of its placement."""
+    return PlannedProp(_cupboard()[0])
+
+
+def _cupboard() -> list[PropCfg]:
+    size_m = (_DEPTH_M, _WIDTH_M, _HEIGHT_M)
+    return cupboard_with_drawer("cupboard", (0.0, 0.0), size_m=size_m)
+
+
 def draw_place_at_wall(
     room: RoomCfg,
-    furniture: Sequence[Prop],
+    furniture: Sequence[StandingProp],
     avoided: Floats,
     apart_m: float,
     rng: np.random.Generator,
@@ -80,9 +89,10 @@ def draw_place_at_wall(
         The point ``(3,)`` of the floor, metres, and the yaw.
 
     Raises:
-        ValueError: If none of 1000 draws fits.
+        ValueError: If none of 1000 draws fits, or a wall is too short for the cupboard.
     """
-    for _ in range(_DRAWS):
+    is_wide = min(room.size_m[:2]) >= 2.0 * _CORNER_M
+    for _ in range(_DRAWS if is_wide else 0):
         place, yaw_rad = _random_place(room, rng)
         front = place + _FRONT_M * rotation_about_vertical(yaw_rad)[:, 0]
         ends = np.array([place[:2], front[:2]])
@@ -90,7 +100,8 @@ def draw_place_at_wall(
         if far and all((clearances_m(prop, ends) >= _CLEAR_M).all() for prop in furniture):
             return place, yaw_rad
     raise ValueError(
-        f"room {room.name!r} leaves no place for a cupboard at a wall, {apart_m} m from its door"
+        f"room {room.name!r} of {room.extent} leaves no place for a cupboard at a wall, "
+        f"{_CORNER_M} m from the corners and {apart_m} m from the door"
     )
 
 

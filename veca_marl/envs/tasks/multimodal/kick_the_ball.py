@@ -15,6 +15,7 @@ from veca_marl.sim.physics import PlaygroundCfg, PropCfg, PropShape
 from veca_marl.sim.sound import SoundCfg, SoundKind
 
 _START_CLEARANCE_M = 1.5  # from the walls
+_LARGEST_RADIUS_M = 0.6  # a ball at the wall is then 0.28 m or more from the middle of the player
 
 
 @dataclass
@@ -22,10 +23,10 @@ class KickTheBallCfg(TaskCfg):
     """Parameters of KickTheBall.
 
     Attributes:
-        radius_m: Radius of the ball.
+        radius_m: Radius of the ball, at most 0.6 m.
         mass_kg: Mass of the ball.
         speed_mps: Least and greatest speed at which the ball leaves the wall.
-        spread_deg: Largest angle between its direction and the wall's normal.
+        spread_deg: Largest angle between its direction and the wall's normal, in [0, 90).
         life_s: Time after which a ball that has not been kicked is replaced.
         rest_s: Time after which a kicked ball is replaced.
         loudness: Level of the ball's sound, see `SoundCfg`.
@@ -48,6 +49,17 @@ class KickTheBallCfg(TaskCfg):
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        self.check_positive("radius_m", "mass_kg", "pulse_s")
+        self.check_not_negative("loudness", "walking_mps")
+        if self.radius_m > _LARGEST_RADIUS_M:
+            raise ValueError(
+                f"task.radius_m={self.radius_m} must be at most {_LARGEST_RADIUS_M}: a larger ball "
+                "could touch the player at the start"
+            )
+        if not 0.0 <= self.spread_deg < 90.0:
+            raise ValueError(
+                f"task.spread_deg={self.spread_deg} must be in [0, 90): the ball leaves the wall"
+            )
         slow, fast = self.speed_mps
         if not 0.0 < slow <= fast < math.inf:
             raise ValueError(f"task.speed_mps={self.speed_mps} must be (least, greatest), above 0")

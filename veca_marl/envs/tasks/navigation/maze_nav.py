@@ -12,7 +12,8 @@ from veca_marl.envs.core.task import Player, Task, TaskCfg, register, require_wa
 from veca_marl.envs.tasks.navigation import places
 from veca_marl.envs.tasks.navigation.mazes.maze import Cell, Maze, random_maze
 from veca_marl.envs.tasks.navigation.mazes.trial_sense import TRIAL, TrialSense
-from veca_marl.envs.tasks.navigation.mazes.walls import MazeWalls, check_maze
+from veca_marl.envs.tasks.navigation.mazes.walls import MazeWalls, beyond_walls_m, check_maze
+from veca_marl.sim.body.walker import WalkerCfg
 from veca_marl.sim.physics import PlaygroundCfg
 
 _RADIUS_M = 0.15  # of the object
@@ -27,7 +28,8 @@ class MazeNavCfg(TaskCfg):
         trials: Trials in each maze.
         trial_s: Time after which a trial ends without success.
         reach_m: Horizontal distance from the pelvis to the surface of the object within which it
-            has been reached.
+            has been reached; so small that it is not reached through a wall: below 0.36 m with
+            cells of 0.7 m, below 0.76 m with the default ones.
     """
 
     max_seconds: float = 150.0
@@ -72,9 +74,11 @@ class MazeNav(Task):
     @classmethod
     def check_playground(cls, cfg: Any, playground: PlaygroundCfg) -> None:
         check_maze(playground, cfg.cells)
+        _check_reach(cfg, playground, WalkerCfg().radius_m)
 
     def build(self) -> None:
         self.walker = require_walker(self.players[0])
+        _check_reach(self.cfg, self.world.playground, self.walker.radius_m)
         self._walls = MazeWalls(self.world, self.cfg.cells)
         self.target = places.add_target(self.world, _RADIUS_M)
         self._start: Cell = (0, 0)
@@ -123,6 +127,21 @@ class MazeNav(Task):
         if isinstance(sense, TrialSense):
             elapsed = self._elapsed_s / self.cfg.trial_s
             sense.show(self._ended_now, elapsed, self._completed / self.cfg.trials)
+
+
+def _check_reach(cfg: MazeNavCfg, playground: PlaygroundCfg, body_m: float) -> None:
+    """Check that a body of a radius does not reach the object through a wall.
+
+    Raises:
+        ValueError: If it does.
+    """
+    limit_m = beyond_walls_m(playground, cfg.cells, body_m) - _RADIUS_M
+    if cfg.reach_m >= limit_m:
+        raise ValueError(
+            f"task.reach_m={cfg.reach_m} must be below {limit_m:.4g} with task.cells={cfg.cells} "
+            f"in playground {playground.name!r} and a body of radius {body_m} m: the object would "
+            "be reached through a wall; choose a smaller one, or fewer cells"
+        )
 
 
 def _draw_goal_and_start(maze: Maze, rng: np.random.Generator) -> tuple[Cell, Cell]:

@@ -17,8 +17,9 @@ from veca_marl.envs.tasks.navigation.helper_reward import (
     TURN_WEIGHT,
     HelperReward,
 )
+from veca_marl.envs.tasks.navigation.placement_check import check_placement
 from veca_marl.envs.tasks.player_starts import direct_gaze_ahead, place_player
-from veca_marl.sim.physics import PlaygroundCfg
+from veca_marl.sim.physics import PlaygroundCfg, RoomCfg
 
 _PASSAGE_M = 0.2  # width that an agent at the object leaves free towards the walls
 
@@ -106,10 +107,17 @@ class MultiAgentNav(Task):
     @classmethod
     def check_playground(cls, cfg: Any, playground: PlaygroundCfg) -> None:
         places.check_rooms(playground, cfg.agents)
+        check_placement(
+            lambda rng: _try_start(cfg, playground, rng),
+            f"playground {playground.name!r}, task.radius_m={cfg.radius_m:g}, "
+            f"task.reach_m={cfg.reach_m:g}",
+            "smaller ones, or larger rooms, such as playground=seven_rooms",
+        )
 
     def build(self) -> None:
         self.plan = FloorPlan(self.world.playground)
         self._furniture = places.furniture_of(self.world)
+        self._homes = places.rooms_with_pairs(self.world.playground, *_distances_m(self.cfg))
         self.target = places.add_target(self.world, self.cfg.radius_m)
         self._helper = HelperReward(self.world.scene)
         self.arrived: set[str] = set()
@@ -118,11 +126,8 @@ class MultiAgentNav(Task):
     def reset(self, rng: np.random.Generator) -> None:
         self.arrived.clear()
         self._newly_arrived = 0
-        order = rng.permutation(len(self.plan.rooms))[: len(self.players)]
-        rooms = [self.plan.rooms[index] for index in order]
-        home = rooms[rng.integers(len(rooms))]
-        clear_m = self.cfg.radius_m + self.cfg.reach_m + _PASSAGE_M
-        apart_m = self.cfg.radius_m + clear_m
+        rooms, home = self._draw_rooms(rng)
+        clear_m, apart_m = _distances_m(self.cfg)
         (x, y, floor_m), beside = places.free_pair(home, self._furniture, clear_m, apart_m, rng)
         self.target.place((x, y, floor_m + self.cfg.radius_m))
         for room, player in zip(rooms, self.players, strict=True):
@@ -134,6 +139,15 @@ class MultiAgentNav(Task):
                 player.body.muted = room is home or self.cfg.muted is Muted.all
         direct_gaze_ahead(self.players)
         self._helper.reset(self.target, self.players)
+
+    def _draw_rooms(self, rng: np.random.Generator) -> tuple[list[RoomCfg], RoomCfg]:
+        """Draw a room for each agent, and of these the room of the object, which must fit in."""
+        while True:
+            order = rng.permutation(len(self.plan.rooms))[: len(self.players)]
+            rooms = [self.plan.rooms[index] for index in order]
+            home = rooms[rng.integers(len(rooms))]
+            if home in self._homes:
+                return rooms, home
 
     def after_step(self, rng: np.random.Generator) -> None:
         direct_gaze_ahead(self.players)
@@ -157,3 +171,17 @@ class MultiAgentNav(Task):
     def sees_target(self, player: Player) -> bool:
         """Return whether the object is visible to an eye of a player."""
         return self._helper.sees(self.target, player)
+
+
+def _distances_m(cfg: MultiAgentNavCfg) -> tuple[float, float]:
+    """Return the least distances of the places from walls and things, and from each other."""
+    clear_m = cfg.radius_m + cfg.reach_m + _PASSAGE_M
+    return clear_m, cfg.radius_m + clear_m
+
+
+def _try_start(cfg: MultiAgentNavCfg, playground: PlaygroundCfg, rng: np.random.Generator) -> None:
+    """Look for a room of the object, and for the place of an agent in each room."""
+    furniture, (clear_m, apart_m) = places.planned_furniture(playground), _distances_m(cfg)
+    places.rooms_with_pairs(playground, clear_m, apart_m)
+    for room in playground.rooms:
+        places.free_place(room, furniture, clear_m, rng)

@@ -6,7 +6,7 @@ from enum import Enum
 from typing import NamedTuple
 
 from veca_marl.sim.geometry import Floats
-from veca_marl.sim.physics import Prop, PropCfg, PropShape, World
+from veca_marl.sim.physics import PlannedProp, Prop, PropCfg, PropShape, World
 
 
 class ObjectKind(Enum):
@@ -64,8 +64,14 @@ class SearchedObject(NamedTuple):
 
 def add_object(world: World, name: str, kind: ObjectKind) -> SearchedObject:
     """Add a fixed object of a kind to a world that is not frozen yet."""
+    return SearchedObject(world.add_prop(_prop_of(name, kind)), _LOOKS[kind].centre_m)
+
+
+def radius_m(kind: ObjectKind) -> float:
+    """Return the horizontal radius of the objects of a kind, see `Prop.radius_m`."""
+    return PlannedProp(_prop_of(kind.name, kind)).radius_m
+
+
+def _prop_of(name: str, kind: ObjectKind) -> PropCfg:
     look = _LOOKS[kind]
-    prop = world.add_prop(
-        PropCfg(name=name, shape=look.shape, size_m=list(look.size_m), colour=look.colour)
-    )
-    return SearchedObject(prop, look.centre_m)
+    return PropCfg(name=name, shape=look.shape, size_m=list(look.size_m), colour=look.colour)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -12,9 +12,10 @@ from veca_marl.envs.core.task import Player, Task, TaskCfg, register, terms
 from veca_marl.envs.tasks.navigation import places
 from veca_marl.envs.tasks.navigation.floors.scattering import Spacing, scattered_places
 from veca_marl.envs.tasks.navigation.helper_reward import AHEAD_WEIGHT, TURN_WEIGHT, HelperReward
-from veca_marl.envs.tasks.navigation.object_kinds import ObjectKind, add_object
+from veca_marl.envs.tasks.navigation.object_kinds import ObjectKind, add_object, radius_m
+from veca_marl.envs.tasks.navigation.placement_check import check_placement
 from veca_marl.envs.tasks.player_starts import direct_gaze_ahead, place_player
-from veca_marl.sim.physics import Prop
+from veca_marl.sim.physics import PlaygroundCfg, Prop
 
 _PASSAGE_M = 0.2  # width that an agent at an object leaves free towards furniture and walls
 _DOOR_M = 0.9  # objects nearer to the middle of a door could block it
@@ -87,6 +88,17 @@ class ObjectNav(Task):
     senses: ClassVar[tuple[str, ...]] = ("vision",)
     cfg: ObjectNavCfg
 
+    @classmethod
+    def check_playground(cls, cfg: Any, playground: PlaygroundCfg) -> None:
+        furniture, count = places.planned_furniture(playground), 1 + len(cfg.objects)
+        spacing = _spacing(cfg)
+        check_placement(
+            lambda rng: scattered_places(playground, furniture, count, spacing, rng),
+            f"{cls.__name__} with {len(cfg.objects)} task.objects, task.apart_m={cfg.apart_m:g} "
+            f"and task.reach_m={cfg.reach_m:g}",
+            "fewer or smaller ones, or a larger playground, such as playground=house",
+        )
+
     def build(self) -> None:
         self.agent = self.players[0]
         self._furniture = places.furniture_of(self.world)
@@ -96,15 +108,14 @@ class ObjectNav(Task):
         ]
         self.target = self._objects[self.cfg.objects.index(self.cfg.target)].prop
         self.wrong = [one.prop for one in self._objects if one.prop is not self.target]
+        self._spacing = _spacing(self.cfg)
         self._helper = HelperReward(self.world.scene)
         self._reached = self._reached_wrong = False
 
     def reset(self, rng: np.random.Generator) -> None:
         self._reached = self._reached_wrong = False
-        largest_m = max(one.prop.radius_m for one in self._objects)
-        spacing = Spacing(largest_m + self.cfg.reach_m + _PASSAGE_M, self.cfg.apart_m, _DOOR_M)
         start, *floors = scattered_places(
-            self.world.playground, self._furniture, 1 + len(self._objects), spacing, rng
+            self.world.playground, self._furniture, 1 + len(self._objects), self._spacing, rng
         )
         for one, floor in zip(self._objects, floors, strict=True):
             one.place(floor, rng.uniform(-math.pi, math.pi))
@@ -134,3 +145,8 @@ class ObjectNav(Task):
 
     def _is_reached(self, prop: Prop) -> bool:
         return places.gap_m(self.agent.body.position, prop) <= self.cfg.reach_m
+
+
+def _spacing(cfg: ObjectNavCfg) -> Spacing:
+    largest_m = max(map(radius_m, cfg.objects))
+    return Spacing(largest_m + cfg.reach_m + _PASSAGE_M, cfg.apart_m, _DOOR_M)

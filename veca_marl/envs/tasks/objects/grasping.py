@@ -40,6 +40,7 @@ class ToyCfg(TaskCfg):
     def __post_init__(self) -> None:
         super().__post_init__()
         self.check_positive("edge_m", "mass_kg", "friction", "near_m")
+        self.check_not_negative("aside_m", "turn_deg")
         if self.edge_m > _HAND_SPAN_M:
             raise ValueError(f"task.edge_m={self.edge_m}: hands span at most {_HAND_SPAN_M} m")
         near, far = self.ahead_m
@@ -47,8 +48,6 @@ class ToyCfg(TaskCfg):
             raise ValueError(
                 f"task.ahead_m={(near, far)} must be (least, greatest), above task.edge_m"
             )
-        if not 0.0 <= self.aside_m < math.inf:
-            raise ValueError(f"task.aside_m={self.aside_m} must be 0 or more")
 
 
 def add_toy(world: World, cfg: ToyCfg) -> Prop:

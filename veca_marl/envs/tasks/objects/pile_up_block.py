@@ -48,8 +48,7 @@ class PileUpBlockCfg(BlocksCfg):
         for name in ("ahead_m", "aside_m"):
             self._check_span(name, self.edge_m, "at least task.edge_m")
         self._check_span("blue_ahead_m", self.ahead_m[1] + self.edge_m, "behind the red blocks")
-        if not 0.0 <= self.blue_aside_m < math.inf:
-            raise ValueError(f"task.blue_aside_m={self.blue_aside_m} must be 0 or more")
+        self.check_not_negative("blue_aside_m", "turn_deg")
 
 
 @register

@@ -45,6 +45,7 @@ class PutDownBlockCfg(BlocksCfg):
         super().__post_init__()
         if self.blue not in (2, 3):
             raise ValueError(f"task.blue={self.blue} must be 2 or 3, so that one can fall")
+        self.check_not_negative("turn_deg")
         self._check_span("ahead_m", 0.0, "0 or more")
         self._check_span("aside_m", 0.0, "0 or more")
         if not 0.0 < self.fallen < 1.0:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -58,6 +59,10 @@ class ColorSort(SortingTask):
     """
 
     cfg: ColorSortCfg
+
+    @classmethod
+    def categories_of(cls, cfg: Any) -> list[str]:
+        return list(cfg.colours)
 
     def add_items(self) -> list[Item]:
         count = self.cfg.items * len(self.cfg.colours)

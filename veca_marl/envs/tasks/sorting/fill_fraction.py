@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from fractions import Fraction
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
 from veca_marl.envs.core.task import Player, Task, TaskCfg, register, terms
 from veca_marl.envs.tasks.navigation.floors.scattering import Spacing, scattered_places
-from veca_marl.envs.tasks.navigation.places import furniture_of
+from veca_marl.envs.tasks.navigation.placement_check import check_placement
+from veca_marl.envs.tasks.navigation.places import furniture_of, planned_furniture
 from veca_marl.envs.tasks.player_starts import place_player
 from veca_marl.envs.tasks.player_verbs import require_verbs
 from veca_marl.envs.tasks.sorting.circles import (
@@ -22,7 +23,7 @@ from veca_marl.envs.tasks.sorting.circles import (
     add_piece,
     division,
 )
-from veca_marl.sim.physics import Prop
+from veca_marl.sim.physics import PlaygroundCfg, Prop
 
 _PASSAGE_M = 0.3  # from walls and furniture to the rim of a circle: an agent passes
 _DOOR_M = 0.9
@@ -93,6 +94,17 @@ class FillFraction(Task):
     senses: ClassVar[tuple[str, ...]] = ("vision",)
     cfg: FillFractionCfg
 
+    @classmethod
+    def check_playground(cls, cfg: Any, playground: PlaygroundCfg) -> None:
+        count, spacing = 1 + cfg.circles + len(cfg.pieces), _spacing(cfg)
+        furniture = planned_furniture(playground)
+        check_placement(
+            lambda rng: scattered_places(playground, furniture, count, spacing, rng),
+            f"FillFraction with task.circles={cfg.circles}, {len(cfg.pieces)} task.pieces and "
+            f"task.apart_m={cfg.apart_m:g}",
+            "fewer or smaller ones, or a larger playground, such as playground=house",
+        )
+
     def build(self) -> None:
         self.walker = require_verbs(self.players[0], "grab", "put_into")
         self._furniture = furniture_of(self.world)
@@ -108,10 +120,9 @@ class FillFraction(Task):
         self._score = self._change = (Fraction(0), 0)
 
     def reset(self, rng: np.random.Generator) -> None:
-        spacing = Spacing(REACH_M + _PASSAGE_M, self.cfg.apart_m, _DOOR_M)
         things: list[Circle | Piece] = [*self.circles, *self.pieces]
         start, *floors = scattered_places(
-            self.world.playground, self._furniture, 1 + len(things), spacing, rng
+            self.world.playground, self._furniture, 1 + len(things), _spacing(self.cfg), rng
         )
         for thing, floor in zip(things, floors, strict=True):
             thing.place(floor, rng.uniform(-math.pi, math.pi))
@@ -148,3 +159,7 @@ class FillFraction(Task):
         for circle in self.circles:
             if circle.prop is applied.prop:
                 circle.put(piece)
+
+
+def _spacing(cfg: FillFractionCfg) -> Spacing:
+    return Spacing(REACH_M + _PASSAGE_M, cfg.apart_m, _DOOR_M)

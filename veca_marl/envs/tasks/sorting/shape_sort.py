@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -56,6 +57,10 @@ class ShapeSort(SortingTask):
     """
 
     cfg: ShapeSortCfg
+
+    @classmethod
+    def categories_of(cls, cfg: Any) -> list[str]:
+        return list(cfg.shapes)
 
     def add_items(self) -> list[Item]:
         kinds = [ToyKind[name] for name in self.cfg.shapes for _ in range(self.cfg.items)]

@@ -6,17 +6,19 @@ import math
 from abc import abstractmethod
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
 from veca_marl.envs.core.task import Player, Task, TaskCfg, terms
 from veca_marl.envs.tasks.navigation.floors.scattering import Spacing, scattered_places
-from veca_marl.envs.tasks.navigation.places import furniture_of
+from veca_marl.envs.tasks.navigation.placement_check import check_placement
+from veca_marl.envs.tasks.navigation.places import furniture_of, planned_furniture
 from veca_marl.envs.tasks.player_starts import place_player
 from veca_marl.envs.tasks.player_verbs import require_verbs
 from veca_marl.envs.tasks.sorting.baskets import REACH_M, Basket
 from veca_marl.envs.tasks.sorting.items import Item
+from veca_marl.sim.physics import PlaygroundCfg
 
 _PASSAGE_M = 0.3  # from walls and furniture to the surface of a basket: an agent passes
 _DOOR_M = 0.9  # baskets nearer to the middle of a door could block it
@@ -74,6 +76,22 @@ class SortingTask(Task):
     senses: ClassVar[tuple[str, ...]] = ("vision",)
     cfg: SortingCfg
 
+    @classmethod
+    @abstractmethod
+    def categories_of(cls, cfg: Any) -> list[str]:
+        """Return the names of the categories."""
+
+    @classmethod
+    def check_playground(cls, cfg: Any, playground: PlaygroundCfg) -> None:
+        baskets = len(cls.categories_of(cfg))
+        toys, furniture, spacing = cfg.items * baskets, planned_furniture(playground), _spacing(cfg)
+        check_placement(
+            lambda rng: scattered_places(playground, furniture, 1 + toys + baskets, spacing, rng),
+            f"{cls.__name__} with {toys} toys (task.items={cfg.items} for each of {baskets} "
+            f"baskets) and task.apart_m={cfg.apart_m:g}",
+            "fewer or smaller ones, or a larger playground, such as playground=house",
+        )
+
     @abstractmethod
     def add_items(self) -> list[Item]:
         """Add the toys to the world."""
@@ -96,10 +114,9 @@ class SortingTask(Task):
 
     def reset(self, rng: np.random.Generator) -> None:
         self.category = self.draw_categories(rng)
-        spacing = Spacing(REACH_M + _PASSAGE_M, self.cfg.apart_m, _DOOR_M)
         things: list[Basket | Item] = [*self.baskets, *self.items]
         start, *floors = scattered_places(
-            self.world.playground, self._furniture, 1 + len(things), spacing, rng
+            self.world.playground, self._furniture, 1 + len(things), _spacing(self.cfg), rng
         )
         for thing, floor in zip(things, floors, strict=True):
             thing.place(floor, rng.uniform(-math.pi, math.pi))
@@ -144,3 +161,7 @@ class SortingTask(Task):
         offsets = toys[:, None] - middles
         near = np.hypot(offsets[..., 0], offsets[..., 1]) <= REACH_M
         return [(int(number), int(basket)) for number, basket in np.argwhere(near)]
+
+
+def _spacing(cfg: SortingCfg) -> Spacing:
+    return Spacing(REACH_M + _PASSAGE_M, cfg.apart_m, _DOOR_M)

@@ -2,6 +2,7 @@
 
 from veca_marl.sim.physics.props.joint_cfg import JointCfg, JointKind, LockCfg
 from veca_marl.sim.physics.props.part_cfg import PartCfg
+from veca_marl.sim.physics.props.planned_prop import PlannedProp, StandingProp
 from veca_marl.sim.physics.props.prop import Prop, follow_physics
 from veca_marl.sim.physics.props.prop_cfg import PropCfg
 from veca_marl.sim.physics.props.prop_shape import SIZE_NAMES, PropShape, check_appearance
@@ -13,9 +14,11 @@ __all__ = [
     "JointKind",
     "LockCfg",
     "PartCfg",
+    "PlannedProp",
     "Prop",
     "PropCfg",
     "PropShape",
+    "StandingProp",
     "check_appearance",
     "follow_physics",
     "limit_detection",

@@ -22,11 +22,11 @@ from veca_marl.sim.geometry import (
 from veca_marl.sim.physics.bullet import pybullet
 from veca_marl.sim.physics.props.joint import LINK, Joint
 from veca_marl.sim.physics.props.prop_cfg import PropCfg
-from veca_marl.sim.physics.props.prop_shape import PropShape
 from veca_marl.sim.physics.props.prop_shapes import (
     bounding_box,
     horizontal_radius_m,
     prop_geoms,
+    prop_radius_m,
     sound_obstacles,
 )
 from veca_marl.sim.physics.props.rigid_body import (
@@ -102,14 +102,7 @@ class Prop:
     @property
     def radius_m(self) -> float:
         """Horizontal radius of the cylinder about the origin of its frame, untilted, in metres."""
-        size = self.cfg.size_m
-        if self.cfg.shape in (PropShape.box, PropShape.wall):
-            return math.hypot(size[0], size[1]) / 2
-        if self.cfg.shape is PropShape.goal:
-            return size[0] / 2
-        if self.cfg.shape in (PropShape.sphere, PropShape.cylinder, PropShape.capsule):
-            return size[0]
-        return self.reach_m
+        return prop_radius_m(self.cfg, self.reach_m)
 
     @property
     def lowest_m(self) -> float:

@@ -69,6 +69,23 @@ def horizontal_radius_m(geoms: Sequence[Geom]) -> float:
     return max(_reach(geom) for geom in geoms)
 
 
+def prop_radius_m(cfg: PropCfg, reach_m: float) -> float:
+    """Return the horizontal radius of a prop, see `Prop.radius_m`.
+
+    Args:
+        cfg: The prop.
+        reach_m: Horizontal radius of a vertical cylinder about its origin that contains it.
+    """
+    size = cfg.size_m
+    if cfg.shape in (PropShape.box, PropShape.wall):
+        return math.hypot(size[0], size[1]) / 2
+    if cfg.shape is PropShape.goal:
+        return size[0] / 2
+    if cfg.shape in (PropShape.sphere, PropShape.cylinder, PropShape.capsule):
+        return size[0]
+    return reach_m
+
+
 def swept_radius_m(geoms: Sequence[Geom], joint: JointCfg) -> float:
     """Return the horizontal distance from the anchor of a joint within which a prop always is.
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from veca_marl.sim.geometry import Bools, Floats, distances_to
-from veca_marl.sim.physics import Prop
+from veca_marl.sim.physics import StandingProp
 
 _HEIGHTS_M = np.array([0.05, 0.2, 0.35, 0.5, 0.65])  # of a body of 0.78 m; lintels are above
 _ROUNDING_M = 1e-9  # by which the distance to a circle and to a shape may differ where they touch
@@ -23,7 +23,7 @@ class Clearances:
         props: The props.
     """
 
-    def __init__(self, props: Sequence[Prop]) -> None:
+    def __init__(self, props: Sequence[StandingProp]) -> None:
         self._props = list(props)
         self._centres = np.array([prop.position[:2] for prop in props]).reshape(-1, 2)
         self._radii_m = np.array([prop.reach_m if prop.fixed else np.inf for prop in props])
@@ -49,7 +49,7 @@ class Clearances:
         return nearer
 
 
-def clearances_m(prop: Prop, points: Floats) -> Floats:
+def clearances_m(prop: StandingProp, points: Floats) -> Floats:
     """Return the least distance to a prop at heights of 0.05 to 0.65 m above points of the floor.
 
     Args:

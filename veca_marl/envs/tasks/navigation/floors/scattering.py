@@ -10,7 +10,7 @@ import numpy as np
 
 from veca_marl.envs.tasks.navigation.floors.clearance import Clearances
 from veca_marl.sim.geometry import Floats, horizontal_distance
-from veca_marl.sim.physics import DoorCfg, PlaygroundCfg, Prop, RoomCfg
+from veca_marl.sim.physics import DoorCfg, PlaygroundCfg, RoomCfg, StandingProp
 
 _DRAWS = 300  # of one place, until all places are drawn again
 _RESTARTS = 20
@@ -32,7 +32,7 @@ class Spacing(NamedTuple):
 
 def scattered_places(
     playground: PlaygroundCfg,
-    furniture: Sequence[Prop],
+    furniture: Sequence[StandingProp],
     count: int,
     spacing: Spacing,
     rng: np.random.Generator,
@@ -62,10 +62,11 @@ def scattered_places(
                 found.append(place)
             if len(found) == count:
                 return found
+    widest = max(playground.rooms, key=lambda room: min(room.size_m[:2]))
     raise ValueError(
         f"playground {playground.name!r} leaves no {count} places {spacing.apart_m:.2f} m apart "
-        f"and {spacing.clear_m:.2f} m away from furniture and walls; choose a larger playground "
-        "or fewer objects"
+        f"and {spacing.clear_m:.2f} m away from furniture and walls (its widest room is "
+        f"{widest.extent})"
     )
 
 

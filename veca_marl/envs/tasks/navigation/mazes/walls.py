@@ -75,6 +75,24 @@ def _add_wall(world: World, name: str, length_m: float, hue: float) -> Prop:
     )
 
 
+def beyond_walls_m(playground: PlaygroundCfg, cells: int, body_m: float) -> float:
+    """Return the least distance from the middle of a cell to a body beyond one of its walls.
+
+    The wall stands on the border of the cell, half of it on either side. A body at the end of a
+    wall, past a corner of the cell, is farther away.
+
+    Args:
+        playground: A playground that `check_maze` accepts.
+        cells: Cells along each side.
+        body_m: Radius of the body.
+
+    Returns:
+        Horizontal distance to the middle of the body, metres.
+    """
+    cell_m = playground.rooms[0].size_m[0] / cells
+    return cell_m / 2.0 + _THICKNESS_M / 2.0 + body_m
+
+
 def check_maze(playground: PlaygroundCfg, cells: int) -> None:
     """Check that a maze can be built in a playground.
 
