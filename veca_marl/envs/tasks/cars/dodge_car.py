@@ -12,6 +12,7 @@ from veca_marl.envs.tasks.cars.car_game import CarGame, CarGameCfg
 from veca_marl.envs.tasks.cars.forecast import Forecast
 from veca_marl.sim.geometry import Floats, horizontal_distance
 
+_CORRECTION_S = 0.2  # between two corrections of the point where car and player will meet
 _DRAWS = 10  # of points from which the line to the player may be clear
 
 
@@ -30,7 +31,7 @@ class DodgeCarCfg(CarGameCfg):
 
     max_seconds: float = 30.0
     aim: float = 0.6
-    aim_from_m: float = 1.2
+    aim_from_m: float = 1.5
     lead_s: float = 2.0
     weights: dict[str, float] = terms(hit=-1.0, survived=0.05)
 
@@ -49,12 +50,13 @@ class DodgeCar(CarGame):
 
     The car drives from point to point. With the probability `aim`, if it is far enough away, it
     drives at the player: to where they will meet if the player goes on walking and turning as in
-    the last 0.4 s. It corrects that point until it is `aim_from_m` away, and then drives straight
-    on. So a player is hit that stands still or repeats one motion, and one is missed that changes
-    its motion when the car is near. If furniture obstructs the straight line to the player, the car
-    first drives to a point from which the line is clear. It is narrower than the player and lower
-    than a table, so that no place of the room is safe for long. A contact of car and player
-    terminates the episode. The task is solved (`solved`) as long as they have not touched.
+    the last 0.4 s. It corrects that point every 0.2 s until it is `aim_from_m` away, and then
+    drives straight on. So a player is hit that stands still or repeats one motion, and one is
+    missed that changes its motion when the car is near. If furniture obstructs the straight line to
+    the player, the car first drives to a point from which the line is clear. It is narrower than
+    the player and lower than a table, so that no place of the room is safe for long. A contact of
+    car and player terminates the episode. The task is solved (`solved`) as long as they have not
+    touched.
 
     The paper states senses, actions and "the toy car moves around in the room fast. The agent must
     dodge the car" (table of tasks in the appendix). The motion of the car, the rewards and the end
@@ -71,22 +73,25 @@ class DodgeCar(CarGame):
 
     def build(self) -> None:
         super().build()
-        self._forecast = Forecast(self.walker, self.car.room, self.world.clock.step_s)
-        self._aims = False
+        step_s = self.world.clock.step_s
+        self._forecast = Forecast(self.walker, self.car.room, step_s)
+        self._correction_steps = max(1, round(_CORRECTION_S / step_s))
+        self._aims, self._age_steps = False, 0
 
     def reset(self, rng: np.random.Generator) -> None:
         super().reset(rng)
         self._forecast.reset()
-        self._aims = False
+        self._aims, self._age_steps = False, 0
 
     def before_step(self, rng: np.random.Generator) -> None:
         self._forecast.observe()
         if self.car.needs_point:
-            self._aims = rng.random() < self.cfg.aim
+            self._aims, self._age_steps = rng.random() < self.cfg.aim, 0
         away_m = horizontal_distance(self.walker.position, self.car.prop.position)
         self._aims = self._aims and away_m >= self.cfg.aim_from_m
-        if self._aims:
+        if self._aims and self._age_steps % self._correction_steps == 0:
             self._drive_at_player()
+        self._age_steps += 1
         super().before_step(rng)
 
     def next_point(self, rng: np.random.Generator) -> Floats:

@@ -100,6 +100,7 @@ class ToyCar:
     Attributes:
         prop: The car, its front along x, see `car_parts`.
         room: The room in which it drives: the first one of the playground.
+        point: The point that it drives to, ``(2,)`` metres.
     """
 
     def __init__(self, world: World, motion: Motion, interactions: Sequence[str] = ()) -> None:
@@ -120,13 +121,13 @@ class ToyCar:
             )
         )
         self._resting_m = self.room.lower_m[2] + HEIGHT_M / 2.0
-        self._point = np.zeros(2)
+        self.point = np.zeros(2)
         self._left_s = 0.0
 
     @property
     def needs_point(self) -> bool:
         """Whether the point has been reached or given up, so that `drive` will draw another."""
-        is_there = math.dist(self.prop.position[:2], self._point) < _ARRIVED_M
+        is_there = math.dist(self.prop.position[:2], self.point) < _ARRIVED_M
         return self._left_s <= 0.0 or is_there
 
     @property
@@ -152,13 +153,19 @@ class ToyCar:
             self.drive_to(self._reachable_point(draw, rng))
         self._left_s -= self._step_s
         heading = self.heading_rad
-        speed, turn = self._motion.towards(self._point, self.prop.position, heading, self._step_s)
+        speed, turn = self._motion.towards(self.point, self.prop.position, heading, self._step_s)
         ahead = speed * math.cos(heading), speed * math.sin(heading)
         self.prop.set_velocity((*ahead, self._vertical_mps()), (0.0, 0.0, turn))
 
     def drive_to(self, point: Floats) -> None:
-        """Drive to a point ``(2,)`` of the floor from now on."""
-        self._point, self._left_s = point, _PATIENCE_S
+        """Drive to a point ``(2,)`` of the floor from now on.
+
+        If the last point has not been reached, the time until the car gives up goes on: a car that
+        is stuck has to get another point, also while its point is corrected.
+        """
+        if self.needs_point:
+            self._left_s = _PATIENCE_S
+        self.point = point
 
     def fits_between(self, start: Floats, end: Floats) -> bool:
         """Return whether no prop obstructs the car on a straight line.
@@ -183,8 +190,8 @@ class ToyCar:
         """
         place, heading, path = self.prop.position[:2], self.heading_rad, []
         for _ in range(steps):
-            if math.dist(place, self._point) >= _ARRIVED_M:
-                speed, turn = self._motion.towards(self._point, place, heading, self._step_s)
+            if math.dist(place, self.point) >= _ARRIVED_M:
+                speed, turn = self._motion.towards(self.point, place, heading, self._step_s)
                 ahead = np.array([math.cos(heading), math.sin(heading)])
                 place, heading = place + speed * self._step_s * ahead, heading + turn * self._step_s
             path.append(place)
