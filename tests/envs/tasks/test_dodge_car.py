@@ -113,6 +113,67 @@ def test_the_same_seed_gives_the_same_drive(game):
     np.testing.assert_array_equal(*tracks)
 
 
+def test_it_drives_under_a_table_and_not_through_its_leg():
+    game = game_of("playground=single_room")
+    car, corner = game.task.car, np.array([-2.88, 2.88])
+    assert car.fits_between(np.array([-1.5, 2.5]), np.array([-2.8, 2.5]))
+    assert not car.fits_between(np.array([-1.5, 1.5]), corner)
+    game.close()
+
+
+# ---- where it aims
+
+
+def aims_at(game, commands, place=(0.0, -2.0, 0.0)):
+    """Return where the car drives after some steps of the player, which is far from it."""
+    game.reset(np.random.default_rng(0))
+    game.task.walker.place(place)
+    game.task.car.prop.place((0.0, 2.7, 0.08), -math.pi / 2.0)
+    for command in commands:
+        walk(game, *command)
+    return game.task.car.point
+
+
+def test_it_drives_to_where_a_walking_player_will_be():
+    game = game_of("task.aim=1")
+    still = aims_at(game, [(0.0, 0.0)] * 20)
+    np.testing.assert_allclose(still, (0.0, -2.0), atol=1e-6)
+    x, y = aims_at(game, [(1.0, 0.0)] * 21, place=(-1.0, -2.0, 0.0))
+    assert x > game.task.walker.position[0] + 1.0
+    assert y == pytest.approx(-2.0, abs=0.01)
+    game.close()
+
+
+def test_it_drives_to_where_a_player_on_a_circle_will_be():
+    game = game_of("task.aim=1")
+    radius_m = 1.0 / math.radians(60.0)
+    point = aims_at(game, [(1.0, 0.5)] * 31, place=(0.0, -2.0, 0.0))
+    assert math.dist(point, (0.0, radius_m - 2.0)) == pytest.approx(radius_m, abs=0.08)
+    assert math.dist(point, game.task.walker.position[:2]) > 0.5
+    game.close()
+
+
+def test_without_lead_it_drives_to_where_the_player_is():
+    game = game_of("task.aim=1", "task.lead_s=0")
+    point = aims_at(game, [(1.0, 0.0)] * 21)
+    assert math.dist(point, game.task.walker.position[:2]) < 0.25
+    game.close()
+
+
+def test_near_the_player_it_drives_straight_on():
+    game = game_of("task.aim=1")
+    game.task.walker.place((0.0, 0.0, 0.0), math.pi / 2.0)
+    game.task.car.prop.place((2.8, 0.0, 0.08), math.pi)
+    while math.dist(game.task.car.prop.position[:2], game.task.walker.position[:2]) > 1.5:
+        walk(game)
+    point = game.task.car.point
+    walk(game, 1.0)
+    for _ in range(12):
+        assert not walk(game, 1.0).done
+        np.testing.assert_array_equal(game.task.car.point, point)
+    game.close()
+
+
 # ---- rules
 
 
@@ -146,6 +207,8 @@ def test_without_a_contact_the_task_is_solved():
     [
         ("task.aim=1.5", r"task.aim=1.5 must be in \[0, 1\]"),
         ("task.speed_mps=0", "task.speed_mps"),
+        ("task.speed_mps=50", "task.speed_mps=50.* at most 21.25 m/s, or raise clock.substeps"),
+        ("task.lead_s=-1", "task.lead_s=-1.0 must be 0 or a positive number"),
         ("playground=four_rooms", "'four_rooms' has 4 rooms; .* choose playground=simple"),
         ("body=mitten", "choose body=walker"),
     ],
@@ -173,6 +236,66 @@ def episodes(game, policy, seeds, place=None):
             done = outcome.done
         solved += bool(game.task.solved(game.players[0]))
     return solved / len(seeds), total / len(seeds)
+
+
+def blind(game, command, seeds, place=None):
+    """Return the share of solved episodes of a policy that knows only the number of the step."""
+    solved = 0
+    for seed in seeds:
+        game.reset(np.random.default_rng(seed))
+        if place is not None:
+            game.task.walker.place(place)
+        step, done = 0, False
+        while not done:
+            done = walk(game, *command(step)).done
+            step += 1
+        solved += bool(game.task.solved(game.players[0]))
+    return solved / len(seeds)
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        pytest.param(lambda step: (1.0, 1.0), id="circle of 0.5 m"),
+        pytest.param(lambda step: (1.0, 0.5), id="circle of 1 m"),
+        pytest.param(lambda step: (1.0, 0.3), id="circle of 1.6 m"),
+        pytest.param(lambda step: (1.0, 0.2), id="circle of 2.4 m"),
+        pytest.param(lambda step: (1.0, 0.0), id="straight on"),
+        pytest.param(lambda step: (1.0 if step // 25 % 2 else -1.0, 0.0), id="forward and back"),
+        pytest.param(lambda step: (1.0, 0.7 if step // 30 % 2 else -0.7), id="left and right"),
+        pytest.param(lambda step: (float(step // 20 % 2), 0.6), id="stops on a circle"),
+    ],
+)
+def test_motion_that_ignores_the_car_is_hit(game, command):
+    assert blind(game, command, range(20)) <= 0.2
+
+
+# a walker of 0.11 m touches the piece, or stands in a corner that furniture shields
+BESIDE = {
+    "bed": (1.93, -0.6, 0.0),
+    "bed and wall": (2.87, 0.42, 0.0),
+    "wardrobe": (2.33, 1.6, 0.0),
+    "wardrobe and wall": (2.87, 2.23, 0.0),
+    "shelf": (-2.53, 1.2, 0.0),
+    "sofa": (-2.13, -1.0, 0.0),
+    "sofa and wall": (-2.87, -0.18, 0.0),
+    "table": (-1.78, 2.3, 0.0),
+    "corner behind the table": (-2.88, 2.88, 0.0),
+    "between table and shelf": (-2.87, 1.93, 0.0),
+    "stool": (-2.12, 1.75, 0.0),
+    "corner behind the lamp": (2.88, -2.88, 0.0),
+    "plant pot": (-2.5, -2.5, 0.0),
+}
+
+
+def test_standing_beside_furniture_is_hit():
+    game = game_of("playground=single_room")
+    solved = {
+        name: blind(game, lambda _: (0.0, 0.0), range(4), place) for name, place in BESIDE.items()
+    }
+    assert max(solved.values()) <= 0.25, solved
+    assert np.mean(list(solved.values())) <= 0.1, solved
+    game.close()
 
 
 @pytest.mark.parametrize("place", [None, (-2.85, -2.85, 0.0)])

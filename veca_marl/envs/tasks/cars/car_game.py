@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from veca_marl.envs.core.task import Task, TaskCfg, require_walker
-from veca_marl.envs.tasks.cars.toy_car import Motion, ToyCar
+from veca_marl.envs.tasks.cars.toy_car import Motion, ToyCar, check_speed
 from veca_marl.envs.tasks.navigation import places
 from veca_marl.envs.tasks.navigation.floors.scattering import Spacing, scattered_places
 from veca_marl.envs.tasks.navigation.placement_check import check_placement
@@ -25,7 +25,7 @@ class CarGameCfg(TaskCfg):
     """Parameters of tasks with a toy car. None of them is in the paper.
 
     Attributes:
-        speed_mps: Speed of the car on a straight line.
+        speed_mps: Speed of the car on a straight line; see `check_speed` for its limit.
         turn_degps: Greatest turning speed of the car.
         apart_m: Least distance between the middles of car and player at the start.
     """
@@ -70,6 +70,7 @@ class CarGame(Task):
     def build(self) -> None:
         self.walker = require_walker(self.players[0])
         self._furniture = places.furniture_of(self.world)
+        check_speed(self.cfg.speed_mps, self.world.clock)
         motion = Motion(self.cfg.speed_mps, math.radians(self.cfg.turn_degps))
         self.car = ToyCar(self.world, motion, self.interactions)
         self.touched = False

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
 from veca_marl.envs.core.task import Player, register, terms
 from veca_marl.envs.tasks.cars.car_game import CarGame, CarGameCfg
+from veca_marl.envs.tasks.cars.forecast import Forecast
 from veca_marl.sim.geometry import Floats, horizontal_distance
+
+_CORRECTION_S = 0.2  # between two corrections of the point where car and player will meet
+_DRAWS = 10  # of points from which the line to the player may be clear
 
 
 @dataclass
@@ -16,15 +21,18 @@ class DodgeCarCfg(CarGameCfg):
     """Parameters of DodgeCar. None of them is in the paper.
 
     Attributes:
-        aim: Probability with which the car drives to where the player is at that moment, instead of
-            to a random point of the room, in [0, 1].
-        aim_from_m: Least distance of car and player for that: from nearer by, the player could not
-            get out of the way.
+        aim: Probability with which the car drives at the player, instead of to a random point of
+            the room, in [0, 1].
+        aim_from_m: Least distance of car and player for that. From nearer by it drives straight on:
+            the player could not get out of the way of a car that still turns.
+        lead_s: Greatest time for which it takes the player to go on walking and turning as in the
+            last 0.4 s; with 0 it drives at where the player is.
     """
 
     max_seconds: float = 30.0
     aim: float = 0.6
-    aim_from_m: float = 1.2
+    aim_from_m: float = 1.5
+    lead_s: float = 2.0
     weights: dict[str, float] = terms(hit=-1.0, survived=0.05)
 
     def __post_init__(self) -> None:
@@ -32,16 +40,23 @@ class DodgeCarCfg(CarGameCfg):
         self.check_positive("aim_from_m")
         if not 0.0 <= self.aim <= 1.0:
             raise ValueError(f"task.aim={self.aim} must be in [0, 1]")
+        if not 0.0 <= self.lead_s < math.inf:
+            raise ValueError(f"task.lead_s={self.lead_s} must be 0 or a positive number")
 
 
 @register
 class DodgeCar(CarGame):
     """A fast toy car drives round the room; the player has to dodge it.
 
-    The car drives in straight lines from point to point. With the probability `aim` the next point
-    is where the player stands when it is drawn, if the car is far enough away, so that no place of
-    the room is safe for long. A contact of car and player terminates the episode. The task is
-    solved (`solved`) as long as they have not touched.
+    The car drives from point to point. With the probability `aim`, if it is far enough away, it
+    drives at the player: to where they will meet if the player goes on walking and turning as in
+    the last 0.4 s. It corrects that point every 0.2 s until it is `aim_from_m` away, and then
+    drives straight on. So a player is hit that stands still or repeats one motion, and one is
+    missed that changes its motion when the car is near. If furniture obstructs the straight line to
+    the player, the car first drives to a point from which the line is clear. It is narrower than
+    the player and lower than a table, so that no place of the room is safe for long. A contact of
+    car and player terminates the episode. The task is solved (`solved`) as long as they have not
+    touched.
 
     The paper states senses, actions and "the toy car moves around in the room fast. The agent must
     dodge the car" (table of tasks in the appendix). The motion of the car, the rewards and the end
@@ -56,12 +71,49 @@ class DodgeCar(CarGame):
     senses = ("vision",)
     cfg: DodgeCarCfg
 
+    def build(self) -> None:
+        super().build()
+        step_s = self.world.clock.step_s
+        self._forecast = Forecast(self.walker, self.car.room, step_s)
+        self._correction_steps = max(1, round(_CORRECTION_S / step_s))
+        self._aims, self._age_steps = False, 0
+
+    def reset(self, rng: np.random.Generator) -> None:
+        super().reset(rng)
+        self._forecast.reset()
+        self._aims, self._age_steps = False, 0
+
+    def before_step(self, rng: np.random.Generator) -> None:
+        self._forecast.observe()
+        if self.car.needs_point:
+            self._aims, self._age_steps = rng.random() < self.cfg.aim, 0
+        away_m = horizontal_distance(self.walker.position, self.car.prop.position)
+        self._aims = self._aims and away_m >= self.cfg.aim_from_m
+        if self._aims and self._age_steps % self._correction_steps == 0:
+            self._drive_at_player()
+        self._age_steps += 1
+        super().before_step(rng)
+
     def next_point(self, rng: np.random.Generator) -> Floats:
+        """Draw a point; if the car aims at the player, one with a clear line to the player."""
+        point = self.car.random_point(rng)
+        if not self._aims:
+            return point
         here = self.walker.position[:2]
-        is_far = horizontal_distance(here, self.car.prop.position) >= self.cfg.aim_from_m
-        if is_far and rng.random() < self.cfg.aim:
-            return here
-        return self.car.random_point(rng)
+        for _ in range(_DRAWS):
+            if self.car.fits_between(point, here):
+                break
+            point = self.car.random_point(rng)
+        return point
+
+    def _drive_at_player(self) -> None:
+        """Drive to where car and player will meet, or to the player, unless both are obstructed."""
+        start, here = self.car.prop.position[:2], self.walker.position[:2]
+        ahead = self._forecast.meeting_place(start, self.cfg.speed_mps, self.cfg.lead_s)
+        for point in (ahead, here):
+            if self.car.fits_between(start, point):
+                self.car.drive_to(point)
+                break
 
     def reward(self, player: Player) -> dict[str, float]:
         survived_s = 0.0 if self.touched else self.world.clock.step_s

@@ -11,7 +11,8 @@ import numpy as np
 from veca_marl.envs.tasks.cars.car_parts import HEIGHT_M, LENGTH_M, WIDTH_M, car_parts
 from veca_marl.envs.tasks.navigation.floors.clearance import Clearances
 from veca_marl.sim.geometry import Floats
-from veca_marl.sim.physics import PropCfg, PropShape, World
+from veca_marl.sim.physics import ClockCfg, PropCfg, PropShape, World
+from veca_marl.sim.physics.rooms import RoomCfg
 
 _MASS_KG = 2.0  # below the push limit of walkers: it is pushed away and displaces none
 _COLOUR = (0.95, 0.75, 0.1)
@@ -20,10 +21,45 @@ _PATIENCE_S = 6.0  # after which a point that has not been reached is given up
 _DRAWS = 30
 _SLOWEST = 0.2  # share of the speed while it turns
 _HALF_M = math.hypot(LENGTH_M, WIDTH_M) / 2.0  # of its diagonal
+_ROOM_TO_TURN_M = LENGTH_M / 2.0 + 0.05  # to the walls, from places where it stops
+_HEIGHTS_M = np.array([0.05, HEIGHT_M])  # at which it can hit something
 _TIPPED = 0.9  # cosine of the inclination from which the car is set upright
 
 DrawPoint: TypeAlias = Callable[[np.random.Generator], Floats]
 """Draws a point of the floor, ``(2,)`` or ``(3,)`` metres, to drive to."""
+
+
+def inside(room: RoomCfg, points: Floats, margin_m: float) -> Floats:
+    """Return the points of a room that are nearest to some points.
+
+    Args:
+        room: The room.
+        points: ``(..., 2)`` metres.
+        margin_m: Least distance to the walls.
+
+    Returns:
+        ``(..., 2)`` metres.
+    """
+    low, size = np.array(room.lower_m[:2]), np.array(room.size_m[:2])
+    return np.clip(points, low + margin_m, low + size - margin_m)
+
+
+def check_speed(speed_mps: float, clock: ClockCfg) -> None:
+    """Check that a car moves by at most half its length in one physics step.
+
+    Contacts are found after each physics step: a faster car could pass through a player or a wall
+    without a contact.
+
+    Raises:
+        ValueError: If it is faster; the message names the limit.
+    """
+    limit = LENGTH_M / 2.0 / clock.substep_s
+    if speed_mps > limit:
+        raise ValueError(
+            f"task.speed_mps={speed_mps} covers more than half the length of the car, "
+            f"{LENGTH_M / 2.0:.2f} m, in a physics step of {clock.substep_s:.4g} s: at most "
+            f"{limit:.4g} m/s, or raise clock.substeps"
+        )
 
 
 class Motion(NamedTuple):
@@ -52,8 +88,9 @@ class ToyCar:
 
     Its velocity is set at the start of each agent step; collisions are those of the physics. It
     turns towards a point with at most `Motion.turn_radps` and drives with the cosine of the
-    bearing, at least 0.2, so that it turns nearly on the spot. A point is reachable if the straight
-    line to it is clear of fixed props; it is replaced when it is reached, or after 6 s.
+    bearing, at least 0.2, so that it turns nearly on the spot. A drawn point is reachable if the
+    straight line to it is clear of props by half the diagonal of the car, or, if there is no such
+    point, by half its width. It is replaced when it is reached, or after 6 s.
 
     Args:
         world: A world that is not frozen.
@@ -63,6 +100,7 @@ class ToyCar:
     Attributes:
         prop: The car, its front along x, see `car_parts`.
         room: The room in which it drives: the first one of the playground.
+        point: The point that it drives to, ``(2,)`` metres.
     """
 
     def __init__(self, world: World, motion: Motion, interactions: Sequence[str] = ()) -> None:
@@ -83,8 +121,14 @@ class ToyCar:
             )
         )
         self._resting_m = self.room.lower_m[2] + HEIGHT_M / 2.0
-        self._point = np.zeros(2)
+        self.point = np.zeros(2)
         self._left_s = 0.0
+
+    @property
+    def needs_point(self) -> bool:
+        """Whether the point has been reached or given up, so that `drive` will draw another."""
+        is_there = math.dist(self.prop.position[:2], self.point) < _ARRIVED_M
+        return self._left_s <= 0.0 or is_there
 
     @property
     def heading_rad(self) -> float:
@@ -105,14 +149,36 @@ class ToyCar:
             rng: Random generator of the episode.
         """
         self._set_upright()
-        here = self.prop.position
+        if self.needs_point:
+            self.drive_to(self._reachable_point(draw, rng))
         self._left_s -= self._step_s
-        if self._left_s <= 0.0 or math.dist(here[:2], self._point) < _ARRIVED_M:
-            self._point, self._left_s = self._reachable_point(draw, rng), _PATIENCE_S
         heading = self.heading_rad
-        speed, turn = self._motion.towards(self._point, here, heading, self._step_s)
+        speed, turn = self._motion.towards(self.point, self.prop.position, heading, self._step_s)
         ahead = speed * math.cos(heading), speed * math.sin(heading)
         self.prop.set_velocity((*ahead, self._vertical_mps()), (0.0, 0.0, turn))
+
+    def drive_to(self, point: Floats) -> None:
+        """Drive to a point ``(2,)`` of the floor from now on.
+
+        If the last point has not been reached, the time until the car gives up goes on: a car that
+        is stuck has to get another point, also while its point is corrected.
+        """
+        if self.needs_point:
+            self._left_s = _PATIENCE_S
+        self.point = point
+
+    def fits_between(self, start: Floats, end: Floats) -> bool:
+        """Return whether no prop obstructs the car on a straight line.
+
+        A body that is wider than the car, such as the default walker, stands at no place where the
+        end of a line is obstructed.
+
+        Args:
+            start: ``(2,)`` metres.
+            end: ``(2,)`` metres.
+        """
+        clearances = Clearances(self._obstacles, _HEIGHTS_M)
+        return clearances.all_at_least(_line(start, end), WIDTH_M / 2.0)
 
     def predicted_path(self, steps: int) -> Floats:
         """Return its positions after each of the next steps, if nothing stops it.
@@ -124,8 +190,8 @@ class ToyCar:
         """
         place, heading, path = self.prop.position[:2], self.heading_rad, []
         for _ in range(steps):
-            if math.dist(place, self._point) >= _ARRIVED_M:
-                speed, turn = self._motion.towards(self._point, place, heading, self._step_s)
+            if math.dist(place, self.point) >= _ARRIVED_M:
+                speed, turn = self._motion.towards(self.point, place, heading, self._step_s)
                 ahead = np.array([math.cos(heading), math.sin(heading)])
                 place, heading = place + speed * self._step_s * ahead, heading + turn * self._step_s
             path.append(place)
@@ -133,29 +199,25 @@ class ToyCar:
 
     def inside(self, point: Floats) -> Floats:
         """Return the point ``(2,)`` of the room nearest to a point that the car can stand on."""
-        low, size = np.array(self.room.lower_m[:2]), np.array(self.room.size_m[:2])
-        margin_m = LENGTH_M / 2.0 + 0.05
-        return np.clip(point[:2], low + margin_m, low + size - margin_m)
+        return inside(self.room, point[:2], _ROOM_TO_TURN_M)
 
     def random_point(self, rng: np.random.Generator) -> Floats:
         """Draw a point of the room, ``(2,)``, on which the car can stand."""
         return self.inside(self.room.sample_floor(rng, 0.0))
 
     def _reachable_point(self, draw: DrawPoint, rng: np.random.Generator) -> Floats:
-        """Return a drawn point with a clear way, or the last of 30 draws."""
-        point = self.inside(draw(rng))
-        clearances = Clearances(self._obstacles)
-        for _ in range(_DRAWS):
-            if self._is_clear(point, clearances):
-                break
-            point = self.inside(draw(rng))
-        return point
+        """Return a drawn point with a clear way, or the last of 31 draws.
 
-    def _is_clear(self, point: Floats, clearances: Clearances) -> bool:
-        here = self.prop.position[:2]
-        count = max(2, math.ceil(math.dist(here, point) / WIDTH_M))
-        line = here + np.linspace(1.0 / count, 1.0, count)[:, None] * (point - here)
-        return clearances.all_at_least(line, _HALF_M)
+        A car that has driven between furniture may find no way that is clear by half its diagonal.
+        """
+        here, clearances, narrow = self.prop.position[:2], Clearances(self._obstacles), None
+        for _ in range(_DRAWS + 1):
+            point = self.inside(draw(rng))
+            if clearances.all_at_least(_line(here, point), _HALF_M):
+                return point
+            if narrow is None and self.fits_between(here, point):
+                narrow = point
+        return point if narrow is None else narrow
 
     def _vertical_mps(self) -> float:
         """Return the vertical velocity of the next step: down if it falls, up if it has sunk.
@@ -172,3 +234,9 @@ class ToyCar:
         if self.prop.rotation[2, 2] < _TIPPED:
             x, y, _ = self.prop.position
             self.prop.place((x, y, self._resting_m), self.heading_rad)
+
+
+def _line(start: Floats, end: Floats) -> Floats:
+    """Return points of a line without its start, at most a width of the car apart, ``(n, 2)``."""
+    count = max(2, math.ceil(math.dist(start, end) / WIDTH_M))
+    return start + np.linspace(1.0 / count, 1.0, count)[:, None] * (end - start)

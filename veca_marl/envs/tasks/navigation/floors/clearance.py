@@ -9,7 +9,7 @@ import numpy as np
 from veca_marl.sim.geometry import Bools, Floats, distances_to
 from veca_marl.sim.physics import StandingProp
 
-_HEIGHTS_M = np.array([0.05, 0.2, 0.35, 0.5, 0.65])  # of a body of 0.78 m; lintels are above
+WALKER_HEIGHTS_M = np.array([0.05, 0.2, 0.35, 0.5, 0.65])  # of a body of 0.78 m; lintels are above
 _ROUNDING_M = 1e-9  # by which the distance to a circle and to a shape may differ where they touch
 
 
@@ -21,10 +21,11 @@ class Clearances:
 
     Args:
         props: The props.
+        heights_m: Heights above the floor at which distances are measured, see `clearances_m`.
     """
 
-    def __init__(self, props: Sequence[StandingProp]) -> None:
-        self._props = list(props)
+    def __init__(self, props: Sequence[StandingProp], heights_m: Floats = WALKER_HEIGHTS_M) -> None:
+        self._props, self._heights_m = list(props), heights_m
         self._centres = np.array([prop.position[:2] for prop in props]).reshape(-1, 2)
         self._radii_m = np.array([prop.reach_m if prop.fixed else np.inf for prop in props])
 
@@ -37,7 +38,7 @@ class Clearances:
         """
         near = self._may_be_nearer(points.reshape(-1, 2), clear_m + _ROUNDING_M)
         return all(
-            bool((clearances_m(self._props[number], points) >= clear_m).all())
+            bool((clearances_m(self._props[number], points, self._heights_m) >= clear_m).all())
             for number in np.flatnonzero(near).tolist()
         )
 
@@ -49,19 +50,22 @@ class Clearances:
         return nearer
 
 
-def clearances_m(prop: StandingProp, points: Floats) -> Floats:
-    """Return the least distance to a prop at heights of 0.05 to 0.65 m above points of the floor.
+def clearances_m(
+    prop: StandingProp, points: Floats, heights_m: Floats = WALKER_HEIGHTS_M
+) -> Floats:
+    """Return the least distance to a prop at some heights above points of the floor.
 
     Args:
         prop: The prop, at its present pose.
         points: ``(..., 2)`` metres.
+        heights_m: The heights, ``(n,)`` metres; 0.05 to 0.65 m if they are not given.
 
     Returns:
         ``(...)`` metres, negative inside of the prop.
     """
-    above = np.empty((*points.shape[:-1], len(_HEIGHTS_M), 3))
+    above = np.empty((*points.shape[:-1], len(heights_m), 3))
     above[..., :2] = points[..., None, :]
-    above[..., 2] = _HEIGHTS_M
+    above[..., 2] = heights_m
     own = (above - prop.position) @ prop.rotation
     distances = [distances_to(geom, own).min(axis=-1) for geom in prop.geoms]
     least: Floats = np.min(distances, axis=0)
