@@ -83,6 +83,13 @@ class RunBaby(Task):
         start_near_edge(self.world, self.body, STANDING, self.cfg.spread_deg, rng)
         self._begin()
 
+    def _begin(self) -> None:
+        """Measure all distances from the present pose."""
+        self._heading = self.body.forward
+        self._chest.reset(self.body.bone("chest").position, self._heading)
+        self._toes_start_m = self._toes_m()
+        self._chest_m = self._covered_m = self._speed_mps = 0.0
+
     def after_step(self, rng: np.random.Generator) -> None:
         chest, step_s = self.body.bone("chest"), self.world.clock.step_s
         before_m = self._covered_m
@@ -96,13 +103,6 @@ class RunBaby(Task):
 
     def terminated(self) -> bool:
         return self._height_m("neck") < self.cfg.fallen_m or self._kneels()
-
-    def _begin(self) -> None:
-        """Measure all distances from the present pose."""
-        self._heading = self.body.forward
-        self._chest.reset(self.body.bone("chest").position, self._heading)
-        self._toes_start_m = self._toes_m()
-        self._chest_m = self._covered_m = self._speed_mps = 0.0
 
     def _toes_m(self) -> Floats:
         """Return the positions of the left and the right toes along the heading at the start."""
