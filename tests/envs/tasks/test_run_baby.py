@@ -14,9 +14,16 @@ def game():
 
 
 def shifted(game, posture, shift_m):
-    """Return the term of a step in which the chest has moved forwards by a distance."""
-    body = put(game, posture)
-    game.task._progress.reset(body.bone("chest").position - shift_m * body.forward, body.forward)
+    """Return the term of a step in which the whole body has moved forwards by a distance."""
+    return shifted_parts(game, posture, shift_m, np.array([shift_m, shift_m]))
+
+
+def shifted_parts(game, posture, chest_m, toes_m):
+    """Return the term of a step in which chest and toes have moved forwards by distances."""
+    body, task = put(game, posture), game.task
+    task._begin()
+    task._chest.reset(body.bone("chest").position - chest_m * body.forward, body.forward)
+    task._toes_start_m = task._toes_start_m - toes_m
     return rest(game).terms["agents"]["forward"]
 
 
@@ -32,6 +39,53 @@ def test_a_fast_motion_backwards_is_not_clipped(game):
 @pytest.mark.parametrize("posture", [ON_ALL_FOURS, ON_BELLY])
 def test_motion_face_down_is_hardly_rewarded(game, posture):
     assert abs(shifted(game, posture, 0.04)) < 0.2
+
+
+@pytest.mark.parametrize(
+    ("chest_m", "toes_m", "term"),
+    [
+        (0.04, (0.0, 0.0), 0.0),  # the body leans forwards
+        (0.04, (0.1, 0.0), 0.0),  # one foot is kicked ahead
+        (0.0, (0.04, 0.04), 0.0),  # both feet slide from under the body
+        (0.04, (0.1, 0.02), 0.5),
+        (0.04, (-0.02, 0.1), -0.5),
+    ],
+)
+def test_the_least_distance_of_chest_and_feet_counts(game, chest_m, toes_m, term):
+    found = shifted_parts(game, STANDING, chest_m, np.array(toes_m))
+    assert found == pytest.approx(term, abs=0.1)
+
+
+def test_a_step_of_each_foot_pays_what_the_chest_covered(game):
+    """While one foot is ahead nothing is paid; when the other one follows, all of it."""
+    put(game, STANDING)
+    task = game.task
+    task._begin()
+    task._chest_m, task._toes_start_m = 0.1, task._toes_start_m - np.array([0.2, 0.0])
+    assert rest(game).terms["agents"]["forward"] == pytest.approx(0.0, abs=0.1)
+    task._toes_start_m = task._toes_start_m - np.array([0.0, 0.1])
+    assert rest(game).terms["agents"]["forward"] == pytest.approx(2.5, abs=0.2)
+
+
+# of all constant postures that were tried it moved the chest farthest; hips end at -10 degrees
+PLANK = Posture(0.0, {"foot.dorsiflexion": 20.0, "thigh.flexion": -10.0, "spine.flexion": -15.0})
+
+
+def test_a_fall_like_a_plank_earns_nothing(game):
+    """The chest moves ahead by almost half a metre, the toes stay where they are."""
+    player, returns, chest_m = game.players[0], [], []
+    for body in starts(game, 6):
+        begin, heading, earned = body.bone("chest").position, body.forward, 0.0
+        target = body.posture_angles(PLANK)
+        outcome = hold(game, target)
+        while not outcome.done:
+            earned += game.reward_of(outcome.terms[player.name])
+            outcome = hold(game, target)
+        returns.append(earned + game.reward_of(outcome.terms[player.name]))
+        chest_m.append((body.bone("chest").position - begin) @ heading)
+    assert np.mean(chest_m) > 0.4
+    assert np.mean(returns) < 0.05
+    assert max(returns) < 0.1
 
 
 UPRIGHT_ON_KNEES = Posture(0.0, {"shank.flexion": 90.0, "foot.dorsiflexion": -45.0})
@@ -67,7 +121,8 @@ def test_it_starts_standing_with_the_room_ahead(game):
 
 
 @pytest.mark.parametrize(("body", "way_m"), [("mitten_limbs", 0.25), ("mitten_position", 0.25)])
-def test_the_expert_runs_forwards(body, way_m):
+def test_the_expert_falls_forwards(body, way_m):
+    """It does not run."""
     rng = np.random.default_rng(3)
     with child_game("RunBaby", f"body={body}") as game:
         ways_m = [play(game, rng)[1] for _ in range(6)]

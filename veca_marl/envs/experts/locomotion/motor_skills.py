@@ -86,9 +86,10 @@ class CrawlBabyExpert(Expert[CrawlBaby]):
 
 @register_expert("RunBaby")
 class RunBabyExpert(SkillExpert):
-    """Steps in the direction of the fall; hips and ankles hold the trunk upright; see `Running`.
+    """Lifts its feet in turn and falls forwards after about one second; see `Running`.
 
-    Reads the pose of the trunk from the simulator (privileged).
+    It does not run: its toes come ahead by one to two centimetres. Reads the pose of the trunk from
+    the simulator (privileged).
     """
 
     skill_type = Running

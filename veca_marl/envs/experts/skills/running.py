@@ -18,7 +18,8 @@ class RunningPattern:
     """Parameters of the gait: angles in degrees, gains in degrees per radian of inclination.
 
     Inclination is the horizontal part of the chest's up axis, forwards or to the left. The values
-    were set by hand and then improved by random searches for the distance covered before a fall.
+    were set by hand and then improved by random searches for the distance that the pelvis
+    covers before a fall.
     """
 
     frequency_hz: float = 2.18
@@ -45,9 +46,10 @@ class RunningPattern:
 
 
 class Running:
-    """Target angles of a running body.
+    """Target angles that imitate running; the body falls forwards after about one second.
 
-    The stance leg holds the trunk upright, the swing leg steps in the direction of the fall.
+    The stance leg turns the trunk upright, the swing leg moves in the direction of the fall. Feet
+    are lifted too little and too late to catch the fall.
 
     Args:
         body: The body.

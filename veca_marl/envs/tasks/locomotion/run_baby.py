@@ -11,8 +11,12 @@ from veca_marl.envs.core.task import Player, Task, register, require_humanoid, t
 from veca_marl.envs.tasks.locomotion.progress import ForwardProgress
 from veca_marl.envs.tasks.locomotion.start_poses import StartCfg, start_near_edge
 from veca_marl.sim.body.humanoid.postures import STANDING
+from veca_marl.sim.geometry import Floats
 
 _SHANKS = ("l_shank", "r_shank")  # their origins are the knees
+_FEET = ("l_foot", "r_foot")
+# lowest point of the toes in the frame of a foot, metres: a foot whose heel rises turns about it
+_TOES_M = np.array([0.07, 0.0, -0.043])
 
 
 @dataclass
@@ -22,7 +26,7 @@ class RunBabyCfg(StartCfg):
     Attributes:
         spread_deg: Standard deviation of every joint angle at the start about the posture
             `standing`, in [0, 30].
-        top_mps: Upper limit of the term `forward`.
+        top_mps: Upper limit of the speed of the chest that counts.
         fallen_m: Height of the top of the chest (the base of the neck) below which the body has
             fallen, in [0, 0.5]; it is 0.61 m when standing. 0 turns this condition off.
         kneeling_m: Height of a knee joint below which the body has fallen, in [0, 0.15]; it is
@@ -51,17 +55,21 @@ class RunBaby(Task):
 
     The paper (table of tasks in the appendix; "Joint-level Locomotion & Control") rewards "the
     velocity to the direction of its torso" and gives no numbers. In this task the velocity is
-    that of the chest along the horizontal part of its forward axis, so that a body that dives or
-    slides on its belly is rewarded little. Departures: the velocity counts at most as much as its
-    component along the heading at the start, so that swaying to and fro is not rewarded; a fall
-    terminates the episode, and so does a knee on the floor, since the task is to run on two feet.
-    Otherwise an episode lasts `max_seconds`. The task has no goal: the farther, the better. With
-    the default weight, 1 m adds 2.5 to the return.
+    that of the chest along the horizontal part of its forward axis. Departures: it counts at most
+    as much as its component along the heading at the start, so that swaying to and fro is not
+    rewarded; the distance that the chest covers counts only as far as the toes of both feet have
+    come, since otherwise a body that falls forwards like a plank would be rewarded for half a
+    metre; a fall terminates the episode, and so does a knee on the floor, since the task is to run
+    on two feet. Otherwise an episode lasts `max_seconds`. The task has no goal: the farther, the
+    better. With the default weight, 1 m adds 2.5 to the return.
 
     Terms:
-        forward: Mean speed of the chest during the step, m/s: the smaller one of its components
-            along the horizontal part of its forward axis and along the heading at the start, at
-            most `top_mps`.
+        forward: Change of the distance covered during the step, divided by its duration, m/s. The
+            distance is the smallest of three: those of the chest and of the toes of each foot from
+            where they were at the start. The toes' is along the heading at the start. The chest's
+            is the sum over the steps of the smaller one of its components along the horizontal
+            part of its forward axis and along the heading at the start, of which at most `top_mps`
+            counts in a step.
     """
 
     senses = ("proprioception", "touch")
@@ -69,21 +77,38 @@ class RunBaby(Task):
 
     def build(self) -> None:
         self.body = require_humanoid(self.players[0])
-        self._progress = ForwardProgress(self.world.clock.step_s, self.cfg.top_mps)
+        self._chest = ForwardProgress(self.world.clock.step_s, self.cfg.top_mps)
 
     def reset(self, rng: np.random.Generator) -> None:
         start_near_edge(self.world, self.body, STANDING, self.cfg.spread_deg, rng)
-        self._progress.reset(self.body.bone("chest").position, self.body.forward)
+        self._begin()
+
+    def _begin(self) -> None:
+        """Measure all distances from the present pose."""
+        self._heading = self.body.forward
+        self._chest.reset(self.body.bone("chest").position, self._heading)
+        self._toes_start_m = self._toes_m()
+        self._chest_m = self._covered_m = self._speed_mps = 0.0
 
     def after_step(self, rng: np.random.Generator) -> None:
-        chest = self.body.bone("chest")
-        self._progress.update(chest.position, horizontal(chest.forward))
+        chest, step_s = self.body.bone("chest"), self.world.clock.step_s
+        before_m = self._covered_m
+        self._chest.update(chest.position, horizontal(chest.forward))
+        self._chest_m += self._chest.speed_mps * step_s
+        self._covered_m = min(self._chest_m, *(self._toes_m() - self._toes_start_m))
+        self._speed_mps = (self._covered_m - before_m) / step_s
 
     def reward(self, player: Player) -> dict[str, float]:
-        return {"forward": self._progress.speed_mps}
+        return {"forward": self._speed_mps}
 
     def terminated(self) -> bool:
         return self._height_m("neck") < self.cfg.fallen_m or self._kneels()
+
+    def _toes_m(self) -> Floats:
+        """Return the positions of the left and the right toes along the heading at the start."""
+        feet = [self.body.bone(name) for name in _FEET]
+        toes = np.array([foot.position + foot.rotation @ _TOES_M for foot in feet])
+        return np.array(toes @ self._heading)
 
     def _kneels(self) -> bool:
         return min(map(self._height_m, _SHANKS)) < self.cfg.kneeling_m
