@@ -1,11 +1,21 @@
 """What learning stores is stated, and refused where it does not fit."""
 
+import errno
+import os
 from pathlib import Path
 
 import pytest
+import torch
 
 from veca_marl.algos import storage
-from veca_marl.algos.storage import StorageNeeded, check_storage
+from veca_marl.algos.files import WriteError
+from veca_marl.algos.storage import (
+    StorageError,
+    StorageNeeded,
+    check_storage,
+    reserve_disk,
+    reserve_memory,
+)
 
 
 @pytest.fixture
@@ -27,12 +37,13 @@ def test_the_needs_of_all_teams_count_together(machine):
         check_storage({"red": one, "blue": one, "green": one})
 
 
-def test_disk_space_is_checked_by_folder(machine):
-    need = StorageNeeded(disk_bytes=15 * 10**9, folder=Path("/data"))
+def test_disk_space_is_checked_by_folder(machine, tmp_path):
+    need = StorageNeeded(disk_bytes=15 * 10**9, folder=tmp_path / "data")
     assert check_storage({"red": need}) == [
-        "replay: 15.00 GB of disk space in /data, 20.00 GB are available"
+        f"replay: 15.00 GB of disk space in {tmp_path}/data, 20.00 GB are available"
     ]
-    with pytest.raises(ValueError, match=r"take 30.00 GB of disk space in /data"):
+    assert not list(tmp_path.iterdir())
+    with pytest.raises(ValueError, match=rf"take 30.00 GB of disk space in {tmp_path}/data"):
         check_storage({"red": need, "blue": need})
 
 
@@ -45,16 +56,6 @@ def test_an_unknown_size_of_memory_refuses_nothing(monkeypatch):
     assert check_storage({"red": StorageNeeded(10**15)}) == ["replay: 1000000.00 GB of memory"]
 
 
-def test_memory_is_limited_by_the_control_group(tmp_path):
-    files = {"memory.max": "1000\n", "memory.current": "400\n"}
-    for name, text in (files | {"memory.stat": "anon 300\ninactive_file 100\n"}).items():
-        (tmp_path / name).write_text(text)
-    assert storage._cgroup_memory(tmp_path) == 700
-    (tmp_path / "memory.max").write_text("max\n")
-    assert storage._cgroup_memory(tmp_path) is None
-    assert storage._cgroup_memory(tmp_path / "other") is None
-
-
 def test_memory_of_the_system_is_read(tmp_path):
     file = tmp_path / "meminfo"
     file.write_text("MemTotal:  99 kB\nMemAvailable:   50 kB\n")
@@ -63,3 +64,72 @@ def test_memory_of_the_system_is_read(tmp_path):
 
 def test_a_folder_that_does_not_exist_yet_is_on_the_disk_of_its_parent(tmp_path):
     assert storage.available_disk(tmp_path / "new" / "folder") > 0
+
+
+@pytest.mark.parametrize("below", ["", "below", "below/it"])
+def test_a_folder_at_or_below_a_file_is_refused(tmp_path, below):
+    (tmp_path / "file").touch()
+    folder = tmp_path / "file" / below
+    need = StorageNeeded(disk_bytes=10, folder=folder, settings="algo.replay.folder")
+    message = rf"cannot be stored in {folder}: Not a directory .*; change algo.replay.folder"
+    with pytest.raises(ValueError, match=message):
+        check_storage({"red": need})
+
+
+def test_a_folder_in_which_nothing_can_be_made_is_refused():
+    need = StorageNeeded(disk_bytes=10, folder=Path("/proc/new"), settings="algo.replay.folder")
+    with pytest.raises(ValueError, match=r"cannot be stored in /proc/new: "):
+        check_storage({"red": need})
+
+
+def test_reserved_memory_is_taken_at_once():
+    array = torch.empty(64 * 2**20, dtype=torch.uint8)
+    before = resident_bytes()
+    reserve_memory([array], "")
+    assert resident_bytes() - before > 0.9 * array.nbytes
+
+
+def resident_bytes():
+    pages = int(Path("/proc/self/statm").read_text().split()[1])
+    return pages * os.sysconf("SC_PAGE_SIZE")
+
+
+def test_memory_that_other_programs_take_in_the_meantime_is_missed_at_once(monkeypatch):
+    """Each of two runs needs 80 of 100 bytes; the other one fills its buffer at the same time."""
+    left = iter(range(100, 0, -20))
+    monkeypatch.setattr(storage, "available_memory", lambda: next(left))
+    monkeypatch.setattr(storage, "_CHUNK", 10)
+    arrays = [torch.ones(4, 10, dtype=torch.uint8), torch.ones(40, dtype=torch.uint8)]
+    message = (
+        r"needs 0.00 GB of memory more, and 0.00 GB are left: other programs .*; change "
+        r"algo.replay.capacity, or .*hydra.launcher.jobs"
+    )
+    with pytest.raises(StorageError, match=message):
+        reserve_memory(arrays, "algo.replay.capacity")
+    assert [int(array.sum()) for array in arrays] == [10, 40]  # needed 50 and left 40
+
+
+def test_reserved_disk_space_is_taken_at_once(tmp_path):
+    file = tmp_path / "sparse"
+    with file.open("wb") as opened:
+        opened.truncate(10**6)
+    assert file.stat().st_blocks * 512 < 10**6
+    reserve_disk(file)
+    assert file.stat().st_blocks * 512 >= 10**6 == file.stat().st_size
+
+
+def test_without_a_call_of_the_system_zeros_are_written(tmp_path, monkeypatch):
+    monkeypatch.delattr(os, "posix_fallocate")
+    monkeypatch.setattr(storage, "_CHUNK", 1000)
+    test_reserved_disk_space_is_taken_at_once(tmp_path)
+
+
+def test_a_disk_that_is_full_is_named(tmp_path, monkeypatch):
+    def fail(*_):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(os, "posix_fallocate", fail)
+    file = tmp_path / "file"
+    file.write_bytes(bytes(3_000_000))
+    with pytest.raises(WriteError, match=r"file: No space left on device \(.* free, 3.0 MB needed"):
+        reserve_disk(file)

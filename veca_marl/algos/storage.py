@@ -1,19 +1,35 @@
-"""Memory and disk space that learning will take: stated and checked before a run begins."""
+"""Memory and disk space that learning will take: checked before a run begins, then reserved.
+
+Runs that begin at the same time find the same memory available. Each reserves what it has stated
+when its buffers are made, so that one for which it is not enough ends then, and not hours later,
+when the buffers have filled.
+"""
 
 from __future__ import annotations
 
 import math
+import os
 import shutil
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import torch
+from torch import Tensor
 
+from veca_marl.algos.control_groups import control_group_memory
+from veca_marl.algos.files import WriteError, naming
 from veca_marl.algos.specs import TeamSpec
 
-_SHARE = 0.9  # of what is available; the rest is left to networks, worlds and other programs
-_CGROUP = Path("/sys/fs/cgroup")
+USABLE_SHARE = 0.9
+"""Of what is available; the rest is left to networks, worlds and other programs."""
+
+_CHUNK = 64 * 2**20  # bytes; between two chunks the memory that is left is read again
+
+
+class StorageError(WriteError):
+    """A buffer does not fit into the memory that is left."""
 
 
 @dataclass(frozen=True)
@@ -43,7 +59,7 @@ def check_storage(needed: Mapping[str, StorageNeeded]) -> list[str]:
         A line for each kind of storage that is needed.
 
     Raises:
-        ValueError: If it does not fit; the message gives numbers and what to change.
+        ValueError: If it does not fit, or a folder cannot be used; the message says what to change.
     """
     settings = next((need.settings for need in needed.values() if need.settings), "")
     lines = []
@@ -52,18 +68,32 @@ def check_storage(needed: Mapping[str, StorageNeeded]) -> list[str]:
         lines.append(_check("memory", memory, available_memory(), settings))
     folders = {need.folder for need in needed.values() if need.folder is not None}
     for folder in sorted(folders):
-        disk = sum(need.disk_bytes for need in needed.values() if need.folder == folder)
-        lines.append(_check(f"disk space in {folder}", disk, available_disk(folder), settings))
+        there = [need for need in needed.values() if need.folder == folder]
+        _check_folder(folder, there[0].settings)
+        disk, free = sum(need.disk_bytes for need in there), available_disk(folder)
+        lines.append(_check(f"disk space in {folder}", disk, free, there[0].settings))
     return lines
+
+
+def _check_folder(folder: Path, settings: str) -> None:
+    """Check that files can be made in a folder, or that it can be made where it is to be."""
+    try:
+        with TemporaryDirectory(dir=_existing(folder)):
+            pass
+    except OSError as error:
+        raise ValueError(
+            f"the replay buffers cannot be stored in {folder}: {error.strerror} "
+            f"({error.filename}); change {settings}"
+        ) from error
 
 
 def _check(kind: str, needed: int, available: int | None, settings: str) -> str:
     if available is None:
         return f"replay: {_size(needed)} of {kind}"
-    if needed > _SHARE * available:
+    if needed > USABLE_SHARE * available:
         raise ValueError(
             f"the replay buffers take {_size(needed)} of {kind}, and {_size(available)} are "
-            f"available, of which {_SHARE:.0%} may be used; change {settings}"
+            f"available, of which {USABLE_SHARE:.0%} may be used; change {settings}"
         )
     return f"replay: {_size(needed)} of {kind}, {_size(available)} are available"
 
@@ -75,10 +105,10 @@ def _size(number: int) -> str:
 def available_memory() -> int | None:
     """Return the bytes of memory that new data can take; None where the system does not say.
 
-    On Linux that is ``MemAvailable``, or what is left of the limit of the process's control group
-    (version 2: containers and batch schedulers), whichever is less.
+    On Linux that is ``MemAvailable``, or what is left of the limits of the process's control groups
+    (containers and batch schedulers), whichever is less.
     """
-    known = [size for size in (_system_memory(), _cgroup_memory(_CGROUP)) if size is not None]
+    known = [size for size in (_system_memory(), control_group_memory()) if size is not None]
     return min(known, default=None)
 
 
@@ -91,22 +121,63 @@ def _system_memory(file: Path = Path("/proc/meminfo")) -> int | None:
     return None
 
 
-def _cgroup_memory(root: Path) -> int | None:
-    """Return the rest of the limit of a control group; its file cache can be reclaimed."""
-    limit, used, detail = (root / f"memory.{name}" for name in ("max", "current", "stat"))
-    if not (limit.is_file() and used.is_file() and detail.is_file()):
-        return None
-    text = limit.read_text().strip()
-    if text == "max":
-        return None
-    counts = dict(line.split() for line in detail.read_text().splitlines())
-    return int(text) - int(used.read_text()) + int(counts.get("inactive_file", 0))
-
-
 def available_disk(folder: Path) -> int:
     """Return the free bytes of the disk on which `folder` is, or will be."""
-    existing = next(path for path in (folder, *folder.absolute().parents) if path.exists())
-    return shutil.disk_usage(existing).free
+    return shutil.disk_usage(_existing(folder)).free
+
+
+def _existing(folder: Path) -> Path:
+    """Return the folder, or the nearest one above it that exists."""
+    return next(path for path in (folder, *folder.absolute().parents) if path.exists())
+
+
+def reserve_memory(arrays: Sequence[Tensor], settings: str) -> None:
+    """Fill new arrays with zeros: the system assigns memory to an array when it is written to.
+
+    Args:
+        arrays: The arrays.
+        settings: Fields of the configuration that change their size, for the error message.
+
+    Raises:
+        StorageError: If the memory that is left is less than what is not filled yet.
+    """
+    left = sum(array.nbytes for array in arrays)
+    for array in arrays:
+        row = array.nbytes // len(array)
+        for rows in array.split(max(1, _CHUNK // max(row, 1))):
+            _check_rest(left, settings)
+            rows.zero_()
+            left -= rows.nbytes
+
+
+def _check_rest(needed: int, settings: str) -> None:
+    available = available_memory()
+    if available is not None and needed > available:
+        raise StorageError(
+            f"the replay buffer needs {_size(needed)} of memory more, and {_size(available)} are "
+            f"left: other programs have taken memory since the run began; change {settings}, or "
+            "let fewer runs share the machine (of a sweep: hydra.launcher.jobs)"
+        )
+
+
+def reserve_disk(file: Path) -> None:
+    """Let the disk reserve the space of a file: a new one takes none until it is written to.
+
+    A program that writes to a memory-mapped file on a full disk is killed by SIGBUS.
+
+    Args:
+        file: An existing file; its content is lost where the system cannot reserve (macOS).
+
+    Raises:
+        WriteError: If the disk is full; the message names the file and the free space.
+    """
+    size = file.stat().st_size
+    with naming(file, size), file.open("r+b") as opened:
+        if hasattr(os, "posix_fallocate"):
+            os.posix_fallocate(opened.fileno(), 0, size)
+            return
+        for begin in range(0, size, _CHUNK):
+            opened.write(bytes(min(_CHUNK, size - begin)))
 
 
 def state_bytes(spec: TeamSpec) -> int:

@@ -2,7 +2,9 @@
 
 import multiprocessing
 import os
+import re
 import signal
+import threading
 import time
 from contextlib import closing
 from functools import partial
@@ -17,6 +19,7 @@ from veca_marl.algos.evaluation.evaluate import Exploration
 from veca_marl.algos.evaluation.evaluators import Players, Request, make_evaluator
 
 SEVEN = Request("policy", 7, 5, Exploration.deterministic)
+LIMIT_S = 60.0
 
 
 @pytest.fixture
@@ -30,7 +33,7 @@ def policy(make_ppo):
 
 def returns(processes, policy, *requests, make_env=make_fake_env):
     players = Players(policy, ("agents",))
-    with closing(make_evaluator(make_env, players, processes, 4)) as evaluator:
+    with closing(make_evaluator(make_env, players, processes, 4, LIMIT_S)) as evaluator:
         return [evaluator.play(request)["agents"].returns for request in requests]
 
 
@@ -46,7 +49,7 @@ def test_several_processes_play_the_same_episodes_in_the_same_order(policy):
 
 def test_new_parameters_reach_the_processes(policy):
     players = Players(policy, ("agents",))
-    with closing(make_evaluator(make_fake_env, players, 2, 4)) as evaluator:
+    with closing(make_evaluator(make_fake_env, players, 2, 4, LIMIT_S)) as evaluator:
         before = evaluator.play(SEVEN)["agents"].returns
         with torch.no_grad():
             for parameter in policy.parameters():
@@ -62,7 +65,7 @@ def test_a_process_that_is_killed_is_noticed_at_once(policy):
             time.sleep(0.1)
 
     players = Players(policy, ("agents",))
-    with closing(make_evaluator(make_fake_env, players, 2, 4)) as evaluator:
+    with closing(make_evaluator(make_fake_env, players, 2, 4, LIMIT_S)) as evaluator:
         evaluator.play(SEVEN)
         multiprocessing.active_children()[0].kill()
         with pytest.raises(WorkerError, match=r"evaluation process [01] was killed by SIGKILL"):
@@ -88,7 +91,7 @@ def test_other_work_is_done_while_processes_play_and_before_this_one_does(policy
     event = multiprocessing.Event()
     players = Players(policy, ("agents",))
     make_env = partial(Waiting, event=event)
-    with closing(make_evaluator(make_env, players, processes, 4)) as evaluator:
+    with closing(make_evaluator(make_env, players, processes, 4, LIMIT_S)) as evaluator:
         assert len(evaluator.play(SEVEN, event.set)["agents"].returns) == 7
 
 
@@ -120,3 +123,68 @@ def make_killed(worlds, seed):
 def test_a_process_that_fails_ends_the_evaluation(policy, make_env, message):
     with pytest.raises(WorkerError, match=message):
         returns(2, policy, SEVEN, make_env=make_env)
+
+
+def stop_one():
+    """Stop a process without ending it."""
+    processes = sorted(multiprocessing.active_children(), key=lambda process: process.pid)
+    os.kill(processes[1].pid, signal.SIGSTOP)
+
+
+def check_that_it_ends(action, seconds):
+    """Check that the time of an action is limited; a thread would be left behind if it is not."""
+    thread = threading.Thread(target=action, daemon=True)
+    thread.start()
+    thread.join(seconds)
+    assert not thread.is_alive()
+
+
+HANGS = (
+    r"^evaluation process 1 \(of 0 to 1\) did not answer for 2 s \(collect.answer_limit_s\) and "
+    r"was killed$"
+)
+
+
+def test_a_process_that_hangs_is_named_and_killed(policy):
+    players = Players(policy, ("agents",))
+    raised = []
+
+    def play():
+        try:
+            evaluator.play(SEVEN)
+        except WorkerError as error:
+            raised.append(str(error))
+
+    with closing(make_evaluator(make_fake_env, players, 2, 4, 2.0)) as evaluator:
+        evaluator.play(SEVEN)
+        stop_one()
+        check_that_it_ends(play, 12.0)
+    assert re.match(HANGS, *raised)
+    assert not multiprocessing.active_children()
+
+
+def test_an_evaluator_with_a_process_that_hangs_can_be_closed(policy):
+    evaluator = make_evaluator(make_fake_env, Players(policy, ("agents",)), 2, 4, LIMIT_S)
+    evaluator.play(SEVEN)
+    stop_one()
+    check_that_it_ends(evaluator.close, 12.0)
+    assert not multiprocessing.active_children()
+
+
+class Slow(FakeEnv):
+    """Takes longer for an episode than the time limit, but not for a step."""
+
+    def _step(self, td):
+        time.sleep(0.5)
+        return super()._step(td)
+
+
+def make_slow(worlds, seed):
+    return Slow(worlds=worlds, seed=seed)
+
+
+def test_an_evaluation_that_takes_longer_than_the_limit_is_not_ended(policy):
+    with closing(make_evaluator(make_slow, Players(policy, ("agents",)), 2, 4, 2.0)) as evaluator:
+        begin = time.monotonic()
+        assert len(evaluator.play(SEVEN)["agents"].returns) == 7
+        assert time.monotonic() - begin > 4.0

@@ -6,15 +6,18 @@ from pathlib import Path
 
 import pytest
 import torch
+from tensordict import TensorDict
 from timed_batches import SPEC, batch_of
 
 from veca_marl.algos.sac.config import ReplayCfg, Storage
+from veca_marl.algos.sac.replay import buffer
 from veca_marl.algos.sac.replay.buffer import Replay, storage_needed
 from veca_marl.algos.sac.replay.segments import StoredKeys
 from veca_marl.algos.sac.replay.windows import Span
 from veca_marl.algos.specs import ArrayLayout
 
 KEYS = StoredKeys.of("team", SPEC)
+TORCHRL_INDEX = 8  # bytes; TorchRL numbers the rows
 CFG = ReplayCfg(capacity=50, warm_up_frames=10, in_checkpoint=True)
 
 
@@ -69,9 +72,22 @@ def test_memory_mapped_files_hold_the_same_and_are_removed(tmp_path):
     cfg = replace(CFG, storage=Storage.memmap, folder=str(folder))
     mapped = replay_of(cfg, 9)
     assert sum(file.stat().st_size for file in folder.rglob("*") if file.is_file()) > 1000
+    files = [file.stat() for file in folder.rglob("*.memmap")]
+    assert len(files) > 5
+    assert all(file.st_blocks * 512 >= file.st_size for file in files), "reserved"
     torch.testing.assert_close(drawn(mapped), drawn(replay_of(CFG, 9)), rtol=0, atol=0)
     del mapped
     assert list(folder.iterdir()) == []
+
+
+def test_the_memory_is_taken_with_the_first_batch(monkeypatch):
+    reserved = []
+    monkeypatch.setattr(
+        buffer, "reserve_memory", lambda arrays, _: reserved.extend(a.nbytes for a in arrays)
+    )
+    replay = replay_of(CFG, 3)
+    rows = TensorDict(replay.state_dict()["rows"]).values(True, True)
+    assert sum(reserved) == 50 * (sum(array[0].nbytes for array in rows) + TORCHRL_INDEX)
 
 
 def test_the_bytes_that_are_needed_are_those_of_the_storage():

@@ -34,6 +34,23 @@ class TimeLimit:
             self._abandon(silent)
 
 
+def no_answer(kind: str, silent: list[int], workers: int, seconds: float) -> str:
+    """Return the message about workers that were killed because they did not answer.
+
+    Args:
+        kind: What they are, such as ``worker process``.
+        silent: Their indices.
+        workers: Number of all workers of this kind.
+        seconds: The time limit.
+    """
+    names = " and ".join(map(str, silent))
+    plural = "es" if len(silent) > 1 else ""
+    return (
+        f"{kind}{plural} {names} (of 0 to {workers - 1}) did not answer for {seconds:g} s "
+        "(collect.answer_limit_s) and was killed"
+    )
+
+
 class BatchQueue:
     """The queue of the workers' batches, with a time limit for each batch of all workers.
 

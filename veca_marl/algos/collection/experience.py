@@ -33,9 +33,9 @@ class CollectCfg:
         worlds: Worlds in each process; one call of the policy acts for all of them.
         steps: Steps of each world in a batch.
         threads: Torch threads of each worker process.
-        answer_limit_s: Seconds that a worker process may take for a batch, a reset or new
-            parameters; a run whose workers take longer ends with an error that names them. The
-            default is more than a hundred times the usual duration of a batch.
+        answer_limit_s: Seconds that a worker process may take for a batch, a reset, new parameters
+            or a step of an evaluation; a run whose workers take longer ends with an error that
+            names them. The default is more than a hundred times the usual duration of a batch.
     """
 
     processes: int = 2

@@ -30,7 +30,7 @@ from torch import multiprocessing, nn
 from torchrl.collectors import Collector, MultiSyncCollector
 from torchrl.weight_update import SharedMemWeightSyncScheme
 
-from veca_marl.algos.collection.answers import CHECK_S, BatchQueue, TimeLimit
+from veca_marl.algos.collection.answers import CHECK_S, BatchQueue, TimeLimit, no_answer
 from veca_marl.algos.collection.parent import end_with_parent
 
 _MESSAGE_CHARS = 1000  # with a pickle's overhead below what a pipe writes at once (4096 bytes)
@@ -92,12 +92,7 @@ class SupervisedCollector(MultiSyncCollector):
 
     def _abandon(self, silent: list[int]) -> None:
         """Kill all workers and raise `WorkerError`, which names those that have not answered."""
-        names = " and ".join(str(i) for i in silent)
-        processes = f"worker process{'es' if len(silent) > 1 else ''} {names}"
-        self._failure = (
-            f"{processes} (of 0 to {len(self.procs) - 1}) did not answer for {self._limit_s:g} s "
-            "(collect.answer_limit_s) and was killed"
-        )
+        self._failure = no_answer("worker process", silent, len(self.procs), self._limit_s)
         self.check()
 
     def check(self) -> None:

@@ -4,17 +4,20 @@ from __future__ import annotations
 
 import os
 import signal
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from multiprocessing.connection import Connection, wait
+from multiprocessing.process import BaseProcess
 from typing import Any, Protocol
 
 import torch
 from torch import multiprocessing, nn
 from torchrl.envs import EnvBase
 
+from veca_marl.algos.collection.answers import CHECK_S, no_answer
 from veca_marl.algos.collection.experience import start_method, workers_ignore_interrupts
 from veca_marl.algos.collection.parent import end_with_parent
 from veca_marl.algos.collection.workers import WorkerError, call_when_a_child_ends, end_of
@@ -27,6 +30,8 @@ from veca_marl.algos.evaluation.evaluate import (
 )
 from veca_marl.algos.policy import Policy
 from veca_marl.algos.specs import EnvFactory
+
+_END_S = 3.0  # until a process that does not follow SIGTERM is killed; others end at once
 
 
 @dataclass(frozen=True)
@@ -103,6 +108,15 @@ class LocalEvaluator:
         self._env = make_env(worlds, 0)
         self._players = players(self._env)
 
+    def count_steps(self, steps: Any) -> None:
+        """Add 1 to ``steps.value`` before each action: another process sees that this one plays."""
+
+        def count(*_: Any) -> None:
+            steps.value += 1
+
+        for player in self._players.values():
+            player.register_forward_pre_hook(count)
+
     def play(self, request: Request, meanwhile: Callable[[], None] = nothing) -> dict[str, Scores]:
         """See `Evaluator`."""
         meanwhile()
@@ -120,20 +134,67 @@ class LocalEvaluator:
         self._env.close()
 
 
+@dataclass(frozen=True)
+class _Worker:
+    """A process that plays.
+
+    Attributes:
+        process: The process.
+        connection: Requests go there, answers come from it.
+        steps: Shared with the process, which counts its steps in it.
+    """
+
+    process: BaseProcess
+    connection: Connection[Any, Any]
+    steps: Any
+
+    @property
+    def waitables(self) -> list[Any]:
+        """What becomes ready when it answers or ends."""
+        return [self.connection, self.process.sentinel]
+
+    def kill(self) -> None:
+        """Kill the process, also one that is stopped and receives no SIGTERM."""
+        self.process.kill()
+        self.process.join(_END_S)
+
+
+class _Progress:
+    """Measures for how long a process has made no step.
+
+    Args:
+        worker: The process.
+    """
+
+    def __init__(self, worker: _Worker) -> None:
+        self._worker = worker
+        self._steps, self._since = worker.steps.value, time.monotonic()
+
+    def silent_s(self) -> float:
+        """Return the seconds since a call of this method first saw the last step."""
+        steps = self._worker.steps.value
+        if steps != self._steps:
+            self._steps, self._since = steps, time.monotonic()
+        return time.monotonic() - self._since
+
+
 class ParallelEvaluator:
     """Plays equal parts of the episodes in several processes.
 
     The parameters and buffers of the policies are in shared memory: a change in this process
-    reaches the others.
+    reaches the others. So are the numbers of steps that the processes have made, by which one that
+    hangs is told from one that plays long episodes.
 
     Args:
         make_env: Makes the worlds.
         players: Makes the policies for an environment, in each process.
         processes: Number of processes.
         worlds: Number of worlds of all processes, rounded up to equal numbers.
+        answer_limit_s: Seconds that a process may take for its worlds, for a step of them, or for
+            its answer after the last one.
 
     Raises:
-        WorkerError: If a process ends, from every method.
+        WorkerError: If a process ends, from every method, or does not answer in time.
     """
 
     def __init__(
@@ -142,45 +203,65 @@ class ParallelEvaluator:
         players: Players,
         processes: int,
         worlds: int,
+        answer_limit_s: float,
     ) -> None:
         players.policy.share_memory()
+        self._limit_s = answer_limit_s
         context: Any = multiprocessing.get_context(start_method())
-        self._processes, self._connections = [], []
+        arguments = (os.getpid(), make_env, players, -(-worlds // processes))
         with workers_ignore_interrupts():
-            for _ in range(processes):
-                here, there = context.Pipe()
-                arguments = (there, os.getpid(), make_env, players, -(-worlds // processes))
-                process = context.Process(target=_serve, args=arguments, daemon=True)
-                process.start()
-                there.close()
-                self._processes.append(process)
-                self._connections.append(here)
+            self._workers = [_start(context, *arguments) for _ in range(processes)]
         self._expected = True  # whether all processes should run
         self._restore_handler = call_when_a_child_ends(self.check)
 
     def check(self) -> None:
         """Raise `WorkerError` if a process has ended; called as soon as one does."""
-        for index, process in enumerate(self._processes):
-            if self._expected and process.exitcode is not None:
+        for index, worker in enumerate(self._workers):
+            if self._expected and worker.process.exitcode is not None:
                 self._expected = False
-                raise WorkerError(f"evaluation process {index} {end_of(process)}")
+                raise WorkerError(f"evaluation process {index} {end_of(worker.process)}")
 
     def play(self, request: Request, meanwhile: Callable[[], None] = nothing) -> dict[str, Scores]:
         """See `Evaluator`."""
-        parts = _split(request, len(self._connections))
+        parts = _split(request, len(self._workers))
         for index, part in enumerate(parts):
             with self._worker_errors(index):
-                self._connections[index].send(part)
+                self._workers[index].connection.send(part)
         meanwhile()
-        return joined_scores([self._receive(index) for index in range(len(parts))])
+        answers = self._answers(len(parts))
+        return joined_scores([answers[index] for index in range(len(parts))])
+
+    def _answers(self, parts: int) -> dict[int, dict[str, Scores]]:
+        """Return the answers of the first processes by index; raise if some do not answer."""
+        answers: dict[int, dict[str, Scores]] = {}
+        playing = {i: _Progress(worker) for i, worker in enumerate(self._workers[:parts])}
+        while playing:
+            waitables = [one for index in playing for one in self._workers[index].waitables]
+            ready = wait(waitables, CHECK_S)
+            for index in list(playing):
+                if any(one in ready for one in self._workers[index].waitables):
+                    answers[index] = self._receive(index)
+                    del playing[index]
+            silent = [i for i, progress in playing.items() if progress.silent_s() > self._limit_s]
+            if silent:
+                self._abandon(silent)
+        return answers
+
+    def _abandon(self, silent: list[int]) -> None:
+        """Kill all processes and raise `WorkerError`, which names those that have not answered."""
+        self._expected = False  # the signal that they have ended is to raise no other error
+        for worker in self._workers:
+            worker.kill()
+        raise WorkerError(
+            no_answer("evaluation process", silent, len(self._workers), self._limit_s)
+        )
 
     def _receive(self, index: int) -> dict[str, Scores]:
-        process, connection = self._processes[index], self._connections[index]
+        """Return the answer of a process that has answered or ended."""
         with self._worker_errors(index):
-            wait([connection, process.sentinel])
-            if not connection.poll():
+            if not self._workers[index].connection.poll():
                 raise EOFError
-            answer = connection.recv()
+            answer = self._workers[index].connection.recv()
         if isinstance(answer, str):
             self._expected = False
             raise WorkerError(f"evaluation process {index}: {answer}")
@@ -193,7 +274,7 @@ class ParallelEvaluator:
         try:
             yield
         except (EOFError, BrokenPipeError, ConnectionResetError):
-            self._processes[index].join()
+            self._workers[index].process.join(_END_S)
             self.check()
             raise
 
@@ -201,10 +282,23 @@ class ParallelEvaluator:
         """End the processes."""
         self._expected = False
         self._restore_handler()
-        for process, connection in zip(self._processes, self._connections, strict=True):
-            connection.close()
-            process.terminate()
-            process.join()
+        for worker in self._workers:
+            worker.connection.close()
+            worker.process.terminate()
+        for worker in self._workers:
+            worker.process.join(_END_S)
+            if worker.process.is_alive():
+                worker.kill()
+
+
+def _start(context: Any, *arguments: Any) -> _Worker:
+    """Start a process; see `_serve` for the rest of its arguments."""
+    here, there = context.Pipe()
+    steps = context.RawValue("Q", 0)
+    process = context.Process(target=_serve, args=(there, steps, *arguments), daemon=True)
+    process.start()
+    there.close()
+    return _Worker(process, here, steps)
 
 
 def _split(request: Request, parts: int) -> list[Request]:
@@ -217,14 +311,22 @@ def _split(request: Request, parts: int) -> list[Request]:
     ]
 
 
-def _serve(connection: Connection[Any, Any], parent: int, *arguments: Any) -> None:
-    """Answer requests with scores, or with the text of an exception, until this process ends."""
+def _serve(connection: Connection[Any, Any], steps: Any, parent: int, *arguments: Any) -> None:
+    """Answer requests with scores, or with the text of an exception, until this process ends.
+
+    Args:
+        connection: Of the requests and answers.
+        steps: Counts the steps.
+        parent: Process id of the parent.
+        *arguments: Of `LocalEvaluator`.
+    """
     end_with_parent(parent)
     if hasattr(signal, "SIGCHLD"):
         signal.signal(signal.SIGCHLD, signal.SIG_DFL)  # the parent's handler is for its workers
     torch.set_num_threads(1)
     try:
         evaluator = LocalEvaluator(*arguments)
+        evaluator.count_steps(steps)
         while True:
             connection.send(evaluator.play(connection.recv()))
     except EOFError:  # the other end was closed
@@ -242,7 +344,7 @@ def _wait_for_the_end(connection: Connection[Any, Any]) -> None:
 
 
 def make_evaluator(
-    make_env: EnvFactory, players: Players, processes: int, worlds: int
+    make_env: EnvFactory, players: Players, processes: int, worlds: int, answer_limit_s: float
 ) -> Evaluator:
     """Return what plays in so many processes, in this one if there are none.
 
@@ -251,7 +353,8 @@ def make_evaluator(
         players: Makes the policies for an environment.
         processes: Number of worker processes.
         worlds: Number of worlds of all processes.
+        answer_limit_s: See `ParallelEvaluator`; not used without worker processes.
     """
     if processes == 0:
         return LocalEvaluator(make_env, players, worlds)
-    return ParallelEvaluator(make_env, players, min(processes, worlds), worlds)
+    return ParallelEvaluator(make_env, players, min(processes, worlds), worlds, answer_limit_s)

@@ -127,7 +127,11 @@ class Trainer:
     def _make_evaluator(self) -> Evaluator:
         players = Players(self.policy, tuple(self.learners.algorithms))
         return make_evaluator(
-            self.make_env, players, self.collect.processes, self.evaluation.worlds
+            self.make_env,
+            players,
+            self.collect.processes,
+            self.evaluation.worlds,
+            self.collect.answer_limit_s,
         )
 
     def _notes(self) -> list[str]:

@@ -20,7 +20,27 @@ from veca_marl.algos.sac.replay.scratch import make_scratch_folder
 from veca_marl.algos.sac.replay.segments import END, PLACE, Key, StoredKeys, segment_rows
 from veca_marl.algos.sac.replay.windows import VALID, Span, Windows
 from veca_marl.algos.specs import TeamSpec
-from veca_marl.algos.storage import StorageNeeded, state_bytes
+from veca_marl.algos.storage import StorageNeeded, reserve_disk, reserve_memory, state_bytes
+
+_MEMORY = "algo.replay.capacity, algo.replay.storage=memmap, algo.replay.in_checkpoint"
+_DISK = "algo.replay.capacity, algo.replay.folder"
+
+
+class _ReservedMemory(LazyTensorStorage):
+    """TorchRL's storage, which takes all of its memory when it is made."""
+
+    def _init(self, data: TensorDictBase) -> None:
+        super()._init(data)
+        reserve_memory(list(self._storage.values(True, True)), _MEMORY)
+
+
+class _ReservedFiles(LazyMemmapStorage):
+    """TorchRL's storage, which takes all of its disk space when it is made."""
+
+    def _init(self, data: TensorDictBase) -> None:
+        super()._init(data)
+        for array in self._storage.values(True, True):
+            reserve_disk(Path(array.filename))
 
 
 class Replay:
@@ -72,11 +92,11 @@ class Replay:
 
     def _make_storage(self) -> LazyTensorStorage:
         if self.cfg.storage is Storage.memory:
-            return LazyTensorStorage(self.cfg.capacity)
+            return _ReservedMemory(self.cfg.capacity)
         folder = make_scratch_folder(Path(self.cfg.folder or gettempdir()))
         weakref.finalize(self, shutil.rmtree, folder, ignore_errors=True)
         # TorchRL's own removal of the files would replace the handlers of Ctrl-C and SIGTERM
-        return LazyMemmapStorage(self.cfg.capacity, scratch_dir=str(folder), auto_cleanup=False)
+        return _ReservedFiles(self.cfg.capacity, scratch_dir=str(folder), auto_cleanup=False)
 
     @property
     def _storage(self) -> LazyTensorStorage:
@@ -162,8 +182,7 @@ def storage_needed(spec: TeamSpec, cfg: ReplayCfg, memory: int = 0) -> StorageNe
     """
     size = cfg.capacity * (state_bytes(spec) + 4 * memory)
     copies = 2 * size if cfg.in_checkpoint else 0
-    settings = "algo.replay.capacity, algo.replay.storage=memmap, algo.replay.in_checkpoint"
     if cfg.storage is Storage.memory:
-        return StorageNeeded(size + copies, settings=settings)
+        return StorageNeeded(size + copies, settings=_MEMORY)
     folder = Path(cfg.folder or gettempdir())
-    return StorageNeeded(copies, size, folder, "algo.replay.capacity, algo.replay.folder")
+    return StorageNeeded(copies, size, folder, _DISK)
