@@ -8,7 +8,6 @@ Overrides that the runs were started with are repeated: ``total_frames=1e5``.
 
 from __future__ import annotations
 
-import json
 import math
 import sys
 from collections.abc import Sequence
@@ -24,8 +23,16 @@ from veca_marl.config.experiment import ExperimentCfg
 from veca_marl.reports.arms import Arm, compose_arms
 from veca_marl.reports.expert import expert_rows
 from veca_marl.reports.figure import check_plotting, draw
-from veca_marl.reports.gather import Found, Row, found_in, gather, read_rows, write_rows
-from veca_marl.reports.page import Report, page, remarks
+from veca_marl.reports.gather import (
+    Found,
+    Row,
+    found_in,
+    gather,
+    planned_rows,
+    read_rows,
+    write_rows,
+)
+from veca_marl.reports.page import Report, page, run_remarks
 from veca_marl.reports.runs import expert_score, runs_of, team_of
 from veca_marl.reports.summary import summarise
 from veca_marl.reports.verdict import Evidence, judge
@@ -73,11 +80,9 @@ def make_report(options: ReportOptions, arms: Sequence[Arm], command: str) -> tu
     check_plotting()
     experiment = arms[0].cfg.experiment
     found, rows, folder = _read(options, arms, str(experiment.name))
-    if not any(row["player"] == "policy" for row in rows):
-        remarks = [run.remark for run in found[:3]]
-        raise ConfigError(f"no run of {experiment.name} has been evaluated: {'; '.join(remarks)}")
-    report = _report(experiment, command, rows, found)
+    report = _report(arms, command, rows, found)
     folder.mkdir(parents=True, exist_ok=True)
+    # all rows that were read: a report on fewer seeds takes none away from the table
     write_rows(folder / "results.csv", rows)
     by_arm = {arm.name: [run for run in report.runs if run.arm == arm.name] for arm in arms}
     drawn = {name: runs for name, runs in by_arm.items() if runs}
@@ -95,7 +100,7 @@ def _read(
     if options.results is not None:
         path = Path(options.results)
         rows = read_rows(path)
-        found = found_in(rows, [arm.name for arm in arms], seeds)
+        found = found_in(rows, {arm.name: arm.budget for arm in arms}, seeds)
         return found, rows, Path(options.to or path.parent)
     runs = Path(options.runs or f"runs/{name}")
     found, rows = gather(runs, {arm.name: arm.plain for arm in arms}, seeds)
@@ -105,10 +110,16 @@ def _read(
 
 
 def _report(
-    experiment: ExperimentCfg, command: str, rows: Sequence[Row], found: Sequence[Found]
+    arms: Sequence[Arm], command: str, rows: Sequence[Row], found: Sequence[Found]
 ) -> Report:
+    experiment = arms[0].cfg.experiment
+    rows, others = planned_rows(rows, experiment.arms, experiment.seeds)
+    if not any(row["player"] == "policy" for row in rows):
+        raise _nothing_evaluated(experiment, found)
     team = team_of(rows, experiment.team)
-    runs = runs_of(rows, experiment.metric, team)
+    runs = runs_of(rows, experiment.metric, team, {arm.name: arm.budget for arm in arms})
+    if not runs:
+        raise _nothing_evaluated(experiment, found)
     by_arm = {arm: [run for run in runs if run.arm == arm] for arm in experiment.arms}
     expert = expert_score(rows, experiment.metric, team)
     evidence = Evidence(by_arm, len(experiment.seeds), expert)
@@ -120,22 +131,17 @@ def _report(
         [summarise(arm, own, experiment.threshold) for arm, own in by_arm.items()],
         runs,
         found,
+        others,
         {text: judge(parse_claim(text, by_arm), evidence) for text in experiment.claims},
         {"random": float(np.mean(random)) if random else math.nan, "expert": expert},
-        _commits(found),
+        sorted({run.commit for run in found if run.counts and run.commit}),
         FIGURE,
     )
 
 
-def _commits(found: Sequence[Found]) -> list[str]:
-    """Return the commits of the runs that count, or the versions of installed packages."""
-    commits = set()
-    for run in found:
-        path = None if run.folder is None else run.folder / "provenance.json"
-        if run.counts and path is not None and path.is_file():
-            stored = json.loads(path.read_text())
-            commits.add(str(stored.get("commit") or stored["packages"]["veca_marl"]))
-    return sorted(commits)
+def _nothing_evaluated(experiment: ExperimentCfg, found: Sequence[Found]) -> ConfigError:
+    remarks = [run.remark for run in found if run.remark][:3]
+    return ConfigError(f"no run of {experiment.name} has been evaluated: {'; '.join(remarks)}")
 
 
 def run(options: ReportOptions, overrides: list[str]) -> None:
@@ -145,7 +151,7 @@ def run(options: ReportOptions, overrides: list[str]) -> None:
     for text, judgement in report.judgements.items():
         print(f"{text}: {judgement.verdict.value}: {judgement.reason}")
     ends = [f"verdict: {report.verdict}", f"report: {folder / 'report.md'}"]
-    print(*remarks(report.found), *ends, sep="\n")
+    print(*run_remarks(report), *ends, sep="\n")
 
 
 def main(words: Sequence[str] | None = None) -> int:

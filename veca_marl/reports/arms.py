@@ -10,6 +10,7 @@ import yaml
 from omegaconf import OmegaConf
 
 from veca_marl.config import Config, ConfigError, compose_node, to_config
+from veca_marl.reports.budget import FrameBudget
 
 
 @dataclass(frozen=True)
@@ -25,6 +26,11 @@ class Arm:
     name: str
     cfg: Config
     plain: dict[str, Any]
+
+    @property
+    def budget(self) -> FrameBudget:
+        """Frames that its runs are asked to have."""
+        return FrameBudget.of(self.plain)
 
 
 def compose_arms(overrides: Sequence[str]) -> list[Arm]:

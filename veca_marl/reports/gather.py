@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import csv
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from veca_marl.reports.budget import FrameBudget
+from veca_marl.reports.stored import DamagedRunError, read_checked_run
 from veca_marl.runs.resumable import may_change
 from veca_marl.sweeps.differences import differences, key_patterns
-from veca_marl.sweeps.run_state import RunState, StoredRun, read_run
+from veca_marl.sweeps.run_state import RunState, StoredRun
 
 Row = dict[str, str]
 
@@ -26,9 +28,10 @@ class Found:
         arm: Its arm.
         seed: Its seed.
         folder: Where it is, or would be; None in a table of results.
-        state: How far it has come.
-        counts: Whether it has ended with the configuration of the experiment.
+        state: How far it has come; ``missing`` if a file is damaged.
+        counts: Whether it has ended with the configuration and the frames of the experiment.
         remark: What a reader has to know; empty for a finished run.
+        commit: Commit that it was made with, or version of the package; empty if not known.
     """
 
     arm: str
@@ -37,6 +40,7 @@ class Found:
     state: RunState
     counts: bool
     remark: str
+    commit: str = ""
 
 
 def run_folder(runs: Path, arm: str, seed: int) -> Path:
@@ -49,7 +53,8 @@ def gather(
 ) -> tuple[list[Found], list[Row]]:
     """Return what there is of each run, and the evaluations of those that fit.
 
-    Runs with another configuration than that of the experiment are left out of the rows.
+    Runs with another configuration than that of the experiment, and damaged ones, are left out of
+    the rows.
 
     Args:
         runs: Folder of the experiment's runs.
@@ -59,12 +64,20 @@ def gather(
     found, rows = [], []
     for arm, config in asked.items():
         for seed in seeds:
-            run = read_run(run_folder(runs, arm, seed))
-            status, fits = _status(run, arm, {**config, "seed": seed})
+            status, own = _gather_run(run_folder(runs, arm, seed), arm, {**config, "seed": seed})
             found.append(status)
-            if fits:
-                rows += _rows(run, status)
+            rows += own
     return found, rows
+
+
+def _gather_run(folder: Path, arm: str, asked: Mapping[str, Any]) -> tuple[Found, list[Row]]:
+    try:
+        run, commit = read_checked_run(folder)
+    except DamagedRunError as error:
+        remark = f"not counted, damaged: {error}"
+        return Found(arm, int(asked["seed"]), folder, RunState.missing, False, remark), []
+    status, fits = _status(run, arm, asked)
+    return replace(status, commit=commit), _rows(run, status) if fits else []
 
 
 def _status(run: StoredRun, arm: str, asked: Mapping[str, Any]) -> tuple[Found, bool]:
@@ -76,11 +89,17 @@ def _status(run: StoredRun, arm: str, asked: Mapping[str, Any]) -> tuple[Found, 
     changed = [str(d) for d in differing if not d.of_version]
     if changed:
         return Found(*base, False, f"not counted: {'; '.join(changed)}"), False
-    remark = _remark(run, state, asked)
+    budget, evaluated = FrameBudget.of(asked), evaluated_frames(run.rows("evaluations"))
+    remark = budget.remark(evaluated) or _remark(run, state, asked)
     others = key_patterns(d.key for d in differing)
     if others:
         remark = f"{remark}; stored by a version with other keys: {', '.join(others)}".lstrip("; ")
-    return Found(*base, state in (RunState.finished, RunState.cut), remark), True
+    return Found(*base, budget.counts(state, evaluated), remark), True
+
+
+def evaluated_frames(rows: Iterable[Mapping[str, str]]) -> list[int]:
+    """Return the frames of training before each evaluation of the policy of a run."""
+    return [int(row["frames"]) for row in rows if row["player"] == "policy"]
 
 
 def _remark(run: StoredRun, state: RunState, asked: Mapping[str, Any]) -> str:
@@ -144,27 +163,72 @@ def _cumulative_minutes(seconds: Any) -> Any:
     return np.concatenate([[0.0], np.cumsum(seconds) / 60.0])
 
 
-def found_in(rows: Sequence[Row], arms: Sequence[str], seeds: Sequence[int]) -> list[Found]:
+def planned_rows(
+    rows: Sequence[Row], arms: Iterable[str], seeds: Sequence[int]
+) -> tuple[list[Row], list[tuple[str, int]]]:
+    """Return the rows of an experiment, and arm and seed of each run that it does not have.
+
+    The expert learns nothing: its rows belong to their arm, whatever their seed.
+
+    Args:
+        rows: A table of results, which may be that of another configuration of the experiment.
+        arms: The arms.
+        seeds: Seeds of each arm.
+    """
+    experts = {(arm, "expert") for arm in arms}
+    runs = {(arm, seed) for arm, _ in experts for seed in seeds}
+    planned, others = [], set()
+    for row in rows:
+        run = (row["arm"], int(row["seed"]))
+        if run in runs or (row["arm"], row["player"]) in experts:
+            planned.append(row)
+        else:
+            others.add(run)
+    return planned, sorted(others)
+
+
+def found_in(
+    rows: Sequence[Row], budgets: Mapping[str, FrameBudget], seeds: Sequence[int]
+) -> list[Found]:
     """Return what a table of results holds of each run of an experiment.
 
     Args:
         rows: The table, which `gather` made at an earlier time.
-        arms: The arms.
+        budgets: Frames that the runs of each arm are asked to have.
         seeds: Seeds of each arm.
     """
-    states = {(row["arm"], row["seed"]): row.get("state") or "finished" for row in rows}
+    runs: dict[tuple[str, int], list[Row]] = {}
+    for row in rows:
+        if row["player"] != "expert":
+            runs.setdefault((row["arm"], int(row["seed"])), []).append(row)
     return [
-        _found_in(arm, seed, states.get((arm, str(seed)), "missing"))
-        for arm in arms
+        _found_in(arm, seed, runs.get((arm, seed), ()), budget)
+        for arm, budget in budgets.items()
         for seed in seeds
     ]
 
 
-def _found_in(arm: str, seed: int, name: str) -> Found:
-    state = RunState(name)
-    remark = "" if state is RunState.finished else f"{name} in the table of results"
-    counts = state in (RunState.finished, RunState.cut)
+def _found_in(arm: str, seed: int, rows: Sequence[Row], budget: FrameBudget) -> Found:
+    state = state_in(rows)
+    evaluated = evaluated_frames(rows)
+    counts = budget.counts(state, evaluated)
+    remark = budget.remark(evaluated)
+    if not remark and state is not RunState.finished:
+        remark = f"{state.value} in the table of results"
+    elif not remark and not counts:
+        reached = f"{max(evaluated, default=0)} of {budget.frames} frames"
+        remark = f"unfinished: {reached} in the table of results; shown, not counted"
     return Found(arm, seed, None, state, counts, remark)
+
+
+def state_in(rows: Sequence[Mapping[str, str]]) -> RunState:
+    """Return the state that a table of results states for a run, from the rows of that run.
+
+    Tables of early versions have no states: they hold finished runs only.
+    """
+    if not rows:
+        return RunState.missing
+    return RunState(rows[-1].get("state") or "finished")
 
 
 def write_rows(path: Path, rows: Sequence[Row]) -> None:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from veca_marl.config.experiment import ExperimentCfg
 from veca_marl.reports.gather import Found
-from veca_marl.reports.runs import Run
+from veca_marl.reports.runs import Point, Run
 from veca_marl.reports.summary import ArmSummary
 from veca_marl.reports.verdict import Judgement, Verdict, overall
 
@@ -26,7 +26,8 @@ class Report:
         team: The team that is compared.
         summaries: The numbers of each arm.
         runs: The runs that were evaluated.
-        found: What there is of each planned run; empty if only a table of results was read.
+        found: What there is of each planned run.
+        others: Arm and seed of runs that the table of results has and the experiment has not.
         judgements: The verdict on each claim, by its text.
         baselines: Score of each policy that does not learn; NaN if it was not measured.
         commits: Commits that the runs were made with.
@@ -39,6 +40,7 @@ class Report:
     summaries: Sequence[ArmSummary]
     runs: Sequence[Run]
     found: Sequence[Found]
+    others: Sequence[tuple[str, int]]
     judgements: Mapping[str, Judgement]
     baselines: Mapping[str, float]
     commits: Sequence[str]
@@ -90,7 +92,32 @@ def _caption(report: Report) -> str:
         "runs (Agarwal et al. 2021), thin lines single runs. Intervals over few runs are too "
         "narrow: resampling cannot show values that no run has. Minutes are those of collection, "
         "learning and evaluation; core-minutes are processor time, of all processes together."
+        f"{_intermediate_text(report)}"
     )
+
+
+def _intermediate_text(report: Report) -> str:
+    """Return a sentence on evaluations of few episodes that curves and times rest on."""
+    # those of a run that has not ended are all intermediate
+    points = [point for run in report.runs for point in run.points[: -1 if run.ended else None]]
+    fewest = _fewest_episodes(points)
+    if fewest is None:
+        return ""
+    times = (
+        ""
+        if report.experiment.threshold is None
+        else " and the frames and minutes to the threshold"
+    )
+    return (
+        f" Before the final evaluations, the curves{times} rest on evaluations of as few as "
+        f"{fewest} episodes; figures need at least {EPISODES_OF_FIGURES}."
+    )
+
+
+def _fewest_episodes(points: Iterable[Point]) -> int | None:
+    """Return the least number of episodes; None if it suffices, or if none is stored."""
+    fewest = min((point.episodes for point in points if point.episodes), default=None)
+    return None if fewest is None or fewest >= EPISODES_OF_FIGURES else fewest
 
 
 def _arm_table(report: Report) -> list[str]:
@@ -125,9 +152,9 @@ def _baseline_lines(baselines: Mapping[str, float]) -> list[str]:
 
 def _remark_lines(report: Report) -> list[str]:
     """Return what a reader has to know about single runs and about all."""
-    lines = [f"- {line}" for line in remarks(report.found)]
-    fewest = min((run.final.episodes for run in report.runs), default=EPISODES_OF_FIGURES)
-    if 0 < fewest < EPISODES_OF_FIGURES:
+    lines = [f"- {line}" for line in run_remarks(report)]
+    fewest = _fewest_episodes(run.final for run in report.runs if run.ended)
+    if fewest is not None:
         lines.append(
             f"- final evaluations of {fewest} episodes; figures need at least {EPISODES_OF_FIGURES}"
         )
@@ -136,6 +163,18 @@ def _remark_lines(report: Report) -> list[str]:
     elif report.commits:
         lines.append(f"- commit {report.commits[0]}")
     return ["**Remarks**", "", *lines] if lines else []
+
+
+def run_remarks(report: Report) -> list[str]:
+    """Return a line for each remark on runs, of the experiment and of the table of results."""
+    others: dict[str, list[str]] = {}
+    for arm, seed in report.others:
+        others.setdefault(arm, []).append(str(seed))
+    if not others:
+        return remarks(report.found)
+    named = "; ".join(_seeds(arm, seeds) for arm, seeds in others.items())
+    line = f"rows of {named} are not part of this experiment as configured; not counted"
+    return [*remarks(report.found), line]
 
 
 def remarks(found: Sequence[Found]) -> list[str]:

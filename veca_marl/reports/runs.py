@@ -8,9 +8,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from veca_marl.reports.budget import FrameBudget
+from veca_marl.reports.gather import state_in
 from veca_marl.reports.statistics import Scores
-
-ENDED = ("finished", "cut")
+from veca_marl.sweeps.run_state import RunState
 
 
 @dataclass(frozen=True)
@@ -40,7 +41,7 @@ class Run:
         arm: Its arm.
         seed: Its seed.
         ended: Whether it has ended; otherwise it has no final score.
-        points: Its evaluations in the order of their frames.
+        points: Its evaluations in the order of their frames, up to the frames asked for.
         random: Score of the random policy from the same starts; NaN if not measured.
     """
 
@@ -60,13 +61,23 @@ class Run:
         return next((point for point in self.points if point.score >= threshold), None)
 
 
-def runs_of(rows: Sequence[Mapping[str, str]], metric: str, team: str) -> list[Run]:
+def runs_of(
+    rows: Sequence[Mapping[str, str]],
+    metric: str,
+    team: str,
+    budgets: Mapping[str, FrameBudget] | None = None,
+) -> list[Run]:
     """Return all runs in a table of results that have been evaluated at least once.
+
+    Evaluations after the frames asked for are left out: arms are compared on the budgets that the
+    experiment states. A run with such evaluations and none at its budget has not ended on it.
 
     Args:
         rows: The table.
         metric: Its column with the score.
         team: The team that is compared.
+        budgets: Frames that the runs of each arm are asked to have; None asks for as many as each
+            run has.
 
     Raises:
         ValueError: If there is no such column.
@@ -77,21 +88,29 @@ def runs_of(rows: Sequence[Mapping[str, str]], metric: str, team: str) -> list[R
             if metric not in row:
                 raise ValueError(f"experiment.metric={metric}: choices: {', '.join(row)}")
             own.setdefault((row["arm"], int(row["seed"])), []).append(row)
-    made = [_run(arm, seed, mine, metric) for (arm, seed), mine in own.items()]
+    budgets = {} if budgets is None else budgets
+    made = [_run(arm, seed, mine, metric, budgets.get(arm)) for (arm, seed), mine in own.items()]
     return [run for run in made if run.points]
 
 
-def _run(arm: str, seed: int, rows: Sequence[Mapping[str, str]], metric: str) -> Run:
+def _run(
+    arm: str,
+    seed: int,
+    rows: Sequence[Mapping[str, str]],
+    metric: str,
+    budget: FrameBudget | None,
+) -> Run:
     policy = [row for row in rows if row["player"] == "policy"]
     by_frames = {int(row["frames"]): _point(row, metric) for row in policy}  # the last of equals
+    shown = sorted(at for at in by_frames if budget is None or budget.includes(at))
     random = [_number(row[metric]) for row in rows if row["player"] == "random"]
-    return Run(
-        arm,
-        seed,
-        all(row.get("state", "finished") in ENDED for row in rows),
-        tuple(by_frames[frames] for frames in sorted(by_frames)),
-        random[-1] if random else math.nan,
-    )
+    state = state_in(rows)
+    if budget is None:
+        ended = state in (RunState.finished, RunState.cut)
+    else:
+        ended = budget.counts(state, by_frames)
+    points = tuple(by_frames[frames] for frames in shown)
+    return Run(arm, seed, ended, points, random[-1] if random else math.nan)
 
 
 def _point(row: Mapping[str, str], metric: str) -> Point:

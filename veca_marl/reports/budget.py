@@ -1,0 +1,72 @@
+"""Which evaluation of a run belongs to the number of frames that an experiment asks for.
+
+A run ends with the first batch at or after ``total_frames``. One that was started with a larger
+number, or continued to it, has later evaluations: they are not compared with those of other runs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from veca_marl.algos.collection.experience import CollectCfg
+from veca_marl.sweeps.run_state import RunState
+
+
+@dataclass(frozen=True)
+class FrameBudget:
+    """Frames that the runs of an arm are asked to have.
+
+    Attributes:
+        frames: ``total_frames`` of the arm.
+        batch: Frames in a batch; a run may end with up to ``batch - 1`` frames more than asked.
+    """
+
+    frames: int
+    batch: int
+
+    @classmethod
+    def of(cls, config: Mapping[str, Any]) -> FrameBudget:
+        """Return the budget of an arm, from its configuration as plain data."""
+        return cls(int(config["total_frames"]), CollectCfg(**config["collect"]).frames)
+
+    def includes(self, frames: int) -> bool:
+        """Return whether a run on this budget can have so many frames."""
+        return frames < self.frames + self.batch
+
+    def final(self, evaluated: Iterable[int]) -> int | None:
+        """Return the frames of the final evaluation; None if the run was not evaluated there.
+
+        Args:
+            evaluated: Frames of training before each evaluation of the policy.
+        """
+        reached = (at for at in evaluated if at >= self.frames and self.includes(at))
+        return min(reached, default=None)
+
+    def counts(self, state: RunState, evaluated: Iterable[int]) -> bool:
+        """Return whether a run has a final score.
+
+        Args:
+            state: How far the run has come; in a stored table, on the budget of that time.
+            evaluated: As for `final`.
+        """
+        evaluated = list(evaluated)
+        if self.final(evaluated) is not None:
+            # with later evaluations it has passed the budget, whether it goes on or not
+            return state in (RunState.finished, RunState.cut) or self._is_exceeded(evaluated)
+        return state is RunState.cut and not self._is_exceeded(evaluated)
+
+    def remark(self, evaluated: Iterable[int]) -> str:
+        """Return what a reader has to know of a run with more frames; empty for other runs."""
+        evaluated = list(evaluated)
+        if not self._is_exceeded(evaluated):
+            return ""
+        more = f"{max(evaluated)} frames, more than the {self.frames} asked for"
+        final = self.final(evaluated)
+        if final is None:
+            return f"not counted: {more}, and no evaluation at {self.frames}"
+        return f"{more}; its final score is that at {final}"
+
+    def _is_exceeded(self, evaluated: Iterable[int]) -> bool:
+        return not all(map(self.includes, evaluated))
