@@ -46,5 +46,6 @@ class DodgeCarExpert(CarExpert[DodgeCar]):
         from_middle_m = np.linalg.norm(places[:, -1] - middle, axis=-1)
         least = np.minimum(away_m.min(axis=1), _SAFE_M)
         far = np.minimum(away_m[:, -1], _FAR_M)
-        later: Floats = _FAR_WEIGHT * far - _MIDDLE_WEIGHT * from_middle_m + _SIDE_WEIGHT * across
-        return least + later
+        later = _FAR_WEIGHT * far - _MIDDLE_WEIGHT * from_middle_m + _SIDE_WEIGHT * across
+        scores: Floats = least + later
+        return scores

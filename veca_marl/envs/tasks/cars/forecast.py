@@ -48,6 +48,7 @@ class Forecast:
             ``(2,)`` metres, within the room.
         """
         course = self._course(round(longest_s / self._step_s))
+        place: Floats
         for step, place in enumerate(course):
             if horizontal_distance(start, place) <= step * self._step_s * speed_mps:
                 break
