@@ -68,8 +68,7 @@ class ProcessLauncher(Launcher):
     """Runs each job in a process of its own, several at a time; see `veca_marl.sweeps`.
 
     Args:
-        jobs: Number of runs at a time; None is as many as the cores can run at once and the memory
-            can hold.
+        jobs: Number of runs at a time; None is as many as the cores can run at once.
     """
 
     def __init__(self, jobs: int | None = None) -> None:
@@ -87,25 +86,22 @@ class ProcessLauncher(Launcher):
         """See `Launcher`.
 
         Raises:
-            ConfigError: If `jobs` is None and a configuration is impossible.
             SweepError: If `jobs` is not positive, a folder holds a run of another configuration,
                 two jobs have the same folder, or some jobs failed.
         """
         if self._jobs is not None and self._jobs < 1:
             raise SweepError(f"hydra.launcher.jobs must be at least 1, got {self._jobs}")
         setup_globals()
-        configured = [
+        jobs = [
             self._job(list(overrides), initial_job_idx + number)
             for number, overrides in enumerate(job_overrides)
         ]
-        jobs = [job for job, _ in configured]
         cores = usable_cores()
-        at_once = self._jobs or _default_jobs(configured, cores)
+        at_once = self._jobs or default_jobs([job.asked for job in jobs], cores)
         run_sweep(jobs, at_once, max(1, cores // at_once))
         return [JobReturn(job.overrides, status=JobStatus.COMPLETED) for job in jobs]
 
-    def _job(self, overrides: list[str], number: int) -> tuple[Job, DictConfig]:
-        """Return a run and its configuration."""
+    def _job(self, overrides: list[str], number: int) -> Job:
         config = self._context.config_loader.load_sweep_config(self._config, overrides)
         with open_dict(config):
             config.hydra.job.id = config.hydra.job.num = number
@@ -120,20 +116,7 @@ class ProcessLauncher(Launcher):
         with open_dict(config):
             del config["hydra"]
         asked = yaml.safe_load(OmegaConf.to_yaml(config, resolve=True))
-        return Job(name, sweep / name, [*shared, *overrides], asked), config
-
-
-def _default_jobs(configured: Sequence[tuple[Job, DictConfig]], cores: int) -> int:
-    """Return the number of runs at a time that fills the cores and fits into the memory."""
-    by_cores = default_jobs([job.asked for job, _ in configured], cores)
-    if by_cores == 1:
-        return 1
-    # here, because it imports torch: see above
-    from veca_marl.algos.storage import available_memory
-    from veca_marl.sweeps.memory import memory_of_runs, runs_that_fit
-
-    needed = memory_of_runs((config, job.asked) for job, config in configured)
-    return min(by_cores, runs_that_fit(needed, available_memory()))
+        return Job(name, sweep / name, [*shared, *overrides], asked)
 
 
 def _store(group: str, name: str, plugin: type, fields: dict[str, Any]) -> None:

@@ -22,9 +22,7 @@ from veca_marl.algos.control_groups import control_group_memory
 from veca_marl.algos.files import WriteError, naming
 from veca_marl.algos.specs import TeamSpec
 
-USABLE_SHARE = 0.9
-"""Of what is available; the rest is left to networks, worlds and other programs."""
-
+_SHARE = 0.9  # of what is available; the rest is left to networks, worlds and other programs
 _CHUNK = 64 * 2**20  # bytes; between two chunks the memory that is left is read again
 
 
@@ -90,10 +88,10 @@ def _check_folder(folder: Path, settings: str) -> None:
 def _check(kind: str, needed: int, available: int | None, settings: str) -> str:
     if available is None:
         return f"replay: {_size(needed)} of {kind}"
-    if needed > USABLE_SHARE * available:
+    if needed > _SHARE * available:
         raise ValueError(
             f"the replay buffers take {_size(needed)} of {kind}, and {_size(available)} are "
-            f"available, of which {USABLE_SHARE:.0%} may be used; change {settings}"
+            f"available, of which {_SHARE:.0%} may be used; change {settings}"
         )
     return f"replay: {_size(needed)} of {kind}, {_size(available)} are available"
 
