@@ -149,6 +149,12 @@ def test_an_actor_is_copied_between_algorithms_with_the_same_network(tmp_path):
     assert all(torch.equal(mine[name], other[name]) for name in other)
 
 
+def test_the_message_names_the_layers_of_an_actor_that_another_algorithm_has_not(tmp_path):
+    there, here = make_learners(), make_learners(algo=SACCfg(network=network()))
+    with pytest.raises(CheckpointError, match=r"they fit with algo.policy_hidden=\[\]"):
+        init_teams(here, {"agents": store(there, tmp_path)}, {})
+
+
 def test_a_frozen_team_starts_from_a_run_that_was_not_frozen(tmp_path):
     there, here = make_learners(seed=1), make_learners(seed=2, frozen=["vision"])
     init_teams(here, {"agents": store(there, tmp_path)}, {})

@@ -181,9 +181,20 @@ class SAC(Algorithm):
             check_same_network(self.cfg.network, other.cfg.network)
             copy_parameters(self.network, other.network)
         else:
-            super().init_from(other)
+            self._copy_actor(other)
         self._move_target(1.0)
         self._warm_up.active.fill_(False)
+
+    def _copy_actor(self, other: Algorithm) -> None:
+        """Copy the actor of another algorithm, which has no hidden layers after its features."""
+        try:
+            super().init_from(other)
+        except ValueError as error:
+            raise ValueError(
+                f"{error}; actors of other algorithms have no layers of "
+                f"algo.policy_hidden={list(self.cfg.policy_hidden)}: they fit with "
+                "algo.policy_hidden=[] and the same network"
+            ) from error
 
     def init_encoders(self, encoders: Mapping[str, Sequence[nn.Module]]) -> None:
         """See `Algorithm`: actor and critics share the encoders."""
