@@ -43,7 +43,9 @@ def test_every_arm_of_an_experiment_can_be_chosen(name):
 def test_a_report_belongs_to_its_table_of_results(path):
     rows = read_rows(path.with_name("results.csv"))
     declared = DECLARED[path.parent.name]
-    runs = runs_of(rows, declared.get("metric", "return"), team_of(rows, declared.get("team")))
+    budgets = {arm.name: arm.budget for arm in compose_arms([f"+experiment={path.parent.name}"])}
+    team = team_of(rows, declared.get("team"))
+    runs = runs_of(rows, declared.get("metric", "return"), team, budgets)
     text = path.read_text()
     for run in runs:
         ended = "yes" if run.ended else "no"
