@@ -52,7 +52,7 @@ def test_other_senses_are_accepted():
 @pytest.mark.parametrize(
     ("overrides", "message"),
     [
-        (["task.max_seconds=3"], r"version 1, differs in task.max_seconds=3.0 \(not 20.0\)"),
+        (["task.max_seconds=3"], r"version 2, differs in task.max_seconds=3.0 \(not 20.0\)"),
         (["playground=two_rooms"], "of 100 starts are not those of the benchmark of KickTheBall"),
     ],
 )

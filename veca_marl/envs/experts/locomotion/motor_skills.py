@@ -88,8 +88,8 @@ class CrawlBabyExpert(Expert[CrawlBaby]):
 class RunBabyExpert(SkillExpert):
     """Lifts its feet in turn and falls forwards after about one second; see `Running`.
 
-    It does not run: its toes come ahead by one to two centimetres. Reads the pose of the trunk from
-    the simulator (privileged).
+    It does not run: on average its toes do not come ahead. Reads the pose of the trunk from the
+    simulator (privileged).
     """
 
     skill_type = Running
