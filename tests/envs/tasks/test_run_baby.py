@@ -57,7 +57,7 @@ def test_the_least_distance_of_chest_and_feet_counts(game, chest_m, toes_m, term
 
 
 def test_a_step_of_each_foot_pays_what_the_chest_covered(game):
-    """While one foot is ahead there is no reward; when the other one follows, there is all of it."""
+    """While one foot is ahead there is no reward; when the other one follows, all of it."""
     put(game, STANDING)
     task = game.task
     task._begin()
