@@ -109,19 +109,18 @@ def test_memory_that_other_programs_take_in_the_meantime_is_missed_at_once(monke
     assert [int(array.sum()) for array in arrays] == [10, 40]  # needed 50 and left 40
 
 
-def test_reserved_disk_space_is_taken_at_once(tmp_path):
+@pytest.mark.parametrize("call", ["posix_fallocate", "none"])
+def test_reserved_disk_space_is_taken_at_once(tmp_path, monkeypatch, call):
+    """By a call of the system, or by writing zeros where there is none."""
+    if call == "none":
+        monkeypatch.delattr(os, "posix_fallocate", raising=False)
+        monkeypatch.setattr(storage, "_CHUNK", 1000)
     file = tmp_path / "sparse"
     with file.open("wb") as opened:
         opened.truncate(10**6)
     assert file.stat().st_blocks * 512 < 10**6
     reserve_disk(file)
     assert file.stat().st_blocks * 512 >= 10**6 == file.stat().st_size
-
-
-def test_without_a_call_of_the_system_zeros_are_written(tmp_path, monkeypatch):
-    monkeypatch.delattr(os, "posix_fallocate")
-    monkeypatch.setattr(storage, "_CHUNK", 1000)
-    test_reserved_disk_space_is_taken_at_once(tmp_path)
 
 
 def test_a_disk_that_is_full_is_named(tmp_path, monkeypatch):

@@ -4,12 +4,11 @@ import csv
 from dataclasses import replace
 
 import pytest
+from small_experiment import write_all
 from stored_runs import write_run
 
 from veca_marl import report
 from veca_marl.reports import figure
-from veca_marl.reports.arms import compose_arms
-from veca_marl.reports.budget import FrameBudget
 from veca_marl.reports.gather import (
     Found,
     gather,
@@ -22,43 +21,6 @@ from veca_marl.reports.gather import (
 from veca_marl.reports.page import remarks
 from veca_marl.reports.runs import runs_of, team_of
 from veca_marl.sweeps.run_state import RunState
-
-EXPERIMENT = ["+experiment=audio_ablation", "experiment.seeds=[0,1,2]", "total_frames=200"]
-# without the numbers of frames that these arms have in the file
-EXPERIMENT += [f"experiment.arms.{name}=['senses/audio={name}']" for name in ("stereo", "mono")]
-RETURNS = {"hrtf": (6.0, 6.5, 7.0), "stereo": (5.0, 5.5, 6.0), "mono": (0.0, 0.5, 0.2)}
-
-
-@pytest.fixture(scope="module")
-def composed():
-    return compose_arms(EXPERIMENT)
-
-
-@pytest.fixture(scope="module")
-def arms(composed):
-    return {arm.name: arm.plain for arm in composed}
-
-
-@pytest.fixture
-def run(composed, capsys, monkeypatch):
-    """The command, with the experiment composed once for all tests."""
-    monkeypatch.setattr(report, "compose_arms", lambda overrides: composed)
-
-    def call(*words):
-        status = report.main([*EXPERIMENT, "expert_episodes=0", *words])
-        captured = capsys.readouterr()
-        return status, captured.out, captured.err
-
-    return call
-
-
-def write_all(runs, arms, leave_out=()):
-    for arm, returns in RETURNS.items():
-        for seed, final in enumerate(returns):
-            if (arm, seed) not in leave_out:
-                config = {**arms[arm], "seed": seed}
-                points = [(100, final / 2), (200, final)]
-                write_run(run_folder(runs, arm, seed), config, points)
 
 
 def test_complete_runs_give_verdict_table_and_figure(tmp_path, arms, run):
@@ -207,7 +169,7 @@ def test_the_metric_and_the_team_must_exist():
     with pytest.raises(ValueError, match=r"experiment.team=None: choices: blue, red"):
         team_of([*rows, {**rows[0], "team": "blue"}], None)
     with pytest.raises(ValueError, match=r"experiment.metric=goals: choices: team, player, arm"):
-        runs_of(rows, "goals", "red")
+        runs_of(rows, "goals", "red", {})
 
 
 def test_without_matplotlib_the_extra_is_named(tmp_path, run, monkeypatch):
@@ -281,177 +243,6 @@ def test_a_table_without_rows_of_the_experiment_is_refused(
     status, _, errors = run(f"results={tmp_path / 'results.csv'}")
     assert status == 2
     assert "no run of audio_ablation has been evaluated: missing in the table" in errors
-
-
-BATCH = 1024  # of the default configuration
-
-
-def write_longer(folder, config, points, **options):
-    write_run(folder, {**config, "total_frames": points[-1][0]}, points, **options)
-
-
-def test_a_run_with_more_frames_is_compared_at_the_frames_asked_for(tmp_path, arms, run):
-    write_all(tmp_path, arms, [("mono", 2)])
-    points = [(100, 0.1), (200, 0.2), (200 + BATCH, 9.0)]
-    write_longer(run_folder(tmp_path, "mono", 2), {**arms["mono"], "seed": 2}, points)
-    status, printed, _ = run(f"runs={tmp_path}")
-    page = (tmp_path / "report.md").read_text()
-    remark = (
-        "mono, seed 2: 1224 frames, more than the 200 asked for; its final score is that at 200"
-    )
-    assert status == 0
-    assert remark in page
-    assert remark in printed
-    assert "| mono | 2 | yes | 200 | 0.20 |" in page
-    assert "| mono | 3 | 0.23 [0.00, 0.50] | -0.50 | 0 of 3 | not reached |" in page
-    run(f"results={tmp_path / 'results.csv'}", f"to={tmp_path / 'again'}")
-    again = (tmp_path / "again" / "report.md").read_text()
-    assert remark in again
-    assert "| mono | 2 | yes | 200 | 0.20 |" in again
-
-
-def test_a_run_with_more_frames_and_no_evaluation_there_does_not_count(tmp_path, arms, run):
-    write_all(tmp_path, arms, [("mono", 2)])
-    points = [(100, 0.1), (200 + BATCH, 9.0)]
-    write_longer(run_folder(tmp_path, "mono", 2), {**arms["mono"], "seed": 2}, points)
-    _, printed, _ = run(f"runs={tmp_path}")
-    page = (tmp_path / "report.md").read_text()
-    remark = (
-        "mono, seed 2: not counted: 1224 frames, more than the 200 asked for, and no evaluation "
-        "at 200"
-    )
-    assert remark in page
-    assert remark in printed
-    assert "| mono | 2 | no | 100 | 0.10 |" in page
-    assert "| mono | 2 | 0.25 " in page  # two runs count
-
-
-@pytest.mark.parametrize(
-    ("evaluated", "final", "remark"),
-    [
-        ((100,), None, ""),
-        ((100, 200), 200, ""),
-        ((100, 1023 + 200), 1223, ""),  # an overshoot of less than a batch
-        ((200, 1224), 200, "1224 frames, more than the 200 asked for; its final score is that at"),
-        ((100, 1224), None, "not counted: 1224 frames, more than the 200 asked for, and no"),
-    ],
-)
-def test_the_final_evaluation_is_in_the_batch_that_completes_the_frames(evaluated, final, remark):
-    budget = FrameBudget(200, BATCH)
-    assert budget.final(evaluated) == final
-    assert budget.counts(RunState.finished, evaluated) == (final is not None)
-    assert budget.remark(evaluated).startswith(remark)
-    assert bool(budget.remark(evaluated)) == bool(remark)
-
-
-def test_a_run_that_goes_on_to_a_larger_budget_counts_at_the_asked_one():
-    budget = FrameBudget(200, BATCH)
-    assert budget.counts(RunState.unfinished, [100, 200, 2000])
-    assert not budget.counts(RunState.unfinished, [100, 200])  # it may still write its last files
-    assert budget.counts(RunState.cut, [100])
-    assert not budget.counts(RunState.cut, [100, 2000])
-
-
-def test_each_arm_has_its_own_budget():
-    overrides = ["experiment.arms.stereo=['senses/audio=stereo','total_frames=300']"]
-    arms = {arm.name: arm.budget for arm in compose_arms([*EXPERIMENT, *overrides])}
-    assert arms == {name: FrameBudget(200, BATCH) for name in ("hrtf", "mono")} | {
-        "stereo": FrameBudget(300, BATCH)
-    }
-
-
-def test_runs_of_a_table_that_end_before_the_frames_asked_for_do_not_count(
-    tmp_path, arms, composed, run, monkeypatch
-):
-    write_all(tmp_path, arms)
-    run(f"runs={tmp_path}")
-    longer = [replace(arm, plain={**arm.plain, "total_frames": 400}) for arm in composed]
-    monkeypatch.setattr(report, "compose_arms", lambda overrides: longer)
-    _, printed, _ = run(f"results={tmp_path / 'results.csv'}", f"to={tmp_path / 'second'}")
-    assert "seeds 0, 1, 2: unfinished: 200 of 400 frames in the table of results" in printed
-    assert "| hrtf | 0 | no ended run |" in (tmp_path / "second" / "report.md").read_text()
-
-
-EVALUATIONS = "frames,player,team,episodes,return\n0,random,agents,32,-0.5\n"
-
-
-@pytest.mark.parametrize(
-    ("file", "content", "reason"),
-    [
-        ("config.yaml", b"task: [", "while parsing"),
-        ("config.yaml", b"text", "holds no configuration"),
-        ("config.yaml", b"task: {name: KickTheBall}\nseed: 1\n", "no key 'total_frames'"),
-        ("config.yaml", b"\xff\xfe\xff", ""),
-        ("provenance.json", b'{"commit": ', "Expecting value"),
-        ("provenance.json", b"[]", "holds no object"),
-        ("provenance.json", b"{}", "names neither a commit nor a version"),
-        ("evaluations.csv", b"", "no column 'frames'"),
-        ("evaluations.csv", b"frames,player\n0,random\n", "no column 'team'"),
-        ("evaluations.csv", b"\xff\xfe\xff", "can't decode"),
-        (
-            "evaluations.csv",
-            f"{EVALUATIONS}x,policy,agents,8,1\n".encode(),
-            "row 2, column 'frames': 'x' is not a whole number",
-        ),
-        (
-            "evaluations.csv",
-            f"{EVALUATIONS}100,policy,agents,8,1.5.2\n".encode(),
-            "row 2, column 'return': '1.5.2' is not a number",
-        ),
-        (
-            "evaluations.csv",
-            f"{EVALUATIONS}100,pol\n200,policy,agents,32,1\n".encode(),
-            "row 2 has another number of cells than the head",
-        ),
-        ("metrics.csv", b"frames,frames_per_s\n100,\n", "row 1, column 'frames_per_s': ''"),
-    ],
-)
-def test_a_damaged_file_is_named_with_the_reason(tmp_path, arms, file, content, reason):
-    for seed in (0, 1):
-        config = {**arms["hrtf"], "seed": seed}
-        write_run(run_folder(tmp_path, "hrtf", seed), config, [(200, 1.0)])
-    path = run_folder(tmp_path, "hrtf", 1) / file
-    path.write_bytes(content)
-    (sound, broken), rows = gather(tmp_path, {"hrtf": arms["hrtf"]}, [0, 1])
-    assert sound.counts
-    assert not broken.counts
-    assert broken.remark.startswith(f"not counted, damaged: {path}")
-    assert reason in broken.remark
-    assert {row["seed"] for row in rows} == {"0"}
-
-
-@pytest.mark.parametrize("file", ["config.yaml", "provenance.json", "evaluations.csv"])
-def test_the_other_runs_are_reported_beside_a_damaged_one(tmp_path, arms, run, file):
-    write_all(tmp_path, arms)
-    path = run_folder(tmp_path, "hrtf", 1) / file
-    path.write_text('{"cut": ')
-    status, printed, errors = run(f"runs={tmp_path}")
-    assert status == 0, errors
-    page = (tmp_path / "report.md").read_text()
-    for text in (page, printed):
-        assert f"hrtf, seed 1: not counted, damaged: {path}" in text
-    assert "| hrtf | 2 | 6.50 [6.00, 7.00] |" in page
-    assert "| hrtf | 1 | yes |" not in page
-    assert "| mono | 3 |" in page
-
-
-def test_a_run_without_provenance_is_not_damaged(tmp_path, arms):
-    folder = run_folder(tmp_path, "hrtf", 0)
-    write_run(folder, {**arms["hrtf"], "seed": 0}, [(200, 1.0)])
-    (folder / "provenance.json").unlink()
-    ((found,), _) = gather(tmp_path, {"hrtf": arms["hrtf"]}, [0])
-    assert found.counts
-    assert found.commit == ""
-
-
-def test_only_damaged_runs_end_in_one_line(tmp_path, arms, run):
-    folder = run_folder(tmp_path, "hrtf", 1)
-    write_run(folder, {**arms["hrtf"], "seed": 1}, [(200, 1.0)])
-    (folder / "config.yaml").write_text("task: [")
-    status, _, errors = run(f"runs={tmp_path}")
-    assert status == 2
-    assert len(errors.splitlines()) == 1
-    assert "no run of audio_ablation has been evaluated" in errors
 
 
 def rows_with_episodes(path, episodes):

@@ -11,7 +11,6 @@ import numpy as np
 from veca_marl.reports.budget import FrameBudget
 from veca_marl.reports.gather import state_in
 from veca_marl.reports.statistics import Scores
-from veca_marl.sweeps.run_state import RunState
 
 
 @dataclass(frozen=True)
@@ -65,7 +64,7 @@ def runs_of(
     rows: Sequence[Mapping[str, str]],
     metric: str,
     team: str,
-    budgets: Mapping[str, FrameBudget] | None = None,
+    budgets: Mapping[str, FrameBudget],
 ) -> list[Run]:
     """Return all runs in a table of results that have been evaluated at least once.
 
@@ -76,8 +75,7 @@ def runs_of(
         rows: The table.
         metric: Its column with the score.
         team: The team that is compared.
-        budgets: Frames that the runs of each arm are asked to have; None asks for as many as each
-            run has.
+        budgets: Frames that the runs of each arm are asked to have.
 
     Raises:
         ValueError: If there is no such column.
@@ -88,8 +86,7 @@ def runs_of(
             if metric not in row:
                 raise ValueError(f"experiment.metric={metric}: choices: {', '.join(row)}")
             own.setdefault((row["arm"], int(row["seed"])), []).append(row)
-    budgets = {} if budgets is None else budgets
-    made = [_run(arm, seed, mine, metric, budgets.get(arm)) for (arm, seed), mine in own.items()]
+    made = [_run(arm, seed, mine, metric, budgets[arm]) for (arm, seed), mine in own.items()]
     return [run for run in made if run.points]
 
 
@@ -98,17 +95,13 @@ def _run(
     seed: int,
     rows: Sequence[Mapping[str, str]],
     metric: str,
-    budget: FrameBudget | None,
+    budget: FrameBudget,
 ) -> Run:
     policy = [row for row in rows if row["player"] == "policy"]
     by_frames = {int(row["frames"]): _point(row, metric) for row in policy}  # the last of equals
-    shown = sorted(at for at in by_frames if budget is None or budget.includes(at))
+    shown = sorted(at for at in by_frames if budget.includes(at))
     random = [_number(row[metric]) for row in rows if row["player"] == "random"]
-    state = state_in(rows)
-    if budget is None:
-        ended = state in (RunState.finished, RunState.cut)
-    else:
-        ended = budget.counts(state, by_frames)
+    ended = budget.counts(state_in(rows), by_frames)
     points = tuple(by_frames[frames] for frames in shown)
     return Run(arm, seed, ended, points, random[-1] if random else math.nan)
 

@@ -34,8 +34,8 @@ class CollectCfg:
         steps: Steps of each world in a batch.
         threads: Torch threads of each worker process.
         answer_limit_s: Seconds that a worker process may take for a batch, a reset, new parameters
-            or a step of an evaluation; a run whose workers take longer ends with an error that
-            names them. The default is more than a hundred times the usual duration of a batch.
+            or a step of an evaluation; if one takes longer, the run ends with an error that names
+            it. The default is more than a hundred times the usual duration of a batch.
     """
 
     processes: int = 2

@@ -15,7 +15,7 @@ from veca_marl.sim.geometry import Floats
 
 _SHANKS = ("l_shank", "r_shank")  # their origins are the knees
 _FEET = ("l_foot", "r_foot")
-# lowest point of the toes in the frame of a foot, metres: a foot whose heel rises turns about it
+# lowest point of the toes in the frame of a foot, metres; the foot turns about it as its heel rises
 _TOES_M = np.array([0.07, 0.0, -0.043])
 
 

@@ -12,8 +12,8 @@ def check_placement(
 ) -> None:
     """Try out a random placement with a fixed generator.
 
-    A task draws places at the start of an episode until they fit; what finds none here would find
-    none there.
+    A task draws places at the start of an episode until they fit, some hundred times at most. Where
+    this trial finds none, most episodes would find none.
 
     Args:
         place: Draws the places of one episode, and raises `ValueError` if it finds none.
