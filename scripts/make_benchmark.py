@@ -7,8 +7,7 @@ that is current stays as it is; one that is not gets the next version.
 from __future__ import annotations
 
 import argparse
-import json
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 
 from veca_marl.config import compose
@@ -18,7 +17,8 @@ from veca_marl.envs.core.benchmark import (
     Benchmark,
     find_benchmark,
     parameters,
-    start_digests,
+    read_starts,
+    to_text,
 )
 from veca_marl.envs.core.task import TASKS
 
@@ -28,7 +28,7 @@ FOLDER = Path(__file__).resolve().parent.parent / "veca_marl" / "data" / "benchm
 def current(task: str) -> Benchmark:
     """Return the frozen episodes that the present code and presets give, as version 1."""
     game = compose([f"+task={task}"]).game
-    starts = start_digests(game, SEED, range(EPISODES))
+    starts = read_starts(game, SEED, range(EPISODES))
     return Benchmark(task, 1, SEED, parameters(game.task), tuple(starts))
 
 
@@ -40,7 +40,7 @@ def write(task: str) -> str:
         if replace(new, version=stored.version) == stored:
             return f"version {stored.version} is current"
         new = replace(new, version=stored.version + 1)
-    file.write_text(json.dumps(asdict(new), indent=1) + "\n", encoding="utf-8")
+    file.write_text(to_text(new), encoding="utf-8")
     return f"wrote version {new.version}"
 
 

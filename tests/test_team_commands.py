@@ -11,7 +11,7 @@ import torch
 
 from veca_marl.algos.training.checkpoint import CheckpointError
 from veca_marl.config import ConfigError, compose
-from veca_marl.envs.core.benchmark import Benchmark, parameters, start_digests
+from veca_marl.envs.core.benchmark import Benchmark, parameters, read_starts
 from veca_marl.evaluate import main as evaluate
 from veca_marl.play.command import main as play
 from veca_marl.runs.assembly import make_trainer
@@ -188,13 +188,15 @@ def test_frozen_episodes_are_those_of_their_seed(played, tmp_path, capsys, monke
     assert evaluate([run, "episodes=2", "seed=77", f"evaluate.json={table}"]) == 0
     expected = json.loads(table.read_text())
     game = compose(TASK).game
-    starts = tuple(start_digests(game, 77, range(2)))
+    starts = tuple(read_starts(game, 77, range(2)))
     frozen = Benchmark("PushOut1v1", 3, 77, parameters(game.task), starts)
     monkeypatch.setattr("veca_marl.evaluate.find_benchmark", lambda task: frozen)
     capsys.readouterr()
     assert evaluate([run, "episodes=benchmark", f"evaluate.json={table}"]) == 0
-    line = capsys.readouterr().out.splitlines()[0]
-    assert line == "benchmark of PushOut1v1, version 3: 2 frozen episodes"
+    first, second, *_ = capsys.readouterr().out.splitlines()
+    assert first == "benchmark of PushOut1v1, version 3: 2 frozen episodes"
+    assert second.startswith("other than in the default game: ")
+    assert "task.max_seconds=1.0 (" in second
     assert json.loads(table.read_text()) == [{**row, "benchmark": 3} for row in expected]
 
 

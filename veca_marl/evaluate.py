@@ -3,7 +3,8 @@
 The episodes are played on the configuration stored with the run. Other overrides change it:
 ``senses/audio=mono``, ``opponent.defender=expert``, ``task.max_seconds=30``. The policies must fit:
 the same senses in the same shapes, the same actions. The random policy plays the same episodes
-against the same opponents. ``episodes=benchmark`` plays the frozen episodes of the task.
+against the same opponents. ``episodes=benchmark`` plays the frozen episodes of the task and prints
+in what the game differs from the default one of the task.
 """
 
 from __future__ import annotations
@@ -23,11 +24,13 @@ from veca_marl.algos.evaluation.evaluate import Exploration, RandomTeams, Scores
 from veca_marl.algos.files import WriteError, write_atomically
 from veca_marl.algos.specs import team_specs
 from veca_marl.algos.training.checkpoint import CheckpointError
-from veca_marl.config import Config, ConfigError, one_line
+from veca_marl.config import Config, ConfigError, compose, one_line
 from veca_marl.config.command_line import CommandLine
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
-from veca_marl.envs.core.benchmark import Benchmark, find_benchmark
+from veca_marl.envs.core.benchmark import Benchmark, find_benchmark, parameters
+from veca_marl.envs.core.game_cfg import GameCfg
 from veca_marl.runs.stored_policies import stored_actors, stored_configuration
+from veca_marl.sweeps.differences import differences
 
 _ERRORS = (CheckpointError, WriteError)
 Table = dict[str, dict[str, Scores]]
@@ -89,10 +92,12 @@ class Evaluated:
     Attributes:
         table: The scores.
         benchmark: The frozen episodes that were played; None for others.
+        game: The game that was played.
     """
 
     table: Table
     benchmark: Benchmark | None
+    game: GameCfg
 
 
 def evaluate_run(options: EvaluateOptions, overrides: Sequence[str] = ()) -> Evaluated:
@@ -123,7 +128,7 @@ def evaluate_run(options: EvaluateOptions, overrides: Sequence[str] = ()) -> Eva
         name: evaluate(env, player, episodes, seed, exploration) for name, player in players.items()
     }
     env.close()
-    return Evaluated(table, benchmark)
+    return Evaluated(table, benchmark, cfg.game)
 
 
 def _checked_benchmark(cfg: Config) -> Benchmark:
@@ -133,6 +138,21 @@ def _checked_benchmark(cfg: Config) -> Benchmark:
     except ValueError as error:
         raise ConfigError(one_line(error)) from error
     return benchmark
+
+
+def departures(game: GameCfg) -> str:
+    """Return in words in what a game differs from the default one of its task.
+
+    Frozen episodes fix the task and its starts. Clock, body, senses and opponents are free, but
+    returns with different ones cannot be compared.
+    """
+    default = compose([f"+task={game.task.name}"]).game
+    changed = differences(parameters(default), parameters(game))
+    if not changed:
+        return "the game is the default one of the task"
+    return "other than in the default game: " + ", ".join(
+        f"{one.key}={one.asked} ({one.stored})" for one in changed
+    )
 
 
 def _episodes(options: EvaluateOptions, benchmark: Benchmark | None) -> tuple[int, int]:
@@ -191,6 +211,7 @@ def run(options: EvaluateOptions, overrides: list[str]) -> None:
     table, rows = evaluated.table, summary(evaluated.table)
     if evaluated.benchmark is not None:
         print(evaluated.benchmark)
+        print(departures(evaluated.game))
         rows = [{**row, BENCHMARK: evaluated.benchmark.version} for row in rows]
     print(*lines(rows), sep="\n")
     for team, scores in table["policy"].items():

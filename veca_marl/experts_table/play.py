@@ -19,7 +19,7 @@ from veca_marl.envs.core.episodes import Episodes
 from veca_marl.envs.core.game import Game
 from veca_marl.envs.core.game_cfg import GameCfg
 from veca_marl.envs.core.scripted_episodes import first_team, play_to_end
-from veca_marl.envs.core.starts import start_digest
+from veca_marl.envs.core.starts import start_values
 from veca_marl.envs.core.team import Script
 
 
@@ -142,5 +142,5 @@ def _reset(game: Game, job: Job) -> int:
     if not job.frozen:
         return 0
     benchmark = find_benchmark(job.task)
-    benchmark.check_starts([start_digest(game, rng)], first=job.episode)
+    benchmark.check_starts([start_values(game, rng)], first=job.episode)
     return benchmark.version

@@ -1,47 +1,33 @@
-"""Frozen episodes: what belongs to a start, and which games are refused."""
+"""Frozen episodes: their files, and which games are refused."""
 
-import numpy as np
+import json
+from dataclasses import replace
+
 import pytest
 from composed import compose
 
-from veca_marl.envs.core.benchmark import find_benchmark, start_digests
-from veca_marl.envs.core.episodes import Episodes
-from veca_marl.envs.core.game import Game
-from veca_marl.envs.core.starts import start_digest, start_state
+from veca_marl.envs.core.benchmark import find_benchmark, from_text, read_starts, to_text
 
 QUIET = ("senses/vision=blind",)
 
 
-@pytest.fixture
-def game():
-    game = Game(compose(["+task=KickTheBall", *QUIET]).game)
-    game.reset(Episodes(0).next())
-    yield game
-    game.close()
-
-
-def test_the_state_has_the_poses_of_bones_and_props(game):
-    state = start_state(game)
-    assert len(state) == 12 * (47 * len(game.players) + len(game.world.props))
-    np.testing.assert_allclose(state[:3], game.players[0].body.bone_positions()[0], atol=1e-6)
-
-
-def test_the_digest_changes_with_poses_and_with_draws_and_leaves_the_generator(game):
-    rng = Episodes(5).next()
-    first = start_digest(game, rng)
-    assert start_digest(game, rng) == first
-    assert len(first) == 16
-    rng.random()
-    assert start_digest(game, rng) != first
-    x, y, _ = game.players[0].body.position
-    game.players[0].body.place((x + 0.01, y, 0.0))
-    assert start_digest(game, Episodes(5).next()) != first
-
-
 def test_an_episode_has_its_start_whatever_was_played_before():
     cfg = compose(["+task=KickTheBall", *QUIET]).game
-    stored = find_benchmark("KickTheBall").starts
-    assert start_digests(cfg, 20260, [3, 1]) == [stored[3], stored[1]]
+    benchmark = find_benchmark("KickTheBall")
+    found = read_starts(cfg, 20260, [3, 1])
+    benchmark.check_starts(found[:1], first=3)
+    benchmark.check_starts(found[1:], first=1)
+
+
+def test_the_text_of_a_file_is_read_as_it_was_written():
+    benchmark = find_benchmark("ColorSort")
+    text = to_text(benchmark)
+    assert from_text(text) == benchmark
+    stored = json.loads(text)
+    assert not set(stored["constant"]) & set(stored["starts"][0])
+    assert set(stored["constant"]) | set(stored["starts"][0]) == set(benchmark.starts[0])
+    one = replace(benchmark, starts=benchmark.starts[:1])
+    assert from_text(to_text(one)) == one
 
 
 def test_other_senses_are_accepted():
@@ -53,13 +39,24 @@ def test_other_senses_are_accepted():
     ("overrides", "message"),
     [
         (["task.max_seconds=3"], r"version 2, differs in task.max_seconds=3.0 \(not 20.0\)"),
-        (["playground=two_rooms"], "of 100 starts are not those of the benchmark of KickTheBall"),
+        (
+            ["playground=two_rooms"],
+            "100 of 100 starts are not those of the benchmark of KickTheBall, version 2, "
+            r"in episode 0 .* and [0-9]+ others: another playground or body was chosen",
+        ),
     ],
 )
 def test_other_parameters_and_playgrounds_are_refused(overrides, message):
     cfg = compose(["+task=KickTheBall", *QUIET, *overrides]).game
     with pytest.raises(ValueError, match=message):
         find_benchmark("KickTheBall").check(cfg)
+
+
+def test_the_first_start_that_differs_is_named():
+    benchmark = find_benchmark("KickTheBall")
+    moved = {**benchmark.starts[8], "ball/position": (0.0, 0.0, 0.15)}
+    with pytest.raises(ValueError, match=r"1 of 2 starts .* in episode 8 ball/position is 0, 0, "):
+        benchmark.check_starts([benchmark.starts[7], moved], first=7)
 
 
 def test_a_task_without_frozen_episodes_is_refused():

@@ -1,8 +1,9 @@
 """Frozen episodes: the same 100 starts of a task for everyone who evaluates on it.
 
-Each task of the package has a file ``veca_marl/data/benchmark/<task>.json``. The randomness of an
-episode depends on the seed, its number and the world alone, so the file has one seed, the
-parameters of the task, and a digest of each start, by which a change of the task is noticed.
+Each task of the package has a file ``veca_marl/data/benchmark/<task>.json``: one seed, the
+parameters of the task, and all that was drawn for each start. The randomness of an episode depends
+on the seed, its number and the world alone, so that the seed is enough to play the episodes here;
+the values show that they start as they did, and other programs can start from them.
 ``scripts/make_benchmark.py`` writes the files.
 """
 
@@ -19,11 +20,12 @@ from typing import Any
 from veca_marl.envs.core.episodes import Episodes
 from veca_marl.envs.core.game import Game
 from veca_marl.envs.core.game_cfg import GameCfg
-from veca_marl.envs.core.starts import start_digest
+from veca_marl.envs.core.starts import Start, differences, start_values
 from veca_marl.envs.core.task import TaskCfg
 
 EPISODES = 100
 SEED = 20260
+_SHOWN = 3  # differing values in a message
 
 
 @dataclass(frozen=True)
@@ -35,14 +37,14 @@ class Benchmark:
         version: Increases whenever the episodes or the parameters of the task change.
         seed: Seed of all episodes; episode n is episode 0 of world n.
         parameters: Parameters of the task (`TaskCfg`), as plain values.
-        starts: `start_digest` of each episode.
+        starts: `start_values` of each episode.
     """
 
     task: str
     version: int
     seed: int
     parameters: dict[str, Any]
-    starts: tuple[str, ...]
+    starts: tuple[Start, ...]
 
     def check(self, cfg: GameCfg) -> None:
         """Check that a game is that of the benchmark, with all its starts.
@@ -51,7 +53,7 @@ class Benchmark:
             ValueError: If a parameter of the task or a start differs; the message names them.
         """
         self.check_parameters(cfg.task)
-        self.check_starts(start_digests(cfg, self.seed, range(len(self.starts))))
+        self.check_starts(read_starts(cfg, self.seed, range(len(self.starts))))
 
     def check_parameters(self, cfg: TaskCfg) -> None:
         """Check that the parameters of a task are those of the benchmark.
@@ -67,23 +69,26 @@ class Benchmark:
             changes = [f"task.{n}={own.get(n)} (not {self.parameters.get(n)})" for n in differing]
             raise ValueError(f"episodes=benchmark: {self._name} differs in {', '.join(changes)}")
 
-    def check_starts(self, found: Sequence[str], first: int = 0) -> None:
+    def check_starts(self, found: Sequence[Start], first: int = 0) -> None:
         """Check that episodes start as those of the benchmark.
 
         Args:
-            found: `start_digest` of consecutive episodes.
+            found: `start_values` of consecutive episodes.
             first: Number of the first of them.
 
         Raises:
-            ValueError: If a start differs.
+            ValueError: If a start differs; the message names the values of the first.
         """
         stored = self.starts[first : first + len(found)]
-        others = [n for n, (a, b) in enumerate(zip(found, stored, strict=True), first) if a != b]
+        changes = [differences(*pair) for pair in zip(found, stored, strict=True)]
+        others = [number for number, change in enumerate(changes) if change]
         if others:
+            names = changes[others[0]]
+            more = f" and {len(names) - _SHOWN} others" if len(names) > _SHOWN else ""
             raise ValueError(
                 f"episodes=benchmark: {len(others)} of {len(found)} starts are not those of "
-                f"{self._name}, the first is that of episode {others[0]}: another playground or "
-                "body was chosen, or the task has changed"
+                f"{self._name} in episode {first + others[0]} {'; '.join(names[:_SHOWN])}{more}: "
+                "another playground or body was chosen, or the task has changed"
             )
 
     @property
@@ -105,12 +110,43 @@ def find_benchmark(task: str) -> Benchmark:
     file = files("veca_marl") / "data" / "benchmark" / f"{task}.json"
     if not file.is_file():
         raise ValueError(f"episodes=benchmark: task {task!r} has no frozen episodes")
-    stored = json.loads(file.read_text(encoding="utf-8"))
-    return Benchmark(**{**stored, "starts": tuple(stored["starts"])})
+    return from_text(file.read_text(encoding="utf-8"))
 
 
-def parameters(cfg: TaskCfg) -> dict[str, Any]:
-    """Return the parameters of a task as values of JSON."""
+def to_text(benchmark: Benchmark) -> str:
+    """Return the JSON of frozen episodes, with one line for each start.
+
+    What is the same in all starts stands once, in ``constant``.
+    """
+    first = benchmark.starts[0]
+    constant = {
+        name: value
+        for name, value in first.items()
+        if all(start.get(name) == value for start in benchmark.starts)
+    }
+    lines = [
+        json.dumps({name: value for name, value in start.items() if name not in constant})
+        for start in benchmark.starts
+    ]
+    head = {key: value for key, value in vars(benchmark).items() if key != "starts"}
+    entries = [f'"{key}": {json.dumps(value)}' for key, value in head.items()]
+    entries += [f'"constant": {json.dumps(constant)}', '"starts": [\n' + ",\n".join(lines) + "\n]"]
+    return "{\n" + ",\n".join(entries) + "\n}\n"
+
+
+def from_text(text: str) -> Benchmark:
+    """Return the frozen episodes that `to_text` wrote."""
+    stored = json.loads(text)
+    constant = stored.pop("constant")
+    starts = [
+        {name: tuple(value) for name, value in {**constant, **start}.items()}
+        for start in stored.pop("starts")
+    ]
+    return Benchmark(**stored, starts=tuple(starts))
+
+
+def parameters(cfg: TaskCfg | GameCfg) -> dict[str, Any]:
+    """Return the parameters of a task, or of a whole game, as values of JSON."""
     values: dict[str, Any] = json.loads(json.dumps(asdict(cfg), default=_plain))
     return values
 
@@ -121,8 +157,8 @@ def _plain(value: Any) -> Any:
     raise TypeError(f"{value!r} is no value of a configuration")
 
 
-def start_digests(cfg: GameCfg, seed: int, numbers: Iterable[int]) -> list[str]:
-    """Return `start_digest` of some episodes.
+def read_starts(cfg: GameCfg, seed: int, numbers: Iterable[int]) -> list[Start]:
+    """Return `start_values` of some episodes.
 
     Args:
         cfg: The game.
@@ -134,5 +170,5 @@ def start_digests(cfg: GameCfg, seed: int, numbers: Iterable[int]) -> list[str]:
         for number in numbers:
             rng = Episodes(seed, number).next()
             game.reset(rng)
-            found.append(start_digest(game, rng))
+            found.append(start_values(game, rng))
     return found
