@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from verbs import begin, do, seeing, toy
-from walking import ball, box, empty_world, let_pass
+from walking import ball, box, empty_world, let_pass, wall
 
 from veca_marl.sim.physics.props.joint_cfg import LockCfg
-from veca_marl.sim.physics.props.library import door_leaf
+from veca_marl.sim.physics.props.library import door_leaf, sliding_leaf
 
 BASKET = ("basket", (0.3, 0.3, 0.02), 0.0, (0.6, 0.0, 0.01))  # a plate: what is put on it stays
 
@@ -83,6 +83,32 @@ def test_a_door_is_opened_and_closed():
     assert do(world, walker, "close")
     let_pass(world, 3.0)
     assert world.prop("door").opening < 0.1
+
+
+def test_a_sliding_door_is_opened_passed_and_closed():
+    beside = wall("beside", length_m=1.0, position=(1.0, 1.0, 0.0), yaw_deg=90.0)
+    leaf = sliding_leaf("door", (1.0, 0.0), 0.0, 1.0, 1.5, wall="beside")
+    world = empty_world(beside, leaf)
+    walker, leaf = seeing(world), world.prop("door")
+    begin(world)
+    walker.walk(1.0, 0.0)
+    let_pass(world, 2.0)
+    assert walker.position[0] < 1.0  # it does not yield across its axis
+    walker.walk(0.0, 0.0)
+    walker.place((0.3, -0.1, 0.0))
+    world.refresh()
+    assert walker.open(leaf)
+    let_pass(world, 3.0)
+    assert leaf.opening > 0.9
+    walker.look_toward_point((1.0, 0.42, 0.45))
+    world.refresh()
+    assert walker.is_interactable(leaf)  # its handle stays in the opening
+    walker.walk(1.0, 0.0)
+    let_pass(world, 2.0)
+    assert walker.position[0] > 1.3
+    assert walker.close(leaf)
+    let_pass(world, 3.0)
+    assert leaf.opening < 0.01
 
 
 def test_methods_open_and_close_as_the_verbs_do():

@@ -15,6 +15,7 @@ from veca_marl.sim.physics.props.library import (
     door_leaf,
     fraction_piece,
     key,
+    sliding_leaf,
     toy,
 )
 
@@ -51,6 +52,31 @@ def test_a_door_opens_to_the_side_that_was_asked_for(to_front):
     leaf.close()
     let_pass(world, 1.2)
     assert leaf.opening == 0.0
+
+
+@pytest.mark.parametrize(("to_left", "side"), [(True, 1.0), (False, -1.0)])
+def test_a_sliding_door_moves_into_the_wall_and_back(to_left, side):
+    # an opening of 0.9 m in a wall of 0.1 m
+    names = {-1.0: "right", 1.0: "left"}
+    beside = [
+        wall(name, length_m=1.0, position=(1.0, y * 0.95, 0.0), yaw_deg=90.0)
+        for y, name in names.items()
+    ]
+    leaf = sliding_leaf("door", (1.0, 0.0), 0.0, 0.9, wall=names[side], slides_to_left=to_left)
+    world = empty_world(*beside, leaf)
+    leaf = world.prop("door")
+    assert_at_rest(world, 0.4)
+    leaf.open()
+    let_pass(world, 1.2)
+    assert leaf.opening == 1.0
+    low, high = leaf.bounds()
+    inner = -high[1] if side < 0 else low[1]  # its edge in the opening
+    assert inner == pytest.approx(0.45 - 0.13, abs=0.01)
+    assert leaf.position == pytest.approx((1.0, side * 0.76, 1.0), abs=0.002)
+    leaf.close()
+    let_pass(world, 1.2)
+    assert leaf.opening == 0.0
+    assert_at_rest(world, 0.4)
 
 
 def test_a_locked_drawer_opens_with_its_key_and_moves_what_lies_in_it():

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from veca_marl.sim.geometry import Floats
-from veca_marl.sim.physics.props import check_appearance
+from veca_marl.sim.physics.props import JointKind, check_appearance
 
 
 @dataclass
@@ -110,16 +110,20 @@ class RoomCfg:
 
 @dataclass
 class LeafCfg:
-    """The hinged leaf of a door, a prop with the name of the door after ``leaf_``.
+    """The leaf of a door, a prop with the name of the door after ``leaf_``.
 
     Attributes:
-        opening: Opening at the start of an episode, from 0 (closed) to 1 (95 degrees).
-        opens_to_front: Whether it opens to the side of greater x or y; otherwise to the other.
+        kind: A hinge turns it by 90 degrees, a slide moves it into the wall beside the opening,
+            which has to be as long as the leaf.
+        opening: Opening at the start of an episode, from 0 (closed) to 1.
+        opens_to_front: Whether it opens to the side of greater x or y, across the wall for a hinge
+            and along it for a slide; otherwise to the other.
         key: Name of the prop that unlocks it; empty for none.
         locked: Whether it is locked at the start of an episode; a locked leaf does not move.
         colour: Red, green, blue in [0, 1].
     """
 
+    kind: JointKind = JointKind.hinge
     opening: float = 1.0
     opens_to_front: bool = True
     key: str = ""

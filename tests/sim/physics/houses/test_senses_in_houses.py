@@ -131,7 +131,7 @@ def test_the_leaves_of_a_house_are_open_and_close_the_doors_for_sound():
     world.freeze()
     world.reset(np.random.default_rng(0))
     leaves = [door for door in world.playground.doors if door.leaf is not None]
-    assert len(leaves) == 3
+    assert len(leaves) == 4
     for door in leaves:
         leaf = world.prop(f"leaf_{door.name}")
         assert leaf.opening == pytest.approx(1.0, abs=0.01)

@@ -1,5 +1,7 @@
 """Walls that are built from rooms and doors."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from floor_maps import FloorMap, pieces
@@ -9,20 +11,23 @@ from veca_marl.sim.physics import (
     DoorCfg,
     FurnitureCfg,
     FurnitureKind,
+    JointKind,
+    LeafCfg,
     PlaygroundCfg,
     RoomCfg,
     WallsCfg,
+    World,
 )
 from veca_marl.sim.physics.houses.furniture import FURNITURE, furniture_prop
 from veca_marl.sim.physics.houses.walls import wall_lines
 
 
-def row(count, gap_m=0.1, **numbers):
+def row(count, gap_m=0.1, walls=None, **numbers):
     """Rooms of 3 x 3 m in a row along x."""
     rooms = [
         RoomCfg(f"room_{n}", (n * (3.0 + gap_m), 0.0, 0.0), (3.0, 3.0, 2.5)) for n in range(count)
     ]
-    return PlaygroundCfg(name="row", rooms=rooms, walls=WallsCfg(), **numbers)
+    return PlaygroundCfg(name="row", rooms=rooms, walls=walls or WallsCfg(), **numbers)
 
 
 def test_rooms_in_a_row_share_the_walls_between_them():
@@ -40,6 +45,75 @@ def test_a_door_is_an_opening_with_a_wall_above():
     assert walls["wall_1_1"].size_m == pytest.approx([0.1, 1.55, 2.5])
     assert walls["wall_over_door"].position_m == pytest.approx((3.05, 1.0, 2.0))
     assert walls["wall_over_door"].size_m == pytest.approx([0.1, 1.0, 0.5])
+
+
+SLIDE = LeafCfg(JointKind.slide)
+
+
+@pytest.mark.parametrize(
+    ("door", "direction", "wall"),
+    [
+        (DoorCfg("door", ("room_0", "room_1"), (3.05, 1.0), 1.0, SLIDE), (0.0, 1.0), "wall_1_1"),
+        (
+            DoorCfg(
+                "door",
+                ("room_0", "room_1"),
+                (3.05, 2.0),
+                1.0,
+                LeafCfg(JointKind.slide, opens_to_front=False),
+            ),
+            (0.0, -1.0),
+            "wall_1_0",
+        ),
+    ],
+)
+def test_a_sliding_leaf_moves_into_the_wall_on_its_side(door, direction, wall):
+    props = {prop.name: prop for prop in row(2, doors=[door]).built_props()}
+    assert props["leaf_door"].joint.parent == wall
+    assert list(props).index(wall) < list(props).index("leaf_door")
+    assert opened_by(door, row(2)) == pytest.approx((*(0.86 * np.array(direction)), 0.0), abs=1e-6)
+
+
+@pytest.mark.parametrize(("front", "shift"), [(True, 0.86), (False, -0.86)])
+def test_a_sliding_leaf_in_a_wall_along_x_opens_towards_greater_x_at_its_front(front, shift):
+    rooms = [
+        RoomCfg("a", (0.0, 0.0, 0.0), (4.0, 3.0, 2.5)),
+        RoomCfg("b", (0.0, 3.1, 0.0), (4.0, 3.0, 2.5)),
+    ]
+    leaf = LeafCfg(JointKind.slide, opens_to_front=front)
+    door = DoorCfg("door", ("a", "b"), (2.0, 3.05), 1.0, leaf)
+    flat = PlaygroundCfg("flat", rooms, walls=WallsCfg())
+    assert opened_by(door, flat) == pytest.approx((shift, 0.0, 0.0), abs=1e-6)
+
+
+def opened_by(door, playground):
+    """Return how far the leaf of a door moves when it is opened."""
+    world = World(replace(playground, doors=[door]))
+    leaf = world.prop("leaf_door")
+    leaf.set_opening(0.0)
+    closed = leaf.position
+    leaf.set_opening(1.0)
+    moved = leaf.position - closed
+    world.close()
+    return moved
+
+
+@pytest.mark.parametrize(
+    ("y_m", "walls", "message"),
+    [
+        (
+            2.3,
+            WallsCfg(),
+            r"its leaf of 1.0 m slides into the wall beside it, which is 0.25 m long; "
+            "choose leaf.opens_to_front=false",
+        ),
+        (1.0, WallsCfg(0.04), "walls.thickness_m=0.04 is too thin for a leaf that slides"),
+    ],
+)
+def test_a_wall_that_cannot_take_the_leaf_is_refused(y_m, walls, message):
+    door = DoorCfg("door", ("room_0", "room_1"), (3.0 + walls.thickness_m / 2, y_m), 1.0, SLIDE)
+    with pytest.raises(ValueError, match=message):
+        row(2, walls.thickness_m, walls, doors=[door])
 
 
 def test_rooms_are_separate_without_a_door_and_connected_by_it():

@@ -11,8 +11,8 @@ from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 from veca_marl.sim.physics.props import PropCfg, PropShape, check_appearance
-from veca_marl.sim.physics.props.joint_cfg import LockCfg
-from veca_marl.sim.physics.props.library.doors import door_leaf
+from veca_marl.sim.physics.props.joint_cfg import JointKind, LockCfg
+from veca_marl.sim.physics.props.library.doors import SLIDING_WALL_M, door_leaf, sliding_leaf
 from veca_marl.sim.physics.rooms import DoorCfg, LeafCfg, RoomCfg
 
 COVERING_M = 0.004
@@ -81,7 +81,8 @@ def wall_props(rooms: Sequence[RoomCfg], doors: Sequence[DoorCfg], cfg: WallsCfg
 
     Raises:
         ValueError: If a wall would stand in a room, because two rooms are less than one wall
-            thickness apart, or a door is not in a wall.
+            thickness apart, a door is not in a wall, or a wall is too short or too thin for the
+            leaf that slides into it.
     """
     lines = wall_lines(rooms, cfg.thickness_m)
     props: list[PropCfg] = []
@@ -93,9 +94,12 @@ def wall_props(rooms: Sequence[RoomCfg], doors: Sequence[DoorCfg], cfg: WallsCfg
         _check_outside(line, rooms, cfg.thickness_m)
         cut = [door for door in doors if _is_in(door, line)]
         placed.update(door.name for door in cut)
-        props += _pieces(f"wall_{number}", line, cut, cfg, colour)
+        pieces = _pieces(f"wall_{number}", line, cut, cfg, colour)
         height_m = min(cfg.door_height_m, line.height_m)
-        props += [_leaf(door, door.leaf, line, height_m) for door in cut if door.leaf is not None]
+        leaves = [
+            _leaf(door, door.leaf, line, height_m, pieces) for door in cut if door.leaf is not None
+        ]
+        props += pieces + leaves
     missing = sorted({door.name for door in doors} - placed)
     if missing:
         raise ValueError(f"doors {missing} are not in the middle of a wall between rooms")
@@ -203,21 +207,63 @@ def _wall(
     )
 
 
-def _leaf(door: DoorCfg, leaf: LeafCfg, line: WallLine, height_m: float) -> PropCfg:
+def _leaf(
+    door: DoorCfg, leaf: LeafCfg, line: WallLine, height_m: float, pieces: Sequence[PropCfg]
+) -> PropCfg:
     """Return the leaf of a door; the opening of a wall of constant x leads along x."""
-    has_lock = bool(leaf.key) or leaf.locked
-    prop = door_leaf(
-        f"leaf_{door.name}",
-        door.position_m,
-        0.0 if line.axis == 0 else 90.0,
-        door.width_m,
-        height_m,
-        opens_to_front=leaf.opens_to_front,
-        lock=LockCfg(leaf.key, leaf.locked) if has_lock else None,
-        colour=leaf.colour,
-    )
+    place = (f"leaf_{door.name}", door.position_m, 0.0 if line.axis == 0 else 90.0)
+    lock = LockCfg(leaf.key, leaf.locked) if leaf.key or leaf.locked else None
+    if leaf.kind is JointKind.hinge:
+        prop = door_leaf(
+            *place,
+            door.width_m,
+            height_m,
+            opens_to_front=leaf.opens_to_front,
+            lock=lock,
+            colour=leaf.colour,
+        )
+    else:
+        prop = sliding_leaf(
+            *place,
+            door.width_m,
+            height_m,
+            wall=_wall_beside(door, leaf, line, pieces).name,
+            # +y of the leaf is +y of the house in a wall of constant x, and -x in one of constant y
+            slides_to_left=leaf.opens_to_front == (line.axis == 0),
+            lock=lock,
+            colour=leaf.colour,
+        )
     assert prop.joint is not None
     return replace(prop, joint=replace(prop.joint, opening=leaf.opening))
+
+
+def _wall_beside(
+    door: DoorCfg, leaf: LeafCfg, line: WallLine, pieces: Sequence[PropCfg]
+) -> PropCfg:
+    """Return the piece of a wall into which the leaf of a door slides.
+
+    Raises:
+        ValueError: If it is shorter than the leaf or too thin for it.
+    """
+    along, across = 1 - line.axis, line.axis
+    side = 1.0 if leaf.opens_to_front else -1.0
+    edge = door.position_m[along] + side * door.width_m / 2.0
+    for piece in pieces:
+        begins = piece.position_m[along] - side * piece.size_m[along] / 2.0
+        if piece.position_m[2] == 0.0 and abs(begins - edge) < _TOLERANCE_M:
+            break
+    if piece.size_m[along] < door.width_m:
+        raise ValueError(
+            f"door {door.name!r}: its leaf of {door.width_m} m slides into the wall beside it, "
+            f"which is {piece.size_m[along]:.2f} m long; choose leaf.opens_to_front="
+            f"{str(not leaf.opens_to_front).lower()}, a narrower door or leaf.kind=hinge"
+        )
+    if piece.size_m[across] < SLIDING_WALL_M:
+        raise ValueError(
+            f"door {door.name!r}: walls.thickness_m={piece.size_m[across]} is too thin for a leaf "
+            f"that slides into the wall; choose at least {SLIDING_WALL_M} or leaf.kind=hinge"
+        )
+    return piece
 
 
 def _check_outside(line: WallLine, rooms: Sequence[RoomCfg], thickness_m: float) -> None:

@@ -2,7 +2,7 @@
 
 from veca_marl.sim.physics.props.library.containers import basket, chest
 from veca_marl.sim.physics.props.library.cupboards import cupboard_with_drawer
-from veca_marl.sim.physics.props.library.doors import door_leaf
+from veca_marl.sim.physics.props.library.doors import door_leaf, sliding_leaf
 from veca_marl.sim.physics.props.library.toys import ToyKind, fraction_piece, key, toy
 
 __all__ = [
@@ -13,5 +13,6 @@ __all__ = [
     "door_leaf",
     "fraction_piece",
     "key",
+    "sliding_leaf",
     "toy",
 ]

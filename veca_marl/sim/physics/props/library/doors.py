@@ -1,8 +1,8 @@
-"""Leaves of hinged doors."""
+"""Leaves of hinged and of sliding doors."""
 
 from __future__ import annotations
 
-from veca_marl.sim.physics.props.joint_cfg import JointCfg, LockCfg
+from veca_marl.sim.physics.props.joint_cfg import JointCfg, JointKind, LockCfg
 from veca_marl.sim.physics.props.part_cfg import PartCfg
 from veca_marl.sim.physics.props.prop_cfg import PropCfg
 from veca_marl.sim.physics.props.prop_shape import PropShape
@@ -12,10 +12,16 @@ Colour = tuple[float, float, float]
 DOOR_KG = 3.0
 """Light enough for a walker (`push_limit_kg` is 5 by default); a real leaf has about 20 kg."""
 
+SLIDING_WALL_M = 0.05
+"""Least thickness of a wall into which a leaf slides."""
+
 _GAP_M = 0.01  # to the frame on either side and to the floor
 _THICKNESS_M = 0.04
 _HANDLE_HEIGHT_M = 0.45  # within reach of a child of 0.78 m
 _METAL: Colour = (0.75, 0.75, 0.78)
+_WOOD: Colour = (0.80, 0.62, 0.42)
+_PULL_M = 0.002  # by which the shallow handle of a sliding leaf stands out
+_LEFT_OUT_M = 0.12  # of an open sliding leaf, so that its handle is seen and the door can be closed
 
 
 def door_leaf(
@@ -27,7 +33,7 @@ def door_leaf(
     *,
     opens_to_front: bool = True,
     lock: LockCfg | None = None,
-    colour: Colour = (0.80, 0.62, 0.42),
+    colour: Colour = _WOOD,
     mass_kg: float = DOOR_KG,
 ) -> PropCfg:
     """Return a hinged leaf that closes an opening in a wall and turns by 90 degrees.
@@ -47,11 +53,7 @@ def door_leaf(
         mass_kg: Its mass.
     """
     width, height = width_m - 2.0 * _GAP_M, height_m - 2.0 * _GAP_M
-    parts = [PartCfg(PropShape.box, [_THICKNESS_M, width, height])]
-    for face in (-1.0, 1.0):
-        out = face * (_THICKNESS_M / 2.0 + 0.015)
-        place = (out, width / 2.0 - 0.08, _HANDLE_HEIGHT_M - height_m / 2.0)
-        parts.append(PartCfg(PropShape.box, [0.03, 0.1, 0.02], place, colour=_METAL))
+    parts = _leaf_parts(width, height, 0.03, width / 2.0 - 0.08)
     side = 1.0 if opens_to_front else -1.0
     return PropCfg(
         name=name,
@@ -69,3 +71,66 @@ def door_leaf(
             lock=lock,
         ),
     )
+
+
+def sliding_leaf(
+    name: str,
+    position_m: tuple[float, float],
+    yaw_deg: float,
+    width_m: float,
+    height_m: float = 2.0,
+    *,
+    wall: str,
+    slides_to_left: bool = True,
+    lock: LockCfg | None = None,
+    colour: Colour = _WOOD,
+    mass_kg: float = DOOR_KG,
+) -> PropCfg:
+    """Return a leaf that closes an opening in a wall and slides into the wall beside it.
+
+    Its frame has x through the opening and y along its width. Open, 12 cm of it stay in the
+    opening, with the handle.
+
+    Args:
+        name: Name of the prop.
+        position_m: Middle of the threshold.
+        yaw_deg: Rotation about z; at 0 the opening leads along x.
+        width_m: Clear width of the closed opening, more than 12 cm; the leaf is 2 cm narrower.
+        height_m: Clear height of the opening.
+        wall: Name of the fixed prop into which it slides, at least `SLIDING_WALL_M` thick and as
+            long as the leaf.
+        slides_to_left: Whether it slides to the side of +y; otherwise to -y.
+        lock: Its lock.
+        colour: Of the leaf.
+        mass_kg: Its mass.
+    """
+    width, height = width_m - 2.0 * _GAP_M, height_m - 2.0 * _GAP_M
+    side = 1.0 if slides_to_left else -1.0
+    return PropCfg(
+        name=name,
+        shape=PropShape.compound,
+        position_m=(*position_m, height_m / 2.0),
+        yaw_deg=yaw_deg,
+        mass_kg=mass_kg,
+        colour=colour,
+        parts=_leaf_parts(width, height, _PULL_M, -side * (width / 2.0 - 0.06)),
+        interactions=["open", "close"],
+        joint=JointCfg(
+            JointKind.slide,
+            parent=wall,
+            axis=(0.0, side, 0.0),
+            range_m=width - _LEFT_OUT_M,
+            friction=1.0,
+            lock=lock,
+        ),
+    )
+
+
+def _leaf_parts(width: float, height: float, handle_m: float, handle_y: float) -> list[PartCfg]:
+    """Return a leaf with a handle on both faces that stands out by `handle_m`."""
+    parts = [PartCfg(PropShape.box, [_THICKNESS_M, width, height])]
+    for face in (-1.0, 1.0):
+        out = face * (_THICKNESS_M + handle_m) / 2.0
+        place = (out, handle_y, _HANDLE_HEIGHT_M - height / 2.0 - _GAP_M)
+        parts.append(PartCfg(PropShape.box, [handle_m, 0.1, 0.02], place, colour=_METAL))
+    return parts
