@@ -18,6 +18,9 @@ class KeyPoses:
         body: The body.
         poses: Key poses by name; only their joint angles are used.
         step_s: Duration of an environment step.
+
+    Attributes:
+        targets: The target angles of the last step, ``(82,)`` rad.
     """
 
     def __init__(self, body: Humanoid, poses: Mapping[str, Posture], step_s: float) -> None:
@@ -25,9 +28,9 @@ class KeyPoses:
         self._poses = {name: body.posture_angles(pose) for name, pose in poses.items()}
         self.reset()
 
-    def reset(self) -> None:
-        """Start from the present joint angles."""
-        self._targets = self._body.joint_angles()
+    def reset(self, targets: Floats | None = None) -> None:
+        """Start from target angles, ``(82,)`` rad; None are the present joint angles."""
+        self.targets = self._body.joint_angles() if targets is None else targets.copy()
 
     def toward(self, name: str, speed_radps: float) -> Floats:
         """Return the target angles of the next step, ``(82,)`` rad.
@@ -37,6 +40,6 @@ class KeyPoses:
             speed_radps: Speed of each target angle.
         """
         limit_rad = speed_radps * self._step_s
-        change = self._poses[name] - self._targets
-        self._targets = self._targets + np.clip(change, -limit_rad, limit_rad)
-        return self._targets.copy()
+        change = self._poses[name] - self.targets
+        self.targets = self.targets + np.clip(change, -limit_rad, limit_rad)
+        return self.targets.copy()

@@ -8,6 +8,7 @@ from typing import Any, Protocol
 
 from veca_marl.envs.core.task import Player, require_walker
 from veca_marl.envs.experts.control.crawl_gait import CrawlGait
+from veca_marl.envs.experts.control.fall_recovery import FallRecovery
 from veca_marl.envs.experts.control.gait_patterns import BACK, CRAWL, KNEEL, GaitPattern
 from veca_marl.envs.experts.control.steering import bearing_rad, walk_to
 from veca_marl.envs.tasks.navigation.floor_plan import DoorApproach
@@ -120,10 +121,10 @@ class WalkerLocomotion:
 
 
 class CrawlLocomotion:
-    """`Locomotion` of a joint-level body on hands and knees.
+    """`Locomotion` of a joint-level body on hands and knees; it gets up again after a fall.
 
     Args:
-        body: The body to move; it must be on hands and knees now.
+        body: The body to move; it must be on hands and knees, or lie, now.
         step_s: Duration of an environment step.
     """
 
@@ -144,38 +145,48 @@ class CrawlLocomotion:
 
     def __init__(self, body: Humanoid, step_s: float) -> None:
         self._body, self._step_s = body, step_s
-        self._gait = CrawlGait(body, step_s)
+        self._gait: CrawlGait | None = None
+        self._recovery = FallRecovery(body, step_s)
         self._pivot: Floats | None = None
 
     def to(self, place: Floats, call: Call = Call.none) -> JointCommand:
         """See `Locomotion.to`. The body turns while it moves; obstacles stop it."""
         self._pivot = None
-        return self._towards(place, call)
+        return (self._rising() or self._towards(place))._replace(call=call)
 
     def turn(self, left: float, call: Call = Call.none) -> JointCommand:
         """Crawl in a small circle about the place where the turn began; see `Locomotion.turn`."""
+        return (self._rising() or self._turning(left))._replace(call=call)
+
+    def rest(self, call: Call = Call.none) -> JointCommand:
+        """See `Locomotion.rest`."""
+        return (self._rising() or self._with_pattern(KNEEL).command())._replace(call=call)
+
+    def back(self, call: Call = Call.none) -> JointCommand:
+        """See `Locomotion.back`."""
+        return (self._rising() or self._with_pattern(BACK).command())._replace(call=call)
+
+    def _rising(self) -> JointCommand | None:
+        """Return the command of a body that has fallen; a new gait begins when it is up."""
+        command = self._recovery.command()
+        if command is not None:
+            self._gait = None
+        return command
+
+    def _turning(self, left: float) -> JointCommand:
         here = self._body.position[:2]
         if self._pivot is None:
             self._pivot = here
         if math.dist(here, self._pivot) >= _TURNING_RADIUS_M:
-            return self._towards(self._pivot, call)
-        return self._with_pattern(CRAWL).command(left)._replace(call=call)
+            return self._towards(self._pivot)
+        return self._with_pattern(CRAWL).command(left)
 
-    def rest(self, call: Call = Call.none) -> JointCommand:
-        """See `Locomotion.rest`."""
-        return self._with_pattern(KNEEL).command()._replace(call=call)
-
-    def back(self, call: Call = Call.none) -> JointCommand:
-        """See `Locomotion.back`."""
-        return self._with_pattern(BACK).command()._replace(call=call)
-
-    def _towards(self, place: Floats, call: Call) -> JointCommand:
-        bearing = bearing_rad(self._body, place)
-        return self._with_pattern(CRAWL).towards(bearing)._replace(call=call)
+    def _towards(self, place: Floats) -> JointCommand:
+        return self._with_pattern(CRAWL).towards(bearing_rad(self._body, place))
 
     def _with_pattern(self, pattern: GaitPattern) -> CrawlGait:
         """Return the current gait, or a new one if the pattern changes."""
-        if self._gait.pattern is not pattern:
+        if self._gait is None or self._gait.pattern is not pattern:
             self._gait = CrawlGait(self._body, self._step_s, pattern)
         return self._gait
 
@@ -184,7 +195,7 @@ def locomotion_of(player: Player, step_s: float) -> Locomotion:
     """Return the `Locomotion` for a player's kind of body.
 
     Args:
-        player: The player; a joint-level body must be on hands and knees now.
+        player: The player; a joint-level body must be on hands and knees, or lie, now.
         step_s: Duration of an environment step.
     """
     if isinstance(player.body, Humanoid):

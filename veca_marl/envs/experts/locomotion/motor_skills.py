@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from veca_marl.envs.core.expert import Expert, register_expert
 from veca_marl.envs.core.task import Player, Task, require_humanoid
 from veca_marl.envs.experts.control.locomotion import CrawlLocomotion
+from veca_marl.envs.experts.control.turn_over import TurnOver
 from veca_marl.envs.experts.skills.running import Running
 from veca_marl.envs.experts.skills.sit_up import SitUp
-from veca_marl.envs.experts.skills.turn_over import TurnOver
 from veca_marl.envs.tasks.locomotion.crawl_baby import CrawlBaby
 from veca_marl.sim.body.humanoid import JointCommand
 from veca_marl.sim.geometry import Floats
@@ -68,7 +68,8 @@ class SitBabyExpert(SkillExpert):
 class CrawlBabyExpert(Expert[CrawlBaby]):
     """Crawls straight ahead with an open-loop gait and feedback from its heading.
 
-    Reads position and heading from the simulator (privileged).
+    After a fall on its back or a side it gets up again; see `GetUp`. Reads position
+    and heading from the simulator (privileged).
     """
 
     reads = ()

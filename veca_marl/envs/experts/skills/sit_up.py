@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import math
 
+from veca_marl.envs.experts.control.get_up import GetUp
 from veca_marl.envs.experts.control.key_poses import KeyPoses
 from veca_marl.envs.experts.control.seated_balance import SeatedBalance
-from veca_marl.envs.experts.skills.turn_over import TurnOver
 from veca_marl.sim.body.humanoid import Humanoid, JointCommand
 from veca_marl.sim.body.humanoid.postures import Posture
 from veca_marl.sim.geometry import Floats
@@ -21,39 +21,8 @@ _KNEELING = {
     "foot.dorsiflexion": -52,
     "upper_arm.internal_rotation": 11,
 }
-# set by hand; those up to "push" then improved by a random search, as those of `turn_over`
+# set by hand
 _POSES = {
-    # on the belly: hands beside the shoulders, knees bent
-    "prepare": Posture(
-        joints_deg={
-            "upper_arm.flexion": 70,
-            "upper_arm.abduction": 33,
-            "upper_arm.internal_rotation": -6,
-            "forearm.flexion": 126,
-            "thigh.flexion": -7,
-            "thigh.abduction": 20,
-            "shank.flexion": 88,
-            "spine.flexion": 12,
-            "neck.flexion": -40,
-            "foot.dorsiflexion": -44,
-        }
-    ),
-    # arms extended, knees under the hips
-    "push": Posture(
-        joints_deg={
-            "upper_arm.flexion": 79,
-            "upper_arm.abduction": 20,
-            "upper_arm.internal_rotation": 3,
-            "forearm.flexion": 38,
-            "hand.flexion": -44,
-            "thigh.flexion": 102,
-            "thigh.abduction": 40,
-            "shank.flexion": 131,
-            "spine.flexion": -15,
-            "neck.flexion": -44,
-            "foot.dorsiflexion": -43,
-        }
-    ),
     # hips on the heels, trunk bent forwards by 50 degrees, supported by straight arms
     "sit": Posture(
         joints_deg={
@@ -80,10 +49,8 @@ _POSES = {
         }
     ),
 }
-_SPEEDS_RADPS = {"prepare": 10.0, "push": 10.0, "sit": 4.0}
-_DURATION_S = {"lie": 0.4, "prepare": 0.5, "push": 1.1, "sit": 1.0, "rise": 1.5}
-_NEXT_STAGE = {"lie": "prepare", "prepare": "push", "push": "sit", "sit": "rise"}
-_ON_BELLY = 0.7  # cosine of the angle between the front of the chest and straight down
+_SIT_RADPS = 4.0
+_SIT_S, _RISE_S = 1.0, 1.5
 _FAILED_M = 0.12  # below this height of the top of the chest the attempt has failed
 _HORIZON = 0.5  # before rising: prediction of the joint angles in agent steps; 1 damps more
 _BENT_AT_FIRST, _RISING_S = 0.8, 0.5  # share of the bend at the start; time from bent to upright
@@ -105,16 +72,16 @@ class SitUp:
 
     def __init__(self, body: Humanoid, step_s: float) -> None:
         self._body, self._step_s = body, step_s
-        self._turn = TurnOver(body, step_s)
+        self._get_up = GetUp(body, step_s)
         self._key_poses = KeyPoses(body, _POSES, step_s)
         self._balance = SeatedBalance(body, _POSES["rise"], _POSES["sit"], integral_gain=0.0)
-        self._stage, self._elapsed_s, self._bend = "lie", 0.0, _BENT_AT_FIRST
+        self._stage, self._elapsed_s, self._bend = "get up", 0.0, _BENT_AT_FIRST
         self.reset()
 
     def reset(self) -> None:
-        """Start with turning over."""
-        self._begin("lie")
-        self._turn.reset()
+        """Start with getting up onto hands and knees."""
+        self._get_up.reset()
+        self._begin("get up")
 
     def command(self) -> JointCommand:
         """Return the target angles of the next step."""
@@ -124,13 +91,11 @@ class SitUp:
         return command
 
     def _stage_command(self) -> JointCommand:
+        if self._stage == "get up":
+            return self._get_up.command()
         if self._stage == "rise":
             return JointCommand(self._rising(), self._step_s)
-        if self._stage == "lie":
-            if not self._body.bone("chest").forward[2] < -_ON_BELLY:
-                self._elapsed_s = 0.0
-            return JointCommand(self._turn.command(), _HORIZON * self._step_s)
-        targets = self._key_poses.toward(self._stage, _SPEEDS_RADPS[self._stage])
+        targets = self._key_poses.toward("sit", _SIT_RADPS)
         return JointCommand(targets, _HORIZON * self._step_s)
 
     def _rising(self) -> Floats:
@@ -146,14 +111,16 @@ class SitUp:
         return math.atan2(way @ self._body.forward, -way[2]) > _ON_HEELS_RAD
 
     def _advance_stage(self) -> None:
-        late = self._elapsed_s >= _DURATION_S[self._stage]
-        if late and self._stage in _NEXT_STAGE:
-            self._begin(_NEXT_STAGE[self._stage])
-        elif late and self._body.bone("neck").position[2] < _FAILED_M:
+        if self._stage == "get up" and self._get_up.is_complete:
+            self._key_poses.reset(self._get_up.targets)
+            self._begin("sit")
+        elif self._stage == "sit" and self._elapsed_s >= _SIT_S:
+            self._begin("rise")
+        elif self._stage == "rise" and self._has_failed():
             self.reset()
 
+    def _has_failed(self) -> bool:
+        return self._elapsed_s >= _RISE_S and self._body.bone("neck").position[2] < _FAILED_M
+
     def _begin(self, stage: str) -> None:
-        self._stage, self._elapsed_s = stage, 0.0
-        self._bend = _BENT_AT_FIRST
-        if stage == "prepare":
-            self._key_poses.reset()
+        self._stage, self._elapsed_s, self._bend = stage, 0.0, _BENT_AT_FIRST

@@ -1,0 +1,56 @@
+"""A crawling body that has fallen on its back gets up and goes on."""
+
+import math
+
+import numpy as np
+import pytest
+from composed import compose
+
+from veca_marl.envs.core.game import Game
+from veca_marl.envs.core.team import Script
+from veca_marl.envs.experts.control.fall_recovery import FallRecovery
+from veca_marl.sim.body.humanoid.postures import ON_ALL_FOURS, ON_BACK, ON_BELLY
+
+
+@pytest.fixture(scope="module")
+def game():
+    game = Game(compose(["+task=CrawlBaby", "senses/touch=numb", "task.max_seconds=60"]).game)
+    yield game
+    game.close()
+
+
+def crawl(game, seconds):
+    """Let the expert play; return the distance that the body comes ahead."""
+    body = game.players[0].body
+    start = body.position
+    for _ in range(round(seconds / game.cfg.clock.step_s)):
+        game.play_script(game.players[0], Script.expert)
+        game.advance()
+    return math.dist(body.position[:2], start[:2])
+
+
+@pytest.mark.parametrize("posture", [ON_BACK, ON_BELLY], ids=["back", "belly"])
+@pytest.mark.parametrize("seed", [0, 1, pytest.param(2, marks=pytest.mark.slow)])
+def test_after_a_fall_the_expert_gets_up_and_crawls_on(game, posture, seed):
+    rng = np.random.default_rng(seed)
+    game.reset(rng)
+    body, player = game.players[0].body, game.players[0]
+    game.expert_of(player).reset()
+    assert crawl(game, 1.0) > 0.05
+    body.place((0.0, 0.0, 0.0), rng.uniform(-math.pi, math.pi), body.perturb(posture, 8.0, rng))
+    crawl(game, 4.0)
+    assert body.bone("chest").forward[2] < -0.6
+    assert crawl(game, 6.0) > 0.6
+
+
+def test_a_body_that_crawls_is_left_alone_and_one_that_stays_on_its_back_is_not(game):
+    game.reset(np.random.default_rng(5))
+    body = game.players[0].body
+    recovery = FallRecovery(body, game.cfg.clock.step_s)
+    body.place((0.0, 0.0, 0.0), 0.0, ON_ALL_FOURS)
+    assert [recovery.command() for _ in range(50)] == [None] * 50
+    body.place((0.0, 0.0, 0.0), 0.0, ON_BACK)
+    steps = round(0.4 / game.cfg.clock.step_s)
+    commands = [recovery.command() for _ in range(steps + 1)]
+    assert commands[: steps - 1] == [None] * (steps - 1)
+    assert commands[-1] is not None
