@@ -40,6 +40,9 @@ class AlgorithmCfg:
     def check_batch(self, worlds: int, steps: int) -> None:
         """Raise `ValueError` if batches of so many worlds and steps cannot be learnt from."""
 
+    def check_budget(self, frames: int) -> None:
+        """Raise `ValueError` if nothing is learnt from so many frames of a run."""
+
 
 class Algorithm(ABC):
     """Learns one team.

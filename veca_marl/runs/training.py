@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from tensordict.nn import TensorDictModuleBase
+from torchrl import timeit
 
 from veca_marl.algos.collection.workers import WorkerError
 from veca_marl.algos.training.loop import Trainer
@@ -59,7 +60,8 @@ class LastVideo:
         """Record it; an exception is kept for `check`."""
         trainer = self._trainer
         try:
-            record_episode(self._path, self._game, trainer.policy.play, trainer.evaluation_seed)
+            with timeit("evaluate/video"):
+                record_episode(self._path, self._game, trainer.policy.play, trainer.evaluation_seed)
         except WorkerError:  # of the evaluation, which ends the run
             raise
         except Exception as error:
@@ -99,14 +101,15 @@ def run_training(
         comparison = trainer.run()
         if video is not None:
             video.check()
+    timing = trainer.timing()
     if folder is not None:
-        folder.write("timing.txt", trainer.timing())
+        folder.write("timing.txt", timing)
         folder.write("comparison.txt", "\n".join(comparison))  # last: the run is complete
     return TrainingResult(
         memory.rows["metrics"],
         memory.rows["evaluations"],
         comparison,
         trainer.policy.play,
-        trainer.timing(),
+        timing,
         None if folder is None else folder.path,
     )
