@@ -14,7 +14,9 @@ from veca_marl.algos.training.stored import load_actor
 from veca_marl.config import ConfigError, compose, compose_node, to_config
 from veca_marl.runs.assembly import decide_precision, make_trainer, read_specs
 from veca_marl.runs.run_folder import RunFolder
+from veca_marl.runs.run_progress import RunProgress
 from veca_marl.runs.training import run_training
+from veca_marl.sweeps.run_state import RunState, read_run
 
 register()
 KICK = "+task=KickTheBall"
@@ -145,6 +147,37 @@ def test_a_replay_buffer_that_does_not_fit_is_refused_before_the_run():
     message = r"the replay buffers take \d+\.\d+ GB of memory.*change algo.replay.capacity"
     with pytest.raises(ConfigError, match=message):
         run_training(compose([*SMALL, "algo=sac", "algo.replay.capacity=10_000_000_000"]))
+
+
+def test_a_run_without_loggers_stores_how_far_it_has_come(tmp_path, monkeypatch):
+    stored = []
+    monkeypatch.setattr(
+        RunFolder, "write_progress", lambda _, progress: stored.append((progress, rest(tmp_path)))
+    )
+    node = compose_node([*SMALL, "log.logger=[]"])
+    folder = RunFolder(tmp_path)
+    folder.begin(node, [])
+    run_training(to_config(node), folder)
+    written = [(progress.frames, progress.ended) for progress, _ in stored]
+    assert written == [(0, False), (32, False), (64, False), (64, True)]
+    assert ["comparison.txt" in files for _, files in stored] == [False, False, False, True]
+    folder.begin_again(node, [], 64)
+    assert stored[-1][0] == RunProgress(64, False)
+
+
+def rest(folder):
+    return {path.name for path in folder.iterdir()}
+
+
+def test_a_sweep_knows_that_a_run_without_loggers_has_ended(tmp_path):
+    node = compose_node([*SMALL, "log.logger=[]"])
+    folder = RunFolder(tmp_path)
+    folder.begin(node, [])
+    run_training(to_config(node), folder)
+    run = read_run(tmp_path)
+    assert run.rows("evaluations") == []
+    assert run.state(64, None) is RunState.finished
+    assert run.state(65, None) is RunState.unfinished
 
 
 def sac(warm_up_frames):

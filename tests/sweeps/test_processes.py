@@ -128,6 +128,9 @@ def test_the_line_of_progress_has_frames_and_the_time_left(tmp_path):
     (tmp_path / "metrics.csv").write_text("frames,iteration\n40,1\n80,2\n")
     assert frames_so_far(tmp_path) == 80
     assert frames_so_far(tmp_path / "none") == 0
+    (tmp_path / "metrics.csv").unlink()
+    (tmp_path / "progress.json").write_text('{"frames": 64, "ended": false}')
+    assert frames_so_far(tmp_path) == 64
     now = 0.0
     out = io.StringIO()
     progress = Progress(400, 4, out, lambda: now)

@@ -12,12 +12,13 @@ from torchrl import timeit
 
 from veca_marl.algos.collection.workers import WorkerError
 from veca_marl.algos.training.loop import Trainer
-from veca_marl.algos.training.reporters import MemoryReporter
+from veca_marl.algos.training.reporters import MemoryReporter, Reporter, Row
 from veca_marl.config import Config
 from veca_marl.envs.core.game_cfg import GameCfg
 from veca_marl.runs.assembly import make_reporters, make_trainer
 from veca_marl.runs.recording import record_episode
 from veca_marl.runs.run_folder import RunFolder
+from veca_marl.runs.run_progress import RunProgress
 
 
 @dataclass(frozen=True)
@@ -39,6 +40,29 @@ class TrainingResult:
     policy: TensorDictModuleBase
     timing: str
     folder: Path | None
+
+
+class ProgressReporter:
+    """Writes ``progress.json`` with each checkpoint.
+
+    Args:
+        folder: Folder of the run.
+        frames: Frames after which the run begins or continues.
+    """
+
+    def __init__(self, folder: RunFolder, frames: int) -> None:
+        self._folder, self._frames = folder, frames
+
+    def write(self, kind: str, frames: int, row: Row) -> None:
+        """See `Reporter`; only the number of frames is kept."""
+        self._frames = frames
+
+    def sync(self) -> None:
+        """See `Reporter`."""
+        self._folder.write_progress(RunProgress(self._frames, ended=False))
+
+    def close(self) -> None:
+        """See `Reporter`; nothing is pending."""
 
 
 class LastVideo:
@@ -90,7 +114,7 @@ def run_training(
     trainer = trainer or make_trainer(cfg, folder)
     memory = MemoryReporter()
     with ExitStack() as pending:
-        written = [] if folder is None else make_reporters(cfg, folder, trainer.progress.frames)
+        written = [] if folder is None else _make_reporters(cfg, folder, trainer.progress.frames)
         for reporter in written:
             pending.callback(reporter.close)
         trainer.reporters = [memory, *written]
@@ -104,7 +128,8 @@ def run_training(
     timing = trainer.timing()
     if folder is not None:
         folder.write("timing.txt", timing)
-        folder.write("comparison.txt", "\n".join(comparison))  # last: the run is complete
+        folder.write("comparison.txt", "\n".join(comparison))
+        folder.write_progress(RunProgress(trainer.progress.frames, ended=True))  # last
     return TrainingResult(
         memory.rows["metrics"],
         memory.rows["evaluations"],
@@ -113,3 +138,8 @@ def run_training(
         timing,
         None if folder is None else folder.path,
     )
+
+
+def _make_reporters(cfg: Config, folder: RunFolder, frames: int) -> list[Reporter]:
+    """Return the loggers of a run, and what writes its progress, which needs none of them."""
+    return [*make_reporters(cfg, folder, frames), ProgressReporter(folder, frames)]
