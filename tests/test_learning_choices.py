@@ -12,9 +12,11 @@ from veca_marl.algos.ppo import PPOCfg
 from veca_marl.algos.training.loggers import LoggerKind
 from veca_marl.algos.training.stored import load_actor
 from veca_marl.config import ConfigError, compose, compose_node, to_config
-from veca_marl.runs.assembly import decide_precision, read_specs
+from veca_marl.runs.assembly import decide_precision, make_trainer, read_specs
 from veca_marl.runs.run_folder import RunFolder
+from veca_marl.runs.run_progress import RunProgress
 from veca_marl.runs.training import run_training
+from veca_marl.sweeps.run_state import RunState, read_run
 
 register()
 KICK = "+task=KickTheBall"
@@ -101,6 +103,9 @@ def test_a_recurrent_policy_is_trained_recorded_and_loaded(tmp_path):
     cfg = compose([*SMALL, *memory, "log.video=true", "log.keep_checkpoints=1"])
     result = run_training(cfg, RunFolder(tmp_path))
     assert (tmp_path / "videos" / "final.mp4").stat().st_size > 0
+    assert (tmp_path / "timing.txt").read_text() == f"{result.timing}\n"
+    seconds = {line.split()[0]: float(line.split()[1]) for line in result.timing.splitlines()[1:]}
+    assert 0.0 < seconds["evaluate/video"] <= seconds["evaluate"] <= seconds["total"]
     assert result.metrics[-1]["agents/kl"] >= 0.0
     actor = load_actor(tmp_path, "agents", read_specs(cfg.game)["agents"])
     assert ("agents", "memory", "hidden") in actor.in_keys
@@ -142,6 +147,74 @@ def test_a_replay_buffer_that_does_not_fit_is_refused_before_the_run():
     message = r"the replay buffers take \d+\.\d+ GB of memory.*change algo.replay.capacity"
     with pytest.raises(ConfigError, match=message):
         run_training(compose([*SMALL, "algo=sac", "algo.replay.capacity=10_000_000_000"]))
+
+
+def test_a_run_without_loggers_stores_how_far_it_has_come(tmp_path, monkeypatch):
+    stored = []
+    monkeypatch.setattr(
+        RunFolder, "write_progress", lambda _, progress: stored.append((progress, rest(tmp_path)))
+    )
+    node = compose_node([*SMALL, "log.logger=[]"])
+    folder = RunFolder(tmp_path)
+    folder.begin(node, [])
+    run_training(to_config(node), folder)
+    written = [(progress.frames, progress.ended) for progress, _ in stored]
+    assert written == [(0, False), (32, False), (64, False), (64, True)]
+    assert ["comparison.txt" in files for _, files in stored] == [False, False, False, True]
+    folder.begin_again(node, [], 64)
+    assert stored[-1][0] == RunProgress(64, False)
+
+
+def rest(folder):
+    return {path.name for path in folder.iterdir()}
+
+
+def test_a_sweep_knows_that_a_run_without_loggers_has_ended(tmp_path):
+    node = compose_node([*SMALL, "log.logger=[]"])
+    folder = RunFolder(tmp_path)
+    folder.begin(node, [])
+    run_training(to_config(node), folder)
+    run = read_run(tmp_path)
+    assert run.rows("evaluations") == []
+    assert run.state(64, None) is RunState.finished
+    assert run.state(65, None) is RunState.unfinished
+
+
+def sac(warm_up_frames):
+    replay = ["algo.replay.capacity=200", f"algo.replay.warm_up_frames={warm_up_frames}"]
+    return [*SMALL, "algo=sac", "algo.batch_size=8", *replay]
+
+
+def test_a_budget_without_an_update_is_refused_before_the_run(tmp_path):
+    message = r"total_frames=63: the 64 frames end before .* algo.replay.warm_up_frames=65"
+    with pytest.raises(ConfigError, match=message):
+        run_training(compose([*sac(65), "total_frames=63"]), RunFolder(tmp_path))
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_run_that_starts_from_another_one_needs_frames_for_an_update_too(tmp_path):
+    run_training(compose(sac(16)), RunFolder(tmp_path))
+    with pytest.raises(ConfigError, match=r"total_frames=64: .*warm_up_frames=65"):
+        make_trainer(compose([*sac(65), f"init_from.agents={tmp_path}"]))
+
+
+@pytest.mark.parametrize("stored", [False, True])
+def test_a_resumed_run_that_ends_before_its_buffer_is_full_again_says_so(tmp_path, caplog, stored):
+    stored_rows = f"algo.replay.in_checkpoint={stored}"
+    run_training(compose([*sac(48), stored_rows]), RunFolder(tmp_path))
+    resumed = [*sac(48), stored_rows, f"resume={tmp_path}"]
+    make_trainer(compose(resumed), RunFolder(tmp_path))
+    assert not warnings(caplog), "nothing is left to learn"
+    make_trainer(compose([*resumed, "total_frames=96"]), RunFolder(tmp_path))
+    said = (
+        "team 'agents' learns nothing more: from frame 64 to total_frames=96, the 32 frames end "
+        "before the first update, which needs algo.replay.warm_up_frames=48"
+    )
+    assert warnings(caplog) == ([] if stored else [said])
+
+
+def warnings(caplog):
+    return [record.getMessage() for record in caplog.records if record.levelname == "WARNING"]
 
 
 def test_intrinsic_rewards_are_chosen_by_name_also_for_a_team():

@@ -18,7 +18,7 @@ from hydra.plugins.launcher import Launcher
 from hydra.types import HydraContext, TaskFunction
 from omegaconf import DictConfig, OmegaConf, open_dict
 
-from veca_marl.sweeps.cores import default_jobs, usable_cores
+from veca_marl.sweeps.cores import usable_cores
 from veca_marl.sweeps.plans import Job, SweepError
 from veca_marl.sweeps.sweep import run_sweep
 
@@ -68,11 +68,13 @@ class ProcessLauncher(Launcher):
     """Runs each job in a process of its own, several at a time; see `veca_marl.sweeps`.
 
     Args:
-        jobs: Number of runs at a time; None is as many as the cores can run at once.
+        jobs: Largest number of runs at a time; None is as many as the cores can run at once. Fewer
+            run at a time where so many do not fit into the memory.
     """
 
     def __init__(self, jobs: int | None = None) -> None:
         self._jobs = jobs
+        self._nodes: dict[Path, DictConfig] = {}  # folder of a job to its configuration
 
     def setup(
         self, *, hydra_context: HydraContext, task_function: TaskFunction, config: DictConfig
@@ -88,6 +90,7 @@ class ProcessLauncher(Launcher):
         Raises:
             SweepError: If `jobs` is not positive, a folder holds a run of another configuration,
                 two jobs have the same folder, or some jobs failed.
+            ConfigError: If a run is impossible, or does not fit into the memory alone.
         """
         if self._jobs is not None and self._jobs < 1:
             raise SweepError(f"hydra.launcher.jobs must be at least 1, got {self._jobs}")
@@ -96,10 +99,16 @@ class ProcessLauncher(Launcher):
             self._job(list(overrides), initial_job_idx + number)
             for number, overrides in enumerate(job_overrides)
         ]
-        cores = usable_cores()
-        at_once = self._jobs or default_jobs([job.asked for job in jobs], cores)
-        run_sweep(jobs, at_once, max(1, cores // at_once))
+        run_sweep(jobs, self._jobs, usable_cores(), self._fit)
         return [JobReturn(job.overrides, status=JobStatus.COMPLETED) for job in jobs]
+
+    def _fit(self, jobs: Sequence[Job]) -> int:
+        """Return how many of the jobs fit on the machine together."""
+        # here, and not above: they import torch, which `train` has loaded
+        from veca_marl.config import to_config
+        from veca_marl.runs.simultaneous import runs_at_once
+
+        return runs_at_once({job.name: to_config(self._nodes[job.folder]) for job in jobs})
 
     def _job(self, overrides: list[str], number: int) -> Job:
         config = self._context.config_loader.load_sweep_config(self._config, overrides)
@@ -116,6 +125,7 @@ class ProcessLauncher(Launcher):
         with open_dict(config):
             del config["hydra"]
         asked = yaml.safe_load(OmegaConf.to_yaml(config, resolve=True))
+        self._nodes[sweep / name] = config
         return Job(name, sweep / name, [*shared, *overrides], asked)
 
 

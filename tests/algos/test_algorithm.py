@@ -28,7 +28,7 @@ from veca_marl.algos.training.learners import TeamLearners
 from veca_marl.algos.training.loop import Trainer
 from veca_marl.algos.training.progress import Budget
 from veca_marl.algos.training.reporters import CsvReporter, MemoryReporter
-from veca_marl.algos.training.stored import load_actor, load_algorithm
+from veca_marl.algos.training.stored import load_actor, load_learnt
 
 register()
 CPU = torch.device("cpu")
@@ -133,7 +133,7 @@ def test_a_file_for_playing_gives_the_same_actions(make_trainer, tmp_path, cfg):
 def test_a_run_starts_from_what_another_one_learnt(make_trainer, tmp_path, cfg):
     trainer = make_trainer("run", cfg, 4)
     trainer.run()
-    stored = load_algorithm(tmp_path / "run", "agents", specs_of()["agents"])
+    stored = load_learnt(tmp_path / "run", "agents", specs_of()["agents"])
     fresh = make_algorithm("agents", specs_of()["agents"], cfg, CPU)
     fresh.init_from(stored)
     assert equal(fresh.actor.state_dict(), trainer.learners.algorithms["agents"].actor.state_dict())

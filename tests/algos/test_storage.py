@@ -15,6 +15,7 @@ from veca_marl.algos.storage import (
     check_storage,
     reserve_disk,
     reserve_memory,
+    runs_that_fit,
 )
 
 
@@ -45,6 +46,24 @@ def test_disk_space_is_checked_by_folder(machine, tmp_path):
     assert not list(tmp_path.iterdir())
     with pytest.raises(ValueError, match=rf"take 30.00 GB of disk space in {tmp_path}/data"):
         check_storage({"red": need, "blue": need})
+
+
+def test_so_many_runs_fit_that_any_of_them_fit_together(machine, tmp_path, monkeypatch):
+    """90 % of 10 GB of memory and of 20 GB of disk space may be used."""
+
+    def run(memory_gb, disk_gb=0, folder=None):
+        half = StorageNeeded(memory_gb * 10**9 // 2, disk_gb * 10**9, folder)
+        return {"red": half, "blue": StorageNeeded(memory_gb * 10**9 // 2)}
+
+    assert runs_that_fit([run(4)] * 3) == 2
+    assert runs_that_fit([run(1), run(8), run(1)]) == 2
+    assert runs_that_fit([run(1), run(8), run(0)]) == 3
+    assert runs_that_fit([run(0)] * 5) == 5
+    assert runs_that_fit([run(10), run(1)]) == 0
+    assert runs_that_fit([run(1, 9, tmp_path)] * 3) == 2
+    assert runs_that_fit([run(1, 9, tmp_path), run(1, 9, tmp_path / "b"), run(1)]) == 3
+    monkeypatch.setattr(storage, "available_memory", lambda: None)
+    assert runs_that_fit([run(10)] * 3) == 3
 
 
 def test_nothing_is_said_where_nothing_is_stored(machine):

@@ -1,5 +1,7 @@
 """Teams that start from other runs: whole teams, encoders of single senses, frozen encoders."""
 
+from pathlib import Path
+
 import pytest
 import torch
 from fake_env import make_fake_env
@@ -14,6 +16,7 @@ from veca_marl.algos.ppo import PPOCfg
 from veca_marl.algos.ppo.value_normalisation import ValueNormalisation
 from veca_marl.algos.sac import SACCfg
 from veca_marl.algos.sac.config import ReplayCfg
+from veca_marl.algos.sac.replay.buffer import Replay
 from veca_marl.algos.sense_encoders import sense_encoders
 from veca_marl.algos.specs import TeamSpec, team_specs
 from veca_marl.algos.training.checkpoint import CheckpointError, Checkpoints, Identity
@@ -29,6 +32,18 @@ def small_sac(**numbers):
     return SACCfg(batch_size=16, updates_per_frame=0.1, replay=replay, **numbers)
 
 
+def sac_with_stored_rows(folder, bytes_of_rows=0):
+    """Return SAC that has learnt, and its run, whose checkpoint contains the replay buffer."""
+    replay = ReplayCfg(capacity=256, warm_up_frames=16, in_checkpoint=True)
+    cfg = SACCfg(network=network(), batch_size=16, updates_per_frame=0.1, replay=replay)
+    learners = make_learners(seed=1, algo=cfg)
+    with torch.no_grad():
+        env = make_fake_env(4, 0, agents=2)
+        batch = env.rollout(16, learners.policy.collect, break_when_any_done=False)
+    learners.learn(batch)
+    return learners, store(learners, folder, {"more": torch.zeros(bytes_of_rows // 4)})
+
+
 def network(**numbers):
     return MultisenseCfg(**{**vars(SMALL), **numbers})
 
@@ -39,10 +54,11 @@ def make_learners(seed=0, algo=None, teams=("agents",), discrete=False, **number
     return TeamLearners(specs, algo or PPOCfg(network=network(**numbers)), CPU)
 
 
-def store(learners, folder):
+def store(learners, folder, more=None):
     checkpoints = Checkpoints(folder / "checkpoints", Identity("Toy", learners.specs), {})
     numbers = {team: to_plain(cfg) for team, cfg in learners.cfgs.items()}
     state = {"algorithm": learners.state_dict(), "actors": learners.actor_states()}
+    state |= more or {}
     checkpoints.save(state, 0, best=False, algorithms=numbers)
     return str(folder)
 
@@ -153,6 +169,36 @@ def test_the_message_names_the_layers_of_an_actor_that_another_algorithm_has_not
     there, here = make_learners(), make_learners(algo=SACCfg(network=network()))
     with pytest.raises(CheckpointError, match=r"they fit with algo.policy_hidden=\[\]"):
         init_teams(here, {"agents": store(there, tmp_path)}, {})
+
+
+def test_the_replay_buffer_of_the_other_run_is_not_rebuilt(tmp_path, monkeypatch):
+    there, source = sac_with_stored_rows(tmp_path)
+    written = []
+    monkeypatch.setattr(Replay, "_write", lambda replay, rows: written.append(len(rows)))
+    here = make_learners(seed=2, algo=small_sac(network=network()))
+    init_teams(here, {"agents": source}, {})
+    assert written == []
+    mine, other = (each.algorithms["agents"].network.state_dict() for each in (here, there))
+    assert all(torch.equal(mine[name], other[name]) for name in other)
+
+
+@pytest.mark.skipif(not Path("/proc/self/io").is_file(), reason="counts what Linux has read")
+@pytest.mark.parametrize("senses", [[], ["vision"]], ids=["team", "encoder"])
+def test_of_a_large_checkpoint_only_the_networks_are_read(tmp_path, senses):
+    size = 50_000_000
+    _, source = sac_with_stored_rows(tmp_path, size)
+    here = make_learners(seed=2, algo=small_sac(network=network()))
+    before = bytes_read()
+    if senses:
+        init_teams(here, {}, {"agents": dict.fromkeys(senses, source)})
+    else:
+        init_teams(here, {"agents": source}, {})
+    assert bytes_read() - before < 0.1 * size
+
+
+def bytes_read():
+    """Return the bytes that this process has read from files so far, page faults left out."""
+    return int(Path("/proc/self/io").read_text().split()[1])
 
 
 def test_a_frozen_team_starts_from_a_run_that_was_not_frozen(tmp_path):

@@ -28,6 +28,8 @@ def write_run(folder, config, evaluations, ended=True, seconds_per_frame=0.01, r
     )
     rate = 1.0 / seconds_per_frame
     table(folder / "metrics.csv", [{"frames": f, "frames_per_s": rate} for f, _ in evaluations])
+    progress = {"frames": max(frames for frames, _, _ in scores), "ended": ended}
+    (folder / "progress.json").write_text(json.dumps(progress))
     if ended:
         (folder / "comparison.txt").write_text("agents: ...\n")
 

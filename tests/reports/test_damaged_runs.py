@@ -18,6 +18,7 @@ EVALUATIONS = "frames,player,team,episodes,return\n0,random,agents,32,-0.5\n"
         ("config.yaml", b"\xff\xfe\xff", ""),
         ("provenance.json", b'{"commit": ', "Expecting value"),
         ("provenance.json", b"[]", "holds no object"),
+        ("progress.json", b'{"frames": 2', "is damaged: Expecting"),
         ("provenance.json", b"{}", "names neither a commit nor a version"),
         ("evaluations.csv", b"", "no column 'frames'"),
         ("evaluations.csv", b"frames,player\n0,random\n", "no column 'team'"),
@@ -67,6 +68,19 @@ def test_the_other_runs_are_reported_beside_a_damaged_one(tmp_path, arms, run, f
     assert "| hrtf | 2 | 6.50 [6.00, 7.00] |" in page
     assert "| hrtf | 1 | yes |" not in page
     assert "| mono | 3 |" in page
+
+
+@pytest.mark.parametrize("minutes", [None, 1.0])
+def test_a_run_without_evaluations_does_not_count(tmp_path, arms, minutes):
+    """It was logged without csv, and has all frames or was cut by its time."""
+    folder = run_folder(tmp_path, "hrtf", 0)
+    asked = {**arms["hrtf"], "max_minutes": minutes}
+    write_run(folder, {**asked, "seed": 0}, [(200 if minutes is None else 100, 1.0)])
+    (folder / "evaluations.csv").unlink()
+    ((found,), rows) = gather(tmp_path, {"hrtf": asked}, [0])
+    assert (found.counts, rows) == (False, [])
+    message = "not counted: it has no evaluations.csv (csv is not in its log.logger)"
+    assert found.remark == message
 
 
 def test_a_run_without_provenance_is_not_damaged(tmp_path, arms):

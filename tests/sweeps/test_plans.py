@@ -39,6 +39,35 @@ def test_a_run_that_has_ended_is_skipped(tmp_path):
     assert plan(job(tmp_path / "run")).action is Action.skip
 
 
+@pytest.mark.parametrize("version_0_2", [False, True])
+def test_the_loggers_of_a_run_have_no_influence(tmp_path, version_0_2):
+    """A run of version 0.2, without progress.json, is judged by its tables."""
+    folder = tmp_path / "run"
+    write_run(folder, CONFIG, [(100, 1.0), (200, 2.0)])
+    if version_0_2:
+        (folder / "progress.json").unlink()
+    else:
+        (folder / "evaluations.csv").unlink()
+        (folder / "metrics.csv").unlink()
+    assert plan(job(folder)).action is Action.skip
+    assert plan(job(folder, total_frames=400)).action is Action.resume
+
+
+def test_a_run_that_is_being_continued_has_not_ended(tmp_path):
+    """comparison.txt is that of the smaller budget, the last checkpoint has all frames."""
+    write_run(tmp_path / "run", {**CONFIG, "total_frames": 400}, [(200, 1.0), (400, 1.0)])
+    (tmp_path / "run" / "progress.json").write_text('{"frames": 400, "ended": false}')
+    assert plan(job(tmp_path / "run", total_frames=400)).action is Action.resume
+
+
+@pytest.mark.parametrize("content", ["", "[]", '{"frames": 3}', '{"frames": "x", "ended": true}'])
+def test_a_damaged_progress_is_named(tmp_path, content):
+    write_run(tmp_path / "run", CONFIG, [(200, 1.0)])
+    (tmp_path / "run" / "progress.json").write_text(content)
+    with pytest.raises(SweepError, match=r"run/progress.json is damaged: "):
+        plan(job(tmp_path / "run"))
+
+
 def test_a_run_that_was_interrupted_is_continued(tmp_path):
     write_run(tmp_path / "run", CONFIG, [(100, 1.0)], ended=False)
     made = plan(job(tmp_path / "run"))

@@ -113,7 +113,7 @@ def test_failed_runs_are_named_with_their_logs(tmp_path, monkeypatch, capsys):
     plans = [make(tmp_path, "a", "raise SystemExit(3)"), make(tmp_path, "b")]
     monkeypatch.setattr(sweep, "plan", lambda job: plans[job.name == "b"])
     with pytest.raises(SweepError, match=rf"^1 of 2 runs failed: a \({tmp_path / 'a'}.log\)$"):
-        run_sweep([plan.job for plan in plans], 2, 1)
+        run_sweep([plan.job for plan in plans], 2, 1, len)
     assert (
         "2 runs: 0 skipped (they have ended), 0 to continue, 2 to start" in capsys.readouterr().err
     )
@@ -121,13 +121,16 @@ def test_failed_runs_are_named_with_their_logs(tmp_path, monkeypatch, capsys):
 
 def test_two_jobs_with_one_folder_are_refused(tmp_path):
     with pytest.raises(SweepError, match=r"2 jobs have the folder .*a: set hydra.sweep.subdir"):
-        run_sweep([make(tmp_path, "a").job] * 2, 2, 1)
+        run_sweep([make(tmp_path, "a").job] * 2, 2, 1, len)
 
 
 def test_the_line_of_progress_has_frames_and_the_time_left(tmp_path):
     (tmp_path / "metrics.csv").write_text("frames,iteration\n40,1\n80,2\n")
     assert frames_so_far(tmp_path) == 80
     assert frames_so_far(tmp_path / "none") == 0
+    (tmp_path / "metrics.csv").unlink()
+    (tmp_path / "progress.json").write_text('{"frames": 64, "ended": false}')
+    assert frames_so_far(tmp_path) == 64
     now = 0.0
     out = io.StringIO()
     progress = Progress(400, 4, out, lambda: now)

@@ -5,17 +5,20 @@ from importlib import import_module
 
 import pytest
 
+from veca_marl.algos import storage
+
 TRAIN = import_module("veca_marl.train")
+sweep_module = import_module("veca_marl.sweeps.sweep")
 
 
 @pytest.fixture
 def sweep(tmp_path, monkeypatch):
-    """Return the jobs and the number at a time of a command; nothing is started."""
+    """Return jobs, largest number at a time and cores of a command; nothing is started."""
     monkeypatch.chdir(tmp_path)
     seen = []
 
-    def record(jobs, at_once, threads):
-        seen.extend([jobs, at_once, threads])
+    def record(jobs, most, cores, fit):
+        seen.extend([jobs, most, cores])
 
     def call(*words):
         seen.clear()
@@ -30,8 +33,8 @@ def sweep(tmp_path, monkeypatch):
 
 def test_every_arm_is_run_with_every_seed_in_a_folder_of_its_own(sweep):
     words = ["experiment.seeds=[5]", "experiment.arm=stereo,mono", "hydra.launcher.jobs=3"]
-    jobs, at_once, _ = sweep("+experiment=audio_ablation", *words)
-    assert at_once == 3
+    jobs, most, _ = sweep("+experiment=audio_ablation", *words)
+    assert most == 3
     arms = ["stereo", "mono"]
     assert [str(job.folder) for job in jobs] == [f"runs/audio_ablation/{a}/seed_5" for a in arms]
     assert [job.asked["senses"]["audio"]["quality"] for job in jobs] == arms
@@ -55,6 +58,54 @@ def test_the_jobs_find_presets_in_the_folder_of_config_dir(sweep, tmp_path):
     (job,), _, _ = sweep("--config-dir", str(own), "+task=KickTheBall", "clock=slow")
     assert job.asked["clock"]["control_rate_hz"] == 10
     assert job.overrides[0] == f"--config-dir={own}"
+
+
+@pytest.fixture
+def sac_sweep(tmp_path, monkeypatch):
+    """Return how many of four runs, each with a buffer, run at a time and their threads."""
+    monkeypatch.chdir(tmp_path)
+    seen = []
+    monkeypatch.setattr(sweep_module, "run_all", lambda _, *numbers: seen.extend(numbers) or [])
+    monkeypatch.setattr(sys.modules["hydra_plugins.veca_marl_sweeps"], "usable_cores", lambda: 4)
+
+    def call(available_gb, *words):
+        seen.clear()
+        monkeypatch.setattr(storage, "available_memory", lambda: int(available_gb * 1e9))
+        small = ["senses/vision=blind", "senses/touch=numb", "threads=1"]
+        small += ["collect.processes=1", "collect.threads=1"]
+        monkeypatch.setattr(sys, "argv", ["train", "-m", *SAC_SWEEP, *small, *words])
+        TRAIN.main()
+        return tuple(seen[:2])
+
+    return call
+
+
+SAC_SWEEP = ["+task=KickTheBall", "algo=sac", "seed=0,1,2,3", "algo.replay.capacity=400_000"]
+
+
+def test_runs_that_do_not_fit_into_the_memory_together_wait(sac_sweep, capsys):
+    """Four cores; each run takes 0.81 GB for its replay buffer, 1.45 GB for its processes."""
+    assert sac_sweep(20.0) == (4, 1)
+    assert "at most 4 at a time\n" in capsys.readouterr().err
+    assert sac_sweep(6.0) == (2, 2)
+    assert "at most 2 at a time, because 4 do not fit into the memory" in capsys.readouterr().err
+    assert sac_sweep(6.0, "hydra.launcher.jobs=1") == (1, 4)
+    assert sac_sweep(1.5) == (1, 4)
+
+
+def test_a_run_that_does_not_fit_alone_ends_the_sweep_before_anything_is_started(sac_sweep, capsys):
+    with pytest.raises(SystemExit) as ended:
+        sac_sweep(0.8)
+    assert ended.value.code == 2
+    message = capsys.readouterr().err
+    assert "seed_0: the replay buffers take 0.81 GB of memory, and 0.80 GB are available" in message
+    assert "change algo.replay.capacity" in message
+
+
+def test_runs_that_have_ended_need_no_memory(sac_sweep, monkeypatch):
+    job = import_module("veca_marl.sweeps.plans")
+    monkeypatch.setattr(sweep_module, "plan", lambda one: job.Plan(one, job.Action.skip))
+    assert sac_sweep(0.1)[0] >= 1
 
 
 @pytest.mark.parametrize(

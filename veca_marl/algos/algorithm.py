@@ -40,6 +40,9 @@ class AlgorithmCfg:
     def check_batch(self, worlds: int, steps: int) -> None:
         """Raise `ValueError` if batches of so many worlds and steps cannot be learnt from."""
 
+    def check_budget(self, frames: int) -> None:
+        """Raise `ValueError` if nothing is learnt from so many frames of a run."""
+
 
 class Algorithm(ABC):
     """Learns one team.
@@ -105,6 +108,14 @@ class Algorithm(ABC):
     @abstractmethod
     def load_state_dict(self, state: dict[str, Any]) -> None:
         """Continue from `state_dict`."""
+
+    def load_learnt(self, state: dict[str, Any]) -> None:
+        """Load what `init_from` of another algorithm copies out of a `state_dict`.
+
+        This method loads everything. An algorithm with a large state beside its networks (a replay
+        buffer) leaves that out.
+        """
+        self.load_state_dict(state)
 
     def init_from(self, other: Algorithm) -> None:
         """Copy the parameters of `other`, an algorithm from another run, before learning begins.

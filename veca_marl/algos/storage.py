@@ -10,8 +10,9 @@ from __future__ import annotations
 import math
 import os
 import shutil
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import accumulate
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -64,13 +65,39 @@ def check_storage(needed: Mapping[str, StorageNeeded]) -> list[str]:
     memory = sum(need.memory_bytes for need in needed.values())
     if memory:
         lines.append(_check("memory", memory, available_memory(), settings))
-    folders = {need.folder for need in needed.values() if need.folder is not None}
-    for folder in sorted(folders):
+    for folder in _folders([needed]):
         there = [need for need in needed.values() if need.folder == folder]
         _check_folder(folder, there[0].settings)
         disk, free = sum(need.disk_bytes for need in there), available_disk(folder)
         lines.append(_check(f"disk space in {folder}", disk, free, there[0].settings))
     return lines
+
+
+def runs_that_fit(needs: Sequence[Mapping[str, StorageNeeded]]) -> int:
+    """Return the largest number of runs of which any so many fit at the same time.
+
+    Args:
+        needs: For each run what its teams need, see `check_storage`.
+    """
+    memory = available_memory()
+    sizes = [sum(need.memory_bytes for need in run.values()) for run in needs]
+    numbers = [len(needs)] if memory is None else [_any_fit(sizes, memory)]
+    for folder in _folders(needs):
+        taken = [
+            sum(need.disk_bytes for need in run.values() if need.folder == folder) for run in needs
+        ]
+        numbers.append(_any_fit(taken, available_disk(folder)))
+    return min(numbers)
+
+
+def _folders(needs: Iterable[Mapping[str, StorageNeeded]]) -> list[Path]:
+    """Return the folders in which something is stored."""
+    return sorted({n.folder for run in needs for n in run.values() if n.folder is not None})
+
+
+def _any_fit(sizes: Sequence[int], available: int) -> int:
+    """Return how many of the largest sizes fit together: any other choice of so many does too."""
+    return sum(total <= _SHARE * available for total in accumulate(sorted(sizes, reverse=True)))
 
 
 def _check_folder(folder: Path, settings: str) -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from veca_marl.algos.training.checkpoint import CheckpointError
 from veca_marl.algos.training.learners import TeamLearners
-from veca_marl.algos.training.stored import load_algorithm, load_encoders, teams_learnt
+from veca_marl.algos.training.stored import load_encoders, load_learnt, teams_learnt
 
 
 def init_teams(
@@ -37,7 +37,7 @@ def init_teams(
 
 def _init_team(learners: TeamLearners, team: str, source: str) -> None:
     path, there = _find(source, team)
-    stored = load_algorithm(path, there, learners.specs[team])
+    stored = load_learnt(path, there, learners.specs[team])
     try:
         learners.algorithms[team].init_from(stored)
     except ValueError as error:

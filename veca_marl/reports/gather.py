@@ -94,7 +94,8 @@ def _status(run: StoredRun, arm: str, asked: Mapping[str, Any]) -> tuple[Found, 
     others = key_patterns(d.key for d in differing)
     if others:
         remark = f"{remark}; stored by a version with other keys: {', '.join(others)}".lstrip("; ")
-    return Found(*base, budget.counts(state, evaluated), remark), True
+    counts = bool(evaluated) and budget.counts(state, evaluated)
+    return Found(*base, counts, remark), True
 
 
 def evaluated_frames(rows: Iterable[Mapping[str, str]]) -> list[int]:
@@ -103,9 +104,11 @@ def evaluated_frames(rows: Iterable[Mapping[str, str]]) -> list[int]:
 
 
 def _remark(run: StoredRun, state: RunState, asked: Mapping[str, Any]) -> str:
+    if state in (RunState.finished, RunState.cut) and not run.rows("evaluations"):
+        return "not counted: it has no evaluations.csv (csv is not in its log.logger)"
     if state is RunState.finished:
         return ""
-    reached = f"{run.frames} of {asked['total_frames']} frames"
+    reached = f"{run.progress.frames} of {asked['total_frames']} frames"
     if state is RunState.cut:
         return f"cut by max_minutes={asked['max_minutes']} at {reached}"
     return f"unfinished: {reached}; shown, not counted"

@@ -45,12 +45,13 @@ def read_checked_run(folder: Path) -> tuple[StoredRun, str]:
 
 @contextmanager
 def _naming(path: Path) -> Iterator[None]:
-    """Turn errors of reading a file into one sentence that names it."""
+    """Turn errors of reading a file into one sentence that names it, or another file beside it."""
     try:
         yield
     except (ValueError, OSError, csv.Error) as error:
         reason = " ".join(str(error).split())
-        raise DamagedRunError(reason if str(path) in reason else f"{path}: {reason}") from error
+        named = str(path.parent) in reason
+        raise DamagedRunError(reason if named else f"{path}: {reason}") from error
 
 
 def _check_keys(config: dict[str, Any]) -> None:

@@ -59,8 +59,8 @@ def make_trainer(cfg: Config, folder: RunFolder | None = None) -> Trainer:
         folder: Folder of the run; None stores nothing.
 
     Raises:
-        ConfigError: If the device does not exist, no world can be made, or what learning stores
-            does not fit.
+        ConfigError: If the device does not exist, no world can be made, what learning stores
+            does not fit, or the frames end before a team learns.
         CheckpointError: If a run to continue or to load from does not fit.
     """
     device = find_device(cfg.device)
@@ -93,7 +93,41 @@ def make_trainer(cfg: Config, folder: RunFolder | None = None) -> Trainer:
         trainer.matchmaking = SelfPlay(cfg.self_play, learners, Pool(folder.pool), cfg.seed)
     if continued:
         trainer.resume(checkpoints.latest())
+        _warn_of_idle_rest(trainer)
+    else:
+        _check_budget(trainer)
     return trainer
+
+
+def _check_budget(trainer: Trainer) -> None:
+    """Refuse a new run in which a team would learn nothing."""
+    for numbers in trainer.learners.cfgs.values():
+        try:
+            numbers.check_budget(trainer.budget_frames)
+        except ValueError as error:
+            asked = trainer.budget.total_frames
+            raise ConfigError(f"total_frames={asked}: {one_line(error)}") from error
+
+
+def _warn_of_idle_rest(trainer: Trainer) -> None:
+    """Log which teams learn nothing in the rest of a run: it can still be completed.
+
+    A replay buffer that is not in the checkpoint is filled again before the next update.
+    """
+    for team, algorithm in trainer.learners.algorithms.items():
+        left = trainer.budget_frames - trainer.progress.frames
+        if left <= 0 or algorithm.exact_resume:
+            continue
+        try:
+            trainer.learners.cfgs[team].check_budget(left)
+        except ValueError as error:
+            _LOG.warning(
+                "team %r learns nothing more: from frame %d to total_frames=%d, %s",
+                team,
+                trainer.progress.frames,
+                trainer.budget.total_frames,
+                one_line(error),
+            )
 
 
 def _log_storage(learners: TeamLearners) -> None:

@@ -15,6 +15,8 @@ from veca_marl.algos.files import write_atomically
 from veca_marl.config import ConfigError, one_line
 from veca_marl.config.stored import body_names, typed
 from veca_marl.runs.provenance import provenance
+from veca_marl.runs.run_progress import FILE as PROGRESS_FILE
+from veca_marl.runs.run_progress import RunProgress
 
 
 @dataclass(frozen=True)
@@ -52,6 +54,11 @@ class RunFolder:
         """Command line, commit and versions of the run."""
         return self.path / "provenance.json"
 
+    @property
+    def progress(self) -> Path:
+        """How far the run has come."""
+        return self.path / PROGRESS_FILE
+
     def begin(self, node: DictConfig, overrides: Sequence[str]) -> None:
         """Create the folder with the configuration and the provenance of the run."""
         content = {**provenance(overrides), "bodies": body_names(node)}
@@ -73,6 +80,7 @@ class RunFolder:
         again = {"frames": frames, **provenance(overrides)}
         content.setdefault("resumed", []).append(again)
         self._write_json(self.provenance, content)
+        self.write_progress(RunProgress(frames, ended=False))  # before a budget that it may reach
         stored = node.copy()
         stored.resume = None
         write_atomically(self.config, OmegaConf.to_yaml(stored, resolve=True))
@@ -109,6 +117,10 @@ class RunFolder:
     @staticmethod
     def _write_json(path: Path, content: dict[str, Any]) -> None:
         write_atomically(path, json.dumps(content, indent=2) + "\n")
+
+    def write_progress(self, progress: RunProgress) -> None:
+        """Write how far the run has come."""
+        write_atomically(self.progress, progress.text)
 
     def write(self, name: str, text: str) -> None:
         """Write a small text file."""

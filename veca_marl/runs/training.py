@@ -8,15 +8,17 @@ from pathlib import Path
 from typing import Any
 
 from tensordict.nn import TensorDictModuleBase
+from torchrl import timeit
 
 from veca_marl.algos.collection.workers import WorkerError
 from veca_marl.algos.training.loop import Trainer
-from veca_marl.algos.training.reporters import MemoryReporter
+from veca_marl.algos.training.reporters import MemoryReporter, Reporter, Row
 from veca_marl.config import Config
 from veca_marl.envs.core.game_cfg import GameCfg
 from veca_marl.runs.assembly import make_reporters, make_trainer
 from veca_marl.runs.recording import record_episode
 from veca_marl.runs.run_folder import RunFolder
+from veca_marl.runs.run_progress import RunProgress
 
 
 @dataclass(frozen=True)
@@ -40,6 +42,29 @@ class TrainingResult:
     folder: Path | None
 
 
+class ProgressReporter:
+    """Writes ``progress.json`` with each checkpoint.
+
+    Args:
+        folder: Folder of the run.
+        frames: Frames after which the run begins or continues.
+    """
+
+    def __init__(self, folder: RunFolder, frames: int) -> None:
+        self._folder, self._frames = folder, frames
+
+    def write(self, kind: str, frames: int, row: Row) -> None:
+        """See `Reporter`; only the number of frames is kept."""
+        self._frames = frames
+
+    def sync(self) -> None:
+        """See `Reporter`."""
+        self._folder.write_progress(RunProgress(self._frames, ended=False))
+
+    def close(self) -> None:
+        """See `Reporter`; nothing is pending."""
+
+
 class LastVideo:
     """The video of the trained policy, recorded while other processes evaluate it.
 
@@ -59,7 +84,8 @@ class LastVideo:
         """Record it; an exception is kept for `check`."""
         trainer = self._trainer
         try:
-            record_episode(self._path, self._game, trainer.policy.play, trainer.evaluation_seed)
+            with timeit("evaluate/video"):
+                record_episode(self._path, self._game, trainer.policy.play, trainer.evaluation_seed)
         except WorkerError:  # of the evaluation, which ends the run
             raise
         except Exception as error:
@@ -88,7 +114,7 @@ def run_training(
     trainer = trainer or make_trainer(cfg, folder)
     memory = MemoryReporter()
     with ExitStack() as pending:
-        written = [] if folder is None else make_reporters(cfg, folder, trainer.progress.frames)
+        written = [] if folder is None else _make_reporters(cfg, folder, trainer.progress.frames)
         for reporter in written:
             pending.callback(reporter.close)
         trainer.reporters = [memory, *written]
@@ -99,14 +125,21 @@ def run_training(
         comparison = trainer.run()
         if video is not None:
             video.check()
+    timing = trainer.timing()
     if folder is not None:
-        folder.write("timing.txt", trainer.timing())
-        folder.write("comparison.txt", "\n".join(comparison))  # last: the run is complete
+        folder.write("timing.txt", timing)
+        folder.write("comparison.txt", "\n".join(comparison))
+        folder.write_progress(RunProgress(trainer.progress.frames, ended=True))  # last
     return TrainingResult(
         memory.rows["metrics"],
         memory.rows["evaluations"],
         comparison,
         trainer.policy.play,
-        trainer.timing(),
+        timing,
         None if folder is None else folder.path,
     )
+
+
+def _make_reporters(cfg: Config, folder: RunFolder, frames: int) -> list[Reporter]:
+    """Return the loggers of a run, and what writes its progress, which needs none of them."""
+    return [*make_reporters(cfg, folder, frames), ProgressReporter(folder, frames)]

@@ -9,15 +9,22 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TextIO
 
+from veca_marl.runs.run_progress import read_progress
+
 _INTERVAL_TERMINAL_S = 2.0
 _INTERVAL_FILE_S = 60.0
 
 
 def frames_so_far(folder: Path) -> int:
-    """Return the frames that a run has learnt from, by the last line of its ``metrics.csv``."""
+    """Return the frames that a run has learnt from.
+
+    They are those of its last batch by ``metrics.csv``, and without that logger those of its last
+    checkpoint by ``progress.json``.
+    """
     path = folder / "metrics.csv"
     if not path.is_file():
-        return 0
+        stored = read_progress(folder)
+        return 0 if stored is None else stored.frames
     lines = path.read_text().splitlines()
     first = lines[-1].partition(",")[0] if lines else ""
     return int(first) if first.isdigit() else 0

@@ -10,6 +10,8 @@ from typing import Any
 
 import yaml
 
+from veca_marl.runs.run_progress import RunProgress, read_progress
+
 
 class RunState(Enum):
     """How far a run has come.
@@ -34,15 +36,20 @@ class StoredRun:
     Attributes:
         folder: Its folder.
         config: Its configuration as plain data; None if there is no run.
+        stored_progress: Content of its ``progress.json``; None without one.
     """
 
     folder: Path
     config: dict[str, Any] | None
+    stored_progress: RunProgress | None = None
 
     @property
-    def frames(self) -> int:
-        """Frames after which it was evaluated last; 0 without an evaluation."""
-        return max((int(row["frames"]) for row in self.rows("evaluations")), default=0)
+    def progress(self) -> RunProgress:
+        """Where it stands; for a run of version 0.2, which has no such file, by its other files."""
+        if self.stored_progress is not None:
+            return self.stored_progress
+        evaluated = (int(row["frames"]) for row in self.rows("evaluations"))
+        return RunProgress(max(evaluated, default=0), (self.folder / "comparison.txt").is_file())
 
     def rows(self, kind: str) -> list[dict[str, str]]:
         """Return the complete rows of ``evaluations.csv`` or ``metrics.csv``; none without a file.
@@ -64,9 +71,10 @@ class StoredRun:
         """
         if self.config is None:
             return RunState.missing
-        if not (self.folder / "comparison.txt").is_file():
+        progress = self.progress
+        if not progress.ended:
             return RunState.unfinished
-        if self.frames >= total_frames:
+        if progress.frames >= total_frames:
             return RunState.finished
         stopped = max_minutes is not None and self.config.get("max_minutes") == max_minutes
         return RunState.cut if stopped else RunState.unfinished
@@ -76,7 +84,7 @@ def read_run(folder: Path) -> StoredRun:
     """Return the run in a folder, which may be missing.
 
     Raises:
-        ValueError: If its ``config.yaml`` cannot be read.
+        ValueError: If its ``config.yaml`` or its ``progress.json`` cannot be read.
     """
     path = folder / "config.yaml"
     if not path.is_file():
@@ -87,4 +95,4 @@ def read_run(folder: Path) -> StoredRun:
         raise ValueError(f"{path} cannot be read: {' '.join(str(error).split())}") from error
     if not isinstance(config, dict):
         raise ValueError(f"{path} holds no configuration")
-    return StoredRun(folder, config)
+    return StoredRun(folder, config, read_progress(folder))

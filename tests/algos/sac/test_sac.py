@@ -130,6 +130,16 @@ def test_updates_follow_the_frames_and_begin_after_the_warm_up(make_sac, collect
     assert rows[-1]["updates_per_frame"] == pytest.approx(9 / 256)
 
 
+def test_a_budget_of_the_warm_up_alone_is_the_least_with_updates(make_sac, collect):
+    cfg = SACCfg(replay=ReplayCfg(1024, warm_up_frames=64))
+    cfg.check_budget(64)
+    row = make_sac(changes={"replay": cfg.replay}).learn(collect(make_sac()))
+    assert row["updates"] > 0.0
+    message = r"the 63 frames end before the first update, .* algo.replay.warm_up_frames=64"
+    with pytest.raises(ValueError, match=message):
+        cfg.check_budget(63)
+
+
 def test_actions_are_uniform_until_the_first_update(make_sac, collect):
     algorithm = make_sac(discrete=True)
     with torch.no_grad():

@@ -145,6 +145,20 @@ def test_table_of_times_accounts_for_the_whole():
     assert lines[-1].split()[-1] == "10.000"
 
 
+def test_a_part_within_another_has_a_line_after_the_total_and_counts_once():
+    timeit.erase()
+    with timeit("evaluate"), timeit("evaluate/video"):
+        sum(range(100_000))
+    spent = timeit.todict(percall=False)
+    lines = timing_table(elapsed_s=2.0 * spent["evaluate"], frames=100).splitlines()
+    timeit.erase()
+    names = ["part", "evaluate", "other", "total", "evaluate/video"]
+    assert [line.split()[0] for line in lines] == names
+    shares = [float(line.split()[2].rstrip("%")) for line in lines[1:]]
+    video = 50.0 * spent["evaluate/video"] / spent["evaluate"]
+    assert shares == pytest.approx([50.0, 50.0, 100.0, video], abs=0.1)
+
+
 @pytest.mark.parametrize("kind", [LoggerKind.wandb, LoggerKind.mlflow])
 def test_the_loggers_of_the_extras_write_into_the_folder_of_the_run(tmp_path, monkeypatch, kind):
     pytest.importorskip(kind.name, reason=f"needs the extra [{kind.name}]")

@@ -229,3 +229,11 @@ class SACCfg(AlgorithmCfg):
                 f"algo.replay.capacity={self.replay.capacity} must be at least twice the "
                 f"{frames} frames of a batch"
             )
+
+    def check_budget(self, frames: int) -> None:
+        """See `AlgorithmCfg`: the frames of the warm-up precede the first update."""
+        if frames < self.replay.warm_up_frames:
+            raise ValueError(
+                f"the {frames} frames end before the first update, which needs "
+                f"algo.replay.warm_up_frames={self.replay.warm_up_frames}"
+            )

@@ -165,6 +165,10 @@ class SAC(Algorithm):
             part.load_state_dict(state[name])
         self._updates, self._due = state["updates"], state["due"]
 
+    def load_learnt(self, state: dict[str, Any]) -> None:
+        """See `Algorithm`: the network alone."""
+        self.network.load_state_dict(state["network"])
+
     def _parts(self) -> dict[str, Any]:
         target = {"target": self.loss.target} if self.loss.averages else {}
         return target | {

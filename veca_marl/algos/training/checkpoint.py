@@ -210,13 +210,29 @@ def _interrupts_wait() -> Iterator[None]:
         signal.raise_signal(number)
 
 
-def read_checkpoint(path: Path, device: torch.device = _CPU) -> dict[str, Any]:
+def read_checkpoint(path: Path, device: torch.device) -> dict[str, Any]:
     """Return everything that is in the file of a checkpoint.
 
     Raises:
         CheckpointError: If it cannot be read, or is not a checkpoint of this version.
     """
-    content = load_file(path, device)
+    return _checked(path, load_file(path, device))
+
+
+def map_checkpoint(path: Path) -> dict[str, Any]:
+    """Return what `read_checkpoint` returns; of its tensors, the disk is read when they are used.
+
+    A replay buffer in a checkpoint thus takes neither memory nor time where only a network is
+    wanted. The file has to stay as it is until the tensors have been copied.
+
+    Raises:
+        CheckpointError: See `read_checkpoint`.
+    """
+    return _checked(path, _load(path, map_location=_CPU, mmap=True))
+
+
+def _checked(path: Path, content: Any) -> dict[str, Any]:
+    """Return the content of a file if it is a checkpoint of this version."""
     if not isinstance(content, dict) or "format" not in content:
         raise CheckpointError(f"{path} is not a checkpoint of a run")
     if content["format"] != _FORMAT:
@@ -226,7 +242,8 @@ def read_checkpoint(path: Path, device: torch.device = _CPU) -> dict[str, Any]:
     missing = sorted(_KEYS - set(content))
     if missing:
         raise CheckpointError(f"{path} is incomplete: no {', '.join(missing)}")
-    return content
+    checked: dict[str, Any] = content
+    return checked
 
 
 def load_file(path: Path, device: torch.device) -> Any:
@@ -235,8 +252,12 @@ def load_file(path: Path, device: torch.device) -> Any:
     Raises:
         CheckpointError: If it cannot be read.
     """
+    return _load(path, map_location=device)
+
+
+def _load(path: Path, **options: Any) -> Any:
     try:
-        return torch.load(path, map_location=device, weights_only=True)
+        return torch.load(path, weights_only=True, **options)
     except FileNotFoundError as error:
         raise CheckpointError(f"{path} does not exist") from error
     except (OSError, *_UNREADABLE) as error:

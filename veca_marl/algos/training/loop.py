@@ -155,7 +155,7 @@ class Trainer:
         scores = None
         iterations = self.budget.iterations(self.collect.frames)
         with tqdm(
-            total=iterations * self.collect.frames,
+            total=self.budget_frames,
             initial=self.progress.frames,
             unit=" frames",
             disable=not self.progress_bar,
@@ -171,6 +171,11 @@ class Trainer:
         """Whether the frames, or the time, of the budget are spent."""
         iterations = self.budget.iterations(self.collect.frames)
         return self.progress.iteration >= iterations or self.budget.is_spent(self._clock.elapsed())
+
+    @property
+    def budget_frames(self) -> int:
+        """Frames of the whole budget, in whole batches."""
+        return self.budget.iterations(self.collect.frames) * self.collect.frames
 
     def timing(self) -> str:
         """Return a table of where the time went."""

@@ -22,8 +22,8 @@ from veca_marl.algos.sense_encoders import sense_encoders
 from veca_marl.algos.specs import TeamSpec
 from veca_marl.algos.training.checkpoint import (
     CheckpointError,
+    map_checkpoint,
     naming_checkpoint,
-    read_checkpoint,
     spec_differences,
 )
 
@@ -45,8 +45,8 @@ def load_actor(path: Path, team: str, spec: TeamSpec) -> TensorDictModuleBase:
     return for_acting(algorithm.actor.requires_grad_(False))
 
 
-def load_algorithm(path: Path, team: str, spec: TeamSpec) -> Algorithm:
-    """Return the algorithm of a team in the state that another run left it in.
+def load_learnt(path: Path, team: str, spec: TeamSpec) -> Algorithm:
+    """Return the algorithm of a team with what another run has learnt, for `Algorithm.init_from`.
 
     Args:
         path: See `load_actor`.
@@ -58,7 +58,7 @@ def load_algorithm(path: Path, team: str, spec: TeamSpec) -> Algorithm:
     """
     algorithm, content = _make(path, team, spec)
     with naming_checkpoint(path):
-        algorithm.load_state_dict(content["state"]["algorithm"][team])
+        algorithm.load_learnt(content["state"]["algorithm"][team])
     return algorithm
 
 
@@ -87,7 +87,7 @@ def teams_learnt(path: Path) -> list[str]:
     Raises:
         CheckpointError: If there is no such checkpoint.
     """
-    return sorted(read_checkpoint(_file(path))["algorithms"])
+    return sorted(map_checkpoint(_file(path))["algorithms"])
 
 
 def _make(path: Path, team: str, spec: TeamSpec | None) -> tuple[Algorithm, dict[str, Any]]:
@@ -98,7 +98,7 @@ def _make(path: Path, team: str, spec: TeamSpec | None) -> tuple[Algorithm, dict
         team: Name of the team there.
         spec: What its arrays have to be; None for any.
     """
-    content = read_checkpoint(_file(path))
+    content = map_checkpoint(_file(path))
     stored, learnt = content["identity"]["specs"], content["algorithms"]
     if team not in learnt:
         raise CheckpointError(f"{path} has learnt the teams {sorted(learnt)}, not {team!r}")

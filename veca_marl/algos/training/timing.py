@@ -9,17 +9,20 @@ def timing_table(elapsed_s: float, frames: int) -> str:
     """Return lines of seconds, share and milliseconds per frame of each part.
 
     Beyond `timeit.print`: shares of the whole, the time that no part accounts for, and the time
-    per frame.
+    per frame. A part that lies in another one, such as ``evaluate/video``, has a line after the
+    total: its time is that of the other one too.
 
     Args:
         elapsed_s: The whole time.
         frames: Frames learnt from in it.
     """
     # `timeit.erase` leaves the names of parts, with no time
-    parts = {name: s for name, s in timeit.todict(percall=False).items() if s > 0.0}
+    measured = {name: s for name, s in timeit.todict(percall=False).items() if s > 0.0}
+    parts = {name: s for name, s in measured.items() if "/" not in name}
+    within = [(name, s) for name, s in measured.items() if "/" in name]
     parts["other"] = max(0.0, elapsed_s - sum(parts.values()))
-    lines = [f"{'part':<12}{'seconds':>10}{'share':>8}{'ms/frame':>10}"]
-    for part, seconds in [*parts.items(), ("total", elapsed_s)]:
+    lines = [f"{'part':<16}{'seconds':>10}{'share':>8}{'ms/frame':>10}"]
+    for part, seconds in [*parts.items(), ("total", elapsed_s), *within]:
         share, each = seconds / elapsed_s, 1e3 * seconds / max(frames, 1)
-        lines.append(f"{part:<12}{seconds:>10.1f}{share:>8.1%}{each:>10.3f}")
+        lines.append(f"{part:<16}{seconds:>10.1f}{share:>8.1%}{each:>10.3f}")
     return "\n".join(lines)

@@ -1,0 +1,46 @@
+"""How far a run has come: the file ``progress.json`` of its folder, whatever its loggers are."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+FILE = "progress.json"
+
+
+@dataclass(frozen=True)
+class RunProgress:
+    """Where a run stands.
+
+    Attributes:
+        frames: Frames learnt from until its last checkpoint, or its end.
+        ended: Whether it has ended by its budget, with all of its files.
+    """
+
+    frames: int
+    ended: bool
+
+    @property
+    def text(self) -> str:
+        """The content of the file."""
+        return json.dumps(asdict(self)) + "\n"
+
+
+def read_progress(folder: Path) -> RunProgress | None:
+    """Return what the file in the folder of a run says.
+
+    Returns:
+        None without a file: the run has no checkpoint yet, or was stored by version 0.2.
+
+    Raises:
+        ValueError: If the file cannot be read.
+    """
+    path = folder / FILE
+    if not path.is_file():
+        return None
+    try:
+        content = json.loads(path.read_text())
+        return RunProgress(int(content["frames"]), bool(content["ended"]))
+    except (ValueError, KeyError, TypeError) as error:
+        raise ValueError(f"{path} is damaged: {' '.join(str(error).split())}") from error
