@@ -140,7 +140,7 @@ class ToyCar:
     def reset(self, place: Floats, rng: np.random.Generator) -> None:
         """Stand at a place of the floor with a random heading."""
         self.prop.place((place[0], place[1], self._resting_m), rng.uniform(-math.pi, math.pi))
-        self._left_s = 0.0
+        self.point, self._left_s = np.array(place[:2]), 0.0
 
     def drive(self, draw: DrawPoint, rng: np.random.Generator) -> None:
         """Set the velocity of the next step. Called before the physics of each step.
