@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import NamedTuple
 
 import matplotlib as mpl
 import numpy as np
@@ -10,13 +11,12 @@ from numpy.typing import NDArray
 
 from docs_pages.parts_picture import parts_picture
 from docs_pages.task_pages import built_in_tasks
+from docs_pages.viewpoints import FOV_DEG, viewpoint
 from veca_marl.api import make
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
 from veca_marl.envs.adapters.torchrl.scripted import ExpertPolicy
 from veca_marl.envs.core.game import Game
 from veca_marl.envs.rendering.touch_image import touch_image
-from veca_marl.envs.tasks.contests.push_out import PushOut
-from veca_marl.envs.tasks.contests.soccer import Soccer
 from veca_marl.sim.body.walker import Walker
 from veca_marl.sim.touch import TAXELS_PER_TRIANGLE
 from veca_marl.sim.vision import Camera, look_at
@@ -25,9 +25,28 @@ mpl.use("Agg")
 import matplotlib.pyplot as plt
 
 BIN_HZ = 22050 / 1024
-_ABOVE_FLOOR = np.array([0.0, 0.0, 0.1])
-# steps of the expert before the picture, of tasks with the same start as another one
-_EXPERT_STEPS = {"HandRegard": 60, "SelfTouch": 60}
+
+
+class Moment(NamedTuple):
+    """The moment that a task's picture shows.
+
+    Attributes:
+        seed: Seed of the episode.
+        expert_steps: Steps of the expert before the picture.
+    """
+
+    seed: int = 1
+    expert_steps: int = 0
+
+
+# of tasks with the same start as another one, and of those where all things are near in an episode
+_MOMENTS = {
+    "BabyzumasRevenge": Moment(seed=6),
+    "HandRegard": Moment(expert_steps=60),
+    "ObjectNav": Moment(seed=6),
+    "ObjectPhysNav": Moment(seed=6),
+    "SelfTouch": Moment(expert_steps=60),
+}
 
 
 def write_pictures(folder: Path) -> None:
@@ -48,41 +67,20 @@ def started(task: str, seed: int) -> tuple[VecaEnv, Game]:
 
 
 def task_picture(task: str, path: Path) -> None:
-    """Draw the start of an episode from inside the room, above the agents."""
-    env, game = started(task, seed=1)
-    if task in _EXPERT_STEPS:
-        env.rollout(_EXPERT_STEPS[task], policy=ExpertPolicy(env))
-    if isinstance(game.players[0].body, Walker):
+    """Draw one moment of an episode: the first second of most tasks."""
+    moment = _MOMENTS.get(task, Moment())
+    env, game = started(task, moment.seed)
+    if moment.expert_steps:
+        env.rollout(moment.expert_steps, policy=ExpertPolicy(env))
+    elif isinstance(game.players[0].body, Walker):
         for _ in range(25):  # one second, in which the ball of KickTheBall appears
             for player in game.players:
                 player.body.rest()
             game.advance()
-    camera = Camera(640, 400, fov_deg=48.0)
+    camera = Camera(640, 400, fov_deg=FOV_DEG)
     image = camera.render(game.world.scene, [look_at(*viewpoint(game))]).rgb[0]
     plt.imsave(path, image, pil_kwargs={"optimize": True})
     env.close()
-
-
-def viewpoint(game: Game) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return where the camera of a task's picture is, and what it looks at, metres.
-
-    It is near a joint-level body except in games on a whole floor, above a house of several rooms,
-    and otherwise in a corner of the room.
-    """
-    first = game.players[0].body
-    if not isinstance(first, Walker) and not isinstance(game.task, Soccer | PushOut):
-        target = np.array([*first.position[:2], 0.15])
-        return target + first.forward * 1.0 + np.array([0.5, 0.9, 0.85]), target
-    rooms = game.cfg.playground.rooms
-    if len(rooms) > 1:
-        corners = np.array([room.lower_m for room in rooms])
-        centre = (corners.min(0) + (corners + [room.size_m for room in rooms]).max(0)) / 2.0
-        return centre + np.array([-0.1, -6.0, 11.0]), centre
-    room = next(room for room in rooms if room.contains(first.position + _ABOVE_FLOOR))
-    low, size = np.array(room.lower_m), np.array(room.size_m)
-    seen = [p.body.position for p in game.players if room.contains(p.body.position + _ABOVE_FLOOR)]
-    centre = low + size * (0.5, 0.5, 0.0)
-    return low + size * (0.06, 0.06, 0.85), 0.4 * centre + 0.6 * np.mean(seen, axis=0)
 
 
 def perception_picture(path: Path) -> None:

@@ -113,6 +113,15 @@ def test_the_same_seed_gives_the_same_drive(game):
     np.testing.assert_array_equal(*tracks)
 
 
+def test_an_episode_starts_without_the_point_of_the_last_one(game):
+    game.reset(np.random.default_rng(5))
+    drive(game, 10)
+    game.reset(np.random.default_rng(6))
+    car = game.task.car
+    np.testing.assert_array_equal(car.point, car.prop.position[:2])
+    np.testing.assert_array_equal(car.predicted_path(3), [car.point] * 3)
+
+
 def test_it_drives_under_a_table_and_not_through_its_leg():
     game = game_of("playground=single_room")
     car, corner = game.task.car, np.array([-2.88, 2.88])
@@ -311,6 +320,23 @@ def test_the_expert_dodges():
     assert solved == 1.0
     assert mean == pytest.approx(0.5)
     game.close()
+
+
+def is_hit(game, seed):
+    """Return whether the car hits the expert near which it draws another point."""
+    game.reset(np.random.default_rng(seed))
+    game.task.walker.place((1.28, -1.02, 0.0), math.radians(76.0))
+    game.task.car.prop.place((0.51, -1.16, 0.08), math.radians(20.0))
+    game.task.car.drive_to(np.array([0.93, -1.0]))
+    for _ in range(45):
+        game.play_script(game.players[0], Script.expert)
+        if game.advance().done:
+            return True
+    return False
+
+
+def test_the_expert_expects_the_car_to_draw_another_point_near_it(game):
+    assert sum(is_hit(game, seed) for seed in range(40)) <= 3
 
 
 @pytest.mark.slow

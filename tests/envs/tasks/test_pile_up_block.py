@@ -1,8 +1,20 @@
 """PileUpBlock: reward, success criterion, start and expert."""
 
+from contextlib import contextmanager
+
 import numpy as np
+import pybullet
 import pytest
 from blocks import blocks_game, play, sit, sits
+
+from veca_marl.envs.experts.skills.lifting import lift
+from veca_marl.envs.experts.skills.palm_motion import Grip, PalmMotion
+from veca_marl.envs.tasks.objects.blocks import (
+    height_in_edges,
+    is_at_rest,
+    is_released,
+    rests_on,
+)
 
 EDGE = 0.06
 # at which the expert succeeds; its share of successes is that of the frozen episodes
@@ -93,23 +105,83 @@ def test_a_red_block_on_the_blue_one_has_a_height(game):
     assert game.task.solved(game.players[0])
 
 
-def test_holding_blocks_up_has_a_lower_return_than_piling_them_up(game):
-    """The expert lifts a block; held in its hands for a whole episode, it is rewarded once."""
+@pytest.fixture(scope="module")
+def piling(game):
+    """Return of an episode in which the expert piles the blocks up."""
+    total, solved = play(game, EXPERT_SEEDS[0])
+    assert solved
+    return game.reward_of(total)
+
+
+def play_commands(game, commands):
+    """Play target angles to the end of the episode; yield the terms of every step."""
     player = game.players[0]
-    game.reset(np.random.default_rng(EXPERT_SEEDS[0]))
-    lifted = []
-    for _ in range(game.max_steps):
-        terms = game.step({player.name: player.body.encode(game.expert_of(player).act({}))}).terms
-        held = [red for red in game.task.red if player.body.touches(red)]
-        if any(red.position[2] > 1.5 * EDGE for red in held):
-            lifted.append(terms[player.name])
-        if game.task.solved(player):
-            break
-    assert game.task.solved(player)
-    assert len(lifted) > 10
-    assert sum(terms["height"] for terms in lifted[:10]) == 0.0
-    # both blocks in the hands, for ever, against one block on the other for three seconds
-    assert 2.0 * game.weights["lift"] < 3.0 / game.world.clock.step_s * game.weights["height"]
+    while game.steps < game.max_steps:
+        row = player.body.encode(next(commands))
+        yield game.step({player.name: row}).terms[player.name]
+
+
+def test_a_block_that_is_held_up_has_a_lower_return_than_a_pile(game, piling):
+    game.reset(np.random.default_rng(0))
+    child, (held, other) = game.task.child, game.task.red
+    held.place((0.25, 0.0, EDGE / 2))
+    other.place(AWAY)
+    game.task.blue.place((AWAY[0], -AWAY[1], EDGE / 2))
+    gained, high, commands = 0.0, 0, lift(child, PalmMotion(child), held, height_m=0.2)
+    for terms in play_commands(game, commands):
+        gained += game.reward_of(terms)
+        high += height_in_edges(held) > 2.0 and is_at_rest(held) and child.touches(held)
+        assert not game.task.solved(game.players[0])
+    assert high > game.max_steps / 2  # higher than a pile, and still: only the hands prevent it
+    assert gained == pytest.approx(game.weights["lift"], abs=0.1)
+    assert gained < 0.5 * piling
+
+
+@contextmanager
+def fixed_at(client, block, place):
+    """Keep a block at a place by a constraint."""
+    block.place(place)
+    constraint = pybullet.createConstraint(
+        block.body_id,
+        -1,
+        -1,
+        -1,
+        pybullet.JOINT_FIXED,
+        (0, 0, 0),
+        (0, 0, 0),
+        place,
+        physicsClientId=client,
+    )
+    yield
+    pybullet.removeConstraint(constraint, physicsClientId=client)
+
+
+def gripping(palms, block):
+    """Yield target angles, endlessly: close both hands round a block, under its top."""
+    place = block.position - np.array([0.0, 0.0, 0.02])
+    yield from palms.for_steps(Grip(place, EDGE + 0.06), 60)
+    while True:
+        yield palms.move(Grip(place, EDGE - 0.04))
+
+
+def test_a_block_on_one_that_is_held_up_has_a_lower_return_than_a_pile(game, piling):
+    """A constraint keeps the lower block level, in the place of a strong grip."""
+    game.reset(np.random.default_rng(0))
+    child, (block, other), base = game.task.child, game.task.red, game.task.blue
+    other.place(AWAY)
+    block.place((AWAY[0], -AWAY[1], EDGE / 2))
+    gained, lying = 0.0, 0
+    with fixed_at(game.world.client, base, (0.25, 0.0, 0.2)):
+        for terms in play_commands(game, gripping(PalmMotion(child), base)):
+            if game.steps == 100:
+                assert child.touches(base)
+                block.place((0.27, 0.0, 0.2 + EDGE + 0.001))
+            gained += game.reward_of(terms)
+            lying += rests_on(block, base) and is_released(block, child) and child.touches(base)
+    assert lying > 60
+    assert height_in_edges(block) > 3.0
+    assert gained < 0.5 * piling
+    assert not game.task.solved(game.players[0])
 
 
 def test_putting_a_block_down_takes_the_reward_for_lifting_back(game):

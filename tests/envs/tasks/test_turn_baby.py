@@ -50,3 +50,10 @@ def test_the_expert_ends_on_the_belly(body):
             assert min(last.terms["agents"].values()) > 0.8
             assert last.truncated
             assert not last.terminated
+
+
+@pytest.mark.slow
+def test_the_expert_turns_a_body_with_fingers_over():
+    with child_game("TurnBaby", "body=full") as game:
+        ends = [play(game, np.random.default_rng(seed))[0][-1] for seed in range(7000, 7010)]
+    assert sum(end.solved["agents"] for end in ends) >= 9

@@ -8,6 +8,7 @@ from typing import TypeVar
 import numpy as np
 
 from veca_marl.envs.core.expert import Expert
+from veca_marl.envs.experts.control.obstructed_courses import ObstructedCourses
 from veca_marl.envs.experts.control.walk_plans import walk_plans
 from veca_marl.envs.tasks.cars.car_game import CarGame
 from veca_marl.sim.geometry import Floats
@@ -19,13 +20,13 @@ CarGameT = TypeVar("CarGameT", bound=CarGame)
 
 
 class CarExpert(Expert[CarGameT]):
-    """Predicts the path of the car to its next point and takes the best of a few courses.
+    """Predicts the path of the car and takes the best of a few courses.
 
-    In each step it compares courses of 1.6 s and walks the first step of the best one. Furniture is
-    not considered.
+    In each step it compares courses of 1.6 s and walks the first step of the best one. A course
+    ends at furniture that the player cannot push.
 
     Reads privileged state: position and heading of car and player, the point that the car drives
-    to, and the room.
+    to, the room and its furniture.
 
     Attributes:
         plans: The courses.
@@ -36,6 +37,7 @@ class CarExpert(Expert[CarGameT]):
     def reset(self) -> None:
         """See `Expert.reset`."""
         self.plans = walk_plans(_HORIZON_S, self.task.world.clock.step_s)
+        self._courses = ObstructedCourses(self.task.walker, self.task.world)
 
     def best_move(self) -> tuple[float, float]:
         """Return (forward, turn) of the first step of the course with the highest score."""
@@ -43,15 +45,14 @@ class CarExpert(Expert[CarGameT]):
         places = self.plans.positions(walker.position, walker.yaw_rad, walker.cfg)
         low, size = np.array(room.lower_m[:2]), np.array(room.size_m[:2])
         places = np.clip(places, low + _WALL_M, low + size - _WALL_M)
-        car = self.task.car.predicted_path(places.shape[1])
-        forward, turn = self.plans.commands[int(np.argmax(self.scores(places, car)))][0]
+        places = self._courses.held(walker.position, places)
+        forward, turn = self.plans.commands[int(np.argmax(self.scores(places)))][0]
         return float(forward), float(turn)
 
     @abstractmethod
-    def scores(self, places: Floats, car: Floats) -> Floats:
+    def scores(self, places: Floats) -> Floats:
         """Return the score of each course, ``(plans,)``.
 
         Args:
             places: Positions of the player on each course, ``(plans, steps, 2)`` metres.
-            car: Predicted positions of the car, ``(steps, 2)`` metres.
         """

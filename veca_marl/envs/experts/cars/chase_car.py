@@ -24,10 +24,11 @@ class ChaseCarExpert(CarExpert[ChaseCar]):
     """Predicts the path of the car to its next point, follows at a distance, and always presses.
 
     In each step it compares courses of 1.6 s: they should end 0.8 m from the car, facing it, and
-    not come nearer than 0.55 m. A press out of range has no effect. Furniture is not considered.
+    not come nearer than 0.55 m. A course ends at furniture that the player cannot push. A press
+    out of range has no effect.
 
     Reads privileged state: position and heading of car and player, the point that the car drives
-    to, and the room.
+    to, the room and its furniture.
     """
 
     def act(self, observation: Mapping[str, NDArray[Any]]) -> WalkCommand:
@@ -35,9 +36,9 @@ class ChaseCarExpert(CarExpert[ChaseCar]):
         forward, turn = self.best_move()
         return WalkCommand(forward, turn, verb=PRESS)
 
-    def scores(self, places: Floats, car: Floats) -> Floats:
+    def scores(self, places: Floats) -> Floats:
         """See `CarExpert.scores`."""
-        ways = car - places
+        ways = self.task.car.predicted_path(places.shape[1]) - places
         away_m = np.linalg.norm(ways, axis=-1)
         yaw = self.plans.headings(self.task.walker.yaw_rad, self.task.walker.cfg)[:, -1]
         ahead = np.stack([np.cos(yaw), np.sin(yaw)], axis=-1)

@@ -16,10 +16,10 @@ from veca_marl.sim.physics.rooms import RoomCfg
 
 _MASS_KG = 2.0  # below the push limit of walkers: it is pushed away and displaces none
 _COLOUR = (0.95, 0.75, 0.1)
-_ARRIVED_M = 0.15
+ARRIVED_M = 0.15
 _PATIENCE_S = 6.0  # after which a point that has not been reached is given up
 _DRAWS = 30
-_SLOWEST = 0.2  # share of the speed while it turns
+SLOWEST = 0.2  # share of the speed while it turns
 _HALF_M = math.hypot(LENGTH_M, WIDTH_M) / 2.0  # of its diagonal
 _ROOM_TO_TURN_M = LENGTH_M / 2.0 + 0.05  # to the walls, from places where it stops
 _HEIGHTS_M = np.array([0.05, HEIGHT_M])  # at which it can hit something
@@ -80,7 +80,7 @@ class Motion(NamedTuple):
         bearing = math.atan2(point[1] - place[1], point[0] - place[0]) - heading_rad
         bearing = math.remainder(bearing, 2.0 * math.pi)
         turn = min(max(bearing / step_s, -self.turn_radps), self.turn_radps)
-        return self.speed_mps * max(math.cos(bearing), _SLOWEST), turn
+        return self.speed_mps * max(math.cos(bearing), SLOWEST), turn
 
 
 class ToyCar:
@@ -100,12 +100,13 @@ class ToyCar:
     Attributes:
         prop: The car, its front along x, see `car_parts`.
         room: The room in which it drives: the first one of the playground.
+        motion: How it drives.
         point: The point that it drives to, ``(2,)`` metres.
     """
 
     def __init__(self, world: World, motion: Motion, interactions: Sequence[str] = ()) -> None:
         self.room = world.playground.rooms[0]
-        self._motion, self._step_s = motion, world.clock.step_s
+        self.motion, self._step_s = motion, world.clock.step_s
         self._obstacles = [p for p in world.props.values() if p.cfg.tangible]
         self.prop = world.add_prop(
             PropCfg(
@@ -127,7 +128,7 @@ class ToyCar:
     @property
     def needs_point(self) -> bool:
         """Whether the point has been reached or given up, so that `drive` will draw another."""
-        is_there = math.dist(self.prop.position[:2], self.point) < _ARRIVED_M
+        is_there = math.dist(self.prop.position[:2], self.point) < ARRIVED_M
         return self._left_s <= 0.0 or is_there
 
     @property
@@ -139,7 +140,7 @@ class ToyCar:
     def reset(self, place: Floats, rng: np.random.Generator) -> None:
         """Stand at a place of the floor with a random heading."""
         self.prop.place((place[0], place[1], self._resting_m), rng.uniform(-math.pi, math.pi))
-        self._left_s = 0.0
+        self.point, self._left_s = np.array(place[:2]), 0.0
 
     def drive(self, draw: DrawPoint, rng: np.random.Generator) -> None:
         """Set the velocity of the next step. Called before the physics of each step.
@@ -153,7 +154,7 @@ class ToyCar:
             self.drive_to(self._reachable_point(draw, rng))
         self._left_s -= self._step_s
         heading = self.heading_rad
-        speed, turn = self._motion.towards(self.point, self.prop.position, heading, self._step_s)
+        speed, turn = self.motion.towards(self.point, self.prop.position, heading, self._step_s)
         ahead = speed * math.cos(heading), speed * math.sin(heading)
         self.prop.set_velocity((*ahead, self._vertical_mps()), (0.0, 0.0, turn))
 
@@ -190,8 +191,8 @@ class ToyCar:
         """
         place, heading, path = self.prop.position[:2], self.heading_rad, []
         for _ in range(steps):
-            if math.dist(place, self.point) >= _ARRIVED_M:
-                speed, turn = self._motion.towards(self.point, place, heading, self._step_s)
+            if math.dist(place, self.point) >= ARRIVED_M:
+                speed, turn = self.motion.towards(self.point, place, heading, self._step_s)
                 ahead = np.array([math.cos(heading), math.sin(heading)])
                 place, heading = place + speed * self._step_s * ahead, heading + turn * self._step_s
             path.append(place)

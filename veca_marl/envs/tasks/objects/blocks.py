@@ -7,6 +7,7 @@ the presets of both tasks.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from veca_marl.envs.core.task import TaskCfg
@@ -75,6 +76,25 @@ def rests_on(block: Prop, base: Prop) -> bool:
     """Return whether a block is at rest on top of another one, also if it lies on a third, too."""
     above = block.position[2] - base.position[2] > 0.9 * block.cfg.size_m[0]
     return bool(above) and block.touches(base.body_id) and is_at_rest(block)
+
+
+def stands_free(block: Prop, others: Sequence[Prop], child: Humanoid) -> bool:
+    """Return whether no part of a body touches a block, or a block that carries it.
+
+    Args:
+        block: The block.
+        others: Blocks that may carry it, and each other.
+        child: The body.
+    """
+    return is_released(block, child) and all(
+        stands_free(base, others, child) for base in others if _lies_on(block, base)
+    )
+
+
+def _lies_on(block: Prop, base: Prop) -> bool:
+    """Return whether a block touches another one from above, also if both are inclined."""
+    above_m = block.position[2] - base.position[2]
+    return bool(above_m > 0.5 * block.cfg.size_m[0]) and block.touches(base.body_id)
 
 
 def is_at_rest(block: Prop) -> bool:

@@ -15,8 +15,8 @@ from veca_marl.envs.tasks.objects.blocks import (
     add_block,
     height_in_edges,
     is_at_rest,
-    is_released,
     rests_on,
+    stands_free,
 )
 from veca_marl.sim.body.humanoid.postures import REACHING
 from veca_marl.sim.physics import Prop
@@ -61,20 +61,22 @@ class PileUpBlock(Task):
     The senses and the joint-level action are those of the paper (table of tasks in the appendix).
     The reward in the paper is "the sum of the y-axis position of red blocks" (the vertical axis):
     by this rule a block that is held up is rewarded like one that lies on another, and more the
-    higher it is held. Departures: `height` counts red blocks that have been released and rest, and
-    `lift` rewards raising a block once. The number of blocks, the blue one and all numbers are not
-    in the paper.
+    higher it is held. Departures: `height` counts red blocks that rest and have been released, with
+    all blocks that carry them: otherwise a red block that lies on one held up would be rewarded
+    more the higher it is held. `lift` rewards raising a block once. The number of blocks, the blue
+    one and all numbers are not in the paper.
 
     The body is free and can topple. An episode lasts `max_seconds` and never terminates. The task
     is solved (`solved`) while a red block rests on another block and no part of the body touches
-    the red one. Bullet solves contacts with 30 iterations (`clock.solver_iterations`): with the
-    default of 10 a block that lies on another one creeps by 1 mm/s.
+    the red one or a block that carries it. Bullet solves contacts with 30 iterations
+    (`clock.solver_iterations`): with the default of 10 a block that lies on another one creeps by
+    1 mm/s.
 
     Terms:
         height: Sum of the heights above the floor of the lowest corners of the red blocks that are
-            at rest and that no part of the body touches, in lengths of their edge. Its default
-            weight is the duration of a step in seconds, so that a block on top of another adds 1
-            per second to the return.
+            at rest and that no part of the body touches, nor a block that carries them, in lengths
+            of their edge. Its default weight is the duration of a step in seconds, so that a block
+            on top of another adds 1 per second to the return.
         lift: Increase during the step of the sum of the heights of the red blocks, each clipped to
             [0, 1] edge, held or not. It is the difference of a potential: putting a block down
             again takes the reward back.
@@ -107,17 +109,20 @@ class PileUpBlock(Task):
         self._lift, self._raised = raised - self._raised, raised
 
     def reward(self, player: Player) -> dict[str, float]:
-        piled = [b for b in self.red if is_at_rest(b) and is_released(b, self.child)]
+        piled = [block for block in self.red if is_at_rest(block) and self._stands_free(block)]
         return {"height": sum(max(height_in_edges(b), 0.0) for b in piled), "lift": self._lift}
 
     def _raised_edges(self) -> float:
         return sum(min(max(height_in_edges(block), 0.0), 1.0) for block in self.red)
 
     def solved(self, player: Player) -> bool:
-        """Return whether a red block rests on another block and has been released."""
+        """Return whether a red block rests on another block and the pile has been released."""
         return any(
-            rests_on(block, base) and is_released(block, self.child)
+            rests_on(block, base) and self._stands_free(block)
             for block in self.red
             for base in (*self.red, self.blue)
             if base is not block
         )
+
+    def _stands_free(self, block: Prop) -> bool:
+        return stands_free(block, (*self.red, self.blue), self.child)
