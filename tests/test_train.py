@@ -226,7 +226,10 @@ def is_running(pid):
 
 @pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
-def test_a_killed_worker_ends_the_command_with_its_name(tmp_path):
+@pytest.mark.parametrize(
+    ("number", "name"), [(1, "evaluation process 1"), (3, "worker process 1 (of 0 to 1)")]
+)
+def test_a_killed_process_ends_the_command_with_its_name(tmp_path, number, name):
     arguments = [
         *SMOKE,
         "collect=workers8",
@@ -241,15 +244,15 @@ def test_a_killed_worker_ends_the_command_with_its_name(tmp_path):
     while not list(tmp_path.glob("run/checkpoints/frames_*128.pt")) and time.monotonic() < deadline:
         assert running.poll() is None, running.stderr.read()
         time.sleep(0.05)
-    workers = workers_of(running.pid)
-    assert len(workers) == 2
-    os.kill(workers[1], signal.SIGKILL)
+    workers = workers_of(running.pid)  # those that evaluate, then those that collect
+    assert len(workers) == 4
+    os.kill(workers[number], signal.SIGKILL)
     begin = time.monotonic()
     _, errors = running.communicate(timeout=60)
     assert time.monotonic() - begin < 20
     assert running.returncode == 1
     (line,) = errors.strip().splitlines()
-    assert line.startswith("error: worker process 1 (of 0 to 1) was killed by SIGKILL")
+    assert line.startswith(f"error: {name} was killed by SIGKILL")
     assert f"continue with: python -m veca_marl.train resume={tmp_path / 'run'}" in line
     assert not any(map(is_running, workers))
     done = train(tmp_path, f"resume={tmp_path / 'run'}", "total_frames=256", "log.video=false")
