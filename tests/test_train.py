@@ -79,13 +79,29 @@ def test_smoke_run_writes_all_files(smoke):
     assert "ms/frame" in printed
 
 
+@pytest.fixture
+def start():
+    """A function that starts a command; what still runs at the end of the test is killed."""
+    started = []
+
+    def begin(words, folder):
+        started.append(subprocess.Popen(words, cwd=folder, stderr=subprocess.PIPE, text=True))
+        return started[-1]
+
+    yield begin
+    for process in started:
+        process.kill()
+        process.wait()
+        process.stderr.close()
+
+
 @pytest.mark.slow
 @pytest.mark.usefixtures("ctrl_c")
-def test_interrupted_and_resumed_equals_uninterrupted(smoke, tmp_path):
+def test_interrupted_and_resumed_equals_uninterrupted(smoke, tmp_path, start):
     """Ctrl-C in the second stage of the real task, then the command that it prints."""
     whole, _ = smoke
     arguments = [*SMOKE, "total_frames=25600", "hydra.run.dir=run"]
-    running = subprocess.Popen(command(*arguments), cwd=tmp_path, stderr=subprocess.PIPE, text=True)
+    running = start(command(*arguments), tmp_path)
     run = tmp_path / "run"
     deadline = time.monotonic() + 300
     while not list(run.glob("checkpoints/frames_*128.pt")) and time.monotonic() < deadline:
@@ -229,7 +245,7 @@ def is_running(pid):
 @pytest.mark.parametrize(
     ("number", "name"), [(1, "evaluation process 1"), (3, "worker process 1 (of 0 to 1)")]
 )
-def test_a_killed_process_ends_the_command_with_its_name(tmp_path, number, name):
+def test_a_killed_process_ends_the_command_with_its_name(tmp_path, start, number, name):
     arguments = [
         *SMOKE,
         "collect=workers8",
@@ -237,9 +253,7 @@ def test_a_killed_process_ends_the_command_with_its_name(tmp_path, number, name)
         "collect.steps=32",
         "total_frames=1e5",
     ]
-    running = subprocess.Popen(
-        command(*arguments, "hydra.run.dir=run"), cwd=tmp_path, stderr=subprocess.PIPE, text=True
-    )
+    running = start(command(*arguments, "hydra.run.dir=run"), tmp_path)
     deadline = time.monotonic() + 300
     while not list(tmp_path.glob("run/checkpoints/frames_*128.pt")) and time.monotonic() < deadline:
         assert running.poll() is None, running.stderr.read()
