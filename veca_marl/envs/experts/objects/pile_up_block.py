@@ -12,11 +12,13 @@ from veca_marl.envs.core.expert import register_expert
 from veca_marl.envs.core.task import Player
 from veca_marl.envs.experts.objects.carrying_expert import CarryingExpert
 from veca_marl.envs.experts.skills.carrying import CarryCfg, carry, return_to_rest
-from veca_marl.envs.experts.skills.palm_motion import PalmMotion
+from veca_marl.envs.experts.skills.palm_motion import Grip, PalmMotion
+from veca_marl.envs.tasks.objects.blocks import height_in_edges
 from veca_marl.envs.tasks.objects.pile_up_block import PileUpBlock
 from veca_marl.sim.geometry import Floats
 from veca_marl.sim.physics import Prop
 
+_SETTLING_STEPS, _PILED_EDGES = 30, 0.5
 _CLEARANCE_M = 0.035  # of the carried block above the other one
 # high palms, since thumbs that press on the rear edge tilt the block by 20 to 40 degrees
 _CARRY = CarryCfg(squeeze_m=0.025, speed_m=0.005, thumbs_m=0.012, levelling=0.1)
@@ -36,9 +38,21 @@ class PileUpBlockExpert(CarryingExpert[PileUpBlock]):
     def _script(self) -> Iterator[Floats]:
         height_m = 1.5 * self.task.cfg.edge_m + _CLEARANCE_M
         for block, base in itertools.cycle(itertools.permutations(self.task.red)):
+            yield from carry(self._palms, block, partial(_on_top_of, base), height_m, _CARRY)
+            yield from self._let_settle(block)
             if self.task.solved(self.player):
                 yield from return_to_rest(self._palms)
-            yield from carry(self._palms, block, partial(_on_top_of, base), height_m, _CARRY)
+
+    def _let_settle(self, block: Prop) -> Iterator[Floats]:
+        """Hold the hands still while a block that has been put down still moves.
+
+        A pile sways after it was released: it is not solved yet, but must not be gripped.
+        """
+        here = Grip(self._palms.middle, self._palms.gap_m)
+        for _ in range(_SETTLING_STEPS):
+            if self.task.solved(self.player) or height_in_edges(block) < _PILED_EDGES:
+                return
+            yield self._palms.move(here)
 
 
 def _on_top_of(base: Prop) -> Floats:
