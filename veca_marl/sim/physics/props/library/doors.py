@@ -20,6 +20,7 @@ _THICKNESS_M = 0.04
 _HANDLE_HEIGHT_M = 0.45  # within reach of a child of 0.78 m
 _METAL: Colour = (0.75, 0.75, 0.78)
 _WOOD: Colour = (0.80, 0.62, 0.42)
+_HANDLE_M = 0.03  # by which the handle of a hinged leaf stands out
 _PULL_M = 0.002  # by which the shallow handle of a sliding leaf stands out
 _LEFT_OUT_M = 0.12  # of an open sliding leaf, so that its handle is seen and the door can be closed
 
@@ -52,25 +53,16 @@ def door_leaf(
         colour: Of the leaf.
         mass_kg: Its mass.
     """
-    width, height = width_m - 2.0 * _GAP_M, height_m - 2.0 * _GAP_M
-    parts = _leaf_parts(width, height, 0.03, width / 2.0 - 0.08)
+    width = width_m - 2.0 * _GAP_M
     side = 1.0 if opens_to_front else -1.0
-    return PropCfg(
-        name=name,
-        shape=PropShape.compound,
-        position_m=(*position_m, height_m / 2.0),
-        yaw_deg=yaw_deg,
-        mass_kg=mass_kg,
-        colour=colour,
-        parts=parts,
-        interactions=["open", "close"],
-        joint=JointCfg(
-            axis=(0.0, 0.0, -side),
-            anchor_m=(side * _THICKNESS_M / 2.0, -width / 2.0, 0.0),
-            range_deg=90.0,
-            lock=lock,
-        ),
+    hinge = JointCfg(
+        axis=(0.0, 0.0, -side),
+        anchor_m=(side * _THICKNESS_M / 2.0, -width / 2.0, 0.0),
+        range_deg=90.0,
+        lock=lock,
     )
+    parts = _leaf_parts(width, height_m, _HANDLE_M, width / 2.0 - 0.08)
+    return _leaf(name, (*position_m, height_m / 2.0), yaw_deg, parts, hinge, colour, mass_kg)
 
 
 def sliding_leaf(
@@ -104,33 +96,54 @@ def sliding_leaf(
         colour: Of the leaf.
         mass_kg: Its mass.
     """
-    width, height = width_m - 2.0 * _GAP_M, height_m - 2.0 * _GAP_M
+    width = width_m - 2.0 * _GAP_M
     side = 1.0 if slides_to_left else -1.0
+    slide = JointCfg(
+        JointKind.slide,
+        parent=wall,
+        axis=(0.0, side, 0.0),
+        range_m=width - _LEFT_OUT_M,
+        friction=1.0,
+        lock=lock,
+    )
+    parts = _leaf_parts(width, height_m, _PULL_M, -side * (width / 2.0 - 0.06))
+    return _leaf(name, (*position_m, height_m / 2.0), yaw_deg, parts, slide, colour, mass_kg)
+
+
+def _leaf(
+    name: str,
+    position_m: tuple[float, float, float],
+    yaw_deg: float,
+    parts: list[PartCfg],
+    joint: JointCfg,
+    colour: Colour,
+    mass_kg: float,
+) -> PropCfg:
     return PropCfg(
         name=name,
         shape=PropShape.compound,
-        position_m=(*position_m, height_m / 2.0),
+        position_m=position_m,
         yaw_deg=yaw_deg,
         mass_kg=mass_kg,
         colour=colour,
-        parts=_leaf_parts(width, height, _PULL_M, -side * (width / 2.0 - 0.06)),
+        parts=parts,
         interactions=["open", "close"],
-        joint=JointCfg(
-            JointKind.slide,
-            parent=wall,
-            axis=(0.0, side, 0.0),
-            range_m=width - _LEFT_OUT_M,
-            friction=1.0,
-            lock=lock,
-        ),
+        joint=joint,
     )
 
 
-def _leaf_parts(width: float, height: float, handle_m: float, handle_y: float) -> list[PartCfg]:
-    """Return a leaf with a handle on both faces that stands out by `handle_m`."""
-    parts = [PartCfg(PropShape.box, [_THICKNESS_M, width, height])]
+def _leaf_parts(width: float, height_m: float, handle_m: float, handle_y: float) -> list[PartCfg]:
+    """Return a leaf for an opening of a height, and handles on both faces.
+
+    Args:
+        width: Width of the leaf, m.
+        height_m: Clear height of the opening.
+        handle_m: By how much the handles stand out.
+        handle_y: Their place along the width.
+    """
+    parts = [PartCfg(PropShape.box, [_THICKNESS_M, width, height_m - 2.0 * _GAP_M])]
     for face in (-1.0, 1.0):
         out = face * (_THICKNESS_M + handle_m) / 2.0
-        place = (out, handle_y, _HANDLE_HEIGHT_M - height / 2.0 - _GAP_M)
+        place = (out, handle_y, _HANDLE_HEIGHT_M - height_m / 2.0)
         parts.append(PartCfg(PropShape.box, [handle_m, 0.1, 0.02], place, colour=_METAL))
     return parts
