@@ -9,8 +9,8 @@ def timing_table(elapsed_s: float, frames: int) -> str:
     """Return lines of seconds, share and milliseconds per frame of each part.
 
     Beyond `timeit.print`: shares of the whole, the time that no part accounts for, and the time
-    per frame. A part that lies in another one, such as ``evaluate/video``, has a line after the
-    total: its time is that of the other one too.
+    per frame. A part of another one, such as ``evaluate/video``, has a line after the total: its
+    time is counted in both.
 
     Args:
         elapsed_s: The whole time.

@@ -248,10 +248,12 @@ def _wall_beside(
     along, across = 1 - line.axis, line.axis
     side = 1.0 if leaf.opens_to_front else -1.0
     edge = door.position_m[along] + side * door.width_m / 2.0
-    for piece in pieces:
-        begins = piece.position_m[along] - side * piece.size_m[along] / 2.0
-        if piece.position_m[2] == 0.0 and abs(begins - edge) < _TOLERANCE_M:
-            break
+    piece = next(
+        one
+        for one in pieces
+        if one.position_m[2] == 0.0  # not above a door
+        and abs(one.position_m[along] - side * one.size_m[along] / 2.0 - edge) < _TOLERANCE_M
+    )
     if piece.size_m[along] < door.width_m:
         raise ValueError(
             f"door {door.name!r}: its leaf of {door.width_m} m slides into the wall beside it, "
