@@ -43,6 +43,14 @@ def test_a_run_of_version_0_2_is_read(tmp_path):
     assert to_config(read) == to_config(node)
 
 
+def test_a_run_without_kernels_has_those_it_was_trained_with(tmp_path):
+    node = compose_node(["+task=KickTheBall"])
+    plain = OmegaConf.to_container(node, resolve=True, enum_to_str=True)
+    del plain["algo"]["network"]["kernels"], plain["algo"]["network"]["strides"]
+    network = to_config(typed(OmegaConf.create(plain), body_names(node))).algo.network
+    assert (network.kernels, network.strides) == ([8, 4, 3], [4, 2, 1])
+
+
 @pytest.fixture
 def stored(tmp_path):
     node = compose_node(

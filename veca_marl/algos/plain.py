@@ -28,12 +28,14 @@ def from_plain(kind: type[T], plain: dict[str, Any], find: Callable[[type, str],
         kind: Its type, or the base class of it.
         plain: What `to_plain` returned.
         find: Returns the type for a base class and the `name` that the plain data hold, for
-            dataclasses that are chosen from a registry.
+            dataclasses that are chosen from a registry. If that type has an attribute
+            `formerly`, it holds the values of fields that `plain` may be too old to have.
 
     Raises:
         ValueError: If a field is unknown.
     """
     actual = find(kind, plain["name"]) if "name" in plain else kind
+    plain = getattr(actual, "formerly", {}) | plain
     hints = get_type_hints(actual)
     unknown = sorted(set(plain) - set(hints))
     if unknown:

@@ -84,7 +84,8 @@ def _of_this_version(stored: DictConfig) -> DictConfig:
 def _algorithm(stored: DictConfig) -> Any:
     node = OmegaConf.structured(ALGORITHMS.find(stored.name).cfg_type)
     if "network" in node:
-        node.network = OmegaConf.structured(NETWORKS.find(stored.network.name).cfg_type)
+        network = NETWORKS.find(stored.network.name).cfg_type
+        node.network = OmegaConf.merge(OmegaConf.structured(network), network.formerly)
     return node
 
 

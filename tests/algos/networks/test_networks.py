@@ -1,4 +1,5 @@
 import math
+import re
 
 import pytest
 import torch
@@ -6,6 +7,7 @@ from fake_env import FakeEnv
 from torchrl.data import Bounded, Composite
 
 from veca_marl.algos.networks.encoders import (
+    Convolutions,
     ImageEncoder,
     Places,
     Pooling,
@@ -16,6 +18,7 @@ from veca_marl.algos.networks.encoders import (
 from veca_marl.algos.networks.factory import make_network
 from veca_marl.algos.networks.multisense import MultisenseCfg, Trunk
 from veca_marl.algos.networks.precision import Precision
+from veca_marl.algos.plain import from_plain, to_plain
 from veca_marl.algos.specs import ArrayLayout, team_specs
 
 IMAGE = ArrayLayout((2, 3, 84, 84), "uint8", 0.0, 255.0)
@@ -28,17 +31,19 @@ def network(cfg=None, **env):
 
 
 def test_encoder_is_chosen_by_type_and_shape():
-    assert isinstance(make_encoder("a", IMAGE, (16, 32, 32), 64, Pooling.flatten), ImageEncoder)
-    assert isinstance(make_encoder("b", SPECTRUM, (16, 32, 32), 64, Pooling.flatten), VectorEncoder)
+    assert isinstance(make_encoder("a", IMAGE, Convolutions(), 64, Pooling.flatten), ImageEncoder)
+    assert isinstance(
+        make_encoder("b", SPECTRUM, Convolutions(), 64, Pooling.flatten), VectorEncoder
+    )
     # depth is not bytes: it has no colour channels to stack
     assert isinstance(
         make_encoder(
-            "c", ArrayLayout((2, 8, 8), "float32", 0.0, 9.0), (16, 32, 32), 64, Pooling.flatten
+            "c", ArrayLayout((2, 8, 8), "float32", 0.0, 9.0), Convolutions(), 64, Pooling.flatten
         ),
         VectorEncoder,
     )
     with pytest.raises(ValueError, match=r"touch: no encoder for int64\(3,\); choices: uint8"):
-        make_encoder("touch", ArrayLayout((3,), "int64", 0, 1), (16, 32, 32), 64, Pooling.flatten)
+        make_encoder("touch", ArrayLayout((3,), "int64", 0, 1), Convolutions(), 64, Pooling.flatten)
 
 
 @pytest.mark.parametrize("size", [(84, 84), (36, 36), (20, 31), (4, 4), (120, 96)])
@@ -51,8 +56,35 @@ def test_images_of_any_size_are_encoded(size):
 def test_image_encoder_has_the_documented_layers():
     encoder = ImageEncoder(IMAGE.shape)
     shapes = [tuple(p.shape) for p in encoder.parameters() if p.ndim == 4]
-    assert shapes == [(16, 6, 8, 8), (32, 16, 4, 4), (32, 32, 3, 3)]
+    assert shapes == [(16, 6, 4, 4), (32, 16, 4, 4), (32, 32, 3, 3)]
     assert encoder.features == 32 * 7 * 7
+
+
+def test_sizes_of_convolutions_are_chosen():
+    cfg = MultisenseCfg(channels=[8, 16, 16], kernels=[8, 4, 3], strides=[4, 2, 2])
+    encoder = ImageEncoder(IMAGE.shape, cfg.convolutions)
+    shapes = [tuple(p.shape) for p in encoder.parameters() if p.ndim == 4]
+    assert shapes == [(8, 6, 8, 8), (16, 8, 4, 4), (16, 16, 3, 3)]
+    assert encoder.features == 16 * 4 * 4
+
+
+@pytest.mark.parametrize("name", ["channels", "kernels", "strides"])
+@pytest.mark.parametrize("numbers", [[4, 4], [4, 0, 3]])
+def test_impossible_sizes_of_convolutions_are_refused(name, numbers):
+    message = rf"network\.{name}: need 3 positive numbers, got {re.escape(str(numbers))}"
+    with pytest.raises(ValueError, match=message):
+        MultisenseCfg(**{name: numbers})
+
+
+def test_a_stored_network_without_kernels_has_those_it_was_trained_with():
+    plain = to_plain(MultisenseCfg())
+    del plain["kernels"], plain["strides"]
+    read = from_plain(MultisenseCfg, plain, lambda base, name: MultisenseCfg)
+    assert (read.kernels, read.strides) == ([8, 4, 3], [4, 2, 1])
+    assert (
+        from_plain(MultisenseCfg, to_plain(MultisenseCfg()), lambda base, name: MultisenseCfg)
+        == MultisenseCfg()
+    )
 
 
 def test_bytes_are_encoded_as_numbers_from_0_to_1():
@@ -145,7 +177,6 @@ def test_unsupported_actions_raise_an_error_with_the_choices():
 @pytest.mark.parametrize(
     ("kwargs", "message"),
     [
-        ({"channels": [1, 2]}, "need 3 numbers"),
         ({"trunk_features": 0}, "must be positive"),
         ({"initial_scale": 0.0}, "initial_scale must be finite and above 0.01, got 0.0"),
         ({"initial_scale": math.inf}, "initial_scale must be finite and above 0.01, got inf"),
@@ -168,7 +199,7 @@ def test_places_are_positions_of_activations():
 
 @pytest.mark.parametrize("shape", [(3, 84, 84), (2, 3, 21, 40), (1, 8, 6)])
 def test_places_accept_any_size(shape):
-    encoder = ImageEncoder(shape, (4, 8, 8), Pooling.places)
+    encoder = ImageEncoder(shape, Convolutions((4, 8, 8)), Pooling.places)
     features = encoder(torch.randint(0, 256, (5, *shape), dtype=torch.uint8))
     assert features.shape == (5, encoder.features) == (5, 24)
     features.sum().backward()
@@ -186,7 +217,7 @@ def test_places_learn_a_position_from_fewer_images():
 
     def error(pooling):
         torch.manual_seed(1)
-        encoder = ImageEncoder((3, 64, 64), (8, 16, 16), pooling)
+        encoder = ImageEncoder((3, 64, 64), Convolutions((8, 16, 16)), pooling)
         model = torch.nn.Sequential(encoder, torch.nn.Linear(encoder.features, 1))
         optimizer = torch.optim.Adam(model.parameters(), 1e-3)
         for batch in torch.randint(0, 256, (100, 64)):

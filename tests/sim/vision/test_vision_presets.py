@@ -8,7 +8,7 @@ from composed import compose
 from eye_scenes import FakeBody, clutter
 from stand_in_worlds import SceneWorld
 
-from veca_marl.algos.networks.encoders import ImageEncoder
+from veca_marl.algos.networks.encoders import Convolutions, ImageEncoder
 from veca_marl.config import conf_dir
 from veca_marl.sim.vision import VisionSense
 from veca_marl.sim.vision.image_filters import Defocus
@@ -49,7 +49,9 @@ def test_every_preset_works_at_higher_resolutions(preset):
     assert high.shape == (2, 3, 168, 168)
     difference = np.abs(reduced(high, 84).astype(float) - reduced(low, 84))
     assert difference.mean() < 2.5
-    features = ImageEncoder(high.shape, (4, 4, 4))(torch.from_numpy(high[None].copy()))
+    features = ImageEncoder(high.shape, Convolutions((4, 4, 4)))(
+        torch.from_numpy(high[None].copy())
+    )
     assert features.isfinite().all()
 
 

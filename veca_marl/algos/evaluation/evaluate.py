@@ -53,7 +53,7 @@ class EvalCfg:
             collection does.
     """
 
-    every_frames: int = 20480
+    every_frames: int = 40_960
     episodes: int = 8
     final_episodes: int | None = None
     worlds: int = 8

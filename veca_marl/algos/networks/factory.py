@@ -42,9 +42,11 @@ class NetworkCfg:
             tanh maps them to [-1, 1]: with 1 they are nearly uniform, with 0.3 nearly normal.
             Greater than 0.01.
         not_parameters: Fields that a network with the same parameters may have differently.
+        formerly: Fields that were added later, and their values in runs that were stored before.
     """
 
     not_parameters: ClassVar[tuple[str, ...]] = ("frozen",)
+    formerly: ClassVar[dict[str, Any]] = {}
 
     name: str = ""
     frozen: list[str] = field(default_factory=list)

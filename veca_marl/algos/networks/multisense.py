@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
+from typing import Any, ClassVar
 
 import torch
 from tensordict.nn import TensorDictModule, TensorDictModuleBase, TensorDictSequential
 from torch import Tensor, nn
 
 from veca_marl.algos.acting.modules import ArrayModule
-from veca_marl.algos.networks.encoders import Pooling, make_encoder
+from veca_marl.algos.networks.encoders import Convolutions, Pooling, make_encoder
 from veca_marl.algos.networks.factory import NetworkCfg, NetworkFactory, register_network
 from veca_marl.algos.networks.initialisation import orthogonal
 from veca_marl.algos.networks.memory.gru import GatedMemory, TeamMemory
@@ -58,6 +59,8 @@ class MultisenseCfg(NetworkCfg):
 
     Attributes:
         channels: Output channels of the three convolutions of an image encoder.
+        kernels: Widths of their windows; ``[8, 4, 3]`` are those of Mnih et al. 2015.
+        strides: Distances of their windows.
         pooling: Pooling of an image's last feature maps.
         vector_features: Width of the encoder of any sense that is not an image.
         compressed: Senses with values of many magnitudes: symlog is applied before their encoder.
@@ -72,9 +75,12 @@ class MultisenseCfg(NetworkCfg):
     """
 
     not_parameters = ("frozen", "precision")
+    formerly: ClassVar[dict[str, Any]] = {"kernels": [8, 4, 3], "strides": [4, 2, 1]}
 
     name: str = "multisense"
     channels: list[int] = field(default_factory=lambda: [16, 32, 32])
+    kernels: list[int] = field(default_factory=lambda: [4, 4, 3])
+    strides: list[int] = field(default_factory=lambda: [4, 2, 1])
     pooling: Pooling = Pooling.flatten
     vector_features: int = 64
     compressed: list[str] = field(default_factory=lambda: ["proprioception"])
@@ -87,11 +93,17 @@ class MultisenseCfg(NetworkCfg):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if len(self.channels) != 3:
-            raise ValueError(f"network.channels: need 3 numbers, got {list(self.channels)}")
-        sizes = (self.vector_features, self.trunk_features, self.memory_features)
-        if min(*self.channels, *sizes) < 1:
+        for name in ("channels", "kernels", "strides"):
+            numbers = list(getattr(self, name))
+            if len(numbers) != 3 or min(numbers) < 1:
+                raise ValueError(f"network.{name}: need 3 positive numbers, got {numbers}")
+        if min(self.vector_features, self.trunk_features, self.memory_features) < 1:
             raise ValueError(f"network: sizes must be positive, got {self}")
+
+    @property
+    def convolutions(self) -> Convolutions:
+        """Sizes of the convolutions of an image encoder."""
+        return Convolutions(self.channels, self.kernels, self.strides)
 
     @property
     def recurrent(self) -> bool:
@@ -113,7 +125,7 @@ class Trunk(nn.Module):
             name: make_encoder(
                 name,
                 layout,
-                cfg.channels,
+                cfg.convolutions,
                 cfg.vector_features,
                 cfg.pooling,
                 name in cfg.compressed,

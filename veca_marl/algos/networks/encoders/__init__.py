@@ -1,7 +1,15 @@
 """Encoders: one for each sense, chosen by type and shape of its array."""
 
 from veca_marl.algos.networks.encoders.choice import make_encoder
-from veca_marl.algos.networks.encoders.image import ImageEncoder, Places, Pooling
+from veca_marl.algos.networks.encoders.image import Convolutions, ImageEncoder, Places, Pooling
 from veca_marl.algos.networks.encoders.vector import VectorEncoder, scale_of
 
-__all__ = ["ImageEncoder", "Places", "Pooling", "VectorEncoder", "make_encoder", "scale_of"]
+__all__ = [
+    "Convolutions",
+    "ImageEncoder",
+    "Places",
+    "Pooling",
+    "VectorEncoder",
+    "make_encoder",
+    "scale_of",
+]

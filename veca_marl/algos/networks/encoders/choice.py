@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
-from veca_marl.algos.networks.encoders.image import ImageEncoder, Pooling
+from veca_marl.algos.networks.encoders.image import Convolutions, ImageEncoder, Pooling
 from veca_marl.algos.networks.encoders.vector import VectorEncoder
 from veca_marl.algos.specs import ArrayLayout
 
@@ -12,7 +10,7 @@ from veca_marl.algos.specs import ArrayLayout
 def make_encoder(
     name: str,
     layout: ArrayLayout,
-    channels: Sequence[int],
+    convolutions: Convolutions,
     features: int,
     pooling: Pooling,
     compressed: bool = False,
@@ -23,7 +21,7 @@ def make_encoder(
         ValueError: If there is none.
     """
     if layout.dtype == "uint8" and len(layout.shape) >= 3:
-        return ImageEncoder(layout.shape, channels, pooling)
+        return ImageEncoder(layout.shape, convolutions, pooling)
     if layout.dtype.startswith("float"):
         return VectorEncoder(layout, features, compressed)
     raise ValueError(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from enum import Enum
 
 import torch
@@ -11,8 +12,24 @@ from torch import Tensor, nn
 
 from veca_marl.algos.networks.initialisation import orthogonal
 
-_KERNELS = (8, 4, 3)  # Mnih et al. 2015, "Human-level control ...", with a half of their channels
-_STRIDES = (4, 2, 1)
+
+@dataclass(frozen=True)
+class Convolutions:
+    """Three convolutions, each followed by a rectified linear unit.
+
+    Those of Mnih et al. 2015, "Human-level control ...", are ``kernels=(8, 4, 3)`` with twice the
+    channels. By default the windows of the first layer do not overlap, as in vision transformers
+    (Dosovitskiy et al. 2021): it has a quarter of their products, and those of the others dominate.
+
+    Attributes:
+        channels: Output channels of each.
+        kernels: Width and height of the window of each, pixels or cells.
+        strides: Distance of the windows of each.
+    """
+
+    channels: Sequence[int] = (16, 32, 32)
+    kernels: Sequence[int] = (4, 4, 3)
+    strides: Sequence[int] = (4, 2, 1)
 
 
 class Pooling(Enum):
@@ -81,7 +98,7 @@ class ImageEncoder(nn.Module):
 
     Args:
         shape: Shape of one observation: at least channels, height, width.
-        channels: Output channels of the three convolutions.
+        convolutions: Their sizes.
         pooling: Pooling of the last maps.
 
     Attributes:
@@ -91,14 +108,15 @@ class ImageEncoder(nn.Module):
     def __init__(
         self,
         shape: Sequence[int],
-        channels: Sequence[int] = (16, 32, 32),
+        convolutions: Convolutions = Convolutions(),
         pooling: Pooling = Pooling.flatten,
     ) -> None:
         super().__init__()
         *stack, height, width = shape
         size_in = math.prod(stack)
         layers: list[nn.Module] = []
-        for size_out, kernel, stride in zip(channels, _KERNELS, _STRIDES, strict=True):
+        sizes = convolutions.channels, convolutions.kernels, convolutions.strides
+        for size_out, kernel, stride in zip(*sizes, strict=True):
             window = (min(kernel, height), min(kernel, width))
             convolution = nn.Conv2d if layers else PixelConv2d
             layers += [orthogonal(convolution(size_in, size_out, window, stride))]
