@@ -3,7 +3,7 @@
 import json
 from functools import partial
 from itertools import count
-from multiprocessing import active_children
+from multiprocessing import active_children, get_context
 
 import numpy as np
 import pytest
@@ -163,6 +163,10 @@ def test_rollouts_at_once_name_a_process_that_was_killed():
     before = set(active_children())
     rollouts = SimultaneousRollouts(partial(VecaEnv, game, 1, seed=0), steps=2, processes=1)
     assert rollouts.frames_per_s() > 0.0
+    # shared memory that this process asks for is not that in which the others wait for each other
+    shared = [get_context("spawn").Array("i", [7] * 8, lock=False) for _ in range(8)]
+    assert rollouts.frames_per_s() > 0.0
+    assert all(list(array) == [7] * 8 for array in shared)
     for process in set(active_children()) - before:
         process.kill()
         process.join()

@@ -34,11 +34,12 @@ class SimultaneousRollouts:
 
     def __init__(self, make_env: Callable[[], VecaEnv], steps: int, processes: int) -> None:
         context = get_context("spawn")  # this process may have threads, which a fork would break
-        begin = context.Barrier(processes)
+        # kept: its shared memory is given to other arrays as soon as this process drops it
+        self._begin = context.Barrier(processes)
         self._processes, self._connections = [], []
         for _ in range(processes):
             here, there = context.Pipe()
-            arguments = (there, begin, make_env, steps, os.getpid())
+            arguments = (there, self._begin, make_env, steps, os.getpid())
             process = context.Process(target=_roll_out_on_request, args=arguments, daemon=True)
             process.start()
             there.close()
