@@ -55,7 +55,8 @@ def test_teams_learn_with_every_kind_of_parameters_and_critic(
 
 def test_it_learns_from_shifted_images_with_an_encoder_trained_by_the_critics(make_sac, collect):
     changes = {
-        "critic": ActionValuesCfg(hidden=[32], normalisation=Normalisation.layer),
+        # with half of the updates or of the units, some seeds have not learnt after seven batches
+        "critic": ActionValuesCfg(hidden=[64], normalisation=Normalisation.layer),
         "encoder_gradient": EncoderGradient.critic,
         "temperature": TemperatureCfg(0.1, Adaptation.automatic),
         # with the few channels of SMALL all units may be inactive on images of one brightness
@@ -63,8 +64,8 @@ def test_it_learns_from_shifted_images_with_an_encoder_trained_by_the_critics(ma
         "policy_hidden": [32],
         "random_shift": 2,
         "steps": 3,
-        "learning_rate": 5e-3,
-        "updates_per_frame": 0.25,
+        "learning_rate": 3e-3,
+        "updates_per_frame": 0.5,
     }
     eyes = {"senses": ("vision",)}
     algorithm = make_sac(changes=changes, seed=1, **eyes)
