@@ -16,7 +16,7 @@ import numpy as np
 import torch
 
 from veca_marl.algos.files import WriteError, write_atomically
-from veca_marl.algos.training.checkpoint import CheckpointError
+from veca_marl.algos.training.checkpoint_file import CheckpointError
 from veca_marl.config import ConfigError
 from veca_marl.config.command_line import CommandLine
 from veca_marl.envs.core.task import find_task

@@ -23,7 +23,7 @@ from veca_marl.algos.evaluation.comparison import comparison_line, interval, sol
 from veca_marl.algos.evaluation.evaluate import Exploration, RandomTeams, Scores, evaluate
 from veca_marl.algos.files import WriteError, write_atomically
 from veca_marl.algos.specs import team_specs
-from veca_marl.algos.training.checkpoint import CheckpointError
+from veca_marl.algos.training.checkpoint_file import CheckpointError
 from veca_marl.config import Config, ConfigError, compose, one_line
 from veca_marl.config.command_line import CommandLine
 from veca_marl.envs.adapters.torchrl.env import VecaEnv

@@ -19,7 +19,9 @@ from veca_marl.algos.sac.config import ReplayCfg
 from veca_marl.algos.sac.replay.buffer import Replay
 from veca_marl.algos.sense_encoders import sense_encoders
 from veca_marl.algos.specs import TeamSpec, team_specs
-from veca_marl.algos.training.checkpoint import CheckpointError, Checkpoints, Identity
+from veca_marl.algos.training.checkpoint import Checkpoints
+from veca_marl.algos.training.checkpoint_file import CheckpointError
+from veca_marl.algos.training.checkpoint_identity import Identity
 from veca_marl.algos.training.learners import TeamLearners
 from veca_marl.algos.transfer import init_teams
 

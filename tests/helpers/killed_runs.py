@@ -13,7 +13,8 @@ from veca_marl.algos.collection.experience import CollectCfg
 from veca_marl.algos.evaluation.evaluate import EvalCfg
 from veca_marl.algos.ppo import PPOCfg
 from veca_marl.algos.specs import team_specs
-from veca_marl.algos.training.checkpoint import Checkpoints, Identity
+from veca_marl.algos.training.checkpoint import Checkpoints
+from veca_marl.algos.training.checkpoint_identity import Identity
 from veca_marl.algos.training.learners import TeamLearners
 from veca_marl.algos.training.loop import Trainer
 from veca_marl.algos.training.progress import Budget

@@ -14,7 +14,8 @@ from veca_marl.algos.selfplay.pool import Pool
 from veca_marl.algos.selfplay.self_play import SelfPlay
 from veca_marl.algos.specs import TeamSpec, team_specs
 from veca_marl.algos.storage import check_storage
-from veca_marl.algos.training.checkpoint import Checkpoints, Identity
+from veca_marl.algos.training.checkpoint import Checkpoints
+from veca_marl.algos.training.checkpoint_identity import Identity
 from veca_marl.algos.training.learners import TeamLearners
 from veca_marl.algos.training.loggers import make_reporter
 from veca_marl.algos.training.loop import Trainer

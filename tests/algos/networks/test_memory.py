@@ -18,7 +18,8 @@ from veca_marl.algos.ppo import PPOCfg
 from veca_marl.algos.selfplay.pool import Pool
 from veca_marl.algos.selfplay.tournament import play_all
 from veca_marl.algos.specs import team_specs
-from veca_marl.algos.training.checkpoint import Checkpoints, Identity
+from veca_marl.algos.training.checkpoint import Checkpoints
+from veca_marl.algos.training.checkpoint_identity import Identity
 from veca_marl.algos.training.learners import TeamLearners
 from veca_marl.algos.training.loop import Trainer
 from veca_marl.algos.training.progress import Budget

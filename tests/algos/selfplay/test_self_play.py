@@ -10,7 +10,9 @@ from veca_marl.algos.evaluation.evaluate import EvalCfg
 from veca_marl.algos.selfplay.pool import Pool
 from veca_marl.algos.selfplay.self_play import SelfPlay, SelfPlayCfg
 from veca_marl.algos.specs import team_specs
-from veca_marl.algos.training.checkpoint import CheckpointError, Checkpoints, Identity
+from veca_marl.algos.training.checkpoint import Checkpoints
+from veca_marl.algos.training.checkpoint_file import CheckpointError
+from veca_marl.algos.training.checkpoint_identity import Identity
 from veca_marl.algos.training.loop import Trainer
 from veca_marl.algos.training.progress import Budget
 from veca_marl.algos.training.reporters import CsvReporter

@@ -8,11 +8,9 @@ import torch
 from fake_env import FakeEnv
 
 from veca_marl.algos.specs import team_specs
-from veca_marl.algos.training.checkpoint import (
-    CheckpointError,
-    Checkpoints,
-    Identity,
-)
+from veca_marl.algos.training.checkpoint import Checkpoints
+from veca_marl.algos.training.checkpoint_file import CheckpointError
+from veca_marl.algos.training.checkpoint_identity import Identity
 
 CPU = torch.device("cpu")
 

@@ -6,7 +6,8 @@ from training import FRAMES, Interrupt, read
 from veca_marl.algos.collection.experience import CollectCfg
 from veca_marl.algos.evaluation.evaluate import EvalCfg
 from veca_marl.algos.specs import team_specs
-from veca_marl.algos.training.checkpoint import Checkpoints, Identity
+from veca_marl.algos.training.checkpoint import Checkpoints
+from veca_marl.algos.training.checkpoint_identity import Identity
 from veca_marl.algos.training.loop import Trainer
 from veca_marl.algos.training.progress import Budget
 from veca_marl.algos.training.reporters import CsvReporter

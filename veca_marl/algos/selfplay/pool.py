@@ -10,7 +10,7 @@ import torch
 from torch import nn
 
 from veca_marl.algos.files import WriteError, write_atomically
-from veca_marl.algos.training.checkpoint import CheckpointError, load_file, naming_checkpoint
+from veca_marl.algos.training.checkpoint_file import CheckpointError, load_file, naming_checkpoint
 
 
 class Pool:

@@ -14,7 +14,7 @@ import numpy as np
 
 from veca_marl.algos.policy import Policy
 from veca_marl.algos.selfplay.pool import Pool
-from veca_marl.algos.training.checkpoint import CheckpointError
+from veca_marl.algos.training.checkpoint_file import CheckpointError
 from veca_marl.algos.training.learners import TeamLearners
 
 _DRAWS = 7  # the random stream of the matches differs from those of the stages

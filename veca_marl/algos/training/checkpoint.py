@@ -3,48 +3,16 @@
 from __future__ import annotations
 
 import io
-import pickle
-import signal
-import threading
-from collections.abc import Collection, Iterator, Mapping
-from contextlib import contextmanager
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any
 
 import torch
 
 from veca_marl.algos.files import WriteError, write_atomically
-from veca_marl.algos.specs import TeamSpec
-
-# 3: actions have named parts, and each team an algorithm of its own
-_FORMAT = 3
-_KEYS = {"identity", "config", "algorithms", "state"}
-_CPU = torch.device("cpu")
-_ABSENT = "absent"
-# what torch.load raises for files that are cut off or have other content
-_UNREADABLE = (RuntimeError, EOFError, pickle.UnpicklingError, ValueError, KeyError, TypeError)
-
-
-class CheckpointError(RuntimeError):
-    """A checkpoint that cannot be written, read, or used here."""
-
-
-@dataclass(frozen=True)
-class Identity:
-    """What a checkpoint belongs to.
-
-    Attributes:
-        task: Name of the task.
-        specs: Team name to its arrays.
-    """
-
-    task: str
-    specs: dict[str, TeamSpec]
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return plain data."""
-        return {"task": self.task, "specs": {t: s.to_dict() for t, s in self.specs.items()}}
+from veca_marl.algos.training.checkpoint_file import FORMAT, CheckpointError, read_checkpoint
+from veca_marl.algos.training.checkpoint_identity import Identity, check_config, check_identity
+from veca_marl.algos.training.delayed_signals import interrupts_wait
 
 
 class Checkpoints:
@@ -97,13 +65,13 @@ class Checkpoints:
             return None
         path = self.folder / f"frames_{frames:012d}.pt"
         content = {
-            "format": _FORMAT,
+            "format": FORMAT,
             "identity": self.identity.to_dict(),
             "config": self.config,
             "algorithms": dict(algorithms or {}),
             "state": state,
         }
-        with _interrupts_wait():
+        with interrupts_wait():
             file = io.BytesIO()
             torch.save(content, file)
             if best:  # first: a run that is killed in between writes both again
@@ -128,23 +96,10 @@ class Checkpoints:
             raise CheckpointError(
                 f"{error}; remove it to continue from {earlier[-1].name}"
             ) from error
-        _check_identity(path, content["identity"], self.identity.to_dict())
-        self._check_config(path, content["config"])
+        check_identity(path, content["identity"], self.identity.to_dict())
+        check_config(path, content["config"], self.config, self.may_change)
         state: dict[str, Any] = content["state"]
         return state
-
-    def _check_config(self, path: Path, stored: dict[str, Any]) -> None:
-        """Check that the configuration is the stored one; keys of newer versions are ignored."""
-        differing = [
-            f"{name} was {before}, is {now}"
-            for name, before, now in _differences(stored, self.config)
-            if before != _ABSENT and name.partition(".")[0] not in self.may_change
-        ]
-        if differing:
-            raise CheckpointError(
-                f"{path} is of another configuration: {'; '.join(differing)}; "
-                f"a resumed run may change {', '.join(self.may_change) or 'nothing'}"
-            )
 
     @property
     def empty(self) -> bool:
@@ -180,127 +135,3 @@ class Checkpoints:
             kept = self._files()
             last = kept[-1] if kept else "none"
             raise CheckpointError(f"{error}; the last intact checkpoint is {last}") from error
-
-
-_DELAYED = [
-    getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGCHLD") if name in dir(signal)
-]
-
-
-@contextmanager
-def _interrupts_wait() -> Iterator[None]:
-    """Delay what signals raise until the block is done; inside it torch would raise another error.
-
-    They are Ctrl-C, the request to end, and the end of a worker process.
-    """
-    if threading.current_thread() is not threading.main_thread():
-        yield  # only the main thread receives signals
-        return
-    received: list[int] = []
-    previous = {number: signal.getsignal(number) for number in _DELAYED}
-    delayed = {number: action for number, action in previous.items() if callable(action)}
-    for number in delayed:
-        signal.signal(number, lambda number, _: received.append(number))
-    try:
-        yield
-    finally:
-        for number, action in delayed.items():
-            signal.signal(number, action)
-    for number in received:
-        signal.raise_signal(number)
-
-
-def read_checkpoint(path: Path, device: torch.device) -> dict[str, Any]:
-    """Return everything that is in the file of a checkpoint.
-
-    Raises:
-        CheckpointError: If it cannot be read, or is not a checkpoint of this version.
-    """
-    return _checked(path, load_file(path, device))
-
-
-def map_checkpoint(path: Path) -> dict[str, Any]:
-    """Return what `read_checkpoint` returns; of its tensors, the disk is read when they are used.
-
-    A replay buffer in a checkpoint thus takes neither memory nor time where only a network is
-    wanted. The file has to stay as it is until the tensors have been copied.
-
-    Raises:
-        CheckpointError: See `read_checkpoint`.
-    """
-    return _checked(path, _load(path, map_location=_CPU, mmap=True))
-
-
-def _checked(path: Path, content: Any) -> dict[str, Any]:
-    """Return the content of a file if it is a checkpoint of this version."""
-    if not isinstance(content, dict) or "format" not in content:
-        raise CheckpointError(f"{path} is not a checkpoint of a run")
-    if content["format"] != _FORMAT:
-        raise CheckpointError(
-            f"{path} has format {content['format']}, this version reads format {_FORMAT}"
-        )
-    missing = sorted(_KEYS - set(content))
-    if missing:
-        raise CheckpointError(f"{path} is incomplete: no {', '.join(missing)}")
-    checked: dict[str, Any] = content
-    return checked
-
-
-def load_file(path: Path, device: torch.device) -> Any:
-    """Return the tensors and plain data in a file that `torch.save` wrote.
-
-    Raises:
-        CheckpointError: If it cannot be read.
-    """
-    return _load(path, map_location=device)
-
-
-def _load(path: Path, **options: Any) -> Any:
-    try:
-        return torch.load(path, weights_only=True, **options)
-    except FileNotFoundError as error:
-        raise CheckpointError(f"{path} does not exist") from error
-    except (OSError, *_UNREADABLE) as error:
-        reason = str(error).partition("\n")[0] or type(error).__name__
-        raise CheckpointError(f"cannot read {path} (cut off or no checkpoint): {reason}") from error
-
-
-@contextmanager
-def naming_checkpoint(path: Path) -> Iterator[None]:
-    """Raise `CheckpointError` where a state that is loaded inside the block does not fit."""
-    try:
-        yield
-    except (RuntimeError, KeyError, TypeError, ValueError) as error:
-        reason = " ".join(str(error).split())
-        raise CheckpointError(f"{path} does not fit: {type(error).__name__}: {reason}") from error
-
-
-def _check_identity(path: Path, stored: dict[str, Any], wanted: dict[str, Any]) -> None:
-    if stored["task"] != wanted["task"]:
-        raise CheckpointError(f"{path} is of task {stored['task']}, wanted: {wanted['task']}")
-    differing = [
-        f"{name}: {ours} in the checkpoint, {theirs} here"
-        for name, ours, theirs in _differences(stored["specs"], wanted["specs"])
-    ]
-    if differing:
-        raise CheckpointError(f"{path} was made for other specs: {'; '.join(differing)}")
-
-
-def spec_differences(stored: dict[str, Any], spec: TeamSpec) -> str:
-    """Return how a stored specification differs from `spec`; empty if it does not."""
-    return "; ".join(
-        f"{name}: {there} there, {here} here"
-        for name, there, here in _differences(stored, spec.to_dict())
-    )
-
-
-def _differences(one: Any, other: Any, name: str = "") -> list[tuple[str, Any, Any]]:
-    if isinstance(one, dict) and isinstance(other, dict):
-        return [
-            found
-            for key in sorted({*one, *other})
-            for found in _differences(
-                one.get(key, _ABSENT), other.get(key, _ABSENT), f"{name}.{key}".lstrip(".")
-            )
-        ]
-    return [] if one == other else [(name, one, other)]

@@ -34,7 +34,8 @@ from veca_marl.algos.plain import to_plain
 from veca_marl.algos.policy import Policy
 from veca_marl.algos.seeds import derived_seed
 from veca_marl.algos.specs import EnvFactory
-from veca_marl.algos.training.checkpoint import Checkpoints, naming_checkpoint
+from veca_marl.algos.training.checkpoint import Checkpoints
+from veca_marl.algos.training.checkpoint_file import naming_checkpoint
 from veca_marl.algos.training.finite import check_batch, check_scores, check_state
 from veca_marl.algos.training.learners import TeamLearners
 from veca_marl.algos.training.matchmaking import AllLearn, Matchmaking

@@ -20,12 +20,12 @@ from veca_marl.algos.networks.precision import for_acting
 from veca_marl.algos.plain import from_plain
 from veca_marl.algos.sense_encoders import sense_encoders
 from veca_marl.algos.specs import TeamSpec
-from veca_marl.algos.training.checkpoint import (
+from veca_marl.algos.training.checkpoint_file import (
     CheckpointError,
     map_checkpoint,
     naming_checkpoint,
-    spec_differences,
 )
+from veca_marl.algos.training.checkpoint_identity import spec_differences
 
 
 def load_actor(path: Path, team: str, spec: TeamSpec) -> TensorDictModuleBase:
