@@ -7,8 +7,10 @@ import pytest
 from babies import zero_action
 from seekers import STEP_S, game_of, seconds_needed
 
+from veca_marl.envs.experts.control.furniture_detours import detours_in
 from veca_marl.envs.experts.control.locomotion import locomotion_of
 from veca_marl.envs.experts.control.path_following import PathFollower
+from veca_marl.envs.experts.control.steering import walk_to
 from veca_marl.envs.tasks.navigation.multi_agent_nav import Muted
 from veca_marl.envs.tasks.player_starts import place_player
 from veca_marl.sim.sound import CALLS, Call, call_waveform
@@ -29,6 +31,31 @@ def test_the_experts_solve_every_house(playground, agents):
     game = game_of("task.max_seconds=40", agents=agents, playground=playground)
     assert [player.team for player in game.players] == ["seekers"] * agents
     assert math.isfinite(seconds_needed(game, seed=1))
+    game.close()
+
+
+def test_an_expert_behind_the_leaf_of_an_open_door_walks_round_it():
+    game = game_of("task.max_seconds=20", playground="house2")
+    game.reset(np.random.default_rng(0))
+    leaf = game.world.prop("leaf_door_bathroom")
+    inside, outside = game.players
+    place_player(inside, np.array([-3.6, 2.6, 0.0]), 0.0)
+    place_player(outside, np.array([-2.0, 3.6, 0.0]), 0.0)
+    game.task.target.place(np.array([0.0, 3.6, 0.2]))
+    path = PathFollower(
+        inside.body,
+        locomotion_of(inside, game.world.clock.step_s),
+        game.task.plan,
+        game.world.clock.step_s,
+        detours_in(game.world, 0.2),
+    )
+    rest = outside.body.encode(walk_to(outside.body, outside.body.position))
+    hall = game.task.plan.room_of(game.task.target.position)
+    while path.room != hall:
+        command = path.to(game.task.target.position)
+        rows = {inside.name: inside.body.encode(command), outside.name: rest}
+        assert not game.step(rows).done
+    assert leaf.opening > 0.9
     game.close()
 
 

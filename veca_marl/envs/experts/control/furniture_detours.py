@@ -9,9 +9,10 @@ import numpy as np
 from veca_marl.envs.tasks.navigation.floors.floor_grid import CELL_M, floor_grid, free_cells
 from veca_marl.envs.tasks.navigation.floors.grid_paths import PathsTo
 from veca_marl.sim.geometry import Floats, horizontal_distance
-from veca_marl.sim.physics import World
+from veca_marl.sim.physics import Prop, World
 
 _GREATEST_CLEARANCE_M = 0.3  # half of a door 1 m wide, less the cells that a path needs
+_OPEN = 0.5  # a leaf that is further open leaves room to walk through
 
 
 class Detours(Protocol):
@@ -33,6 +34,9 @@ class StraightWays:
 class FurnitureDetours:
     """Shortest ways that keep a distance from walls and furniture.
 
+    Toys and closed doors are walked into, and move. An open door is walked round: a body that comes
+    from behind its leaf would close it, and a leaf that opens towards the body stays closed.
+
     Args:
         world: The world; its props are where they are now.
         clear_m: Least distance, limited so that doors are passable.
@@ -40,9 +44,9 @@ class FurnitureDetours:
 
     def __init__(self, world: World, clear_m: float) -> None:
         self._grid = floor_grid(world.playground)
-        light = [prop for prop in world.props.values() if not prop.fixed]
+        moved = [prop for prop in world.props.values() if _is_pushed_away(prop)]
         limited_m = min(clear_m, _GREATEST_CLEARANCE_M)
-        self._free = free_cells(self._grid, world, limited_m, passable=light)
+        self._free = free_cells(self._grid, world, limited_m, passable=moved)
         self._paths: tuple[Floats, PathsTo] | None = None
 
     def next_point(self, place: Floats, waypoint: Floats) -> Floats:
@@ -52,6 +56,12 @@ class FurnitureDetours:
             known = np.array(waypoint), PathsTo(self._grid, self._free, waypoint)
             self._paths = known
         return known[1].next_point(place)
+
+
+def _is_pushed_away(prop: Prop) -> bool:
+    if prop.joint is None:
+        return not prop.fixed
+    return prop.opening < _OPEN
 
 
 def detours_in(world: World, clear_m: float) -> Detours:
