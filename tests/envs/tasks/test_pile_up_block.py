@@ -84,6 +84,17 @@ def test_a_raised_block_has_no_height_and_does_not_solve_the_task(game):
     assert not game.task.solved(game.players[0])
 
 
+def test_a_block_at_the_highest_point_of_a_throw_has_no_height(game):
+    game.reset(np.random.default_rng(0))
+    one, other = game.task.red
+    one.place(AWAY)
+    step_s = game.world.clock.step_s
+    other.place((AWAY[0] + 0.2, AWAY[1], 0.5), velocity=(0.0, 0.0, 9.81 * step_s))
+    (terms,) = sit(game, step_s)
+    assert np.linalg.norm(other.velocity) < 0.05
+    assert terms["height"] == pytest.approx(0.0, abs=0.03)
+
+
 def test_the_blue_block_has_no_height(game):
     game.reset(np.random.default_rng(0))
     one, _ = game.task.red

@@ -66,15 +66,18 @@ def test_reset_clears_the_fallen_blocks(game):
     assert sum(terms["blue_fell"] for terms in sit(game, 0.2)) == 0.0
 
 
-def test_a_collapse_of_the_tower_has_a_lower_return_than_doing_nothing(game):
-    """The red and the upper blue block are swept to the floor at once."""
+@pytest.mark.parametrize("changes", [[], ["task.blue=3"], ["task.max_seconds=40"]])
+def test_a_collapse_of_the_tower_has_a_lower_return_than_doing_nothing(changes):
+    """The red block and the blue one below it are swept to the floor at once."""
+    game = blocks_game("PutDownBlock", *changes)
     game.reset(np.random.default_rng(0))
     task = game.task
-    still = 2.0 * game.max_steps * game.weights["height"]
-    for block, aside in ((task.blue[1], -0.5), (task.red, 0.5)):
+    still = task.cfg.blue * game.max_steps * game.weights["height"]
+    for block, aside in ((task.blue[-1], -0.5), (task.red, 0.5)):
         block.place((1.0, aside, EDGE / 2))
     swept = sum(game.reward_of(terms) for terms in sit(game, 1.0))
     assert swept < 1.2 * still < 0.0
+    game.close()
 
 
 def test_the_expert_puts_the_red_block_down_and_leaves_the_tower_in_place(game):

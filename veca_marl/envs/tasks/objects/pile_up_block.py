@@ -109,7 +109,7 @@ class PileUpBlock(Task):
         self._lift, self._raised = raised - self._raised, raised
 
     def reward(self, player: Player) -> dict[str, float]:
-        piled = [block for block in self.red if is_at_rest(block) and self._stands_free(block)]
+        piled = [block for block in self.red if self._rests(block)]
         return {"height": sum(max(height_in_edges(b), 0.0) for b in piled), "lift": self._lift}
 
     def _raised_edges(self) -> float:
@@ -123,6 +123,15 @@ class PileUpBlock(Task):
             for base in (*self.red, self.blue)
             if base is not block
         )
+
+    def _rests(self, block: Prop) -> bool:
+        """Return whether a block lies on the floor or on other blocks, untouched and at rest.
+
+        A block that was thrown is as slow for a moment at the highest point of its path.
+        """
+        carriers = (self.world.floor_id, *(each.body_id for each in (*self.red, self.blue)))
+        lies = any(block.touches(body) for body in carriers if body != block.body_id)
+        return lies and is_at_rest(block) and self._stands_free(block)
 
     def _stands_free(self, block: Prop) -> bool:
         return stands_free(block, (*self.red, self.blue), self.child)

@@ -20,6 +20,9 @@ from veca_marl.envs.tasks.objects.blocks import (
 )
 from veca_marl.sim.body.humanoid.postures import REACHING
 
+# sum of `height` times the duration of a step, with two blue blocks and 12 s, if nothing is done
+_DEFAULT_EDGE_SECONDS = 24.0
+
 
 @dataclass
 class PutDownBlockCfg(BlocksCfg):
@@ -70,9 +73,10 @@ class PutDownBlock(Task):
         height: Height of the red block above the floor, in lengths of its edge. Its default weight
             is minus the duration of a step in seconds, so that the red block on two blue ones
             adds -2 per second to the return.
-        blue_fell: Number of blue blocks that have fallen in this step; each falls once. With the
-            default weights and duration one costs 30, more than the 24 of a red block that stays on
-            the tower, so that tearing the tower down is worse than doing nothing.
+        blue_fell: Number of blue blocks that have fallen in this step, each once; 1 for each with the
+            default tower and duration, else in proportion to `blue` times `max_seconds`. With the
+            default weights one costs 1.25 times as much as a red block that stays on the tower for
+            the whole episode, so that tearing the tower down is worse than doing nothing.
     """
 
     senses = ("vision", "touch", "proprioception")
@@ -106,7 +110,8 @@ class PutDownBlock(Task):
         self._fallen |= fallen
 
     def reward(self, player: Player) -> dict[str, float]:
-        return {"height": height_in_edges(self.red), "blue_fell": float(self._newly_fallen)}
+        lost = self._newly_fallen * self.cfg.blue * self.cfg.max_seconds / _DEFAULT_EDGE_SECONDS
+        return {"height": height_in_edges(self.red), "blue_fell": lost}
 
     def solved(self, player: Player) -> bool:
         """Return whether the red block is released on the floor and all blue ones stand."""
