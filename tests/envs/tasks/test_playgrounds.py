@@ -7,6 +7,7 @@ from composed import compose
 from veca_marl.checks.overlaps import overlaps
 from veca_marl.config import ConfigError
 from veca_marl.envs.core.game import Game
+from veca_marl.envs.tasks.navigation import places
 
 FURNISHED = [
     *(pytest.param(name, marks=pytest.mark.slow) for name in ("house", "random_house")),
@@ -64,13 +65,43 @@ def test_tasks_of_the_paper_are_played_in_furnished_houses(task, playground):
         ),
         (
             ["+task=MultiAgentNav", "playground=house", "task.agents=5"],
-            r"task.agents=5 .*'house' has 4",
+            r"task.agents=5 .*'house' has 4; choose playground=seven_rooms, house2 or .* at most 4",
+        ),
+        (
+            ["+task=MultiAgentNav", "playground=simple"],
+            r"'simple' has 1; choose playground=two_rooms, .*playground.room_count=2$",
+        ),
+        (
+            ["+task=GrabObject", "task.ahead_m=[4.0,8.0]"],
+            r"GrabObject needs 8.05 m in front .*task.ahead_m=\(4.0, 8.0\).* of 6 x 6 m",
+        ),
+        (
+            ["+task=MoveToTarget", "task.way_m=[2.0,3.0]", "task.far_m=4"],
+            r"MoveToTarget needs .* and 3.05 m to its sides .*choose smaller values or",
+        ),
+        (
+            ["+task=PileUpBlock", "task.blue_ahead_m=[2.9,3.0]"],
+            r"PileUpBlock needs 3.04 m in front",
+        ),
+        (
+            ["+task=PutDownBlock", "task.aside_m=[5,9]"],
+            r"PutDownBlock needs .* 9.04 m to its sides",
+        ),
+        (
+            ["+task=RotateCube", "playground.rooms=[{lower_m: [1.0, 1.0, 0.0]}]"],
+            r"RotateCube needs 0.6 m .*has no room; choose playground=simple",
         ),
     ],
 )
 def test_what_does_not_fit_is_refused_in_the_configuration(words, message):
     with pytest.raises(ConfigError, match=message):
         compose(words)
+
+
+@pytest.mark.parametrize("playground", places._ROOMS)
+def test_the_playgrounds_that_are_offered_have_so_many_rooms(playground):
+    cfg = compose(["+task=KickTheBall", f"playground={playground}"]).game.playground
+    assert len(cfg.rooms) == places._ROOMS[playground]
 
 
 @pytest.mark.parametrize("task", ["CrawlBaby", "TurnBaby"])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -16,7 +17,9 @@ from veca_marl.envs.tasks.objects.grasping import (
     palm_distances_m,
     place_toy,
 )
+from veca_marl.envs.tasks.objects.seat import check_seat
 from veca_marl.sim.body.humanoid.postures import REACHING
+from veca_marl.sim.physics import PlaygroundCfg
 
 
 @dataclass
@@ -63,6 +66,11 @@ class GrabObject(Task):
 
     senses = ("vision", "touch", "proprioception")
     cfg: GrabObjectCfg
+
+    @classmethod
+    def check_playground(cls, cfg: Any, playground: PlaygroundCfg) -> None:
+        asked = f"task.ahead_m={tuple(cfg.ahead_m)}, task.aside_m={cfg.aside_m:g}"
+        check_seat(cls.__name__, playground, cfg.ahead_m[1], cfg.aside_m, cfg.edge_m, asked)
 
     def build(self) -> None:
         self.child = require_humanoid(self.players[0])

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from veca_marl.envs.core.scoring import horizontal
 from veca_marl.envs.core.task import Player, Task, register, require_humanoid, terms
 from veca_marl.envs.tasks.objects.grasping import ToyCfg, add_toy, place_toy
+from veca_marl.envs.tasks.objects.seat import check_seat
 from veca_marl.sim.body.humanoid.postures import REACHING
-from veca_marl.sim.physics import PropCfg, PropShape
+from veca_marl.sim.physics import PlaygroundCfg, PropCfg, PropShape
 
 _MARK_HEIGHT_M = 0.001
 
@@ -67,6 +69,15 @@ class MoveToTarget(Task):
 
     senses = ("vision", "touch", "proprioception")
     cfg: MoveToTargetCfg
+
+    @classmethod
+    def check_playground(cls, cfg: Any, playground: PlaygroundCfg) -> None:
+        asked = (
+            f"task.ahead_m={tuple(cfg.ahead_m)}, task.aside_m={cfg.aside_m:g}, "
+            f"task.way_m={tuple(cfg.way_m)}"
+        )
+        aside_m = cfg.aside_m + cfg.way_m[1]
+        check_seat(cls.__name__, playground, cfg.ahead_m[1], aside_m, cfg.edge_m, asked)
 
     def build(self) -> None:
         self.child = require_humanoid(self.players[0])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -18,8 +19,9 @@ from veca_marl.envs.tasks.objects.blocks import (
     rests_on,
     stands_free,
 )
+from veca_marl.envs.tasks.objects.seat import check_seat
 from veca_marl.sim.body.humanoid.postures import REACHING
-from veca_marl.sim.physics import Prop
+from veca_marl.sim.physics import PlaygroundCfg, Prop
 
 
 @dataclass
@@ -84,6 +86,16 @@ class PileUpBlock(Task):
 
     senses = ("vision", "touch", "proprioception")
     cfg: PileUpBlockCfg
+
+    @classmethod
+    def check_playground(cls, cfg: Any, playground: PlaygroundCfg) -> None:
+        asked = ", ".join(
+            f"task.{name}={getattr(cfg, name)}"
+            for name in ("ahead_m", "aside_m", "blue_ahead_m", "blue_aside_m")
+        )
+        ahead_m = max(cfg.ahead_m[1], cfg.blue_ahead_m[1])
+        aside_m = max(cfg.aside_m[1], cfg.blue_aside_m)
+        check_seat(cls.__name__, playground, ahead_m, aside_m, cfg.edge_m, asked)
 
     def build(self) -> None:
         self.child = require_humanoid(self.players[0])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -18,7 +19,9 @@ from veca_marl.envs.tasks.objects.blocks import (
     is_at_rest,
     is_released,
 )
+from veca_marl.envs.tasks.objects.seat import check_seat
 from veca_marl.sim.body.humanoid.postures import REACHING
+from veca_marl.sim.physics import PlaygroundCfg
 
 # sum of `height` times the duration of a step, with two blue blocks and 12 s, if nothing is done
 _DEFAULT_EDGE_SECONDS = 24.0
@@ -73,14 +76,19 @@ class PutDownBlock(Task):
         height: Height of the red block above the floor, in lengths of its edge. Its default weight
             is minus the duration of a step in seconds, so that the red block on two blue ones
             adds -2 per second to the return.
-        blue_fell: Number of blue blocks that have fallen in this step, each once; 1 for each with the
-            default tower and duration, else in proportion to `blue` times `max_seconds`. With the
-            default weights one costs 1.25 times as much as a red block that stays on the tower for
-            the whole episode, so that tearing the tower down is worse than doing nothing.
+        blue_fell: Number of blue blocks that have fallen in this step, each once; 1 for each with
+            the default tower and duration, else in proportion to `blue` times `max_seconds`. With
+            the default weights one costs 1.25 times as much as a red block that stays on the tower
+            for the whole episode, so that tearing the tower down is worse than doing nothing.
     """
 
     senses = ("vision", "touch", "proprioception")
     cfg: PutDownBlockCfg
+
+    @classmethod
+    def check_playground(cls, cfg: Any, playground: PlaygroundCfg) -> None:
+        asked = f"task.ahead_m={tuple(cfg.ahead_m)}, task.aside_m={tuple(cfg.aside_m)}"
+        check_seat(cls.__name__, playground, cfg.ahead_m[1], cfg.aside_m[1], cfg.edge_m, asked)
 
     def build(self) -> None:
         self.child = require_humanoid(self.players[0])

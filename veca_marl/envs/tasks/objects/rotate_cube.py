@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from veca_marl.envs.core.scoring import rotation_angle_rad
 from veca_marl.envs.core.task import Player, Task, TaskCfg, register, require_humanoid, terms
 from veca_marl.envs.tasks.objects.clearance import clearance_m
+from veca_marl.envs.tasks.objects.seat import check_seat
 from veca_marl.sim.body.humanoid.postures import OFFERING
 from veca_marl.sim.geometry import rotation_about_vertical
-from veca_marl.sim.physics import PropCfg, PropShape
+from veca_marl.sim.physics import PlaygroundCfg, PropCfg, PropShape
 
 SHOULDER = "r_upper_arm.abduction"
 _GAP_M = 0.001  # between the cube and the skin of the palm at the start
@@ -83,6 +85,10 @@ class RotateCube(Task):
 
     senses = ("touch", "proprioception")
     cfg: RotateCubeCfg
+
+    @classmethod
+    def check_playground(cls, cfg: Any, playground: PlaygroundCfg) -> None:
+        check_seat(cls.__name__, playground)
 
     def build(self) -> None:
         self.child = require_humanoid(self.players[0])
