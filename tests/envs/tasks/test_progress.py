@@ -4,8 +4,10 @@ import math
 
 import numpy as np
 import pytest
+from babies import child_game, put, rest
 
 from veca_marl.envs.tasks.locomotion.progress import ForwardProgress
+from veca_marl.sim.body.humanoid.postures import ON_ALL_FOURS, STANDING
 
 STEP_S, TOP_MPS = 0.04, 1.0
 EAST = np.array([1.0, 0.0, 0.0])
@@ -66,3 +68,18 @@ def test_no_random_cycle_is_rewarded():
         ways = [*ways, -ways.sum(axis=0)]
         turns = [facing(*rng.uniform(-180.0, 180.0, 2)) for _ in ways]
         assert sum(speeds(*zip(ways, turns, strict=True))) <= 1e-9
+
+
+@pytest.mark.parametrize(("task", "posture"), [("CrawlBaby", ON_ALL_FOURS), ("RunBaby", STANDING)])
+def test_a_body_that_rocks_slowly_forward_and_fast_backward_earns_nothing(task, posture):
+    """It is moved 4 x 40 mm forward and 160 mm back, faster than the limit, eight times."""
+    yaw_rad = 0.7
+    ahead = np.array([math.cos(yaw_rad), math.sin(yaw_rad), 0.0])
+    with child_game(task) as game:
+        body, earned = put(game, posture), []
+        rest(game)  # the reward of the way from the start is not counted
+        for place_m in [0.04, 0.08, 0.12, 0.16, 0.0] * 8:
+            body.place(place_m * ahead, yaw_rad, posture)
+            earned.append(rest(game).terms["agents"]["forward"] * game.world.clock.step_s)
+    assert max(earned) == pytest.approx(0.04, abs=0.01), "the way forward is rewarded"
+    assert sum(earned) < 0.02
