@@ -100,13 +100,14 @@ def test_episodes_of_another_configuration_are_not_mixed(tmp_path, capsys):
 def test_the_table_has_rates_with_intervals_and_marks_low_ones():
     episodes = [played(solved=float(n < 15), score=n, episode=n) for n in range(20)]
     episodes += [played("random", float(n < 5), -1.0, n) for n in range(20)]
-    table = markdown({"Walk": episodes, "Aimless": [played(solved=None)]}, {"Walk": "falls"})
+    remarks = {("Walk", "expert"): "falls", ("Walk", "random"): "is pushed"}
+    table = markdown({"Walk": episodes, "Aimless": [played(solved=None)]}, remarks)
     _, _, head, _, aimless, expert, random, *_ = table.splitlines()
     assert head.startswith("| task | policy | episodes | return | solved |")
     assert "| no goal | 400 | 0123456-dirty |" in aimless
     assert "| 20 (version 1) | 9.50 [6.73, 12.27] | 75% [53%, 89%] | 400 |" in expert
     assert expert.endswith("| below 95%; falls |")
-    assert random.endswith("| above 20% |")
+    assert random.endswith("| above 20%; is pushed |")
 
 
 def test_the_game_computes_only_the_senses_that_an_expert_reads(monkeypatch):

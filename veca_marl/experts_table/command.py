@@ -30,7 +30,7 @@ returns, success rates and speeds:
 
 The players of other teams act at random (``opponent.TEAM=expert`` for others). Each episode is
 stored when it ends: a second call with the same folder plays those that are missing. A file
-``remarks.csv`` in it (columns task, remark) adds remarks to the rows of experts.
+``remarks.csv`` in it (columns task, policy, remark) adds remarks to rows of the table.
 """
 TABLE, REMARKS = "table.md", "remarks.csv"
 
@@ -89,12 +89,12 @@ def _file(folder: Path, task: str) -> EpisodeFile:
     return EpisodeFile(folder / f"{task}.csv")
 
 
-def _remarks(folder: Path) -> dict[str, str]:
+def _remarks(folder: Path) -> dict[tuple[str, str], str]:
     path = folder / REMARKS
     if not path.exists():
         return {}
     with path.open(newline="", encoding="utf-8") as file:
-        return {row["task"]: row["remark"] for row in csv.DictReader(file)}
+        return {(row["task"], row["policy"]): row["remark"] for row in csv.DictReader(file)}
 
 
 def _report(label: str, played: Played) -> None:

@@ -11,14 +11,16 @@ from veca_marl.experts_table.play import Played
 
 _HEAD = ("task", "policy", "episodes", "return", "solved", "agent steps/s", "commit", "remark")
 EXPERT_AT_LEAST, RANDOM_AT_MOST = 0.95, 0.20
+Remarks = Mapping[tuple[str, str], str]
+"""Text by task and policy."""
 
 
-def markdown(tasks: Mapping[str, Sequence[Played]], remarks: Mapping[str, str]) -> str:
+def markdown(tasks: Mapping[str, Sequence[Played]], remarks: Remarks) -> str:
     """Return a table with a row for each task and policy, and a line that explains it.
 
     Args:
         tasks: Episodes by task.
-        remarks: Text that is added to the row of a task's expert, by task.
+        remarks: Text that is added to rows.
     """
     rows = [
         _row(task, policy, [one for one in episodes if one.policy == policy], remarks)
@@ -39,9 +41,7 @@ _EXPLANATION = (
 )
 
 
-def _row(
-    task: str, policy: str, episodes: Sequence[Played], remarks: Mapping[str, str]
-) -> list[str]:
+def _row(task: str, policy: str, episodes: Sequence[Played], remarks: Remarks) -> list[str]:
     scores = np.array([one.score for one in episodes])
     low, high = interval(scores)
     speeds = [one.steps * one.agents / one.processor_s for one in episodes]
@@ -71,18 +71,15 @@ def _solved_cell(episodes: Sequence[Played]) -> str:
     return f"{np.mean(shares):.0%} [{low:.0%}, {high:.0%}]"
 
 
-def _remarks(
-    task: str, policy: str, episodes: Sequence[Played], remarks: Mapping[str, str]
-) -> Iterator[str]:
+def _remarks(task: str, policy: str, episodes: Sequence[Played], remarks: Remarks) -> Iterator[str]:
     shares = solved_of(episodes)
     rate = float(np.mean(shares)) if shares else None
-    if policy == "expert":
-        if rate is not None and rate < EXPERT_AT_LEAST:
-            yield f"below {EXPERT_AT_LEAST:.0%}"
-        if task in remarks:
-            yield remarks[task]
-    elif rate is not None and rate > RANDOM_AT_MOST:
+    if rate is not None and policy == "expert" and rate < EXPERT_AT_LEAST:
+        yield f"below {EXPERT_AT_LEAST:.0%}"
+    if rate is not None and policy == "random" and rate > RANDOM_AT_MOST:
         yield f"above {RANDOM_AT_MOST:.0%}"
+    if (task, policy) in remarks:
+        yield remarks[task, policy]
 
 
 def _short(commit: str) -> str:
