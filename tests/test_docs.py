@@ -1,6 +1,7 @@
 """The site builds, and its generated pages are those of the code and data of this commit."""
 
 import ast
+import dataclasses
 import importlib
 import inspect
 import io
@@ -13,20 +14,26 @@ from pathlib import Path
 
 import make_docs
 import pytest
+from docs_pages.bodies_of_tasks import DISCRETE_BODIES
 from docs_pages.body_tables import body_page
 from docs_pages.docstrings import entries, prose
 from docs_pages.observation_page import MEANINGS, all_specs
 from docs_pages.parts_picture import parts_picture
 from docs_pages.pictures import perception_picture, task_picture, touch_picture
 from docs_pages.playground_page import from_above, playground, playgrounds
+from docs_pages.tables import text
 from docs_pages.task_pages import built_in_tasks, task_page
 from docutils.core import publish_doctree
 from sphinx.ext import napoleon
 
 import veca_marl
+from veca_marl import list_tasks
 from veca_marl.conf_dir import conf_dir
+from veca_marl.config import compose
+from veca_marl.envs.core.game import Game
 from veca_marl.envs.core.task import find_task
 from veca_marl.sim.body.anatomy import limit_sources
+from veca_marl.sim.body.humanoid import HumanoidCfg
 
 ROOT = Path(__file__).resolve().parent.parent
 DOCS = ROOT / "docs"
@@ -115,6 +122,44 @@ def test_no_docstring_of_an_attribute_has_a_colon_in_its_first_line():
 @pytest.mark.parametrize("name", built_in_tasks())
 def test_the_page_of_a_task_is_current(name):
     assert read(f"tasks/{name}.md") == task_page(find_task(name)), "run make pages"
+
+
+def rows_of(page, section):
+    """Return the rows of the table in a section of a page: name to the cells that follow."""
+    lines = page.split(f"\n## {section}\n")[1].split("\n## ")[0].splitlines()
+    cells = [line.strip("| ").split(" | ") for line in lines if line.startswith("| `")]
+    return {name.strip("`"): values for name, *values in cells}
+
+
+@pytest.mark.parametrize("name", built_in_tasks())
+def test_the_defaults_on_the_page_of_a_task_are_those_of_its_preset(name):
+    page, task = read(f"tasks/{name}.md"), compose([f"+task={name}"]).game.task
+    fields = [field.name for field in dataclasses.fields(task)]
+    parameters = rows_of(page, "Parameters")
+    assert set(parameters) == set(fields) - {"name", "weights"}
+    for field, (_, value, _) in parameters.items():
+        assert value.split("`")[1] == text(getattr(task, field)), field
+    weights = {term: float(value) for term, (value, _) in rows_of(page, "Reward terms").items()}
+    assert weights == task.weights
+
+
+@pytest.mark.parametrize("name", list_tasks())
+def test_the_page_of_a_task_tells_its_default_body_from_that_of_the_paper(name):
+    page, body = read(f"tasks/{name}.md"), compose([f"+task={name}"]).game.body
+    is_reduced = isinstance(body, HumanoidCfg) and body != compose(["+task=GrabObject"]).game.body
+    assert ("82 joints move, knuckles included: `body=full`" in page) == is_reduced
+    assert ("in the paper within 1.5 m" in page) == (body.interaction_range_m != 1.5)
+    if is_reduced:
+        compose([f"+task={name}", "body=full"])
+
+
+@pytest.mark.parametrize(("name", "body"), DISCRETE_BODIES.items())
+def test_the_discrete_form_of_a_task_has_no_continuous_action(name, body):
+    game = Game(compose([f"+task={name}", f"body={body}"]).game)
+    specs = [spec for player in game.players for spec in player.body.action_spec.values()]
+    game.close()
+    assert all(spec.is_discrete for spec in specs)
+    assert f"`body={body}`" in read(f"tasks/{name}.md")
 
 
 @pytest.mark.parametrize("name", built_in_tasks())

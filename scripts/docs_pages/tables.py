@@ -39,15 +39,22 @@ def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> list[str]:
     ]
 
 
-def field_table(cfg_type: type, leave_out: Sequence[str] = ()) -> list[str]:
-    """Return field, unit, default and meaning of a configuration, one row per field."""
+def field_table(cfg_type: type, leave_out: Sequence[str] = (), cfg: object = None) -> list[str]:
+    """Return field, unit, default and meaning of a configuration, one row per field.
+
+    Args:
+        cfg_type: Its dataclass.
+        leave_out: Fields without a row.
+        cfg: A composed configuration; its values replace the defaults of the dataclass, which
+            presets can change.
+    """
     meanings = attributes(cfg_type)
     hints = get_type_hints(cfg_type)
     rows = [
         (
             f"`{field.name}`",
             unit(field.name),
-            default(field, hints[field.name]),
+            default(getattr(cfg, field.name, default_value(field)), hints[field.name]),
             meanings.get(field.name, ""),
         )
         for field in dataclasses.fields(cfg_type)
@@ -61,11 +68,15 @@ def unit(name: str) -> str:
     return UNITS.get(name.rpartition("_")[2], "")
 
 
-def default(field: dataclasses.Field[Any], hint: Any) -> str:
-    """Return a field's default as code, with the choices of an enumeration."""
-    value = field.default
+def default_value(field: dataclasses.Field[Any]) -> Any:
+    """Return a field's default; ``MISSING`` without one."""
     if field.default_factory is not dataclasses.MISSING:
-        value = field.default_factory()
+        return field.default_factory()
+    return field.default
+
+
+def default(value: Any, hint: Any) -> str:
+    """Return a default as code, with the choices of an enumeration."""
     if value is dataclasses.MISSING or value == "???":
         return "required"
     enum = enumeration(hint)

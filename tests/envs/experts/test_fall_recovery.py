@@ -1,4 +1,4 @@
-"""A crawling body that has fallen on its back gets up and goes on."""
+"""A crawling body that has fallen on its back gets back onto hands and knees and goes on."""
 
 import math
 
@@ -31,7 +31,7 @@ def crawl(game, seconds):
 
 @pytest.mark.parametrize("posture", [ON_BACK, ON_BELLY], ids=["back", "belly"])
 @pytest.mark.parametrize("seed", [0, 1, pytest.param(2, marks=pytest.mark.slow)])
-def test_after_a_fall_the_expert_gets_up_and_crawls_on(game, posture, seed):
+def test_after_a_fall_the_expert_gets_onto_hands_and_knees_and_crawls_on(game, posture, seed):
     rng = np.random.default_rng(seed)
     game.reset(rng)
     body, player = game.players[0].body, game.players[0]

@@ -1,4 +1,4 @@
-"""Getting up again after a fall, for bodies that crawl."""
+"""Getting back onto hands and knees after a fall, for bodies that crawl."""
 
 from __future__ import annotations
 

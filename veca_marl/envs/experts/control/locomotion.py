@@ -121,7 +121,7 @@ class WalkerLocomotion:
 
 
 class CrawlLocomotion:
-    """`Locomotion` of a joint-level body on hands and knees; it gets up again after a fall.
+    """`Locomotion` of a joint-level body on hands and knees, to which it returns after a fall.
 
     Args:
         body: The body to move; it must be on hands and knees, or lie, now.

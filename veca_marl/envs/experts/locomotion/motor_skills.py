@@ -68,8 +68,8 @@ class SitBabyExpert(SkillExpert):
 class CrawlBabyExpert(Expert[CrawlBaby]):
     """Crawls straight ahead with an open-loop gait and feedback from its heading.
 
-    After a fall on its back or a side it gets up again; see `GetUp`. Reads position
-    and heading from the simulator (privileged).
+    After a fall on its back or a side it gets back onto hands and knees; see `GetUp`. Reads
+    position and heading from the simulator (privileged).
     """
 
     reads = ()

@@ -18,10 +18,11 @@ class PushOut1v1(PushOut):
     to win", with joint-level actions; the ring, the start and the reward are not in the paper.
     Every term is zero-sum over `push` and `out` together and over `ground`.
 
-    The players start on hands and knees. With `body=walker`, a variation that is not in the paper,
-    they walk: two walkers in contact push each other with the speeds at which they walk towards
-    each other; face to face they hold each other, from behind or from the side one moves the other
-    at half its speed.
+    The players start on hands and knees. Departure: their eyes are turned to the horizon ahead in
+    each step, because on hands and knees the face points to the floor. With `body=walker`, a
+    variation that is not in the paper, they walk: two walkers in contact push each other with the
+    speeds at which they walk towards each other; face to face they hold each other, from behind or
+    from the side one moves the other at half its speed.
 
     Terms:
         push: 1 on the step in which the opponent is out, else 0.

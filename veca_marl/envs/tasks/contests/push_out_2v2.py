@@ -17,7 +17,8 @@ class PushOut2v2(PushOut):
     the ring to win"; the rest is not in the paper. Terms are divided by the size of a full team: a
     push has the same reward with and without a mate, and a mate's exit costs the other one half as
     much as its own, so that pushing the own mate out is never rewarded. The sum over all players is
-    not zero.
+    not zero. Departure: the eyes of players on hands and knees are turned to the horizon ahead in
+    each step, as in PushOut1v1.
 
     Terms:
         push: Number of opponents that are out since this step, divided by 2.

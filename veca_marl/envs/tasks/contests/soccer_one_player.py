@@ -14,7 +14,9 @@ class SoccerOnePlayer(Soccer):
     the front, between the posts and under the bar; it terminates the episode, and the task is
     solved (`solved`). The player starts on hands and knees and pushes the ball. The paper (table of
     tasks in the appendix) says "put the ball into the goal with joint-level actions [...] there is
-    no rule"; the numbers and all terms except `goal` are not in the paper.
+    no rule"; the numbers and all terms except `goal` are not in the paper. Departure: the eyes are
+    turned to the horizon ahead in each step, because on hands and knees the face points to the
+    floor.
 
     With `body=walker`, a variation that is not in the paper, the player walks; a ball within reach
     of its foot (`Walker.can_kick`) is kicked automatically, away from the body, at most once per

@@ -45,7 +45,8 @@ class SoccerTwoPlayer(Soccer):
     appendix) says "the attacker must put the ball into the goal, and the defender must block the
     ball from the goal with joint-level actions [...] there is no rule"; the numbers and all terms
     except `goal` are not in the paper. Every term of the defender is minus that of the attacker
-    (zero-sum).
+    (zero-sum). Departure: the eyes of players on hands and knees are turned to the horizon ahead in
+    each step, as in SoccerOnePlayer.
 
     Terms:
         goal: 1 for the attacker on the step in which a goal is scored, else 0.

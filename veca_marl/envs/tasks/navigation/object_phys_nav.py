@@ -28,10 +28,10 @@ class ObjectPhysNav(ObjectNav):
     """ObjectNav with a body that is controlled by its joints and starts on hands and knees.
 
     Objects, rewards and the end of an episode are as in ObjectNav: the task is solved (`solved`)
-    when the target has been reached. The agent feels and senses its own body as well. The eyes are
-    turned ahead, because on hands and knees the face points to the floor; this is ours. Senses and
+    when the target has been reached. The agent feels and senses its own body as well. Senses and
     joint-level actions are those of the paper (table of tasks in the appendix); sizes and times are
-    not in the paper.
+    not in the paper. Departure: the eyes are turned to the horizon ahead in each step, because on
+    hands and knees the face points to the floor.
 
     Terms:
         reached: 1 on the step in which the target is reached, else 0.
