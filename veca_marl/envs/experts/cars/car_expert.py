@@ -8,8 +8,8 @@ from typing import TypeVar
 import numpy as np
 
 from veca_marl.envs.core.expert import Expert
-from veca_marl.envs.experts.control.obstructed_courses import ObstructedCourses
-from veca_marl.envs.experts.control.walk_plans import walk_plans
+from veca_marl.envs.experts.control.paths.obstructed_courses import ObstructedCourses
+from veca_marl.envs.experts.control.paths.walk_plans import walk_plans
 from veca_marl.envs.tasks.cars.car_game import CarGame
 from veca_marl.sim.geometry import Floats
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from veca_marl.envs.core.expert import Expert, register_expert
 from veca_marl.envs.experts.control.locomotion import locomotion_of
-from veca_marl.envs.experts.control.wall_recovery import WallRecovery
+from veca_marl.envs.experts.control.paths.wall_recovery import WallRecovery
 from veca_marl.envs.experts.skills.soccer import open_corner, shooting_goal
 from veca_marl.envs.tasks.contests.soccer import ATTACKER, Soccer
 from veca_marl.sim.geometry import Floats

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from veca_marl.envs.core.expert import Expert, register_expert
 from veca_marl.envs.core.task import Player, Task, require_humanoid
+from veca_marl.envs.experts.control.crawling.turn_over import TurnOver
 from veca_marl.envs.experts.control.locomotion import CrawlLocomotion
-from veca_marl.envs.experts.control.turn_over import TurnOver
 from veca_marl.envs.experts.skills.running import Running
 from veca_marl.envs.experts.skills.sit_up import SitUp
 from veca_marl.envs.tasks.locomotion.crawl_baby import CrawlBaby

@@ -7,8 +7,8 @@ import math
 import numpy as np
 
 from veca_marl.envs.experts.control.locomotion import WalkerLocomotion
-from veca_marl.envs.experts.control.steering import bearing_rad
-from veca_marl.envs.experts.control.wall_recovery import WallRecovery
+from veca_marl.envs.experts.control.paths.steering import bearing_rad
+from veca_marl.envs.experts.control.paths.wall_recovery import WallRecovery
 from veca_marl.envs.tasks.navigation.floors.floor_grid import floor_grid, free_cells
 from veca_marl.envs.tasks.navigation.floors.grid_paths import PathsTo
 from veca_marl.envs.tasks.navigation.places import gap_m

@@ -7,9 +7,9 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from veca_marl.envs.experts.control.furniture_detours import detours_in
 from veca_marl.envs.experts.control.locomotion import Locomotion
-from veca_marl.envs.experts.control.path_following import PathFollower
+from veca_marl.envs.experts.control.paths.furniture_detours import detours_in
+from veca_marl.envs.experts.control.paths.path_following import PathFollower
 from veca_marl.envs.experts.perception.call_localization import CallSourceMap
 from veca_marl.envs.tasks.navigation.floor_plan import FloorPlan
 from veca_marl.sim.body import Body

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from veca_marl.envs.experts.control.get_up import GetUp
+from veca_marl.envs.experts.control.crawling.get_up import GetUp
 from veca_marl.sim.body.humanoid import Humanoid, JointCommand
 
 # vertical component of the front of the chest: -1 on the belly, 1 on the back; at most -0.6 in 20 s

@@ -1,0 +1,1 @@
+"""Paths of bodies over the floor: steering, detours round furniture, recovery from walls."""

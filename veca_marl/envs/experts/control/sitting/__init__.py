@@ -1,0 +1,1 @@
+"""The upper body of a sitting child: balance, and inverse kinematics of the arms."""
