@@ -1,6 +1,7 @@
 """SoccerOnePlayer and SoccerTwoPlayer: goals, rewards, kicks and experts."""
 
 import math
+from contextlib import closing
 
 import numpy as np
 import pytest
@@ -138,6 +139,21 @@ def test_approach_ignores_the_motion_of_the_ball(alone):
     begin(alone, (0.0, 0.0, 0.12), (1.0, 0.0, 0.0))
     for outcome in rest(alone, 1.0):
         assert outcome.terms["attacker"]["approach"] == pytest.approx(0.0, abs=1e-9)
+
+
+def test_chasing_the_ball_for_an_episode_is_worth_less_than_a_goal():
+    """The ball is moved away from the player in each step."""
+    with closing(game_of("SoccerOnePlayer", "body=walker")) as game:
+        game.reset(np.random.default_rng(0))
+        body, ball, turn = game.players[0].body, game.task.ball, 0.3
+        terms = []
+        while game.steps < game.max_steps:
+            row = np.array([1.0, turn], np.float32)
+            terms.append(game.step({"attacker": row}).terms["attacker"])
+            ball.place(body.position + 0.8 * body.forward + [0.0, 0.0, 0.2])
+            game.task._state = game.task._observe_state()
+        chased = sum(game.weights["approach"] * each["approach"] for each in terms)
+    assert 0.8 < chased < 1.001 < game.weights["goal"]
 
 
 def test_a_game_without_a_goal_is_truncated():

@@ -18,6 +18,7 @@ from veca_marl.sim.geometry import Floats, horizontal_distance
 from veca_marl.sim.physics import PlaygroundCfg
 
 ATTACKER, DEFENDER = "attacker", "defender"
+_MOST_APPROACH_M = 10.0  # longer chases are not rewarded
 
 
 @dataclass(frozen=True)
@@ -54,6 +55,7 @@ class Soccer(Task):
         self._kicks = AutomaticKicks(self.players, self.ball, self.cfg.kick_rest_s)
         self._terms: dict[str, float] = {}
         self._scored = False
+        self._approached_m = 0.0
         self._state = self._observe_state()
 
     def reset(self, rng: np.random.Generator) -> None:
@@ -66,6 +68,7 @@ class Soccer(Task):
         direct_gaze_ahead(self.players)
         self._kicks.reset()
         self._scored = False
+        self._approached_m = 0.0
         self._state = self._observe_state()
 
     def start(self, player: Player, rng: np.random.Generator) -> Floats:
@@ -82,7 +85,9 @@ class Soccer(Task):
         self._terms = {
             "goal": float(self._scored),
             "progress": before.to_goal_m - self._state.to_goal_m,
-            "approach": before.to_ball_m - horizontal_distance(attacker, before.ball),
+            "approach": self._approach_m(
+                before.to_ball_m - horizontal_distance(attacker, before.ball)
+            ),
             "facing": before.bearing_rad - self._state.bearing_rad,
         }
         self._kicks.after_step(self.world.clock.step_s)
@@ -97,6 +102,11 @@ class Soccer(Task):
     def solved(self, player: Player) -> bool:
         """Return whether a goal is scored; for a defender, whether none is scored."""
         return self._scored == (player.team == ATTACKER)
+
+    def _approach_m(self, nearer_m: float) -> float:
+        """Return by how much the sum of all approaches of the episode, if limited, has grown."""
+        before_m, self._approached_m = self._approached_m, self._approached_m + nearer_m
+        return min(self._approached_m, _MOST_APPROACH_M) - min(before_m, _MOST_APPROACH_M)
 
     def _observe_state(self) -> _State:
         attacker, ball = self.players[0].body, self.ball.position

@@ -27,7 +27,8 @@ class SoccerOnePlayer(Soccer):
         progress: Decrease during the step of the distance of the ball from the middle of the goal
             line, m.
         approach: Decrease during the step of the distance of the player from the ball's position
-            before the step, m. It ignores the motion of the ball, so that kicking costs nothing.
+            before the step, m. It ignores the motion of the ball, so that kicking costs nothing; in
+            an episode it adds up to at most 10, so that chasing the ball is worth less than a goal.
         facing: Decrease during the step of the angle between the player's forward direction and
             the direction of the ball, rad; over an episode it adds up to at most pi. It helps
             learning to look for the ball; its default weight is 0.
