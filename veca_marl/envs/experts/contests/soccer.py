@@ -14,6 +14,8 @@ from veca_marl.envs.experts.skills.soccer import open_corner, shooting_goal
 from veca_marl.envs.tasks.contests.soccer import ATTACKER, Soccer
 from veca_marl.sim.geometry import Floats
 
+_TURNING_S = 2.8  # from beside the ball to behind it
+
 
 @register_expert("SoccerOnePlayer")
 class SoccerExpert(Expert[Soccer]):
@@ -28,7 +30,7 @@ class SoccerExpert(Expert[Soccer]):
         """See `Expert.reset`."""
         step_s = self.task.world.clock.step_s
         locomotion = locomotion_of(self.player, step_s)
-        self._locomotion = WallRecovery(self.player.body, locomotion, step_s)
+        self._locomotion = WallRecovery(self.player.body, locomotion, step_s, _TURNING_S)
 
     def act(self, observation: Mapping[str, NDArray[Any]]) -> Any:
         """Return a command for the player's kind of body, see `Expert.act`."""

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from veca_marl.envs.experts.control.locomotion import Locomotion
+from veca_marl.envs.experts.control.paths.steering import bearing_rad
 from veca_marl.sim.body import Body
 from veca_marl.sim.geometry import Floats
 from veca_marl.sim.sound import Call
@@ -15,6 +16,7 @@ from veca_marl.sim.sound import Call
 # a body is stuck that has moved and turned by less than this within this time
 _STUCK_S, _STUCK_M, _STUCK_RAD = 1.4, 0.15, 0.5
 _BACK_S = 1.2
+_ASIDE_RAD = 1.0  # a body turns towards a place at a greater angle from straight ahead
 
 
 class WallRecovery:
@@ -24,17 +26,23 @@ class WallRecovery:
         body: The body to watch.
         locomotion: What moves the body otherwise.
         step_s: Duration of an environment step.
+        turning_s: Time for turning towards a place at the side or behind in which the body does not
+            count as stuck. The gaits on hands and knees turn by about 20 degrees per second on the
+            spot, and moving backwards would undo it.
 
     Attributes:
         clearances: See `Locomotion`.
     """
 
-    def __init__(self, body: Body, locomotion: Locomotion, step_s: float) -> None:
+    def __init__(
+        self, body: Body, locomotion: Locomotion, step_s: float, turning_s: float = 0.0
+    ) -> None:
         self.clearances = locomotion.clearances
         self._body, self._locomotion = body, locomotion
         self._stuck_steps, self._back_steps = round(_STUCK_S / step_s), round(_BACK_S / step_s)
         self._track: list[Floats] = []
         self._steps_left = 0
+        self._turning_steps, self._aside_steps = round(turning_s / step_s), 0
 
     @property
     def is_recovering(self) -> bool:
@@ -43,7 +51,7 @@ class WallRecovery:
 
     def to(self, place: Floats, call: Call = Call.none) -> Any:
         """See `Locomotion.to`."""
-        recovers = self._update()
+        recovers = not self._is_turning(place) and self._update()
         return self._locomotion.back(call) if recovers else self._locomotion.to(place, call)
 
     def turn(self, left: float, call: Call = Call.none) -> Any:
@@ -60,6 +68,12 @@ class WallRecovery:
         """See `Locomotion.back`."""
         self._track.clear()
         return self._locomotion.back(call)
+
+    def _is_turning(self, place: Floats) -> bool:
+        """Count the steps for which a place has been aside; return whether there is time left."""
+        is_aside = abs(bearing_rad(self._body, place)) > _ASIDE_RAD
+        self._aside_steps = self._aside_steps + 1 if is_aside else 0
+        return 0 < self._aside_steps < self._turning_steps and not self.is_recovering
 
     def _update(self) -> bool:
         """Count one step; return whether the body moves backwards in it."""
