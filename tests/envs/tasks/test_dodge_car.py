@@ -9,6 +9,7 @@ from composed import compose
 
 from veca_marl.envs.core.game import Game
 from veca_marl.envs.core.team import Script
+from veca_marl.sim.senses import make_senses
 
 SMALL_EYES = ("senses.vision.width=16", "senses.vision.height=16")
 STEP_S = 0.04
@@ -45,6 +46,41 @@ def drive(game, steps):
 
 
 # ---- the car
+
+
+def loudness_of_ears(game, side_m):
+    """Return the mean of each ear's spectrum after 10 steps beside a car at rest."""
+    player = game.players[0]
+    game.senses[player.name].update(
+        make_senses(player.body, ["audio"], game.cfg.senses, game.world)
+    )
+    game.reset(np.random.default_rng(0))
+    task = game.task
+    task.walker.place((0.0, 0.0, 0.0))
+    for _ in range(10):
+        task.car.prop.place((0.0, side_m, 0.08))
+        walk(game)
+    return game.observe(player)["audio"].mean(axis=-1)
+
+
+@pytest.mark.parametrize("side_m", [1.0, -1.0])
+def test_the_motor_is_heard_from_its_side(side_m):
+    game = game_of()
+    left, right = loudness_of_ears(game, side_m)
+    assert np.sign(left - right) == np.sign(side_m)
+    assert abs(left - right) > 0.05
+    game.close()
+
+
+def test_the_motor_can_be_silent():
+    game = game_of("task.loudness=0")
+    np.testing.assert_array_equal(loudness_of_ears(game, 1.0), -8.0)  # silence, log10
+    game.close()
+
+
+def test_a_negative_loudness_is_refused():
+    with pytest.raises(ValueError, match=r"task\.loudness=-1"):
+        game_of("task.loudness=-1")
 
 
 def test_the_car_drives_round_the_room_at_its_speed():

@@ -16,8 +16,10 @@ from veca_marl.envs.tasks.navigation.floors.scattering import Spacing, scattered
 from veca_marl.envs.tasks.navigation.placement_check import check_placement
 from veca_marl.sim.geometry import Floats
 from veca_marl.sim.physics import PlaygroundCfg
+from veca_marl.sim.sound import SoundCfg, SoundKind
 
 _CLEAR_M = 0.35  # of starting places, from walls and furniture
+_MOTOR_HZ = 110.0  # below the ball of KickTheBall, 150, so that the two can be told apart
 
 
 @dataclass
@@ -28,15 +30,23 @@ class CarGameCfg(TaskCfg):
         speed_mps: Speed of the car on a straight line; see `check_speed` for its limit.
         turn_degps: Greatest turning speed of the car.
         apart_m: Least distance between the middles of car and player at the start.
+        loudness: Level of the motor's sound, see `SoundCfg`; a player of a task of one's own hears
+            it if ``audio`` is among its senses.
     """
 
     speed_mps: float = 1.5
     turn_degps: float = 240.0
     apart_m: float = 1.5
+    loudness: float = 0.03
 
     def __post_init__(self) -> None:
         super().__post_init__()
         self.check_positive("speed_mps", "turn_degps", "apart_m")
+        self.check_not_negative("loudness")
+
+    def sound(self) -> SoundCfg:
+        """Return the sound of the car's motor."""
+        return SoundCfg(SoundKind.buzz, frequency_hz=_MOTOR_HZ, level=self.loudness)
 
 
 class CarGame(Task):
@@ -72,7 +82,7 @@ class CarGame(Task):
         self._furniture = places.furniture_of(self.world)
         check_speed(self.cfg.speed_mps, self.world.clock)
         motion = Motion(self.cfg.speed_mps, math.radians(self.cfg.turn_degps))
-        self.car = ToyCar(self.world, motion, self.interactions)
+        self.car = ToyCar(self.world, motion, self.cfg.sound(), self.interactions)
         self.touched = False
         self.world.after_substep.append(self._notice_contact)
 

@@ -13,6 +13,7 @@ from veca_marl.envs.tasks.navigation.floors.clearance import Clearances
 from veca_marl.sim.geometry import Floats
 from veca_marl.sim.physics import ClockCfg, PropCfg, PropShape, World
 from veca_marl.sim.physics.rooms import RoomCfg
+from veca_marl.sim.sound import SoundCfg
 
 _MASS_KG = 2.0  # below the push limit of walkers: it is pushed away and displaces none
 _COLOUR = (0.95, 0.75, 0.1)
@@ -95,6 +96,7 @@ class ToyCar:
     Args:
         world: A world that is not frozen.
         motion: How it drives.
+        sound: What it sounds like while the episode lasts.
         interactions: Names of the verbs that can be applied to it, see `PropCfg.interactions`.
 
     Attributes:
@@ -104,7 +106,9 @@ class ToyCar:
         point: The point that it drives to, ``(2,)`` metres.
     """
 
-    def __init__(self, world: World, motion: Motion, interactions: Sequence[str] = ()) -> None:
+    def __init__(
+        self, world: World, motion: Motion, sound: SoundCfg, interactions: Sequence[str] = ()
+    ) -> None:
         self.room = world.playground.rooms[0]
         self.motion, self._step_s = motion, world.clock.step_s
         self._obstacles = [p for p in world.props.values() if p.cfg.tangible]
@@ -118,6 +122,7 @@ class ToyCar:
                 rolling_friction=0.0,
                 restitution=0.0,
                 colour=_COLOUR,
+                sound=sound,
                 interactions=list(interactions),
             )
         )
