@@ -17,6 +17,10 @@ ARMS = {"a": ["seed=1"], "b": []}
         ({"name": "x", "seeds": [1, 1]}, r"seeds must differ and be 0 or more, got \[1, 1\]"),
         ({"name": "x", "seeds": [-1]}, r"seeds must differ and be 0 or more, got \[-1\]"),
         ({"name": "x", "arms": ARMS, "claims": ["a > c"]}, "claim 'a > c': no arm 'c'"),
+        (
+            {"name": "x", "arms": ARMS, "claims": ["a faster than b"]},
+            "claim 'a faster than b': experiment.threshold must say",
+        ),
     ],
 )
 def test_impossible_declarations_are_refused(fields, message):

@@ -122,7 +122,7 @@ def _report(
         raise _nothing_evaluated(experiment, found)
     by_arm = {arm: [run for run in runs if run.arm == arm] for arm in experiment.arms}
     expert = expert_score(rows, experiment.metric, team)
-    evidence = Evidence(by_arm, len(experiment.seeds), expert)
+    evidence = Evidence(by_arm, len(experiment.seeds), expert, experiment.threshold)
     random = [run.random for run in runs if not math.isnan(run.random)]
     return Report(
         experiment,

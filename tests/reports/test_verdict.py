@@ -4,7 +4,15 @@ import math
 
 import pytest
 
-from veca_marl.config.claims import Above, AboveNumber, Equal, RunsAbove, parse_claim
+from veca_marl.config.claims import (
+    Above,
+    AboveNumber,
+    AboveTimes,
+    Equal,
+    Faster,
+    RunsAbove,
+    parse_claim,
+)
 from veca_marl.reports.runs import Point, Run
 from veca_marl.reports.verdict import Evidence, Judgement, Verdict, judge, overall
 
@@ -32,6 +40,8 @@ def verdict(text, given):
         ("a  >  -1.5", AboveNumber("a", -1.5)),
         ("9 runs of a > 6", RunsAbove(9, "a", 6.0)),
         ("a = b +- 0.5", Equal("a", "b", 0.5)),
+        ("a > 1.25 x b", AboveTimes("a", 1.25, "b")),
+        ("a faster than b", Faster("a", "b")),
     ],
 )
 def test_a_line_of_text_is_a_claim(text, claim):
@@ -46,6 +56,9 @@ def test_a_line_of_text_is_a_claim(text, claim):
         ("random > a", "no arm 'random'"),
         ("a = b +- 0", "the margin must be positive, got 0.0"),
         ("2 runs of c > 1", "no arm 'c'"),
+        ("a > -1 x b", "the factor must be positive, got -1.0"),
+        ("a faster than random", "no arm 'random'"),
+        ("a faster b", "'ARM faster than ARM'"),
     ],
 )
 def test_other_text_is_refused(text, message):
@@ -123,3 +136,49 @@ def test_all_claims_have_to_hold_together():
     assert overall([holds, open_]) is Verdict.undecided
     assert overall([holds, open_, fails]) is Verdict.does_not_hold
     assert overall([]) is Verdict.undecided
+
+
+def test_an_arm_is_compared_with_a_multiple_of_another():
+    given = evidence(a=[6.0, 6.5, 7.0], b=[5.0, 5.1, 5.2])
+    assert verdict("a > 1.1 x b", given) is Verdict.holds
+    assert verdict("a > 1.25 x b", given) is Verdict.undecided
+    assert verdict("a > 1.5 x b", given) is Verdict.does_not_hold
+
+
+def reaching(arm, frames):
+    """Return runs that reach 5.0 after so many frames, None: never; all have 6.0 or 4.0 at 900."""
+    return [
+        Run(
+            arm,
+            seed,
+            True,
+            tuple(Point(at, 1.0, 2.0, 6.0 if first and at >= first else 4.0, 32) for at in ats),
+            0.0,
+        )
+        for seed, first in enumerate(frames)
+        for ats in [range(100, 1000, 100)]
+    ]
+
+
+def faster(a, b, threshold=5.0):
+    given = Evidence({"a": reaching("a", a), "b": reaching("b", b)}, 3, threshold=threshold)
+    return judge(Faster("a", "b"), given)
+
+
+def test_an_arm_is_faster_that_needs_fewer_frames_to_the_threshold():
+    assert faster([100, 200, 300], [400, 500, 600]).verdict is Verdict.holds
+    assert faster([400, 500, 600], [100, 200, 300]).verdict is Verdict.does_not_hold
+    assert faster([100, 400, 700], [200, 400, 600]).verdict is Verdict.undecided
+
+
+def test_a_run_that_does_not_reach_the_threshold_is_slower_than_each_that_does():
+    assert faster([900, 900, 900], [None, None, None]).verdict is Verdict.holds
+    judgement = faster([None, None, None], [None, None, None])
+    assert judgement.verdict is Verdict.undecided
+    assert "probability of fewer frames to 5 0.50 [0.50, 0.50]" in judgement.reason
+
+
+def test_without_a_threshold_no_arm_is_faster():
+    assert faster([100] * 3, [900] * 3, threshold=None) == Judgement(
+        Verdict.undecided, "the experiment has no threshold"
+    )

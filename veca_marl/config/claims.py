@@ -2,10 +2,12 @@
 
 ================================ =====================================================
 ``hrtf > mono``                  the final score of an arm is above that of another arm
+``hrtf > 1.25 x mono``           ... above a multiple of that of another arm
 ``hrtf > random``                ... above that of the random policy (or ``expert``)
 ``hrtf > 6.0``                   ... above a number
 ``9 runs of hrtf > 6.0``         at least so many runs of an arm end above a number
 ``bfloat16 = float32 +- 0.5``    the final scores of two arms differ by at most a number
+``hrtf faster than mono``        an arm needs fewer frames to reach the threshold than another
 ================================ =====================================================
 """
 
@@ -23,6 +25,8 @@ _NAME = r"[A-Za-z_][\w.-]*"
 _ABOVE = re.compile(rf"({_NAME}) > ({_NAME})")
 _ABOVE_NUMBER = re.compile(rf"({_NAME}) > ({_NUMBER})")
 _RUNS_ABOVE = re.compile(rf"(\d+) runs of ({_NAME}) > ({_NUMBER})")
+_TIMES = re.compile(rf"({_NAME}) > ({_NUMBER}) x ({_NAME})")
+_FASTER = re.compile(rf"({_NAME}) faster than ({_NAME})")
 _EQUAL = re.compile(rf"({_NAME}) = ({_NAME}) \+- ({_NUMBER})")
 
 
@@ -60,7 +64,27 @@ class Equal:
     margin: float
 
 
-Claim = Above | AboveNumber | RunsAbove | Equal
+@dataclass(frozen=True)
+class AboveTimes:
+    """The interquartile mean of an arm is above `factor` times that of another arm."""
+
+    arm: str
+    factor: float
+    other: str
+
+
+@dataclass(frozen=True)
+class Faster:
+    """Runs of an arm reach the threshold of the experiment in fewer frames than those of another.
+
+    A run that does not reach it is slower than each that does.
+    """
+
+    arm: str
+    other: str
+
+
+Claim = Above | AboveNumber | AboveTimes | RunsAbove | Equal | Faster
 
 
 def parse_claim(text: str, arms: Collection[str]) -> Claim:
@@ -77,17 +101,26 @@ def parse_claim(text: str, arms: Collection[str]) -> Claim:
     if claim is None:
         raise ValueError(
             f"claim {text!r}: expected 'ARM > ARM', 'ARM > random', 'ARM > expert', 'ARM > NUMBER',"
-            " 'N runs of ARM > NUMBER' or 'ARM = ARM +- NUMBER'"
+            " 'ARM > NUMBER x ARM', 'N runs of ARM > NUMBER', 'ARM = ARM +- NUMBER' or 'ARM faster"
+            " than ARM'"
         )
-    named = [claim.arm]
-    if isinstance(claim, Above | Equal) and claim.other not in BASELINES:
-        named.append(claim.other)
-    for arm in named:
+    for arm in _arms_of(claim):
         if arm not in arms:
             raise ValueError(f"claim {text!r}: no arm {arm!r}; choices: {', '.join(arms)}")
     if isinstance(claim, Equal) and not claim.margin > 0:
         raise ValueError(f"claim {text!r}: the margin must be positive, got {claim.margin}")
+    if isinstance(claim, AboveTimes) and not claim.factor > 0:
+        raise ValueError(f"claim {text!r}: the factor must be positive, got {claim.factor}")
     return claim
+
+
+def _arms_of(claim: Claim) -> list[str]:
+    """Return the arms that a claim names; baselines are none, and can follow ``>`` alone."""
+    if isinstance(claim, Above):
+        return [claim.arm, *([] if claim.other in BASELINES else [claim.other])]
+    if isinstance(claim, AboveTimes | Equal | Faster):
+        return [claim.arm, claim.other]
+    return [claim.arm]
 
 
 def _parse(text: str) -> Claim | None:
@@ -97,6 +130,10 @@ def _parse(text: str) -> Claim | None:
         return AboveNumber(match[1], float(match[2]))
     if match := _ABOVE.fullmatch(text):
         return Above(match[1], match[2])
+    if match := _TIMES.fullmatch(text):
+        return AboveTimes(match[1], float(match[2]), match[3])
+    if match := _FASTER.fullmatch(text):
+        return Faster(match[1], match[2])
     if match := _EQUAL.fullmatch(text):
         return Equal(match[1], match[2], float(match[3]))
     return None

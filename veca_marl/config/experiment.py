@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass, field
 
-from veca_marl.config.claims import BASELINES, parse_claim
+from veca_marl.config.claims import BASELINES, Faster, parse_claim
 
 _NAME = re.compile(r"[A-Za-z_][\w.-]*")
 
@@ -28,7 +28,7 @@ class ExperimentCfg:
         metric: Column of ``evaluations.csv`` that is compared.
         team: Team that is compared; None is the only team that learns.
         threshold: The report states the frames and minutes until the metric reaches this; None
-            states none.
+            states none. Claims with ``faster than`` need it.
     """
 
     name: str | None = None
@@ -55,7 +55,8 @@ class ExperimentCfg:
                 f"experiment.seeds must differ and be 0 or more, got {list(self.seeds)}"
             )
         for text in self.claims:
-            parse_claim(text, self.arms)
+            if isinstance(parse_claim(text, self.arms), Faster) and self.threshold is None:
+                raise ValueError(f"claim {text!r}: experiment.threshold must say faster to what")
 
 
 def _check_name(word: str) -> None:

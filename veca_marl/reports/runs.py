@@ -12,6 +12,9 @@ from veca_marl.reports.budget import FrameBudget
 from veca_marl.reports.gather import state_in
 from veca_marl.reports.statistics import Scores
 
+NEVER = 1e18
+"""Frames to a threshold that a run has not reached: finite, so that differences are defined."""
+
 
 @dataclass(frozen=True)
 class Point:
@@ -156,3 +159,13 @@ def team_of(rows: Sequence[Mapping[str, str]], asked: str | None) -> str:
     if asked not in teams:
         raise ValueError(f"experiment.team={asked}: choices: {', '.join(teams)}")
     return asked
+
+
+def frames_to(threshold: float, runs: Iterable[Run]) -> Scores:
+    """Return the frames until runs that have ended reached a threshold, ``(runs, 1)``.
+
+    Runs that did not reach it have `NEVER`, so that they are equal among themselves.
+    """
+    points = [run.reached(threshold) for run in runs if run.ended]
+    frames = [NEVER if point is None else float(point.frames) for point in points]
+    return np.array(frames, float).reshape(-1, 1)

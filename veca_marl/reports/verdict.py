@@ -5,10 +5,15 @@ two arms, of an arm and a baseline, or of an arm and a number.
 
 - ``ARM > OTHER`` holds if the interval lies above 0, does not hold if it lies below 0, and is
   undecided if it contains 0.
+- ``ARM > FACTOR x OTHER`` is judged in the same way, by the difference of the one to a multiple of
+  the other.
 - ``ARM = OTHER +- MARGIN`` holds if the interval lies within the margin, does not hold if it lies
   outside, and is undecided if it contains an end of the margin.
 - ``N runs of ARM > NUMBER`` counts runs: it holds with at least N above the number, does not hold
   if the missing runs could not make it hold, and is undecided otherwise.
+- ``ARM faster than OTHER`` holds if the interval of the probability that a run of the one reaches
+  the threshold in fewer frames than a run of the other lies above 1/2, and does not hold if it lies
+  below.
 
 Claims about intervals need at least `MIN_RUNS` ended runs of each arm and are undecided with fewer.
 """
@@ -22,8 +27,8 @@ from enum import Enum
 
 import numpy as np
 
-from veca_marl.config.claims import AboveNumber, Claim, Equal, RunsAbove
-from veca_marl.reports.runs import Run, final_scores, random_scores
+from veca_marl.config.claims import Above, AboveNumber, AboveTimes, Claim, Equal, Faster, RunsAbove
+from veca_marl.reports.runs import Run, final_scores, frames_to, random_scores
 from veca_marl.reports.statistics import (
     Interval,
     Scores,
@@ -61,11 +66,13 @@ class Evidence:
         runs: Runs of each arm that were evaluated.
         planned: Number of runs of each arm.
         expert: Score of the expert; NaN if it was not measured.
+        threshold: The score to reach; None if the experiment has none.
     """
 
     runs: Mapping[str, Sequence[Run]]
     planned: int
     expert: float = math.nan
+    threshold: float | None = None
 
     def final(self, arm: str) -> Scores:
         """Return the final scores of the ended runs of an arm, ``(runs, 1)``."""
@@ -74,20 +81,31 @@ class Evidence:
 
 def judge(claim: Claim, evidence: Evidence) -> Judgement:
     """Return whether a claim holds, see the module."""
-    if isinstance(claim, RunsAbove):
-        return _judge_count(claim, evidence)
+    match claim:
+        case RunsAbove():
+            return _judge_count(claim, evidence)
+        case Faster():
+            return _judge_faster(claim, evidence)
+        case Equal(arm, other, margin):
+            return _judge_equal(evidence.final(arm), evidence.final(other), margin)
+        case AboveNumber(arm, number):
+            return _judge_above(evidence.final(arm), _constant(number), f"{number:g}")
+        case AboveTimes(arm, factor, other):
+            return _judge_above(evidence.final(arm), factor * evidence.final(other))
+        case Above():
+            return _judge_order(claim, evidence)
+
+
+def _judge_order(claim: Above, evidence: Evidence) -> Judgement:
+    """Judge a claim about an arm and another arm, or one of the baselines."""
     one = evidence.final(claim.arm)
-    if isinstance(claim, AboveNumber):
-        return _judge_above(one, _constant(claim.number), f"{claim.number:g}")
-    if isinstance(claim, Equal):
-        return _judge_equal(one, evidence.final(claim.other), claim.margin)
-    if claim.other == "expert":
-        if math.isnan(evidence.expert):
-            return Judgement(Verdict.undecided, "the expert was not measured")
-        return _judge_above(one, _constant(evidence.expert), f"{evidence.expert:.2f} (expert)")
     if claim.other == "random":
         return _judge_above(one, random_scores(evidence.runs.get(claim.arm, ())))
-    return _judge_above(one, evidence.final(claim.other))
+    if claim.other != "expert":
+        return _judge_above(one, evidence.final(claim.other))
+    if math.isnan(evidence.expert):
+        return Judgement(Verdict.undecided, "the expert was not measured")
+    return _judge_above(one, _constant(evidence.expert), f"{evidence.expert:.2f} (expert)")
 
 
 def overall(judgements: Sequence[Judgement]) -> Verdict:
@@ -140,6 +158,24 @@ def _judge_count(claim: RunsAbove, evidence: Evidence) -> Judgement:
         return Judgement(Verdict.holds, reason)
     impossible = above + missing < claim.runs
     return Judgement(Verdict.does_not_hold if impossible else Verdict.undecided, reason)
+
+
+def _judge_faster(claim: Faster, evidence: Evidence) -> Judgement:
+    if evidence.threshold is None:
+        return Judgement(Verdict.undecided, "the experiment has no threshold")
+    arms = [evidence.runs.get(name, ()) for name in (claim.arm, claim.other)]
+    one, other = (frames_to(evidence.threshold, runs) for runs in arms)
+    if (few := _too_few(one, other)) is not None:
+        return few
+    low, high = bootstrap_interval(probability_of_improvement, [-one, -other], _rng())
+    reason = (
+        f"probability of fewer frames to {evidence.threshold:g} "
+        f"{probability_of_improvement(-one, -other):.2f} [{low:.2f}, {high:.2f}], "
+        f"{_count_text(one, other)}"
+    )
+    if low > 0.5:
+        return Judgement(Verdict.holds, reason)
+    return Judgement(Verdict.does_not_hold if high < 0.5 else Verdict.undecided, reason)
 
 
 def _too_few(*arms: Scores) -> Judgement | None:
