@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import started
 
+from veca_marl.envs.core.scripted_episodes import play_to_end
 from veca_marl.envs.core.team import Script
 
 SMALL = ("senses.vision.width=32", "senses.vision.height=32", "senses.audio.present=false")
@@ -73,6 +74,25 @@ def test_the_expert_reports_each_event_once_and_only_the_room_is_rewarded(game):
     assert reward == 1.0
 
 
-def test_a_first_room_with_another_number_of_doors_is_refused():
-    with pytest.raises(ValueError, match=r"'simple' has 0; choose playground=two_rooms or three"):
-        game_of("playground=simple")
+@pytest.mark.parametrize(
+    ("playground", "room"),
+    [
+        (["playground=house2"], "nursery"),
+        (["playground=random_house", "playground.seed=2"], "living"),
+        (["playground=seven_rooms"], "south_middle"),
+    ],
+)
+def test_the_expert_escapes_from_a_room_of_a_house(playground, room):
+    game = game_of(*playground)
+    game.reset(np.random.default_rng(0))
+    assert game.task.room.name == room
+    list(play_to_end(game, Script.expert))
+    assert game.task.solved(game.players[0])
+    assert not game.task.room.contains(game.task.walker.position)
+    game.close()
+
+
+@pytest.mark.parametrize("playground", ["simple", "house", "four_rooms"])
+def test_a_playground_without_a_room_with_one_open_door_is_refused(playground):
+    with pytest.raises(ValueError, match=rf"playground '{playground}' has none: choose .*house2"):
+        game_of(f"playground={playground}")

@@ -58,8 +58,8 @@ class BabyzumasRevengeCfg(TaskCfg):
 class BabyzumasRevenge(Task):
     """An agent has to find the key that opens the door to the next room.
 
-    The agent starts in the first room of the playground. Its only door is closed by a locked leaf.
-    A cupboard stands at a wall, at a place drawn for each episode. Its drawer is opened with
+    The agent starts in the first room of the playground that has one door, without a leaf of its
+    own. A locked leaf closes that door. A cupboard stands at a wall, at a place drawn for each episode. Its drawer is opened with
     the verb `open`; the key inside can then be seen and taken with `grab`. With the key in the
     hand, `open` unlocks and opens the door. A verb is applied to what is nearest to the centre of
     the view, up to 1.5 m away, of the things that declare it. The episode terminates when the
@@ -85,27 +85,21 @@ class BabyzumasRevenge(Task):
 
     @classmethod
     def check_playground(cls, cfg: Any, playground: PlaygroundCfg) -> None:
-        room, doors = playground.rooms[0], _doors_of_first_room(playground)
-        if len(doors) != 1:
-            raise ValueError(
-                f"BabyzumasRevenge starts in the first room of a playground, which must have one "
-                f"door; room {room.name!r} of {playground.name!r} has {len(doors)}; choose "
-                "playground=two_rooms or three_rooms"
-            )
+        room, door = _start_of(playground)
         check_placement(
-            lambda rng: _try_start(playground, rng),
-            f"BabyzumasRevenge in playground {playground.name!r}",
-            "a larger first room with less furniture, such as playground=two_rooms",
+            lambda rng: _try_start(playground, room, door, rng),
+            f"BabyzumasRevenge in room {room.name!r} of playground {playground.name!r}",
+            "a larger room with less furniture, such as playground=two_rooms",
         )
 
     def build(self) -> None:
         self.walker = require_verbs(self.players[0], "grab", "open")
         playground = self.world.playground
         self._furniture = furniture_of(self.world)
-        self._room, doorway = playground.rooms[0], _doors_of_first_room(playground)[0]
-        self._next = _room_behind(playground, doorway)
+        self.room, doorway = _start_of(playground)
+        self._next = _room_behind(playground, doorway, self.room)
         self.doorway = np.array(doorway.position_m)
-        self.out = direction_out(self._room, self.doorway)
+        self.out = direction_out(self.room, self.doorway)
         yaw_deg = math.degrees(math.atan2(self.out[1], self.out[0]))
         leaf = door_leaf(
             "door_leaf", doorway.position_m, yaw_deg, doorway.width_m, lock=LockCfg("key")
@@ -119,11 +113,11 @@ class BabyzumasRevenge(Task):
 
     def reset(self, rng: np.random.Generator) -> None:
         place, yaw_rad = draw_place_at_wall(
-            self._room, self._furniture, self.doorway, _DOOR_APART_M, rng
+            self.room, self._furniture, self.doorway, _DOOR_APART_M, rng
         )
         self._drawer.place(place, yaw_rad)
         things = [*self._furniture, self.cupboard]
-        start = free_place(self._room, things, _START_CLEAR_M, rng)
+        start = free_place(self.room, things, _START_CLEAR_M, rng)
         place_player(self.players[0], start, rng.uniform(-math.pi, math.pi))
         self._done = self._new = frozenset()
 
@@ -159,21 +153,34 @@ def direction_out(room: RoomCfg, place: Floats) -> Floats:
     return out
 
 
-def _try_start(playground: PlaygroundCfg, rng: np.random.Generator) -> None:
+def _try_start(
+    playground: PlaygroundCfg, room: RoomCfg, door: DoorCfg, rng: np.random.Generator
+) -> None:
     """Draw the places of the cupboard and of the agent as at the start of an episode."""
-    room, furniture = playground.rooms[0], planned_furniture(playground)
-    doorway = np.array(_doors_of_first_room(playground)[0].position_m)
+    furniture, doorway = planned_furniture(playground), np.array(door.position_m)
     cupboard = planned_cupboard()
     cupboard.place(*draw_place_at_wall(room, furniture, doorway, _DOOR_APART_M, rng))
     free_place(room, [*furniture, cupboard], _START_CLEAR_M, rng)
 
 
-def _doors_of_first_room(playground: PlaygroundCfg) -> list[DoorCfg]:
-    return [door for door in playground.doors if playground.rooms[0].name in door.rooms]
+def _start_of(playground: PlaygroundCfg) -> tuple[RoomCfg, DoorCfg]:
+    """Return the first room that a locked leaf in its only door closes, and that door.
+
+    Raises:
+        ValueError: If each room has several doors, none, or one that has a leaf already.
+    """
+    for room in playground.rooms:
+        doors = [door for door in playground.doors if room.name in door.rooms]
+        if len(doors) == 1 and doors[0].leaf is None:
+            return room, doors[0]
+    raise ValueError(
+        "BabyzumasRevenge starts in a room that has one door, without a leaf of its own; playground "
+        f"{playground.name!r} has none: choose playground=two_rooms, three_rooms, seven_rooms or "
+        "house2, or another playground.seed of random_house"
+    )
 
 
-def _room_behind(playground: PlaygroundCfg, door: DoorCfg) -> RoomCfg:
-    """Return the room on the other side of a door of the first room."""
-    first = playground.rooms[0].name
-    other = next(name for name in door.rooms if name != first)
+def _room_behind(playground: PlaygroundCfg, door: DoorCfg, room: RoomCfg) -> RoomCfg:
+    """Return the room on the other side of a door of a room."""
+    other = next(name for name in door.rooms if name != room.name)
     return next(room for room in playground.rooms if room.name == other)
