@@ -109,7 +109,7 @@ def by_sense(entry: tuple[str, Any]) -> tuple[int, int]:
 
 def key_rows() -> dict[str, tuple[str, ...]]:
     """Return the row of every key that a sense can observe."""
-    rows = {}
+    rows: dict[str, tuple[str, ...]] = {}
     for key, spec in all_specs().items():
         sense, unit, meaning, request = MEANINGS[key]
         shape, dtype, span = describe(spec)
@@ -142,7 +142,7 @@ def game_specs(game: Game) -> dict[str, dict[str, ArraySpec]]:
 
 def task_rows() -> list[tuple[str, ...]]:
     """Return the teams of all tasks with the keys that they observe."""
-    rows = []
+    rows: list[tuple[str, ...]] = []
     for task in built_in_tasks():
         game = Game(choose(task))
         sizes = {team.name: team.size for team in game.cfg.teams}

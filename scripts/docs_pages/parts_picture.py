@@ -43,8 +43,8 @@ def parts_picture(path: Path) -> None:
 def part_colours() -> NDArray[np.float64]:
     """Return the colour of each triangle, ``(1648, 3)`` in [0, 1]."""
     names = [part.name.removeprefix("l_").removeprefix("r_") for part in skin_parts()]
-    palette = plt.get_cmap("tab20").colors
-    of_name = {name: palette[i % len(palette)] for i, name in enumerate(dict.fromkeys(names))}
+    palette = plt.get_cmap("tab20")
+    of_name = {name: palette(i % palette.N)[:3] for i, name in enumerate(dict.fromkeys(names))}
     colours = np.zeros((1648, 3))
     for part, name in zip(skin_parts(), names, strict=True):
         colours[part.triangles] = of_name[name]

@@ -89,7 +89,7 @@ def perception_picture(path: Path) -> None:
     player = game.players[0]
     # the ball ahead, to the left, in view of both eyes
     player.body.place((0.6, -0.2, 0.0), yaw_rad=1.95)
-    game.task.ball.place((-0.35, 0.95, 0.15), velocity=(0.1, -0.1, 0.0))
+    game.world.props["ball"].place((-0.35, 0.95, 0.15), velocity=(0.1, -0.1, 0.0))
     observation = game.observe(player)
     for _ in range(6):
         game.step({player.name: np.zeros(2, np.float32)})
