@@ -164,6 +164,46 @@ def test_workers_end_when_the_main_process_is_killed(tmp_path):
     assert not any(is_running(pid) for pid in processes)
 
 
+@pytest.fixture
+def starting(tmp_path):
+    """A process that starts two workers, whose worlds are never built, and the workers' ids."""
+    script = tmp_path / "main_process.py"
+    script.write_text(STARTING_PROCESS)
+    paths = os.pathsep.join([str(ROOT), str(HELPERS)])
+    main = subprocess.Popen(
+        [sys.executable, str(script)],
+        env={**os.environ, "PYTHONPATH": paths},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    workers = [int(main.stdout.readline()) for _ in range(2)]
+    time.sleep(0.5)  # until the main process waits for them
+    yield main, workers
+    main.kill()
+    main.communicate()
+
+
+def test_a_worker_killed_while_it_starts_ends_the_program(starting):
+    """TorchRL's transfer of parameters waited forever for a thread when Python ended."""
+    main, workers = starting
+    os.kill(workers[1], signal.SIGKILL)
+    _, errors = main.communicate(timeout=20)
+    assert main.returncode == 1
+    assert "was killed by SIGKILL" in errors.splitlines()[-1]
+    assert not any(is_running(pid) for pid in workers)
+
+
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_an_interrupt_while_workers_start_ends_the_program(starting, number, code):
+    main, workers = starting
+    os.kill(workers[0], signal.SIGINT)  # a terminal sends it to all processes of a command
+    main.send_signal(number)
+    main.communicate(timeout=20)
+    assert main.returncode == code
+    assert not any(is_running(pid) for pid in workers)
+
+
 def is_running(pid):
     """Return whether a process runs; one that has ended may wait for its new parent to read it."""
     try:
@@ -183,4 +223,40 @@ policy = RandomPolicy(make_fake_env(1, 0).action_spec)
 experience = Experience(make_fake_env, policy, CollectCfg(2, worlds=1, steps=100_000))
 print(*(process.pid for process in experience._collector.procs), flush=True)
 experience.collect()
+"""
+
+
+STARTING_PROCESS = """
+import os
+import signal
+import sys
+import time
+
+import torch
+from fake_env import FakeEnv, make_fake_env
+
+from veca_marl.algos.collection.experience import CollectCfg, Experience
+from veca_marl.algos.ppo.config import PPOCfg
+from veca_marl.algos.specs import team_specs
+from veca_marl.algos.training.learners import TeamLearners
+
+main = os.getpid()
+
+
+def make_env(worlds, seed):
+    if os.getpid() != main:
+        os.write(1, f"{os.getpid()}\\n".encode())
+        time.sleep(600.0)
+    return make_fake_env(worlds, seed, senses=("audio",))
+
+
+def end(number, frame):
+    raise SystemExit(128 + number)
+
+
+signal.signal(signal.SIGINT, end)
+signal.signal(signal.SIGTERM, end)
+specs = team_specs(FakeEnv(1, senses=("audio",)))
+policy = TeamLearners(specs, PPOCfg(), torch.device("cpu")).policy.copy()
+Experience(make_env, policy.collect, CollectCfg(2, worlds=1))
 """

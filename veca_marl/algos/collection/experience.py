@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import signal
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -89,7 +88,7 @@ class Experience:
             self._collector = Collector(make, policy, **common)
         else:
             threads = torch.get_num_threads()
-            with workers_ignore_interrupts(), _start_method(start_method()):
+            with _start_method(start_method()):
                 self._collector = SupervisedCollector(
                     [make] * cfg.processes,
                     policy,
@@ -125,18 +124,6 @@ class Experience:
 
 def _make_env(make_env: EnvFactory, worlds: int, memory: Compose | None) -> EnvBase:
     return with_transform(make_env(worlds, 0), memory)  # seeded by `restart`
-
-
-@contextmanager
-def workers_ignore_interrupts() -> Iterator[None]:
-    """Let workers made inside the block ignore Ctrl-C: this process receives it and ends them."""
-    inherited = {signal.SIGINT: signal.SIG_IGN, signal.SIGTERM: signal.SIG_DFL}
-    previous = {number: signal.signal(number, action) for number, action in inherited.items()}
-    try:
-        yield
-    finally:
-        for number, action in previous.items():
-            signal.signal(number, action)
 
 
 @contextmanager

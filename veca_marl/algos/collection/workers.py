@@ -31,6 +31,7 @@ from torchrl.collectors import Collector, MultiSyncCollector
 from torchrl.weight_update import SharedMemWeightSyncScheme
 
 from veca_marl.algos.collection.answers import CHECK_S, BatchQueue, TimeLimit, no_answer
+from veca_marl.algos.collection.interrupts import block_interrupts, ignore_interrupts
 from veca_marl.algos.collection.parent import end_with_parent
 
 _MESSAGE_CHARS = 1000  # with a pickle's overhead below what a pipe writes at once (4096 bytes)
@@ -70,20 +71,24 @@ class SupervisedCollector(MultiSyncCollector):
         self._limit_s = answer_limit_s
         self._exceptions: SimpleQueue[tuple[int, str]] = multiprocessing.SimpleQueue()
         self._restore_handler = call_when_a_child_ends(self.check)
-        schemes = {"policy": _SupervisedWeights()} if isinstance(policy, nn.Module) else {}
+        weights = _SupervisedWeights()
+        self.receive_interrupts = block_interrupts()
         try:
             super().__init__(
                 make_envs,
                 policy,
                 init_fn=partial(_start_worker, os.getpid()),
                 collector_class=partial(_WorkerCollector, exceptions=self._exceptions),
-                weight_sync_schemes=schemes,
+                weight_sync_schemes={"policy": weights} if isinstance(policy, nn.Module) else {},
                 **kwargs,
             )
         except BaseException as error:
+            weights.shutdown()  # it needs a thread, which cannot be started when Python ends
             self._raise_worker_error(error)
             self.shutdown(raise_on_error=False)
             raise
+        finally:
+            self.receive_interrupts()
         self.queue_out = BatchQueue(self.queue_out, len(self.procs), self.time_limit())
 
     def time_limit(self) -> TimeLimit:
@@ -177,6 +182,12 @@ class SupervisedCollector(MultiSyncCollector):
 class _SupervisedWeights(SharedMemWeightSyncScheme):
     """TorchRL's transfer of parameters, which checks the workers while it waits for them."""
 
+    def connect(self, **options: Any) -> None:
+        """See the base class; it is called when all workers have been started, and in each."""
+        if isinstance(self.context, SupervisedCollector):
+            self.context.receive_interrupts()
+        super().connect(**options)
+
     def _wait_for_ack(
         self, worker_ids: int | list[int] | None = None, timeout: float | None = None
     ) -> None:
@@ -222,6 +233,7 @@ class _WorkerCollector(Collector):
 
 
 def _start_worker(parent: int) -> None:
+    ignore_interrupts()
     if hasattr(signal, "SIGCHLD"):
         signal.signal(signal.SIGCHLD, signal.SIG_DFL)  # the parent's handler is for its workers
     end_with_parent(parent)

@@ -18,7 +18,8 @@ from torch import multiprocessing, nn
 from torchrl.envs import EnvBase
 
 from veca_marl.algos.collection.answers import CHECK_S, no_answer
-from veca_marl.algos.collection.experience import start_method, workers_ignore_interrupts
+from veca_marl.algos.collection.experience import start_method
+from veca_marl.algos.collection.interrupts import ignore_interrupts, interrupts_blocked
 from veca_marl.algos.collection.parent import end_with_parent
 from veca_marl.algos.collection.workers import WorkerError, call_when_a_child_ends, end_of
 from veca_marl.algos.evaluation.evaluate import (
@@ -209,7 +210,7 @@ class ParallelEvaluator:
         self._limit_s = answer_limit_s
         context: Any = multiprocessing.get_context(start_method())
         arguments = (os.getpid(), make_env, players, -(-worlds // processes))
-        with workers_ignore_interrupts():
+        with interrupts_blocked():
             self._workers = [_start(context, *arguments) for _ in range(processes)]
         self._expected = True  # whether all processes should run
         self._restore_handler = call_when_a_child_ends(self.check)
@@ -320,6 +321,7 @@ def _serve(connection: Connection[Any, Any], steps: Any, parent: int, *arguments
         parent: Process id of the parent.
         *arguments: Of `LocalEvaluator`.
     """
+    ignore_interrupts()
     end_with_parent(parent)
     if hasattr(signal, "SIGCHLD"):
         signal.signal(signal.SIGCHLD, signal.SIG_DFL)  # the parent's handler is for its workers

@@ -59,11 +59,11 @@ class BabyzumasRevenge(Task):
     """An agent has to find the key that opens the door to the next room.
 
     The agent starts in the first room of the playground that has one door, without a leaf of its
-    own. A locked leaf closes that door. A cupboard stands at a wall, at a place drawn for each episode. Its drawer is opened with
-    the verb `open`; the key inside can then be seen and taken with `grab`. With the key in the
-    hand, `open` unlocks and opens the door. A verb is applied to what is nearest to the centre of
-    the view, up to 1.5 m away, of the things that declare it. The episode terminates when the
-    agent is in the next room; then the task is solved (`solved`).
+    own. A locked leaf closes that door. A cupboard stands at a wall, at a place drawn for each
+    episode. Its drawer is opened with the verb `open`; the key inside can then be seen and taken
+    with `grab`. With the key in the hand, `open` unlocks and opens the door. A verb is applied to
+    what is nearest to the centre of the view, up to 1.5 m away, of the things that declare it. The
+    episode terminates when the agent is in the next room; then the task is solved (`solved`).
 
     Senses, actions (a continuous or discrete `move` and the discrete `verb`) and the sequence of
     interactions are those of the paper (table of tasks in the appendix), which gives it as an
@@ -174,8 +174,8 @@ def _start_of(playground: PlaygroundCfg) -> tuple[RoomCfg, DoorCfg]:
         if len(doors) == 1 and doors[0].leaf is None:
             return room, doors[0]
     raise ValueError(
-        "BabyzumasRevenge starts in a room that has one door, without a leaf of its own; playground "
-        f"{playground.name!r} has none: choose playground=two_rooms, three_rooms, seven_rooms or "
+        "BabyzumasRevenge starts in a room that has one door, without a leaf of its own; "
+        f"playground {playground.name!r} has none: choose playground=two_rooms, three_rooms, seven_rooms or "
         "house2, or another playground.seed of random_house"
     )
 
