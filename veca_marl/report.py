@@ -103,7 +103,8 @@ def _read(
         found = found_in(rows, {arm.name: arm.budget for arm in arms}, seeds)
         return found, rows, Path(options.to or path.parent)
     runs = Path(options.runs or f"runs/{name}")
-    found, rows = gather(runs, {arm.name: arm.plain for arm in arms}, seeds)
+    asked = {arm.name: arm.plain for arm in arms}
+    found, rows = gather(runs, asked, seeds, {arm.name: arm.former for arm in arms})
     if rows:
         rows += expert_rows(arms[0].cfg, arms[0].name, options.expert_episodes)
     return found, rows, Path(options.to or runs)

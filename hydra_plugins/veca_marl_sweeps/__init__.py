@@ -19,6 +19,7 @@ from hydra.types import HydraContext, TaskFunction
 from omegaconf import DictConfig, OmegaConf, open_dict
 
 from veca_marl.sweeps.cores import usable_cores
+from veca_marl.sweeps.former import former_values
 from veca_marl.sweeps.plans import Job, SweepError
 from veca_marl.sweeps.sweep import run_sweep
 
@@ -126,7 +127,8 @@ class ProcessLauncher(Launcher):
             del config["hydra"]
         asked = yaml.safe_load(OmegaConf.to_yaml(config, resolve=True))
         self._nodes[sweep / name] = config
-        return Job(name, sweep / name, [*shared, *overrides], asked)
+        former = former_values(config)
+        return Job(name, sweep / name, [*shared, *overrides], asked, former)
 
 
 def _store(group: str, name: str, plugin: type, fields: dict[str, Any]) -> None:

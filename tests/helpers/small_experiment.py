@@ -7,6 +7,10 @@ from veca_marl.reports.gather import run_folder
 EXPERIMENT = ["+experiment=audio_ablation", "experiment.seeds=[0,1,2]", "total_frames=200"]
 # without the numbers of frames that these arms have in the file
 EXPERIMENT += [f"experiment.arms.{name}=['senses/audio={name}']" for name in ("stereo", "mono")]
+# without the claim about speed: all arms have two evaluations
+EXPERIMENT += [
+    "experiment.claims=['hrtf > stereo','hrtf > mono','stereo > mono','hrtf > random']",
+]
 RETURNS = {"hrtf": (6.0, 6.5, 7.0), "stereo": (5.0, 5.5, 6.0), "mono": (0.0, 0.5, 0.2)}
 
 

@@ -1,5 +1,6 @@
 """The command `report` on small run folders."""
 
+import copy
 import csv
 from dataclasses import replace
 
@@ -110,6 +111,18 @@ def test_a_run_that_ended_on_a_smaller_budget_does_not_count(tmp_path, arms):
     ((found,), _) = gather(tmp_path, {"hrtf": arms["hrtf"]}, [0])
     assert not found.counts
     assert found.remark.startswith("unfinished: 100 of 200 frames")
+
+
+def test_a_run_of_an_older_network_does_not_count(tmp_path, composed):
+    """Its configuration has no windows of the image encoder: they were others than the default."""
+    (arm,) = [arm for arm in composed if arm.name == "hrtf"]
+    config = copy.deepcopy({**arm.plain, "seed": 0})
+    del config["algo"]["network"]["kernels"]
+    write_run(run_folder(tmp_path, "hrtf", 0), config, [(200, 3.0)])
+    ((found,), rows) = gather(tmp_path, {"hrtf": arm.plain}, [0], {"hrtf": arm.former})
+    assert not found.counts
+    assert rows == []
+    assert "algo.network.kernels is [8, 4, 3] there and [4, 4, 3] here" in found.remark
 
 
 def test_minutes_of_runs_without_times_between_batches_are_those_of_batches(tmp_path, arms):

@@ -1,6 +1,8 @@
 """How the configuration of a stored run is compared with the one that is asked for."""
 
+from veca_marl.config import compose_node
 from veca_marl.sweeps.differences import differences, key_patterns
+from veca_marl.sweeps.former import former_values
 
 BALL = {"name": "ball", "mass_kg": 0.3, "size_m": [0.1]}
 BOX = {"name": "box", "mass_kg": 1.0, "size_m": [0.1, 0.2, 0.3]}
@@ -20,6 +22,27 @@ def test_a_key_that_another_version_lacks_is_told_from_a_changed_value_in_lists_
     (changed,) = differences(props(BALL, BOX), props(BALL, {**BOX, "mass_kg": 2.0}))
     assert not changed.of_version
     assert str(changed) == "playground.props.1.mass_kg is 1.0 there and 2.0 here"
+
+
+def network(**fields):
+    return {"algo": {"network": {"name": "multisense", **fields}}}
+
+
+def test_a_key_that_a_run_is_too_old_to_have_has_its_former_value():
+    former = {"algo.network.kernels": [8, 4, 3]}
+    assert differences(network(), network(kernels=[8, 4, 3]), former) == []
+    (changed,) = differences(network(), network(kernels=[4, 4, 3]), former)
+    assert not changed.of_version
+    assert str(changed) == "algo.network.kernels is [8, 4, 3] there and [4, 4, 3] here"
+    assert differences(network(kernels=[4, 4, 3]), network(kernels=[4, 4, 3]), former) == []
+
+
+def test_former_values_are_those_of_the_types_of_a_configuration():
+    node = compose_node(["+task=KickTheBall", "+algo@learner.agents=sac"])
+    former = former_values(node)
+    assert former["algo.network.kernels"] == [8, 4, 3]
+    assert former["learner.agents.network.strides"] == [4, 2, 1]
+    assert {key.rpartition(".")[2] for key in former} == {"kernels", "strides"}
 
 
 def test_lists_of_other_lengths_differ():

@@ -11,6 +11,7 @@ from omegaconf import OmegaConf
 
 from veca_marl.config import Config, ConfigError, compose_node, to_config
 from veca_marl.reports.budget import FrameBudget
+from veca_marl.sweeps.former import former_values
 
 
 @dataclass(frozen=True)
@@ -21,11 +22,13 @@ class Arm:
         name: Its name.
         cfg: Its configuration.
         plain: The same as stored with a run.
+        former: Values of keys that a stored run may be too old to have, see `former_values`.
     """
 
     name: str
     cfg: Config
     plain: dict[str, Any]
+    former: dict[str, Any]
 
     @property
     def budget(self) -> FrameBudget:
@@ -50,4 +53,4 @@ def compose_arms(overrides: Sequence[str]) -> list[Arm]:
 def _compose_arm(overrides: Sequence[str], name: str, own: Sequence[str]) -> Arm:
     node = compose_node([*overrides, f"experiment.arm={name}", *own])
     plain = yaml.safe_load(OmegaConf.to_yaml(node, resolve=True))
-    return Arm(name, to_config(node), cast(dict[str, Any], plain))
+    return Arm(name, to_config(node), cast(dict[str, Any], plain), former_values(node))

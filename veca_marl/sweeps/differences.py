@@ -36,7 +36,9 @@ class Difference:
         return f"{self.key} is {self.stored} there and {self.asked} here"
 
 
-def differences(stored: Mapping[str, Any], asked: Mapping[str, Any]) -> list[Difference]:
+def differences(
+    stored: Mapping[str, Any], asked: Mapping[str, Any], former: Mapping[str, Any] | None = None
+) -> list[Difference]:
     """Return all keys with different values, in alphabetical order.
 
     A value ``auto`` that is asked for differs from no other value.
@@ -44,8 +46,10 @@ def differences(stored: Mapping[str, Any], asked: Mapping[str, Any]) -> list[Dif
     Args:
         stored: Content of ``config.yaml`` of a run as plain data.
         asked: The resolved configuration as plain data.
+        former: Values of keys that `stored` may be too old to have, by dotted path, see
+            `veca_marl.sweeps.former`.
     """
-    one, other = dict(_flat(stored)), dict(_flat(asked))
+    one, other = dict(_flat(former or {})) | dict(_flat(stored)), dict(_flat(asked))
     return [
         Difference(key, one.get(key, _ABSENT), other.get(key, _ABSENT))
         for key in sorted({*one, *other})
