@@ -1,5 +1,7 @@
 import csv
+import errno
 import math
+import os
 
 import pytest
 import torch
@@ -11,7 +13,7 @@ from torchrl import timeit
 from veca_marl.algos.evaluation.episodes import TrainingEpisodes
 from veca_marl.algos.files import WriteError
 from veca_marl.algos.training.loggers import LoggerKind, check_installed, make_reporter
-from veca_marl.algos.training.reporters import CsvReporter
+from veca_marl.algos.training.reporters import CsvReporter, LoggerReporter
 from veca_marl.algos.training.timing import timing_table
 
 
@@ -112,6 +114,23 @@ def test_tensorboard_gets_every_finite_number(tmp_path):
     assert events.Tags()["scalars"] == ["evaluations/red/return"]
     (point,) = events.Scalars("evaluations/red/return")
     assert (point.step, point.value) == (10, 2.5)
+
+
+class FullLogger:
+    def log_scalar(self, name, value, step):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    def close(self):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+
+def test_a_full_disk_under_a_logger_is_reported_with_the_folder_and_the_space(tmp_path):
+    reporter = LoggerReporter(FullLogger(), tmp_path)
+    message = rf"cannot write {tmp_path}: No space left .* MB free"
+    with pytest.raises(WriteError, match=message):
+        reporter.write("metrics", 10, {"a/return": 1.5})
+    with pytest.raises(WriteError, match=message):
+        reporter.close()
 
 
 def test_points_after_a_checkpoint_are_hidden_when_a_run_resumes(tmp_path):

@@ -10,6 +10,7 @@ from typing import Any
 
 from torchrl.record.loggers import Logger, MLFlowLogger, TensorboardLogger, WandbLogger
 
+from veca_marl.algos.files import naming
 from veca_marl.algos.training.reporters import CsvReporter, LoggerReporter, Reporter
 
 
@@ -103,8 +104,11 @@ def make_reporter(kind: LoggerKind, folder: Path, resumed_frames: int = 0) -> Re
 
     Raises:
         ValueError: If the package behind it is not installed.
+        WriteError: If it cannot write into the folder.
     """
     check_installed(kind)
     if kind is LoggerKind.csv:
         return CsvReporter(folder, resumed_frames)
-    return LoggerReporter(_MAKERS[kind](folder, resumed_frames))
+    with naming(folder):
+        logger = _MAKERS[kind](folder, resumed_frames)
+    return LoggerReporter(logger, folder)

@@ -107,24 +107,31 @@ class LoggerReporter:
 
     Args:
         logger: The logger.
+        path: Where it writes.
+
+    Raises:
+        WriteError: If it cannot write there; `write` and `close` raise it.
     """
 
-    def __init__(self, logger: Logger) -> None:
-        self._logger = logger
+    def __init__(self, logger: Logger, path: Path) -> None:
+        self._logger, self._path = logger, path
 
     def write(self, kind: str, frames: int, row: Row) -> None:
         """Add a point to each curve; a row's words become part of the names of its curves."""
         words = [value for value in row.values() if isinstance(value, str)]
         for name, value in row.items():
             if not isinstance(value, str) and math.isfinite(value):
-                self._logger.log_scalar("/".join([kind, *words, name]), float(value), step=frames)
+                curve = "/".join([kind, *words, name])
+                with naming(self._path):
+                    self._logger.log_scalar(curve, float(value), step=frames)
 
     def sync(self) -> None:
         """See `Reporter`; the logger decides when it writes."""
 
     def close(self) -> None:
         """Write pending points."""
-        self._logger.close()
+        with naming(self._path):
+            self._logger.close()
 
 
 def _cell(value: float | int | str) -> str | int:
