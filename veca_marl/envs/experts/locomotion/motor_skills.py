@@ -11,8 +11,8 @@ from veca_marl.envs.core.expert import Expert, register_expert
 from veca_marl.envs.core.task import Player, Task, require_humanoid
 from veca_marl.envs.experts.control.crawling.turn_over import TurnOver
 from veca_marl.envs.experts.control.locomotion import CrawlLocomotion
-from veca_marl.envs.experts.skills.running import Running
 from veca_marl.envs.experts.skills.sit_up import SitUp
+from veca_marl.envs.experts.skills.stepping import Stepping
 from veca_marl.envs.tasks.locomotion.crawl_baby import CrawlBaby
 from veca_marl.sim.body.humanoid import JointCommand
 from veca_marl.sim.geometry import Floats
@@ -29,7 +29,7 @@ class SkillExpert(Expert[Task]):
 
     reads = ()
 
-    skill_type: ClassVar[type[TurnOver | SitUp | Running]]
+    skill_type: ClassVar[type[TurnOver | SitUp | Stepping]]
 
     def __init__(self, task: Task, player: Player) -> None:
         super().__init__(task, player)
@@ -87,10 +87,10 @@ class CrawlBabyExpert(Expert[CrawlBaby]):
 
 @register_expert("RunBaby")
 class RunBabyExpert(SkillExpert):
-    """Lifts its feet in turn and falls forwards after about one second; see `Running`.
+    """Balances, and makes two or three steps forwards before it falls; see `Stepping`.
 
-    It does not run: on average its toes do not come ahead. Reads the pose of the trunk from the
-    simulator (privileged).
+    Reads the pose and the velocity of the trunk and the places of the feet from the simulator
+    (privileged).
     """
 
-    skill_type = Running
+    skill_type = Stepping
