@@ -13,7 +13,7 @@ from veca_marl.reports.gather import state_in
 from veca_marl.reports.statistics import Scores
 
 NEVER = 1e18
-"""Frames to a threshold that a run has not reached: finite, so that differences are defined."""
+"""Frames to a threshold that a run has not reached; finite, so that differences are defined."""
 
 
 @dataclass(frozen=True)
