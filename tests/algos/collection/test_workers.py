@@ -144,16 +144,21 @@ def test_the_signal_handler_is_restored(start):
     assert signal.getsignal(signal.SIGCHLD) == before
 
 
-def test_workers_end_when_the_main_process_is_killed(tmp_path):
-    script = tmp_path / "main_process.py"
-    script.write_text(MAIN_PROCESS)
+def start_script(folder, text):
+    script = folder / "main_process.py"
+    script.write_text(text)
     paths = os.pathsep.join([str(ROOT), str(HELPERS)])
-    main = subprocess.Popen(
+    return subprocess.Popen(
         [sys.executable, str(script)],
         env={**os.environ, "PYTHONPATH": paths},
         stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
         text=True,
     )
+
+
+def test_workers_end_when_the_main_process_is_killed(tmp_path):
+    main = start_script(tmp_path, MAIN_PROCESS)
     processes = [int(word) for word in main.stdout.readline().split()]
     assert len(processes) == 2
     main.kill()
@@ -166,17 +171,8 @@ def test_workers_end_when_the_main_process_is_killed(tmp_path):
 
 @pytest.fixture
 def starting(tmp_path):
-    """A process that starts two workers, whose worlds are never built, and the workers' ids."""
-    script = tmp_path / "main_process.py"
-    script.write_text(STARTING_PROCESS)
-    paths = os.pathsep.join([str(ROOT), str(HELPERS)])
-    main = subprocess.Popen(
-        [sys.executable, str(script)],
-        env={**os.environ, "PYTHONPATH": paths},
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
+    """A process that starts two workers with worlds that are never built, and their ids."""
+    main = start_script(tmp_path, STARTING_PROCESS)
     workers = [int(main.stdout.readline()) for _ in range(2)]
     time.sleep(0.5)  # until the main process waits for them
     yield main, workers
