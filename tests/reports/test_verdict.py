@@ -146,18 +146,13 @@ def test_an_arm_is_compared_with_a_multiple_of_another():
 
 
 def reaching(arm, frames):
-    """Return runs that reach 5.0 after so many frames, None: never; all have 6.0 or 4.0 at 900."""
-    return [
-        Run(
-            arm,
-            seed,
-            True,
-            tuple(Point(at, 1.0, 2.0, 6.0 if first and at >= first else 4.0, 32) for at in ats),
-            0.0,
-        )
-        for seed, first in enumerate(frames)
-        for ats in [range(100, 1000, 100)]
-    ]
+    """Return runs with 4.0 at first, and 6.0 after so many frames; None: never."""
+    return [Run(arm, seed, True, points_of(first), 0.0) for seed, first in enumerate(frames)]
+
+
+def points_of(first):
+    scores = {at: 6.0 if first and at >= first else 4.0 for at in range(100, 1000, 100)}
+    return tuple(Point(at, 1.0, 2.0, score, 32) for at, score in scores.items())
 
 
 def faster(a, b, threshold=5.0):

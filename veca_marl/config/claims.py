@@ -66,7 +66,11 @@ class Equal:
 
 @dataclass(frozen=True)
 class AboveTimes:
-    """The interquartile mean of an arm is above `factor` times that of another arm."""
+    """The interquartile mean of an arm is above `factor` times that of another arm.
+
+    It states a relative difference where 0 is the worst score; of a negative score a multiple is
+    lower, not higher.
+    """
 
     arm: str
     factor: float

@@ -1,7 +1,8 @@
 """Stepping: a periodic gait on two feet with feedback from the balance of the trunk.
 
-The feedback of ankles and hips alone keeps a body standing; each leg that is lifted moves towards
-the fall, as in Yin, Loken & van de Panne 2007, "SIMBICON: simple biped locomotion control".
+Position and velocity of the trunk relative to the feet act on the angles of the loaded and of the
+lifted leg, as in Yin, Loken & van de Panne 2007, "SIMBICON: simple biped locomotion control". Which
+way a gain acts is not prescribed: signs and sizes are what a search found.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ _PELVIS_SHARE = 0.45  # of the middle of the trunk between pelvis and chest
 
 @dataclass(frozen=True)
 class SteppingPattern:
-    """Parameters of the gait; angles are in degrees.
+    """Parameters of the gait; angles are in degrees, beyond the limits of a joint they are clipped.
 
     A standing posture with its feedback was found first, then steps in place, then steps forwards,
     each by covariance matrix adaptation (Hansen 2016, "The CMA evolution strategy: a tutorial")
@@ -58,7 +59,10 @@ class SteppingPattern:
         inversion_swing: Amplitude and phase (rad).
         yaw: Gains of the inward rotation of the hips per radian of yaw to the left, and per radian
             per second.
-        arm: Flexion, amplitude of the swing against the legs, abduction, flexion of the elbow.
+        arm: Flexion of the upper arms at rest.
+        arm_swing: Amplitude of their swing against the legs.
+        arm_abduction: Abduction of the upper arms.
+        elbow: Flexion of the elbows.
     """
 
     frequency_hz: float = 3.569
@@ -90,7 +94,10 @@ class SteppingPattern:
     inversion_balance: tuple[float, float] = (266.7, -46.51)
     inversion_swing: tuple[float, float] = (-14.54, 3.16)
     yaw: tuple[float, float] = (11.11, -16.78)
-    arm: tuple[float, float, float, float] = (-33.03, 61.75, 30.85, -14.57)
+    arm: float = -33.03
+    arm_swing: float = 61.75
+    arm_abduction: float = 30.85
+    elbow: float = -14.57
 
 
 class Balance(NamedTuple):
@@ -198,11 +205,10 @@ def leg(
 
 def arm(p: SteppingPattern, phase: float, growth: float) -> dict[str, float]:
     """Return the angles of an arm in degrees; it swings against the leg of its side."""
-    flexion, swing, abduction, elbow = p.arm
     return {
-        "upper_arm.flexion": flexion - growth * swing * math.sin(phase + p.hip_swing[1]),
-        "upper_arm.abduction": abduction,
-        "forearm.flexion": elbow,
+        "upper_arm.flexion": p.arm - growth * p.arm_swing * math.sin(phase + p.hip_swing[1]),
+        "upper_arm.abduction": p.arm_abduction,
+        "forearm.flexion": p.elbow,
     }
 
 

@@ -30,8 +30,8 @@ class CarGameCfg(TaskCfg):
         speed_mps: Speed of the car on a straight line; see `check_speed` for its limit.
         turn_degps: Greatest turning speed of the car.
         apart_m: Least distance between the middles of car and player at the start.
-        loudness: Level of the motor's sound, see `SoundCfg`; a player of a task of one's own hears
-            it if ``audio`` is among its senses.
+        loudness: Level of the motor's sound, see `SoundCfg`. Players of these tasks do not hear; a
+            task that is derived from them and has ``audio`` among its senses observes it.
     """
 
     speed_mps: float = 1.5
