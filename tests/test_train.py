@@ -19,7 +19,7 @@ from training import TIMES
 from veca_marl.config import ConfigError
 from veca_marl.runs.assembly import find_device
 
-KILLS = int(os.environ.get("VECA_TEST_KILLS", "4"))
+KILLS = int(os.environ.get("VECA_TEST_KILLS", "20"))
 SMOKE = ["+experiment=smoke", "log=silent", "device=cpu", "threads=1"]
 
 
