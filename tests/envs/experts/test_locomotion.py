@@ -78,12 +78,12 @@ def test_a_body_stays_near_while_it_turns(mover):
 
 
 def test_a_body_moves_backwards(mover):
-    """In 3 s, from rest and after moving forwards: more than 0.3 m, with the same heading.
+    """In 3 s, from rest and after moving forwards: 0.4 m in the mean, and rarely with a turn.
 
-    Hands and knees slip, and one movement in ten turns the body aside.
+    Hands and knees slip, and the gait does not steer: single movements differ.
     """
     moved_m, aligned = [], []
-    for yaw_rad in (0.0, 0.7, 1.5, 3.0):
+    for yaw_rad in (0.0, 0.7, 1.5, 3.0, -2.0):
         locomotion = start(mover, yaw_rad)
         heading = np.array([math.cos(yaw_rad), math.sin(yaw_rad)])
         for ahead_s in (0, 1, 2):
@@ -94,8 +94,8 @@ def test_a_body_moves_backwards(mover):
                 body = let(mover, locomotion.back())
             moved_m.append(heading @ (begin - body.position[:2]))
             aligned.append(heading @ body.forward[:2])
-    assert np.mean((np.array(moved_m) > 0.3) & (np.array(aligned) > 0.5)) >= 0.75
-    assert np.mean(aligned) > 0.75
+    assert np.mean(moved_m) > 0.4
+    assert np.median(aligned) > 0.7
 
 
 def test_the_head_is_at_rest(mover):

@@ -75,7 +75,7 @@ class Locomotion(Protocol):
         ...
 
     def back(self, call: Call = Call.none) -> Any:
-        """Move straight backwards."""
+        """Move backwards; on hands and knees the heading is not controlled."""
         ...
 
 
@@ -148,7 +148,6 @@ class CrawlLocomotion:
         self._gait: CrawlGait | None = None
         self._recovery = FallRecovery(body, step_s)
         self._pivot: Floats | None = None
-        self._heading: Floats | None = None  # at the beginning of a movement backwards
 
     def to(self, place: Floats, call: Call = Call.none) -> JointCommand:
         """See `Locomotion.to`. The body turns while it moves; obstacles stop it."""
@@ -165,7 +164,7 @@ class CrawlLocomotion:
 
     def back(self, call: Call = Call.none) -> JointCommand:
         """See `Locomotion.back`."""
-        return (self._rising() or self._backwards())._replace(call=call)
+        return (self._rising() or self._with_pattern(BACK).command())._replace(call=call)
 
     def _rising(self) -> JointCommand | None:
         """Return the command of a body that has fallen; a new gait begins when it is up."""
@@ -173,13 +172,6 @@ class CrawlLocomotion:
         if command is not None:
             self._gait = None
         return command
-
-    def _backwards(self) -> JointCommand:
-        body = self._body
-        if self._heading is None or self._gait is None or self._gait.pattern is not BACK:
-            self._heading = body.forward[:2]
-        bearing = bearing_rad(body, body.position[:2] + self._heading)
-        return self._with_pattern(BACK).towards(bearing)
 
     def _turning(self, left: float) -> JointCommand:
         here = self._body.position[:2]

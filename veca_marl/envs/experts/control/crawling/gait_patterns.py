@@ -113,8 +113,7 @@ CRAWL = GaitPattern(
     full_turn_rad=0.67,
 )
 
-# likewise; how it steers (shortening of the legs, twist, full turn) was chosen among 18 variants by
-# distance and heading of 21 movements of each kind of body
+# likewise; it does not steer
 BACK = GaitPattern(
     frequency_hz=2.17,
     leg=LimbPattern(
@@ -125,7 +124,7 @@ BACK = GaitPattern(
             "foot.dorsiflexion": JointSwing(-46.2, -7.9, 7.5),
         },
         lead_rad=0.01,
-        shortening=0.8,
+        shortening=0.0,
     ),
     arm=LimbPattern(
         {
@@ -149,14 +148,9 @@ BACK = GaitPattern(
         "spine.lateral": -9.9,
     },
     sway_lead_rad=-0.36,
-    twist={
-        "chest.lateral": 1.7,
-        "chest.rotation": -11.7,
-        "spine.lateral": 24.2,
-        "spine.rotation": -20.9,
-    },
+    twist={},
     steering_s=0.31,
-    full_turn_rad=1.0,
+    full_turn_rad=0.66,
 )
 
 
