@@ -94,7 +94,8 @@ def test_no_sense_is_constant(env, rollout):
         for name, seen in rollout[team, "observation"].items():
             for world in seen:
                 changes = (world[1:] != world[:-1]).flatten(1).any(1)
-                assert changes.float().mean() > 0.5, f"{team} {name}"
+                least = 0.0 if name == "touch" else 0.5  # a body may touch nothing for seconds
+                assert changes.float().mean() > least, f"{team} {name}"
 
 
 def test_an_episode_starts_alike_whatever_was_played_before(task, kind):
