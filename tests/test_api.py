@@ -43,5 +43,40 @@ def test_train_stays_a_function_after_the_module_of_the_command_was_imported():
 
 
 def test_fractions_of_frames_are_refused():
-    with pytest.raises(ConfigError, match=r"total_frames: Value '1.5' .* converted to Integer"):
+    with pytest.raises(ConfigError, match=r"total_frames=1.5 must be an integral number"):
         veca_marl.train("KickTheBall", total_frames=1.5)
+
+
+def close_of_closed():
+    env = veca_marl.make("KickTheBall", senses=BLIND)
+    env.close()
+    env.reset()
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: veca_marl.list_tasks("babybench"), "plugins='babybench' must be a list of texts"),
+        (lambda: veca_marl.make("KickTheBall", plugins="mine"), "plugins='mine' must be a list"),
+        (lambda: veca_marl.make("KickTheBall", overrides="seed=3"), "overrides='seed=3' must be"),
+        (
+            lambda: veca_marl.make("KickTheBall", overrides=[3]),
+            r"overrides=\[3\] must be a list of",
+        ),
+        (lambda: veca_marl.make("KickTheBall", senses="mono"), "senses='mono' must be a mapping"),
+        (lambda: veca_marl.make(3), "task=3 must be a name"),
+        (lambda: veca_marl.make("KickTheBall", worlds=2.5), "worlds=2.5 must be an integer"),
+        (lambda: veca_marl.make("KickTheBall", worlds=0), "worlds=0 must be 1 or more"),
+        (lambda: veca_marl.make("KickTheBall", seed="a"), "seed='a' must be an integer"),
+        (
+            lambda: veca_marl.train("KickTheBall", total_frames="many"),
+            "total_frames='many' must",
+        ),
+        (lambda: veca_marl.train("KickTheBall", folder=__file__), "is a file; give a folder"),
+        (lambda: veca_marl.check_task(3), "task=3 must be a registered class or its name"),
+        (close_of_closed, "the environment is closed; make a new one"),
+    ],
+)
+def test_wrong_arguments_are_named(call, message):
+    with pytest.raises((ValueError, RuntimeError), match=message):
+        call()

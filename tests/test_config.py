@@ -107,6 +107,14 @@ def test_files_hold_only_what_differs_from_the_dataclasses():
         ([KICK, "total_frames=0"], r"total_frames must be at least 1, got 0"),
         ([KICK, "algo.minibatches=9999"], r"a batch of \d+ frames cannot be split"),
         ([KICK, "see d=1"], r"see d=1"),
+        ([KICK, "task.speed_mps=[1]"], r"task.speed_mps=\[1.0\]: 2 values are needed, got 1"),
+        ([KICK, "task.speed_mps=fast"], r"task.speed_mps must be a list, such as task.speed_mps="),
+        (
+            [KICK, "senses.audio=mono"],
+            r"senses.audio is a group of values, .*: choose a preset with senses/audio=NAME",
+        ),
+        ([KICK, "+senses.extra.compas.noisy=true"], r"unknown sense 'compas'; choices: audio"),
+        ([KICK, "+senses.extra.audio.quality=mono"], r"senses.extra.audio: set senses.audio, "),
         (
             [PUSH, "opponent.green=idle"],
             r"opponent: no \['green'\] in PushOut1v1; .*\['red', 'blue'\]",

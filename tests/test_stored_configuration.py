@@ -80,7 +80,7 @@ def test_values_of_teams_and_opponents_are_changed(stored):
     ("override", "message"),
     [
         ("algo.clip=1", r"algo.clip=1: of a run, only body, clock, eval"),
-        ("task=KickTheBall", r"task=KickTheBall: of a run, only"),
+        ("+task=KickTheBall", r"\+task=KickTheBall: it is a run of SoccerTwoPlayer"),
         ("senses/audio=momo", r"unknown senses/audio 'momo' \(did you mean mono\?\)"),
         ("task.max_second=1", r"unknown key 'task.max_second' \(did you mean max_seconds\?\)"),
         ("task.max_seconds=x", r"task.max_seconds: Value 'x' .* could not be converted to Float"),

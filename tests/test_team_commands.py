@@ -171,7 +171,7 @@ def test_a_run_is_evaluated_against_another_opponent(played, tmp_path, capsys):
         ("senses/vision=monocular", "other specs"),
         ("senses/audio=lout", "unknown senses/audio 'lout'"),
         ("algo.clip=1", "of a run, only body, clock, eval"),
-        ("task=KickTheBall", "of a run, only body, clock, eval"),
+        ("task=KickTheBall", "task=KickTheBall: it is a run of PushOut1v1"),
         ("opponent.green=idle", "opponent: no ['green'] in PushOut1v1"),
         ("evaluate.exploration=loud", "expected one of [deterministic, stochastic]"),
         ("episodes=0", "episodes must be at least 1"),
@@ -250,9 +250,25 @@ def test_a_folder_that_is_no_run_is_refused(tmp_path, capsys):
     nowhere = tmp_path / "nowhere"
     for command in (tournament, evaluate):
         assert command([f"run={nowhere}"]) == 2
-        assert "nowhere holds no run" in capsys.readouterr().err
+        assert "nowhere does not exist; give the folder of a run" in capsys.readouterr().err
 
 
 def test_past_policies_are_chosen_evenly():
     assert spread([0, 1, 2, 3, 4, 5, 6], 3) == [0, 3, 6]
     assert spread([0, 5], 6) == [0, 5]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["eval.every_frames=128"], "total_frames=128: team 'blue' would not learn"),
+        (
+            ["eval.every_frames=64", "algo=sac", "algo.replay.warm_up_frames=100"],
+            "team 'red': the 64 frames end before the first update",
+        ),
+    ],
+)
+def test_self_play_in_which_a_team_would_not_learn_is_refused(tmp_path, capsys, arguments, message):
+    turns = ["self_play.teams=[red,blue]", "total_frames=128", *arguments]
+    assert train(tmp_path, "run", *turns) == 2
+    assert message in capsys.readouterr().err

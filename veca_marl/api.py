@@ -9,8 +9,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from veca_marl.api_arguments import as_integer, check_list, check_name, check_presets
 from veca_marl.checks import CheckCfg, TaskReport, check_game
 from veca_marl.config import ConfigError, compose, compose_node, to_config
+from veca_marl.config.outputs import check_folder
 from veca_marl.envs.adapters.gymnasium import VecaGymEnv
 from veca_marl.envs.adapters.pettingzoo import VecaParallelEnv
 from veca_marl.envs.adapters.spaces import SensesLayout
@@ -37,8 +39,10 @@ def list_tasks(plugins: Sequence[str] = (), suite: str = "veca") -> list[str]:
 
     Raises:
         PluginError: If a plug-in cannot be loaded.
+        ConfigError: If `plugins` is no list of names.
         ValueError: If there is no such suite; the message lists those there are.
     """
+    check_list("plugins", plugins, '["my_tasks"] (a suite is suite="babybench")')
     load_plugins(plugins)
     suites = {task.suite for task in TASKS.values()}
     if suite not in suites:
@@ -185,9 +189,12 @@ def train(
             resumed.
         CheckpointError: If something cannot be loaded or stored.
     """
+    run = None if folder is None else new_run(check_folder(folder, "folder"))
     chosen = _choices(task, playground, body, senses, plugins)
-    chosen += [] if total_frames is None else [f"total_frames={_integer(total_frames)}"]
-    chosen += [f"seed={seed}", *overrides]
+    if total_frames is not None:
+        chosen.append(f"total_frames={as_integer('total_frames', total_frames)}")
+    check_list("overrides", overrides, '["algo=mappo"]')
+    chosen += [f"seed={as_integer('seed', seed)}", *overrides]
     node = compose_node(chosen)
     if node.resume is not None:
         raise ConfigError(
@@ -196,7 +203,6 @@ def train(
         )
     decide_precision(node)
     cfg = to_config(node)
-    run = None if folder is None else new_run(Path(folder))
     trainer = make_trainer(cfg, run)
     if run is not None:
         run.begin(node, chosen)
@@ -238,6 +244,8 @@ def check_task(
         ConfigError: If there is no such choice, or the configuration is impossible.
         ValueError: If the class is not registered.
     """
+    if not isinstance(task, (str, type)):
+        raise ConfigError(f"task={task!r} must be a registered class or its name")
     name = task if isinstance(task, str) else task.__name__
     if not isinstance(task, str) and TASKS.get(name) is not task:
         raise ValueError(f"task {name!r} is not registered; decorate the class with @register")
@@ -245,11 +253,6 @@ def check_task(
         name, playground=playground, body=body, senses=senses, overrides=overrides, plugins=plugins
     )
     return check_game(cfg, CheckCfg() if checks is None else checks)
-
-
-def _integer(number: float) -> str:
-    """Return an integral number without exponent; another one as it is, to be refused."""
-    return str(int(number)) if float(number).is_integer() else str(number)
 
 
 def choose(
@@ -266,6 +269,7 @@ def choose(
     Raises:
         ConfigError: If there is no such choice; the message lists those there are.
     """
+    check_list("overrides", overrides, '["task.life_s=4.0"]')
     return compose([*_choices(task, playground, body, senses, plugins), *overrides]).game
 
 
@@ -277,6 +281,11 @@ def _choices(
     plugins: Sequence[str],
 ) -> list[str]:
     """Return the arguments as overrides."""
+    check_list("plugins", plugins, '["my_tasks"]')
+    check_presets("senses", senses or {})
+    for argument, value in (("task", task), ("playground", playground), ("body", body)):
+        if argument == "task" or value is not None:
+            check_name(argument, value)
     choices = [f"+task={task}"]
     choices += [f"plugins=[{','.join(plugins)}]"] if plugins else []
     choices += [] if playground is None else [f"playground={playground}"]

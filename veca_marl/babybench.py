@@ -10,7 +10,6 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
-from pathlib import Path
 
 import numpy as np
 import torch
@@ -19,6 +18,7 @@ from veca_marl.algos.files import WriteError, write_atomically
 from veca_marl.algos.training.checkpoint_file import CheckpointError
 from veca_marl.config import ConfigError
 from veca_marl.config.command_line import CommandLine
+from veca_marl.config.outputs import check_file
 from veca_marl.envs.core.task import find_task
 from veca_marl.envs.tasks.developmental.regions import HANDS, regions_of
 from veca_marl.envs.tasks.developmental.self_touch import SelfTouch
@@ -122,6 +122,7 @@ def lines(result: Result) -> list[str]:
 def run(options: BabyBenchOptions, overrides: list[str]) -> None:
     """Play the episodes, print the scores and write the JSON file."""
     torch.set_num_threads(1)
+    json_file = None if options.json is None else check_file(options.json, "json")
     choice = choose(options.policy, overrides)
     name = choice.cfg.task.name
     if find_task(name).suite != SUITE:
@@ -131,9 +132,9 @@ def run(options: BabyBenchOptions, overrides: list[str]) -> None:
     play(session, result, options.episodes)
     session.close()
     print(*lines(result), sep="\n")
-    if options.json is not None:
+    if json_file is not None:
         content = {**asdict(result), "scores": result.scores}
-        write_atomically(Path(options.json), json.dumps(content, indent=2) + "\n")
+        write_atomically(json_file, json.dumps(content, indent=2) + "\n")
 
 
 def main(words: Sequence[str] | None = None) -> int:

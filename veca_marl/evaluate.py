@@ -26,6 +26,7 @@ from veca_marl.algos.specs import team_specs
 from veca_marl.algos.training.checkpoint_file import CheckpointError
 from veca_marl.config import Config, ConfigError, compose, one_line
 from veca_marl.config.command_line import CommandLine
+from veca_marl.config.outputs import check_file
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
 from veca_marl.envs.core.benchmark import Benchmark, find_benchmark, parameters
 from veca_marl.envs.core.game_cfg import GameCfg
@@ -173,6 +174,7 @@ def summary(table: Table) -> list[dict[str, object]]:
     """Return a row for each player and team: means over the episodes, the return's interval.
 
     In a task with a goal, ``solved`` is the share of the episodes that ended with the goal reached.
+    One episode has no interval: None.
     """
     return [
         {
@@ -180,7 +182,7 @@ def summary(table: Table) -> list[dict[str, object]]:
             "team": team,
             "episodes": len(scores.returns),
             "return": float(scores.returns.mean()),
-            "interval": interval(scores.returns),
+            "interval": interval(scores.returns) if len(scores.returns) > 1 else None,
             "length": float(scores.lengths.mean()),
             **solved_rate(scores),
             **{name: float(values.mean()) for name, values in scores.terms.items()},
@@ -199,6 +201,8 @@ def lines(rows: Sequence[dict[str, object]]) -> list[str]:
 
 
 def _cell(value: object) -> str:
+    if value is None:
+        return "-"
     if isinstance(value, tuple):
         return f"[{value[0]:.3f}, {value[1]:.3f}]"
     return f"{value:.3f}" if isinstance(value, float) else str(value)
@@ -207,6 +211,8 @@ def _cell(value: object) -> str:
 def run(options: EvaluateOptions, overrides: list[str]) -> None:
     """Evaluate, print the table and the paired comparison, write the JSON file."""
     torch.set_num_threads(1)
+    file = options.evaluate.json
+    json_file = None if file is None else check_file(file, "evaluate.json")
     evaluated = evaluate_run(options, overrides)
     table, rows = evaluated.table, summary(evaluated.table)
     if evaluated.benchmark is not None:
@@ -216,8 +222,8 @@ def run(options: EvaluateOptions, overrides: list[str]) -> None:
     print(*lines(rows), sep="\n")
     for team, scores in table["policy"].items():
         print(comparison_line(team, scores, table["random"][team]))
-    if options.evaluate.json is not None:
-        write_atomically(Path(options.evaluate.json), json.dumps(rows, indent=2) + "\n")
+    if json_file is not None:
+        write_atomically(json_file, json.dumps(rows, indent=2) + "\n")
 
 
 def main(words: Sequence[str] | None = None) -> int:

@@ -20,6 +20,7 @@ from veca_marl.config import ConfigError
 from veca_marl.config.claims import parse_claim
 from veca_marl.config.command_line import CommandLine
 from veca_marl.config.experiment import ExperimentCfg
+from veca_marl.config.outputs import check_folder
 from veca_marl.reports.arms import Arm, compose_arms
 from veca_marl.reports.expert import expert_rows
 from veca_marl.reports.figure import check_plotting, draw
@@ -72,12 +73,16 @@ def make_report(options: ReportOptions, arms: Sequence[Arm], command: str) -> tu
         command: The command that runs them.
 
     Raises:
-        ConfigError: If nothing has been evaluated.
+        ConfigError: If nothing has been evaluated, or a path of the options is impossible.
         PlotError: If matplotlib is missing.
         ValueError: If a file is not what it should be, or the team or metric does not exist.
         OSError: If a file cannot be read or written.
     """
     check_plotting()
+    if options.to is not None:
+        check_folder(options.to, "to")
+    if options.results is not None and not Path(options.results).is_file():
+        raise ConfigError(f"results={options.results} is no file")
     experiment = arms[0].cfg.experiment
     found, rows, folder = _read(options, arms, str(experiment.name))
     report = _report(arms, command, rows, found)
@@ -141,8 +146,10 @@ def _report(
 
 
 def _nothing_evaluated(experiment: ExperimentCfg, found: Sequence[Found]) -> ConfigError:
-    remarks = [run.remark for run in found if run.remark][:3]
-    return ConfigError(f"no run of {experiment.name} has been evaluated: {'; '.join(remarks)}")
+    remarks = [run.remark for run in found if run.remark]
+    more = f"; and {len(remarks) - 3} more" if len(remarks) > 3 else ""
+    named = "; ".join(remarks[:3])
+    return ConfigError(f"no run of {experiment.name} has been evaluated: {named}{more}")
 
 
 def run(options: ReportOptions, overrides: list[str]) -> None:

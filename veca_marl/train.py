@@ -23,11 +23,12 @@ from omegaconf.errors import OmegaConfBaseException
 from veca_marl import api
 from veca_marl.algos.collection.parent import end_with_parent
 from veca_marl.algos.collection.workers import WorkerError
-from veca_marl.algos.files import WriteError
+from veca_marl.algos.files import DISK_FULL, WriteError
 from veca_marl.algos.training.checkpoint_file import CheckpointError
 from veca_marl.algos.training.finite import NotFiniteError
 from veca_marl.algos.training.loop import Trainer
 from veca_marl.config import Config, ConfigError, conf_dir, one_line, prepare, to_config
+from veca_marl.config.outputs import check_folder
 from veca_marl.config.stored import change
 from veca_marl.runs.assembly import decide_precision, make_trainer
 from veca_marl.runs.resumable import RESUMABLE, may_change
@@ -38,7 +39,6 @@ from veca_marl.sweeps.processes import PARENT
 
 _COMMAND = "python -m veca_marl.train"
 _NO_FOLDER = (errno.EACCES, errno.EPERM, errno.EROFS, errno.ENOTDIR)
-_DISK_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 _CONFIGURATION_ERRORS = (ConfigError, CheckpointError, WriteError)
 _FAILURES = (WorkerError, NotFiniteError, FloatingPointError, CheckpointError, WriteError)
 
@@ -87,7 +87,7 @@ def run(node: DictConfig) -> None:
         print(f"error: {one_line(error)}; {_continue(path)}", file=sys.stderr)
         raise SystemExit(1) from error
     except OSError as error:
-        if error.errno not in _DISK_FULL:
+        if error.errno not in DISK_FULL:
             raise
         print(f"error: {error}; make room; {_continue(path)}", file=sys.stderr)
         raise SystemExit(1) from error
@@ -108,12 +108,20 @@ def set_up(node: DictConfig, path: Path) -> tuple[Config, RunFolder, Trainer]:
         folder.begin_again(stored, overrides, trainer.progress.frames)
         return cfg, folder, trainer
     folder = new_run(path)
-    for precision in decide_precision(node):
-        print(f"network.precision=auto: {precision.value} on this machine")
+    decided = decide_precision(node)
     cfg = to_config(node)
     trainer = make_trainer(cfg, folder)
+    for precision in dict.fromkeys(decided):
+        print(f"algo.network.precision=auto: {precision.value} on this machine")
     folder.begin(node, list(HydraConfig.get().overrides.task))
     return cfg, folder, trainer
+
+
+def _check_folders(overrides: list[str]) -> None:
+    """Raise `ConfigError` for a folder that Hydra could not create."""
+    for option, _, path in (text.partition("=") for text in overrides):
+        if option in ("hydra.run.dir", "hydra.sweep.dir"):
+            check_folder(path, option)
 
 
 def give_up(error: Exception) -> NoReturn:
@@ -133,13 +141,14 @@ def main() -> None:
         end_with_parent(int(os.environ.pop(PARENT)))
     try:
         sys.argv[1:] = prepare(sys.argv[1:])
+        _check_folders(sys.argv[1:])
         run()
     except (ConfigError, SweepError, HydraException, OmegaConfBaseException) as error:
         give_up(error)
     except KeyboardInterrupt:  # a sweep; `run` handles that of a single run
         raise SystemExit(130) from None
     except OSError as error:
-        if error.errno not in _NO_FOLDER + _DISK_FULL or Path(error.filename or ".").exists():
+        if error.errno not in _NO_FOLDER + DISK_FULL or Path(error.filename or ".").exists():
             raise
         give_up(ConfigError(f"cannot create {error.filename}: {error.strerror}"))
 

@@ -44,7 +44,7 @@ def test_a_deaf_agent_has_a_video_without_sound(tmp_path):
 @pytest.mark.parametrize(
     ("wrong", "message"),
     [
-        (["policy=champion"], "policy=champion: choices: keyboard, expert, random"),
+        (["policy=champion"], "policy=champion: choices: expert, random, a run"),
         (["episodes=0"], "episodes must be at least 1"),
         (["video=kick.avi"], "must end in .mp4"),
     ],

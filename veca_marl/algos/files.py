@@ -1,7 +1,8 @@
-"""Files that are complete or absent, and errors that name the file and the space on its disk."""
+"""Files that are complete or absent, and errors that name the file and, if it is full, its disk."""
 
 from __future__ import annotations
 
+import errno
 import os
 import shutil
 from collections.abc import Iterator
@@ -9,10 +10,12 @@ from contextlib import contextmanager
 from pathlib import Path
 
 Content = bytes | memoryview
+DISK_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+"""Numbers of the errors by which the system says that a file has no room."""
 
 
 class WriteError(RuntimeError):
-    """A file cannot be written; the message names it, the reason and the free space."""
+    """A file cannot be written; the message names it and the reason."""
 
 
 def write_atomically(path: Path, content: Content | str) -> None:
@@ -49,7 +52,7 @@ def temporary_of(path: Path) -> Path:
 
 @contextmanager
 def naming(path: Path, size: int = 0) -> Iterator[None]:
-    """Raise `WriteError`, with the path and the free space, in place of `OSError`.
+    """Raise `WriteError`, with the path and the space on a full disk, in place of `OSError`.
 
     Args:
         path: The file that is written inside the block.
@@ -58,16 +61,15 @@ def naming(path: Path, size: int = 0) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        needed = f", {_megabytes(size)} needed" if size else ""
-        raise WriteError(
-            f"cannot write {path}: {error.strerror or error} ({_free(path)} free{needed})"
-        ) from error
+        space = _space(path, size) if error.errno in DISK_FULL else ""
+        raise WriteError(f"cannot write {path}: {error.strerror or error}{space}") from error
 
 
-def _free(path: Path) -> str:
-    """Return the free space where `path` is, or would be."""
+def _space(path: Path, size: int) -> str:
+    """Return the free space where `path` is, or would be, beside that which is needed."""
     existing = next(folder for folder in path.absolute().parents if folder.is_dir())
-    return _megabytes(shutil.disk_usage(existing).free)
+    needed = f", {_megabytes(size)} needed" if size else ""
+    return f" ({_megabytes(shutil.disk_usage(existing).free)} free{needed})"
 
 
 def _megabytes(size: int) -> str:

@@ -19,6 +19,7 @@ from omegaconf.errors import OmegaConfBaseException
 
 from veca_marl.conf_dir import conf_dir
 from veca_marl.config.errors import ConfigError, one_line
+from veca_marl.config.lengths import check_lengths
 from veca_marl.config.overrides import plugins_in, with_integers
 from veca_marl.config.root import Config
 from veca_marl.config.schemas import register_schemas, store_tasks_without_file
@@ -95,6 +96,7 @@ def to_config(node: DictConfig) -> Config:
     if OmegaConf.is_missing(node, "task"):
         raise ConfigError(no_task())
     load_config_plugins(node.plugins)
+    check_lengths(node)
     try:
         config = cast(Config, OmegaConf.to_object(node))
         find_task(config.task.name)

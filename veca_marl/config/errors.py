@@ -12,6 +12,9 @@ from hydra.errors import ConfigCompositionException, MissingConfigException
 from omegaconf import DictConfig
 from omegaconf.errors import ConfigKeyError, OmegaConfBaseException
 
+_NO_GROUP = re.compile("Invalid type assigned: .* is not a subclass of")
+_NO_LIST = re.compile("is not a ListConfig, list or tuple")
+
 
 class ConfigError(ValueError):
     """An impossible configuration; the message is one line."""
@@ -52,6 +55,12 @@ def _wrong_value(error: OmegaConfBaseException) -> str:
         near = _nearest(key.rpartition(".")[2], names)
         return f"unknown key {key!r}{near}; choices: {', '.join(names)}"
     message = _flat(str(error).partition("\n")[0])
+    if _NO_GROUP.search(message) and error.full_key:
+        path, _, group = str(error.full_key).rpartition(".")
+        preset = f": choose a preset with {path}/{group}=NAME" if path else ""
+        return f"{error.full_key} is a group of values, not a single one{preset}"
+    if _NO_LIST.search(message) and error.full_key:
+        return f"{error.full_key} must be a list, such as {error.full_key}=[...]"
     _, resolver, said = message.partition(" raised while resolving interpolation: ")
     if resolver:
         return said

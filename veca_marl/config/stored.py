@@ -109,8 +109,11 @@ def change(node: DictConfig, overrides: Sequence[str], allowed: Sequence[str] = 
     """
     for override in parse(with_integers(overrides)):
         path = (override.package or str(override.key_or_group).replace("/", ".")).split(".")
-        if path == ["task"] or path[0] not in allowed:
-            choices = ", ".join(allowed)
+        if path == ["task"]:
+            _require_same_task(node, override)
+            continue
+        if path[0] not in allowed:
+            choices = ", ".join("task.FIELD" if key == "task" else key for key in allowed)
             raise ConfigError(f"{override.input_line}: of a run, only {choices} can be changed")
         if path[0] == "team" and len(path) > 1 and path[1] not in node.team:
             node.team[path[1]] = OmegaConf.structured(TeamCfg)
@@ -118,6 +121,11 @@ def change(node: DictConfig, overrides: Sequence[str], allowed: Sequence[str] = 
             _apply(node, override)
         except OmegaConfBaseException as error:
             raise ConfigError(one_line(error)) from error
+
+
+def _require_same_task(node: DictConfig, override: Override) -> None:
+    if override.value() != node.task.name:
+        raise ConfigError(f"{override.input_line}: it is a run of {node.task.name}")
 
 
 def _apply(node: DictConfig, override: Override) -> None:

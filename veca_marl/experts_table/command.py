@@ -10,6 +10,7 @@ from pathlib import Path
 from veca_marl.algos.files import WriteError, write_atomically
 from veca_marl.config import ConfigError, one_line, prepare
 from veca_marl.config.command_line import CommandLine
+from veca_marl.config.outputs import check_folder
 from veca_marl.envs.core.benchmark import find_benchmark
 from veca_marl.envs.core.expert import has_expert
 from veca_marl.envs.core.task import TASKS
@@ -46,7 +47,7 @@ def run(options: TableOptions, overrides: list[str]) -> None:
     Raises:
         ConfigError: If a choice is impossible, or stored episodes are of another configuration.
     """
-    folder = Path(options.to)
+    folder = check_folder(options.to, "to")
     try:
         prepare(overrides)  # loads plug-ins with tasks of their own
         jobs = list(_missing(options, folder, overrides))

@@ -22,6 +22,7 @@ from veca_marl.algos.files import WriteError, naming
 from veca_marl.algos.training.checkpoint_file import CheckpointError
 from veca_marl.config import ConfigError, one_line
 from veca_marl.config.command_line import CommandLine
+from veca_marl.config.outputs import check_file
 from veca_marl.play.film import film
 from veca_marl.play.policies import EXPERT, KEYBOARD, Choice, choose
 from veca_marl.play.session import Session
@@ -81,7 +82,7 @@ def run(options: PlayOptions, overrides: list[str]) -> None:
     if options.video is None:
         _play(options, overrides)
     else:
-        _film(options, overrides, Path(options.video))
+        _film(options, overrides, check_file(options.video, "video"))
 
 
 def _film(options: PlayOptions, overrides: list[str], path: Path) -> None:

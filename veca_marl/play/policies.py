@@ -19,7 +19,6 @@ from veca_marl.runs.assembly import read_specs
 from veca_marl.runs.stored_policies import stored_actors, stored_configuration
 
 KEYBOARD, EXPERT, RANDOM = "keyboard", "expert", "random"
-_NAMES = f"{KEYBOARD}, {EXPERT}, {RANDOM}"
 
 
 @dataclass(frozen=True)
@@ -73,7 +72,8 @@ def choose(policy: str, overrides: Sequence[str], keyboard: PolicyMaker | None =
         cfg = compose(overrides)
         return _with_opponents(cfg, lambda env: RandomTeams(env, list(env.group_map)))
     if not Path(policy).exists():
-        raise ConfigError(f"policy={policy}: choices: {_NAMES}, a run, a checkpoint")
+        names = [EXPERT, RANDOM] if keyboard is None else [KEYBOARD, EXPERT, RANDOM]
+        raise ConfigError(f"policy={policy}: choices: {', '.join(names)}, a run, a checkpoint")
     return _stored(Path(policy), overrides)
 
 

@@ -102,12 +102,18 @@ def make_trainer(cfg: Config, folder: RunFolder | None = None) -> Trainer:
 
 def _check_budget(trainer: Trainer) -> None:
     """Refuse a new run in which a team would learn nothing."""
-    for numbers in trainer.learners.cfgs.values():
+    asked = trainer.budget.total_frames
+    for team, numbers in trainer.learners.cfgs.items():
+        frames = trainer.frames_to_learn(team)
+        if not frames:
+            raise ConfigError(
+                f"total_frames={asked}: team {team!r} would not learn: in self-play the teams "
+                f"learn in turns of eval.every_frames={trainer.evaluation.every_frames}"
+            )
         try:
-            numbers.check_budget(trainer.budget_frames)
+            numbers.check_budget(frames)
         except ValueError as error:
-            asked = trainer.budget.total_frames
-            raise ConfigError(f"total_frames={asked}: {one_line(error)}") from error
+            raise ConfigError(f"total_frames={asked}: team {team!r}: {one_line(error)}") from error
 
 
 def _warn_of_idle_rest(trainer: Trainer) -> None:
@@ -116,7 +122,7 @@ def _warn_of_idle_rest(trainer: Trainer) -> None:
     A replay buffer that is not in the checkpoint is filled again before the next update.
     """
     for team, algorithm in trainer.learners.algorithms.items():
-        left = trainer.budget_frames - trainer.progress.frames
+        left = trainer.frames_to_learn(team)
         if left <= 0 or algorithm.exact_resume:
             continue
         try:

@@ -154,6 +154,8 @@ def open_run(path: Path, asked_by: str = "") -> RunFolder:
         ConfigError: If there is no run in `path`.
     """
     folder = RunFolder(path)
+    if not path.exists():
+        raise ConfigError(f"{asked_by}{path} does not exist; give the folder of a run")
     if not folder.config.is_file():
         raise ConfigError(f"{asked_by}{path} holds no run (no config.yaml)")
     return folder

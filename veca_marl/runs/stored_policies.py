@@ -10,7 +10,7 @@ from tensordict.nn import TensorDictModuleBase
 from veca_marl.algos.selfplay.self_play import SelfPlayCfg
 from veca_marl.algos.specs import TeamSpec
 from veca_marl.algos.training.stored import load_actor
-from veca_marl.config import Config, to_config
+from veca_marl.config import Config, ConfigError, to_config
 from veca_marl.config.stored import change
 from veca_marl.runs.run_folder import open_run
 
@@ -26,6 +26,8 @@ def stored_configuration(checkpoint: Path, overrides: Sequence[str], asked_by: s
     Raises:
         ConfigError: If there is no run, or a change is impossible.
     """
+    if checkpoint.is_file() and checkpoint.suffix != ".pt":
+        raise ConfigError(f"{asked_by}{checkpoint} is no checkpoint; give a run, or a checkpoint")
     folder = open_run(checkpoint.parent.parent if checkpoint.is_file() else checkpoint, asked_by)
     node = folder.typed_config()
     # nothing is learnt here

@@ -90,6 +90,9 @@ class SensesCfg:
         extra: Settings of registered senses that have no field here, by name: an instance of the
             sense's own dataclass or a mapping of its fields. A sense that is not in it has its
             defaults.
+
+    Raises:
+        ValueError: If a name in `extra` is not that of a registered sense without a field here.
     """
 
     vision: VisionCfg = field(default_factory=VisionCfg)
@@ -98,6 +101,16 @@ class SensesCfg:
     touch: TouchCfg = field(default_factory=TouchCfg)
     extra: dict[str, Any] = field(default_factory=dict)
 
+    def __post_init__(self) -> None:
+        for name in self.extra:
+            if name in self._own_fields():
+                raise ValueError(f"senses.extra.{name}: set senses.{name}, which is built in")
+            SENSES.find(name)
+
+    @classmethod
+    def _own_fields(cls) -> set[str]:
+        return {f.name for f in fields(cls)} - {"extra"}
+
     def of(self, name: str) -> Any:
         """Return the settings of one registered sense.
 
@@ -105,7 +118,7 @@ class SensesCfg:
             ValueError: If no sense of that name is registered, or its settings in `extra` have
                 a field that its dataclass has not.
         """
-        if name in {f.name for f in fields(self)} - {"extra"}:
+        if name in self._own_fields():
             return getattr(self, name)
         cfg_type = SENSES.find(name).cfg_type
         given = self.extra.get(name, {})

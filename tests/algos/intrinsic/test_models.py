@@ -201,3 +201,17 @@ def test_invalid_numbers_raise_an_error_with_their_name(wrong):
     (name,) = wrong
     with pytest.raises(ValueError, match=f"intrinsic.{name} must be"):
         RNDCfg(**wrong)
+
+
+@both
+def test_the_first_batch_with_present_agents_is_learnt_more_often(kind):
+    """An empty batch before it does not use up the warm-up."""
+    rewards = []
+    for empty in (False, True):
+        model = make(kind, SPEC, warm_up=20)
+        if empty:
+            nobody = transitions()
+            nobody["next", "team", "mask"][:] = False
+            model.learn(nobody)
+        rewards.append(float(model.learn(transitions())[0].mean()))
+    assert rewards[1] == pytest.approx(rewards[0], rel=0.5)

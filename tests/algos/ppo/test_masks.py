@@ -1,5 +1,7 @@
 """Agents that are eliminated: their rows change neither losses, gradients nor measures."""
 
+import math
+
 import pytest
 import torch
 from fake_env import FakeEnv
@@ -158,3 +160,22 @@ def test_explained_variance_is_numpys_over_the_valid_rows():
         error = (target - value)[rows, agent].numpy().var()
         total = target[rows, agent].numpy().var()
         assert found[agent].item() == pytest.approx(1.0 - error / total, rel=1e-4)
+
+
+@pytest.mark.parametrize("normalisation", [ValueNormalisation.none, ValueNormalisation.popart])
+def test_minibatches_without_present_agents_are_left_out(leaving, normalisation):
+    ppo, batch = leaving(value_normalisation=normalisation)
+    batch["agents", "mask"][:, 8:] = False  # half of the rows, minibatches of one row
+    ppo.cfg.minibatches, ppo.cfg.epochs = batch.numel(), 1
+    measured = ppo.learn(batch)
+    assert all(math.isfinite(number) for number in measured.values())
+
+
+def test_a_batch_without_present_agents_changes_nothing(leaving):
+    ppo, batch = leaving(value_normalisation=ValueNormalisation.running)
+    batch["agents", "mask"][:] = False
+    before = {name: array.clone() for name, array in ppo.network.state_dict().items()}
+    measured = ppo.learn(batch)
+    assert math.isnan(measured["policy_loss"])
+    after = ppo.network.state_dict()
+    assert all(torch.equal(before[name], after[name]) for name in before)

@@ -99,3 +99,19 @@ def test_the_bytes_that_are_needed_are_those_of_the_storage():
     mapped = storage_needed(spec, replace(CFG, storage=Storage.memmap, folder="/data"))
     assert mapped.disk_bytes == needed.memory_bytes
     assert mapped.folder == Path("/data")
+
+
+@pytest.mark.parametrize("length", [1, 2, 6])
+def test_the_warm_up_counts_frames_however_short_episodes_are(length):
+    replay = Replay(KEYS, ReplayCfg(capacity=100, warm_up_frames=24), Span(0, 1, 3))
+    ends = [(world, step) for world in range(2) for step in range(length - 1, 6, length)]
+    for frames in (12, 24):
+        assert not replay.ready
+        replay.extend(batch_of(done=ends))
+        assert replay.frames == frames
+    assert replay.ready
+
+
+def test_the_end_of_an_episode_is_not_drawn_as_a_first_step():
+    replay = replay_of(replace(CFG, warm_up_frames=0), 3)
+    assert replay.sample(500).took_place[:, 0].all()

@@ -75,7 +75,9 @@ def test_a_header_that_was_cut_off_is_written_again(tmp_path, text):
     assert rows_of(path) == [{"frames": "10", "a/return": "1.5"}]
 
 
-@pytest.mark.parametrize("text", ["10,1.5\n20,2.5\n", "frames,a/return\nx,1.5\n"])
+@pytest.mark.parametrize(
+    "text", ["10,1.5\n20,2.5\n", "frames,a/return\nx,1.5\n", "frames,a/ret", ""]
+)
 def test_a_damaged_table_is_named_and_kept(tmp_path, text):
     path = tmp_path / "metrics.csv"
     path.write_text(text)

@@ -89,16 +89,20 @@ def solved_rate(scores: Scores) -> dict[str, float]:
 def comparison_line(team: str, policy: Scores, baseline: Scores) -> str:
     """Return one line that compares a policy with the random baseline, episode by episode."""
     parts = [
-        f"{name} {scores.returns.mean():.3f} [{low:.3f}, {high:.3f}]"
+        f"{name} {scores.returns.mean():.3f} {_bounds(*interval(scores.returns))}"
         for name, scores in (("policy", policy), ("random", baseline))
-        for low, high in [interval(scores.returns)]
     ]
     mean, low, high = paired_difference(policy.returns, baseline.returns)
     return (
         f"{team}: return of {parts[0]}, {parts[1]}, difference {mean:.3f} "
-        f"[{low:.3f}, {high:.3f}] (means of {len(policy.returns)} paired episodes, "
+        f"{_bounds(low, high)} (means of {len(policy.returns)} paired episodes, "
         f"95 % intervals){_solved_part(policy, baseline)}"
     )
+
+
+def _bounds(low: float, high: float) -> str:
+    """Return an interval as text; that of a single episode is not known."""
+    return "[-, -]" if math.isnan(low) else f"[{low:.3f}, {high:.3f}]"
 
 
 def _solved_part(policy: Scores, baseline: Scores) -> str:

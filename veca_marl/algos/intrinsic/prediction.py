@@ -109,7 +109,7 @@ class PredictionReward(IntrinsicReward):
         counted = counted_steps(batch, self.team)
         rows = self.rows(batch, counted)
         self.senses.update(rows["after"])
-        if not self._warm:
+        if not self._warm and len(rows):
             self._warm = True
             for _ in range(self.cfg.warm_up):
                 self._pass(rows)

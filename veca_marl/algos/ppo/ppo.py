@@ -110,15 +110,22 @@ class PPO(Algorithm):
         """Make all epochs over `rows` and return the mean of each measure."""
         if self.normalised_critic is not None:
             targets = rows[self.team, "value_target"]
-            self.normalised_critic.update(
-                targets[rows[self.team, "mask"]] if self._masked else targets.flatten(0, -2)
-            )
+            targets = targets[rows[self.team, "mask"]] if self._masked else targets.flatten(0, -2)
+            if len(targets):
+                self.normalised_critic.update(targets)
         measured: list[dict[str, float]] = []
         for _ in range(self.cfg.epochs):
-            epoch = [self.step(minibatch) for minibatch in minibatches(rows, self.cfg.minibatches)]
-            self.schedule.step(_mean(epoch)["kl"])
+            parts = minibatches(rows, self.cfg.minibatches)
+            epoch = [self.step(minibatch) for minibatch in parts if self._counts(minibatch)]
+            if epoch:
+                self.schedule.step(_mean(epoch)["kl"])
             measured += epoch
-        return _mean(measured) | {"learning_rate": self.schedule.get_last_lr()[0]}
+        means = _mean(measured) if measured else self.idle()
+        return means | {"learning_rate": self.schedule.get_last_lr()[0]}
+
+    def _counts(self, minibatch: TensorDictBase) -> bool:
+        """Return whether an agent is present in any row: there is nothing to learn otherwise."""
+        return not self._masked or bool(minibatch[self.team, "mask"].any())
 
     def step(self, minibatch: TensorDictBase) -> dict[str, float]:
         """Take one gradient step and return what was measured.

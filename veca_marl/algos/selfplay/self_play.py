@@ -8,6 +8,7 @@ section 4; Vinyals et al. 2019 extend the idea to a league).
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -75,7 +76,7 @@ class SelfPlay:
         if frames == 0:
             for team in self.cfg.teams:
                 self._store(team, 0)
-        self.turn, self.opponent = self.cfg.teams if stage % 2 == 0 else self.cfg.teams[::-1]
+        self.turn, self.opponent = self._order(stage)
         self._learners.learning = [self.turn, *self._others]
         rng = np.random.default_rng([self._seed, stage, _DRAWS])
         members = self.pool.members(self.opponent, frames)
@@ -83,6 +84,14 @@ class SelfPlay:
             raise CheckpointError(f"{self.pool.folder} holds no past policy of {self.opponent!r}")
         latest = rng.random() < self.cfg.latest
         self.past_frames = None if latest else int(rng.choice(members))
+
+    def _order(self, stage: int) -> Sequence[str]:
+        """Return the team that learns in a stage, and its opponent."""
+        return self.cfg.teams if stage % 2 == 0 else self.cfg.teams[::-1]
+
+    def learns(self, team: str, stage: int) -> bool:
+        """See `Matchmaking`."""
+        return team in self._others or team == self._order(stage)[0]
 
     def load_opponent(self, policy: Policy) -> None:
         """See `Matchmaking`."""

@@ -62,7 +62,7 @@ def play_all(
         policy: A policy for all its teams, into which the past ones are loaded.
         pool: Where those are stored.
         members: Frames of the past policies by team, of two teams.
-        episodes: Number of episodes of each match, rounded up to a multiple of the worlds.
+        episodes: Number of episodes of each match.
         draw_margin: A smaller difference of the returns is a draw: teams that scored no goal may
             still differ in shaping rewards.
         seed: Seed of the starts.

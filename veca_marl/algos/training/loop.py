@@ -142,6 +142,11 @@ class Trainer:
                 "no best.pt: several teams learn, and the mean of their returns does not measure "
                 "their skill (it is 0 in a zero-sum game); the latest checkpoints are kept"
             )
+        if self._resumed_frames >= self.budget_frames:
+            notes.append(
+                f"nothing was learnt: the run had {self._resumed_frames} frames already, "
+                f"total_frames={self.budget_frames}"
+            )
         if self._resumed_frames and not self.learners.exact_resume:
             notes.append("resumed: an algorithm of this run does not continue bit for bit")
         return notes
@@ -178,6 +183,21 @@ class Trainer:
         """Frames of the whole budget, in whole batches."""
         return self.budget.iterations(self.collect.frames) * self.collect.frames
 
+    @property
+    def _batches_per_stage(self) -> int:
+        return math.ceil(self.evaluation.every_frames / self.collect.frames)
+
+    def frames_to_learn(self, team: str) -> int:
+        """Return the frames from which a team learns in the rest of the budget."""
+        left = self.budget.iterations(self.collect.frames) - self.progress.iteration
+        stages = range(math.ceil(left / self._batches_per_stage))
+        batches = sum(
+            min(self._batches_per_stage, left - stage * self._batches_per_stage)
+            for stage in stages
+            if self.matchmaking.learns(team, self.progress.stage + stage)
+        )
+        return batches * self.collect.frames
+
     def timing(self) -> str:
         """Return a table of where the time went."""
         return timing_table(self._clock.elapsed(), self.progress.frames - self._resumed_frames)
@@ -188,8 +208,7 @@ class Trainer:
         with timeit("collect"):
             experience.restart(derived_seed(self.seed, self.progress.stage))
         episodes = TrainingEpisodes()
-        per_stage = math.ceil(self.evaluation.every_frames / self.collect.frames)
-        until = min(self.progress.iteration + per_stage, iterations)
+        until = min(self.progress.iteration + self._batches_per_stage, iterations)
         while self.progress.iteration < until:
             row = self._iterate(experience, episodes)
             bar.update(self.collect.frames)

@@ -19,6 +19,10 @@ class Matchmaking(Protocol):
         """
         ...
 
+    def learns(self, team: str, stage: int) -> bool:
+        """Return whether a team that is not frozen learns in a stage."""
+        ...
+
     def load_opponent(self, policy: Policy) -> None:
         """Load the parameters of the opponent into the copy of the policy that collects."""
         ...
@@ -37,6 +41,10 @@ class AllLearn:
 
     def begin_stage(self, stage: int, frames: int) -> None:
         """See `Matchmaking`."""
+
+    def learns(self, team: str, stage: int) -> bool:
+        """See `Matchmaking`."""
+        return True
 
     def load_opponent(self, policy: Policy) -> None:
         """See `Matchmaking`."""

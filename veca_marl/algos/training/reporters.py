@@ -153,7 +153,10 @@ def _drop_rows_after(path: Path, frames: int) -> None:
     """Keep the rows up to `frames`, without a row that was cut off while it was written."""
     if not path.exists():
         return
-    reader = csv.DictReader(path.read_text().rpartition("\n")[0].splitlines())
+    whole, end, _ = path.read_text().rpartition("\n")
+    if frames and not end:
+        raise WriteError(f"{path} is damaged (no line is complete): move it away to continue")
+    reader = csv.DictReader(whole.splitlines())
     try:
         kept = [row for row in reader if frames and int(row["frames"]) <= frames]
     except (KeyError, TypeError, ValueError) as error:

@@ -23,6 +23,6 @@ def timing_table(elapsed_s: float, frames: int) -> str:
     parts["other"] = max(0.0, elapsed_s - sum(parts.values()))
     lines = [f"{'part':<16}{'seconds':>10}{'share':>8}{'ms/frame':>10}"]
     for part, seconds in [*parts.items(), ("total", elapsed_s), *within]:
-        share, each = seconds / elapsed_s, 1e3 * seconds / max(frames, 1)
-        lines.append(f"{part:<16}{seconds:>10.1f}{share:>8.1%}{each:>10.3f}")
+        share, each = seconds / elapsed_s, f"{1e3 * seconds / frames:.3f}" if frames else "-"
+        lines.append(f"{part:<16}{seconds:>10.1f}{share:>8.1%}{each:>10}")
     return "\n".join(lines)

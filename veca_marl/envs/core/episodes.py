@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import operator
+from typing import SupportsIndex
+
 import numpy as np
 
 
@@ -10,6 +13,21 @@ def fresh_seed() -> int:
     entropy = np.random.SeedSequence().entropy
     assert isinstance(entropy, int)  # what numpy draws when it is given no entropy
     return entropy
+
+
+def check_integer(name: str, value: SupportsIndex, least: int = 0) -> int:
+    """Return an integer that is at least `least`.
+
+    Raises:
+        ValueError: If it is another value; the message begins with its name.
+    """
+    try:
+        number = operator.index(value)
+    except TypeError:
+        raise ValueError(f"{name}={value!r} must be an integer") from None
+    if number < least:
+        raise ValueError(f"{name}={number} must be {least} or more")
+    return number
 
 
 class Episodes:
@@ -28,14 +46,12 @@ class Episodes:
         world: Number of the world, 0 or more.
 
     Raises:
-        ValueError: If `seed` or `world` is negative.
+        ValueError: If `seed` or `world` is negative or no integer.
     """
 
     def __init__(self, seed: int | None = None, world: int = 0) -> None:
-        for name, value in (("seed", seed), ("world", world)):
-            if value is not None and value < 0:
-                raise ValueError(f"{name}={value} must be 0 or more")
-        self.seed = fresh_seed() if seed is None else int(seed)
+        check_integer("world", world)
+        self.seed = fresh_seed() if seed is None else check_integer("seed", seed)
         self.number = 0
         self._world = world
 
@@ -47,12 +63,10 @@ class Episodes:
                 last.
 
         Raises:
-            ValueError: If `number` is negative.
+            ValueError: If `number` is negative or no integer.
         """
         if number is not None:
-            if number < 0:
-                raise ValueError(f"episode={number} must be 0 or more")
-            self.number = number
+            self.number = check_integer("episode", number)
         rng = np.random.default_rng([self.seed, self._world, self.number])
         self.number += 1
         return rng

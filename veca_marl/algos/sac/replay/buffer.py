@@ -59,12 +59,16 @@ class Replay:
         frames: Frames that were ever added.
     """
 
+    # since the buffer was last empty; those that were overwritten count
+    _gathered = 0
+
     def __init__(self, keys: StoredKeys, cfg: ReplayCfg, span: Span) -> None:
         self.cfg, self.frames = cfg, 0
         self._keys, self._span = keys, span
         self._rows_written = 0
         self._buffer: TensorDictReplayBuffer | None = None  # made with the first rows
         self._table: TensorDictBase = TensorDict({}, [0])
+        self._starts = torch.zeros(0, dtype=torch.long)  # places of the first rows of parts
         self._unit = Sequence(
             length=span.length, bootstrap=span.steps, burn_in=span.burn_in, done_key=END
         )
@@ -75,13 +79,14 @@ class Replay:
 
     @property
     def ready(self) -> bool:
-        """Whether there are enough rows to learn from."""
-        return len(self) >= max(self.cfg.warm_up_frames, 1)
+        """Whether there are enough frames to learn from."""
+        return self._gathered >= max(self.cfg.warm_up_frames, 1)
 
     def extend(self, batch: TensorDictBase) -> None:
         """Add a batch ``(worlds, steps)``."""
         self._write(segment_rows(batch, self._keys))
         self.frames += batch.numel()
+        self._gathered += batch.numel()
 
     def _write(self, rows: TensorDictBase) -> None:
         if self._buffer is None:
@@ -89,6 +94,13 @@ class Replay:
         self._buffer.extend(rows)
         self._rows_written += len(rows)
         self._table = self._storage[:]  # views of all rows; to make them takes longer than to read
+        self._starts = self._part_starts()
+
+    def _part_starts(self) -> Tensor:
+        """Return the places of the rows in which parts begin, from the oldest on."""
+        places = self._places(torch.arange(len(self)))
+        begins = self._column(PLACE, places) % self._span.length == 0
+        return places[begins & ~self._column(END, places)]
 
     def _make_storage(self) -> LazyTensorStorage:
         if self.cfg.storage is Storage.memory:
@@ -110,10 +122,12 @@ class Replay:
         return (ages + self._rows_written * full) % self.cfg.capacity
 
     def sample(self, windows: int) -> Windows:
-        """Return the windows of uniformly drawn rows.
+        """Return uniformly drawn windows.
 
-        Segments are divided into parts of ``span.length`` steps. The steps of a window that are
-        learnt from are the part in which the row is, so that all steps are drawn equally often.
+        Segments are divided into parts of ``span.length`` steps, the last of which may be shorter.
+        The steps of a window that are learnt from are a part, and each part is drawn equally often:
+        so is each step. (Of a segment of which the oldest rows have been overwritten, the steps
+        before the first complete part are not drawn.)
         """
         keys, span = self._keys, self._span
         index, valid = self._window_rows(windows)
@@ -131,9 +145,7 @@ class Replay:
 
     def _window_rows(self, windows: int) -> tuple[Tensor, Tensor]:
         """Return places in the ring ``(windows, rows)``, and whether they are in one segment."""
-        ages = torch.randint(len(self), (windows,))
-        within = self._column(PLACE, self._places(ages)) % self._span.length
-        starts = self._places((ages - within).clamp_min(0))
+        starts = self._starts[torch.randint(len(self._starts), (windows,))]
         index, info = self._unit.expand(starts, {}, self._storage)
         valid: Tensor = info["validity_mask"]
         return index.view(windows, -1), valid.view(windows, -1)
@@ -162,14 +174,17 @@ class Replay:
         rows = None
         if self.cfg.in_checkpoint and len(self):
             rows = self._rows(self._keys.all, self._places(torch.arange(len(self)))).to_dict()
-        return {"frames": self.frames, "rows": rows}
+        gathered = 0 if rows is None else self._gathered
+        return {"frames": self.frames, "gathered": gathered, "rows": rows}
 
     def load_state_dict(self, state: dict[str, Any]) -> None:
         """Continue from `state_dict`."""
         self.frames = state["frames"]
-        self._rows_written, self._buffer = 0, None
+        self._rows_written, self._buffer, self._gathered = 0, None, 0
         if state["rows"] is not None:
             self._write(TensorDict(state["rows"], [len(state["rows"][END])]))
+            # checkpoints before version 0.3 do not have it
+            self._gathered = state.get("gathered", self._rows_written)
 
 
 def storage_needed(spec: TeamSpec, cfg: ReplayCfg, memory: int = 0) -> StorageNeeded:

@@ -11,7 +11,7 @@ from veca_marl.envs.adapters.torchrl.actions import ActionReader, TeamActions, a
 from veca_marl.envs.adapters.torchrl.fast_step import FastStepEnv
 from veca_marl.envs.adapters.torchrl.layout import Arrays, Layout
 from veca_marl.envs.adapters.torchrl.specs import env_specs
-from veca_marl.envs.core.episodes import Episodes, fresh_seed
+from veca_marl.envs.core.episodes import Episodes, check_integer, fresh_seed
 from veca_marl.envs.core.game import Game, Outcome
 from veca_marl.envs.core.game_cfg import GameCfg
 from veca_marl.envs.core.task import SOLVED
@@ -75,10 +75,12 @@ class VecaEnv(FastStepEnv):
         first_world: int = 0,
         fast_step: bool = True,
     ) -> None:
-        if worlds < 1:
-            raise ValueError(f"worlds={worlds}: at least one is needed")
+        check_integer("worlds", worlds, least=1)
+        if seed is not None:
+            check_integer("seed", seed)
         announce_compilation()
         super().__init__(fast_step, torch.Size([worlds]))
+        self._worlds_closed = False
         self.cfg = cfg
         self.first_world = first_world
         self.games = [Game(cfg) for _ in range(worlds)]
@@ -116,6 +118,8 @@ class VecaEnv(FastStepEnv):
             tensordict: May contain the mask.
             episode: Number of the episode to begin; None is the one after the last.
         """
+        if self._worlds_closed:  # TorchRL's `is_closed` is also True before the first reset
+            raise RuntimeError("the environment is closed; make a new one")
         arrays = self._start.new()
         for world in self._selected(tensordict, "_reset"):
             self.games[world].reset(self.episodes[world].next(episode))
@@ -217,6 +221,7 @@ class VecaEnv(FastStepEnv):
 
     def close(self, *, raise_if_closed: bool = True) -> None:
         """Close all worlds."""
+        self._worlds_closed = True
         for game in self.games:
             game.close()
         super().close(raise_if_closed=raise_if_closed)

@@ -1,0 +1,40 @@
+"""Places that cannot be written to are refused before a command starts to work."""
+
+import pytest
+
+from veca_marl.babybench import main as babybench
+from veca_marl.config import ConfigError
+from veca_marl.config.outputs import check_file, check_folder
+from veca_marl.experts_table.command import main as experts_table
+from veca_marl.report import main as report
+
+
+def test_new_places_are_accepted(tmp_path):
+    assert check_file(tmp_path / "new" / "scores.json", "json") == tmp_path / "new" / "scores.json"
+    assert check_folder(tmp_path / "new" / "table", "to") == tmp_path / "new" / "table"
+    assert not (tmp_path / "new").exists()
+
+
+def test_impossible_places_are_named(tmp_path):
+    file = tmp_path / "file"
+    file.touch()
+    with pytest.raises(ConfigError, match=r"json=\S+ is a folder; give a file"):
+        check_file(tmp_path, "json")
+    with pytest.raises(ConfigError, match=r"to=\S+file is a file; give a folder"):
+        check_folder(file, "to")
+    with pytest.raises(ConfigError, match=r"json=\S+ cannot be written: \S+file is not a folder"):
+        check_file(file / "scores.json", "json")
+
+
+@pytest.mark.parametrize(
+    ("command", "arguments", "message"),
+    [
+        (babybench, ["+task=SelfTouch", "json=."], "json=. is a folder"),
+        (experts_table, ["tasks=[KickTheBall]", f"to={__file__}"], "is a file; give a folder"),
+        (report, ["+experiment=audio_ablation", f"to={__file__}"], "is a file; give a folder"),
+        (report, ["+experiment=audio_ablation", "results=no.csv"], "results=no.csv is no file"),
+    ],
+)
+def test_commands_refuse_them(command, arguments, message, capsys):
+    assert command(arguments) == 2
+    assert message in capsys.readouterr().err

@@ -1,0 +1,60 @@
+"""Checks of the arguments of `veca_marl.api`, which Hydra would answer in its own words."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from veca_marl.config import ConfigError
+
+
+def check_name(argument: str, value: Any) -> None:
+    """Check an argument that is a name.
+
+    Raises:
+        ConfigError: If it is no text.
+    """
+    if not isinstance(value, str):
+        raise ConfigError(f"{argument}={value!r} must be a name, as text")
+
+
+def check_list(argument: str, value: Any, example: str) -> None:
+    """Check an argument that is a list of texts.
+
+    Args:
+        argument: Its name.
+        value: Its value.
+        example: A list that it may be, for the message.
+
+    Raises:
+        ConfigError: If it is one text, or another thing than a list of texts.
+    """
+    is_list = isinstance(value, Sequence) and not isinstance(value, str)
+    if not is_list or not all(isinstance(entry, str) for entry in value):
+        raise ConfigError(f"{argument}={value!r} must be a list of texts, such as {example}")
+
+
+def check_presets(argument: str, value: Any) -> None:
+    """Check an argument that gives names of senses the names of presets.
+
+    Raises:
+        ConfigError: If it does not.
+    """
+    is_mapping = isinstance(value, Mapping)
+    if not is_mapping or not all(isinstance(part, str) for pair in value.items() for part in pair):
+        raise ConfigError(f'{argument}={value!r} must be a mapping, such as {{"audio": "mono"}}')
+
+
+def as_integer(argument: str, value: Any) -> int:
+    """Return an argument that is an integral number, such as 1e6.
+
+    Raises:
+        ConfigError: If it is none.
+    """
+    try:
+        number = float(value)
+        if number.is_integer() and not isinstance(value, str):
+            return int(number)
+    except (TypeError, ValueError, OverflowError):
+        pass
+    raise ConfigError(f"{argument}={value!r} must be an integral number")
