@@ -24,17 +24,14 @@ experiment has chosen is changed by `task=NAME`. Teams can differ: see
 
 ## Presets
 
-The defaults are those that `conf/config.yaml` names.
+The default of a group is the preset that `conf/config.yaml` names, unless the preset of the task or
+an experiment chooses another.
 """
 
 
 def config_page() -> str:
     """Return the Markdown page of the configuration."""
-    lines = [
-        HEAD,
-        "## Presets\n",
-        "The first preset of a group that is named in `conf/config.yaml` is the default.\n",
-    ]
+    lines = [HEAD]
     for group in groups(conf_dir()):
         lines += [
             f"### `{group}`\n",

@@ -49,8 +49,8 @@ class SelfTouch(Task):
     - A step lasts 40 ms (1000 steps are 40 s), in MIMo 5 ms (5 s).
     - The body starts on its back with random joint angles about that posture; MIMo starts on its
       back and makes ten steps of random actions.
-    - Torques drive the 40 joints of trunk and limbs of a mitten; MIMo's mitten has 44 joints, of
-      which those of feet and eyes are locked.
+    - Torques drive the 40 joints of trunk and limbs of a body with fixed fingers (`mitten_limbs`);
+      that of MIMo has 44 joints, of which those of feet and eyes are locked.
 
     Terms:
         left_hand: Regions that the left hand touches for the first time in this episode, as a share

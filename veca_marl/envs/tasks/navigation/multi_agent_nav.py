@@ -83,8 +83,8 @@ class MultiAgentNav(Task):
 
     The default `playground=seven_rooms` serves up to 7 agents; `two_rooms`, `three_rooms` and
     `four_rooms` serve as many as their names say. Joint-level bodies start on hands and knees with
-    the eyes turned ahead; with `body=mitten_voice` or `full_voice` they can call. They need more
-    time: the scripted expert solves nearly every game with `task.max_seconds=90`.
+    the eyes turned ahead; with `body=mitten_voice` (fixed fingers) or `full_voice` they can call.
+    They need more time: the scripted expert solves nearly every game with `task.max_seconds=90`.
 
     Terms:
         reached: Number of agents that reached the object for the first time in this step, equal
