@@ -157,7 +157,7 @@ def test_a_half_written_last_row_is_left_out(tmp_path, arms):
     ("words", "message"),
     [
         (["runs=nowhere"], "no run of audio_ablation has been evaluated: missing: no run in"),
-        (["results=nowhere.csv"], "No such file or directory: 'nowhere.csv'"),
+        (["results=nowhere.csv"], "results=nowhere.csv is no file"),
         (["expert_episodes=x"], "could not be converted to Integer"),
         (["expert_episodes=-1"], "expert_episodes must be 0 or more, got -1"),
         (["runs=a", "results=b"], "runs and results: choose one of both"),
