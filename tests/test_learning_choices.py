@@ -186,7 +186,7 @@ def sac(warm_up_frames):
 
 
 def test_a_budget_without_an_update_is_refused_before_the_run(tmp_path):
-    message = r"total_frames=63: team 'agents': the 64 frames end before .* warm_up_frames=65"
+    message = r"total_frames=63: team 'agents': the 64 frames end before .*warm_up_frames=65"
     with pytest.raises(ConfigError, match=message):
         run_training(compose([*sac(65), "total_frames=63"]), RunFolder(tmp_path))
     assert not list(tmp_path.iterdir())
