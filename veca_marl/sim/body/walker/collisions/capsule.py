@@ -1,7 +1,8 @@
 """The collision capsule of a walker: light props are pushed, heavy obstacles stop the walker.
 
 Doors and drawers that are light enough are pushed as well, as long as they can move: a leaf that is
-locked, or pushed against its stop, stops the walker.
+locked, or pushed against its stop, stops the walker. So does every light thing that is jammed
+between the walker and something else, see `JammedProps`.
 
 The paper's collision rule of the animation-based agent: against a light object the agent is
 kinematic and pushes it; against a heavy one the object is kinematic and pushes the agent out.
@@ -17,11 +18,13 @@ above its mass walkers push it.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import chain
 from typing import Any
 
 import numpy as np
 
+from veca_marl.sim.body.walker.collisions.jammed import JammedProps
 from veca_marl.sim.body.walker.collisions.leaves import Leaves
 from veca_marl.sim.body.walker.collisions.obstacle_boxes import ObstacleBoxes
 from veca_marl.sim.geometry import Floats, Primitive, Scene, Shape, quaternion_from_yaw
@@ -31,6 +34,9 @@ _ROUNDS = 3  # two for the walls of a corner, one spare
 _LIMB_REACH_M = 1.0  # from the pelvis of a joint-level body to its stretched toes
 _PARKED_M = -100.0  # height of a capsule that is not in use
 _MARGIN_M = 0.06  # an obstacle may displace the capsule by so much within one agent step
+_ON_BODY, _NORMAL, _DISTANCE = 6, 7, 8  # entries of PyBullet's points of contact
+
+_Overlap = tuple[Sequence[float], float]  # direction towards the capsule, and metres
 
 
 class Capsule:
@@ -72,6 +78,7 @@ class Capsule:
         self._reach_m = _reach_m(form)
         self._obstacles = ObstacleBoxes(client, scene, [], [], _LIMB_REACH_M)
         self._leaves = Leaves(client, [])
+        self._jammed = JammedProps(client, scene, self.body_id, [])
         self._known = (0, 0)
         self._near: list[int] = []
         self._near_leaves: list[Prop] = []
@@ -93,12 +100,13 @@ class Capsule:
         near = self._obstacles.near(position, reach_m)
         self._near = [body_id for body_id in near if body_id != self.support_id]
         self._near_leaves = self._leaves.near(position, reach_m)
+        self._jammed.collect(position, reach_m, self._near_leaves)
 
     def resolve_contacts(self, x: float, y: float) -> tuple[float, float]:
         """Set the position and move the capsule out of obstacles; return the new position."""
         self._set_position(x, y)
         for _ in range(_ROUNDS):
-            out_x, out_y = self._depenetration()
+            out_x, out_y = _depenetration(chain(self._overlaps(), self._jammed.overlaps()))
             if out_x == 0.0 and out_y == 0.0:
                 break
             x, y = x + out_x, y + out_y
@@ -106,7 +114,14 @@ class Capsule:
         return x, y
 
     def set_velocity(self, vx: float, vy: float, turn_radps: float) -> None:
-        """Set the velocity with which Bullet computes contacts with light props."""
+        """Set the velocity with which Bullet computes contacts with light props.
+
+        Bullet moves the capsule by this velocity in the physics step, which would press a jammed
+        thing further: then it is at rest.
+        """
+        if self._jammed.found:
+            vx = vy = turn_radps = 0.0
+        self._jammed.forget()
         pybullet.resetBaseVelocity(
             self.body_id, (vx, vy, 0.0), (0.0, 0.0, turn_radps), physicsClientId=self._client
         )
@@ -114,10 +129,11 @@ class Capsule:
     def overlaps(self, x: float, y: float) -> bool:
         """Move it to a place, and return whether it penetrates an obstacle there."""
         self._set_position(x, y)
-        return self._depenetration() != (0.0, 0.0)
+        return _depenetration(self._overlaps()) != (0.0, 0.0)
 
     def park(self) -> None:
         """Move it far below the floor, where it collides with nothing."""
+        self._jammed.forget()
         self._put((0.0, 0.0, _PARKED_M))
         self.set_velocity(0.0, 0.0, 0.0)
 
@@ -130,25 +146,15 @@ class Capsule:
             self.body_id, position, orientation, physicsClientId=self._client
         )
 
-    def _depenetration(self) -> tuple[float, float]:
-        """Return the horizontal displacement that ends all penetrations."""
-        out_x = out_y = 0.0
-        contacts = [contact for body_id in self._near for contact in self._contacts(body_id)]
+    def _overlaps(self) -> Iterator[_Overlap]:
+        """Yield how deep it is in obstacles, and in doors and drawers that cannot yield."""
+        for body_id in self._near:
+            for contact in self._contacts(body_id):
+                yield contact[_NORMAL], -contact[_DISTANCE]
         for leaf in self._near_leaves:
-            contacts += [
-                contact
-                for contact in self._contacts(leaf.body_id)
-                if not leaf.yields(contact[6], [-axis for axis in contact[7]])
-            ]
-        for contact in contacts:
-            normal, depth = contact[7], -contact[8]
-            length = math.hypot(normal[0], normal[1])
-            if depth > 1e-6 and length > 0.1:
-                # several points of one face give the same direction: the deepest counts
-                away_x, away_y = normal[0] / length * depth, normal[1] / length * depth
-                out_x = _larger(out_x, away_x)
-                out_y = _larger(out_y, away_y)
-        return out_x, out_y
+            for contact in self._contacts(leaf.body_id):
+                if not leaf.yields(contact[_ON_BODY], [-axis for axis in contact[_NORMAL]]):
+                    yield contact[_NORMAL], -contact[_DISTANCE]
 
     def _contacts(self, body_id: int) -> tuple[tuple[Any, ...], ...]:
         """Return PyBullet's points of contact with a body; normals point to the capsule."""
@@ -165,13 +171,28 @@ class Capsule:
         things = [p for p in solid if p.fixed or p.cfg.mass_kg > limit_kg]
         heavy = [one for one in bodies if _mass_kg(self._client, one) > limit_kg]
         self._obstacles = ObstacleBoxes(self._client, self._scene, things, heavy, _LIMB_REACH_M)
-        light = [p for p in solid if p.joint is not None and p.cfg.mass_kg <= limit_kg]
-        self._leaves = Leaves(self._client, light)
+        light = [p for p in solid if not p.fixed and p.cfg.mass_kg <= limit_kg]
+        self._leaves = Leaves(self._client, [p for p in light if p.joint is not None])
+        loose = [p for p in light if p.joint is None]
+        self._jammed = JammedProps(self._client, self._scene, self.body_id, loose)
         for body_id in self._obstacles.ids:
             for link in range(-1, pybullet.getNumJoints(body_id, physicsClientId=self._client)):
                 pybullet.setCollisionFilterPair(
                     self.body_id, body_id, -1, link, 0, physicsClientId=self._client
                 )
+
+
+def _depenetration(overlaps: Iterable[_Overlap]) -> tuple[float, float]:
+    """Return the horizontal displacement that ends all overlaps, metres."""
+    out_x = out_y = 0.0
+    for normal, depth in overlaps:
+        length = math.hypot(normal[0], normal[1])
+        if depth > 1e-6 and length > 0.1:
+            # several points of one face give the same direction: the deepest counts
+            away_x, away_y = normal[0] / length * depth, normal[1] / length * depth
+            out_x = _larger(out_x, away_x)
+            out_y = _larger(out_y, away_y)
+    return out_x, out_y
 
 
 def upright_capsule(
