@@ -3,11 +3,17 @@
 import math
 
 import numpy as np
+import pybullet
 import pytest
 from verbs import begin, do, seeing, toy
-from walking import ball, box, empty_world, let_pass, walker_in, wall
+from walking import STEP_S, ball, box, empty_world, let_pass, walker_in, wall
 
 from veca_marl.sim.body.walker import WalkCommand, WalkerCfg
+from veca_marl.sim.physics.props.library import fraction_piece, key
+
+
+def centre_of_mass(prop):
+    return prop.position + prop.rotation @ prop.centre_of_mass
 
 
 def test_a_grabbed_prop_follows_the_hand_and_falls_when_released():
@@ -43,10 +49,75 @@ def test_a_held_prop_does_not_move_its_holder_and_stays_before_walls():
         free.step()
         assert world.prop("toy").bounds()[1][0] < 0.96
     np.testing.assert_array_equal(walker.position[:2], alone.position[:2])
-    hand_mps = walker.velocity
+    hand_mps = world.prop("toy").velocity
     do(world, walker, "release")
     # it keeps the velocity of the hand, falls, and is not expelled from the wall
     assert np.linalg.norm(world.prop("toy").velocity - hand_mps) < 0.5
+
+
+@pytest.mark.parametrize("fraction", [0.5, 0.125])
+def test_a_held_prop_has_the_velocity_with_which_it_moves(fraction):
+    """While the walker turns, the hand moves on a circle: v + omega x r at the centre of mass."""
+    world = empty_world(fraction_piece("piece", fraction, (0.4, 0.0)))
+    walker = walker_in(world)
+    piece = world.prop("piece")
+    assert walker.grab(piece)
+    walker.walk(0.7, 1.5)
+    before = after = centre_of_mass(piece)
+    for _ in range(5):
+        world.step()
+        before, after = after, centre_of_mass(piece)
+    assert np.linalg.norm(piece.velocity - walker.velocity) > 0.2
+    # the mean velocity over an agent step is that in its middle, and shorter by the chord
+    arc_rad = 1.5 * STEP_S
+    c, s = math.cos(arc_rad / 2), math.sin(arc_rad / 2)
+    mean = (after - before) / STEP_S
+    now = np.array([c * mean[0] - s * mean[1], s * mean[0] + c * mean[1], 0.0])
+    np.testing.assert_allclose(piece.velocity, now, atol=0.02)
+    _, spin = pybullet.getBaseVelocity(piece.body_id, physicsClientId=world.client)
+    assert spin[2] == pytest.approx(1.5)
+    released = centre_of_mass(piece)
+    assert walker.release()
+    world.step()
+    flown = (centre_of_mass(piece) - released)[:2] / STEP_S
+    np.testing.assert_allclose(flown, piece.velocity[:2], atol=0.02)
+
+
+@pytest.mark.parametrize("kind", ["half", "quarter", "key", "cube"])
+def test_a_prop_held_in_a_corner_stays_out_of_its_walls_and_falls_there(kind):
+    thing = {
+        "half": fraction_piece("thing", 0.5, (0.4, 0.0)),
+        "quarter": fraction_piece("thing", 0.25, (0.4, 0.0)),
+        "key": key("thing", (0.4, 0.0)),
+        "cube": box("thing", (0.12, 0.12, 0.12), 0.3, (0.4, 0.0, 0.06)),
+    }[kind]
+    east, north = wall("east", position=(1.6, 0, 0)), wall("north", position=(0, 1.6, 0), yaw_deg=0)
+    world = empty_world(east, north, thing)
+    walker, held = walker_in(world), world.prop("thing")
+    world.freeze()
+    for seed in range(6):
+        rng = np.random.default_rng(seed)
+        world.reset(rng)
+        walker.place((0.0, 0.0, 0.0))
+        held.place(held.position, rng.uniform(-math.pi, math.pi))
+        assert walker.grab(held)
+        for step in range(80):
+            walker.walk(0.9, rng.uniform(0.0, 0.5) if step < 50 else rng.uniform(-2.0, 2.0))
+            world.step()
+            overlaps = [
+                -point[8]
+                for one in ("east", "north")
+                for point in pybullet.getClosestPoints(
+                    held.body_id, world.prop(one).body_id, 0.0, physicsClientId=world.client
+                )
+            ]
+            assert max(overlaps, default=0.0) < 0.01
+        walker.walk(0.0, 0.0)
+        assert walker.release()
+        let_pass(world, 1.5)
+        low, high = held.bounds()
+        assert ((low + high)[:2] / 2.0 < 1.55).all()
+        assert np.linalg.norm(held.velocity) < 0.5
 
 
 @pytest.mark.parametrize(

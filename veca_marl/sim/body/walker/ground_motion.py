@@ -86,14 +86,13 @@ class GroundMotion:
         x, y = self.ground
         return x + distance * math.cos(self.yaw_rad), y + distance * math.sin(self.yaw_rad)
 
-    def set_position(self, x: float, y: float, substep_s: float) -> tuple[float, float]:
-        """Set the position at the end of a physics step; return the velocity (x, y) in m/s."""
+    def set_position(self, x: float, y: float, substep_s: float) -> None:
+        """Set the position at the end of a physics step."""
         vx, vy = (x - self.ground[0]) / substep_s, (y - self.ground[1]) / substep_s
         self.ground[:] = x, y
         self.capsule.set_velocity(vx, vy, self.turn_radps)
         if self.footing.prop is not None:
             self._update_surface()
-        return vx, vy
 
     def after_step(self) -> None:
         """Compute the mean velocity over this agent step."""

@@ -302,6 +302,7 @@ class Walker(Body):
     def before_step(self) -> None:
         """Collect the obstacles that can be reached within this agent step."""
         self._motion.before_step()
+        self._handling.before_step(self._world.clock.step_s)
 
     def proposed_position(self, substep_s: float) -> tuple[float, float]:
         """Turn; return the position after this physics step without obstacles, metres."""
@@ -313,7 +314,8 @@ class Walker(Body):
 
     def set_position(self, x: float, y: float, substep_s: float) -> None:
         """Set the position at the end of this physics step."""
-        self._handling.follow_trunk(*self._motion.set_position(x, y, substep_s))
+        self._motion.set_position(x, y, substep_s)
+        self._handling.follow_trunk(substep_s)
 
     def write_frames(self) -> None:
         """Advance the gait, pose the bones and move the voice to the mouth."""

@@ -38,10 +38,10 @@ class Grip:
             self._set_collision(self.prop, 1)
             self.prop.holder, self.prop = None, None
 
-    def carry(self, position: Floats, yaw_rad: float, velocity: Sequence[float]) -> None:
-        """Move the held prop to a pose, upright, with the velocity of the hand."""
+    def carry(self, position: Floats, yaw_rad: float) -> None:
+        """Move the held prop to a pose, upright and at rest; see `Prop.set_velocity`."""
         if self.prop is not None:
-            self.prop.carry(position, yaw_rad, velocity)
+            self.prop.carry(position, yaw_rad, (0.0, 0.0, 0.0))
 
     def _set_collision(self, prop: Prop, enabled: int) -> None:
         for body_id in self._body_ids:

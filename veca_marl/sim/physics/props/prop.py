@@ -50,6 +50,7 @@ class Prop:
         reach_m: Horizontal radius of the cylinder about the origin of its frame that contains them
             while it is not tilted.
         extent_m: Greatest distance of a corner of the box about them from that origin.
+        centre_of_mass: ``(3,)`` metres, in its frame; the origin of a fixed prop.
         object_id: Its value in segmentation images.
         joint: Its hinge or slide; None for a prop that is fixed or free.
         sound: Its sound source; None for a silent prop.
@@ -85,6 +86,7 @@ class Prop:
         self.body_id, self.link, self.joint, frame = _create_body(cfg, client, geoms)
         self.links = range(self.link, pybullet.getNumJoints(self.body_id, physicsClientId=client))
         self._read_pose = _pose_reader(self.body_id, self.link, client)
+        self.centre_of_mass = frame.position
         self._centre = frame.position if frame.position.any() else None
         self._axes = frame.rotation if is_turned(frame) else None
         self.place(cfg.position_m, math.radians(cfg.yaw_deg))

@@ -102,6 +102,16 @@ class Capsule:
         self._near_leaves = self._leaves.near(position, reach_m)
         self._jammed.collect(position, reach_m, self._near_leaves)
 
+    def solid_near(self, position: Floats, reach_m: float) -> list[int]:
+        """Return PyBullet's ids of the obstacles, doors and drawers within a horizontal distance.
+
+        Args:
+            position: ``(2,)`` or ``(3,)`` metres; only the horizontal part counts.
+            reach_m: Metres.
+        """
+        leaves = self._leaves.near(position, reach_m)
+        return self._obstacles.near(position, reach_m) + [leaf.body_id for leaf in leaves]
+
     def resolve_contacts(self, x: float, y: float) -> tuple[float, float]:
         """Set the position and move the capsule out of obstacles; return the new position."""
         self._set_position(x, y)

@@ -6,7 +6,9 @@ import math
 
 import numpy as np
 
-from veca_marl.sim.geometry import Floats
+from veca_marl.sim.body.walker.collisions.capsule import Capsule
+from veca_marl.sim.body.walker.objects.free_place import way_out
+from veca_marl.sim.geometry import Floats, rotation_about_vertical
 from veca_marl.sim.physics import Prop
 from veca_marl.sim.physics.interactions import Grip, free_path_m, surface_m
 
@@ -14,28 +16,33 @@ _COMPRESSION_M = 0.002  # of the palm's skin by the held prop, so that the palm 
 _FLOOR_GAP_M = 0.01  # between the floor and the lowest point of a held prop
 _WALL_GAP_M = 0.01  # between a wall and the surface of a held prop
 _CLEARANCE_M = 1e-4  # from the surface of the walker's own capsule to the start of a ray
+_ARM_M = 0.5  # no palm is farther from the axis of the trunk
+_ROUNDS = 6  # of moving a prop out of walls; in a corner that is not square each leaves a rest
 
 
 class Hand:
     """Holds a prop beside the palm, upright, at a constant yaw relative to the trunk.
 
-    The prop is kinematic while it is held: its pose is set at each physics step. It does not
-    collide with its holder. It stays on the walker's side of walls: where a wall is nearer than
-    the hand would hold it, it is held nearer to the trunk.
+    Its centre of mass is beside the palm. The prop is kinematic while it is held: its pose is set
+    at each physics step, and its velocity is that of this motion. It does not collide with its
+    holder. It stays on the walker's side of walls: where they are nearer than the hand would hold
+    it, it is held nearer to the trunk.
 
     Args:
         client: PyBullet's client id.
         holder: Name of the walker.
-        capsule_id: PyBullet's id of the walker's capsule.
-        radius_m: Radius of the capsule.
+        capsule: The upright capsule of the walker.
+        radius_m: Its radius.
     """
 
-    def __init__(self, client: int, holder: str, capsule_id: int, radius_m: float) -> None:
+    def __init__(self, client: int, holder: str, capsule: Capsule, radius_m: float) -> None:
         self._client, self._radius_m = client, radius_m
-        self._grip = Grip(client, holder, [capsule_id])
-        self._yaw_rad = 0.0
+        self._capsule = capsule
+        self._grip = Grip(client, holder, [capsule.body_id])
+        self._obstacles: list[int] = []
+        self._yaw_rad = self._turn_radps = 0.0
         self._half_width_m = self._below_m = 0.0
-        self._offset: Floats = np.zeros(3)
+        self._offset, self._centre, self._velocity = np.zeros((3, 3))
 
     @property
     def prop(self) -> Prop | None:
@@ -43,7 +50,7 @@ class Hand:
         return self._grip.prop
 
     def take(self, prop: Prop, yaw_rad: float) -> None:
-        """Hold a prop from now on; `follow` moves it to the palm.
+        """Hold a prop from now on, at rest; `set_palm` moves it to the palm.
 
         Args:
             prop: Any prop that is not held.
@@ -52,16 +59,28 @@ class Hand:
         yaw = prop.yaw_rad
         prop.carry(prop.position, yaw, (0.0, 0.0, 0.0))  # upright, as it is measured and held
         self._half_width_m = self._measured_half_width_m(prop, yaw_rad)
-        self._below_m = float(prop.position[2]) - prop.lowest_m
+        self._below_m = float(_centre_of_mass(prop)[2]) - prop.lowest_m
         self._yaw_rad = yaw - yaw_rad
+        self._velocity, self._turn_radps = np.zeros(3), 0.0
         self._grip.take(prop)
 
     def drop(self) -> None:
         """Hold nothing from now on; nothing is moved."""
         self._grip.drop()
 
+    def collect_obstacles(self, ground: Floats, distance_m: float) -> None:
+        """Collect what the held prop can reach within this agent step.
+
+        Args:
+            ground: ``(2,)`` metres: the walker's place on the floor.
+            distance_m: The distance that the walker covers without obstacles.
+        """
+        if self.prop is not None:
+            reach_m = _ARM_M + 2.0 * self.prop.extent_m + distance_m
+            self._obstacles = self._capsule.solid_near(ground, reach_m)
+
     def set_palm(self, palm: Floats, ground: Floats, yaw_rad: float) -> None:
-        """Compute where the prop is relative to the walker, from the present pose of the palm.
+        """Move the held prop to the present pose of the palm; its velocity stays as it is.
 
         Args:
             palm: ``(3,)`` metres, world frame: centre of the right palm, which faces to the left.
@@ -73,21 +92,51 @@ class Hand:
         left = self._half_width_m - _COMPRESSION_M
         height = max(float(palm[2]), self._below_m + _FLOOR_GAP_M)
         self._offset = np.array([c * x + s * y, c * y - s * x + left, height])
+        if self.prop is not None:
+            self._place(self.prop, ground, yaw_rad)
+            self._set_velocity(self.prop)
 
-    def follow(self, ground: Floats, yaw_rad: float, velocity: tuple[float, float, float]) -> None:
-        """Move the held prop with the walker.
+    def follow(self, ground: Floats, yaw_rad: float, turn_radps: float, substep_s: float) -> None:
+        """Move the held prop with the walker by one physics step.
 
         Args:
             ground: ``(2,)`` metres: the walker's place on the floor.
             yaw_rad: Its heading.
-            velocity: m/s, of the walker.
+            turn_radps: Its turning speed.
+            substep_s: Seconds since the last call.
         """
         if self.prop is not None:
-            place = self._reachable(self.prop, ground, yaw_rad)
-            self._grip.carry(place, yaw_rad + self._yaw_rad, velocity)
+            before = self._centre
+            self._place(self.prop, ground, yaw_rad)
+            self._velocity = (self._centre - before) / substep_s
+            self._turn_radps = turn_radps
+            self._set_velocity(self.prop)
+
+    def _place(self, prop: Prop, ground: Floats, yaw_rad: float) -> None:
+        """Hold the prop beside the palm, or as near to it as walls allow."""
+        centre = self._reachable(prop, ground, yaw_rad)
+        self._carry(prop, centre, yaw_rad)
+        holder = np.array([ground[0], ground[1], centre[2]])
+        for _ in range(_ROUNDS if self._obstacles else 0):
+            out = way_out(self._client, prop.body_id, self._obstacles, holder)
+            if not out.any():
+                break
+            centre = centre + out
+            self._carry(prop, centre, yaw_rad)
+        self._centre = centre
+
+    def _carry(self, prop: Prop, centre: Floats, yaw_rad: float) -> None:
+        """Set the pose of the prop by the place ``(3,)`` of its centre of mass."""
+        yaw = yaw_rad + self._yaw_rad
+        place = centre - rotation_about_vertical(yaw) @ prop.centre_of_mass
+        self._grip.carry(place, yaw)
+
+    def _set_velocity(self, prop: Prop) -> None:
+        """Give the prop the velocities of the last physics step."""
+        prop.set_velocity(self._velocity, (0.0, 0.0, self._turn_radps))
 
     def _reachable(self, prop: Prop, ground: Floats, yaw_rad: float) -> Floats:
-        """Return the place of the prop, on the walker's side of all that is solid."""
+        """Return the place of the prop, its centre on the walker's side of all that is solid."""
         c, s = math.cos(yaw_rad), math.sin(yaw_rad)
         x, y, height = self._offset
         distance_m = math.hypot(x, y)
@@ -100,8 +149,13 @@ class Hand:
         return axis + min(distance_m, start_m + free_m) * way
 
     def _measured_half_width_m(self, prop: Prop, yaw_rad: float) -> float:
-        """Return the distance from the prop's centre to its surface on the walker's right."""
+        """Return the distance from the prop's centre of mass to its surface on the right."""
         right = np.array([math.sin(yaw_rad), -math.cos(yaw_rad), 0.0])
-        centre, reach_m = prop.position, prop.radius_m + 0.1
+        centre, reach_m = _centre_of_mass(prop), 2.0 * prop.extent_m
         outside_m = surface_m(self._client, prop.body_id, centre + reach_m * right, centre)
         return reach_m - outside_m
+
+
+def _centre_of_mass(prop: Prop) -> Floats:
+    """Return the place ``(3,)`` of a prop's centre of mass, metres, world frame."""
+    return prop.position + prop.rotation @ prop.centre_of_mass

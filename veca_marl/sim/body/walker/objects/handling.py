@@ -27,7 +27,7 @@ class ObjectHandling:
     ) -> None:
         self._client, self._cfg = client, cfg
         self._motion, self._gait = motion, gait
-        self._hand = Hand(client, name, motion.capsule.body_id, cfg.radius_m)
+        self._hand = Hand(client, name, motion.capsule, cfg.radius_m)
 
     @property
     def held(self) -> Prop | None:
@@ -74,6 +74,7 @@ class ObjectHandling:
         if not self.can_grab(prop):
             return False
         self._hand.take(prop, self._motion.yaw_rad)
+        self._hand.collect_obstacles(self._motion.ground, 0.0)
         self._gait.carrying = True
         return True
 
@@ -89,22 +90,19 @@ class ObjectHandling:
         """Hold nothing from now on; nothing is moved."""
         self._hand.drop()
 
-    def follow_trunk(self, vx: float, vy: float) -> None:
-        """Move a held prop with the trunk, once per physics step.
+    def before_step(self, step_s: float) -> None:
+        """Collect what a held prop can reach within an agent step of a duration in seconds."""
+        motion = self._motion
+        self._hand.collect_obstacles(motion.ground, abs(motion.speed_mps) * step_s)
 
-        Args:
-            vx: Velocity of the walker along x, m/s.
-            vy: Along y.
-        """
-        if self.held is not None:
-            self._hand.follow(self._motion.ground, self._motion.yaw_rad, (vx, vy, 0.0))
+    def follow_trunk(self, substep_s: float) -> None:
+        """Move a held prop with the trunk by one physics step of a duration in seconds."""
+        motion = self._motion
+        self._hand.follow(motion.ground, motion.yaw_rad, motion.turn_radps, substep_s)
 
     def follow_palm(self, palm: Floats) -> None:
         """Move a held prop to the present place of the palm, ``(3,)`` metres."""
-        motion = self._motion
-        self._hand.set_palm(palm, motion.ground, motion.yaw_rad)
-        vx, vy, _ = motion.velocity
-        self._hand.follow(motion.ground, motion.yaw_rad, (float(vx), float(vy), 0.0))
+        self._hand.set_palm(palm, self._motion.ground, self._motion.yaw_rad)
 
     def _is_loose(self, prop: Prop) -> bool:
         """Return whether a prop is light, without joint and held by no body."""
