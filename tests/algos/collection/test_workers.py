@@ -200,6 +200,16 @@ def test_an_interrupt_while_workers_start_ends_the_program(starting, number, cod
     assert not any(is_running(pid) for pid in workers)
 
 
+def test_a_program_that_closes_its_workers_before_any_update_ends(tmp_path):
+    """TorchRL's transfer of parameters tried to start a thread when Python ended, and waited."""
+    main = start_script(tmp_path, CLOSING_PROCESS)
+    try:
+        _, errors = main.communicate(timeout=20)
+    finally:
+        main.kill()
+    assert main.returncode == 0, errors
+
+
 def is_running(pid):
     """Return whether a process runs; one that has ended may wait for its new parent to read it."""
     try:
@@ -255,4 +265,25 @@ signal.signal(signal.SIGTERM, end)
 specs = team_specs(FakeEnv(1, senses=("audio",)))
 policy = TeamLearners(specs, PPOCfg(), torch.device("cpu")).policy.copy()
 Experience(make_env, policy.collect, CollectCfg(2, worlds=1))
+"""
+
+CLOSING_PROCESS = """
+import torch
+from fake_env import FakeEnv, make_fake_env
+
+from veca_marl.algos.collection.experience import CollectCfg, Experience
+from veca_marl.algos.ppo.config import PPOCfg
+from veca_marl.algos.specs import team_specs
+from veca_marl.algos.training.learners import TeamLearners
+
+
+
+def main():
+    policy = TeamLearners(team_specs(FakeEnv(1)), PPOCfg(), torch.device("cpu")).policy.copy()
+    experience = Experience(make_fake_env, policy.collect, CollectCfg(2, worlds=1))
+    experience.restart(0)
+    experience.close()
+
+
+main()
 """

@@ -71,7 +71,7 @@ class SupervisedCollector(MultiSyncCollector):
         self._limit_s = answer_limit_s
         self._exceptions: SimpleQueue[tuple[int, str]] = multiprocessing.SimpleQueue()
         self._restore_handler = call_when_a_child_ends(self.check)
-        weights = _SupervisedWeights()
+        self._weights = _SupervisedWeights()
         self.receive_interrupts = block_interrupts()
         try:
             super().__init__(
@@ -79,11 +79,13 @@ class SupervisedCollector(MultiSyncCollector):
                 policy,
                 init_fn=partial(_start_worker, os.getpid()),
                 collector_class=partial(_WorkerCollector, exceptions=self._exceptions),
-                weight_sync_schemes={"policy": weights} if isinstance(policy, nn.Module) else {},
+                weight_sync_schemes=(
+                    {"policy": self._weights} if isinstance(policy, nn.Module) else {}
+                ),
                 **kwargs,
             )
         except BaseException as error:
-            weights.shutdown()  # it needs a thread, which cannot be started when Python ends
+            self._weights.shutdown()
             self._raise_worker_error(error)
             self.shutdown(raise_on_error=False)
             raise
@@ -177,6 +179,9 @@ class SupervisedCollector(MultiSyncCollector):
         """End the workers."""
         self._restore_handler()
         super().shutdown(*args, **kwargs)
+        # otherwise done when it is collected as garbage: it may start a thread, which, when Python
+        # ends, waits for ever
+        self._weights.shutdown()
 
 
 class _SupervisedWeights(SharedMemWeightSyncScheme):
