@@ -6,11 +6,13 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
+from veca_marl.config.claims import Above, parse_claim
 from veca_marl.config.experiment import ExperimentCfg
+from veca_marl.reports.error_rates import false_decision_rate
 from veca_marl.reports.gather import Found
 from veca_marl.reports.runs import Point, Run
 from veca_marl.reports.summary import ArmSummary
-from veca_marl.reports.verdict import Judgement, Verdict, overall
+from veca_marl.reports.verdict import MIN_RUNS, Judgement, Verdict, overall
 
 EPISODES_OF_FIGURES = 32
 """Evaluations with fewer episodes have intervals too wide for a figure."""
@@ -67,6 +69,7 @@ def page(report: Report) -> str:
         f"**Claim.** {experiment.claim or '(none in words)'}",
         f"**Verdict.** {report.verdict[0].upper()}{report.verdict[1:]}.",
         "\n".join(_verdict_lines(report.judgements)),
+        _error_rate_text(report),
         f"![Learning curves of {experiment.name}]({report.figure})",
         _caption(report),
         "\n".join(_arm_table(report)),
@@ -83,6 +86,32 @@ def _verdict_lines(judgements: Mapping[str, Judgement]) -> list[str]:
         f"- `{text}` {judgement.verdict.value}: {judgement.reason}"
         for text, judgement in judgements.items()
     ]
+
+
+def _error_rate_text(report: Report) -> str:
+    """Return how often claims about two arms with so few runs are decided although none differs."""
+    rates = [
+        f"{100.0 * false_decision_rate(*counts):.0f} % ({counts[0]} and {counts[1]} runs)"
+        for counts in _compared_counts(report)
+    ]
+    if not rates:
+        return ""
+    return (
+        "Of two arms whose scores have the same normal distribution, a claim `ARM > OTHER` would "
+        f"be decided in {', '.join(rates)} of experiments, by a simulation."
+    )
+
+
+def _compared_counts(report: Report) -> list[tuple[int, int]]:
+    """Return the numbers of ended runs of arms that are compared, where a verdict is possible."""
+    ended = {summary.arm: summary.ended for summary in report.summaries}
+    claims = [parse_claim(text, list(ended)) for text in report.judgements]
+    counts = {
+        (ended[claim.arm], ended[claim.other])
+        for claim in claims
+        if isinstance(claim, Above) and claim.other in ended
+    }
+    return sorted(pair for pair in counts if min(pair) >= MIN_RUNS)
 
 
 def _caption(report: Report) -> str:
