@@ -1,4 +1,5 @@
 import multiprocessing
+import threading
 
 import pytest
 import torch
@@ -66,6 +67,28 @@ def test_collection_restores_process_settings(make_ppo):
 
 
 @pytest.mark.slow
+def test_no_other_thread_copies_the_policy(make_ppo, monkeypatch):
+    """A thread that copied its parameters kept a team of OpenMP threads.
+
+    Gradient steps on two cores then took 36 ms instead of 23.
+    """
+    threads = []
+    share = torch.UntypedStorage._share_fd_cpu_
+
+    def recording(storage, *args, **options):
+        if not storage.is_shared():
+            threads.append(threading.current_thread())
+        return share(storage, *args, **options)
+
+    monkeypatch.setattr(torch.UntypedStorage, "_share_fd_cpu_", recording)
+    policy = make_ppo().policy.copy()
+    played = Experience(make_fake_env, policy.collect, CollectCfg(2, worlds=1, steps=4))
+    played.restart(0)
+    played.close()
+    assert threads, "the parameters are shared by other means than this test knows"
+    assert {*threads} == {threading.main_thread()}
+
+
 def test_spawned_and_forked_workers_collect_the_same(make_ppo, monkeypatch):
     batches = []
     for method in ("fork", "spawn"):

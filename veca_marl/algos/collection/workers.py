@@ -72,6 +72,13 @@ class SupervisedCollector(MultiSyncCollector):
         self._exceptions: SimpleQueue[tuple[int, str]] = multiprocessing.SimpleQueue()
         self._restore_handler = call_when_a_child_ends(self.check)
         self._weights = _SupervisedWeights()
+        schemes = {}
+        if isinstance(policy, nn.Module):
+            # here, and not in the thread of torchrl that sends them to the workers: a second thread
+            # that computes in parallel slows down every parallel loop of this one (libgomp no
+            # longer waits actively if it knows of more threads than there are cores)
+            policy.share_memory()
+            schemes["policy"] = self._weights
         self.receive_interrupts = block_interrupts()
         try:
             super().__init__(
@@ -79,9 +86,7 @@ class SupervisedCollector(MultiSyncCollector):
                 policy,
                 init_fn=partial(_start_worker, os.getpid()),
                 collector_class=partial(_WorkerCollector, exceptions=self._exceptions),
-                weight_sync_schemes=(
-                    {"policy": self._weights} if isinstance(policy, nn.Module) else {}
-                ),
+                weight_sync_schemes=schemes,
                 **kwargs,
             )
         except BaseException as error:
