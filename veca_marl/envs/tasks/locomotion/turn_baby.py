@@ -7,8 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from veca_marl.envs.core.task import Player, Task, register, require_humanoid, terms
-from veca_marl.envs.tasks.locomotion.start_poses import StartCfg, face_down_cosines, start_anywhere
+from veca_marl.envs.core.task import Player, register, require_humanoid, terms
+from veca_marl.envs.tasks.locomotion.start_poses import (
+    PosedStart,
+    StartCfg,
+    face_down_cosines,
+    start_anywhere,
+)
 from veca_marl.sim.body.humanoid.postures import ON_BACK
 
 
@@ -34,7 +39,7 @@ class TurnBabyCfg(StartCfg):
 
 
 @register
-class TurnBaby(Task):
+class TurnBaby(PosedStart):
     """A joint-level body lies on its back at a random place in the room and has to turn over.
 
     The paper (table of tasks in the appendix; "Joint-level Locomotion & Control") rewards "the
