@@ -45,8 +45,10 @@ class TurnBaby(PosedStart):
     The paper (table of tasks in the appendix; "Joint-level Locomotion & Control") rewards "the
     orientation of its torso and hip" and gives no numbers. This task rewards a front that points
     straight down. An episode lasts `max_seconds` and never terminates. With the default weights
-    its return is -10 on the back and +10 on the belly. The task is solved (`solved`) while the
-    fronts of chest and pelvis point at most `turned_deg` away from straight down.
+    its return is -10 on the back and +10 on the belly. A body that sits and folds forwards, chest
+    on the legs, is rewarded by four fifths of that: the front of its pelvis points about 55 degrees
+    away from straight down. The task is solved (`solved`) while the fronts of chest and pelvis
+    point at most `turned_deg` away from it.
 
     Terms:
         torso: Cosine of the angle between the front of the chest and straight down, in [-1, 1].
