@@ -115,6 +115,28 @@ class InfiniteTerm(East):
         return {**super().reward(player), "progress": float("nan")}
 
 
+class TooGreatForFloat32(East):
+    def reward(self, player):
+        return super().reward(player) | {"progress": 1e39}
+
+
+class TooGreatWithItsWeight(East):
+    def __init__(self, cfg, world, players):
+        super().__init__(cfg, world, players)
+        cfg.weights["progress"] = 1e30
+
+    def reward(self, player):
+        return super().reward(player) | {"progress": 1e10}
+
+
+class SolvedIsForgotten(East):
+    def reward(self, player):
+        return {"progress": self.now - self.last, "arrived": 0.0}
+
+    def solved(self, player):
+        super().solved(player)  # no return
+
+
 class TermMissing(East):
     def reward(self, player):
         return {"progress": 0.0}
@@ -212,6 +234,10 @@ def test_a_sound_task_passes_every_check(game_of):
         (SomeSolvedAtOnce, starts, "first step", "[1-4] of 5 episodes are solved for agents at"),
         (InfiniteTerm, random_play, "rewards", "term 'progress' of agents is nan"),
         (InfiniteTerm, returns, "reward terms", "term 'progress' of agents is nan"),
+        (TooGreatForFloat32, random_play, "rewards", r"term 'progress' of agents is 1e\+39"),
+        (TooGreatForFloat32, returns, "reward terms", r"term 'progress' of agents is 1e\+39"),
+        (TooGreatWithItsWeight, random_play, "rewards", r"the reward of agents is 1e\+40"),
+        (SolvedIsForgotten, random_play, "rewards", r"solved\(\) of agents is None"),
         (TermMissing, random_play, "rewards", r"agents has the terms \['progress'\], weights"),
         (TermOfZeros, returns, "reward terms", "term 'arrived' is 0 in all steps of 4 episodes"),
         (SilentWorld, random_play, "no constant observation", "'audio' of agents is equal in all"),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from time import perf_counter
@@ -15,6 +14,7 @@ from veca_marl.envs.core.episodes import Episodes
 from veca_marl.envs.core.game import Game, Observation, Outcome
 from veca_marl.sim.spec import ArraySpec
 
+_GREATEST = float(np.finfo(np.float32).max)  # TorchRL's rewards are float32
 NAMES = ("observations", "rewards", "no constant observation", "cost per step")
 
 
@@ -45,7 +45,8 @@ def check_random_play(game: Game, steps: int, seed: int) -> Iterator[Finding]:
 
     Yields:
         ``observations``: finite, of the shape, type and range of their specifications. ``rewards``:
-        finite, named as the weights. ``no constant observation``: each changes at least once.
+        finite as float32, named as the weights; ``solved`` is True or False where it is defined.
+        ``no constant observation``: each changes at least once.
         ``cost per step``: the median.
     """
     seen = _play(game, steps, seed)
@@ -74,6 +75,7 @@ def _play(game: Game, steps: int, seed: int) -> _Seen:
         seen.seconds.append(perf_counter() - started)
         _compare(before, after, seen)
         _add_problems(seen.rewards, reward_problems(game, outcome))
+        _add_problems(seen.rewards, _undecided(game))
         before, done = _observe(game, seen), outcome.done
     return seen
 
@@ -122,11 +124,25 @@ def reward_problems(game: Game, outcome: Outcome) -> Iterator[str]:
     for name, terms in outcome.terms.items():
         if set(terms) != set(game.weights):
             yield f"{name} has the terms {sorted(terms)}, weights {sorted(game.weights)}"
-        yield from (
-            f"term {term!r} of {name} is {value}"
-            for term, value in terms.items()
-            if not math.isfinite(value)
-        )
+        unfit = [f"term {term!r} of {name} is {v}" for term, v in terms.items() if not _fits(v)]
+        yield from unfit
+        if not unfit and set(terms) == set(game.weights) and not _fits(game.reward_of(terms)):
+            yield f"the reward of {name} is {game.reward_of(terms)}"
+
+
+def _fits(value: float) -> bool:
+    """Return whether a number is finite, also as float32."""
+    return abs(value) <= _GREATEST
+
+
+def _undecided(game: Game) -> Iterator[str]:
+    """Yield the players for whom a task with a goal does not return whether it is reached."""
+    if not game.task.has_goal():
+        return
+    for player in game.players:
+        solved = game.task.solved(player)
+        if not isinstance(solved, (bool, np.bool_)):
+            yield f"solved() of {player.name} is {solved!r}, not True or False"
 
 
 def _add_problems(found: list[str], problems: Iterator[str] | list[str]) -> None:

@@ -62,6 +62,11 @@ def test_a_thinner_body_needs_a_smaller_reach():
         game_of("task.reach_m=0.75", "body.radius_m=0.06")
 
 
+def test_a_body_that_is_wider_than_the_passages_is_refused():
+    with pytest.raises(ValueError, match=r"radius_m=0\.35 .* through passages of 0\.65 m"):
+        game_of("task.cells=8", "body.radius_m=0.35")
+
+
 # ---- mazes
 
 

@@ -6,8 +6,9 @@ from composed import compose
 
 from veca_marl.checks.overlaps import overlaps
 from veca_marl.config import ConfigError
+from veca_marl.config import compose as check_whole
 from veca_marl.envs.core.game import Game
-from veca_marl.envs.tasks.navigation import places
+from veca_marl.envs.tasks.navigation.room_counts import ROOMS
 
 FURNISHED = [
     *(pytest.param(name, marks=pytest.mark.slow) for name in ("house", "random_house")),
@@ -68,6 +69,10 @@ def test_tasks_of_the_paper_are_played_in_furnished_houses(task, playground):
             r"task.agents=5 .*'house' has 4; choose playground=seven_rooms, house2 or .* at most 4",
         ),
         (
+            ["+task=MultiAgentNav", "task.agents=9"],
+            r"task.agents=9 .*'seven_rooms' has 7; choose task.agents of at most 7$",
+        ),
+        (
             ["+task=MultiAgentNav", "playground=simple"],
             r"'simple' has 1; choose playground=two_rooms, .*playground.room_count=2$",
         ),
@@ -98,10 +103,37 @@ def test_what_does_not_fit_is_refused_in_the_configuration(words, message):
         compose(words)
 
 
-@pytest.mark.parametrize("playground", places._ROOMS)
+@pytest.mark.parametrize(
+    "task", ["TurnBaby", "SitBaby", "CrawlBaby", "RunBaby", "SelfTouch", "HandRegard"]
+)
+def test_a_room_that_is_too_small_to_lie_in_is_refused_in_the_configuration(task):
+    room = "playground.rooms=[{name: den, size_m: [1.9, 4.0, 2.6]}]"
+    with pytest.raises(ConfigError, match=rf"{task} needs 2 m .*room 'den' .*1.9 x 4 m; choose "):
+        compose([f"+task={task}", room])
+
+
+def test_more_agents_than_any_playground_has_rooms_are_told_how_many_fit():
+    choice = r"choose playground=seven_rooms, house2 with task.agents of at most 7$"
+    with pytest.raises(ConfigError, match=choice):
+        check_whole(["+task=MultiAgentNav", "playground=simple", "task.agents=9"])
+
+
+@pytest.mark.parametrize("agents", [5, 6, 7])
+def test_the_playgrounds_that_are_offered_to_more_agents_can_be_composed(agents):
+    with pytest.raises(ConfigError) as refusal:
+        check_whole(["+task=MultiAgentNav", "playground=two_rooms", f"task.agents={agents}"])
+    offered = str(refusal.value).split("choose ")[1].split(" or ")
+    assert any("seven_rooms" in choice for choice in offered)
+    for choice in offered:
+        if choice.startswith("playground="):
+            words = [word.rstrip(",") for word in choice.split() if "=" in word]
+            check_whole(["+task=MultiAgentNav", f"task.agents={agents}", *words])
+
+
+@pytest.mark.parametrize("playground", ROOMS)
 def test_the_playgrounds_that_are_offered_have_so_many_rooms(playground):
     cfg = compose(["+task=KickTheBall", f"playground={playground}"]).game.playground
-    assert len(cfg.rooms) == places._ROOMS[playground]
+    assert len(cfg.rooms) == ROOMS[playground]
 
 
 @pytest.mark.parametrize("task", ["CrawlBaby", "TurnBaby"])

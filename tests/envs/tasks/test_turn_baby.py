@@ -6,12 +6,16 @@ from babies import (
     BODIES,
     check_limbs_fall_and_none_flies,
     child_game,
+    hold,
     play,
+    put,
     starts,
     terms_at_rest,
 )
 
-from veca_marl.sim.body.humanoid.postures import ON_BACK, ON_BELLY
+from veca_marl.sim.body.humanoid.postures import ON_BACK, ON_BELLY, Posture
+
+SPINE = {"spine.flexion": 44.0, "chest.flexion": 20.0}
 
 
 @pytest.fixture(scope="module")
@@ -23,6 +27,19 @@ def game():
 def test_the_terms_are_1_on_the_belly_and_minus_1_on_the_back(game):
     assert terms_at_rest(game, ON_BACK) == pytest.approx({"torso": -1.0, "hip": -1.0}, abs=0.1)
     assert terms_at_rest(game, ON_BELLY) == pytest.approx({"torso": 1.0, "hip": 1.0}, abs=0.1)
+
+
+@pytest.mark.parametrize("pitch_deg", [0.0, 60.0])
+def test_sitting_folded_forwards_is_not_turned_over(game, pitch_deg):
+    """The chest lies on the legs and faces down, the pelvis does not."""
+    folded = Posture(pitch_deg, {"thigh.flexion": 120.0, **SPINE})
+    angles = put(game, folded).posture_angles(folded)
+    for _ in range(50):
+        outcome = hold(game, angles)
+    received = outcome.terms["agents"]
+    assert received["torso"] > 0.9
+    assert 0.4 < received["hip"] < 0.65
+    assert not outcome.solved["agents"]
 
 
 def test_the_greatest_return_is_10(game):

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from veca_marl.envs.core.task import Player, Task, register, require_humanoid, terms
-from veca_marl.envs.tasks.locomotion.start_poses import StartCfg, start_anywhere
+from veca_marl.envs.core.task import Player, register, require_humanoid, terms
+from veca_marl.envs.tasks.locomotion.start_poses import PosedStart, StartCfg, start_anywhere
 from veca_marl.sim.body.humanoid import Humanoid
 from veca_marl.sim.body.humanoid.postures import ON_BACK
 from veca_marl.sim.physics import PropCfg, World
@@ -48,7 +48,7 @@ class HandRegardCfg(StartCfg):
 
 
 @register
-class HandRegard(Task):
+class HandRegard(PosedStart):
     """A joint-level body lies on its back and keeps both hands before both eyes.
 
     Not in the VECA paper: the hand-regard task of BabyBench 2025 (suite `babybench`). As there, an

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from veca_marl.envs.core.task import Player, Task, register, require_humanoid, terms
+from veca_marl.envs.core.task import Player, register, require_humanoid, terms
 from veca_marl.envs.tasks.developmental.regions import HANDS, regions_of, touched_regions
-from veca_marl.envs.tasks.locomotion.start_poses import StartCfg, start_anywhere
+from veca_marl.envs.tasks.locomotion.start_poses import PosedStart, StartCfg, start_anywhere
 from veca_marl.sim.body.humanoid.postures import ON_BACK
 
 
@@ -27,7 +27,7 @@ class SelfTouchCfg(StartCfg):
 
 
 @register
-class SelfTouch(Task):
+class SelfTouch(PosedStart):
     """A joint-level body lies on its back and touches as many regions of itself as possible.
 
     Not in the VECA paper: the self-touch task of BabyBench 2025 (suite `babybench`). As there, the

@@ -6,9 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from veca_marl.envs.core.task import Player, Task, register, require_humanoid, terms
+from veca_marl.envs.core.task import Player, register, require_humanoid, terms
 from veca_marl.envs.tasks.locomotion.progress import ForwardProgress
 from veca_marl.envs.tasks.locomotion.start_poses import (
+    PosedStart,
     StartCfg,
     face_down_cosines,
     start_near_edge,
@@ -37,7 +38,7 @@ class CrawlBabyCfg(StartCfg):
 
 
 @register
-class CrawlBaby(Task):
+class CrawlBaby(PosedStart):
     """A joint-level body on hands and knees at the edge of the room has to crawl ahead.
 
     The paper (table of tasks in the appendix; "Joint-level Locomotion & Control") rewards "the

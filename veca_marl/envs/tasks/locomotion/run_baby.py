@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from veca_marl.envs.core.scoring import horizontal
-from veca_marl.envs.core.task import Player, Task, register, require_humanoid, terms
+from veca_marl.envs.core.task import Player, register, require_humanoid, terms
 from veca_marl.envs.tasks.locomotion.progress import ForwardProgress
-from veca_marl.envs.tasks.locomotion.start_poses import StartCfg, start_near_edge
+from veca_marl.envs.tasks.locomotion.start_poses import PosedStart, StartCfg, start_near_edge
 from veca_marl.sim.body.humanoid.postures import STANDING
 from veca_marl.sim.geometry import Floats
 
@@ -50,7 +50,7 @@ class RunBabyCfg(StartCfg):
 
 
 @register
-class RunBaby(Task):
+class RunBaby(PosedStart):
     """A joint-level body stands at the edge of the room, faces its middle and has to run.
 
     The paper (table of tasks in the appendix; "Joint-level Locomotion & Control") rewards "the

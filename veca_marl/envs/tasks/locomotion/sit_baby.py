@@ -8,8 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from veca_marl.envs.core.scoring import clipped_share
-from veca_marl.envs.core.task import Player, Task, register, require_humanoid, terms
-from veca_marl.envs.tasks.locomotion.start_poses import StartCfg, draw_posture, start_anywhere
+from veca_marl.envs.core.task import Player, register, require_humanoid, terms
+from veca_marl.envs.tasks.locomotion.start_poses import (
+    PosedStart,
+    StartCfg,
+    draw_posture,
+    start_anywhere,
+)
 
 
 @dataclass
@@ -52,7 +57,7 @@ class SitBabyCfg(StartCfg):
 
 
 @register
-class SitBaby(Task):
+class SitBaby(PosedStart):
     """A joint-level body lies on its back at a random place in the room and has to sit up.
 
     The paper (table of tasks in the appendix; "Joint-level Locomotion & Control") rewards "the

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from veca_marl.envs.core.task import TaskCfg
+from veca_marl.envs.core.task import Task, TaskCfg
 from veca_marl.sim.body.humanoid import Humanoid
 from veca_marl.sim.body.humanoid.postures import POSTURES, Posture
 from veca_marl.sim.geometry import Floats
-from veca_marl.sim.physics import World
+from veca_marl.sim.physics import PlaygroundCfg, World
 
 _WALL_CLEARANCE_M = 1.0
 _GREATEST_OVERLAP_M = 0.005  # the skin of hands and feet yields as much
@@ -32,6 +33,20 @@ class StartCfg(TaskCfg):
         super().__post_init__()
         if not 0.0 <= self.spread_deg <= 30.0:
             raise ValueError(f"task.spread_deg={self.spread_deg} must be in [0, 30]")
+
+
+class PosedStart(Task):
+    """A task in which a body starts in a posture on the floor of the first room."""
+
+    @classmethod
+    def check_playground(cls, cfg: Any, playground: PlaygroundCfg) -> None:
+        room, least_m = playground.rooms[0], 2.0 * _WALL_CLEARANCE_M
+        if min(room.size_m[:2]) < least_m:
+            raise ValueError(
+                f"{cls.__name__} needs {least_m:g} m along x and y, to start {_WALL_CLEARANCE_M:g} "
+                f"m away from walls; playground {playground.name!r} has room {room.name!r} of "
+                f"{room.extent}; choose a larger room, or playground=simple"
+            )
 
 
 def draw_posture(weights: dict[str, float], rng: np.random.Generator) -> Posture:

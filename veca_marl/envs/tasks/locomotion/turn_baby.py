@@ -7,8 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from veca_marl.envs.core.task import Player, Task, register, require_humanoid, terms
-from veca_marl.envs.tasks.locomotion.start_poses import StartCfg, face_down_cosines, start_anywhere
+from veca_marl.envs.core.task import Player, register, require_humanoid, terms
+from veca_marl.envs.tasks.locomotion.start_poses import (
+    PosedStart,
+    StartCfg,
+    face_down_cosines,
+    start_anywhere,
+)
 from veca_marl.sim.body.humanoid.postures import ON_BACK
 
 
@@ -34,14 +39,16 @@ class TurnBabyCfg(StartCfg):
 
 
 @register
-class TurnBaby(Task):
+class TurnBaby(PosedStart):
     """A joint-level body lies on its back at a random place in the room and has to turn over.
 
     The paper (table of tasks in the appendix; "Joint-level Locomotion & Control") rewards "the
     orientation of its torso and hip" and gives no numbers. This task rewards a front that points
     straight down. An episode lasts `max_seconds` and never terminates. With the default weights
-    its return is -10 on the back and +10 on the belly. The task is solved (`solved`) while the
-    fronts of chest and pelvis point at most `turned_deg` away from straight down.
+    its return is -10 on the back and +10 on the belly. A body that sits and folds forwards, chest
+    on the legs, is rewarded by four fifths of that: the front of its pelvis points about 55 degrees
+    away from straight down. The task is solved (`solved`) while the fronts of chest and pelvis
+    point at most `turned_deg` away from it.
 
     Terms:
         torso: Cosine of the angle between the front of the chest and straight down, in [-1, 1].

@@ -12,7 +12,12 @@ from veca_marl.envs.core.task import Player, Task, TaskCfg, register, require_wa
 from veca_marl.envs.tasks.navigation import places
 from veca_marl.envs.tasks.navigation.mazes.maze import Cell, Maze, random_maze
 from veca_marl.envs.tasks.navigation.mazes.trial_sense import TRIAL, TrialSense
-from veca_marl.envs.tasks.navigation.mazes.walls import MazeWalls, beyond_walls_m, check_maze
+from veca_marl.envs.tasks.navigation.mazes.walls import (
+    MazeWalls,
+    beyond_walls_m,
+    check_maze,
+    passage_m,
+)
 from veca_marl.sim.body.walker import WalkerCfg
 from veca_marl.sim.physics import PlaygroundCfg
 
@@ -78,6 +83,7 @@ class MazeNav(Task):
 
     def build(self) -> None:
         self.walker = require_walker(self.players[0])
+        _check_passage(self.cfg, self.world.playground, self.walker.radius_m)
         _check_reach(self.cfg, self.world.playground, self.walker.radius_m)
         self._walls = MazeWalls(self.world, self.cfg.cells)
         self.target = places.add_target(self.world, _RADIUS_M)
@@ -127,6 +133,21 @@ class MazeNav(Task):
         if isinstance(sense, TrialSense):
             elapsed = self._elapsed_s / self.cfg.trial_s
             sense.show(self._ended_now, elapsed, self._completed / self.cfg.trials)
+
+
+def _check_passage(cfg: MazeNavCfg, playground: PlaygroundCfg, body_m: float) -> None:
+    """Check that a body of a radius fits between the walls.
+
+    Raises:
+        ValueError: If it does not.
+    """
+    width_m = passage_m(playground, cfg.cells)
+    if 2.0 * body_m >= width_m:
+        raise ValueError(
+            f"body.radius_m={body_m} does not fit through passages of {width_m:.4g} m with "
+            f"task.cells={cfg.cells} in playground {playground.name!r}; choose a smaller one, or "
+            "fewer cells"
+        )
 
 
 def _check_reach(cfg: MazeNavCfg, playground: PlaygroundCfg, body_m: float) -> None:

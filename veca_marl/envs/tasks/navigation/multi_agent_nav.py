@@ -18,6 +18,7 @@ from veca_marl.envs.tasks.navigation.helper_reward import (
     HelperReward,
 )
 from veca_marl.envs.tasks.navigation.placement_check import check_placement
+from veca_marl.envs.tasks.navigation.room_counts import check_rooms
 from veca_marl.envs.tasks.player_starts import direct_gaze_ahead, place_player
 from veca_marl.sim.physics import PlaygroundCfg, RoomCfg
 
@@ -106,7 +107,7 @@ class MultiAgentNav(Task):
 
     @classmethod
     def check_playground(cls, cfg: Any, playground: PlaygroundCfg) -> None:
-        places.check_rooms(playground, cfg.agents)
+        check_rooms(playground, cfg.agents)
         check_placement(
             lambda rng: _try_start(cfg, playground, rng),
             f"playground {playground.name!r}, task.radius_m={cfg.radius_m:g}, "

@@ -20,39 +20,9 @@ from veca_marl.sim.physics import (
 )
 
 _DRAWS = 1000
-_LEAST_AGENTS = 2
-# rooms of the playgrounds with several
-_ROOMS = {
-    "two_rooms": 2,
-    "three_rooms": 3,
-    "four_rooms": 4,
-    "house": 4,
-    "seven_rooms": 7,
-    "house2": 7,
-}
 _PAIR_DRAWS = 10_000
 _LEAST_SHARE = 0.001  # of the pairs that are drawn: none of them fits in 5 of 100 000 attempts
 _SAMPLES = 200  # places for an estimate of that share
-
-
-def check_rooms(playground: PlaygroundCfg, agents: int) -> None:
-    """Check that a playground has a room for each agent.
-
-    Raises:
-        ValueError: If it has too few.
-    """
-    rooms = len(playground.rooms)
-    if agents <= rooms:
-        return
-    larger = ", ".join(name for name, count in _ROOMS.items() if count >= agents)
-    choices = [f"playground={larger}"] if larger else []
-    choices.append(f"playground=random_house playground.room_count={agents}")
-    if rooms >= _LEAST_AGENTS:
-        choices.append(f"task.agents of at most {rooms}")
-    raise ValueError(
-        f"task.agents={agents} start in rooms of their own, but playground "
-        f"{playground.name!r} has {rooms}; choose {' or '.join(choices)}"
-    )
 
 
 def furniture_of(world: World) -> list[Prop]:

@@ -119,12 +119,17 @@ class RandomHouseCfg(PlaygroundCfg):
                 f"playground.least_room_m={self.least_room_m} must be at least {needed_m:.2f}, for "
                 f"doors of {self.door_width_m} m and an open floor"
             )
-        holds = limits_of(self).capacity(self.house_size_m)
-        if not 1 <= self.room_count <= holds:
+        most = self.most_rooms
+        if not 1 <= self.room_count <= most:
             raise ValueError(
-                f"playground.room_count={self.room_count} must be from 1 to {holds}: so many rooms "
+                f"playground.room_count={self.room_count} must be from 1 to {most}: so many rooms "
                 f"of {self.least_room_m} m fit into house_size_m={tuple(self.house_size_m)}"
             )
+
+    @property
+    def most_rooms(self) -> int:
+        """The greatest `room_count` that fits into `house_size_m`."""
+        return limits_of(self).capacity(self.house_size_m)
 
     def _set_floor(self) -> None:
         """Draw the floor beneath the whole house, with its outer walls."""

@@ -75,6 +75,11 @@ def _add_wall(world: World, name: str, length_m: float, hue: float) -> Prop:
     )
 
 
+def passage_m(playground: PlaygroundCfg, cells: int) -> float:
+    """Return the width between two opposite walls of a cell, metres, see `beyond_walls_m`."""
+    return playground.rooms[0].size_m[0] / cells - _THICKNESS_M
+
+
 def beyond_walls_m(playground: PlaygroundCfg, cells: int, body_m: float) -> float:
     """Return the least distance from the middle of a cell to a body beyond one of its walls.
 
