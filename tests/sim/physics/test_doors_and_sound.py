@@ -1,4 +1,4 @@
-"""Closed doors attenuate sound; open ones attenuate no path more than closed ones."""
+"""Closed doors attenuate sound at any width; open ones attenuate no path more than closed ones."""
 
 import math
 
@@ -9,9 +9,13 @@ from seeking import shipped
 from veca_marl.sim.geometry import Pose
 from veca_marl.sim.physics import (
     DoorCfg,
+    JointCfg,
     JointKind,
     LeafCfg,
+    PartCfg,
     PlaygroundCfg,
+    PropCfg,
+    PropShape,
     RoomCfg,
     WallsCfg,
     World,
@@ -96,6 +100,25 @@ def test_source_and_listener_can_be_exchanged_at_any_opening(build, leaf):
 
 
 @pytest.mark.parametrize("leaf", [HINGE, SLIDE])
+@pytest.mark.parametrize(
+    ("width_m", "height_m"), [(1.0, 2.0), (0.6, 2.0), (0.3, 2.0), (1.0, 0.8), (0.3, 0.8)]
+)
+def test_a_closed_leaf_attenuates_at_any_size_and_an_open_one_does_not(
+    build, leaf, width_m, height_m
+):
+    world = build(flat(leaf, width_m, WallsCfg(door_height_m=height_m)))
+    door = world.prop("leaf_door")
+    for aside in (-0.45, 0.0, 0.45):
+        y = 1.4 + aside * (width_m - 0.04)
+        ends = (2.5, y, 0.45), (3.6, y, 0.45)  # at the height of the handle
+        door.set_opening(0.0)
+        assert losses_db(world, *ends) == pytest.approx([LOSS_DB])
+    door.set_opening(1.0)
+    y = 1.4 - 0.45 * (width_m - 0.04) if leaf is SLIDE else 1.4
+    assert losses_db(world, (2.5, y, 0.45), (3.6, y, 0.45)) == pytest.approx([0.0])
+
+
+@pytest.mark.parametrize("leaf", [HINGE, SLIDE])
 def test_oblique_paths_past_the_frame_pass_one_partition(build, leaf):
     """The wall and the edge of the closed leaf, with a gap of 1 cm between them."""
     world = build(flat(leaf))
@@ -173,3 +196,26 @@ def test_a_reset_puts_leaf_and_opening_back(build):
         leaf.place((9.0, 9.0, 1.0), 1.0)
         leaf.set_opening(1.0)
         assert losses_db(world, *ends) == pytest.approx([0.0])
+
+
+def test_a_small_box_with_a_joint_that_is_no_partition_does_not_attenuate(build):
+    """The flap of a cupboard, say, keeps the rule of furniture."""
+    flap = PropCfg(
+        "flap", PropShape.box, [0.04, 0.5, 0.9], (1.5, 1.5, 0.5), mass_kg=1.0, joint=JointCfg()
+    )
+    playground = flat(HINGE)
+    playground.props.append(flap)
+    world = build(playground)
+    assert losses_db(world, (1.0, 1.5, 0.5), (2.0, 1.5, 0.5))[0] == 0.0
+
+
+@pytest.mark.parametrize(
+    "shape",
+    [
+        {"shape": PropShape.sphere, "size_m": [0.1]},
+        {"shape": PropShape.compound, "parts": [PartCfg(PropShape.sphere, [0.1])]},
+    ],
+)
+def test_a_partition_without_a_box_is_refused(shape):
+    with pytest.raises(ValueError, match=r"prop 'ball': partition=true .* without a box"):
+        PropCfg("ball", partition=True, **shape)

@@ -127,6 +127,7 @@ def _leaf(
         mass_kg=mass_kg,
         colour=colour,
         parts=parts,
+        partition=True,
         interactions=["open", "close"],
         joint=joint,
     )
