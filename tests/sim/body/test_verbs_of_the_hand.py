@@ -147,6 +147,21 @@ def test_a_prop_held_in_a_corner_stays_out_of_its_walls_and_falls_there(kind):
         assert np.linalg.norm(held.velocity) < 0.5
 
 
+@pytest.mark.parametrize("place", [(0.35, 0.1, 0.0), (0.25, -0.35, 0.0), (0.35, -0.25, 0.0)])
+@pytest.mark.parametrize("yaw_deg", [0.0, 90.0, 270.0])
+def test_a_held_prop_stays_out_of_another_walker(place, yaw_deg):
+    world = empty_world(fraction_piece("piece", 0.5, (0.4, 0.0)))
+    walker, other = walker_in(world), walker_in(world, "other", place)
+    piece = world.prop("piece")
+    piece.place((0.4, 0.0, piece.position[2]), math.radians(yaw_deg))
+    assert walker.grab(piece)
+    let_pass(world, 0.2)
+    points = pybullet.getClosestPoints(
+        piece.body_id, other.body_id, 0.0, physicsClientId=world.client
+    )
+    assert max((-point[8] for point in points), default=0.0) < 0.01
+
+
 @pytest.mark.parametrize(
     "prop",
     [

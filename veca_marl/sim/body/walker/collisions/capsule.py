@@ -27,7 +27,14 @@ import numpy as np
 from veca_marl.sim.body.walker.collisions.jammed import JammedProps
 from veca_marl.sim.body.walker.collisions.leaves import Leaves
 from veca_marl.sim.body.walker.collisions.obstacle_boxes import ObstacleBoxes
-from veca_marl.sim.geometry import Floats, Primitive, Scene, Shape, quaternion_from_yaw
+from veca_marl.sim.geometry import (
+    Floats,
+    Primitive,
+    Scene,
+    Shape,
+    horizontal_distance,
+    quaternion_from_yaw,
+)
 from veca_marl.sim.physics import Prop, World, create_collision_shape, pybullet
 
 _ROUNDS = 3  # two for the walls of a corner, one spare
@@ -80,6 +87,7 @@ class Capsule:
         self._leaves = Leaves(client, [])
         self._jammed = JammedProps(client, scene, self.body_id, [], [])
         self._known = (0, 0)
+        self._capsules: Collection[int] = ()
         self._near: list[int] = []
         self._near_leaves: list[Prop] = []
 
@@ -102,6 +110,7 @@ class Capsule:
         """
         if (len(props), len(bodies)) != self._known:
             self._find_obstacles(props, bodies)
+        self._capsules = capsules
         reach_m = self._reach_m + _MARGIN_M + distance_m
         near = self._obstacles.near(position, reach_m)
         self._near = [body_id for body_id in near if body_id != self.support_id]
@@ -109,14 +118,22 @@ class Capsule:
         self._jammed.collect(position, reach_m, self._near_leaves, capsules)
 
     def solid_near(self, position: Floats, reach_m: float) -> list[int]:
-        """Return PyBullet's ids of the obstacles, doors and drawers within a horizontal distance.
+        """Return PyBullet's ids of what is within a horizontal distance and is not pushed.
+
+        These are obstacles, doors, drawers and the capsules of other walkers.
 
         Args:
             position: ``(2,)`` or ``(3,)`` metres; only the horizontal part counts.
             reach_m: Metres.
         """
-        leaves = self._leaves.near(position, reach_m)
-        return self._obstacles.near(position, reach_m) + [leaf.body_id for leaf in leaves]
+        leaves = [leaf.body_id for leaf in self._leaves.near(position, reach_m)]
+        others = [
+            body_id
+            for body_id in self._capsules
+            if body_id != self.body_id
+            and horizontal_distance(self._centre(body_id), position) < reach_m + _LIMB_REACH_M
+        ]
+        return [*self._obstacles.near(position, reach_m), *leaves, *others]
 
     def resolve_contacts(self, x: float, y: float) -> tuple[float, float]:
         """Set the position and move the capsule out of obstacles; return the new position."""
@@ -165,6 +182,11 @@ class Capsule:
         pybullet.resetBasePositionAndOrientation(
             self.body_id, position, orientation, physicsClientId=self._client
         )
+
+    def _centre(self, body_id: int) -> Floats:
+        """Return the position ``(3,)`` of a body, metres."""
+        position, _ = pybullet.getBasePositionAndOrientation(body_id, physicsClientId=self._client)
+        return np.array(position)
 
     def _overlaps(self) -> Iterator[_Overlap]:
         """Yield how deep it is in obstacles, and in doors and drawers that cannot yield."""

@@ -28,8 +28,8 @@ class Hand:
 
     Its centre of mass is beside the palm. The prop is kinematic while it is held: its pose is set
     at each physics step, and its velocity is that of this motion, without jumps at the edges of
-    walls. It does not collide with its holder. It stays on the walker's side of walls: where they
-    are nearer than the hand would hold it, it is held nearer to the trunk.
+    walls. It does not collide with its holder. It stays on the walker's side of walls and of other
+    walkers: where they are nearer than the hand would hold it, it is held nearer to the trunk.
 
     Args:
         client: PyBullet's client id.
