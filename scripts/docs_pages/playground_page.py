@@ -56,8 +56,8 @@ SENSES = """## Sight and sound
 
 Walls, furniture and leaves of doors hide what is behind them. A sound in the same room is heard
 with its reflections; one from another room is heard by its direct path, attenuated by
-`transmission_loss_db` at each wall, closed door or large box (0.7 m wide and 1 m high) that the
-path passes, and not attenuated through an open door. Diffraction is not modelled.
+`transmission_loss_db` at each wall, closed door (of any size) or large box (0.7 m wide and 1 m
+high) that the path passes, and not attenuated by an open door. Diffraction is not modelled.
 
 ## Houses of your own
 

@@ -1,6 +1,7 @@
 """Light things between a walker and something that does not give way stop the walker."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pybullet
@@ -121,3 +122,62 @@ def test_what_can_move_does_not_slow_a_walker_down(thing):
         world.step()
     assert walker.position[0] == pytest.approx(0.5 + 50 * 0.04 * SPEED_MPS, abs=1e-6)
     assert world.prop("thing").position[0] > 1.5
+
+
+def row_of_boxes(count, mass_kg=0.5):
+    return [
+        box(f"thing_{n}", (0.2, 0.2, 0.2), mass_kg, (1.0 + 0.205 * n, 0.0, 0.1))
+        for n in range(count)
+    ]
+
+
+@pytest.mark.parametrize("mass_kg", [0.3, 4.9])
+@pytest.mark.parametrize("count", [2, 4])
+def test_a_row_of_boxes_that_can_move_does_not_slow_a_walker_down(count, mass_kg):
+    """Each is supported by the next one, which gives way."""
+    world = empty_world(*row_of_boxes(count, mass_kg))
+    walker = walker_in(world, place=(0.5, 0.0, 0.0))
+    walker.walk(SPEED_MPS, 0.0)
+    for _ in range(40):
+        world.step()
+    assert walker.position[0] == pytest.approx(0.5 + 40 * 0.04 * SPEED_MPS, abs=1e-6)
+    assert world.prop(f"thing_{count - 1}").position[0] > 1.9 + 0.2 * (count - 1)
+
+
+def test_a_row_of_boxes_stops_a_walker_where_it_meets_a_wall():
+    world = empty_world(*row_of_boxes(3), wall(position=(2.0, 0.0, 0.0)))
+    walker = walker_in(world, place=(0.5, 0.0, 0.0))
+    walker.walk(SPEED_MPS, 0.0)
+    for _ in range(80):
+        world.step()
+        for n in range(3):
+            assert depth_m(world, f"thing_{n}", "wall") < 0.01
+            assert depth_m(world, walker, f"thing_{n}") < 0.02
+
+
+def test_a_door_is_pushed_open_with_a_light_box_behind_it():
+    world = empty_world(door(), box("thing", position=(1.2, 0.2, 0.15)))
+    walker = walker_in(world, place=(0.0, 0.2, 0.0))
+    walker.walk(SPEED_MPS, 0.0)
+    for _ in range(60):
+        world.step()
+    assert world.prop("door").opening > 0.5
+    assert walker.position[0] > 1.5
+
+
+@pytest.mark.parametrize("speed_mps", [0.0, 0.3])
+@pytest.mark.parametrize("thing", [ball("thing"), box("thing")], ids=["ball", "box"])
+def test_walkers_with_a_thing_between_them_move_alike_in_any_order(thing, speed_mps):
+    """The one pushes the other back, as it does without the thing."""
+    places = {"one": ((-1.0, 0.0, 0.0), 0.0), "other": ((1.03, 0.0, 0.0), 180.0)}
+    ends = []
+    for order in (("one", "other"), ("other", "one")):
+        world = empty_world(replace(thing, position_m=(0.0, 0.0, thing.position_m[2])))
+        walkers = {name: walker_in(world, name, *places[name]) for name in order}
+        walkers["one"].walk(SPEED_MPS, 0.0)
+        walkers["other"].walk(speed_mps, 0.0)
+        for _ in range(50):
+            world.step()
+        ends.append([walkers[name].position[0] for name in ("one", "other")])
+    np.testing.assert_allclose(ends[0], ends[1], atol=0.05)
+    assert ends[0][1] > 1.03 - 50 * 0.04 * speed_mps + 0.1

@@ -83,6 +83,33 @@ def test_a_held_prop_has_the_velocity_with_which_it_moves(fraction):
     np.testing.assert_allclose(flown, piece.velocity[:2], atol=0.02)
 
 
+@pytest.mark.parametrize("turn_radps", [2.1, -2.1])
+@pytest.mark.parametrize(("fraction", "y"), [(0.5, 0.1), (0.125, -0.1), (0.125, 0.05)])
+def test_a_prop_that_is_released_at_the_end_of_a_wall_is_not_thrown(fraction, y, turn_radps):
+    """While the walker turns there, the prop is moved round the edge within one physics step."""
+    world = empty_world(
+        wall(position=(1.0, -3.0, 0.0)), fraction_piece("piece", fraction, (0.4, 0.0))
+    )
+    walker, piece = walker_in(world), world.prop("piece")
+    world.freeze()
+    fastest_mps = fastest = 0
+    for steps in (75, None):
+        world.reset(np.random.default_rng(0))
+        walker.place((0.83, y, 0.0))
+        assert walker.grab(piece)
+        for step in range(steps or fastest):
+            walker.walk(0.0, turn_radps)
+            world.step()
+            speed_mps = np.linalg.norm(piece.velocity)
+            if speed_mps > fastest_mps:
+                fastest_mps, fastest = speed_mps, step + 1
+    assert fastest_mps < 2.1 * 0.5 + 1.0  # of a hand at 0.5 m, and of the arm
+    released = piece.position
+    assert walker.release()
+    let_pass(world, 0.6)
+    assert np.linalg.norm(piece.position - released) < 1.0
+
+
 @pytest.mark.parametrize("kind", ["half", "quarter", "key", "cube"])
 def test_a_prop_held_in_a_corner_stays_out_of_its_walls_and_falls_there(kind):
     thing = {
@@ -118,6 +145,21 @@ def test_a_prop_held_in_a_corner_stays_out_of_its_walls_and_falls_there(kind):
         low, high = held.bounds()
         assert ((low + high)[:2] / 2.0 < 1.55).all()
         assert np.linalg.norm(held.velocity) < 0.5
+
+
+@pytest.mark.parametrize("place", [(0.35, 0.1, 0.0), (0.25, -0.35, 0.0), (0.35, -0.25, 0.0)])
+@pytest.mark.parametrize("yaw_deg", [0.0, 90.0, 270.0])
+def test_a_held_prop_stays_out_of_another_walker(place, yaw_deg):
+    world = empty_world(fraction_piece("piece", 0.5, (0.4, 0.0)))
+    walker, other = walker_in(world), walker_in(world, "other", place)
+    piece = world.prop("piece")
+    piece.place((0.4, 0.0, piece.position[2]), math.radians(yaw_deg))
+    assert walker.grab(piece)
+    let_pass(world, 0.2)
+    points = pybullet.getClosestPoints(
+        piece.body_id, other.body_id, 0.0, physicsClientId=world.client
+    )
+    assert max((-point[8] for point in points), default=0.0) < 0.01
 
 
 @pytest.mark.parametrize(

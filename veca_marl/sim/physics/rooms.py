@@ -114,7 +114,7 @@ class LeafCfg:
 
     Attributes:
         kind: A hinge turns it by 90 degrees, a slide moves it into the wall beside the opening,
-            which has to be as long as the leaf.
+            which has to be as long as the leaf, and must not meet another wall or leaf there.
         opening: Opening at the start of an episode, from 0 (closed) to 1.
         opens_to_front: Whether it opens to the side of greater x or y, across the wall for a hinge
             and along it for a slide; otherwise to the other.

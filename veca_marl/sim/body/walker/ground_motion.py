@@ -10,6 +10,7 @@ from veca_marl.sim.body.base import Body
 from veca_marl.sim.body.walker.animation.stances import Stance
 from veca_marl.sim.body.walker.collisions.capsule import Capsule
 from veca_marl.sim.body.walker.collisions.footing import Footing, middle
+from veca_marl.sim.body.walker.collisions.walker_collisions import WalkerCollisions
 from veca_marl.sim.geometry import Floats
 from veca_marl.sim.physics import Prop, World
 
@@ -45,6 +46,12 @@ class GroundMotion:
     def capsule(self) -> Capsule:
         """The capsule of the present stance."""
         return self.stance.capsule
+
+    @property
+    def capsule_ids(self) -> list[int]:
+        """PyBullet's ids of the capsules of all stances."""
+        stances = [self._upright, self._on_all_fours]
+        return [stance.capsule.body_id for stance in stances if stance is not None]
 
     @property
     def can_crawl(self) -> bool:
@@ -144,7 +151,9 @@ class GroundMotion:
             self.capsule.support_id = -1
 
     def _collect_obstacles(self, distance_m: float) -> None:
-        """Collect the obstacles within a distance, joint-level bodies among them."""
+        """Collect the obstacles within a distance, joint-level bodies and walkers among them."""
         movers = self._world.movers
         bodies = [id_ for mover in movers if isinstance(mover, Body) for id_ in mover.obstacle_ids]
-        self.capsule.collect_obstacles(self._world.props, bodies, self.ground, distance_m)
+        collisions = (mover for mover in movers if isinstance(mover, WalkerCollisions))
+        capsules = [id_ for each in collisions for id_ in each.capsule_ids]
+        self.capsule.collect_obstacles(self._world.props, bodies, capsules, self.ground, distance_m)

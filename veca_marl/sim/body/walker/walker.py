@@ -75,6 +75,11 @@ class Walker(Body):
         return self._motion.capsule.body_id
 
     @property
+    def capsule_ids(self) -> list[int]:
+        """PyBullet's ids of the capsules of all stances."""
+        return self._motion.capsule_ids
+
+    @property
     def yaw_rad(self) -> float:
         """Heading: 0 along x, counter-clockwise is positive; not wrapped to a circle."""
         return self._motion.yaw_rad
@@ -311,6 +316,10 @@ class Walker(Body):
     def resolve_contacts(self, x: float, y: float) -> tuple[float, float]:
         """Return the position nearest to ``(x, y)`` outside walls and heavy things."""
         return self._motion.capsule.resolve_contacts(x, y)
+
+    def room_for_others(self) -> tuple[float, float]:
+        """Return by how much it makes room for what it and other walkers press together, metres."""
+        return self._motion.capsule.room_for_others()
 
     def set_position(self, x: float, y: float, substep_s: float) -> None:
         """Set the position at the end of this physics step."""

@@ -7,13 +7,12 @@ the wall between them. Walls in one line form one wall, which the doors in it di
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
+from veca_marl.sim.physics.houses.door_leaves import WallWithDoors, leaf_props
 from veca_marl.sim.physics.props import PropCfg, PropShape, check_appearance
-from veca_marl.sim.physics.props.joint_cfg import JointKind, LockCfg
-from veca_marl.sim.physics.props.library.doors import SLIDING_WALL_M, door_leaf, sliding_leaf
-from veca_marl.sim.physics.rooms import DoorCfg, LeafCfg, RoomCfg
+from veca_marl.sim.physics.rooms import DoorCfg, RoomCfg
 
 COVERING_M = 0.004
 """Height of the coloured covering of a floor, thinner than what casts contact shadows differently
@@ -82,10 +81,10 @@ def wall_props(rooms: Sequence[RoomCfg], doors: Sequence[DoorCfg], cfg: WallsCfg
     Raises:
         ValueError: If a wall would stand in a room, because two rooms are less than one wall
             thickness apart, a door is not in a wall, or a wall is too short or too thin for the
-            leaf that slides into it.
+            leaf that slides into it, or meets another wall there.
     """
     lines = wall_lines(rooms, cfg.thickness_m)
-    props: list[PropCfg] = []
+    walls: list[WallWithDoors] = []
     placed: set[str] = set()
     for number, line in enumerate(lines):
         colours = cfg.colours or _COLOURS
@@ -95,14 +94,14 @@ def wall_props(rooms: Sequence[RoomCfg], doors: Sequence[DoorCfg], cfg: WallsCfg
         cut = [door for door in doors if _is_in(door, line)]
         placed.update(door.name for door in cut)
         pieces = _pieces(f"wall_{number}", line, cut, cfg, colour)
-        height_m = min(cfg.door_height_m, line.height_m)
-        leaves = [
-            _leaf(door, door.leaf, line, height_m, pieces) for door in cut if door.leaf is not None
-        ]
-        props += pieces + leaves
+        walls.append(WallWithDoors(line.axis, cut, pieces))
     missing = sorted({door.name for door in doors} - placed)
     if missing:
         raise ValueError(f"doors {missing} are not in the middle of a wall between rooms")
+    props: list[PropCfg] = []
+    for line, wall in zip(lines, walls, strict=True):
+        height_m = min(cfg.door_height_m, line.height_m)
+        props += [*wall.pieces, *leaf_props(wall, walls, height_m)]
     return props
 
 
@@ -205,67 +204,6 @@ def _wall(
         position_m=(line.at_m, middle, foot) if across else (middle, line.at_m, foot),
         colour=colour,
     )
-
-
-def _leaf(
-    door: DoorCfg, leaf: LeafCfg, line: WallLine, height_m: float, pieces: Sequence[PropCfg]
-) -> PropCfg:
-    """Return the leaf of a door; the opening of a wall of constant x leads along x."""
-    place = (f"leaf_{door.name}", door.position_m, 0.0 if line.axis == 0 else 90.0)
-    lock = LockCfg(leaf.key, leaf.locked) if leaf.key or leaf.locked else None
-    if leaf.kind is JointKind.hinge:
-        prop = door_leaf(
-            *place,
-            door.width_m,
-            height_m,
-            opens_to_front=leaf.opens_to_front,
-            lock=lock,
-            colour=leaf.colour,
-        )
-    else:
-        prop = sliding_leaf(
-            *place,
-            door.width_m,
-            height_m,
-            wall=_wall_beside(door, leaf, line, pieces).name,
-            # +y of the leaf is +y of the house in a wall of constant x, and -x in one of constant y
-            slides_to_left=leaf.opens_to_front == (line.axis == 0),
-            lock=lock,
-            colour=leaf.colour,
-        )
-    assert prop.joint is not None
-    return replace(prop, joint=replace(prop.joint, opening=leaf.opening))
-
-
-def _wall_beside(
-    door: DoorCfg, leaf: LeafCfg, line: WallLine, pieces: Sequence[PropCfg]
-) -> PropCfg:
-    """Return the piece of a wall into which the leaf of a door slides.
-
-    Raises:
-        ValueError: If it is shorter than the leaf or too thin for it.
-    """
-    along, across = 1 - line.axis, line.axis
-    side = 1.0 if leaf.opens_to_front else -1.0
-    edge = door.position_m[along] + side * door.width_m / 2.0
-    piece = next(
-        one
-        for one in pieces
-        if one.position_m[2] == 0.0  # not above a door
-        and abs(one.position_m[along] - side * one.size_m[along] / 2.0 - edge) < _TOLERANCE_M
-    )
-    if piece.size_m[along] < door.width_m:
-        raise ValueError(
-            f"door {door.name!r}: its leaf of {door.width_m} m slides into the wall beside it, "
-            f"which is {piece.size_m[along]:.2f} m long; choose leaf.opens_to_front="
-            f"{str(not leaf.opens_to_front).lower()}, a narrower door or leaf.kind=hinge"
-        )
-    if piece.size_m[across] < SLIDING_WALL_M:
-        raise ValueError(
-            f"door {door.name!r}: walls.thickness_m={piece.size_m[across]} is too thin for a leaf "
-            f"that slides into the wall; choose at least {SLIDING_WALL_M} or leaf.kind=hinge"
-        )
-    return piece
 
 
 def _check_outside(line: WallLine, rooms: Sequence[RoomCfg], thickness_m: float) -> None:

@@ -34,6 +34,7 @@ from veca_marl.sim.physics.props.rigid_body import (
     create_prop_body,
     is_turned,
 )
+from veca_marl.sim.physics.props.sound_obstacles import make_obstacles
 from veca_marl.sim.sound import Source
 from veca_marl.sim.sound.rooms import Obstacles
 
@@ -76,7 +77,6 @@ class Prop:
         self._client = client
         self._scene = scene
         self.geoms = geoms = prop_geoms(cfg)
-        self._obstacles = [_Obstacle(box, obstacles) for box in sound_obstacles(cfg, geoms)]
         shown = scene.add_object(cfg.name, [geoms])
         self.object_id = shown.id
         self._row = shown.rows.start
@@ -89,6 +89,8 @@ class Prop:
         self.centre_of_mass = frame.position
         self._centre = frame.position if frame.position.any() else None
         self._axes = frame.rotation if is_turned(frame) else None
+        boxes = sound_obstacles(cfg, geoms)
+        self._obstacles = make_obstacles(boxes, cfg.joint, self.body_id, client, obstacles)
         self.place(cfg.position_m, math.radians(cfg.yaw_deg))
 
     @property
@@ -282,21 +284,6 @@ class Prop:
         if self.joint is None:
             raise ValueError(f"prop {self.name!r} has no joint")
         return self.joint
-
-
-class _Obstacle:
-    """A box of a prop among the obstacles of the sound."""
-
-    def __init__(self, box: Geom, obstacles: Obstacles) -> None:
-        self._offset, self._turn = np.asarray(box.offset), np.asarray(box.rotation)
-        self._obstacles = obstacles
-        self._number = obstacles.add(box.size)
-
-    def move(self, position: Floats, rotation: Floats) -> None:
-        """Follow the frame of the prop."""
-        self._obstacles.move(
-            self._number, position + rotation @ self._offset, rotation @ self._turn
-        )
 
 
 def follow_physics(props: Sequence[Prop]) -> None:

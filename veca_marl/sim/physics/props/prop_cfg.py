@@ -16,6 +16,8 @@ from veca_marl.sim.physics.props.prop_shape import (
 from veca_marl.sim.sound import SoundCfg
 from veca_marl.sim.sound.impacts import Material
 
+_BOXES = {PropShape.box, PropShape.wall}
+
 
 @dataclass
 class PropCfg:
@@ -43,6 +45,8 @@ class PropCfg:
         checker_m: Edge of a checker pattern, which is fixed to the prop; 0 is plain.
         transparent: Whether eyes see through it; it does not hinder `is_visible`.
         tangible: Whether it collides, is felt and stops sound; a mark on the floor is only seen.
+        partition: Whether it fills an opening in a wall, as the leaf of a door does: its largest
+            box attenuates sound at any size. Walls do so too, and of other props large boxes.
         sound: What it emits; None for a silent prop.
         angle_deg: Angle of a sector of a disc, in (0, 180], halved by the x axis.
         parts: The parts of a compound prop.
@@ -67,6 +71,7 @@ class PropCfg:
     checker_m: float = 0.0
     transparent: bool = False
     tangible: bool = True
+    partition: bool = False
     sound: SoundCfg | None = None
     material: Material = Material.wood
     interactions: list[str] = field(default_factory=list)
@@ -104,6 +109,12 @@ class PropCfg:
                 "a compound has at least one part, other shapes have none"
             )
         check_piece(f"prop {self.name!r}: ", self.shape, self.angle_deg, self.points_m)
+        shapes = {self.shape, *(part.shape for part in self.parts)}
+        if self.partition and not shapes & _BOXES:
+            raise ValueError(
+                f"prop {self.name!r}: partition=true of a {self.shape.name} without a box; a "
+                "partition is a box or a compound with one"
+            )
 
     def _check_appearance(self) -> None:
         check_appearance(f"prop {self.name!r}: ", self.colour, self.checker_m)

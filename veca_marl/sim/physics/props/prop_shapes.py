@@ -25,7 +25,8 @@ from veca_marl.sim.physics.props.prop_shape import PropShape
 
 SOUND_OBSTACLE_M = (0.7, 1.0)
 """Least width and height of a box that attenuates sound as a wall does. Sound below 340 Hz, with
-wavelengths above a metre, is diffracted round anything smaller."""
+wavelengths above a metre, is diffracted round anything smaller. Walls and partitions, which fill
+openings, attenuate at any size."""
 
 
 def prop_geoms(cfg: PropCfg) -> tuple[Geom, ...]:
@@ -54,13 +55,16 @@ def prop_geoms(cfg: PropCfg) -> tuple[Geom, ...]:
 def sound_obstacles(cfg: PropCfg, geoms: Sequence[Geom]) -> list[Geom]:
     """Return the boxes of a prop that attenuate sound between rooms.
 
-    These are walls and large boxes, such as doors, also as parts of a compound, see
-    `SOUND_OBSTACLE_M`.
+    These are walls, the largest box of a partition, such as the leaf of a door, and large boxes,
+    also as parts of a compound, see `SOUND_OBSTACLE_M`.
     """
     if not cfg.tangible:
         return []
     if cfg.shape is PropShape.wall:
         return list(geoms)
+    if cfg.partition:
+        boxes = [geom for geom in geoms if geom.shape is Shape.BOX]
+        return [max(boxes, key=lambda box: box.volume)]
     return [geom for geom in geoms if geom.shape is Shape.BOX and _is_large(geom)]
 
 

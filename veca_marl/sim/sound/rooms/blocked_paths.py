@@ -19,7 +19,16 @@ _INSIDE_M = 1e-3
 
 @njit(cache=True)
 def crosses_box(one: Floats, other: Floats, centre: Floats, rotation: Floats, half: Floats) -> bool:
-    """Return whether a segment passes through a box (slab test: Kay & Kajiya, SIGGRAPH 1986).
+    """Return whether a segment passes through a box, see `stretch_in_box`."""
+    enter, leave = stretch_in_box(one, other, centre, rotation, half)
+    return bool(leave - enter > _GRAZE_M)
+
+
+@njit(cache=True)
+def stretch_in_box(
+    one: Floats, other: Floats, centre: Floats, rotation: Floats, half: Floats
+) -> tuple[float, float]:
+    """Return where a segment enters and leaves a box (Kay & Kajiya, SIGGRAPH 1986: slab test).
 
     Args:
         one: ``(3,)`` metres, one end of the segment.
@@ -27,6 +36,9 @@ def crosses_box(one: Floats, other: Floats, centre: Floats, rotation: Floats, ha
         centre: ``(3,)`` metres.
         rotation: ``(3, 3)`` from the axes of the box to the world's.
         half: ``(3,)`` metres, half of its edges.
+
+    Returns:
+        Metres from `one`; the second is not greater than the first if the segment misses the box.
     """
     enter, leave, square = 0.0, 1.0, 0.0
     for axis in range(3):
@@ -37,12 +49,13 @@ def crosses_box(one: Floats, other: Floats, centre: Floats, rotation: Floats, ha
             way += (other[k] - one[k]) * rotation[k, axis]
         if abs(way) < 1e-12:
             if abs(begin) > half[axis] - _GRAZE_M:
-                return False
+                return 0.0, 0.0
             continue
         first, second = (-half[axis] - begin) / way, (half[axis] - begin) / way
         enter = max(enter, min(first, second))
         leave = min(leave, max(first, second))
-    return bool((leave - enter) * np.sqrt(square) > _GRAZE_M)
+    length_m = np.sqrt(square)
+    return float(enter * length_m), float(leave * length_m)
 
 
 @njit(cache=True)
@@ -132,11 +145,8 @@ def count_crossed_inside(
     Returns:
         ``(K,)``.
     """
-    begin, end = _within(source, bounds), _within(head, bounds)
-    corners = np.empty((len(lattice), 2 + np.abs(lattice).sum(axis=1).max(), 3))
-    n_corners = np.empty(len(lattice), np.int64)
-    for k in range(len(lattice)):
-        n_corners[k] = _write_folded_path(begin, end, lower, size, lattice[k], corners[k])
+    begin, end = within_bounds(source, bounds), within_bounds(head, bounds)
+    corners, n_corners = folded_paths(begin, end, lower, size, lattice)
     counts = np.zeros(len(lattice), np.int64)
     for n in range(len(centres)):
         box = centres[n], rotations[n], halves[n]
@@ -145,17 +155,40 @@ def count_crossed_inside(
         if contains_point(begin, *box) or contains_point(end, *box):
             continue
         for k in range(len(lattice)):
-            counts[k] += _polygon_crosses(corners[k, : n_corners[k]], *box)
+            counts[k] += polygon_crosses(corners[k, : n_corners[k]], *box)
     return counts
 
 
 @njit(cache=True)
-def _within(point: Floats, bounds: tuple[Floats, Floats]) -> Floats:
+def within_bounds(point: Floats, bounds: tuple[Floats, Floats]) -> Floats:
     """Return the nearest point ``(3,)`` within bounds."""
     nearest = np.empty(3)
     for axis in range(3):
         nearest[axis] = min(max(point[axis], bounds[0][axis]), bounds[1][axis])
     return nearest
+
+
+@njit(cache=True)
+def folded_paths(
+    source: Floats, head: Floats, lower: Floats, size: Floats, lattice: NDArray[np.int64]
+) -> tuple[Floats, NDArray[np.int64]]:
+    """Return the corners of all paths from a head to a source in a room, folded at the walls.
+
+    Args:
+        source: ``(3,)`` metres in the room.
+        head: ``(3,)`` metres in the room.
+        lower: See `count_crossed_inside`.
+        size: Likewise.
+        lattice: Likewise.
+
+    Returns:
+        ``(K, n, 3)`` metres, and ``(K,)`` how many of the n corners belong to each path.
+    """
+    corners = np.empty((len(lattice), 2 + np.abs(lattice).sum(axis=1).max(), 3))
+    n_corners = np.empty(len(lattice), np.int64)
+    for k in range(len(lattice)):
+        n_corners[k] = _write_folded_path(source, head, lower, size, lattice[k], corners[k])
+    return corners, n_corners
 
 
 @njit(cache=True)
@@ -232,7 +265,7 @@ def _next_wall(
 
 
 @njit(cache=True)
-def _polygon_crosses(corners: Floats, centre: Floats, rotation: Floats, half: Floats) -> bool:
+def polygon_crosses(corners: Floats, centre: Floats, rotation: Floats, half: Floats) -> bool:
     """Return whether a segment between corners ``(n, 3)`` passes a box, see `crosses_box`."""
     for n in range(len(corners) - 1):
         if crosses_box(corners[n], corners[n + 1], centre, rotation, half):

@@ -3,9 +3,9 @@
 Image sources are right inside one box. A listener in the room of a source hears it with the
 reflections of that room. A listener in another room hears the direct sound alone. Each path is
 attenuated by every obstacle (wall, closed door, wardrobe) that it passes through at that moment. An
-open door is no obstacle, so that the direct sound through it is not attenuated. Diffraction round
-edges and reflections at obstacles are not modelled. When a listener enters another room or an
-obstacle moves into a path, the sound is cross-faded over one control step.
+open door is no obstacle, see `leaf_paths`, so that the direct sound through it is not attenuated.
+Diffraction round edges and reflections at obstacles are not modelled. When a listener enters
+another room or an obstacle moves into a path, the sound is cross-faded over one control step.
 """
 
 from __future__ import annotations

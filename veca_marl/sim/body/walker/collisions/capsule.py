@@ -18,7 +18,7 @@ above its mass walkers push it.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from itertools import chain
 from typing import Any
 
@@ -27,7 +27,14 @@ import numpy as np
 from veca_marl.sim.body.walker.collisions.jammed import JammedProps
 from veca_marl.sim.body.walker.collisions.leaves import Leaves
 from veca_marl.sim.body.walker.collisions.obstacle_boxes import ObstacleBoxes
-from veca_marl.sim.geometry import Floats, Primitive, Scene, Shape, quaternion_from_yaw
+from veca_marl.sim.geometry import (
+    Floats,
+    Primitive,
+    Scene,
+    Shape,
+    horizontal_distance,
+    quaternion_from_yaw,
+)
 from veca_marl.sim.physics import Prop, World, create_collision_shape, pybullet
 
 _ROUNDS = 3  # two for the walls of a corner, one spare
@@ -78,39 +85,55 @@ class Capsule:
         self._reach_m = _reach_m(form)
         self._obstacles = ObstacleBoxes(client, scene, [], [], _LIMB_REACH_M)
         self._leaves = Leaves(client, [])
-        self._jammed = JammedProps(client, scene, self.body_id, [])
+        self._jammed = JammedProps(client, scene, self.body_id, [], [])
         self._known = (0, 0)
+        self._capsules: Collection[int] = ()
         self._near: list[int] = []
         self._near_leaves: list[Prop] = []
 
     def collect_obstacles(
-        self, props: dict[str, Prop], bodies: Sequence[int], position: Floats, distance_m: float
+        self,
+        props: dict[str, Prop],
+        bodies: Sequence[int],
+        capsules: Collection[int],
+        position: Floats,
+        distance_m: float,
     ) -> None:
         """Collect the obstacles that can be reached within this agent step.
 
         Args:
             props: All props of the world.
             bodies: PyBullet's ids of all joint-level bodies.
+            capsules: PyBullet's ids of the capsules of all walkers.
             position: ``(2,)`` or ``(3,)`` metres; only the horizontal part counts.
             distance_m: The distance that the walker covers without obstacles.
         """
         if (len(props), len(bodies)) != self._known:
             self._find_obstacles(props, bodies)
+        self._capsules = capsules
         reach_m = self._reach_m + _MARGIN_M + distance_m
         near = self._obstacles.near(position, reach_m)
         self._near = [body_id for body_id in near if body_id != self.support_id]
         self._near_leaves = self._leaves.near(position, reach_m)
-        self._jammed.collect(position, reach_m, self._near_leaves)
+        self._jammed.collect(position, reach_m, self._near_leaves, capsules)
 
     def solid_near(self, position: Floats, reach_m: float) -> list[int]:
-        """Return PyBullet's ids of the obstacles, doors and drawers within a horizontal distance.
+        """Return PyBullet's ids of what is within a horizontal distance and is not pushed.
+
+        These are obstacles, doors, drawers and the capsules of other walkers.
 
         Args:
             position: ``(2,)`` or ``(3,)`` metres; only the horizontal part counts.
             reach_m: Metres.
         """
-        leaves = self._leaves.near(position, reach_m)
-        return self._obstacles.near(position, reach_m) + [leaf.body_id for leaf in leaves]
+        leaves = [leaf.body_id for leaf in self._leaves.near(position, reach_m)]
+        others = [
+            body_id
+            for body_id in self._capsules
+            if body_id != self.body_id
+            and horizontal_distance(self._centre(body_id), position) < reach_m + _LIMB_REACH_M
+        ]
+        return [*self._obstacles.near(position, reach_m), *leaves, *others]
 
     def resolve_contacts(self, x: float, y: float) -> tuple[float, float]:
         """Set the position and move the capsule out of obstacles; return the new position."""
@@ -122,6 +145,10 @@ class Capsule:
             x, y = x + out_x, y + out_y
             self._set_position(x, y)
         return x, y
+
+    def room_for_others(self) -> tuple[float, float]:
+        """Return by how much it makes room for what it and other walkers press together, metres."""
+        return _depenetration(self._jammed.squeezes())
 
     def set_velocity(self, vx: float, vy: float, turn_radps: float) -> None:
         """Set the velocity with which Bullet computes contacts with light props.
@@ -156,6 +183,11 @@ class Capsule:
             self.body_id, position, orientation, physicsClientId=self._client
         )
 
+    def _centre(self, body_id: int) -> Floats:
+        """Return the position ``(3,)`` of a body, metres."""
+        position, _ = pybullet.getBasePositionAndOrientation(body_id, physicsClientId=self._client)
+        return np.array(position)
+
     def _overlaps(self) -> Iterator[_Overlap]:
         """Yield how deep it is in obstacles, and in doors and drawers that cannot yield."""
         for body_id in self._near:
@@ -182,9 +214,10 @@ class Capsule:
         heavy = [one for one in bodies if _mass_kg(self._client, one) > limit_kg]
         self._obstacles = ObstacleBoxes(self._client, self._scene, things, heavy, _LIMB_REACH_M)
         light = [p for p in solid if not p.fixed and p.cfg.mass_kg <= limit_kg]
-        self._leaves = Leaves(self._client, [p for p in light if p.joint is not None])
+        leaves = [p for p in light if p.joint is not None]
+        self._leaves = Leaves(self._client, leaves)
         loose = [p for p in light if p.joint is None]
-        self._jammed = JammedProps(self._client, self._scene, self.body_id, loose)
+        self._jammed = JammedProps(self._client, self._scene, self.body_id, loose, leaves)
         for body_id in self._obstacles.ids:
             for link in range(-1, pybullet.getNumJoints(body_id, physicsClientId=self._client)):
                 pybullet.setCollisionFilterPair(

@@ -2,13 +2,15 @@
 
 Walkers are kinematic and have no mass, so Bullet does not keep them apart. All walkers of a world
 therefore move at once: each proposes a position, overlapping pairs are separated by half of their
-overlap each, and walls and heavy things take precedence. The result for a pair depends on the
-positions of both and not on which of them was added first.
+overlap each, and walls and heavy things take precedence. So are pairs that press a light thing
+between them. The result for a pair depends on the positions of both and not on which of them was
+added first.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Protocol
 
 import numpy as np
@@ -43,12 +45,21 @@ class CollidingWalker(VerbUser, Protocol):
         """Radius of the capsule."""
         ...
 
+    @property
+    def capsule_ids(self) -> Sequence[int]:
+        """PyBullet's ids of the capsules of all stances."""
+        ...
+
     def proposed_position(self, substep_s: float) -> tuple[float, float]:
         """Turn; return the position after this physics step without obstacles, metres."""
         ...
 
     def resolve_contacts(self, x: float, y: float) -> tuple[float, float]:
         """Return the position nearest to ``(x, y)`` outside walls and heavy things."""
+        ...
+
+    def room_for_others(self) -> tuple[float, float]:
+        """Return by how much it makes room for what it and other walkers press together, metres."""
         ...
 
     def set_position(self, x: float, y: float, substep_s: float) -> None:
@@ -64,6 +75,11 @@ class WalkerCollisions:
         self._radii: Floats = np.zeros(0)
         self._positions: Floats = np.zeros((0, 2))
         self._corrections: Floats = np.zeros((0, 2))
+
+    @property
+    def capsule_ids(self) -> list[int]:
+        """PyBullet's ids of the capsules of all walkers."""
+        return [id_ for walker in self._walkers for id_ in walker.capsule_ids]
 
     def add(self, walker: CollidingWalker) -> None:
         """Add a walker."""
@@ -89,13 +105,26 @@ class WalkerCollisions:
         for index, walker in enumerate(self._walkers):
             positions[index] = walker.resolve_contacts(*walker.proposed_position(substep_s))
         for _ in range(_ROUNDS):
-            if not separate(positions, self._radii, corrections):
+            overlap = separate(positions, self._radii, corrections)
+            if not (self._make_room(corrections) or overlap):
                 break
             for index in np.flatnonzero(corrections.any(axis=1)).tolist():
                 x, y = positions[index] + corrections[index]
                 positions[index] = self._walkers[index].resolve_contacts(float(x), float(y))
         for (x, y), walker in zip(positions.tolist(), self._walkers, strict=True):
             walker.set_position(x, y, substep_s)
+
+    def _make_room(self, corrections: Floats) -> bool:
+        """Add the displacements that release what walkers press together; return if there are any.
+
+        Args:
+            corrections: ``(n, 2)`` metres.
+        """
+        if len(self._walkers) == 1:
+            return False
+        rooms = np.array([walker.room_for_others() for walker in self._walkers])
+        corrections += rooms
+        return bool(rooms.any())
 
     def write_frames(self) -> None:
         """See `Mover`."""

@@ -17,6 +17,9 @@ _FLOOR_GAP_M = 0.01  # between the floor and the lowest point of a held prop
 _WALL_GAP_M = 0.01  # between a wall and the surface of a held prop
 _CLEARANCE_M = 1e-4  # from the surface of the walker's own capsule to the start of a ray
 _ARM_M = 0.5  # no palm is farther from the axis of the trunk
+_ARM_MPS = (
+    1.0  # greatest speed of a held prop relative to the trunk; it is moved past edges at once
+)
 _ROUNDS = 6  # of moving a prop out of walls; in a corner that is not square each leaves a rest
 
 
@@ -24,9 +27,9 @@ class Hand:
     """Holds a prop beside the palm, upright, at a constant yaw relative to the trunk.
 
     Its centre of mass is beside the palm. The prop is kinematic while it is held: its pose is set
-    at each physics step, and its velocity is that of this motion. It does not collide with its
-    holder. It stays on the walker's side of walls: where they are nearer than the hand would hold
-    it, it is held nearer to the trunk.
+    at each physics step, and its velocity is that of this motion, without jumps at the edges of
+    walls. It does not collide with its holder. It stays on the walker's side of walls and of other
+    walkers: where they are nearer than the hand would hold it, it is held nearer to the trunk.
 
     Args:
         client: PyBullet's client id.
@@ -43,6 +46,7 @@ class Hand:
         self._yaw_rad = self._turn_radps = 0.0
         self._half_width_m = self._below_m = 0.0
         self._offset, self._centre, self._velocity = np.zeros((3, 3))
+        self._trunk = (np.zeros(2), 0.0)  # place and heading for which the prop was placed
 
     @property
     def prop(self) -> Prop | None:
@@ -106,9 +110,13 @@ class Hand:
             substep_s: Seconds since the last call.
         """
         if self.prop is not None:
-            before = self._centre
+            before, (start, start_rad) = self._centre, self._trunk
             self._place(self.prop, ground, yaw_rad)
-            self._velocity = (self._centre - before) / substep_s
+            # where it would be if it had kept its place beside the trunk
+            turn = rotation_about_vertical(yaw_rad - start_rad)
+            carried = turn @ (before - _on_floor(start)) + _on_floor(ground)
+            by_arm = _limited((self._centre - carried) / substep_s, _ARM_MPS)
+            self._velocity = (carried - before) / substep_s + by_arm
             self._turn_radps = turn_radps
             self._set_velocity(self.prop)
 
@@ -123,7 +131,7 @@ class Hand:
                 break
             centre = centre + out
             self._carry(prop, centre, yaw_rad)
-        self._centre = centre
+        self._centre, self._trunk = centre, (ground.copy(), yaw_rad)
 
     def _carry(self, prop: Prop, centre: Floats, yaw_rad: float) -> None:
         """Set the pose of the prop by the place ``(3,)`` of its centre of mass."""
@@ -154,6 +162,17 @@ class Hand:
         centre, reach_m = _centre_of_mass(prop), 2.0 * prop.extent_m
         outside_m = surface_m(self._client, prop.body_id, centre + reach_m * right, centre)
         return reach_m - outside_m
+
+
+def _on_floor(ground: Floats) -> Floats:
+    """Return a place ``(3,)`` on the floor from its coordinates ``(2,)``, metres."""
+    return np.array([ground[0], ground[1], 0.0])
+
+
+def _limited(velocity: Floats, greatest_mps: float) -> Floats:
+    """Return a velocity ``(3,)``, shortened to a speed."""
+    speed = float(np.linalg.norm(velocity))
+    return velocity if speed <= greatest_mps else velocity * (greatest_mps / speed)
 
 
 def _centre_of_mass(prop: Prop) -> Floats:

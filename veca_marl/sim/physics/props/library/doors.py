@@ -15,8 +15,10 @@ DOOR_KG = 3.0
 SLIDING_WALL_M = 0.05
 """Least thickness of a wall into which a leaf slides."""
 
+LEAF_M = 0.04
+"""Thickness of a leaf."""
+
 _GAP_M = 0.01  # to the frame on either side and to the floor
-_THICKNESS_M = 0.04
 _HANDLE_HEIGHT_M = 0.45  # within reach of a child of 0.78 m
 _METAL: Colour = (0.75, 0.75, 0.78)
 _WOOD: Colour = (0.80, 0.62, 0.42)
@@ -57,7 +59,7 @@ def door_leaf(
     side = 1.0 if opens_to_front else -1.0
     hinge = JointCfg(
         axis=(0.0, 0.0, -side),
-        anchor_m=(side * _THICKNESS_M / 2.0, -width / 2.0, 0.0),
+        anchor_m=(side * LEAF_M / 2.0, -width / 2.0, 0.0),
         range_deg=90.0,
         lock=lock,
     )
@@ -110,6 +112,11 @@ def sliding_leaf(
     return _leaf(name, (*position_m, height_m / 2.0), yaw_deg, parts, slide, colour, mass_kg)
 
 
+def open_reach_m(width_m: float) -> float:
+    """Return how far the open leaf of a sliding door of a clear width reaches into its wall."""
+    return width_m - 3.0 * _GAP_M - _LEFT_OUT_M
+
+
 def _leaf(
     name: str,
     position_m: tuple[float, float, float],
@@ -127,6 +134,7 @@ def _leaf(
         mass_kg=mass_kg,
         colour=colour,
         parts=parts,
+        partition=True,
         interactions=["open", "close"],
         joint=joint,
     )
@@ -141,9 +149,9 @@ def _leaf_parts(width: float, height_m: float, handle_m: float, handle_y: float)
         handle_m: By how much the handles stand out.
         handle_y: Their place along the width.
     """
-    parts = [PartCfg(PropShape.box, [_THICKNESS_M, width, height_m - 2.0 * _GAP_M])]
+    parts = [PartCfg(PropShape.box, [LEAF_M, width, height_m - 2.0 * _GAP_M])]
     for face in (-1.0, 1.0):
-        out = face * (_THICKNESS_M + handle_m) / 2.0
+        out = face * (LEAF_M + handle_m) / 2.0
         place = (out, handle_y, _HANDLE_HEIGHT_M - height_m / 2.0)
         parts.append(PartCfg(PropShape.box, [handle_m, 0.1, 0.02], place, colour=_METAL))
     return parts
