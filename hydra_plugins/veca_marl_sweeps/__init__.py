@@ -18,7 +18,7 @@ from hydra.plugins.launcher import Launcher
 from hydra.types import HydraContext, TaskFunction
 from omegaconf import DictConfig, OmegaConf, open_dict
 
-from veca_marl.sweeps.cores import usable_cores
+from veca_marl.runs.cores import usable_cores
 from veca_marl.sweeps.former import former_values
 from veca_marl.sweeps.plans import Job, SweepError
 from veca_marl.sweeps.sweep import run_sweep

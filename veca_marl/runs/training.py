@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import logging
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import torch
 from tensordict.nn import TensorDictModuleBase
 from torchrl import timeit
 
@@ -16,9 +18,12 @@ from veca_marl.algos.training.reporters import MemoryReporter, Reporter, Row
 from veca_marl.config import Config
 from veca_marl.envs.core.game_cfg import GameCfg
 from veca_marl.runs.assembly import make_reporters, make_trainer
+from veca_marl.runs.cores import contention_warning, load, usable_cores
 from veca_marl.runs.recording import record_episode
 from veca_marl.runs.run_folder import RunFolder
 from veca_marl.runs.run_progress import RunProgress
+
+_LOG = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -112,6 +117,8 @@ def run_training(
         CheckpointError: See `make_trainer`; also if a checkpoint cannot be written.
     """
     trainer = trainer or make_trainer(cfg, folder)
+    if cfg.threads is None and cfg.device == "cpu":
+        _warn_of_contention()
     memory = MemoryReporter()
     with ExitStack() as pending:
         written = [] if folder is None else _make_reporters(cfg, folder, trainer.progress.frames)
@@ -138,6 +145,13 @@ def run_training(
         timing,
         None if folder is None else folder.path,
     )
+
+
+def _warn_of_contention() -> None:
+    """Log that fewer threads would be faster, if other programs use the cores."""
+    warning = contention_warning(torch.get_num_threads(), usable_cores(), load())
+    if warning:
+        _LOG.warning(warning)
 
 
 def _make_reporters(cfg: Config, folder: RunFolder, frames: int) -> list[Reporter]:

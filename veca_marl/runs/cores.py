@@ -1,0 +1,41 @@
+"""The cores that a run may use, and whether other programs use them too."""
+
+from __future__ import annotations
+
+import os
+
+
+def usable_cores() -> int:
+    """Return the number of cores that this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def load() -> float:
+    """Return the mean number of threads that ran in the last minute; 0 where it is not known."""
+    return os.getloadavg()[0] if hasattr(os, "getloadavg") else 0.0
+
+
+def contention_warning(threads: int, cores: int, others: float) -> str:
+    """Return a sentence for the log if several threads learn on cores that are in use.
+
+    A parallel loop waits for its last thread. If another program interrupts that one, the others
+    wait actively for a time slice of the system, in each of the hundreds of loops of a gradient
+    step: beside one busy program on two cores, a step of the default network took 55 ms with two
+    threads and 35 ms with one; beside several programs, seconds.
+
+    Args:
+        threads: Threads that learn.
+        cores: Cores that they may use.
+        others: Mean number of threads of other programs, see `load`.
+
+    Returns:
+        The sentence; empty if one thread learns or there are cores for all.
+    """
+    if threads == 1 or others + threads < cores + 1.0:
+        return ""
+    return (
+        f"other programs had a load of {others:.1f} in the last minute, and {threads} threads "
+        f"learn on {cores} cores: while that lasts, threads=1 is faster"
+    )
