@@ -3,6 +3,7 @@
 import csv
 
 import pytest
+from paths import ROOT
 from scipy import stats
 
 from veca_marl.algos.evaluation.comparison import share_interval
@@ -12,9 +13,11 @@ from veca_marl.envs.core.expert import Expert, find_expert
 from veca_marl.envs.core.game import Game
 from veca_marl.envs.core.team import Script
 from veca_marl.experts_table.command import main
-from veca_marl.experts_table.play import Played, game_cfg
+from veca_marl.experts_table.play import Played, digest, game_cfg
 from veca_marl.experts_table.table import markdown
+from veca_marl.sim.physics import PropCfg
 
+BENCHMARK = ROOT / "experiments" / "experts" / "benchmark"
 SHORT = ("tasks=[DodgeCar]", "frozen=false", "task.max_seconds=0.4")
 
 
@@ -126,3 +129,21 @@ def test_the_game_computes_only_the_senses_that_an_expert_reads(monkeypatch):
     game.play_script(player, Script.expert)
     assert seen == [{"audio"}, {"audio", "vision"}]
     game.close()
+
+
+@pytest.mark.parametrize("path", sorted(BENCHMARK.glob("[A-Z]*.csv")), ids=lambda path: path.stem)
+def test_stored_episodes_are_of_the_present_configuration(path):
+    """Otherwise the command of the table refuses them: whoever changes a task plays them again."""
+    with path.open(newline="") as file:
+        stored = {row["configuration"] for row in csv.DictReader(file)}
+    assert stored == {digest(game_cfg(path.stem, ()))}
+
+
+def test_a_field_that_was_added_changes_a_digest_only_with_another_value():
+    cfg = game_cfg("ObjectNav", ())
+    before = digest(cfg)
+    cfg.playground.props.append(PropCfg(name="screen", size_m=[1.0, 0.1, 1.0]))
+    with_screen = digest(cfg)
+    cfg.playground.props[-1].partition = True
+    assert len({before, with_screen, digest(cfg)}) == 3
+    assert PropCfg.formerly == {"partition": False}

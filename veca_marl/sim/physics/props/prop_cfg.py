@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from typing import Any, ClassVar
 
 from veca_marl.sim.physics.props.joint_cfg import JointCfg
 from veca_marl.sim.physics.props.part_cfg import PartCfg
@@ -57,6 +58,9 @@ class PropCfg:
         interactions: Names of the verbs that bodies can apply to it, such as ``[grab]``; see
             `veca_marl.sim.physics.interactions`.
     """
+
+    # fields that were added later, with the value that props had before
+    formerly: ClassVar[dict[str, Any]] = {"partition": False}
 
     name: str = ""
     shape: PropShape = PropShape.box
