@@ -206,6 +206,24 @@ def test_eyes_converge_on_near_points():
         assert convergence_deg(distance_m) == pytest.approx(expected, rel=1e-6)
 
 
+@pytest.mark.parametrize("below_m", [-0.25, 0.0, 0.2])
+@pytest.mark.parametrize("aside_m", [-0.1, 0.0, 0.25])
+def test_images_of_a_fixated_point_are_not_rolled_against_each_other(aside_m, below_m):
+    """What lies in the plane of both lines of sight is in the same row of both images.
+
+    With yaw before pitch the vertical axes of both images were up to 18 degrees apart.
+    """
+    walker = walker_in(empty_world(), head_pitch_deg=10.0)
+    left, right = (walker.mount(eye).position for eye in ("eye_left", "eye_right"))
+    head = walker.mount("head").rotation
+    point = (left + right) / 2.0 + head @ np.array([0.25, aside_m, -below_m])
+    walker.look_toward_point(point)
+    up = [walker.mount(eye).rotation[:, 2] for eye in ("eye_left", "eye_right")]
+    np.testing.assert_allclose(up[0], up[1], atol=1e-12)
+    normal = np.cross(point - left, point - right)
+    assert abs(up[0] @ normal) == pytest.approx(np.linalg.norm(normal), rel=1e-9)
+
+
 def test_eyes_keep_looking_at_the_point_until_released():
     world = empty_world()
     walker = walker_in(world)
