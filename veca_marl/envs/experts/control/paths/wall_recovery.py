@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from veca_marl.sim.sound import Call
 
 # a body is stuck that has moved and turned by less than this within this time
 _STUCK_S, _STUCK_M, _STUCK_RAD = 1.4, 0.15, 0.5
+_STUCK_IN_SPACE_S = 4.0  # the same for a body with nothing near that could stop it
 _BACK_S = 1.2
 _ASIDE_RAD = 1.0  # a body turns towards a place at a greater angle from straight ahead
 
@@ -29,17 +31,25 @@ class WallRecovery:
         turning_s: Time for turning towards a place at the side or behind in which the body does not
             count as stuck. The gaits on hands and knees turn by about 20 degrees per second on the
             spot, and moving backwards would undo it.
+        has_space: Returns whether nothing is near that could stop the body, which then counts as
+            stuck only after 4 s; None never returns it.
 
     Attributes:
         clearances: See `Locomotion`.
     """
 
     def __init__(
-        self, body: Body, locomotion: Locomotion, step_s: float, turning_s: float = 0.0
+        self,
+        body: Body,
+        locomotion: Locomotion,
+        step_s: float,
+        turning_s: float = 0.0,
+        has_space: Callable[[], bool] | None = None,
     ) -> None:
         self.clearances = locomotion.clearances
         self._body, self._locomotion = body, locomotion
         self._stuck_steps, self._back_steps = round(_STUCK_S / step_s), round(_BACK_S / step_s)
+        self._has_space, self._steps_in_space = has_space, round(_STUCK_IN_SPACE_S / step_s)
         self._track: list[Floats] = []
         self._steps_left = 0
         self._turning_steps, self._aside_steps = round(turning_s / step_s), 0
@@ -85,9 +95,11 @@ class WallRecovery:
 
     def _is_stuck(self) -> bool:
         now = np.append(self._body.position[:2], self._body.forward[:2])
-        self._track.append(now)
-        if len(self._track) <= self._stuck_steps:
+        has_space = self._has_space is not None and self._has_space()
+        steps = self._steps_in_space if has_space else self._stuck_steps
+        self._track = [*self._track[-self._steps_in_space :], now]
+        if len(self._track) <= steps:
             return False
-        before = self._track.pop(0)
+        before = self._track[-1 - steps]
         turned = float(before[2:] @ now[2:]) < math.cos(_STUCK_RAD)
         return not turned and math.dist(before[:2], now[:2]) < _STUCK_M
