@@ -97,7 +97,7 @@ def _error_rate_text(report: Report) -> str:
     if not rates:
         return ""
     return (
-        "Of two arms whose scores have the same normal distribution, a claim `ARM > OTHER` would "
+        "Of two arms with scores from one normal distribution, a claim `ARM > OTHER` would "
         f"be decided in {', '.join(rates)} of experiments, by a simulation."
     )
 

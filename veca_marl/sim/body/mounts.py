@@ -103,7 +103,7 @@ def aimed(eye: Pose, point: Floats, range_rad: float) -> Pose:
 
 
 def _upright(x: float, y: float, z: float) -> Floats:
-    """Return the rotation whose x axis is a unit vector and whose z axis is in the plane y = 0."""
+    """Return the rotation with a given x axis, a unit vector, and a z axis in the plane y = 0."""
     sagittal = math.hypot(x, z)
     up_x, up_z = -z / sagittal, x / sagittal
     return np.array([[x, -up_z * y, up_x], [y, up_z * x - up_x * z, 0.0], [z, up_x * y, up_z]])

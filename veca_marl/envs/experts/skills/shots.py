@@ -24,7 +24,7 @@ _DEVIATIONS_RAD = [side * math.radians(deg) for deg in range(0, 180, 15) for sid
 
 @dataclass(frozen=True)
 class Shooter:
-    """Where a body is that will shoot, and who is in its way.
+    """Positions of a body that will shoot and of an opponent.
 
     Attributes:
         here: Position of the body, ``(2,)`` metres.
