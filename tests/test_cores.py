@@ -30,7 +30,7 @@ def test_a_run_that_finds_its_cores_in_use_logs_it(monkeypatch, caplog):
     monkeypatch.setattr(torch, "get_num_threads", lambda: usable_cores() + 1)
     with caplog.at_level(logging.WARNING):
         training._warn_of_contention()
-    assert "other programs had a load of 100.0" in caplog.text
+    assert "the machine had a load of 100.0" in caplog.text
 
 
 def test_the_load_is_not_negative():

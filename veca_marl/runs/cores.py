@@ -28,7 +28,7 @@ def contention_warning(threads: int, cores: int, others: float) -> str:
     Args:
         threads: Threads that learn.
         cores: Cores that they may use.
-        others: Mean number of threads of other programs, see `load`.
+        others: Mean number of threads that ran before this run learnt, see `load`.
 
     Returns:
         The sentence; empty if one thread learns or there are cores for all.
@@ -36,6 +36,6 @@ def contention_warning(threads: int, cores: int, others: float) -> str:
     if threads == 1 or others + threads < cores + 1.0:
         return ""
     return (
-        f"other programs had a load of {others:.1f} in the last minute, and {threads} threads "
-        f"learn on {cores} cores: while that lasts, threads=1 is faster"
+        f"the machine had a load of {others:.1f} in the last minute, and {threads} threads learn "
+        f"on {cores} cores: if other programs go on using them, threads=1 is faster"
     )

@@ -211,7 +211,7 @@ def test_eyes_converge_on_near_points():
 def test_images_of_a_fixated_point_are_not_rolled_against_each_other(aside_m, below_m):
     """What lies in the plane of both lines of sight is in the same row of both images.
 
-    With yaw before pitch the vertical axes of both images were up to 18 degrees apart.
+    With yaw before pitch the vertical axes of both images differ, the more the nearer the point.
     """
     walker = walker_in(empty_world(), head_pitch_deg=10.0)
     left, right = (walker.mount(eye).position for eye in ("eye_left", "eye_right"))

@@ -17,9 +17,8 @@ _FLOOR_GAP_M = 0.01  # between the floor and the lowest point of a held prop
 _WALL_GAP_M = 0.01  # between a wall and the surface of a held prop
 _CLEARANCE_M = 1e-4  # from the surface of the walker's own capsule to the start of a ray
 _ARM_M = 0.5  # no palm is farther from the axis of the trunk
-_ARM_MPS = (
-    1.0  # greatest speed of a held prop relative to the trunk; it is moved past edges at once
-)
+# greatest speed of a held prop relative to the trunk, also where it is moved past an edge at once
+_ARM_MPS = 1.0
 _ROUNDS = 6  # of moving a prop out of walls; in a corner that is not square each leaves a rest
 
 
