@@ -46,7 +46,7 @@ def test_every_task_has_a_file_and_every_file_a_task():
 
 @pytest.mark.parametrize("choices", [list(filter(None, row)) for row in TOGETHER], ids=" ".join)
 def test_every_preset_composes(choices):
-    assert isinstance(compose([KICK, *choices]), Config)
+    assert isinstance(compose(["+task=ObjectNav", *choices]), Config)
 
 
 @pytest.mark.parametrize("name", EXPERIMENTS)
@@ -186,12 +186,12 @@ def test_configuration_survives_the_file_of_a_run(tmp_path):
     ],
 )
 def test_a_body_composes_to_its_own_type(preset, kind, different):
-    assert compose([KICK, f"body={preset}"]).body == kind(**different)
+    assert compose(["+task=ObjectNav", f"body={preset}"]).body == kind(**different)
 
 
 def test_a_body_takes_its_own_numbers_alone():
-    assert compose([KICK, "body=mitten", "body.strength=0.5"]).body.strength == 0.5
+    assert compose(["+task=ObjectNav", "body=mitten", "body.strength=0.5"]).body.strength == 0.5
     with pytest.raises(ConfigError, match="walk_speed_mps"):
-        compose([KICK, "body=mitten", "body.walk_speed_mps=0.5"])
+        compose(["+task=ObjectNav", "body=mitten", "body.walk_speed_mps=0.5"])
     with pytest.raises(ConfigError, match=r"body\.detail|Detail"):
-        compose([KICK, "body=full", "body.detail=stick"])
+        compose(["+task=ObjectNav", "body=full", "body.detail=stick"])

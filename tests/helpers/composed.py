@@ -30,6 +30,7 @@ def compose(overrides=()):
     try:
         composed = with_numbers(composed, {each.key_or_group: each.value() for each in numbers})
         composed.check_teams()
+        composed.game.check_bodies()
         composed.game.check_playground()
     except (OmegaConfBaseException, ValueError) as error:
         raise config.ConfigError(one_line(error)) from error

@@ -102,6 +102,7 @@ def to_config(node: DictConfig) -> Config:
         find_task(config.task.name)
         _refuse_extra(config, "")
         config.check_teams()
+        config.game.check_bodies()
         config.game.check_playground()
     except (OmegaConfBaseException, ValueError) as error:
         raise ConfigError(one_line(error)) from error

@@ -75,7 +75,7 @@ def test_each_agent_has_its_own_rewards_and_senses(env, cfg):
 
 
 def test_returned_arrays_do_not_change_in_later_steps():
-    game = compose(["+task=KickTheBall", "playground=simple", "body=mitten"]).game
+    game = compose(["+task=ObjectNav", "playground=simple", "body=mitten"]).game
     senses = ("vision", "audio", "touch", "proprioception")
     with free_play(game, 2, senses=senses) as cfg:
         env = VecaParallelEnv(cfg, seed=1)

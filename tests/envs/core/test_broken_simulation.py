@@ -14,7 +14,7 @@ from veca_marl.envs.adapters.torchrl.env import VecaEnv
 from veca_marl.envs.core.game import Game
 from veca_marl.sim.physics import pybullet
 
-CFG = compose(["+task=KickTheBall", "body=mitten"]).game
+CFG = compose(["+task=ObjectNav", "body=mitten"]).game
 SENSES = ("vision", "audio", "proprioception")
 
 
@@ -83,8 +83,3 @@ def test_pettingzoo_continues_in_a_new_world(cfg):
     np.testing.assert_array_equal(broken.render(), sound.render())
     broken.close()
     sound.close()
-
-
-def test_a_task_for_walkers_refuses_other_bodies():
-    with pytest.raises(ValueError, match="a body that walks and kicks; choose body=walker"):
-        Game(CFG)

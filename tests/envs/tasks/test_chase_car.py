@@ -94,7 +94,10 @@ def test_a_contact_ends_the_episode_unsolved(game):
 @pytest.mark.parametrize(
     ("override", "message"),
     [
-        ("body.verbs=[grab]", r"needs a body with the verb 'press'; body.verbs=\['grab'\]"),
+        (
+            "body.verbs=[grab]",
+            r"needs the verbs \['press'\]; body.verbs=\['grab'\] lacks \['press'\]",
+        ),
         ("task.presses=0", "task.presses=0 must be at least 1"),
         ("task.rest_s=0", "task.rest_s"),
         ("playground=four_rooms", "choose playground=simple or single_room"),

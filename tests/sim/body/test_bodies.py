@@ -92,7 +92,7 @@ def test_a_plug_in_adds_a_body_that_acts_and_calls(statue):
 
 
 def test_the_body_of_a_plug_in_is_a_choice_of_the_configuration(statue):
-    cfg = compose(["+task=KickTheBall", "body=statue", "body.height_m=0.7"]).game.body
+    cfg = compose(["+task=ObjectNav", "body=statue", "body.height_m=0.7"]).game.body
     assert type(cfg) is StatueCfg
     assert cfg.height_m == 0.7
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from veca_marl.envs.core.bodies import check_body
 from veca_marl.envs.core.expert import find_expert
 from veca_marl.envs.core.task import TaskCfg, Team, find_task
 from veca_marl.envs.core.team import Script, TeamCfg
@@ -53,14 +54,25 @@ class GameCfg:
         return self.senses if own is None else own.senses.replace_in(self.senses)
 
     def check(self) -> None:
-        """Check the names of the teams, the scripts and the playground.
+        """Check the names of the teams, the scripts, the bodies and the playground.
 
         Raises:
             ValueError: If a team does not exist, all teams are scripted, the task has no expert
-                for a script, or the playground does not fit.
+                for a script, or a body or the playground does not fit.
         """
         self._check_teams([team.name for team in self.teams])
+        self.check_bodies()
         self.check_playground()
+
+    def check_bodies(self) -> None:
+        """Check that the task can be played with the bodies of all teams.
+
+        Raises:
+            ValueError: If a body is of another kind than it needs, or lacks a verb.
+        """
+        task = find_task(self.task.name)
+        for team in self.teams:
+            check_body(team.name, self.body_of(team.name), task.body_cfg, task.verbs)
 
     def check_playground(self) -> None:
         """Check that the task and all its players fit into the playground.

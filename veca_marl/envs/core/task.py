@@ -11,10 +11,11 @@ from typing import Any, ClassVar, NamedTuple, TypeVar, get_type_hints
 
 import numpy as np
 
+from veca_marl.envs.core.bodies import wrong_body
 from veca_marl.registry import Registry
-from veca_marl.sim.body import Body
-from veca_marl.sim.body.humanoid import Humanoid
-from veca_marl.sim.body.walker import Walker
+from veca_marl.sim.body import Body, BodyCfg
+from veca_marl.sim.body.humanoid import Humanoid, HumanoidCfg
+from veca_marl.sim.body.walker import Walker, WalkerCfg
 from veca_marl.sim.physics import PlaygroundCfg, World
 from veca_marl.sim.sense import Sense
 
@@ -58,29 +59,24 @@ class Player(NamedTuple):
 
 
 def require_walker(player: Player) -> Walker:
-    """Return the body of a player, for a task that needs one that walks and kicks.
+    """Return the body of a player, which walks and kicks, see `Task.body_cfg`.
 
     Raises:
         ValueError: If the body is of another kind.
     """
     if not isinstance(player.body, Walker):
-        raise ValueError(
-            f"{player.name}: this task needs a body that walks and kicks; choose body=walker"
-        )
+        raise wrong_body(player.name, WalkerCfg)
     return player.body
 
 
 def require_humanoid(player: Player) -> Humanoid:
-    """Return the body of a player, for a task that needs one that is controlled by its joints.
+    """Return the body of a player, which is controlled by its joints, see `Task.body_cfg`.
 
     Raises:
         ValueError: If the body is of another kind.
     """
     if not isinstance(player.body, Humanoid):
-        raise ValueError(
-            f"{player.name}: this task needs a body with joints; choose body=full, mitten, "
-            "full_limbs or mitten_limbs"
-        )
+        raise wrong_body(player.name, HumanoidCfg)
     return player.body
 
 
@@ -149,6 +145,9 @@ class Task(ABC):
     Attributes:
         teams: The teams, see also `teams_of`.
         senses: Senses of the players.
+        body_cfg: Class of the parameters of the bodies that can play it: `WalkerCfg`,
+            `HumanoidCfg`, or `BodyCfg` for any.
+        verbs: Choices of the action part `verb` that it needs.
         eliminates: Whether the game can end for single players, see `is_eliminated`.
         suite: Name of the collection of tasks that it belongs to, see `veca_marl.list_tasks`.
         cfg: Parameters of the task. Subclasses annotate it with their own dataclass.
@@ -158,6 +157,8 @@ class Task(ABC):
 
     teams: ClassVar[tuple[Team, ...]] = (Team("agents"),)
     senses: ClassVar[tuple[str, ...]] = ()
+    body_cfg: ClassVar[type[BodyCfg]] = BodyCfg
+    verbs: ClassVar[tuple[str, ...]] = ()
     eliminates: ClassVar[bool] = False
     suite: ClassVar[str] = "veca"
     cfg: TaskCfg

@@ -14,6 +14,7 @@ from veca_marl.envs.tasks.cars.toy_car import Motion, ToyCar, check_speed
 from veca_marl.envs.tasks.navigation import places
 from veca_marl.envs.tasks.navigation.floors.scattering import Spacing, scattered_places
 from veca_marl.envs.tasks.navigation.placement_check import check_placement
+from veca_marl.sim.body.walker import WalkerCfg
 from veca_marl.sim.geometry import Floats
 from veca_marl.sim.physics import PlaygroundCfg
 from veca_marl.sim.sound import SoundCfg, SoundKind
@@ -60,6 +61,7 @@ class CarGame(Task):
     """
 
     interactions: ClassVar[tuple[str, ...]] = ()
+    body_cfg = WalkerCfg
     cfg: CarGameCfg
 
     @classmethod

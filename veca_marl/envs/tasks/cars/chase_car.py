@@ -62,14 +62,11 @@ class ChaseCar(CarGame):
 
     senses = ("vision", "touch", "proprioception")
     interactions: ClassVar[tuple[str, ...]] = (PRESS,)
+    verbs = (PRESS,)
     cfg: ChaseCarCfg
 
     def build(self) -> None:
         super().build()
-        if PRESS not in self.walker.cfg.verbs:
-            raise ValueError(
-                f"ChaseCar needs a body with the verb {PRESS!r}; body.verbs={self.walker.cfg.verbs}"
-            )
         self._presses = 0
         self._rest_steps = 0
         self._pressed_now = False

@@ -9,7 +9,7 @@ import numpy as np
 
 from veca_marl.envs.core.task import Player, register, require_humanoid, terms
 from veca_marl.envs.tasks.locomotion.start_poses import PosedStart, StartCfg, start_anywhere
-from veca_marl.sim.body.humanoid import Humanoid
+from veca_marl.sim.body.humanoid import Humanoid, HumanoidCfg
 from veca_marl.sim.body.humanoid.postures import ON_BACK
 from veca_marl.sim.physics import PropCfg, World
 
@@ -80,6 +80,7 @@ class HandRegard(PosedStart):
 
     suite = "babybench"
     senses = ("vision", "proprioception")
+    body_cfg = HumanoidCfg
     cfg: HandRegardCfg
 
     def build(self) -> None:

@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from veca_marl.envs.core.task import Player, Task, TaskCfg, register, terms
+from veca_marl.envs.core.task import Player, Task, TaskCfg, register, require_walker, terms
 from veca_marl.envs.tasks.escape.key_drawer import (
     add_key_drawer,
     draw_place_at_wall,
@@ -17,7 +17,7 @@ from veca_marl.envs.tasks.escape.key_drawer import (
 from veca_marl.envs.tasks.navigation.placement_check import check_placement
 from veca_marl.envs.tasks.navigation.places import free_place, furniture_of, planned_furniture
 from veca_marl.envs.tasks.player_starts import place_player
-from veca_marl.envs.tasks.player_verbs import require_verbs
+from veca_marl.sim.body.walker import WalkerCfg
 from veca_marl.sim.geometry import Floats
 from veca_marl.sim.physics import DoorCfg, LockCfg, PlaygroundCfg, RoomCfg
 from veca_marl.sim.physics.props.library import door_leaf
@@ -81,6 +81,8 @@ class BabyzumasRevenge(Task):
     """
 
     senses: ClassVar[tuple[str, ...]] = ("vision", "audio")
+    body_cfg = WalkerCfg
+    verbs = ("grab", "open")
     cfg: BabyzumasRevengeCfg
 
     @classmethod
@@ -93,7 +95,7 @@ class BabyzumasRevenge(Task):
         )
 
     def build(self) -> None:
-        self.walker = require_verbs(self.players[0], "grab", "open")
+        self.walker = require_walker(self.players[0])
         playground = self.world.playground
         self._furniture = furniture_of(self.world)
         self.room, doorway = _start_of(playground)

@@ -14,6 +14,7 @@ from veca_marl.envs.tasks.locomotion.start_poses import (
     face_down_cosines,
     start_near_edge,
 )
+from veca_marl.sim.body.humanoid import HumanoidCfg
 from veca_marl.sim.body.humanoid.postures import ON_ALL_FOURS
 
 
@@ -58,6 +59,7 @@ class CrawlBaby(PosedStart):
     """
 
     senses = ("proprioception", "touch")
+    body_cfg = HumanoidCfg
     cfg: CrawlBabyCfg
 
     def build(self) -> None:

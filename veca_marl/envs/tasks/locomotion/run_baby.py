@@ -10,6 +10,7 @@ from veca_marl.envs.core.scoring import horizontal
 from veca_marl.envs.core.task import Player, register, require_humanoid, terms
 from veca_marl.envs.tasks.locomotion.progress import ForwardProgress
 from veca_marl.envs.tasks.locomotion.start_poses import PosedStart, StartCfg, start_near_edge
+from veca_marl.sim.body.humanoid import HumanoidCfg
 from veca_marl.sim.body.humanoid.postures import STANDING
 from veca_marl.sim.geometry import Floats
 
@@ -73,6 +74,7 @@ class RunBaby(PosedStart):
     """
 
     senses = ("proprioception", "touch")
+    body_cfg = HumanoidCfg
     cfg: RunBabyCfg
 
     def build(self) -> None:

@@ -15,6 +15,7 @@ from veca_marl.envs.tasks.locomotion.start_poses import (
     draw_posture,
     start_anywhere,
 )
+from veca_marl.sim.body.humanoid import HumanoidCfg
 
 
 @dataclass
@@ -79,6 +80,7 @@ class SitBaby(PosedStart):
     """
 
     senses = ("proprioception", "touch")
+    body_cfg = HumanoidCfg
     cfg: SitBabyCfg
 
     def build(self) -> None:

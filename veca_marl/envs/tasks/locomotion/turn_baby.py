@@ -14,6 +14,7 @@ from veca_marl.envs.tasks.locomotion.start_poses import (
     face_down_cosines,
     start_anywhere,
 )
+from veca_marl.sim.body.humanoid import HumanoidCfg
 from veca_marl.sim.body.humanoid.postures import ON_BACK
 
 
@@ -56,6 +57,7 @@ class TurnBaby(PosedStart):
     """
 
     senses = ("proprioception", "touch")
+    body_cfg = HumanoidCfg
     cfg: TurnBabyCfg
 
     def build(self) -> None:

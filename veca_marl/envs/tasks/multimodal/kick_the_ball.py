@@ -11,6 +11,7 @@ import numpy as np
 from veca_marl.envs.core.scoring import cosine, horizontal, norm
 from veca_marl.envs.core.task import Player, Task, TaskCfg, register, require_walker, terms
 from veca_marl.envs.tasks.multimodal.rolling_ball import launch_from_side_wall
+from veca_marl.sim.body.walker import WalkerCfg
 from veca_marl.sim.physics import PlaygroundCfg, PropCfg, PropShape
 from veca_marl.sim.sound import SoundCfg, SoundKind
 
@@ -96,6 +97,7 @@ class KickTheBall(Task):
     """
 
     senses = ("vision", "audio")
+    body_cfg = WalkerCfg
     cfg: KickTheBallCfg
 
     @classmethod

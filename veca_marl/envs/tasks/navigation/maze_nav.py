@@ -74,6 +74,7 @@ class MazeNav(Task):
     """
 
     senses = ("vision", TRIAL)
+    body_cfg = WalkerCfg
     cfg: MazeNavCfg
 
     @classmethod

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from veca_marl.envs.core.task import register, require_humanoid
 from veca_marl.envs.tasks.navigation.object_nav import ObjectNav, ObjectNavCfg
+from veca_marl.sim.body.humanoid import HumanoidCfg
 
 
 @dataclass
@@ -44,6 +45,7 @@ class ObjectPhysNav(ObjectNav):
     """
 
     senses = ("vision", "touch", "proprioception")
+    body_cfg = HumanoidCfg
     cfg: ObjectPhysNavCfg
 
     def build(self) -> None:

@@ -18,6 +18,7 @@ from veca_marl.envs.tasks.objects.grasping import (
     place_toy,
 )
 from veca_marl.envs.tasks.objects.seat import check_seat
+from veca_marl.sim.body.humanoid import HumanoidCfg
 from veca_marl.sim.body.humanoid.postures import REACHING
 from veca_marl.sim.physics import PlaygroundCfg
 
@@ -65,6 +66,7 @@ class GrabObject(Task):
     """
 
     senses = ("vision", "touch", "proprioception")
+    body_cfg = HumanoidCfg
     cfg: GrabObjectCfg
 
     @classmethod

@@ -12,6 +12,7 @@ from veca_marl.envs.core.scoring import horizontal
 from veca_marl.envs.core.task import Player, Task, register, require_humanoid, terms
 from veca_marl.envs.tasks.objects.grasping import ToyCfg, add_toy, place_toy
 from veca_marl.envs.tasks.objects.seat import check_seat
+from veca_marl.sim.body.humanoid import HumanoidCfg
 from veca_marl.sim.body.humanoid.postures import REACHING
 from veca_marl.sim.physics import PlaygroundCfg, PropCfg, PropShape
 
@@ -68,6 +69,7 @@ class MoveToTarget(Task):
     """
 
     senses = ("vision", "touch", "proprioception")
+    body_cfg = HumanoidCfg
     cfg: MoveToTargetCfg
 
     @classmethod

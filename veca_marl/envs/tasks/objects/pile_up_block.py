@@ -20,6 +20,7 @@ from veca_marl.envs.tasks.objects.blocks import (
     stands_free,
 )
 from veca_marl.envs.tasks.objects.seat import check_seat
+from veca_marl.sim.body.humanoid import HumanoidCfg
 from veca_marl.sim.body.humanoid.postures import REACHING
 from veca_marl.sim.physics import PlaygroundCfg, Prop
 
@@ -85,6 +86,7 @@ class PileUpBlock(Task):
     """
 
     senses = ("vision", "touch", "proprioception")
+    body_cfg = HumanoidCfg
     cfg: PileUpBlockCfg
 
     @classmethod

@@ -20,6 +20,7 @@ from veca_marl.envs.tasks.objects.blocks import (
     is_released,
 )
 from veca_marl.envs.tasks.objects.seat import check_seat
+from veca_marl.sim.body.humanoid import HumanoidCfg
 from veca_marl.sim.body.humanoid.postures import REACHING
 from veca_marl.sim.physics import PlaygroundCfg
 
@@ -83,6 +84,7 @@ class PutDownBlock(Task):
     """
 
     senses = ("vision", "touch", "proprioception")
+    body_cfg = HumanoidCfg
     cfg: PutDownBlockCfg
 
     @classmethod

@@ -12,6 +12,7 @@ from veca_marl.envs.core.scoring import rotation_angle_rad
 from veca_marl.envs.core.task import Player, Task, TaskCfg, register, require_humanoid, terms
 from veca_marl.envs.tasks.objects.clearance import clearance_m
 from veca_marl.envs.tasks.objects.seat import check_seat
+from veca_marl.sim.body.humanoid import HumanoidCfg
 from veca_marl.sim.body.humanoid.postures import OFFERING
 from veca_marl.sim.geometry import rotation_about_vertical
 from veca_marl.sim.physics import PlaygroundCfg, PropCfg, PropShape
@@ -84,6 +85,7 @@ class RotateCube(Task):
     """
 
     senses = ("touch", "proprioception")
+    body_cfg = HumanoidCfg
     cfg: RotateCubeCfg
 
     @classmethod

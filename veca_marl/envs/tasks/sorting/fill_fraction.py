@@ -9,12 +9,11 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from veca_marl.envs.core.task import Player, Task, TaskCfg, register, terms
+from veca_marl.envs.core.task import Player, Task, TaskCfg, register, require_walker, terms
 from veca_marl.envs.tasks.navigation.floors.scattering import Spacing, scattered_places
 from veca_marl.envs.tasks.navigation.placement_check import check_placement
 from veca_marl.envs.tasks.navigation.places import furniture_of, planned_furniture
 from veca_marl.envs.tasks.player_starts import place_player
-from veca_marl.envs.tasks.player_verbs import require_verbs
 from veca_marl.envs.tasks.sorting.circles import (
     DENOMINATORS,
     REACH_M,
@@ -23,6 +22,7 @@ from veca_marl.envs.tasks.sorting.circles import (
     add_piece,
     division,
 )
+from veca_marl.sim.body.walker import WalkerCfg
 from veca_marl.sim.physics import PlaygroundCfg, Prop
 
 _PASSAGE_M = 0.3  # from walls and furniture to the rim of a circle: an agent passes
@@ -92,6 +92,8 @@ class FillFraction(Task):
     """
 
     senses: ClassVar[tuple[str, ...]] = ("vision",)
+    body_cfg = WalkerCfg
+    verbs = ("grab", "put_into")
     cfg: FillFractionCfg
 
     @classmethod
@@ -106,7 +108,7 @@ class FillFraction(Task):
         )
 
     def build(self) -> None:
-        self.walker = require_verbs(self.players[0], "grab", "put_into")
+        self.walker = require_walker(self.players[0])
         self._furniture = furniture_of(self.world)
         self.pieces = [
             add_piece(self.world, number, denominator)

@@ -10,14 +10,14 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from veca_marl.envs.core.task import Player, Task, TaskCfg, terms
+from veca_marl.envs.core.task import Player, Task, TaskCfg, require_walker, terms
 from veca_marl.envs.tasks.navigation.floors.scattering import Spacing, scattered_places
 from veca_marl.envs.tasks.navigation.placement_check import check_placement
 from veca_marl.envs.tasks.navigation.places import furniture_of, planned_furniture
 from veca_marl.envs.tasks.player_starts import place_player
-from veca_marl.envs.tasks.player_verbs import require_verbs
 from veca_marl.envs.tasks.sorting.baskets import REACH_M, Basket
 from veca_marl.envs.tasks.sorting.items import Item
+from veca_marl.sim.body.walker import WalkerCfg
 from veca_marl.sim.physics import PlaygroundCfg
 
 _PASSAGE_M = 0.3  # from walls and furniture to the surface of a basket: an agent passes
@@ -74,6 +74,8 @@ class SortingTask(Task):
     """
 
     senses: ClassVar[tuple[str, ...]] = ("vision",)
+    body_cfg = WalkerCfg
+    verbs = ("grab", "put_into")
     cfg: SortingCfg
 
     @classmethod
@@ -105,7 +107,7 @@ class SortingTask(Task):
         """Give the toys their looks for an episode; return the category of each."""
 
     def build(self) -> None:
-        self.walker = require_verbs(self.players[0], "grab", "put_into")
+        self.walker = require_walker(self.players[0])
         self._furniture = furniture_of(self.world)
         self.items = self.add_items()
         self.baskets = self.add_baskets()

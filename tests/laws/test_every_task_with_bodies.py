@@ -1,0 +1,58 @@
+"""A task is played with a body, or the configuration refuses the pair with the choices."""
+
+import re
+from dataclasses import replace
+from functools import cache
+
+import pytest
+from composed import compose
+from rollouts import game_cfg
+
+from veca_marl.conf_dir import conf_dir
+from veca_marl.config import ConfigError
+from veca_marl.envs.core.game import Game
+
+BODIES = sorted(path.stem for path in (conf_dir() / "body").glob("*.yaml"))
+CHOICES = re.compile(r"^agents: this task needs (a body .*choose body=|the verbs .* lacks )")
+CHEAPEST = ("walker", "mitten")  # one of each kind
+
+
+@cache
+def body(name):
+    return compose(["+task=ObjectNav", f"body={name}"]).game.body
+
+
+def refusal(task, name):
+    """Return why a body is refused, when a configuration of `game_cfg` is changed; or nothing."""
+    try:
+        replace(game_cfg(task), body=body(name)).check_bodies()
+    except ValueError as error:
+        return str(error)
+    return ""
+
+
+def test_a_misfit_is_refused_with_the_kind_of_body_or_the_verbs_that_are_needed(task):
+    game_cfg(task).check_bodies()
+    for name in BODIES:
+        assert not (message := refusal(task, name)) or CHOICES.search(message)
+
+
+def test_no_game_is_built_with_a_body_that_is_refused(task):
+    for name in CHEAPEST:
+        if message := refusal(task, name):
+            with pytest.raises(ValueError, match=re.escape(message)):
+                Game(replace(game_cfg(task), body=body(name)))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", BODIES)
+def test_what_is_not_refused_is_built(task, name):
+    if refusal(task, name):
+        pytest.skip("refused, see the tests above")
+    Game(replace(game_cfg(task), body=body(name), team={})).close()
+
+
+@pytest.mark.parametrize("overrides", [["body=walker"], ["seed=1", "body=walker_voice"]])
+def test_a_configuration_with_another_kind_of_body_is_refused(overrides):
+    with pytest.raises(ConfigError, match="agents: this task needs a body with joints; choose"):
+        compose(["+task=GrabObject", *overrides])
