@@ -8,7 +8,7 @@ import numpy as np
 
 from veca_marl.reports.statistics import bootstrap_interval, difference
 
-_TRIALS, _RESAMPLES = 1000, 1000
+_TRIALS, _RESAMPLES = 4000, 400
 _SEED = 0
 
 
@@ -19,7 +19,7 @@ def false_decision_rate(runs: int, others: int) -> float:
     The scores of all runs are drawn from one normal distribution; its mean and scale make no
     difference. A decision is a 95 % bootstrap interval of the difference of the interquartile means
     that does not contain 0. With exact intervals the probability would be 0.05; those of few runs
-    are too narrow. Simulated with a fixed seed; the standard error is at most 0.016.
+    are too narrow. Simulated with a fixed seed; the standard error is at most 0.008.
 
     Args:
         runs: Runs of one arm, at least 2.
