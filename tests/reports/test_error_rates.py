@@ -2,21 +2,25 @@
 
 import pytest
 
-from veca_marl.reports.error_rates import false_decision_rate
+from veca_marl.reports.error_rates import false_order_rate, false_speed_rate
 
 
 def test_few_runs_are_told_apart_more_often_than_the_confidence_says():
     """0.2 with three runs: 3 ** 3 resamples have too little spread."""
-    assert 0.16 < false_decision_rate(3, 3) < 0.26
+    assert 0.16 < false_order_rate(3, 3) < 0.26
 
 
 @pytest.mark.slow
 def test_the_rate_of_many_runs_is_that_of_the_confidence():
-    assert 0.03 < false_decision_rate(12, 12) < 0.08
+    assert 0.03 < false_order_rate(12, 12) < 0.08
 
 
 def test_the_rate_is_the_same_each_time_and_does_not_depend_on_the_order():
-    first = false_decision_rate(3, 5)
-    false_decision_rate.cache_clear()
-    assert false_decision_rate(3, 5) == first
-    assert false_decision_rate(5, 3) == pytest.approx(first, abs=0.05)
+    first = false_order_rate(3, 5)
+    false_order_rate.cache_clear()
+    assert false_order_rate(3, 5) == first
+    assert false_order_rate(5, 3) == pytest.approx(first, abs=0.05)
+
+
+def test_speeds_are_told_apart_by_chance_more_often_than_the_confidence_says_too():
+    assert 0.14 < false_speed_rate(3, 3) < 0.24

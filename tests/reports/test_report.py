@@ -10,7 +10,7 @@ from stored_runs import write_run
 
 from veca_marl import report
 from veca_marl.reports import figure
-from veca_marl.reports.error_rates import false_decision_rate
+from veca_marl.reports.error_rates import false_order_rate
 from veca_marl.reports.gather import (
     Found,
     gather,
@@ -36,7 +36,7 @@ def test_complete_runs_give_verdict_table_and_figure(tmp_path, arms, run):
     assert "| mono | 3 | 0.23 [0.00, 0.50] | -0.50 | 0 of 3 | not reached | not reached |" in page
     assert "lines in the figure: random -0.50." in page
     assert "`hrtf > mono` holds: difference 6.27 [" in page
-    assert f"decided in {100 * false_decision_rate(3, 3):.0f} % (3 and 3 runs) of" in page
+    assert f"decided in {100 * false_order_rate(3, 3):.0f} % (3 and 3 runs) of" in page
     assert (tmp_path / "curves.png").read_bytes().startswith(b"\x89PNG")
 
 

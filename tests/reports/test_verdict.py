@@ -173,6 +173,27 @@ def test_a_run_that_does_not_reach_the_threshold_is_slower_than_each_that_does()
     assert "probability of fewer frames to 5 0.50 [0.50, 0.50]" in judgement.reason
 
 
+def runs_at(arm, *scores):
+    """Return three equal runs of an arm with these scores by frames."""
+    points = tuple(Point(at, 1.0, 2.0, score, 32) for at, score in scores)
+    return [Run(arm, seed, True, points, 0.0) for seed in range(3)]
+
+
+def test_a_run_with_fewer_frames_is_not_slower_than_one_that_reached_the_threshold_after_them():
+    short, long = runs_at("a", (100, 3.0)), runs_at("b", (100, 2.0), (200, 6.0))
+    for given in ({"a": short, "b": long}, {"a": long, "b": short}):
+        judgement = judge(Faster("a", "b"), Evidence(given, 3, threshold=5.0))
+        assert judgement.verdict is Verdict.undecided
+        assert "0.50 [0.50, 0.50] within 100" in judgement.reason
+
+
+def test_runs_that_were_evaluated_at_different_frames_are_not_compared():
+    often = runs_at("a", (20, 2.0), (40, 6.0), (60, 6.0))
+    seldom = runs_at("b", (60, 6.0))
+    judgement = judge(Faster("a", "b"), Evidence({"a": often, "b": seldom}, 3, threshold=5.0))
+    assert judgement == Judgement(Verdict.undecided, "the runs were evaluated at different frames")
+
+
 def test_without_a_threshold_no_arm_is_faster():
     assert faster([100] * 3, [900] * 3, threshold=None) == Judgement(
         Verdict.undecided, "the experiment has no threshold"

@@ -83,8 +83,8 @@ class Config:
         device: Device of the networks: cpu, cuda, cuda:1, ...
         threads: Torch threads of the learner; None for all cores.
         total_frames: Frames of experience: steps of worlds, summed over all worlds.
-        max_minutes: Training stops after the stage in which this time is exceeded; None for no
-            limit.
+        max_minutes: Training stops after the stage in which this time is exceeded, which begins
+            anew when the run is resumed; None for no limit.
         resume: Folder of a run that is continued.
         plugins: Packages that add tasks, bodies, presets and more, see `veca_marl.plugins`.
     """

@@ -6,14 +6,20 @@ from functools import cache
 
 import numpy as np
 
-from veca_marl.reports.statistics import bootstrap_interval, difference
+from veca_marl.reports.statistics import (
+    Scores,
+    Statistic,
+    bootstrap_interval,
+    difference,
+    probability_of_improvement,
+)
 
 _TRIALS, _RESAMPLES = 4000, 400
 _SEED = 0
 
 
 @cache
-def false_decision_rate(runs: int, others: int) -> float:
+def false_order_rate(runs: int, others: int) -> float:
     """Return the probability that ``ARM > OTHER`` is decided for two arms that do not differ.
 
     The scores of all runs are drawn from one normal distribution; its mean and scale make no
@@ -25,11 +31,29 @@ def false_decision_rate(runs: int, others: int) -> float:
         runs: Runs of one arm, at least 2.
         others: Runs of the other arm, at least 2.
     """
+    return _rate(difference, 0.0, runs, others)
+
+
+@cache
+def false_speed_rate(runs: int, others: int) -> float:
+    """Return the same for ``ARM faster than OTHER``, which depends on the order of all runs alone.
+
+    Runs reach the threshold after different frames; where some reach it after equal frames, or
+    never, the probability is lower.
+
+    Args:
+        runs: Runs of one arm, at least 2.
+        others: Runs of the other arm, at least 2.
+    """
+    return _rate(probability_of_improvement, 0.5, runs, others)
+
+
+def _rate(statistic: Statistic, equal: float, runs: int, others: int) -> float:
+    """Return how often the interval of a statistic leaves out its value for equal arms."""
     rng = np.random.default_rng(_SEED)
-    return sum(_is_decided(runs, others, rng) for _ in range(_TRIALS)) / _TRIALS
-
-
-def _is_decided(runs: int, others: int, rng: np.random.Generator) -> bool:
-    scores = [rng.standard_normal((count, 1)) for count in (runs, others)]
-    low, high = bootstrap_interval(difference, scores, rng, _RESAMPLES)
-    return low > 0.0 or high < 0.0
+    decided = 0
+    for _ in range(_TRIALS):
+        scores: list[Scores] = [rng.standard_normal((count, 1)) for count in (runs, others)]
+        low, high = bootstrap_interval(statistic, scores, rng, _RESAMPLES)
+        decided += low > equal or high < equal
+    return decided / _TRIALS

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
-from veca_marl.config.claims import Above, parse_claim
+from veca_marl.config.claims import Above, Faster, parse_claim
 from veca_marl.config.experiment import ExperimentCfg
-from veca_marl.reports.error_rates import false_decision_rate
+from veca_marl.reports.error_rates import false_order_rate, false_speed_rate
 from veca_marl.reports.gather import Found
 from veca_marl.reports.runs import Point, Run
 from veca_marl.reports.summary import ArmSummary
@@ -90,26 +90,31 @@ def _verdict_lines(judgements: Mapping[str, Judgement]) -> list[str]:
 
 def _error_rate_text(report: Report) -> str:
     """Return how often claims about two arms with so few runs are decided although none differs."""
+    order = _rates_text(false_order_rate, _compared_counts(report, Above))
+    speed = _rates_text(false_speed_rate, _compared_counts(report, Faster))
     rates = [
-        f"{100.0 * false_decision_rate(*counts):.0f} % ({counts[0]} and {counts[1]} runs)"
-        for counts in _compared_counts(report)
+        *([f"a claim `ARM > OTHER` would be decided in {order} of experiments"] if order else []),
+        *([f"`ARM faster than OTHER` in at most {speed}"] if speed else []),
     ]
     if not rates:
         return ""
-    return (
-        "Of two arms with scores from one normal distribution, a claim `ARM > OTHER` would "
-        f"be decided in {', '.join(rates)} of experiments, by a simulation."
-    )
+    decided = ", ".join(rates)
+    start = "Of two arms with scores from one normal distribution"
+    return f"{start}, {decided}, by a simulation."
 
 
-def _compared_counts(report: Report) -> list[tuple[int, int]]:
+def _rates_text(rate: Callable[[int, int], float], counts: Sequence[tuple[int, int]]) -> str:
+    return ", ".join(f"{100.0 * rate(*n):.0f} % ({n[0]} and {n[1]} runs)" for n in counts)
+
+
+def _compared_counts(report: Report, kind: type[Above | Faster]) -> list[tuple[int, int]]:
     """Return the numbers of ended runs of arms that are compared, where a verdict is possible."""
     ended = {summary.arm: summary.ended for summary in report.summaries}
     claims = [parse_claim(text, list(ended)) for text in report.judgements]
     counts = {
         (ended[claim.arm], ended[claim.other])
         for claim in claims
-        if isinstance(claim, Above) and claim.other in ended
+        if isinstance(claim, kind) and claim.other in ended
     }
     return sorted(pair for pair in counts if min(pair) >= MIN_RUNS)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -57,6 +57,10 @@ class Run:
     def final(self) -> Point:
         """The last evaluation."""
         return self.points[-1]
+
+    def until(self, frames: int) -> Run:
+        """Return the run with its evaluations after at most so many frames."""
+        return replace(self, points=tuple(p for p in self.points if p.frames <= frames))
 
     def reached(self, threshold: float) -> Point | None:
         """Return the first evaluation with at least this score; None if there is none."""
@@ -162,10 +166,10 @@ def team_of(rows: Sequence[Mapping[str, str]], asked: str | None) -> str:
 
 
 def frames_to(threshold: float, runs: Iterable[Run]) -> Scores:
-    """Return the frames until runs that have ended reached a threshold, ``(runs, 1)``.
+    """Return the frames until runs reached a threshold, ``(runs, 1)``.
 
     Runs that did not reach it have `NEVER`, so that they are equal among themselves.
     """
-    points = [run.reached(threshold) for run in runs if run.ended]
+    points = [run.reached(threshold) for run in runs]
     frames = [NEVER if point is None else float(point.frames) for point in points]
     return np.array(frames, float).reshape(-1, 1)

@@ -45,8 +45,8 @@ class ArmSummary:
         score: Interquartile mean of their final scores; NaN without runs.
         interval: Its 95 % bootstrap interval; NaN with fewer than two runs.
         reached: Number of ended runs that reached the threshold.
-        frames: Median frames until the threshold; infinite if fewer than half reached it, NaN
-            without a threshold.
+        frames: Median frames until the threshold; of an even number the higher of the two in
+            the middle; infinite unless more than half reached it, NaN without a threshold.
         minutes: Median minutes of training until the threshold, likewise.
         core_minutes: The same of processor time, of all processes.
         random: Mean score of the random policy beside the ended runs; NaN if not measured.

@@ -13,7 +13,8 @@ two arms, of an arm and a baseline, or of an arm and a number.
   if the missing runs could not make it hold, and is undecided otherwise.
 - ``ARM faster than OTHER`` holds if the interval of the probability that a run of the one reaches
   the threshold in fewer frames than a run of the other lies above 1/2, and does not hold if it lies
-  below.
+  below. Runs are compared up to the frames that all of them have; it is undecided if they were
+  evaluated at different frames.
 
 Claims about intervals need at least `MIN_RUNS` ended runs of each arm and are undecided with fewer.
 """
@@ -163,15 +164,22 @@ def _judge_count(claim: RunsAbove, evidence: Evidence) -> Judgement:
 def _judge_faster(claim: Faster, evidence: Evidence) -> Judgement:
     if evidence.threshold is None:
         return Judgement(Verdict.undecided, "the experiment has no threshold")
-    arms = [evidence.runs.get(name, ()) for name in (claim.arm, claim.other)]
-    one, other = (frames_to(evidence.threshold, runs) for runs in arms)
-    if (few := _too_few(one, other)) is not None:
+    arms = [
+        [run for run in evidence.runs.get(name, ()) if run.ended]
+        for name in (claim.arm, claim.other)
+    ]
+    if (few := _too_few(*map(final_scores, arms))) is not None:
         return few
+    last = min(run.final.frames for runs in arms for run in runs)
+    arms = [[run.until(last) for run in runs] for runs in arms]
+    if len({tuple(p.frames for p in run.points) for runs in arms for run in runs}) > 1:
+        return Judgement(Verdict.undecided, "the runs were evaluated at different frames")
+    one, other = (frames_to(evidence.threshold, runs) for runs in arms)
     low, high = bootstrap_interval(probability_of_improvement, [-one, -other], _rng())
     reason = (
         f"probability of fewer frames to {evidence.threshold:g} "
-        f"{probability_of_improvement(-one, -other):.2f} [{low:.2f}, {high:.2f}], "
-        f"{_count_text(one, other)}"
+        f"{probability_of_improvement(-one, -other):.2f} [{low:.2f}, {high:.2f}] "
+        f"within {last}, {_count_text(one, other)}"
     )
     if low > 0.5:
         return Judgement(Verdict.holds, reason)

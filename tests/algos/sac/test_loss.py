@@ -16,8 +16,10 @@ from veca_marl.algos.networks.action_values import (
     ActorCritics,
     BatchRenorm,
     Normalisation,
+    statistics_of,
 )
 from veca_marl.algos.networks.factory import NetworkCfg, NetworkFactory
+from veca_marl.algos.networks.per_agent import PerAgent
 from veca_marl.algos.sac.config import Adaptation, EncoderGradient, TemperatureCfg
 from veca_marl.algos.sac.joint_action import JointAction
 from veca_marl.algos.sac.loss import TeamCrossQLoss, TeamSACLoss
@@ -277,8 +279,15 @@ def test_each_loss_trains_its_own_part(gradient):
     assert gradients(loss, "policy", parts) == [expected, True, False]
 
 
-def test_entries_that_do_not_count_change_nothing():
-    loss, _ = loss_of(HYBRID, factory=Central)
+@pytest.mark.parametrize(
+    ("kind", "critic", "factory"),
+    [
+        (TeamSACLoss, CRITIC, Central),
+        (TeamCrossQLoss, RENORMALISED, PlainNetwork),
+        (TeamCrossQLoss, RENORMALISED, Central),
+    ],
+)
+def test_entries_that_do_not_count_change_nothing(kind, critic, factory):
     batch = transitions_of(HYBRID)
     eliminated = (slice(0, 3), 1)
     for rows in (batch.first, batch.last):
@@ -291,6 +300,7 @@ def test_entries_that_do_not_count_change_nothing():
         for rows in (batch.first, batch.last):
             rows["agents", "observation", "state"][eliminated] = value
         batch.returns[eliminated] = value
+        loss, _ = loss_of(HYBRID, factory=factory, kind=kind, critic=critic)
         torch.manual_seed(0)
         losses = loss(Transitions(**vars(batch) | {"counted": counted}))
         found.append(torch.stack([losses.critic, losses.policy, losses.temperature]))
@@ -339,6 +349,35 @@ def test_a_learnt_temperature_stays_above_its_minimum():
 def test_an_impossible_minimum_of_the_temperature_is_refused(minimum):
     with pytest.raises(ValueError, match=r"temperature\.minimum"):
         replace(LEARNT, minimum=minimum)
+
+
+def test_batch_statistics_are_those_of_the_entries_that_count_also_of_separate_critics():
+    class Separate(PlainNetwork):
+        def per_agent(self, make, ranks=(1,)):
+            return PerAgent(make, self.spec.agents, ranks)
+
+    _, network = loss_of(HYBRID, factory=Separate, kind=TeamCrossQLoss, critic=RENORMALISED)
+    layers = [m for m in network.values.modules() if isinstance(m, BatchRenorm)]
+    x, counted = torch.randn(6, 2, 16), torch.ones(6, 2, dtype=torch.bool)
+    counted[2:, 1] = False
+    with statistics_of(network.values, counted):
+        for i, layer in enumerate(layers):
+            layer(x[:, i % 2 : i % 2 + 1])
+    for i, layer in enumerate(layers):
+        assert layer.counted is None
+        agent = i % 2
+        mean = x[counted[:, agent], agent].mean(0)
+        torch.testing.assert_close(layer.layer.running_mean, layer.layer.momentum * mean)
+
+
+@pytest.mark.parametrize("present", [0, 1])
+def test_a_batch_of_one_entry_or_none_has_no_statistics(present):
+    layer = BatchRenorm(4)
+    before = layer.layer.running_mean.clone()
+    layer.counted = torch.zeros(5, 2, dtype=torch.bool)
+    layer.counted[:present, 0] = True
+    assert not layer(torch.randn(5, 2, 4)).any()
+    torch.testing.assert_close(layer.layer.running_mean, before)
 
 
 def test_batch_renormalisation_corrects_fully_after_its_warm_up_and_not_more():

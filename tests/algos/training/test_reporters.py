@@ -58,6 +58,29 @@ def test_csv_has_one_row_per_write_and_blanks_for_nan(tmp_path):
     ]
 
 
+def read(path):
+    with path.open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def test_csv_has_numbers_under_their_names_in_whatever_order_they_come(tmp_path):
+    reporter = CsvReporter(tmp_path)
+    reporter.write("metrics", 10, {"x": 1, "y": 2})
+    reporter.write("metrics", 20, {"y": 2, "x": 1})
+    rows = read(tmp_path / "metrics.csv")
+    assert [(row["x"], row["y"]) for row in rows] == [("1", "2")] * 2
+
+
+def test_a_number_that_earlier_rows_do_not_have_becomes_a_column(tmp_path):
+    CsvReporter(tmp_path).write("metrics", 10, {"x": 1})
+    resumed = CsvReporter(tmp_path, resumed_frames=10)
+    resumed.write("metrics", 20, {"seconds": 3, "x": 2})
+    resumed.write("metrics", 30, {"x": 4})
+    rows = [tuple(row.values()) for row in read(tmp_path / "metrics.csv")]
+    assert rows == [("10", "1", ""), ("20", "2", "3"), ("30", "4", "")]
+    assert list(read(tmp_path / "metrics.csv")[0]) == ["frames", "x", "seconds"]
+
+
 def test_a_row_that_was_cut_off_is_dropped(tmp_path):
     """'frames' of the cut row reads 3, which is a smaller number than that of the checkpoint."""
     path = tmp_path / "metrics.csv"

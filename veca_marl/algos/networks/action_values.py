@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from enum import Enum
 from functools import partial
@@ -18,6 +20,7 @@ from veca_marl.algos.networks.factory import (
     freeze,
 )
 from veca_marl.algos.networks.initialisation import perceptron
+from veca_marl.algos.networks.per_agent import PerAgent
 from veca_marl.algos.specs import TeamSpec
 
 
@@ -40,7 +43,13 @@ class BatchRenorm(nn.Module):
 
     Args:
         features: Width of the input.
+
+    Attributes:
+        counted: ``(...)``, False for entries that do not enter the statistics of a batch; None
+            counts all. The output of the others is 0. See `statistics_of`.
     """
+
+    counted: Tensor | None = None
 
     def __init__(self, features: int) -> None:
         super().__init__()
@@ -48,11 +57,18 @@ class BatchRenorm(nn.Module):
 
     def forward(self, x: Tensor) -> Tensor:
         """Normalise over all dimensions but the last."""
-        normalised: Tensor = self.layer(x.flatten(0, -2)).view_as(x)
+        flat = x.flatten(0, -2)
+        if not self.training or self.counted is None or self.counted.all():
+            normalised: Tensor = self.layer(flat)
+        else:
+            counted = self.counted.flatten()
+            normalised = torch.zeros_like(flat)
+            if counted.sum() > 1:  # one entry has no variance
+                normalised[counted] = self.layer(flat[counted])
         # TorchRL 0.14 counts on, and corrects twice as much after twice the steps of its warm-up
         count = self.layer.num_batches_tracked
         count.copy_(count.clamp(max=self.layer.warmup_steps))
-        return normalised
+        return normalised.view_as(x)
 
 
 _LAYERS: dict[Normalisation, type[nn.Module] | None] = {
@@ -137,6 +153,34 @@ class ActionValues(nn.Module):
         inputs = [features, vector] if others is None else [features, vector, others]
         joined = torch.cat(inputs, dim=-1)
         return torch.stack([critic(joined) for critic in self.critics])
+
+
+@contextmanager
+def statistics_of(values: ActionValues, counted: Tensor) -> Iterator[None]:
+    """Let batch normalisation of the critics use the entries alone that count.
+
+    Args:
+        values: The critics.
+        counted: ``(..., agents)``, False for entries whose values are not used.
+    """
+    layers = list(_with_counted(values, counted))
+    for layer, own in layers:
+        layer.counted = own
+    try:
+        yield
+    finally:
+        for layer, _ in layers:
+            layer.counted = None
+
+
+def _with_counted(values: ActionValues, counted: Tensor) -> Iterator[tuple[BatchRenorm, Tensor]]:
+    """Yield the normalisations of all critics, each with the entries that it reads."""
+    for critic in values.critics:
+        parts = [(critic, counted)]
+        if isinstance(critic, PerAgent):
+            parts = [(own, counted[..., i : i + 1]) for i, own in enumerate(critic.agents)]
+        for module, own in parts:
+            yield from ((m, own) for m in module.modules() if isinstance(m, BatchRenorm))
 
 
 def mean_of_others(arrays: Tensor, mask: Tensor | None) -> Tensor:

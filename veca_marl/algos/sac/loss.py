@@ -9,7 +9,7 @@ import torch
 from tensordict import TensorDict, TensorDictBase
 from torch import Tensor, nn
 
-from veca_marl.algos.networks.action_values import ActorCritics, mean_of_others
+from veca_marl.algos.networks.action_values import ActorCritics, mean_of_others, statistics_of
 from veca_marl.algos.sac.config import EncoderGradient
 from veca_marl.algos.sac.critic import Critic, constant
 from veca_marl.algos.sac.joint_action import JointAction, Proposed, Taken
@@ -172,7 +172,8 @@ class TeamCrossQLoss(TeamSACLoss):
     """SAC whose critics give their own targets.
 
     The critics read both ends of each window in one batch, so that their batch normalisation
-    sees actions of the replay buffer and of the policy in the same proportion.
+    sees actions of the replay buffer and of the policy in the same proportion. Entries that do not
+    count, such as those of eliminated agents, do not enter its statistics.
 
     Source: Bhatt et al. 2024, "CrossQ: batch normalization in deep reinforcement learning for
     greater sample efficiency and simplicity". For continuous actions it equals TorchRL's
@@ -191,9 +192,16 @@ class TeamCrossQLoss(TeamSACLoss):
         first = self._inputs(batch.first, features, taken.vector, taken.code)
         last = self._proposed_inputs(batch.last, after, proposed)
         joined = [torch.cat(pair) for pair in zip(first, last, strict=True)]
-        values, following = self.critic.values(*joined).chunk(2, dim=1)
+        with statistics_of(self.critic.values, self._counted_at_both_ends(batch)):
+            values, following = self.critic.values(*joined).chunk(2, dim=1)
         soft_value = self._soft_value(following.detach(), proposed)
         return _chosen(values, taken), batch.returns + batch.discount * soft_value
+
+    def _counted_at_both_ends(self, batch: Transitions) -> Tensor:
+        """Return ``(2 B, agents)``, False where the value at that end of a window is not used."""
+        present = batch.last.get((self._team, "mask"), None)
+        last = batch.counted if present is None else batch.counted & present
+        return torch.cat([batch.counted, last])
 
 
 def _chosen(values: Tensor, taken: Taken) -> Tensor:

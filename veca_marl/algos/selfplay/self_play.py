@@ -104,7 +104,7 @@ class SelfPlay:
         self._store(self.turn, frames)
 
     def measures(self) -> dict[str, float]:
-        """See `Matchmaking`: index of the team that learns, age of its opponent (NaN: current)."""
+        """See `Matchmaking`: index of the team that learns, frames of its opponent (NaN: now)."""
         past = math.nan if self.past_frames is None else float(self.past_frames)
         turn = float(self.cfg.teams.index(self.turn))
         return {"self_play/turn": turn, "self_play/opponent_frames": past}

@@ -12,7 +12,8 @@ class Budget:
 
     Attributes:
         total_frames: Frames of experience (rounded up to whole batches).
-        max_minutes: Also stop after the stage in which this time runs out; None for no limit.
+        max_minutes: Also stop after the stage in which this time runs out, which begins anew when a
+            run is resumed; None for no limit.
     """
 
     total_frames: int

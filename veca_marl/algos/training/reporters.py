@@ -7,7 +7,7 @@ import io
 import math
 import os
 from collections import defaultdict
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -65,7 +65,8 @@ class CsvReporter:
     """One tidy file per kind of row: ``metrics.csv``, ``evaluations.csv``.
 
     TorchRL's `CSVLogger` writes a file for each number; here one table holds a run, and a resumed
-    run drops the rows that it writes again.
+    run drops the rows that it writes again. Numbers that the first row does not have become columns
+    when they are first written.
 
     Args:
         folder: Folder of the files.
@@ -81,15 +82,21 @@ class CsvReporter:
         self._folder = folder
         for kind in self.KINDS:
             _drop_rows_after(folder / f"{kind}.csv", resumed_frames)
+        self._columns = {kind: _columns(folder / f"{kind}.csv") for kind in self.KINDS}
 
     def write(self, kind: str, frames: int, row: Row) -> None:
         """Append `row` to ``<kind>.csv``; not-a-number is left blank."""
         path = self._folder / f"{kind}.csv"
         full = {"frames": frames, **row}
-        new = not path.exists()
-        row_text = _table(full.keys(), [{k: _cell(v) for k, v in full.items()}], header=new)
+        columns = self._columns[kind] if path.exists() else []
+        added = [name for name in full if name not in columns]
+        if columns and added:
+            _add_columns(path, added)
+        cells = {name: _cell(value) for name, value in full.items()}
+        row_text = _table([*columns, *added], [cells], header=not columns)
         with naming(path), path.open("a", newline="") as file:
             file.write(row_text)
+        self._columns[kind] = [*columns, *added]
 
     def sync(self) -> None:
         """See `Reporter`."""
@@ -132,6 +139,22 @@ class LoggerReporter:
         """Write pending points."""
         with naming(self._path):
             self._logger.close()
+
+
+def _columns(path: Path) -> list[str]:
+    """Return the names in the first line of a table; nothing if there is no such file."""
+    if not path.exists():
+        return []
+    with naming(path), path.open(newline="") as file:
+        return next(csv.reader(file), [])
+
+
+def _add_columns(path: Path, names: Sequence[str]) -> None:
+    """Add columns to a table, which are blank in its rows."""
+    with naming(path), path.open(newline="") as file:
+        reader = csv.DictReader(file)
+        rows = list(reader)
+    write_atomically(path, _table([*(reader.fieldnames or []), *names], rows, header=True))
 
 
 def _cell(value: float | int | str) -> str | int:

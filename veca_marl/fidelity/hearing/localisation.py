@@ -28,7 +28,7 @@ scenes; {test} others are its test. The same scenes are used for each quality.
   confusion leaves unchanged; 45 degrees if it is always found at 0.
 
 The observation contains magnitudes only: interaural times change it through the interference of
-direct sound and reflections alone. `stereo` depends on the difference of the distances to both ears.
+direct sound and reflections alone. `stereo` depends on how the distances to both ears differ.
 """
 ARMS: dict[str, AudioCfg] = {
     "hrtf": AudioCfg(),
