@@ -37,7 +37,7 @@ ADAPTED = (
 
 @pytest.fixture(scope="module", params=BODIES)
 def cfg(request):
-    game = compose(["+task=KickTheBall", f"body={request.param}"]).game
+    game = compose(["+task=ObjectNav", f"body={request.param}"]).game
     with free_play(game, 2, senses=SENSES) as cfg:
         yield cfg
 
