@@ -49,7 +49,9 @@ def test_no_game_is_built_with_a_body_that_is_refused(task):
 def test_what_is_not_refused_is_built(task, name):
     if refusal(task, name):
         pytest.skip("refused, see the tests above")
-    Game(replace(game_cfg(task), body=body(name), team={})).close()
+    game = Game(replace(game_cfg(task), body=body(name), team={}))
+    assert {type(player.body).cfg_type for player in game.players} == {type(body(name))}
+    game.close()
 
 
 @pytest.mark.parametrize("overrides", [["body=walker"], ["seed=1", "body=walker_voice"]])
