@@ -9,7 +9,15 @@ from composed import compose
 from walking import ball, box, empty_world, film, let_pass, walker_in
 
 from veca_marl.sim.geometry import joined_inertia, primitive_inertia
-from veca_marl.sim.physics import PartCfg, PlaygroundCfg, PropCfg, PropShape, World, pybullet
+from veca_marl.sim.physics import (
+    ClockCfg,
+    PartCfg,
+    PlaygroundCfg,
+    PropCfg,
+    PropShape,
+    World,
+    pybullet,
+)
 from veca_marl.sim.physics.props.prop_shapes import prop_geoms
 
 
@@ -73,6 +81,28 @@ def test_a_compound_that_falls_and_spins_keeps_its_angular_momentum():
     before = momentum()
     let_pass(world, 1.0)
     assert np.linalg.norm(momentum() - before) < 0.03 * np.linalg.norm(before)
+
+
+@pytest.mark.parametrize("substeps", [5, 20, 40])
+def test_the_rebound_does_not_depend_on_which_part_lands(substeps):
+    speeds = []
+    for heights in [(0.0, 0.1), (0.1, 0.0)]:
+        parts = [PartCfg(PropShape.sphere, [0.05], (0.0, 0.0, height)) for height in heights]
+        numbers = {"mass_kg": 0.2, "restitution": 0.7, "friction": 0.0}
+        two = PropCfg("two", PropShape.compound, [], (0.0, 0.0, 0.55), parts=parts, **numbers)
+        world = empty_world(two, clock=ClockCfg(substeps=substeps))
+        seen = record_speeds(world, "two")
+        let_pass(world, 0.6)
+        speeds.append(max(seen) / -min(seen))
+    assert speeds[0] == pytest.approx(speeds[1], abs=0.01)
+    assert speeds[0] == pytest.approx(0.7, abs=0.1)
+
+
+def record_speeds(world, name):
+    """Return a list to which each physics step adds the vertical speed of a prop."""
+    seen = []
+    world.after_substep.append(lambda: seen.append(world.prop(name).velocity[2]))
+    return seen
 
 
 def test_each_part_has_its_pose_and_colour():

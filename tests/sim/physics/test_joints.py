@@ -1,6 +1,7 @@
 """Doors, drawers and lids: friction, range, locks, motors, sound, pushes, and the reset."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -244,6 +245,55 @@ def test_a_walker_can_neither_grab_nor_kick_a_drawer():
     assert not walker.can_grab(world.prop("drawer"))
     world.prop("drawer").place((0.3, 0.0, 0.06))
     assert not walker.can_kick(world.prop("drawer"))
+
+
+def panels(order):
+    """A tall panel and a small block above it on one slide to x; `order` 1 swaps the parts."""
+    parts = [
+        PartCfg(PropShape.box, [0.1, 0.4, 0.4], (0.0, 0.0, 0.0)),
+        PartCfg(PropShape.box, [0.1, 0.1, 0.1], (0.0, 0.0, 0.8)),
+    ]
+    slide = JointCfg(JointKind.slide, axis=(1.0, 0.0, 0.0), range_m=0.6, friction=0.5, motor=20.0)
+    return PropCfg(
+        "panels",
+        PropShape.compound,
+        [],
+        (0.5, 0.0, 0.25),
+        mass_kg=2.0,
+        parts=parts[:: 1 - 2 * order],
+        joint=slide,
+    )
+
+
+@pytest.mark.parametrize("order", [0, 1])
+def test_every_part_of_a_driven_compound_stops_at_a_fixed_prop(order):
+    ahead = box("ahead", edges_m=(0.1, 0.4, 0.4), mass_kg=0.0, position=(0.9, 0.0, 0.25))
+    world = empty_world(panels(order), ahead)
+    world.prop("panels").open()
+    let_pass(world, 2.4)
+    assert world.prop("panels").opening * 0.6 == pytest.approx(0.3, abs=0.002)
+
+
+@pytest.mark.parametrize("order", [0, 1])
+def test_a_walker_pushes_every_part_of_a_compound(order):
+    world = empty_world(panels(order))
+    walker = walker_in(world)
+    for _ in range(50):
+        walker.act({"move": np.array([0.5, 0.0], np.float32)})
+        world.step()
+    panel = world.prop("panels").position[0] - 0.05
+    assert world.prop("panels").opening > 0.3
+    assert walker.position[0] + walker.radius_m <= panel + 0.01
+
+
+def test_no_part_of_an_attached_compound_collides_with_its_parent():
+    case = box("case", edges_m=(0.4, 0.4, 0.4), mass_kg=0.0, position=(0.5, 0.0, 0.25))
+    world = empty_world(case, replace(panels(1), joint=replace(panels(1).joint, parent="case")))
+    panel = world.prop("panels")
+    assert world.overlap_m(panel.body_id, world.prop("case").body_id) == 0.0
+    panel.open()
+    let_pass(world, 2.4)
+    assert panel.opening == 1.0
 
 
 def test_yields_tells_apart_pushes_that_move_and_pushes_against_the_stop():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import weakref
 from collections.abc import Callable
 
@@ -17,7 +18,7 @@ from veca_marl.sim.physics.interactions.registry import check_interactions
 from veca_marl.sim.physics.mover import Mover
 from veca_marl.sim.physics.playground import PlaygroundCfg, make_house
 from veca_marl.sim.physics.props import Prop, PropCfg, follow_physics, limit_detection
-from veca_marl.sim.physics.props.joint import LINK, Joint
+from veca_marl.sim.physics.props.joint import Joint
 from veca_marl.sim.sound import SoundField, make_sound
 
 GRAVITY_MPS2 = 9.81
@@ -88,10 +89,10 @@ class World:
         sound = None if cfg.sound is None else make_sound(cfg.sound)
         source = None if sound is None else self.sound.add_source(cfg.name, sound)
         prop = Prop(cfg, self.client, self.scene, source, self.house.obstacles)
-        limit_detection(prop.body_id, prop.link, cfg, self.client, self.clock)
+        limit_detection(prop.body_id, prop.links, cfg, self.client, self.clock)
         self.props[cfg.name] = prop
         if prop.joint is not None:
-            self._add_joint(prop.body_id, prop.joint, parent)
+            self._add_joint(prop, prop.joint, parent)
         if self._impacts is not None:
             self._impacts.add(prop)
         if not prop.fixed:
@@ -230,14 +231,16 @@ class World:
             )
         return self.props[cfg.joint.parent]
 
-    def _add_joint(self, body_id: int, joint: Joint, parent: Prop | None) -> None:
+    def _add_joint(self, prop: Prop, joint: Joint, parent: Prop | None) -> None:
         """Let a joint act after each physics step; the two props that it joins do not collide."""
         if not self._joints:
             self.after_substep.append(self._after_substep_of_joints)
         self._joints.append(joint)
-        if parent is not None:
+        if parent is None:
+            return
+        for ours, theirs in itertools.product(prop.links, parent.links):
             pybullet.setCollisionFilterPair(
-                parent.body_id, body_id, parent.link, LINK, 0, physicsClientId=self.client
+                parent.body_id, prop.body_id, theirs, ours, 0, physicsClientId=self.client
             )
 
     def _after_substep_of_joints(self) -> None:

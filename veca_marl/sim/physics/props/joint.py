@@ -10,8 +10,8 @@ from veca_marl.sim.geometry import Floats
 from veca_marl.sim.physics.bullet import pybullet
 from veca_marl.sim.physics.props.joint_cfg import JointCfg, JointKind
 
-LINK = 0
-"""The link that carries the shape of an attached prop; its base is fixed to the world."""
+LINK = 1
+"""The link that a joint moves, with the first shape of the prop; see `create_attached_body`."""
 
 _ARRIVED = 1e-6  # rad or metres: Bullet's stop at the end of the range leaves a rounding error
 

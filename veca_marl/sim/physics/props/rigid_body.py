@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -28,6 +28,7 @@ from veca_marl.sim.physics.props.prop_shape import PropShape
 _STEP_S = 0.008  # physics step at which `contact_share` is used as it is
 _ROUNDING = 1e-9  # of products of inertia, relative to the moments
 _SEVERAL_LINKS = (PropShape.doll, PropShape.compound)
+_SPACER = LINK - 1
 _JOINTS = {JointKind.hinge: pybullet.JOINT_REVOLUTE, JointKind.slide: pybullet.JOINT_PRISMATIC}
 _EXACT_IN_BULLET = (PropShape.sphere, PropShape.box, PropShape.cylinder)
 
@@ -66,9 +67,12 @@ def create_prop_body(cfg: PropCfg, client: int, geoms: Sequence[Primitive]) -> t
 def create_attached_body(
     cfg: PropCfg, joint: JointCfg, client: int, geoms: Sequence[Primitive]
 ) -> tuple[int, Pose]:
-    """Create the body of a prop with a joint: a fixed base without a shape, and one link.
+    """Create the body of a prop with a joint: a fixed base, a spacer, and the link that moves.
 
-    The base is at the anchor of the joint, with the axes of the closed prop.
+    Base and spacer have no shape. They are at the anchor of the joint, with the axes of the closed
+    prop. Bullet takes a link that is fixed to link 0 of a fixed base for a static one, whatever the
+    joint of link 0 is: further shapes would pass through fixed props and walkers. The spacer is
+    link 0 instead.
 
     Args:
         cfg: The prop.
@@ -86,23 +90,25 @@ def create_attached_body(
     visual = unused_visual_shape(client, geoms)
     leaf = _Link(
         shapes[0],
+        parent=_SPACER,
         mass_kg=cfg.mass_kg,
         centre=frame.position - anchor,
         axes=frame.rotation,
         joint=_JOINTS[joint.kind],
         axis=axis / np.linalg.norm(axis),
     )
+    spacer = _Link(shape=-1)
     body_id: int = pybullet.createMultiBody(
         baseMass=0.0,
         basePosition=anchor.tolist(),
         physicsClientId=client,
-        **_links([leaf, *(_welded(shape, parent=LINK) for shape in shapes[1:])], visual),
+        **_links([spacer, leaf, *(_welded(shape, parent=LINK) for shape in shapes[1:])], visual),
     )
     dynamics = prop_dynamics(cfg, moments)
     if moments is not None:
         dynamics["localInertiaDiagonal"] = moments.tolist()
     pybullet.changeDynamics(body_id, LINK, **dynamics, physicsClientId=client)
-    _prepare_links(body_id, LINK + 1, len(shapes), cfg, client)
+    _prepare_links(body_id, LINK + 1, LINK + len(shapes), cfg, client)
     return body_id, frame
 
 
@@ -214,7 +220,9 @@ def is_turned(frame: Pose) -> bool:
     return not np.array_equal(frame.rotation, np.eye(3))
 
 
-def limit_detection(body_id: int, link: int, cfg: PropCfg, client: int, clock: ClockCfg) -> None:
+def limit_detection(
+    body_id: int, links: Iterable[int], cfg: PropCfg, client: int, clock: ClockCfg
+) -> None:
     """Limit how far ahead a movable prop with restitution has contacts at short physics steps.
 
     Bullet subtracts the distance to a contact over the time step from the speed of rebound: at a
@@ -222,7 +230,9 @@ def limit_detection(body_id: int, link: int, cfg: PropCfg, client: int, clock: C
     no limit.
     """
     shortening = clock.substep_s / _STEP_S
-    if cfg.mass_kg > 0.0 and cfg.restitution > 0.0 and shortening < 1.0:
+    if cfg.mass_kg == 0.0 or cfg.restitution == 0.0 or shortening >= 1.0:
+        return
+    for link in links:
         low, high = pybullet.getAABB(body_id, link, physicsClientId=client)
         size = float(np.linalg.norm(np.subtract(high, low))) / 2.0
         pybullet.changeDynamics(
