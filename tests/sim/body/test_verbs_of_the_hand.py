@@ -9,7 +9,9 @@ from verbs import begin, do, seeing, toy
 from walking import STEP_S, ball, box, empty_world, let_pass, walker_in, wall
 
 from veca_marl.sim.body.walker import WalkCommand, WalkerCfg
+from veca_marl.sim.hearing import AudioCfg, AudioQuality, AudioSense
 from veca_marl.sim.physics.props.library import fraction_piece, key
+from veca_marl.sim.sound import SoundCfg, SoundKind
 
 
 def centre_of_mass(prop):
@@ -33,6 +35,27 @@ def test_a_grabbed_prop_follows_the_hand_and_falls_when_released():
     assert (walker.held, prop.holder) == (None, None)
     let_pass(world, 0.6)
     assert prop.position[2] == pytest.approx(0.05, abs=0.01)
+
+
+def test_a_sounding_prop_is_grabbed_without_a_doppler_sweep():
+    """The grabbed prop appears at the hand; the pitch of its tone stays."""
+    tone = SoundCfg(SoundKind.tone, frequency_hz=1000.0)
+    far = toy(position=(1.4, 0.0, 0.05), sound=tone)
+    world = empty_world(far)
+    walker = seeing(world)
+    ears = AudioSense(AudioCfg(quality=AudioQuality.mono, waveform=True), walker, world)
+    begin(world)
+    ears.reset()
+    for _ in range(5):
+        world.step()
+        ears.read()
+    assert walker.grab(world.prop("toy"))
+    world.step()
+    heard = ears.read()["waveform"][0]
+    crossings = np.flatnonzero((heard[:-1] < 0.0) & (heard[1:] >= 0.0))
+    pitch_hz = world.sound.sample_rate_hz / np.diff(crossings)
+    assert np.median(pitch_hz) == pytest.approx(1000.0, rel=0.03)
+    assert pitch_hz.max() < 1070.0
 
 
 def test_a_held_prop_does_not_move_its_holder_and_stays_before_walls():

@@ -9,7 +9,7 @@ import pytest
 from walking import empty_world, let_pass, walker_in, wall
 
 from veca_marl.sim.body.humanoid import Detail, Humanoid, HumanoidCfg
-from veca_marl.sim.body.walker.collisions.walker_collisions import separate
+from veca_marl.sim.body.walker.collisions.separation import separate
 
 RADIUS_M = 0.11
 SLACK_M = 0.003
@@ -139,14 +139,66 @@ def test_many_overlapping_discs_separate_and_come_to_rest():
     rng = np.random.default_rng(0)
     positions = rng.normal(size=(12, 2)) * 0.05
     far = np.abs(positions).max() + 12 * 2.0 * RADIUS_M
-    radii, corrections = np.full(12, RADIUS_M), np.zeros((12, 2))
+    radii, points, corrections = np.full(12, RADIUS_M), np.zeros((12, 2)), np.zeros((12, 2))
     for _ in range(400):
-        if not separate(positions, radii, corrections):
+        if not separate(positions, points, radii, corrections):
             break
         positions += corrections
         assert np.linalg.norm(corrections, axis=1).max() < 2.0 * RADIUS_M
-    assert not separate(positions, radii, corrections)
+    assert not separate(positions, points, radii, corrections)
     assert np.abs(positions).max() < far
+
+
+@pytest.mark.parametrize(
+    ("start", "yaw_deg"),
+    [((1.0, 0.0, 0.0), 180.0), ((0.0, 1.0, 0.0), -90.0), ((-1.0, 0.3, 0.0), 0.0)],
+    ids=["head to head", "head to side", "beside each other"],
+)
+def test_crawling_walkers_do_not_pass_through_each_other(start, yaw_deg):
+    world = empty_world()
+    one = walker_in(world, "one", verbs=["crawl"])
+    other = walker_in(world, "other", start, yaw_deg, verbs=["crawl"])
+    assert one.crawl()
+    assert other.crawl()
+    other.walk(0.4, 0.0)
+    gaps = []
+    for _ in range(100):
+        world.step()
+        points = pybullet.getClosestPoints(
+            one.body_id, other.body_id, 2.0, physicsClientId=world.client
+        )
+        gaps.append(min(point[8] for point in points))
+    assert min(gaps) == pytest.approx(0.0, abs=SLACK_M)
+
+
+@pytest.mark.parametrize(
+    ("way", "one", "other", "distance"),
+    [
+        ((3.0, 4.0), (0.0, 0.0), (0.0, 0.0), 5.0),
+        ((3.0, 0.0), (1.0, 0.0), (0.5, 0.0), 1.5),
+        ((0.0, 2.0), (1.0, 0.0), (0.5, 0.0), 2.0),
+        ((3.0, 0.0), (1.0, 0.0), (0.0, 1.0), 2.0),
+        ((3.0, 4.0), (0.0, 0.0), (3.0, 0.0), 4.0),
+        ((2.0, 2.0), (0.5, 0.5), (0.5, -0.5), 1.5 * math.sqrt(2.0)),
+    ],
+)
+def test_stadiums_are_separated_along_the_shortest_way_between_their_axes(
+    way, one, other, distance
+):
+    positions, half_axes = np.array([way, (0.0, 0.0)]), np.array([one, other])
+    radii, corrections = np.full(2, distance / 2.0 + 0.1), np.zeros((2, 2))
+    assert separate(positions, half_axes, radii, corrections)
+    np.testing.assert_allclose(corrections[0], -corrections[1], atol=1e-12)
+    assert np.linalg.norm(corrections[0]) == pytest.approx(0.1)
+    radii[:] = distance / 2.0 - 1e-6
+    assert not separate(positions, half_axes, radii, corrections)
+
+
+def test_crossed_axes_are_separated_between_their_centres():
+    positions, half_axes = np.array([(0.1, 0.0), (0.0, 0.0)]), np.array([(1.0, 0.0), (0.0, 1.0)])
+    corrections = np.zeros((2, 2))
+    assert separate(positions, half_axes, np.full(2, 0.2), corrections)
+    np.testing.assert_allclose(corrections, [(0.2, 0.0), (-0.2, 0.0)], atol=1e-12)
 
 
 def standing_humanoid(world, place=(0.5, 0.0, 0.0)):

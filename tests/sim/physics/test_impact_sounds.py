@@ -136,6 +136,22 @@ def test_a_walker_is_heard_when_it_walks_and_silent_when_it_stands():
     assert not heard[-20:].any()
 
 
+def test_footsteps_sound_at_the_floor_where_the_walker_stands():
+    world = world_with()
+    walker = Walker("child", WalkerCfg(), world)
+    world.freeze()
+    world.reset(np.random.default_rng(0))
+    steps = world.sound.sources["child.steps"]
+    walker.walk(1.0, 0.0)
+    world.step()
+    np.testing.assert_allclose(steps.position, (0.04, 0.0, 0.03), atol=1e-9)
+    before = steps.teleports
+    walker.place((1.0, 2.0, 0.0))
+    np.testing.assert_allclose(steps.position, (1.0, 2.0, 0.03), atol=1e-9)
+    assert steps.teleports == before + 1
+    world.close()
+
+
 @pytest.mark.parametrize("wrong", [{"gain_per_ns": 0.0}, {"min_speed_mps": float("nan")}])
 def test_impossible_numbers_are_refused(wrong):
     with pytest.raises(ValueError, match=f"impacts.{next(iter(wrong))}"):

@@ -28,6 +28,7 @@ from veca_marl.sim.body.walker.animation.footsteps import Footsteps
 from veca_marl.sim.body.walker.animation.gait import Gait
 from veca_marl.sim.body.walker.animation.stances import make_stances
 from veca_marl.sim.body.walker.collisions.footing import foot_steps_on
+from veca_marl.sim.body.walker.collisions.separation import Footprint
 from veca_marl.sim.body.walker.collisions.walker_collisions import walker_collisions
 from veca_marl.sim.body.walker.ground_motion import GroundMotion
 from veca_marl.sim.body.walker.objects.handling import ObjectHandling
@@ -96,8 +97,13 @@ class Walker(Body):
 
     @property
     def radius_m(self) -> float:
-        """Radius of the capsule in the physics."""
+        """Radius of the upright capsule in the physics."""
         return self.cfg.radius_m
+
+    @property
+    def footprint(self) -> Footprint:
+        """The capsule in use on the floor plan."""
+        return self._motion.capsule.footprint
 
     def place(self, position: Floats | tuple[float, float, float], yaw_rad: float = 0.0) -> None:
         """Stand at a place on the floor, facing `yaw_rad`, looking ahead, with empty hands.
@@ -121,6 +127,7 @@ class Walker(Body):
         self._motion.start(x, y, yaw_rad)
         self._pose_bones()
         self._mouth.teleport(self.mount("mouth").position)
+        self._footsteps.teleport(self._surface)
 
     def info(self) -> dict[str, float]:
         """Return `refused_verbs`, 1 after a verb without effect; empty for bodies without verbs."""
@@ -212,6 +219,7 @@ class Walker(Body):
             return False
         self._pose_bones()
         self._handling.follow_palm(self.palms()[1])
+        prop.teleport_sounds()
         return True
 
     def release(self) -> bool:
@@ -331,15 +339,20 @@ class Walker(Body):
         motion, step_s = self._motion, self._world.clock.step_s
         motion.after_step()
         self._gait.advance(float(motion.velocity @ self.forward), motion.turn_radps, step_s)
-        before = self._angles.copy()
+        pelvis, angles = self.position, self._angles.copy()
         self._pose_bones()
-        self._speeds[:] = (self._angles - before) / step_s
-        self._pelvis_velocity[:] = motion.velocity
+        self._speeds[:] = (self._angles - angles) / step_s
+        self._pelvis_velocity[:] = (self.position - pelvis) / step_s
         self._pelvis_spin[2] = motion.turn_radps
         self._mouth.position = self.mount("mouth").position
-        self._footsteps.follow(self.position, self._gait.landing_mps)
+        self._footsteps.follow(self._surface, self._gait.landing_mps)
         if self.held is not None:
             self._handling.follow_palm(self.palms()[1])
+
+    @property
+    def _surface(self) -> Floats:
+        """The place ``(3,)`` on the floor or prop on which it stands, metres."""
+        return np.array([*self._motion.ground, self._motion.footing.height_m])
 
     def _pose_bones(self) -> None:
         """Compute joint angles and bone poses of the present position."""

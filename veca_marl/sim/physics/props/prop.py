@@ -226,6 +226,10 @@ class Prop:
             ValueError: If a number is not finite.
         """
         self.carry(position, yaw_rad, velocity, angular_velocity)
+        self.teleport_sounds()
+
+    def teleport_sounds(self) -> None:
+        """Let its sounds start at its present place, without a Doppler sweep from the last one."""
         for source in (self.sound, self.impact):
             if source is not None:
                 source.teleport(self.position)

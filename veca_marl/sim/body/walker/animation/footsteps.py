@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
+
 from veca_marl.sim.geometry import Floats
 from veca_marl.sim.physics import World
 from veca_marl.sim.sound.impacts import (
@@ -49,15 +51,25 @@ class Footsteps:
             self._board = StruckBody(modes + click, impacts.gain_per_ns, rate)
             self._source = world.sound.add_source(f"{name}.steps", self._board)
 
-    def follow(self, position: Floats, landing_speed_mps: float) -> None:
+    def teleport(self, surface: Floats) -> None:
+        """Sound at another place from now on, without motion; see `follow`."""
+        if self._board is not None:
+            self._source.teleport(_sole(surface))
+
+    def follow(self, surface: Floats, landing_speed_mps: float) -> None:
         """Sound at a place on the floor if a foot has landed in this agent step.
 
         Args:
-            position: ``(3,)`` metres.
+            surface: ``(3,)`` metres, on the floor or prop beneath the walker.
             landing_speed_mps: Speed at which a foot has landed; 0 if none has.
         """
         if self._board is None:
             return
-        self._source.position = position
+        self._source.position = _sole(surface)
         if landing_speed_mps > self._min_speed_mps:
             self._board.strike(self._foot_kg * landing_speed_mps, 0)
+
+
+def _sole(surface: Floats) -> Floats:
+    """Return the middle ``(3,)`` of a sole on a surface, metres."""
+    return surface + np.array([0.0, 0.0, _SOLE_M])

@@ -27,6 +27,7 @@ import numpy as np
 from veca_marl.sim.body.walker.collisions.jammed import JammedProps
 from veca_marl.sim.body.walker.collisions.leaves import Leaves
 from veca_marl.sim.body.walker.collisions.obstacle_boxes import ObstacleBoxes
+from veca_marl.sim.body.walker.collisions.separation import Footprint
 from veca_marl.sim.geometry import (
     Floats,
     Primitive,
@@ -82,7 +83,8 @@ class Capsule:
         pybullet.changeDynamics(
             self.body_id, -1, lateralFriction=0.2, restitution=0.0, physicsClientId=client
         )
-        self._reach_m = _reach_m(form)
+        self._radius_m, self._half_axis_m = form.radius, _half_axis_m(form)
+        self._reach_m = self._half_axis_m + form.radius
         self._obstacles = ObstacleBoxes(client, scene, [], [], _LIMB_REACH_M)
         self._leaves = Leaves(client, [])
         self._jammed = JammedProps(client, scene, self.body_id, [], [])
@@ -90,6 +92,12 @@ class Capsule:
         self._capsules: Collection[int] = ()
         self._near: list[int] = []
         self._near_leaves: list[Prop] = []
+
+    @property
+    def footprint(self) -> Footprint:
+        """Its outline on the floor plan, at its present heading."""
+        x, y = math.cos(self.yaw_rad), math.sin(self.yaw_rad)
+        return Footprint(self._radius_m, (self._half_axis_m * x, self._half_axis_m * y))
 
     def collect_obstacles(
         self,
@@ -271,10 +279,10 @@ def lying_capsule(world: World, height_m: float, length_m: float, push_limit_kg:
     return Capsule(world.client, world.scene, form, height_m / 2.0, push_limit_kg)
 
 
-def _reach_m(form: Primitive) -> float:
-    """Return the horizontal distance from the centre of a capsule to its farthest point."""
+def _half_axis_m(form: Primitive) -> float:
+    """Return the horizontal distance from the centre of a capsule to an end of its axis."""
     ends = form.cap_centres()
-    return float(np.linalg.norm((ends[0] - ends[-1])[:2])) / 2.0 + form.radius
+    return float(np.linalg.norm((ends[0] - ends[-1])[:2])) / 2.0
 
 
 def _mass_kg(client: int, body_id: int) -> float:

@@ -9,20 +9,18 @@ added first.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import Protocol
 
 import numpy as np
-from numba import njit
 
 from veca_marl.sim.body.walker.actions.verb_part import VerbUser, apply_verbs
+from veca_marl.sim.body.walker.collisions.separation import Footprint, separate
 from veca_marl.sim.geometry import Floats
 from veca_marl.sim.physics import World
 
 # when a wall stops one walker of a pair, each round removes half of the remaining overlap
 _ROUNDS = 16
-_TOLERANCE_M = 1e-7
 
 
 class CollidingWalker(VerbUser, Protocol):
@@ -41,8 +39,8 @@ class CollidingWalker(VerbUser, Protocol):
         ...
 
     @property
-    def radius_m(self) -> float:
-        """Radius of the capsule."""
+    def footprint(self) -> Footprint:
+        """Its capsule on the floor plan."""
         ...
 
     @property
@@ -73,8 +71,7 @@ class WalkerCollisions:
     def __init__(self) -> None:
         self._walkers: list[CollidingWalker] = []
         self._radii: Floats = np.zeros(0)
-        self._positions: Floats = np.zeros((0, 2))
-        self._corrections: Floats = np.zeros((0, 2))
+        self._half_axes, self._positions, self._corrections = np.zeros((3, 0, 2))
 
     @property
     def capsule_ids(self) -> list[int]:
@@ -84,9 +81,9 @@ class WalkerCollisions:
     def add(self, walker: CollidingWalker) -> None:
         """Add a walker."""
         self._walkers.append(walker)
-        self._radii = np.array([one.radius_m for one in self._walkers])
-        self._positions = np.zeros((len(self._walkers), 2))
-        self._corrections = np.zeros((len(self._walkers), 2))
+        count = len(self._walkers)
+        self._radii = np.zeros(count)
+        self._half_axes, self._positions, self._corrections = np.zeros((3, count, 2))
 
     def reset(self) -> None:
         """See `Mover`."""
@@ -104,8 +101,9 @@ class WalkerCollisions:
         positions, corrections = self._positions, self._corrections
         for index, walker in enumerate(self._walkers):
             positions[index] = walker.resolve_contacts(*walker.proposed_position(substep_s))
+            self._radii[index], self._half_axes[index] = walker.footprint
         for _ in range(_ROUNDS):
-            overlap = separate(positions, self._radii, corrections)
+            overlap = separate(positions, self._half_axes, self._radii, corrections)
             if not (self._make_room(corrections) or overlap):
                 break
             for index in np.flatnonzero(corrections.any(axis=1)).tolist():
@@ -140,57 +138,3 @@ def walker_collisions(world: World) -> WalkerCollisions:
     collisions = WalkerCollisions()
     world.attach(collisions)
     return collisions
-
-
-@njit(cache=True)
-def separate(positions: Floats, radii: Floats, corrections: Floats) -> bool:
-    """Write the displacements that separate all overlapping pairs of discs.
-
-    Each disc of a pair moves by half of the overlap, divided by the larger number of overlaps that
-    one of the two has: a damped Jacobi iteration, in which no disc moves by more than its deepest
-    overlap.
-
-    Args:
-        positions: ``(n, 2)`` metres on the floor plan.
-        radii: ``(n,)`` metres.
-        corrections: ``(n, 2)`` metres; overwritten.
-
-    Returns:
-        Whether any two overlap.
-    """
-    n = len(positions)
-    corrections[:] = 0.0
-    counts = _overlap_counts(positions, radii)
-    for i in range(n):
-        for j in range(i):
-            overlap = _overlap(positions, radii, i, j)
-            if overlap <= _TOLERANCE_M:
-                continue
-            dx, dy = positions[i, 0] - positions[j, 0], positions[i, 1] - positions[j, 1]
-            distance = math.hypot(dx, dy)
-            if distance < 1e-9:  # coincident: the one that was added first moves toward -x
-                dx, dy, distance = 1.0, 0.0, 1.0
-            share = 0.5 * overlap / (distance * max(counts[i], counts[j]))
-            corrections[i, 0] += dx * share
-            corrections[i, 1] += dy * share
-            corrections[j, 0] -= dx * share
-            corrections[j, 1] -= dy * share
-    return bool(counts.any())
-
-
-@njit(cache=True)
-def _overlap_counts(positions: Floats, radii: Floats) -> Floats:
-    """Return for each disc how many others it overlaps, ``(n,)``."""
-    counts = np.zeros(len(positions))
-    for i in range(len(positions)):
-        for j in range(i):
-            if _overlap(positions, radii, i, j) > _TOLERANCE_M:
-                counts[i] += 1.0
-                counts[j] += 1.0
-    return counts
-
-
-@njit(cache=True)
-def _overlap(positions: Floats, radii: Floats, i: int, j: int) -> float:
-    dx, dy = positions[i, 0] - positions[j, 0], positions[i, 1] - positions[j, 1]
-    return float(radii[i] + radii[j] - math.hypot(dx, dy))
