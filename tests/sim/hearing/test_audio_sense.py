@@ -166,6 +166,10 @@ def test_invalid_settings_are_refused():
         AudioCfg(sofa_sample_rate_hz=44_100.0)
     with pytest.raises(ValueError, match="noise_floor_db"):
         AudioCfg(noise_floor_db=float("nan"))
+    with pytest.raises(ValueError, match=r"senses.audio.window='hann'; choices: .*hann"):
+        AudioCfg(window="hann")
+    with pytest.raises(ValueError, match=r"senses.audio.quality='mono'; choices: .*mono"):
+        AudioCfg(quality="mono")
     with pytest.raises(ValueError, match="nowhere"):
         Scene(buzz_at(150.0), sofa_path="nowhere.sofa")
 

@@ -18,6 +18,7 @@ from veca_marl.sim.physics import (
     World,
     pybullet,
 )
+from veca_marl.sim.physics.props.library import fraction_piece
 from veca_marl.sim.physics.props.prop_shapes import prop_geoms
 
 
@@ -155,6 +156,18 @@ def test_things_in_a_basket_move_alike_after_every_reset(mass_kg):
         paths.append(film(world, 30))
     np.testing.assert_array_equal(paths[0], paths[1])
     np.testing.assert_array_equal(paths[0], paths[2])
+
+
+def test_a_basket_contains_a_thing_by_its_centre_of_mass():
+    """The frame of a sector is at its tip, its centre of mass is not."""
+    piece = fraction_piece("piece", 0.25, (0.0, 0.0))
+    world = empty_world(basket(), piece)
+    piece, holder = world.prop("piece"), world.prop("basket")
+    inside_m = holder.box[1][0] - piece.centre_of_mass[0]
+    piece.place((inside_m - 0.01, 0.0, 0.1))
+    assert holder.contains(piece)
+    piece.place((inside_m + 0.01, 0.0, 0.1))
+    assert not holder.contains(piece)
 
 
 def test_fraction_pieces_fill_a_disc_without_overlap():

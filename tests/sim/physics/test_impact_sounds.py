@@ -1,10 +1,12 @@
 """Sounds of impacts: silent at rest, louder with the impulse, deterministic."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from composed import compose
+from scipy.special import spherical_jn
 
 from veca_marl.sim.body.walker import Walker, WalkerCfg
 from veca_marl.sim.physics import PlaygroundCfg, World
@@ -12,6 +14,8 @@ from veca_marl.sim.physics.impacts.cfg import ImpactCfg
 from veca_marl.sim.physics.impacts.sounds import prop_modes
 from veca_marl.sim.physics.props import PartCfg, PropCfg, PropShape
 from veca_marl.sim.sound.impacts import Material
+from veca_marl.sim.sound.impacts.modes import SPHERE_ROOTS
+from veca_marl.sim.sound.rooms import SPEED_OF_SOUND_MPS
 
 
 def ball(height_m, material=Material.wood):
@@ -119,6 +123,33 @@ def test_material_and_size_determine_pitch_and_decay():
     assert wood.frequencies_hz[1] / wood.frequencies_hz[0] == pytest.approx(2.757, abs=1e-3)
     assert longer.frequencies_hz[0] == pytest.approx(wood.frequencies_hz[0] / 4.0)
     assert metal.decay_per_s[0] < 0.2 * wood.decay_per_s[0]
+
+
+@pytest.mark.parametrize("lines", [2, 3, 4])
+def test_spheres_ring_at_the_roots_of_the_frequency_equation(lines):
+    """Eringen & Suhubi 1975, section 8.14, Poisson's ratio 0.3: the sign changes at the root."""
+
+    def determinant(eta, n=lines, ratio=0.3):
+        xi = eta * math.sqrt((1.0 - 2.0 * ratio) / (2.0 - 2.0 * ratio))
+        j = spherical_jn
+        radial = (n * n - n - eta**2 / 2) * j(n, xi) + 2 * xi * j(n + 1, xi)
+        radial_shear = n * (n + 1) * ((n - 1) * j(n, eta) - eta * j(n + 1, eta))
+        tangential = (n - 1) * j(n, xi) - xi * j(n + 1, xi)
+        tangential_shear = (n * n - 1 - eta**2 / 2) * j(n, eta) + eta * j(n + 1, eta)
+        return radial * tangential_shear - radial_shear * tangential
+
+    root = SPHERE_ROOTS[lines - 2]
+    assert determinant(root - 0.001) * determinant(root + 0.001) < 0.0
+
+
+def test_a_goal_rings_as_its_bar_and_clicks_as_its_volume():
+    goal = PropCfg("goal", PropShape.goal, [1.5, 1.0, 0.03], mass_kg=3.0)
+    bar = PropCfg("bar", PropShape.cylinder, [0.03, 1.5], mass_kg=1.0)
+    rings, clicks = prop_modes(goal).frequencies_hz[:-1], prop_modes(goal).frequencies_hz[-1]
+    np.testing.assert_allclose(rings, prop_modes(bar).frequencies_hz[:-1])
+    volume = math.pi * 0.03**2 * (1.5 + 2.0 * 1.0)
+    radius_m = (volume / (4.0 / 3.0 * math.pi)) ** (1.0 / 3.0)
+    assert clicks == pytest.approx(SPEED_OF_SOUND_MPS / (2.0 * math.pi * radius_m), rel=0.01)
 
 
 def test_a_walker_is_heard_when_it_walks_and_silent_when_it_stands():

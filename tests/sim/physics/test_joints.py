@@ -209,6 +209,20 @@ def test_a_reset_restores_opening_motor_and_lock_bit_by_bit():
     np.testing.assert_array_equal(rested[:, row], rested[:1, row].repeat(5, axis=0))
 
 
+def test_a_reset_restores_what_was_opened_and_unlocked_before_the_world_was_frozen():
+    ajar = replace(door(lock=LockCfg("ball")), name="ajar", position_m=(3.0, 0.0, 1.05))
+    world = empty_world(door(lock=LockCfg("ball")), ajar, box("ball", position=(0, 1, 1)))
+    world.prop("door").unlock(world.prop("ball"))
+    world.prop("ajar").set_opening(0.5)
+    world.freeze()
+    world.prop("door").joint.lock()
+    world.reset(np.random.default_rng(0))
+    assert not world.prop("door").locked
+    assert world.prop("ajar").locked
+    world.step()
+    assert world.prop("ajar").opening == pytest.approx(0.5)
+
+
 def test_a_walker_pushes_a_door_open_and_stops_at_a_locked_one():
     for lock in (None, LockCfg()):
         # hinged at +y: it opens away from the walker

@@ -76,6 +76,8 @@ class AudioCfg:
     noise_floor_db: float | None = None
 
     def __post_init__(self) -> None:
+        _check_choice("quality", self.quality, AudioQuality)
+        _check_choice("window", self.window, Window)
         check_scale(self.head_scale)
         if self.sofa_sample_rate_hz is not None and self.sofa_path is None:
             raise ValueError(
@@ -83,6 +85,13 @@ class AudioCfg:
             )
         if self.noise_floor_db is not None and not np.isfinite(self.noise_floor_db):
             raise ValueError(f"noise_floor_db must be finite or None, got {self.noise_floor_db}")
+
+
+def _check_choice(name: str, value: object, kinds: type[Enum]) -> None:
+    """Raise `ValueError` with the choices if a value is not one of them."""
+    if not isinstance(value, kinds):
+        choices = [kind.name for kind in kinds]
+        raise ValueError(f"senses.audio.{name}={value!r}; choices: {choices}")
 
 
 class AudioSense(Sense):

@@ -133,6 +133,8 @@ class World:
         pybullet.performCollisionDetection(physicsClientId=self.client)
         self._state = pybullet.saveState(physicsClientId=self.client)
         self._built = built_state(self.scene, self.sound.sources)
+        for joint in self._joints:
+            joint.save()
 
     def reset(self, rng: np.random.Generator) -> None:
         """Restore the built state, bit by bit, and restart all sounds.

@@ -99,19 +99,21 @@ def opened_by(door, playground):
 
 
 @pytest.mark.parametrize(
-    ("y_m", "walls", "message"),
+    ("y_m", "walls", "leaf", "message"),
     [
         (
             2.3,
             WallsCfg(),
+            SLIDE,
             r"its leaf of 1.0 m slides into the wall beside it, which is 0.25 m long; "
             "choose leaf.opens_to_front=false",
         ),
-        (1.0, WallsCfg(0.04), "walls.thickness_m=0.04 is too thin for a leaf that slides"),
+        (1.0, WallsCfg(0.04), SLIDE, "walls.thickness_m=0.04 is too thin for a leaf of 0.04 m"),
+        (1.0, WallsCfg(0.03), LeafCfg(), "walls.thickness_m=0.03 is too thin for a leaf"),
     ],
 )
-def test_a_wall_that_cannot_take_the_leaf_is_refused(y_m, walls, message):
-    door = DoorCfg("door", ("room_0", "room_1"), (3.0 + walls.thickness_m / 2, y_m), 1.0, SLIDE)
+def test_a_wall_that_cannot_take_the_leaf_is_refused(y_m, walls, leaf, message):
+    door = DoorCfg("door", ("room_0", "room_1"), (3.0 + walls.thickness_m / 2, y_m), 1.0, leaf)
     with pytest.raises(ValueError, match=message):
         row(2, walls.thickness_m, walls, doors=[door])
 

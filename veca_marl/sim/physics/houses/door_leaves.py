@@ -11,7 +11,7 @@ from veca_marl.sim.physics.props import PropCfg
 from veca_marl.sim.physics.props.joint_cfg import JointKind, LockCfg
 from veca_marl.sim.physics.props.library.doors import (
     LEAF_M,
-    SLIDING_WALL_M,
+    LEAF_WALL_M,
     door_leaf,
     open_reach_m,
     sliding_leaf,
@@ -68,6 +68,7 @@ def _leaf(
     """Return the leaf of a door; the opening of a wall of constant x leads along x."""
     place = (f"leaf_{door.name}", door.position_m, 0.0 if wall.axis == 0 else 90.0)
     lock = LockCfg(leaf.key, leaf.locked) if leaf.key or leaf.locked else None
+    _check_thickness(door, wall)
     if leaf.kind is JointKind.hinge:
         prop = door_leaf(
             *place,
@@ -93,6 +94,20 @@ def _leaf(
     return replace(prop, joint=replace(prop.joint, opening=leaf.opening))
 
 
+def _check_thickness(door: DoorCfg, wall: WallWithDoors) -> None:
+    """Check that a closed leaf is inside its wall, as walls and sound take it.
+
+    Raises:
+        ValueError: If the wall is too thin.
+    """
+    thickness_m = wall.pieces[0].size_m[wall.axis]
+    if thickness_m < LEAF_WALL_M:
+        raise ValueError(
+            f"door {door.name!r}: walls.thickness_m={thickness_m} is too thin for a leaf of "
+            f"{LEAF_M} m; choose at least {LEAF_WALL_M} or a door without a leaf"
+        )
+
+
 def _check_slide(
     door: DoorCfg, leaf: LeafCfg, wall: WallWithDoors, others: Sequence[PropCfg]
 ) -> None:
@@ -101,12 +116,6 @@ def _check_slide(
     Raises:
         ValueError: If it cannot; the message names the choices.
     """
-    thickness_m = wall.pieces[0].size_m[wall.axis]
-    if thickness_m < SLIDING_WALL_M:
-        raise ValueError(
-            f"door {door.name!r}: walls.thickness_m={thickness_m} is too thin for a leaf "
-            f"that slides into the wall; choose at least {SLIDING_WALL_M} or leaf.kind=hinge"
-        )
     front = leaf.opens_to_front
     fault = _hindrance(door, front, wall, others)
     if fault:

@@ -132,7 +132,7 @@ class RandomHouseCfg(PlaygroundCfg):
         return limits_of(self).capacity(self.house_size_m)
 
     def _set_floor(self) -> None:
-        """Draw the floor beneath the whole house, with its outer walls."""
+        """Let the floor reach to the inner faces of the outer walls."""
         corners = np.array([room.lower_m[:2] for room in self.rooms])
         ends = corners + [room.size_m[:2] for room in self.rooms]
         low, high = corners.min(axis=0), ends.max(axis=0)

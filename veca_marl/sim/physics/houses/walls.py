@@ -80,8 +80,8 @@ def wall_props(rooms: Sequence[RoomCfg], doors: Sequence[DoorCfg], cfg: WallsCfg
 
     Raises:
         ValueError: If a wall would stand in a room, because two rooms are less than one wall
-            thickness apart, a door is not in a wall, or a wall is too short or too thin for the
-            leaf that slides into it, or meets another wall there.
+            thickness apart, a door is not in a wall, a wall is too thin for the leaf of its door,
+            or too short for a leaf that slides into it, or meets another wall there.
     """
     lines = wall_lines(rooms, cfg.thickness_m)
     walls: list[WallWithDoors] = []

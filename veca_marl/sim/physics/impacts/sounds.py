@@ -21,7 +21,7 @@ from veca_marl.sim.sound.impacts import (
 )
 
 _GRAVITY_MPS2 = 9.81
-_EDGES_ARE_SIZES = (PropShape.box, PropShape.wall, PropShape.goal)
+_EDGES_ARE_SIZES = (PropShape.box, PropShape.wall)
 _BODY_A, _BODY_B, _NORMAL_FORCE = 1, 2, 9  # in a contact point of PyBullet
 
 
@@ -94,7 +94,8 @@ class ImpactSounds:
 def prop_modes(cfg: PropCfg) -> Modes:
     """Return the modes of a prop by its shape, size and material.
 
-    A sphere rings as a solid sphere, every other shape as a free bar of its greatest length.
+    A sphere rings as a solid sphere, a goal as its bar, every other shape as a free bar of its
+    greatest length.
     """
     material = MATERIALS[cfg.material]
     click = acceleration_noise(equal_volume_radius_m(cfg), material.contact_s)
@@ -105,6 +106,9 @@ def prop_modes(cfg: PropCfg) -> Modes:
         if cfg.shape is PropShape.capsule:
             length += 2.0 * radius
         return bar_modes(length, 0.5 * radius, material) + click
+    if cfg.shape is PropShape.goal:
+        width, _, radius = cfg.size_m
+        return bar_modes(width, 0.5 * radius, material) + click
     shortest, _, longest = sorted(_edges_m(cfg))
     return bar_modes(longest, shortest / math.sqrt(12.0), material) + click
 

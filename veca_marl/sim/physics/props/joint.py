@@ -41,6 +41,7 @@ class Joint:
         self._axis: Floats = axis / np.linalg.norm(axis)
         self.locked = False
         self._held = 0.0
+        self._built = (False, 0.0)
         self._target: float | None = None
         self._direction = 1.0
         pybullet.changeDynamics(
@@ -51,8 +52,9 @@ class Joint:
             jointDamping=0.0,
             physicsClientId=client,
         )
-        self._set_coordinate(cfg.opening * cfg.range)
-        self.reset()
+        self.locked = cfg.lock is not None and cfg.lock.locked
+        self.set_opening(cfg.opening)
+        self.save()
 
     @property
     def opening(self) -> float:
@@ -69,11 +71,14 @@ class Joint:
         """Whether its motor moves it."""
         return self._target is not None
 
+    def save(self) -> None:
+        """Make the present lock and opening the built state, to which `reset` returns."""
+        self._built = (self.locked, self._held)
+
     def reset(self) -> None:
-        """Return motor and lock to the built state; Bullet restores the coordinate."""
+        """Stop the motor and return to the saved lock; Bullet restores the coordinate."""
         self._release_motor()
-        self.locked = self.cfg.lock is not None and self.cfg.lock.locked
-        self._held = self.cfg.opening * self.cfg.range
+        self.locked, self._held = self._built
 
     def set_opening(self, opening: float) -> None:
         """Put it at rest at an opening in [0, 1], also if it is locked."""

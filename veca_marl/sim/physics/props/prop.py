@@ -182,12 +182,13 @@ class Prop:
         return self.joint is not None and self.joint.unlock(key.name)
 
     def contains(self, other: Prop) -> bool:
-        """Return whether the centre of another prop is in the box about its own shape.
+        """Return whether the centre of mass of another prop is in the box about its own shape.
 
         This is what a basket or drawer contains: their shapes are walls and a floor.
         """
         low, high = self._inside
-        local = self.rotation.T @ (other.position - self.position)
+        centre = other.position + other.rotation @ other.centre_of_mass
+        local = self.rotation.T @ (centre - self.position)
         return bool((local >= low).all() and (local <= high).all())
 
     def yields(self, point: Sequence[float], force: Sequence[float]) -> bool:

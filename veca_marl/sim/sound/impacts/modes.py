@@ -14,9 +14,10 @@ from veca_marl.sim.sound.rooms import SPEED_OF_SOUND_MPS
 BAR_ROOTS = (4.7300, 7.8532, 10.9956, 14.1372)
 """Roots of ``cos(x) cosh(x) = 1`` (free-free bar, Fletcher & Rossing 1998, section 2.15)."""
 
-SPHERE_ROOTS = (2.64, 3.88, 4.87)
+SPHERE_ROOTS = (2.646, 3.937, 5.046)
 """``2 pi f a / c_s`` of the spheroidal modes with 2, 3 and 4 nodal lines of a solid sphere with
-Poisson's ratio near 0.3 (Lamb 1882; Eringen & Suhubi 1975, section 8.14)."""
+Poisson's ratio 0.3: first roots of the frequency equation (Lamb 1882; Eringen & Suhubi 1975,
+section 8.14)."""
 
 
 @dataclass(frozen=True)

@@ -72,4 +72,5 @@ class Footsteps:
 
 def _sole(surface: Floats) -> Floats:
     """Return the middle ``(3,)`` of a sole on a surface, metres."""
-    return surface + np.array([0.0, 0.0, _SOLE_M])
+    place: Floats = surface + np.array([0.0, 0.0, _SOLE_M])
+    return place

@@ -111,7 +111,7 @@ def _cross(dx: float, dy: float, one: Floats, other: Floats) -> bool:
         return math.hypot(nearest_x, nearest_y) < 1e-9
     along_one = (other[0] * dy - other[1] * dx) / turned
     along_other = (one[0] * dy - one[1] * dx) / turned
-    return abs(along_one) <= 1.0 and abs(along_other) <= 1.0
+    return bool(abs(along_one) <= 1.0 and abs(along_other) <= 1.0)
 
 
 @njit(cache=True)
@@ -144,4 +144,5 @@ def _share(x: float, y: float, half_axis: Floats) -> float:
     squared = half_axis[0] * half_axis[0] + half_axis[1] * half_axis[1]
     if squared == 0.0:
         return 0.0
-    return min(1.0, max(-1.0, (x * half_axis[0] + y * half_axis[1]) / squared))
+    share = (x * half_axis[0] + y * half_axis[1]) / squared
+    return float(min(1.0, max(-1.0, share)))

@@ -12,8 +12,8 @@ Colour = tuple[float, float, float]
 DOOR_KG = 3.0
 """Light enough for a walker (`push_limit_kg` is 5 by default); a real leaf has about 20 kg."""
 
-SLIDING_WALL_M = 0.05
-"""Least thickness of a wall into which a leaf slides."""
+LEAF_WALL_M = 0.05
+"""Least thickness of a wall with a leaf in its door."""
 
 LEAF_M = 0.04
 """Thickness of a leaf."""
@@ -91,7 +91,7 @@ def sliding_leaf(
         yaw_deg: Rotation about z; at 0 the opening leads along x.
         width_m: Clear width of the closed opening, more than 12 cm; the leaf is 2 cm narrower.
         height_m: Clear height of the opening.
-        wall: Name of the fixed prop into which it slides, at least `SLIDING_WALL_M` thick and as
+        wall: Name of the fixed prop into which it slides, at least `LEAF_WALL_M` thick and as
             long as the leaf.
         slides_to_left: Whether it slides to the side of +y; otherwise to -y.
         lock: Its lock.
