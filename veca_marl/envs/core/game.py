@@ -98,6 +98,7 @@ class Game:
         ]
         self.actors = [player for player in self.players if player.team not in cfg.script]
         self.task = find_task(cfg.task.name)(cfg.task, self.world, self.players)
+        self._weights = self.task.step_weights()
         self.world.freeze()
         teams = {team.name: team for team in cfg.teams}
         for player in self.players:
@@ -120,8 +121,8 @@ class Game:
 
     @property
     def weights(self) -> dict[str, float]:
-        """Weight of each reward term by its name."""
-        return self.task.cfg.weights
+        """Weight of each reward term in a step by its name, see `Task.rates`."""
+        return self._weights
 
     @property
     def has_begun(self) -> bool:

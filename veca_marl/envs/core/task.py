@@ -80,6 +80,10 @@ def require_humanoid(player: Player) -> Humanoid:
     return player.body
 
 
+RATE_STEP_S = 0.04
+"""Duration of the step for which weights of rates are given: that of the default clock."""
+
+
 def terms(**weights: float) -> Any:
     """Declare the reward terms of a task with the default weight of each."""
     return field(default_factory=lambda: dict(weights))
@@ -92,7 +96,8 @@ class TaskCfg:
     Attributes:
         name: Class name of the task.
         max_seconds: Simulated time after which an episode is truncated.
-        weights: Weight of each reward term by its name; the reward is the weighted sum.
+        weights: Weight of each reward term by its name; the reward is the weighted sum. For the
+            terms in `Task.rates` it is that of a step of 40 ms.
     """
 
     name: str = ""
@@ -148,6 +153,10 @@ class Task(ABC):
         body_cfg: Class of the parameters of the bodies that can play it: `WalkerCfg`,
             `HumanoidCfg`, or `BodyCfg` for any.
         verbs: Choices of the action part `verb` that it needs.
+        rates: Names of the reward terms that are earned as long as a state lasts, such as a speed
+            or a height, and not by a change or an event. Their weights are for a step of
+            `RATE_STEP_S`; with another clock they are proportional to the duration of a step, so
+            that an episode of equal motion has an equal return.
         eliminates: Whether the game can end for single players, see `is_eliminated`.
         suite: Name of the collection of tasks that it belongs to, see `veca_marl.list_tasks`.
         cfg: Parameters of the task. Subclasses annotate it with their own dataclass.
@@ -159,6 +168,7 @@ class Task(ABC):
     senses: ClassVar[tuple[str, ...]] = ()
     body_cfg: ClassVar[type[BodyCfg]] = BodyCfg
     verbs: ClassVar[tuple[str, ...]] = ()
+    rates: ClassVar[tuple[str, ...]] = ()
     eliminates: ClassVar[bool] = False
     suite: ClassVar[str] = "veca"
     cfg: TaskCfg
@@ -167,7 +177,8 @@ class Task(ABC):
         """Store the arguments and build the props.
 
         Raises:
-            ValueError: If the names of the weights are not those of the reward terms.
+            ValueError: If the names of the weights are not those of the reward terms, or `rates`
+                names another term.
         """
         known = set(type(self).cfg_type()().weights)
         if set(cfg.weights) != known:
@@ -175,8 +186,20 @@ class Task(ABC):
                 f"task.weights has the terms {sorted(cfg.weights)}; "
                 f"{type(self).__name__} has {sorted(known)}"
             )
+        if unknown := sorted(set(self.rates) - known):
+            raise ValueError(
+                f"{type(self).__name__}.rates names {unknown}; its reward terms are {sorted(known)}"
+            )
         self.cfg, self.world, self.players = cfg, world, players
         self.build()
+
+    def step_weights(self) -> dict[str, float]:
+        """Return the weight of each reward term in a step of the world's clock, see `rates`."""
+        duration = self.world.clock.step_s / RATE_STEP_S
+        return {
+            name: weight * duration if name in self.rates else weight
+            for name, weight in self.cfg.weights.items()
+        }
 
     @abstractmethod
     def build(self) -> None:

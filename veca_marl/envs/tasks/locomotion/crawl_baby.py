@@ -59,6 +59,7 @@ class CrawlBaby(PosedStart):
     """
 
     senses = ("proprioception", "touch")
+    rates = ("forward", "torso", "hip")
     body_cfg = HumanoidCfg
     cfg: CrawlBabyCfg
 

@@ -74,6 +74,7 @@ class RunBaby(PosedStart):
     """
 
     senses = ("proprioception", "touch")
+    rates = ("forward",)
     body_cfg = HumanoidCfg
     cfg: RunBabyCfg
 

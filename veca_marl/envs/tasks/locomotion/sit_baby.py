@@ -80,6 +80,7 @@ class SitBaby(PosedStart):
     """
 
     senses = ("proprioception", "touch")
+    rates = ("torso", "head")
     body_cfg = HumanoidCfg
     cfg: SitBabyCfg
 

@@ -57,6 +57,7 @@ class TurnBaby(PosedStart):
     """
 
     senses = ("proprioception", "touch")
+    rates = ("torso", "hip")
     body_cfg = HumanoidCfg
     cfg: TurnBabyCfg
 

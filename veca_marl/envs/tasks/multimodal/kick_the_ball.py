@@ -97,6 +97,7 @@ class KickTheBall(Task):
     """
 
     senses = ("vision", "audio")
+    rates = ("approach",)
     body_cfg = WalkerCfg
     cfg: KickTheBallCfg
 

@@ -66,6 +66,7 @@ class GrabObject(Task):
     """
 
     senses = ("vision", "touch", "proprioception")
+    rates = ("effort",)
     body_cfg = HumanoidCfg
     cfg: GrabObjectCfg
 

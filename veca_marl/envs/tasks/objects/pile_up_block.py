@@ -78,14 +78,15 @@ class PileUpBlock(Task):
     Terms:
         height: Sum of the heights above the floor of the lowest corners of the red blocks that are
             at rest and that no part of the body touches, nor a block that carries them, in lengths
-            of their edge. Its default weight is the duration of a step in seconds, so that a block
-            on top of another adds 1 per second to the return.
+            of their edge. With the default weight a block on top of another adds 1 per second to
+            the return.
         lift: Increase during the step of the sum of the heights of the red blocks, each clipped to
             [0, 1] edge, held or not. It is the difference of a potential: putting a block down
             again takes the reward back.
     """
 
     senses = ("vision", "touch", "proprioception")
+    rates = ("height",)
     body_cfg = HumanoidCfg
     cfg: PileUpBlockCfg
 

@@ -24,7 +24,7 @@ from veca_marl.sim.body.humanoid import HumanoidCfg
 from veca_marl.sim.body.humanoid.postures import REACHING
 from veca_marl.sim.physics import PlaygroundCfg
 
-# sum of `height` times the duration of a step, with two blue blocks and 12 s, if nothing is done
+# height in edges times seconds, with two blue blocks and 12 s, if nothing is done
 _DEFAULT_EDGE_SECONDS = 24.0
 
 
@@ -74,9 +74,8 @@ class PutDownBlock(Task):
     (`clock.solver_iterations`), as in PileUpBlock.
 
     Terms:
-        height: Height of the red block above the floor, in lengths of its edge. Its default weight
-            is minus the duration of a step in seconds, so that the red block on two blue ones
-            adds -2 per second to the return.
+        height: Height of the red block above the floor, in lengths of its edge. With the default
+            weight the red block on two blue ones adds -2 per second to the return.
         blue_fell: Number of blue blocks that have fallen in this step, each once; 1 for each with
             the default tower and duration, else in proportion to `blue` times `max_seconds`. With
             the default weights one costs 1.25 times as much as a red block that stays on the tower
@@ -84,6 +83,7 @@ class PutDownBlock(Task):
     """
 
     senses = ("vision", "touch", "proprioception")
+    rates = ("height",)
     body_cfg = HumanoidCfg
     cfg: PutDownBlockCfg
 
