@@ -24,17 +24,18 @@ def cfg():
         yield cfg
 
 
-def break_down(game):
-    """Give a body a velocity that is not a number, as an unstable simulation would."""
+def break_down(game, speed=math.nan):
+    """Give a body a velocity as that of an unstable simulation."""
     body = game.players[0].body
-    nan = (math.nan,) * 3
-    pybullet.resetBaseVelocity(body.body_id, nan, nan, physicsClientId=game.world.client)
+    velocity = (speed,) * 3
+    pybullet.resetBaseVelocity(body.body_id, velocity, velocity, physicsClientId=game.world.client)
 
 
-def test_the_episode_is_truncated_the_cause_is_logged_and_data_are_finite(cfg, caplog):
+@pytest.mark.parametrize("speed", [math.nan, math.inf, 1e10, 1e100])
+def test_the_episode_is_truncated_the_cause_is_logged_and_data_are_finite(cfg, caplog, speed):
     env = VecaEnv(cfg, worlds=2, seed=0)
     state = env.reset()
-    break_down(env.games[1])
+    break_down(env.games[1], speed)
     with caplog.at_level(logging.WARNING):
         after = env.step(env.rand_action(state))["next"]
     assert after["truncated"].squeeze(-1).tolist() == [False, True]

@@ -270,7 +270,7 @@ class Game:
         names = self._non_finite_bodies()
         if names:
             _LOG.warning(
-                "step %d of %s: the simulation of %s is not finite any more; "
+                "step %d of %s: the simulation of %s is not finite or beyond any motion; "
                 "the episode is truncated, the next one has a new world",
                 self.steps,
                 self.cfg.task.name,

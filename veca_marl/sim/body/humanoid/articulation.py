@@ -28,6 +28,8 @@ _TOP_SPEED_RADPS = 30.0  # of a joint: twice the speed of human limbs
 # Bullet clips the speed of each joint without its reaction on the body, which adds momentum: its
 # limit is so high that it never acts
 _BULLET_TOP_SPEED = 1000.0
+# m, m/s, rad or rad/s: no motion reaches it; what does becomes infinite within a few steps
+_LARGEST = 1e6
 _STOP_DISTANCE_RAD = 0.05  # 3 degrees, by which Bullet's stops are outside the joint limits
 _FLAGS = (
     pybullet.URDF_USE_INERTIA_FROM_FILE
@@ -151,7 +153,7 @@ class Articulation:
     # ---- reading
 
     def read(self) -> bool:
-        """Read the state from Bullet; return whether all numbers are finite, keep the last if not.
+        """Read the state from Bullet; return whether it is valid, keep the last one if not.
 
         Call it after everything but a physics step that changes pose or velocity.
         """
@@ -164,7 +166,7 @@ class Articulation:
     def settle(self, step_s: float) -> bool:
         """Read the state after a physics step, apply joint limits and restore the momentum.
 
-        Return whether all numbers are finite; if not, keep the last ones.
+        Return whether the state is valid; if not, keep the last one.
         """
         if not self._read():
             return False
@@ -192,7 +194,10 @@ class Articulation:
         return any(contact[1] != contact[2] for contact in found)
 
     def _read(self) -> bool:
-        """Read Bullet's state; return whether all numbers are finite, keep the last if not."""
+        """Read Bullet's state; return whether it is valid, keep the last one if not.
+
+        It is valid if all numbers are finite and below `_LARGEST`.
+        """
         states = pybullet.getJointStates(self.body_id, self._links, physicsClientId=self._client)
         position, quaternion = pybullet.getBasePositionAndOrientation(
             self.body_id, physicsClientId=self._client
@@ -201,7 +206,7 @@ class Articulation:
         # zip first: an array of tuples costs three times an array of numbers
         angles, speeds = list(zip(*states, strict=True))[:2]
         row = np.array(position + quaternion + spin + velocity + speeds + angles)
-        if not np.isfinite(row).all():
+        if not (np.abs(row) < _LARGEST).all():  # false for numbers that are not finite
             return False
         self.dynamics.solver.numbers[:] = row
         return True
