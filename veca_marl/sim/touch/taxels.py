@@ -157,13 +157,6 @@ def _bound_corners(mesh: Mesh) -> Floats:
     return corners
 
 
-def _gaps(corners: Floats) -> Floats:
-    """Return a third of the longest median ``(T,)`` of triangles ``(T, 3, 3)``."""
-    from_centroid: Floats = np.linalg.norm(corners - corners.mean(axis=1, keepdims=True), axis=2)
-    gaps: Floats = 0.5 * from_centroid.max(axis=1)
-    return gaps
-
-
 def _depths(mesh: Mesh, corners: Floats) -> Floats:
     """Return the depths ``(T, 6)`` of the physical skin below the mesh, in the binding pose."""
     skeleton = load_skeleton()

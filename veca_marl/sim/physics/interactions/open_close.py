@@ -24,10 +24,12 @@ class Open(Interaction):
         """Return whether the joint is not open, and not locked or its key is held."""
         if prop.joint is None or prop.opening > _END:
             return False
-        return not prop.locked or (body.held is not None and prop.unlock(body.held))
+        return not prop.locked or (body.held is not None and prop.takes(body.held))
 
     def apply(self, body: InteractingBody, prop: Prop) -> None:
-        """Start the motor."""
+        """Unlock it if it is locked, and start the motor."""
+        if prop.locked and body.held is not None:
+            prop.unlock(body.held)
         prop.open()
 
 

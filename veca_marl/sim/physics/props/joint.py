@@ -106,9 +106,13 @@ class Joint:
         self._release_motor()
         self.locked = True
 
+    def takes(self, key: str) -> bool:
+        """Return whether the prop of a name is the key of its lock."""
+        return self.cfg.lock is not None and bool(key) and key == self.cfg.lock.key
+
     def unlock(self, key: str) -> bool:
         """Unlock it with the prop of a name; return whether that prop is its key."""
-        if self.cfg.lock is None or not key or key != self.cfg.lock.key:
+        if not self.takes(key):
             return False
         self.locked = False
         return True

@@ -177,6 +177,10 @@ class Prop:
         """Let the motor of its joint close it; return False if it is locked or has no joint."""
         return self.joint is not None and self.joint.drive(0.0)
 
+    def takes(self, key: Prop) -> bool:
+        """Return whether another prop is the key of the lock of its joint."""
+        return self.joint is not None and self.joint.takes(key.name)
+
     def unlock(self, key: Prop) -> bool:
         """Unlock its joint with a key; return whether that prop is the key of its lock."""
         return self.joint is not None and self.joint.unlock(key.name)

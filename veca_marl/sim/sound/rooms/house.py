@@ -28,7 +28,7 @@ Measurements, SAE 2007-01-2201); 47 is one of those in use, 5 dB below normal in
 attenuate high frequencies more."""
 
 
-_BETWEEN_ROOMS = -1
+_BETWEEN_ROOMS = -1  # `paths_id` of the direct path from one room to another; rooms have 0 and up
 
 
 class House:

@@ -39,7 +39,7 @@ def write_torques(
     ``(M + dt D + dt^2 K) a = u + f - h - (D + dt K) v``, and the torques are
     ``u - (D + dt K) (v + dt a)``. A joint that would enter the margin of a limit is held by a
     damper that is stiff enough to give it the speed with which it reaches the margin. The joints
-    that need it are found by revision, which starts from those of the last step.
+    that need it are found by an active-set method, which starts from those of the last step.
 
     Args:
         tree: The tree of n hinges.
