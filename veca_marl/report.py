@@ -139,7 +139,10 @@ def _report(
         found,
         others,
         {text: judge(parse_claim(text, by_arm), evidence) for text in experiment.claims},
-        {"random": float(np.mean(random)) if random else math.nan, "expert": expert},
+        {
+            "random": float(np.mean(random)) if random else math.nan,
+            "expert": math.nan if expert is None else expert.score,
+        },
         sorted({run.commit for run in found if run.counts and run.commit}),
         FIGURE,
     )

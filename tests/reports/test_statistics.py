@@ -12,10 +12,18 @@ from veca_marl.reports.statistics import (
     bootstrap_interval,
     difference,
     interquartile_mean,
+    interval_of_difference,
     probability_of_improvement,
 )
 
 GOLDEN = json.loads((Path(__file__).parent / "rliable.json").read_text())
+
+
+def test_the_interval_of_a_difference_combines_those_of_both():
+    low, high = interval_of_difference(5.0, (4.0, 6.5), 3.0, (2.0, 4.0))
+    assert low == pytest.approx(2.0 - math.hypot(1.0, 1.0))
+    assert high == pytest.approx(2.0 + math.hypot(1.5, 1.0))
+    assert interval_of_difference(5.0, (4.0, 6.5), 3.0, (3.0, 3.0)) == (1.0, 3.5)
 
 
 def column(*values):

@@ -1,7 +1,5 @@
 """Verdicts on claims."""
 
-import math
-
 import pytest
 
 from veca_marl.config.claims import (
@@ -13,7 +11,7 @@ from veca_marl.config.claims import (
     RunsAbove,
     parse_claim,
 )
-from veca_marl.reports.runs import Point, Run
+from veca_marl.reports.runs import ExpertScore, Point, Run
 from veca_marl.reports.verdict import Evidence, Judgement, Verdict, judge, overall
 
 
@@ -24,8 +22,9 @@ def runs(arm, scores, random=0.0, ended=True):
     ]
 
 
-def evidence(planned=3, expert=math.nan, **scores):
-    return Evidence({arm: runs(arm, values) for arm, values in scores.items()}, planned, expert)
+def evidence(planned=3, expert=None, **scores):
+    by_arm = {arm: runs(arm, values) for arm, values in scores.items()}
+    return Evidence(by_arm, planned, expert)
 
 
 def verdict(text, given):
@@ -98,10 +97,19 @@ def test_an_arm_is_compared_with_random_actions_in_its_own_runs():
     assert verdict("a > random", evidence(a=[-1.0, -1.5, -2.0])) is Verdict.does_not_hold
 
 
-def test_the_expert_is_a_number_that_may_be_missing():
-    assert verdict("a > expert", evidence(a=[8, 9, 9.5], expert=7.4)) is Verdict.holds
-    assert verdict("a > expert", evidence(a=[6, 6.5, 7], expert=7.4)) is Verdict.does_not_hold
-    assert verdict("a > expert", evidence(a=[8, 9, 9.5])) is Verdict.undecided
+@pytest.mark.parametrize(
+    ("scores", "expert", "expected"),
+    [
+        ([8.0, 9.0, 9.5], ExpertScore(7.4, (7.2, 7.6)), Verdict.holds),
+        ([6.0, 6.5, 7.0], ExpertScore(7.4, (7.2, 7.6)), Verdict.does_not_hold),
+        # with few episodes of the expert nothing is decided
+        ([8.0, 9.0, 9.5], ExpertScore(7.4, (5.0, 9.8)), Verdict.undecided),
+        ([8.0, 9.0, 9.5], ExpertScore(7.4), Verdict.undecided),
+        ([8.0, 9.0, 9.5], None, Verdict.undecided),
+    ],
+)
+def test_the_score_of_the_expert_has_an_interval_and_may_be_missing(scores, expert, expected):
+    assert verdict("a > expert", evidence(a=scores, expert=expert)) is expected
 
 
 @pytest.mark.parametrize(

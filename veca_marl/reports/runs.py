@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
 from veca_marl.reports.budget import FrameBudget
 from veca_marl.reports.gather import state_in
-from veca_marl.reports.statistics import Scores
+from veca_marl.reports.statistics import Interval, Scores
 
 NEVER = 1e18
 """Frames to a threshold that a run has not reached; finite, so that differences are defined."""
@@ -137,14 +138,28 @@ def random_scores(runs: Iterable[Run]) -> Scores:
     return np.array([[run.random] for run in runs if run.ended], float).reshape(-1, 1)
 
 
-def expert_score(rows: Sequence[Mapping[str, str]], metric: str, team: str) -> float:
-    """Return the mean score of the expert; NaN if it was not measured."""
-    scores = [
-        _number(row.get(metric, ""))
-        for row in rows
-        if (row["player"], row["team"]) == ("expert", team)
-    ]
-    return float(np.mean(scores)) if scores else math.nan
+class ExpertScore(NamedTuple):
+    """The score of the expert of a task.
+
+    Attributes:
+        score: Mean over its episodes.
+        interval: Its 95 % interval over the episodes; NaN for another metric than the return.
+    """
+
+    score: float
+    interval: Interval = (math.nan, math.nan)
+
+
+def expert_score(rows: Sequence[Mapping[str, str]], metric: str, team: str) -> ExpertScore | None:
+    """Return the score of the expert, of several rows the mean of each number; None without."""
+    own = [row for row in rows if (row["player"], row["team"]) == ("expert", team)]
+    if not own:
+        return None
+    score, low, high = (
+        float(np.mean([_number(row.get(name, "")) for row in own]))
+        for name in (metric, f"{metric}_low", f"{metric}_high")
+    )
+    return ExpertScore(score, (low, high))
 
 
 def team_of(rows: Sequence[Mapping[str, str]], asked: str | None) -> str:

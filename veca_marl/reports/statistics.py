@@ -93,6 +93,20 @@ def bootstrap_interval(
     return float(low), float(high)
 
 
+def interval_of_difference(
+    one: float, one_interval: Interval, other: float, other_interval: Interval
+) -> Interval:
+    """Return the interval of the difference of two independent estimates from theirs.
+
+    The distances to the ends are combined as square roots of sums of squares (method of variance
+    estimates recovery: Zou & Donner 2008, Construction of confidence limits about effect measures).
+    """
+    difference = one - other
+    below = math.hypot(one - one_interval[0], other_interval[1] - other)
+    above = math.hypot(one_interval[1] - one, other - other_interval[0])
+    return difference - below, difference + above
+
+
 def _resampled(scores: Scores, resamples: int, rng: np.random.Generator) -> Scores:
     runs, tasks = scores.shape
     return scores[rng.integers(runs, size=(resamples, runs, tasks)), np.arange(tasks)]

@@ -29,13 +29,14 @@ from enum import Enum
 import numpy as np
 
 from veca_marl.config.claims import Above, AboveNumber, AboveTimes, Claim, Equal, Faster, RunsAbove
-from veca_marl.reports.runs import Run, final_scores, frames_to, random_scores
+from veca_marl.reports.runs import ExpertScore, Run, final_scores, frames_to, random_scores
 from veca_marl.reports.statistics import (
     Interval,
     Scores,
     bootstrap_interval,
     difference,
     interquartile_mean,
+    interval_of_difference,
     probability_of_improvement,
 )
 
@@ -66,13 +67,13 @@ class Evidence:
     Attributes:
         runs: Runs of each arm that were evaluated.
         planned: Number of runs of each arm.
-        expert: Score of the expert; NaN if it was not measured.
+        expert: Score of the expert; None if it was not measured.
         threshold: The score to reach; None if the experiment has none.
     """
 
     runs: Mapping[str, Sequence[Run]]
     planned: int
-    expert: float = math.nan
+    expert: ExpertScore | None = None
     threshold: float | None = None
 
     def final(self, arm: str) -> Scores:
@@ -104,9 +105,7 @@ def _judge_order(claim: Above, evidence: Evidence) -> Judgement:
         return _judge_above(one, random_scores(evidence.runs.get(claim.arm, ())))
     if claim.other != "expert":
         return _judge_above(one, evidence.final(claim.other))
-    if math.isnan(evidence.expert):
-        return Judgement(Verdict.undecided, "the expert was not measured")
-    return _judge_above(one, _constant(evidence.expert), f"{evidence.expert:.2f} (expert)")
+    return _judge_above_expert(one, evidence.expert)
 
 
 def overall(judgements: Sequence[Judgement]) -> Verdict:
@@ -137,6 +136,28 @@ def _judge_above(one: Scores, other: Scores, number: str | None = None) -> Judge
     if interval[0] > 0:
         return Judgement(Verdict.holds, reason)
     return Judgement(Verdict.does_not_hold if interval[1] < 0 else Verdict.undecided, reason)
+
+
+def _judge_above_expert(one: Scores, expert: ExpertScore | None) -> Judgement:
+    """Judge whether an arm is above the expert, whose score is a mean over episodes."""
+    if (few := _too_few(one)) is not None:
+        return few
+    if expert is None:
+        return Judgement(Verdict.undecided, "the expert was not measured")
+    if math.isnan(expert.interval[0]):
+        return Judgement(
+            Verdict.undecided, "the interval of the expert is known for the return alone"
+        )
+    score = float(interquartile_mean(one))
+    interval = bootstrap_interval(interquartile_mean, [one], _rng())
+    low, high = interval_of_difference(score, interval, expert.score, expert.interval)
+    reason = (
+        f"difference {score - expert.score:.2f} [{low:.2f}, {high:.2f}] to the expert, "
+        f"{len(one)} runs"
+    )
+    if low > 0:
+        return Judgement(Verdict.holds, reason)
+    return Judgement(Verdict.does_not_hold if high < 0 else Verdict.undecided, reason)
 
 
 def _judge_equal(one: Scores, other: Scores, margin: float) -> Judgement:
