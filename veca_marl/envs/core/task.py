@@ -104,7 +104,7 @@ class TaskCfg:
 
         Raises:
             ValueError: If the duration is not positive, a weight is not finite, or a term is named
-                as another entry of `info`.
+                `solved`, as another entry of `info`; `Task` checks the entries of bodies.
         """
         self.check_positive("max_seconds")
         if SOLVED in self.weights:
@@ -167,16 +167,28 @@ class Task(ABC):
         """Store the arguments and build the props.
 
         Raises:
-            ValueError: If the names of the weights are not those of the reward terms.
+            ValueError: If the names of the weights are not those of the reward terms, a body
+                reports a number of the name of a term, or `is_eliminated` is defined without
+                `eliminates`.
         """
+        self._check_elimination()
         known = set(type(self).cfg_type()().weights)
         if set(cfg.weights) != known:
             raise ValueError(
                 f"task.weights has the terms {sorted(cfg.weights)}; "
                 f"{type(self).__name__} has {sorted(known)}"
             )
+        _check_info(known, players)
         self.cfg, self.world, self.players = cfg, world, players
         self.build()
+
+    def _check_elimination(self) -> None:
+        """Raise `ValueError` if `is_eliminated` would never be called."""
+        if type(self).is_eliminated is not Task.is_eliminated and not self.eliminates:
+            raise ValueError(
+                f"{type(self).__name__} defines is_eliminated, but has eliminates=False: nobody "
+                "would be eliminated; set eliminates = True in the class"
+            )
 
     @abstractmethod
     def build(self) -> None:
@@ -240,6 +252,17 @@ class Task(ABC):
         """Return the class with which this task annotates `cfg`."""
         hint: type[TaskCfg] = get_type_hints(cls)["cfg"]
         return hint
+
+
+def _check_info(names: set[str], players: list[Player]) -> None:
+    """Raise `ValueError` if a body reports a number of the name of a reward term."""
+    for player in players:
+        both = sorted(names.intersection(player.body.info()))
+        if both:
+            raise ValueError(
+                f"task.weights: {both} are the names of other entries of info, which the body of "
+                f"{player.name!r} reports; choose other names of terms"
+            )
 
 
 TASKS: Registry[type[Task]] = Registry("task")
