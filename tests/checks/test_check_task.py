@@ -254,7 +254,7 @@ def test_a_sound_task_passes_every_check(game_of):
             TermOfAnArray,
             random_play,
             "rewards",
-            r"term 'progress' of agents is array\(.*\), not a number",
+            "^term 'progress' of agents is of type ndarray, not a number$",
         ),
         (TooGreatWithItsWeight, random_play, "rewards", r"the reward of agents is 1e\+40"),
         (SolvedIsForgotten, random_play, "rewards", r"solved\(\) of agents is None"),

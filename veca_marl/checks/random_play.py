@@ -142,7 +142,7 @@ def _is_number(value: object) -> bool:
 
 
 def _described(value: object) -> str:
-    return str(value) if _is_number(value) else f"{value!r}, not a number"
+    return str(value) if _is_number(value) else f"of type {type(value).__name__}, not a number"
 
 
 def _fits(value: float) -> bool:
