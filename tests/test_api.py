@@ -1,18 +1,22 @@
 """The public functions of `veca_marl`."""
 
 from importlib import import_module
+from pathlib import Path
 
 import pytest
 import torch
 
 import veca_marl
 from veca_marl.algos.networks.precision import Precision
+from veca_marl.api import choose
 from veca_marl.config import ConfigError
+from veca_marl.envs.core.team import Script
 from veca_marl.runs.run_folder import RunFolder
 
 TINY = ["collect=one_process", "collect.worlds=1", "collect.steps=32", "algo.minibatches=2"]
 TINY += ["log=silent", "eval.episodes=1", "eval.worlds=1", "task.max_seconds=0.4"]
 BLIND = {"vision": "blind"}
+FOLDER = Path(__file__).parent
 
 
 def test_every_public_name_exists():
@@ -63,6 +67,27 @@ def close_of_closed():
             lambda: veca_marl.make("KickTheBall", overrides=[3]),
             r"overrides=\[3\] must be a list of",
         ),
+        (
+            lambda: veca_marl.make("KickTheBall", overrides=["seed=3"]),
+            "overrides: 'seed=3' is not of the game; give the seed as the argument `seed`",
+        ),
+        (
+            lambda: veca_marl.gym_env("KickTheBall", overrides=["algo/network=memory"]),
+            "overrides: 'algo/network=memory' is not of the game; choices: body, clock, opponent, "
+            "playground, plugins, senses, task, team",
+        ),
+        (
+            lambda: veca_marl.parallel_env("PushOut1v1", overrides=["+algo@learner.red=mappo"]),
+            r"overrides: '\+algo@learner.red=mappo' is not of the game",
+        ),
+        (
+            lambda: veca_marl.check_task("KickTheBall", overrides=["total_frames=1e6"]),
+            "overrides: 'total_frames=1e6' is not of the game",
+        ),
+        (
+            lambda: veca_marl.gym_env("PushOut1v1", overrides=[f"opponent.blue={FOLDER}"]),
+            f"opponent.blue={FOLDER}: an environment does not play the policy of a run; choices: ",
+        ),
         (lambda: veca_marl.make("KickTheBall", senses="mono"), "senses='mono' must be a mapping"),
         (lambda: veca_marl.make(3), "task=3 must be a name"),
         (lambda: veca_marl.make("KickTheBall", worlds=2.5), "worlds=2.5 must be an integer"),
@@ -80,3 +105,14 @@ def close_of_closed():
 def test_wrong_arguments_are_named(call, message):
     with pytest.raises((ValueError, RuntimeError), match=message):
         call()
+
+
+@pytest.mark.parametrize("script", ["idle", "random"])
+def test_overrides_of_every_part_of_the_game_have_effect(script):
+    overrides = ["task.max_seconds=0.4", "body=walker_discrete", "senses/touch=numb"]
+    overrides += ["playground=simple", "clock.control_rate_hz=10", "clock.substeps=12"]
+    overrides += ["+body@team.red.body=walker", f"opponent.blue={script}", "plugins=[]"]
+    game = choose("PushOut1v1", senses=BLIND, overrides=overrides)
+    assert (game.task.max_seconds, game.clock.control_rate_hz) == (0.4, 10)
+    assert game.body_of("red") != game.body_of("blue")
+    assert game.script == {"blue": Script(script)}

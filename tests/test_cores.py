@@ -1,6 +1,7 @@
 """The cores of a run, and the warning where other programs use them."""
 
 import logging
+import os
 
 import pytest
 import torch
@@ -33,5 +34,8 @@ def test_a_run_that_finds_its_cores_in_use_logs_it(monkeypatch, caplog):
     assert "the machine had a load of 100.0" in caplog.text
 
 
-def test_the_load_is_not_negative():
-    assert cores.load() >= 0.0
+def test_the_load_is_the_mean_of_the_last_minute_if_the_system_has_it(monkeypatch):
+    monkeypatch.setattr(os, "getloadavg", lambda: (3.25, 1.0, 0.5), raising=False)
+    assert cores.load() == 3.25
+    monkeypatch.delattr(os, "getloadavg")
+    assert cores.load() == 0.0

@@ -9,7 +9,14 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from veca_marl.api_arguments import as_integer, check_list, check_name, check_presets
+from veca_marl.api_arguments import (
+    as_integer,
+    check_game_overrides,
+    check_list,
+    check_name,
+    check_presets,
+    check_scripted,
+)
 from veca_marl.checks import CheckCfg, TaskReport, check_game
 from veca_marl.config import ConfigError, compose, compose_node, to_config
 from veca_marl.config.outputs import check_folder
@@ -70,7 +77,8 @@ def make(
         body: A file of `conf/body`, such as `walker_discrete`.
         senses: Sense to preset, a file of `conf/senses/<sense>`, such as `{"audio": "mono"}`.
         seed: The same seed gives the same worlds, bit by bit; None is fresh entropy.
-        overrides: Anything else the command line takes, such as `["task.life_s=4.0"]`.
+        overrides: Anything else of the game that the command line takes, such as
+            `["task.life_s=4.0"]`.
         plugins: Packages that add tasks or presets and are not installed as plug-ins.
 
     Returns:
@@ -267,10 +275,14 @@ def choose(
     """Return the configuration of the game that `make` makes. The arguments are the same.
 
     Raises:
-        ConfigError: If there is no such choice; the message lists those there are.
+        ConfigError: If there is no such choice, or an override is not of the game; the message
+            lists the choices there are.
     """
     check_list("overrides", overrides, '["task.life_s=4.0"]')
-    return compose([*_choices(task, playground, body, senses, plugins), *overrides]).game
+    check_game_overrides(overrides)
+    cfg = compose([*_choices(task, playground, body, senses, plugins), *overrides])
+    check_scripted(cfg)
+    return cfg.game
 
 
 def _choices(

@@ -3,9 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import fields
 from typing import Any
 
-from veca_marl.config import ConfigError
+from veca_marl.config import Config, ConfigError
+from veca_marl.config.overrides import parse, root_of
+from veca_marl.envs.core.game_cfg import GameCfg
+from veca_marl.envs.core.team import Script
+
+# `opponent` is the configuration of `GameCfg.script`
+_ROOTS_OF_GAMES = {f.name for f in fields(GameCfg)} - {"script"} | {"opponent", "plugins"}
 
 
 def check_name(argument: str, value: Any) -> None:
@@ -32,6 +39,40 @@ def check_list(argument: str, value: Any, example: str) -> None:
     is_list = isinstance(value, Sequence) and not isinstance(value, str)
     if not is_list or not all(isinstance(entry, str) for entry in value):
         raise ConfigError(f"{argument}={value!r} must be a list of texts, such as {example}")
+
+
+def check_game_overrides(overrides: Sequence[str]) -> None:
+    """Check that all overrides change the game, which is all that an environment has.
+
+    Raises:
+        ConfigError: If one is of the seed, or of another part of the configuration.
+    """
+    for override in parse(overrides):
+        root = root_of(override)
+        if root == "seed":
+            raise ConfigError(
+                f"overrides: {override.input_line!r} is not of the game; give the seed as the "
+                "argument `seed` (of check_task as checks=CheckCfg(seed=...))"
+            )
+        if root not in _ROOTS_OF_GAMES:
+            raise ConfigError(
+                f"overrides: {override.input_line!r} is not of the game; "
+                f"choices: {', '.join(sorted(_ROOTS_OF_GAMES))}"
+            )
+
+
+def check_scripted(cfg: Config) -> None:
+    """Check that no opponent is the policy of a run, which no environment plays.
+
+    Raises:
+        ConfigError: If one is.
+    """
+    for team, path in cfg.frozen.items():
+        raise ConfigError(
+            f"opponent.{team}={path}: an environment does not play the policy of a run; choices: "
+            f"{', '.join(script.value for script in Script)}; `train` and "
+            "python -m veca_marl.evaluate play it"
+        )
 
 
 def check_presets(argument: str, value: Any) -> None:

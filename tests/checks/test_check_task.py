@@ -16,7 +16,7 @@ from veca_marl.checks.seeding import check_seeding
 from veca_marl.checks.starts import check_starts
 from veca_marl.envs.core.expert import EXPERTS, Expert
 from veca_marl.envs.core.game import Game
-from veca_marl.envs.core.task import TASKS, Task, TaskCfg, terms
+from veca_marl.envs.core.task import TASKS, Task, TaskCfg, Team, terms
 from veca_marl.sim.physics import PropCfg, PropShape
 
 CHOSEN = compose(["+task=KickTheBall", "body=walker", "playground=simple"]).game
@@ -129,6 +129,20 @@ class TooGreatWithItsWeight(East):
         return super().reward(player) | {"progress": 1e10}
 
 
+class TermOfAnArray(East):
+    def reward(self, player):
+        return super().reward(player) | {"progress": np.array([self.now - self.last])}
+
+
+class EliminatesNobody(East):
+    def is_eliminated(self, player):
+        return True
+
+
+class TeamOfNobody(East):
+    teams = (*East.teams, Team("red", 0))
+
+
 class SolvedIsForgotten(East):
     def reward(self, player):
         return {"progress": self.now - self.last, "arrived": 0.0}
@@ -236,6 +250,12 @@ def test_a_sound_task_passes_every_check(game_of):
         (InfiniteTerm, returns, "reward terms", "term 'progress' of agents is nan"),
         (TooGreatForFloat32, random_play, "rewards", r"term 'progress' of agents is 1e\+39"),
         (TooGreatForFloat32, returns, "reward terms", r"term 'progress' of agents is 1e\+39"),
+        (
+            TermOfAnArray,
+            random_play,
+            "rewards",
+            "^term 'progress' of agents is of type ndarray, not a number$",
+        ),
         (TooGreatWithItsWeight, random_play, "rewards", r"the reward of agents is 1e\+40"),
         (SolvedIsForgotten, random_play, "rewards", r"solved\(\) of agents is None"),
         (TermMissing, random_play, "rewards", r"agents has the terms \['progress'\], weights"),
@@ -296,9 +316,17 @@ def test_an_exception_of_the_task_is_reported_with_its_place(game_of):
         assert "in reward)" in report[name].message
 
 
-def test_what_cannot_be_built_is_not_played(game_of):
-    report = check_game(game_of(FailsInBuild), QUICK)
-    assert "RuntimeError: no such furniture" in report["build"].message
+@pytest.mark.parametrize(
+    ("task", "message"),
+    [
+        (FailsInBuild, "RuntimeError: no such furniture"),
+        (EliminatesNobody, "EliminatesNobody defines is_eliminated, but has eliminates=False"),
+        (TeamOfNobody, "team 'red' of TeamOfNobody has size=0"),
+    ],
+)
+def test_what_cannot_be_built_is_not_played(game_of, task, message):
+    report = check_game(game_of(task), QUICK)
+    assert message in report["build"].message
     assert [f.check for f in report.failed] == ["build"]
     assert {f.status for f in report.findings[1:]} == {Status.skipped}
 

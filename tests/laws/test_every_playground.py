@@ -17,6 +17,14 @@ from veca_marl.envs.core.game import Game
 PLAYGROUNDS = sorted(path.stem for path in (conf_dir() / "playground").glob("*.yaml"))
 SMALL_EYES = ("senses.vision.width=8", "senses.vision.height=8")
 STARTS, STEPS = 20, 5
+HOUSES = set(PLAYGROUNDS) - {"simple", "single_room"}
+REFUSED = {
+    "KickTheBall": set(),
+    "MultiAgentNav": {"simple", "single_room"},
+    "ChaseCar": HOUSES,
+    "MazeNav": {*HOUSES, "single_room"},
+    "SoccerOnePlayer": HOUSES - {"house", "house2", "two_rooms"} | {"single_room"},
+}
 CHOICES = re.compile(r"choose .*playground=\w+")
 
 
@@ -40,6 +48,13 @@ def test_a_misfit_is_refused_with_names_and_choices(task):
     for name in PLAYGROUNDS:
         message = refusal(replace(own, playground=playground(name)))
         assert not message or (f"'{name}'" in message and CHOICES.search(message))
+
+
+@pytest.mark.parametrize(("name", "refused"), REFUSED.items(), ids=REFUSED)
+def test_no_other_playgrounds_than_these_are_refused(name, refused):
+    own = game_cfg(name)
+    found = {place for place in PLAYGROUNDS if refusal(replace(own, playground=playground(place)))}
+    assert found == refused
 
 
 @pytest.mark.slow

@@ -11,10 +11,21 @@ from rollouts import game_cfg
 from veca_marl.conf_dir import conf_dir
 from veca_marl.config import ConfigError
 from veca_marl.envs.core.game import Game
+from veca_marl.envs.core.task import find_task
+from veca_marl.sim.body import BodyCfg
 
 BODIES = sorted(path.stem for path in (conf_dir() / "body").glob("*.yaml"))
 CHOICES = re.compile(r"^agents: this task needs (a body .*choose body=|the verbs .* lacks )")
 CHEAPEST = ("walker", "mitten")  # one of each kind
+WALKERS = {name for name in BODIES if name.startswith("walker")}
+# tasks for all bodies, for bodies with joints, for bodies that walk, and for those that grab
+REFUSED = {
+    "ObjectNav": set(),
+    "PushOut1v1": set(),
+    "GrabObject": WALKERS,
+    "KickTheBall": set(BODIES) - WALKERS,
+    "ColorSort": set(BODIES) - {"walker_carry", "walker_verbs", "walker_discrete_verbs"},
+}
 
 
 @cache
@@ -37,11 +48,18 @@ def test_a_misfit_is_refused_with_the_kind_of_body_or_the_verbs_that_are_needed(
         assert not (message := refusal(task, name)) or CHOICES.search(message)
 
 
+@pytest.mark.parametrize(("name", "refused"), REFUSED.items(), ids=REFUSED)
+def test_no_other_bodies_than_these_are_refused(name, refused):
+    assert {body for body in BODIES if refusal(name, body)} == refused
+
+
 def test_no_game_is_built_with_a_body_that_is_refused(task):
-    for name in CHEAPEST:
-        if message := refusal(task, name):
-            with pytest.raises(ValueError, match=re.escape(message)):
-                Game(replace(game_cfg(task), body=body(name)))
+    refused = {name: message for name in CHEAPEST if (message := refusal(task, name))}
+    rules = find_task(task)  # `walker` has no verbs
+    assert len(refused) == (rules.body_cfg is not BodyCfg) + bool(rules.verbs)
+    for name, message in refused.items():
+        with pytest.raises(ValueError, match=re.escape(message)):
+            Game(replace(game_cfg(task), body=body(name)))
 
 
 @pytest.mark.slow

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from numbers import Real
 from time import perf_counter
 
 import numpy as np
@@ -45,7 +46,8 @@ def check_random_play(game: Game, steps: int, seed: int) -> Iterator[Finding]:
 
     Yields:
         ``observations``: finite, of the shape, type and range of their specifications. ``rewards``:
-        finite as float32, named as the weights; ``solved`` is True or False where it is defined.
+        numbers, finite as float32, named as the weights; ``solved`` is True or False where it is
+        defined.
         ``no constant observation``: each changes at least once.
         ``cost per step``: the median.
     """
@@ -124,10 +126,23 @@ def reward_problems(game: Game, outcome: Outcome) -> Iterator[str]:
     for name, terms in outcome.terms.items():
         if set(terms) != set(game.weights):
             yield f"{name} has the terms {sorted(terms)}, weights {sorted(game.weights)}"
-        unfit = [f"term {term!r} of {name} is {v}" for term, v in terms.items() if not _fits(v)]
+        unfit = [
+            f"term {term!r} of {name} is {_described(value)}"
+            for term, value in terms.items()
+            if not _is_number(value) or not _fits(value)
+        ]
         yield from unfit
         if not unfit and set(terms) == set(game.weights) and not _fits(game.reward_of(terms)):
             yield f"the reward of {name} is {game.reward_of(terms)}"
+
+
+def _is_number(value: object) -> bool:
+    """Return whether a value is a number, as which an array of one number is not counted."""
+    return isinstance(value, (Real, np.bool_))
+
+
+def _described(value: object) -> str:
+    return str(value) if _is_number(value) else f"of type {type(value).__name__}, not a number"
 
 
 def _fits(value: float) -> bool:

@@ -27,6 +27,11 @@ def parse(overrides: Sequence[str]) -> list[Override]:
     return parsed
 
 
+def root_of(override: Override) -> str:
+    """Return the first part of the key of an override: ``senses`` of ``senses/audio=mono``."""
+    return re.split(r"[./]", override.key_or_group, maxsplit=1)[0]
+
+
 def plugins_in(overrides: Sequence[str]) -> list[str]:
     """Return the packages that `plugins=[...]` names.
 

@@ -74,6 +74,12 @@ def test_a_wrong_shape_is_refused(env, shape):
     assert all(game.steps == 0 for game in env.games)
 
 
+def test_numbers_that_numpy_lacks_are_refused_with_the_type_that_is_expected(env):
+    state = with_action(env, torch.zeros(3, 1, 2, dtype=torch.bfloat16))
+    with pytest.raises(ValueError, match=r"of agents: dtype torch.bfloat16, not torch.float32"):
+        env.step(state)
+
+
 def test_the_reward_of_a_step_is_that_of_its_terms(env):
     state = env.reset()
     for _ in range(5):
@@ -221,9 +227,12 @@ def test_a_picture_of_each_world_shows_the_senses_and_the_room():
 
 def test_a_closed_env_has_closed_its_worlds(env):
     other = VecaEnv(cfg_of(*CHEAP), worlds=2)
-    games = other.games
+    games, state = other.games, with_action(other, torch.zeros(2, 1, 2))
     other.close()
     assert all(game.world.client == -1 for game in games)
+    for use in (other.reset, lambda: other.step(state), other.render):
+        with pytest.raises(RuntimeError, match="the environment is closed; make a new one"):
+            use()
 
 
 def make_env():

@@ -56,6 +56,19 @@ def test_there_is_no_step_without_an_episode(env):
         env.unwrapped.step(np.zeros(2, np.float32))
 
 
+@pytest.mark.parametrize(
+    "use",
+    [lambda env: env.reset(), lambda env: env.step(np.zeros(2, np.float32)), VecaGymEnv.render],
+)
+def test_a_closed_environment_says_so(use):
+    env = gym_env("KickTheBall", **CHEAP, render_mode="rgb_array")
+    env.reset()
+    env.close()
+    env.close()
+    with pytest.raises(RuntimeError, match="the environment is closed; make a new one"):
+        use(env)
+
+
 def test_an_invalid_action_is_an_error_with_the_expected_shape(env):
     env.reset()
     with pytest.raises(

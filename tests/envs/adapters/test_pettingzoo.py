@@ -146,6 +146,15 @@ def test_invalid_actions_are_errors_that_name_agent_and_part(env, actions, said)
     env.step(still(env))  # and the game goes on
 
 
+def test_a_closed_environment_says_so(cfg):
+    env = VecaParallelEnv(cfg)
+    env.reset()
+    env.close()
+    for use in (env.reset, lambda: env.step({name: np.zeros(2) for name in AGENTS})):
+        with pytest.raises(RuntimeError, match="the environment is closed; make a new one"):
+            use()
+
+
 def test_there_is_no_step_without_an_episode(env):
     actions = {name: np.zeros(2) for name in AGENTS}
     with pytest.raises(RuntimeError, match=r"reset\(\) before step"):

@@ -145,6 +145,30 @@ def test_the_length_of_an_episode_is_positive_and_finite(seconds):
         TaskCfg(max_seconds=seconds)
 
 
+@pytest.mark.parametrize("seconds", [0.01, 0.019])
+def test_an_episode_has_a_step(seconds):
+    with pytest.raises(ValueError, match=f"task.max_seconds={seconds} is no step: .* 0.04 s "):
+        Game(cfg_of(f"task.max_seconds={seconds}"))
+
+
+def test_a_team_without_players_is_refused(monkeypatch):
+    monkeypatch.setattr(find_task("KickTheBall"), "teams", (Team("agents"), Team("red", 0)))
+    with pytest.raises(ValueError, match="team 'red' of KickTheBall has size=0; it must be at"):
+        Game(cfg_of())
+
+
+def test_a_task_that_would_eliminate_nobody_is_refused(monkeypatch):
+    monkeypatch.setattr(find_task("KickTheBall"), "is_eliminated", lambda *_: True)
+    with pytest.raises(ValueError, match="is_eliminated, but has eliminates=False: nobody"):
+        Game(cfg_of())
+
+
+def test_a_term_has_not_the_name_of_another_entry_of_info(monkeypatch):
+    monkeypatch.setattr(Walker, "info", lambda body: {"kick": 0.0})
+    with pytest.raises(ValueError, match=r"\['kick'\] are the names of other .* of 'agents' rep"):
+        Game(cfg_of())
+
+
 def test_a_weight_is_a_finite_number():
     with pytest.raises(ValueError, match=r"weights.*kick"):
         TaskCfg(weights={"kick": float("nan")})

@@ -51,10 +51,12 @@ def test_the_start_is_at_rest(game):
 
 
 def test_the_hands_are_not_near_the_toy_at_the_start(game):
+    task, cfg = game.task, game.task.cfg
     for seed in range(10):
         game.reset(np.random.default_rng(seed))
-        assert game.task.held_m == 0.0
-        assert not game.task.solved(game.players[0])
+        assert palm_distances_m(task.child, task.toy).max() > cfg.edge_m / 2 + cfg.near_m
+        assert not both_hands_near(task.child, task.toy, cfg)
+        assert not task.solved(game.players[0])
         assert game.task.toy.velocity == pytest.approx(np.zeros(3))
 
 

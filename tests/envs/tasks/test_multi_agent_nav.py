@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from seekers import STEP_S, begin, game_of, put, step
 
+from veca_marl.checks.overlaps import overlaps
 from veca_marl.envs.tasks.navigation.places import gap_m
 
 REACH_M = 0.6  # from the middle of the object: its radius and the task's reach
@@ -54,17 +55,15 @@ def test_two_agents_start_in_any_two_rooms_the_object_with_one_of_them(game):
     assert all(one != other for one, other in pairs)
 
 
-def test_the_start_is_free_and_at_rest(game):
+def test_agents_start_free_and_out_of_reach_and_nothing_pushes_them(game):
     for seed in range(10):
         game.reset(np.random.default_rng(seed))
+        assert not overlaps(game)
         before = [player.body.position[:2] for player in game.players]
-        before.append(game.task.target.position[:2])
         step(game)
         after = [player.body.position[:2] for player in game.players]
-        after.append(game.task.target.position[:2])
         np.testing.assert_allclose(after, before, atol=1e-6)
-        for place in after[:-1]:
-            assert math.dist(place, after[-1]) > REACH_M
+        assert all(math.dist(place, game.task.target.position[:2]) > REACH_M for place in after)
 
 
 @pytest.mark.parametrize("agents", [2, 7])

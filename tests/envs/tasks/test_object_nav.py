@@ -90,6 +90,14 @@ def test_a_playground_without_space_is_an_error_that_names_it():
         compose(["+task=ObjectNav", "playground=seven_rooms", "task.apart_m=9"])
 
 
+def test_nothing_is_reached_at_the_start_with_the_least_distance():
+    game = game_of("task.reach_m=0.8", "task.apart_m=1.0")
+    for seed in range(40):
+        game.reset(np.random.default_rng(seed))
+        assert not walk(game).terminated
+    game.close()
+
+
 # ---- rewards and the end of an episode
 
 

@@ -30,7 +30,11 @@ CLEAR_M, APART_M = 0.8, 1.0  # of MultiAgentNav
     ("task", "overrides", "message"),
     [
         ("ObjectNav", ["task.apart_m=9"], "task.apart_m=9 .*'simple'.* 6 x 6 m.*; choose fewer"),
-        ("ObjectNav", ["task.reach_m=5"], "task.reach_m=5: .* 5.40 m away.*playground=house"),
+        (
+            "ObjectNav",
+            ["task.reach_m=5", "task.apart_m=6"],
+            "task.reach_m=5: .* 5.40 m away.*playground=house",
+        ),
         ("ObjectNav", [f"task.objects=[ball{18 * ',cube'}]"], "19 task.objects.* no 20 places"),
         ("ObjectPhysNav", ["task.apart_m=7"], "ObjectPhysNav .*task.apart_m=7"),
         ("MultiAgentNav", ["task.radius_m=3"], "task.radius_m=3, .*no room leaves two .*hall 9.2"),

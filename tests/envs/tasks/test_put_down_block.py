@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 from blocks import blocks_game, play, sit, sits
 
+from veca_marl.checks.overlaps import overlaps
+
 EDGE = 0.06
 EXPERT_SEEDS = (0, 1, 2)
 
@@ -26,6 +28,18 @@ def test_the_tower_stands_on_either_side_with_the_red_block_on_top(game):
         sides.append(tower[0][1])
     assert min(sides) < -0.05
     assert max(sides) > 0.05
+
+
+@pytest.mark.parametrize("numbers", [(0.03, 2), (0.06, 2), (0.06, 3), (0.1, 2)])
+def test_the_tower_is_clear_of_the_body_from_the_least_distance_on(numbers):
+    edge_m, blue = numbers
+    ahead_m = (2.0 / 3.0 * (blue + 1) + 0.5) * edge_m + 1e-9
+    words = (f"task.edge_m={edge_m}", f"task.blue={blue}", f"task.ahead_m=[{ahead_m},{ahead_m}]")
+    game = blocks_game("PutDownBlock", *words, "task.aside_m=[0,0.05]")
+    for seed in range(10):
+        game.reset(np.random.default_rng(seed))
+        assert not overlaps(game), seed
+    game.close()
 
 
 def test_the_tower_stands_while_the_body_sits_still(game):

@@ -7,6 +7,9 @@ import numpy as np
 import pytest
 from contests import episodes, game_of, rest, total_reward
 
+from veca_marl.checks.overlaps import overlaps
+from veca_marl.envs.tasks.contests.soccer_cfg import CHILD_M
+
 GAMES = 15
 
 
@@ -78,6 +81,24 @@ def test_the_goal_counts_in_the_step_in_which_the_centre_passes_the_line(alone):
 )
 def test_a_goal_is_between_the_posts_under_the_bar_from_the_front(alone, before, after, counts):
     assert alone.task.pitch.scores(np.array(before), np.array(after)) is counts
+
+
+def test_a_ball_that_fits_behind_the_line_scores_against_the_wall():
+    with closing(game_of("SoccerOnePlayer", "task.goal_from_wall_m=0.13")) as game:
+        x, y, _ = game.task.goal
+        assert roll_in(game, (x - 0.6, y, 0.12), (2.0, 0.0, 0.0)).terminated
+
+
+@pytest.mark.parametrize("radius_m", [0.06, 0.12, 0.3])
+def test_bodies_on_hands_and_knees_start_clear_of_the_ball(radius_m):
+    near = radius_m + CHILD_M
+    words = [f"task.radius_m={radius_m}", f"task.attacker_from_ball_m=[{near},{near}]"]
+    words += [f"task.ball_from_goal_m=[{near + 0.3},{near + 0.3}]", "task.aside_m=0"]
+    words += ["task.defender_from_goal_m=[0.3,0.3]", "body=mitten"]
+    with closing(game_of("SoccerTwoPlayer", *words)) as game:
+        for seed in range(5):
+            game.reset(np.random.default_rng(seed))
+            assert not [pair for pair in overlaps(game) if "ball" in pair]
 
 
 def test_boards_close_the_goal_line_beside_the_goal(alone):

@@ -73,7 +73,7 @@ class VecaGymEnv(gymnasium.Env[Observation, Any]):
         """Play one step.
 
         Raises:
-            RuntimeError: If no episode is running.
+            RuntimeError: If no episode is running, or the environment is closed.
             ValueError: If the action is invalid.
         """
         step = self._played.step({self._agent: action})

@@ -78,7 +78,7 @@ class VecaParallelEnv(ParallelEnv[str, Observation, Any]):
         """Play one step of those in `agents`; when the episode is over, `agents` is empty.
 
         Raises:
-            RuntimeError: If no episode is running.
+            RuntimeError: If no episode is running, or the environment is closed.
             ValueError: If an action is missing, invalid, or for an unknown agent.
         """
         step = self._played.step(actions)

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from veca_marl.envs.adapters.closed import refuse_closed
 from veca_marl.envs.core.episodes import Episodes
 from veca_marl.envs.core.game import Game, Observation
 from veca_marl.envs.core.game_cfg import GameCfg
@@ -86,6 +87,7 @@ class SeededGame:
         self._spectator = Spectator(self.game)
         self._render_mode = render_mode
         self._running = False
+        self._closed = False
 
     def reset(
         self, seed: int | None = None, options: Mapping[str, Any] | None = None
@@ -98,8 +100,10 @@ class SeededGame:
                 ignored, because PettingZoo's own test passes one.
 
         Raises:
+            RuntimeError: If the environment is closed.
             ValueError: If the seed or the number is negative.
         """
+        refuse_closed(self._closed)
         if seed is not None:
             self._episodes = Episodes(seed)
         self.rng = self._episodes.next((options or {}).get("episode"))
@@ -117,9 +121,10 @@ class SeededGame:
             The result for each player that was not eliminated before the step.
 
         Raises:
-            RuntimeError: If no episode is running.
+            RuntimeError: If no episode is running, or the environment is closed.
             ValueError: If an action is missing, invalid, or for an unknown player.
         """
+        refuse_closed(self._closed)
         if not self._running:
             raise RuntimeError("no episode is running: call reset() before step()")
         names = self.playing
@@ -153,8 +158,10 @@ class SeededGame:
         """Return what the first player perceives beside the room, ``(252, width, 3)`` uint8.
 
         Raises:
-            RuntimeError: If the environment was made without `render_mode`, or not yet reset.
+            RuntimeError: If the environment was made without `render_mode`, not yet reset, or is
+                closed.
         """
+        refuse_closed(self._closed)
         if self._render_mode is None:
             raise RuntimeError(f"made without a render_mode; choices: {list(RENDER_MODES)}")
         if self.rng is None:
@@ -163,5 +170,5 @@ class SeededGame:
 
     def close(self) -> None:
         """Release the resources of the world."""
-        self._running = False
+        self._running, self._closed = False, True
         self.game.close()

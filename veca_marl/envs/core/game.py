@@ -82,7 +82,7 @@ class Game:
     def __init__(self, cfg: GameCfg) -> None:
         cfg.check()
         self.cfg = cfg
-        self.max_steps = round(cfg.task.max_seconds / cfg.clock.step_s)
+        self.max_steps = cfg.max_steps
         self._rng: np.random.Generator | None = None
         self._build()
 

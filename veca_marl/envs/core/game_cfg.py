@@ -43,6 +43,11 @@ class GameCfg:
         """The teams of the task."""
         return find_task(self.task.name).teams_of(self.task)
 
+    @property
+    def max_steps(self) -> int:
+        """Number of steps after which an episode is truncated."""
+        return round(self.task.max_seconds / self.clock.step_s)
+
     def body_of(self, team: str) -> BodyCfg:
         """Return the body of the players of a team."""
         own = self.team.get(team)
@@ -54,12 +59,15 @@ class GameCfg:
         return self.senses if own is None else own.senses.replace_in(self.senses)
 
     def check(self) -> None:
-        """Check the names of the teams, the scripts, the bodies and the playground.
+        """Check the duration, the teams, the scripts, the bodies and the playground.
 
         Raises:
-            ValueError: If a team does not exist, all teams are scripted, the task has no expert
-                for a script, or a body or the playground does not fit.
+            ValueError: If an episode has no step, a team does not exist or has no players, all
+                teams are scripted, the task has no expert for a script, or a body or the playground
+                does not fit.
         """
+        self._check_duration()
+        self._check_sizes()
         self._check_teams([team.name for team in self.teams])
         self.check_bodies()
         self.check_playground()
@@ -82,6 +90,21 @@ class GameCfg:
         """
         find_task(self.task.name).check_playground(self.task, self.playground)
         self._check_floor()
+
+    def _check_duration(self) -> None:
+        if self.max_steps < 1:
+            raise ValueError(
+                f"task.max_seconds={self.task.max_seconds:g} is no step: a step lasts "
+                f"{self.clock.step_s:g} s (clock.control_rate_hz={self.clock.control_rate_hz:g})"
+            )
+
+    def _check_sizes(self) -> None:
+        for team in self.teams:
+            if team.size < 1:
+                raise ValueError(
+                    f"team {team.name!r} of {self.task.name} has size={team.size}; it must be at "
+                    "least 1"
+                )
 
     def _check_teams(self, names: list[str]) -> None:
         for key, asked in (("team", self.team), ("script", self.script)):

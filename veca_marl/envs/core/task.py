@@ -109,7 +109,7 @@ class TaskCfg:
 
         Raises:
             ValueError: If the duration is not positive, a weight is not finite, or a term is named
-                as another entry of `info`.
+                `solved`, as another entry of `info`; `Task` checks the entries of bodies.
         """
         self.check_positive("max_seconds")
         if SOLVED in self.weights:
@@ -177,21 +177,33 @@ class Task(ABC):
         """Store the arguments and build the props.
 
         Raises:
-            ValueError: If the names of the weights are not those of the reward terms, or `rates`
-                names another term.
+            ValueError: If the names of the weights are not those of the reward terms, `rates` names
+                another term, a body reports a number of the name of a term, or `is_eliminated` is
+                defined without `eliminates`.
         """
-        known = set(type(self).cfg_type()().weights)
-        if set(cfg.weights) != known:
-            raise ValueError(
-                f"task.weights has the terms {sorted(cfg.weights)}; "
-                f"{type(self).__name__} has {sorted(known)}"
-            )
-        if unknown := sorted(set(self.rates) - known):
-            raise ValueError(
-                f"{type(self).__name__}.rates names {unknown}; its reward terms are {sorted(known)}"
-            )
+        self._check_elimination()
+        self._check_terms(cfg, players)
         self.cfg, self.world, self.players = cfg, world, players
         self.build()
+
+    def _check_elimination(self) -> None:
+        """Raise `ValueError` if `is_eliminated` would never be called."""
+        if type(self).is_eliminated is not Task.is_eliminated and not self.eliminates:
+            raise ValueError(
+                f"{type(self).__name__} defines is_eliminated, but has eliminates=False: nobody "
+                "would be eliminated; set eliminates = True in the class"
+            )
+
+    def _check_terms(self, cfg: TaskCfg, players: list[Player]) -> None:
+        """Raise `ValueError` if weights, rates or bodies do not agree with the reward terms."""
+        name, known = type(self).__name__, set(type(self).cfg_type()().weights)
+        if set(cfg.weights) != known:
+            raise ValueError(
+                f"task.weights has the terms {sorted(cfg.weights)}; {name} has {sorted(known)}"
+            )
+        if unknown := sorted(set(self.rates) - known):
+            raise ValueError(f"{name}.rates names {unknown}; its reward terms are {sorted(known)}")
+        _check_info(known, players)
 
     def step_weights(self) -> dict[str, float]:
         """Return the weight of each reward term in a step of the world's clock, see `rates`."""
@@ -263,6 +275,17 @@ class Task(ABC):
         """Return the class with which this task annotates `cfg`."""
         hint: type[TaskCfg] = get_type_hints(cls)["cfg"]
         return hint
+
+
+def _check_info(names: set[str], players: list[Player]) -> None:
+    """Raise `ValueError` if a body reports a number of the name of a reward term."""
+    for player in players:
+        both = sorted(names.intersection(player.body.info()))
+        if both:
+            raise ValueError(
+                f"task.weights: {both} are the names of other entries of info, which the body of "
+                f"{player.name!r} reports; choose other names of terms"
+            )
 
 
 TASKS: Registry[type[Task]] = Registry("task")

@@ -23,28 +23,26 @@ class ActionReader:
 
     def __init__(self, team: str, spec: TensorSpec) -> None:
         self._team = team
-        self._shape = spec.shape
-        self._parts = {}
-        if isinstance(spec, Composite):
-            self._parts = {part: leaf.shape for part, leaf in spec.items()}
+        self._spec = spec
+        self._parts = dict(spec.items()) if isinstance(spec, Composite) else {}
 
     def read(self, tensordict: TensorDictBase) -> TeamActions:
         """Return the actions as numpy arrays.
 
         Raises:
-            ValueError: If a tensor has another shape than its spec.
+            ValueError: If a tensor has another shape than its spec, or a type that numpy lacks.
         """
         action = tensordict.get((self._team, "action"))
         if not self._parts:
-            return _to_numpy(f"action of {self._team}", action, self._shape)
+            return _to_numpy(f"action of {self._team}", action, self._spec)
         # TorchRL's policies write log-probabilities beside the parts
         if not isinstance(action, TensorDictBase) or not self._parts.keys() <= set(action.keys()):
             raise ValueError(
                 f"action of {self._team} must be a tensordict with the parts {list(self._parts)}"
             )
         return {
-            part: _to_numpy(f"action {part!r} of {self._team}", action.get(part), shape)
-            for part, shape in self._parts.items()
+            part: _to_numpy(f"action {part!r} of {self._team}", action.get(part), leaf)
+            for part, leaf in self._parts.items()
         }
 
 
@@ -55,10 +53,13 @@ def action_of(actions: TeamActions, world: int, player: int) -> Any:
     return actions[world, player]
 
 
-def _to_numpy(what: str, action: Any, expected: torch.Size) -> NDArray[Any]:
-    if not isinstance(action, torch.Tensor) or action.shape != expected:
+def _to_numpy(what: str, action: Any, spec: TensorSpec) -> NDArray[Any]:
+    if not isinstance(action, torch.Tensor) or action.shape != spec.shape:
         got = tuple(action.shape) if isinstance(action, torch.Tensor) else type(action).__name__
-        raise ValueError(f"{what}: shape {got}, not {tuple(expected)}")
+        raise ValueError(f"{what}: shape {got}, not {tuple(spec.shape)}")
     plain = action.is_cpu and not action.requires_grad
-    array: NDArray[Any] = action.numpy() if plain else action.numpy(force=True)
+    try:
+        array: NDArray[Any] = action.numpy() if plain else action.numpy(force=True)
+    except TypeError:  # numpy has no such numbers
+        raise ValueError(f"{what}: dtype {action.dtype}, not {spec.dtype}") from None
     return array

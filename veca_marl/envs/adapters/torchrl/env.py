@@ -7,6 +7,7 @@ import torch
 from numpy.typing import NDArray
 from tensordict import TensorDict, TensorDictBase
 
+from veca_marl.envs.adapters.closed import refuse_closed
 from veca_marl.envs.adapters.torchrl.actions import ActionReader, TeamActions, action_of
 from veca_marl.envs.adapters.torchrl.fast_step import FastStepEnv
 from veca_marl.envs.adapters.torchrl.layout import Arrays, Layout
@@ -80,6 +81,7 @@ class VecaEnv(FastStepEnv):
             check_integer("seed", seed)
         announce_compilation()
         super().__init__(fast_step, torch.Size([worlds]))
+        # TorchRL's `is_closed` is also True before the first reset
         self._worlds_closed = False
         self.cfg = cfg
         self.first_world = first_world
@@ -118,8 +120,7 @@ class VecaEnv(FastStepEnv):
             tensordict: May contain the mask.
             episode: Number of the episode to begin; None is the one after the last.
         """
-        if self._worlds_closed:  # TorchRL's `is_closed` is also True before the first reset
-            raise RuntimeError("the environment is closed; make a new one")
+        refuse_closed(self._worlds_closed)
         arrays = self._start.new()
         for world in self._selected(tensordict, "_reset"):
             self.games[world].reset(self.episodes[world].next(episode))
@@ -134,6 +135,7 @@ class VecaEnv(FastStepEnv):
         return [world for world, flag in enumerate(selected.flatten().tolist()) if flag]
 
     def _step(self, tensordict: TensorDictBase) -> TensorDict:
+        refuse_closed(self._worlds_closed)
         worlds = self._selected(tensordict, "_step")
         self._command(worlds, {team: self._actions[team].read(tensordict) for team in self._teams})
         arrays = self._next.new()
@@ -210,8 +212,9 @@ class VecaEnv(FastStepEnv):
 
         Raises:
             IndexError: If there is no such world.
-            RuntimeError: If the world was never reset.
+            RuntimeError: If the world was never reset, or the environment is closed.
         """
+        refuse_closed(self._worlds_closed)
         if not 0 <= world < len(self.games):
             raise IndexError(f"world={world}; there are {len(self.games)} worlds, from 0 on")
         game = self.games[world]

@@ -44,6 +44,23 @@ def check_start_area(cfg: SoccerCfg, playground: PlaygroundCfg) -> None:
             )
 
 
+def check_goal(cfg: SoccerCfg, playground: PlaygroundCfg) -> None:
+    """Check that the goal fits between the boards across the corners of the first room.
+
+    Raises:
+        ValueError: If it does not.
+    """
+    room = playground.rooms[0]
+    free_m = room.size_m[1] - 2.0 * _CORNER_M
+    if cfg.goal_width_m > free_m:
+        raise ValueError(
+            f"playground {playground.name!r}: task.goal_width_m={cfg.goal_width_m:g} must be at "
+            f"most {free_m:g} in room {room.name!r}, which is {room.size_m[1]:g} m wide with "
+            f"boards of {_CORNER_M:g} m across its corners; choose a smaller goal, or "
+            "playground=simple"
+        )
+
+
 class Pitch:
     """A pitch in the first room of a world, along x, with the goal at the end of greater x.
 

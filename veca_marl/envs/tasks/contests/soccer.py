@@ -11,7 +11,7 @@ import numpy as np
 from veca_marl.envs.core.scoring import horizontal_angle_rad
 from veca_marl.envs.core.task import Player, Task
 from veca_marl.envs.tasks.contests.kicking import AutomaticKicks
-from veca_marl.envs.tasks.contests.pitch import Pitch, check_start_area
+from veca_marl.envs.tasks.contests.pitch import Pitch, check_goal, check_start_area
 from veca_marl.envs.tasks.contests.soccer_cfg import SoccerCfg
 from veca_marl.envs.tasks.player_starts import direct_gaze_ahead, place_player
 from veca_marl.sim.geometry import Floats, horizontal_distance
@@ -48,6 +48,7 @@ class Soccer(Task):
     @classmethod
     def check_playground(cls, cfg: Any, playground: PlaygroundCfg) -> None:
         check_start_area(cfg, playground)
+        check_goal(cfg, playground)
 
     def build(self) -> None:
         self.pitch = Pitch(self.world, self.cfg)

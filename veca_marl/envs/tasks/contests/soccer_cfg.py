@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from veca_marl.envs.core.task import TaskCfg, terms
 
 POST_M = 0.04  # radius of posts and bar
+CHILD_M = 0.45  # from the pelvis of a body on hands and knees to the front of its head, at most
 
 
 @dataclass
@@ -19,11 +20,11 @@ class SoccerCfg(TaskCfg):
         mass_kg: Mass of the ball.
         goal_width_m: Distance between the axes of the posts.
         goal_height_m: Height of the bar.
-        goal_from_wall_m: Distance of the goal line from the end of the room.
+        goal_from_wall_m: Distance of the goal line from the end of the room, above `radius_m`.
         ball_from_goal_m: Least and greatest distance of the ball from the goal line at the start.
         aside_m: Largest lateral distance of ball and players from the middle line at the start.
         attacker_from_ball_m: Least and greatest distance of the attacker behind the ball at the
-            start.
+            start; at least 0.45 m from its surface.
         spread_deg: Largest angle at the start between the heading of a player and the direction
             of the ball, in [0, 180].
         kick_rest_s: Least time between two kicks of a player.
@@ -51,7 +52,18 @@ class SoccerCfg(TaskCfg):
                     "does not fit through"
                 )
         self._check_span("ball_from_goal_m", 0.3, "0.3 m or more")
-        self._check_span("attacker_from_ball_m", 0.3, "0.3 m or more")
+        apart_m = self.radius_m + CHILD_M
+        self._check_span(
+            "attacker_from_ball_m",
+            apart_m,
+            f"at least {apart_m:g}: task.radius_m={self.radius_m:g} and {CHILD_M} m from pelvis to "
+            "head",
+        )
+        if self.goal_from_wall_m <= self.radius_m:
+            raise ValueError(
+                f"task.goal_from_wall_m={self.goal_from_wall_m} must be larger than task.radius_m="
+                f"{self.radius_m}: else the wall stops the ball before its centre passes the line"
+            )
         if not 0.0 <= self.aside_m < math.inf:
             raise ValueError(f"task.aside_m={self.aside_m} must be 0 or more")
         if not 0.0 <= self.spread_deg <= 180.0:

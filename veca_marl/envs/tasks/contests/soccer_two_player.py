@@ -8,7 +8,7 @@ import numpy as np
 
 from veca_marl.envs.core.task import Player, Team, register
 from veca_marl.envs.tasks.contests.soccer import ATTACKER, DEFENDER, Soccer
-from veca_marl.envs.tasks.contests.soccer_cfg import SoccerCfg
+from veca_marl.envs.tasks.contests.soccer_cfg import CHILD_M, SoccerCfg
 from veca_marl.sim.geometry import Floats
 
 
@@ -26,10 +26,12 @@ class SoccerTwoPlayerCfg(SoccerCfg):
     def __post_init__(self) -> None:
         super().__post_init__()
         near, far = self.defender_from_goal_m
-        if not 0.2 <= near <= far < self.ball_from_goal_m[0] - 0.3:
+        apart_m = self.radius_m + CHILD_M
+        if not 0.2 <= near <= far <= self.ball_from_goal_m[0] - apart_m:
             raise ValueError(
                 f"task.defender_from_goal_m={(near, far)} must be (least, greatest), 0.2 m or "
-                f"more, and 0.3 m nearer than task.ball_from_goal_m={self.ball_from_goal_m}"
+                f"more, and {apart_m:g} m (task.radius_m and {CHILD_M} m from pelvis to head) "
+                f"nearer than task.ball_from_goal_m={self.ball_from_goal_m}"
             )
 
 

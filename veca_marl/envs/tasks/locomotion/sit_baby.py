@@ -15,7 +15,9 @@ from veca_marl.envs.tasks.locomotion.start_poses import (
     draw_posture,
     start_anywhere,
 )
+from veca_marl.registry import unknown
 from veca_marl.sim.body.humanoid import HumanoidCfg
+from veca_marl.sim.body.humanoid.postures import POSTURES
 
 
 @dataclass
@@ -52,6 +54,9 @@ class SitBabyCfg(StartCfg):
             raise ValueError(f"task.upright_deg={self.upright_deg} must be in [0, 90)")
         if not 0.0 < self.sat <= 1.0:
             raise ValueError(f"task.sat={self.sat} must be above 0 and at most 1")
+        strange = sorted(set(self.starts) - set(POSTURES))
+        if strange:
+            raise ValueError(f"task.starts: {unknown('posture', strange[0], sorted(POSTURES))}")
         shares = self.starts.values()
         if not all(0.0 <= share < math.inf for share in shares) or sum(shares) == 0.0:
             raise ValueError(f"task.starts={self.starts} must be shares: 0 or more, not all 0")

@@ -35,7 +35,8 @@ class ObjectNavCfg(TaskCfg):
         target: Kind of the target, once among `objects`. It is the same in all episodes.
         reach_m: Horizontal distance from the pelvis to the surface of an object within which it
             has been reached.
-        apart_m: Least distance between the middles of any two objects, and from the start to each.
+        apart_m: Least distance between the middles of any two objects, and from the start to each;
+            larger than the radius of the widest object and `reach_m` together.
     """
 
     objects: list[ObjectKind] = field(default_factory=_default_objects)
@@ -57,6 +58,17 @@ class ObjectNavCfg(TaskCfg):
             raise ValueError(
                 f"task.objects={names} must be at least 2 and hold task.target="
                 f"{self.target.name} once; choices: {kinds}"
+            )
+        self._check_reach()
+
+    def _check_reach(self) -> None:
+        """Raise `ValueError` if an object could be within reach at the start."""
+        widest = max(self.objects, key=radius_m)
+        if self.reach_m + radius_m(widest) >= self.apart_m:
+            raise ValueError(
+                f"task.apart_m={self.apart_m:g} must be larger than task.reach_m={self.reach_m:g} "
+                f"and the radius of {widest.name}, {radius_m(widest):.2f} m, together: else an "
+                "object is reached at the start"
             )
 
 

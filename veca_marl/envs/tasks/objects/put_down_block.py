@@ -24,6 +24,7 @@ from veca_marl.sim.body.humanoid import HumanoidCfg
 from veca_marl.sim.body.humanoid.postures import REACHING
 from veca_marl.sim.physics import PlaygroundCfg
 
+_LEAN = 2.0 / 3.0  # of the front of a body that is `REACHING`: metres ahead per metre of height
 # height in edges times seconds, with two blue blocks and 12 s, if nothing is done
 _DEFAULT_EDGE_SECONDS = 24.0
 
@@ -34,7 +35,8 @@ class PutDownBlockCfg(BlocksCfg):
 
     Attributes:
         blue: Number of blue blocks in the tower, 2 or 3.
-        ahead_m: Least and greatest distance of the tower in front of the pelvis.
+        ahead_m: Least and greatest distance of the tower in front of the pelvis; above two thirds
+            of the height of the tower, where the trunk that leans over it ends.
         aside_m: Least and greatest lateral distance of the tower, to the left or to the right.
         turn_deg: Largest yaw of the tower.
         fallen: Loss of height, in lengths of an edge, at which a blue block has fallen, in (0, 1).
@@ -53,10 +55,21 @@ class PutDownBlockCfg(BlocksCfg):
         if self.blue not in (2, 3):
             raise ValueError(f"task.blue={self.blue} must be 2 or 3, so that one can fall")
         self.check_not_negative("turn_deg")
-        self._check_span("ahead_m", 0.0, "0 or more")
+        least_m = self._least_ahead_m()
+        self._check_span(
+            "ahead_m",
+            least_m,
+            f"at least {least_m:.3f}: the trunk leans over a tower of task.blue={self.blue} and a "
+            f"red block of task.edge_m={self.edge_m:g}",
+        )
         self._check_span("aside_m", 0.0, "0 or more")
         if not 0.0 < self.fallen < 1.0:
             raise ValueError(f"task.fallen={self.fallen} must be between 0 and 1 edges")
+
+    def _least_ahead_m(self) -> float:
+        """Return the distance from which on a tower in the middle is clear of the trunk."""
+        height_m = (self.blue + 1) * self.edge_m
+        return _LEAN * height_m + self.edge_m / 2.0
 
 
 @register
