@@ -118,6 +118,19 @@ def test_a_wall_that_cannot_take_the_leaf_is_refused(y_m, walls, leaf, message):
         row(2, walls.thickness_m, walls, doors=[door])
 
 
+def test_an_opening_that_reaches_beyond_a_room_is_refused():
+    """The wall of the smaller room would stand in the opening."""
+    rooms = [
+        RoomCfg("hall", (0.0, -2.1, 0.0), (6.1, 2.0, 2.5)),
+        RoomCfg("one", (0.0, 0.0, 0.0), (3.0, 3.0, 2.5)),
+        RoomCfg("other", (3.1, 0.0, 0.0), (3.0, 3.0, 2.5)),
+    ]
+    door = DoorCfg("door", ("hall", "one"), (2.5, -0.05), 1.0)
+    PlaygroundCfg("flat", rooms, [door], walls=WallsCfg())
+    with pytest.raises(ValueError, match=r"from 2.10 to 3.10 m reaches beyond room 'one', from 0"):
+        PlaygroundCfg("flat", rooms, [replace(door, position_m=(2.6, -0.05))], walls=WallsCfg())
+
+
 def test_rooms_are_separate_without_a_door_and_connected_by_it():
     door = DoorCfg("door", ("room_0", "room_1"), (3.05, 1.0), 1.0)
     assert FloorMap(row(2)).count == 2

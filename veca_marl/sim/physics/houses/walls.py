@@ -80,8 +80,9 @@ def wall_props(rooms: Sequence[RoomCfg], doors: Sequence[DoorCfg], cfg: WallsCfg
 
     Raises:
         ValueError: If a wall would stand in a room, because two rooms are less than one wall
-            thickness apart, a door is not in a wall, a wall is too thin for the leaf of its door,
-            or too short for a leaf that slides into it, or meets another wall there.
+            thickness apart, a door is not in a wall or reaches beyond one of its rooms, a wall is
+            too thin for the leaf of its door or too short for one that slides into it, or meets
+            another wall there.
     """
     lines = wall_lines(rooms, cfg.thickness_m)
     walls: list[WallWithDoors] = []
@@ -92,6 +93,8 @@ def wall_props(rooms: Sequence[RoomCfg], doors: Sequence[DoorCfg], cfg: WallsCfg
         colour = (red, green, blue)
         _check_outside(line, rooms, cfg.thickness_m)
         cut = [door for door in doors if _is_in(door, line)]
+        for door in cut:
+            _check_beside(door, line.axis, rooms)
         placed.update(door.name for door in cut)
         pieces = _pieces(f"wall_{number}", line, cut, cfg, colour)
         walls.append(WallWithDoors(line.axis, cut, pieces))
@@ -161,6 +164,25 @@ def _is_in(door: DoorCfg, line: WallLine) -> bool:
         and line.begin_m < along - half
         and along + half < line.end_m
     )
+
+
+def _check_beside(door: DoorCfg, axis: int, rooms: Sequence[RoomCfg]) -> None:
+    """Check that the whole opening of a door leads from one of its rooms to the other.
+
+    Raises:
+        ValueError: If it reaches beyond a room, where another wall would stand in it.
+    """
+    along, half = door.position_m[1 - axis], door.width_m / 2.0
+    for room in rooms:
+        low = room.lower_m[1 - axis]
+        high = low + room.size_m[1 - axis]
+        inside = low - _TOLERANCE_M <= along - half and along + half <= high + _TOLERANCE_M
+        if room.name in door.rooms and not inside:
+            raise ValueError(
+                f"door {door.name!r}: its opening from {along - half:.2f} to {along + half:.2f} m "
+                f"reaches beyond room {room.name!r}, from {low:.2f} to {high:.2f} m; move it, or "
+                f"choose a smaller width_m than {door.width_m:g}"
+            )
 
 
 def _pieces(
