@@ -1,5 +1,6 @@
 """Teams that start from other runs: whole teams, encoders of single senses, frozen encoders."""
 
+import math
 from pathlib import Path
 
 import pytest
@@ -9,6 +10,7 @@ from toy_dqn import ToyDQNCfg, register
 from training import SMALL
 
 from veca_marl.algos.intrinsic import RNDCfg
+from veca_marl.algos.networks.encoders import VectorEncoder
 from veca_marl.algos.networks.memory import with_memory
 from veca_marl.algos.networks.multisense import Memory, MultisenseCfg, Parameters
 from veca_marl.algos.plain import to_plain
@@ -17,8 +19,8 @@ from veca_marl.algos.ppo.value_normalisation import ValueNormalisation
 from veca_marl.algos.sac import SACCfg
 from veca_marl.algos.sac.config import ReplayCfg
 from veca_marl.algos.sac.replay.buffer import Replay
-from veca_marl.algos.sense_encoders import sense_encoders
-from veca_marl.algos.specs import TeamSpec, team_specs
+from veca_marl.algos.sense_encoders import SenseEncoders, copy_encoders, sense_encoders
+from veca_marl.algos.specs import ArrayLayout, TeamSpec, team_specs
 from veca_marl.algos.training.checkpoint import Checkpoints
 from veca_marl.algos.training.checkpoint_file import CheckpointError
 from veca_marl.algos.training.checkpoint_identity import Identity
@@ -165,6 +167,29 @@ def test_an_actor_is_copied_between_algorithms_with_the_same_network(tmp_path):
     init_teams(here, {"agents": store(there, tmp_path)}, {})
     mine, other = (each.policy.actors["agents"].state_dict() for each in (here, there))
     assert all(torch.equal(mine[name], other[name]) for name in other)
+
+
+def test_an_actor_with_another_scale_of_actions_is_refused(tmp_path):
+    """Equal parameters would be another policy: the initial scale is not one of them."""
+    cfg = small_sac(network=network(initial_scale=0.1), policy_hidden=[])
+    there, here = make_learners(seed=1), make_learners(seed=2, algo=cfg)
+    with pytest.raises(CheckpointError, match=r"initial_scale=1.0 there, 0.1 here"):
+        init_teams(here, {"agents": store(there, tmp_path)}, {})
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "compressed"), [(-2.0, 1.0, False), (-math.inf, math.inf, True)]
+)
+def test_an_encoder_with_another_scale_of_its_input_is_refused(low, high, compressed):
+    """Equal parameters would be another function: the scale is not one of them."""
+
+    def encoder(low=-math.inf, high=math.inf, compressed=False):
+        layout = ArrayLayout((3,), "float32", low, high)
+        return SenseEncoders({"audio": VectorEncoder(layout, 4, compressed)})
+
+    copy_encoders(encoder(), {"audio": [encoder()["audio"]]})
+    with pytest.raises(ValueError, match=r"encoder of audio: its input is scaled by .* there, by"):
+        copy_encoders(encoder(), {"audio": [encoder(low, high, compressed)["audio"]]})
 
 
 def test_the_message_names_the_layers_of_an_actor_that_another_algorithm_has_not(tmp_path):

@@ -22,6 +22,7 @@ from tensordict.nn import TensorDictModuleBase
 from torch import nn
 
 from veca_marl.algos.choices import ChoiceRegistry
+from veca_marl.algos.networks.factory import NetworkCfg, check_same_actor
 from veca_marl.algos.sense_encoders import copy_encoders, copy_parameters
 from veca_marl.algos.specs import TeamSpec
 from veca_marl.algos.storage import StorageNeeded
@@ -68,6 +69,11 @@ class Algorithm(ABC):
         actions are asked for, a sample otherwise. A file for playing contains its `state_dict`.
         A policy with hidden state brings the primers of it (`networks.memory`).
         """
+
+    @property
+    def network_cfg(self) -> NetworkCfg | None:
+        """The numbers of the network, by which actors are compared; None if it has none."""
+        return None
 
     @property
     def explorer(self) -> TensorDictModuleBase:
@@ -127,6 +133,8 @@ class Algorithm(ABC):
         Raises:
             ValueError: If the parameters do not fit.
         """
+        if self.network_cfg is not None and other.network_cfg is not None:
+            check_same_actor(self.network_cfg, other.network_cfg)
         copy_parameters(self.actor, other.actor)
 
     def init_encoders(self, encoders: Mapping[str, Sequence[nn.Module]]) -> None:

@@ -10,6 +10,7 @@ from tensordict.nn import TensorDictModuleBase, TensorDictSequential
 from torch import nn
 
 from veca_marl.algos.acting.direct import DirectPolicy
+from veca_marl.algos.networks.exploration import UniformWarmUp
 from veca_marl.algos.networks.precision import for_acting
 
 
@@ -35,6 +36,13 @@ class Policy(nn.Module):
         self.actors = nn.ModuleDict(actors)
         self.play: TensorDictModuleBase = TensorDictSequential(*actors.values())
         self.collect: TensorDictModuleBase = TensorDictSequential(*explorers.values())
+        self._explorers = dict(explorers)
+
+    def end_warm_up(self, team: str) -> None:
+        """Let a team collect with its actor from now on, without uniformly random actions."""
+        for module in self._explorers[team].modules():
+            if isinstance(module, UniformWarmUp):
+                module.active.fill_(False)
 
     def copy(self) -> Policy:
         """Return an independent copy that acts on the CPU, by `DirectPolicy`."""

@@ -63,9 +63,21 @@ def copy_encoders(network: nn.Module, encoders: Mapping[str, Sequence[nn.Module]
             )
         for i, target in enumerate(targets):
             try:
+                _check_same_scale(target, sources[i % len(sources)])
                 copy_parameters(target, sources[i % len(sources)])
             except ValueError as error:
                 raise ValueError(f"encoder of {sense}: {error}") from error
+
+
+def _check_same_scale(target: nn.Module, source: nn.Module) -> None:
+    """Check that two encoders scale their input alike, which is not among the parameters.
+
+    Raises:
+        ValueError: If not: the range of the sense, or what compresses it, differs.
+    """
+    here, there = (getattr(module, "scale", None) for module in (target, source))
+    if here != there:
+        raise ValueError(f"its input is scaled by {there} there, by {here} here")
 
 
 def copy_parameters(target: nn.Module, source: nn.Module) -> None:

@@ -37,6 +37,24 @@ def test_advantages_equal_the_recursion(make_ppo, agents, terminated):
     torch.testing.assert_close(found["value_target"], expected + value, rtol=1e-4, atol=1e-5)
 
 
+@pytest.mark.parametrize(("gamma", "gae_lambda"), [(0.9, 0.0), (0.0, 0.95), (0.0, 0.0)])
+def test_advantages_without_decaying_sums_are_errors_of_one_step(make_ppo, gamma, gae_lambda):
+    ppo = make_ppo()
+    with torch.no_grad(), set_exploration_type(ExplorationType.RANDOM):
+        batch = FakeEnv(4, horizon=5).rollout(
+            13, ppo.policy.collect, break_when_any_done=False, auto_cast_to_device=False
+        )
+    network = ppo.algorithms["agents"].network
+    found = advantages(network, batch, "agents", gamma, gae_lambda)
+    with torch.no_grad():
+        value = network.critic(network.encoder(batch.clone()))["agents", "state_value"]
+        following = network.critic(network.encoder(batch["next"].clone()))["agents", "state_value"]
+    team = batch["next", "agents"]
+    target = team["reward"] + gamma * following * ~team["terminated"]
+    torch.testing.assert_close(found["value_target"], target, rtol=1e-4, atol=1e-5)
+    torch.testing.assert_close(found["advantage"], target - value, rtol=1e-4, atol=1e-5)
+
+
 @pytest.mark.parametrize(
     ("discrete", "teams"),
     [

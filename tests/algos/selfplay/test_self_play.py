@@ -3,16 +3,21 @@
 import pytest
 import torch
 from fake_env import make_fake_env
-from training import FRAMES, Interrupt, read
+from torchrl.envs import ExplorationType, set_exploration_type
+from training import FRAMES, SMALL, Interrupt, read
 
 from veca_marl.algos.collection.experience import CollectCfg
 from veca_marl.algos.evaluation.evaluate import EvalCfg
+from veca_marl.algos.networks.multisense import MultisenseCfg
+from veca_marl.algos.sac import SACCfg
+from veca_marl.algos.sac.config import ReplayCfg
 from veca_marl.algos.selfplay.pool import Pool
 from veca_marl.algos.selfplay.self_play import SelfPlay, SelfPlayCfg
 from veca_marl.algos.specs import team_specs
 from veca_marl.algos.training.checkpoint import Checkpoints
 from veca_marl.algos.training.checkpoint_file import CheckpointError
 from veca_marl.algos.training.checkpoint_identity import Identity
+from veca_marl.algos.training.learners import TeamLearners
 from veca_marl.algos.training.loop import Trainer
 from veca_marl.algos.training.progress import Budget
 from veca_marl.algos.training.reporters import CsvReporter
@@ -92,6 +97,25 @@ def test_the_opponent_plays_its_past_policy(make):
     now = trainer.learners.policy.actors["red"].state_dict()
     for name, array in trainer.policy.actors["red"].state_dict().items():
         torch.testing.assert_close(array, now[name])
+
+
+def test_a_past_opponent_acts_by_its_policy_though_it_would_still_act_at_random(tmp_path):
+    """Soft actor-critic acts uniformly until its replay buffer is filled, which a turn may take."""
+    cfg = SACCfg(
+        network=MultisenseCfg(**{**vars(SMALL), "initial_scale": 0.02}),
+        replay=ReplayCfg(capacity=256, warm_up_frames=128),
+    )
+    learners = TeamLearners(team_specs(make_env(1, 0)), cfg, torch.device("cpu"))
+    matches = SelfPlay(SelfPlayCfg(list(TEAMS), 0.0), learners, Pool(tmp_path), 0)
+    matches.begin_stage(0, 0)
+    policy = learners.policy.copy()
+    policy.take_over(learners.policy)
+    matches.load_opponent(policy)
+    with torch.no_grad(), set_exploration_type(ExplorationType.RANDOM):
+        batch = make_env(4, 0).rollout(16, policy.collect, break_when_any_done=False)
+    assert (matches.turn, matches.past_frames) == ("red", 0)
+    assert batch["red", "action"].std() > 0.5
+    assert batch["blue", "action"].std() < 0.2
 
 
 def test_logs_contain_team_and_age_of_the_opponent(make, tmp_path):

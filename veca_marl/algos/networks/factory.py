@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
@@ -42,10 +42,12 @@ class NetworkCfg:
             tanh maps them to [-1, 1]: with 1 they are nearly uniform, with 0.3 nearly normal.
             Greater than 0.01.
         not_parameters: Fields that a network with the same parameters may have differently.
+        critics_only: Fields that do not concern the actor.
         formerly: Fields that were added later, and their values in runs that were stored before.
     """
 
     not_parameters: ClassVar[tuple[str, ...]] = ("frozen",)
+    critics_only: ClassVar[tuple[str, ...]] = ()
     formerly: ClassVar[dict[str, Any]] = {}
 
     name: str = ""
@@ -216,8 +218,22 @@ def trainable(network: nn.Module) -> list[nn.Parameter]:
     return [parameter for parameter in network.parameters() if parameter.requires_grad]
 
 
-def check_same_network(here: NetworkCfg, there: NetworkCfg) -> None:
+def check_same_actor(here: NetworkCfg, there: NetworkCfg) -> None:
+    """Check that actors of two configurations with equal parameters are the same function.
+
+    Raises:
+        ValueError: If they differ; the message names the fields.
+    """
+    check_same_network(here, there, here.critics_only)
+
+
+def check_same_network(here: NetworkCfg, there: NetworkCfg, left_out: Collection[str] = ()) -> None:
     """Check that two configurations describe the same parameters.
+
+    Args:
+        here: A configuration.
+        there: Another one.
+        left_out: Fields that may differ.
 
     Raises:
         ValueError: If they differ; the message names the fields.
@@ -226,7 +242,7 @@ def check_same_network(here: NetworkCfg, there: NetworkCfg) -> None:
     differing = [
         f"{name}={other.get(name, 'absent')} there, {own.get(name, 'absent')} here"
         for name in {**own, **other}
-        if name not in here.not_parameters and other.get(name) != own.get(name)
+        if name not in (*here.not_parameters, *left_out) and other.get(name) != own.get(name)
     ]
     if differing:
         raise ValueError(f"another network: {'; '.join(differing)}")

@@ -75,6 +75,7 @@ class MultisenseCfg(NetworkCfg):
     """
 
     not_parameters = ("frozen", "precision")
+    critics_only = ("critic",)
     formerly: ClassVar[dict[str, Any]] = {"kernels": [8, 4, 3], "strides": [4, 2, 1]}
 
     name: str = "multisense"

@@ -5,7 +5,10 @@ from __future__ import annotations
 import torch
 from tensordict import TensorDict, TensorDictBase
 from torch import Tensor
-from torchrl.objectives.value.functional import vec_generalized_advantage_estimate
+from torchrl.objectives.value.functional import (
+    generalized_advantage_estimate,
+    vec_generalized_advantage_estimate,
+)
 
 from veca_marl.algos.networks.factory import TeamNetwork
 
@@ -34,7 +37,13 @@ def advantages(
     cut = batch["next", "done"].squeeze(-1).clone()
     cut[:, -1] = True
     following[cut.to(device)] = _values_after(network, batch["next"], cut, team, device)
-    advantage, target = vec_generalized_advantage_estimate(
+    # the vectorised estimate divides by the decay of the sum
+    estimate = (
+        vec_generalized_advantage_estimate
+        if gamma * gae_lambda > 0.0
+        else generalized_advantage_estimate
+    )
+    advantage, target = estimate(
         gamma,
         gae_lambda,
         *(array.to(device).squeeze(-1) for array in (value, following, *_outcome(batch, team))),

@@ -12,6 +12,7 @@ from torchrl.objectives import KLAdaptiveLR
 
 from veca_marl.algos.algorithm import Algorithm
 from veca_marl.algos.networks.factory import (
+    NetworkCfg,
     TeamNetwork,
     check_same_network,
     make_network,
@@ -72,6 +73,11 @@ class PPO(Algorithm):
         )
         self._recurrent = memory_of(self.network.actor) is not None
         self._batch_keys = _batch_keys(self.network, team, spec.masked)
+
+    @property
+    def network_cfg(self) -> NetworkCfg:
+        """See `Algorithm`."""
+        return self.cfg.network
 
     @property
     def actor(self) -> TensorDictModuleBase:

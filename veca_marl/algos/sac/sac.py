@@ -14,7 +14,7 @@ from torch import nn
 from veca_marl.algos.algorithm import Algorithm
 from veca_marl.algos.networks.action_values import make_actor_critics
 from veca_marl.algos.networks.exploration import UniformWarmUp
-from veca_marl.algos.networks.factory import check_same_network, trainable
+from veca_marl.algos.networks.factory import NetworkCfg, check_same_network, trainable
 from veca_marl.algos.networks.memory import memory_size
 from veca_marl.algos.sac.config import SACCfg, Targets
 from veca_marl.algos.sac.joint_action import JointAction
@@ -75,6 +75,11 @@ class SAC(Algorithm):
         self._warm_up = UniformWarmUp(team, spec).to(device)
         self._explorer = TensorDictSequential(self.network.actor, self._warm_up)
         self._updates, self._due = 0, 0.0
+
+    @property
+    def network_cfg(self) -> NetworkCfg:
+        """See `Algorithm`."""
+        return self.cfg.network
 
     @property
     def actor(self) -> TensorDictModuleBase:

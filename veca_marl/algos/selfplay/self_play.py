@@ -98,6 +98,7 @@ class SelfPlay:
         if self.past_frames is not None:
             actor = policy.actors[self.opponent]
             self.pool.load_into(actor, self.opponent, self.past_frames)
+            policy.end_warm_up(self.opponent)
 
     def end_stage(self, frames: int) -> None:
         """See `Matchmaking`."""
