@@ -49,6 +49,13 @@ def test_multirun_runs_every_combination():
     ]
 
 
+def test_runs_that_would_write_the_same_file_are_refused():
+    line = CommandLine("tool", ToolOptions, "Does something.", outputs=("run",))
+    with pytest.raises(ConfigError, match=r"run=a would be written by 2 combinations .* run=A,B"):
+        next(line.jobs(["-m", "run=a", "episodes=1,2"]))
+    assert [o.run for o, _ in line.jobs(["-m", "run=a,b", "seed=1"])] == ["a", "b"]
+
+
 @pytest.mark.parametrize(
     ("words", "message"),
     [

@@ -139,7 +139,9 @@ def run(options: BabyBenchOptions, overrides: list[str]) -> None:
 
 def main(words: Sequence[str] | None = None) -> int:
     """Run the command line; return the exit status."""
-    return CommandLine("babybench", BabyBenchOptions, str(__doc__), _ERRORS).run(run, words)
+    return CommandLine("babybench", BabyBenchOptions, str(__doc__), _ERRORS, outputs=("json",)).run(
+        run, words
+    )
 
 
 if __name__ == "__main__":

@@ -229,7 +229,9 @@ def run(options: EvaluateOptions, overrides: list[str]) -> None:
 def main(words: Sequence[str] | None = None) -> int:
     """Run the command line; return the exit status."""
     description = str(__doc__)
-    return CommandLine("evaluate", EvaluateOptions, description, _ERRORS).run(run, words)
+    return CommandLine(
+        "evaluate", EvaluateOptions, description, _ERRORS, outputs=("evaluate.json",)
+    ).run(run, words)
 
 
 if __name__ == "__main__":

@@ -32,7 +32,7 @@ from veca_marl.runs.run_folder import RunFolder, open_run
 
 @dataclass
 class TournamentCfg:
-    """Who plays, and what counts as a draw.
+    """Players, and what counts as a draw.
 
     Attributes:
         members: Number of past policies of each team, spread evenly over the run.
@@ -56,7 +56,7 @@ class TournamentOptions:
     Attributes:
         run: Folder of a self-play run.
         episodes: Number of episodes of each match.
-        tournament: Who plays, and what counts as a draw.
+        tournament: Players, and what counts as a draw.
     """
 
     run: str = MISSING
@@ -83,7 +83,7 @@ def tournament(
 
     Args:
         folder: The run.
-        options: Who plays how many episodes.
+        options: Players and number of episodes.
         overrides: Changes of the stored configuration.
 
     Raises:

@@ -51,7 +51,9 @@ or the speed of learning as a share of that of the simulator on all cores:
 
 def main(words: Sequence[str] | None = None) -> int:
     """Run the command line; return the exit status."""
-    return CommandLine("bench", BenchOptions, DESCRIPTION).run(bench, words)
+    return CommandLine("bench", BenchOptions, DESCRIPTION, outputs=("bench.json",)).run(
+        bench, words
+    )
 
 
 def bench(options: BenchOptions, overrides: list[str]) -> None:

@@ -38,12 +38,14 @@ class CommandLine(Generic[Options]):
         options: Dataclass of its options.
         description: What the command does; printed by ``--help``.
         errors: Errors, beside `ConfigError`, that end in one line.
+        outputs: Keys of the options that name what a run of the command writes.
     """
 
     command: str
     options: type[Options]
     description: str
     errors: tuple[type[Exception], ...] = ()
+    outputs: tuple[str, ...] = ()
 
     def run(
         self, call: Callable[[Options, list[str]], None], words: Sequence[str] | None = None
@@ -76,17 +78,36 @@ class CommandLine(Generic[Options]):
         """Return the options and the other overrides of each run of the command.
 
         Raises:
-            ConfigError: If an override does not follow the grammar, or an option is unknown.
+            ConfigError: If an override does not follow the grammar, an option is unknown, or
+                several runs would write the same file.
         """
         texts = [word for word in words if word not in _MULTIRUN]
         flags = [text for text in texts if text.startswith("-")]
         if flags:
             raise ConfigError(f"unknown flag {flags[0]!r}; choices: --help, --multirun, KEY=VALUE")
-        for combination in _combinations(parse(with_integers(texts)), len(texts) < len(words)):
+        combinations = _combinations(parse(with_integers(texts)), len(texts) < len(words))
+        self._check_outputs(combinations)
+        for combination in combinations:
             own = [text for text in combination if _root(text) in self._names]
             others = [text for text in combination if text not in own]
             self._check_roots(others)
             yield self._read(own), others
+
+    def _check_outputs(self, combinations: Sequence[Sequence[str]]) -> None:
+        """Raise `ConfigError` if a run would overwrite what another one has written."""
+        named = [
+            text
+            for combination in combinations
+            for text in combination
+            if text.partition("=")[0] in self.outputs
+        ]
+        twice = sorted({text for text in named if named.count(text) > 1})
+        if twice:
+            raise ConfigError(
+                f"{twice[0]} would be written by {named.count(twice[0])} combinations of values; "
+                f"give each its own: {twice[0].partition('=')[0]}=A,B,..., or start the command "
+                "once for each"
+            )
 
     @property
     def _names(self) -> list[str]:
@@ -127,13 +148,13 @@ def _root(text: str) -> str:
     return text.lstrip("+~").partition("=")[0].partition("@")[0].partition(".")[0]
 
 
-def _combinations(overrides: list[Override], multirun: bool) -> Iterator[list[str]]:
+def _combinations(overrides: list[Override], multirun: bool) -> list[list[str]]:
     """Return the overrides of each run, without sweeps."""
     swept = [override for override in overrides if override.is_sweep_override()]
     if swept and not multirun:
         raise ConfigError(f"{swept[0].input_line}: several values need -m (--multirun)")
     alternatives = [_alternatives(override) for override in overrides]
-    return (list(combination) for combination in product(*alternatives))
+    return [list(combination) for combination in product(*alternatives)]
 
 
 def _alternatives(override: Override) -> list[str]:

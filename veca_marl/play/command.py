@@ -136,4 +136,6 @@ def _session(choice: Choice, options: PlayOptions) -> Session:
 
 def main(words: Sequence[str] | None = None) -> int:
     """Run the command line; return the exit status."""
-    return CommandLine("play", PlayOptions, str(__doc__), _ERRORS).run(run, words)
+    return CommandLine("play", PlayOptions, str(__doc__), _ERRORS, outputs=("video",)).run(
+        run, words
+    )

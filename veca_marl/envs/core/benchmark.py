@@ -1,4 +1,4 @@
-"""Frozen episodes: the same 100 starts of a task for everyone who evaluates on it.
+"""Frozen episodes: the same 100 starts of a task for all evaluations of it.
 
 Each task of the package has a file ``veca_marl/data/benchmark/<task>.json``: one seed, the
 parameters of the task, and all that was drawn for each start. The randomness of an episode depends
