@@ -98,9 +98,22 @@ class WalkerCollisions:
 
     def before_substep(self, substep_s: float) -> None:
         """Move all walkers by one physics step and separate those that overlap."""
-        positions, corrections = self._positions, self._corrections
+        positions = self._positions
         for index, walker in enumerate(self._walkers):
             positions[index] = walker.resolve_contacts(*walker.proposed_position(substep_s))
+        if len(self._walkers) > 1:
+            self._separate(positions)
+        for (x, y), walker in zip(positions.tolist(), self._walkers, strict=True):
+            walker.set_position(x, y, substep_s)
+
+    def _separate(self, positions: Floats) -> None:
+        """Move walkers apart that overlap or press a thing between them.
+
+        Args:
+            positions: ``(n, 2)`` metres; changed in place.
+        """
+        corrections = self._corrections
+        for index, walker in enumerate(self._walkers):
             self._radii[index], self._half_axes[index] = walker.footprint
         for _ in range(_ROUNDS):
             overlap = separate(positions, self._half_axes, self._radii, corrections)
@@ -109,8 +122,6 @@ class WalkerCollisions:
             for index in np.flatnonzero(corrections.any(axis=1)).tolist():
                 x, y = positions[index] + corrections[index]
                 positions[index] = self._walkers[index].resolve_contacts(float(x), float(y))
-        for (x, y), walker in zip(positions.tolist(), self._walkers, strict=True):
-            walker.set_position(x, y, substep_s)
 
     def _make_room(self, corrections: Floats) -> bool:
         """Add the displacements that release what walkers press together; return if there are any.
@@ -118,8 +129,6 @@ class WalkerCollisions:
         Args:
             corrections: ``(n, 2)`` metres.
         """
-        if len(self._walkers) == 1:
-            return False
         rooms = np.array([walker.room_for_others() for walker in self._walkers])
         corrections += rooms
         return bool(rooms.any())
