@@ -66,14 +66,6 @@ class TournamentOptions:
     def __post_init__(self) -> None:
         if self.episodes < 1:
             raise ValueError(f"episodes must be at least 1, got {self.episodes}")
-        if self.tournament.members < 2:
-            raise ValueError(
-                f"tournament.members must be at least 2, got {self.tournament.members}"
-            )
-        if not self.tournament.draw_margin >= 0:
-            raise ValueError(
-                f"tournament.draw_margin must be 0 or more, got {self.tournament.draw_margin}"
-            )
 
 
 def tournament(

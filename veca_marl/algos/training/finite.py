@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import torch
@@ -28,18 +28,38 @@ def check_batch(batch: TensorDictBase, teams: list[str], frames: int) -> None:
         NotFiniteError: With team, term or sense, world and step of the earliest value.
     """
     found = [
-        (*_first(array), order, team, name, array)
+        _Found(*_first(array), order, team, name, array)
         for team in teams
         for order, (name, array) in enumerate(_arrays(batch, team))
         if array.is_floating_point() and not torch.isfinite(array).all()
     ]
     if found:
-        step, world, _, team, name, array = min(found, key=lambda entry: entry[:3])
-        values = array[world, step]
+        earliest = min(found, key=lambda one: (one.step, one.world, one.order))
+        values = earliest.array[earliest.world, earliest.step]
         raise NotFiniteError(
-            f"team {team!r}: {name} is {values[~values.isfinite()][0].item()} in world {world} "
-            f"at step {step} of the batch after {frames} frames"
+            f"team {earliest.team!r}: {earliest.name} is {values[~values.isfinite()][0].item()} "
+            f"in world {earliest.world} at step {earliest.step} of the batch after {frames} frames"
         )
+
+
+class _Found(NamedTuple):
+    """An array with values that are not finite.
+
+    Attributes:
+        step: Step of the earliest of them.
+        world: Its world.
+        order: Place of the array among those of its team, causes before their consequences.
+        team: The team.
+        name: What the array holds.
+        array: ``(worlds, steps, ...)``.
+    """
+
+    step: int
+    world: int
+    order: int
+    team: str
+    name: str
+    array: torch.Tensor
 
 
 def _arrays(batch: TensorDictBase, team: str) -> Iterator[tuple[str, torch.Tensor]]:
