@@ -1,6 +1,8 @@
 """The table of experts: what is played, stored, continued and refused."""
 
 import csv
+import os
+import signal
 
 import pytest
 from paths import ROOT
@@ -14,6 +16,7 @@ from veca_marl.envs.core.game import Game
 from veca_marl.envs.core.team import Script
 from veca_marl.experts_table.command import main
 from veca_marl.experts_table.play import Played, digest, game_cfg
+from veca_marl.experts_table.processes import LostProcessError, play_all
 from veca_marl.experts_table.table import markdown
 from veca_marl.sim.physics import PropCfg
 
@@ -60,6 +63,16 @@ def test_two_processes_play_the_same_episodes(tmp_path):
         return {(row["policy"], row["episode"]): row["score"] for row in rows_of(folder)}
 
     assert scores(alone) == scores(together)
+
+
+def _kill_itself(share, commit, results):
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+def test_a_process_that_is_killed_is_named_with_its_signal(monkeypatch):
+    monkeypatch.setattr("veca_marl.experts_table.processes._play_share", _kill_itself)
+    with pytest.raises(LostProcessError, match=r"which played episodes, ended by signal 9"):
+        list(play_all([object(), object()], 2, "commit"))
 
 
 def test_the_stored_return_is_that_of_the_frozen_episode(tmp_path):

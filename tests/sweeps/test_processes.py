@@ -137,6 +137,7 @@ def test_the_line_of_progress_has_frames_and_the_time_left(tmp_path):
     progress.update(100, 2, 1)  # 100 frames are of an earlier sweep
     now = 30.0
     progress.update(150, 2, 1)
+    assert not progress.due
     assert out.getvalue().count("\n") == 1  # too early for another line
     now = 60.0
     progress.update(200, 2, 1)

@@ -22,7 +22,6 @@ from tensordict.nn import TensorDictModuleBase
 from torch import nn
 
 from veca_marl.algos.choices import ChoiceRegistry
-from veca_marl.algos.networks.factory import NetworkCfg, check_same_actor
 from veca_marl.algos.sense_encoders import copy_encoders, copy_parameters
 from veca_marl.algos.specs import TeamSpec
 from veca_marl.algos.storage import StorageNeeded
@@ -71,8 +70,8 @@ class Algorithm(ABC):
         """
 
     @property
-    def network_cfg(self) -> NetworkCfg | None:
-        """The numbers of the network, by which actors are compared; None if it has none."""
+    def network_cfg(self) -> Any:
+        """The `NetworkCfg` by which other algorithms compare its actor; None if it has none."""
         return None
 
     @property
@@ -133,8 +132,6 @@ class Algorithm(ABC):
         Raises:
             ValueError: If the parameters do not fit.
         """
-        if self.network_cfg is not None and other.network_cfg is not None:
-            check_same_actor(self.network_cfg, other.network_cfg)
         copy_parameters(self.actor, other.actor)
 
     def init_encoders(self, encoders: Mapping[str, Sequence[nn.Module]]) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import time
 from dataclasses import dataclass, replace
 from functools import partial
@@ -17,6 +16,7 @@ from veca_marl.bench.rollouts import RandomActions
 from veca_marl.config import Config
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
 from veca_marl.runs.assembly import GameFactory, make_trainer
+from veca_marl.runs.cores import usable_cores
 
 
 @dataclass
@@ -114,7 +114,7 @@ class Turns:
         self._rollout()  # fills caches
         make_game = GameFactory(cfg.game, tuple(cfg.plugins))
         make_env = partial(make_game, cfg.collect.worlds, seed=0)
-        self._all_cores = SimultaneousRollouts(make_env, steps, _cores())
+        self._all_cores = SimultaneousRollouts(make_env, steps, usable_cores())
         self._frames = 0
         self._start: Cost | None = None
 
@@ -144,12 +144,8 @@ class Turns:
         self._all_cores.close()
 
 
-def _cores() -> int:
-    return os.cpu_count() or 1
-
-
 def _summary(cfg: Config, turns: Turns) -> Learning:
-    cores = _cores()
+    cores = usable_cores()
     pairs = list(zip(turns.rollouts, turns.stages, strict=True))
     return Learning(
         algorithm=cfg.algo.name,

@@ -12,7 +12,7 @@ from veca_marl.algos.collection.experience import CollectCfg
 from veca_marl.algos.evaluation.evaluate import EvalCfg
 from veca_marl.algos.intrinsic import IntrinsicCfg
 from veca_marl.algos.selfplay.self_play import SelfPlayCfg
-from veca_marl.algos.training.loggers import LoggerKind, check_installed
+from veca_marl.algos.training.loggers import LoggerKind
 from veca_marl.config.experiment import ExperimentCfg
 from veca_marl.envs.core.game_cfg import GameCfg
 from veca_marl.envs.core.task import TaskCfg
@@ -42,8 +42,6 @@ class LogCfg:
     keep_checkpoints: int = 3
 
     def __post_init__(self) -> None:
-        for kind in self.logger:
-            check_installed(kind)
         if self.keep_checkpoints < 1:
             raise ValueError(
                 f"log.keep_checkpoints must be at least 1, got {self.keep_checkpoints}"

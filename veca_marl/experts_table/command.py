@@ -18,7 +18,7 @@ from veca_marl.envs.core.team import Script
 from veca_marl.experts_table.episode_file import EpisodeFile
 from veca_marl.experts_table.options import TableOptions
 from veca_marl.experts_table.play import Job, Played, digest, game_cfg
-from veca_marl.experts_table.processes import play_all
+from veca_marl.experts_table.processes import LostProcessError, play_all
 from veca_marl.experts_table.table import markdown
 from veca_marl.runs.provenance import checkout_commit
 
@@ -38,7 +38,8 @@ TABLE, REMARKS = "table.md", "remarks.csv"
 
 def main(words: Sequence[str] | None = None) -> int:
     """Run the command line; return the exit status."""
-    return CommandLine("experts_table", TableOptions, DESCRIPTION, (WriteError,)).run(run, words)
+    errors = (WriteError, LostProcessError)
+    return CommandLine("experts_table", TableOptions, DESCRIPTION, errors).run(run, words)
 
 
 def run(options: TableOptions, overrides: list[str]) -> None:

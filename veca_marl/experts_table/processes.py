@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from multiprocessing import get_context
 from multiprocessing.connection import Connection, wait
+from multiprocessing.process import BaseProcess
 
 from veca_marl.experts_table.play import Job, Played, play_in_order
+
+
+class LostProcessError(RuntimeError):
+    """A process ended before it had played its episodes."""
 
 
 def play_all(jobs: Sequence[Job], processes: int, commit: str) -> Iterator[tuple[Job, Played]]:
@@ -19,7 +24,7 @@ def play_all(jobs: Sequence[Job], processes: int, commit: str) -> Iterator[tuple
 
     Raises:
         ValueError: If a start is not the frozen one.
-        RuntimeError: If a process ends before its episodes are played.
+        LostProcessError: If a process ends before its episodes are played.
     """
     if processes == 1:
         yield from play_in_order(jobs, commit)
@@ -33,7 +38,7 @@ def play_all(jobs: Sequence[Job], processes: int, commit: str) -> Iterator[tuple
         there.close()
         running[here] = process
     try:
-        yield from _received(list(running))
+        yield from _received(running)
     finally:
         for process in running.values():
             process.terminate()
@@ -50,17 +55,28 @@ def _play_share(share: Sequence[Job], commit: str, results: Connection) -> None:
         results.send(error)
 
 
-def _received(connections: list[Connection]) -> Iterator[tuple[Job, Played]]:
+def _received(running: Mapping[Connection, BaseProcess]) -> Iterator[tuple[Job, Played]]:
+    connections = list(running)
     while connections:
         for connection in wait(connections):
             assert isinstance(connection, Connection)
             try:
                 message = connection.recv()
             except EOFError:
-                raise RuntimeError("a process that plays episodes was killed") from None
+                raise _lost(running[connection]) from None
             if isinstance(message, ValueError):
                 raise message
             if message is None:
                 connections.remove(connection)
             else:
                 yield message
+
+
+def _lost(process: BaseProcess) -> LostProcessError:
+    process.join()
+    code = process.exitcode or 0
+    how = f"by signal {-code}" if code < 0 else f"with exit status {code}"
+    return LostProcessError(
+        f"the process {process.pid}, which played episodes, ended {how}; the episodes before are "
+        "stored, and the same command plays the others"
+    )

@@ -9,7 +9,6 @@ Broken laws are named at the end, and the exit status is 1.
 
 from __future__ import annotations
 
-import os
 import sys
 import time
 from collections.abc import Iterator, Sequence
@@ -24,6 +23,7 @@ from veca_marl.fidelity.law import Section
 from veca_marl.fidelity.page import number, write_page
 from veca_marl.fidelity.sections import SECTIONS, check_names, measure
 from veca_marl.reports.figure import PlotError, check_plotting
+from veca_marl.runs.cores import usable_cores
 
 
 @dataclass
@@ -95,7 +95,7 @@ def run(options: FidelityOptions, overrides: list[str]) -> list[str]:
         raise ConfigError(f"{overrides[0]}: fidelity has the options sections, to and processes")
     check_plotting()
     names = [name for name in SECTIONS if name in options.sections or not options.sections]
-    sections = measure_all(names, options.processes or os.cpu_count() or 1)
+    sections = measure_all(names, options.processes or usable_cores())
     print(f"page: {write_page(Path(options.to), sections)}")
     return broken_laws(sections)
 

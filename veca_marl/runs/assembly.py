@@ -17,7 +17,7 @@ from veca_marl.algos.storage import check_storage
 from veca_marl.algos.training.checkpoint import Checkpoints
 from veca_marl.algos.training.checkpoint_identity import Identity
 from veca_marl.algos.training.learners import TeamLearners
-from veca_marl.algos.training.loggers import make_reporter
+from veca_marl.algos.training.loggers import check_installed, make_reporter
 from veca_marl.algos.training.loop import Trainer
 from veca_marl.algos.training.progress import Budget
 from veca_marl.algos.training.reporters import Reporter
@@ -60,10 +60,12 @@ def make_trainer(cfg: Config, folder: RunFolder | None = None) -> Trainer:
         folder: Folder of the run; None stores nothing.
 
     Raises:
-        ConfigError: If the device does not exist, no world can be made, what learning stores
-            does not fit, or the frames end before a team learns.
+        ConfigError: If the device does not exist, the package of a logger is not installed, no
+            world can be made, what learning stores does not fit, or the frames end before a team
+            learns.
         CheckpointError: If a run to continue or to load from does not fit.
     """
+    _check_loggers(cfg)
     device = find_device(cfg.device)
     keep_freed_memory()
     if cfg.threads is not None:
@@ -98,6 +100,15 @@ def make_trainer(cfg: Config, folder: RunFolder | None = None) -> Trainer:
     else:
         _check_budget(trainer)
     return trainer
+
+
+def _check_loggers(cfg: Config) -> None:
+    """Refuse to train where the package of a logger is missing; a stored run can be read there."""
+    try:
+        for kind in cfg.log.logger:
+            check_installed(kind)
+    except ValueError as error:
+        raise ConfigError(str(error)) from error
 
 
 def _check_budget(trainer: Trainer) -> None:

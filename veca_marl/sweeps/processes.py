@@ -134,7 +134,12 @@ def last_line(plan: Plan) -> str:
 def _show(
     plans: Sequence[Plan], waiting: deque[Plan], running: list[Running], progress: Progress
 ) -> None:
-    """Show the frames of all runs; those that are skipped have all of theirs."""
+    """Show the frames of all runs; those that are skipped have all of theirs.
+
+    The frames of a run are in a file, which is not read more often than they are printed.
+    """
+    if not progress.due:
+        return
     done = [
         job.frames if plan.action is Action.skip else min(frames_so_far(job.folder), job.frames)
         for plan in plans

@@ -57,6 +57,12 @@ class Progress:
         self.out.flush()
         self._width = 0
 
+    @property
+    def due(self) -> bool:
+        """Whether the interval since the last line of progress is over."""
+        interval_s = _INTERVAL_TERMINAL_S if self.out.isatty() else _INTERVAL_FILE_S
+        return self.clock() - self._printed >= interval_s
+
     def update(self, frames: int, running: int, ended: int) -> None:
         """Print the progress of all runs, at most once in an interval.
 
@@ -68,9 +74,9 @@ class Progress:
         now = self.clock()
         if self._frames_at_start < 0:
             self._frames_at_start, self._started = frames, now
-        terminal = self.out.isatty()
-        if now - self._printed < (_INTERVAL_TERMINAL_S if terminal else _INTERVAL_FILE_S):
+        if not self.due:
             return
+        terminal = self.out.isatty()
         self._printed = now
         text = self.text(frames, running, ended, now)
         if terminal:

@@ -80,6 +80,13 @@ def test_the_pool_stores_the_start_and_the_end_of_every_turn(make, tmp_path):
     assert pool.members("green") == []
 
 
+def test_names_of_teams_may_begin_alike(tmp_path):
+    pool = Pool(tmp_path)
+    pool.store("red", 0, {})
+    pool.store("red_two", 4096, {})
+    assert (pool.members("red"), pool.members("red_two")) == ([0], [4096])
+
+
 def test_the_opponent_plays_its_past_policy(make):
     trainer = make("past", batches=6, latest=0.0)
     trainer.run()

@@ -218,13 +218,18 @@ def trainable(network: nn.Module) -> list[nn.Parameter]:
     return [parameter for parameter in network.parameters() if parameter.requires_grad]
 
 
-def check_same_actor(here: NetworkCfg, there: NetworkCfg) -> None:
+def check_same_actor(here: NetworkCfg, there: Any) -> None:
     """Check that actors of two configurations with equal parameters are the same function.
+
+    Args:
+        here: A configuration.
+        there: That of another algorithm; what is no `NetworkCfg` is not compared.
 
     Raises:
         ValueError: If they differ; the message names the fields.
     """
-    check_same_network(here, there, here.critics_only)
+    if isinstance(there, NetworkCfg):
+        check_same_network(here, there, here.critics_only)
 
 
 def check_same_network(here: NetworkCfg, there: NetworkCfg, left_out: Collection[str] = ()) -> None:

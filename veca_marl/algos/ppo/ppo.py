@@ -14,6 +14,7 @@ from veca_marl.algos.algorithm import Algorithm
 from veca_marl.algos.networks.factory import (
     NetworkCfg,
     TeamNetwork,
+    check_same_actor,
     check_same_network,
     make_network,
     trainable,
@@ -177,6 +178,7 @@ class PPO(Algorithm):
             check_same_network(self.cfg.network, other.cfg.network)
             copy_parameters(self.network, other.network)
         else:
+            check_same_actor(self.cfg.network, other.network_cfg)
             super().init_from(other)
 
 

@@ -14,7 +14,12 @@ from torch import nn
 from veca_marl.algos.algorithm import Algorithm
 from veca_marl.algos.networks.action_values import make_actor_critics
 from veca_marl.algos.networks.exploration import UniformWarmUp
-from veca_marl.algos.networks.factory import NetworkCfg, check_same_network, trainable
+from veca_marl.algos.networks.factory import (
+    NetworkCfg,
+    check_same_actor,
+    check_same_network,
+    trainable,
+)
 from veca_marl.algos.networks.memory import memory_size
 from veca_marl.algos.sac.config import SACCfg, Targets
 from veca_marl.algos.sac.joint_action import JointAction
@@ -196,6 +201,7 @@ class SAC(Algorithm):
 
     def _copy_actor(self, other: Algorithm) -> None:
         """Copy the actor of another algorithm, which has no hidden layers after its features."""
+        check_same_actor(self.cfg.network, other.network_cfg)
         try:
             super().init_from(other)
         except ValueError as error:

@@ -12,6 +12,8 @@ from torch import nn
 from veca_marl.algos.files import WriteError, write_atomically
 from veca_marl.algos.training.checkpoint_file import CheckpointError, load_file, naming_checkpoint
 
+_DIGITS = 12  # of the frames in the name of a file
+
 
 class Pool:
     """Past policies in a folder: the actor of a team after so many frames.
@@ -43,7 +45,8 @@ class Pool:
             team: Name of the team.
             until: Leave out later ones: an interrupted run may have been further.
         """
-        found = (int(path.stem.rpartition("_")[2]) for path in self.folder.glob(f"{team}_*.pt"))
+        files = self.folder.glob(f"{team}_{'[0-9]' * _DIGITS}.pt")
+        found = (int(path.stem.rpartition("_")[2]) for path in files)
         return sorted(frames for frames in found if until is None or frames <= until)
 
     def load_into(self, actor: nn.Module, team: str, frames: int) -> None:
@@ -58,4 +61,4 @@ class Pool:
             actor.load_state_dict(state)
 
     def _path(self, team: str, frames: int) -> Path:
-        return self.folder / f"{team}_{frames:012d}.pt"
+        return self.folder / f"{team}_{frames:0{_DIGITS}d}.pt"
