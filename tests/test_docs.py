@@ -139,8 +139,12 @@ def test_the_defaults_on_the_page_of_a_task_are_those_of_its_preset(name):
     assert set(parameters) == set(fields) - {"name", "weights"}
     for field, (_, value, _) in parameters.items():
         assert value.split("`")[1] == text(getattr(task, field)), field
-    weights = {term: float(value) for term, (value, _) in rows_of(page, "Reward terms").items()}
-    assert weights == task.weights
+    weights = {
+        term: value.partition(" per ") for term, (value, _) in rows_of(page, "Reward terms").items()
+    }
+    assert {term: float(number) for term, (number, *_) in weights.items()} == task.weights
+    rates = {term for term, (*_, step) in weights.items() if step == "40 ms"}
+    assert rates == set(find_task(name).rates)
 
 
 @pytest.mark.parametrize("name", list_tasks())

@@ -81,7 +81,7 @@ def require_humanoid(player: Player) -> Humanoid:
 
 
 RATE_STEP_S = 0.04
-"""Duration of the step for which weights of rates are given: that of the default clock."""
+"""Duration of the step for which weights of rates are given, which is that of the default clock."""
 
 
 def terms(**weights: float) -> Any:
