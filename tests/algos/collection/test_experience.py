@@ -93,7 +93,7 @@ def test_spawned_and_forked_workers_collect_the_same(make_ppo, monkeypatch):
     batches = []
     for method in ("fork", "spawn"):
         monkeypatch.setattr(
-            "veca_marl.algos.collection.experience.start_method", lambda m=method: m
+            "veca_marl.algos.collection.experience.start_method", lambda _, m=method: m
         )
         experience = Experience(
             make_fake_env, make_ppo().policy.copy().collect, CollectCfg(1, 2, 8)

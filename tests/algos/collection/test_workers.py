@@ -12,7 +12,7 @@ import pytest
 from fake_env import FakeEnv, make_fake_env
 from paths import HELPERS, ROOT
 
-from veca_marl.algos.collection.experience import CollectCfg, Experience
+from veca_marl.algos.collection.experience import CollectCfg, Experience, start_method
 from veca_marl.algos.collection.workers import WorkerError
 
 KILLED = r"worker process 1 \(of 0 to 1\) was killed by SIGKILL"
@@ -210,6 +210,21 @@ def test_a_program_that_closes_its_workers_before_any_update_ends(tmp_path):
     assert main.returncode == 0, errors
 
 
+def test_workers_of_several_threads_collect_beside_a_learner_of_several(tmp_path):
+    """A forked worker waited forever for the threads of its parent, which a fork does not copy."""
+    main = start_script(tmp_path, SEVERAL_THREADS)
+    try:
+        printed, errors = main.communicate(timeout=120)
+    finally:
+        main.kill()
+    assert printed.split() == ["2", "4"], errors
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems never fork")
+def test_workers_are_forked_only_with_one_thread():
+    assert [start_method(threads) for threads in (1, 2)] == ["fork", "spawn"]
+
+
 def is_running(pid):
     """Return whether a process runs; one that has ended may wait for its new parent to read it."""
     try:
@@ -286,4 +301,31 @@ def main():
 
 
 main()
+"""
+
+
+SEVERAL_THREADS = """
+import torch
+from fake_env import make_fake_env
+from torchrl.envs.utils import RandomPolicy
+
+from veca_marl.algos.collection.experience import CollectCfg, Experience
+
+
+def compute_in_parallel():
+    torch.ones(1_000_000).exp()
+
+
+def make_env(worlds, seed):
+    compute_in_parallel()
+    return make_fake_env(worlds, seed)
+
+
+if __name__ == "__main__":
+    torch.set_num_threads(2)
+    compute_in_parallel()
+    policy = RandomPolicy(make_fake_env(2, 0).action_spec)
+    experience = Experience(make_env, policy, CollectCfg(1, worlds=2, steps=4, threads=2))
+    print(*experience.collect().batch_size)
+    experience.close()
 """

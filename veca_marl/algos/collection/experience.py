@@ -31,7 +31,8 @@ class CollectCfg:
         processes: Worker processes; 0 steps the worlds in this one.
         worlds: Worlds in each process; one call of the policy acts for all of them.
         steps: Steps of each world in a batch.
-        threads: Torch threads of each worker process.
+        threads: Torch threads of each worker process; with more than 1, workers take some seconds
+            longer to start.
         answer_limit_s: Seconds that a worker process may take for a batch, a reset, new parameters
             or a step of an evaluation; if one takes longer, the run ends with an error that names
             it. The default is more than a hundred times the usual duration of a batch.
@@ -88,7 +89,7 @@ class Experience:
             self._collector = Collector(make, policy, **common)
         else:
             threads = torch.get_num_threads()
-            with _start_method(start_method()):
+            with _start_method(start_method(cfg.threads)):
                 self._collector = SupervisedCollector(
                     [make] * cfg.processes,
                     policy,
@@ -137,10 +138,15 @@ def _start_method(name: str) -> Iterator[None]:
         multiprocessing.set_start_method(previous, force=True)
 
 
-def start_method() -> str:
+def start_method(threads: int) -> str:
     """Return how workers are created: ``fork`` (0.2 s) where it is safe, else ``spawn`` (5 s).
 
-    A process that has used CUDA must not be forked, and macOS's own libraries forbid it.
+    A process that has used CUDA must not be forked, and macOS's own libraries forbid it. A forked
+    worker of several threads waits forever in its first parallel loop: OpenMP believes that the
+    threads of the parent process, which a fork does not copy, are there.
+
+    Args:
+        threads: Torch threads of each worker.
     """
-    safe = sys.platform == "linux" and not torch.cuda.is_initialized()
+    safe = sys.platform == "linux" and not torch.cuda.is_initialized() and threads == 1
     return "fork" if safe else "spawn"

@@ -33,6 +33,7 @@ from veca_marl.algos.policy import Policy
 from veca_marl.algos.specs import EnvFactory
 
 _END_S = 3.0  # until a process that does not follow SIGTERM is killed; others end at once
+_THREADS = 1  # of each process
 
 
 @dataclass(frozen=True)
@@ -208,7 +209,7 @@ class ParallelEvaluator:
     ) -> None:
         players.policy.share_memory()
         self._limit_s = answer_limit_s
-        context: Any = multiprocessing.get_context(start_method())
+        context: Any = multiprocessing.get_context(start_method(_THREADS))
         arguments = (os.getpid(), make_env, players, -(-worlds // processes))
         with interrupts_blocked():
             self._workers = [_start(context, *arguments) for _ in range(processes)]
@@ -325,7 +326,7 @@ def _serve(connection: Connection[Any, Any], steps: Any, parent: int, *arguments
     end_with_parent(parent)
     if hasattr(signal, "SIGCHLD"):
         signal.signal(signal.SIGCHLD, signal.SIG_DFL)  # the parent's handler is for its workers
-    torch.set_num_threads(1)
+    torch.set_num_threads(_THREADS)
     try:
         evaluator = LocalEvaluator(*arguments)
         evaluator.count_steps(steps)
