@@ -1,5 +1,8 @@
 """Worker processes that end too early, and the end of the process that started them."""
 
+import itertools
+import multiprocessing
+import multiprocessing.process
 import os
 import signal
 import subprocess
@@ -117,6 +120,31 @@ def test_a_worker_that_hangs_is_named_and_killed(start, use):
     experience.close()
     assert time.monotonic() - begin < 12.0
     check_that_none_is_left(processes)
+
+
+class UnreadyEnv(FakeEnv):
+    """Is never ready in the second worker process."""
+
+    def __init__(self, worlds, seed):
+        if multiprocessing.current_process().name.endswith("2"):
+            time.sleep(600.0)
+        super().__init__(worlds, seed, senses=("audio",))
+
+
+@pytest.fixture
+def in_a_new_count(monkeypatch):
+    """Number the processes from 1, as in a program of its own."""
+    monkeypatch.setattr(multiprocessing.process, "_process_counter", itertools.count(1))
+
+
+@pytest.mark.usefixtures("in_a_new_count")
+def test_a_worker_that_hangs_while_it_starts_is_named_and_killed(start):
+    """TorchRL waits for the first answer without limit."""
+    begin = time.monotonic()
+    with pytest.raises(WorkerError, match=HANGS):
+        start(UnreadyEnv, answer_limit_s=2.0)
+    assert time.monotonic() - begin < 12.0
+    assert not multiprocessing.active_children()
 
 
 def test_the_time_limit_must_be_positive():

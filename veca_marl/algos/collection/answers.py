@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable
 from queue import Empty
@@ -49,6 +50,49 @@ def no_answer(kind: str, silent: list[int], workers: int, seconds: float) -> str
         f"{kind}{plural} {names} (of 0 to {workers - 1}) did not answer for {seconds:g} s "
         "(collect.answer_limit_s) and was killed"
     )
+
+
+class AnswerPipe:
+    """The pipe of a worker, with a time limit for each answer from the last message on.
+
+    The first limit begins when it is made, before the worker starts.
+
+    Args:
+        pipe: The pipe of `MultiSyncCollector`.
+        index: Index of the worker.
+        check: Raises an error if a worker has ended.
+        limit: Time limit of an answer.
+    """
+
+    def __init__(self, pipe: Any, index: int, check: Callable[[], None], limit: TimeLimit) -> None:
+        self._pipe, self._index = pipe, index
+        self._check, self._limit = check, limit
+
+    def send(self, message: Any) -> None:
+        """Send a message; the time limit of its answer begins."""
+        self._limit.begin()
+        self._pipe.send(message)
+
+    def poll(self, timeout: float = 0.0) -> bool:
+        """Return whether there is a message, after at most `timeout` seconds."""
+        until = time.monotonic() + timeout
+        while not self._pipe.poll(max(0.0, min(CHECK_S, until - time.monotonic()))):
+            if time.monotonic() >= until:
+                return False
+            self._check()
+            self._limit.check([self._index])
+        return True
+
+    def recv(self) -> Any:
+        """Return the next message, within the time limit."""
+        self.poll(math.inf)
+        message = self._pipe.recv()
+        self._limit.begin()
+        return message
+
+    def close(self) -> None:
+        """Close the pipe."""
+        self._pipe.close()
 
 
 class BatchQueue:

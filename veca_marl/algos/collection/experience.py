@@ -33,9 +33,9 @@ class CollectCfg:
         steps: Steps of each world in a batch.
         threads: Torch threads of each worker process; with more than 1, workers take some seconds
             longer to start.
-        answer_limit_s: Seconds that a worker process may take for a batch, a reset, new parameters
-            or a step of an evaluation; if one takes longer, the run ends with an error that names
-            it. The default is more than a hundred times the usual duration of a batch.
+        answer_limit_s: Seconds that a worker process may take to start, for a batch, a reset, new
+            parameters or a step of an evaluation; if one takes longer, the run ends with an error
+            that names it. The default is more than a hundred times the usual duration of a batch.
     """
 
     processes: int = 2

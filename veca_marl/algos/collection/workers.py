@@ -30,7 +30,13 @@ from torch import multiprocessing, nn
 from torchrl.collectors import Collector, MultiSyncCollector
 from torchrl.weight_update import SharedMemWeightSyncScheme
 
-from veca_marl.algos.collection.answers import CHECK_S, BatchQueue, TimeLimit, no_answer
+from veca_marl.algos.collection.answers import (
+    CHECK_S,
+    AnswerPipe,
+    BatchQueue,
+    TimeLimit,
+    no_answer,
+)
 from veca_marl.algos.collection.interrupts import block_interrupts, ignore_interrupts
 from veca_marl.algos.collection.parent import end_with_parent
 
@@ -49,11 +55,12 @@ class SupervisedCollector(MultiSyncCollector):
     Args:
         make_envs: As for `MultiSyncCollector`.
         policy: As for `MultiSyncCollector`.
-        answer_limit_s: Seconds that a worker may take for a batch, a reset or new parameters.
+        answer_limit_s: Seconds that a worker may take to start, for a batch, a reset or new
+            parameters.
         **kwargs: As for `MultiSyncCollector`.
 
     Raises:
-        WorkerError: If a worker ends before all are ready.
+        WorkerError: If a worker ends before all are ready, or is not ready in time.
     """
 
     procs: Sequence[BaseProcess] = ()  # torchrl replaces it while it starts them
@@ -97,6 +104,18 @@ class SupervisedCollector(MultiSyncCollector):
         finally:
             self.receive_interrupts()
         self.queue_out = BatchQueue(self.queue_out, len(self.procs), self.time_limit())
+
+    @property
+    def pipes(self) -> Sequence[AnswerPipe]:
+        """The pipes to the workers; torchrl makes them, and waits for the first answers."""
+        return self._pipes
+
+    @pipes.setter
+    def pipes(self, made: Sequence[Any]) -> None:
+        self._pipes = [
+            AnswerPipe(pipe, index, self.check, self.time_limit())
+            for index, pipe in enumerate(made)
+        ]
 
     def time_limit(self) -> TimeLimit:
         """Return a limit for a wait that begins now; beyond it `WorkerError` is raised."""
@@ -150,12 +169,8 @@ class SupervisedCollector(MultiSyncCollector):
         with self._worker_errors():
             return int(super().set_seed(seed, static_seed))
 
-    def _recv_and_check(self, pipe: Any, *, worker_idx: int, **_: Any) -> Any:
+    def _recv_and_check(self, pipe: AnswerPipe, **_: Any) -> Any:
         """Return the next message of a worker, as the base class does, within the time limit."""
-        limit = self.time_limit()
-        while not pipe.poll(CHECK_S):
-            self.check()
-            limit.check([worker_idx])
         return pipe.recv()
 
     def reset(self, reset_idx: Sequence[bool] | None = None) -> None:
