@@ -7,6 +7,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import nullcontext
 from pathlib import Path
 
 from veca_marl.api_arguments import (
@@ -30,6 +31,7 @@ from veca_marl.gymnasium_ids import register_task
 from veca_marl.plugins import load_plugins
 from veca_marl.registry import unknown
 from veca_marl.runs.assembly import decide_precision, make_trainer
+from veca_marl.runs.lock import locked
 from veca_marl.runs.run_folder import new_run
 from veca_marl.runs.training import TrainingResult, run_training
 
@@ -193,28 +195,30 @@ def train(
         The rows of the metrics and of the evaluations, and the policy.
 
     Raises:
-        ConfigError: If there is no such choice, there is a run in `folder`, or a run is to be
-            resumed.
+        ConfigError: If there is no such choice, there is a run in `folder` or another process
+            trains in it, or a run is to be resumed.
         CheckpointError: If something cannot be loaded or stored.
     """
-    run = None if folder is None else new_run(check_folder(folder, "folder"))
-    chosen = _choices(task, playground, body, senses, plugins)
-    if total_frames is not None:
-        chosen.append(f"total_frames={as_integer('total_frames', total_frames)}")
-    check_list("overrides", overrides, '["algo=mappo"]')
-    chosen += [f"seed={as_integer('seed', seed)}", *overrides]
-    node = compose_node(chosen)
-    if node.resume is not None:
-        raise ConfigError(
-            f"resume={node.resume}: `train` begins a new run; continue one with "
-            f"python -m veca_marl.train resume={node.resume}"
-        )
-    decide_precision(node)
-    cfg = to_config(node)
-    trainer = make_trainer(cfg, run)
-    if run is not None:
-        run.begin(node, chosen)
-    return run_training(cfg, run, trainer)
+    path = None if folder is None else check_folder(folder, "folder")
+    with nullcontext() if path is None else locked(path):
+        run = None if path is None else new_run(path)
+        chosen = _choices(task, playground, body, senses, plugins)
+        if total_frames is not None:
+            chosen.append(f"total_frames={as_integer('total_frames', total_frames)}")
+        check_list("overrides", overrides, '["algo=mappo"]')
+        chosen += [f"seed={as_integer('seed', seed)}", *overrides]
+        node = compose_node(chosen)
+        if node.resume is not None:
+            raise ConfigError(
+                f"resume={node.resume}: `train` begins a new run; continue one with "
+                f"python -m veca_marl.train resume={node.resume}"
+            )
+        decide_precision(node)
+        cfg = to_config(node)
+        trainer = make_trainer(cfg, run)
+        if run is not None:
+            run.begin(node, chosen)
+        return run_training(cfg, run, trainer)
 
 
 def check_task(

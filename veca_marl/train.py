@@ -10,6 +10,7 @@ import logging
 import os
 import signal
 import sys
+from contextlib import ExitStack
 from pathlib import Path
 from types import ModuleType
 from typing import Any, NoReturn
@@ -31,8 +32,9 @@ from veca_marl.config import Config, ConfigError, conf_dir, one_line, prepare, t
 from veca_marl.config.outputs import check_folder
 from veca_marl.config.stored import change
 from veca_marl.runs.assembly import decide_precision, make_trainer
+from veca_marl.runs.lock import locked
 from veca_marl.runs.resumable import RESUMABLE, may_change
-from veca_marl.runs.run_folder import RunFolder, new_run, open_run, remove_if_empty
+from veca_marl.runs.run_folder import RunFolder, new_run, open_run
 from veca_marl.runs.training import TrainingResult, run_training
 from veca_marl.sweeps.plans import SweepError
 from veca_marl.sweeps.processes import PARENT
@@ -72,11 +74,18 @@ def stored_node(folder: RunFolder, overrides: list[str]) -> DictConfig:
 def run(node: DictConfig) -> None:
     """Train in the folder that Hydra has created."""
     path = Path(HydraConfig.get().runtime.output_dir)
-    try:
-        cfg, folder, trainer = set_up(node, path)
-    except _CONFIGURATION_ERRORS as error:
-        remove_if_empty(path)
-        give_up(error)
+    with ExitStack() as pending:
+        try:
+            pending.enter_context(locked(path))
+            cfg, folder, trainer = set_up(node, path)
+        except _CONFIGURATION_ERRORS as error:
+            give_up(error)
+        _train(cfg, folder, trainer)
+
+
+def _train(cfg: Config, folder: RunFolder, trainer: Trainer) -> None:
+    """Train, print the results; failures end in one line and exit status 1."""
+    path = folder.path
     try:
         result = run_training(cfg, folder, trainer)
         print(result.timing, *result.comparison, f"run folder: {folder.path}", sep="\n")

@@ -159,9 +159,3 @@ def open_run(path: Path, asked_by: str = "") -> RunFolder:
     if not folder.config.is_file():
         raise ConfigError(f"{asked_by}{path} holds no run (no config.yaml)")
     return folder
-
-
-def remove_if_empty(path: Path) -> None:
-    """Remove the folder of a run that could not be started."""
-    if path.is_dir() and not any(path.iterdir()):
-        path.rmdir()
