@@ -31,6 +31,7 @@ from veca_marl.gymnasium_ids import register_task
 from veca_marl.plugins import load_plugins
 from veca_marl.registry import unknown
 from veca_marl.runs.assembly import decide_precision, make_trainer
+from veca_marl.runs.continuation import resume_argument
 from veca_marl.runs.lock import locked
 from veca_marl.runs.run_folder import new_run
 from veca_marl.runs.training import TrainingResult, run_training
@@ -211,7 +212,7 @@ def train(
         if node.resume is not None:
             raise ConfigError(
                 f"resume={node.resume}: `train` begins a new run; continue one with "
-                f"python -m veca_marl.train resume={node.resume}"
+                f"python -m veca_marl.train {resume_argument(node.resume)}"
             )
         decide_precision(node)
         cfg = to_config(node)

@@ -32,6 +32,7 @@ from veca_marl.config import Config, ConfigError, conf_dir, one_line, prepare, t
 from veca_marl.config.outputs import check_folder
 from veca_marl.config.stored import change
 from veca_marl.runs.assembly import decide_precision, make_trainer
+from veca_marl.runs.continuation import resume_argument
 from veca_marl.runs.lock import locked
 from veca_marl.runs.resumable import RESUMABLE, may_change
 from veca_marl.runs.run_folder import RunFolder, new_run, open_run
@@ -103,7 +104,7 @@ def _train(cfg: Config, folder: RunFolder, trainer: Trainer) -> None:
 
 
 def _continue(path: Path) -> str:
-    return f"continue with: {_COMMAND} resume={path}"
+    return f"continue with: {_COMMAND} {resume_argument(path)}"
 
 
 def set_up(node: DictConfig, path: Path) -> tuple[Config, RunFolder, Trainer]:

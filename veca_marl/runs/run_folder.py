@@ -14,6 +14,7 @@ from yaml import YAMLError
 from veca_marl.algos.files import write_atomically
 from veca_marl.config import ConfigError, one_line
 from veca_marl.config.stored import body_names, typed
+from veca_marl.runs.continuation import resume_argument
 from veca_marl.runs.provenance import provenance
 from veca_marl.runs.run_progress import FILE as PROGRESS_FILE
 from veca_marl.runs.run_progress import RunProgress
@@ -139,7 +140,7 @@ def new_run(path: Path) -> RunFolder:
     """
     folder = RunFolder(path)
     if folder.config.exists():
-        raise ConfigError(f"{path} holds a run already; continue it with resume={path}")
+        raise ConfigError(f"{path} holds a run already; continue it with {resume_argument(path)}")
     return folder
 
 

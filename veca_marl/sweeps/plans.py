@@ -9,6 +9,7 @@ from enum import Enum
 from pathlib import Path
 from typing import Any
 
+from veca_marl.runs.continuation import quoted
 from veca_marl.runs.resumable import may_change
 from veca_marl.sweeps.differences import Difference, differences
 from veca_marl.sweeps.run_state import RunState, StoredRun, read_run
@@ -92,12 +93,12 @@ def plan(job: Job) -> Plan:
     except ValueError as error:
         raise SweepError(str(error)) from error
     if stored.config is None:
-        own = [*job.overrides, f"hydra.run.dir={_quoted(job.folder)}", _QUIET]
+        own = [*job.overrides, f"hydra.run.dir={quoted(job.folder)}", _QUIET]
         return Plan(job, Action.start, (*_TRAIN, *own))
     changed = _changed(job, stored)
     if stored.state(job.frames, job.asked["max_minutes"]) in (RunState.finished, RunState.cut):
         return Plan(job, Action.skip)
-    own = [f"resume={_quoted(job.folder)}", _QUIET, *map(_override, changed)]
+    own = [f"resume={quoted(job.folder)}", _QUIET, *map(_override, changed)]
     return Plan(job, Action.resume, (*_TRAIN, *own))
 
 
@@ -120,9 +121,3 @@ def _changed(job: Job, stored: StoredRun) -> list[Difference]:
 def _override(difference: Difference) -> str:
     value = "null" if difference.asked is None else difference.asked
     return f"{difference.key}={value}"
-
-
-def _quoted(path: Path) -> str:
-    """Return a path as a quoted word of Hydra's grammar."""
-    escaped = str(path).replace("\\", "\\\\").replace("'", "\\'")
-    return f"'{escaped}'"
