@@ -237,4 +237,7 @@ def find_device(name: str) -> torch.device:
 
 def make_reporters(cfg: Config, folder: RunFolder, resumed_frames: int) -> list[Reporter]:
     """Return the loggers of a run, without rows that will be written again."""
-    return [make_reporter(kind, folder.path, resumed_frames) for kind in cfg.log.logger]
+    return [
+        make_reporter(kind, folder.path, folder.identifier, resumed_frames)
+        for kind in cfg.log.logger
+    ]

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+from uuid import uuid4
 
 from omegaconf import DictConfig, OmegaConf
 from yaml import YAMLError
@@ -60,9 +61,17 @@ class RunFolder:
         """How far the run has come."""
         return self.path / PROGRESS_FILE
 
+    @property
+    def identifier(self) -> str:
+        """A name that no other run has, by which loggers continue the curves of a resumed run."""
+        stored = self._read_provenance() if self.provenance.exists() else {}
+        # runs of earlier versions have none stored; theirs was made of the path
+        return str(stored.get("id", "-".join(self.path.resolve().parts[-2:])))
+
     def begin(self, node: DictConfig, overrides: Sequence[str]) -> None:
         """Create the folder with the configuration and the provenance of the run."""
-        content = {**provenance(overrides), "bodies": body_names(node)}
+        # from the system's entropy: no generator of the run is touched
+        content = {"id": uuid4().hex, **provenance(overrides), "bodies": body_names(node)}
         self._write_json(self.provenance, content)
         write_atomically(self.config, OmegaConf.to_yaml(node, resolve=True))  # last: it is a run
 

@@ -132,7 +132,7 @@ def test_resumed_csv_drops_later_rows(tmp_path):
 
 
 def test_tensorboard_gets_every_finite_number(tmp_path):
-    reporter = make_reporter(LoggerKind.tensorboard, tmp_path)
+    reporter = make_reporter(LoggerKind.tensorboard, tmp_path, "run")
     reporter.write("evaluations", 10, {"team": "red", "return": 2.5, "length": math.nan})
     reporter.close()
     events = EventAccumulator(str(tmp_path / "tensorboard")).Reload()
@@ -160,7 +160,7 @@ def test_a_full_disk_under_a_logger_is_reported_with_the_folder_and_the_space(tm
 
 def test_points_after_a_checkpoint_are_hidden_when_a_run_resumes(tmp_path):
     for resumed, value in ((0, 1.0), (10, 2.0)):
-        reporter = make_reporter(LoggerKind.tensorboard, tmp_path, resumed)
+        reporter = make_reporter(LoggerKind.tensorboard, tmp_path, "run", resumed)
         for frames in (10, 20) if not resumed else (20,):
             reporter.write("metrics", frames, {"x": value})
         reporter.close()
@@ -209,7 +209,7 @@ def test_the_loggers_of_the_extras_write_into_the_folder_of_the_run(tmp_path, mo
     monkeypatch.setenv("WANDB_MODE", "offline")
     monkeypatch.delenv("MLFLOW_TRACKING_URI", raising=False)
     for resumed in (0, 10):  # a closed logger lets another one start
-        reporter = make_reporter(kind, tmp_path, resumed)
+        reporter = make_reporter(kind, tmp_path, "run", resumed)
         reporter.write("metrics", resumed + 10, {"x": 1.5, "y": math.nan})
         reporter.close()
     names = {path.name for path in tmp_path.iterdir()}

@@ -33,7 +33,7 @@ class LoggerKind(Enum):
 class _Tensorboard(TensorboardLogger):
     """TorchRL's logger, with the points after a checkpoint hidden when a run resumes from it."""
 
-    def __init__(self, folder: Path, resumed_frames: int) -> None:
+    def __init__(self, folder: Path, identifier: str, resumed_frames: int) -> None:
         self._purge_step = resumed_frames + 1 if resumed_frames else None
         super().__init__(exp_name="tensorboard", log_dir=str(folder))
 
@@ -44,9 +44,9 @@ class _Tensorboard(TensorboardLogger):
         return SummaryWriter(path, purge_step=self._purge_step)
 
 
-def _wandb(folder: Path, resumed_frames: int) -> Logger:
+def _wandb(folder: Path, identifier: str, resumed_frames: int) -> Logger:
     return WandbLogger(
-        exp_name=folder.name, save_dir=str(folder), project="veca_marl", id=_identifier(folder)
+        exp_name=folder.name, save_dir=str(folder), project="veca_marl", id=identifier
     )
 
 
@@ -56,7 +56,7 @@ class _MLflow(MLFlowLogger):
     MLflow's default is a folder of files, which its newer versions refuse: here it is SQLite.
     """
 
-    def __init__(self, folder: Path, resumed_frames: int) -> None:
+    def __init__(self, folder: Path, identifier: str, resumed_frames: int) -> None:
         import mlflow
 
         given = mlflow.get_tracking_uri() if mlflow.is_tracking_uri_set() else None
@@ -70,12 +70,7 @@ class _MLflow(MLFlowLogger):
         mlflow.end_run()
 
 
-def _identifier(folder: Path) -> str:
-    """Return a name of the run by which a resumed one continues its curves."""
-    return "-".join(folder.resolve().parts[-2:])
-
-
-_MAKERS: dict[LoggerKind, Callable[[Path, int], Logger]] = {
+_MAKERS: dict[LoggerKind, Callable[[Path, str, int], Logger]] = {
     LoggerKind.tensorboard: _Tensorboard,
     LoggerKind.wandb: _wandb,
     LoggerKind.mlflow: _MLflow,
@@ -94,12 +89,15 @@ def check_installed(kind: LoggerKind) -> None:
         )
 
 
-def make_reporter(kind: LoggerKind, folder: Path, resumed_frames: int = 0) -> Reporter:
+def make_reporter(
+    kind: LoggerKind, folder: Path, identifier: str, resumed_frames: int = 0
+) -> Reporter:
     """Return what writes the numbers of a run.
 
     Args:
         kind: Where to.
         folder: Folder of the run.
+        identifier: A name that no other run has, by which a resumed one continues its curves.
         resumed_frames: Frames of the checkpoint from which the run continues, or 0.
 
     Raises:
@@ -110,5 +108,5 @@ def make_reporter(kind: LoggerKind, folder: Path, resumed_frames: int = 0) -> Re
     if kind is LoggerKind.csv:
         return CsvReporter(folder, resumed_frames)
     with naming(folder):
-        logger = _MAKERS[kind](folder, resumed_frames)
+        logger = _MAKERS[kind](folder, identifier, resumed_frames)
     return LoggerReporter(logger, folder)
