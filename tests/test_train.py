@@ -159,7 +159,7 @@ def test_an_existing_run_is_not_overwritten(smoke):
         ([f"resume={__file__}"], f"error: resume={__file__} is a file; give the folder of a run"),
         (
             ["+task=KickTheBall", "hydra.run.dir=/dev/null/run"],
-            "error: cannot create /dev/null/run: Not a directory",
+            "error: hydra.run.dir=/dev/null/run cannot be written: /dev/null is not a folder",
         ),
     ],
 )
@@ -192,7 +192,9 @@ def comparable(run):
         path.name: torch.load(path, weights_only=True)["state"]
         for path in run.glob("checkpoints/*.pt")
     }
-    return tables | states | {"comparison": (run / "comparison.txt").read_text()}
+    # a run that was killed after its last checkpoint adds that nothing was learnt
+    compared = (run / "comparison.txt").read_text().splitlines()[0]
+    return tables | states | {"comparison": compared}
 
 
 WITH_VIDEO = [*SMOKE, "log.video=true", "log.logger=[csv,tensorboard]"]
