@@ -37,7 +37,7 @@ def advantages(
     cut = batch["next", "done"].squeeze(-1).clone()
     cut[:, -1] = True
     following[cut.to(device)] = _values_after(network, batch["next"], cut, team, device)
-    # the vectorised estimate divides by the decay of the sum
+    # TorchRL's vectorised estimate raises an error where no later step counts
     estimate = (
         vec_generalized_advantage_estimate
         if gamma * gae_lambda > 0.0

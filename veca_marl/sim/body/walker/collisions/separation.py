@@ -78,10 +78,10 @@ def _overlap_counts(positions: Floats, half_axes: Floats, radii: Floats) -> Floa
 def _overlap(
     positions: Floats, half_axes: Floats, radii: Floats, i: int, j: int
 ) -> tuple[float, float, float, float]:
-    """Return the way from `j` to `i` (x, y and length) and by how much they overlap, metres.
+    """Return the vector from `j` to `i` (x, y and length) and their overlap, metres.
 
-    The way is that between the nearest points of the axes. Where these cross it is that between the
-    centres, and along x, from the one that was added first, where the centres coincide.
+    The vector is that between the nearest points of the axes. Where these cross it is that between
+    the centres, and the x axis where the centres coincide.
     """
     dx, dy = positions[i, 0] - positions[j, 0], positions[i, 1] - positions[j, 1]
     width = radii[i] + radii[j]
@@ -116,7 +116,7 @@ def _cross(dx: float, dy: float, one: Floats, other: Floats) -> bool:
 
 @njit(cache=True)
 def _nearest(dx: float, dy: float, one: Floats, other: Floats) -> tuple[float, float]:
-    """Return the shortest way from the other axis to the one, which do not cross; see `_cross`.
+    """Return the shortest vector from the other axis to the one, which do not cross; see `_cross`.
 
     One of the two points is an end of an axis.
     """
