@@ -6,7 +6,8 @@ killed, it waits forever. `SupervisedCollector` raises `WorkerError` instead, in
 - The signal SIGCHLD, which the system sends when a worker ends, raises it in the main thread at
   once: also while the main process learns or evaluates.
 - Every wait for a worker checks each second whether all workers are alive. In other threads and on
-  Windows, where the signal is not received, this is the only way.
+  Windows, where the signal is not received, this is the only way. So it is while workers start: an
+  exception that a signal raises within the fork of a process is lost.
 
 A worker that hangs does not end: every wait has a time limit, after which the workers that have not
 answered are named and all are killed.
@@ -77,7 +78,7 @@ class SupervisedCollector(MultiSyncCollector):
     ) -> None:
         self._limit_s = answer_limit_s
         self._exceptions: SimpleQueue[tuple[int, str]] = multiprocessing.SimpleQueue()
-        self._restore_handler = call_when_a_child_ends(self.check)
+        self._restore_handler: Callable[[], None] = lambda: None
         self._weights = _SupervisedWeights()
         schemes = {}
         if isinstance(policy, nn.Module):
@@ -104,6 +105,7 @@ class SupervisedCollector(MultiSyncCollector):
         finally:
             self.receive_interrupts()
         self.queue_out = BatchQueue(self.queue_out, len(self.procs), self.time_limit())
+        self._restore_handler = call_when_a_child_ends(self.check)
 
     @property
     def pipes(self) -> Sequence[AnswerPipe]:
