@@ -24,8 +24,8 @@ from veca_marl.algos.specs import EnvFactory
 class CollectCfg:
     """Number of worlds that play at the same time.
 
-    The defaults are the paper's 8 workers; the default preset, `collect=workers16`, has twice as
-    many worlds and batches of the same size.
+    The defaults are the paper's 8 workers; the default preset, `collect=workers32`, has four times
+    as many worlds and batches of the same size.
 
     Attributes:
         processes: Worker processes; 0 steps the worlds in this one.
