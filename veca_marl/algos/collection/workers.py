@@ -6,8 +6,8 @@ killed, it waits forever. `SupervisedCollector` raises `WorkerError` instead, in
 - The signal SIGCHLD, which the system sends when a worker ends, raises it in the main thread at
   once: also while the main process learns or evaluates.
 - Every wait for a worker checks each second whether all workers are alive. In other threads and on
-  Windows, where the signal is not received, this is the only way. So it is while workers start: an
-  exception that a signal raises within the fork of a process is lost.
+  Windows, where the signal is not received, and while workers start, this is the only way: Python
+  drops an exception that a signal handler raises within a fork.
 
 A worker that hangs does not end: every wait has a time limit, after which the workers that have not
 answered are named and all are killed.
