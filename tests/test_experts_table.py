@@ -15,6 +15,7 @@ from veca_marl.envs.core.expert import Expert, find_expert
 from veca_marl.envs.core.game import Game
 from veca_marl.envs.core.team import Script
 from veca_marl.experts_table.command import main
+from veca_marl.experts_table.episode_file import EpisodeFile
 from veca_marl.experts_table.play import Played, digest, game_cfg
 from veca_marl.experts_table.processes import LostProcessError, play_all
 from veca_marl.experts_table.table import markdown
@@ -160,3 +161,11 @@ def test_a_field_that_was_added_changes_a_digest_only_with_another_value():
     cfg.playground.props[-1].partition = True
     assert len({before, with_screen, digest(cfg)}) == 3
     assert PropCfg.formerly == {"partition": False}
+
+
+def test_episodes_with_other_starts_are_not_mixed(tmp_path):
+    file = EpisodeFile(tmp_path / "DodgeCar.csv")
+    file.check([played()], "c", version=1)
+    for version in (0, 2):
+        with pytest.raises(ValueError, match=rf"starts of version 1, not {version} .*another"):
+            file.check([played()], "c", version)

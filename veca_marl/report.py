@@ -16,6 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
+from veca_marl.algos.files import WriteError, write_atomically
 from veca_marl.config import ConfigError
 from veca_marl.config.claims import parse_claim
 from veca_marl.config.command_line import CommandLine
@@ -76,7 +77,8 @@ def make_report(options: ReportOptions, arms: Sequence[Arm], command: str) -> tu
         ConfigError: If nothing has been evaluated, or a path of the options is impossible.
         PlotError: If matplotlib is missing.
         ValueError: If a file is not what it should be, or the team or metric does not exist.
-        OSError: If a file cannot be read or written.
+        OSError: If a file cannot be read, or the figure cannot be written.
+        WriteError: If another file cannot be written.
     """
     check_plotting()
     if options.to is not None:
@@ -93,7 +95,7 @@ def make_report(options: ReportOptions, arms: Sequence[Arm], command: str) -> tu
     drawn = {name: runs for name, runs in by_arm.items() if runs}
     title = f"{arms[0].cfg.task.name}: {experiment.name}"
     draw(folder / FIGURE, drawn, report.baselines, title, f"{experiment.metric} of an episode")
-    (folder / "report.md").write_text(page(report))
+    write_atomically(folder / "report.md", page(report))
     return report, folder
 
 
@@ -167,7 +169,9 @@ def run(options: ReportOptions, overrides: list[str]) -> None:
 
 def main(words: Sequence[str] | None = None) -> int:
     """Run the command line; return the exit status."""
-    return CommandLine("report", ReportOptions, str(__doc__), (ValueError, OSError)).run(run, words)
+    return CommandLine(
+        "report", ReportOptions, str(__doc__), (ValueError, OSError, WriteError)
+    ).run(run, words)
 
 
 if __name__ == "__main__":

@@ -76,6 +76,8 @@ class Child:
 
 
 def _prepared(prepare, folder, processes):
+    # a fork of a process that has computed in parallel waits for ever for threads it does not have
+    torch.set_num_threads(1)
     if prepare is not None:
         prepare()
     make_trainer(folder, processes).run()

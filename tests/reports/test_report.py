@@ -4,11 +4,13 @@ import copy
 import csv
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from small_experiment import write_all
 from stored_runs import write_run
 
 from veca_marl import report
+from veca_marl.algos.files import WriteError
 from veca_marl.reports import figure
 from veca_marl.reports.error_rates import false_order_rate
 from veca_marl.reports.gather import (
@@ -89,7 +91,7 @@ def test_missing_unfinished_cut_and_different_runs_are_named(tmp_path, arms, run
     for text in (printed, page):
         assert f"hrtf, seed 0: missing: no run in {run_folder(tmp_path, 'hrtf', 0)}" in text
         assert "hrtf, seed 1: unfinished: 100 of 200 frames; shown, not counted" in text
-        assert "stereo, seed 2: not counted: task.max_seconds is 99.0 there and" in text
+        assert "stereo, seed 2: not counted: task.max_seconds is 99.0 in the run" in text
         assert "mono, seed 1: missing" in text
         assert "device" not in text
     assert "**Verdict.** Undecided: 1 to 2 seeds." in page
@@ -124,7 +126,7 @@ def test_a_run_of_an_older_network_does_not_count(tmp_path, composed):
     ((found,), rows) = gather(tmp_path, {"hrtf": arm.plain}, [0], {"hrtf": arm.former})
     assert not found.counts
     assert rows == []
-    assert "algo.network.kernels is [8, 4, 3] there and [4, 4, 3] here" in found.remark
+    assert "algo.network.kernels is [8, 4, 3] in the run, [4, 4, 3] is asked for" in found.remark
 
 
 def test_minutes_of_runs_without_times_between_batches_are_those_of_batches(tmp_path, arms):
@@ -288,3 +290,22 @@ def test_few_episodes_of_evaluations_during_a_run_are_stated(tmp_path, arms, run
     page = (tmp_path / "report.md").read_text()
     assert "as few as" not in page
     assert "final evaluations of 8 episodes; figures need at least 32" in page
+
+
+def test_times_that_were_not_logged_are_not_zero():
+    spent = training_time([])
+    assert np.isnan(spent.minutes).all()
+    assert np.isnan(spent.core_minutes).all()
+
+
+def test_a_table_that_cannot_be_rewritten_keeps_its_rows(tmp_path, monkeypatch):
+    path = tmp_path / "results.csv"
+    write_rows(path, [{"arm": "a"}])
+
+    def fail(*_):
+        raise OSError("the disk is gone")
+
+    monkeypatch.setattr("veca_marl.algos.files.os.fsync", fail)
+    with pytest.raises(WriteError, match="the disk is gone"):
+        write_rows(path, [{"arm": "b"}])
+    assert path.read_text() == "arm\na\n"

@@ -1,7 +1,10 @@
 """How the configuration of a stored run is compared with the one that is asked for."""
 
+import pytest
+
 from veca_marl.config import compose_node
-from veca_marl.sweeps.differences import differences, key_patterns
+from veca_marl.config.schemas import BY_TEAM
+from veca_marl.sweeps.differences import FREE_NAMES, differences, key_patterns
 from veca_marl.sweeps.former import former_values
 
 BALL = {"name": "ball", "mass_kg": 0.3, "size_m": [0.1]}
@@ -21,7 +24,7 @@ def test_a_key_that_another_version_lacks_is_told_from_a_changed_value_in_lists_
     assert (added.key, added.of_version) == ("playground.props.1.joint", True)
     (changed,) = differences(props(BALL, BOX), props(BALL, {**BOX, "mass_kg": 2.0}))
     assert not changed.of_version
-    assert str(changed) == "playground.props.1.mass_kg is 1.0 there and 2.0 here"
+    assert str(changed) == "playground.props.1.mass_kg is 1.0 in the run, 2.0 is asked for"
 
 
 def network(**fields):
@@ -33,7 +36,7 @@ def test_a_key_that_a_run_is_too_old_to_have_has_its_former_value():
     assert differences(network(), network(kernels=[8, 4, 3]), former) == []
     (changed,) = differences(network(), network(kernels=[4, 4, 3]), former)
     assert not changed.of_version
-    assert str(changed) == "algo.network.kernels is [8, 4, 3] there and [4, 4, 3] here"
+    assert str(changed) == "algo.network.kernels is [8, 4, 3] in the run, [4, 4, 3] is asked for"
     assert differences(network(kernels=[4, 4, 3]), network(kernels=[4, 4, 3]), former) == []
 
 
@@ -60,3 +63,38 @@ def test_elements_of_a_list_are_named_by_one_pattern():
         "seed",
     ]
     assert key_patterns(keys) == ["playground.props.*.joint", "playground.props.*.parts", "seed"]
+
+
+@pytest.mark.parametrize(
+    ("stored", "asked"),
+    [
+        ({"opponent": {}}, {"opponent": {"blue": "expert"}}),
+        ({"opponent": {"red": "random"}}, {"opponent": {"red": "random", "blue": "expert"}}),
+        ({"team": {"red": {"senses": 1}}}, {"team": {"blue": {"senses": 1}}}),
+        (
+            {"algo": {"entropy_coefficient": 0.03}},
+            {"algo": {"entropy_coefficient": {"move": 0.003}}},
+        ),
+        (
+            {"algo": {"entropy_coefficient": {"move": 0.003}}},
+            {"algo": {"entropy_coefficient": {"move": 0.003, "voice": 0.01}}},
+        ),
+    ],
+)
+def test_other_names_and_a_mapping_in_place_of_a_value_are_changed_values(stored, asked):
+    for one, other in ((stored, asked), (asked, stored)):
+        found = differences(one, other)
+        assert found
+        assert not any(d.of_version for d in found)
+
+
+def test_keys_of_one_version_below_a_name_of_the_user_are_told_apart():
+    stored, asked = {"team": {"red": {"body": 1}}}, {"team": {"red": {"body": 1, "new": 2}}}
+    (added,) = differences(stored, asked)
+    assert (added.key, added.of_version) == ("team.red.new", True)
+    (added,) = differences({}, {"team": {"red": {"body": 1}}})
+    assert added.of_version
+
+
+def test_mappings_with_the_names_of_teams_have_free_names():
+    assert set(BY_TEAM) <= set(FREE_NAMES)

@@ -95,7 +95,9 @@ def test_a_run_that_its_time_limit_ended_is_continued_without_the_limit(tmp_path
 def test_a_run_of_another_configuration_is_refused_with_the_difference(tmp_path):
     write_run(tmp_path / "run", CONFIG, [(200, 1.0)])
     other = {"name": "KickTheBall", "weights": {"kick": 2.0}}
-    expected = r"another configuration: task.weights.kick is 1.0 there and 2.0 here. Choose another"
+    expected = (
+        r"another configuration: task.weights.kick is 1.0 in the run, 2.0 is asked for. Choose"
+    )
     with pytest.raises(SweepError, match=expected):
         plan(job(tmp_path / "run", task=other, seed=0))
 

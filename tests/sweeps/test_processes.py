@@ -146,3 +146,8 @@ def test_the_line_of_progress_has_frames_and_the_time_left(tmp_path):
         .splitlines()[-1]
         .endswith("1 of 4 runs ended, 2 running; 200 of 400 frames (50 %), about 2 min left")
     )
+
+
+def test_a_damaged_file_of_a_run_does_not_end_the_display_of_all(tmp_path):
+    (tmp_path / "progress.json").write_text("{")
+    assert frames_so_far(tmp_path) == 0

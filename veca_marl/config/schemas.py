@@ -20,8 +20,8 @@ from veca_marl.envs.core.task import TASKS
 from veca_marl.sim.body import BODIES, BodyCfg
 from veca_marl.sim.physics import PLAYGROUND_GENERATORS
 
-# keys of the root that have the names of teams as their keys
-_BY_TEAM = ("team", "opponent", "init_from", "init_encoders", "learner", "team_intrinsic")
+BY_TEAM = ("team", "opponent", "init_from", "init_encoders", "learner", "team_intrinsic")
+"""Keys of the root that have the names of teams as their keys."""
 
 
 def register_schemas() -> None:
@@ -40,7 +40,7 @@ def register_schemas() -> None:
 def root_schema() -> Any:
     """Return `Config` as a node that takes any team's name where teams are keys."""
     schema = OmegaConf.structured(Config)
-    for key in _BY_TEAM:
+    for key in BY_TEAM:
         OmegaConf.set_struct(schema[key], False)
     return schema
 

@@ -67,11 +67,13 @@ def run(options: TableOptions, overrides: list[str]) -> None:
 def _missing(options: TableOptions, folder: Path, overrides: Sequence[str]) -> Iterator[Job]:
     """Return the episodes that are not stored, task by task."""
     for task in sorted(TASKS) if options.tasks == ["all"] else options.tasks:
-        cfg, file = game_cfg(task, overrides), _file(folder, task)
+        cfg, file, version = game_cfg(task, overrides), _file(folder, task), 0
         if options.frozen:
-            find_benchmark(task).check_parameters(cfg.task)
+            benchmark = find_benchmark(task)
+            benchmark.check_parameters(cfg.task)
+            version = benchmark.version
         stored = file.read()
-        file.check(stored, digest(cfg))
+        file.check(stored, digest(cfg), version)
         done = {(one.policy, one.episode) for one in stored}
         policies = [Script.expert, Script.random] if has_expert(task) else [Script.random]
         yield from (

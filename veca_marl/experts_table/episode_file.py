@@ -12,6 +12,7 @@ from pathlib import Path
 from veca_marl.algos.files import naming
 from veca_marl.experts_table.play import Played
 
+_ADVICE = "choose another folder (to=FOLDER) or delete the file"
 _COLUMNS = [field.name for field in fields(Played)]
 
 
@@ -42,17 +43,25 @@ class EpisodeFile:
         except (TypeError, ValueError) as error:
             raise ValueError(f"{self._path}, line {reader.line_num}: {error}") from error
 
-    def check(self, stored: Iterable[Played], configuration: str) -> None:
-        """Check that stored episodes are of one configuration.
+    def check(self, stored: Iterable[Played], configuration: str, version: int) -> None:
+        """Check that stored episodes are of one configuration and have the same starts.
+
+        Args:
+            stored: The episodes.
+            configuration: `digest` of the game.
+            version: Version of the frozen episodes, 0 for other starts.
 
         Raises:
             ValueError: If they are of another one; the message names what to do.
         """
-        if any(row.configuration != configuration for row in stored):
-            raise ValueError(
-                f"{self._path} has episodes of another configuration: choose another folder "
-                "(to=FOLDER) or delete the file"
-            )
+        for row in stored:
+            if row.configuration != configuration:
+                raise ValueError(f"{self._path} has episodes of another configuration: {_ADVICE}")
+            if row.version != version:
+                raise ValueError(
+                    f"{self._path} has episodes with starts of version {row.version}, not "
+                    f"{version} (0: not frozen): {_ADVICE}"
+                )
 
     def add(self, played: Played) -> None:
         """Add an episode and write it to the disk.

@@ -6,11 +6,13 @@ import csv
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from io import StringIO
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from veca_marl.algos.files import write_atomically
 from veca_marl.reports.budget import FrameBudget
 from veca_marl.reports.stored import DamagedRunError, read_checked_run
 from veca_marl.runs.resumable import may_change
@@ -150,9 +152,9 @@ class TrainingTime:
 
     Attributes:
         frames: Frames of training after each batch, ``(n,)``.
-        minutes: Elapsed minutes, ``(n + 1,)``. The time between an interruption and its resumption
-            is left out. Runs that were stored without the column ``between_s`` have minutes of
-            collection and learning alone.
+        minutes: Elapsed minutes, ``(n + 1,)``; NaN without batches. The time between an
+            interruption and its resumption is left out. Runs that were stored without the column
+            ``between_s`` have minutes of collection and learning alone.
         core_minutes: Minutes of processor time of all processes, ``(n + 1,)``; NaN where they were
             not measured.
     """
@@ -163,7 +165,14 @@ class TrainingTime:
 
 
 def training_time(metrics: Sequence[Mapping[str, str]]) -> TrainingTime:
-    """Return the time of training, from the rows of ``metrics.csv``."""
+    """Return the time of training, from the rows of ``metrics.csv``.
+
+    Args:
+        metrics: A row for each batch; empty if the logger of these rows was not chosen.
+    """
+    if not metrics:
+        unknown = np.array([math.nan])
+        return TrainingTime(np.array([], dtype=int), unknown, unknown)
     frames = np.array([int(row["frames"]) for row in metrics])
     rates = np.array([float(row["frames_per_s"]) for row in metrics])
     between = np.array([float(row.get("between_s") or 0.0) for row in metrics])
@@ -245,13 +254,17 @@ def state_in(rows: Sequence[Mapping[str, str]]) -> RunState:
 
 
 def write_rows(path: Path, rows: Sequence[Row]) -> None:
-    """Write rows as CSV; columns that a row lacks are empty."""
+    """Write rows as CSV; columns that a row lacks are empty.
+
+    Raises:
+        WriteError: If the file cannot be written; a former one is unchanged.
+    """
     columns = list(dict.fromkeys(name for row in rows for name in row))
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with path.open("w", newline="") as file:
-        writer = csv.DictWriter(file, columns, lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(rows)
+    text = StringIO()
+    writer = csv.DictWriter(text, columns, lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(rows)
+    write_atomically(path, text.getvalue())
 
 
 def read_rows(path: Path) -> list[Row]:

@@ -12,6 +12,17 @@ _NUMBER = "number"  # of the elements of a list
 _IGNORED = ("experiment", "resume")  # claims and seeds of an experiment do not change its runs
 _DECIDED = "auto"  # such a value is decided when a run starts, and the run stores the decision
 
+FREE_NAMES = (
+    "team",
+    "opponent",
+    "init_from",
+    "init_encoders",
+    "learner",
+    "team_intrinsic",
+    "algo.entropy_coefficient",
+)
+"""Mappings whose keys are names that the user chooses, not names of this version."""
+
 
 @dataclass(frozen=True)
 class Difference:
@@ -21,19 +32,17 @@ class Difference:
         key: Dotted path.
         stored: Value of the run; ``absent`` if it has none.
         asked: Value that is asked for; ``absent`` if there is none.
+        of_version: Whether only one of both knows the key: it was added or removed between
+            versions.
     """
 
     key: str
     stored: Any
     asked: Any
-
-    @property
-    def of_version(self) -> bool:
-        """Whether only one of both has the key: it was added or removed between versions."""
-        return _ABSENT in (self.stored, self.asked)
+    of_version: bool = False
 
     def __str__(self) -> str:
-        return f"{self.key} is {self.stored} there and {self.asked} here"
+        return f"{self.key} is {self.stored} in the run, {self.asked} is asked for"
 
 
 def differences(
@@ -49,13 +58,49 @@ def differences(
         former: Values of keys that `stored` may be too old to have, by dotted path, see
             `veca_marl.sweeps.former`.
     """
-    one, other = dict(_flat(former or {})) | dict(_flat(stored)), dict(_flat(asked))
+    before, now = dict(_flat(former or {})) | dict(_flat(stored)), dict(_flat(asked))
     return [
-        Difference(key, one.get(key, _ABSENT), other.get(key, _ABSENT))
-        for key in sorted({*one, *other})
+        Difference(
+            key,
+            before.get(key, _ABSENT),
+            now.get(key, _ABSENT),
+            of_version=not (_knows(before, key) and _knows(now, key)),
+        )
+        for key in sorted({*before, *now})
         if key.partition(".")[0] not in _IGNORED
-        and other.get(key, _ABSENT) not in (one.get(key, _ABSENT), _DECIDED)
+        and now.get(key, _ABSENT) not in (before.get(key, _ABSENT), _DECIDED)
     ]
+
+
+def _knows(flat: Mapping[str, Any], key: str) -> bool:
+    """Return whether the version of a configuration has a key, with this value or another.
+
+    A version knows a key, too, if a single value has the place of a mapping or a mapping that of a
+    single value, and if a mapping with free names has other names.
+
+    Args:
+        flat: Values by dotted path.
+        key: Dotted path.
+    """
+    parts = key.split(".")
+    above = {".".join(parts[:count]) for count in range(1, len(parts) + 1)}
+    if above & flat.keys() or _has_below(flat, key):
+        return True
+    return any(
+        _has_below(flat, mapping) and not _has_below(flat, _named(mapping, key))
+        for mapping in FREE_NAMES
+        if mapping in above
+    )
+
+
+def _has_below(flat: Mapping[str, Any], path: str) -> bool:
+    return any(key.startswith(f"{path}.") for key in flat)
+
+
+def _named(mapping: str, key: str) -> str:
+    """Return the path of the name in a mapping that a dotted path leads through."""
+    name = key.removeprefix(f"{mapping}.").partition(".")[0]
+    return f"{mapping}.{name}"
 
 
 def key_patterns(keys: Iterable[str]) -> list[str]:

@@ -19,8 +19,16 @@ def frames_so_far(folder: Path) -> int:
     """Return the frames that a run has learnt from.
 
     They are those of its last batch by ``metrics.csv``, and without that logger those of its last
-    checkpoint by ``progress.json``.
+    checkpoint by ``progress.json``; 0 if the file is damaged or was removed in the meantime, which
+    concerns the run and not the display of its progress.
     """
+    try:
+        return _frames_stored(folder)
+    except (OSError, ValueError):
+        return 0
+
+
+def _frames_stored(folder: Path) -> int:
     path = folder / "metrics.csv"
     if not path.is_file():
         stored = read_progress(folder)

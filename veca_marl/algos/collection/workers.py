@@ -16,8 +16,6 @@ answered are named and all are killed.
 from __future__ import annotations
 
 import os
-import signal
-import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
@@ -28,7 +26,7 @@ from typing import Any
 
 from tensordict import TensorDictBase
 from torch import multiprocessing, nn
-from torchrl.collectors import Collector, MultiSyncCollector
+from torchrl.collectors import MultiSyncCollector
 from torchrl.weight_update import SharedMemWeightSyncScheme
 
 from veca_marl.algos.collection.answers import (
@@ -38,10 +36,15 @@ from veca_marl.algos.collection.answers import (
     TimeLimit,
     no_answer,
 )
-from veca_marl.algos.collection.interrupts import block_interrupts, ignore_interrupts
-from veca_marl.algos.collection.parent import end_with_parent
-
-_MESSAGE_CHARS = 1000  # with a pickle's overhead below what a pipe writes at once (4096 bytes)
+from veca_marl.algos.collection.child_processes import (
+    call_when_a_child_ends,
+    end_of,
+    has_ended,
+    is_running,
+    prepare_child,
+)
+from veca_marl.algos.collection.interrupts import block_interrupts
+from veca_marl.algos.collection.worker_collector import WorkerCollector
 
 
 class WorkerError(RuntimeError):
@@ -92,8 +95,8 @@ class SupervisedCollector(MultiSyncCollector):
             super().__init__(
                 make_envs,
                 policy,
-                init_fn=partial(_start_worker, os.getpid()),
-                collector_class=partial(_WorkerCollector, exceptions=self._exceptions),
+                init_fn=partial(prepare_child, os.getpid()),
+                collector_class=partial(WorkerCollector, exceptions=self._exceptions),
                 weight_sync_schemes=schemes,
                 **kwargs,
             )
@@ -140,12 +143,12 @@ class SupervisedCollector(MultiSyncCollector):
         if self._failure:
             self._restore_handler()  # the others end too
             for process in self.procs:
-                if _is_running(process):
+                if is_running(process):
                     process.kill()
             raise WorkerError(self._failure)
 
     def _find_failure(self) -> str:
-        ended = {i: end_of(p) for i, p in enumerate(self.procs) if _has_ended(p)}
+        ended = {i: end_of(p) for i, p in enumerate(self.procs) if has_ended(p)}
         raised = self._raised() if ended else {}
         return "; ".join(self._sentence(i, ended[i], raised) for i in ended)
 
@@ -231,88 +234,3 @@ def _received(queue: Any) -> bool:
     except Empty:
         return False
     return True
-
-
-class _WorkerCollector(Collector):
-    """The collector in a worker; it sends an exception's message before the worker ends."""
-
-    def __init__(self, *args: Any, exceptions: Any, worker_idx: int, **kwargs: Any) -> None:
-        self._exceptions, self._index = exceptions, worker_idx
-        with self._sent():
-            super().__init__(*args, worker_idx=worker_idx, **kwargs)
-
-    def iterator(self) -> Iterator[TensorDictBase]:
-        with self._sent():
-            yield from super().iterator()
-
-    def reset(self, *args: Any, **kwargs: Any) -> None:
-        with self._sent():
-            super().reset(*args, **kwargs)
-
-    @contextmanager
-    def _sent(self) -> Iterator[None]:
-        try:
-            yield
-        except Exception as error:
-            message = f"{type(error).__name__}: {error}"
-            self._exceptions.put((self._index, message[:_MESSAGE_CHARS]))
-            raise
-
-
-def _start_worker(parent: int) -> None:
-    ignore_interrupts()
-    if hasattr(signal, "SIGCHLD"):
-        signal.signal(signal.SIGCHLD, signal.SIG_DFL)  # the parent's handler is for its workers
-    end_with_parent(parent)
-
-
-def call_when_a_child_ends(call: Callable[[], None]) -> Callable[[], None]:
-    """Call a function in the main thread when a child process ends; return what revokes it.
-
-    What was to be called before is called too.
-    """
-    if not hasattr(signal, "SIGCHLD") or threading.current_thread() is not threading.main_thread():
-        return lambda: None
-    previous: Any = None
-
-    def handle(number: int, frame: Any) -> None:
-        call()
-        if callable(previous):
-            previous(number, frame)
-
-    previous = signal.signal(signal.SIGCHLD, handle)
-
-    def restore() -> None:
-        nonlocal previous
-        if previous is not None and threading.current_thread() is threading.main_thread():
-            signal.signal(signal.SIGCHLD, previous)
-            previous = None
-
-    return restore
-
-
-def _has_ended(process: BaseProcess) -> bool:
-    try:
-        return process.exitcode is not None
-    except ValueError:  # torchrl has ended and closed it, because another one had ended
-        return False
-
-
-def _is_running(process: BaseProcess) -> bool:
-    try:
-        return process.is_alive()
-    except ValueError:  # closed
-        return False
-
-
-def end_of(process: BaseProcess) -> str:
-    """Return how a process has ended, as the rest of a sentence."""
-    code = process.exitcode or 0
-    if code >= 0:
-        return f"ended with exit code {code}"
-    try:
-        name = signal.Signals(-code).name
-    except ValueError:
-        name = f"signal {-code}"
-    hint = ", which the system sends when memory runs out" if name == "SIGKILL" else ""
-    return f"was killed by {name}{hint}"

@@ -9,7 +9,6 @@ interrupted stage had learnt is learnt again.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack, closing
 from dataclasses import asdict, dataclass, field
@@ -23,28 +22,23 @@ from veca_marl.algos.collection.experience import CollectCfg, Experience
 from veca_marl.algos.evaluation.comparison import comparison_line, score_rows
 from veca_marl.algos.evaluation.episodes import TrainingEpisodes
 from veca_marl.algos.evaluation.evaluate import EvalCfg, Scores
-from veca_marl.algos.evaluation.evaluators import (
-    Evaluator,
-    Players,
-    Request,
-    make_evaluator,
-    nothing,
-)
+from veca_marl.algos.evaluation.evaluators import Evaluator, Players, nothing
+from veca_marl.algos.evaluation.parallel import make_evaluator
 from veca_marl.algos.plain import to_plain
 from veca_marl.algos.policy import Policy
 from veca_marl.algos.seeds import derived_seed
 from veca_marl.algos.specs import EnvFactory
 from veca_marl.algos.training.checkpoint import Checkpoints
 from veca_marl.algos.training.checkpoint_file import naming_checkpoint
-from veca_marl.algos.training.finite import check_batch, check_scores, check_state
+from veca_marl.algos.training.evaluations import Evaluations, evaluation_seed
+from veca_marl.algos.training.finite import check_batch, check_state
 from veca_marl.algos.training.learners import TeamLearners
 from veca_marl.algos.training.matchmaking import AllLearn, Matchmaking
 from veca_marl.algos.training.progress import Budget, Progress
 from veca_marl.algos.training.reporters import Reporter
+from veca_marl.algos.training.schedule import Schedule
 from veca_marl.algos.training.stopwatch import Stopwatch
 from veca_marl.algos.training.timing import timing_table
-
-_EVALUATION_STAGE = 2**31 - 1  # in place of a stage number: seeds that no training stage uses
 
 
 @dataclass
@@ -81,7 +75,7 @@ class Trainer:
     during_last_evaluation: Callable[[], None] = nothing
     progress: Progress = field(default_factory=Progress)
     _resumed_frames: int = 0
-    _evaluator: Evaluator = field(init=False)
+    _evaluations: Evaluations = field(init=False)
 
     def __post_init__(self) -> None:
         self.policy: Policy = self.learners.policy.copy()
@@ -113,15 +107,16 @@ class Trainer:
             self._save(best=False)  # an interruption at any time finds a checkpoint
         with ExitStack() as pending:
             with timeit("build"):
-                self._evaluator = pending.enter_context(closing(self._make_evaluator()))
+                evaluator = pending.enter_context(closing(self._make_evaluator()))
                 experience = Experience(self.make_env, self.policy.collect, self.collect)
                 pending.enter_context(closing(experience))
-            baseline = self._evaluate("random", self.evaluation.last_episodes)
+            self._evaluations = Evaluations(evaluator, self.evaluation, self.seed)
+            baseline = self._evaluations.play_baseline()
             if fresh:
                 self._report_scores("random", baseline)
             scores = self._train(experience)
             if scores is None:
-                scores = self._evaluate_last()
+                scores = self._evaluations.play_last(self.during_last_evaluation)
         compared = [comparison_line(t, scores[t], baseline[t]) for t in self.learners.algorithms]
         return [*compared, *self._notes()]
 
@@ -142,10 +137,11 @@ class Trainer:
                 "no best.pt: several teams learn, and the mean of their returns does not measure "
                 "their skill (it is 0 in a zero-sum game); the latest checkpoints are kept"
             )
-        if self._resumed_frames >= self.budget_frames:
+        frames = self.schedule.frames
+        if self._resumed_frames >= frames:
             notes.append(
                 f"nothing was learnt: the run had {self._resumed_frames} frames already, "
-                f"total_frames={self.budget_frames}"
+                f"total_frames={frames}"
             )
         if self._resumed_frames and not self.learners.exact_resume:
             notes.append("resumed: an algorithm of this run does not continue bit for bit")
@@ -159,57 +155,47 @@ class Trainer:
     def _train(self, experience: Experience) -> dict[str, Scores] | None:
         """Go through all stages and return the scores of the last, if there was one."""
         scores = None
-        iterations = self.budget.iterations(self.collect.frames)
         with tqdm(
-            total=self.budget_frames,
+            total=self.schedule.frames,
             initial=self.progress.frames,
             unit=" frames",
             disable=not self.progress_bar,
         ) as bar:
             finished = self._is_finished()
             while not finished:
-                self._run_stage(experience, bar, iterations)
+                self._run_stage(experience, bar)
                 finished = self._is_finished()
                 scores = self._end_stage(finished)
         return scores
 
     def _is_finished(self) -> bool:
         """Whether the frames, or the time, of the budget are spent."""
-        iterations = self.budget.iterations(self.collect.frames)
-        return self.progress.iteration >= iterations or self.budget.is_spent(self._clock.elapsed())
+        spent = self.budget.is_spent(self._clock.elapsed())
+        return spent or self.progress.iteration >= self.schedule.batches
 
     @property
-    def budget_frames(self) -> int:
-        """Frames of the whole budget, in whole batches."""
-        return self.budget.iterations(self.collect.frames) * self.collect.frames
-
-    @property
-    def _batches_per_stage(self) -> int:
-        return math.ceil(self.evaluation.every_frames / self.collect.frames)
+    def schedule(self) -> Schedule:
+        """Batches and stages of the whole run."""
+        frames = self.budget.total_frames
+        return Schedule.of(frames, self.evaluation.every_frames, self.collect.frames)
 
     def frames_to_learn(self, team: str) -> int:
         """Return the frames from which a team learns in the rest of the budget."""
-        left = self.budget.iterations(self.collect.frames) - self.progress.iteration
-        stages = range(math.ceil(left / self._batches_per_stage))
-        batches = sum(
-            min(self._batches_per_stage, left - stage * self._batches_per_stage)
-            for stage in stages
-            if self.matchmaking.learns(team, self.progress.stage + stage)
-        )
+        stages = enumerate(self.schedule.stages_after(self.progress.iteration), self.progress.stage)
+        batches = sum(batches for stage, batches in stages if self.matchmaking.learns(team, stage))
         return batches * self.collect.frames
 
     def timing(self) -> str:
         """Return a table of where the time went."""
         return timing_table(self._clock.elapsed(), self.progress.frames - self._resumed_frames)
 
-    def _run_stage(self, experience: Experience, bar: tqdm[Any], iterations: int) -> None:
+    def _run_stage(self, experience: Experience, bar: tqdm[Any]) -> None:
         self.matchmaking.begin_stage(self.progress.stage, self.progress.frames)
         self._update_policy(experience)
         with timeit("collect"):
             experience.restart(derived_seed(self.seed, self.progress.stage))
         episodes = TrainingEpisodes()
-        until = min(self.progress.iteration + self._batches_per_stage, iterations)
-        while self.progress.iteration < until:
+        for _ in range(next(self.schedule.stages_after(self.progress.iteration))):
             row = self._iterate(experience, episodes)
             bar.update(self.collect.frames)
             finished = {k: v for k, v in row.items() if k.endswith("/return") and v == v}
@@ -246,9 +232,9 @@ class Trainer:
     def _end_stage(self, last: bool) -> dict[str, Scores]:
         self.policy.take_over(self.learners.policy)
         if last:
-            scores = self._evaluate_last()
+            scores = self._evaluations.play_last(self.during_last_evaluation)
         else:
-            scores = self._evaluate("policy", self.evaluation.episodes)
+            scores = self._evaluations.play()
         self._report_scores("policy", scores)
         best = self._is_best(scores)
         self.progress.stage += 1
@@ -279,23 +265,10 @@ class Trainer:
         numbers = {team: to_plain(cfg) for team, cfg in self.learners.cfgs.items()}
         self.checkpoints.save(state, self.progress.frames, best, numbers)
 
-    def _evaluate_last(self) -> dict[str, Scores]:
-        episodes = self.evaluation.last_episodes
-        return self._evaluate("policy", episodes, self.during_last_evaluation)
-
-    def _evaluate(
-        self, player: str, episodes: int, meanwhile: Callable[[], None] = nothing
-    ) -> dict[str, Scores]:
-        seed, exploration = self.evaluation_seed, self.evaluation.exploration
-        with timeit("evaluate"):
-            scores = self._evaluator.play(Request(player, episodes, seed, exploration), meanwhile)
-        check_scores(scores)
-        return scores
-
     @property
     def evaluation_seed(self) -> int:
         """Seed of the episodes of all evaluations."""
-        return derived_seed(self.seed, _EVALUATION_STAGE)
+        return evaluation_seed(self.seed)
 
     def _report_scores(self, player: str, scores: dict[str, Scores]) -> None:
         for row in score_rows(player, scores):
