@@ -2,9 +2,8 @@
 
 import pytest
 
-from veca_marl.config import compose_node
-from veca_marl.config.schemas import BY_TEAM
-from veca_marl.sweeps.differences import FREE_NAMES, differences, key_patterns
+from veca_marl.config import compose_node, schemas
+from veca_marl.sweeps.differences import BY_TEAM, differences, key_patterns
 from veca_marl.sweeps.former import former_values
 
 BALL = {"name": "ball", "mass_kg": 0.3, "size_m": [0.1]}
@@ -79,6 +78,10 @@ def test_elements_of_a_list_are_named_by_one_pattern():
             {"algo": {"entropy_coefficient": {"move": 0.003}}},
             {"algo": {"entropy_coefficient": {"move": 0.003, "voice": 0.01}}},
         ),
+        (
+            {"learner": {"red": {"entropy_coefficient": {"move": 0.003}}}},
+            {"learner": {"red": {"entropy_coefficient": {"voice": 0.01}}}},
+        ),
     ],
 )
 def test_other_names_and_a_mapping_in_place_of_a_value_are_changed_values(stored, asked):
@@ -96,5 +99,5 @@ def test_keys_of_one_version_below_a_name_of_the_user_are_told_apart():
     assert added.of_version
 
 
-def test_mappings_with_the_names_of_teams_have_free_names():
-    assert set(BY_TEAM) <= set(FREE_NAMES)
+def test_all_mappings_from_the_names_of_teams_are_known():
+    assert BY_TEAM == schemas.BY_TEAM

@@ -12,16 +12,9 @@ _NUMBER = "number"  # of the elements of a list
 _IGNORED = ("experiment", "resume")  # claims and seeds of an experiment do not change its runs
 _DECIDED = "auto"  # such a value is decided when a run starts, and the run stores the decision
 
-FREE_NAMES = (
-    "team",
-    "opponent",
-    "init_from",
-    "init_encoders",
-    "learner",
-    "team_intrinsic",
-    "algo.entropy_coefficient",
-)
-"""Mappings whose keys are names that the user chooses, not names of this version."""
+BY_TEAM = ("team", "opponent", "init_from", "init_encoders", "learner", "team_intrinsic")
+"""Mappings from the names of teams."""
+_BY_ACTION = "entropy_coefficient"  # of any algorithm: mapping from the parts of an action
 
 
 @dataclass(frozen=True)
@@ -75,8 +68,8 @@ def differences(
 def _knows(flat: Mapping[str, Any], key: str) -> bool:
     """Return whether the version of a configuration has a key, with this value or another.
 
-    A version knows a key, too, if a single value has the place of a mapping or a mapping that of a
-    single value, and if a mapping with free names has other names.
+    It also has the key if there is a single value in place of a mapping or a mapping in place of a
+    single value, and if a mapping from names, see `_maps_names`, has other names.
 
     Args:
         flat: Values by dotted path.
@@ -88,9 +81,13 @@ def _knows(flat: Mapping[str, Any], key: str) -> bool:
         return True
     return any(
         _has_below(flat, mapping) and not _has_below(flat, _named(mapping, key))
-        for mapping in FREE_NAMES
-        if mapping in above
+        for mapping in filter(_maps_names, above)
     )
+
+
+def _maps_names(path: str) -> bool:
+    """Return whether the keys of a mapping are names of the user's game, not of this version."""
+    return path in BY_TEAM or path.rpartition(".")[2] == _BY_ACTION
 
 
 def _has_below(flat: Mapping[str, Any], path: str) -> bool:

@@ -1,4 +1,4 @@
-"""Start and end of child processes: signals, and the end in words."""
+"""Signals and exit codes of child processes."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def prepare_child(parent: int) -> None:
     """Prepare this process, which was just started: ignore interrupts, end with the parent.
 
     Args:
-        parent: Process number of the parent.
+        parent: Process id of the parent.
     """
     ignore_interrupts()
     if hasattr(signal, "SIGCHLD"):
@@ -25,9 +25,13 @@ def prepare_child(parent: int) -> None:
 
 
 def call_when_a_child_ends(call: Callable[[], None]) -> Callable[[], None]:
-    """Call a function in the main thread when a child process ends; return what revokes it.
+    """Install a handler of SIGCHLD that calls a function when a child process ends.
 
-    What was to be called before is called too.
+    The handler that was installed before is called too.
+
+    Returns:
+        A function that restores the former handler. It does nothing, and none is installed, outside
+        the main thread and on Windows.
     """
     if not hasattr(signal, "SIGCHLD") or threading.current_thread() is not threading.main_thread():
         return lambda: None

@@ -25,7 +25,7 @@ _THREADS = 1  # of each process
 
 @dataclass(frozen=True)
 class EvaluationProcess:
-    """A process that plays.
+    """A process that plays, as seen from the one that started it.
 
     Attributes:
         process: The process.
@@ -48,7 +48,7 @@ class EvaluationProcess:
         self.process.join(END_S)
 
 
-class Progress:
+class IdleTimer:
     """Measures for how long a process has made no step.
 
     Args:
@@ -59,8 +59,8 @@ class Progress:
         self._worker = worker
         self._steps, self._since = worker.steps.value, time.monotonic()
 
-    def silent_s(self) -> float:
-        """Return the seconds since a call of this method first saw the last step."""
+    def idle_s(self) -> float:
+        """Return the seconds since this method, or the constructor, first saw the last step."""
         steps = self._worker.steps.value
         if steps != self._steps:
             self._steps, self._since = steps, time.monotonic()
@@ -68,7 +68,13 @@ class Progress:
 
 
 def start_process(make_env: EnvFactory, players: Players, worlds: int) -> EvaluationProcess:
-    """Start a process; the arguments are those of `LocalEvaluator`."""
+    """Start a process; it ends with this one.
+
+    Args:
+        make_env: Makes the worlds.
+        players: Makes the policies for an environment.
+        worlds: Number of worlds.
+    """
     context: Any = multiprocessing.get_context(start_method(_THREADS))
     connection, child_connection = context.Pipe()
     steps = context.RawValue("Q", 0)
@@ -83,8 +89,8 @@ def _serve(connection: Connection[Any, Any], steps: Any, parent: int, *arguments
     """Answer requests with scores, or with the text of an exception, until this process ends.
 
     Args:
-        connection: Of the requests and answers.
-        steps: Counts the steps.
+        connection: Requests come from it, answers go there.
+        steps: Shared with the parent; its value grows by 1 with each step.
         parent: Process id of the parent.
         *arguments: Of `LocalEvaluator`.
     """

@@ -1,4 +1,4 @@
-"""What plays the episodes of evaluations, and how it does in this process."""
+"""The interface of evaluators, and the evaluator that plays in this process."""
 
 from __future__ import annotations
 

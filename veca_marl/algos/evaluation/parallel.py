@@ -14,7 +14,7 @@ from veca_marl.algos.collection.child_processes import call_when_a_child_ends, e
 from veca_marl.algos.collection.interrupts import interrupts_blocked
 from veca_marl.algos.collection.workers import WorkerError
 from veca_marl.algos.evaluation.evaluate import Scores, joined_scores
-from veca_marl.algos.evaluation.evaluation_process import END_S, Progress, start_process
+from veca_marl.algos.evaluation.evaluation_process import END_S, IdleTimer, start_process
 from veca_marl.algos.evaluation.evaluators import (
     Evaluator,
     LocalEvaluator,
@@ -82,7 +82,7 @@ class ParallelEvaluator:
     def _answers(self, parts: int) -> dict[int, dict[str, Scores]]:
         """Return the answers of the first processes by index; raise if some do not answer."""
         answers: dict[int, dict[str, Scores]] = {}
-        playing = {i: Progress(worker) for i, worker in enumerate(self._workers[:parts])}
+        playing = {i: IdleTimer(worker) for i, worker in enumerate(self._workers[:parts])}
         while playing:
             waitables = [one for index in playing for one in self._workers[index].waitables]
             ready = wait(waitables, CHECK_S)
@@ -90,7 +90,7 @@ class ParallelEvaluator:
                 if any(one in ready for one in self._workers[index].waitables):
                     answers[index] = self._receive(index)
                     del playing[index]
-            silent = [i for i, progress in playing.items() if progress.silent_s() > self._limit_s]
+            silent = [i for i, timer in playing.items() if timer.idle_s() > self._limit_s]
             if silent:
                 self._abandon(silent)
         return answers
@@ -118,7 +118,7 @@ class ParallelEvaluator:
 
     @contextmanager
     def _worker_errors(self, index: int) -> Iterator[None]:
-        """Raise `WorkerError` in place of the error of a pipe whose other end is closed."""
+        """Raise `WorkerError` instead of an error of the pipe if the process has ended."""
         try:
             yield
         except (EOFError, BrokenPipeError, ConnectionResetError):
@@ -152,7 +152,7 @@ def _split(request: Request, parts: int) -> list[Request]:
 def make_evaluator(
     make_env: EnvFactory, players: Players, processes: int, worlds: int, answer_limit_s: float
 ) -> Evaluator:
-    """Return what plays in so many processes, in this one if there are none.
+    """Return an evaluator with a number of processes; with none it plays in this process.
 
     Args:
         make_env: Makes the worlds.

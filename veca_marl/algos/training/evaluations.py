@@ -41,7 +41,7 @@ class Evaluations:
         return self._play("random", self.cfg.last_episodes)
 
     def play(self) -> dict[str, Scores]:
-        """Play an evaluation of the policy that ends a stage but the last."""
+        """Play the evaluation of the policy after a stage that is not the last."""
         return self._play("policy", self.cfg.episodes)
 
     def play_last(self, meanwhile: Callable[[], None]) -> dict[str, Scores]:

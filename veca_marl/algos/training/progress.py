@@ -19,10 +19,6 @@ class Budget:
     total_frames: int
     max_minutes: float | None = None
 
-    def iterations(self, frames_per_batch: int) -> int:
-        """Return the number of batches."""
-        return math.ceil(self.total_frames / frames_per_batch)
-
     def is_spent(self, elapsed_s: float) -> bool:
         """Return whether the time has run out."""
         return self.max_minutes is not None and elapsed_s > 60.0 * self.max_minutes

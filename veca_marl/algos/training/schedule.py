@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Schedule:
-    """A run of whole batches; every stage but the last has equally many.
+    """The numbers of batches of a run and of its stages; the last stage may have fewer.
 
     Attributes:
         batches: Batches of the run, at least 1.
