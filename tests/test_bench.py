@@ -10,6 +10,7 @@ import pytest
 import torch
 from composed import compose
 
+from veca_marl.algos.training.checkpoint import Checkpoints
 from veca_marl.bench.all_cores import SimultaneousRollouts
 from veca_marl.bench.command import chosen_games, main
 from veca_marl.bench.free_play import free_play
@@ -141,7 +142,10 @@ def test_results_as_tables_and_json(tmp_path, capsys):
     assert (found["machine"]["commit"] or "unknown") in printed.splitlines()[0]
 
 
-def test_learning_is_measured_beside_rollouts(tmp_path, capsys):
+def test_learning_is_measured_beside_rollouts(tmp_path, capsys, monkeypatch):
+    written = []
+    save = Checkpoints.save
+    monkeypatch.setattr(Checkpoints, "save", lambda *args: written.append(save(*args)))
     file = tmp_path / "bench.json"
     words = ["+task=KickTheBall", "senses/vision=blind", "task.max_seconds=0.4", "threads=1"]
     words += ["collect=one_process", "collect.worlds=2", "collect.steps=8", "eval.every_frames=16"]
@@ -149,7 +153,10 @@ def test_learning_is_measured_beside_rollouts(tmp_path, capsys):
     assert main([*QUICK, "bench.learning=true", "bench.stages=2", *words]) == 0
     found = json.loads(file.read_text())["learning"]
     assert found["algorithm"] == "ppo"
-    assert {"collect", "learn", "evaluate"} <= set(found["seconds"])
+    assert {"collect", "learn", "evaluate", "checkpoint"} <= set(found["seconds"])
+    assert len(set(written)) == 4, "one at the start, one at the end of each stage"
+    assert None not in written
+    assert not any(path.exists() for path in written), "the folder is temporary"
     speeds = found["frames_per_s"] / found["rollout_per_s"] / found["cores"]
     assert 0.0 < found["ratio"] < 1.0
     assert found["ratio"] == pytest.approx(speeds, rel=1.0), "both are medians of the same turns"

@@ -126,6 +126,7 @@ def test_files_hold_only_what_differs_from_the_dataclasses():
         ),
         ([PUSH, "+algo@learner.green=mappo"], r"learner: no \['green'\] in PushOut1v1; choices:"),
         ([PUSH, "self_play.teams=[red]"], r"self_play.teams=\['red'\]: two teams, or none"),
+        ([PUSH, "self_play.teams=[red,blue,red]"], r"'blue', 'red'\]: two teams, or none"),
         (
             [PUSH, "self_play.teams=[red,blue]", "opponent.blue=idle"],
             r"self_play.teams: no \['blue'\] in PushOut1v1; choices: \['red'\]",

@@ -28,6 +28,19 @@ def record(path, *overrides):
         )
 
 
+def test_the_world_is_closed_after_an_error(tmp_path, monkeypatch):
+    closed = []
+    monkeypatch.setattr(VecaEnv, "close", lambda self, **_: closed.append(self))
+
+    def fail(state):
+        raise ArithmeticError
+
+    game = compose(["+task=KickTheBall", "senses/vision=blind"]).game
+    with pytest.raises(ArithmeticError):
+        record_episode(tmp_path / "video.mp4", game, fail, seed=1)
+    assert len(closed) == 1
+
+
 def difference_of_ears(sound):
     """Return it as a share of the sound's level, after the codec has settled."""
     settled = sound[:, 22_050 // 4 :]

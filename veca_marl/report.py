@@ -124,7 +124,8 @@ def _report(
     rows, others = planned_rows(rows, experiment.arms, experiment.seeds)
     if not any(row["player"] == "policy" for row in rows):
         raise _nothing_evaluated(experiment, found)
-    team = team_of(rows, experiment.team)
+    opponents = {team for arm in arms for team in arm.cfg.opponent}
+    team = team_of(rows, experiment.team, opponents)
     runs = runs_of(rows, experiment.metric, team, {arm.name: arm.budget for arm in arms})
     if not runs:
         raise _nothing_evaluated(experiment, found)

@@ -49,6 +49,13 @@ def test_disk_space_is_checked_by_folder(machine, tmp_path):
         check_storage({"red": need, "blue": need})
 
 
+def test_folders_on_one_disk_share_its_space(machine, tmp_path):
+    red, blue = (StorageNeeded(disk_bytes=10 * 10**9, folder=tmp_path / name) for name in "ab")
+    with pytest.raises(ValueError, match=rf"take 20.00 GB of disk space in {tmp_path}/a and "):
+        check_storage({"red": red, "blue": blue})
+    assert runs_that_fit([{"red": red}, {"blue": blue}]) == 1
+
+
 def test_so_many_runs_fit_that_any_of_them_fit_together(machine, tmp_path, monkeypatch):
     """90 % of 10 GB of memory and of 20 GB of disk space may be used."""
 

@@ -185,6 +185,7 @@ def test_the_metric_and_the_team_must_exist():
         team_of(rows, "blue")
     with pytest.raises(ValueError, match=r"experiment.team=None: choices: blue, red"):
         team_of([*rows, {**rows[0], "team": "blue"}], None)
+    assert team_of([*rows, {**rows[0], "team": "blue"}], None, {"blue": "runs/other"}) == "red"
     with pytest.raises(ValueError, match=r"experiment.metric=goals: choices: team, player, arm"):
         runs_of(rows, "goals", "red", {})
 

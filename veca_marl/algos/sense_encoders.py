@@ -75,9 +75,10 @@ def _check_same_scale(target: nn.Module, source: nn.Module) -> None:
     Raises:
         ValueError: If not: the range of the sense, or what compresses it, differs.
     """
-    here, there = (getattr(module, "scale", None) for module in (target, source))
-    if here != there:
-        raise ValueError(f"its input is scaled by {there} there, by {here} here")
+    scales = [getattr(module, "scale", None) for module in (target, source)]
+    if scales[0] != scales[1]:
+        own, loaded = (getattr(scale, "__name__", str(scale)) for scale in scales)
+        raise ValueError(f"its input is scaled by {loaded} there, by {own} here")
 
 
 def copy_parameters(target: nn.Module, source: nn.Module) -> None:

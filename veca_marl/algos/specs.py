@@ -39,6 +39,11 @@ class ArrayLayout:
     low: float
     high: float
 
+    @property
+    def is_image(self) -> bool:
+        """Whether it is an image: bytes ``(..., channels, height, width)``."""
+        return self.dtype == "uint8" and len(self.shape) >= 3
+
 
 @dataclass(frozen=True)
 class ActionLayout:

@@ -65,11 +65,14 @@ def check_storage(needed: Mapping[str, StorageNeeded]) -> list[str]:
     memory = sum(need.memory_bytes for need in needed.values())
     if memory:
         lines.append(_check("memory", memory, available_memory(), settings))
-    for folder in _folders([needed]):
-        there = [need for need in needed.values() if need.folder == folder]
-        _check_folder(folder, there[0].settings)
-        disk, free = sum(need.disk_bytes for need in there), available_disk(folder)
-        lines.append(_check(f"disk space in {folder}", disk, free, there[0].settings))
+    for folders in _folders_by_disk([needed]):
+        on_disk = [need for need in needed.values() if need.folder in folders]
+        settings = on_disk[0].settings
+        for folder in folders:
+            _check_folder(folder, settings)
+        disk, free = sum(need.disk_bytes for need in on_disk), available_disk(folders[0])
+        names = " and ".join(map(str, folders))
+        lines.append(_check(f"disk space in {names}", disk, free, settings))
     return lines
 
 
@@ -82,17 +85,20 @@ def runs_that_fit(needs: Sequence[Mapping[str, StorageNeeded]]) -> int:
     memory = available_memory()
     sizes = [sum(need.memory_bytes for need in run.values()) for run in needs]
     numbers = [len(needs)] if memory is None else [_any_fit(sizes, memory)]
-    for folder in _folders(needs):
+    for folders in _folders_by_disk(needs):
         taken = [
-            sum(need.disk_bytes for need in run.values() if need.folder == folder) for run in needs
+            sum(need.disk_bytes for need in run.values() if need.folder in folders) for run in needs
         ]
-        numbers.append(_any_fit(taken, available_disk(folder)))
+        numbers.append(_any_fit(taken, available_disk(folders[0])))
     return min(numbers)
 
 
-def _folders(needs: Iterable[Mapping[str, StorageNeeded]]) -> list[Path]:
-    """Return the folders in which something is stored."""
-    return sorted({n.folder for run in needs for n in run.values() if n.folder is not None})
+def _folders_by_disk(needs: Iterable[Mapping[str, StorageNeeded]]) -> list[list[Path]]:
+    """Return the folders in which something is stored, those on one disk together."""
+    disks: dict[int, list[Path]] = {}
+    for folder in sorted({n.folder for run in needs for n in run.values() if n.folder is not None}):
+        disks.setdefault(_existing(folder).stat().st_dev, []).append(folder)
+    return list(disks.values())
 
 
 def _any_fit(sizes: Sequence[int], available: int) -> int:

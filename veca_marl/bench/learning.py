@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import time
+from contextlib import closing
 from dataclasses import dataclass, replace
 from functools import partial
+from pathlib import Path
 from statistics import median
+from tempfile import TemporaryDirectory
 
 from torchrl import timeit
 
@@ -17,6 +20,7 @@ from veca_marl.config import Config
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
 from veca_marl.runs.assembly import GameFactory, make_trainer
 from veca_marl.runs.cores import usable_cores
+from veca_marl.runs.run_folder import RunFolder
 
 
 @dataclass
@@ -83,11 +87,12 @@ def measure_learning(cfg: Config, steps: int, stages: int) -> Learning:
     log = replace(cfg.log, progress_bar=False)
     evaluation = replace(cfg.eval, final_episodes=cfg.eval.episodes)
     frames = (stages + 1) * cfg.eval.every_frames
-    trainer = make_trainer(replace(cfg, log=log, eval=evaluation, total_frames=frames))
-    turns = Turns(cfg, steps)
-    trainer.reporters = [turns]
-    trainer.run()
-    turns.close()
+    run = replace(cfg, log=log, eval=evaluation, total_frames=frames)
+    with TemporaryDirectory() as folder:
+        trainer = make_trainer(run, RunFolder(Path(folder)))
+        with closing(Turns(cfg, steps)) as turns:
+            trainer.reporters = [turns]
+            trainer.run()
     return _summary(cfg, turns)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -162,19 +162,23 @@ def expert_score(rows: Sequence[Mapping[str, str]], metric: str, team: str) -> E
     return ExpertScore(score, (low, high))
 
 
-def team_of(rows: Sequence[Mapping[str, str]], asked: str | None) -> str:
+def team_of(
+    rows: Sequence[Mapping[str, str]], asked: str | None, opponents: Container[str] = ()
+) -> str:
     """Return the team that is compared.
 
     Args:
         rows: The table of results.
-        asked: The team that the experiment names; None is the only one.
+        asked: The team that the experiment names; None is the only one that learns.
+        opponents: Teams that do not learn.
 
     Raises:
         ValueError: If there is no such team, or several and none is named.
     """
     teams = sorted({row["team"] for row in rows})
-    if asked is None and len(teams) == 1:
-        return teams[0]
+    learning = [team for team in teams if team not in opponents]
+    if asked is None and len(learning) == 1:
+        return learning[0]
     if asked not in teams:
         raise ValueError(f"experiment.team={asked}: choices: {', '.join(teams)}")
     return asked

@@ -146,7 +146,7 @@ def _judge_above_expert(one: Scores, expert: ExpertScore | None) -> Judgement:
         return Judgement(Verdict.undecided, "the expert was not measured")
     if math.isnan(expert.interval[0]):
         return Judgement(
-            Verdict.undecided, "the interval of the expert is known for the return alone"
+            Verdict.undecided, "the expert has no interval: tables have one of the return alone"
         )
     score = float(interquartile_mean(one))
     interval = bootstrap_interval(interquartile_mean, [one], _rng())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -33,10 +34,13 @@ def record_episode(path: Path, game: GameCfg, policy: ActionPolicy, seed: int) -
         policy: Writes the actions of all teams.
         seed: Seed of the episode.
     """
-    env = VecaEnv(_with_waveform(game), worlds=1, seed=seed)
     frames: list[NDArray[np.uint8]] = []
     sound: list[NDArray[Any]] = []
-    with torch.no_grad(), set_exploration_type(ExplorationType.DETERMINISTIC):
+    with (
+        closing(VecaEnv(_with_waveform(game), worlds=1, seed=seed)) as env,
+        torch.no_grad(),
+        set_exploration_type(ExplorationType.DETERMINISTIC),
+    ):
         playing = with_memory(env, policy)
         state, done = playing.reset(), False
         while not done:
@@ -46,7 +50,6 @@ def record_episode(path: Path, game: GameCfg, policy: ActionPolicy, seed: int) -
             if "waveform" in seen:
                 sound.append(seen["waveform"])
             done = bool(played["next", "done"].all())
-    env.close()
     waveform = np.concatenate(sound, axis=1) if sound else None
     write_video(path, frames, waveform, game.clock.control_rate_hz, SAMPLE_RATE_HZ)
 

@@ -105,7 +105,10 @@ class LastVideo:
 def run_training(
     cfg: Config, folder: RunFolder | None = None, trainer: Trainer | None = None
 ) -> TrainingResult:
-    """Train as configured, with a video of the last evaluation's first episode, return the results.
+    """Train as configured, record a video and return the results.
+
+    The video shows the most likely actions, in the world in which the first episode of evaluations
+    begins: that episode itself with ``eval.exploration=deterministic``.
 
     Args:
         cfg: The configuration.

@@ -8,6 +8,7 @@ import torch
 from tensordict import TensorDict
 
 from veca_marl.algos.intrinsic import RND, ForwardModel, ForwardModelCfg, RNDCfg
+from veca_marl.algos.intrinsic.observations import NormalisedSenses
 from veca_marl.algos.specs import PLAIN, ActionLayout, ArrayLayout, TeamSpec
 
 CPU = torch.device("cpu")
@@ -42,6 +43,22 @@ def make(kind, spec=VECTOR, **numbers):
     torch.manual_seed(0)
     model, cfg = MODELS[kind]
     return model("team", spec, cfg(**numbers), CPU)
+
+
+@pytest.mark.parametrize(
+    ("layout", "cells", "width"),
+    [
+        (ArrayLayout((2, 3, 84, 84), "uint8", 0, 255), 21, 6 * 21 * 21),
+        (ArrayLayout((3, 16, 84), "uint8", 0, 255), 21, 3 * 4 * 21),
+        (ArrayLayout((3, 16, 20), "uint8", 0, 255), 21, 3 * 16 * 20),
+        (ArrayLayout((40, 250), "float32", 0, 1), 21, 40 * 250),
+    ],
+)
+def test_images_are_averaged_to_at_most_so_many_cells_along_each_side(layout, cells, width):
+    senses = NormalisedSenses({"sense": layout}, cells)
+    vector = senses.read(TensorDict({"sense": torch.zeros(2, *layout.shape)}, [2]))
+    assert vector.shape == (2, width)
+    assert senses.widths == {"sense": width}
 
 
 def batch_of(before, after, action):

@@ -162,6 +162,17 @@ def test_explained_variance_is_numpys_over_the_valid_rows():
         assert found[agent].item() == pytest.approx(1.0 - error / total, rel=1e-4)
 
 
+def test_the_explained_variance_of_an_absent_agent_is_left_out(leaving):
+    rows = torch.randn(20, 2, 1)
+    valid = torch.ones(20, 2, 1, dtype=torch.bool)
+    valid[:, 1] = False
+    assert explained_variance(rows, 0.5 * rows, valid)[:, 0].isnan().tolist() == [False, True]
+    ppo, batch = leaving()
+    batch["agents", "mask"][..., 1] = False
+    measured, _ = step(ppo, ppo.prepare(batch))
+    assert measured["explained_variance"] < 0.5, "a critic that has not learnt explains little"
+
+
 @pytest.mark.parametrize("normalisation", [ValueNormalisation.none, ValueNormalisation.popart])
 def test_minibatches_without_present_agents_are_left_out(leaving, normalisation):
     ppo, batch = leaving(value_normalisation=normalisation)

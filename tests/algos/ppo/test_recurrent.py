@@ -152,6 +152,7 @@ def test_a_task_that_needs_memory_is_not_learnt_without():
         ({"sequence_steps": 0}, 8, 128, "algo.sequence_steps must be at least 1, got 0"),
         ({"sequence_steps": 48}, 8, 128, "sequence_steps=48 must divide collect.steps, got 128"),
         ({"sequence_steps": 32}, 1, 64, "a batch of 2 sequences of 32 steps cannot be split"),
+        ({"sequence_steps": 1}, 1, 7, "algo.minibatches=4 leaves one frame for a minibatch"),
     ],
 )
 def test_sequences_that_do_not_fit_a_batch_are_refused(numbers, worlds, steps, message):
@@ -161,6 +162,13 @@ def test_sequences_that_do_not_fit_a_batch_are_refused(numbers, worlds, steps, m
 
 def test_without_memory_the_length_of_sequences_does_not_matter():
     PPOCfg(network=SMALL, sequence_steps=48).check_batch(8, 128)
+
+
+def test_minibatches_of_one_frame_are_refused():
+    """One advantage has no standard deviation, by which advantages are divided."""
+    PPOCfg(network=SMALL, minibatches=4).check_batch(1, 8)
+    with pytest.raises(ValueError, match="minibatches=4 leaves one frame for a minibatch of a"):
+        PPOCfg(network=SMALL, minibatches=4).check_batch(1, 7)
 
 
 def test_a_batch_of_other_steps_is_refused():

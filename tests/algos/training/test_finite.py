@@ -72,8 +72,20 @@ def test_scores_and_states_are_checked():
     state = {"red": {"network": {"0.weight": torch.zeros(2)}, "optimizer": [{"step": 3}]}}
     check_state(state, 0)
     state["red"]["network"]["0.weight"][1] = math.nan
-    with pytest.raises(NotFiniteError, match=r"red.network.0.weight is NaN after 128 frames"):
+    with pytest.raises(NotFiniteError, match=r"red.network.0.weight is nan after 128 frames"):
         check_state(state, 128)
+    state["red"]["network"]["0.weight"][1] = -math.inf
+    with pytest.raises(NotFiniteError, match=r"red.network.0.weight is -inf after 128 frames"):
+        check_state(state, 128)
+
+
+def test_a_checkpoint_of_intrinsic_rewards_that_are_not_finite_is_refused(tmp_path, monkeypatch):
+    trainer = make_trainer(tmp_path)
+    state = {"agents": {"scale": torch.tensor(math.inf)}}
+    monkeypatch.setattr(trainer.learners, "intrinsic_state", lambda: state)
+    with pytest.raises(NotFiniteError, match=r"intrinsic.agents.scale is inf after 0 frames"):
+        trainer.run()
+    assert not list(tmp_path.rglob("*.pt"))
 
 
 class BrokenRewards(FakeEnv):

@@ -149,6 +149,14 @@ class FullLogger:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
 
+def test_whole_numbers_keep_all_their_digits(tmp_path):
+    """The frames of a past opponent are a float: they may be blank."""
+    reporter = CsvReporter(tmp_path)
+    reporter.write("metrics", 2_461_696, {"opponent_frames": 2461696.0, "x": 1.23456789})
+    last = (tmp_path / "metrics.csv").read_text().splitlines()[-1]
+    assert last == "2461696,2461696,1.23457"
+
+
 def test_a_full_disk_under_a_logger_is_reported_with_the_folder_and_the_space(tmp_path):
     reporter = LoggerReporter(FullLogger(), tmp_path)
     message = rf"cannot write {tmp_path}: No space left .* MB free"
@@ -214,3 +222,19 @@ def test_the_loggers_of_the_extras_write_into_the_folder_of_the_run(tmp_path, mo
         reporter.close()
     names = {path.name for path in tmp_path.iterdir()}
     assert names == {"wandb" if kind is LoggerKind.wandb else "mlflow.db"}
+
+
+def test_a_resumed_run_continues_its_run_in_mlflow(tmp_path, monkeypatch):
+    mlflow = pytest.importorskip("mlflow", reason="needs the extra [mlflow]")
+    monkeypatch.delenv("MLFLOW_TRACKING_URI", raising=False)
+    for identifier, resumed in (("one", 0), ("one", 10), ("two", 0)):
+        reporter = make_reporter(LoggerKind.mlflow, tmp_path, identifier, resumed)
+        reporter.write("metrics", resumed + 10, {"x": 1.5})
+        reporter.close()
+    client = mlflow.MlflowClient(f"sqlite:///{tmp_path / 'mlflow.db'}")
+    experiment = client.get_experiment_by_name("veca_marl").experiment_id
+    points = [
+        [point.step for point in client.get_metric_history(run.info.run_id, "metrics/x")]
+        for run in client.search_runs([experiment], order_by=["attributes.start_time"])
+    ]
+    assert points == [[10, 20], [10]]

@@ -45,10 +45,10 @@ def no_answer(kind: str, silent: list[int], workers: int, seconds: float) -> str
         seconds: The time limit.
     """
     names = " and ".join(map(str, silent))
-    plural = "es" if len(silent) > 1 else ""
+    plural, was = ("es", "were") if len(silent) > 1 else ("", "was")
     return (
         f"{kind}{plural} {names} (of 0 to {workers - 1}) did not answer for {seconds:g} s "
-        "(collect.answer_limit_s) and was killed"
+        f"(collect.answer_limit_s) and {was} killed"
     )
 
 

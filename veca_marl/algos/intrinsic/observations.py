@@ -99,9 +99,7 @@ class NormalisedSenses(nn.Module):
 
 def _window(layout: ArrayLayout, cells: int) -> int:
     """Return the edge of the squares of pixels that are averaged; 1 for what is not an image."""
-    if len(layout.shape) < 2 or min(layout.shape[-2:]) <= cells:
-        return 1
-    return math.ceil(max(layout.shape[-2:]) / cells)
+    return math.ceil(max(layout.shape[-2:]) / cells) if layout.is_image else 1
 
 
 def _width(layout: ArrayLayout, window: int) -> int:

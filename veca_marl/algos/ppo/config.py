@@ -74,7 +74,7 @@ class PPOCfg(AlgorithmCfg):
             )
 
     def check_batch(self, worlds: int, steps: int) -> None:
-        """See `AlgorithmCfg`: each minibatch needs at least one frame, or one sequence."""
+        """See `AlgorithmCfg`: each minibatch needs two frames, whose advantages are normalised."""
         length, unit = 1, "frames"
         if self.network.recurrent:
             check_sequences(self.sequence_steps, steps)
@@ -83,6 +83,11 @@ class PPOCfg(AlgorithmCfg):
         if rows < self.minibatches:
             raise ValueError(
                 f"a batch of {rows} {unit} cannot be split into algo.minibatches={self.minibatches}"
+            )
+        if rows // self.minibatches * length < 2:
+            raise ValueError(
+                f"algo.minibatches={self.minibatches} leaves one frame for a minibatch of a batch "
+                f"of {worlds * steps}: one advantage has no standard deviation"
             )
 
 

@@ -100,6 +100,8 @@ class TeamPPOLoss(ClipPPOLoss):
 def explained_variance(target: Tensor, value: Tensor, valid: Tensor) -> Tensor:
     """Return 1 - Var(target - value) / Var(target) of each agent over the rows that count.
 
+    Not a number for an agent without such a row.
+
     Args:
         target: ``(rows, agents, 1)``.
         value: The same shape.
@@ -112,7 +114,8 @@ def explained_variance(target: Tensor, value: Tensor, valid: Tensor) -> Tensor:
         return centred.square().sum(0) / count
 
     smallest = torch.finfo(target.dtype).eps
-    return 1.0 - variance(target - value) / (variance(target) + smallest)
+    explained = 1.0 - variance(target - value) / (variance(target) + smallest)
+    return torch.where(valid.any(0), explained, torch.nan)
 
 
 def _zero_unless(valid: Tensor | None, x: Tensor) -> Tensor:

@@ -153,7 +153,8 @@ class PPO(Algorithm):
                 "are not finite, or the learning rate is too high"
             )
         self.optimizer.step()
-        measured = {name: float(out[key].detach().mean()) for name, key in _MEASURES.items()}
+        # of an agent that is absent in all rows the explained variance is not a number
+        measured = {name: float(out[key].detach().nanmean()) for name, key in _MEASURES.items()}
         return measured | {"gradient_norm": float(norm)}
 
     def state_dict(self) -> dict[str, Any]:

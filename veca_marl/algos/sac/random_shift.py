@@ -22,7 +22,7 @@ class RandomShift:
 
     Args:
         team: Name of the team.
-        spec: Its arrays; bytes of rank 3 or more are images.
+        spec: Its arrays.
         pixels: Largest shift in each direction; 0 for none.
     """
 
@@ -31,7 +31,7 @@ class RandomShift:
         self._keys = [
             (team, "observation", name)
             for name, layout in spec.observations.items()
-            if layout.dtype == "uint8" and len(layout.shape) >= 3
+            if layout.is_image
         ]
 
     def __call__(self, *rows: TensorDictBase) -> None:

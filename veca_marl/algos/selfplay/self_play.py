@@ -35,7 +35,7 @@ class SelfPlayCfg:
     latest: float = 0.5
 
     def __post_init__(self) -> None:
-        if len(set(self.teams)) not in (0, 2):
+        if len(self.teams) not in (0, 2) or len(set(self.teams)) != len(self.teams):
             raise ValueError(f"self_play.teams={list(self.teams)}: two teams, or none")
         if not 0.0 <= self.latest <= 1.0:
             raise ValueError(f"self_play.latest={self.latest} must be in [0, 1]")

@@ -101,18 +101,19 @@ def check_scores(scores: Mapping[str, Scores]) -> None:
 
 
 def check_state(state: Mapping[str, Any], frames: int) -> None:
-    """Check that no number of what was learnt is NaN.
+    """Check that all numbers of what was learnt are finite.
 
     Args:
-        state: Nested tensors and plain data by team.
+        state: Nested tensors and plain data.
         frames: Training frames so far.
 
     Raises:
         NotFiniteError: With the team and the name of the tensor.
     """
     for name, tensor in _tensors(state):
-        if tensor.is_floating_point() and tensor.isnan().any():
-            raise NotFiniteError(f"{name} is NaN after {frames} frames: learning has diverged")
+        if tensor.is_floating_point() and not (finite := tensor.isfinite()).all():
+            value = tensor[~finite][0].item()
+            raise NotFiniteError(f"{name} is {value} after {frames} frames: learning has diverged")
 
 
 def _tensors(state: Any, name: str = "") -> Iterator[tuple[str, torch.Tensor]]:

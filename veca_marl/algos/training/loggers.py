@@ -14,6 +14,9 @@ from veca_marl.algos.files import naming
 from veca_marl.algos.training.reporters import CsvReporter, LoggerReporter, Reporter
 
 
+_TAG = "veca_marl.run"  # of a run in MLflow: the identifier by which it is continued
+
+
 class LoggerKind(Enum):
     """A place for the numbers of a run.
 
@@ -51,23 +54,41 @@ def _wandb(folder: Path, identifier: str, resumed_frames: int) -> Logger:
 
 
 class _MLflow(MLFlowLogger):
-    """TorchRL's logger, which leaves its run open when it is closed; a second one could not start.
+    """TorchRL's logger, with one run in MLflow for a run and what resumes it.
 
-    MLflow's default is a folder of files, which its newer versions refuse: here it is SQLite.
+    TorchRL starts a new one each time, and leaves it open when it is closed, so that a second one
+    could not start. MLflow's default is a folder of files, which its newer versions refuse: here
+    it is SQLite.
     """
 
     def __init__(self, folder: Path, identifier: str, resumed_frames: int) -> None:
         import mlflow
 
-        given = mlflow.get_tracking_uri() if mlflow.is_tracking_uri_set() else None
-        super().__init__("veca_marl", given or f"sqlite:///{folder.resolve() / 'mlflow.db'}")
+        self._name, self._identifier = folder.name, identifier
+        self._given: Any = mlflow.get_tracking_uri() if mlflow.is_tracking_uri_set() else None
+        in_folder = f"sqlite:///{folder.resolve() / 'mlflow.db'}"
+        super().__init__("veca_marl", self._given or in_folder)
+
+    def _create_experiment(self) -> Any:
+        import mlflow
+
+        self.id = mlflow.set_experiment(self.exp_name).experiment_id
+        begun = mlflow.search_runs(
+            experiment_ids=[self.id],
+            filter_string=f"tags.`{_TAG}` = '{self._identifier}'",
+            output_format="list",
+        )
+        if begun:
+            return mlflow.start_run(run_id=begun[0].info.run_id)
+        return mlflow.start_run(run_name=self._name, tags={_TAG: self._identifier})
 
     def shutdown(self, timeout: float | None = None) -> None:
-        """End the run."""
+        """End the run; the next one of this process chooses its own place."""
         import mlflow
 
         super().shutdown(timeout)
         mlflow.end_run()
+        mlflow.set_tracking_uri(self._given)
 
 
 _MAKERS: dict[LoggerKind, Callable[[Path, str, int], Logger]] = {

@@ -260,6 +260,7 @@ class Trainer:
             "progress": asdict(self.progress),
         }
         check_state(state["algorithm"], self.progress.frames)
+        check_state({"intrinsic": state["intrinsic"]}, self.progress.frames)
         for reporter in self.reporters:
             reporter.sync()
         numbers = {team: to_plain(cfg) for team, cfg in self.learners.cfgs.items()}

@@ -158,9 +158,11 @@ def _add_columns(path: Path, names: Sequence[str]) -> None:
 
 
 def _cell(value: float | int | str) -> str | int:
-    if isinstance(value, float):
-        return f"{value:.6g}" if math.isfinite(value) else ""
-    return value
+    if not isinstance(value, float):
+        return value
+    if not math.isfinite(value):
+        return ""
+    return f"{value:.0f}" if value.is_integer() else f"{value:.6g}"  # numbers of frames in full
 
 
 def _table(columns: Iterable[str], rows: Iterable[Mapping[str, Any]], header: bool) -> str:

@@ -15,12 +15,12 @@ def make_encoder(
     pooling: Pooling,
     compressed: bool = False,
 ) -> ImageEncoder | VectorEncoder:
-    """Return the encoder for `layout`: bytes of rank 3 or more are images, floats are vectors.
+    """Return the encoder for `layout`, an image or a vector of floats.
 
     Raises:
         ValueError: If there is none.
     """
-    if layout.dtype == "uint8" and len(layout.shape) >= 3:
+    if layout.is_image:
         return ImageEncoder(layout.shape, convolutions, pooling)
     if layout.dtype.startswith("float"):
         return VectorEncoder(layout, features, compressed)
