@@ -3,12 +3,14 @@
 from importlib import import_module
 from pathlib import Path
 
+import numpy as np
 import pytest
 import torch
 
 import veca_marl
 from veca_marl.algos.networks.precision import Precision
 from veca_marl.api import choose
+from veca_marl.api_arguments import as_integer
 from veca_marl.config import ConfigError
 from veca_marl.envs.core.team import Script
 from veca_marl.runs.run_folder import RunFolder
@@ -49,6 +51,14 @@ def test_train_stays_a_function_after_the_module_of_the_command_was_imported():
 def test_fractions_of_frames_are_refused():
     with pytest.raises(ConfigError, match=r"total_frames=1.5 must be an integral number"):
         veca_marl.train("KickTheBall", total_frames=1.5)
+
+
+@pytest.mark.parametrize("number", [1e6, 2**53 + 1, np.int64(2**53 + 1), np.float32(4.0)])
+def test_integral_numbers_keep_all_their_digits(number):
+    """A seed above 2^53 is not the nearest float."""
+    found = as_integer("seed", number)
+    assert type(found) is int
+    assert found == number
 
 
 def close_of_closed():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Mapping, Sequence
 from dataclasses import fields
 from typing import Any
@@ -92,6 +93,10 @@ def as_integer(argument: str, value: Any) -> int:
     Raises:
         ConfigError: If it is none.
     """
+    try:
+        return operator.index(value)  # exact, also where a float has fewer digits
+    except TypeError:
+        pass
     try:
         number = float(value)
         if number.is_integer() and not isinstance(value, str):

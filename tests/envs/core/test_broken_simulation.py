@@ -1,4 +1,4 @@
-"""A body with a non-finite state truncates the episode; the next one has a new world."""
+"""A non-finite state of a body or prop truncates the episode; the next one has a new world."""
 
 import logging
 import math
@@ -46,6 +46,38 @@ def test_the_episode_is_truncated_the_cause_is_logged_and_data_are_finite(cfg, c
     assert "agents_0" in record.getMessage()
     assert "not finite" in record.getMessage()
     env.close()
+
+
+PROPS = [  # tasks whose steps read a prop, and whose bodies collide with it
+    (["+task=KickTheBall"], "ball"),
+    (["+task=GrabObject"], "toy"),
+    (["+task=SoccerOnePlayer", "body=walker"], "ball"),
+]
+
+
+@pytest.mark.parametrize("speed", [math.nan, math.inf])
+@pytest.mark.parametrize(("words", "prop"), PROPS, ids=lambda value: str(value))
+def test_a_broken_prop_ends_the_episode_as_a_broken_body_does(words, prop, speed, caplog):
+    env = VecaEnv(compose([*words, "senses/vision=blind"]).game, worlds=1, seed=0)
+    sound = VecaEnv(env.cfg, worlds=1, seed=0)
+    state, game = env.reset(), env.games[0]
+    body_id, client = game.world.prop(prop).body_id, game.world.client
+    pybullet.resetBaseVelocity(body_id, (speed,) * 3, physicsClientId=client)
+    with caplog.at_level(logging.WARNING):
+        after = env.step(env.rand_action(state))["next"]
+    assert bool(after["truncated"].all())
+    assert f"the simulation of {prop} is not finite" in caplog.text
+    for key, value in after.items(True, True):
+        assert torch.isfinite(value).all(), key
+    for team in env.group_map:
+        assert not after[team, "reward"].any()
+        assert not any(value.any() for value in after[team, "info"].values())
+    following, expected = env.reset(), sound.reset()
+    expected = sound.reset()  # its second episode
+    for key, value in expected.items(True, True):
+        assert torch.equal(following[key], value), key
+    env.close()
+    sound.close()
 
 
 def test_the_next_episode_is_as_in_a_new_world(cfg):

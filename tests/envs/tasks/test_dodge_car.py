@@ -166,6 +166,17 @@ def test_it_drives_under_a_table_and_not_through_its_leg():
     game.close()
 
 
+def test_a_table_top_above_the_car_does_not_obstruct_it():
+    """The first of two points, below the table, is as clear as the second one beside it."""
+    game = game_of("playground=single_room")
+    car, below, beside = game.task.car, np.array([-2.0, 2.6]), np.array([0.0, 2.6])
+    car.prop.place((-1.2, 2.6, 0.08))
+    points = iter((below, beside))
+    car.drive(lambda rng: next(points), np.random.default_rng(0))
+    np.testing.assert_array_equal(car.point, below)
+    game.close()
+
+
 # ---- where it aims
 
 

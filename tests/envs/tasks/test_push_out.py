@@ -46,6 +46,19 @@ def push(game, seconds, *rows):
     return outcome
 
 
+@pytest.mark.parametrize(
+    ("task", "numbers"),
+    [
+        ("PushOut1v1", ["task.radius_m=0.5", "task.start_share=0.3", "body=mitten"]),
+        ("PushOut2v2", ["task.radius_m=0.5", "task.start_share=0.3"]),
+    ],
+)
+def test_starts_at_which_players_overlap_are_refused(task, numbers):
+    """Opponents, or two of a team; Bullet itself finds no contacts between walkers."""
+    with pytest.raises(ValueError, match=r"task.start_share=0.\d of task.radius_m=0.5: players "):
+        game_of(task, *numbers)
+
+
 def test_rewards_of_a_duel_sum_to_zero_in_every_step(duel):
     fallen = 0
     for outcomes in episodes(duel, 3, red="expert", blue="random"):

@@ -107,6 +107,7 @@ def test_two_bodies_of_one_configuration_are_refused():
     [
         ({"eye_range_deg": math.nan}, r"body\.eye_range_deg=nan"),
         ({"eye_range_deg": -1.0}, r"body\.eye_range_deg=-1\.0"),
+        ({"eye_range_deg": 90.0}, r"body\.eye_range_deg=90\.0 must be below 90"),
         ({"voice": "loud"}, r"body\.voice='loud'; there are \['silent', 'calls'\]"),
     ],
 )

@@ -13,7 +13,6 @@ from torchrl.record.loggers import Logger, MLFlowLogger, TensorboardLogger, Wand
 from veca_marl.algos.files import naming
 from veca_marl.algos.training.reporters import CsvReporter, LoggerReporter, Reporter
 
-
 _TAG = "veca_marl.run"  # of a run in MLflow: the identifier by which it is continued
 
 

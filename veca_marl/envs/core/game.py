@@ -6,7 +6,7 @@ Every adapter (TorchRL, Gymnasium, PettingZoo) plays its episodes through this c
 from __future__ import annotations
 
 import logging
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
@@ -35,7 +35,7 @@ class Outcome(NamedTuple):
     Attributes:
         terms: Unweighted reward terms by player and name.
         terminated: Whether the episode has ended by the rules.
-        truncated: Whether the time is up, or the state of a body is not finite any more.
+        truncated: Whether the time is up, or the simulation is not finite any more.
         eliminated: Names of the players for whom the episode has ended.
         solved: Whether the goal of the task is reached, by player; empty for a task without a goal.
         bodies: `Body.info` by player; empty for a body that reports nothing.
@@ -144,13 +144,13 @@ class Game:
         return self._rng
 
     def reset(self, rng: np.random.Generator) -> None:
-        """Begin an episode; with a new world if the state of a body is not finite any more.
+        """Begin an episode; with a new world if the simulation is not finite any more.
 
         Args:
             rng: Generator of this episode: its start, its steps and its scripted players.
         """
         self._rng = rng
-        if self._non_finite_bodies():
+        if self._broken():
             self.world.close()
             self._build()
         self.steps = 0
@@ -204,6 +204,9 @@ class Game:
     def advance(self) -> Outcome:
         """Simulate one agent step with the actions that were set last.
 
+        A step after which the simulation is not finite any more truncates the episode. All its
+        reward terms are 0, and it solves nothing.
+
         Raises:
             RuntimeError: If `reset` was never called.
         """
@@ -211,15 +214,39 @@ class Game:
         self._play_scripts()
         self.task.before_step(rng)
         self.world.step()
-        self.task.after_step(rng)
         self.steps += 1
+        if broken := self._broken():
+            return self._broken_outcome(broken)
+        self.task.after_step(rng)
         terms = {player.name: self._terms(player) for player in self.players}
         if self.task.eliminates:
             self.eliminated |= {p.name for p in self.players if self.task.is_eliminated(p)}
         terminated = self.task.terminated() or len(self.eliminated) == len(self.players)
-        truncated = self.steps >= self.max_steps or self._is_non_finite()
-        bodies = {player.name: player.body.info() for player in self.players}
-        return Outcome(terms, terminated, truncated, self.eliminated, self._solved(), bodies)
+        truncated = self.steps >= self.max_steps
+        return Outcome(
+            terms, terminated, truncated, self.eliminated, self._solved(), self._body_info()
+        )
+
+    def _body_info(self) -> dict[str, dict[str, float]]:
+        return {player.name: player.body.info() for player in self.players}
+
+    def _broken(self) -> list[str]:
+        """Return the names of bodies and props whose state is not finite any more."""
+        bodies = [player.name for player in self.players if not player.body.is_finite]
+        return bodies + self.world.broken_props
+
+    def _broken_outcome(self, names: Sequence[str]) -> Outcome:
+        """Return the outcome of a step after which the simulation is not finite; log the cause."""
+        _LOG.warning(
+            "step %d of %s: the simulation of %s is not finite or beyond any motion; "
+            "the episode is truncated, the next one has a new world",
+            self.steps,
+            self.cfg.task.name,
+            ", ".join(names),
+        )
+        terms = {player.name: dict.fromkeys(self.weights, 0.0) for player in self.players}
+        solved = dict.fromkeys(terms, False) if self.task.has_goal() else {}
+        return Outcome(terms, False, True, self.eliminated, solved, self._body_info())
 
     def _play_scripts(self) -> None:
         for team, script in self.cfg.script.items():
@@ -264,22 +291,6 @@ class Game:
         if not self.task.has_goal():
             return {}
         return {player.name: bool(self.task.solved(player)) for player in self.players}
-
-    def _is_non_finite(self) -> bool:
-        """Return whether the state of a body is not finite; log which."""
-        names = self._non_finite_bodies()
-        if names:
-            _LOG.warning(
-                "step %d of %s: the simulation of %s is not finite or beyond any motion; "
-                "the episode is truncated, the next one has a new world",
-                self.steps,
-                self.cfg.task.name,
-                ", ".join(names),
-            )
-        return bool(names)
-
-    def _non_finite_bodies(self) -> list[str]:
-        return [player.name for player in self.players if not player.body.is_finite]
 
     def observe(self, player: Player, names: Collection[str] | None = None) -> Observation:
         """Read senses of a player; within one step, every call returns the same values.

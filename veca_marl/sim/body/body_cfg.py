@@ -14,7 +14,8 @@ class BodyCfg:
     """Parameters that all bodies have.
 
     Attributes:
-        eye_range_deg: Largest rotation of the eyes in the head, to each side and up and down.
+        eye_range_deg: Largest rotation of the eyes in the head, to each side and up and down, below
+            90.
         voice: Whether the action has a part `voice` that chooses a call.
         interaction_range_m: Objects can be interacted with if their distance from the head is
             smaller. The paper's main text has 1.5 m, its table of functions 2.5 m.
@@ -30,6 +31,8 @@ class BodyCfg:
         for name, value in vars(self).items():
             if isinstance(value, (int, float)) and not (math.isfinite(value) and value >= 0):
                 raise ValueError(f"body.{name}={value} must be a finite number, 0 or more")
+        if self.eye_range_deg >= 90.0:
+            raise ValueError(f"body.eye_range_deg={self.eye_range_deg} must be below 90")
 
     def _check_choices(self, **kinds: type[Enum]) -> None:
         """Raise `ValueError` for a field that is no member of its enumeration."""

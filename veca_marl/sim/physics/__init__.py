@@ -7,6 +7,7 @@ from veca_marl.sim.physics.collision_shapes import (
     shape_arguments,
     urdf_geometry,
 )
+from veca_marl.sim.physics.contacts import are_in_contact, is_contact, penetration_m
 from veca_marl.sim.physics.houses.furniture_cfg import FurnitureCfg, FurnitureKind
 from veca_marl.sim.physics.houses.random_house import RandomHouseCfg
 from veca_marl.sim.physics.houses.walls import WallsCfg
@@ -51,7 +52,10 @@ __all__ = [
     "StandingProp",
     "WallsCfg",
     "World",
+    "are_in_contact",
     "create_collision_shape",
+    "is_contact",
+    "penetration_m",
     "pybullet",
     "shape_arguments",
     "urdf_geometry",

@@ -44,6 +44,9 @@ class World:
         after_substep: Functions that are called after every physics step.
         version: Counts steps, resets and refreshes. A sense computes its values once per version.
         step_count: Agent steps since the world was built; a reset does not set it back.
+        broken_props: Names of props whose simulated pose is not finite any more. What eyes and ears
+            perceive stays as it was before. Bullet's collision detection does not recover from
+            numbers that are not finite, whatever is restored, so the world must be rebuilt.
     """
 
     def __init__(self, playground: PlaygroundCfg, clock: ClockCfg | None = None) -> None:
@@ -59,6 +62,7 @@ class World:
         self.after_substep: list[Callable[[], None]] = []
         self.version = 0
         self.step_count = 0
+        self.broken_props: list[str] = []
         self._state: int | None = None
         self._built: BuiltState | None = None
         self._moving: list[Prop] = []
@@ -200,7 +204,7 @@ class World:
         return max((-contact[_CONTACT_DISTANCE] for contact in contacts), default=0.0)
 
     def touches_props(self, body_id: int) -> bool:
-        """Return whether a body touches or penetrates a prop where it is now."""
+        """Return whether a body penetrates a prop where it is now."""
         pybullet.performCollisionDetection(physicsClientId=self.client)
         contacts = pybullet.getContactPoints(body_id, physicsClientId=self.client)
         touched = {contact[_CONTACT_BODY] for contact in contacts if contact[_CONTACT_DISTANCE] < 0}
@@ -216,7 +220,7 @@ class World:
         self.client = -1
 
     def _update_scene(self) -> None:
-        follow_physics(self._moving)
+        self.broken_props = follow_physics(self._moving) or self.broken_props
         for mover in self.movers:
             mover.write_frames()
         self.scene.update()

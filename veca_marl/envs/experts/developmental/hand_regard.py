@@ -40,8 +40,10 @@ class HandRegardExpert(Expert[HandRegard]):
     """Holds both hands before the eyes, the head tilted towards them.
 
     A correction that grows with the integral of each joint's error carries the weight of arms and
-    head. Reads the joint angles, which proprioception contains too.
+    head. Reads the joint angles from the simulator; proprioception contains them too.
     """
+
+    reads = ()
 
     def __init__(self, task: HandRegard, player: Player) -> None:
         super().__init__(task, player)

@@ -72,6 +72,8 @@ class SelfTouchExpert(Expert[SelfTouch]):
     bones and which regions have been touched from the simulator (privileged).
     """
 
+    reads = ()
+
     def __init__(self, task: SelfTouch, player: Player) -> None:
         super().__init__(task, player)
         self._arms = ArmKinematics(task.body)

@@ -216,7 +216,8 @@ class ToyCar:
 
         A car that has driven between furniture may find no way that is clear by half its diagonal.
         """
-        here, clearances, narrow = self.prop.position[:2], Clearances(self._obstacles), None
+        here, narrow = self.prop.position[:2], None
+        clearances = Clearances(self._obstacles, _HEIGHTS_M)
         for _ in range(_DRAWS + 1):
             point = self.inside(draw(rng))
             if clearances.all_at_least(_line(here, point), _HALF_M):

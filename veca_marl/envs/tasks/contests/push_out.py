@@ -62,11 +62,11 @@ class PushOut(Task):
 
     def reset(self, rng: np.random.Generator) -> None:
         side_rad, cfg = rng.uniform(-math.pi, math.pi), self.cfg
+        placed: list[Player] = []
         for number, name in enumerate(self._team_names):
-            team_side_rad = side_rad + number * math.pi
-            self.ring.place_team(
-                self._team(name), team_side_rad, cfg.start_share, cfg.spread_deg, rng
-            )
+            team, team_side_rad = self._team(name), side_rad + number * math.pi
+            self.ring.place_team(team, placed, team_side_rad, cfg.start_share, cfg.spread_deg, rng)
+            placed += team
         direct_gaze_ahead(self.players)
         self._playing = {player.name for player in self.players}
         self._newly_out = set()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from itertools import combinations
+from itertools import combinations, product
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from veca_marl.envs.core.task import Player
 from veca_marl.envs.tasks.player_starts import place_player
 from veca_marl.sim.body import Body
 from veca_marl.sim.geometry import Floats
-from veca_marl.sim.physics import PlaygroundCfg, PropCfg, PropShape, World
+from veca_marl.sim.physics import PlaygroundCfg, PropCfg, PropShape, World, penetration_m
 
 Colour = tuple[float, float, float]
 
@@ -69,6 +69,7 @@ class Ring:
     def place_team(
         self,
         players: Sequence[Player],
+        others: Sequence[Player],
         side_rad: float,
         start_share: float,
         spread_deg: float,
@@ -76,10 +77,11 @@ class Ring:
     ) -> None:
         """Place a team side by side on one side of the ring, facing the middle.
 
-        The headings are drawn again while players of the team penetrate each other.
+        The headings are drawn again while its players penetrate each other, or others.
 
         Args:
             players: The players of the team.
+            others: Players that have been placed before.
             side_rad: Direction of the team, seen from the middle.
             start_share: Distance from the middle as a share of the radius.
             spread_deg: Largest deviation of the heading from the direction of the middle.
@@ -95,17 +97,20 @@ class Ring:
                 place = self.middle + _polar_point(angle_rad, start_share * self.radius_m)
                 deviation_rad = math.radians(rng.uniform(-spread_deg, spread_deg))
                 place_player(player, place, angle_rad + math.pi + deviation_rad)
-            if not self._overlap(players):
+            if not self._overlap(players, others):
                 return
         raise ValueError(
-            f"task.start_share={start_share} of task.radius_m={self.radius_m}: players of a team "
-            f"overlap in each of {_MOST_DRAWS} starts; choose a greater one"
+            f"task.start_share={start_share} of task.radius_m={self.radius_m}: players overlap in "
+            f"each of {_MOST_DRAWS} starts; choose a greater one"
         )
 
-    def _overlap(self, players: Sequence[Player]) -> bool:
-        """Return whether two players penetrate each other."""
-        pairs = combinations([player.body.body_id for player in players], 2)
-        return any(self._world.overlap_m(*pair) > 0.0 for pair in pairs)
+    def _overlap(self, players: Sequence[Player], others: Sequence[Player]) -> bool:
+        """Return whether two of some players, or one of them and one of others, penetrate."""
+        pairs = [*combinations(players, 2), *product(players, others)]
+        return any(
+            penetration_m(self._world.client, one.body.body_id, other.body.body_id) > 0.0
+            for one, other in pairs
+        )
 
 
 def _polar_point(direction_rad: float, distance_m: float = 1.0) -> Floats:

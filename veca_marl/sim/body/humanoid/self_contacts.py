@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from veca_marl.sim.physics import pybullet
+from veca_marl.sim.physics import is_contact, pybullet
 
 
 def self_contacts(client: int, body_id: int, bones: Mapping[int, str]) -> set[tuple[str, str]]:
     """Return the pairs of bones that touched each other in the last physics step.
-
-    Bullet also lists points that are about to touch; those with a positive distance are left out.
 
     Args:
         client: The PyBullet client.
@@ -21,5 +19,5 @@ def self_contacts(client: int, body_id: int, bones: Mapping[int, str]) -> set[tu
         Each pair in the order of their names.
     """
     points = pybullet.getContactPoints(body_id, body_id, physicsClientId=client)
-    pairs = [(bones[p[3]], bones[p[4]]) for p in points if p[8] <= 0.0]
+    pairs = [(bones[p[3]], bones[p[4]]) for p in points if is_contact(p)]
     return {(min(pair), max(pair)) for pair in pairs}

@@ -20,6 +20,7 @@ from veca_marl.sim.geometry import (
     rotation_about_vertical,
 )
 from veca_marl.sim.physics.bullet import pybullet
+from veca_marl.sim.physics.contacts import are_in_contact
 from veca_marl.sim.physics.props.joint import LINK, Joint
 from veca_marl.sim.physics.props.prop_cfg import PropCfg
 from veca_marl.sim.physics.props.prop_shapes import (
@@ -37,6 +38,8 @@ from veca_marl.sim.physics.props.rigid_body import (
 from veca_marl.sim.physics.props.sound_obstacles import make_obstacles
 from veca_marl.sim.sound import Source
 from veca_marl.sim.sound.rooms import Obstacles
+
+_LARGEST_M = 1e6  # no playground is as large; the limit of bodies, too
 
 
 class Prop:
@@ -206,8 +209,7 @@ class Prop:
 
     def touches(self, body_id: int) -> bool:
         """Return whether it was in contact with a body of PyBullet in the last physics step."""
-        points = pybullet.getContactPoints(self.body_id, body_id, physicsClientId=self._client)
-        return bool(points)
+        return are_in_contact(self._client, self.body_id, body_id)
 
     def place(
         self,
@@ -295,19 +297,28 @@ class Prop:
         return self.joint
 
 
-def follow_physics(props: Sequence[Prop]) -> None:
+def follow_physics(props: Sequence[Prop]) -> list[str]:
     """Copy the poses of props of one world from Bullet to the scene, sound sources and obstacles.
 
     All at once takes 0.4 of the time of one after the other.
+
+    Returns:
+        Names of the props whose pose is not finite or beyond 1e6 m; if there is one, nothing is
+        copied.
     """
     if not props:
-        return
+        return []
     positions, rotations = props[0]._scene.positions, props[0]._scene.rotations
-    poses = [prop._read_pose() for prop in props]
+    read, turned = zip(*(prop._read_pose() for prop in props), strict=True)
+    origins, quaternions = np.array(read), np.array(turned)
+    # false for numbers that are not finite
+    valid = (np.abs(origins) < _LARGEST_M).all(axis=1) & np.isfinite(quaternions).all(axis=1)
+    if not valid.all():
+        return [prop.name for prop, good in zip(props, valid, strict=True) if not good]
     rows = [prop._row for prop in props]
     matrices = np.empty((len(props), 3, 3))
-    quaternions_to_matrices(np.array([pose[1] for pose in poses]), matrices)
-    positions[rows] = [pose[0] for pose in poses]
+    quaternions_to_matrices(quaternions, matrices)
+    positions[rows] = origins
     rotations[rows] = matrices
     for row, prop in zip(rows, props, strict=True):
         if prop._axes is not None:
@@ -320,6 +331,7 @@ def follow_physics(props: Sequence[Prop]) -> None:
             prop.impact.position = positions[row]
         for obstacle in prop._obstacles:
             obstacle.move(positions[row], rotations[row])
+    return []
 
 
 def _create_body(
