@@ -28,6 +28,11 @@ def record(path, *overrides):
         )
 
 
+def test_a_team_with_ears_of_its_own_is_heard(tmp_path):
+    words = ["+senses/audio@team.agents.senses.audio=mono", "senses/vision=blind"]
+    assert record(tmp_path / "video.mp4", *words)[2] is not None
+
+
 def test_the_world_is_closed_after_an_error(tmp_path, monkeypatch):
     closed = []
     monkeypatch.setattr(VecaEnv, "close", lambda self, **_: closed.append(self))

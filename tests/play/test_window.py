@@ -47,6 +47,20 @@ def ticks(window, count):
         window.tick()
 
 
+def test_a_rebuilt_world_is_played_with_its_new_body(window):
+    """A game makes new bodies when a simulation breaks down."""
+    opened, before = window
+    game = opened._session.game
+    game.world.broken_props = ["ball"]
+    opened.begin(1)
+    body = game.actors[0].body
+    assert body is not before
+    ahead = body.mount("eye_left").rotation[:, 0]
+    pygame.event.post(pygame.event.Event(pygame.MOUSEBUTTONDOWN, button=1, pos=(1100, 360)))
+    opened.tick()
+    assert np.cross(ahead, body.mount("eye_left").rotation[:, 0])[2] < -0.2
+
+
 def test_held_keys_walk_and_turn_the_agent(window):
     opened, body = window
     start, yaw = body.position, body.yaw_rad

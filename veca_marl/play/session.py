@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 import torch
@@ -67,7 +67,7 @@ class Session:
     def __init__(
         self, cfg: GameCfg, make_policy: PolicyMaker, seed: int, exploration: Exploration
     ) -> None:
-        self.env = VecaEnv(_with_waveform(cfg), 1, seed)
+        self.env = VecaEnv(cfg.with_waveform(), 1, seed)
         self.game: Game = self.env.games[0]
         self.policy = make_policy(self.env)
         self._playing = with_memory(self.env, self.policy)
@@ -129,8 +129,3 @@ class Session:
     def close(self) -> None:
         """Release the world."""
         self.env.close()
-
-
-def _with_waveform(cfg: GameCfg) -> GameCfg:
-    audio = replace(cfg.senses.audio, waveform=True)
-    return replace(cfg, senses=replace(cfg.senses, audio=audio))

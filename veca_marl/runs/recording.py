@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from contextlib import closing
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -37,7 +36,7 @@ def record_episode(path: Path, game: GameCfg, policy: ActionPolicy, seed: int) -
     frames: list[NDArray[np.uint8]] = []
     sound: list[NDArray[Any]] = []
     with (
-        closing(VecaEnv(_with_waveform(game), worlds=1, seed=seed)) as env,
+        closing(VecaEnv(game.with_waveform(), worlds=1, seed=seed)) as env,
         torch.no_grad(),
         set_exploration_type(ExplorationType.DETERMINISTIC),
     ):
@@ -52,11 +51,6 @@ def record_episode(path: Path, game: GameCfg, policy: ActionPolicy, seed: int) -
             done = bool(played["next", "done"].all())
     waveform = np.concatenate(sound, axis=1) if sound else None
     write_video(path, frames, waveform, game.clock.control_rate_hz, SAMPLE_RATE_HZ)
-
-
-def _with_waveform(game: GameCfg) -> GameCfg:
-    audio = replace(game.senses.audio, waveform=True)
-    return replace(game, senses=replace(game.senses, audio=audio))
 
 
 def _first_player(step: TensorDictBase, env: VecaEnv) -> dict[str, NDArray[Any]]:

@@ -45,6 +45,17 @@ def test_the_ball_comes_out_of_either_side_wall(game):
     assert 8 < sides.count(1.0) < 32
 
 
+def test_no_ball_starts_within_the_player(game):
+    """The player stands at the side wall, where a new ball may begin."""
+    game.reset(np.random.default_rng(0))
+    player = game.players[0].body
+    for seed in range(60):
+        player.place((0.0, 2.8, 0.0))
+        game.task._launch(np.random.default_rng(seed))
+        gap_m = math.dist(game.task.ball.position[:2], (0.0, 2.8)) - 0.15 - player.radius_m
+        assert gap_m >= 0.0
+
+
 def test_it_rolls_into_the_room_at_the_speed_asked_for(game):
     speeds = []
     for ball in launches(game, 40):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from veca_marl.envs.core.bodies import check_body
 from veca_marl.envs.core.expert import find_expert
@@ -57,6 +57,12 @@ class GameCfg:
         """Return the quality of the senses of a team."""
         own = self.team.get(team)
         return self.senses if own is None else own.senses.replace_in(self.senses)
+
+    def with_waveform(self) -> GameCfg:
+        """Return this game with the samples at the ears among what hearing players observe."""
+        audio = replace(self.senses.audio, waveform=True)
+        team = {name: own.with_waveform() for name, own in self.team.items()}
+        return replace(self, senses=replace(self.senses, audio=audio), team=team)
 
     def check(self) -> None:
         """Check the duration, the teams, the scripts, the bodies and the playground.

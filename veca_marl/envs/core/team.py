@@ -42,6 +42,13 @@ class TeamCfg:
     body: BodyCfg | None = None
     senses: TeamSensesCfg = field(default_factory=TeamSensesCfg)
 
+    def with_waveform(self) -> TeamCfg:
+        """Return this team with the samples at the ears, if it has an audio setting of its own."""
+        if self.senses.audio is None:
+            return self
+        audio = replace(self.senses.audio, waveform=True)
+        return replace(self, senses=replace(self.senses, audio=audio))
+
 
 class Script(Enum):
     """How the game chooses the actions of a scripted team, which is not part of the specs.

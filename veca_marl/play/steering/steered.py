@@ -26,12 +26,13 @@ class SteeredPolicy(CommandPolicy):
     def __init__(self, env: VecaEnv, keyboard: Keyboard) -> None:
         super().__init__(env)
         self._keyboard = keyboard
-        self._walker = steerable(env.games[0].actors[0].body)
+        steerable(env.games[0].actors[0].body)
         if len(env.games[0].actors) > 1:
             find_expert(env.cfg.task.name)
 
     def command(self, game: Game, player: Player, observation: Observation) -> Any:
         """Return the command of the keyboard, or that of the player's expert."""
         if player is game.actors[0]:
-            return self._keyboard.command(self._walker)
+            # a game makes new bodies when a simulation breaks down
+            return self._keyboard.command(steerable(player.body))
         return game.expert_of(player).act(observation)

@@ -13,6 +13,7 @@ from veca_marl.play.steering.gaze import gaze_point
 from veca_marl.play.steering.keyboard import Keyboard, steerable, steering_help
 from veca_marl.play.window.loudspeaker import Loudspeaker
 from veca_marl.runs.recording import SAMPLE_RATE_HZ
+from veca_marl.sim.body import Body
 
 HELP = "p pause, r again, n next episode, escape quit"
 _LEFT_BUTTON, _RIGHT_BUTTON = 1, 3
@@ -56,12 +57,16 @@ class Window:
         self._surface = _open(title)
         self._clock = pygame.time.Clock()
         self._screen = Screen(session)
-        self._body = session.game.actors[0].body
         steering = [] if keyboard is None else steering_help(steerable(self._body))
         self._lines = [title, *steering, HELP]
         self._loudspeaker = self._open_loudspeaker() if sound and session.hears else None
         self.paused, self.is_open = False, True
         self.begin(0)
+
+    @property
+    def _body(self) -> Body:
+        """The body of the first actor: a game makes new ones when a simulation breaks down."""
+        return self._session.game.actors[0].body
 
     def _open_loudspeaker(self) -> Loudspeaker | None:
         try:

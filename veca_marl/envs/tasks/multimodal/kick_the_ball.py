@@ -12,10 +12,11 @@ from veca_marl.envs.core.scoring import cosine, horizontal, norm
 from veca_marl.envs.core.task import Player, Task, TaskCfg, register, require_walker, terms
 from veca_marl.envs.tasks.multimodal.rolling_ball import launch_from_side_wall
 from veca_marl.sim.body.walker import WalkerCfg
-from veca_marl.sim.physics import PlaygroundCfg, PropCfg, PropShape
+from veca_marl.sim.physics import PlaygroundCfg, PropCfg, PropShape, penetration_m
 from veca_marl.sim.sound import SoundCfg, SoundKind
 
 _START_CLEARANCE_M = 1.5  # from the walls
+_MOST_DRAWS = 50
 _LARGEST_RADIUS_M = 0.6  # a ball at the wall is then 0.28 m or more from the middle of the player
 
 
@@ -149,6 +150,11 @@ class KickTheBall(Task):
         return {"kick": float(self._kicked_now), "approach": approach}
 
     def _launch(self, rng: np.random.Generator) -> None:
-        launch_from_side_wall(self.ball, self.room, self.cfg.speed_mps, self.cfg.spread_deg, rng)
+        """Launch the ball; where the player stands only if it stands everywhere in 50 draws."""
+        cfg, bodies = self.cfg, (self.kicker.body_id, self.ball.body_id)
+        for _ in range(_MOST_DRAWS):
+            launch_from_side_wall(self.ball, self.room, cfg.speed_mps, cfg.spread_deg, rng)
+            if penetration_m(self.world.client, *bodies) == 0.0:
+                break
         self._kicked = self._kicked_now = False
         self._replaced_in_s = self.cfg.life_s
