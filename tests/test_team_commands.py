@@ -129,9 +129,9 @@ def test_a_team_starts_from_the_parameters_of_another_run(played, tmp_path):
         (["init_from.red=nowhere"], "nowhere is neither a checkpoint nor the folder of a run"),
         (
             ["init_from.red={run}", "algo.network.vector_features=7"],
-            "another network: vector_features=64 there, 7 here",
+            "another network: vector_features=64 in the stored run, 7 in this one",
         ),
-        (["init_from.red={run}", "senses/vision=monocular"], "vision: absent there"),
+        (["init_from.red={run}", "senses/vision=monocular"], "vision: absent in the checkpoint"),
         (["init_encoders.red.vision={run}", "senses/vision=monocular"], "no encoder of vision"),
         (["init_encoders.green.audio={run}"], "init_encoders: no ['green'] in PushOut1v1"),
         (["init_from.red={run}:green"], "has learnt the teams ['blue', 'red'], not 'green'"),

@@ -96,7 +96,9 @@ def test_an_encoder_is_copied_to_each_agent_with_one_of_its_own(tmp_path):
 
 def test_the_encoders_of_separate_agents_do_not_fit_a_shared_one(tmp_path):
     there, here = make_learners(seed=1, parameters=Parameters.separate), make_learners(seed=2)
-    with pytest.raises(CheckpointError, match="one for each of 2 agents there, for 1 here"):
+    with pytest.raises(
+        CheckpointError, match="one for each of 2 agents in the stored run, for 1 in this one"
+    ):
         init_teams(here, {}, {"agents": {"audio": store(there, tmp_path)}})
 
 
@@ -117,7 +119,11 @@ def test_teams_are_found_by_name_or_named_by_the_source(tmp_path):
 @pytest.mark.parametrize(
     ("numbers", "sense", "message"),
     [
-        ({"channels": [4, 8, 9]}, "vision", r"encoder of vision: layers.4.bias is \(9,\) there"),
+        (
+            {"channels": [4, 8, 9]},
+            "vision",
+            r"encoder of vision: layers.4.bias is \(9,\) in the stored run",
+        ),
         ({}, "smell", "no encoder of smell; choices: audio, vision"),
     ],
 )
@@ -129,7 +135,9 @@ def test_an_encoder_that_does_not_fit_is_refused(tmp_path, numbers, sense, messa
 
 def test_an_actor_of_another_algorithm_with_another_network_is_refused(tmp_path):
     there = make_learners(algo=ToyDQNCfg(), discrete=True)
-    with pytest.raises(CheckpointError, match=r"init_from.agents: .* there, absent here"):
+    with pytest.raises(
+        CheckpointError, match=r"init_from.agents: .* in the stored run, absent in this one"
+    ):
         init_teams(make_learners(discrete=True), {"agents": store(there, tmp_path)}, {})
 
 
@@ -173,7 +181,9 @@ def test_an_actor_with_another_scale_of_actions_is_refused(tmp_path):
     """Equal parameters would be another policy: the initial scale is not one of them."""
     cfg = small_sac(network=network(initial_scale=0.1), policy_hidden=[])
     there, here = make_learners(seed=1), make_learners(seed=2, algo=cfg)
-    with pytest.raises(CheckpointError, match=r"initial_scale=1.0 there, 0.1 here"):
+    with pytest.raises(
+        CheckpointError, match=r"initial_scale=1.0 in the stored run, 0.1 in this one"
+    ):
         init_teams(here, {"agents": store(there, tmp_path)}, {})
 
 
@@ -188,7 +198,9 @@ def test_an_encoder_with_another_scale_of_its_input_is_refused(low, high, compre
         return SenseEncoders({"audio": VectorEncoder(layout, 4, compressed)})
 
     copy_encoders(encoder(), {"audio": [encoder()["audio"]]})
-    with pytest.raises(ValueError, match=r"audio: its input is scaled by [a-zA-Z][^<]* there, by"):
+    with pytest.raises(
+        ValueError, match=r"audio: its input is scaled by [a-zA-Z][^<]* in the stored run, by"
+    ):
         copy_encoders(encoder(), {"audio": [encoder(low, high, compressed)["audio"]]})
 
 

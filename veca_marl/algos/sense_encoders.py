@@ -58,8 +58,8 @@ def copy_encoders(network: nn.Module, encoders: Mapping[str, Sequence[nn.Module]
         targets = encoders_of(network, [sense], "init_encoders")
         if len(sources) not in (1, len(targets)):
             raise ValueError(
-                f"encoder of {sense}: one for each of {len(sources)} agents there, "
-                f"for {len(targets)} here"
+                f"encoder of {sense}: one for each of {len(sources)} agents in the stored run, "
+                f"for {len(targets)} in this one"
             )
         for i, target in enumerate(targets):
             try:
@@ -77,8 +77,8 @@ def _check_same_scale(target: nn.Module, source: nn.Module) -> None:
     """
     scales = [getattr(module, "scale", None) for module in (target, source)]
     if scales[0] != scales[1]:
-        own, loaded = (getattr(scale, "__name__", str(scale)) for scale in scales)
-        raise ValueError(f"its input is scaled by {loaded} there, by {own} here")
+        new, stored = (getattr(scale, "__name__", str(scale)) for scale in scales)
+        raise ValueError(f"its input is scaled by {stored} in the stored run, by {new} in this one")
 
 
 def copy_parameters(target: nn.Module, source: nn.Module) -> None:
@@ -87,12 +87,12 @@ def copy_parameters(target: nn.Module, source: nn.Module) -> None:
     Raises:
         ValueError: If names or shapes differ; the message names the first that does.
     """
-    own, other = target.state_dict(), source.state_dict()
-    for name in sorted({*own, *other}):
-        here, there = _shape(own, name), _shape(other, name)
-        if here != there:
-            raise ValueError(f"{name} is {there} there, {here} here")
-    target.load_state_dict(other)
+    new, stored = target.state_dict(), source.state_dict()
+    for name in sorted({*new, *stored}):
+        shape, stored_shape = _shape(new, name), _shape(stored, name)
+        if shape != stored_shape:
+            raise ValueError(f"{name} is {stored_shape} in the stored run, {shape} in this one")
+    target.load_state_dict(stored)
 
 
 def _shape(state: Mapping[str, object], name: str) -> str:

@@ -18,7 +18,7 @@ def init_teams(
     """Copy parameters of other runs, first those of whole teams, then single encoders.
 
     A source is the folder of a run or a checkpoint, and ``:TEAM`` where several teams learnt
-    there and none has the name of the team here.
+    in it and none has the name of the team of this run.
 
     Args:
         learners: What starts.
@@ -36,8 +36,8 @@ def init_teams(
 
 
 def _init_team(learners: TeamLearners, team: str, source: str) -> None:
-    path, there = _find(source, team)
-    stored = load_learnt(path, there, learners.specs[team])
+    path, stored_team = _find(source, team)
+    stored = load_learnt(path, stored_team, learners.specs[team])
     try:
         learners.algorithms[team].init_from(stored)
     except ValueError as error:
@@ -45,8 +45,8 @@ def _init_team(learners: TeamLearners, team: str, source: str) -> None:
 
 
 def _init_encoder(learners: TeamLearners, team: str, sense: str, source: str) -> None:
-    path, there = _find(source, team)
-    found = load_encoders(path, there)
+    path, stored_team = _find(source, team)
+    found = load_encoders(path, stored_team)
     if sense not in found:
         raise CheckpointError(
             f"init_encoders.{team}.{sense}: {path} has no encoder of {sense}; "
@@ -59,11 +59,11 @@ def _init_encoder(learners: TeamLearners, team: str, sense: str, source: str) ->
 
 
 def _find(source: str, team: str) -> tuple[Path, str]:
-    """Return the path of a source and the name that the team has there."""
-    path, there = _split(source)
+    """Return the path of a source and the name of the team in it."""
+    path, named = _split(source)
     learnt = teams_learnt(path)
-    if there or team in learnt:
-        return path, there or team
+    if named or team in learnt:
+        return path, named or team
     if len(learnt) == 1:
         return path, learnt[0]
     raise CheckpointError(f"{path} has learnt the teams {learnt}, not {team!r}; write {path}:TEAM")

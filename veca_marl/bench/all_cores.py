@@ -38,13 +38,13 @@ class SimultaneousRollouts:
         self._begin = context.Barrier(processes)
         self._processes, self._connections = [], []
         for _ in range(processes):
-            here, there = context.Pipe()
-            arguments = (there, self._begin, make_env, steps, os.getpid())
+            own_end, process_end = context.Pipe()
+            arguments = (process_end, self._begin, make_env, steps, os.getpid())
             process = context.Process(target=_roll_out_on_request, args=arguments, daemon=True)
             process.start()
-            there.close()
+            process_end.close()
             self._processes.append(process)
-            self._connections.append(here)
+            self._connections.append(own_end)
         self.frames_per_s()  # fills caches
 
     def frames_per_s(self) -> float:

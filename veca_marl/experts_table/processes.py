@@ -32,11 +32,11 @@ def play_all(jobs: Sequence[Job], processes: int, commit: str) -> Iterator[tuple
     context = get_context("spawn")  # this process may have threads, which a fork would break
     running = {}
     for share in (jobs[n::processes] for n in range(processes)):
-        here, there = context.Pipe(duplex=False)
-        process = context.Process(target=_play_share, args=(share, commit, there), daemon=True)
+        receiver, sender = context.Pipe(duplex=False)
+        process = context.Process(target=_play_share, args=(share, commit, sender), daemon=True)
         process.start()
-        there.close()
-        running[here] = process
+        sender.close()
+        running[receiver] = process
     try:
         yield from _received(running)
     finally:

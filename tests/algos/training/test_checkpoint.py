@@ -63,15 +63,15 @@ def test_another_task_raises_an_error_with_both_names(checkpoints, identity):
     [
         (
             {"image": 20},
-            r"vision\.shape: \[2, 3, 16, 16\] in the checkpoint, \[2, 3, 20, 20\] here",
+            r"vision\.shape: \[2, 3, 16, 16\] in the checkpoint, \[2, 3, 20, 20\] in this run",
         ),
-        ({"senses": ("audio",)}, r"agents\.observations\.vision: .* absent here"),
+        ({"senses": ("audio",)}, r"agents\.observations\.vision: .* absent in this run"),
         (
             {"discrete": True},
-            r"agents\.actions\.action\.discrete: False in the checkpoint, True here",
+            r"agents\.actions\.action\.discrete: False in the checkpoint, True in this run",
         ),
-        ({"agents": 2}, r"agents\.agents: 1 in the checkpoint, 2 here"),
-        ({"teams": ("red",)}, r"agents: .* absent here; red: absent in the checkpoint"),
+        ({"agents": 2}, r"agents\.agents: 1 in the checkpoint, 2 in this run"),
+        ({"teams": ("red",)}, r"agents: .* absent in this run; red: absent in the checkpoint"),
     ],
 )
 def test_other_specs_raise_an_error_with_the_differences(checkpoints, other, message):

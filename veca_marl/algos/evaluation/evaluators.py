@@ -39,7 +39,8 @@ class Players:
 
     Attributes:
         policy: The policy of all teams.
-        learning: Teams that learn: they act at random in the baseline, the others as ever.
+        learning: Teams that learn: they act at random in the baseline, and the others as in every
+            evaluation.
     """
 
     policy: Policy

@@ -218,36 +218,36 @@ def trainable(network: nn.Module) -> list[nn.Parameter]:
     return [parameter for parameter in network.parameters() if parameter.requires_grad]
 
 
-def check_same_actor(here: NetworkCfg, there: Any) -> None:
+def check_same_actor(cfg: NetworkCfg, stored: Any) -> None:
     """Check that actors of two configurations with equal parameters are the same function.
 
     Args:
-        here: A configuration.
-        there: That of another algorithm; what is no `NetworkCfg` is not compared.
+        cfg: A configuration.
+        stored: That of another algorithm; what is no `NetworkCfg` is not compared.
 
     Raises:
         ValueError: If they differ; the message names the fields.
     """
-    if isinstance(there, NetworkCfg):
-        check_same_network(here, there, here.critics_only)
+    if isinstance(stored, NetworkCfg):
+        check_same_network(cfg, stored, cfg.critics_only)
 
 
-def check_same_network(here: NetworkCfg, there: NetworkCfg, left_out: Collection[str] = ()) -> None:
+def check_same_network(cfg: NetworkCfg, stored: NetworkCfg, left_out: Collection[str] = ()) -> None:
     """Check that two configurations describe the same parameters.
 
     Args:
-        here: A configuration.
-        there: Another one.
+        cfg: A configuration.
+        stored: Another one.
         left_out: Fields that may differ.
 
     Raises:
         ValueError: If they differ; the message names the fields.
     """
-    own, other = vars(here), vars(there)
+    new, old = vars(cfg), vars(stored)
     differing = [
-        f"{name}={other.get(name, 'absent')} there, {own.get(name, 'absent')} here"
-        for name in {**own, **other}
-        if name not in (*here.not_parameters, *left_out) and other.get(name) != own.get(name)
+        f"{name}={old.get(name, 'absent')} in the stored run, {new.get(name, 'absent')} in this one"
+        for name in {**new, **old}
+        if name not in (*cfg.not_parameters, *left_out) and old.get(name) != new.get(name)
     ]
     if differing:
         raise ValueError(f"another network: {'; '.join(differing)}")

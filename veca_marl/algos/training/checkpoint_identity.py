@@ -39,8 +39,8 @@ def check_identity(path: Path, stored: dict[str, Any], wanted: dict[str, Any]) -
     if stored["task"] != wanted["task"]:
         raise CheckpointError(f"{path} is of task {stored['task']}, wanted: {wanted['task']}")
     differing = [
-        f"{name}: {ours} in the checkpoint, {theirs} here"
-        for name, ours, theirs in _differences(stored["specs"], wanted["specs"])
+        f"{name}: {in_file} in the checkpoint, {in_run} in this run"
+        for name, in_file, in_run in _differences(stored["specs"], wanted["specs"])
     ]
     if differing:
         raise CheckpointError(f"{path} was made for other specs: {'; '.join(differing)}")
@@ -49,8 +49,8 @@ def check_identity(path: Path, stored: dict[str, Any], wanted: dict[str, Any]) -
 def spec_differences(stored: dict[str, Any], spec: TeamSpec) -> str:
     """Return how a stored specification differs from `spec`; empty if it does not."""
     return "; ".join(
-        f"{name}: {there} there, {here} here"
-        for name, there, here in _differences(stored, spec.to_dict())
+        f"{name}: {in_file} in the checkpoint, {in_run} in this run"
+        for name, in_file, in_run in _differences(stored, spec.to_dict())
     )
 
 

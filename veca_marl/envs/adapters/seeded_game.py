@@ -28,7 +28,7 @@ class Step(NamedTuple):
     Attributes:
         observations: Observations after the step.
         rewards: Weighted sums of the reward terms.
-        terms: Unweighted reward terms by name.
+        terms: Unweighted reward terms by player and name.
         terminated: Whether the episode has ended by the rules.
         truncated: Whether the time is up; the same for all players.
         done: Whether the episode has ended for all players.

@@ -190,7 +190,7 @@ class Task(ABC):
         """Raise `ValueError` if `is_eliminated` would never be called."""
         if type(self).is_eliminated is not Task.is_eliminated and not self.eliminates:
             raise ValueError(
-                f"{type(self).__name__} defines is_eliminated, but has eliminates=False: nobody "
+                f"{type(self).__name__} defines is_eliminated, but has eliminates=False: no player "
                 "would be eliminated; set eliminates = True in the class"
             )
 

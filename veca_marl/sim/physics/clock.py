@@ -19,7 +19,8 @@ class ClockCfg:
     The paper's VECATime. An agent step emits a whole number of samples of sound, so that blocks of
     sound follow each other without gaps: its rate divides 22 050 Hz (`CONTROL_RATES_HZ`). The rate
     of physics is any multiple of it: 25 Hz times 10 are the 250 Hz (4 ms) of the paper's data,
-    although 250 Hz is no possible rate of agent steps; the nearest is 245 Hz (4.08 ms).
+    although 250 Hz is no possible rate of agent steps; the nearest is 245 Hz (4.08 ms). The default
+    of 5 physics steps per agent step has steps of 8 ms.
 
     Attributes:
         control_rate_hz: Agent steps per second; one of `CONTROL_RATES_HZ`.

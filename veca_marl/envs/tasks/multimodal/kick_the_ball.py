@@ -81,10 +81,10 @@ class KickTheBallCfg(TaskCfg):
 class KickTheBall(Task):
     """A buzzing ball rolls out of a side wall again and again; the player has to kick it.
 
-    The field of view is 60 degrees, so that hearing is needed to find the ball. A ball within
-    reach of the foot (`Walker.can_kick`) is kicked automatically and counts once. `rest_s` later,
-    or `life_s` after the start of a ball that was not kicked, the next ball leaves the left (+y)
-    or the right (-y) wall. An episode lasts `max_seconds` and never terminates.
+    The default field of view is 60 degrees, so that hearing is needed to find the ball. A ball
+    within reach of the foot (`Walker.can_kick`) is kicked automatically and counts once. `rest_s`
+    later, or `life_s` after the start of a ball that was not kicked, the next ball leaves the left
+    (+y) or the right (-y) wall. An episode lasts `max_seconds` and never terminates.
 
     The sound, the walls and the helper reward are those of the paper (table of tasks and "Helper
     Rewards" in the appendix). The paper gives no numbers apart from the helper reward's weight.

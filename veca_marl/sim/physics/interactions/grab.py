@@ -16,7 +16,7 @@ class Grab(Interaction):
     name: ClassVar[str] = "grab"
 
     def allows(self, body: InteractingBody, prop: Prop) -> bool:
-        """Return whether the hand is empty and the prop is light and held by no one else."""
+        """Return whether the hand is empty and the prop is light and no other body holds it."""
         return body.can_grab(prop)
 
     def apply(self, body: InteractingBody, prop: Prop) -> None:

@@ -43,7 +43,8 @@ class JointCfg:
         range_deg: Rotation of a hinge at opening 1.
         range_m: Travel of a slide at opening 1.
         friction: Coulomb friction of the joint: N m for a hinge, N for a slide.
-        motor: Greatest torque (N m) or force (N) of `Prop.drive`, in addition to the friction.
+        motor: Greatest torque (N m) or force (N) of the motor that opens and closes the prop
+            (`Prop.open`, `Prop.close`), in addition to the friction.
         open_s: Duration of a driven motion from opening 0 to 1.
         opening: Opening at the start of an episode, in [0, 1].
         lock: A lock; None if it has none.
