@@ -27,6 +27,7 @@ CASES = {
     "choice": (PPOCfg(network=SMALL), {"discrete": True}),
     "two parts, two teams": (PPOCfg(network=SMALL), {"hybrid": True, **TWO_TEAMS}),
     "hidden state": (PPOCfg(network=GRU), {"agents": 2}),
+    "shortcut": (PPOCfg(network=replace(GRU, memory=Memory.gru_shortcut)), {"agents": 2}),
     "own parameters": (PPOCfg(network=replace(GRU, parameters=Parameters.separate)), TWO_TEAMS),
     "network of one's own": (PPOCfg(network=FirstSeenCfg()), {}),
     "warm-up of SAC": (SACCfg(network=SMALL), {"hybrid": True}),

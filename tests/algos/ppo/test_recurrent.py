@@ -49,6 +49,7 @@ def recurrent(request):
         "shared": GRU,
         "separate": replace(GRU, parameters=Parameters.separate),
         "central": replace(GRU, critic=Critic.central),
+        "shortcut": replace(GRU, memory=Memory.gru_shortcut),
     }
     return collected(choices[request.param])
 

@@ -88,7 +88,14 @@ def sampled(network=GRU, span=(3, 4, 2)):
     )
 
 
-@pytest.mark.parametrize("network", [GRU, replace(GRU, parameters=Parameters.separate)])
+@pytest.mark.parametrize(
+    "network",
+    [
+        GRU,
+        replace(GRU, parameters=Parameters.separate),
+        replace(GRU, memory=Memory.gru_shortcut),
+    ],
+)
 def test_features_are_the_states_that_were_stored(network):
     """As long as parameters have not changed, every state after a step equals the stored one."""
     sac, reader, batch = sampled(network)

@@ -47,10 +47,12 @@ class Memory(Enum):
     Attributes:
         none: None: an action depends on the present observation alone.
         gru: A gated recurrent unit between the joined layer and the heads.
+        gru_shortcut: The same; the heads read the joined layer beside its state.
     """
 
     none = "none"
     gru = "gru"
+    gru_shortcut = "gru_shortcut"
 
 
 @dataclass
@@ -68,7 +70,7 @@ class MultisenseCfg(NetworkCfg):
             team does not have are ignored.
         trunk_features: Width of the joined layer that both heads read, or the memory.
         memory: Hidden state between the joined layer and the heads.
-        memory_features: Length of the hidden state of each agent; both heads read it.
+        memory_features: Length of the hidden state of each agent.
         precision: Arithmetic of the encoder that learns; policies act in float32.
         critic: Input of the critic.
         parameters: One network for a team, or one for each of its agents.
@@ -110,6 +112,14 @@ class MultisenseCfg(NetworkCfg):
     def recurrent(self) -> bool:
         """See `NetworkCfg`."""
         return self.memory is not Memory.none
+
+    @property
+    def head_inputs(self) -> int:
+        """Number of features that the heads read."""
+        if not self.recurrent:
+            return self.trunk_features
+        skipped = self.trunk_features if self.memory is Memory.gru_shortcut else 0
+        return skipped + self.memory_features
 
 
 class Trunk(nn.Module):
@@ -158,7 +168,7 @@ class Multisense(NetworkFactory):
 
     def __init__(self, team: str, spec: TeamSpec, cfg: MultisenseCfg) -> None:
         super().__init__(team, spec, cfg)
-        self.features = cfg.memory_features if cfg.recurrent else cfg.trunk_features
+        self.features = cfg.head_inputs
 
     def encoder(self) -> TensorDictModuleBase:
         """Return the encoder of all senses, joined, and the memory after it."""
@@ -173,10 +183,11 @@ class Multisense(NetworkFactory):
 
     def _memory(self) -> TeamMemory:
         spec, size = self.spec, self.cfg.memory_features
+        shortcut = self.cfg.memory is Memory.gru_shortcut
         memory = self.per_agent(
             lambda: GatedMemory(self.cfg.trunk_features, size), (1,) * (4 if spec.masked else 3)
         )
-        return TeamMemory(self.team, spec.agents, size, spec.masked, memory)
+        return TeamMemory(self.team, spec.agents, size, spec.masked, shortcut, memory)
 
     @property
     def central_critic(self) -> bool:

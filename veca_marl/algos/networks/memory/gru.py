@@ -90,21 +90,35 @@ def _returns(present: Tensor) -> Tensor:
 
 
 class TeamMemory(TensorDictModuleBase):
-    """Replaces ``(team, "features")`` by the state of a `GatedMemory` that reads them.
+    """Adds the state of a `GatedMemory` to ``(team, "features")``, which the memory reads.
+
+    With a shortcut the heads read the features and the state, otherwise the state alone.
+
+    Source of the shortcut: Ni et al. 2022, "Recurrent model-free RL can be a strong baseline for
+    many POMDPs", whose heads read the encoded observation beside the state, too.
 
     Args:
         team: Name of the team.
         agents: Number of its agents.
         size: Length of the state of each agent.
         masked: Whether agents can be eliminated: ``(team, "mask")``.
+        shortcut: Whether the features remain.
         memory: Has the arguments of `GatedMemory.forward`; for all agents or one of its own for
             each of them.
     """
 
-    def __init__(self, team: str, agents: int, size: int, masked: bool, memory: nn.Module) -> None:
+    def __init__(
+        self,
+        team: str,
+        agents: int,
+        size: int,
+        masked: bool,
+        shortcut: bool,
+        memory: nn.Module,
+    ) -> None:
         super().__init__()
         self.team, self.agents, self.size, self.masked = team, agents, size, masked
-        self.memory = memory
+        self.shortcut, self.memory = shortcut, memory
         self.features, self.state = (team, "features"), (team, "memory", "hidden")
         self.in_keys = [self.features, self.state, "is_init", *([(team, "mask")] if masked else [])]
         self.out_keys = [self.features, ("next", *self.state)]
@@ -120,7 +134,8 @@ class TeamMemory(TensorDictModuleBase):
         begins = arrays["is_init"].unsqueeze(-2).expand(*features.shape[:-1], 1)
         present = [arrays[self.team, "mask"].unsqueeze(-1)] if self.masked else []
         after = self.memory(features, state, begins, *present)
-        arrays[self.features] = arrays["next", *self.state] = after
+        arrays["next", *self.state] = after
+        arrays[self.features] = torch.cat([features, after], dim=-1) if self.shortcut else after
 
     def make_tensordict_primer(self) -> TensorDictPrimer:
         """Return the transform with the spec of the state (see `networks.memory`)."""
