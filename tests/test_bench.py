@@ -10,7 +10,7 @@ import pytest
 import torch
 from composed import compose
 
-from veca_marl.algos.training.checkpoint import Checkpoints
+from veca_marl.algos.checkpoints.checkpoints import Checkpoints
 from veca_marl.bench.all_cores import SimultaneousRollouts
 from veca_marl.bench.command import chosen_games, main
 from veca_marl.bench.free_play import free_play

@@ -9,7 +9,7 @@ import commands
 import pytest
 import torch
 
-from veca_marl.algos.training.checkpoint_file import CheckpointError
+from veca_marl.algos.checkpoints.checkpoint_file import CheckpointError
 from veca_marl.config import ConfigError, compose
 from veca_marl.envs.core.benchmark import Benchmark, parameters, read_starts
 from veca_marl.evaluate import main as evaluate

@@ -14,8 +14,8 @@ from dataclasses import asdict, dataclass, field
 import numpy as np
 import torch
 
+from veca_marl.algos.checkpoints.checkpoint_file import CheckpointError
 from veca_marl.algos.files import WriteError, write_atomically
-from veca_marl.algos.training.checkpoint_file import CheckpointError
 from veca_marl.config import ConfigError
 from veca_marl.config.command_line import CommandLine
 from veca_marl.config.outputs import check_file

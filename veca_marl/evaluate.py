@@ -19,11 +19,11 @@ import torch
 from omegaconf import MISSING
 from tensordict.nn import TensorDictSequential
 
+from veca_marl.algos.checkpoints.checkpoint_file import CheckpointError
 from veca_marl.algos.evaluation.comparison import comparison_line, interval, solved_rate
 from veca_marl.algos.evaluation.evaluate import Exploration, RandomTeams, Scores, evaluate
 from veca_marl.algos.files import WriteError, write_atomically
 from veca_marl.algos.specs import team_specs
-from veca_marl.algos.training.checkpoint_file import CheckpointError
 from veca_marl.config import Config, ConfigError, compose, one_line
 from veca_marl.config.command_line import CommandLine
 from veca_marl.config.outputs import check_file

@@ -18,10 +18,10 @@ import numpy as np
 import torch
 from omegaconf import MISSING
 
+from veca_marl.algos.checkpoints.checkpoint_file import CheckpointError
 from veca_marl.algos.files import WriteError, naming
 from veca_marl.algos.selfplay.pool import Pool
 from veca_marl.algos.selfplay.tournament import Match, Rating, play_all, rate, table_of_points
-from veca_marl.algos.training.checkpoint_file import CheckpointError
 from veca_marl.config import Config, ConfigError, to_config
 from veca_marl.config.command_line import CommandLine
 from veca_marl.config.stored import change

@@ -22,10 +22,10 @@ from omegaconf import DictConfig
 from omegaconf.errors import OmegaConfBaseException
 
 from veca_marl import api
+from veca_marl.algos.checkpoints.checkpoint_file import CheckpointError
 from veca_marl.algos.collection.parent import end_with_parent
 from veca_marl.algos.collection.workers import WorkerError
 from veca_marl.algos.files import DISK_FULL, WriteError
-from veca_marl.algos.training.checkpoint_file import CheckpointError
 from veca_marl.algos.training.finite import NotFiniteError
 from veca_marl.algos.training.loop import Trainer
 from veca_marl.config import Config, ConfigError, conf_dir, one_line, prepare, to_config

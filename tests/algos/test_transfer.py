@@ -9,6 +9,9 @@ from fake_env import make_fake_env
 from toy_dqn import ToyDQNCfg, register
 from training import SMALL
 
+from veca_marl.algos.checkpoints.checkpoint_file import CheckpointError
+from veca_marl.algos.checkpoints.checkpoints import Checkpoints
+from veca_marl.algos.checkpoints.identity import Identity
 from veca_marl.algos.intrinsic import RNDCfg
 from veca_marl.algos.networks.encoders import VectorEncoder
 from veca_marl.algos.networks.memory import with_memory
@@ -21,9 +24,6 @@ from veca_marl.algos.sac.config import ReplayCfg
 from veca_marl.algos.sac.replay.buffer import Replay
 from veca_marl.algos.sense_encoders import SenseEncoders, copy_encoders, sense_encoders
 from veca_marl.algos.specs import ArrayLayout, TeamSpec, team_specs
-from veca_marl.algos.training.checkpoint import Checkpoints
-from veca_marl.algos.training.checkpoint_file import CheckpointError
-from veca_marl.algos.training.checkpoint_identity import Identity
 from veca_marl.algos.training.learners import TeamLearners
 from veca_marl.algos.transfer import init_teams
 

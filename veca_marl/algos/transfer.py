@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from veca_marl.algos.training.checkpoint_file import CheckpointError
+from veca_marl.algos.checkpoints.checkpoint_file import CheckpointError
+from veca_marl.algos.checkpoints.stored import load_encoders, load_learnt, teams_learnt
 from veca_marl.algos.training.learners import TeamLearners
-from veca_marl.algos.training.stored import load_encoders, load_learnt, teams_learnt
 
 
 def init_teams(

@@ -12,7 +12,7 @@ from tempfile import TemporaryDirectory
 
 from torchrl import timeit
 
-from veca_marl.algos.training.reporters import Row
+from veca_marl.algos.reporting.reporters import Row
 from veca_marl.algos.training.stopwatch import processor_seconds
 from veca_marl.bench.all_cores import SimultaneousRollouts
 from veca_marl.bench.rollouts import RandomActions

@@ -11,8 +11,8 @@ from veca_marl.algos.algorithm import AlgorithmCfg
 from veca_marl.algos.collection.experience import CollectCfg
 from veca_marl.algos.evaluation.evaluate import EvalCfg
 from veca_marl.algos.intrinsic import IntrinsicCfg
+from veca_marl.algos.reporting.loggers import LoggerKind
 from veca_marl.algos.selfplay.self_play import SelfPlayCfg
-from veca_marl.algos.training.loggers import LoggerKind
 from veca_marl.config.experiment import ExperimentCfg
 from veca_marl.envs.core.game_cfg import GameCfg
 from veca_marl.envs.core.task import TaskCfg

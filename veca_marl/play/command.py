@@ -17,9 +17,9 @@ from types import ModuleType
 
 import torch
 
+from veca_marl.algos.checkpoints.checkpoint_file import CheckpointError
 from veca_marl.algos.evaluation.evaluate import Exploration
 from veca_marl.algos.files import WriteError, naming
-from veca_marl.algos.training.checkpoint_file import CheckpointError
 from veca_marl.config import ConfigError, one_line
 from veca_marl.config.command_line import CommandLine
 from veca_marl.config.outputs import check_file

@@ -9,8 +9,8 @@ from pathlib import Path
 from tensordict import TensorDictBase
 from torch import nn
 
+from veca_marl.algos.checkpoints.stored import load_actor
 from veca_marl.algos.evaluation.evaluate import Exploration, RandomTeams
-from veca_marl.algos.training.stored import load_actor
 from veca_marl.config import Config, ConfigError, compose, one_line
 from veca_marl.envs.adapters.torchrl.scripted import ExpertPolicy
 from veca_marl.envs.core.expert import find_expert

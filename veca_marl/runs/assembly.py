@@ -9,19 +9,19 @@ from typing import Any, cast
 import torch
 from omegaconf import DictConfig, OmegaConf
 
+from veca_marl.algos.checkpoints.checkpoints import Checkpoints
+from veca_marl.algos.checkpoints.identity import Identity
+from veca_marl.algos.checkpoints.stored import load_actor
 from veca_marl.algos.networks.precision import Precision
+from veca_marl.algos.reporting.loggers import check_installed, make_reporter
+from veca_marl.algos.reporting.reporters import Reporter
 from veca_marl.algos.selfplay.pool import Pool
 from veca_marl.algos.selfplay.self_play import SelfPlay
 from veca_marl.algos.specs import TeamSpec, team_specs
 from veca_marl.algos.storage import check_storage
-from veca_marl.algos.training.checkpoint import Checkpoints
-from veca_marl.algos.training.checkpoint_identity import Identity
 from veca_marl.algos.training.learners import TeamLearners
-from veca_marl.algos.training.loggers import check_installed, make_reporter
 from veca_marl.algos.training.loop import Trainer
 from veca_marl.algos.training.progress import Budget
-from veca_marl.algos.training.reporters import Reporter
-from veca_marl.algos.training.stored import load_actor
 from veca_marl.algos.transfer import init_teams
 from veca_marl.config import Config, ConfigError, one_line
 from veca_marl.envs.adapters.torchrl.env import VecaEnv

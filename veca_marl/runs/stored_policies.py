@@ -7,9 +7,9 @@ from pathlib import Path
 
 from tensordict.nn import TensorDictModuleBase
 
+from veca_marl.algos.checkpoints.stored import load_actor
 from veca_marl.algos.selfplay.self_play import SelfPlayCfg
 from veca_marl.algos.specs import TeamSpec
-from veca_marl.algos.training.stored import load_actor
 from veca_marl.config import Config, ConfigError, to_config
 from veca_marl.config.stored import change
 from veca_marl.runs.run_folder import open_run

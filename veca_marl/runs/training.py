@@ -13,8 +13,8 @@ from tensordict.nn import TensorDictModuleBase
 from torchrl import timeit
 
 from veca_marl.algos.collection.workers import WorkerError
+from veca_marl.algos.reporting.reporters import MemoryReporter, Reporter, Row
 from veca_marl.algos.training.loop import Trainer
-from veca_marl.algos.training.reporters import MemoryReporter, Reporter, Row
 from veca_marl.config import Config
 from veca_marl.envs.core.game_cfg import GameCfg
 from veca_marl.runs.assembly import make_reporters, make_trainer

@@ -9,8 +9,12 @@ from typing import Any
 import torch
 from torch import nn
 
+from veca_marl.algos.checkpoints.checkpoint_file import (
+    CheckpointError,
+    load_file,
+    naming_checkpoint,
+)
 from veca_marl.algos.files import WriteError, write_atomically
-from veca_marl.algos.training.checkpoint_file import CheckpointError, load_file, naming_checkpoint
 
 _DIGITS = 12  # of the frames in the name of a file
 

@@ -13,9 +13,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from veca_marl.algos.checkpoints.checkpoint_file import CheckpointError
 from veca_marl.algos.policy import Policy
 from veca_marl.algos.selfplay.pool import Pool
-from veca_marl.algos.training.checkpoint_file import CheckpointError
 from veca_marl.algos.training.learners import TeamLearners
 
 _DRAWS = 7  # the random stream of the matches differs from those of the stages

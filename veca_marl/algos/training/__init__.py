@@ -1,1 +1,1 @@
-"""The training loop: evaluation, checkpoints, metrics."""
+"""The training loop: stages, evaluations, budgets, times."""

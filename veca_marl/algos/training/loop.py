@@ -18,6 +18,8 @@ from typing import Any
 from torchrl import timeit
 from tqdm import tqdm
 
+from veca_marl.algos.checkpoints.checkpoint_file import naming_checkpoint
+from veca_marl.algos.checkpoints.checkpoints import Checkpoints
 from veca_marl.algos.collection.experience import CollectCfg, Experience
 from veca_marl.algos.evaluation.comparison import comparison_line, score_rows
 from veca_marl.algos.evaluation.episodes import TrainingEpisodes
@@ -26,16 +28,14 @@ from veca_marl.algos.evaluation.evaluators import Evaluator, Players, nothing
 from veca_marl.algos.evaluation.parallel import make_evaluator
 from veca_marl.algos.plain import to_plain
 from veca_marl.algos.policy import Policy
+from veca_marl.algos.reporting.reporters import Reporter
 from veca_marl.algos.seeds import derived_seed
 from veca_marl.algos.specs import EnvFactory
-from veca_marl.algos.training.checkpoint import Checkpoints
-from veca_marl.algos.training.checkpoint_file import naming_checkpoint
 from veca_marl.algos.training.evaluations import Evaluations, evaluation_seed
 from veca_marl.algos.training.finite import check_batch, check_state
 from veca_marl.algos.training.learners import TeamLearners
 from veca_marl.algos.training.matchmaking import AllLearn, Matchmaking
 from veca_marl.algos.training.progress import Budget, Progress
-from veca_marl.algos.training.reporters import Reporter
 from veca_marl.algos.training.schedule import Schedule
 from veca_marl.algos.training.stopwatch import Stopwatch
 from veca_marl.algos.training.timing import timing_table

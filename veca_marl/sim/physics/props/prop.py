@@ -309,8 +309,8 @@ def follow_physics(props: Sequence[Prop]) -> list[str]:
     if not props:
         return []
     positions, rotations = props[0]._scene.positions, props[0]._scene.rotations
-    read, turned = zip(*(prop._read_pose() for prop in props), strict=True)
-    origins, quaternions = np.array(read), np.array(turned)
+    poses = [prop._read_pose()[:2] for prop in props]
+    origins, quaternions = np.array([pose[0] for pose in poses]), np.array([p[1] for p in poses])
     # false for numbers that are not finite
     valid = (np.abs(origins) < _LARGEST_M).all(axis=1) & np.isfinite(quaternions).all(axis=1)
     if not valid.all():

@@ -15,17 +15,17 @@ from veca_marl.algos.algorithm import (
     AlgorithmCfg,
     make_algorithm,
 )
+from veca_marl.algos.checkpoints.checkpoint_file import (
+    CheckpointError,
+    map_checkpoint,
+    naming_checkpoint,
+)
+from veca_marl.algos.checkpoints.identity import spec_differences
 from veca_marl.algos.networks.factory import NETWORKS, NetworkCfg
 from veca_marl.algos.networks.precision import for_acting
 from veca_marl.algos.plain import from_plain
 from veca_marl.algos.sense_encoders import sense_encoders
 from veca_marl.algos.specs import TeamSpec
-from veca_marl.algos.training.checkpoint_file import (
-    CheckpointError,
-    map_checkpoint,
-    naming_checkpoint,
-)
-from veca_marl.algos.training.checkpoint_identity import spec_differences
 
 
 def load_actor(path: Path, team: str, spec: TeamSpec) -> TensorDictModuleBase:

@@ -11,7 +11,7 @@ from typing import Any
 from torchrl.record.loggers import Logger, MLFlowLogger, TensorboardLogger, WandbLogger
 
 from veca_marl.algos.files import naming
-from veca_marl.algos.training.reporters import CsvReporter, LoggerReporter, Reporter
+from veca_marl.algos.reporting.reporters import CsvReporter, LoggerReporter, Reporter
 
 _TAG = "veca_marl.run"  # of a run in MLflow: the identifier by which it is continued
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from veca_marl.algos.checkpoints.checkpoint_file import CheckpointError
 from veca_marl.algos.specs import TeamSpec
-from veca_marl.algos.training.checkpoint_file import CheckpointError
 
 _ABSENT = "absent"
 

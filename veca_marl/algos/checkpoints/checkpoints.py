@@ -9,10 +9,10 @@ from typing import Any
 
 import torch
 
+from veca_marl.algos.checkpoints.checkpoint_file import FORMAT, CheckpointError, read_checkpoint
+from veca_marl.algos.checkpoints.delayed_signals import interrupts_wait
+from veca_marl.algos.checkpoints.identity import Identity, check_config, check_identity
 from veca_marl.algos.files import WriteError, write_atomically
-from veca_marl.algos.training.checkpoint_file import FORMAT, CheckpointError, read_checkpoint
-from veca_marl.algos.training.checkpoint_identity import Identity, check_config, check_identity
-from veca_marl.algos.training.delayed_signals import interrupts_wait
 
 
 class Checkpoints:

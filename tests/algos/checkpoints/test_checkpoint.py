@@ -7,10 +7,10 @@ import pytest
 import torch
 from fake_env import FakeEnv
 
+from veca_marl.algos.checkpoints.checkpoint_file import CheckpointError
+from veca_marl.algos.checkpoints.checkpoints import Checkpoints
+from veca_marl.algos.checkpoints.identity import Identity
 from veca_marl.algos.specs import team_specs
-from veca_marl.algos.training.checkpoint import Checkpoints
-from veca_marl.algos.training.checkpoint_file import CheckpointError
-from veca_marl.algos.training.checkpoint_identity import Identity
 
 CPU = torch.device("cpu")
 
