@@ -66,20 +66,38 @@ def make_trainer(cfg: Config, folder: RunFolder | None = None) -> Trainer:
         CheckpointError: If a run to continue or to load from does not fit.
     """
     _check_loggers(cfg)
+    device = _prepare_torch(cfg)
+    specs = read_specs(cfg.game)
+    learners = make_learners(cfg, specs, device)
+    _log_storage(learners)
+    checkpoints = _make_checkpoints(cfg, folder, specs)
+    trainer = _assemble(cfg, learners, checkpoints)
+    if cfg.self_play.teams:
+        trainer.matchmaking = _self_play(cfg, folder, learners)
+    # a run that was killed before its first checkpoint starts from the beginning
+    if cfg.resume is not None and not checkpoints.empty:
+        trainer.resume(checkpoints.latest())
+        _warn_of_idle_rest(trainer)
+    else:
+        _check_budget(trainer)
+    return trainer
+
+
+def _prepare_torch(cfg: Config) -> torch.device:
+    """Set up memory, threads and seed of the process; return the device."""
     device = find_device(cfg.device)
     keep_freed_memory()
     if cfg.threads is not None:
         torch.set_num_threads(cfg.threads)
     torch.manual_seed(cfg.seed)
-    specs = read_specs(cfg.game)
-    learners = make_learners(cfg, specs, device)
-    _log_storage(learners)
-    checkpoints = _make_checkpoints(cfg, folder, specs)
-    # a run that was killed before its first checkpoint starts from the beginning
-    continued = cfg.resume is not None and not checkpoints.empty
-    if not continued:
+    return device
+
+
+def _assemble(cfg: Config, learners: TeamLearners, checkpoints: Checkpoints) -> Trainer:
+    """Return the trainer; of a new run, with the parameters that it takes from other runs."""
+    if cfg.resume is None or checkpoints.empty:
         init_teams(learners, cfg.init_from, cfg.init_encoders)
-    trainer = Trainer(
+    return Trainer(
         make_env=GameFactory(cfg.game, tuple(cfg.plugins)),
         learners=learners,
         collect=cfg.collect,
@@ -90,16 +108,12 @@ def make_trainer(cfg: Config, folder: RunFolder | None = None) -> Trainer:
         seed=cfg.seed,
         progress_bar=cfg.log.progress_bar,
     )
-    if cfg.self_play.teams:
-        if folder is None:
-            raise ConfigError("self_play.teams: past policies are stored in the folder of a run")
-        trainer.matchmaking = SelfPlay(cfg.self_play, learners, Pool(folder.pool), cfg.seed)
-    if continued:
-        trainer.resume(checkpoints.latest())
-        _warn_of_idle_rest(trainer)
-    else:
-        _check_budget(trainer)
-    return trainer
+
+
+def _self_play(cfg: Config, folder: RunFolder | None, learners: TeamLearners) -> SelfPlay:
+    if folder is None:
+        raise ConfigError("self_play.teams: past policies are stored in the folder of a run")
+    return SelfPlay(cfg.self_play, learners, Pool(folder.pool), cfg.seed)
 
 
 def _check_loggers(cfg: Config) -> None:

@@ -9,8 +9,8 @@ from torchrl.data import Bounded, Composite
 from veca_marl.algos.networks.encoders import (
     Convolutions,
     ImageEncoder,
-    Places,
     Pooling,
+    SpatialSoftmax,
     VectorEncoder,
     make_encoder,
     scale_of,
@@ -190,7 +190,7 @@ def test_invalid_sizes_raise_an_error(kwargs, message):
 def test_places_are_positions_of_activations():
     maps = torch.zeros(2, 3, 5, 9)
     maps[0, 0, 0, 8] = maps[0, 1, 4, 4] = 40.0
-    right, down, bright = Places(3)(maps).reshape(2, 3, 3).unbind(1)
+    right, down, bright = SpatialSoftmax(3)(maps).reshape(2, 3, 3).unbind(1)
     torch.testing.assert_close(right[0], torch.tensor([1.0, 0.0, 0.0]), atol=1e-5, rtol=0.0)
     torch.testing.assert_close(down[0], torch.tensor([-1.0, 1.0, 0.0]), atol=1e-5, rtol=0.0)
     torch.testing.assert_close(bright[0], torch.tensor([40.0, 40.0, 0.0]))

@@ -45,7 +45,7 @@ class Pooling(Enum):
     places = "places"
 
 
-class Places(nn.Module):
+class SpatialSoftmax(nn.Module):
     """Feature maps ``(N, C, H, W)`` to position and strength of their activation, ``(N, 3 C)``.
 
     Positions are in [-1, 1], to the right and down: means weighted by a softmax over the map, with
@@ -126,7 +126,7 @@ class ImageEncoder(nn.Module):
             )
             size_in = size_out
         places = pooling is Pooling.places
-        self.layers = nn.Sequential(*layers, Places(size_in) if places else nn.Flatten())
+        self.layers = nn.Sequential(*layers, SpatialSoftmax(size_in) if places else nn.Flatten())
         self.features = size_in * (3 if places else height * width)
 
     def forward(self, image: Tensor) -> Tensor:
