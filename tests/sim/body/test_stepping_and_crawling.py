@@ -5,6 +5,8 @@ import pytest
 from verbs import begin, do, seeing, toy
 from walking import ball, box, empty_world, wall
 
+from veca_marl.sim.body.proprioception import ProprioceptionCfg, ProprioceptionSense
+
 
 def platform(height_m=0.15, mass_kg=0.0):
     return box(
@@ -31,6 +33,49 @@ def test_a_walker_steps_onto_a_low_heavy_prop_and_off_over_its_edge(mass_kg):
     assert walker.position[0] > 1.0
     assert walker.position[2] == pytest.approx(standing_m, abs=0.025)  # the gait bobs
     assert world.prop("platform").position[0] == pytest.approx(0.6, abs=1e-3)
+
+
+def felt(world, walker, *verbs):
+    """Return greatest joint speed, head speed, head acceleration of the steps of some verbs."""
+    sense = ProprioceptionSense(ProprioceptionCfg(), walker, world)
+    rows = []
+    for verb in verbs:
+        done = do(world, walker, verb)
+        assert done or verb == "none"
+        vector = sense.read()["proprioception"]
+        speeds = vector[sense.parts["joint_velocities"]]
+        force = np.linalg.norm(vector[sense.parts["head_acceleration"]])
+        rows.append([np.abs(speeds).max(), np.linalg.norm(walker.head_motion()[0]), force])
+    return np.array(rows)
+
+
+@pytest.mark.parametrize(
+    "verbs", [["step_on", "none"], ["crawl", "none", "stand_up", "none"], ["grab", "release"]]
+)
+def test_a_change_of_posture_is_no_motion(verbs):
+    """The picture of the body changes at once: joints and head would have moved at 10 m/s."""
+    world = empty_world(platform(), toy(position=(0.5, 0.35, 0.05)))
+    walker = seeing(world, extra_verbs=["step_on", "crawl", "stand_up"])
+    begin(world)
+    seen = felt(world, walker, "none", *verbs)
+    np.testing.assert_allclose(seen[:, :2], 0.0, atol=1e-9)
+    np.testing.assert_allclose(seen[:, 2], 9.81, atol=1e-3)
+
+
+def test_walking_over_an_edge_is_no_fall_within_one_step():
+    world = empty_world(platform())
+    walker = seeing(world, extra_verbs=["step_on"])
+    begin(world)
+    assert do(world, walker, "step_on")
+    for _ in range(4):
+        do(world, walker, "none", forward=1.0)
+    heights_m, falling_mps = [walker.position[2]], []
+    for _ in range(8):
+        do(world, walker, "none", forward=1.0)
+        heights_m.append(walker.position[2])
+        falling_mps.append(-walker.head_motion()[0][2])
+    assert np.diff(heights_m).min() < -0.1, "it has walked over the edge"
+    assert max(falling_mps) < 0.5, "the gait moves the head by up to 0.4 m/s"
 
 
 @pytest.mark.parametrize("prop", [platform(0.3), platform(mass_kg=1.0)], ids=["high", "light"])

@@ -94,6 +94,40 @@ def test_things_at_rest_and_rolling_are_silent():
     world.close()
 
 
+def stacked(*masses_kg, lowest_m=0.0):
+    """Boxes of 0.2 m on each other, the first one lowest, all but it at rest."""
+    return [
+        PropCfg(
+            f"box_{number}",
+            PropShape.box,
+            [0.2, 0.2, 0.2],
+            (0.0, 0.0, 0.1 + 0.2 * number + (lowest_m if number else 0.0)),
+            mass_kg=mass_kg,
+            restitution=0.0,
+        )
+        for number, mass_kg in enumerate(masses_kg)
+    ]
+
+
+@pytest.mark.parametrize("masses_kg", [(1.0, 1.0, 1.0), (0.1, 1.0)])
+def test_stacks_at_rest_are_silent(masses_kg):
+    """The lowest box carries the weight of all others, and no velocity changes."""
+    for number in range(len(masses_kg)):
+        world = world_with(*stacked(*masses_kg))
+        world.freeze()
+        assert not emitted(world, f"box_{number}.impact", 40).any()
+        world.close()
+
+
+def test_a_heavy_box_that_falls_on_a_light_one_is_heard():
+    """The light one lies on the floor, so that its velocity hardly changes."""
+    world = world_with(*stacked(0.1, 1.0, lowest_m=0.2))
+    world.freeze()
+    for number in range(2):
+        assert emitted(world, f"box_{number}.impact", 20).any()
+    world.close()
+
+
 def test_without_the_option_there_are_no_sources():
     world = world_with(ball(0.5), present=False)
     assert not world.sound.sources

@@ -39,6 +39,12 @@ def test_a_call_has_its_level_and_begins_and_ends_in_silence(call):
     assert not samples.flags.writeable
 
 
+@pytest.mark.parametrize("pitch_hz", [80.0, 9_900.0, 10_500.0, 11_000.0])
+def test_a_call_of_any_possible_pitch_is_heard(pitch_hz):
+    samples = call_waveform(CallCfg(pitch_hz, pitch_hz), RATE)
+    assert np.sqrt(np.mean(samples.astype(float) ** 2)) == pytest.approx(0.1, rel=0.1)
+
+
 @pytest.mark.parametrize(
     "wrong",
     [

@@ -199,13 +199,30 @@ def test_a_looping_file_has_no_transient_at_its_seam(tmp_path, duration_s):
     assert np.abs(waveforms.load_wav(tmp_path / "constant.wav", RATE)).max() > 0.1
 
 
+@pytest.mark.parametrize("rate", [RATE, 44_100, 48_000, 16_000])
+def test_a_looping_tone_of_any_rate_continues_at_its_seam(tmp_path, rate):
+    """A second of whole periods, repeated, is the tone itself."""
+    tone = 0.5 * np.sin(2.0 * np.pi * 500.0 * np.arange(rate) / rate)
+    scipy.io.wavfile.write(tmp_path / "tone.wav", rate, tone.astype(np.float32))
+    loop = waveforms.load_wav(tmp_path / "tone.wav", RATE, loop=True)
+    phases = 2.0 * np.pi * 500.0 * np.arange(loop.size) / RATE
+    basis = np.stack([np.sin(phases), np.cos(phases)], axis=1)  # the high-pass shifts the phase
+    expected = basis @ np.linalg.lstsq(basis, loop.astype(float), rcond=None)[0]
+    assert np.abs(loop - expected).max() < 1e-3
+
+
+def test_levels_beyond_any_sound_are_refused():
+    with pytest.raises(ValueError, match=r"level must be finite and not negative, at most 1e\+06"):
+        Noise(1e39, RATE)
+
+
 def test_voice_filters_out_constant_pressure():
     voice = Voice(RATE)
     voice.say(np.ones(RATE))
     assert np.abs(voice.emit(RATE)[RATE // 4 :]).max() < 1e-6
 
 
-@pytest.mark.parametrize("bad", [np.ones((2, 100)), [np.nan], [np.inf, 0.0]])
+@pytest.mark.parametrize("bad", [np.ones((2, 100)), [np.nan], [np.inf, 0.0], [1e39]])
 def test_bad_waveforms_are_refused(bad):
     with pytest.raises(ValueError, match="waveform"):
         Voice(RATE).say(bad)

@@ -41,6 +41,14 @@ def coloured():
     return np.random.default_rng(0).integers(0, 256, (2, 200, 200, 3), np.uint8)
 
 
+def test_a_blur_much_wider_than_the_image_has_a_limit():
+    """Windows of OpenCV that grow with the blur took seconds, or did not end."""
+    images = np.random.default_rng(0).integers(0, 256, (2, 84, 84, 3), np.uint8)
+    wide, wider = (Blur(sigma_deg)(images, context_of()) for sigma_deg in (360.0, 1e9))
+    np.testing.assert_array_equal(wide, wider)
+    assert wide.std() < 0.25 * images.std()
+
+
 @pytest.mark.parametrize("filtered", [Grey(), Blur(0.5), Defocus(), InfantVision(2.0)])
 def test_filters_return_new_images_of_equal_shape_and_dtype(filtered):
     images = coloured()

@@ -75,6 +75,7 @@ def call_waveform(cfg: CallCfg, sample_rate_hz: int) -> Samples:
     phase = 2.0 * np.pi * np.cumsum(pitch_hz) / sample_rate_hz
     order = np.arange(1, _HARMONICS + 1)
     audible = order[:, None] * pitch_hz < 0.45 * sample_rate_hz
+    audible[0] = True  # the fundamental, which is below half of the rate
     voice = (np.sin(order[:, None] * phase) * audible * order[:, None] ** _TILT).sum(axis=0)
     voice *= cfg.level / max(float(np.sqrt(np.mean(voice**2))), 1e-12)
     edge_s = np.minimum(np.arange(n), np.arange(n)[::-1]) / sample_rate_hz

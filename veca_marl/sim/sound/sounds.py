@@ -15,6 +15,7 @@ from veca_marl.sim.sound.waveforms import (
     SAMPLE_RATE_HZ,
     Samples,
     check_level,
+    check_waveform,
     high_pass,
 )
 
@@ -58,11 +59,10 @@ class Clip:
         Raises:
             ValueError: If the waveform is empty, not finite or not one-dimensional.
         """
-        self.waveform = np.asarray(waveform, dtype=np.float32)
-        if self.waveform.ndim != 1 or self.waveform.size == 0:
-            raise ValueError(f"a waveform must be (n,), got {self.waveform.shape}")
-        if not np.isfinite(self.waveform).all():
-            raise ValueError("a waveform must be finite")
+        samples = check_waveform(waveform)
+        if samples.size == 0:
+            raise ValueError("a waveform must have samples")
+        self.waveform = samples.astype(np.float32)
         self.loop = loop
         self._position = 0
 
@@ -163,9 +163,7 @@ class Voice:
         Raises:
             ValueError: If it is not one-dimensional or not finite.
         """
-        samples = np.array(waveform, dtype=np.float64)
-        if samples.ndim != 1 or not np.isfinite(samples).all():
-            raise ValueError(f"a waveform must be (n,) finite numbers, got {samples.shape}")
+        samples = check_waveform(waveform)
         if samples.size:
             self._queue.append(samples)
 

@@ -17,11 +17,13 @@ from pathlib import Path
 import numpy as np
 import scipy.io.wavfile
 import scipy.signal
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from veca_marl.sim.geometry import Floats
 
 SAMPLE_RATE_HZ = 22_050
+LOUDEST = 1e6
+"""Greatest level and sample of a sound: beyond any, and far from the limits of float32."""
 """Sampling rate of all sound in a world."""
 
 HIGH_PASS_HZ = 80.0
@@ -89,9 +91,7 @@ def load_wav(
     mono = _full_scale(samples)
     if mono.ndim == 2:
         mono = mono.mean(axis=1)
-    common = math.gcd(rate, sample_rate_hz)
-    resampled = scipy.signal.resample_poly(mono, sample_rate_hz // common, rate // common)
-    filtered = _high_passed(resampled, sample_rate_hz, loop)
+    filtered = _high_passed(_resampled(mono, rate, sample_rate_hz, loop), sample_rate_hz, loop)
     if level is not None:
         rms = np.sqrt(np.mean(filtered**2))
         if rms == 0.0:
@@ -99,6 +99,19 @@ def load_wav(
         filtered = filtered * (check_level(level) / rms)
     waveform: Samples = filtered.astype(np.float32)
     return waveform
+
+
+def _resampled(samples: Floats, rate_hz: int, sample_rate_hz: int, loop: bool) -> Floats:
+    """Return samples at another rate; a loop is taken as periodic, other clips end in silence."""
+    if rate_hz == sample_rate_hz:
+        return samples
+    if loop:
+        number = max(1, round(samples.size * sample_rate_hz / rate_hz))
+        periodic: Floats = scipy.signal.resample(samples, number)
+        return periodic
+    common = math.gcd(rate_hz, sample_rate_hz)
+    clip: Floats = scipy.signal.resample_poly(samples, sample_rate_hz // common, rate_hz // common)
+    return clip
 
 
 def _high_passed(samples: Floats, sample_rate_hz: int, loop: bool) -> Floats:
@@ -129,10 +142,26 @@ def high_pass(sample_rate_hz: float) -> Floats:
 
 
 def check_level(level: float) -> float:
-    """Return the level, or raise `ValueError` if it is negative or not finite."""
-    if not (np.isfinite(level) and level >= 0.0):
-        raise ValueError(f"level must be finite and not negative, got {level}")
+    """Return the level, or raise `ValueError` if it is not in [0, 1e6]; see `LOUDEST`."""
+    if not 0.0 <= level <= LOUDEST:
+        raise ValueError(f"level must be finite and not negative, at most {LOUDEST:g}, got {level}")
     return level
+
+
+def check_waveform(waveform: ArrayLike) -> Floats:
+    """Return a copy of samples ``(n,)``.
+
+    Raises:
+        ValueError: If they have another shape, or a number is not finite or above `LOUDEST`.
+    """
+    samples = np.array(waveform, dtype=np.float64)
+    # false for numbers that are not finite
+    if samples.ndim != 1 or not (np.abs(samples) <= LOUDEST).all():
+        raise ValueError(
+            f"a waveform must be (n,) finite numbers of at most {LOUDEST:g}, got shape "
+            f"{samples.shape}"
+        )
+    return samples
 
 
 def check_pitch(frequency_hz: float, sample_rate_hz: float, name: str = "frequency_hz") -> int:

@@ -166,5 +166,9 @@ def _blend(
 
 
 def _gaussian(image: Images, sigma_pixels: float, out: Images) -> None:
-    """Blur one ``(H, W, 3)`` image; the border pixels are replicated beyond its edges."""
+    """Blur one ``(H, W, 3)`` image; the border pixels are replicated beyond its edges.
+
+    The deviation is at most the larger side: little is left to blur, and OpenCV's windows grow on.
+    """
+    sigma_pixels = min(sigma_pixels, float(max(image.shape[:2])))
     cv2.GaussianBlur(image, (0, 0), sigma_pixels, dst=out, borderType=cv2.BORDER_REPLICATE)

@@ -62,6 +62,7 @@ class Walker(Body):
         self.verb_choice = VerbChoice(cfg.verbs)
         mass_kg = sum(bone.mass_kg for bone in self._skeleton.bones)
         self._footsteps = Footsteps(name, mass_kg, world)
+        self._posed_on_m = 0.0  # height of the surface for which the bones are posed
         self.reset()
         walker_collisions(world).add(self)
 
@@ -87,7 +88,7 @@ class Walker(Body):
 
     @property
     def velocity(self) -> Floats:
-        """``(3,)`` m/s: mean velocity over the last agent step, after contacts."""
+        """``(3,)`` m/s: mean horizontal velocity over the last agent step, after contacts."""
         return self._motion.velocity.copy()
 
     @property
@@ -217,14 +218,17 @@ class Walker(Body):
         """
         if not self._handling.grab(prop):
             return False
-        self._pose_bones()
+        self._change_posture()
         self._handling.follow_palm(self.palms()[1])
         prop.teleport_sounds()
         return True
 
     def release(self) -> bool:
         """Release the held prop, which falls; return False if the hand is empty."""
-        return self._handling.release()
+        if not self._handling.release():
+            return False
+        self._change_posture()
+        return True
 
     def open(self, prop: Prop) -> bool:
         """Open a door, drawer or lid, as the verb `open` does, at any distance.
@@ -253,6 +257,8 @@ class Walker(Body):
         if not self.can_step_on(prop):
             return False
         self._motion.step_on(prop)
+        self._change_posture()
+        self._footsteps.teleport(self._surface)
         return True
 
     @property
@@ -278,11 +284,17 @@ class Walker(Body):
             raise RuntimeError(f"{self.name} cannot crawl: body.verbs={self.cfg.verbs}")
         if self.crawls or self.held is not None or self._stands_on_prop:
             return False
-        return self._motion.crawl()
+        if not self._motion.crawl():
+            return False
+        self._change_posture()
+        return True
 
     def stand_up(self) -> bool:
         """Stand up; return False, without effect, if it stands or there is no room above it."""
-        return self.crawls and self._motion.stand_up()
+        if not (self.crawls and self._motion.stand_up()):
+            return False
+        self._change_posture()
+        return True
 
     @property
     def applied_verb(self) -> Applied | None:
@@ -338,6 +350,7 @@ class Walker(Body):
         """Advance the gait, pose the bones and move the voice to the mouth."""
         motion, step_s = self._motion, self._world.clock.step_s
         motion.after_step()
+        self._step_down()
         self._gait.advance(float(motion.velocity @ self.forward), motion.turn_radps, step_s)
         pelvis, angles = self.position, self._angles.copy()
         self._pose_bones()
@@ -354,6 +367,19 @@ class Walker(Body):
         """The place ``(3,)`` on the floor or prop on which it stands, metres."""
         return np.array([*self._motion.ground, self._motion.footing.height_m])
 
+    def _change_posture(self) -> None:
+        """Pose the bones at once: a change of posture takes no time, and is no motion."""
+        self._pose_bones()
+        self._mouth.teleport(self.mount("mouth").position)
+
+    def _step_down(self) -> None:
+        """Lower the bones at once if it walked over an edge in this step, which is no motion."""
+        drop_m = self._posed_on_m - self._motion.footing.height_m
+        if drop_m != 0.0:
+            self._drawn.positions[:, 2] -= drop_m
+            self._mouth.teleport(self.mount("mouth").position)
+            self._footsteps.teleport(self._surface)
+
     def _pose_bones(self) -> None:
         """Compute joint angles and bone poses of the present position."""
         motion = self._motion
@@ -361,3 +387,4 @@ class Walker(Body):
         self._angles[:] = self._bone_poses.write(
             motion.stance, motion.ground, motion.yaw_rad, surface_m
         )
+        self._posed_on_m = surface_m

@@ -13,8 +13,9 @@ class ImpactCfg:
     Attributes:
         present: Whether things that hit each other or the floor, and steps of walkers, are heard.
         gain_per_ns: Sound pressure at 1 m per newton second of impulse.
-        min_speed_mps: Change of speed of the lighter thing in one physics step, and landing speed
-            of a foot, below which a contact is silent.
+        min_speed_mps: Change of speed in one physics step, and landing speed of a foot, below which
+            a contact is silent: that of the lighter thing by the impulse of the contact, and that
+            of one of both by everything.
     """
 
     present: bool = False

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 
+from veca_marl.sim.geometry import Floats
 from veca_marl.sim.physics.bullet import pybullet
 from veca_marl.sim.physics.clock import ClockCfg
 from veca_marl.sim.physics.impacts.cfg import ImpactCfg
@@ -29,7 +30,9 @@ class ImpactSounds:
     """Strikes the movable props of a world when the impulse of a contact rises.
 
     An impulse that stays the same from one physics step to the next is that of a thing at rest or
-    rolling: it is silent. Fixed props, the floor and bodies do not sound.
+    rolling: it is silent. So is one that changes the velocity of neither thing, such as the weight
+    of what has been put on a thing. Fixed props, the floor and bodies do not sound, and nothing
+    sounds in the first physics step after a reset.
     """
 
     def __init__(self, cfg: ImpactCfg, clock: ClockCfg, client: int, sound: SoundField) -> None:
@@ -41,6 +44,7 @@ class ImpactSounds:
         self._props: dict[int, Prop] = {}
         self._struck: dict[int, StruckBody] = {}
         self._impulses: dict[tuple[int, int], float] = {}
+        self._velocities: dict[int, Floats] = {}
         self._substep = 0
 
     def add(self, prop: Prop) -> None:
@@ -54,15 +58,17 @@ class ImpactSounds:
     def reset(self) -> None:
         """Forget the contacts of the last physics step."""
         self._impulses.clear()
+        self._velocities.clear()
         self._substep = 0
 
     def after_substep(self) -> None:
         """Compare the impulses of all contacts with those of the last physics step."""
-        impulses = self._contact_impulses()
+        impulses, before = self._contact_impulses(), self._velocities
+        self._velocities = {body: prop.velocity for body, prop in self._props.items()}
         delay = int(self._substep * self._samples_per_substep)
         for pair, impulse in impulses.items():
             rise = impulse - self._impulses.get(pair, 0.0)
-            if rise > self._threshold_ns(pair):
+            if rise > self._threshold_ns(pair) and self._was_hit(pair, before):
                 self._strike(pair, rise, delay)
         self._impulses = impulses
         self._substep = (self._substep + 1) % self._clock.substeps
@@ -82,8 +88,20 @@ class ImpactSounds:
         The weight of a thing that is put down counts as no impact.
         """
         masses = [self._props[body].cfg.mass_kg for body in pair if body in self._props]
-        weight = _GRAVITY_MPS2 * self._clock.substep_s
-        return min(masses) * (self._cfg.min_speed_mps + weight)
+        return min(masses) * self._least_change_mps
+
+    def _was_hit(self, pair: Iterable[int], before: dict[int, Floats]) -> bool:
+        """Return whether the velocity of one of two bodies changed by more than by its weight."""
+        return any(
+            math.hypot(*(self._velocities[body] - before[body])) > self._least_change_mps
+            for body in pair
+            if body in before
+        )
+
+    @property
+    def _least_change_mps(self) -> float:
+        """The change of speed of an impact, beside that by the weight of a thing."""
+        return self._cfg.min_speed_mps + _GRAVITY_MPS2 * self._clock.substep_s
 
     def _strike(self, pair: Iterable[int], impulse_ns: float, delay_samples: int) -> None:
         for body in pair:
