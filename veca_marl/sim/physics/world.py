@@ -168,7 +168,11 @@ class World:
             mover.reset()
 
     def refresh(self) -> None:
-        """Show what was placed by hand: update the scene, and emit one step of sound."""
+        """Show what was placed by hand: update the scene, and emit one step of sound.
+
+        It is for the start of an episode: to the velocities and accelerations that bodies sense,
+        it is a step in which they stand still.
+        """
         self._update_scene()
         self.sound.advance()
         self.version += 1
