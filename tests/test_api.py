@@ -78,6 +78,23 @@ def close_of_closed():
             r"overrides=\[3\] must be a list of",
         ),
         (
+            lambda: veca_marl.make("KickTheBall", overrides=["task=MazeNav"]),
+            "overrides: 'task=MazeNav' chooses another task; give it as the argument `task`",
+        ),
+        (
+            lambda: veca_marl.train("KickTheBall", overrides=["seed=3"]),
+            "overrides: 'seed=3' is chosen by the argument `seed`",
+        ),
+        (
+            lambda: veca_marl.train("KickTheBall", overrides=["hydra.run.dir=x"]),
+            "overrides: 'hydra.run.dir=x' is chosen by the argument `folder`",
+        ),
+        (
+            lambda: veca_marl.train("KickTheBall", total_frames=9, overrides=["total_frames=8"]),
+            "overrides: 'total_frames=8' is chosen by the argument `total_frames`",
+        ),
+        (lambda: veca_marl.check_task("KickTheBall", checks=5), "checks=5 must be a CheckCfg"),
+        (
             lambda: veca_marl.make("KickTheBall", overrides=["seed=3"]),
             "overrides: 'seed=3' is not of the game; give the seed as the argument `seed`",
         ),

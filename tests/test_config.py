@@ -7,6 +7,7 @@ from hydra.core.hydra_config import HydraConfig
 from omegaconf import OmegaConf
 
 from veca_marl.config import Config, ConfigError, compose, compose_node, conf_dir
+from veca_marl.config.compose import _job_folder
 from veca_marl.envs.core.task import TASKS
 from veca_marl.sim.body.humanoid import Detail, HumanoidCfg
 from veca_marl.sim.body.humanoid import JointActionKind as Act
@@ -196,3 +197,25 @@ def test_a_body_takes_its_own_numbers_alone():
         compose(["+task=ObjectNav", "body=mitten", "body.walk_speed_mps=0.5"])
     with pytest.raises(ConfigError, match=r"body\.detail|Detail"):
         compose(["+task=ObjectNav", "body=full", "body.detail=stick"])
+
+
+@pytest.mark.parametrize(
+    "words",
+    [["+task=null"], [KICK, "senses/vision=null"], [KICK, "playground=[1]"], [KICK, "body=3"]],
+)
+def test_a_group_without_the_name_of_a_preset_is_refused(words):
+    with pytest.raises(ConfigError, match=r"must be the name of a preset; choices: \w+, \w+"):
+        compose(words)
+
+
+def test_long_names_of_runs_are_shortened_and_stay_apart():
+    """File systems take 255 bytes."""
+    long = ",".join(f"algo.part_{number}=0.{number}" for number in range(40))
+    folders = [_job_folder(None, text, 3) for text in (long, long, f"{long}1", "a=\u00e9" * 90)]
+    for folder in folders:
+        name, seed = folder.split("/")
+        assert len(name.encode()) <= 200
+        assert seed == "seed_3"
+    assert folders[0] == folders[1]
+    assert len(set(folders)) == 3
+    assert _job_folder(None, "+task=A,algo/x=1", 0) == "task=A,algo.x=1/seed_0"

@@ -16,6 +16,7 @@ from veca_marl.api_arguments import (
     check_list,
     check_name,
     check_presets,
+    check_run_overrides,
     check_scripted,
 )
 from veca_marl.checks import CheckCfg, TaskReport, check_game
@@ -207,6 +208,7 @@ def train(
         if total_frames is not None:
             chosen.append(f"total_frames={as_integer('total_frames', total_frames)}")
         check_list("overrides", overrides, '["algo=mappo"]')
+        check_run_overrides(overrides, total_frames)
         chosen += [f"seed={as_integer('seed', seed)}", *overrides]
         node = compose_node(chosen)
         if node.resume is not None:
@@ -265,7 +267,9 @@ def check_task(
     cfg = choose(
         name, playground=playground, body=body, senses=senses, overrides=overrides, plugins=plugins
     )
-    return check_game(cfg, CheckCfg() if checks is None else checks)
+    if checks is not None and not isinstance(checks, CheckCfg):
+        raise ConfigError(f"checks={checks!r} must be a CheckCfg, or None")
+    return check_game(cfg, checks or CheckCfg())
 
 
 def choose(

@@ -50,6 +50,11 @@ def check_game_overrides(overrides: Sequence[str]) -> None:
     """
     for override in parse(overrides):
         root = root_of(override)
+        if override.key_or_group == "task":
+            raise ConfigError(
+                f"overrides: {override.input_line!r} chooses another task; give it as the argument "
+                "`task`"
+            )
         if root == "seed":
             raise ConfigError(
                 f"overrides: {override.input_line!r} is not of the game; give the seed as the "
@@ -59,6 +64,28 @@ def check_game_overrides(overrides: Sequence[str]) -> None:
             raise ConfigError(
                 f"overrides: {override.input_line!r} is not of the game; "
                 f"choices: {', '.join(sorted(_ROOTS_OF_GAMES))}"
+            )
+
+
+def check_run_overrides(overrides: Sequence[str], total_frames: Any) -> None:
+    """Check that no override is of an argument of `train`, or of Hydra.
+
+    Args:
+        overrides: The overrides.
+        total_frames: The argument; None if it was not given.
+
+    Raises:
+        ConfigError: If one is.
+    """
+    given = {"task": "task", "seed": "seed", "hydra": "folder"}
+    if total_frames is not None:
+        given["total_frames"] = "total_frames"
+    for override in parse(overrides):
+        key = override.key_or_group
+        argument = given.get("hydra" if key.partition(".")[0] == "hydra" else key)
+        if argument is not None:
+            raise ConfigError(
+                f"overrides: {override.input_line!r} is chosen by the argument `{argument}`"
             )
 
 

@@ -9,6 +9,7 @@ Overrides that the runs were started with are repeated: ``total_frames=1e5``.
 from __future__ import annotations
 
 import math
+import shlex
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -160,7 +161,7 @@ def _nothing_evaluated(experiment: ExperimentCfg, found: Sequence[Found]) -> Con
 
 def run(options: ReportOptions, overrides: list[str]) -> None:
     """Write the report; print the verdict, what is missing, and where the files are."""
-    command = f"python -m veca_marl.train -m {' '.join(overrides)}"
+    command = shlex.join(["python", "-m", "veca_marl.train", "-m", *overrides])
     report, folder = make_report(options, compose_arms(overrides), command)
     for text, judgement in report.judgements.items():
         print(f"{text}: {judgement.verdict.value}: {judgement.reason}")
@@ -170,9 +171,11 @@ def run(options: ReportOptions, overrides: list[str]) -> None:
 
 def main(words: Sequence[str] | None = None) -> int:
     """Run the command line; return the exit status."""
-    return CommandLine(
-        "report", ReportOptions, str(__doc__), (ValueError, OSError, WriteError)
-    ).run(run, words)
+    errors = (ValueError, OSError, WriteError)
+    places = ("experiment", "runs", "results", "to")
+    return CommandLine("report", ReportOptions, str(__doc__), errors, ("to",), places).run(
+        run, words
+    )
 
 
 if __name__ == "__main__":

@@ -175,7 +175,9 @@ def run(options: TournamentOptions, overrides: list[str]) -> None:
 def main(words: Sequence[str] | None = None) -> int:
     """Run the command line; return the exit status."""
     errors = (CheckpointError, WriteError, ModuleNotFoundError)
-    return CommandLine("tournament", TournamentOptions, str(__doc__), errors).run(run, words)
+    return CommandLine("tournament", TournamentOptions, str(__doc__), errors, places=("run",)).run(
+        run, words
+    )
 
 
 if __name__ == "__main__":

@@ -19,6 +19,7 @@ from hydra.types import HydraContext, TaskFunction
 from omegaconf import DictConfig, OmegaConf, open_dict
 
 from veca_marl.runs.cores import usable_cores
+from veca_marl.sweeps.body_kinds import former_kinds, with_body_kinds
 from veca_marl.sweeps.former import former_values
 from veca_marl.sweeps.plans import Job, SweepError
 from veca_marl.sweeps.sweep import run_sweep
@@ -112,6 +113,9 @@ class ProcessLauncher(Launcher):
         return runs_at_once({job.name: to_config(self._nodes[job.folder]) for job in jobs})
 
     def _job(self, overrides: list[str], number: int) -> Job:
+        # here, and not above: it imports the simulator, which `train` has loaded
+        from veca_marl.config.stored import body_names
+
         config = self._context.config_loader.load_sweep_config(self._config, overrides)
         with open_dict(config):
             config.hydra.job.id = config.hydra.job.num = number
@@ -127,7 +131,8 @@ class ProcessLauncher(Launcher):
             del config["hydra"]
         asked = yaml.safe_load(OmegaConf.to_yaml(config, resolve=True))
         self._nodes[sweep / name] = config
-        former = former_values(config)
+        kinds = body_names(config)
+        asked, former = with_body_kinds(asked, kinds), former_values(config) | former_kinds(kinds)
         return Job(name, sweep / name, [*shared, *overrides], asked, former)
 
 

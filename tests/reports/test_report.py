@@ -2,11 +2,12 @@
 
 import copy
 import csv
+import shlex
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from small_experiment import write_all
+from small_experiment import EXPERIMENT, write_all
 from stored_runs import write_run
 
 from veca_marl import report
@@ -165,6 +166,9 @@ def test_a_half_written_last_row_is_left_out(tmp_path, arms):
         (["expert_episodes=x"], "could not be converted to Integer"),
         (["expert_episodes=-1"], "expert_episodes must be 0 or more, got -1"),
         (["runs=a", "results=b"], "runs and results: choose one of both"),
+        (["-m", "experiment.metric=return,length"], "would write to one folder"),
+        (["-m", "experiment.metric=return,length", "to=x"], "to=x would be written by 2"),
+        (["-m", "seed=glob(*)"], "seed=glob(*): glob is for train; list the values here"),
     ],
 )
 def test_wrong_words_end_in_one_line(run, words, message):
@@ -186,8 +190,9 @@ def test_the_metric_and_the_team_must_exist():
     with pytest.raises(ValueError, match=r"experiment.team=None: choices: blue, red"):
         team_of([*rows, {**rows[0], "team": "blue"}], None)
     assert team_of([*rows, {**rows[0], "team": "blue"}], None, {"blue": "runs/other"}) == "red"
-    with pytest.raises(ValueError, match=r"experiment.metric=goals: choices: team, player, arm"):
-        runs_of(rows, "goals", "red", {})
+    for metric in ("goals", "player"):
+        with pytest.raises(ValueError, match=rf"experiment.metric={metric}: choices: return$"):
+            runs_of(rows, metric, "red", {})
 
 
 def test_without_matplotlib_the_extra_is_named(tmp_path, run, monkeypatch):
@@ -310,3 +315,13 @@ def test_a_table_that_cannot_be_rewritten_keeps_its_rows(tmp_path, monkeypatch):
     with pytest.raises(WriteError, match="the disk is gone"):
         write_rows(path, [{"arm": "b"}])
     assert path.read_text() == "arm\na\n"
+
+
+def test_the_command_of_a_report_is_that_of_a_shell(tmp_path, arms, run):
+    write_all(tmp_path, arms)
+    words = ['experiment.claim="a; b"', f"runs={tmp_path}"]
+    assert run(*words)[0] == 0
+    text = (tmp_path / "report.md").read_text()
+    command = text.rpartition("Command: `")[2].partition("`")[0]
+    expected = ["python", "-m", "veca_marl.train", "-m", *EXPERIMENT, words[0]]
+    assert shlex.split(command) == expected

@@ -1,9 +1,13 @@
 """What a sweep does for a run, by what lies in its folder."""
 
+import json
+from dataclasses import replace
+
 import pytest
 from hydra.core.override_parser.overrides_parser import OverridesParser
 from stored_runs import write_run
 
+from veca_marl.sweeps.body_kinds import former_kinds, with_body_kinds
 from veca_marl.sweeps.cores import cores_of, default_jobs
 from veca_marl.sweeps.differences import differences
 from veca_marl.sweeps.plans import Action, Job, SweepError, plan
@@ -136,3 +140,21 @@ def test_runs_at_a_time_fill_the_cores():
     assert default_jobs([CONFIG] * 9, 16) == 8
     assert default_jobs([small] * 9, 16) == 9
     assert default_jobs([CONFIG, small], 1) == 1
+
+
+@pytest.mark.parametrize("team", [None, "red"])
+def test_a_run_of_another_kind_of_body_is_refused(tmp_path, team):
+    """Two kinds may have the same numbers: a run stores the names of its kinds beside them."""
+    path = "body" if team is None else "team.red.body"
+    config = CONFIG | {"body": {"height_m": 1.0}, "team": {"red": {"body": {"height_m": 1.0}}}}
+    folder = tmp_path / "run"
+    write_run(folder, config, [(100, 1.0), (200, 2.0)])
+    asked = job(folder, **with_body_kinds({**config}, {path: "other"}))
+    asked = replace(asked, former=former_kinds({path: "other"}))
+    assert plan(asked).action is Action.skip, "an early run, which has not stored its kinds"
+    (folder / "provenance.json").write_text(json.dumps({"bodies": {path: "walker"}}))
+    message = rf"{path}.registered_name is walker in the run, other is asked for"
+    with pytest.raises(SweepError, match=message):
+        plan(asked)
+    (folder / "provenance.json").write_text(json.dumps({"bodies": {path: "other"}}))
+    assert plan(asked).action is Action.skip

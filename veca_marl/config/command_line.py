@@ -13,7 +13,7 @@ from dataclasses import dataclass, fields
 from itertools import product
 from typing import Any, Generic, TypeVar, cast
 
-from hydra.core.override_parser.types import Override
+from hydra.core.override_parser.types import Glob, Override
 from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
@@ -39,6 +39,8 @@ class CommandLine(Generic[Options]):
         description: What the command does; printed by ``--help``.
         errors: Errors, beside `ConfigError`, that end in one line.
         outputs: Keys of the options that name what a run of the command writes.
+        places: Keys that decide where it writes if no output is named: combinations have to differ
+            in one of them. None if it writes nothing then.
     """
 
     command: str
@@ -46,6 +48,7 @@ class CommandLine(Generic[Options]):
     description: str
     errors: tuple[type[Exception], ...] = ()
     outputs: tuple[str, ...] = ()
+    places: tuple[str, ...] | None = None
 
     def run(
         self, call: Callable[[Options, list[str]], None], words: Sequence[str] | None = None
@@ -108,6 +111,17 @@ class CommandLine(Generic[Options]):
                 f"give each its own: {twice[0].partition('=')[0]}=A,B,..., or start the command "
                 "once for each"
             )
+        if self.places is None:
+            return
+        chosen = [
+            tuple(sorted(text for text in combination if _key(text) in self.places))
+            for combination in combinations
+        ]
+        if len(set(chosen)) < len(chosen):
+            raise ConfigError(
+                f"several combinations of values would write to one folder; let them differ in "
+                f"{' or '.join(self.places)}, or start the command once for each"
+            )
 
     @property
     def _names(self) -> list[str]:
@@ -143,6 +157,11 @@ class CommandLine(Generic[Options]):
         )
 
 
+def _key(text: str) -> str:
+    """Return the key of an override, or its group."""
+    return text.lstrip("+~").partition("=")[0]
+
+
 def _root(text: str) -> str:
     """Return the first part of the key of an override, or its group."""
     return text.lstrip("+~").partition("=")[0].partition("@")[0].partition(".")[0]
@@ -160,5 +179,7 @@ def _combinations(overrides: list[Override], multirun: bool) -> list[list[str]]:
 def _alternatives(override: Override) -> list[str]:
     if not override.is_sweep_override():
         return [str(override.input_line)]
+    if isinstance(override.value(), Glob):
+        raise ConfigError(f"{override.input_line}: glob is for train; list the values here")
     key = override.get_key_element()
     return [f"{key}={value}" for value in override.sweep_string_iterator()]

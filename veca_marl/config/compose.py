@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import fields, is_dataclass
@@ -21,11 +22,14 @@ from veca_marl.conf_dir import conf_dir
 from veca_marl.config.errors import ConfigError, one_line
 from veca_marl.config.lengths import check_lengths
 from veca_marl.config.overrides import plugins_in, with_integers
+from veca_marl.config.presets import check_presets
 from veca_marl.config.root import Config
 from veca_marl.config.schemas import register_schemas, store_tasks_without_file
 from veca_marl.config.search_path import check_configuration_files, register_search_path
 from veca_marl.envs.core.task import TASKS, find_task
 from veca_marl.plugins import PluginError, load_plugins
+
+_LONGEST_NAME = 200  # bytes; Linux allows 255
 
 
 def compose(overrides: Sequence[str] = ()) -> Config:
@@ -64,9 +68,10 @@ def prepare(overrides: Sequence[str]) -> list[str]:
         The overrides, with integral numbers in exponent notation (1e6) written as integers.
 
     Raises:
-        ConfigError: If a plug-in cannot be loaded.
+        ConfigError: If a plug-in cannot be loaded, or a group has another value than a name.
     """
     load_config_plugins(plugins_in(overrides))
+    check_presets(overrides)
     return with_integers(overrides)
 
 
@@ -170,7 +175,16 @@ def _job_folder(arm: str | None, overrides: str, seed: int) -> str:
         seed: Seed of the run.
     """
     name = arm or overrides.replace("/", ".").replace("+", "") or "default"
-    return f"{name}/seed_{seed}"
+    return f"{_short(name)}/seed_{seed}"
+
+
+def _short(name: str) -> str:
+    """Return a name that file systems take: long ones end in a digest, the same every time."""
+    content = name.encode()
+    if len(content) <= _LONGEST_NAME:
+        return name
+    digest = hashlib.sha256(content).hexdigest()[:12]
+    return f"{content[: _LONGEST_NAME - 13].decode(errors='ignore')}-{digest}"
 
 
 register_schemas()

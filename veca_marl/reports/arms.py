@@ -10,7 +10,9 @@ import yaml
 from omegaconf import OmegaConf
 
 from veca_marl.config import Config, ConfigError, compose_node, to_config
+from veca_marl.config.stored import body_names
 from veca_marl.reports.budget import FrameBudget
+from veca_marl.sweeps.body_kinds import former_kinds, with_body_kinds
 from veca_marl.sweeps.former import former_values
 
 
@@ -21,7 +23,7 @@ class Arm:
     Attributes:
         name: Its name.
         cfg: Its configuration.
-        plain: The same as stored with a run.
+        plain: The same as stored with a run, with the kinds of bodies (`with_body_kinds`).
         former: Values of keys that a stored run may be too old to have, see `former_values`.
     """
 
@@ -52,5 +54,7 @@ def compose_arms(overrides: Sequence[str]) -> list[Arm]:
 
 def _compose_arm(overrides: Sequence[str], name: str, own: Sequence[str]) -> Arm:
     node = compose_node([*overrides, f"experiment.arm={name}", *own])
-    plain = yaml.safe_load(OmegaConf.to_yaml(node, resolve=True))
-    return Arm(name, to_config(node), cast(dict[str, Any], plain), former_values(node))
+    plain = cast(dict[str, Any], yaml.safe_load(OmegaConf.to_yaml(node, resolve=True)))
+    kinds = body_names(node)
+    former = former_values(node) | former_kinds(kinds)
+    return Arm(name, to_config(node), with_body_kinds(plain, kinds), former)

@@ -16,6 +16,8 @@ from veca_marl.reports.statistics import Interval, Scores
 NEVER = 1e18
 """Frames to a threshold that a run has not reached; finite, so that differences are defined."""
 
+_LABELS = ("arm", "seed", "state", "player", "team")  # columns that are no measurements
+
 
 @dataclass(frozen=True)
 class Point:
@@ -91,11 +93,16 @@ def runs_of(
     own: dict[tuple[str, int], list[Mapping[str, str]]] = {}
     for row in rows:
         if row["team"] == team and row["player"] in ("policy", "random"):
-            if metric not in row:
-                raise ValueError(f"experiment.metric={metric}: choices: {', '.join(row)}")
+            if metric not in row or metric in _LABELS:
+                raise _no_metric(metric, row)
             own.setdefault((row["arm"], int(row["seed"])), []).append(row)
     made = [_run(arm, seed, mine, metric, budgets[arm]) for (arm, seed), mine in own.items()]
     return [run for run in made if run.points]
+
+
+def _no_metric(metric: str, row: Mapping[str, str]) -> ValueError:
+    choices = [name for name in row if name not in _LABELS]
+    return ValueError(f"experiment.metric={metric}: choices: {', '.join(choices)}")
 
 
 def _run(

@@ -11,6 +11,7 @@ from typing import Any
 import yaml
 
 from veca_marl.runs.run_progress import RunProgress, read_progress
+from veca_marl.sweeps.body_kinds import stored_kinds, with_body_kinds
 
 
 class RunState(Enum):
@@ -35,7 +36,8 @@ class StoredRun:
 
     Attributes:
         folder: Its folder.
-        config: Its configuration as plain data; None if there is no run.
+        config: Its configuration as plain data, with the kinds of bodies (`with_body_kinds`); None
+            if there is no run.
         stored_progress: Content of its ``progress.json``; None without one.
     """
 
@@ -95,4 +97,5 @@ def read_run(folder: Path) -> StoredRun:
         raise ValueError(f"{path} cannot be read: {' '.join(str(error).split())}") from error
     if not isinstance(config, dict):
         raise ValueError(f"{path} holds no configuration")
-    return StoredRun(folder, config, read_progress(folder))
+    marked = with_body_kinds(config, stored_kinds(folder / "provenance.json"))
+    return StoredRun(folder, marked, read_progress(folder))

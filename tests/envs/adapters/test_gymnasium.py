@@ -51,6 +51,19 @@ def test_a_picture_shows_the_eyes_and_the_room():
     env.close()
 
 
+@pytest.mark.parametrize("options", [{"episode": -1}, {"episode": "x"}, 5])
+def test_a_refused_reset_leaves_the_episodes_as_they_are(options):
+    refused, other = gym_env("KickTheBall", **CHEAP), gym_env("KickTheBall", **CHEAP)
+    for env in (refused, other):
+        env.reset(seed=3)
+    with pytest.raises(ValueError, match="episode"):
+        refused.reset(seed=9, options=options)
+    found, expected = refused.reset()[0], other.reset()[0]
+    np.testing.assert_array_equal(found["audio"], expected["audio"])
+    refused.close()
+    other.close()
+
+
 def test_there_is_no_step_without_an_episode(env):
     with pytest.raises(RuntimeError, match=r"reset\(\) before step"):
         env.unwrapped.step(np.zeros(2, np.float32))

@@ -104,10 +104,13 @@ class SeededGame:
             ValueError: If the seed or the number is negative.
         """
         refuse_closed(self._closed)
-        if seed is not None:
-            self._episodes = Episodes(seed)
-        self.rng = self._episodes.next((options or {}).get("episode"))
-        self.game.reset(self.rng)
+        if options is not None and not isinstance(options, Mapping):
+            raise ValueError(f"options={options!r} must be a mapping, such as {{'episode': 3}}")
+        # a refused number leaves the episodes as they are
+        episodes = self._episodes if seed is None else Episodes(seed)
+        rng = episodes.next((options or {}).get("episode"))
+        self._episodes, self.rng = episodes, rng
+        self.game.reset(rng)
         self._running = True
         return self._observe(self.names)
 
