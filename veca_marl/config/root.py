@@ -177,5 +177,5 @@ def _check_opponent(team: str, player: str) -> None:
     if player not in _SCRIPTS and not Path(player).exists():
         raise ValueError(
             f"opponent.{team}={player}: choices: {', '.join(_SCRIPTS)}, the folder of a run, "
-            "a checkpoint"
+            f"a checkpoint (a path that begins in {Path.cwd()}, or an absolute one)"
         )
