@@ -159,7 +159,7 @@ def test_a_team_without_players_is_refused(monkeypatch):
 
 def test_a_task_that_would_eliminate_nobody_is_refused(monkeypatch):
     monkeypatch.setattr(find_task("KickTheBall"), "is_eliminated", lambda *_: True)
-    with pytest.raises(ValueError, match="is_eliminated, but has eliminates=False: nobody"):
+    with pytest.raises(ValueError, match="is_eliminated, but has eliminates=False: no player"):
         Game(cfg_of())
 
 
