@@ -23,7 +23,7 @@ from veca_marl.sim.geometry import Floats
 
 SAMPLE_RATE_HZ = 22_050
 LOUDEST = 1e6
-"""Greatest level and sample of a sound: beyond any, and far from the limits of float32."""
+"""Greatest level and sample of a sound, beyond any and far from the limits of float32."""
 """Sampling rate of all sound in a world."""
 
 HIGH_PASS_HZ = 80.0
