@@ -18,6 +18,7 @@ from veca_marl.train import stored_node
 
 FRAMES = 8
 CHOICES = [
+    "algo.minibatches=2",
     "collect=one_process",
     "collect.worlds=1",
     "collect.steps=4",
