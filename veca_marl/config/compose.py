@@ -22,7 +22,7 @@ from veca_marl.conf_dir import conf_dir
 from veca_marl.config.errors import ConfigError, one_line
 from veca_marl.config.lengths import check_lengths
 from veca_marl.config.overrides import plugins_in, with_integers
-from veca_marl.config.presets import check_presets
+from veca_marl.config.presets import check_group_values
 from veca_marl.config.root import Config
 from veca_marl.config.schemas import register_schemas, store_tasks_without_file
 from veca_marl.config.search_path import check_configuration_files, register_search_path
@@ -71,7 +71,7 @@ def prepare(overrides: Sequence[str]) -> list[str]:
         ConfigError: If a plug-in cannot be loaded, or a group has another value than a name.
     """
     load_config_plugins(plugins_in(overrides))
-    check_presets(overrides)
+    check_group_values(overrides)
     return with_integers(overrides)
 
 

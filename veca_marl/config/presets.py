@@ -9,7 +9,7 @@ from veca_marl.config.overrides import parse
 from veca_marl.config.search_path import conf_dirs
 
 
-def check_presets(words: Sequence[str]) -> None:
+def check_group_values(words: Sequence[str]) -> None:
     """Check that overrides of groups, such as ``senses/vision``, give the name of a preset.
 
     Hydra answers another value with an error of its own code.

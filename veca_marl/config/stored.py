@@ -15,7 +15,7 @@ from veca_marl.algos.networks.factory import NETWORKS
 from veca_marl.config.compose import compose_node, load_config_plugins
 from veca_marl.config.errors import ConfigError, one_line
 from veca_marl.config.overrides import parse, with_integers
-from veca_marl.config.presets import check_presets
+from veca_marl.config.presets import check_group_values
 from veca_marl.config.schemas import body_types, root_schema
 from veca_marl.config.search_path import conf_dirs
 from veca_marl.envs.core.task import find_task
@@ -119,7 +119,7 @@ def change(node: DictConfig, overrides: Sequence[str], allowed: Sequence[str] = 
         if path[0] == "team" and len(path) > 1 and path[1] not in node.team:
             node.team[path[1]] = OmegaConf.structured(TeamCfg)
         try:
-            check_presets([str(override.input_line)])
+            check_group_values([str(override.input_line)])
             _apply(node, override)
         except OmegaConfBaseException as error:
             raise ConfigError(one_line(error)) from error

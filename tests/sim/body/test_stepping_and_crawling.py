@@ -78,6 +78,20 @@ def test_walking_over_an_edge_is_no_fall_within_one_step():
     assert max(falling_mps) < 0.5, "the gait moves the head by up to 0.4 m/s"
 
 
+def test_on_a_prop_voice_and_footsteps_move_with_the_walker(monkeypatch):
+    """Its surface, as a ray meets it, differs by rounding from step to step: that is no edge."""
+    world = empty_world(platform())
+    walker = seeing(world, extra_verbs=["step_on"])
+    begin(world)
+    assert do(world, walker, "step_on")
+    placed = []
+    monkeypatch.setattr(walker._mouth, "teleport", placed.append)
+    for _ in range(5):
+        do(world, walker, "none", forward=1.0)
+    assert walker._stands_on_prop
+    assert placed == []
+
+
 @pytest.mark.parametrize("prop", [platform(0.3), platform(mass_kg=1.0)], ids=["high", "light"])
 def test_high_and_light_props_are_not_stepped_on(prop):
     world = empty_world(prop)

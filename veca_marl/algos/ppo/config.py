@@ -74,7 +74,7 @@ class PPOCfg(AlgorithmCfg):
             )
 
     def check_batch(self, worlds: int, steps: int) -> None:
-        """See `AlgorithmCfg`: each minibatch needs two frames, whose advantages are normalised."""
+        """See `AlgorithmCfg`: a minibatch has at least two frames, to normalise advantages."""
         length, unit = 1, "frames"
         if self.network.recurrent:
             check_sequences(self.sequence_steps, steps)

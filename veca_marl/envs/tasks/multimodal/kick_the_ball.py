@@ -150,7 +150,7 @@ class KickTheBall(Task):
         return {"kick": float(self._kicked_now), "approach": approach}
 
     def _launch(self, rng: np.random.Generator) -> None:
-        """Launch the ball; where the player stands only if it stands everywhere in 50 draws."""
+        """Launch the ball; a start within the player is drawn again, up to `_MOST_DRAWS` times."""
         cfg, bodies = self.cfg, (self.kicker.body_id, self.ball.body_id)
         for _ in range(_MOST_DRAWS):
             launch_from_side_wall(self.ball, self.room, cfg.speed_mps, cfg.spread_deg, rng)

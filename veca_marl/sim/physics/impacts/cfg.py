@@ -13,9 +13,9 @@ class ImpactCfg:
     Attributes:
         present: Whether things that hit each other or the floor, and steps of walkers, are heard.
         gain_per_ns: Sound pressure at 1 m per newton second of impulse.
-        min_speed_mps: Change of speed in one physics step, and landing speed of a foot, below which
-            a contact is silent: that of the lighter thing by the impulse of the contact, and that
-            of one of both by everything.
+        min_speed_mps: Least change of speed in one physics step that is heard, beside that by
+            gravity, and least landing speed of a foot. A contact is silent if its impulse would
+            change the speed of the lighter thing by less, or if neither thing changes by more.
     """
 
     present: bool = False
