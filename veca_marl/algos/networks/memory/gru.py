@@ -90,9 +90,9 @@ def _returns(present: Tensor) -> Tensor:
 
 
 class TeamMemory(TensorDictModuleBase):
-    """Adds the state of a `GatedMemory` to ``(team, "features")``, which the memory reads.
+    """Writes the state of a `GatedMemory`, which reads ``(team, "features")``, to the same key.
 
-    With a shortcut the heads read the features and the state, otherwise the state alone.
+    With a shortcut the key then holds the features followed by the state, otherwise the state.
 
     Source of the shortcut: Ni et al. 2022, "Recurrent model-free RL can be a strong baseline for
     many POMDPs", whose heads read the encoded observation beside the state, too.
