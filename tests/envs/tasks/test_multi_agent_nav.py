@@ -78,6 +78,32 @@ def test_starts_are_found_in_small_furnished_rooms(agents):
     game.close()
 
 
+def test_a_separate_finder_starts_in_the_room_of_the_object():
+    game = game_of("task.separate_finder=true", agents=3)
+    assert [(player.team, player.name) for player in game.players] == [
+        ("finder", "finder"),
+        ("seekers", "seekers_0"),
+        ("seekers", "seekers_1"),
+    ]
+    plan, homes = game.task.plan, set()
+    for seed in range(20):
+        game.reset(np.random.default_rng(seed))
+        home = plan.room_of(game.task.target.position)
+        rooms = [plan.room_of(player.body.position) for player in game.players]
+        assert [room == home for room in rooms] == [True, False, False]
+        homes.add(home)
+    assert homes == {0, 1, 2, 3}
+    game.close()
+
+
+def test_a_separate_finder_has_the_same_share_in_the_reward():
+    game = game_of("task.separate_finder=true")
+    begin(game)
+    put(game, 0, 0.5)
+    assert reached(step(game)) == [1.0, 1.0]
+    game.close()
+
+
 # ---- reward and termination
 
 

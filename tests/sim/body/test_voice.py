@@ -114,6 +114,40 @@ def test_a_call_is_played_to_its_end_and_later_ones_are_not_queued():
     assert not walker._voice.speaking
 
 
+@pytest.mark.parametrize(("pause_s", "calls"), [(0.0, 7), (0.5, 2), (2.0, 1)])
+def test_a_call_is_followed_by_its_pause(pause_s, calls):
+    """A call of 0.2 s is chosen at each of 34 steps of 40 ms."""
+    world = empty_world()
+    walker = walker_in(world, voice=VoiceKind.calls, call_pause_s=pause_s)
+    begun = 0
+    for _ in range(34):
+        begun += not walker._voice.speaking
+        walker.act({"move": STILL, "voice": np.array(Call.high)})
+        world.step()
+    assert begun == calls
+
+
+def test_the_pause_is_silent_and_ends_with_the_episode():
+    world = empty_world()
+    walker = walker_in(world, voice=VoiceKind.calls, call_pause_s=1.0)
+    world.freeze()
+    ear, heard = AudioSense(AudioCfg(waveform=True), walker, world), []
+    for _ in range(20):
+        walker.act({"move": STILL, "voice": np.array(Call.high)})
+        world.step()
+        heard.append(np.abs(ear.read()["waveform"]).max())
+    assert min(heard[:5]) > 1e-3
+    assert max(heard[10:]) < 1e-6
+    world.reset(np.random.default_rng(0))
+    assert not walker._voice.speaking
+
+
+@pytest.mark.parametrize("pause_s", [-0.1, np.inf, np.nan, 60.1])
+def test_an_impossible_pause_is_refused(pause_s):
+    with pytest.raises(ValueError, match=r"body\.call_pause_s"):
+        walker_in(empty_world(), voice=VoiceKind.calls, call_pause_s=pause_s)
+
+
 # ---- joint-level bodies
 
 

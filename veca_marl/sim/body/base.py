@@ -68,6 +68,7 @@ class Body(ABC):
         self._mouth = world.sound.add_source(f"{name}.voice", self._voice)
         self._gaze = Gaze(math.radians(cfg.eye_range_deg))
         self._sight: Sight | None = None
+        self._call_pause_s = cfg.call_pause_s
         self.interaction_range_m = cfg.interaction_range_m
         self.joint_names = tuple(f"{j.bone}.{j.label}" for j in self._skeleton.joints)
         self.bone_names = tuple(bone.name for bone in self._skeleton.bones)
@@ -226,8 +227,8 @@ class Body(ABC):
     def act(self, action: Mapping[str, Any]) -> None:
         """Apply an action: a value for each part of `action_spec`.
 
-        Movement lasts until the next action. A call is played to its end: calls that are chosen
-        in the meantime are ignored.
+        Movement lasts until the next action. A call is played to its end, with the pause after it:
+        calls that are chosen in the meantime are ignored.
 
         Raises:
             ValueError: If a part is missing, unknown or out of its range; then nothing is applied.
@@ -288,9 +289,14 @@ class Body(ABC):
         self._voice.say(waveform)
 
     def call(self, call: Call) -> None:
-        """Play a call; it is ignored while another sound of this mouth is being played."""
+        """Play a call and the pause after it.
+
+        It is ignored while another sound of this mouth is being played, or the pause after a call.
+        """
         if call is not Call.none and not self._voice.speaking:
-            self._voice.say(call_waveform(CALLS[call], self._world.sound.sample_rate_hz))
+            rate_hz = self._world.sound.sample_rate_hz
+            self._voice.say(call_waveform(CALLS[call], rate_hz))
+            self._voice.say(np.zeros(round(self._call_pause_s * rate_hz)))
 
     # ---- visible and interactable objects (the paper's API)
 

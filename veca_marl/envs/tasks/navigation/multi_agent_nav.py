@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from enum import Enum
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -48,12 +48,18 @@ class MultiAgentNavCfg(TaskCfg):
         radius_m: Radius of the object, a fixed ball.
         reach_m: Distance from the surface of the object within which an agent has reached it.
         muted: Agents without a voice, see `Muted`.
+        separate_finder: Whether the agent that starts in the room of the object is a team of its
+            own, `finder`, before the team `seekers` of the others.
     """
+
+    # fields that were added later, with the value that the task had before
+    formerly: ClassVar[dict[str, Any]] = {"separate_finder": False}
 
     agents: int = 2
     radius_m: float = 0.2
     reach_m: float = 0.4
     muted: Muted = Muted.none
+    separate_finder: bool = False
     weights: dict[str, float] = terms(reached=1.0, ahead=AHEAD_WEIGHT, turn=TURN_WEIGHT)
 
     def __post_init__(self) -> None:
@@ -71,9 +77,10 @@ class MultiAgentNav(Task):
     """Agents start in separate rooms, one of which contains an object that all have to reach.
 
     An agent sees the object only from its room or through a door, so the agent that finds it
-    should call the others. A call is heard from its direction in the next room; a wall attenuates
-    it by 30 dB. The episode terminates when all agents have reached the object; then the task is
-    solved (`solved`) for all of them.
+    should call the others. With `separate_finder` the agent that starts in the room of the object
+    is a team of its own, which can have another policy. A call is heard from its direction in the
+    next room; a wall attenuates it by 30 dB. The episode terminates when all agents have reached
+    the object; then the task is solved (`solved`) for all of them.
 
     The rooms, the shared reward and the helper reward are those of the paper (table of tasks and
     "Helper Rewards" in the appendix; "Multi-Agent Reinforcement Learning"); sizes and times are
@@ -103,6 +110,8 @@ class MultiAgentNav(Task):
 
     @classmethod
     def teams_of(cls, cfg: Any) -> tuple[Team, ...]:
+        if cfg.separate_finder:
+            return (Team("finder"), Team("seekers", cfg.agents - 1))
         return (Team("seekers", cfg.agents),)
 
     @classmethod
@@ -146,7 +155,7 @@ class MultiAgentNav(Task):
         while True:
             order = rng.permutation(len(self.plan.rooms))[: len(self.players)]
             rooms = [self.plan.rooms[index] for index in order]
-            home = rooms[rng.integers(len(rooms))]
+            home = rooms[0 if self.cfg.separate_finder else rng.integers(len(rooms))]
             if home in self._homes:
                 return rooms, home
 
