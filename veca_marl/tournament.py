@@ -19,7 +19,7 @@ import torch
 from omegaconf import MISSING
 
 from veca_marl.algos.checkpoints.checkpoint_file import CheckpointError
-from veca_marl.algos.files import WriteError, naming
+from veca_marl.algos.files import WriteError, write_errors
 from veca_marl.algos.selfplay.pool import Pool
 from veca_marl.algos.selfplay.tournament import Match, Rating, play_all, rate, table_of_points
 from veca_marl.config import Config, ConfigError, to_config
@@ -128,7 +128,7 @@ def write_results(path: Path, matches: list[Match], ratings: list[Rating]) -> No
 
 @contextmanager
 def _created(path: Path) -> Iterator[TextIO]:
-    with naming(path), path.open("w", newline="") as file:
+    with write_errors(path), path.open("w", newline="") as file:
         yield file
 
 

@@ -32,7 +32,7 @@ def write_atomically(path: Path, content: Content | str) -> None:
     """
     data = content.encode() if isinstance(content, str) else content
     temporary = temporary_of(path)
-    with naming(path, len(data)):
+    with write_errors(path, len(data)):
         path.parent.mkdir(parents=True, exist_ok=True)
         try:
             with temporary.open("wb") as file:
@@ -51,7 +51,7 @@ def temporary_of(path: Path) -> Path:
 
 
 @contextmanager
-def naming(path: Path, size: int = 0) -> Iterator[None]:
+def write_errors(path: Path, size: int = 0) -> Iterator[None]:
     """Raise `WriteError`, with the path and the space on a full disk, in place of `OSError`.
 
     Args:

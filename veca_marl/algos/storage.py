@@ -20,7 +20,7 @@ import torch
 from torch import Tensor
 
 from veca_marl.algos.control_groups import control_group_memory
-from veca_marl.algos.files import WriteError, naming
+from veca_marl.algos.files import WriteError, write_errors
 from veca_marl.algos.specs import TeamSpec
 
 _SHARE = 0.9  # of what is available; the rest is left to networks, worlds and other programs
@@ -203,7 +203,7 @@ def reserve_disk(file: Path) -> None:
         WriteError: If the disk is full; the message names the file and the free space.
     """
     size = file.stat().st_size
-    with naming(file, size), file.open("r+b") as opened:
+    with write_errors(file, size), file.open("r+b") as opened:
         if hasattr(os, "posix_fallocate"):
             os.posix_fallocate(opened.fileno(), 0, size)
             return

@@ -9,7 +9,7 @@ from dataclasses import asdict, fields
 from io import StringIO
 from pathlib import Path
 
-from veca_marl.algos.files import naming
+from veca_marl.algos.files import write_errors
 from veca_marl.experts_table.play import Played
 
 _ADVICE = "choose another folder (to=FOLDER) or delete the file"
@@ -69,7 +69,7 @@ class EpisodeFile:
         Raises:
             WriteError: If the file cannot be written.
         """
-        with naming(self._path):
+        with write_errors(self._path):
             self._path.parent.mkdir(parents=True, exist_ok=True)
             self._cut_incomplete_line()
             with self._path.open("a", newline="", encoding="utf-8") as file:

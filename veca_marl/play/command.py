@@ -19,7 +19,7 @@ import torch
 
 from veca_marl.algos.checkpoints.checkpoint_file import CheckpointError
 from veca_marl.algos.evaluation.evaluate import Exploration
-from veca_marl.algos.files import WriteError, naming
+from veca_marl.algos.files import WriteError, write_errors
 from veca_marl.config import ConfigError, one_line
 from veca_marl.config.command_line import CommandLine
 from veca_marl.config.outputs import check_file
@@ -88,7 +88,7 @@ def run(options: PlayOptions, overrides: list[str]) -> None:
 def _film(options: PlayOptions, overrides: list[str], path: Path) -> None:
     policy = options.policy or EXPERT
     session = _session(choose(policy, overrides), options)
-    with naming(path):
+    with write_errors(path):
         returns = film(path, session, options.episodes or 1, f"policy: {policy}")
     session.close()
     for episode, total in enumerate(returns):

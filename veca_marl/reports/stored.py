@@ -29,22 +29,22 @@ def read_checked_run(folder: Path) -> tuple[StoredRun, str]:
     Raises:
         DamagedRunError: If a file that a report reads is damaged.
     """
-    with _naming(folder / "config.yaml"):
+    with _read_errors(folder / "config.yaml"):
         run = read_run(folder)
         if run.config is None:
             return run, ""
         _check_keys(run.config)
     for kind, numbers in _NUMBERS.items():
         path = folder / f"{kind}.csv"
-        with _naming(path):
+        with _read_errors(path):
             _check_table(path, numbers, _WORDS[kind])
     path = folder / "provenance.json"
-    with _naming(path):
+    with _read_errors(path):
         return run, _commit(path)
 
 
 @contextmanager
-def _naming(path: Path) -> Iterator[None]:
+def _read_errors(path: Path) -> Iterator[None]:
     """Turn errors of reading a file into one sentence that names it, or another file beside it."""
     try:
         yield

@@ -17,7 +17,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TextIO
 
-from veca_marl.algos.files import naming
+from veca_marl.algos.files import write_errors
 from veca_marl.config import ConfigError
 
 _FILE = ".lock"
@@ -50,7 +50,7 @@ def _acquire(path: Path) -> TextIO:
     """Return the open file that holds the lock."""
     deadline = time.monotonic() + _WAIT_S
     while True:
-        with naming(path):
+        with write_errors(path):
             path.parent.mkdir(parents=True, exist_ok=True)
             file = path.open("a+")
         if _take(file) and _is_in_place(path, file):
@@ -63,7 +63,7 @@ def _acquire(path: Path) -> TextIO:
                 "wait until it has ended, or choose another folder"
             )
         time.sleep(_RETRY_S)
-    with naming(path):
+    with write_errors(path):
         file.truncate(0)
         file.write(f"process {os.getpid()} on {platform.node()}")
         file.flush()

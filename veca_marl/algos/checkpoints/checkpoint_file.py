@@ -78,7 +78,7 @@ def _load(path: Path, **options: Any) -> Any:
 
 
 @contextmanager
-def naming_checkpoint(path: Path) -> Iterator[None]:
+def load_errors(path: Path) -> Iterator[None]:
     """Raise `CheckpointError` where a state that is loaded inside the block does not fit."""
     try:
         yield

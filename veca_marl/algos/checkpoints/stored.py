@@ -17,8 +17,8 @@ from veca_marl.algos.algorithm import (
 )
 from veca_marl.algos.checkpoints.checkpoint_file import (
     CheckpointError,
+    load_errors,
     map_checkpoint,
-    naming_checkpoint,
 )
 from veca_marl.algos.checkpoints.identity import spec_differences
 from veca_marl.algos.networks.factory import NETWORKS, NetworkCfg
@@ -40,7 +40,7 @@ def load_actor(path: Path, team: str, spec: TeamSpec) -> TensorDictModuleBase:
         CheckpointError: If there is no such checkpoint, or it does not hold this team.
     """
     algorithm, content = _make(path, team, spec)
-    with naming_checkpoint(path):
+    with load_errors(path):
         algorithm.actor.load_state_dict(content["state"]["actors"][team])
     return for_acting(algorithm.actor.requires_grad_(False))
 
@@ -57,7 +57,7 @@ def load_learnt(path: Path, team: str, spec: TeamSpec) -> Algorithm:
         CheckpointError: See `load_actor`.
     """
     algorithm, content = _make(path, team, spec)
-    with naming_checkpoint(path):
+    with load_errors(path):
         algorithm.load_learnt(content["state"]["algorithm"][team])
     return algorithm
 
@@ -76,7 +76,7 @@ def load_encoders(path: Path, team: str) -> dict[str, list[nn.Module]]:
         CheckpointError: If there is no such checkpoint, or it does not hold this team.
     """
     algorithm, content = _make(path, team, None)
-    with naming_checkpoint(path):
+    with load_errors(path):
         algorithm.actor.load_state_dict(content["state"]["actors"][team])
     return sense_encoders(algorithm.actor)
 

@@ -10,7 +10,7 @@ from typing import Any
 
 from torchrl.record.loggers import Logger, MLFlowLogger, TensorboardLogger, WandbLogger
 
-from veca_marl.algos.files import naming
+from veca_marl.algos.files import write_errors
 from veca_marl.algos.reporting.reporters import CsvReporter, LoggerReporter, Reporter
 
 _TAG = "veca_marl.run"  # of a run in MLflow: the identifier by which it is continued
@@ -127,6 +127,6 @@ def make_reporter(
     check_installed(kind)
     if kind is LoggerKind.csv:
         return CsvReporter(folder, resumed_frames)
-    with naming(folder):
+    with write_errors(folder):
         logger = _MAKERS[kind](folder, identifier, resumed_frames)
     return LoggerReporter(logger, folder)

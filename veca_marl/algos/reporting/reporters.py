@@ -13,7 +13,7 @@ from typing import Any, Protocol
 
 from torchrl.record.loggers import Logger
 
-from veca_marl.algos.files import WriteError, naming, write_atomically
+from veca_marl.algos.files import WriteError, write_atomically, write_errors
 
 Row = Mapping[str, float | int | str]
 
@@ -94,7 +94,7 @@ class CsvReporter:
             _add_columns(path, added)
         cells = {name: _cell(value) for name, value in full.items()}
         row_text = _table([*columns, *added], [cells], header=not columns)
-        with naming(path), path.open("a", newline="") as file:
+        with write_errors(path), path.open("a", newline="") as file:
             file.write(row_text)
         self._columns[kind] = [*columns, *added]
 
@@ -102,7 +102,7 @@ class CsvReporter:
         """See `Reporter`."""
         for path in (self._folder / f"{kind}.csv" for kind in self.KINDS):
             if path.exists():
-                with naming(path), path.open("a") as file:
+                with write_errors(path), path.open("a") as file:
                     os.fsync(file.fileno())
 
     def close(self) -> None:
@@ -129,7 +129,7 @@ class LoggerReporter:
         for name, value in row.items():
             if not isinstance(value, str) and math.isfinite(value):
                 curve = "/".join([kind, *words, name])
-                with naming(self._path):
+                with write_errors(self._path):
                     self._logger.log_scalar(curve, float(value), step=frames)
 
     def sync(self) -> None:
@@ -137,7 +137,7 @@ class LoggerReporter:
 
     def close(self) -> None:
         """Write pending points."""
-        with naming(self._path):
+        with write_errors(self._path):
             self._logger.close()
 
 
@@ -145,13 +145,13 @@ def _columns(path: Path) -> list[str]:
     """Return the names in the first line of a table; nothing if there is no such file."""
     if not path.exists():
         return []
-    with naming(path), path.open(newline="") as file:
+    with write_errors(path), path.open(newline="") as file:
         return next(csv.reader(file), [])
 
 
 def _add_columns(path: Path, names: Sequence[str]) -> None:
     """Add columns to a table, which are blank in its rows."""
-    with naming(path), path.open(newline="") as file:
+    with write_errors(path), path.open(newline="") as file:
         reader = csv.DictReader(file)
         rows = list(reader)
     write_atomically(path, _table([*(reader.fieldnames or []), *names], rows, header=True))

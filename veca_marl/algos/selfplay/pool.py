@@ -11,8 +11,8 @@ from torch import nn
 
 from veca_marl.algos.checkpoints.checkpoint_file import (
     CheckpointError,
+    load_errors,
     load_file,
-    naming_checkpoint,
 )
 from veca_marl.algos.files import WriteError, write_atomically
 
@@ -61,7 +61,7 @@ class Pool:
         """
         path = self._path(team, frames)
         state = load_file(path, torch.device("cpu"))
-        with naming_checkpoint(path):
+        with load_errors(path):
             actor.load_state_dict(state)
 
     def _path(self, team: str, frames: int) -> Path:

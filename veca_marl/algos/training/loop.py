@@ -18,7 +18,7 @@ from typing import Any
 from torchrl import timeit
 from tqdm import tqdm
 
-from veca_marl.algos.checkpoints.checkpoint_file import naming_checkpoint
+from veca_marl.algos.checkpoints.checkpoint_file import load_errors
 from veca_marl.algos.checkpoints.checkpoints import Checkpoints
 from veca_marl.algos.collection.experience import CollectCfg, Experience
 from veca_marl.algos.evaluation.comparison import comparison_line, score_rows
@@ -87,7 +87,7 @@ class Trainer:
         """Continue learning and progress from the checkpoint at `path`."""
         state = self.checkpoints.load(path, self.learners.device)
         self.checkpoints.remove_old()
-        with naming_checkpoint(path):
+        with load_errors(path):
             self.learners.load_state_dict(state["algorithm"])
             # runs of version 0.2 have no intrinsic rewards and no such entry
             self.learners.load_intrinsic_state(state.get("intrinsic", {}))
