@@ -15,7 +15,12 @@ from veca_marl.algos.acting.modules import ArrayModule
 from veca_marl.algos.networks.encoders import Convolutions, Pooling, make_encoder
 from veca_marl.algos.networks.factory import NetworkCfg, NetworkFactory, register_network
 from veca_marl.algos.networks.initialisation import orthogonal
-from veca_marl.algos.networks.memory.gru import GatedMemory, TeamMemory
+from veca_marl.algos.networks.memory.gru import (
+    GatedMemory,
+    TeamMemory,
+    features_and_state,
+    state_alone,
+)
 from veca_marl.algos.networks.per_agent import CentralValue, PerAgent
 from veca_marl.algos.networks.precision import Arithmetic, Precision
 from veca_marl.algos.sense_encoders import SenseEncoders
@@ -183,11 +188,11 @@ class Multisense(NetworkFactory):
 
     def _memory(self) -> TeamMemory:
         spec, size = self.spec, self.cfg.memory_features
-        shortcut = self.cfg.memory is Memory.gru_shortcut
+        output = features_and_state if self.cfg.memory is Memory.gru_shortcut else state_alone
         memory = self.per_agent(
             lambda: GatedMemory(self.cfg.trunk_features, size), (1,) * (4 if spec.masked else 3)
         )
-        return TeamMemory(self.team, spec.agents, size, spec.masked, shortcut, memory)
+        return TeamMemory(self.team, spec.agents, size, spec.masked, output, memory)
 
     @property
     def central_critic(self) -> bool:

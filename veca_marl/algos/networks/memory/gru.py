@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from itertools import pairwise
 
 import torch
@@ -89,20 +90,29 @@ def _returns(present: Tensor) -> Tensor:
     return returns
 
 
+def state_alone(features: Tensor, state: Tensor) -> Tensor:
+    """Return the state: the heads read nothing else."""
+    return state
+
+
+def features_and_state(features: Tensor, state: Tensor) -> Tensor:
+    """Return the features followed by the state.
+
+    Source: Ni et al. 2022, "Recurrent model-free RL can be a strong baseline for many POMDPs",
+    whose heads read the encoded observation beside the state, too.
+    """
+    return torch.cat([features, state], dim=-1)
+
+
 class TeamMemory(TensorDictModuleBase):
-    """Writes the state of a `GatedMemory`, which reads ``(team, "features")``, to the same key.
-
-    With a shortcut the key then holds the features followed by the state, otherwise the state.
-
-    Source of the shortcut: Ni et al. 2022, "Recurrent model-free RL can be a strong baseline for
-    many POMDPs", whose heads read the encoded observation beside the state, too.
+    """Applies a `GatedMemory` to ``(team, "features")`` and writes what the heads read to that key.
 
     Args:
         team: Name of the team.
         agents: Number of its agents.
         size: Length of the state of each agent.
         masked: Whether agents can be eliminated: ``(team, "mask")``.
-        shortcut: Whether the features remain.
+        output: What the heads read, from the features and the state after the step.
         memory: Has the arguments of `GatedMemory.forward`; for all agents or one of its own for
             each of them.
     """
@@ -113,12 +123,12 @@ class TeamMemory(TensorDictModuleBase):
         agents: int,
         size: int,
         masked: bool,
-        shortcut: bool,
+        output: Callable[[Tensor, Tensor], Tensor],
         memory: nn.Module,
     ) -> None:
         super().__init__()
         self.team, self.agents, self.size, self.masked = team, agents, size, masked
-        self.shortcut, self.memory = shortcut, memory
+        self.output, self.memory = output, memory
         self.features, self.state = (team, "features"), (team, "memory", "hidden")
         self.in_keys = [self.features, self.state, "is_init", *([(team, "mask")] if masked else [])]
         self.out_keys = [self.features, ("next", *self.state)]
@@ -135,7 +145,7 @@ class TeamMemory(TensorDictModuleBase):
         present = [arrays[self.team, "mask"].unsqueeze(-1)] if self.masked else []
         after = self.memory(features, state, begins, *present)
         arrays["next", *self.state] = after
-        arrays[self.features] = torch.cat([features, after], dim=-1) if self.shortcut else after
+        arrays[self.features] = self.output(features, after)
 
     def make_tensordict_primer(self) -> TensorDictPrimer:
         """Return the transform with the spec of the state (see `networks.memory`)."""
