@@ -114,3 +114,29 @@ def test_a_prop_that_touches_the_walker_can_be_kicked():
     for away_m in (0.16, 0.1, 0.02, 0.0):
         prop.place((away_m, 0.0, 0.05))
         assert walker.can_kick(prop), away_m
+
+
+def test_the_reach_is_measured_to_the_surface_of_a_long_prop():
+    """A plank across the way: the corner of the circle about it is near, its side is not."""
+    for gap_m, reached in ((0.1, True), (0.3, False), (0.86, False)):
+        plank = PropCfg(
+            "plank",
+            PropShape.box,
+            [0.05, 1.6, 0.05],
+            (0.11 + gap_m + 0.025, 0.0, 0.11),
+            mass_kg=0.5,
+        )
+        world = empty_world(plank)
+        assert walker_in(world).can_kick(world.prop("plank")) is reached
+
+
+def test_the_direction_of_a_prop_is_that_of_its_centre_of_mass():
+    """The origin of its frame is behind the walker."""
+    corners = [[x, y, z] for x in (1.0, 1.2) for y in (-0.05, 0.05) for z in (0.0, 0.1)]
+    hull = PropCfg("hull", PropShape.convex, [], (0.0, 0.0, 0.05), mass_kg=0.5, points_m=corners)
+    world = empty_world(hull)
+    walker = walker_in(world, place=(0.8, 0.0, 0.0))
+    assert walker.kick(world.prop("hull"))
+    assert world.prop("hull").velocity[0] > 1.0
+    behind = walker_in(world, "behind", place=(-1.4, 0.0, 0.0))
+    assert not behind.can_kick(world.prop("hull"))

@@ -247,6 +247,30 @@ def test_eye_rotations_are_clipped_to_their_range():
         assert away == pytest.approx(40.0, abs=1.0)
 
 
+@pytest.mark.parametrize(
+    "ahead_m",
+    [
+        (0.10, 0.09, 0.16),  # beyond the range upwards
+        (0.178, 0.15, 0.175),  # to the side and up, within the range in pitch
+        (0.05, -0.2, -0.1),
+        (-0.3, 0.2, 0.1),  # behind
+    ],
+)
+def test_images_of_a_point_beyond_the_range_are_not_rolled_against_each_other(ahead_m):
+    walker = walker_in(empty_world(), eye_range_deg=50.0)
+    eyes = ("eye_left", "eye_right")
+    head = walker.mount("head").rotation
+    middle = sum(walker.mount(eye).position for eye in eyes) / 2.0
+    walker.look_toward_point(middle + head @ np.array(ahead_m))
+    rotations = [head.T @ walker.mount(eye).rotation for eye in eyes]
+    np.testing.assert_allclose(rotations[0][:, 2], rotations[1][:, 2], atol=1e-12)
+    for rotation in rotations:
+        pitch = math.degrees(math.atan2(rotation[2, 0], rotation[0, 0]))
+        yaw = math.degrees(math.asin(rotation[1, 0]))
+        assert max(abs(pitch), abs(yaw)) <= 50.0 + 1e-9
+        assert rotation[:, 0] @ np.sign(ahead_m) >= 0.0 or ahead_m[0] < 0.0
+
+
 @pytest.mark.parametrize("wrong", [(1.0, 2.0), (1.0, np.nan, 0.0), "up"])
 def test_points_to_look_at_must_be_three_finite_numbers(wrong):
     with pytest.raises(ValueError, match=r"look toward|could not convert"):

@@ -154,6 +154,22 @@ def test_what_lies_in_a_drawer_comes_with_it():
     assert key.position[0] > -0.95
 
 
+@pytest.mark.parametrize("friction", [0.0, 5.0, 20.0])
+@pytest.mark.parametrize("motor", [0.0, 1.0, 4.0])
+def test_a_motor_has_its_force_beside_the_friction(friction, motor):
+    """A slide of 10 kg without an obstacle moves as by the force of the motor alone."""
+    slide = JointCfg(
+        JointKind.slide, axis=(1.0, 0.0, 0.0), range_m=1.0, friction=friction, motor=motor
+    )
+    world = empty_world(box("slab", mass_kg=10.0, position=(0.0, 0.0, 0.5), joint=slide))
+    slab = world.prop("slab")
+    slab.open()
+    steps = 10
+    for _ in range(steps):
+        world.step()
+    assert slab.joint.speed == pytest.approx(motor / 10.0 * steps * 0.04, rel=0.03, abs=1e-6)
+
+
 def test_a_motor_gives_up_at_an_obstacle():
     world = empty_world(CUPBOARD, drawer(motor=3.0), box("weight", mass_kg=50.0))
     prop = world.prop("drawer")

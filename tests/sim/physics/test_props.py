@@ -8,7 +8,12 @@ from walking import ball, box, empty_world, let_pass, wall
 
 from veca_marl.sim.geometry import distances_to
 from veca_marl.sim.physics import SIZE_NAMES, PartCfg, PropCfg, PropShape, pybullet
-from veca_marl.sim.physics.props.prop_shapes import prop_geoms
+from veca_marl.sim.physics.props.prop_shapes import (
+    bounding_box,
+    lowest_m,
+    prop_geoms,
+    rotation_about_axes,
+)
 from veca_marl.sim.sound import SoundCfg
 
 SIZES = {
@@ -68,6 +73,55 @@ def test_the_drawn_shape_is_the_collision_shape(shape):
         solid.append(bool(near) and min(n[8] for n in near) < -0.001)
     assert inside.sum() > 10
     assert np.mean(inside != np.array(solid)) < 0.003
+
+
+def inside_points(geoms, rng):
+    """Return random points in primitives, ``(n, 3)``, in their frame."""
+    points = rng.uniform(-1.3, 1.3, (400_000, 3))
+    return points[np.any([distances_to(geom, points) < 0.0 for geom in geoms], axis=0)]
+
+
+LEANING = (
+    PartCfg(PropShape.cylinder, [0.4, 0.05], (0.1, 0.0, 0.0), (30.0, 50.0, 0.0)),
+    PartCfg(PropShape.capsule, [0.1, 0.6], (-0.1, 0.2, 0.0), (70.0, 0.0, 0.0)),
+)
+
+
+@pytest.mark.parametrize(
+    "cfg",
+    [
+        of(PropShape.cylinder),
+        of(PropShape.capsule),
+        of(PropShape.compound),
+        of(PropShape.goal),
+        PropCfg("leaning", PropShape.compound, parts=list(LEANING)),
+    ],
+    ids=lambda cfg: f"{cfg.name} {cfg.shape.name}",
+)
+def test_the_box_and_the_lowest_point_are_tight(cfg):
+    geoms, rng = prop_geoms(cfg), np.random.default_rng(3)
+    points = inside_points(geoms, rng)
+    low, high = bounding_box(geoms)
+    for found, bound, outside in ((points.min(0), low, -1.0), (points.max(0), high, 1.0)):
+        assert (outside * (bound - found) >= 0.0).all()
+        np.testing.assert_allclose(found, bound, atol=0.05)
+    for degrees in ((0.0, 0.0, 0.0), (45.0, 0.0, 0.0), (20.0, 130.0, 70.0)):
+        rotation = rotation_about_axes(degrees)
+        lowest = (points @ rotation.T)[:, 2].min()
+        assert lowest - 0.05 <= lowest_m(geoms, rotation) <= lowest
+
+
+def test_a_tilted_plate_has_its_lowest_point_at_its_rim():
+    plate_cfg = PropCfg("plate", PropShape.cylinder, [0.3, 0.02], (0.0, 0.0, 1.0), mass_kg=1.0)
+    world = empty_world(plate_cfg)
+    plate = world.prop("plate")
+    assert plate.lowest_m == pytest.approx(0.99)
+    turned = pybullet.getQuaternionFromEuler([math.pi / 2.0, 0.0, 0.0])
+    pybullet.resetBasePositionAndOrientation(
+        plate.body_id, (0.0, 0.0, 1.0), turned, physicsClientId=world.client
+    )
+    world.refresh()
+    assert plate.lowest_m == pytest.approx(0.7, abs=1e-3)
 
 
 @pytest.mark.parametrize("shape", [PropShape.sphere, PropShape.box, PropShape.cylinder])

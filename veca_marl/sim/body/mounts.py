@@ -90,23 +90,30 @@ def aimed(eye: Pose, point: Floats, range_rad: float) -> Pose:
     Args:
         eye: Pose of the eye when it looks straight ahead.
         point: ``(3,)`` metres, world frame.
-        range_rad: Largest rotation to either side and up or down.
+        range_rad: Largest pitch and largest yaw, below 90 degrees.
 
     Returns:
-        The pose with its x axis toward `point`; yaw and pitch are clipped to the range.
+        The pose with its x axis toward `point`; pitch and yaw are clipped to the range. Both eyes
+        have the same pitch at the limit, too, since they are beside each other.
     """
     x, y, z = eye.rotation.T @ (point - eye.position)
-    yaw = min(max(math.atan2(y, x), -range_rad), range_rad)
-    pitch = min(max(math.atan2(z, math.hypot(x, y)), -range_rad), range_rad)
-    ahead = (math.cos(yaw) * math.cos(pitch), math.sin(yaw) * math.cos(pitch), math.sin(pitch))
-    return Pose(eye.position, eye.rotation @ _upright(*ahead))
+    pitch = min(max(math.atan2(z, abs(x)), -range_rad), range_rad)
+    ahead = math.copysign(math.hypot(x, z), x)  # negative: the point is behind
+    yaw = min(max(math.atan2(y, ahead), -range_rad), range_rad)
+    return Pose(eye.position, eye.rotation @ _pitched_and_yawed(pitch, yaw))
 
 
-def _upright(x: float, y: float, z: float) -> Floats:
-    """Return the rotation with a given x axis, a unit vector, and a z axis in the plane y = 0."""
-    sagittal = math.hypot(x, z)
-    up_x, up_z = -z / sagittal, x / sagittal
-    return np.array([[x, -up_z * y, up_x], [y, up_z * x - up_x * z, 0.0], [z, up_x * y, up_z]])
+def _pitched_and_yawed(pitch: float, yaw: float) -> Floats:
+    """Return the rotation ``(3, 3)`` by a pitch upwards about y, then a yaw to the left about z."""
+    up, ahead = math.sin(pitch), math.cos(pitch)
+    left, straight = math.sin(yaw), math.cos(yaw)
+    return np.array(
+        [
+            [ahead * straight, -ahead * left, -up],
+            [left, straight, 0.0],
+            [up * straight, -up * left, ahead],
+        ]
+    )
 
 
 def palm_centre(hand: Bone) -> Floats:

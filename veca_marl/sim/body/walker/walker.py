@@ -190,8 +190,8 @@ class Walker(Body):
         """Return whether a kick would reach a prop.
 
         The prop is light enough, near enough, low enough and ahead, and nothing solid is on the
-        line of contact: the horizontal line from the capsule towards the prop's centre, at the
-        height of the centre or of `kick_height_m`, whichever is lower.
+        line of contact: the horizontal line from the capsule towards the prop's centre of mass, at
+        the height of that centre or of `kick_height_m`, whichever is lower.
         """
         return self._handling.can_kick(prop, self.position)
 

@@ -25,7 +25,8 @@ class WalkerCfg(BodyCfg):
         push_limit_kg: Props up to this mass are light: they are pushed, kicked and carried. Heavier
             ones stop the walker.
         kick_reach_m: Largest distance from the capsule's surface to that of a prop it can kick.
-        kick_angle_deg: Largest angle between the walker's heading and the direction of the prop.
+        kick_angle_deg: Largest angle between the walker's heading and the direction of the prop's
+            centre of mass.
         kick_height_m: Largest height of the prop's lowest point.
         kick_speed_mps: Speed of a light prop after a kick.
         kick_impulse_ns: Largest impulse of a kick; it limits the speed of heavy props.

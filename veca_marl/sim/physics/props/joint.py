@@ -97,7 +97,8 @@ class Joint:
         self._target = target
         self._direction = 1.0 if target > self._state()[0] else -1.0
         speed = self._direction * self.cfg.range / self.cfg.open_s
-        self._set_motor(speed, self.cfg.motor + self.cfg.friction)
+        # Bullet has one motor for each joint: the one that acts as friction is off meanwhile
+        self._set_motor(speed, self.cfg.motor)
         return True
 
     def lock(self) -> None:

@@ -26,6 +26,7 @@ from veca_marl.sim.physics.props.prop_cfg import PropCfg
 from veca_marl.sim.physics.props.prop_shapes import (
     bounding_box,
     horizontal_radius_m,
+    lowest_m,
     prop_geoms,
     prop_radius_m,
     sound_obstacles,
@@ -114,7 +115,7 @@ class Prop:
     @property
     def lowest_m(self) -> float:
         """Height of its lowest point."""
-        return float(self.bounds()[0][2])
+        return float(self.position[2]) + lowest_m(self.geoms, self.rotation)
 
     def bounds(self) -> tuple[Floats, Floats]:
         """Return the corners ``(3,)`` of Bullet's box about it, along the axes of the world."""
@@ -129,6 +130,11 @@ class Prop:
     def position(self) -> Floats:
         """``(3,)`` metres, world frame."""
         return np.array(self._scene.positions[self._row])
+
+    @property
+    def mass_centre(self) -> Floats:
+        """``(3,)`` metres: its centre of mass in the world frame."""
+        return self.position + self.rotation @ self.centre_of_mass
 
     @property
     def rotation(self) -> Floats:
@@ -194,8 +200,7 @@ class Prop:
         This is what a basket or drawer contains: their shapes are walls and a floor.
         """
         low, high = self._inside
-        centre = other.position + other.rotation @ other.centre_of_mass
-        local = self.rotation.T @ (centre - self.position)
+        local = self.rotation.T @ (other.mass_centre - self.position)
         return bool((local >= low).all() and (local <= high).all())
 
     def yields(self, point: Sequence[float], force: Sequence[float]) -> bool:

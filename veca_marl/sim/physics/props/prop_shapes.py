@@ -115,10 +115,24 @@ def bounding_box(geoms: Sequence[Geom]) -> tuple[Floats, Floats]:
     """Return the lower and the upper corner of a box about primitives, along their frame's axes."""
     low, high = np.full(3, np.inf), np.full(3, -np.inf)
     for geom in geoms:
-        points, margin = _outline(geom), _roundness(geom)
+        points, margin = _outline(geom), _margins(geom, np.eye(3))
         low = np.minimum(low, points.min(axis=0) - margin)
         high = np.maximum(high, points.max(axis=0) + margin)
     return low, high
+
+
+def lowest_m(geoms: Sequence[Geom], rotation: Floats) -> float:
+    """Return the height of the lowest point of primitives above the origin of their frame, metres.
+
+    Args:
+        geoms: The primitives.
+        rotation: ``(3, 3)`` from their frame to the world's.
+    """
+    down = -rotation[2]
+    return -max(
+        float((_outline(geom) @ down).max()) + float(_margins(geom, down[None])[0])
+        for geom in geoms
+    )
 
 
 def _single_geom(cfg: PropCfg | PartCfg, surface: dict[str, Any]) -> Geom:
@@ -188,6 +202,19 @@ def _outline(geom: Geom) -> Floats:
 
 def _roundness(geom: Geom) -> float:
     return 0.0 if geom.shape in (Shape.BOX, Shape.POLYHEDRON) else geom.radius
+
+
+def _margins(geom: Geom, directions: Floats) -> Floats:
+    """Return how far a primitive extends beyond its `_outline` in unit directions, ``(n,)`` metres.
+
+    Args:
+        geom: The primitive.
+        directions: ``(n, 3)``, in its frame.
+    """
+    if geom.shape is not Shape.CYLINDER:
+        return np.full(len(directions), _roundness(geom))
+    along: Floats = directions @ np.asarray(geom.rotation)[:, 2]  # each cap is a disc
+    return geom.radius * np.sqrt(np.clip(1.0 - along**2, 0.0, None))
 
 
 def _reach(geom: Geom) -> float:

@@ -62,7 +62,7 @@ class Hand:
         yaw = prop.yaw_rad
         prop.carry(prop.position, yaw, (0.0, 0.0, 0.0))  # upright, as it is measured and held
         self._half_width_m = self._measured_half_width_m(prop, yaw_rad)
-        self._below_m = float(_centre_of_mass(prop)[2]) - prop.lowest_m
+        self._below_m = float(prop.mass_centre[2]) - prop.lowest_m
         self._yaw_rad = yaw - yaw_rad
         self._velocity, self._turn_radps = np.zeros(3), 0.0
         self._grip.take(prop)
@@ -158,7 +158,7 @@ class Hand:
     def _measured_half_width_m(self, prop: Prop, yaw_rad: float) -> float:
         """Return the distance from the prop's centre of mass to its surface on the right."""
         right = np.array([math.sin(yaw_rad), -math.cos(yaw_rad), 0.0])
-        centre, reach_m = _centre_of_mass(prop), 2.0 * prop.extent_m
+        centre, reach_m = prop.mass_centre, 2.0 * prop.extent_m
         outside_m = surface_m(self._client, prop.body_id, centre + reach_m * right, centre)
         return reach_m - outside_m
 
@@ -172,8 +172,3 @@ def _limited(velocity: Floats, greatest_mps: float) -> Floats:
     """Return a velocity ``(3,)``, shortened to a speed."""
     speed = float(np.linalg.norm(velocity))
     return velocity if speed <= greatest_mps else velocity * (greatest_mps / speed)
-
-
-def _centre_of_mass(prop: Prop) -> Floats:
-    """Return the place ``(3,)`` of a prop's centre of mass, metres, world frame."""
-    return prop.position + prop.rotation @ prop.centre_of_mass

@@ -47,7 +47,8 @@ class ObjectHandling:
         """
         if self._motion.crawls or not self._is_loose(prop):
             return False
-        return foot_reaches(self._client, self._cfg, position, self._motion.yaw_rad, prop)
+        yaw_rad, capsule_id = self._motion.yaw_rad, self._motion.capsule.body_id
+        return foot_reaches(self._client, self._cfg, capsule_id, position, yaw_rad, prop)
 
     def kick(self, prop: Prop, position: Floats) -> bool:
         """Kick a prop; return False, without effect, if the kick does not reach it.

@@ -15,20 +15,24 @@ _CLEARANCE_M = 1e-4
 _LIFT = 0.2  # vertical velocity of a kicked prop as a fraction of the horizontal one
 
 
-def foot_reaches(client: int, cfg: WalkerCfg, here: Floats, yaw_rad: float, prop: Prop) -> bool:
+def foot_reaches(
+    client: int, cfg: WalkerCfg, capsule_id: int, here: Floats, yaw_rad: float, prop: Prop
+) -> bool:
     """Return whether a prop is near enough, low enough and ahead, and nothing solid is before it.
 
     Args:
         client: PyBullet's client id.
         cfg: Parameters of the walker.
+        capsule_id: PyBullet's id of its capsule.
         here: ``(3,)`` metres: position of the walker.
         yaw_rad: Its heading.
         prop: The prop.
     """
-    there = prop.position
-    gap = horizontal_distance(here, there) - cfg.radius_m - prop.radius_m
-    if gap > cfg.kick_reach_m or prop.lowest_m > cfg.kick_height_m:
+    if prop.lowest_m > cfg.kick_height_m or not pybullet.getClosestPoints(
+        capsule_id, prop.body_id, cfg.kick_reach_m, physicsClientId=client
+    ):
         return False
+    there = prop.mass_centre
     ahead = math.atan2(there[1] - here[1], there[0] - here[0]) - yaw_rad
     aside = abs((ahead + math.pi) % (2.0 * math.pi) - math.pi)
     if aside > math.radians(cfg.kick_angle_deg):
@@ -45,7 +49,7 @@ def kicked_velocity(cfg: WalkerCfg, here: Floats, prop: Prop) -> Floats:
         here: ``(3,)`` metres: position of the walker.
         prop: The prop.
     """
-    away = prop.position - here
+    away = prop.mass_centre - here
     away[2] = 0.0
     away /= max(float(np.linalg.norm(away)), 1e-9)
     speed = min(cfg.kick_speed_mps, cfg.kick_impulse_ns / prop.cfg.mass_kg)
