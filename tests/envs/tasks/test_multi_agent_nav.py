@@ -104,6 +104,21 @@ def test_a_separate_finder_has_the_same_share_in_the_reward():
     game.close()
 
 
+@pytest.mark.parametrize(
+    ("overrides", "message"),
+    [
+        (
+            ["body.radius_m=0.6", "body.height_m=1.5"],
+            "door .* has width_m=1: seekers_0 with body.radius_m=0.6",
+        ),
+        (["body.height_m=2.2"], "walls.door_height_m=2 is too low .* body.height_m=2.2"),
+    ],
+)
+def test_bodies_that_do_not_fit_through_the_doors_are_refused(overrides, message):
+    with pytest.raises(ValueError, match=message):
+        game_of(*overrides, playground="house")
+
+
 # ---- reward and termination
 
 

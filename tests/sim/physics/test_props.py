@@ -210,6 +210,30 @@ def test_impossible_numbers_are_refused(field, wrong):
         of(PropShape.sphere, **{field: wrong})
 
 
+@pytest.mark.parametrize(
+    ("numbers", "message"),
+    [
+        ({"shape": PropShape.pyramid, "size_m": [0.1, 0.1, 0.0015]}, "size_m=.* a pyramid"),
+        (
+            {"shape": PropShape.sector, "size_m": [0.2, 0.04], "angle_deg": 0.4},
+            "size_m=.*angle_deg=0.4",
+        ),
+        (
+            {
+                "shape": PropShape.convex,
+                "points_m": [[0, 0, 0], [0.1, 0, 0], [0, 0.1, 0], [0, 0, 0.002]],
+            },
+            "points_m=.* a convex",
+        ),
+    ],
+)
+def test_a_polyhedron_too_thin_to_collide_is_refused_by_its_name(numbers, message):
+    with pytest.raises(ValueError, match=f"prop 'thin': {message}.* that thin cannot collide"):
+        PropCfg("thin", **numbers)
+    with pytest.raises(ValueError, match=f"part: {message}.* that thin cannot collide"):
+        PartCfg(**numbers)
+
+
 def test_the_error_for_an_unknown_shape_lists_the_shapes():
     with pytest.raises(ValueError, match=r"'thing': shape='torus'.*'sphere'"):
         PropCfg(name="thing", shape="torus", size_m=[1.0])

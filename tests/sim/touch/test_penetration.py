@@ -11,8 +11,11 @@ from touching import SPREAD, Stage, dense, of_bone
 from veca_marl.sim.body.anatomy import load_skeleton
 from veca_marl.sim.body.humanoid.self_collision import may_collide
 from veca_marl.sim.geometry import Shape
-from veca_marl.sim.touch import load_taxels, taxel_positions
-from veca_marl.sim.touch.sensed_pairs import unsensed_bones
+from veca_marl.sim.touch import TouchCfg, load_taxels, taxel_positions
+from veca_marl.sim.touch.penetration import empty_workspace, read_taxels
+from veca_marl.sim.touch.receptive_fields import fields_of
+from veca_marl.sim.touch.rigid_bones import rigid_bones
+from veca_marl.sim.touch.sensed_pairs import unsensed_bones, unsensed_primitives
 
 
 def press_forearm(stage, depth_m, radius=0.04, side="l"):
@@ -254,3 +257,37 @@ def test_distant_primitives_add_less_than_half_of_the_cost():
                 stage.sense.update_taxels()
             costs.append(time.thread_time() - start)
     assert min(costs[1::2]) < 1.5 * min(costs[::2])
+
+
+def test_no_triangle_that_another_skin_presses_deeply_is_left_out():
+    """A bound of how far a triangle's columns and fields reach must contain both.
+
+    With a spread of depths of 1 km no triangle is left out.
+    """
+    rng, taxels = np.random.default_rng(0), load_taxels()
+    everywhere = np.stack([taxels.layers[:, 0], np.full(len(taxels.layers), 1e3)], axis=1)
+    culled, all_read = [], []
+    for _ in range(30):
+        stage = Stage(random_angles(rng), cfg=TouchCfg(receptive_field=0.6))
+        other = add_body(stage.scene, "other")
+        pose(other, random_angles(rng), rng.normal(size=3) * 0.1, random_turn(rng))
+        stage.scene.update()
+        for table, readings in (
+            (taxels, culled),
+            (taxels._replace(layers=everywhere), all_read),
+        ):
+            readings.append(readings_of(stage, table, 0.6))
+    assert np.count_nonzero(np.array(all_read)) > 10_000
+    np.testing.assert_array_equal(np.array(culled), np.array(all_read))
+
+
+def readings_of(stage, taxels, share):
+    """Return the readings of a stage's body for a table of taxels."""
+    geoms, body = stage.scene.geoms, stage.body
+    vertices = stage.scene.meshes.vertices[body.vertices]
+    bones = rigid_bones(geoms, body, 47)
+    readings = np.zeros(taxels.depths.shape)
+    workspace = empty_workspace(taxels, len(vertices), len(geoms.shapes))
+    fields, ignored = fields_of(taxels, share, body.id), unsensed_primitives(geoms, body)
+    read_taxels(taxels, fields, vertices, geoms, bones, ignored, workspace, readings)
+    return readings

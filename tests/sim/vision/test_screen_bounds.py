@@ -61,6 +61,30 @@ def test_rod_in_front_is_bounded_by_its_caps():
             assert got == pytest.approx((low, high), abs=1e-3)
 
 
+def test_a_rod_behind_the_camera_whose_surface_reaches_before_it_is_bounded():
+    """Its ends are on both sides of the camera, one cap in front of its plane, the other behind."""
+    rng = np.random.default_rng(4)
+    angles, steps = np.linspace(0, 2 * np.pi, 200), np.linspace(-1.0, 1.0, 400)
+    seen = 0
+    for _ in range(300):
+        radius, near = rng.uniform(0.02, 0.5), rng.uniform(0.0, 1.0)
+        one = np.array([-rng.uniform(0.1, 5.0), -near * radius])
+        other = np.array([rng.uniform(1.0, 30.0), -rng.uniform(0.5, 3.0)]) * radius
+        middle, way = (one + other) / 2.0, (other - one) / 2.0
+        half = np.linalg.norm(way)
+        points = middle + steps[:, None] * way
+        low, high = slopes_ahead(
+            (points[:, :1] + radius * np.cos(angles)).ravel(),
+            (points[:, 1:] + radius * np.sin(angles)).ravel(),
+        )
+        if low < high:
+            seen += 1
+            got = rod_interval(*middle, *(way / half), half, radius, LIMIT)
+            assert got[0] <= low + 1e-9
+            assert got[1] >= high - 1e-9
+    assert seen > 100
+
+
 def test_box_is_bounded_by_its_edges():
     rng = np.random.default_rng(2)
     along = np.linspace(-1, 1, 60)

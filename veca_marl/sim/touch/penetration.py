@@ -261,8 +261,7 @@ def _is_outside(
     x, y, z = x - depth * normal[0], y - depth * normal[1], z - depth * normal[2]
     beyond = solid_distance(column.solid, x, y, z)
     along = spread + 0.5 * column.length
-    across = 0.5 * math.sqrt(farthest) + radius
-    return beyond > 0.0 and beyond * beyond > across * across + along * along
+    return beyond > math.sqrt(0.25 * farthest + along * along) + radius
 
 
 @njit(cache=True, error_model="numpy", inline="always")

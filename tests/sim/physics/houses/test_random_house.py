@@ -29,7 +29,7 @@ def check(house):
     assert {floor.label(door.position_m) for door in house.doors} <= reached
     assert floor.free.sum() - (floor.labels == reached.pop()).sum() <= 5, "cells of 4 cm"
     for room in house.rooms:
-        assert min(room.size_m[:2]) >= house.least_room_m - 1e-9
+        assert min(room.size_m[:2]) >= house.least_room_m - 1e-5, "but for rounding"
         assert floor.in_box(np.add(room.lower_m, room.size_m), room)[floor.free].any()
     assert len(house.rooms) == house.room_count
     assert len(house.doors) >= house.room_count - 1
@@ -102,6 +102,12 @@ def test_a_stored_run_is_read_with_its_house():
     assert again.rooms == RandomHouseCfg(seed=7).rooms
 
 
+@pytest.mark.parametrize("least_m", [10.0 / 3.0, 3.3333333, 2.9 + 1e-7])
+def test_sizes_with_many_digits_are_divided(least_m):
+    for seed in range(4):
+        check(RandomHouseCfg(seed=seed, least_room_m=least_m))
+
+
 @pytest.mark.parametrize(
     ("numbers", "message"),
     [
@@ -111,6 +117,9 @@ def test_a_stored_run_is_read_with_its_house():
         ("house_size_m=[3,9]", "room_count=5 must be from 1 to 0"),
         ("least_room_m=2", r"least_room_m=2.0 must be at least 2.90"),
         ("door_width_m=3", r"least_room_m=3.2 must be at least 3.50, for doors of 3.0 m"),
+        ("door_width_m=0.1", "playground.door_width_m=0.1 must be at least 0.3, for a body"),
+        ("walls.door_height_m=0.3", "playground.walls.door_height_m=0.3 must be at least 0.75"),
+        ("room_height_m=0.3", "playground.room_height_m=0.3 must be at least 0.75"),
         ("loops=2", r"loops=2.0 must be in \[0, 1\]"),
         ("pieces_per_room=[3,1]", r"pieces_per_room=\(3, 1\)"),
         ("walls=null", "walls of a random house must not be null"),

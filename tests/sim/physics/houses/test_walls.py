@@ -118,6 +118,30 @@ def test_a_wall_that_cannot_take_the_leaf_is_refused(y_m, walls, leaf, message):
         row(2, walls.thickness_m, walls, doors=[door])
 
 
+@pytest.mark.parametrize("apart_m", [0.5, 1.0])
+def test_doors_that_overlap_or_touch_are_refused_by_their_names(apart_m):
+    doors = [
+        DoorCfg(name, ["room_0", "room_1"], (3.05, y), 1.0)
+        for name, y in (("near", 0.8), ("far", 0.8 + apart_m))
+    ]
+    with pytest.raises(ValueError, match="doors 'near' and 'far' in one wall overlap or touch"):
+        row(2, doors=doors)
+
+
+@pytest.mark.parametrize(
+    ("leaf", "width_m", "height_m", "message"),
+    [
+        (LeafCfg(JointKind.slide), 0.13, 2.0, "width_m=0.13 of the opening must be above 0.14"),
+        (LeafCfg(), 0.02, 2.0, "width_m=0.02 of the opening must be above 0.02"),
+        (LeafCfg(), 1.0, 0.02, "height_m=0.02 of the opening must be above 0.02"),
+    ],
+)
+def test_an_opening_without_place_for_its_leaf_is_refused(leaf, width_m, height_m, message):
+    door = DoorCfg("door", ["room_0", "room_1"], (3.05, 1.5), width_m, leaf)
+    with pytest.raises(ValueError, match=f"leaf_door: {message}"):
+        row(2, doors=[door], walls=WallsCfg(door_height_m=height_m))
+
+
 def test_an_opening_that_reaches_beyond_a_room_is_refused():
     """The wall of the smaller room would stand in the opening."""
     rooms = [

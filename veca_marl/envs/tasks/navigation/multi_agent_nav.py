@@ -11,6 +11,7 @@ import numpy as np
 
 from veca_marl.envs.core.task import Player, Task, TaskCfg, Team, register, terms
 from veca_marl.envs.tasks.navigation import places
+from veca_marl.envs.tasks.navigation.doorways import check_doorways
 from veca_marl.envs.tasks.navigation.floor_plan import FloorPlan
 from veca_marl.envs.tasks.navigation.helper_reward import (
     AHEAD_WEIGHT,
@@ -130,6 +131,7 @@ class MultiAgentNav(Task):
         )
 
     def build(self) -> None:
+        check_doorways(self.world.playground, self.players)
         self.plan = FloorPlan(self.world.playground)
         self._furniture = places.furniture_of(self.world)
         self._homes = places.rooms_with_pairs(self.world.playground, *_distances_m(self.cfg))

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 _JITTER = 0.2  # relative deviation of a part's length from its share
-_ROUNDING_M = 1e-9
+_ROUNDING_M = 1e-5  # above the sum of the errors by which parts are rounded
 
 
 class Rectangle(NamedTuple):

@@ -18,6 +18,9 @@ from veca_marl.sim.physics.rooms import DoorCfg, RoomCfg
 
 GENERATOR = "random_house"
 
+_PASSAGE_M = (0.3, 0.75)
+"""Least width and height of a door: those of a body with a radius of 0.11 m and a height of 0.72 m,
+with room to spare."""
 _LARGE = 2.0  # weight of the area of one room; that of the others is 1
 _COVERING = (0.45, 0.75)  # saturation and brightness of the coverings of floors
 
@@ -113,6 +116,7 @@ class RandomHouseCfg(PlaygroundCfg):
                 f"room_height_m={self.room_height_m} and door_width_m={self.door_width_m} must be "
                 "positive and finite"
             )
+        self._check_passages()
         needed_m = max(opening_m(self.door_width_m), _open_floor_m())
         if not self.least_room_m >= needed_m:
             raise ValueError(
@@ -125,6 +129,23 @@ class RandomHouseCfg(PlaygroundCfg):
                 f"playground.room_count={self.room_count} must be from 1 to {most}: so many rooms "
                 f"of {self.least_room_m} m fit into house_size_m={tuple(self.house_size_m)}"
             )
+
+    def _check_passages(self) -> None:
+        """Check that a body fits through the doors."""
+        width_m, height_m = _PASSAGE_M
+        if self.door_width_m < width_m:
+            raise ValueError(
+                f"playground.door_width_m={self.door_width_m} must be at least {width_m}, for a "
+                "body to pass"
+            )
+        heights = {"room_height_m": self.room_height_m}
+        if self.walls is not None:
+            heights["walls.door_height_m"] = self.walls.door_height_m
+        for name, value in heights.items():
+            if value < height_m:
+                raise ValueError(
+                    f"playground.{name}={value} must be at least {height_m}, for a body to pass"
+                )
 
     @property
     def most_rooms(self) -> int:

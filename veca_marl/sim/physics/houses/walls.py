@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import NamedTuple
 
 from veca_marl.sim.physics.houses.door_leaves import WallWithDoors, leaf_props
@@ -79,10 +80,10 @@ def wall_props(rooms: Sequence[RoomCfg], doors: Sequence[DoorCfg], cfg: WallsCfg
     """Return the walls round rooms, with openings for doors, and the leaves of doors.
 
     Raises:
-        ValueError: If a wall would stand in a room, because two rooms are less than one wall
-            thickness apart, a door is not in a wall or reaches beyond one of its rooms, a wall is
-            too thin for the leaf of its door or too short for one that slides into it, or meets
-            another wall there.
+        ValueError: If two doors overlap, a wall would stand in a room, because two rooms are less
+            than one wall thickness apart, a door is not in a wall or reaches beyond one of its
+            rooms, a wall is too thin for the leaf of its door or too short for one that slides
+            into it, or meets another wall there.
     """
     lines = wall_lines(rooms, cfg.thickness_m)
     walls: list[WallWithDoors] = []
@@ -93,6 +94,7 @@ def wall_props(rooms: Sequence[RoomCfg], doors: Sequence[DoorCfg], cfg: WallsCfg
         colour = (red, green, blue)
         _check_outside(line, rooms, cfg.thickness_m)
         cut = [door for door in doors if _is_in(door, line)]
+        _check_apart(cut, line.axis)
         for door in cut:
             _check_beside(door, line.axis, rooms)
         placed.update(door.name for door in cut)
@@ -182,6 +184,23 @@ def _check_beside(door: DoorCfg, axis: int, rooms: Sequence[RoomCfg]) -> None:
                 f"door {door.name!r}: its opening from {along - half:.2f} to {along + half:.2f} m "
                 f"reaches beyond room {room.name!r}, from {low:.2f} to {high:.2f} m; move it, or "
                 f"choose a smaller width_m than {door.width_m:g}"
+            )
+
+
+def _check_apart(doors: Sequence[DoorCfg], axis: int) -> None:
+    """Check that a piece of wall remains between the doors of one wall.
+
+    Raises:
+        ValueError: If two openings overlap or touch.
+    """
+    ordered = sorted(doors, key=lambda door: door.position_m[1 - axis])
+    for first, second in pairwise(ordered):
+        gap_m = second.position_m[1 - axis] - first.position_m[1 - axis]
+        if gap_m - (first.width_m + second.width_m) / 2.0 < _TOLERANCE_M:
+            raise ValueError(
+                f"doors {first.name!r} and {second.name!r} in one wall overlap or touch: their "
+                f"middles are {gap_m:.2f} m apart, with width_m={first.width_m:g} and "
+                f"{second.width_m:g}"
             )
 
 

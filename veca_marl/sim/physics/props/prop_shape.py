@@ -6,7 +6,8 @@ import math
 from collections.abc import Sequence
 from enum import Enum
 
-from veca_marl.sim.geometry import convex_hull
+from veca_marl.sim.geometry import Polyhedron, convex_hull, pyramid, sector_of_disc
+from veca_marl.sim.physics.collision_shapes import HULL_MARGIN_M
 
 
 class PropShape(Enum):
@@ -77,14 +78,40 @@ def check_shape(prefix: str, shape: PropShape, size_m: Sequence[float]) -> None:
         )
 
 
-def check_piece(
-    prefix: str, shape: PropShape, angle_deg: float, points_m: Sequence[Sequence[float]]
-) -> None:
-    """Check the angle of a sector and the points of a convex piece.
+POLYHEDRA = (PropShape.pyramid, PropShape.sector, PropShape.convex)
+"""Shapes whose collision shape is a hull, see `collision_shapes`."""
+
+
+def hull_of(
+    shape: PropShape,
+    size_m: Sequence[float],
+    angle_deg: float,
+    points_m: Sequence[Sequence[float]],
+) -> Polyhedron:
+    """Return the polyhedron of a pyramid, sector or convex piece.
 
     Raises:
-        ValueError: If the angle is not in (0, 180], or the points have no hull with a volume; the
-            message begins with `prefix`.
+        ValueError: If the points have no hull with a volume.
+    """
+    if shape is PropShape.pyramid:
+        return pyramid(*size_m)
+    if shape is PropShape.sector:
+        return sector_of_disc(size_m[0], size_m[1], angle_deg)
+    return convex_hull(points_m)
+
+
+def check_piece(
+    prefix: str,
+    shape: PropShape,
+    size_m: Sequence[float],
+    angle_deg: float,
+    points_m: Sequence[Sequence[float]],
+) -> None:
+    """Check the angle of a sector, the points of a convex piece, and that a hull is not too thin.
+
+    Raises:
+        ValueError: If the angle is not in (0, 180], the points have no hull with a volume, or
+            nothing is left of a hull without Bullet's margin; the message begins with `prefix`.
     """
     if shape is PropShape.sector and not 0.0 < angle_deg <= 180.0:
         raise ValueError(f"{prefix}angle_deg={angle_deg} of a sector is not in (0, 180]")
@@ -92,8 +119,30 @@ def check_piece(
         raise ValueError(
             f"{prefix}points_m={points_m} of a {shape.name}; only convex props have points"
         )
-    if shape is PropShape.convex:
-        try:
-            convex_hull(points_m)
-        except ValueError as error:
-            raise ValueError(f"{prefix}points_m: {error}") from None
+    if shape in POLYHEDRA:
+        _check_hull(prefix, shape, size_m, angle_deg, points_m)
+
+
+def _check_hull(
+    prefix: str,
+    shape: PropShape,
+    size_m: Sequence[float],
+    angle_deg: float,
+    points_m: Sequence[Sequence[float]],
+) -> None:
+    try:
+        hull = hull_of(shape, size_m, angle_deg, points_m)
+    except ValueError as error:
+        raise ValueError(f"{prefix}points_m: {error}") from None
+    try:
+        hull.grown(-HULL_MARGIN_M)
+    except ValueError:
+        numbers = {
+            PropShape.pyramid: f"size_m={list(size_m)}",
+            PropShape.sector: f"size_m={list(size_m)}, angle_deg={angle_deg}",
+            PropShape.convex: f"points_m={[list(point) for point in points_m]}",
+        }[shape]
+        raise ValueError(
+            f"{prefix}{numbers}: a {shape.name} that thin cannot collide; its centroid has to be "
+            f"more than {HULL_MARGIN_M * 1e3:g} mm from each face"
+        ) from None

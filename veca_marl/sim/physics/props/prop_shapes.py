@@ -11,17 +11,13 @@ import numpy as np
 from veca_marl.sim.geometry import (
     Floats,
     Geom,
-    Polyhedron,
     Shape,
-    convex_hull,
-    pyramid,
-    sector_of_disc,
 )
 from veca_marl.sim.physics.props.doll import doll_parts
 from veca_marl.sim.physics.props.joint_cfg import JointCfg, JointKind
 from veca_marl.sim.physics.props.part_cfg import PartCfg
 from veca_marl.sim.physics.props.prop_cfg import PropCfg
-from veca_marl.sim.physics.props.prop_shape import PropShape
+from veca_marl.sim.physics.props.prop_shape import PropShape, hull_of
 
 SOUND_OBSTACLE_M = (0.7, 1.0)
 """Least width and height of a box that attenuates sound as a wall does. Sound below 340 Hz, with
@@ -148,17 +144,8 @@ def _single_geom(cfg: PropCfg | PartCfg, surface: dict[str, Any]) -> Geom:
         case PropShape.capsule:
             return Geom(Shape.CAPSULE, size, **surface)
         case _:
-            return Geom(Shape.POLYHEDRON, (), hull=_hull(cfg), **surface)
-
-
-def _hull(cfg: PropCfg | PartCfg) -> Polyhedron:
-    """Return the polyhedron of a pyramid, sector or convex piece."""
-    if cfg.shape is PropShape.pyramid:
-        return pyramid(*cfg.size_m)
-    if cfg.shape is PropShape.sector:
-        radius, height = cfg.size_m
-        return sector_of_disc(radius, height, cfg.angle_deg)
-    return convex_hull(cfg.points_m)
+            hull = hull_of(cfg.shape, cfg.size_m, cfg.angle_deg, cfg.points_m)
+            return Geom(Shape.POLYHEDRON, (), hull=hull, **surface)
 
 
 def _part_geoms(parts: Sequence[PartCfg], surface: dict[str, Any]) -> tuple[Geom, ...]:

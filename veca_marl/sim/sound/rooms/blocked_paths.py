@@ -76,15 +76,45 @@ def count_crossed(
 ) -> int:
     """Return how many boxes ``(n, ...)`` a segment passes, those round one of its ends left out.
 
-    A source in a box is part of it, such as a loudspeaker in a cabinet. See `crosses_box`.
+    A source in a box is part of it, such as a loudspeaker in a cabinet. See `crosses_box`. Pieces
+    of one wall count once: a segment can pass from the piece above a door into the one beside it.
     """
+    crossed = np.empty(len(centres), np.int64)
     count = 0
     for n in range(len(centres)):
         box = centres[n], rotations[n], halves[n]
         if contains_point(one, *box) or contains_point(other, *box):
             continue
-        count += crosses_box(one, other, *box)
+        if not crosses_box(one, other, *box):
+            continue
+        is_known = False
+        for k in range(count):
+            m = crossed[k]
+            is_known = is_known or have_common_faces((centres[m], rotations[m], halves[m]), box)
+        if not is_known:
+            crossed[count] = n
+            count += 1
     return count
+
+
+@njit(cache=True)
+def have_common_faces(
+    first: tuple[Floats, Floats, Floats], box: tuple[Floats, Floats, Floats]
+) -> bool:
+    """Return whether the two largest faces of one box are in the planes of those of another one.
+
+    Args:
+        first: Centre ``(3,)``, rotation ``(3, 3)`` and half edges ``(3,)`` of a box.
+        box: Those of the other one.
+    """
+    axis, other_axis = np.argmin(first[2]), np.argmin(box[2])
+    cosine = apart_m = 0.0
+    for k in range(3):
+        cosine += first[1][k, axis] * box[1][k, other_axis]
+        apart_m += (box[0][k] - first[0][k]) * first[1][k, axis]
+    thickness_m = first[2][axis] - box[2][other_axis]
+    parallel = abs(cosine) > 1.0 - _GRAZE_M
+    return bool(parallel and abs(apart_m) < _GRAZE_M and abs(thickness_m) < _GRAZE_M)
 
 
 @njit(cache=True)

@@ -69,8 +69,12 @@ def rod_interval(
     behind = forward - half_length * axis_forward
     if ahead * behind < 0.0:
         return -limit, limit  # the axis crosses the plane of the camera: no tangent bounds it
-    low, high = disc_interval(across + half_length * axis_across, ahead, radius, limit)
-    other_low, other_high = disc_interval(across - half_length * axis_across, behind, radius, limit)
+    one, other = across + half_length * axis_across, across - half_length * axis_across
+    if one * other <= 0.0 and min(ahead, behind) <= 0.0 and max(ahead, behind) > -radius:
+        # the axis passes behind the camera, from one side to the other, and the surface before it
+        return -limit, limit
+    low, high = disc_interval(one, ahead, radius, limit)
+    other_low, other_high = disc_interval(other, behind, radius, limit)
     return min(low, other_low), max(high, other_high)
 
 

@@ -54,7 +54,11 @@ def door_leaf(
         lock: Its lock.
         colour: Of the leaf.
         mass_kg: Its mass.
+
+    Raises:
+        ValueError: If nothing is left of a leaf for that opening, or of its way.
     """
+    _check_opening(name, width_m, height_m, 2.0 * _GAP_M)
     width = width_m - 2.0 * _GAP_M
     side = 1.0 if opens_to_front else -1.0
     hinge = JointCfg(
@@ -89,7 +93,7 @@ def sliding_leaf(
         name: Name of the prop.
         position_m: Middle of the threshold.
         yaw_deg: Rotation about z; at 0 the opening leads along x.
-        width_m: Clear width of the closed opening, more than 12 cm; the leaf is 2 cm narrower.
+        width_m: Clear width of the closed opening, more than 14 cm; the leaf is 2 cm narrower.
         height_m: Clear height of the opening.
         wall: Name of the fixed prop into which it slides, at least `LEAF_WALL_M` thick and as
             long as the leaf.
@@ -97,7 +101,11 @@ def sliding_leaf(
         lock: Its lock.
         colour: Of the leaf.
         mass_kg: Its mass.
+
+    Raises:
+        ValueError: If nothing is left of a leaf for that opening, or of its way.
     """
+    _check_opening(name, width_m, height_m, 2.0 * _GAP_M + _LEFT_OUT_M)
     width = width_m - 2.0 * _GAP_M
     side = 1.0 if slides_to_left else -1.0
     slide = JointCfg(
@@ -110,6 +118,15 @@ def sliding_leaf(
     )
     parts = _leaf_parts(width, height_m, _PULL_M, -side * (width / 2.0 - 0.06))
     return _leaf(name, (*position_m, height_m / 2.0), yaw_deg, parts, slide, colour, mass_kg)
+
+
+def _check_opening(name: str, width_m: float, height_m: float, least_width_m: float) -> None:
+    for field, value, least in (
+        ("width_m", width_m, least_width_m),
+        ("height_m", height_m, 2.0 * _GAP_M),
+    ):
+        if not value > least:
+            raise ValueError(f"{name}: {field}={value:g} of the opening must be above {least:g}")
 
 
 def open_reach_m(width_m: float) -> float:
