@@ -118,6 +118,13 @@ def test_a_wall_that_cannot_take_the_leaf_is_refused(y_m, walls, leaf, message):
         row(2, walls.thickness_m, walls, doors=[door])
 
 
+@pytest.mark.parametrize("z", [1.0, -0.2])
+def test_walls_are_built_round_rooms_on_the_floor_only(z):
+    rooms = [RoomCfg("raised", (0.0, 0.0, z), (3.0, 3.0, 2.5))]
+    with pytest.raises(ValueError, match=r"room 'raised': lower_m=.* must have the height 0"):
+        PlaygroundCfg(name="house", rooms=rooms, walls=WallsCfg())
+
+
 @pytest.mark.parametrize("apart_m", [0.5, 1.0])
 def test_doors_that_overlap_or_touch_are_refused_by_their_names(apart_m):
     doors = [

@@ -80,11 +80,12 @@ def wall_props(rooms: Sequence[RoomCfg], doors: Sequence[DoorCfg], cfg: WallsCfg
     """Return the walls round rooms, with openings for doors, and the leaves of doors.
 
     Raises:
-        ValueError: If two doors overlap, a wall would stand in a room, because two rooms are less
-            than one wall thickness apart, a door is not in a wall or reaches beyond one of its
-            rooms, a wall is too thin for the leaf of its door or too short for one that slides
-            into it, or meets another wall there.
+        ValueError: If a room is not on the floor, two doors overlap, a wall would stand in a room,
+            because two rooms are less than one wall thickness apart, a door is not in a wall or
+            reaches beyond one of its rooms, a wall is too thin for the leaf of its door or too
+            short for one that slides into it, or meets another wall there.
     """
+    _check_floors(rooms)
     lines = wall_lines(rooms, cfg.thickness_m)
     walls: list[WallWithDoors] = []
     placed: set[str] = set()
@@ -108,6 +109,16 @@ def wall_props(rooms: Sequence[RoomCfg], doors: Sequence[DoorCfg], cfg: WallsCfg
         height_m = min(cfg.door_height_m, line.height_m)
         props += [*wall.pieces, *leaf_props(wall, walls, height_m)]
     return props
+
+
+def _check_floors(rooms: Sequence[RoomCfg]) -> None:
+    """Check that all rooms are on the floor of the world, on which the walls stand."""
+    for room in rooms:
+        if room.lower_m[2] != 0.0:
+            raise ValueError(
+                f"room {room.name!r}: lower_m={tuple(room.lower_m)} must have the height 0: walls "
+                "are built on the floor of the world"
+            )
 
 
 def floor_coverings(rooms: Sequence[RoomCfg]) -> list[PropCfg]:
