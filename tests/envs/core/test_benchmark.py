@@ -62,3 +62,13 @@ def test_the_first_start_that_differs_is_named():
 def test_a_task_without_frozen_episodes_is_refused():
     with pytest.raises(ValueError, match="task 'Chess' has no frozen episodes"):
         find_benchmark("Chess")
+
+
+def test_parameters_that_a_task_has_got_since_have_their_former_values():
+    quiet = ["senses/vision=blind", "senses/touch=numb"]
+    benchmark = find_benchmark("MultiAgentNav")
+    assert "separate_finder" not in benchmark.parameters
+    benchmark.check_parameters(compose(["+task=MultiAgentNav", *quiet]).game.task)
+    changed = compose(["+task=MultiAgentNav", "task.separate_finder=true", *quiet]).game.task
+    with pytest.raises(ValueError, match=r"task.separate_finder=True \(not False\)"):
+        benchmark.check_parameters(changed)

@@ -44,24 +44,6 @@ def test_distances_are_measured_between_middles_and_doors():
     assert plan.distance_m(1, 1) == 0.0
 
 
-def test_the_path_leads_straight_through_an_opening_or_along_its_frame():
-    plan = plan_of(1.0, 1.0)  # openings 1 m wide
-    place = np.array([2.0, 1.2, 0.5])
-    assert plan.path_m(place, np.array([3.0, 1.2])) == pytest.approx(1.0)
-    assert plan.path_m(place, np.array([6.0, 1.2])) == pytest.approx(4.0)
-    frame = (4.05, 1.0 + 0.5)
-    around = math.dist((2.0, 3.5), frame) + math.dist(frame, (6.0, 3.5))
-    assert plan.path_m(np.array([2.0, 3.5]), np.array([6.0, 3.5])) == pytest.approx(around)
-    assert plan.path_m(place, np.array([10.0, 1.2])) > 8.0
-
-
-def test_the_path_changes_continuously_in_the_opening_and_is_infinite_without_doors():
-    plan, goal = plan_of(1.0, 3.0), np.array([11.0, 3.0])
-    sides = [plan.path_m(np.array([4.05 + side, 1.3]), goal) for side in (-1e-6, 1e-6)]
-    assert sides[0] == pytest.approx(sides[1], abs=1e-5)
-    assert plan_of(rooms=2).path_m(np.array([1.0, 1.0]), np.array([6.0, 1.0])) == math.inf
-
-
 def test_the_waypoint_in_the_same_room_is_the_goal():
     goal = plan_of(1.0, 3.0).waypoint(
         np.array([1.0, 1.0, 0.5]), np.array([3.0, 2.0, 0.5]), APPROACH

@@ -17,8 +17,7 @@ def game():
 
 
 def test_the_weights_are_those_of_the_paper():
-    ours = {"approach": 0.0}
-    assert MultiAgentNavCfg().weights == {"reached": 1.0, "ahead": 0.05, "turn": 0.03} | ours
+    assert MultiAgentNavCfg().weights == {"reached": 1.0, "ahead": 0.05, "turn": 0.03}
 
 
 def moved(game, yaw_deg, *commands):
@@ -37,25 +36,6 @@ def moved(game, yaw_deg, *commands):
 
 def walked(game, yaw_deg, forward=1.0):
     return tuple(moved(game, yaw_deg, (forward, 0.0))[0])
-
-
-def test_approach_adds_up_to_what_the_path_has_become_shorter(game):
-    begin(game)
-    step(game)
-    name = game.players[0].name
-    begin_m = game.task.plan.path_m(game.players[0].body.position, game.task.target.position)
-    moves = [step(game, **{name: (1.0, 0.3)}).terms[name]["approach"] for _ in range(20)]
-    end_m = game.task.plan.path_m(game.players[0].body.position, game.task.target.position)
-    assert sum(moves) == pytest.approx(begin_m - end_m)
-    assert abs(sum(moves)) > 0.1
-
-
-def test_an_agent_that_has_arrived_does_not_approach(game):
-    begin(game)
-    put(game, 0, 0.5)
-    step(game)
-    put(game, 0, 1.5)
-    assert step(game).terms[game.players[0].name]["approach"] == 0.0
 
 
 @pytest.mark.parametrize("forward", [0.0, 1.0])

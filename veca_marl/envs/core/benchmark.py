@@ -58,15 +58,15 @@ class Benchmark:
     def check_parameters(self, cfg: TaskCfg) -> None:
         """Check that the parameters of a task are those of the benchmark.
 
+        Parameters that the task has got since must have their former values.
+
         Raises:
             ValueError: If one differs; the message names them.
         """
-        own = parameters(cfg)
-        differing = sorted(
-            name for name in {*own, *self.parameters} if own.get(name) != self.parameters.get(name)
-        )
+        own, stored = parameters(cfg), {**cfg.formerly, **self.parameters}
+        differing = sorted(name for name in {*own, *stored} if own.get(name) != stored.get(name))
         if differing:
-            changes = [f"task.{n}={own.get(n)} (not {self.parameters.get(n)})" for n in differing]
+            changes = [f"task.{n}={own.get(n)} (not {stored.get(n)})" for n in differing]
             raise ValueError(f"episodes=benchmark: {self._name} differs in {', '.join(changes)}")
 
     def check_starts(self, found: Sequence[Start], first: int = 0) -> None:

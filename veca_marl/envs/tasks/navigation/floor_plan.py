@@ -78,31 +78,6 @@ class FloorPlan:
         length, _ = self._routes[one].get(other, (math.inf, None))
         return length
 
-    def path_m(self, place: Floats, goal: Floats) -> float:
-        """Return the length of a path to a goal; inf if none exists. Furniture is ignored.
-
-        It leads through the doors of the shortest path between the middles of the two rooms, and
-        through each where the straight line to the middle of the next door, or to the goal, passes
-        it, or else along its frame.
-
-        Args:
-            place: ``(2,)`` or ``(3,)`` metres.
-            goal: ``(2,)`` or ``(3,)`` metres.
-        """
-        here, there = self.room_of(place), self.room_of(goal)
-        if here != there and there not in self._routes[here]:
-            return math.inf
-        passages = []
-        while here != there:
-            passages.append(self._routes[here][there][1])
-            here = passages[-1].beyond
-        middles = [np.array(passage.door.position_m) for passage in passages]
-        length_m, point = 0.0, np.array(place[:2], np.float64)
-        for passage, target in zip(passages, [*middles[1:], goal[:2]], strict=False):
-            crossing = _crossing(passage, point, target)
-            length_m, point = length_m + math.dist(point, crossing), crossing
-        return length_m + math.dist(point, goal[:2])
-
     def waypoint(self, place: Floats, goal: Floats, approach: DoorApproach) -> Floats:
         """Return the next point of the shortest path to a goal that can be reached straight.
 
@@ -171,18 +146,6 @@ class FloorPlan:
         door = passage.door.position_m
         middles = (self.rooms[number].middle_m[:2] for number in (room, passage.beyond))
         return sum(math.dist(door, middle) for middle in middles)
-
-
-def _crossing(passage: _Passage, point: Floats, target: Floats) -> Floats:
-    """Return the point of an opening, ``(2,)`` metres, nearest to the line from point to target."""
-    middle, out = np.array(passage.door.position_m), passage.out
-    along = np.array([-out[1], out[0]])
-    ahead_m, depth_m = float(out @ (middle - point)), float(out @ (target - point))
-    # a point that is beside or beyond the wall already passes it where it is
-    share = min(max(ahead_m / depth_m, 0.0), 1.0) if depth_m > 0.0 else 0.0
-    offset_m = float(along @ (point + share * (target - point) - middle))
-    half_m = passage.door.width_m / 2.0
-    return np.asarray(middle + min(max(offset_m, -half_m), half_m) * along)
 
 
 def _way_out(room: RoomCfg, other: RoomCfg) -> Floats:

@@ -18,7 +18,6 @@ from veca_marl.envs.tasks.navigation.helper_reward import (
     TURN_WEIGHT,
     HelperReward,
 )
-from veca_marl.envs.tasks.navigation.path_progress import PathProgress
 from veca_marl.envs.tasks.navigation.placement_check import check_placement
 from veca_marl.envs.tasks.navigation.room_counts import check_rooms
 from veca_marl.envs.tasks.player_starts import direct_gaze_ahead, place_player
@@ -54,7 +53,6 @@ class MultiAgentNavCfg(TaskCfg):
             own, `finder`, before the team `seekers` of the others.
     """
 
-    # fields that were added later, with the value that the task had before
     formerly: ClassVar[dict[str, Any]] = {"separate_finder": False}
 
     agents: int = 2
@@ -62,9 +60,7 @@ class MultiAgentNavCfg(TaskCfg):
     reach_m: float = 0.4
     muted: Muted = Muted.none
     separate_finder: bool = False
-    weights: dict[str, float] = terms(
-        reached=1.0, ahead=AHEAD_WEIGHT, turn=TURN_WEIGHT, approach=0.0
-    )
+    weights: dict[str, float] = terms(reached=1.0, ahead=AHEAD_WEIGHT, turn=TURN_WEIGHT)
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -107,8 +103,6 @@ class MultiAgentNav(Task):
         turn: Decrease during the step of the horizontal angle between the agent's forward direction
             and the direction of the object, rad, under the same conditions and if the object was
             visible before the step, too. In the paper ``Vis a_l L``.
-        approach: Decrease during the step of the length of the path to the object through the
-            middles of doors, m, while the agent has not reached it. Not in the paper.
     """
 
     senses = ("vision", "touch", "proprioception", "audio")
@@ -137,7 +131,6 @@ class MultiAgentNav(Task):
         self._homes = places.rooms_with_pairs(self.world.playground, *_distances_m(self.cfg))
         self.target = places.add_target(self.world, self.cfg.radius_m)
         self._helper = HelperReward(self.world.scene)
-        self._progress = PathProgress(self.plan)
         self.arrived: set[str] = set()
         self._newly_arrived = 0
 
@@ -157,7 +150,6 @@ class MultiAgentNav(Task):
                 player.body.muted = room is home or self.cfg.muted is Muted.all
         direct_gaze_ahead(self.players)
         self._helper.reset(self.target, self.players)
-        self._progress.reset(self.target, self.players)
 
     def _draw_rooms(self, rng: np.random.Generator) -> tuple[list[RoomCfg], RoomCfg]:
         """Draw a room for each agent, and of these the room of the object, which must fit in."""
@@ -175,16 +167,10 @@ class MultiAgentNav(Task):
             if places.gap_m(player.body.position, self.target) <= self.cfg.reach_m:
                 self.arrived.add(player.name)
         self._newly_arrived = len(self.arrived) - before
-        searching = [player for player in self.players if player.name not in self.arrived]
-        self._helper.after_step(searching)
-        self._progress.after_step(searching)
+        self._helper.after_step([p for p in self.players if p.name not in self.arrived])
 
     def reward(self, player: Player) -> dict[str, float]:
-        return {
-            "reached": float(self._newly_arrived),
-            **self._helper.terms(player),
-            "approach": self._progress.of(player),
-        }
+        return {"reached": float(self._newly_arrived), **self._helper.terms(player)}
 
     def terminated(self) -> bool:
         return len(self.arrived) == len(self.players)
