@@ -48,6 +48,12 @@ def test_train_stays_a_function_after_the_module_of_the_command_was_imported():
         veca_marl.train("Chess")
 
 
+@pytest.mark.parametrize("suite", [["veca"], None, 3])
+def test_a_suite_is_a_name(suite):
+    with pytest.raises(ConfigError, match=r"suite=.* must be a name, as text"):
+        veca_marl.list_tasks(suite=suite)
+
+
 def test_fractions_of_frames_are_refused():
     with pytest.raises(ConfigError, match=r"total_frames=1.5 must be an integral number"):
         veca_marl.train("KickTheBall", total_frames=1.5)

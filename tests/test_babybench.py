@@ -39,3 +39,9 @@ def test_episodes_are_played_and_written(tmp_path, capsys):
 def test_another_task_is_refused(capsys):
     assert main(["+task=KickTheBall"]) == 2
     assert "SelfTouch, HandRegard" in capsys.readouterr().err
+
+
+def test_a_game_without_senses_is_refused_in_one_line(capsys):
+    words = ["+task=SelfTouch", "senses/touch=numb", "senses/proprioception=none", "episodes=1"]
+    assert main(words) == 2
+    assert "no sense is left" in capsys.readouterr().err

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import torch
 from composed import compose
+from paths import ROOT
 
 from veca_marl.algos.checkpoints.checkpoints import Checkpoints
 from veca_marl.bench.all_cores import SimultaneousRollouts
@@ -225,6 +226,14 @@ def test_several_tasks_and_playgrounds_are_one_table(capsys):
         assert goal == f"{most}: {'met' if float(views) <= most else 'missed'}"
 
 
+def test_tasks_are_measured_with_each_number_of_worlds(capsys):
+    words = ["bench.tasks=[ObjectNav]", "bench.worlds=[2,3]", "senses/touch=numb"]
+    assert main([*ROLLOUTS, *words]) == 0
+    rows = [line for line in capsys.readouterr().out.splitlines() if line.startswith("| ")]
+    column = rows[0].split(" | ").index("worlds")
+    assert [row.split(" | ")[column] for row in rows[2:]] == ["2", "3"]
+
+
 def test_of_all_tasks_those_are_measured_that_fit_a_playground(capsys, monkeypatch):
     monkeypatch.setattr("veca_marl.bench.command.TASKS", ("MultiAgentNav", "ObjectNav"))
     games = chosen_games(BenchCfg(tasks=["all"], playgrounds=["simple", "house"]), [])
@@ -301,7 +310,9 @@ def test_an_experiment_with_a_scripted_opponent_is_measured(capsys):
         (["+task=KickTheBall", "bench.worlds=[0]"], "bench.worlds must be at least 1"),
         (["+task=KickTheBall", "bench.worlds=[two]"], "bench.worlds[0]: Value 'two'"),
         (["+task=KickTheBall", "bench.wolds=[1]"], "did you mean worlds?"),
-        (["+task=KickTheBall", "bench.json=/nowhere/bench.json"], "/nowhere/bench.json is not in"),
+        (["+task=KickTheBall", f"bench.json={__file__}/bench.json"], "is not a folder"),
+        (["+task=KickTheBall", f"bench.json={ROOT}"], "is a folder; give a file"),
+        (["bench.tasks=[KickTheBall]", "senses/vision=blind", "senses/audio=deaf"], "no sense"),
         (["+task=KickTheBall", "bench.loose_props=3"], "need bench.agents"),
         (["+task=KickTheBall", "bench.learning=true", "bench.agents=[2]"], "is not learnt"),
         (["+task=TurnBaby", "body=walker"], "this task needs a body with joints"),

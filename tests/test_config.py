@@ -208,6 +208,13 @@ def test_a_group_without_the_name_of_a_preset_is_refused(words):
         compose(words)
 
 
+@pytest.mark.parametrize("other", ["DodgeCar", "MazeNav", "SoccerTwoPlayer"])
+def test_another_task_is_not_chosen_by_its_name(other):
+    message = rf"task.name={other} takes \w+, got KickTheBallCfg; .* by \+task={other}"
+    with pytest.raises(ConfigError, match=message):
+        compose([KICK, f"task.name={other}"])
+
+
 def test_long_names_of_runs_are_shortened_and_stay_apart():
     """File systems take 255 bytes."""
     long = ",".join(f"algo.part_{number}=0.{number}" for number in range(40))

@@ -19,6 +19,7 @@ from veca_marl.experts_table.episode_file import EpisodeFile
 from veca_marl.experts_table.play import Played, digest, game_cfg
 from veca_marl.experts_table.processes import LostProcessError, play_all
 from veca_marl.experts_table.table import markdown
+from veca_marl.runs.lock import locked
 from veca_marl.sim.physics import PropCfg
 
 BENCHMARK = ROOT / "experiments" / "experts" / "benchmark"
@@ -95,6 +96,7 @@ def test_the_stored_return_is_that_of_the_frozen_episode(tmp_path):
     [
         (["tasks=[Dodge]"], "Dodge"),
         (["tasks=[DodgeCar]", "episodes=101"], "episodes must be from 0 to 100, got 101"),
+        (["tasks=[DodgeCar,DodgeCar]"], "names 'DodgeCar' more than once"),
         (["processes=0"], "processes must be at least 1, got 0"),
         (["tasks=[DodgeCar]", "task.aim=0.5"], "task.aim=0.5 (not 0.6)"),
         (["tasks=[DodgeCar]", "playground=single_room"], "starts are not those of the benchmark"),
@@ -105,6 +107,33 @@ def test_what_cannot_be_played_is_refused(tmp_path, capsys, words, message):
     assert main([*words, f"to={tmp_path}"]) == 2
     assert message in capsys.readouterr().err
     assert not (tmp_path / "table.md").exists()
+
+
+def test_remarks_without_their_columns_are_refused_before_the_first_episode(tmp_path, capsys):
+    (tmp_path / "remarks.csv").write_text("task,who\nDodgeCar,me\n")
+    assert main([*SHORT, f"to={tmp_path}", "episodes=1"]) == 2
+    assert "remarks.csv has no column 'policy'" in capsys.readouterr().err
+    assert not (tmp_path / "DodgeCar.csv").exists()
+
+
+def test_an_episode_that_is_stored_twice_is_refused(tmp_path, capsys):
+    words = [*SHORT, f"to={tmp_path}", "episodes=1"]
+    assert main(words) == 0
+    file = tmp_path / "DodgeCar.csv"
+    file.write_text(file.read_text() + file.read_text().splitlines()[1] + "\n")
+    assert main(words) == 2
+    assert "has episode 0 of policy expert 2 times" in capsys.readouterr().err
+
+
+def test_two_commands_do_not_play_for_one_folder_at_once(tmp_path, capsys):
+    with locked(tmp_path):
+        assert main([*SHORT, f"to={tmp_path}", "episodes=1"]) == 2
+    assert "is in use" in capsys.readouterr().err
+    assert not (tmp_path / "DodgeCar.csv").exists()
+
+
+def test_the_return_of_one_episode_has_no_interval():
+    assert "| 1.00 [-] |" in markdown({"Walk": [played()]}, {})
 
 
 def test_episodes_of_another_configuration_are_not_mixed(tmp_path, capsys):

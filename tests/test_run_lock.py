@@ -48,7 +48,7 @@ def holder(tmp_path):
 
 
 def test_a_folder_that_another_process_holds_is_refused_until_that_is_killed(tmp_path, holder):
-    message = rf"{tmp_path / 'run'} is in use: process {holder.pid} on \S+ trains in it; wait until"
+    message = rf"{tmp_path / 'run'} is in use: process {holder.pid} on \S+ writes to it; wait until"
     with pytest.raises(ConfigError, match=message), locked(tmp_path / "run"):
         pass
     holder.kill()

@@ -91,6 +91,18 @@ def test_a_tournament_writes_the_matches_the_ratings_and_the_picture(played, cap
     assert len(capsys.readouterr().out.splitlines()) == 4
 
 
+def test_a_tournament_without_a_place_for_its_picture_is_refused_before_it_is_played(
+    played, capsys, monkeypatch
+):
+    monkeypatch.setattr("veca_marl.tournament.tournament", None)  # would be called
+    picture = played / "run" / "cross_play.png"
+    picture.unlink(missing_ok=True)
+    picture.mkdir()
+    assert tournament([f"run={played / 'run'}", "tournament.members=2", "episodes=4"]) == 2
+    assert "cross_play.png is a folder" in capsys.readouterr().err
+    picture.rmdir()
+
+
 def test_a_policy_of_another_run_is_an_opponent(played, tmp_path, capsys):
     assert train(tmp_path, "run", f"opponent.blue={played / 'run'}", "total_frames=32") == 0
     with (tmp_path / "run" / "metrics.csv").open() as file:

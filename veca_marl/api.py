@@ -50,10 +50,11 @@ def list_tasks(plugins: Sequence[str] = (), suite: str = "veca") -> list[str]:
 
     Raises:
         PluginError: If a plug-in cannot be loaded.
-        ConfigError: If `plugins` is no list of names.
+        ConfigError: If `plugins` is no list of names, or `suite` no name.
         ValueError: If there is no such suite; the message lists those there are.
     """
     check_list("plugins", plugins, '["my_tasks"] (a suite is suite="babybench")')
+    check_name("suite", suite)
     load_plugins(plugins)
     suites = {task.suite for task in TASKS.values()}
     if suite not in suites:

@@ -16,7 +16,7 @@ import torch
 
 from veca_marl.algos.checkpoints.checkpoint_file import CheckpointError
 from veca_marl.algos.files import WriteError, write_atomically
-from veca_marl.config import ConfigError
+from veca_marl.config import ConfigError, one_line
 from veca_marl.config.command_line import CommandLine
 from veca_marl.config.outputs import check_file
 from veca_marl.envs.core.task import find_task
@@ -127,7 +127,10 @@ def run(options: BabyBenchOptions, overrides: list[str]) -> None:
     name = choice.cfg.task.name
     if find_task(name).suite != SUITE:
         raise ConfigError(f"+task={name} is not in the suite {SUITE}: SelfTouch, HandRegard")
-    session = Session(choice.cfg.game, choice.make_policy, options.seed, choice.exploration)
+    try:
+        session = Session(choice.cfg.game, choice.make_policy, options.seed, choice.exploration)
+    except ValueError as error:
+        raise ConfigError(one_line(error)) from error
     result = Result(name, options.policy)
     play(session, result, options.episodes)
     session.close()

@@ -24,10 +24,13 @@ from veca_marl.algos.selfplay.pool import Pool
 from veca_marl.algos.selfplay.tournament import Match, Rating, play_all, rate, table_of_points
 from veca_marl.config import Config, ConfigError, to_config
 from veca_marl.config.command_line import CommandLine
+from veca_marl.config.outputs import check_file, check_folder
 from veca_marl.config.stored import change
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
 from veca_marl.runs.assembly import make_learners, read_specs
 from veca_marl.runs.run_folder import RunFolder, open_run
+
+_MATCHES, _RATINGS, _PICTURE = "cross_play.csv", "elo.csv", "cross_play.png"
 
 
 @dataclass
@@ -114,13 +117,13 @@ def spread(frames: Sequence[int], count: int) -> list[int]:
 def write_results(path: Path, matches: list[Match], ratings: list[Rating]) -> None:
     """Write the matches and the ratings as CSV into a folder."""
     first, second = matches[0].members
-    with _created(path / "cross_play.csv") as file:
+    with _created(path / _MATCHES) as file:
         writer = csv.writer(file)
         columns = [f"{first}_frames", f"{second}_frames", "episodes"]
         writer.writerow([*columns, f"{first}_wins", f"{second}_wins", "ahead"])
         for m in matches:
             writer.writerow([*m.members.values(), m.episodes, *m.wins.values(), f"{m.ahead:.6g}"])
-    with _created(path / "elo.csv") as file:
+    with _created(path / _RATINGS) as file:
         writer = csv.writer(file)
         writer.writerow(["team", "frames", "elo"])
         writer.writerows([r.team, r.frames, f"{r.elo:.1f}"] for r in ratings)
@@ -157,19 +160,23 @@ def draw_matrix(path: Path, matches: list[Match]) -> None:
         axis.set_ticks(range(len(frames)), [f"{n / 1000:.0f}k" for n in frames])
     axes.set(xlabel=f"training frames of {second}", ylabel=f"training frames of {first}")
     figure.colorbar(image, label=f"points of {first} (win 1, draw 1/2)")
-    figure.savefig(path, dpi=120, bbox_inches="tight")
+    with write_errors(path):
+        figure.savefig(path, dpi=120, bbox_inches="tight")
 
 
 def run(options: TournamentOptions, overrides: list[str]) -> None:
     """Play the tournament, print the ratings and write the results into the folder of the run."""
     torch.set_num_threads(1)
     folder = open_run(Path(options.run), "run=")
+    check_folder(folder.path, "run")
+    for name in (_MATCHES, _RATINGS, _PICTURE):
+        check_file(folder.path / name, "run")
     matches = tournament(folder, options, overrides)
     ratings = rate(matches)
-    write_results(folder.path, matches, ratings)
     for rating in sorted(ratings, key=lambda r: -r.elo):
         print(f"{rating.elo:7.0f}  {rating.team} after {rating.frames} frames")
-    draw_matrix(folder.path / "cross_play.png", matches)
+    write_results(folder.path, matches, ratings)
+    draw_matrix(folder.path / _PICTURE, matches)
 
 
 def main(words: Sequence[str] | None = None) -> int:

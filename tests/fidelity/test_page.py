@@ -119,3 +119,19 @@ def test_the_committed_page_has_no_broken_law_and_all_its_pictures():
 
 def test_file_names_of_pictures_have_letters_digits_and_underscores_only():
     assert picture_name("fall", "Speed, in (m/s)") == "fall_speed_in_m_s.png"
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["sections=[inertia]", f"to={__file__}"], "is a file; give a folder"),
+        (["-m", "sections=[inertia],[momentum]", "to=laws"], "written by 2 combinations"),
+        (["-m", "sections=[inertia],[momentum]"], "let them differ in to"),
+    ],
+)
+def test_a_folder_that_cannot_take_the_page_is_refused_before_the_first_law(
+    words, message, capsys, monkeypatch
+):
+    monkeypatch.setattr(command, "measure_all", None)  # would be called
+    assert command.main(words) == 2
+    assert message in capsys.readouterr().err

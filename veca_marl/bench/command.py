@@ -10,6 +10,7 @@ from pathlib import Path
 
 import torch
 
+from veca_marl.algos.files import WriteError, write_atomically
 from veca_marl.bench.free_play import free_play
 from veca_marl.bench.learning import measure_learning
 from veca_marl.bench.machine import machine, machine_line
@@ -26,6 +27,7 @@ from veca_marl.bench.report import (
 from veca_marl.bench.rollouts import Rollouts, measure_first_world, measure_rollouts
 from veca_marl.config import ConfigError, compose, one_line
 from veca_marl.config.command_line import CommandLine
+from veca_marl.config.outputs import check_file
 from veca_marl.envs.core.game_cfg import GameCfg
 from veca_marl.envs.core.task import TASKS
 
@@ -51,9 +53,8 @@ or the speed of learning as a share of that of the simulator on all cores:
 
 def main(words: Sequence[str] | None = None) -> int:
     """Run the command line; return the exit status."""
-    return CommandLine("bench", BenchOptions, DESCRIPTION, outputs=("bench.json",)).run(
-        bench, words
-    )
+    command = CommandLine("bench", BenchOptions, DESCRIPTION, (WriteError,), ("bench.json",))
+    return command.run(bench, words)
 
 
 def bench(options: BenchOptions, overrides: list[str]) -> None:
@@ -62,6 +63,8 @@ def bench(options: BenchOptions, overrides: list[str]) -> None:
     Raises:
         ConfigError: If a choice is impossible.
     """
+    if options.bench.json is not None:
+        check_file(options.bench.json, "bench.json")
     if options.bench.learning:
         bench_learning(options.bench, overrides)
         return
@@ -85,7 +88,7 @@ def bench(options: BenchOptions, overrides: list[str]) -> None:
         references = measure_references(game.playground, cfg.steps, cfg.repeats)
         print(references_table(references))
     if cfg.json is not None:
-        Path(cfg.json).write_text(as_json(machine(), first_world_s, runs, references))
+        write_atomically(Path(cfg.json), as_json(machine(), first_world_s, runs, references))
 
 
 def bench_tasks(cfg: BenchCfg, overrides: Sequence[str]) -> None:
@@ -97,11 +100,18 @@ def bench_tasks(cfg: BenchCfg, overrides: Sequence[str]) -> None:
     games = list(chosen_games(cfg, overrides))
     torch.set_num_threads(1)
     print(machine_line(), end="\n\n")
-    first_world_s = measure_first_world(games[0])
-    runs = [measure_rollouts(game, cfg.worlds[0], cfg.steps, cfg.repeats) for game in games]
+    try:
+        first_world_s = measure_first_world(games[0])
+        runs = [
+            measure_rollouts(game, worlds, cfg.steps, cfg.repeats)
+            for game in games
+            for worlds in cfg.worlds
+        ]
+    except ValueError as error:
+        raise ConfigError(one_line(error)) from error
     print(task_table(runs))
     if cfg.json is not None:
-        Path(cfg.json).write_text(as_json(machine(), first_world_s, runs, None))
+        write_atomically(Path(cfg.json), as_json(machine(), first_world_s, runs, None))
 
 
 def chosen_games(cfg: BenchCfg, overrides: Sequence[str]) -> Iterator[GameCfg]:
@@ -135,7 +145,7 @@ def bench_learning(cfg: BenchCfg, overrides: list[str]) -> None:
     print(learning_table(learning))
     if cfg.json is not None:
         content = {"machine": machine(), "learning": asdict(learning)}
-        Path(cfg.json).write_text(json.dumps(content, indent=2) + "\n")
+        write_atomically(Path(cfg.json), json.dumps(content, indent=2) + "\n")
 
 
 def _measure(game: GameCfg, cfg: BenchCfg) -> Iterator[Rollouts]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from pathlib import Path
 
 
 @dataclass
@@ -60,10 +59,6 @@ class BenchCfg:
             raise ValueError("bench.loose_props and bench.senses need bench.agents (free play)")
         if self.learning and self.agents:
             raise ValueError("bench.agents: free play is not learnt (bench.learning=true)")
-        if self.json is not None and not Path(self.json).absolute().parent.is_dir():
-            raise ValueError(f"bench.json={self.json} is not in a folder that exists")
-        if self.json is not None and Path(self.json).is_dir():
-            raise ValueError(f"bench.json={self.json} is a folder")
 
 
 @dataclass

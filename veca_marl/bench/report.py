@@ -20,6 +20,7 @@ def throughput_table(runs: Sequence[Rollouts]) -> str:
             run.task,
             run.playground,
             str(run.worlds),
+            str(run.worlds),
             str(run.agents),
             f"{run.agent_steps_per_s:,.0f}",
             f"{run.wall_agent_steps_per_s:,.0f}",
@@ -38,7 +39,16 @@ def throughput_table(runs: Sequence[Rollouts]) -> str:
 
 def task_table(runs: Sequence[Rollouts]) -> str:
     """Return a Markdown table of tasks: the table of the page on performance."""
-    header = ("task", "playground", "agents", "agent steps/s", "per reference", "views", "goal")
+    header = (
+        "task",
+        "playground",
+        "worlds",
+        "agents",
+        "agent steps/s",
+        "per reference",
+        "views",
+        "goal",
+    )
     rows = [
         (
             run.task,

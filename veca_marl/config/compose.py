@@ -104,7 +104,7 @@ def to_config(node: DictConfig) -> Config:
     check_lengths(node)
     try:
         config = cast(Config, OmegaConf.to_object(node))
-        find_task(config.task.name)
+        _check_task(config)
         _refuse_extra(config, "")
         config.check_teams()
         config.game.check_bodies()
@@ -112,6 +112,17 @@ def to_config(node: DictConfig) -> Config:
     except (OmegaConfBaseException, ValueError) as error:
         raise ConfigError(one_line(error)) from error
     return config
+
+
+def _check_task(config: Config) -> None:
+    """Raise `ValueError` if there is no such task, or the parameters are those of another one."""
+    name, found = config.task.name, type(config.task)
+    expected = find_task(name).cfg_type()
+    if not isinstance(config.task, expected):
+        raise ValueError(
+            f"task.name={name} takes {expected.__name__}, got {found.__name__}; another task is "
+            f"chosen by +task={name}"
+        )
 
 
 def _refuse_extra(config: Any, path: str) -> None:

@@ -22,6 +22,8 @@ def check_file(path: str | Path, option: str) -> Path:
     if file.is_dir():
         raise ConfigError(f"{option}={path} is a folder; give a file")
     _check_parent(file.parent, f"{option}={path}")
+    if file.exists() and not os.access(file, os.W_OK):
+        raise ConfigError(f"{option}={path} cannot be written: no permission to change it")
     return file
 
 

@@ -20,6 +20,7 @@ from veca_marl.experts_table.options import TableOptions
 from veca_marl.experts_table.play import Job, Played, digest, game_cfg
 from veca_marl.experts_table.processes import LostProcessError, play_all
 from veca_marl.experts_table.table import markdown
+from veca_marl.runs.lock import locked
 from veca_marl.runs.provenance import checkout_commit
 
 DESCRIPTION = """
@@ -34,6 +35,7 @@ stored when it ends: a second call with the same folder plays those that are mis
 ``remarks.csv`` in it (columns task, policy, remark) adds remarks to rows of the table.
 """
 TABLE, REMARKS = "table.md", "remarks.csv"
+_REMARK_COLUMNS = ("task", "policy", "remark")
 
 
 def main(words: Sequence[str] | None = None) -> int:
@@ -46,22 +48,30 @@ def run(options: TableOptions, overrides: list[str]) -> None:
     """Play the missing episodes, write the table and print it.
 
     Raises:
-        ConfigError: If a choice is impossible, or stored episodes are of another configuration.
+        ConfigError: If a choice is impossible, stored episodes are of another configuration, or
+            another process plays for the same folder.
     """
     folder = check_folder(options.to, "to")
+    with locked(folder):
+        table = _play_missing(options, folder, overrides)
+        write_atomically(folder / TABLE, table)
+    print(table)
+
+
+def _play_missing(options: TableOptions, folder: Path, overrides: list[str]) -> str:
+    """Play the missing episodes; return the table of all stored ones."""
     try:
         prepare(overrides)  # loads plug-ins with tasks of their own
+        remarks = _remarks(folder)
         jobs = list(_missing(options, folder, overrides))
         for number, (job, played) in enumerate(
             play_all(jobs, options.processes, checkout_commit() or ""), 1
         ):
             _file(folder, job.task).add(played)
             _report(f"{number}/{len(jobs)} {job.task} {played.policy} {job.episode}", played)
-        table = markdown(_stored(folder), _remarks(folder))
+        return markdown(_stored(folder), remarks)
     except ValueError as error:
         raise ConfigError(one_line(error)) from error
-    write_atomically(folder / TABLE, table)
-    print(table)
 
 
 def _missing(options: TableOptions, folder: Path, overrides: Sequence[str]) -> Iterator[Job]:
@@ -98,7 +108,11 @@ def _remarks(folder: Path) -> dict[tuple[str, str], str]:
     if not path.exists():
         return {}
     with path.open(newline="", encoding="utf-8") as file:
-        return {(row["task"], row["policy"]): row["remark"] for row in csv.DictReader(file)}
+        reader = csv.DictReader(file)
+        missing = [name for name in _REMARK_COLUMNS if name not in (reader.fieldnames or ())]
+        if missing:
+            raise ValueError(f"{path} has no column {missing[0]!r}; it needs {_REMARK_COLUMNS}")
+        return {(row["task"], row["policy"]): row["remark"] for row in reader}
 
 
 def _report(label: str, played: Played) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import os
+from collections import Counter
 from collections.abc import Iterable
 from dataclasses import asdict, fields
 from io import StringIO
@@ -30,7 +31,8 @@ class EpisodeFile:
         """Return the stored episodes; an incomplete last line is left out.
 
         Raises:
-            ValueError: If the file has other columns or a value that is none of its column.
+            ValueError: If the file has other columns, a value that is none of its column, or an
+                episode twice.
         """
         if not self._path.exists():
             return []
@@ -39,9 +41,17 @@ class EpisodeFile:
         if reader.fieldnames is not None and reader.fieldnames != _COLUMNS:
             raise ValueError(f"{self._path} has the columns {reader.fieldnames}, not {_COLUMNS}")
         try:
-            return [_played(row) for row in reader]
+            episodes = [_played(row) for row in reader]
         except (TypeError, ValueError) as error:
             raise ValueError(f"{self._path}, line {reader.line_num}: {error}") from error
+        counts = Counter((one.policy, one.episode) for one in episodes)
+        for (policy, episode), count in counts.items():
+            if count > 1:
+                raise ValueError(
+                    f"{self._path} has episode {episode} of policy {policy} {count} times: delete "
+                    "all of these lines but one"
+                )
+        return episodes
 
     def check(self, stored: Iterable[Played], configuration: str, version: int) -> None:
         """Check that stored episodes are of one configuration and have the same starts.

@@ -35,3 +35,6 @@ class TableOptions:
             raise ValueError(f"processes must be at least 1, got {self.processes}")
         if not self.tasks:
             raise ValueError("tasks must name a task; [all] is all")
+        twice = sorted({name for name in self.tasks if self.tasks.count(name) > 1})
+        if twice:
+            raise ValueError(f"tasks={self.tasks} names {twice[0]!r} more than once")

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from veca_marl.algos.evaluation.comparison import interval, share_interval
 from veca_marl.experts_table.play import Played
@@ -43,19 +44,24 @@ _EXPLANATION = (
 
 def _row(task: str, policy: str, episodes: Sequence[Played], remarks: Remarks) -> list[str]:
     scores = np.array([one.score for one in episodes])
-    low, high = interval(scores)
     speeds = [one.steps * one.agents / one.processor_s for one in episodes]
     versions = sorted({one.version for one in episodes})
     return [
         task,
         policy,
         f"{len(episodes)} (version {', '.join(map(str, versions))})",
-        f"{scores.mean():.2f} [{low:.2f}, {high:.2f}]",
+        _return_cell(scores),
         _solved_cell(episodes),
         f"{np.median(speeds):.0f}",
         ", ".join(dict.fromkeys(_short(one.commit) for one in episodes)),
         "; ".join(_remarks(task, policy, episodes, remarks)),
     ]
+
+
+def _return_cell(scores: NDArray[np.float64]) -> str:
+    low, high = interval(scores)
+    bounds = "-" if len(scores) < 2 else f"{low:.2f}, {high:.2f}"
+    return f"{scores.mean():.2f} [{bounds}]"
 
 
 def solved_of(episodes: Sequence[Played]) -> list[float]:

@@ -15,10 +15,10 @@ from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass, field
 from multiprocessing import get_context
-from pathlib import Path
 
 from veca_marl.config import ConfigError
 from veca_marl.config.command_line import CommandLine
+from veca_marl.config.outputs import check_folder
 from veca_marl.fidelity.law import Section
 from veca_marl.fidelity.page import number, write_page
 from veca_marl.fidelity.sections import SECTIONS, check_names, measure
@@ -93,10 +93,11 @@ def run(options: FidelityOptions, overrides: list[str]) -> list[str]:
     """
     if overrides:
         raise ConfigError(f"{overrides[0]}: fidelity has the options sections, to and processes")
+    folder = check_folder(options.to, "to")
     check_plotting()
     names = [name for name in SECTIONS if name in options.sections or not options.sections]
     sections = measure_all(names, options.processes or usable_cores())
-    print(f"page: {write_page(Path(options.to), sections)}")
+    print(f"page: {write_page(folder, sections)}")
     return broken_laws(sections)
 
 
@@ -108,7 +109,10 @@ def main(words: Sequence[str] | None = None) -> int:
         broken.extend(run(options, overrides))
 
     errors = (PlotError, OSError)
-    status = CommandLine("fidelity", FidelityOptions, str(__doc__), errors).run(call, words)
+    command = CommandLine(
+        "fidelity", FidelityOptions, str(__doc__), errors, outputs=("to",), places=("to",)
+    )
+    status = command.run(call, words)
     for line in broken:
         print(f"broken: {line}", file=sys.stderr)
     return status or int(bool(broken))

@@ -1,4 +1,4 @@
-"""The lock on the folder of a run: only one process at a time trains in it.
+"""The lock on a folder of results: only one process at a time writes to it.
 
 The system releases it when the process ends, however it ends, so that a run that was killed can be
 continued. The file stays then, which has no meaning without the lock.
@@ -59,7 +59,7 @@ def _acquire(path: Path) -> TextIO:
         file.close()
         if time.monotonic() >= deadline:
             raise ConfigError(
-                f"{path.parent} is in use: {holder} trains in it; "
+                f"{path.parent} is in use: {holder} writes to it; "
                 "wait until it has ended, or choose another folder"
             )
         time.sleep(_RETRY_S)

@@ -110,6 +110,14 @@ def test_every_actor_needs_an_action(duel):
         duel.step(actions)
     with pytest.raises(ValueError, match="'green'"):
         duel.step({**still(duel), "green": np.zeros(2)})
+    with pytest.raises(ValueError, match=r"unknown agents \[3, None\]"):
+        duel.step({**still(duel), None: np.zeros(2), 3: np.zeros(2)})
+
+
+@pytest.mark.parametrize("actions", [None, 5, [1.0]])
+def test_actions_are_a_mapping(duel, actions):
+    with pytest.raises(ValueError, match=r"actions are \w+, not a mapping with one for each of"):
+        duel.step(actions)
 
 
 def test_the_reward_is_the_weighted_sum_of_the_terms(game):

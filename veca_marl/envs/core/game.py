@@ -192,9 +192,13 @@ class Game:
 
     def _check_names(self, actions: Mapping[str, Any]) -> None:
         names = [player.name for player in self.actors]
+        if not isinstance(actions, Mapping):
+            raise ValueError(
+                f"actions are {type(actions).__name__}, not a mapping with one for each of {names}"
+            )
         if list(actions) == names:
             return
-        unknown = sorted(set(actions) - set(names))
+        unknown = sorted(set(actions) - set(names), key=str)
         if unknown:
             raise ValueError(f"actions for unknown agents {unknown}; there are {names}")
         missing = sorted(set(names) - set(actions) - self.eliminated)
