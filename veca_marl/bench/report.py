@@ -20,7 +20,6 @@ def throughput_table(runs: Sequence[Rollouts]) -> str:
             run.task,
             run.playground,
             str(run.worlds),
-            str(run.worlds),
             str(run.agents),
             f"{run.agent_steps_per_s:,.0f}",
             f"{run.wall_agent_steps_per_s:,.0f}",
@@ -39,20 +38,13 @@ def throughput_table(runs: Sequence[Rollouts]) -> str:
 
 def task_table(runs: Sequence[Rollouts]) -> str:
     """Return a Markdown table of tasks: the table of the page on performance."""
-    header = (
-        "task",
-        "playground",
-        "worlds",
-        "agents",
-        "agent steps/s",
-        "per reference",
-        "views",
-        "goal",
-    )
+    header = ["task", "playground", "worlds", "agents", "agent steps/s", "per reference"]
+    header += ["views", "goal"]
     rows = [
         (
             run.task,
             f"`{run.playground}`",
+            str(run.worlds),
             str(run.agents),
             f"{run.agent_steps_per_s:,.0f}",
             f"{run.agent_steps_per_reference:.2f}",
@@ -61,7 +53,7 @@ def task_table(runs: Sequence[Rollouts]) -> str:
         )
         for run in runs
     ]
-    lines = [header, ("---",) * len(header), *rows]
+    lines = [header, ["---"] * len(header), *rows]
     return "\n".join(f"| {' | '.join(cells)} |" for cells in lines)
 
 
