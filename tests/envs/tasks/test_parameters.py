@@ -138,6 +138,8 @@ def make_game(task, override):
         ),
         ("ObjectNav", "apart_m=0.45", "task.apart_m=0.45 must be larger than task.reach_m=0.3"),
         ("ObjectPhysNav", "reach_m=1.85", "task.apart_m=2 must be larger than task.reach_m=1.85"),
+        ("KickTheBall", "speed_mps=[50,60]", "up to 60 covers more than task.radius_m=0.15 in"),
+        ("RotateCube", "edge_m=0.5", "task.edge_m=0.5 must be at most 0.1"),
         ("MultiAgentNav", "agents=1", "task.agents=1 must be at least 2"),
         ("MultiAgentNav", "radius_m=0", "task.radius_m=0.0 must be a positive number"),
         ("MultiAgentNav", "reach_m=nan", "task.reach_m=nan must be a positive number"),

@@ -148,6 +148,24 @@ def test_a_block_that_is_held_up_has_a_lower_return_than_a_pile(game, piling):
     assert gained < 0.5 * piling
 
 
+def test_a_block_between_two_that_are_pressed_to_its_sides_is_not_released(game, monkeypatch):
+    """Both outer blocks are held, as by two hands; the one between has no contact with the body."""
+    game.reset(np.random.default_rng(0))
+    (middle, right), left, client = game.task.red, game.task.blue, game.world.client
+    child, apart_m, height_m = game.task.child, EDGE - 0.0008, 0.22
+    middle.place((0.45, 0.0, height_m))
+    with (
+        fixed_at(client, left, (0.45, -apart_m, height_m)),
+        fixed_at(client, right, (0.45, apart_m, height_m)),
+    ):
+        monkeypatch.setattr(child, "touches", lambda prop: prop in (left, right))
+        carried = [terms["height"] for terms in sit(game, 1.0)]
+        assert middle.position[2] == pytest.approx(height_m, abs=0.02)
+        assert middle.touches(left.body_id)
+        assert middle.touches(right.body_id)
+    assert max(carried) == 0.0
+
+
 @contextmanager
 def fixed_at(client, block, place):
     """Keep a block at a place by a constraint."""

@@ -18,8 +18,8 @@ class BodyCfg:
         eye_range_deg: Largest rotation of the eyes in the head, to each side and up and down, below
             90.
         voice: Whether the action has a part `voice` that chooses a call.
-        call_pause_s: Silence after each call, during which no other call can begin, and other sounds
-            of the mouth wait; at most 60 s.
+        call_pause_s: Silence after each call, at most 60 s. No other call can begin meanwhile, and
+            other sounds of the mouth wait.
         interaction_range_m: Objects can be interacted with if their distance from the head is
             smaller. The paper's main text has 1.5 m, its table of functions 2.5 m.
     """

@@ -6,10 +6,27 @@ import math
 
 import numpy as np
 
-from veca_marl.sim.physics import Prop, RoomCfg
+from veca_marl.sim.physics import ClockCfg, Prop, RoomCfg
 
 _WALL_GAP_M = 0.02  # between the ball and the wall
 _END_CLEARANCE_M = 1.0  # from the walls at both ends of the side wall
+
+
+def check_ball_speed(speed_mps: float, radius_m: float, clock: ClockCfg) -> None:
+    """Check that a ball moves by at most its radius in one physics step.
+
+    Contacts are found after each physics step: a faster ball could pass through a wall.
+
+    Raises:
+        ValueError: If it is faster; the message names the limit.
+    """
+    limit = radius_m / clock.substep_s
+    if speed_mps > limit:
+        raise ValueError(
+            f"task.speed_mps of up to {speed_mps:g} covers more than task.radius_m={radius_m:g} in "
+            f"a physics step of {clock.substep_s:.4g} s: at most {limit:.4g} m/s, or raise "
+            "clock.substeps"
+        )
 
 
 def launch_from_side_wall(

@@ -85,8 +85,9 @@ class MultiAgentNav(Task):
     The rooms, the shared reward and the helper reward are those of the paper (table of tasks and
     "Helper Rewards" in the appendix; "Multi-Agent Reinforcement Learning"); sizes and times are
     not in the paper. Departures: the paper's table lists vision, touch and proprioception, but its
-    text has agents come "using auditory perception", so hearing is included here; `ahead` is in
-    metres per step, and `turn` stands for the sideways velocity that walking bodies do not have,
+    text has agents come "using auditory perception", so hearing is included here; the paper
+    distributes agents in each room, while by default five of the seven rooms are empty; `ahead` is
+    in metres per step, and `turn` stands for the sideways velocity that walking bodies do not have,
     see `HelperReward`.
 
     The default `playground=seven_rooms` serves up to 7 agents; `two_rooms`, `three_rooms` and

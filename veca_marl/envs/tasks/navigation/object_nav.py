@@ -85,7 +85,8 @@ class ObjectNav(Task):
     of tasks and "Helper Rewards" in the appendix). The paper does not state the cue for the
     target, the objects, the distance at which one is reached, and when an episode ends. Here the
     target is of one kind, `target`, in all episodes; the kinds are those that the paper's data sets
-    classify, and further ones. The helper reward is as in MultiAgentNav.
+    classify, and further ones. Departures: `ahead` is in metres per step, and `turn` stands for the
+    sideways velocity that walking bodies do not have, see `HelperReward`.
 
     Terms:
         reached: 1 on the step in which the target is reached, else 0.

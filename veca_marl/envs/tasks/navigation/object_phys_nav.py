@@ -31,8 +31,8 @@ class ObjectPhysNav(ObjectNav):
     Objects, rewards and the end of an episode are as in ObjectNav: the task is solved (`solved`)
     when the target has been reached. The agent feels and senses its own body as well. Senses and
     joint-level actions are those of the paper (table of tasks in the appendix); sizes and times are
-    not in the paper. Departure: the eyes are turned to the horizon ahead in each step, because on
-    hands and knees the face points to the floor.
+    not in the paper. Departures: those of ObjectNav's helper reward; the eyes are turned to the
+    horizon ahead in each step, because on hands and knees the face points to the floor.
 
     Terms:
         reached: 1 on the step in which the target is reached, else 0.

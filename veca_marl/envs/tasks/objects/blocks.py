@@ -79,22 +79,22 @@ def rests_on(block: Prop, base: Prop) -> bool:
 
 
 def stands_free(block: Prop, others: Sequence[Prop], child: Humanoid) -> bool:
-    """Return whether no part of a body touches a block, or a block that carries it.
+    """Return whether no part of a body touches a block, or blocks that touch it, or these.
+
+    A block can be carried by what is below it, and by friction between two that are pressed to its
+    sides.
 
     Args:
         block: The block.
         others: Blocks that may carry it, and each other.
         child: The body.
     """
-    return is_released(block, child) and all(
-        stands_free(base, others, child) for base in others if _lies_on(block, base)
-    )
-
-
-def _lies_on(block: Prop, base: Prop) -> bool:
-    """Return whether a block touches another one from above, also if both are inclined."""
-    above_m = block.position[2] - base.position[2]
-    return bool(above_m > 0.5 * block.cfg.size_m[0]) and block.touches(base.body_id)
+    group, rest = [block], [other for other in others if other is not block]
+    for member in group:  # grows meanwhile
+        touched = [other for other in rest if member.touches(other.body_id)]
+        group += touched
+        rest = [other for other in rest if other not in touched]
+    return all(is_released(member, child) for member in group)
 
 
 def is_at_rest(block: Prop) -> bool:

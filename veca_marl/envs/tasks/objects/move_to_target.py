@@ -57,8 +57,8 @@ class MoveToTarget(Task):
     reward, "the difference of distance between the target position and the object's position",
     are those of the paper (table of tasks in the appendix); the numbers are not in the paper.
     Departures: touch is limited to the hands and the eyes look at the object, which the paper says
-    of GrabObject only; the distance is clipped at `far_m`, so that a toy that is pushed across the
-    room costs no more than one out of reach.
+    of GrabObject only; the distance is horizontal, and clipped at `far_m`, so that a toy that is
+    pushed across the room costs no more than one out of reach.
 
     The body is free and can topple. An episode lasts `max_seconds` and never terminates. The task
     is solved (`solved`) while the toy is within `there_m` of the mark.

@@ -78,8 +78,8 @@ class PutDownBlock(Task):
 
     The senses, the joint-level action and the reward, "the negative sum of the y-axis position of
     red blocks" (the vertical axis) and "a negative reward when the blue blocks fall", are those of
-    the paper (table of tasks in the appendix); the tower and all numbers are not in the paper. A
-    height is that of a block's lowest corner.
+    the paper (table of tasks in the appendix); the tower and all numbers are not in the paper.
+    Departure: there is one red block. A height is that of a block's lowest corner.
 
     The body is free and can topple. An episode lasts `max_seconds` and never terminates. The task
     is solved (`solved`) while the red block rests on the floor, no part of the body touches it and

@@ -18,6 +18,7 @@ from veca_marl.sim.geometry import rotation_about_vertical
 from veca_marl.sim.physics import PlaygroundCfg, PropCfg, PropShape
 
 SHOULDER = "r_upper_arm.abduction"
+_LARGEST_EDGE_M = 0.1
 _GAP_M = 0.001  # between the cube and the skin of the palm at the start
 
 
@@ -26,7 +27,7 @@ class RotateCubeCfg(TaskCfg):
     """Parameters of RotateCube.
 
     Attributes:
-        edge_m: Length of the cube's edges.
+        edge_m: Length of the cube's edges, at most 0.1 m: a palm is 0.04 m wide.
         mass_kg: Mass of the cube.
         friction: Friction of the cube, see `PropCfg`.
         turn_deg: Target orientation: yaw from the orientation at the start, positive to the left.
@@ -52,6 +53,11 @@ class RotateCubeCfg(TaskCfg):
     def __post_init__(self) -> None:
         super().__post_init__()
         self.check_positive("edge_m", "mass_kg", "friction", "clear_m")
+        if self.edge_m > _LARGEST_EDGE_M:
+            raise ValueError(
+                f"task.edge_m={self.edge_m} must be at most {_LARGEST_EDGE_M}: the cube lies on a "
+                "palm"
+            )
         if not self.edge_m < self.lost_m < math.inf:
             raise ValueError(f"task.lost_m={self.lost_m} must be above task.edge_m={self.edge_m}")
         if not 0.0 <= self.start_deg <= 45.0:
