@@ -29,9 +29,9 @@ from sphinx.ext import napoleon
 import veca_marl
 from veca_marl import list_tasks
 from veca_marl.conf_dir import conf_dir
-from veca_marl.config import compose
+from veca_marl.config import ConfigError, compose
 from veca_marl.envs.core.game import Game
-from veca_marl.envs.core.task import find_task
+from veca_marl.envs.core.task import TASKS, find_task
 from veca_marl.sim.body.anatomy import limit_sources
 from veca_marl.sim.body.humanoid import HumanoidCfg
 
@@ -249,3 +249,23 @@ def test_the_changelog_and_the_citation_have_the_version_of_the_package():
     changelog = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
     assert re.findall(r"^## \[(\d\S*)\]", changelog, re.M)[0] == veca_marl.__version__
     assert f"version: {veca_marl.__version__}\n" in (ROOT / "CITATION.cff").read_text()
+
+
+@pytest.mark.slow
+def test_the_table_of_playgrounds_that_are_refused_is_true():
+    page = read("reference/playgrounds.md")
+    places = sorted(path.stem for path in (Path(conf_dir()) / "playground").glob("*.yaml"))
+    refused = {}
+    for row in re.findall(r"^\| (\w.*?) \| (.*?) \| .* \|$", page, re.MULTILINE):
+        tasks, names = row[0].split(", "), set(re.findall(r"`(\w+)`", row[1]))
+        if set(tasks) <= set(TASKS):
+            wrong = set(places) - names if row[1].startswith("all but") else names
+            refused |= dict.fromkeys(tasks, wrong)
+    assert len(refused) == 7
+    for task, place in itertools.product(sorted(TASKS), places):
+        try:
+            compose([f"+task={task}", f"playground={place}"])
+        except ConfigError:
+            assert place in refused.get(task, ()), (task, place)
+        else:
+            assert place not in refused.get(task, ()), (task, place)

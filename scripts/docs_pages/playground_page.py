@@ -52,6 +52,27 @@ and its walls of constant y are free of furniture, because balls roll out of the
 What a step costs in each playground is on the page on [performance](../performance.md).
 """
 
+REFUSED = (
+    (
+        "BabyzumasRevenge",
+        "`simple`, `single_room`, `four_rooms`, `house`",
+        "it starts in a room with one door, without a leaf",
+    ),
+    (
+        "ChaseCar, DodgeCar",
+        "all but `simple`, `single_room`",
+        "the car drives in one room: another would be a hiding place",
+    ),
+    ("MazeNav", "all but `simple`", "a maze fills a single square room without furniture"),
+    ("MultiAgentNav", "`simple`, `single_room`", "each agent starts in a room of its own"),
+    (
+        "SoccerOnePlayer, SoccerTwoPlayer",
+        "`single_room`, `three_rooms`, `four_rooms`, `seven_rooms`, `random_house`",
+        "the pitch does not fit, or furniture stands on it",
+    ),
+)
+"""Tasks, playgrounds that they refuse, and the reason."""
+
 SENSES = """## Sight and sound
 
 Walls, furniture and leaves of doors hide what is behind them. A sound in the same room is heard
@@ -90,6 +111,9 @@ def playground_page() -> str:
     """Return the Markdown page of the playgrounds."""
     lines = [
         HEAD,
+        *table(("task", "refused in", "reason"), REFUSED),
+        "",
+        "All other tasks take every playground.\n",
         *table(("playground", "rooms", "doors", "furniture", "primitives"), rows()),
         "",
         "`random_house` stands for `playground.seed=0`; the picture on the right is seed 7.\n",
