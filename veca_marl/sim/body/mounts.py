@@ -98,7 +98,7 @@ def aimed(eye: Pose, point: Floats, range_rad: float) -> Pose:
     """
     x, y, z = eye.rotation.T @ (point - eye.position)
     pitch = min(max(math.atan2(z, abs(x)), -range_rad), range_rad)
-    ahead = math.copysign(math.hypot(x, z), x)  # negative: the point is behind
+    ahead = math.copysign(math.hypot(x, z), x)  # negative where the point is behind
     yaw = min(max(math.atan2(y, ahead), -range_rad), range_rad)
     return Pose(eye.position, eye.rotation @ _pitched_and_yawed(pitch, yaw))
 

@@ -79,10 +79,10 @@ def rests_on(block: Prop, base: Prop) -> bool:
 
 
 def stands_free(block: Prop, others: Sequence[Prop], child: Humanoid) -> bool:
-    """Return whether no part of a body touches a block, or blocks that touch it, or these.
+    """Return whether no part of a body touches a block, or one that is in contact with it.
 
-    A block can be carried by what is below it, and by friction between two that are pressed to its
-    sides.
+    Contacts are followed from block to block: a block is carried by what is below it, or by
+    friction between two that are pressed to its sides.
 
     Args:
         block: The block.
@@ -90,7 +90,7 @@ def stands_free(block: Prop, others: Sequence[Prop], child: Humanoid) -> bool:
         child: The body.
     """
     group, rest = [block], [other for other in others if other is not block]
-    for member in group:  # grows meanwhile
+    for member in group:  # the list grows while it is read
         touched = [other for other in rest if member.touches(other.body_id)]
         group += touched
         rest = [other for other in rest if other not in touched]
