@@ -19,8 +19,8 @@ from veca_marl.sim.physics.rooms import DoorCfg, RoomCfg
 GENERATOR = "random_house"
 
 _PASSAGE_M = (0.3, 0.75)
-"""Least width and height of a door: those of a body with a radius of 0.11 m and a height of 0.72 m,
-with room to spare."""
+"""Least width and height of a door, with room to spare for a body with a radius of 0.11 m and a
+height of 0.72 m."""
 _LARGE = 2.0  # weight of the area of one room; that of the others is 1
 _COVERING = (0.45, 0.75)  # saturation and brightness of the coverings of floors
 
