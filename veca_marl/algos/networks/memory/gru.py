@@ -99,7 +99,7 @@ def features_and_state(features: Tensor, state: Tensor) -> Tensor:
     """Return the features followed by the state.
 
     Source: Ni et al. 2022, "Recurrent model-free RL can be a strong baseline for many POMDPs",
-    whose heads read the encoded observation beside the state, too.
+    whose heads read the encoded observation in addition to the state.
     """
     return torch.cat([features, state], dim=-1)
 

@@ -90,8 +90,7 @@ class KickTheBall(Task):
     Rewards" in the appendix). The paper gives no numbers apart from the helper reward's weight.
     Departure from the paper: `approach` is 0 below a least speed, because one of three policies
     learnt to creep backwards towards the ball without kicking it. A player that walks towards the
-    ball faster than that, and away from it more slowly, still gets about half of the return of the
-    expert with few kicks.
+    ball faster than that, and away from it more slowly, still receives `approach` without kicking.
 
     Terms:
         kick: 1 on the step in which the ball is kicked, else 0.

@@ -53,7 +53,7 @@ class PartCfg:
         if self.shape not in SINGLE_SHAPES:
             names = [shape.name for shape in SINGLE_SHAPES]
             raise ValueError(f"part: shape={self.shape.name}; a part is one of {names}")
-        check_piece("part: ", self.shape, self.size_m, self.angle_deg, self.points_m)
+        check_piece("part: ", self)
         if not all(math.isfinite(value) for value in (*self.position_m, *self.rotation_deg)):
             raise ValueError(
                 f"part: position_m={tuple(self.position_m)}, "

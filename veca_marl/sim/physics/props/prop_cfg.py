@@ -112,7 +112,7 @@ class PropCfg:
                 f"prop {self.name!r}: parts={self.parts} of a {self.shape.name}; "
                 "a compound has at least one part, other shapes have none"
             )
-        check_piece(f"prop {self.name!r}: ", self.shape, self.size_m, self.angle_deg, self.points_m)
+        check_piece(f"prop {self.name!r}: ", self)
         shapes = {self.shape, *(part.shape for part in self.parts)}
         if self.partition and not shapes & _BOXES:
             raise ValueError(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from enum import Enum
+from typing import Protocol
 
 from veca_marl.sim.geometry import Polyhedron, convex_hull, pyramid, sector_of_disc
 from veca_marl.sim.physics.collision_shapes import HULL_MARGIN_M
@@ -79,70 +80,78 @@ def check_shape(prefix: str, shape: PropShape, size_m: Sequence[float]) -> None:
 
 
 POLYHEDRA = (PropShape.pyramid, PropShape.sector, PropShape.convex)
-"""Shapes whose collision shape is a hull, see `collision_shapes`."""
+"""Shapes with flat faces other than boxes; they collide as convex hulls, see `collision_shapes`."""
 
 
-def hull_of(
-    shape: PropShape,
-    size_m: Sequence[float],
-    angle_deg: float,
-    points_m: Sequence[Sequence[float]],
-) -> Polyhedron:
+class Piece(Protocol):
+    """What the geometry of a prop or part of one primitive depends on; see `PropCfg`."""
+
+    @property
+    def shape(self) -> PropShape:
+        """The shape."""
+        ...
+
+    @property
+    def size_m(self) -> Sequence[float]:
+        """Its sizes, metres, see `SIZE_NAMES`."""
+        ...
+
+    @property
+    def angle_deg(self) -> float:
+        """Angle of a sector, in (0, 180]."""
+        ...
+
+    @property
+    def points_m(self) -> Sequence[Sequence[float]]:
+        """Points ``(n, 3)``, metres, of which a convex piece is the hull."""
+        ...
+
+
+def hull_of(piece: Piece) -> Polyhedron:
     """Return the polyhedron of a pyramid, sector or convex piece.
 
     Raises:
         ValueError: If the points have no hull with a volume.
     """
-    if shape is PropShape.pyramid:
-        return pyramid(*size_m)
-    if shape is PropShape.sector:
-        return sector_of_disc(size_m[0], size_m[1], angle_deg)
-    return convex_hull(points_m)
+    if piece.shape is PropShape.pyramid:
+        return pyramid(*piece.size_m)
+    if piece.shape is PropShape.sector:
+        return sector_of_disc(piece.size_m[0], piece.size_m[1], piece.angle_deg)
+    return convex_hull(piece.points_m)
 
 
-def check_piece(
-    prefix: str,
-    shape: PropShape,
-    size_m: Sequence[float],
-    angle_deg: float,
-    points_m: Sequence[Sequence[float]],
-) -> None:
+def check_piece(prefix: str, piece: Piece) -> None:
     """Check the angle of a sector, the points of a convex piece, and that a hull is not too thin.
 
     Raises:
         ValueError: If the angle is not in (0, 180], the points have no hull with a volume, or
             nothing is left of a hull without Bullet's margin; the message begins with `prefix`.
     """
-    if shape is PropShape.sector and not 0.0 < angle_deg <= 180.0:
-        raise ValueError(f"{prefix}angle_deg={angle_deg} of a sector is not in (0, 180]")
+    shape, points_m = piece.shape, piece.points_m
+    if shape is PropShape.sector and not 0.0 < piece.angle_deg <= 180.0:
+        raise ValueError(f"{prefix}angle_deg={piece.angle_deg} of a sector is not in (0, 180]")
     if (shape is PropShape.convex) != bool(points_m):
         raise ValueError(
             f"{prefix}points_m={points_m} of a {shape.name}; only convex props have points"
         )
     if shape in POLYHEDRA:
-        _check_hull(prefix, shape, size_m, angle_deg, points_m)
+        _check_hull(prefix, piece)
 
 
-def _check_hull(
-    prefix: str,
-    shape: PropShape,
-    size_m: Sequence[float],
-    angle_deg: float,
-    points_m: Sequence[Sequence[float]],
-) -> None:
+def _check_hull(prefix: str, piece: Piece) -> None:
     try:
-        hull = hull_of(shape, size_m, angle_deg, points_m)
+        hull = hull_of(piece)
     except ValueError as error:
         raise ValueError(f"{prefix}points_m: {error}") from None
     try:
         hull.grown(-HULL_MARGIN_M)
     except ValueError:
         numbers = {
-            PropShape.pyramid: f"size_m={list(size_m)}",
-            PropShape.sector: f"size_m={list(size_m)}, angle_deg={angle_deg}",
-            PropShape.convex: f"points_m={[list(point) for point in points_m]}",
-        }[shape]
+            PropShape.pyramid: f"size_m={list(piece.size_m)}",
+            PropShape.sector: f"size_m={list(piece.size_m)}, angle_deg={piece.angle_deg}",
+            PropShape.convex: f"points_m={[list(point) for point in piece.points_m]}",
+        }[piece.shape]
         raise ValueError(
-            f"{prefix}{numbers}: a {shape.name} that thin cannot collide; its centroid has to be "
-            f"more than {HULL_MARGIN_M * 1e3:g} mm from each face"
+            f"{prefix}{numbers}: a {piece.shape.name} that thin cannot collide; its centroid has "
+            f"to be more than {HULL_MARGIN_M * 1e3:g} mm from each face"
         ) from None

@@ -144,8 +144,7 @@ def _single_geom(cfg: PropCfg | PartCfg, surface: dict[str, Any]) -> Geom:
         case PropShape.capsule:
             return Geom(Shape.CAPSULE, size, **surface)
         case _:
-            hull = hull_of(cfg.shape, cfg.size_m, cfg.angle_deg, cfg.points_m)
-            return Geom(Shape.POLYHEDRON, (), hull=hull, **surface)
+            return Geom(Shape.POLYHEDRON, (), hull=hull_of(cfg), **surface)
 
 
 def _part_geoms(parts: Sequence[PartCfg], surface: dict[str, Any]) -> tuple[Geom, ...]:
