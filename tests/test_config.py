@@ -6,6 +6,7 @@ import yaml
 from hydra.core.hydra_config import HydraConfig
 from omegaconf import OmegaConf
 
+from veca_marl.algos.training.schedule import Schedule
 from veca_marl.config import Config, ConfigError, compose, compose_node, conf_dir
 from veca_marl.config.compose import _job_folder
 from veca_marl.envs.core.task import TASKS
@@ -32,6 +33,15 @@ PRESETS = [(g, path.stem) for g in GROUPS for path in sorted((conf_dir() / g).gl
 # the first preset of each group together, the second ones, ...: fewer compositions than presets
 TOGETHER = zip_longest(*([f"{g}={p}" for g, p in PRESETS if g == group] for group in GROUPS))
 EXPERIMENTS = sorted(path.stem for path in (conf_dir() / "experiment").glob("*.yaml"))
+
+
+@pytest.mark.parametrize("task", sorted(TASKS))
+def test_episodes_end_before_the_worlds_start_new_ones(task):
+    """What comes later in an episode would not be learnt from."""
+    cfg = compose([f"+task={task}"])
+    stage = Schedule.of(cfg.total_frames, cfg.eval.every_frames, cfg.collect.frames)
+    steps = [batches * cfg.collect.steps for batches in stage.stages_after(0)]
+    assert min(steps) >= cfg.game.max_steps
 
 
 @pytest.mark.parametrize("task", sorted(TASKS))
@@ -103,7 +113,7 @@ def test_files_hold_only_what_differs_from_the_dataclasses():
         ),
         ([KICK, "playground=hose"], r"unknown playground 'hose'.*; choices: .*single_room"),
         ([KICK, "senses.audio.quality=loud"], r"'loud', expected one of \[hrtf, stereo, mono\]"),
-        ([KICK, "algo.clip=-1"], r"algo.clip must be positive, got -1.0"),
+        ([KICK, "algo.clip=-1"], r"algo.clip must be in \(0, 1\], got -1.0"),
         ([KICK, "task.name=Nim"], r"unknown task 'Nim'.*; choices: BabyzumasRevenge"),
         ([KICK, "total_frames=0"], r"total_frames must be at least 1, got 0"),
         ([KICK, "algo.minibatches=9999"], r"a batch of \d+ frames cannot be split"),

@@ -199,11 +199,20 @@ def test_a_run_that_starts_from_another_one_needs_frames_for_an_update_too(tmp_p
         make_trainer(compose([*sac(65), f"init_from.agents={tmp_path}"]))
 
 
+@pytest.mark.parametrize(("seconds", "warned"), [(0.64, False), (0.68, True)])
+def test_episodes_that_are_longer_than_the_steps_between_evaluations_are_named(
+    caplog, seconds, warned
+):
+    make_trainer(compose([*SMALL, f"task.max_seconds={seconds}"]))  # 16 steps of 40 ms
+    found = [text for text in warnings(caplog) if "episodes last up to 17 steps" in text]
+    assert bool(found) is warned
+
+
 @pytest.mark.parametrize("stored", [False, True])
 def test_a_resumed_run_that_ends_before_its_buffer_is_full_again_says_so(tmp_path, caplog, stored):
-    stored_rows = f"algo.replay.in_checkpoint={stored}"
-    run_training(compose([*sac(48), stored_rows]), RunFolder(tmp_path))
-    resumed = [*sac(48), stored_rows, f"resume={tmp_path}"]
+    choices = [f"algo.replay.in_checkpoint={stored}", "task.max_seconds=0.6"]
+    run_training(compose([*sac(48), *choices]), RunFolder(tmp_path))
+    resumed = [*sac(48), *choices, f"resume={tmp_path}"]
     make_trainer(compose(resumed), RunFolder(tmp_path))
     assert not warnings(caplog), "nothing is left to learn"
     make_trainer(compose([*resumed, "total_frames=96"]), RunFolder(tmp_path))

@@ -10,12 +10,18 @@ import pytest
 import torch
 
 from veca_marl.algos.checkpoints.checkpoint_file import CheckpointError
+from veca_marl.algos.evaluation.evaluate import RandomTeams
+from veca_marl.algos.evaluation.evaluate import evaluate as run_episodes
+from veca_marl.algos.specs import team_specs
 from veca_marl.config import ConfigError, compose
+from veca_marl.envs.adapters.torchrl.env import VecaEnv
 from veca_marl.envs.core.benchmark import Benchmark, parameters, read_starts
+from veca_marl.evaluate import EvaluateOptions, evaluate_run
 from veca_marl.evaluate import main as evaluate
 from veca_marl.play.command import main as play
 from veca_marl.runs.assembly import make_trainer
 from veca_marl.runs.run_folder import RunFolder
+from veca_marl.runs.stored_policies import stored_actors, stored_configuration
 from veca_marl.tournament import main as tournament
 from veca_marl.tournament import spread
 
@@ -61,7 +67,10 @@ def test_past_policies_of_both_teams_are_stored(played):
     frames = {"red": (0, 32, 96), "blue": (0, 64, 128)}
     assert kept == sorted(f"{team}_{n:012d}.pt" for team, ns in frames.items() for n in ns)
     assert not (played / "run" / "checkpoints" / "best.pt").exists()
-    assert "no best.pt" in (played / "run" / "comparison.txt").read_text()
+    notes = (played / "run" / "comparison.txt").read_text()
+    assert "no best.pt" in notes
+    assert "no comparison with random actions" in notes
+    assert "difference" not in notes
     # only the critic of blue observes the whole team
     central, own = (actors(played / "run", team) for team in ("blue", "red"))
     assert central.keys() != own.keys() or any(central[k].shape != own[k].shape for k in own)
@@ -230,6 +239,21 @@ def test_a_self_play_run_is_evaluated_against_an_expert(played, tmp_path, capsys
     words = [f"run={played / 'run'}", "opponent.blue=expert", "senses/audio=mono", "episodes=2"]
     assert evaluate([*words, "evaluate.exploration=stochastic", f"evaluate.json={table}"]) == 0
     assert [row["team"] for row in json.loads(table.read_text())] == ["red", "red"]
+
+
+def test_each_team_that_learnt_acts_at_random_against_the_policies_of_the_others(played):
+    """If all acted at random at once, a team would meet other opponents than its own."""
+    folder, seed = played / "run", 5
+    options = EvaluateOptions(str(folder), episodes=4, seed=seed)
+    table = evaluate_run(options, ["task.max_seconds=0.4"]).table
+    cfg = stored_configuration(folder, ["task.max_seconds=0.4"], "run=")
+    env = VecaEnv(cfg.game, 2, seed)
+    policies = stored_actors(cfg, folder, team_specs(env))
+    for team, other in (("red", "blue"), ("blue", "red")):
+        random = RandomTeams(env, [team], [policies[other]])
+        alone = run_episodes(env, random, 4, seed, cfg.eval.exploration)
+        assert table["random"][team].returns.tolist() == alone[team].returns.tolist()
+    env.close()
 
 
 def test_evaluation_uses_the_stored_configuration_and_not_the_defaults_of_today(

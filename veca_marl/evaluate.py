@@ -2,22 +2,25 @@
 
 The episodes are played on the configuration stored with the run. Other overrides change it:
 ``senses/audio=mono``, ``opponent.defender=expert``, ``task.max_seconds=30``. The policies must fit:
-the same senses in the same shapes, the same actions. The random policy plays the same episodes
-against the same opponents. ``episodes=benchmark`` plays the frozen episodes of the task and prints
-in what the game differs from the default one of the task.
+the same senses in the same shapes, the same actions. In the same episodes each team that learnt
+acts at random against the same opponents: the policies of the other teams. ``episodes=benchmark``
+plays the frozen episodes of the task and prints in what the game differs from the default one of
+the task.
 """
 
 from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from contextlib import closing
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import torch
 from omegaconf import MISSING
 from tensordict.nn import TensorDictSequential
+from torch import nn
 
 from veca_marl.algos.checkpoints.checkpoint_file import CheckpointError
 from veca_marl.algos.evaluation.comparison import comparison_line, interval, solved_rate
@@ -104,6 +107,8 @@ class Evaluated:
 def evaluate_run(options: EvaluateOptions, overrides: Sequence[str] = ()) -> Evaluated:
     """Return the scores of each team by its policy, and by a random one in the same episodes.
 
+    Of teams that did not learn in the run, which are its opponents, there is no random one.
+
     Args:
         options: The run and the episodes.
         overrides: Changes of the stored configuration.
@@ -121,15 +126,22 @@ def evaluate_run(options: EvaluateOptions, overrides: Sequence[str] = ()) -> Eva
     env = _make_env(cfg, episodes, seed)
     actors = stored_actors(cfg, checkpoint, team_specs(env))
     learnt = [team for team in actors if team not in cfg.frozen]
-    players = {
-        "policy": TensorDictSequential(*actors.values()),
-        "random": RandomTeams(env, learnt, [actors[team] for team in cfg.frozen]),
-    }
-    table = {
-        name: evaluate(env, player, episodes, seed, exploration) for name, player in players.items()
-    }
-    env.close()
+    with closing(env):
+
+        def play(policy: nn.Module) -> dict[str, Scores]:
+            return evaluate(env, policy, episodes, seed, exploration)
+
+        table = {
+            "policy": play(TensorDictSequential(*actors.values())),
+            "random": {
+                team: play(RandomTeams(env, [team], _others(actors, team)))[team] for team in learnt
+            },
+        }
     return Evaluated(table, benchmark, cfg.game)
+
+
+def _others(actors: Mapping[str, nn.Module], team: str) -> list[nn.Module]:
+    return [actor for name, actor in actors.items() if name != team]
 
 
 def _checked_benchmark(cfg: Config) -> Benchmark:
@@ -220,8 +232,8 @@ def run(options: EvaluateOptions, overrides: list[str]) -> None:
         print(departures(evaluated.game))
         rows = [{**row, BENCHMARK: evaluated.benchmark.version} for row in rows]
     print(*lines(rows), sep="\n")
-    for team, scores in table["policy"].items():
-        print(comparison_line(team, scores, table["random"][team]))
+    for team, scores in table["random"].items():
+        print(comparison_line(team, table["policy"][team], scores))
     if json_file is not None:
         write_atomically(json_file, json.dumps(rows, indent=2) + "\n")
 

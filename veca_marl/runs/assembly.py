@@ -24,6 +24,7 @@ from veca_marl.algos.training.loop import Trainer
 from veca_marl.algos.training.progress import Budget
 from veca_marl.algos.transfer import init_teams
 from veca_marl.config import Config, ConfigError, one_line
+from veca_marl.config.schemas import BY_TEAM
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
 from veca_marl.envs.core.game_cfg import GameCfg
 from veca_marl.plugins import load_plugins
@@ -72,6 +73,7 @@ def make_trainer(cfg: Config, folder: RunFolder | None = None) -> Trainer:
     _log_storage(learners)
     checkpoints = _make_checkpoints(cfg, folder, specs)
     trainer = _assemble(cfg, learners, checkpoints)
+    _warn_of_cut_episodes(trainer)
     if cfg.self_play.teams:
         trainer.matchmaking = _self_play(cfg, folder, learners)
     # a run that was killed before its first checkpoint starts from the beginning
@@ -107,6 +109,7 @@ def _assemble(cfg: Config, learners: TeamLearners, checkpoints: Checkpoints) -> 
         reporters=[],
         seed=cfg.seed,
         progress_bar=cfg.log.progress_bar,
+        episode_steps=cfg.game.max_steps,
     )
 
 
@@ -139,6 +142,21 @@ def _check_budget(trainer: Trainer) -> None:
             numbers.check_budget(frames)
         except ValueError as error:
             raise ConfigError(f"total_frames={asked}: team {team!r}: {one_line(error)}") from error
+
+
+def _warn_of_cut_episodes(trainer: Trainer) -> None:
+    """Log that learning does not see the end of episodes that are longer than a stage."""
+    stage = trainer.schedule.batches_per_stage * trainer.collect.steps
+    if trainer.episode_steps is not None and stage < trainer.episode_steps:
+        _LOG.warning(
+            "episodes last up to %d steps, but worlds start new ones every %d steps "
+            "(eval.every_frames=%d, %d worlds): what comes later is not learnt from; choose larger "
+            "eval.every_frames, or fewer worlds, such as collect=workers8",
+            trainer.episode_steps,
+            stage,
+            trainer.evaluation.every_frames,
+            trainer.collect.all_worlds,
+        )
 
 
 def _warn_of_idle_rest(trainer: Trainer) -> None:
@@ -182,6 +200,7 @@ def _make_checkpoints(
         cast(dict[str, Any], plain),
         cfg.log.keep_checkpoints,
         RESUMABLE,
+        BY_TEAM,
     )
 
 

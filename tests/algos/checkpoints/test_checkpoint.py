@@ -144,3 +144,20 @@ def test_an_interruption_is_delayed_until_the_file_is_written(checkpoints, ident
         assert checkpoints.load(path, CPU) == {"n": 1}
     with pytest.raises(KeyboardInterrupt):  # and is heard at once again
         signal.raise_signal(signal.SIGINT)
+
+
+def test_an_entry_that_is_added_to_a_mapping_by_team_is_refused(tmp_path, identity):
+    """A field that is new in this version is not: it has no value in the stored run."""
+    stored = {"learner": {}, "opponent": {"blue": "expert"}, "algo": {"gamma": 0.9}}
+    path = Checkpoints(tmp_path, identity, stored).save({}, 10, best=False)
+
+    def load(config):
+        return Checkpoints(tmp_path, identity, config, by_team=("learner", "opponent")).load(
+            path, CPU
+        )
+
+    load(stored | {"algo": {"gamma": 0.9, "clip": 0.2}, "new": 1})
+    with pytest.raises(CheckpointError, match=r"learner\.red was absent, is "):
+        load(stored | {"learner": {"red": {"gamma": 0.5}}})
+    with pytest.raises(CheckpointError, match=r"opponent\.red was absent, is idle"):
+        load(stored | {"opponent": {"blue": "expert", "red": "idle"}})

@@ -159,6 +159,33 @@ def test_training_episodes_count_the_share_that_ended_solved():
     assert np.isnan(TrainingEpisodes().add(batch[:, :1], "agents")["solved"])
 
 
+@pytest.mark.parametrize("pieces", [[30], [7, 13, 10]])
+def test_episodes_that_end_early_are_not_too_many_among_those_of_a_stage(pieces):
+    """Of the episodes one in five is solved, after 2 steps; the others last 20 steps."""
+    rng = np.random.default_rng(0)
+    solved = np.zeros((4000, 30), dtype=np.bool_)
+    done = np.zeros_like(solved)
+    for world in range(len(done)):
+        step = -1
+        while step < 30:
+            early = rng.random() < 0.2
+            step += 2 if early else 20
+            if step < 30:
+                done[world, step], solved[world, step] = True, early
+    steps = [step_of(d.tolist(), s.tolist()) for d, s in zip(done.T, solved.T, strict=True)]
+    stage = TensorDict({"next": torch.stack(steps, 1)}, done.shape)
+    episodes, means = TrainingEpisodes(last_start=30 - 20), []
+    for batch in stage.split(pieces, dim=1):
+        means.append(episodes.add(batch, "agents"))
+    if len(pieces) == 1:
+        assert means[0]["solved"] == pytest.approx(0.2, abs=0.02)
+        assert means[0]["length"] == pytest.approx(0.2 * 2 + 0.8 * 20, abs=0.4)
+    whole = TrainingEpisodes(last_start=30 - 20).add(stage, "agents")
+    assert np.isnan(TrainingEpisodes(last_start=-1).add(stage, "agents")["return"])
+    everything = TrainingEpisodes().add(stage, "agents")["solved"]
+    assert everything > 0.3 > whole["solved"]
+
+
 def test_rates_of_solved_episodes_are_printed_for_a_task_with_a_goal():
     def scores(*solved):
         ones = np.ones(len(solved))

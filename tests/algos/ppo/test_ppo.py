@@ -1,16 +1,21 @@
 import math
 from copy import deepcopy
+from dataclasses import replace
 
 import pytest
 import torch
 from fake_env import FakeEnv
 from gae import gae_by_hand
 from torchrl.envs import ExplorationType, set_exploration_type
-from training import rewards_until
+from training import SMALL, rewards_until
 
 from veca_marl.algos.collection.experience import CollectCfg, Experience
-from veca_marl.algos.ppo import PPOCfg
+from veca_marl.algos.networks.multisense import Parameters
+from veca_marl.algos.ppo import PPO, PPOCfg
 from veca_marl.algos.ppo.advantages import advantages
+from veca_marl.algos.specs import team_specs
+
+CPU = torch.device("cpu")
 
 
 @pytest.mark.parametrize("terminated", [False, True])
@@ -112,6 +117,43 @@ def test_rewards_that_are_not_finite_raise_an_error(make_ppo):
     assert torch.equal(before, torch.cat([p.flatten() for p in ppo.policy.parameters()]))
 
 
+def small_ppo(agents=1, **numbers):
+    torch.manual_seed(0)
+    cfg = PPOCfg(**{"network": SMALL, **numbers})
+    return PPO("agents", team_specs(FakeEnv(1, agents=agents))["agents"], cfg, CPU)
+
+
+def collected(ppo, seed, agents=1):
+    torch.manual_seed(seed)
+    env = FakeEnv(4, seed, agents=agents)
+    with torch.no_grad(), set_exploration_type(ExplorationType.RANDOM):
+        return env.rollout(16, ppo.actor, break_when_any_done=False)
+
+
+@pytest.mark.parametrize(("epochs", "minibatches"), [(1, 1), (2, 1)])
+def test_the_rate_does_not_follow_a_divergence_before_the_first_step(epochs, minibatches):
+    ppo = small_ppo(epochs=epochs, minibatches=minibatches, target_kl=1e9)  # never too large
+    for seed in range(8):
+        rate = ppo.schedule.get_last_lr()[0]
+        after = ppo.learn(collected(ppo, seed))["learning_rate"]
+        assert after <= rate * 1.5 ** (epochs - 1) + 1e-12
+
+
+def test_agents_with_networks_of_their_own_learn_independently():
+    """The gradient of one agent does not scale that of another one."""
+    network = replace(SMALL, parameters=Parameters.separate)
+    learnt = []
+    for scale in (1.0, 1e4):
+        ppo = small_ppo(2, network=network, epochs=1, minibatches=1)
+        batch = collected(ppo, 0, agents=2)
+        batch["next", "agents", "reward"][:, :, 1] *= scale
+        ppo.learn(batch)
+        parameters = dict(ppo.network.named_parameters())
+        learnt.append({n: p.detach().clone() for n, p in parameters.items() if "agents.0." in n})
+    assert learnt[0], "the test must see parameters of the first agent"
+    assert all(torch.equal(learnt[0][name], learnt[1][name]) for name in learnt[0])
+
+
 def test_learning_continues_exactly_from_a_state(make_ppo):
     def batch(ppo, seed):
         torch.manual_seed(seed)
@@ -129,7 +171,14 @@ def test_learning_continues_exactly_from_a_state(make_ppo):
 
 @pytest.mark.parametrize(
     "wrong",
-    [{"gamma": 1.5}, {"clip": 0.0}, {"epochs": 0}, {"learning_rate": 1.0}, {"target_kl": -1.0}],
+    [
+        {"gamma": 1.5},
+        {"clip": 0.0},
+        {"clip": 1.5},
+        {"epochs": 0},
+        {"learning_rate": 1.0},
+        {"target_kl": -1.0},
+    ],
 )
 def test_invalid_numbers_raise_an_error_with_their_name(wrong):
     (name,) = wrong

@@ -5,10 +5,12 @@ import math
 import pytest
 import torch
 from fake_env import FakeEnv
+from torchrl.data import Categorical
 from training import SMALL
 
 from veca_marl.algos.networks.action_values import ActionValuesCfg, Normalisation
 from veca_marl.algos.networks.multisense import Critic, MultisenseCfg, Parameters
+from veca_marl.algos.sac import SAC
 from veca_marl.algos.sac.config import (
     Adaptation,
     EncoderGradient,
@@ -17,6 +19,7 @@ from veca_marl.algos.sac.config import (
     Targets,
     TemperatureCfg,
 )
+from veca_marl.algos.specs import team_specs
 
 FORMS = {"continuous": {}, "discrete": {"discrete": True}, "hybrid": {"hybrid": True}}
 
@@ -163,6 +166,37 @@ def test_a_policy_that_was_learnt_before_acts_while_the_buffer_is_filled(make_sa
     for algorithm in (continued, copied):
         algorithm.learn(collect(algorithm))  # 64 frames: the buffer is not ready
         assert not algorithm.state_dict()["warm_up"]["active"]
+
+
+class AbsentEnv(FakeEnv):
+    """The toy in which no agent is present at any time."""
+
+    def __init__(self, worlds):
+        super().__init__(worlds)
+        self.observation_spec["agents", "mask"] = Categorical(
+            2, shape=(worlds, 1), dtype=torch.bool
+        )
+
+    def _team(self, right):
+        return super()._team(right).set("mask", torch.zeros(right.shape[:2], dtype=torch.bool))
+
+
+def test_samples_without_an_agent_that_is_present_change_nothing():
+    env = AbsentEnv(4)
+    temperature = TemperatureCfg(adaptation=Adaptation.automatic)
+    cfg = SACCfg(network=SMALL, replay=ReplayCfg(2048, 64), temperature=temperature)
+    torch.manual_seed(0)
+    algorithm = SAC("agents", team_specs(env)["agents"], cfg, torch.device("cpu"))
+    with torch.no_grad():
+        batch = env.rollout(64, algorithm.explorer, break_when_any_done=False)
+    before = [p.detach().clone() for p in algorithm.network.parameters()]
+    alpha = algorithm.temperatures.alphas()
+    measured = algorithm.learn(batch)
+    assert measured["updates"] > 0
+    assert math.isnan(measured["value"])
+    after = algorithm.network.parameters()
+    assert all(torch.equal(p, q) for p, q in zip(before, after, strict=True))
+    assert algorithm.temperatures.alphas() == alpha
 
 
 def test_a_gradient_that_is_not_finite_is_reported(make_sac, collect):

@@ -65,6 +65,32 @@ def test_interrupted_and_resumed_equals_uninterrupted(make_trainer, tmp_path, pr
         assert read(tmp_path / "whole" / name) == read(tmp_path / "resumed" / name)
 
 
+def test_a_larger_budget_after_a_run_that_ended_between_evaluations_is_noted(make_trainer):
+    for batches, noted in ((4, False), (3, True)):
+        name = f"longer_{batches}"
+        make_trainer(name, batches).run()
+        resumed = make_trainer(name, 6)
+        resumed.resume(resumed.checkpoints.latest())
+        notes = [line for line in resumed.run() if "between two evaluations" in line]
+        assert bool(notes) is noted
+
+
+def test_a_resumed_run_reads_its_state_into_main_memory(make_trainer, monkeypatch):
+    """A replay buffer is larger than the memory of many devices."""
+    make_trainer("run", 2).run()
+    resumed, devices = make_trainer("run", 4), []
+    load = Checkpoints.load
+
+    def watched(self, path, device):
+        devices.append(device)
+        return load(self, path, device)
+
+    monkeypatch.setattr(Checkpoints, "load", watched)
+    monkeypatch.setattr(resumed.learners, "device", torch.device("meta"))
+    resumed.resume(resumed.checkpoints.latest())
+    assert devices == [torch.device("cpu")]
+
+
 def test_interruption_before_the_first_evaluation_can_be_resumed(make_trainer, tmp_path):
     whole = make_trainer("whole", 2)
     whole.run()

@@ -27,6 +27,7 @@ class Checkpoints:
         config: The run's configuration as plain data.
         keep_last: Number of the latest that are kept, beside the best one.
         may_change: Keys of `config` in which a checkpoint that is loaded may differ from it.
+        by_team: Keys of `config` that are mappings from the names of teams.
     """
 
     def __init__(
@@ -36,9 +37,10 @@ class Checkpoints:
         config: dict[str, Any],
         keep_last: int = 3,
         may_change: Collection[str] = (),
+        by_team: Collection[str] = (),
     ) -> None:
         self.folder, self.identity, self.config = folder, identity, config
-        self.keep_last, self.may_change = keep_last, may_change
+        self.keep_last, self.may_change, self.by_team = keep_last, may_change, by_team
 
     def save(
         self,
@@ -97,7 +99,7 @@ class Checkpoints:
                 f"{error}; remove it to continue from {earlier[-1].name}"
             ) from error
         check_identity(path, content["identity"], self.identity.to_dict())
-        check_config(path, content["config"], self.config, self.may_change)
+        check_config(path, content["config"], self.config, self.may_change, self.by_team)
         state: dict[str, Any] = content["state"]
         return state
 

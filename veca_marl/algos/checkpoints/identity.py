@@ -67,15 +67,21 @@ def _differences(one: Any, other: Any, name: str = "") -> list[tuple[str, Any, A
 
 
 def check_config(
-    path: Path, stored: dict[str, Any], config: dict[str, Any], may_change: Collection[str]
+    path: Path,
+    stored: dict[str, Any],
+    config: dict[str, Any],
+    may_change: Collection[str],
+    by_team: Collection[str] = (),
 ) -> None:
-    """Check that a configuration is the stored one; keys of newer versions are ignored.
+    """Check that a configuration is the stored one; fields of newer versions are ignored.
 
     Args:
         path: The checkpoint.
         stored: Its configuration as plain data.
         config: That of the run that is to continue.
         may_change: First parts of the keys in which they may differ.
+        by_team: Keys of mappings from the names of teams: an entry that the stored ones do not
+            have is a difference.
 
     Raises:
         CheckpointError: If they differ elsewhere.
@@ -83,10 +89,17 @@ def check_config(
     differing = [
         f"{name} was {before}, is {now}"
         for name, before, now in _differences(stored, config)
-        if before != _ABSENT and name.partition(".")[0] not in may_change
+        if (before != _ABSENT or _is_entry(name, by_team))
+        and name.partition(".")[0] not in may_change
     ]
     if differing:
         raise CheckpointError(
             f"{path} is of another configuration: {'; '.join(differing)}; "
             f"a resumed run may change {', '.join(may_change) or 'nothing'}"
         )
+
+
+def _is_entry(name: str, mappings: Collection[str]) -> bool:
+    """Return whether a key is that of an entry of one of some mappings."""
+    mapping, _, entry = name.partition(".")
+    return mapping in mappings and "." not in entry

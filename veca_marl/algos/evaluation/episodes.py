@@ -75,17 +75,28 @@ class EpisodeTally:
 
 
 class TrainingEpisodes:
-    """Means over episodes that begin and end in different batches.
+    """Means over episodes that begin and end in different batches of one stage.
 
     TorchRL's `RewardSum` and `StepCounter` do the same inside the environment, for rewards and
     steps; this one also sums the reward terms, and adds nothing to a step of the worlds.
+
+    The worlds start new episodes after a stage. If all that end before were counted, those that
+    end early would be too many: an episode counts if one of the greatest length that starts with
+    it would end in the stage, too.
+
+    Args:
+        last_start: Step of the stage, from 0, at which the last episodes that count begin; None
+            counts all.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, last_start: int | None = None) -> None:
+        self._last_start = last_start
         self._open: dict[tuple[str, str], NDArray[np.float64]] = {}
+        self._begun: dict[str, NDArray[np.int64]] = {}
+        self._steps: dict[str, int] = {}
 
     def add(self, batch: TensorDictBase, team: str) -> dict[str, float]:
-        """Return means over the episodes that ended in `batch` ``(worlds, steps)``.
+        """Return means over the episodes that ended in `batch` ``(worlds, steps)`` and count.
 
         Returns:
             ``return``, ``length`` and each reward term, NaN where no episode ended; in a task with
@@ -93,16 +104,32 @@ class TrainingEpisodes:
             the mean over all steps.
         """
         done = batch["next", "done"].squeeze(-1).cpu().numpy()
+        counted = self._counted(team, done)
         measures = team_measures(batch["next"], team)
         means = {"reward_per_step": float(measures["return"].mean())}
         for name, values in measures.items():
             ends = values[done] if name == SOLVED else self._finish((team, name), values, done)
-            means[name] = float(np.mean(ends)) if len(ends) else math.nan
+            means[name] = float(np.mean(ends[counted])) if counted.any() else math.nan
         return means
+
+    def _counted(self, team: str, done: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Return which of the episodes that end count, world after world."""
+        worlds, steps = done.shape
+        begun = self._begun.setdefault(team, np.zeros(worlds, dtype=np.int64))
+        passed = self._steps.setdefault(team, 0)
+        starts = []
+        for world, row in enumerate(done):
+            following = passed + np.flatnonzero(row) + 1
+            starts.append(np.concatenate([begun[world : world + 1], following]))
+            begun[world] = starts[-1][-1]
+        self._steps[team] = passed + steps
+        ended = np.concatenate([start[:-1] for start in starts])
+        every = self._last_start is None
+        return np.ones(len(ended), dtype=np.bool_) if every else ended <= self._last_start
 
     def _finish(
         self, key: tuple[str, str], values: NDArray[np.float64], done: NDArray[np.bool_]
-    ) -> list[float]:
+    ) -> NDArray[np.float64]:
         carried = self._open.setdefault(key, np.zeros(len(values)))
         finished: list[float] = []
         for world, row in enumerate(values):
@@ -111,4 +138,4 @@ class TrainingEpisodes:
             sums[0] += carried[world]
             carried[world] = sums.pop()
             finished += sums
-        return finished
+        return np.array(finished)

@@ -20,12 +20,13 @@ class PPOCfg(AlgorithmCfg):
         network: The network and its sizes.
         gamma: Discount.
         gae_lambda: Lambda of the generalised advantage estimate (Schulman et al. 2016).
-        clip: Clipping range of the probability ratio.
+        clip: Clipping range of the probability ratio, in (0, 1].
         entropy_coefficient: Weight of the entropy bonus: a number for all parts of the action, or
             one for each of them: ``algo.entropy_coefficient={move:0.003,voice:0.03}``.
         value_coefficient: Weight of the value loss.
         value_normalisation: What the critic predicts, and in which unit its loss is measured.
-        max_gradient_norm: Gradients are scaled down to this norm.
+        max_gradient_norm: Gradients are scaled down to this norm, those of agents with networks of
+            their own each by itself.
         epochs: Passes over each batch.
         minibatches: Parts of the batch in one pass.
         sequence_steps: Steps through which gradients of a network with hidden state flow: its
@@ -34,7 +35,9 @@ class PPOCfg(AlgorithmCfg):
         learning_rate: Initial value of the adaptive rate (ours).
         target_kl: The rate is divided by 1.5 above twice this divergence, multiplied by 1.5 below
             half of it: the rule of rl_games with its target of 0.008 (ours; the paper says
-            "adaptive to the KL divergence").
+            "adaptive to the KL divergence"). The divergence of a minibatch is measured before its
+            step: it is 0 in the first step after collection, and with one epoch of one minibatch
+            the rate stays.
         min_learning_rate: Lower bound of the rate.
         max_learning_rate: Upper bound of the rate.
     """
@@ -60,7 +63,9 @@ class PPOCfg(AlgorithmCfg):
         for name in ("gamma", "gae_lambda"):
             if not 0.0 <= getattr(self, name) <= 1.0:
                 raise ValueError(f"algo.{name} must be in [0, 1], got {getattr(self, name)}")
-        for name in ("clip", "max_gradient_norm", "target_kl", "min_learning_rate"):
+        if not 0.0 < self.clip <= 1.0:
+            raise ValueError(f"algo.clip must be in (0, 1], got {self.clip}")
+        for name in ("max_gradient_norm", "target_kl", "min_learning_rate"):
             if not getattr(self, name) > 0.0:
                 raise ValueError(f"algo.{name} must be positive, got {getattr(self, name)}")
         for name in ("epochs", "minibatches", "sequence_steps"):

@@ -7,7 +7,6 @@ from typing import Any
 import torch
 from tensordict import TensorDictBase
 from tensordict.nn import TensorDictModuleBase
-from torch import nn
 from torchrl.objectives import KLAdaptiveLR
 
 from veca_marl.algos.algorithm import Algorithm
@@ -19,6 +18,7 @@ from veca_marl.algos.networks.factory import (
     make_network,
     trainable,
 )
+from veca_marl.algos.networks.gradients import clip_norms, independent_parameters
 from veca_marl.algos.networks.memory import memory_of
 from veca_marl.algos.ppo.advantages import advantages
 from veca_marl.algos.ppo.config import PPOCfg, check_sequences
@@ -64,6 +64,7 @@ class PPO(Algorithm):
         self.loss = _make_loss(team, self.network, cfg, weights).to(device)
         if self.normalised_critic is not None:
             self.loss.value_norm = self.normalised_critic.statistics
+        self._independent = independent_parameters([self.network])
         self.optimizer = torch.optim.Adam(trainable(self.network), lr=cfg.learning_rate, fused=True)
         self.schedule = KLAdaptiveLR(
             self.optimizer,
@@ -124,9 +125,10 @@ class PPO(Algorithm):
         for _ in range(self.cfg.epochs):
             parts = minibatches(rows, self.cfg.minibatches)
             epoch = [self.step(minibatch) for minibatch in parts if self._counts(minibatch)]
-            if epoch:
-                self.schedule.step(_mean(epoch)["kl"])
             measured += epoch
+            # the divergence before the first step is 0 but for rounding, which is no measure of it
+            if epoch and len(measured) > 1:
+                self.schedule.step(_mean(epoch)["kl"])
         means = _mean(measured) if measured else self.idle()
         return means | {"learning_rate": self.schedule.get_last_lr()[0]}
 
@@ -138,7 +140,7 @@ class PPO(Algorithm):
         """Take one gradient step and return what was measured.
 
         Raises:
-            FloatingPointError: If the gradient is not finite.
+            FloatingPointError: If the gradient or the loss is not finite.
         """
         if self._masked:
             minibatch[VALID] = minibatch[self.team, "mask"].unsqueeze(-1)
@@ -146,11 +148,11 @@ class PPO(Algorithm):
         loss = out["loss_objective"] + out["loss_critic"] + out["loss_entropy"]
         self.optimizer.zero_grad()
         loss.backward()
-        norm = nn.utils.clip_grad_norm_(self.network.parameters(), self.cfg.max_gradient_norm)
-        if not torch.isfinite(norm):
+        norm = clip_norms(self._independent, self.cfg.max_gradient_norm)
+        if not torch.isfinite(norm + loss.detach()):
             raise FloatingPointError(
-                f"team {self.team!r}: the gradient is {norm.item()}; observations or rewards "
-                "are not finite, or the learning rate is too high"
+                f"team {self.team!r}: the gradient is {norm.item()}, the loss {loss.item()}; "
+                "observations or rewards are not finite, or the learning rate is too high"
             )
         self.optimizer.step()
         # of an agent that is absent in all rows the explained variance is not a number

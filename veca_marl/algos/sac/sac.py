@@ -20,6 +20,7 @@ from veca_marl.algos.networks.factory import (
     check_same_network,
     trainable,
 )
+from veca_marl.algos.networks.gradients import clip_norms, independent_parameters
 from veca_marl.algos.networks.memory import memory_size
 from veca_marl.algos.sac.config import SACCfg, Targets
 from veca_marl.algos.sac.joint_action import JointAction
@@ -67,10 +68,11 @@ class SAC(Algorithm):
             cfg.encoder_gradient,
             make_reader(team, memory, span),
         ).to(device)
-        self._critics = [*trainable(self.network.encoder), *self.network.values.parameters()]
-        self._policy = list(self.loss.policy.parameters())
+        critics = [*trainable(self.network.encoder), *self.network.values.parameters()]
+        self._critics = independent_parameters([self.network.encoder, self.network.values])
+        self._policy = independent_parameters([self.loss.policy])
         groups: list[dict[str, Any]] = [
-            {"params": [*self._critics, *self._policy]},
+            {"params": [*critics, *self.loss.policy.parameters()]},
             {"params": list(self.temperatures.parameters()), "lr": cfg.temperature.learning_rate},
         ]
         self.optimizer = torch.optim.Adam(groups, cfg.learning_rate, fused=True)
@@ -129,12 +131,17 @@ class SAC(Algorithm):
     def update(self) -> dict[str, float]:
         """Take one gradient step on a sample of the replay buffer and return what was measured.
 
+        A sample without any agent that is present changes nothing; its measures are not a number.
+
         Raises:
             FloatingPointError: If the gradient is not finite.
         """
         windows = self.replay.sample(self._windows)
         self._shift(*windows.observed)
-        losses = self.loss(transitions(windows, self.team, self.cfg.gamma).to(self._device))
+        batch = transitions(windows, self.team, self.cfg.gamma)
+        if not batch.counted.any():
+            return dict.fromkeys(_MEASURES, math.nan)
+        losses = self.loss(batch.to(self._device))
         self.optimizer.zero_grad()
         (losses.critic + losses.policy + losses.temperature).backward()
         norms = [self._clip(self._critics), self._clip(self._policy)]
@@ -145,8 +152,8 @@ class SAC(Algorithm):
         measured = {name: float(number.detach()) for name, number in numbers.items()}
         return measured | {"critic_gradient_norm": norms[0], "policy_gradient_norm": norms[1]}
 
-    def _clip(self, parameters: list[nn.Parameter]) -> float:
-        norm = float(nn.utils.clip_grad_norm_(parameters, self.cfg.max_gradient_norm))
+    def _clip(self, groups: list[list[nn.Parameter]]) -> float:
+        norm = float(clip_norms(groups, self.cfg.max_gradient_norm))
         if not math.isfinite(norm):
             raise FloatingPointError(
                 f"team {self.team!r}: the gradient is {norm}; observations or rewards are not "
@@ -247,7 +254,10 @@ def _name(part: str) -> str:
 
 
 def _mean(measures: list[dict[str, float]]) -> dict[str, float]:
-    """Return the mean of each measure; not a number if there are none."""
-    if not measures:
-        return dict.fromkeys(_MEASURES, math.nan)
-    return {name: sum(m[name] for m in measures) / len(measures) for name in _MEASURES}
+    """Return the mean of each measure that is a number; not a number if there are none."""
+    return {name: _mean_of([m[name] for m in measures]) for name in _MEASURES}
+
+
+def _mean_of(numbers: list[float]) -> float:
+    known = [number for number in numbers if not math.isnan(number)]
+    return sum(known) / len(known) if known else math.nan

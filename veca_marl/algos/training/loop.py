@@ -9,12 +9,13 @@ interrupted stage had learnt is learnt again.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack, closing
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
+import torch
 from torchrl import timeit
 from tqdm import tqdm
 
@@ -55,6 +56,7 @@ class Trainer:
         reporters: Where numbers go.
         seed: Determines all random numbers.
         progress_bar: Whether to show one.
+        episode_steps: Steps after which an episode is truncated; None if that is not known.
         matchmaking: Which teams learn against which opponents.
         during_last_evaluation: Called once, while other processes play the last evaluation; it
             may act with `policy`.
@@ -71,10 +73,12 @@ class Trainer:
     reporters: Sequence[Reporter]
     seed: int
     progress_bar: bool = True
+    episode_steps: int | None = None
     matchmaking: Matchmaking = field(default_factory=AllLearn)
     during_last_evaluation: Callable[[], None] = nothing
     progress: Progress = field(default_factory=Progress)
     _resumed_frames: int = 0
+    _resumed_within_stage: bool = False
     _evaluations: Evaluations = field(init=False)
 
     def __post_init__(self) -> None:
@@ -85,7 +89,8 @@ class Trainer:
 
     def resume(self, path: Path) -> None:
         """Continue learning and progress from the checkpoint at `path`."""
-        state = self.checkpoints.load(path, self.learners.device)
+        # modules and optimisers copy to their device; a replay buffer stays in main memory
+        state = self.checkpoints.load(path, torch.device("cpu"))
         self.checkpoints.remove_old()
         with load_errors(path):
             self.learners.load_state_dict(state["algorithm"])
@@ -94,13 +99,15 @@ class Trainer:
             self.progress = Progress(**state["progress"])
         self.policy.take_over(self.learners.policy)
         self._resumed_frames = self.progress.frames
+        within_stage = self.progress.iteration % self.schedule.batches_per_stage != 0
+        self._resumed_within_stage = within_stage and not self._is_finished()
 
     def run(self) -> list[str]:
         """Train until the budget is spent.
 
         Returns:
-            A line for each team that learns, which compares it with random actions, and a line for
-            each property of the run that its user should know.
+            A line that compares the team that learns with random actions, and a line for each
+            property of the run that its user should know.
         """
         fresh = self.progress.frames == 0
         if fresh:
@@ -117,8 +124,16 @@ class Trainer:
             scores = self._train(experience)
             if scores is None:
                 scores = self._evaluations.play_last(self.during_last_evaluation)
-        compared = [comparison_line(t, scores[t], baseline[t]) for t in self.learners.algorithms]
-        return [*compared, *self._notes()]
+        return [*self._compared(scores, baseline), *self._notes()]
+
+    def _compared(self, scores: Mapping[str, Scores], baseline: Mapping[str, Scores]) -> list[str]:
+        """Return a line that compares the team that learns with random actions.
+
+        In the baseline all teams that learn act at random: of several, none met the same opponents.
+        """
+        if len(self.learners.algorithms) > 1:
+            return []
+        return [comparison_line(t, scores[t], baseline[t]) for t in self.learners.algorithms]
 
     def _make_evaluator(self) -> Evaluator:
         players = Players(self.policy, tuple(self.learners.algorithms))
@@ -137,11 +152,20 @@ class Trainer:
                 "no best.pt: several teams learn, and the mean of their returns does not measure "
                 "their skill (it is 0 in a zero-sum game); the latest checkpoints are kept"
             )
+            notes.append(
+                "no comparison with random actions: in the baseline all these teams act at random; "
+                "veca_marl.evaluate lets each of them act at random against the others' policies"
+            )
         frames = self.schedule.frames
         if self._resumed_frames >= frames:
             notes.append(
                 f"nothing was learnt: the run had {self._resumed_frames} frames already, "
                 f"total_frames={frames}"
+            )
+        if self._resumed_within_stage:
+            notes.append(
+                "resumed: the stored run ended between two evaluations, so that this run evaluates "
+                "and starts its worlds anew at other frames than one without interruption"
             )
         if self._resumed_frames and not self.learners.exact_resume:
             notes.append("resumed: an algorithm of this run does not continue bit for bit")
@@ -194,13 +218,19 @@ class Trainer:
         self._update_policy(experience)
         with timeit("collect"):
             experience.restart(derived_seed(self.seed, self.progress.stage))
-        episodes = TrainingEpisodes()
-        for _ in range(next(self.schedule.stages_after(self.progress.iteration))):
+        batches = next(self.schedule.stages_after(self.progress.iteration))
+        episodes = self._stage_episodes(batches * self.collect.steps)
+        for _ in range(batches):
             row = self._iterate(experience, episodes)
             bar.update(self.collect.frames)
             finished = {k: v for k, v in row.items() if k.endswith("/return") and v == v}
             if finished:  # otherwise the bar keeps the last mean returns
                 bar.set_postfix({k: f"{v:.3g}" for k, v in finished.items()})
+
+    def _stage_episodes(self, steps: int) -> TrainingEpisodes:
+        """Return what counts the episodes of a stage in which each world makes so many steps."""
+        last = None if self.episode_steps is None else steps - self.episode_steps
+        return TrainingEpisodes(last)
 
     def _iterate(self, experience: Experience, episodes: TrainingEpisodes) -> dict[str, float]:
         self._stopwatch.begin()
