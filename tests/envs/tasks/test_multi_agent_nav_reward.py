@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from seekers import STEP_S, begin, game_of, put, step
 
+from veca_marl.envs.tasks.navigation.helper_reward import HelperReward
 from veca_marl.envs.tasks.navigation.multi_agent_nav import MultiAgentNavCfg
 
 
@@ -61,6 +62,32 @@ def test_turning_round_adds_at_most_one_step_of_turning(game):
     turns = moved(game, 180.0, *[(0.0, 1.0)] * steps)[:, 1]
     assert np.abs(turns).sum() > 0.5
     assert abs(turns.sum()) <= 1.01 * turned_rad
+
+
+def test_turning_quickly_out_of_sight_and_slowly_back_adds_nothing(game):
+    """The object leaves the images in one step, and enters them in many."""
+    there_and_back = [(0.0, 1.0), *[(0.0, -0.25)] * 4]
+    start = moved(game, 180.0, *[(0.0, 1.0)] * 7)
+    turns = moved(game, 180.0, *[(0.0, 1.0)] * 7, *there_and_back * 30)[:, 1]
+    assert (turns == 0.0).any(), "the test must see the object out of sight"
+    assert turns[7:].sum() < 0.05
+    assert turns.sum() < start[:, 1].sum() + 0.05
+
+
+@pytest.mark.parametrize("rate_hz", [5, 10, 25])
+def test_the_first_step_of_an_episode_counts_at_every_control_rate(rate_hz):
+    """A turn of 24 degrees towards an object that is visible at the start."""
+    game = game_of(f"clock.control_rate_hz={rate_hz}", f"clock.substeps={50 // rate_hz * 5}")
+    begin(game)
+    put(game, 0, 1.5, yaw_deg=156.0)
+    player, helper, turned_rad = game.players[0], HelperReward(game.world.scene), 0.0
+    helper.reset(game.task.target, [player])
+    for _ in range(rate_hz // 5):
+        step(game, **{player.name: (0.0, 1.0)})
+        helper.after_step([player])
+        turned_rad += helper.terms(player)["turn"]
+    assert turned_rad == pytest.approx(math.radians(24.0), abs=0.03)
+    game.close()
 
 
 def test_the_helper_reward_is_in_metres_while_the_object_is_visible(game):

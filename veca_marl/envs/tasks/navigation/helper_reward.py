@@ -24,14 +24,14 @@ class HelperReward:
     - ``ahead`` (a_f) is the displacement of the body along its forward direction during the step,
       m. In metres per second, 25 times as much, going to and fro in front of an object has a higher
       return than reaching it.
-    - ``turn`` (a_l L) is the decrease during the step of the horizontal angle between the forward
-      direction and the direction of the object, rad. The action of the paper's walking body is
-      ``walk(walk_speed, turn_speed)``: it has no velocity to the side, and reaches an object on the
-      left by turning left. While the object stays visible the sum depends only on the first and the
-      last angle: turning to and fro adds nothing.
+    - ``turn`` (a_l L) is the decrease of the horizontal angle between the forward direction and the
+      direction of the object since the object was last visible, rad. The action of the paper's
+      walking body is ``walk(walk_speed, turn_speed)``: it has no velocity to the side, and reaches
+      an object on the left by turning left. The sum depends only on the first and the last angle
+      at which the object was visible: turning to and fro adds nothing, also if the object is out
+      of sight in between.
 
-    Both are 0 unless the object is visible after the step; `turn` is 0 unless it was visible before
-    the step, too.
+    Both are 0 unless the object is visible after the step.
 
     Args:
         scene: The scene that eyes see.
@@ -45,15 +45,17 @@ class HelperReward:
         self._terms: dict[str, dict[str, float]] = {}
 
     def reset(self, prop: Prop, players: Sequence[Player]) -> None:
-        """Begin an episode. Called after the players have been placed.
+        """Begin an episode. Called after players have been placed and their eyes directed.
 
         Args:
             prop: The object.
             players: All players.
         """
-        self._prop = prop
+        self._prop, self._terms = prop, {}
         self._positions = {player.name: player.body.position for player in players}
-        self._angles_rad, self._terms = {}, {}
+        self._angles_rad = {
+            player.name: _angle_rad(prop, player) for player in players if self.sees(prop, player)
+        }
 
     def after_step(self, players: Sequence[Player]) -> None:
         """Compute the terms of a step. Called once per step, after the eyes have been directed.
@@ -61,15 +63,16 @@ class HelperReward:
         Args:
             players: The players that still search; the terms of the others are 0.
         """
-        before_rad, self._angles_rad, self._terms = self._angles_rad, {}, {}
+        self._terms = {}
         for player in players:
-            position, forward = player.body.position, player.body.forward
-            way, self._positions[player.name] = position - self._positions[player.name], position
+            name, position = player.name, player.body.position
+            way, self._positions[name] = position - self._positions[name], position
             if self._prop is not None and self.sees(self._prop, player):
-                angle_rad = horizontal_angle_rad(self._prop.position - position, forward)
-                turned_rad = before_rad.get(player.name, angle_rad) - angle_rad
-                self._angles_rad[player.name] = angle_rad
-                self._terms[player.name] = {"ahead": float(way @ forward), "turn": turned_rad}
+                angle_rad = _angle_rad(self._prop, player)
+                turned_rad = self._angles_rad.get(name, angle_rad) - angle_rad
+                self._angles_rad[name] = angle_rad
+                ahead_m = float(way @ player.body.forward)
+                self._terms[name] = {"ahead": ahead_m, "turn": turned_rad}
 
     def terms(self, player: Player) -> dict[str, float]:
         """Return the terms `ahead`, m, and `turn`, rad, of a player in the last step."""
@@ -78,6 +81,11 @@ class HelperReward:
     def sees(self, prop: Prop, player: Player) -> bool:
         """Return whether a prop is visible to an eye of a player, see `PropVisibility`."""
         return self._visibility.of(prop, player)
+
+
+def _angle_rad(prop: Prop, player: Player) -> float:
+    """Return the horizontal angle between a player's forward direction and that of a prop."""
+    return horizontal_angle_rad(prop.position - player.body.position, player.body.forward)
 
 
 class PropVisibility:

@@ -101,9 +101,9 @@ class MultiAgentNav(Task):
             the object" is read as +1 for each agent that arrives.
         ahead: Displacement forwards during the step, m (negative backwards), while the object is
             visible to the agent's eyes and the agent has not reached it. In the paper ``Vis a_f``.
-        turn: Decrease during the step of the horizontal angle between the agent's forward direction
-            and the direction of the object, rad, under the same conditions and if the object was
-            visible before the step, too. In the paper ``Vis a_l L``.
+        turn: Decrease of the horizontal angle between the agent's forward direction and the
+            direction of the object since the object was last visible, rad, under the same
+            conditions. In the paper ``Vis a_l L``.
     """
 
     senses = ("vision", "touch", "proprioception", "audio")

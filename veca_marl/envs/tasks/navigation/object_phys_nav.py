@@ -39,9 +39,9 @@ class ObjectPhysNav(ObjectNav):
         wrong: 1 on the step in which another object is reached, and the target is not, else 0.
         ahead: Displacement forwards during the step, m (negative backwards), while the target is
             visible to the agent's eyes. In the paper ``Vis a_f``.
-        turn: Decrease during the step of the horizontal angle between the agent's forward direction
-            and the direction of the target, rad, if the target is visible before and after the
-            step. In the paper ``Vis a_l L``, see `HelperReward`.
+        turn: Decrease of the horizontal angle between the agent's forward direction and the
+            direction of the target since the target was last visible, rad, if it is visible after
+            the step. In the paper ``Vis a_l L``, see `HelperReward`.
     """
 
     senses = ("vision", "touch", "proprioception")
