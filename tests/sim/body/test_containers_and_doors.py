@@ -7,8 +7,10 @@ import pytest
 from verbs import begin, do, seeing, toy
 from walking import ball, box, empty_world, let_pass, wall
 
+from veca_marl.sim.physics import PropCfg, PropShape
+from veca_marl.sim.physics.interactions.put_into import PutInto
 from veca_marl.sim.physics.props.joint_cfg import LockCfg
-from veca_marl.sim.physics.props.library import door_leaf, sliding_leaf
+from veca_marl.sim.physics.props.library import basket, chest, door_leaf, sliding_leaf
 
 BASKET = ("basket", (0.3, 0.3, 0.02), 0.0, (0.6, 0.0, 0.01))  # a plate: what is put on it stays
 
@@ -141,3 +143,35 @@ def test_a_locked_door_opens_with_its_key_in_the_hand_only():
     assert (leaf.locked, leaf.opening > 0.5) == (False, True)
     world.reset(np.random.default_rng(0))
     assert (leaf.locked, leaf.opening) == (True, pytest.approx(0.0, abs=1e-3))
+
+
+@pytest.mark.parametrize(("radius_m", "fits"), [(0.15, True), (0.18, True), (0.19, False)])
+def test_what_is_put_into_a_basket_is_then_in_it(radius_m, fits):
+    """The walls of a basket leave 0.37 m of its 0.4 m."""
+    can = PropCfg(
+        name="can",
+        shape=PropShape.cylinder,
+        size_m=[radius_m, 0.08],
+        position_m=(0.4, 0.0, 0.04),
+        mass_kg=0.5,
+    )
+    world = empty_world(basket("basket", (1.0, 0.0)), can)
+    walker = seeing(world, extra_verbs=["put_into"])
+    begin(world)
+    assert walker.grab(world.prop("can"))
+    assert PutInto().attempt(walker, world.prop("basket")) is fits
+    let_pass(world, 2.0)
+    assert world.prop("basket").contains(world.prop("can")) is fits
+
+
+def test_nothing_is_put_into_a_closed_chest():
+    world = empty_world(*chest("chest", (1.0, 0.0)), toy())
+    walker = seeing(world, extra_verbs=["put_into", "open"])
+    begin(world)
+    assert walker.grab(world.prop("toy"))
+    assert not PutInto().attempt(walker, world.prop("chest"))
+    assert walker.open(world.prop("chest.lid"))
+    let_pass(world, 2.0)
+    assert PutInto().attempt(walker, world.prop("chest"))
+    let_pass(world, 2.0)
+    assert world.prop("chest").contains(world.prop("toy"))

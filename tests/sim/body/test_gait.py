@@ -8,6 +8,7 @@ from walking import ball, empty_world, let_pass, walker_in
 
 from veca_marl.sim.body.anatomy import Soles, load_skeleton
 from veca_marl.sim.body.walker.animation.gait import Gait
+from veca_marl.sim.body.walker.animation.neck import Neck
 
 SKELETON = load_skeleton()
 SOLES = Soles(SKELETON)
@@ -37,7 +38,7 @@ def test_the_lowest_sole_is_on_the_floor(walk):
 def test_joint_angles_are_within_the_limits_before_clipping(walk):
     gait = Gait(SKELETON)
     gait._low, gait._high = np.full(82, -np.inf), np.full(82, np.inf)
-    gait._turn_neck = lambda *_: None
+    gait._neck.turn = lambda *_: None
     for step in range(100):
         gait.advance(*walk, 0.04)
         if step == 50:
@@ -145,7 +146,8 @@ def test_a_kick_swings_the_right_leg_and_ends():
 def test_neck_and_head_rotations_add_up_to_the_commanded_angle(fraction):
     world = empty_world()
     walker = walker_in(world, head_pitch_deg=0.0)
-    down, left = walker._gait.pitch_range_rad, walker._gait.yaw_range_rad
+    neck = Neck(SKELETON)
+    down, left = neck.pitch_range_rad, neck.yaw_range_rad
     pitch = fraction * down[1] if fraction > 0 else -fraction * down[0]
     walker.rotate_up_down_head(math.degrees(pitch))
     world.step()

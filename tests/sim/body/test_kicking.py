@@ -15,10 +15,33 @@ def test_a_kick_sends_a_ball_away_at_the_documented_speed(mass_kg):
     walker = walker_in(world, kick_speed_mps=3.0, kick_impulse_ns=3.0)
     assert walker.kick(world.prop("ball"))
     velocity = world.prop("ball").velocity
-    assert np.linalg.norm(velocity[:2]) == pytest.approx(min(3.0, 3.0 / mass_kg))
+    assert np.linalg.norm(velocity[:2]) == pytest.approx(min(3.0, 3.0 / mass_kg / np.hypot(1, 0.2)))
     assert math.atan2(velocity[1], velocity[0]) == pytest.approx(math.atan2(0.1, 0.3))
     let_pass(world, 0.4)
     assert np.linalg.norm(world.prop("ball").position[:2]) > 0.32
+
+
+@pytest.mark.parametrize("mass_kg", [0.3, 1.0, 5.0])
+@pytest.mark.parametrize("before_mps", [(-3.0, 0.0, 0.0), (0.0, 2.0, 0.5), (2.5, 0.0, 0.0)])
+def test_a_kick_adds_an_impulse_up_to_a_speed(mass_kg, before_mps):
+    world = empty_world(ball(mass_kg=mass_kg, position=(0.3, 0.0, 0.1)))
+    walker = walker_in(world, kick_speed_mps=3.0, kick_impulse_ns=3.0)
+    prop, before = world.prop("ball"), np.array(before_mps)
+    prop.set_velocity(before_mps)
+    assert walker.kick(prop)
+    impulse_ns = mass_kg * (prop.velocity - before)
+    assert np.linalg.norm(impulse_ns) <= 3.0 + 1e-9
+    assert impulse_ns[:2] == pytest.approx([np.linalg.norm(impulse_ns[:2]), 0.0])
+    free = np.linalg.norm(impulse_ns) < 3.0 - 1e-6
+    assert not free or prop.velocity[0] == pytest.approx(3.0)
+
+
+def test_a_kick_does_not_slow_a_ball_that_is_faster():
+    world = empty_world(ball(position=(0.3, 0.0, 0.1)))
+    walker, prop = walker_in(world, kick_speed_mps=3.0), world.prop("ball")
+    prop.set_velocity((6.0, 0.0, 0.0))
+    assert walker.kick(prop)
+    assert prop.velocity == pytest.approx([6.0, 0.0, 0.0])
 
 
 @pytest.mark.parametrize(

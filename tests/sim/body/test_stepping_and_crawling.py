@@ -6,6 +6,7 @@ from verbs import begin, do, seeing, toy
 from walking import ball, box, empty_world, wall
 
 from veca_marl.sim.body.proprioception import ProprioceptionCfg, ProprioceptionSense
+from veca_marl.sim.physics import ClockCfg
 
 
 def platform(height_m=0.15, mass_kg=0.0):
@@ -33,6 +34,88 @@ def test_a_walker_steps_onto_a_low_heavy_prop_and_off_over_its_edge(mass_kg):
     assert walker.position[0] > 1.0
     assert walker.position[2] == pytest.approx(standing_m, abs=0.025)  # the gait bobs
     assert world.prop("platform").position[0] == pytest.approx(0.6, abs=1e-3)
+
+
+@pytest.mark.parametrize("height_m", [0.3, 1.2])
+def test_a_walker_does_not_step_through_a_wall(height_m):
+    between = box("wall", (0.05, 3.0, height_m), 0.0, (0.2, 0.0, height_m / 2))
+    world = empty_world(platform(), between)
+    walker = seeing(world, extra_verbs=["step_on"])
+    begin(world)
+    here = walker.position
+    assert not walker.can_step_on(world.prop("platform"))
+    assert walker.position == pytest.approx(here)
+
+
+def test_a_walker_does_not_step_to_where_something_heavy_stands():
+    load = box("load", (0.3, 0.3, 0.3), 50.0, (0.6, 0.0, 0.3))
+    world = empty_world(platform(), load)
+    walker = seeing(world, extra_verbs=["step_on"])
+    begin(world)
+    assert not do(world, walker, "step_on")
+    assert not do(world, walker, "none")  # and it is where it was
+    assert walker.position[:2] == pytest.approx([0.0, 0.0], abs=1e-6)
+    world.prop("load").place((3.0, 0.0, 0.15))
+    assert do(world, walker, "step_on")
+
+
+def test_a_held_prop_is_not_thrown_by_a_step_onto_something():
+    toy_at = (0.75, -0.2, 0.2)  # beside where the hand will be
+    resting = ball("resting", 0.05, 0.2, toy_at)
+    world = empty_world(platform(), resting, clock=ClockCfg(substeps=1))
+    world.add_prop(box("toy", (0.1, 0.1, 0.1), 0.3, (0.25, 0.0, 0.05), interactions=["grab"]))
+    walker = seeing(world, extra_verbs=["step_on"])
+    begin(world)
+    assert walker.grab(world.prop("toy"))
+    do(world, walker, "none")
+    assert walker.step_on(world.prop("platform"))
+    for _ in range(3):
+        world.step()
+        assert np.linalg.norm(world.prop("toy").velocity) < 2.0
+        assert np.linalg.norm(world.prop("resting").velocity) < 2.0
+    assert walker.release()
+    world.step()
+    assert np.linalg.norm(world.prop("toy").velocity[:2]) < 1.0
+
+
+@pytest.mark.parametrize("width_m", [0.1, 0.4, 1.2])
+def test_a_walker_does_not_stand_up_below_a_table(width_m):
+    """Also where the nearest side of its top is far: the contact is then vertical."""
+    top = box("top", (width_m, width_m, 0.04), 0.0, (4.0, 0.0, 0.5))
+    carpet = box("carpet", (2.0, 2.0, 0.01), 0.0, (0.0, 0.0, 0.005))
+    world = empty_world(top, carpet)
+    walker = seeing(world, extra_verbs=["crawl", "stand_up"])
+    begin(world)
+    assert walker.crawl()
+    assert walker.stand_up(), "what is beneath it is no obstacle"
+    assert walker.crawl()
+    world.prop("top").place((0.0, 0.0, 0.5))
+    world.step()
+    assert not walker.stand_up()
+    assert walker.crawls
+
+
+@pytest.mark.parametrize("deg", [10.0, 30.0, -3.0])
+def test_the_head_of_a_crawling_walker_follows_its_commands(deg):
+    world = empty_world()
+    walker = seeing(world, extra_verbs=["crawl", "stand_up"])
+    begin(world)
+    assert walker.crawl()
+
+    def down_deg():
+        return np.degrees(np.arcsin(-walker.mount("head").rotation[2, 0]))
+
+    before = down_deg()
+    walker.rotate_up_down_head(deg)
+    world.step()
+    assert down_deg() - before == pytest.approx(deg, abs=1e-6)
+    walker.rotate_up_down_head(-90.0)  # to its limit
+    walker.rotate_up_down_head(20.0)
+    world.step()
+    limit = down_deg()
+    walker.rotate_up_down_head(-20.0)
+    world.step()
+    assert limit - down_deg() == pytest.approx(20.0, abs=1e-6)
 
 
 def felt(world, walker, *verbs):

@@ -10,6 +10,7 @@ from veca_marl.sim.body import MOUNTS
 from veca_marl.sim.body.walker import WalkerCfg
 from veca_marl.sim.body.walker.actions.walk_commands import MOVES, WALK_ACTIONS, WalkActionKind
 from veca_marl.sim.hearing import AudioCfg, AudioSense
+from veca_marl.sim.physics import ClockCfg
 from veca_marl.sim.senses import SensesCfg, make_senses
 from veca_marl.sim.vision import is_visible
 
@@ -301,3 +302,18 @@ def test_unknown_senses_are_refused_with_the_choices():
     walker = walker_in(world)
     with pytest.raises(ValueError, match=r"'smell'.*audio.*vision"):
         make_senses(walker, ("vision", "smell"), SensesCfg(), world)
+
+
+@pytest.mark.parametrize(("rate_hz", "substeps"), [(10, 1), (25, 1), (25, 10)])
+def test_the_path_of_a_turning_walker_is_an_arc_at_every_clock(rate_hz, substeps):
+    """Half a circle at 0.4 m/s and 90 degrees/s: its diameter is 2 * 0.4 / (pi / 2) m."""
+    world = empty_world(clock=ClockCfg(rate_hz, substeps))
+    walker = walker_in(world)
+    walker.walk(0.4, math.pi / 2.0)
+    for _ in range(2 * rate_hz):
+        world.step()
+    assert walker.position[:2] == pytest.approx([0.0, 1.6 / math.pi], abs=1e-9)
+    walker.walk(-0.4, -math.pi / 2.0)
+    for _ in range(2 * rate_hz):
+        world.step()
+    assert walker.position[:2] == pytest.approx([0.0, 0.0], abs=1e-9)

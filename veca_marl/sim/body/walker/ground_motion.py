@@ -9,7 +9,7 @@ import numpy as np
 from veca_marl.sim.body.base import Body
 from veca_marl.sim.body.walker.animation.stances import Stance
 from veca_marl.sim.body.walker.collisions.capsule import Capsule
-from veca_marl.sim.body.walker.collisions.footing import Footing, middle
+from veca_marl.sim.body.walker.collisions.footing import Footing, middle, surface_height_m
 from veca_marl.sim.body.walker.collisions.walker_collisions import WalkerCollisions
 from veca_marl.sim.geometry import Floats
 from veca_marl.sim.physics import Prop, World
@@ -86,12 +86,18 @@ class GroundMotion:
         self._collect_obstacles(abs(self.speed_mps) * self._world.clock.step_s)
 
     def proposed_position(self, substep_s: float) -> tuple[float, float]:
-        """Turn; return the position after this physics step without obstacles, metres."""
-        self.yaw_rad += self.turn_radps * substep_s
-        self.stance.turn(self.yaw_rad)
-        distance = self.speed_mps * substep_s
+        """Turn; return the position after this physics step without obstacles, metres.
+
+        It is the end of the arc of a circle that constant speeds give, for any duration.
+        """
+        half_rad = self.turn_radps * substep_s / 2.0
+        chord_m = self.speed_mps * substep_s * float(np.sinc(half_rad / math.pi))
         x, y = self.ground
-        return x + distance * math.cos(self.yaw_rad), y + distance * math.sin(self.yaw_rad)
+        x += chord_m * math.cos(self.yaw_rad + half_rad)
+        y += chord_m * math.sin(self.yaw_rad + half_rad)
+        self.yaw_rad += 2.0 * half_rad
+        self.stance.turn(self.yaw_rad)
+        return x, y
 
     def set_position(self, x: float, y: float, substep_s: float) -> None:
         """Set the position at the end of a physics step."""
@@ -104,6 +110,27 @@ class GroundMotion:
     def after_step(self) -> None:
         """Compute the mean velocity over this agent step."""
         self.velocity[:2] = (self.ground - self._step_start) / self._world.clock.step_s
+
+    def can_step_on(self, prop: Prop) -> bool:
+        """Return whether there is room for it on the middle of a prop."""
+        top_m = surface_height_m(self._world.client, prop, *middle(prop))
+        if top_m is None:
+            return False
+        before = self._standing
+        occupied = self._overlaps_at((np.array(middle(prop)), top_m, prop.body_id))
+        self._overlaps_at(before)  # back again
+        return not occupied
+
+    @property
+    def _standing(self) -> tuple[Floats, float, int]:
+        """The place on the floor plan, the height, and PyBullet's id of what it stands on."""
+        return self.ground.copy(), self.capsule.base_m, self.capsule.support_id
+
+    def _overlaps_at(self, standing: tuple[Floats, float, int]) -> bool:
+        """Move the capsule to where it would stand, and return whether that is occupied."""
+        self.ground[:], self.capsule.base_m, self.capsule.support_id = standing
+        self._collect_obstacles(0.0)
+        return self.capsule.overlaps(*self.ground)
 
     def step_on(self, prop: Prop) -> None:
         """Stand on the middle of a prop, which is no obstacle from now on."""

@@ -59,7 +59,7 @@ class Walker(Body):
         self._gait = Gait(self._skeleton)
         self._motion = GroundMotion(world, *make_stances(self._skeleton, self._gait, cfg, world))
         self._handling = ObjectHandling(world.client, name, cfg, self._motion, self._gait)
-        self._bone_poses = BonePoses(self._skeleton, self._gait, self._drawn)
+        self._bone_poses = BonePoses(self._skeleton, self._drawn)
         self.verb_choice = VerbChoice(cfg.verbs)
         mass_kg = sum(bone.mass_kg for bone in self._skeleton.bones)
         self._footsteps = Footsteps(name, mass_kg, world)
@@ -245,10 +245,14 @@ class Walker(Body):
         return Close().attempt(self, prop)
 
     def can_step_on(self, prop: Prop) -> bool:
-        """Return whether it stands on the floor and a prop is heavy, low and within reach."""
+        """Return whether it stands on the floor and a prop is heavy, low and within reach.
+
+        Nothing solid is between them, nor where it would stand.
+        """
         if self._stands_on_prop or self.crawls or self.is_light(prop):
             return False
-        return foot_steps_on(self._world.client, self.cfg, self._motion.ground, prop)
+        reached = foot_steps_on(self._world.client, self.cfg, self._motion.ground, prop)
+        return reached and self._motion.can_step_on(prop)
 
     def step_on(self, prop: Prop) -> bool:
         """Step onto the middle of a prop; return False, and do nothing, if it cannot.
@@ -260,6 +264,9 @@ class Walker(Body):
         self._motion.step_on(prop)
         self._change_posture()
         self._footsteps.teleport(self._surface)
+        if self.held is not None:
+            self._handling.follow_palm(self.palms()[1])
+            self.held.teleport_sounds()
         return True
 
     @property
@@ -313,7 +320,7 @@ class Walker(Body):
         Raises:
             ValueError: If the angle is not finite.
         """
-        self._bone_poses.pitch_head(deg)
+        self._bone_poses.pitch_head(deg, self._motion.stance)
 
     def rotate_left_right_head(self, deg: float) -> None:
         """Turn the head right (left when negative) by an angle, clipped to the range of the neck.

@@ -11,6 +11,7 @@ from veca_marl.sim.geometry import Floats
 from veca_marl.sim.physics.interactions.interaction import InteractingBody, Interaction
 from veca_marl.sim.physics.interactions.registry import register_interaction
 from veca_marl.sim.physics.props.prop import Prop
+from veca_marl.sim.physics.props.prop_shape import PropShape
 
 _GAP_M = 0.01  # between the lowest point of the prop and what it falls on, or the rim
 _RIM_M = 0.02  # thickness of the walls of a container
@@ -24,8 +25,8 @@ _PLACES = np.array(
 class PutInto(Interaction):
     """Release the held prop above the emptiest place of a container, into which it falls.
 
-    The container declares the verb. The prop must be held, be narrower than the container, and be
-    accepted by it (`Prop.accepts`).
+    The container declares the verb. The prop must be held, be narrower than the inside of the
+    container, and be accepted by it (`Prop.accepts`), and no closed lid may be above it.
     """
 
     name: ClassVar[str] = "put_into"
@@ -33,7 +34,9 @@ class PutInto(Interaction):
     def allows(self, body: InteractingBody, prop: Prop) -> bool:
         """Return whether the held prop fits into the container and is accepted by it."""
         held = body.held
-        return held is not None and fits(held, prop) and prop.accepts(held)
+        if held is None or not fits(held, prop) or not prop.accepts(held):
+            return False
+        return not is_covered(held, prop, body.world.props.values())
 
     def apply(self, body: InteractingBody, prop: Prop) -> None:
         """Open the hand and place the prop above the container, at rest, with its yaw."""
@@ -45,9 +48,24 @@ class PutInto(Interaction):
 
 
 def fits(prop: Prop, container: Prop) -> bool:
-    """Return whether a prop is narrower than the box of a container."""
+    """Return whether a prop is narrower than the inside of a container."""
     low, high = container.box
-    return 2.0 * prop.radius_m <= float(np.min((high - low)[:2]))
+    wall_m = _RIM_M if container.cfg.shape is PropShape.compound else 0.0  # plates have none
+    return 2.0 * (prop.radius_m + wall_m) <= float(np.min((high - low)[:2]))
+
+
+def is_covered(prop: Prop, container: Prop, others: Iterable[Prop]) -> bool:
+    """Return whether a lid, or another leaf, is above each place in a container for a prop.
+
+    Args:
+        prop: The prop.
+        container: The container, upright.
+        others: All props of the world.
+    """
+    leaves = [_in_frame(p, container) for p in others if p.joint is not None and p is not container]
+    half = np.full(2, prop.radius_m)
+    piles = [_pile_m(place - half, place + half, leaves) for place in _places(container, half)]
+    return min(piles) > -np.inf
 
 
 def place_above(prop: Prop, container: Prop, others: Iterable[Prop]) -> Floats:
@@ -61,10 +79,9 @@ def place_above(prop: Prop, container: Prop, others: Iterable[Prop]) -> Floats:
         container: The container, upright.
         others: All props of the world.
     """
-    (low, high), (own_low, own_high) = container.box, prop.box
+    (_, high), (own_low, own_high) = container.box, prop.box
     half = (own_high - own_low)[:2] / 2.0
-    reach = np.maximum((high - low)[:2] / 2.0 - half - _RIM_M, 0.0)
-    places = ((low + high) / 2.0)[:2] + _PLACES * reach
+    places = _places(container, half)
     piles = [_in_frame(p, container) for p in others if p not in (prop, container) and not p.fixed]
     heights = [_pile_m(place - half, place + half, piles) for place in places]
     best = int(np.argmin(heights))
@@ -73,6 +90,14 @@ def place_above(prop: Prop, container: Prop, others: Iterable[Prop]) -> Floats:
     local = np.array([*(places[best] - middle), bottom_m - own_low[2]])
     world: Floats = container.position + container.rotation @ local
     return world
+
+
+def _places(container: Prop, half: Floats) -> Floats:
+    """Return places ``(9, 2)`` in a container's frame for a prop of half widths ``(2,)``."""
+    low, high = container.box
+    reach = np.maximum((high - low)[:2] / 2.0 - half - _RIM_M, 0.0)
+    places: Floats = ((low + high) / 2.0)[:2] + _PLACES * reach
+    return places
 
 
 def _in_frame(prop: Prop, container: Prop) -> tuple[Floats, Floats]:

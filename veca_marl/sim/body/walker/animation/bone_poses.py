@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from veca_marl.sim.body.anatomy import Skeleton, forward_kinematics
-from veca_marl.sim.body.walker.animation.gait import Gait
+from veca_marl.sim.body.walker.animation.neck import Neck
 from veca_marl.sim.body.walker.animation.stances import Stance
 from veca_marl.sim.geometry import Floats, SceneObject
 
@@ -15,26 +15,27 @@ class BonePoses:
 
     Args:
         skeleton: The table of bones and joints.
-        gait: The gait; the ranges of the head are its.
         bones: The object of the scene with a frame for each bone.
     """
 
-    def __init__(self, skeleton: Skeleton, gait: Gait, bones: SceneObject) -> None:
-        self._skeleton, self._gait, self._bones = skeleton, gait, bones
+    def __init__(self, skeleton: Skeleton, bones: SceneObject) -> None:
+        self._skeleton, self._bones = skeleton, bones
+        self._yaw_range_rad = Neck(skeleton).yaw_range_rad
         self._head_pitch_rad = self._head_yaw_rad = 0.0
 
     def reset(self, head_pitch_rad: float) -> None:
         """Look straight ahead with a pitch of the head; down is positive."""
         self._head_pitch_rad, self._head_yaw_rad = head_pitch_rad, 0.0
 
-    def pitch_head(self, deg: float) -> None:
-        """Turn the head down by an angle, clipped to its range.
+    def pitch_head(self, deg: float, stance: Stance) -> None:
+        """Turn the head down by an angle, clipped to its range in a stance.
 
         Raises:
             ValueError: If the angle is not finite.
         """
-        angle_rad = self._head_pitch_rad + _finite_rad(deg)
-        self._head_pitch_rad = _clipped(angle_rad, self._gait.pitch_range_rad)
+        range_rad = stance.pitch_range_rad
+        angle_rad = _clipped(self._head_pitch_rad, range_rad) + _finite_rad(deg)
+        self._head_pitch_rad = _clipped(angle_rad, range_rad)
 
     def yaw_head(self, deg: float) -> None:
         """Turn the head to the left by an angle, clipped to its range.
@@ -43,7 +44,7 @@ class BonePoses:
             ValueError: If the angle is not finite.
         """
         angle_rad = self._head_yaw_rad + _finite_rad(deg)
-        self._head_yaw_rad = _clipped(angle_rad, self._gait.yaw_range_rad)
+        self._head_yaw_rad = _clipped(angle_rad, self._yaw_range_rad)
 
     def write(self, stance: Stance, ground: Floats, yaw_rad: float, surface_m: float) -> Floats:
         """Compute all bone poses, shifted vertically until the body touches the surface.
@@ -59,7 +60,8 @@ class BonePoses:
         """
         positions, rotations = self._bones.positions, self._bones.rotations
         positions[0], rotations[0] = stance.pelvis(ground, yaw_rad)
-        angles = stance.angles(self._head_pitch_rad, self._head_yaw_rad)
+        pitch_rad = _clipped(self._head_pitch_rad, stance.pitch_range_rad)
+        angles = stance.angles(pitch_rad, self._head_yaw_rad)
         forward_kinematics(self._skeleton, angles, positions, rotations)
         positions[:, 2] -= stance.underside.lowest_m(positions, rotations) - surface_m
         return angles

@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from veca_marl.sim.body.anatomy import Skeleton
+from veca_marl.sim.body.walker.animation.neck import Neck
 from veca_marl.sim.geometry import Floats
 
 _STANCE = 0.5  # fraction of the stride in which a foot is on the floor
@@ -77,8 +78,6 @@ class Gait:
         phase: Of the stride, in [0, 1).
         angles: ``(82,)`` rad, as of the last `pose`.
         landing_mps: Speed at which a foot landed in the last `advance`; 0 if none did.
-        pitch_range_rad: Range of the head's pitch (down is positive): neck and head together.
-        yaw_range_rad: Range of its yaw (left is positive), likewise.
         carrying: Whether the right hand is held in front of the body.
     """
 
@@ -93,12 +92,9 @@ class Gait:
         self._ankle_roll = (joint("l_foot", "inversion"), joint("r_foot", "inversion"))
         self._arm = (joint("l_upper_arm", "flexion"), joint("r_upper_arm", "flexion"))
         self._elbow = (joint("l_forearm", "flexion"), joint("r_forearm", "flexion"))
-        self._nod = (joint("neck", "flexion"), joint("head", "flexion"))
-        self._shake = (joint("neck", "rotation"), joint("head", "rotation"))
+        self._neck = Neck(skeleton)
         self._low = np.array([j.low_rad for j in skeleton.joints])
         self._high = np.array([j.high_rad for j in skeleton.joints])
-        self.pitch_range_rad = self._range_rad(self._nod)
-        self.yaw_range_rad = self._range_rad(self._shake)
         self._measure_legs(skeleton)
         self.angles: Floats = np.zeros(len(skeleton.joints))
         self.reset()
@@ -109,11 +105,6 @@ class Gait:
         self._hip_y_m = tuple(float(origins[skeleton.bone(f"{s}_thigh"), 1]) for s in "lr")
         self._thigh_m = -float(origins[skeleton.bone("l_shank"), 2])
         self._shank_m = -float(origins[skeleton.bone("l_foot"), 2])
-
-    def _range_rad(self, joints: tuple[int, ...]) -> tuple[float, float]:
-        """Return the sums of the least and of the greatest angles of some joints."""
-        low, high = self._low[list(joints)].sum(), self._high[list(joints)].sum()
-        return float(low), float(high)
 
     def reset(self) -> None:
         """Stand still with empty hands."""
@@ -156,8 +147,7 @@ class Gait:
         if self.carrying:
             self.angles[self._arm[1]] = self.cfg.carry_arm_rad
             self.angles[self._elbow[1]] = self.cfg.carry_elbow_rad
-        self._turn_neck(self._nod, head_pitch_rad, self.pitch_range_rad)
-        self._turn_neck(self._shake, head_yaw_rad, self.yaw_range_rad)
+        self._neck.turn(self.angles, head_pitch_rad, head_yaw_rad)
         np.clip(self.angles, self._low, self._high, out=self.angles)
         return self.angles
 
@@ -245,13 +235,3 @@ class Gait:
         self.angles[self._thigh[1]] = np.interp(done, _KICK[:, 0], _KICK[:, 1])
         self.angles[self._shank[1]] = np.interp(done, _KICK[:, 0], _KICK[:, 2])
         self.angles[self._foot[1]] = _KICK_TOES_RAD * (1.0 - done)
-
-    def _turn_neck(
-        self, joints: tuple[int, ...], turn_rad: float, turn_range_rad: tuple[float, float]
-    ) -> None:
-        """Distribute a rotation so that neck and head reach their limits together."""
-        limits, total = (
-            (self._high, turn_range_rad[1]) if turn_rad >= 0.0 else (self._low, turn_range_rad[0])
-        )
-        for joint in joints:
-            self.angles[joint] = turn_rad * limits[joint] / total

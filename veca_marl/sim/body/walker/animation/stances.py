@@ -11,6 +11,7 @@ import numpy as np
 from veca_marl.sim.body.anatomy import Skeleton, Soles
 from veca_marl.sim.body.anatomy.undersides import Underside
 from veca_marl.sim.body.walker.animation.gait import Gait
+from veca_marl.sim.body.walker.animation.neck import Neck
 from veca_marl.sim.body.walker.collisions.capsule import Capsule, lying_capsule, upright_capsule
 from veca_marl.sim.body.walker.walker_cfg import WalkerCfg
 from veca_marl.sim.geometry import Floats
@@ -26,12 +27,14 @@ class Stance(Protocol):
         speed_share: Speeds of full actions as fractions of those in walking.
         underside: The bones that touch the surface.
         hands_are_free: Whether it can hold, kick and step.
+        pitch_range_rad: Range of the head's pitch; down is positive.
     """
 
     capsule: Capsule
     speed_share: float
     underside: Underside
     hands_are_free: bool
+    pitch_range_rad: tuple[float, float]
 
     def turn(self, yaw_rad: float) -> None:
         """Turn the capsule to a heading."""
@@ -61,6 +64,7 @@ class Upright:
     def __init__(self, skeleton: Skeleton, gait: Gait, capsule: Capsule) -> None:
         self.capsule = capsule
         self.underside: Underside = Soles(skeleton)
+        self.pitch_range_rad = Neck(skeleton).pitch_range_rad
         self._gait = gait
 
     def turn(self, yaw_rad: float) -> None:
@@ -137,8 +141,10 @@ class OnAllFours:
             ]
             for leg, arm in ("lr", "rl")
         ]
-        self._nod = [skeleton.joint(bone, "flexion") for bone in ("neck", "head")]
-        self._shake = [skeleton.joint(bone, "rotation") for bone in ("neck", "head")]
+        self._neck = Neck(skeleton)
+        low_rad, high_rad = self._neck.pitch_range_rad
+        extended_rad = math.radians(self._pose.neck_deg)
+        self.pitch_range_rad = low_rad + extended_rad, high_rad + extended_rad
 
     def turn(self, yaw_rad: float) -> None:
         """See `Stance`."""
@@ -160,8 +166,7 @@ class OnAllFours:
         swing *= math.sin(2.0 * math.pi * self._gait.phase)
         for joints, sign in zip(self._diagonals, (1.0, -1.0), strict=True):
             angles[joints] += sign * swing
-        angles[self._nod] = (head_pitch_rad - math.radians(self._pose.neck_deg)) / 2.0
-        angles[self._shake] = head_yaw_rad / 2.0
+        self._neck.turn(angles, head_pitch_rad - math.radians(self._pose.neck_deg), head_yaw_rad)
         clipped: Floats = np.clip(angles, self._low, self._high)
         return clipped
 

@@ -42,6 +42,8 @@ _ROUNDS = 3  # two for the walls of a corner, one spare
 _LIMB_REACH_M = 1.0  # from the pelvis of a joint-level body to its stretched toes
 _PARKED_M = -100.0  # height of a capsule that is not in use
 _MARGIN_M = 0.06  # an obstacle may displace the capsule by so much within one agent step
+_CARPET_M = 0.02  # what is lower is walked over
+_DEPTH_M = 1e-6  # less is rounding
 _ON_BODY, _NORMAL, _DISTANCE = 6, 7, 8  # entries of PyBullet's points of contact
 
 _Overlap = tuple[Sequence[float], float]  # direction towards the capsule, and metres
@@ -172,9 +174,21 @@ class Capsule:
         )
 
     def overlaps(self, x: float, y: float) -> bool:
-        """Move it to a place, and return whether it penetrates an obstacle there."""
+        """Move it to a place, and return whether it penetrates an obstacle there.
+
+        A carpet, which is as low as what it stands on, does not count.
+        """
         self._set_position(x, y)
-        return _depenetration(self._overlaps()) != (0.0, 0.0)
+        if _depenetration(self._overlaps()) != (0.0, 0.0):
+            return True
+        # in the middle of something wide the nearest way out is vertical
+        high = [body_id for body_id in self._near if self._rises(body_id)]
+        return any(-c[_DISTANCE] > _DEPTH_M for body_id in high for c in self._contacts(body_id))
+
+    def _rises(self, body_id: int) -> bool:
+        """Return whether a body is higher than the surface on which the walker is."""
+        _, highest = pybullet.getAABB(body_id, physicsClientId=self._client)
+        return float(highest[2]) > self.base_m + _CARPET_M
 
     def park(self) -> None:
         """Move it far below the floor, where it collides with nothing."""
@@ -238,7 +252,7 @@ def _depenetration(overlaps: Iterable[_Overlap]) -> tuple[float, float]:
     out_x = out_y = 0.0
     for normal, depth in overlaps:
         length = math.hypot(normal[0], normal[1])
-        if depth > 1e-6 and length > 0.1:
+        if depth > _DEPTH_M and length > 0.1:
             # several points of one face give the same direction: the deepest counts
             away_x, away_y = normal[0] / length * depth, normal[1] / length * depth
             out_x = _larger(out_x, away_x)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from veca_marl.sim.body.sight import distance_m
+from veca_marl.sim.body.walker.collisions.free_line import is_first_hit
 from veca_marl.sim.body.walker.walker_cfg import WalkerCfg
 from veca_marl.sim.geometry import Floats
 from veca_marl.sim.physics import Prop
@@ -57,7 +58,7 @@ def surface_height_m(client: int, prop: Prop, x: float, y: float) -> float | Non
 
 
 def foot_steps_on(client: int, cfg: WalkerCfg, ground: Floats, prop: Prop) -> bool:
-    """Return whether a tangible prop is low enough and near enough to be stepped on.
+    """Return whether a tangible prop is low and near enough, and nothing solid is before it.
 
     Args:
         client: PyBullet's client id.
@@ -69,7 +70,10 @@ def foot_steps_on(client: int, cfg: WalkerCfg, ground: Floats, prop: Prop) -> bo
     if height_m is None or height_m > cfg.step_height_m or not prop.cfg.tangible:
         return False
     foot = np.array([ground[0], ground[1], prop.lowest_m])
-    return distance_m(prop, foot) - cfg.radius_m <= cfg.step_reach_m
+    if distance_m(prop, foot) - cfg.radius_m > cfg.step_reach_m:
+        return False
+    end, height_m = np.array([*middle(prop), height_m]), (prop.lowest_m + height_m) / 2.0
+    return is_first_hit(client, prop.body_id, foot, end, cfg.radius_m, height_m)
 
 
 def middle(prop: Prop) -> tuple[float, float]:

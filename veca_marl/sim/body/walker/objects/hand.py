@@ -19,6 +19,8 @@ _CLEARANCE_M = 1e-4  # from the surface of the walker's own capsule to the start
 _ARM_M = 0.5  # no palm is farther from the axis of the trunk
 # greatest speed of a held prop relative to the trunk, also where it is moved past an edge at once
 _ARM_MPS = 1.0
+# greatest speed at which things shove the trunk; a walker that is moved out of one is faster
+_SHOVED_MPS = 1.0
 _ROUNDS = 6  # of moving a prop out of walls; in a corner that is not square each leaves a rest
 
 
@@ -26,9 +28,10 @@ class Hand:
     """Holds a prop beside the palm, upright, at a constant yaw relative to the trunk.
 
     Its centre of mass is beside the palm. The prop is kinematic while it is held: its pose is set
-    at each physics step, and its velocity is that of this motion, without jumps at the edges of
-    walls. It does not collide with its holder. It stays on the walker's side of walls and of other
-    walkers: where they are nearer than the hand would hold it, it is held nearer to the trunk.
+    at each physics step, and its velocity is that of this motion, without jumps: neither those of
+    the hand at the edges of walls, nor those of a walker that is moved out of something. It does
+    not collide with its holder. It stays on the walker's side of walls and of other walkers: where
+    they are nearer than the hand would hold it, it is held nearer to the trunk.
 
     Args:
         client: PyBullet's client id.
@@ -99,12 +102,20 @@ class Hand:
             self._place(self.prop, ground, yaw_rad)
             self._set_velocity(self.prop)
 
-    def follow(self, ground: Floats, yaw_rad: float, turn_radps: float, substep_s: float) -> None:
+    def follow(
+        self,
+        ground: Floats,
+        yaw_rad: float,
+        speed_mps: float,
+        turn_radps: float,
+        substep_s: float,
+    ) -> None:
         """Move the held prop with the walker by one physics step.
 
         Args:
             ground: ``(2,)`` metres: the walker's place on the floor.
             yaw_rad: Its heading.
+            speed_mps: Its commanded speed.
             turn_radps: Its turning speed.
             substep_s: Seconds since the last call.
         """
@@ -115,7 +126,9 @@ class Hand:
             turn = rotation_about_vertical(yaw_rad - start_rad)
             carried = turn @ (before - _on_floor(start)) + _on_floor(ground)
             by_arm = _limited((self._centre - carried) / substep_s, _ARM_MPS)
-            self._velocity = (carried - before) / substep_s + by_arm
+            walking_mps = abs(speed_mps) + abs(turn_radps) * _ARM_M
+            by_trunk = _limited((carried - before) / substep_s, walking_mps + _SHOVED_MPS)
+            self._velocity = by_trunk + by_arm
             self._turn_radps = turn_radps
             self._set_velocity(self.prop)
 

@@ -99,7 +99,9 @@ class ObjectHandling:
     def follow_trunk(self, substep_s: float) -> None:
         """Move a held prop with the trunk by one physics step of a duration in seconds."""
         motion = self._motion
-        self._hand.follow(motion.ground, motion.yaw_rad, motion.turn_radps, substep_s)
+        self._hand.follow(
+            motion.ground, motion.yaw_rad, motion.speed_mps, motion.turn_radps, substep_s
+        )
 
     def follow_palm(self, palm: Floats) -> None:
         """Move a held prop to the present place of the palm, ``(3,)`` metres."""
