@@ -9,7 +9,7 @@ from composed import compose
 from scipy.special import spherical_jn
 
 from veca_marl.sim.body.walker import Walker, WalkerCfg
-from veca_marl.sim.physics import PlaygroundCfg, World
+from veca_marl.sim.physics import ClockCfg, PlaygroundCfg, World
 from veca_marl.sim.physics.impacts.cfg import ImpactCfg
 from veca_marl.sim.physics.impacts.sounds import prop_modes
 from veca_marl.sim.physics.props import PartCfg, PropCfg, PropShape
@@ -249,3 +249,24 @@ def test_a_box_as_a_compound_has_the_modes_of_a_box():
     one = prop_modes(PropCfg("rod", PropShape.compound, parts=[part]))
     other = prop_modes(rod())
     np.testing.assert_allclose(one.frequencies_hz, other.frequencies_hz, rtol=1e-9)
+
+
+@pytest.mark.parametrize("substeps", [2, 5, 20])
+def test_strikes_add_up_to_the_change_of_momentum(substeps):
+    """A box that falls flat hits the floor with four corners, in several physics steps."""
+    size, mass_kg = [0.2, 0.2, 0.2], 0.5
+    box = PropCfg("box", PropShape.box, size, (0.0, 0.0, 0.6), mass_kg=mass_kg, restitution=0.3)
+    playground = PlaygroundCfg("test", props=[box], impacts=ImpactCfg(present=True))
+    world = World(playground, clock=ClockCfg(substeps=substeps))
+    world.freeze()
+    world.reset(np.random.default_rng(0))
+    prop, strikes, speeds = world.prop("box"), [], []
+    struck = world.sound.sources["box.impact"].sound
+    struck.strike = lambda impulse_ns, delay: strikes.append(impulse_ns)
+    world.after_substep.append(lambda: speeds.append(prop.velocity[2]))
+    for _ in range(11):  # it falls for 0.32 s and hits again after 0.5 s
+        world.step()
+    lowest, highest = np.argmin(speeds), len(speeds) - 1 - np.argmax(speeds[::-1])
+    hit_s = (highest - lowest) * world.clock.substep_s
+    impulse_ns = mass_kg * (speeds[highest] - speeds[lowest] + 9.81 * hit_s)
+    assert sum(strikes) == pytest.approx(impulse_ns, rel=0.1)

@@ -138,3 +138,18 @@ def test_two_walls_one_behind_the_other_count_twice():
     centres[3:, 0] += 1.0
     ends = np.array([0.0, -1.0, 1.0]), np.array([4.0, -1.2, 1.0])
     assert count_crossed(*ends, centres, rotations, halves) == 2
+
+
+def test_the_pieces_of_one_wall_count_once_inside_a_room():
+    """A path inside one room is attenuated as the same path between two rooms is."""
+    gains = []
+    whole = [Room((0.0, 0.0, 0.0), (6.0, 6.0, 2.6), 0.5)]
+    halves = [Room((x, 0.0, 0.0), (2.95, 6.0, 2.6), 0.5) for x in (0.0, 3.05)]
+    for rooms in (whole, halves):
+        house = House(rooms, image_order=0)
+        for y in (1.5, 4.5):
+            piece = house.obstacles.add((0.05, 1.5, 1.3))
+            house.obstacles.move(piece, (3.0, y, 1.3), np.eye(3))
+        head = Pose(np.array([4.0, 4.0, 1.2]), np.eye(3))
+        gains.append(house.arrivals(np.array([2.0, 2.0, 1.2]), head).gains)
+    np.testing.assert_allclose(gains[0], gains[1])

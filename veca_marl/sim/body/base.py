@@ -276,6 +276,11 @@ class Body(ABC):
         self._gaze.adjust(focal_distance_m)
 
     @property
+    def teleports(self) -> int:
+        """How often its head was moved at once, which is no motion: no sound is shifted by it."""
+        return self._mouth.teleports
+
+    @property
     def muted(self) -> bool:
         """Whether the voice is inaudible to all agents, including this one; False after a reset."""
         return self._mouth.muted

@@ -120,6 +120,7 @@ class AudioSense(Sense):
         self._listener = field.add_listener(
             make_receiver(cfg, field.sample_rate_hz, nearest_m), self._steps_in_window
         )
+        self._teleports = body.teleports
         self._weights = window_weights(cfg.window)
         self._noise_power = noise_power(cfg.noise_floor_db, self._weights)
         self._recent = np.zeros((2, max(WINDOW_SAMPLES, field.step_samples)), np.float32)
@@ -130,6 +131,7 @@ class AudioSense(Sense):
     def reset(self) -> None:
         """See `Sense`."""
         super().reset()
+        self._teleports = self._body.teleports
         self._recent[:] = 0.0
         self._listener.reset()
 
@@ -137,6 +139,9 @@ class AudioSense(Sense):
         """See `Sense`."""
         head = self._body.mount("head")
         centre = Pose(head.position + head.rotation @ self._centre, head.rotation)
+        if self._body.teleports != self._teleports:
+            self._listener.teleport()
+        self._teleports = self._body.teleports
         missed = self._listener.missed_steps
         if missed:
             self._append(self._listener.rejoin(centre, min(missed, self._steps_in_window)))

@@ -57,6 +57,13 @@ class Listener:
             propagation.reset()
         self._rendered_steps = self._clock.steps
 
+    def teleport(self) -> None:
+        """Let the next step be heard from elsewhere without a Doppler shift: sounds are faded over.
+
+        As `Source.teleport` for a head that is moved at once.
+        """
+        self._ears.teleports += 1
+
     def forget(self, source: Source) -> None:
         """Drop the state that belongs to a source."""
         self._propagations.pop(source.name, None)

@@ -27,12 +27,13 @@ _BODY_A, _BODY_B, _NORMAL_FORCE = 1, 2, 9  # in a contact point of PyBullet
 
 
 class ImpactSounds:
-    """Strikes the movable props of a world when the impulse of a contact rises.
+    """Strikes the movable props of a world when a contact changes their velocities.
 
-    An impulse that stays the same from one physics step to the next is that of a thing at rest or
-    rolling: it is silent. So is one that changes the velocity of neither thing, such as the weight
-    of what has been put on a thing. Fixed props, the floor and bodies do not sound, and nothing
-    sounds in the first physics step after a reset.
+    The impulse of a strike is that of the contact without its impulse while the things were at rest
+    or rolling: what lies still is silent. A hit that Bullet distributes over several physics steps
+    strikes in each of them. A contact that changes the velocity of neither thing, such as the
+    weight of what has been put on a thing, is silent. Fixed props, the floor and bodies do not
+    sound, and nothing sounds in the first physics step after a reset.
     """
 
     def __init__(self, cfg: ImpactCfg, clock: ClockCfg, client: int, sound: SoundField) -> None:
@@ -43,7 +44,7 @@ class ImpactSounds:
         self._samples_per_substep = sound.step_samples / clock.substeps
         self._props: dict[int, Prop] = {}
         self._struck: dict[int, StruckBody] = {}
-        self._impulses: dict[tuple[int, int], float] = {}
+        self._resting: dict[tuple[int, int], float] = {}  # impulses without a hit
         self._velocities: dict[int, Floats] = {}
         self._substep = 0
 
@@ -56,21 +57,25 @@ class ImpactSounds:
         prop.impact = self._sound.add_source(f"{prop.name}.impact", body)
 
     def reset(self) -> None:
-        """Forget the contacts of the last physics step."""
-        self._impulses.clear()
+        """Forget all contacts."""
+        self._resting.clear()
         self._velocities.clear()
         self._substep = 0
 
     def after_substep(self) -> None:
-        """Compare the impulses of all contacts with those of the last physics step."""
+        """Compare the impulses of all contacts with those at rest."""
         impulses, before = self._contact_impulses(), self._velocities
         self._velocities = {body: prop.velocity for body, prop in self._props.items()}
         delay = int(self._substep * self._samples_per_substep)
+        resting = {}
         for pair, impulse in impulses.items():
-            rise = impulse - self._impulses.get(pair, 0.0)
-            if rise > self._threshold_ns(pair) and self._was_hit(pair, before):
-                self._strike(pair, rise, delay)
-        self._impulses = impulses
+            resting[pair] = impulse
+            if self._was_hit(pair, before):
+                resting[pair] = self._resting.get(pair, 0.0)
+                added_ns = impulse - resting[pair]
+                if added_ns > self._threshold_ns(pair):
+                    self._strike(pair, added_ns, delay)
+        self._resting = resting
         self._substep = (self._substep + 1) % self._clock.substeps
 
     def _contact_impulses(self) -> dict[tuple[int, int], float]:

@@ -18,7 +18,7 @@ from veca_marl.sim.sound.sound_source import Source
 MAX_SPEED_MPS = 50.0
 """A path of which the length changes faster is cross-faded as a new path, without Doppler shift."""
 
-Place = tuple[int, int, bytes, bytes, bytes]
+Place = tuple[int, int, int, bytes, bytes, bytes]
 
 
 class Ears:
@@ -27,6 +27,7 @@ class Ears:
     Attributes:
         mixer: Filters and adds the sound of all paths.
         reach_samples: How many of the newest samples of a source can be heard in one step.
+        teleports: How often the head was teleported.
     """
 
     def __init__(
@@ -38,6 +39,7 @@ class Ears:
         step_samples: int,
     ) -> None:
         self.mixer = mixer
+        self.teleports = 0
         self._receiver = receiver
         self._surroundings = surroundings
         self._sample_rate_hz = sample_rate_hz
@@ -60,6 +62,7 @@ class Ears:
         """Return what the arrivals of a source at the head depend on: equal, they are equal."""
         return (
             self._surroundings.changes,
+            self.teleports,
             source.teleports,
             source.position.tobytes(),
             head.position.tobytes(),
@@ -183,7 +186,7 @@ class Propagation:
         """Forget the last position of the source and the sound that was read."""
         self._paths: _Paths | None = None
         self._place: Place | None = None
-        self._teleports = self._source.teleports
+        self._teleports = self._all_teleports
         # the newest samples that were not heard yet: all
         self._unheard_samples = self._ears.reach_samples
 
@@ -199,13 +202,18 @@ class Propagation:
         arrivals = self._ears.arrivals(self._source, head)
         if self._paths is None:
             self._begin(arrivals)
-        elif self._source.teleports != self._teleports or not self._follow(self._paths, arrivals):
+        elif self._all_teleports != self._teleports or not self._follow(self._paths, arrivals):
             self._paths.fade_out(self._source.memory)
             self._paths = _Paths(self._ears, arrivals)
             self._paths.begin(self._source.memory, self._ears.reach_samples)
             self._paths.fade_in()
-        self._teleports = self._source.teleports
+        self._teleports = self._all_teleports
         return True
+
+    @property
+    def _all_teleports(self) -> int:
+        """How often source or head were moved at once."""
+        return self._source.teleports + self._ears.teleports
 
     def add_past_step(self, head: Pose, age_samples: int) -> bool:
         """Add a step that was left out, as if nothing had moved since; see `Listener.rejoin`.

@@ -158,8 +158,8 @@ def count_crossed_inside(
 ) -> NDArray[np.int64]:
     """Return how many boxes in a room each path inside it passes.
 
-    A box counts once for each path. Boxes that only touch the room, and those round the source or
-    the head, are left out.
+    A box counts once for each path, and so do boxes with common faces, the pieces of one wall.
+    Boxes that only touch the room, and those round the source or the head, are left out.
 
     Args:
         source: ``(3,)`` metres, moved to the nearest point within the bounds.
@@ -178,6 +178,7 @@ def count_crossed_inside(
     begin, end = within_bounds(source, bounds), within_bounds(head, bounds)
     corners, n_corners = folded_paths(begin, end, lower, size, lattice)
     counts = np.zeros(len(lattice), np.int64)
+    crossed = np.zeros((len(centres), len(lattice)), np.bool_)
     for n in range(len(centres)):
         box = centres[n], rotations[n], halves[n]
         if not extends_into(*box, lower, size):
@@ -185,8 +186,26 @@ def count_crossed_inside(
         if contains_point(begin, *box) or contains_point(end, *box):
             continue
         for k in range(len(lattice)):
-            counts[k] += polygon_crosses(corners[k, : n_corners[k]], *box)
+            if polygon_crosses(corners[k, : n_corners[k]], *box):
+                crossed[n, k] = True
+                counts[k] += not _counted_before(n, crossed[:, k], centres, rotations, halves)
     return counts
+
+
+@njit(cache=True)
+def _counted_before(
+    number: int,
+    crossed: NDArray[np.bool_],
+    centres: Floats,
+    rotations: Floats,
+    halves: Floats,
+) -> bool:
+    """Return whether a path has crossed an earlier box that is a piece of the same wall."""
+    box = centres[number], rotations[number], halves[number]
+    for n in range(number):
+        if crossed[n] and have_common_faces((centres[n], rotations[n], halves[n]), box):
+            return True
+    return False
 
 
 @njit(cache=True)
