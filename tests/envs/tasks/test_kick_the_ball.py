@@ -155,6 +155,27 @@ def test_approach_is_0_at_rest(game):
     assert outcome.terms["agents"]["approach"] == 0.0
 
 
+@pytest.mark.parametrize("rate_hz", [5, 10, 25, 49])
+def test_balls_live_and_rest_for_the_same_time_at_every_control_rate(rate_hz, monkeypatch):
+    clock = [f"clock.control_rate_hz={rate_hz}", f"clock.substeps={max(1, 125 // rate_hz)}"]
+    game = game_of("senses/vision=blind", "task.life_s=2.0", *clock)
+    launched, task, step = [], game.task, 0
+    launch = task._launch
+    monkeypatch.setattr(task, "_launch", lambda rng: (launched.append(step), launch(rng)))
+    kick_at = 5 * rate_hz  # steps, after two balls that were not kicked
+    for step in range(8 * rate_hz):
+        can_kick = step == kick_at
+        monkeypatch.setattr(task.kicker, "kick", lambda ball, can=can_kick: can)
+        game.step({"agents": np.zeros(2, np.float32)})
+    seconds = np.array(launched) / rate_hz
+    # the kick counts at the end of its step
+    after_kick = (kick_at + 1) / rate_hz + 0.4
+    np.testing.assert_allclose(seconds[:3], [2.0, 4.0, after_kick], atol=0.5 / rate_hz + 1e-9)
+    if rate_hz != 49:
+        np.testing.assert_allclose(seconds[:3], [2.0, 4.0, after_kick], atol=1e-9)
+    game.close()
+
+
 def test_the_episode_never_terminates(game):
     game.reset(np.random.default_rng(1))
     outcomes = list(stand(game, 20.0))

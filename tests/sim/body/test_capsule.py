@@ -308,3 +308,15 @@ def test_pushed_props_stay_on_the_floor():
         for toy in world.props.values():
             assert -0.01 < toy.position[2] < 0.6, toy.name
             assert np.linalg.norm(toy.velocity) < 4.0, toy.name
+
+
+@pytest.mark.parametrize("rate_hz", [5, 10, 25])
+def test_a_heavy_ball_that_rolls_against_a_walker_moves_it_at_every_control_rate(rate_hz):
+    heavy = ball("heavy", 0.2, 20.0, (1.5, 0.0, 0.2), rolling_friction=0.0)
+    world = empty_world(heavy, clock=ClockCfg(rate_hz, 125 // rate_hz))
+    walker = walker_in(world)
+    world.prop("heavy").place((1.5, 0.0, 0.2), 0.0, (-3.0, 0.0, 0.0))
+    for _ in range(rate_hz):
+        world.step()
+        apart_m = np.linalg.norm((walker.position - world.prop("heavy").position)[:2])
+        assert apart_m > walker.radius_m + 0.2 - 0.04

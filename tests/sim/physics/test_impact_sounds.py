@@ -201,6 +201,26 @@ def test_a_walker_is_heard_when_it_walks_and_silent_when_it_stands():
     assert not heard[-20:].any()
 
 
+@pytest.mark.parametrize("rate_hz", [5, 10, 25, 98])
+def test_feet_land_at_the_same_times_at_every_control_rate(rate_hz):
+    """Also if several of them land in one agent step."""
+    clock = ClockCfg(control_rate_hz=rate_hz, substeps=max(1, 50 // rate_hz))
+    world = World(PlaygroundCfg("test", impacts=ImpactCfg(present=True)), clock=clock)
+    walker, struck = Walker("child", WalkerCfg(), world), []
+    world.freeze()
+    world.reset(np.random.default_rng(0))
+    walker.place((0.0, 0.0, 0.0))
+    board = world.sound.sources["child.steps"].sound
+    for step in range(4 * rate_hz):
+        board.strike = lambda _, delay, step=step: struck.append((step, delay))
+        walker.walk(0.7, 0.0)
+        world.step()
+    samples = np.array([world.sound.step_samples * step + delay for step, delay in struck])
+    apart_s = np.diff(samples[samples > 3 * 22_050]) / 22_050
+    assert len(apart_s) >= 2
+    np.testing.assert_allclose(apart_s, 0.2 / 0.7, atol=2e-4)
+
+
 def test_footsteps_sound_at_the_floor_where_the_walker_stands():
     world = world_with()
     walker = Walker("child", WalkerCfg(), world)

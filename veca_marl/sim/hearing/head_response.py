@@ -29,8 +29,8 @@ class HeadResponse:
 
     Attributes:
         directions: ``(M, 3)`` unit vectors to the source in the head frame.
-        filters: ``(M, 2, T)`` float32 minimum-phase impulse responses, left ear first; unit gain
-            at low frequency.
+        filters: ``(M, 2, T)`` float32 minimum-phase impulse responses, left ear first; their gain
+            at low frequency is that of the measurement, about 1.
         arrival_s: ``(M, 2)`` seconds relative to the arrival at the centre of the absent head;
             negative at the ear on the side of the source.
         sample_rate_hz: Sampling rate of the filters.

@@ -44,8 +44,8 @@ def sphere_response(
 ) -> NDArray[np.complex128]:
     """Return the pressure on a rigid sphere, relative to that at its centre in the free field.
 
-    Duda & Martens (1998), eq. 3 and 4, multiplied by the source's distance factor so that the
-    limit at low frequency is 1.
+    Duda & Martens (1998), eq. 3 and 4, multiplied by the source's distance factor: for a distant
+    source the limit at low frequency is 1.
 
     Args:
         incidence_rad: ``(A,)`` angles as in `woodworth_arrival_s`.

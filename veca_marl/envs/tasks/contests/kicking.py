@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 from veca_marl.envs.core.task import Player
@@ -9,7 +10,8 @@ from veca_marl.sim.body.walker import Walker
 from veca_marl.sim.geometry import horizontal_distance
 from veca_marl.sim.physics import Prop
 
-_LEAST_SPEED_MPS = 0.1  # a standing walker does not kick: the ball rebounds
+_ROUNDING = 1e-6  # in agent steps
+_LEAST_SPEED_MPS = 0.1  # a standing walker does not kick: it stops the ball
 
 
 class AutomaticKicks:
@@ -29,7 +31,7 @@ class AutomaticKicks:
 
     def reset(self) -> None:
         """Allow all players to kick."""
-        self._left_s = {player.name: 0.0 for player in self._players}
+        self._steps_left = {player.name: 0 for player in self._players}
 
     def after_step(self, step_s: float) -> None:
         """Count a step of a duration and let one player kick if it can."""
@@ -37,10 +39,10 @@ class AutomaticKicks:
         nearest_first = sorted(
             self._players, key=lambda p: horizontal_distance(p.body.position, ball)
         )
-        self._left_s = {name: left_s - step_s for name, left_s in self._left_s.items()}
+        self._steps_left = {name: steps - 1 for name, steps in self._steps_left.items()}
         for player in nearest_first:
-            if self._left_s[player.name] <= 0.0 and self._kicks(player):
-                self._left_s[player.name] = self._rest_s
+            if self._steps_left[player.name] <= 0 and self._kicks(player):
+                self._steps_left[player.name] = math.ceil(self._rest_s / step_s - _ROUNDING)
                 return
 
     def _kicks(self, player: Player) -> bool:

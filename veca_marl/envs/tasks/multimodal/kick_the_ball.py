@@ -128,7 +128,7 @@ class KickTheBall(Task):
             )
         )
         self._kicked = self._kicked_now = False
-        self._replaced_in_s = 0.0
+        self._steps_left = 0
 
     def reset(self, rng: np.random.Generator) -> None:
         start = self.room.sample_floor(rng, margin_m=_START_CLEARANCE_M)
@@ -136,14 +136,14 @@ class KickTheBall(Task):
         self._launch(rng)
 
     def before_step(self, rng: np.random.Generator) -> None:
-        self._replaced_in_s -= self.world.clock.step_s
-        if self._replaced_in_s <= 0.0:
+        if self._steps_left == 0:
             self._launch(rng)
+        self._steps_left -= 1
 
     def after_step(self, rng: np.random.Generator) -> None:
         self._kicked_now = not self._kicked and self.kicker.kick(self.ball)
         if self._kicked_now:
-            self._kicked, self._replaced_in_s = True, self.cfg.rest_s
+            self._kicked, self._steps_left = True, self._steps(self.cfg.rest_s)
 
     def reward(self, player: Player) -> dict[str, float]:
         way, velocity = horizontal(self.ball.position - self.kicker.position), self.kicker.velocity
@@ -159,4 +159,8 @@ class KickTheBall(Task):
             if penetration_m(self.world.client, *bodies) == 0.0:
                 break
         self._kicked = self._kicked_now = False
-        self._replaced_in_s = self.cfg.life_s
+        self._steps_left = self._steps(self.cfg.life_s)
+
+    def _steps(self, seconds: float) -> int:
+        """Return the number of agent steps that is nearest to a time, at least 1."""
+        return max(1, round(seconds / self.world.clock.step_s))

@@ -14,6 +14,8 @@ from veca_marl.sim.body.walker.collisions.walker_collisions import WalkerCollisi
 from veca_marl.sim.geometry import Floats
 from veca_marl.sim.physics import Prop, World
 
+_APPROACH_MPS = 5.0  # obstacles that approach faster may be overlooked within an agent step
+
 
 class GroundMotion:
     """Moves the capsule of one walker at commanded speeds and keeps it out of obstacles.
@@ -83,7 +85,8 @@ class GroundMotion:
     def before_step(self) -> None:
         """Collect the obstacles that can be reached within this agent step."""
         self._step_start = self.ground.copy()
-        self._collect_obstacles(abs(self.speed_mps) * self._world.clock.step_s)
+        greatest_mps = abs(self.speed_mps) + _APPROACH_MPS
+        self._collect_obstacles(greatest_mps * self._world.clock.step_s)
 
     def proposed_position(self, substep_s: float) -> tuple[float, float]:
         """Turn; return the position after this physics step without obstacles, metres.

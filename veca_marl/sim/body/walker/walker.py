@@ -366,7 +366,7 @@ class Walker(Body):
         self._pelvis_velocity[:] = (self.position - pelvis) / step_s
         self._pelvis_spin[2] = motion.turn_radps
         self._mouth.position = self.mount("mouth").position
-        self._footsteps.follow(self._surface, self._gait.landing_mps)
+        self._footsteps.follow(self._surface, self._gait.landing_mps, self._gait.landings_s)
         if self.held is not None:
             self._handling.follow_palm(self.palms()[1])
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -42,13 +43,13 @@ class Footsteps:
         self._foot_kg = _FOOT_MASS_SHARE * mass_kg
         self._min_speed_mps = impacts.min_speed_mps
         self._board: StruckBody | None = None
+        self._rate_hz, self._last_sample = world.sound.sample_rate_hz, world.sound.step_samples - 1
         if impacts.present:
             sole = MATERIALS[Material.rubber]
             length, thickness = _BOARD_M
             modes = bar_modes(length, thickness / 12.0**0.5, _FLOOR)
             click = acceleration_noise(_SOLE_M, sole.contact_s)
-            rate = world.sound.sample_rate_hz
-            self._board = StruckBody(modes + click, impacts.gain_per_ns, rate)
+            self._board = StruckBody(modes + click, impacts.gain_per_ns, self._rate_hz)
             self._source = world.sound.add_source(f"{name}.steps", self._board)
 
     def teleport(self, surface: Floats) -> None:
@@ -56,18 +57,23 @@ class Footsteps:
         if self._board is not None:
             self._source.teleport(_sole(surface))
 
-    def follow(self, surface: Floats, landing_speed_mps: float) -> None:
-        """Sound at a place on the floor if a foot has landed in this agent step.
+    def follow(
+        self, surface: Floats, landing_speed_mps: float, landings_s: Sequence[float]
+    ) -> None:
+        """Sound at a place on the floor whenever a foot landed in this agent step.
 
         Args:
             surface: ``(3,)`` metres, on the floor or prop beneath the walker.
-            landing_speed_mps: Speed at which a foot has landed; 0 if none has.
+            landing_speed_mps: Speed at which feet land.
+            landings_s: When they did, seconds from the beginning of the step.
         """
         if self._board is None:
             return
         self._source.position = _sole(surface)
         if landing_speed_mps > self._min_speed_mps:
-            self._board.strike(self._foot_kg * landing_speed_mps, 0)
+            for landing_s in landings_s:
+                sample = min(int(landing_s * self._rate_hz), self._last_sample)
+                self._board.strike(self._foot_kg * landing_speed_mps, sample)
 
 
 def _sole(surface: Floats) -> Floats:

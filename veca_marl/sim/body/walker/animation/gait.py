@@ -77,7 +77,7 @@ class Gait:
     Attributes:
         phase: Of the stride, in [0, 1).
         angles: ``(82,)`` rad, as of the last `pose`.
-        landing_mps: Speed at which a foot landed in the last `advance`; 0 if none did.
+        landings_s: When feet landed in the last `advance`, from its beginning.
         carrying: Whether the right hand is held in front of the body.
     """
 
@@ -109,7 +109,8 @@ class Gait:
     def reset(self) -> None:
         """Stand still with empty hands."""
         self.carrying = False
-        self.phase = self.landing_mps = 0.0
+        self.phase = 0.0
+        self.landings_s: list[float] = []
         self._speed_mps = self._turn_radps = 0.0
         self._kick_left_s = 0.0
 
@@ -128,10 +129,12 @@ class Gait:
         follow = 1.0 - math.exp(-step_s / self.cfg.settle_s)
         self._speed_mps += follow * (speed_mps - self._speed_mps)
         self._turn_radps += follow * (turn_radps - self._turn_radps)
-        before = self.phase
-        self.phase = (before + _STANCE * step_s / self._stance_s()) % 1.0
-        landed = (before < _STANCE) != (self.phase < _STANCE)
-        self.landing_mps = self._landing_mps() if landed else 0.0
+        phase_per_s = _STANCE / self._stance_s()
+        before, after = self.phase, self.phase + phase_per_s * step_s
+        # one foot lands at the phase 0, the other one half a stride later
+        landings = range(math.floor(before / _STANCE) + 1, math.floor(after / _STANCE) + 1)
+        self.landings_s = [(_STANCE * landing - before) / phase_per_s for landing in landings]
+        self.phase = after % 1.0
         if self._kick_left_s > 0.0:
             self._kick_left_s -= step_s
             self.phase = 0.5  # the kicking foot is about to land
@@ -159,8 +162,9 @@ class Gait:
         """Length of the stride as a fraction of the full one."""
         return min(1.0, self._pace_mps() / self.cfg.full_stride_mps)
 
-    def _landing_mps(self) -> float:
-        """Return the vertical speed of a foot at the end of its swing."""
+    @property
+    def landing_mps(self) -> float:
+        """Vertical speed of a foot at the end of its swing."""
         return math.pi * self.cfg.lift_m * self.share / self._stance_s()
 
     def _stance_s(self) -> float:
