@@ -39,7 +39,7 @@ class TournamentCfg:
 
     Attributes:
         members: Number of past policies of each team, spread evenly over the run.
-        draw_margin: Returns that differ by less than this are a draw.
+        draw_margin: In tasks without a goal, returns that differ by less than this are a draw.
     """
 
     members: int = 6

@@ -50,10 +50,8 @@ def test_the_table_of_results_gives_the_same_report(tmp_path, arms, run):
     run(f"results={first / 'results.csv'}", f"to={tmp_path / 'second'}")
     for name in ("results.csv", "curves.png"):
         assert (first / name).read_bytes() == (tmp_path / "second" / name).read_bytes()
-    without_commit = [line for line in lines(first) if line not in ("**Remarks**", "- commit abc")]
-    assert [line for line in without_commit if line] == [
-        line for line in lines(tmp_path / "second") if line
-    ]
+    assert "- commit abc" in lines(first)
+    assert lines(first) == lines(tmp_path / "second")
 
 
 def test_runs_that_a_table_of_results_lacks_are_named(tmp_path, arms, run):
@@ -61,6 +59,68 @@ def test_runs_that_a_table_of_results_lacks_are_named(tmp_path, arms, run):
     run(f"runs={tmp_path}")
     _, printed, _ = run(f"results={tmp_path / 'results.csv'}")
     assert "mono, seed 2: missing in the table of results" in printed
+
+
+@pytest.mark.parametrize(
+    ("row", "message"),
+    [
+        ("hrtf,0,finished,0,expert", "line 3: the row has another number of cells"),
+        ("hrtf,0,fin,0,policy,agents,1.0", "line 3: state 'fin'; choices: "),
+        ("hrtf,0,finished,1e3,policy,agents,1.0", "line 3: frames '1e3' is no whole number"),
+    ],
+)
+def test_a_damaged_row_of_a_table_of_results_is_named(tmp_path, run, row, message):
+    table = tmp_path / "results.csv"
+    head, good = "arm,seed,state,frames,player,team,return", "hrtf,0,finished,0,policy,agents,1.0"
+    table.write_text(f"{head}\n{good}\n{row}\n")
+    status, _, errors = run(f"results={table}")
+    assert status == 2
+    assert len(errors.splitlines()) == 1
+    assert f"{table}, {message}" in errors
+
+
+def rows_of(arm, seed, *scores, episodes=32):
+    """Rows of a finished run of 200 frames, evaluated at the same distances."""
+    head = {"arm": arm, "seed": str(seed), "state": "finished", "player": "policy"}
+    return [
+        {
+            **head,
+            "team": "agents",
+            "frames": str(200 * (n + 1) // len(scores)),
+            "episodes": str(episodes),
+            "return": str(score),
+        }
+        for n, score in enumerate(scores)
+    ]
+
+
+def test_a_score_that_was_not_measured_is_no_failure(tmp_path, run, arms):
+    rows = [row for seed in range(3) for row in rows_of("hrtf", seed, 1.0, 6.0)]
+    rows[-1]["return"] = ""
+    rows += [row for seed in range(3) for row in rows_of("mono", seed, 0.0, 0.0)]
+    write_rows(tmp_path / "results.csv", rows)
+    _, printed, _ = run(f"results={tmp_path / 'results.csv'}")
+    assert "hrtf, seed 2: `return` was not measured at the end; not counted" in printed
+    assert "`hrtf > mono` undecided: 2 and 3 ended runs" in (tmp_path / "report.md").read_text()
+
+
+def test_runs_with_few_episodes_at_the_end_are_named(tmp_path, run):
+    rows = [
+        row
+        for seed in range(3)
+        for row in rows_of("hrtf", seed, 6.0, episodes=8 if seed == 1 else 32)
+    ]
+    write_rows(tmp_path / "results.csv", rows)
+    run(f"results={tmp_path / 'results.csv'}")
+    page = (tmp_path / "report.md").read_text()
+    assert "final evaluations of as few as 8 episodes (hrtf, seed 1); figures need" in page
+
+
+def test_a_curve_over_fewer_and_fewer_runs_is_explained(tmp_path, run):
+    rows = [*rows_of("hrtf", 0, 1.0, 1.0), *rows_of("hrtf", 1, 9.0, 9.0)[:1]]
+    write_rows(tmp_path / "results.csv", rows)
+    run(f"results={tmp_path / 'results.csv'}")
+    assert "over the runs that were evaluated there" in (tmp_path / "report.md").read_text()
 
 
 def test_equal_remarks_are_one_line():

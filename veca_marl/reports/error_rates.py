@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cache
 
 import numpy as np
@@ -16,6 +17,9 @@ from veca_marl.reports.statistics import (
 
 _TRIALS, _RESAMPLES = 4000, 400
 _SEED = 0
+_LEVELS = (3, 4)  # numbers of evaluations at which runs reach a threshold
+Draw = Callable[[np.random.Generator, int], Scores]
+"""Draws the scores ``(runs, 1)`` of some runs."""
 
 
 @cache
@@ -38,22 +42,34 @@ def false_order_rate(runs: int, others: int) -> float:
 def false_speed_rate(runs: int, others: int) -> float:
     """Return the same for ``ARM faster than OTHER``, which depends on the order of all runs alone.
 
-    Runs reach the threshold after different frames; where some reach it after equal frames, or
-    never, the probability is lower.
+    Runs are evaluated at few frames, so that some reach the threshold after equal frames, or never:
+    the probability is the largest of those with different frames and with `_LEVELS` equally likely
+    ones.
 
     Args:
         runs: Runs of one arm, at least 2.
         others: Runs of the other arm, at least 2.
     """
-    return _rate(probability_of_improvement, 0.5, runs, others)
+
+    def few(levels: int) -> Draw:
+        return lambda rng, count: rng.integers(levels, size=(count, 1)).astype(float)
+
+    draws = [_normal, *map(few, _LEVELS)]
+    return max(_rate(probability_of_improvement, 0.5, runs, others, draw) for draw in draws)
 
 
-def _rate(statistic: Statistic, equal: float, runs: int, others: int) -> float:
+def _normal(rng: np.random.Generator, count: int) -> Scores:
+    return rng.standard_normal((count, 1))
+
+
+def _rate(
+    statistic: Statistic, equal: float, runs: int, others: int, draw: Draw = _normal
+) -> float:
     """Return how often the interval of a statistic leaves out its value for equal arms."""
     rng = np.random.default_rng(_SEED)
     decided = 0
     for _ in range(_TRIALS):
-        scores: list[Scores] = [rng.standard_normal((count, 1)) for count in (runs, others)]
+        scores: list[Scores] = [draw(rng, count) for count in (runs, others)]
         low, high = bootstrap_interval(statistic, scores, rng, _RESAMPLES)
         decided += low > equal or high < equal
     return decided / _TRIALS

@@ -87,7 +87,8 @@ def _gather_run(
         remark = f"not counted, damaged: {error}"
         return Found(arm, int(asked["seed"]), folder, RunState.missing, False, remark), []
     status, fits = _status(run, arm, asked, former)
-    return replace(status, commit=commit), _rows(run, status) if fits else []
+    status = replace(status, commit=commit)
+    return status, _rows(run, status) if fits else []
 
 
 def _status(
@@ -135,7 +136,7 @@ def _rows(run: StoredRun, status: Found) -> list[Row]:
         head = {"arm": status.arm, "seed": str(status.seed), "state": status.state.value}
         times = {"minutes": _cell(spent.minutes[after])}
         times["core_minutes"] = _cell(spent.core_minutes[after])
-        rows.append({**head, **row, **times})
+        rows.append({**head, **row, **times, "commit": status.commit, "remark": status.remark})
     return rows
 
 
@@ -240,7 +241,9 @@ def _found_in(arm: str, seed: int, rows: Sequence[Row], budget: FrameBudget) -> 
     elif not remark and not counts:
         reached = f"{max(evaluated, default=0)} of {budget.frames} frames"
         remark = f"unfinished: {reached} in the table of results; shown, not counted"
-    return Found(arm, seed, None, state, counts, remark)
+    last = rows[-1] if rows else {}
+    remark = remark or last.get("remark", "")
+    return Found(arm, seed, None, state, counts, remark, last.get("commit", ""))
 
 
 def state_in(rows: Sequence[Mapping[str, str]]) -> RunState:
@@ -271,7 +274,7 @@ def read_rows(path: Path) -> list[Row]:
     """Return the rows of a file that `write_rows` wrote.
 
     Raises:
-        ValueError: If a column that a report needs is missing.
+        ValueError: If a column that a report needs is missing, or a row is damaged.
     """
     with path.open(newline="") as file:
         reader = csv.DictReader(file)
@@ -279,4 +282,19 @@ def read_rows(path: Path) -> list[Row]:
         absent = sorted({"arm", "seed", "frames", "player", "team"} - columns)
         if absent:
             raise ValueError(f"{path} has no column {absent[0]!r}; it is no table of results")
-        return list(reader)
+        rows = list(reader)
+    for line, row in enumerate(rows, 2):
+        _check_row(path, line, row)
+    return rows
+
+
+def _check_row(path: Path, line: int, row: Mapping[str | None, object]) -> None:
+    """Raise `ValueError` for a row that was cut, or that no run can have."""
+    if None in row or None in row.values():
+        raise ValueError(f"{path}, line {line}: the row has another number of cells than the first")
+    state, states = row.get("state"), [state.value for state in RunState]
+    if state and state not in states:
+        raise ValueError(f"{path}, line {line}: state {state!r}; choices: {', '.join(states)}")
+    for name in ("seed", "frames"):
+        if not str(row[name]).isdecimal():
+            raise ValueError(f"{path}, line {line}: {name} {row[name]!r} is no whole number")

@@ -126,7 +126,20 @@ def _caption(report: Report) -> str:
         "runs (Agarwal et al. 2021), thin lines single runs. Intervals over few runs are too "
         "narrow: resampling cannot show values that no run has. Minutes are those of collection, "
         "learning and evaluation; core-minutes are processor time, of all processes together."
-        f"{_intermediate_text(report)}"
+        f"{_unequal_text(report)}{_intermediate_text(report)}"
+    )
+
+
+def _unequal_text(report: Report) -> str:
+    """Return a sentence on curves in which not all runs of an arm have all points."""
+    lasts: dict[str, set[int]] = {}
+    for run in report.runs:
+        lasts.setdefault(run.arm, set()).add(run.final.frames)
+    if all(len(frames) == 1 for frames in lasts.values()):
+        return ""
+    return (
+        " Each point of a thick line is over the runs that were evaluated there: where a run has "
+        "stopped earlier, the line may jump."
     )
 
 
@@ -187,11 +200,13 @@ def _baseline_lines(baselines: Mapping[str, float]) -> list[str]:
 def _remark_lines(report: Report) -> list[str]:
     """Return what a reader has to know about single runs and about all."""
     lines = [f"- {line}" for line in run_remarks(report)]
-    fewest = _fewest_episodes(run.final for run in report.runs if run.ended)
-    if fewest is not None:
-        lines.append(
-            f"- final evaluations of {fewest} episodes; figures need at least {EPISODES_OF_FIGURES}"
-        )
+    ended = [run for run in report.runs if run.ended]
+    short = [run for run in ended if 0 < run.final.episodes < EPISODES_OF_FIGURES]
+    if short:
+        fewest = min(run.final.episodes for run in short)
+        equal = all(run.final.episodes == fewest for run in ended)
+        which = f"{fewest} episodes" if equal else f"as few as {fewest} episodes ({_named(short)})"
+        lines.append(f"- final evaluations of {which}; figures need at least {EPISODES_OF_FIGURES}")
     if len(report.commits) > 1:
         lines.append(f"- runs of several commits: {', '.join(report.commits)}")
     elif report.commits:
@@ -204,11 +219,23 @@ def run_remarks(report: Report) -> list[str]:
     others: dict[str, list[str]] = {}
     for arm, seed in report.others:
         others.setdefault(arm, []).append(str(seed))
-    if not others:
-        return remarks(report.found)
-    named = "; ".join(_seeds(arm, seeds) for arm, seeds in others.items())
-    line = f"rows of {named} are not part of this experiment as configured; not counted"
-    return [*remarks(report.found), line]
+    lines = remarks(report.found)
+    unmeasured = [run for run in report.runs if math.isnan(run.final.score)]
+    if unmeasured:
+        metric = report.experiment.metric
+        lines.append(f"{_named(unmeasured)}: `{metric}` was not measured at the end; not counted")
+    if others:
+        named = "; ".join(_seeds(arm, seeds) for arm, seeds in others.items())
+        lines.append(f"rows of {named} are not part of this experiment as configured; not counted")
+    return lines
+
+
+def _named(runs: Iterable[Run]) -> str:
+    """Return the names of some runs: arms with their seeds."""
+    seeds: dict[str, list[str]] = {}
+    for run in runs:
+        seeds.setdefault(run.arm, []).append(str(run.seed))
+    return "; ".join(_seeds(arm, own) for arm, own in seeds.items())
 
 
 def remarks(found: Sequence[Found]) -> list[str]:

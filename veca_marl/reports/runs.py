@@ -16,7 +16,8 @@ from veca_marl.reports.statistics import Interval, Scores
 NEVER = 1e18
 """Frames to a threshold that a run has not reached; finite, so that differences are defined."""
 
-_LABELS = ("arm", "seed", "state", "player", "team")  # columns that are no measurements
+# columns that are no measurements
+_LABELS = ("arm", "seed", "state", "player", "team", "commit", "remark")
 
 
 @dataclass(frozen=True)
@@ -45,7 +46,7 @@ class Run:
     Attributes:
         arm: Its arm.
         seed: Its seed.
-        ended: Whether it has ended; otherwise it has no final score.
+        ended: Whether it has ended and its final score was measured; otherwise it has none.
         points: Its evaluations in the order of their frames, up to the frames asked for.
         random: Score of the random policy from the same starts; NaN if not measured.
     """
@@ -116,8 +117,9 @@ def _run(
     by_frames = {int(row["frames"]): _point(row, metric) for row in policy}  # the last of equals
     shown = sorted(at for at in by_frames if budget.includes(at))
     random = [_number(row[metric]) for row in rows if row["player"] == "random"]
-    ended = budget.counts(state_in(rows), by_frames)
     points = tuple(by_frames[frames] for frames in shown)
+    measured = bool(points) and not math.isnan(points[-1].score)
+    ended = measured and budget.counts(state_in(rows), by_frames)
     return Run(arm, seed, ended, points, random[-1] if random else math.nan)
 
 

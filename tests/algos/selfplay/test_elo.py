@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 
+from veca_marl.algos.evaluation.evaluate import Scores
 from veca_marl.algos.selfplay.elo import elo_ratings
+from veca_marl.algos.selfplay.tournament import make_match
 
 
 def expected_wins(ratings, games):
@@ -43,3 +45,22 @@ def test_invalid_tables_raise_an_error(wins):
 def test_the_prior_must_be_positive():
     with pytest.raises(ValueError, match="prior_games=0"):
         elo_ratings(np.zeros((2, 2)), prior_games=0.0)
+
+
+def scores(returns, solved=None):
+    returns = np.array(returns)
+    return Scores(returns, np.ones(len(returns)), {}, None if solved is None else np.array(solved))
+
+
+def test_games_are_won_by_the_goal_and_not_by_shaping_rewards():
+    red = scores([0.9, 2.0, -2.0], solved=[0.0, 1.0, 0.0])
+    blue = scores([-0.9, -2.0, 2.0], solved=[0.0, 0.0, 1.0])
+    match = make_match({"red": 0, "blue": 0}, {"red": red, "blue": blue}, draw_margin=0.5)
+    assert match.wins == {"red": 1, "blue": 1}
+    assert match.points == 0.5
+
+
+def test_without_a_goal_games_are_won_by_the_return():
+    red, blue = scores([0.9, 0.2, -2.0]), scores([-0.9, -0.2, 2.0])
+    match = make_match({"red": 0, "blue": 0}, {"red": red, "blue": blue}, draw_margin=0.5)
+    assert match.wins == {"red": 1, "blue": 1}

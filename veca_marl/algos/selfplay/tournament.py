@@ -63,8 +63,7 @@ def play_all(
         pool: Where those are stored.
         members: Frames of the past policies by team, of two teams.
         episodes: Number of episodes of each match.
-        draw_margin: A smaller difference of the returns is a draw: teams that scored no goal may
-            still differ in shaping rewards.
+        draw_margin: In tasks without a goal, a smaller difference of the returns is a draw.
         seed: Seed of the starts.
     """
     first, second = members
@@ -74,17 +73,27 @@ def play_all(
         for other in members[second]:
             pool.load_into(policy.actors[second], second, other)
             scores = evaluate(env, policy.play, episodes, seed, Exploration.stochastic)
-            matches.append(_match({first: one, second: other}, scores, draw_margin))
+            matches.append(make_match({first: one, second: other}, scores, draw_margin))
     return matches
 
 
-def _match(members: dict[str, int], scores: dict[str, Scores], draw_margin: float) -> Match:
+def make_match(members: dict[str, int], scores: dict[str, Scores], draw_margin: float) -> Match:
+    """Count who won: in a task with a goal the team that reached it alone, or more of its agents.
+
+    Returns do not tell: teams that reached no goal differ in shaping rewards.
+
+    Args:
+        members: See `Match`.
+        scores: Scores of both teams.
+        draw_margin: See `play_all`.
+    """
     first, second = members
     ahead = scores[first].returns - scores[second].returns
-    wins = {
-        first: int((ahead > draw_margin).sum()),
-        second: int((ahead < -draw_margin).sum()),
-    }
+    better, margin = ahead, draw_margin
+    solved, other_solved = scores[first].solved, scores[second].solved
+    if solved is not None and other_solved is not None:
+        better, margin = solved - other_solved, 0.0
+    wins = {first: int((better > margin).sum()), second: int((better < -margin).sum())}
     return Match(members, wins, len(ahead), float(ahead.mean()))
 
 
