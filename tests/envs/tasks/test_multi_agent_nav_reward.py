@@ -83,6 +83,7 @@ def test_the_first_step_of_an_episode_counts_at_every_control_rate(rate_hz):
     player, helper, turned_rad = game.players[0], HelperReward(game.world.scene), 0.0
     helper.reset(game.task.target, [player])
     for _ in range(rate_hz // 5):
+        helper.before_step([player])
         step(game, **{player.name: (0.0, 1.0)})
         helper.after_step([player])
         turned_rad += helper.terms(player)["turn"]

@@ -85,11 +85,10 @@ class TrainingEpisodes:
     it would end in the stage, too.
 
     Args:
-        last_start: Step of the stage, from 0, at which the last episodes that count begin; None
-            counts all.
+        last_start: Step of the stage, from 0, at which the last episodes that count begin.
     """
 
-    def __init__(self, last_start: int | None = None) -> None:
+    def __init__(self, last_start: float = math.inf) -> None:
         self._last_start = last_start
         self._open: dict[tuple[str, str], NDArray[np.float64]] = {}
         self._begun: dict[str, NDArray[np.int64]] = {}
@@ -124,8 +123,8 @@ class TrainingEpisodes:
             begun[world] = starts[-1][-1]
         self._steps[team] = passed + steps
         ended = np.concatenate([start[:-1] for start in starts])
-        every = self._last_start is None
-        return np.ones(len(ended), dtype=np.bool_) if every else ended <= self._last_start
+        counted: NDArray[np.bool_] = ended <= self._last_start
+        return counted
 
     def _finish(
         self, key: tuple[str, str], values: NDArray[np.float64], done: NDArray[np.bool_]

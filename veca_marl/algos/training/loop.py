@@ -229,8 +229,9 @@ class Trainer:
 
     def _stage_episodes(self, steps: int) -> TrainingEpisodes:
         """Return what counts the episodes of a stage in which each world makes so many steps."""
-        last = None if self.episode_steps is None else steps - self.episode_steps
-        return TrainingEpisodes(last)
+        if self.episode_steps is None:
+            return TrainingEpisodes()
+        return TrainingEpisodes(steps - self.episode_steps)
 
     def _iterate(self, experience: Experience, episodes: TrainingEpisodes) -> dict[str, float]:
         self._stopwatch.begin()

@@ -40,22 +40,37 @@ class HelperReward:
     def __init__(self, scene: Scene) -> None:
         self._visibility = PropVisibility(scene)
         self._prop: Prop | None = None
+        self._begins = False
         self._positions: dict[str, Floats] = {}
         self._angles_rad: dict[str, float] = {}
         self._terms: dict[str, dict[str, float]] = {}
 
     def reset(self, prop: Prop, players: Sequence[Player]) -> None:
-        """Begin an episode. Called after players have been placed and their eyes directed.
+        """Begin an episode. Called after the players have been placed.
 
         Args:
             prop: The object.
             players: All players.
         """
-        self._prop, self._terms = prop, {}
+        self._prop, self._terms, self._angles_rad = prop, {}, {}
         self._positions = {player.name: player.body.position for player in players}
-        self._angles_rad = {
-            player.name: _angle_rad(prop, player) for player in players if self.sees(prop, player)
-        }
+        self._begins = True
+
+    def before_step(self, players: Sequence[Player]) -> None:
+        """Measure the angles at the start of an episode. Called once per step, before it.
+
+        At a reset the eyes do not see yet how bodies have been placed.
+
+        Args:
+            players: All players.
+        """
+        if self._begins and self._prop is not None:
+            self._angles_rad = {
+                player.name: _angle_rad(self._prop, player)
+                for player in players
+                if self.sees(self._prop, player)
+            }
+        self._begins = False
 
     def after_step(self, players: Sequence[Player]) -> None:
         """Compute the terms of a step. Called once per step, after the eyes have been directed.

@@ -161,6 +161,9 @@ class MultiAgentNav(Task):
             if home in self._homes:
                 return rooms, home
 
+    def before_step(self, rng: np.random.Generator) -> None:
+        self._helper.before_step(self.players)
+
     def after_step(self, rng: np.random.Generator) -> None:
         direct_gaze_ahead(self.players)
         before = len(self.arrived)

@@ -136,6 +136,9 @@ class ObjectNav(Task):
         direct_gaze_ahead(self.players)
         self._helper.reset(self.target, self.players)
 
+    def before_step(self, rng: np.random.Generator) -> None:
+        self._helper.before_step(self.players)
+
     def after_step(self, rng: np.random.Generator) -> None:
         direct_gaze_ahead(self.players)
         self._reached = self._is_reached(self.target)
