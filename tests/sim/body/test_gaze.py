@@ -107,3 +107,17 @@ def test_images_of_a_point_beyond_the_range_are_not_rolled_against_each_other(ah
 def test_points_to_look_at_must_be_three_finite_numbers(wrong):
     with pytest.raises(ValueError, match=r"look toward|could not convert"):
         walker_in(empty_world()).look_toward_point(wrong)
+
+
+@pytest.mark.parametrize("aside_m", [-0.05, -0.01, 0.0, 0.01, 0.05])
+def test_both_eyes_turn_to_the_same_side_for_a_point_behind(aside_m):
+    """Also for one that is to the left of one eye and to the right of the other."""
+    walker = walker_in(empty_world())
+    head = walker.mount("head")
+    walker.look_toward_point(head.position + head.rotation @ np.array([-1.0, aside_m, 0.0]))
+    looks = [
+        head.rotation.T @ walker.mount(eye).rotation[:, 0] for eye in ("eye_left", "eye_right")
+    ]
+    left = [math.copysign(1.0, look[1]) for look in looks]
+    assert left[0] == left[1]
+    assert aside_m == 0.0 or left[0] == math.copysign(1.0, aside_m)

@@ -212,7 +212,7 @@ class Body(ABC):
         """Return the pose of a sense organ, one of `MOUNTS`; eyes look along their x axis."""
         head = Pose(self._drawn.positions[self._head], self._drawn.rotations[self._head])
         organ = resting_mount(name, head)
-        return self._gaze.turned(organ) if name in EYES else organ
+        return self._gaze.turned(name, organ) if name in EYES else organ
 
     def touches(self, prop: Prop) -> bool:
         """Return whether any part of the body is in contact with a prop."""

@@ -73,12 +73,14 @@ class Gaze:
             raise ValueError(f"focal distance {focal_distance_m} must be positive metres or inf")
         self.focal_distance_m = float(focal_distance_m)
 
-    def turned(self, eye: Pose) -> Pose:
-        """Return the pose of an eye, given its pose when it looks straight ahead."""
-        return eye if self.point is None else aimed(eye, self.point, self._range_rad)
+    def turned(self, name: str, eye: Pose) -> Pose:
+        """Return the pose of an eye, given its name and its pose when it looks straight ahead."""
+        if self.point is None:
+            return eye
+        return aimed(eye, self.point, self._range_rad, MOUNTS_M[name][1])
 
 
-def aimed(eye: Pose, point: Floats, range_rad: float) -> Pose:
+def aimed(eye: Pose, point: Floats, range_rad: float, aside_m: float = 0.0) -> Pose:
     """Rotate an eye toward a point within its range.
 
     The vertical axis of the image stays in the sagittal plane of the head (Helmholtz coordinates:
@@ -91,6 +93,8 @@ def aimed(eye: Pose, point: Floats, range_rad: float) -> Pose:
         eye: Pose of the eye when it looks straight ahead.
         point: ``(3,)`` metres, world frame.
         range_rad: Largest pitch and largest yaw, below 90 degrees.
+        aside_m: Distance of the eye to the left of the sagittal plane. Both eyes turn to the side
+            of this plane on which a point behind them is.
 
     Returns:
         The pose with its x axis toward `point`; pitch and yaw are clipped to the range. Both eyes
@@ -99,7 +103,8 @@ def aimed(eye: Pose, point: Floats, range_rad: float) -> Pose:
     x, y, z = eye.rotation.T @ (point - eye.position)
     pitch = min(max(math.atan2(z, abs(x)), -range_rad), range_rad)
     ahead = math.copysign(math.hypot(x, z), x)  # negative where the point is behind
-    yaw = min(max(math.atan2(y, ahead), -range_rad), range_rad)
+    left = y if x >= 0.0 else y + aside_m
+    yaw = math.copysign(min(abs(math.atan2(y, ahead)), range_rad), left)
     return Pose(eye.position, eye.rotation @ _pitched_and_yawed(pitch, yaw))
 
 
