@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from walking import ball, box, empty_world, let_pass, walker_in, wall
 
-from veca_marl.sim.physics import PropCfg, PropShape
+from veca_marl.sim.physics import ClockCfg, PropCfg, PropShape
 
 
 @pytest.mark.parametrize("mass_kg", [0.1, 0.5, 2.0])
@@ -163,3 +163,16 @@ def test_the_direction_of_a_prop_is_that_of_its_centre_of_mass():
     assert world.prop("hull").velocity[0] > 1.0
     behind = walker_in(world, "behind", place=(-1.4, 0.0, 0.0))
     assert not behind.can_kick(world.prop("hull"))
+
+
+@pytest.mark.parametrize(("rate_hz", "speed"), [(25, 0.0), (98, 0.7), (245, 0.0), (245, 0.7)])
+def test_the_joints_of_a_kicking_leg_move_at_the_speeds_of_a_child(rate_hz, speed):
+    """The pose does not jump at the beginning or the end of the kick."""
+    world = empty_world(ball(position=(0.3, 0.0, 0.1)), clock=ClockCfg(rate_hz, 1))
+    walker = walker_in(world)
+    walker.walk(speed, 0.0)
+    for step in range(rate_hz):
+        if step == 2:
+            assert walker.kick(world.prop("ball"))
+        world.step()
+        assert np.abs(walker.joint_velocities()).max() < 30.0

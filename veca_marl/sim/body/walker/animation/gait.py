@@ -42,6 +42,7 @@ class GaitCfg:
         carry_elbow_rad: Flexion of the right elbow then.
         settle_s: Time constant with which the stride follows the speed.
         kick_s: Duration of a kick.
+        blend_s: Time in which the legs go over to a kick, and from it.
     """
 
     step_m: float = 0.2
@@ -59,6 +60,7 @@ class GaitCfg:
     carry_elbow_rad: float = 1.2
     settle_s: float = 0.08
     kick_s: float = 0.36
+    blend_s: float = 0.08
 
 
 # the kicking leg: fraction of the kick, flexion of thigh and knee (rad); the strike comes first,
@@ -112,11 +114,17 @@ class Gait:
         self.phase = 0.0
         self.landings_s: list[float] = []
         self._speed_mps = self._turn_radps = 0.0
-        self._kick_left_s = 0.0
+        self._kick_left_s = self._blend_left_s = 0.0
+        self._blended = self.angles
 
     def kick(self) -> None:
         """Start a kick with the right leg."""
         self._kick_left_s = self.cfg.kick_s
+        self._blend()
+
+    def _blend(self) -> None:
+        """Go over from the present pose to another motion within `blend_s`."""
+        self._blended, self._blend_left_s = self.angles.copy(), self.cfg.blend_s
 
     def advance(self, speed_mps: float, turn_radps: float, step_s: float) -> None:
         """Advance the stride by one step; turning on the spot needs strides as well.
@@ -135,9 +143,12 @@ class Gait:
         landings = range(math.floor(before / _STANCE) + 1, math.floor(after / _STANCE) + 1)
         self.landings_s = [(_STANCE * landing - before) / phase_per_s for landing in landings]
         self.phase = after % 1.0
+        self._blend_left_s = max(0.0, self._blend_left_s - step_s)
         if self._kick_left_s > 0.0:
             self._kick_left_s -= step_s
             self.phase = 0.5  # the kicking foot is about to land
+            if self._kick_left_s <= 0.0:
+                self._blend()
 
     def pose(self, head_pitch_rad: float, head_yaw_rad: float) -> Floats:
         """Compute and return the ``(82,)`` joint angles of the present phase."""
@@ -150,6 +161,8 @@ class Gait:
         if self.carrying:
             self.angles[self._arm[1]] = self.cfg.carry_arm_rad
             self.angles[self._elbow[1]] = self.cfg.carry_elbow_rad
+        if self._blend_left_s > 0.0:
+            self.angles += self._blend_left_s / self.cfg.blend_s * (self._blended - self.angles)
         self._neck.turn(self.angles, head_pitch_rad, head_yaw_rad)
         np.clip(self.angles, self._low, self._high, out=self.angles)
         return self.angles
