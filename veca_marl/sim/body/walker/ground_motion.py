@@ -14,7 +14,7 @@ from veca_marl.sim.body.walker.collisions.walker_collisions import WalkerCollisi
 from veca_marl.sim.geometry import Floats
 from veca_marl.sim.physics import Prop, World
 
-_APPROACH_MPS = 5.0  # obstacles that approach faster may be overlooked within an agent step
+_APPROACH_MPS = 3.0  # obstacles that approach faster may be overlooked within an agent step
 
 
 class GroundMotion:
