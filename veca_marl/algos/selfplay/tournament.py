@@ -78,9 +78,10 @@ def play_all(
 
 
 def make_match(members: dict[str, int], scores: dict[str, Scores], draw_margin: float) -> Match:
-    """Count who won: in a task with a goal the team that reached it alone, or more of its agents.
+    """Count the games that each team won.
 
-    Returns do not tell: teams that reached no goal differ in shaping rewards.
+    In a task with a goal that is the team of which the greater share of agents has reached it at
+    the end: returns of teams that have not differ in shaping rewards.
 
     Args:
         members: See `Match`.

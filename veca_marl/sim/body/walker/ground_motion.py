@@ -119,21 +119,17 @@ class GroundMotion:
         top_m = surface_height_m(self._world.client, prop, *middle(prop))
         if top_m is None:
             return False
-        before = self._standing
-        occupied = self._overlaps_at((np.array(middle(prop)), top_m, prop.body_id))
-        self._overlaps_at(before)  # back again
+        here, base_m, support_id = self.ground.copy(), self.capsule.base_m, self.capsule.support_id
+        self._stand_at(np.array(middle(prop)), top_m, prop.body_id)
+        occupied = self.capsule.overlaps(*self.ground)
+        self._stand_at(here, base_m, support_id)
         return not occupied
 
-    @property
-    def _standing(self) -> tuple[Floats, float, int]:
-        """The place on the floor plan, the height, and PyBullet's id of what it stands on."""
-        return self.ground.copy(), self.capsule.base_m, self.capsule.support_id
-
-    def _overlaps_at(self, standing: tuple[Floats, float, int]) -> bool:
-        """Move the capsule to where it would stand, and return whether that is occupied."""
-        self.ground[:], self.capsule.base_m, self.capsule.support_id = standing
+    def _stand_at(self, place: Floats, height_m: float, support_id: int) -> None:
+        """Move the capsule to a place ``(2,)`` on a surface of a height, on a prop or -1."""
+        self.ground[:], self.capsule.base_m, self.capsule.support_id = place, height_m, support_id
         self._collect_obstacles(0.0)
-        return self.capsule.overlaps(*self.ground)
+        self.capsule.move_to(*self.ground)
 
     def step_on(self, prop: Prop) -> None:
         """Stand on the middle of a prop, which is no obstacle from now on."""

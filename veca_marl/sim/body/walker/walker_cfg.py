@@ -28,8 +28,8 @@ class WalkerCfg(BodyCfg):
         kick_angle_deg: Largest angle between the walker's heading and the direction of the prop's
             centre of mass.
         kick_height_m: Largest height of the prop's lowest point.
-        kick_speed_mps: Speed of a light prop after a kick.
-        kick_impulse_ns: Largest impulse of a kick; it limits the speed of heavy props.
+        kick_speed_mps: Speed away from the walker up to which a kick accelerates a prop.
+        kick_impulse_ns: Largest impulse of a kick; heavy props do not reach that speed.
         head_pitch_deg: Pitch of the head at the start of an episode; down is positive.
         step_height_m: Height of the highest prop onto which it steps.
         step_reach_m: Largest distance from the capsule's surface to such a prop.

@@ -147,13 +147,13 @@ class Capsule:
 
     def resolve_contacts(self, x: float, y: float) -> tuple[float, float]:
         """Set the position and move the capsule out of obstacles; return the new position."""
-        self._set_position(x, y)
+        self.move_to(x, y)
         for _ in range(_ROUNDS):
             out_x, out_y = _depenetration(chain(self._overlaps(), self._jammed.overlaps()))
             if out_x == 0.0 and out_y == 0.0:
                 break
             x, y = x + out_x, y + out_y
-            self._set_position(x, y)
+            self.move_to(x, y)
         return x, y
 
     def room_for_others(self) -> tuple[float, float]:
@@ -178,7 +178,7 @@ class Capsule:
 
         A carpet, which is as low as what it stands on, does not count.
         """
-        self._set_position(x, y)
+        self.move_to(x, y)
         if _depenetration(self._overlaps()) != (0.0, 0.0):
             return True
         # in the middle of something wide the nearest way out is vertical
@@ -196,7 +196,8 @@ class Capsule:
         self._put((0.0, 0.0, _PARKED_M))
         self.set_velocity(0.0, 0.0, 0.0)
 
-    def _set_position(self, x: float, y: float) -> None:
+    def move_to(self, x: float, y: float) -> None:
+        """Move it to a place on the surface on which the walker is; nothing is resolved."""
         self._put((x, y, self.base_m + self._centre_height_m))
 
     def _put(self, position: tuple[float, float, float]) -> None:
