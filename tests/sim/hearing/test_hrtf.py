@@ -1,14 +1,20 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from listening import RATE, direction
 from paths import ROOT, SHARED
 
 from veca_marl.sim.hearing import HrtfReceiver, HrtfTable, condition, kemar_table, read_sofa
-from veca_marl.sim.hearing.conditioning import ear_incidence
 from veca_marl.sim.hearing.head_response import HeadResponse
 from veca_marl.sim.hearing.hrtf import direction_vectors
 from veca_marl.sim.hearing.minimum_phase import minimum_phase
-from veca_marl.sim.hearing.spherical_head import HEAD_RADIUS_M, sphere_response, woodworth_arrival_s
+from veca_marl.sim.hearing.spherical_head import (
+    HEAD_RADIUS_M,
+    ear_incidence,
+    sphere_response,
+    woodworth_arrival_s,
+)
 from veca_marl.sim.hearing.unmeasured import stand_ins
 
 DATA = ROOT / "veca_marl/data/kemar.npz"
@@ -109,10 +115,33 @@ def test_front_and_back_differ_by_the_pinna_only(head, low, high):
     assert low <= np.sqrt(np.mean(difference**2)) <= high
 
 
-def test_arrival_times_below_the_lowest_ring_are_those_of_the_sphere():
-    table = kemar_table()
-    assert np.allclose(table.arrival_samples[:, 0], 0.0, atol=1e-6)
-    assert table.arrival_samples.min() > -0.5e-3 * RATE
+def test_arrival_times_are_continuous_at_the_lowest_ring():
+    """KEMAR ends at -40 degrees: a step to the next row below is none of the largest ones."""
+    steps = np.abs(np.diff(kemar_table().arrival_samples, axis=1)).max(axis=(0, 2))
+    assert steps[9] < steps[10]
+    assert steps[:10].max() < 1e-3 * RATE * 0.03
+
+
+def test_arrival_times_at_the_nadir_depend_neither_on_azimuth_nor_ear():
+    times = kemar_table().arrival_samples[:, 0]
+    assert np.allclose(times, times[0, 0], atol=1e-6)
+
+
+def test_arrival_times_below_the_ring_of_a_sphere_are_those_of_the_sphere():
+    head = sphere_head()
+    kept = head.directions[:, 2] > np.sin(np.deg2rad(-41.0))
+    cut = replace(
+        head,
+        directions=head.directions[kept],
+        filters=head.filters[kept],
+        arrival_s=head.arrival_s[kept],
+    )
+    below = HrtfTable(cut).arrival_samples[:, :10]
+    directions = direction_vectors(
+        np.deg2rad(np.arange(0, 360, 5)), np.deg2rad(np.arange(-90, -40, 5))
+    )
+    expected = RATE * woodworth_arrival_s(ear_incidence(directions), HEAD_RADIUS_M)
+    assert np.allclose(below, expected, atol=0.02)
 
 
 def test_the_lowest_ring_has_its_measured_arrival_times():

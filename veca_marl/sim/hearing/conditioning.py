@@ -13,7 +13,7 @@ from veca_marl.sim.hearing.arrival_times import arrival_times
 from veca_marl.sim.hearing.head_response import HeadResponse
 from veca_marl.sim.hearing.minimum_phase import minimum_phase
 from veca_marl.sim.hearing.sofa import MeasuredHead
-from veca_marl.sim.hearing.spherical_head import sphere_response
+from veca_marl.sim.hearing.spherical_head import ear_incidence, sphere_response
 
 # window around the peak: seconds before it, seconds after it, and length of the fade-out
 _BEFORE_PEAK_S, _AFTER_PEAK_S, _FADE_OUT_S = 1.5e-3, 4.0e-3, 2.0e-3
@@ -66,13 +66,6 @@ def condition(
         measured.distance_m,
         licence,
     )
-
-
-def ear_incidence(directions: Floats) -> Floats:
-    """Return the angles ``(..., 2)`` in rad of unit vectors ``(..., 3)`` to the two ear axes."""
-    left = np.clip(directions[..., 1], -1.0, 1.0)
-    incidence: Floats = np.stack([np.arccos(left), np.arccos(-left)], axis=-1)
-    return incidence
 
 
 def _resample(measured: MeasuredHead, sample_rate_hz: int) -> Floats:

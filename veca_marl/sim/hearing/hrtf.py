@@ -11,12 +11,11 @@ from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
 
 from veca_marl.sim.geometry import Floats
-from veca_marl.sim.hearing.conditioning import condition, ear_incidence
+from veca_marl.sim.hearing.conditioning import condition
 from veca_marl.sim.hearing.head_response import HeadResponse
 from veca_marl.sim.hearing.minimum_phase import minimum_phase
 from veca_marl.sim.hearing.sofa import read_sofa
-from veca_marl.sim.hearing.spherical_head import woodworth_arrival_s
-from veca_marl.sim.hearing.unmeasured import stand_ins
+from veca_marl.sim.hearing.unmeasured import arrival_below_s, stand_ins
 
 GRID_STEP_DEG = 5
 _N_FFT = 512
@@ -30,7 +29,8 @@ class HrtfTable:
     """Filters and arrival times of a head on a regular grid of azimuths and elevations.
 
     Below the lowest measured ring the filters are those of the ring with the same lateral angle,
-    see `stand_ins`, and the arrival times are Woodworth's.
+    see `stand_ins`, and the arrival times those of a sphere that join the ring's, see
+    `arrival_below_s`.
 
     Read-only and shared by all listeners of a process.
 
@@ -60,11 +60,14 @@ class HrtfTable:
         self.filters = np.concatenate(
             [_interpolate_filters(response.filters, *part) for part in parts], axis=1
         )
-        corners, weights = parts[-1]
-        measured_s = np.einsum("aek,aekc->aec", weights, response.arrival_s[corners])
-        below_s = woodworth_arrival_s(ear_incidence(below), response.head_radius_m)
-        arrival_s = np.concatenate([below_s, measured_s], axis=1)
-        self.arrival_samples: Floats = arrival_s * response.sample_rate_hz
+        arrival_s = [_interpolate_times(response.arrival_s, *parts[-1])]
+        if below.size:
+            lowest = direction_vectors(azimuth, np.array([inside]))
+            ring_s = _interpolate_times(
+                response.arrival_s, *_triangles(response.directions, lowest)
+            )
+            arrival_s.insert(0, arrival_below_s(below, lowest, ring_s, response.head_radius_m))
+        self.arrival_samples: Floats = np.concatenate(arrival_s, axis=1) * response.sample_rate_hz
         self.filters.setflags(write=False)
         self.arrival_samples.setflags(write=False)
         self.sample_rate_hz = response.sample_rate_hz
@@ -202,6 +205,12 @@ def _ring_corners(
     corners, weights = _triangles(measured, on_ring)
     shape = (*below.shape[:2], 6)
     return corners.reshape(shape), (weights * shares[..., None]).reshape(shape)
+
+
+def _interpolate_times(arrival_s: Floats, corners: NDArray[np.int64], weights: Floats) -> Floats:
+    """Interpolate arrival times ``(M, 2)``; ``(A, E, 2)``."""
+    times_s: Floats = np.einsum("aek,aekc->aec", weights, arrival_s[corners])
+    return times_s
 
 
 def _interpolate_filters(

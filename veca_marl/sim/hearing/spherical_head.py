@@ -17,6 +17,13 @@ _TOLERANCE = 1e-8
 _MIN_WAVE_NUMBER = 1e-3
 
 
+def ear_incidence(directions: Floats) -> Floats:
+    """Return the angles ``(..., 2)`` in rad of unit vectors ``(..., 3)`` to the two ear axes."""
+    left = np.clip(directions[..., 1], -1.0, 1.0)
+    incidence: Floats = np.stack([np.arccos(left), np.arccos(-left)], axis=-1)
+    return incidence
+
+
 def woodworth_arrival_s(incidence_rad: ArrayLike, radius_m: float = HEAD_RADIUS_M) -> Floats:
     """Return the arrival time of a distant source at an ear, relative to the absent head's centre.
 

@@ -1,10 +1,11 @@
-"""Directions below the lowest measured ring: which measured directions stand in for them."""
+"""Directions below the lowest measured ring: which ones stand in for them, and arrival times."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from veca_marl.sim.geometry import Floats
+from veca_marl.sim.hearing.spherical_head import ear_incidence, woodworth_arrival_s
 
 
 def stand_ins(directions: Floats, lowest_rad: float) -> tuple[Floats, Floats]:
@@ -32,3 +33,31 @@ def stand_ins(directions: Floats, lowest_rad: float) -> tuple[Floats, Floats]:
     first = np.arctan2(-down, forward)
     to_behind = np.clip((around - first) / np.maximum(np.pi - 2.0 * first, 1e-9), 0.0, 1.0)
     return np.stack([front, behind], axis=-2), np.stack([1.0 - to_behind, to_behind], axis=-1)
+
+
+def arrival_below_s(below: Floats, ring: Floats, ring_arrival_s: Floats, radius_m: float) -> Floats:
+    """Return arrival times ``(A, E, 2)`` in s of directions below the lowest measured ring.
+
+    They are Woodworth's plus a correction. On the ring it is the difference between the measured
+    times and Woodworth's, so that times are continuous there; at the nadir it is the mean of the
+    differences over all azimuths and both ears, so that times do not depend on the azimuth. In
+    between it changes in proportion to the horizontal component of the direction.
+
+    Args:
+        below: ``(A, E, 3)`` unit vectors.
+        ring: ``(A, 1, 3)`` unit vectors on the ring with the same azimuths.
+        ring_arrival_s: ``(A, 1, 2)`` measured times of these.
+        radius_m: Radius of the sphere that fits the measured times.
+    """
+    difference_s = ring_arrival_s - woodworth_arrival_s(ear_incidence(ring), radius_m)
+    mean_s = difference_s.mean()
+    share = _horizontal(below) / _horizontal(ring)
+    sphere_s = woodworth_arrival_s(ear_incidence(below), radius_m)
+    arrival_s: Floats = sphere_s + mean_s + share * (difference_s - mean_s)
+    return arrival_s
+
+
+def _horizontal(directions: Floats) -> Floats:
+    """Return the lengths ``(..., 1)`` of the horizontal components of unit vectors."""
+    lengths: Floats = np.linalg.norm(directions[..., :2], axis=-1, keepdims=True)
+    return lengths
