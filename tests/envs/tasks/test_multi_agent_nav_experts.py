@@ -159,6 +159,7 @@ def test_muted_agents_depend_on_the_starting_rooms():
     assert voices == {
         Muted.none: {True: False, False: False},
         Muted.finder: {True: True, False: False},
+        Muted.seekers: {True: False, False: True},
         Muted.all: {True: True, False: True},
     }
 

@@ -32,11 +32,13 @@ class Muted(Enum):
     Attributes:
         none: All agents have a voice.
         finder: The agent that starts in the room of the object has none.
+        seekers: The agents that start in other rooms have none.
         all: No agent has a voice.
     """
 
     none = "none"
     finder = "finder"
+    seekers = "seekers"
     all = "all"
 
 
@@ -148,7 +150,8 @@ class MultiAgentNav(Task):
                 free = places.free_place(room, self._furniture, clear_m, rng)
             place_player(player, free, rng.uniform(-math.pi, math.pi))
             if self.cfg.muted is not Muted.none:
-                player.body.muted = room is home or self.cfg.muted is Muted.all
+                silent = (Muted.all, Muted.finder if room is home else Muted.seekers)
+                player.body.muted = self.cfg.muted in silent
         direct_gaze_ahead(self.players)
         self._helper.reset(self.target, self.players)
 
