@@ -29,6 +29,7 @@ from veca_marl.algos.files import DISK_FULL, WriteError
 from veca_marl.algos.training.finite import NotFiniteError
 from veca_marl.algos.training.loop import Trainer
 from veca_marl.config import Config, ConfigError, conf_dir, one_line, prepare, to_config
+from veca_marl.config.arms import check_arm
 from veca_marl.config.outputs import check_folder
 from veca_marl.config.stored import change
 from veca_marl.runs.assembly import decide_precision, make_trainer
@@ -117,13 +118,15 @@ def set_up(node: DictConfig, path: Path) -> tuple[Config, RunFolder, Trainer]:
         trainer = make_trainer(cfg, folder)
         folder.begin_again(stored, overrides, trainer.progress.frames)
         return cfg, folder, trainer
+    overrides = list(HydraConfig.get().overrides.task)
+    check_arm(node.experiment, overrides)
     folder = new_run(path)
     decided = decide_precision(node)
     cfg = to_config(node)
     trainer = make_trainer(cfg, folder)
     for precision in dict.fromkeys(decided):
         print(f"algo.network.precision=auto: {precision.value} on this machine")
-    folder.begin(node, list(HydraConfig.get().overrides.task))
+    folder.begin(node, overrides)
     return cfg, folder, trainer
 
 

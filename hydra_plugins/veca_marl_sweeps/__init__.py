@@ -6,17 +6,21 @@ module in every Hydra application of the environment, so that nothing slow is im
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import yaml
 from hydra._internal.core_plugins.basic_sweeper import BasicSweeper
 from hydra.core.config_store import ConfigStore
+from hydra.core.override_parser.overrides_parser import OverridesParser
 from hydra.core.utils import JobReturn, JobStatus, setup_globals
+from hydra.errors import HydraException
 from hydra.plugins.launcher import Launcher
 from hydra.types import HydraContext, TaskFunction
 from omegaconf import DictConfig, OmegaConf, open_dict
+from omegaconf.errors import OmegaConfBaseException
 
 from veca_marl.runs.cores import usable_cores
 from veca_marl.sweeps.body_kinds import former_kinds, with_body_kinds
@@ -34,13 +38,28 @@ class ArmSweeper(BasicSweeper):
     """
 
     def sweep(self, arguments: list[str]) -> Any:
-        """See `Sweeper`."""
+        """See `Sweeper`.
+
+        Raises:
+            SweepError: If several experiments are asked for, or one without seeds, or ``seed=``.
+        """
+        self._check(arguments)
+        return super().sweep(arguments)
+
+    def _check(self, arguments: list[str]) -> None:
         assert self.config is not None
-        if self.config.experiment.arms:
+        for override in OverridesParser.create().parse_overrides(arguments):
+            if override.key_or_group == "experiment" and override.is_sweep_override():
+                raise SweepError(f"{override.input_line}: one experiment per command")
+        experiment = self.config.experiment
+        if experiment.arms:
             names = [text.lstrip("+").partition("=")[0] for text in arguments]
             if "seed" in names:
                 raise SweepError("seed: an experiment has experiment.seeds=[...]")
-        return super().sweep(arguments)
+            if not experiment.seeds:
+                raise SweepError(
+                    f"experiment {experiment.name} has no seeds: give experiment.seeds=[0,1,2]"
+                )
 
     def _parse_config(self) -> list[str]:
         """Return the parameters that are swept, as the base class does, with arms and seeds."""
@@ -56,14 +75,36 @@ class ArmSweeper(BasicSweeper):
         """Return the overrides of each run, those of its arm included."""
         return [self._with_arm(job) for job in super().get_job_batch()]
 
+    def validate_batch_is_legal(self, batch: Sequence[Sequence[str]]) -> None:
+        """See `Sweeper`; the error says which run cannot be composed."""
+        for overrides in batch:
+            with _naming(" ".join(overrides)):
+                super().validate_batch_is_legal([overrides])
+
     def _with_arm(self, job: Sequence[str]) -> list[str]:
+        # here, and not above: it imports the simulator, which `train` has loaded
+        from veca_marl.config.arms import check_contradictions
+
         assert self.config is not None
         arms = self.config.experiment.arms
         chosen = [text.partition("=")[2] for text in job if text.startswith("experiment.arm=")]
         for arm in chosen:
             if arm not in arms:
                 raise SweepError(f"experiment.arm={arm}: choices: {', '.join(arms)}")
+            check_contradictions(arm, arms[arm], job)
         return [*job, *(text for arm in chosen for text in arms[arm])]
+
+
+@contextmanager
+def _naming(run: str) -> Iterator[None]:
+    """Raise errors of a configuration as `ConfigError` with what the run is called in front."""
+    # here, and not above: it imports the simulator, which `train` has loaded
+    from veca_marl.config import ConfigError, one_line
+
+    try:
+        yield
+    except (ConfigError, HydraException, OmegaConfBaseException) as error:
+        raise ConfigError(f"{run}: {one_line(error)}") from error
 
 
 class ProcessLauncher(Launcher):
@@ -110,7 +151,11 @@ class ProcessLauncher(Launcher):
         from veca_marl.config import to_config
         from veca_marl.runs.simultaneous import runs_at_once
 
-        return runs_at_once({job.name: to_config(self._nodes[job.folder]) for job in jobs})
+        configs = {}
+        for job in jobs:
+            with _naming(job.name):
+                configs[job.name] = to_config(self._nodes[job.folder])
+        return runs_at_once(configs)
 
     def _job(self, overrides: list[str], number: int) -> Job:
         # here, and not above: it imports the simulator, which `train` has loaded

@@ -5,8 +5,10 @@ import numpy as np
 import pytest
 from composed import compose
 
-from veca_marl.algos.evaluation.evaluate import Exploration
+from veca_marl.algos.evaluation.evaluate import Exploration, seed_episodes
+from veca_marl.envs.adapters.torchrl.env import VecaEnv
 from veca_marl.envs.adapters.torchrl.scripted import ExpertPolicy
+from veca_marl.envs.core.starts import start_state
 from veca_marl.play.command import main
 from veca_marl.play.screen import HEIGHT, WIDTH
 from veca_marl.play.session import Session
@@ -52,6 +54,25 @@ def test_a_deaf_agent_has_a_video_without_sound(tmp_path):
 def test_wrong_options_end_in_one_line(tmp_path, capsys, wrong, message):
     assert play(tmp_path / "a.mp4", *wrong) == 2
     assert message in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_session_plays_the_episodes_of_evaluate():
+    game = compose(TASK).game
+    session = Session(game, ExpertPolicy, 1, Exploration.deterministic)
+    env = VecaEnv(game, worlds=2, seed=5)
+    seed_episodes(env, 1, 0)
+    env.reset()
+    for episode in (0, 1, 0):
+        session.begin(episode)
+        assert (start_state(session.game) == start_state(env.games[episode])).all()
+    session.close()
+    env.close()
+
+
+def test_an_expert_without_the_sense_that_it_needs_ends_in_one_line(tmp_path, capsys):
+    assert play(tmp_path / "deaf.mp4", "senses/audio=deaf") == 2
+    assert "KickTheBallExpert needs audio, which agents has not" in capsys.readouterr().err
     assert not list(tmp_path.iterdir())
 
 

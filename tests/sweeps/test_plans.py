@@ -88,6 +88,13 @@ def test_a_run_that_has_ended_is_continued_on_a_larger_budget(tmp_path):
     assert made.arguments[4:] == ("device=cuda", "max_minutes=3.0", "total_frames=400")
 
 
+def test_a_run_within_its_time_limit_is_continued_on_a_larger_budget(tmp_path):
+    write_run(tmp_path / "run", {**CONFIG, "max_minutes": 600.0}, [(200, 1.0)])
+    made = plan(job(tmp_path / "run", total_frames=400, max_minutes=600.0))
+    assert made.action is Action.resume
+    assert made.arguments[4:] == ("total_frames=400",)
+
+
 def test_a_run_that_its_time_limit_ended_is_continued_without_the_limit(tmp_path):
     write_run(tmp_path / "run", {**CONFIG, "max_minutes": 1.0}, [(100, 1.0)])
     assert plan(job(tmp_path / "run", max_minutes=1.0)).action is Action.skip

@@ -102,10 +102,24 @@ def test_a_run_that_does_not_fit_alone_ends_the_sweep_before_anything_is_started
     assert "change algo.replay.capacity" in message
 
 
+def test_an_impossible_run_is_named(sac_sweep, capsys):
+    with pytest.raises(SystemExit) as ended:
+        sac_sweep(20.0, "task.max_seconds=-1")
+    assert ended.value.code == 2
+    assert "/seed_0: task.max_seconds=-1.0 must be" in capsys.readouterr().err
+
+
 def test_runs_that_have_ended_need_no_memory(sac_sweep, monkeypatch):
     job = import_module("veca_marl.sweeps.plans")
     monkeypatch.setattr(sweep_module, "plan", lambda one: job.Plan(one, job.Action.skip))
     assert sac_sweep(0.1)[0] >= 1
+
+
+def test_several_experiments_in_one_command_are_refused(sweep, capsys):
+    with pytest.raises(SystemExit):
+        sweep("+experiment=smoke,first_light")
+    message = "error: +experiment=smoke,first_light: one experiment per command"
+    assert message in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
@@ -113,6 +127,16 @@ def test_runs_that_have_ended_need_no_memory(sac_sweep, monkeypatch):
     [
         (["seed=0,1"], "error: seed: an experiment has experiment.seeds=[...]"),
         (["experiment.arm=deaf"], "error: experiment.arm=deaf: choices: hrtf, stereo, mono"),
+        (["experiment.seeds=[]"], "error: experiment audio_ablation has no seeds: give"),
+        (
+            ["total_frames=1e4"],
+            "error: total_frames=10000: arm stereo sets total_frames=245_760; "
+            "give experiment.arms.stereo=[...] instead",
+        ),
+        (
+            ["experiment.arms.mono=['senses/audio=none']"],
+            "senses/audio=none: unknown senses/audio 'none'",
+        ),
         (
             ["experiment.arm=hrtf", "experiment.seeds=[0]", "hydra.launcher.jobs=0"],
             "error: hydra.launcher.jobs must be at least 1, got 0",

@@ -19,6 +19,7 @@ from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
 from veca_marl.conf_dir import conf_dir
+from veca_marl.config.arms import check_arm
 from veca_marl.config.errors import ConfigError, one_line
 from veca_marl.config.lengths import check_lengths
 from veca_marl.config.overrides import plugins_in, with_integers
@@ -58,6 +59,7 @@ def compose_node(overrides: Sequence[str]) -> DictConfig:
             node: DictConfig = hydra.compose("config", overrides=prepared)
     except (HydraException, OmegaConfBaseException) as error:
         raise ConfigError(one_line(error)) from error
+    check_arm(node.experiment, prepared)
     return node
 
 

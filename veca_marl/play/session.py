@@ -13,7 +13,7 @@ from torch import nn
 from torchrl.envs import set_exploration_type
 from torchrl.envs.utils import step_mdp
 
-from veca_marl.algos.evaluation.evaluate import EXPLORATION_TYPES, Exploration
+from veca_marl.algos.evaluation.evaluate import EXPLORATION_TYPES, Exploration, seed_episodes
 from veca_marl.algos.networks.memory import with_memory
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
 from veca_marl.envs.core.game import Game
@@ -73,7 +73,7 @@ class Session:
         self._playing = with_memory(self.env, self.policy)
         self._exploration = EXPLORATION_TYPES[exploration]
         self._team = next(iter(self.env.group_map))
-        torch.manual_seed(seed)
+        self._seed = seed
 
     @property
     def step_s(self) -> float:
@@ -91,8 +91,9 @@ class Session:
         return "waveform" in list(self.env.observation_spec[self._team, "observation"].keys())
 
     def begin(self, episode: int) -> Moment:
-        """Begin the episode of a number, from 0 on; return its start."""
-        self._state: TensorDictBase = self._playing.reset(episode=episode)
+        """Begin the episode of a number, from 0 on, as `evaluate` counts; return its start."""
+        seed_episodes(self._playing, self._seed, episode)
+        self._state: TensorDictBase = self._playing.reset()
         weights = self.game.weights
         self._moment = Moment(self._observation(self._state))
         self._moment.unweighted = dict.fromkeys(weights, 0.0)

@@ -10,6 +10,7 @@ import yaml
 from omegaconf import OmegaConf
 
 from veca_marl.config import Config, ConfigError, compose_node, to_config
+from veca_marl.config.arms import check_contradictions
 from veca_marl.config.stored import body_names
 from veca_marl.reports.budget import FrameBudget
 from veca_marl.sweeps.body_kinds import former_kinds, with_body_kinds
@@ -53,6 +54,7 @@ def compose_arms(overrides: Sequence[str]) -> list[Arm]:
 
 
 def _compose_arm(overrides: Sequence[str], name: str, own: Sequence[str]) -> Arm:
+    check_contradictions(name, own, overrides)
     node = compose_node([*overrides, f"experiment.arm={name}", *own])
     plain = cast(dict[str, Any], yaml.safe_load(OmegaConf.to_yaml(node, resolve=True)))
     kinds = body_names(node)

@@ -78,8 +78,10 @@ class StoredRun:
             return RunState.unfinished
         if progress.frames >= total_frames:
             return RunState.finished
-        stopped = max_minutes is not None and self.config.get("max_minutes") == max_minutes
-        return RunState.cut if stopped else RunState.unfinished
+        # one that had all frames of its own budget was not cut by the time
+        of_its_own = int(self.config.get("total_frames", total_frames))
+        limited = max_minutes is not None and self.config.get("max_minutes") == max_minutes
+        return RunState.cut if limited and progress.frames < of_its_own else RunState.unfinished
 
 
 def read_run(folder: Path) -> StoredRun:

@@ -152,6 +152,21 @@ def test_pettingzoo_removes_eliminated_agents(cfg):
     env.close()
 
 
+@pytest.mark.parametrize("scripted", ["red", "blue"])
+def test_the_episode_ends_when_only_scripted_players_are_left(cfg, scripted):
+    env = VecaParallelEnv(replace(cfg, script={scripted: Script.idle}))
+    for seed in range(4):
+        env.reset(seed=seed)
+        steps = 0
+        while env.agents:
+            env.step({name: np.zeros(2, np.float32) for name in env.agents})
+            steps += 1
+        assert steps <= 6
+        with pytest.raises(RuntimeError, match="no episode is running"):
+            env.step({})
+    env.close()
+
+
 # ---- own senses and bodies
 
 
@@ -197,12 +212,13 @@ def test_each_sense_can_differ_by_team():
 
 
 def test_a_team_scripted_by_the_expert_acts_like_the_expert_policy(cfg):
-    whole = VecaEnv(cfg, 2, seed=3)
-    scripted = VecaEnv(replace(cfg, script={"blue": Script.expert}), 2, seed=3)
+    whole = VecaEnv(cfg, 2, seed=0)
+    scripted = VecaEnv(replace(cfg, script={"blue": Script.expert}), 2, seed=0)
     assert scripted.group_map == {"red": ["red"]}
     assert "blue" not in scripted.full_observation_spec.keys()  # noqa: SIM118
-    one = whole.rollout(STEPS, ExpertPolicy(whole), break_when_any_done=False)
-    other = scripted.rollout(STEPS, ExpertPolicy(scripted), break_when_any_done=False)
+    other = scripted.rollout(STEPS, ExpertPolicy(scripted))  # until a red player is eliminated
+    one = whole.rollout(len(other[0]), ExpertPolicy(whole), break_when_any_done=False)
+    assert other.shape == (2, 6)
     for key in (("red", "observation", "proprioception"), ("next", "red", "reward"), "done"):
         torch.testing.assert_close(one[key], other[key], rtol=0.0, atol=0.0)
     ours, theirs = (env.games[1].world.scene.positions for env in (whole, scripted))

@@ -120,14 +120,14 @@ def evaluate(
     tallies = []
     with torch.no_grad(), set_exploration_type(EXPLORATION_TYPES[exploration]):
         for number in range(first, first + episodes, worlds):
-            _seed(env, seed, number)
+            seed_episodes(env, seed, number)
             count = min(worlds, first + episodes - number)
             tallies.append(_play_one_each(env, policy, count))
     return {team: _joined([tally.sums(team) for tally in tallies]) for team in env.group_map}
 
 
-def _seed(env: EnvBase, seed: int, first: int) -> None:
-    """Let world w begin episode `first` + w, and seed the samples."""
+def seed_episodes(env: EnvBase, seed: int, first: int) -> None:
+    """Let the next reset of world w begin episode `first` + w, and seed the samples."""
     base = env
     while isinstance(base, TransformedEnv):
         base = base.base_env

@@ -25,11 +25,13 @@ class Expert(ABC, Generic[TaskT]):
     Attributes:
         reads: Names of the senses that `act` reads; the game computes no others for it. None is
             all senses of the player.
+        needs: Names of the senses without which it cannot play.
         task: The rules that are played.
         player: The player that the commands are for.
     """
 
     reads: ClassVar[tuple[str, ...] | None] = None
+    needs: ClassVar[tuple[str, ...]] = ()
 
     def __init__(self, task: TaskT, player: Player) -> None:
         self.task, self.player = task, player
@@ -89,3 +91,17 @@ def find_expert(task: str) -> type[Expert[Any]]:
     if task not in EXPERTS:
         raise ValueError(f"task {task!r} has no expert; tasks with an expert: {sorted(EXPERTS)}")
     return EXPERTS[task]
+
+
+def check_senses(expert: type[Expert[Any]], player: Player) -> None:
+    """Check that a player has the senses that an expert needs.
+
+    Raises:
+        ValueError: If one is missing.
+    """
+    missing = [name for name in expert.needs if name not in player.senses]
+    if missing:
+        raise ValueError(
+            f"{expert.__name__} needs {', '.join(missing)}, which {player.name} has not; "
+            f"its senses: {', '.join(player.senses) or 'none'}"
+        )

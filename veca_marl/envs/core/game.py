@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veca_marl.envs.core.actions import to_parts
-from veca_marl.envs.core.expert import Expert, find_expert
+from veca_marl.envs.core.expert import Expert, check_senses, find_expert
 from veca_marl.envs.core.game_cfg import GameCfg
 from veca_marl.envs.core.scripts import play_script
 from veca_marl.envs.core.task import Player, Team, find_task
@@ -225,7 +225,9 @@ class Game:
         terms = {player.name: self._terms(player) for player in self.players}
         if self.task.eliminates:
             self.eliminated |= {p.name for p in self.players if self.task.is_eliminated(p)}
-        terminated = self.task.terminated() or len(self.eliminated) == len(self.players)
+        # nobody is left to act when only scripted players are
+        left = [p for p in self.actors or self.players if p.name not in self.eliminated]
+        terminated = self.task.terminated() or not left
         truncated = self.steps >= self.max_steps
         return Outcome(
             terms, terminated, truncated, self.eliminated, self._solved(), self._body_info()
@@ -275,7 +277,7 @@ class Game:
         """Return the expert of a player. It is made at the first call and reset with the game.
 
         Raises:
-            ValueError: If the task has no expert.
+            ValueError: If the task has no expert, or it needs a sense that the player has not.
         """
         if player.name not in self._experts:
             self._experts[player.name] = self._make_expert(player)
@@ -283,7 +285,9 @@ class Game:
         return self._experts[player.name]
 
     def _make_expert(self, player: Player) -> Expert[Any]:
-        return find_expert(self.cfg.task.name)(self.task, player)
+        expert = find_expert(self.cfg.task.name)
+        check_senses(expert, player)
+        return expert(self.task, player)
 
     def _terms(self, player: Player) -> dict[str, float]:
         """Return the reward terms of a player; zeros if it was eliminated in an earlier step."""

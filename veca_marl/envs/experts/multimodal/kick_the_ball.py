@@ -22,7 +22,7 @@ class KickTheBallExpert(Expert[KickTheBall]):
     Reads the observation ``audio`` only; it uses no privileged state.
     """
 
-    reads = ("audio",)
+    reads = needs = ("audio",)
 
     def act(self, observation: Mapping[str, NDArray[Any]]) -> tuple[float, float]:
         """Return (forward, turn), see `Expert.act`."""
