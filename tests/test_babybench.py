@@ -16,7 +16,7 @@ def test_the_suite_is_not_among_the_tasks_of_the_paper():
 
 
 def test_the_score_is_the_share_of_regions_touched_by_both_hands():
-    result = Result("SelfTouch", "expert")
+    result = Result("SelfTouch", "expert", 1000)
     for left, right in (({"chest", "head"}, {"chest"}), ({"chest"}, set())):
         result.add({"left_hand": len(left) / 14, "right_hand": len(right) / 14})
         result.add_touched({"left_hand": left, "right_hand": right})
@@ -24,6 +24,7 @@ def test_the_score_is_the_share_of_regions_touched_by_both_hands():
     assert result.union_score == pytest.approx(3 / 28)
     assert result.touched["left_hand"]["chest"] == 2
     assert any("chest 2" in line for line in lines(result))
+    assert not any("BabyBench" in line for line in lines(result))
 
 
 def test_episodes_are_played_and_written(tmp_path, capsys):
@@ -33,7 +34,9 @@ def test_episodes_are_played_and_written(tmp_path, capsys):
     content = json.loads(file.read_text())
     assert len(content["scores"]) == 2
     assert len(content["parts"]) == 4
-    assert "HandRegard, policy random, 2 episodes" in capsys.readouterr().out
+    printed = capsys.readouterr().out
+    assert "HandRegard, policy random, 2 episodes of 5 steps" in printed
+    assert "BabyBench plays episodes of 1000 steps: its scores are others" in printed
 
 
 def test_another_task_is_refused(capsys):

@@ -143,13 +143,15 @@ def test_results_as_tables_and_json(tmp_path, capsys):
     assert (found["machine"]["commit"] or "unknown") in printed.splitlines()[0]
 
 
-def test_learning_is_measured_beside_rollouts(tmp_path, capsys, monkeypatch):
+@pytest.mark.parametrize("every_frames", [16, 20])  # a batch has 16
+def test_learning_is_measured_beside_rollouts(every_frames, tmp_path, capsys, monkeypatch):
     written = []
     save = Checkpoints.save
     monkeypatch.setattr(Checkpoints, "save", lambda *args: written.append(save(*args)))
     file = tmp_path / "bench.json"
     words = ["+task=KickTheBall", "senses/vision=blind", "task.max_seconds=0.4", "threads=1"]
-    words += ["collect=one_process", "collect.worlds=2", "collect.steps=8", "eval.every_frames=16"]
+    words += ["collect=one_process", "collect.worlds=2", "collect.steps=8"]
+    words += [f"eval.every_frames={every_frames}"]
     words += ["eval.episodes=1", "eval.worlds=1", f"bench.json={file}"]
     assert main([*QUICK, "bench.learning=true", "bench.stages=2", *words]) == 0
     found = json.loads(file.read_text())["learning"]

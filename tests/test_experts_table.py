@@ -5,6 +5,7 @@ import os
 import signal
 
 import pytest
+from knockouts import knockout
 from paths import ROOT
 from scipy import stats
 
@@ -53,6 +54,15 @@ def test_a_second_call_plays_the_missing_episodes_only(tmp_path):
     assert both[:2] == first
     assert [row["episode"] for row in both[2:]] == ["1", "1"]
     assert "| DodgeCar | expert | 2 (version 0) |" in (tmp_path / "table.md").read_text()
+
+
+def test_tasks_without_frozen_episodes_are_left_out_of_all(tmp_path, capsys):
+    with knockout():
+        assert main([f"to={tmp_path}", "tasks=[all]", "episodes=0"]) == 0
+        assert "left out, without frozen episodes: Knockout\n" in capsys.readouterr().err
+        assert main([f"to={tmp_path}", "tasks=[Knockout]", "episodes=0"]) == 2
+        message = "task 'Knockout' has no frozen episodes; frozen=false plays other starts"
+        assert message in capsys.readouterr().err
 
 
 @pytest.mark.slow

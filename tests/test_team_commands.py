@@ -112,6 +112,14 @@ def test_a_tournament_without_a_place_for_its_picture_is_refused_before_it_is_pl
     picture.rmdir()
 
 
+def test_a_tournament_needs_two_past_policies_of_a_team(played, tmp_path, capsys):
+    run = shutil.copytree(played / "run", tmp_path / "short")
+    for path in sorted((run / "pool").glob("blue_*"))[1:]:
+        path.unlink()
+    assert tournament([f"run={run}"]) == 2
+    assert "past policies of blue: 1, and 2 are needed" in capsys.readouterr().err
+
+
 def test_a_policy_of_another_run_is_an_opponent(played, tmp_path, capsys):
     assert train(tmp_path, "run", f"opponent.blue={played / 'run'}", "total_frames=32") == 0
     with (tmp_path / "run" / "metrics.csv").open() as file:

@@ -1,8 +1,9 @@
 """The scores of BabyBench 2025: ``python -m veca_marl.babybench +task=SelfTouch policy=expert``.
 
-Plays ten episodes of 1000 steps of SelfTouch or HandRegard and prints the score of each, their mean
-and what it consists of. ``policy`` is expert, random, the folder of a run or a checkpoint in it. A
-run is played on its stored configuration. See the pages of both tasks for the definitions.
+Plays ten episodes of SelfTouch or HandRegard, by default of 1000 steps, and prints the score of
+each, their mean and what it consists of. ``policy`` is expert, random, the folder of a run or a
+checkpoint in it. A run is played on its stored configuration. See the pages of both tasks for the
+definitions.
 """
 
 from __future__ import annotations
@@ -26,6 +27,7 @@ from veca_marl.play.policies import EXPERT, choose
 from veca_marl.play.session import Session
 
 SUITE = "babybench"
+STEPS = 1000  # of an episode in BabyBench
 _ERRORS = (CheckpointError, WriteError)
 
 
@@ -59,12 +61,14 @@ class Result:
     Attributes:
         task: The task.
         policy: The policy.
+        steps: Steps of an episode.
         parts: The parts of the score, by the name of the reward term: one number per episode.
         touched: Of SelfTouch, by hand and region: in how many episodes the hand touched it.
     """
 
     task: str
     policy: str
+    steps: int
     parts: dict[str, list[float]] = field(default_factory=dict)
     touched: dict[str, dict[str, int]] = field(default_factory=dict)
 
@@ -107,7 +111,10 @@ def play(session: Session, result: Result, episodes: int) -> None:
 
 def lines(result: Result) -> list[str]:
     """Return the result as lines of text."""
-    text = [f"{result.task}, policy {result.policy}, {len(result.scores)} episodes"]
+    episodes = f"{len(result.scores)} episodes of {result.steps} steps"
+    text = [f"{result.task}, policy {result.policy}, {episodes}"]
+    if result.steps != STEPS:
+        text.append(f"BabyBench plays episodes of {STEPS} steps: its scores are others")
     text += [f"score {np.mean(result.scores):.3f} (mean over the episodes)"]
     text += ["episodes " + " ".join(f"{score:.3f}" for score in result.scores)]
     text += [f"{name:24} {np.mean(values):.3f}" for name, values in result.parts.items()]
@@ -131,7 +138,7 @@ def run(options: BabyBenchOptions, overrides: list[str]) -> None:
         session = Session(choice.cfg.game, choice.make_policy, options.seed, choice.exploration)
     except ValueError as error:
         raise ConfigError(one_line(error)) from error
-    result = Result(name, options.policy)
+    result = Result(name, options.policy, session.game.max_steps)
     play(session, result, options.episodes)
     session.close()
     print(*lines(result), sep="\n")

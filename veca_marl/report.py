@@ -114,7 +114,7 @@ def _read(
     asked = {arm.name: arm.plain for arm in arms}
     found, rows = gather(runs, asked, seeds, {arm.name: arm.former for arm in arms})
     if rows:
-        rows += expert_rows(arms[0].cfg, arms[0].name, options.expert_episodes)
+        rows += expert_rows(arms, options.expert_episodes)
     return found, rows, Path(options.to or runs)
 
 

@@ -89,8 +89,14 @@ def tournament(
     cfg = to_config(node)
     pool, members = Pool(folder.pool), options.tournament.members
     chosen = {team: spread(pool.members(team), members) for team in cfg.self_play.teams}
-    if not chosen or min(len(frames) for frames in chosen.values()) < 2:
+    if not chosen:
         raise ConfigError(f"{folder.path}: no past policies; it was run without self_play.teams")
+    for team, frames in chosen.items():
+        if len(frames) < 2:
+            raise ConfigError(
+                f"{folder.path}: past policies of {team}: {len(frames)}, and 2 are needed; "
+                "the run has to come further"
+            )
     return _play(cfg, pool, chosen, options)
 
 

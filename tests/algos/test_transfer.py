@@ -13,7 +13,12 @@ from veca_marl.algos.checkpoints.checkpoint_file import CheckpointError
 from veca_marl.algos.checkpoints.checkpoints import Checkpoints
 from veca_marl.algos.checkpoints.identity import Identity
 from veca_marl.algos.intrinsic import RNDCfg
-from veca_marl.algos.networks.encoders import VectorEncoder
+from veca_marl.algos.networks.encoders import (
+    Convolutions,
+    ImageEncoder,
+    Pooling,
+    VectorEncoder,
+)
 from veca_marl.algos.networks.memory import with_memory
 from veca_marl.algos.networks.multisense import Memory, MultisenseCfg, Parameters
 from veca_marl.algos.plain import to_plain
@@ -136,9 +141,37 @@ def test_an_encoder_that_does_not_fit_is_refused(tmp_path, numbers, sense, messa
 def test_an_actor_of_another_algorithm_with_another_network_is_refused(tmp_path):
     there = make_learners(algo=ToyDQNCfg(), discrete=True)
     with pytest.raises(
-        CheckpointError, match=r"init_from.agents: .* in the stored run, absent in this one"
+        CheckpointError, match=r"init_from.agents=.*: .* in the stored run, absent in this one"
     ):
         init_teams(make_learners(discrete=True), {"agents": store(there, tmp_path)}, {})
+
+
+def test_further_layers_of_the_actor_of_sac_are_named(tmp_path):
+    source = store(make_learners(algo=small_sac(network=network())), tmp_path)
+    with pytest.raises(CheckpointError, match=r"that of SAC with algo.policy_hidden=\[\]"):
+        init_teams(make_learners(), {"agents": source}, {})
+
+
+def test_a_critic_with_normalised_values_fits_none_without(tmp_path):
+    kinds = ValueNormalisation.running, ValueNormalisation.none
+    there, here = (
+        make_learners(algo=PPOCfg(network=network(), value_normalisation=kind)) for kind in kinds
+    )
+    message = "algo.value_normalisation=running in the stored run, none in this one"
+    with pytest.raises(CheckpointError, match=message):
+        init_teams(here, {"agents": store(there, tmp_path)}, {})
+
+
+@pytest.mark.parametrize(
+    ("teams", "senses", "option"),
+    [
+        ({"agents": "nowhere"}, {}, "init_from.agents=nowhere: nowhere is neither"),
+        ({}, {"agents": {"audio": "nowhere"}}, "init_encoders.agents.audio=nowhere: nowhere is"),
+    ],
+)
+def test_a_source_that_is_missing_is_named_with_its_option(teams, senses, option):
+    with pytest.raises(CheckpointError, match=option):
+        init_teams(make_learners(), teams, senses)
 
 
 @pytest.mark.parametrize("make_cfg", [PPOCfg, small_sac], ids=["ppo", "sac"])
@@ -198,10 +231,29 @@ def test_an_encoder_with_another_scale_of_its_input_is_refused(low, high, compre
         return SenseEncoders({"audio": VectorEncoder(layout, 4, compressed)})
 
     copy_encoders(encoder(), {"audio": [encoder()["audio"]]})
-    with pytest.raises(
-        ValueError, match=r"audio: its input is scaled by [a-zA-Z][^<]* in the stored run, by"
-    ):
+    with pytest.raises(ValueError, match=r"audio: its scale is [a-zA-Z][^<]* in the stored run, "):
         copy_encoders(encoder(), {"audio": [encoder(low, high, compressed)["audio"]]})
+
+
+@pytest.mark.parametrize(
+    ("size", "strides", "message"),
+    [
+        (64, (4, 2, 1), r"vision: its input is \(3, 64, 64\) in the stored run, \(3, 84, 84\) in"),
+        (84, (2, 2, 1), r"vision: its strides are \(2, 2, 1\) in the stored run, \(4, 2, 1\) in"),
+    ],
+)
+def test_an_encoder_of_other_images_or_strides_is_refused(size, strides, message):
+    """Pooled to places, the parameters are equal: the images are not the same to them."""
+
+    def encoder(size=84, strides=(4, 2, 1)):
+        convolutions = Convolutions(strides=strides)
+        return SenseEncoders(
+            {"vision": ImageEncoder((3, size, size), convolutions, Pooling.places)}
+        )
+
+    copy_encoders(encoder(), {"vision": [encoder()["vision"]]})
+    with pytest.raises(ValueError, match=message):
+        copy_encoders(encoder(), {"vision": [encoder(size, strides)["vision"]]})
 
 
 def test_the_message_names_the_layers_of_an_actor_that_another_algorithm_has_not(tmp_path):

@@ -306,6 +306,12 @@ def test_checks_of_what_a_task_does_not_have_are_skipped(game_of):
     assert "does not define solved()" in goal.message
 
 
+def test_an_expert_without_the_sense_that_it_needs_is_skipped():
+    cfg = compose(["+task=KickTheBall", "senses/audio=deaf", "task.max_seconds=0.2"]).game
+    for finding in returns(cfg)[1:]:
+        assert (finding.status, finding.message) == (Status.skipped, "the expert needs audio")
+
+
 def test_an_exception_of_the_task_is_reported_with_its_place(game_of):
     report = check_game(game_of(FailsInReward), QUICK)
     assert not report.passed

@@ -6,6 +6,13 @@ from collections.abc import Iterable, Mapping, Sequence
 
 from torch import nn
 
+# attributes of encoders that are not among the parameters, and how a message calls them
+_BESIDE_PARAMETERS = {
+    "shape": "its input is",
+    "strides": "its strides are",
+    "scale": "its scale is",
+}
+
 
 class SenseEncoders(nn.ModuleDict):
     """Encoder modules by the name of their sense.
@@ -63,22 +70,23 @@ def copy_encoders(network: nn.Module, encoders: Mapping[str, Sequence[nn.Module]
             )
         for i, target in enumerate(targets):
             try:
-                _check_same_scale(target, sources[i % len(sources)])
+                _check_same_input(target, sources[i % len(sources)])
                 copy_parameters(target, sources[i % len(sources)])
             except ValueError as error:
                 raise ValueError(f"encoder of {sense}: {error}") from error
 
 
-def _check_same_scale(target: nn.Module, source: nn.Module) -> None:
-    """Check that two encoders scale their input alike, which is not among the parameters.
+def _check_same_input(target: nn.Module, source: nn.Module) -> None:
+    """Check that equal parameters of two encoders are the same function of the sense.
 
     Raises:
-        ValueError: If not: the range of the sense, or what compresses it, differs.
+        ValueError: If not: shape or range of the sense, what compresses it, or strides differ.
     """
-    scales = [getattr(module, "scale", None) for module in (target, source)]
-    if scales[0] != scales[1]:
-        new, stored = (getattr(scale, "__name__", str(scale)) for scale in scales)
-        raise ValueError(f"its input is scaled by {stored} in the stored run, by {new} in this one")
+    for attribute, words in _BESIDE_PARAMETERS.items():
+        new, stored = (getattr(module, attribute, None) for module in (target, source))
+        if new != stored:
+            old_name, name = (getattr(v, "__name__", str(v)) for v in (stored, new))
+            raise ValueError(f"{words} {old_name} in the stored run, {name} in this one")
 
 
 def copy_parameters(target: nn.Module, source: nn.Module) -> None:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 
 from veca_marl.algos.checkpoints.checkpoint_file import CheckpointError
@@ -22,7 +23,8 @@ def init_teams(
 
     Args:
         learners: What starts.
-        teams: Team to the source of all its parameters; senses and actions must be equal.
+        teams: Team to the source of all its parameters; its specification must be equal: senses,
+            actions, number of agents, and whether agents can be eliminated.
         encoders: Team to sense to the source of its encoder; the shape of the sense must be equal.
 
     Raises:
@@ -36,26 +38,29 @@ def init_teams(
 
 
 def _init_team(learners: TeamLearners, team: str, source: str) -> None:
-    path, stored_team = _find(source, team)
-    stored = load_learnt(path, stored_team, learners.specs[team])
-    try:
+    with _naming(f"init_from.{team}={source}"):
+        path, stored_team = _find(source, team)
+        stored = load_learnt(path, stored_team, learners.specs[team])
         learners.algorithms[team].init_from(stored)
-    except ValueError as error:
-        raise CheckpointError(f"init_from.{team}: {path}: {error}") from error
 
 
 def _init_encoder(learners: TeamLearners, team: str, sense: str, source: str) -> None:
-    path, stored_team = _find(source, team)
-    found = load_encoders(path, stored_team)
-    if sense not in found:
-        raise CheckpointError(
-            f"init_encoders.{team}.{sense}: {path} has no encoder of {sense}; "
-            f"choices: {', '.join(sorted(found)) or 'none'}"
-        )
-    try:
+    with _naming(f"init_encoders.{team}.{sense}={source}"):
+        path, stored_team = _find(source, team)
+        found = load_encoders(path, stored_team)
+        if sense not in found:
+            choices = ", ".join(sorted(found)) or "none"
+            raise CheckpointError(f"{path} has no encoder of {sense}; choices: {choices}")
         learners.algorithms[team].init_encoders({sense: found[sense]})
-    except ValueError as error:
-        raise CheckpointError(f"init_encoders.{team}.{sense}: {path}: {error}") from error
+
+
+@contextmanager
+def _naming(option: str) -> Iterator[None]:
+    """Raise errors as `CheckpointError` with the option in front."""
+    try:
+        yield
+    except (CheckpointError, ValueError) as error:
+        raise CheckpointError(f"{option}: {error}") from error
 
 
 def _find(source: str, team: str) -> tuple[Path, str]:

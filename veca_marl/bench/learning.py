@@ -10,9 +10,11 @@ from pathlib import Path
 from statistics import median
 from tempfile import TemporaryDirectory
 
+import torch
 from torchrl import timeit
 
 from veca_marl.algos.reporting.reporters import Row
+from veca_marl.algos.training.schedule import Schedule
 from veca_marl.algos.training.stopwatch import processor_seconds
 from veca_marl.bench.all_cores import SimultaneousRollouts
 from veca_marl.bench.rollouts import RandomActions
@@ -86,7 +88,8 @@ def measure_learning(cfg: Config, steps: int, stages: int) -> Learning:
     """
     log = replace(cfg.log, progress_bar=False)
     evaluation = replace(cfg.eval, final_episodes=cfg.eval.episodes)
-    frames = (stages + 1) * cfg.eval.every_frames
+    stage = Schedule.of(cfg.eval.every_frames, cfg.eval.every_frames, cfg.collect.frames)
+    frames = (stages + 1) * stage.frames
     run = replace(cfg, log=log, eval=evaluation, total_frames=frames)
     with TemporaryDirectory() as folder:
         trainer = make_trainer(run, RunFolder(Path(folder)))
@@ -136,9 +139,13 @@ class Turns:
         self._frames, self._start = frames, _now()
 
     def _rollout(self) -> Cost:
+        threads = torch.get_num_threads()
+        torch.set_num_threads(1)
         start = _now()
         self._env.rollout(self._steps, self._actions, break_when_any_done=False)
-        return _per_frame(start, self._steps * self._env.batch_size[0])
+        cost = _per_frame(start, self._steps * self._env.batch_size[0])
+        torch.set_num_threads(threads)
+        return cost
 
     def sync(self) -> None:
         """See `Reporter`; nothing is stored."""

@@ -11,7 +11,7 @@ from veca_marl.algos.evaluation.comparison import paired_difference
 from veca_marl.checks.random_play import reward_problems
 from veca_marl.checks.report import Finding, Status, finding
 from veca_marl.envs.core.episodes import Episodes
-from veca_marl.envs.core.expert import has_expert
+from veca_marl.envs.core.expert import find_expert, has_expert, missing_senses
 from veca_marl.envs.core.game import Game
 from veca_marl.envs.core.scripted_episodes import first_team, play_to_end
 from veca_marl.envs.core.team import Script
@@ -49,18 +49,27 @@ def check_returns(game: Game, episodes: int, seed: int) -> Iterator[Finding]:
     Yields:
         ``reward terms``: each is finite and was not 0 in some step. ``expert``: the 95 % interval
         of the paired difference of the returns is above 0. ``goal``: the expert ends more episodes
-        solved than the random policy. The last two are skipped without an expert or a goal.
+        solved than the random policy. The last two are skipped without an expert, or without the
+        senses that it needs, and the last one without a goal.
     """
     random = _play_all(game, Script.random, episodes, seed)
-    expert = []
-    if has_expert(game.cfg.task.name):
-        expert = _play_all(game, Script.expert, episodes, seed)
+    reason = _no_expert(game)
+    expert = [] if reason else _play_all(game, Script.expert, episodes, seed)
     yield _terms(game, [*random, *expert])
-    if not expert:
-        yield from (Finding(n, Status.skipped, "the task has no expert") for n in NAMES[1:])
+    if reason:
+        yield from (Finding(name, Status.skipped, reason) for name in NAMES[1:])
         return
     yield _expert(expert, random)
     yield _goal(game, expert, random)
+
+
+def _no_expert(game: Game) -> str:
+    """Return why no expert can play the first team; an empty text if one can."""
+    if not has_expert(game.cfg.task.name):
+        return "the task has no expert"
+    expert = find_expert(game.cfg.task.name)
+    missing = sorted({sense for p in first_team(game) for sense in missing_senses(expert, p)})
+    return f"the expert needs {', '.join(missing)}" if missing else ""
 
 
 def _play_all(game: Game, script: Script, episodes: int, seed: int) -> list[_Played]:

@@ -11,7 +11,7 @@ from veca_marl.algos.files import WriteError, write_atomically
 from veca_marl.config import ConfigError, one_line, prepare
 from veca_marl.config.command_line import CommandLine
 from veca_marl.config.outputs import check_folder
-from veca_marl.envs.core.benchmark import find_benchmark
+from veca_marl.envs.core.benchmark import Benchmark, find_benchmark, has_benchmark
 from veca_marl.envs.core.expert import has_expert
 from veca_marl.envs.core.task import TASKS
 from veca_marl.envs.core.team import Script
@@ -76,10 +76,10 @@ def _play_missing(options: TableOptions, folder: Path, overrides: list[str]) -> 
 
 def _missing(options: TableOptions, folder: Path, overrides: Sequence[str]) -> Iterator[Job]:
     """Return the episodes that are not stored, task by task."""
-    for task in sorted(TASKS) if options.tasks == ["all"] else options.tasks:
+    for task in _tasks(options):
         cfg, file, version = game_cfg(task, overrides), _file(folder, task), 0
         if options.frozen:
-            benchmark = find_benchmark(task)
+            benchmark = _benchmark(task)
             benchmark.check_parameters(cfg.task)
             version = benchmark.version
         stored = file.read()
@@ -92,6 +92,23 @@ def _missing(options: TableOptions, folder: Path, overrides: Sequence[str]) -> I
             for number in range(options.episodes)
             if (policy.value, number) not in done
         )
+
+
+def _tasks(options: TableOptions) -> list[str]:
+    """Return the tasks that are asked for; of all, those without frozen episodes are left out."""
+    if options.tasks != ["all"]:
+        return options.tasks
+    left_out = [task for task in sorted(TASKS) if options.frozen and not has_benchmark(task)]
+    if left_out:
+        sys.stderr.write(f"left out, without frozen episodes: {', '.join(left_out)}\n")
+    return sorted(set(TASKS) - set(left_out))
+
+
+def _benchmark(task: str) -> Benchmark:
+    try:
+        return find_benchmark(task)
+    except ValueError as error:
+        raise ValueError(f"{error}; frozen=false plays other starts") from error
 
 
 def _stored(folder: Path) -> dict[str, list[Played]]:

@@ -9,6 +9,7 @@ Broken laws are named at the end, and the exit status is 1.
 
 from __future__ import annotations
 
+import os
 import sys
 import time
 from collections.abc import Iterator, Sequence
@@ -16,6 +17,7 @@ from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass, field
 from multiprocessing import get_context
 
+from veca_marl.algos.collection.parent import end_with_parent
 from veca_marl.config import ConfigError
 from veca_marl.config.command_line import CommandLine
 from veca_marl.config.outputs import check_folder
@@ -62,7 +64,13 @@ def measure_all(names: Sequence[str], processes: int) -> dict[str, Section]:
 
 
 def _measured(names: Sequence[str], processes: int) -> Iterator[tuple[str, Section]]:
-    with ProcessPoolExecutor(processes, mp_context=get_context("spawn")) as pool:
+    pool = ProcessPoolExecutor(
+        processes,
+        mp_context=get_context("spawn"),
+        initializer=end_with_parent,
+        initargs=(os.getpid(),),
+    )
+    with pool:
         futures = {pool.submit(measure, name): name for name in names}
         for future in as_completed(futures):
             error = future.exception()

@@ -179,10 +179,30 @@ class PPO(Algorithm):
         """See `Algorithm`: copies actor and critic from PPO, the actor from another algorithm."""
         if isinstance(other, PPO):
             check_same_network(self.cfg.network, other.cfg.network)
+            self._check_same_values(other.cfg.value_normalisation)
             copy_parameters(self.network, other.network)
         else:
-            check_same_actor(self.cfg.network, other.network_cfg)
+            self._copy_actor(other)
+
+    def _check_same_values(self, stored: ValueNormalisation) -> None:
+        """Check that both critics have statistics of their values, or neither."""
+        here, none = self.cfg.value_normalisation, ValueNormalisation.none
+        if (here is none) is not (stored is none):
+            raise ValueError(
+                f"algo.value_normalisation={stored.value} in the stored run, "
+                f"{here.value} in this one"
+            )
+
+    def _copy_actor(self, other: Algorithm) -> None:
+        """Copy the actor of another algorithm, which may have layers that this one has not."""
+        check_same_actor(self.cfg.network, other.network_cfg)
+        try:
             super().init_from(other)
+        except ValueError as error:
+            raise ValueError(
+                f"{error}; an actor of another algorithm fits if it has the same network without "
+                "further layers: that of SAC with algo.policy_hidden=[]"
+            ) from error
 
 
 def _batch_keys(network: TeamNetwork, team: str, masked: bool) -> list[Any]:

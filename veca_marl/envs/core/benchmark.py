@@ -15,6 +15,7 @@ from contextlib import closing
 from dataclasses import asdict, dataclass
 from enum import Enum
 from importlib.resources import files
+from importlib.resources.abc import Traversable
 from typing import Any
 
 from veca_marl.envs.core.episodes import Episodes
@@ -101,16 +102,24 @@ class Benchmark:
         )
 
 
+def has_benchmark(task: str) -> bool:
+    """Return whether a task has frozen episodes."""
+    return _file_of(task).is_file()
+
+
 def find_benchmark(task: str) -> Benchmark:
     """Return the frozen episodes of a task.
 
     Raises:
         ValueError: If the task has none.
     """
-    file = files("veca_marl") / "data" / "benchmark" / f"{task}.json"
-    if not file.is_file():
-        raise ValueError(f"episodes=benchmark: task {task!r} has no frozen episodes")
-    return from_text(file.read_text(encoding="utf-8"))
+    if not has_benchmark(task):
+        raise ValueError(f"task {task!r} has no frozen episodes")
+    return from_text(_file_of(task).read_text(encoding="utf-8"))
+
+
+def _file_of(task: str) -> Traversable:
+    return files("veca_marl") / "data" / "benchmark" / f"{task}.json"
 
 
 def to_text(benchmark: Benchmark) -> str:

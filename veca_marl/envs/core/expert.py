@@ -93,14 +93,18 @@ def find_expert(task: str) -> type[Expert[Any]]:
     return EXPERTS[task]
 
 
+def missing_senses(expert: type[Expert[Any]], player: Player) -> list[str]:
+    """Return the names of the senses that an expert needs and a player has not."""
+    return [name for name in expert.needs if name not in player.senses]
+
+
 def check_senses(expert: type[Expert[Any]], player: Player) -> None:
     """Check that a player has the senses that an expert needs.
 
     Raises:
         ValueError: If one is missing.
     """
-    missing = [name for name in expert.needs if name not in player.senses]
-    if missing:
+    if missing := missing_senses(expert, player):
         raise ValueError(
             f"{expert.__name__} needs {', '.join(missing)}, which {player.name} has not; "
             f"its senses: {', '.join(player.senses) or 'none'}"

@@ -103,6 +103,8 @@ class ImageEncoder(nn.Module):
 
     Attributes:
         features: Length of the output.
+        shape: Shape of one observation.
+        strides: Those of the convolutions.
     """
 
     def __init__(
@@ -125,6 +127,7 @@ class ImageEncoder(nn.Module):
                 (n - k) // stride + 1 for n, k in zip((height, width), window, strict=True)
             )
             size_in = size_out
+        self.shape, self.strides = tuple(shape), tuple(convolutions.strides)
         places = pooling is Pooling.places
         self.layers = nn.Sequential(*layers, SpatialSoftmax(size_in) if places else nn.Flatten())
         self.features = size_in * (3 if places else height * width)

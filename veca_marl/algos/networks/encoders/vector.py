@@ -21,11 +21,16 @@ class VectorEncoder(nn.Module):
         layout: Layout of one observation.
         features: Length of the output.
         compressed: See `scale_of`.
+
+    Attributes:
+        features: Length of the output.
+        shape: Shape of one observation.
+        scale: See `scale_of`.
     """
 
     def __init__(self, layout: ArrayLayout, features: int = 64, compressed: bool = False) -> None:
         super().__init__()
-        self.scale = scale_of(layout, compressed)
+        self.shape, self.scale = tuple(layout.shape), scale_of(layout, compressed)
         self.layers = nn.Sequential(
             orthogonal(nn.Linear(math.prod(layout.shape), features)),
             nn.ReLU(),
