@@ -82,9 +82,10 @@ def test_a_run_that_goes_on_to_a_larger_budget_counts_at_the_asked_one():
 
 
 def test_each_arm_has_its_own_budget():
-    overrides = ["experiment.arms.stereo=['senses/audio=stereo','total_frames=300']"]
-    arms = {arm.name: arm.budget for arm in compose_arms([*EXPERIMENT, *overrides])}
-    assert arms == {name: FrameBudget(200, BATCH) for name in ("hrtf", "mono")} | {
+    words = [text for text in EXPERIMENT if text != "total_frames=200"]
+    words.append("experiment.arms.stereo=['senses/audio=stereo','total_frames=300']")
+    arms = {arm.name: arm.budget for arm in compose_arms(words)}
+    assert arms == {name: FrameBudget(122_880, BATCH) for name in ("hrtf", "mono")} | {
         "stereo": FrameBudget(300, BATCH)
     }
 
