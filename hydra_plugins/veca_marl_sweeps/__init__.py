@@ -47,6 +47,7 @@ class ArmSweeper(BasicSweeper):
         return super().sweep(arguments)
 
     def _check(self, arguments: list[str]) -> None:
+        """Raise `SweepError` for arguments that would leave out arms or seeds without a word."""
         assert self.config is not None
         for override in OverridesParser.create().parse_overrides(arguments):
             if override.key_or_group == "experiment" and override.is_sweep_override():
