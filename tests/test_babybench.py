@@ -36,7 +36,7 @@ def test_episodes_are_played_and_written(tmp_path, capsys):
     assert len(content["parts"]) == 4
     printed = capsys.readouterr().out
     assert "HandRegard, policy random, 2 episodes of 5 steps" in printed
-    assert "BabyBench plays episodes of 1000 steps: its scores are others" in printed
+    assert "not comparable with BabyBench, whose episodes have 1000 steps" in printed
 
 
 def test_another_task_is_refused(capsys):

@@ -114,7 +114,7 @@ def lines(result: Result) -> list[str]:
     episodes = f"{len(result.scores)} episodes of {result.steps} steps"
     text = [f"{result.task}, policy {result.policy}, {episodes}"]
     if result.steps != STEPS:
-        text.append(f"BabyBench plays episodes of {STEPS} steps: its scores are others")
+        text.append(f"not comparable with BabyBench, whose episodes have {STEPS} steps")
     text += [f"score {np.mean(result.scores):.3f} (mean over the episodes)"]
     text += ["episodes " + " ".join(f"{score:.3f}" for score in result.scores)]
     text += [f"{name:24} {np.mean(values):.3f}" for name, values in result.parts.items()]

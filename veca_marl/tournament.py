@@ -95,7 +95,7 @@ def tournament(
         if len(frames) < 2:
             raise ConfigError(
                 f"{folder.path}: past policies of {team}: {len(frames)}, and 2 are needed; "
-                "the run has to come further"
+                "continue the run"
             )
     return _play(cfg, pool, chosen, options)
 

@@ -32,3 +32,4 @@ def test_workers_end_with_a_command_that_is_killed(tmp_path):
     os.kill(command.pid, signal.SIGKILL)
     command.wait()
     wait_until(lambda: not any(Path(f"/proc/{pid}").exists() for pid in workers), 10)
+    assert len(workers) == 3

@@ -225,7 +225,7 @@ class Game:
         terms = {player.name: self._terms(player) for player in self.players}
         if self.task.eliminates:
             self.eliminated |= {p.name for p in self.players if self.task.is_eliminated(p)}
-        # nobody is left to act when only scripted players are
+        # the episode is over when only scripted players are left
         left = [p for p in self.actors or self.players if p.name not in self.eliminated]
         terminated = self.task.terminated() or not left
         truncated = self.steps >= self.max_steps
