@@ -13,6 +13,7 @@ from veca_marl.algos.checkpoints.checkpoint_file import CheckpointError
 from veca_marl.algos.checkpoints.checkpoints import Checkpoints
 from veca_marl.algos.checkpoints.identity import Identity
 from veca_marl.algos.intrinsic import RNDCfg
+from veca_marl.algos.networks.action_values import ActionValuesCfg
 from veca_marl.algos.networks.encoders import (
     Convolutions,
     ImageEncoder,
@@ -148,7 +149,7 @@ def test_an_actor_of_another_algorithm_with_another_network_is_refused(tmp_path)
 
 def test_further_layers_of_the_actor_of_sac_are_named(tmp_path):
     source = store(make_learners(algo=small_sac(network=network())), tmp_path)
-    with pytest.raises(CheckpointError, match=r"that of SAC with algo.policy_hidden=\[\]"):
+    with pytest.raises(CheckpointError, match=r"policy_hidden=\[\d+\] in the stored run, \[\]"):
         init_teams(make_learners(), {"agents": source}, {})
 
 
@@ -258,7 +259,29 @@ def test_an_encoder_of_other_images_or_strides_is_refused(size, strides, message
 
 def test_the_message_names_the_layers_of_an_actor_that_another_algorithm_has_not(tmp_path):
     there, here = make_learners(), make_learners(algo=SACCfg(network=network()))
-    with pytest.raises(CheckpointError, match=r"they fit with algo.policy_hidden=\[\]"):
+    message = r"algo.policy_hidden=\[\] in the stored run, \[256\] in this one; actors of PPO have"
+    with pytest.raises(CheckpointError, match=message):
+        init_teams(here, {"agents": store(there, tmp_path)}, {})
+
+
+@pytest.mark.parametrize(
+    ("sizes", "message"),
+    [
+        (
+            {"policy_hidden": [16]},
+            r"algo.policy_hidden=\[\] in the stored run, \[16\] in this one$",
+        ),
+        ({"critic": ActionValuesCfg(critics=3)}, r"algo.critic.critics=2 in the stored run, 3 in"),
+        (
+            {"critic": ActionValuesCfg(hidden=[9])},
+            r"algo.critic.hidden=.*stored run, \[9\] in this",
+        ),
+    ],
+)
+def test_the_message_names_the_other_sizes_of_the_same_algorithm(tmp_path, sizes, message):
+    there = make_learners(algo=SACCfg(network=network(), policy_hidden=[]))
+    here = make_learners(algo=SACCfg(network=network(), **{"policy_hidden": []} | sizes))
+    with pytest.raises(CheckpointError, match=message):
         init_teams(here, {"agents": store(there, tmp_path)}, {})
 
 

@@ -75,6 +75,11 @@ class Algorithm(ABC):
         return None
 
     @property
+    def policy_hidden(self) -> Sequence[int]:
+        """Widths of the hidden layers that its actor has between features and policy heads."""
+        return ()
+
+    @property
     def explorer(self) -> TensorDictModuleBase:
         """The policy that collects experience; it contains `actor` if it is another module.
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
@@ -216,38 +216,3 @@ def freeze(encoder: nn.Module, cfg: NetworkCfg, team: str) -> None:
 def trainable(network: nn.Module) -> list[nn.Parameter]:
     """Return the parameters that an optimiser changes: all that are not frozen."""
     return [parameter for parameter in network.parameters() if parameter.requires_grad]
-
-
-def check_same_actor(cfg: NetworkCfg, stored: Any) -> None:
-    """Check that actors of two configurations with equal parameters are the same function.
-
-    Args:
-        cfg: A configuration.
-        stored: That of another algorithm; what is no `NetworkCfg` is not compared.
-
-    Raises:
-        ValueError: If they differ; the message names the fields.
-    """
-    if isinstance(stored, NetworkCfg):
-        check_same_network(cfg, stored, cfg.critics_only)
-
-
-def check_same_network(cfg: NetworkCfg, stored: NetworkCfg, left_out: Collection[str] = ()) -> None:
-    """Check that two configurations describe the same parameters.
-
-    Args:
-        cfg: A configuration.
-        stored: Another one.
-        left_out: Fields that may differ.
-
-    Raises:
-        ValueError: If they differ; the message names the fields.
-    """
-    new, old = vars(cfg), vars(stored)
-    differing = [
-        f"{name}={old.get(name, 'absent')} in the stored run, {new.get(name, 'absent')} in this one"
-        for name in {**new, **old}
-        if name not in (*cfg.not_parameters, *left_out) and old.get(name) != new.get(name)
-    ]
-    if differing:
-        raise ValueError(f"another network: {'; '.join(differing)}")

@@ -10,14 +10,8 @@ from tensordict.nn import TensorDictModuleBase
 from torchrl.objectives import KLAdaptiveLR
 
 from veca_marl.algos.algorithm import Algorithm
-from veca_marl.algos.networks.factory import (
-    NetworkCfg,
-    TeamNetwork,
-    check_same_actor,
-    check_same_network,
-    make_network,
-    trainable,
-)
+from veca_marl.algos.networks.copies import check_same_network, copy_actor
+from veca_marl.algos.networks.factory import NetworkCfg, TeamNetwork, make_network, trainable
 from veca_marl.algos.networks.gradients import clip_norms, independent_parameters
 from veca_marl.algos.networks.memory import memory_of
 from veca_marl.algos.ppo.advantages import advantages
@@ -182,7 +176,7 @@ class PPO(Algorithm):
             self._check_same_values(other.cfg.value_normalisation)
             copy_parameters(self.network, other.network)
         else:
-            self._copy_actor(other)
+            copy_actor(self, other)
 
     def _check_same_values(self, stored: ValueNormalisation) -> None:
         """Check that both critics have statistics of their values, or neither."""
@@ -192,17 +186,6 @@ class PPO(Algorithm):
                 f"algo.value_normalisation={stored.value} in the stored run, "
                 f"{here.value} in this one"
             )
-
-    def _copy_actor(self, other: Algorithm) -> None:
-        """Copy the actor of another algorithm, which may have layers that this one has not."""
-        check_same_actor(self.cfg.network, other.network_cfg)
-        try:
-            super().init_from(other)
-        except ValueError as error:
-            raise ValueError(
-                f"{error}; an actor of another algorithm fits if it has the same network without "
-                "further layers: that of SAC with algo.policy_hidden=[]"
-            ) from error
 
 
 def _batch_keys(network: TeamNetwork, team: str, masked: bool) -> list[Any]:

@@ -13,13 +13,13 @@ from torch import nn
 
 from veca_marl.algos.algorithm import Algorithm
 from veca_marl.algos.networks.action_values import make_actor_critics
-from veca_marl.algos.networks.exploration import UniformWarmUp
-from veca_marl.algos.networks.factory import (
-    NetworkCfg,
-    check_same_actor,
+from veca_marl.algos.networks.copies import (
     check_same_network,
-    trainable,
+    check_same_settings,
+    copy_actor,
 )
+from veca_marl.algos.networks.exploration import UniformWarmUp
+from veca_marl.algos.networks.factory import NetworkCfg, trainable
 from veca_marl.algos.networks.gradients import clip_norms, independent_parameters
 from veca_marl.algos.networks.memory import memory_size
 from veca_marl.algos.sac.config import SACCfg, Targets
@@ -55,7 +55,7 @@ class SAC(Algorithm):
         self.team, self.cfg, self._spec, self._device = team, cfg, spec, device
         self.exact_resume = cfg.replay.in_checkpoint
         self.network = make_actor_critics(
-            team, spec, cfg.network, cfg.critic, list(cfg.policy_hidden)
+            team, spec, cfg.network, cfg.critic, self.policy_hidden
         ).to(device)
         memory = memory_keys(self.network.encoder, team)
         span = _span(cfg, recurrent=bool(memory))
@@ -87,6 +87,11 @@ class SAC(Algorithm):
     def network_cfg(self) -> NetworkCfg:
         """See `Algorithm`."""
         return self.cfg.network
+
+    @property
+    def policy_hidden(self) -> list[int]:
+        """See `Algorithm`."""
+        return list(self.cfg.policy_hidden)
 
     @property
     def actor(self) -> TensorDictModuleBase:
@@ -200,23 +205,12 @@ class SAC(Algorithm):
         """See `Algorithm`: copies actor and critics from SAC, the actor from another algorithm."""
         if isinstance(other, SAC):
             check_same_network(self.cfg.network, other.cfg.network)
+            check_same_settings("network", _sizes(self.cfg), _sizes(other.cfg))
             copy_parameters(self.network, other.network)
         else:
-            self._copy_actor(other)
+            copy_actor(self, other)
         self._move_target(1.0)
         self._warm_up.active.fill_(False)
-
-    def _copy_actor(self, other: Algorithm) -> None:
-        """Copy the actor of another algorithm, which has no hidden layers after its features."""
-        check_same_actor(self.cfg.network, other.network_cfg)
-        try:
-            super().init_from(other)
-        except ValueError as error:
-            raise ValueError(
-                f"{error}; actors of other algorithms have no layers of "
-                f"algo.policy_hidden={list(self.cfg.policy_hidden)}: they fit with "
-                "algo.policy_hidden=[] and the same network"
-            ) from error
 
     def init_encoders(self, encoders: Mapping[str, Sequence[nn.Module]]) -> None:
         """See `Algorithm`: actor and critics share the encoders."""
@@ -261,3 +255,9 @@ def _mean(measures: list[dict[str, float]]) -> dict[str, float]:
 def _mean_of(numbers: list[float]) -> float:
     known = [number for number in numbers if not math.isnan(number)]
     return sum(known) / len(known) if known else math.nan
+
+
+def _sizes(cfg: SACCfg) -> dict[str, Any]:
+    """Return the settings on which the layers depend beside those of `NetworkCfg`, by name."""
+    critic = {f"algo.critic.{name}": value for name, value in vars(cfg.critic).items()}
+    return {"algo.policy_hidden": list(cfg.policy_hidden), **critic}

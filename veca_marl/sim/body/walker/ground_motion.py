@@ -94,7 +94,8 @@ class GroundMotion:
         It is the end of the arc of a circle that constant speeds give, for any duration.
         """
         half_rad = self.turn_radps * substep_s / 2.0
-        chord_m = self.speed_mps * substep_s * float(np.sinc(half_rad / math.pi))
+        chord_share = math.sin(half_rad) / half_rad if half_rad else 1.0
+        chord_m = self.speed_mps * substep_s * chord_share
         x, y = self.ground
         x += chord_m * math.cos(self.yaw_rad + half_rad)
         y += chord_m * math.sin(self.yaw_rad + half_rad)
