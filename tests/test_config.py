@@ -103,6 +103,11 @@ def test_files_hold_only_what_differs_from_the_dataclasses():
         ([KICK, "seed=abc"], r"seed: Value 'abc' of type 'str' could not be converted to Integer"),
         ([KICK, "task.life_s=x"], r"task.life_s: Value 'x' .* could not be converted to Float"),
         ([KICK, "sede=1"], r"unknown key 'sede' \(did you mean seed\?\); choices: .*playground"),
+        (
+            [KICK, "senses/visoin=blind"],
+            r"'senses/visoin' \(did you mean vision\?\); choices: audio, ",
+        ),
+        ([KICK, "sensors/vision=blind"], r"key 'sensors/vision'.*; choices: .*playground"),
         ([KICK, "+sede=1"], r"unknown key 'sede'; choices: .*playground"),
         ([KICK, "+algo.clipp=1"], r"unknown key 'algo.clipp'; choices: clip, .*gamma"),
         ([KICK, "task.kick_reech=1"], r"unknown key 'task.kick_reech'.*; choices: life_s"),

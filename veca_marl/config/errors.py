@@ -6,7 +6,7 @@ import difflib
 import re
 from collections.abc import Iterator
 from dataclasses import fields, is_dataclass
-from typing import Any
+from typing import Any, get_type_hints
 
 from hydra.errors import ConfigCompositionException, MissingConfigException
 from omegaconf import DictConfig
@@ -52,7 +52,9 @@ def _wrong_value(error: OmegaConfBaseException) -> str:
     names = _keys(error)
     if isinstance(error, (ConfigKeyError, AttributeError)) and names:
         key = str(error.full_key or error.key)
-        near = _nearest(key.rpartition(".")[2], names)
+        group, _, last = key.rpartition("/")
+        names = _names_of_group(error.object_type, group) or names
+        near = _nearest(last.rpartition(".")[2], names)
         return f"unknown key {key!r}{near}; choices: {', '.join(names)}"
     message = _flat(str(error).partition("\n")[0])
     if _NO_GROUP.search(message) and error.full_key:
@@ -74,6 +76,13 @@ def _keys(error: OmegaConfBaseException) -> list[str]:
         return sorted(f.name for f in fields(owner))
     parent = error.parent_node
     return sorted(map(str, parent.keys())) if isinstance(parent, DictConfig) else []
+
+
+def _names_of_group(root: Any, group: str) -> list[str]:
+    """Return the keys of a group, such as ``senses/audio``; none if there is no such group."""
+    for part in filter(None, group.split("/")):
+        root = get_type_hints(root).get(part) if is_dataclass(root) else None
+    return sorted(f.name for f in fields(root)) if group and is_dataclass(root) else []
 
 
 def _wrong_override(message: str) -> str:
