@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from veca_marl.config import compose
 from veca_marl.envs.core.game import Game
 from veca_marl.envs.experts.control.locomotion import locomotion_of
-from veca_marl.envs.experts.perception.call_localization import loudness
+from veca_marl.envs.experts.perception.call_localization import loudness, sound_power
 from veca_marl.envs.tasks.navigation.places import free_place
 from veca_marl.envs.tasks.player_starts import place_player
 from veca_marl.sim.sound import Call
@@ -58,7 +58,7 @@ def listen(game: Game, together: bool, rng: np.random.Generator) -> NDArray[np.f
     way = (caller - head.position) @ head.rotation
     away_m = float(np.linalg.norm(way))
     walls = world.house.obstacles_between(head.position, caller)
-    left, right = loudness(heard["audio"])
+    left, right = loudness(sound_power(heard["audio"]))
     loss = world.playground.transmission_loss_db / 20.0 * walls
     return np.array(
         [(left + right) / 2.0 + math.log10(away_m) + loss, left - right, way[1] / away_m]

@@ -7,7 +7,11 @@ import pytest
 from composed import compose
 
 from veca_marl.envs.core.game import Game
-from veca_marl.envs.experts.perception.call_localization import CallSourceMap, loudness
+from veca_marl.envs.experts.perception.call_localization import (
+    CallSourceMap,
+    loudness,
+    sound_power,
+)
 from veca_marl.sim.sound import Call
 
 STEPS = 10
@@ -76,4 +80,40 @@ def test_loudness_is_the_root_of_the_energy():
     audio = np.full((2, 250), -np.inf)
     audio[0, [3, 200]] = math.log10(3.0), math.log10(4.0)
     audio[1, 7] = 2.0
-    np.testing.assert_allclose(loudness(audio), (math.log10(5.0), 2.0))
+    np.testing.assert_allclose(loudness(sound_power(audio)), (math.log10(5.0), 2.0))
+
+
+@pytest.fixture(scope="module")
+def noisy_game():
+    shut = ("senses/vision=blind", "senses/touch=numb", "senses.audio.noise_floor_db=-80")
+    made = Game(compose(["+task=MultiAgentNav", *shut]).game)
+    yield made
+    made.close()
+
+
+@pytest.fixture
+def noisy_map(noisy_game):
+    noisy_game.reset(np.random.default_rng(0))
+    for player in noisy_game.players:
+        noisy_game.observe(player)
+    ears = noisy_game.players[0].senses["audio"]
+    return CallSourceMap(noisy_game.world, ears.noise_power)
+
+
+def test_the_noise_of_the_receivers_is_no_call(noisy_game, noisy_map):
+    heard(noisy_game, noisy_map, (0.0, 0.0, 0.0), (1.0, 0.0), Call.none)
+    assert not noisy_map.heard
+
+
+def test_a_call_is_localized_beside_noise(noisy_game, noisy_map):
+    for turned_deg in (0.0, 40.0, 80.0):
+        heard(noisy_game, noisy_map, (-1.0, 0.0, turned_deg), (-0.2, 1.0))
+    assert math.dist(noisy_map.best()[:2], (-0.2, 1.0)) < 0.8
+
+
+def test_the_expert_takes_the_noise_of_its_receivers_into_account(noisy_game):
+    noisy_game.reset(np.random.default_rng(0))
+    player = noisy_game.players[0]
+    expert = noisy_game.expert_of(player)
+    expert.act(noisy_game.observe(player))
+    assert not expert._search._calls.heard

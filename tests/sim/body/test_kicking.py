@@ -44,6 +44,16 @@ def test_a_kick_does_not_slow_a_ball_that_is_faster():
     assert prop.velocity == pytest.approx([6.0, 0.0, 0.0])
 
 
+@pytest.mark.parametrize("speed_mps", [1.0, 4.0])
+def test_a_kick_does_not_change_the_spin_of_a_rolling_ball(speed_mps):
+    world = empty_world(ball(position=(0.3, 0.0, 0.1)))
+    walker, prop = walker_in(world), world.prop("ball")
+    spin = (0.0, speed_mps / prop.radius_m, 0.0)
+    prop.set_velocity((speed_mps, 0.0, 0.0), spin)
+    assert walker.kick(prop)
+    assert prop.angular_velocity == pytest.approx(spin)
+
+
 @pytest.mark.parametrize(
     ("prop_cfg", "reason"),
     [

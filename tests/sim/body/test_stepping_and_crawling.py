@@ -36,6 +36,16 @@ def test_a_walker_steps_onto_a_low_heavy_prop_and_off_over_its_edge(mass_kg):
     assert world.prop("platform").position[0] == pytest.approx(0.6, abs=1e-3)
 
 
+def test_a_walker_steps_onto_a_small_thing_at_its_feet_which_it_does_not_see():
+    step = box("step", (0.3, 0.3, 0.1), 0.0, (0.35, 0.0, 0.05), interactions=["step_on"])
+    world = empty_world(step)
+    walker = seeing(world, extra_verbs=["step_on"])
+    begin(world)
+    assert not walker.is_visible(world.prop("step"))
+    assert do(world, walker, "step_on")
+    assert walker.position[0] == pytest.approx(0.35, abs=0.01)
+
+
 @pytest.mark.parametrize("height_m", [0.3, 1.2])
 def test_a_walker_does_not_step_through_a_wall(height_m):
     between = box("wall", (0.05, 3.0, height_m), 0.0, (0.2, 0.0, height_m / 2))

@@ -251,15 +251,32 @@ def test_a_reset_releases_and_equal_actions_give_equal_bytes():
     assert films[0] == films[1] == films[2]
 
 
-def test_a_kick_is_a_verb_too():
-    world = empty_world(ball(position=(0.3, 0.0, 0.1), interactions=["kick"]))
+@pytest.mark.parametrize("radius_m", [0.06, 0.1, 0.15, 0.2])
+def test_a_ball_at_the_foot_is_kicked_though_it_is_below_the_view(radius_m):
+    cfg = ball(radius_m=radius_m, position=(0.2 + radius_m, 0.0, radius_m), interactions=["kick"])
+    world = empty_world(cfg)
     walker = seeing(world)
-    walker.rotate_up_down_head(25.0)
     begin(world)
-    walker.rotate_up_down_head(25.0)
-    world.refresh()
     assert do(world, walker, "kick")
     assert world.prop("ball").velocity[0] > 1.0
+
+
+def test_of_two_balls_at_the_foot_the_one_ahead_is_kicked():
+    beside = ball("beside", position=(0.2, 0.2, 0.1), interactions=["kick"])
+    ahead = ball("ahead", position=(0.3, -0.05, 0.1), interactions=["kick"])
+    world = empty_world(beside, ahead)
+    walker = seeing(world)
+    begin(world)
+    assert do(world, walker, "kick")
+    assert np.linalg.norm(world.prop("ahead").velocity) > 1.0
+    assert np.linalg.norm(world.prop("beside").velocity) < 0.1
+
+
+def test_a_ball_that_does_not_declare_it_is_not_kicked_by_the_verb():
+    world = empty_world(ball(position=(0.3, 0.0, 0.1)))
+    walker = seeing(world)
+    begin(world)
+    assert not do(world, walker, "kick")
 
 
 def test_unknown_verbs_are_refused_where_they_are_named():

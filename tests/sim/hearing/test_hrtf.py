@@ -122,6 +122,19 @@ def test_arrival_times_are_continuous_at_the_lowest_ring():
     assert steps[:10].max() < 1e-3 * RATE * 0.03
 
 
+@pytest.mark.parametrize("n_taps", [100, 300, 700])
+def test_filters_of_any_length_keep_their_magnitudes(n_taps):
+    """At 96 kHz a head has filters of 557 samples; all of them are interpolated alike."""
+    head = sphere_head()
+    filters = np.zeros((*head.filters.shape[:2], n_taps), np.float32)
+    filters[..., : min(n_taps, 128)] = head.filters[..., :n_taps]
+    table = HrtfTable(replace(head, filters=filters))
+    row = int((head.directions @ direction(90.0, 0.0)).argmax())
+    found, measured = (np.abs(np.fft.rfft(f, 2048)) for f in (table.filters[18, 18], filters[row]))
+    assert table.filters.shape[-1] == n_taps
+    assert np.abs(20.0 * np.log10(found / measured)).max() < 0.5
+
+
 def test_arrival_times_at_the_nadir_depend_neither_on_azimuth_nor_ear():
     times = kemar_table().arrival_samples[:, 0]
     assert np.allclose(times, times[0, 0], atol=1e-6)

@@ -18,7 +18,8 @@ from veca_marl.sim.hearing.sofa import read_sofa
 from veca_marl.sim.hearing.unmeasured import arrival_below_s, stand_ins
 
 GRID_STEP_DEG = 5
-_N_FFT = 512
+# length of transforms in lengths of the filters: a short cepstrum aliases
+_OVERSAMPLING = 4
 _MIN_MAGNITUDE = 1e-5
 _BATCH = 256
 # directions of the lowest ring are moved up by this angle into the triangles
@@ -217,7 +218,8 @@ def _interpolate_filters(
     filters: NDArray[np.float32], corners: NDArray[np.int64], weights: Floats
 ) -> NDArray[np.float32]:
     """Interpolate log magnitudes, and return the minimum-phase filters of the result."""
-    magnitude = np.abs(scipy.fft.rfft(filters, _N_FFT))
+    n_fft = 1 << (_OVERSAMPLING * filters.shape[-1] - 1).bit_length()
+    magnitude = np.abs(scipy.fft.rfft(filters, n_fft))
     log_magnitude = np.log(np.maximum(magnitude, _MIN_MAGNITUDE))
     table = np.empty((*corners.shape[:2], *filters.shape[1:]), np.float32)
     for a in range(corners.shape[0]):

@@ -107,6 +107,9 @@ class AudioSense(Sense):
             At 22 050 Hz these are 0 to 5.4 kHz in steps of 21.5 Hz. Exact silence is -8; a
             full-scale sine is 2.7.
         waveform: ``(2, step_samples)`` float32 sound pressure of this step, on request.
+
+    Attributes:
+        noise_power: Squared magnitude of the receivers' own noise in each bin; 0 without noise.
     """
 
     cfg_type = AudioCfg
@@ -122,7 +125,7 @@ class AudioSense(Sense):
         )
         self._teleports = body.teleports
         self._weights = window_weights(cfg.window)
-        self._noise_power = noise_power(cfg.noise_floor_db, self._weights)
+        self.noise_power = noise_power(cfg.noise_floor_db, self._weights)
         self._recent = np.zeros((2, max(WINDOW_SAMPLES, field.step_samples)), np.float32)
         self.specs = {"audio": ArraySpec((2, N_BINS), np.float32, low=SILENCE)}
         if cfg.waveform:
@@ -148,7 +151,7 @@ class AudioSense(Sense):
         waveform = self._listener.render(centre)
         self._append(waveform)
         windowed = self._recent[:, -WINDOW_SAMPLES:] * self._weights
-        observation = {"audio": log_spectrum(windowed, self._noise_power)}
+        observation = {"audio": log_spectrum(windowed, self.noise_power)}
         if "waveform" in self.specs:
             observation["waveform"] = waveform
         return observation

@@ -11,6 +11,7 @@ from veca_marl.envs.core.expert import Expert, register_expert
 from veca_marl.envs.experts.control.locomotion import locomotion_of
 from veca_marl.envs.experts.skills.object_search import ObjectSearch
 from veca_marl.envs.tasks.navigation.multi_agent_nav import MultiAgentNav
+from veca_marl.sim.hearing import AudioSense
 
 
 @register_expert("MultiAgentNav")
@@ -23,8 +24,9 @@ class MultiAgentNavExpert(Expert[MultiAgentNav]):
     for each wall, and differs between the ears with the direction. Without calls it turns round
     once in each room, the nearest first. An agent that is stuck moves backwards.
 
-    Reads privileged state: its own position and heading, the floor plan, and whether the object is
-    visible. A crawling body needs up to a minute where a walker needs ten seconds.
+    Reads privileged state: its own position and heading, the floor plan, the places of walls, doors
+    and things, and whether the object is visible, where it then is, and which agents have reached
+    it. A crawling body needs up to a minute where a walker needs ten seconds.
     """
 
     reads = ("audio",)
@@ -33,7 +35,9 @@ class MultiAgentNavExpert(Expert[MultiAgentNav]):
         """See `Expert.reset`."""
         body, world = self.player.body, self.task.world
         locomotion = locomotion_of(self.player, world.clock.step_s)
-        self._search = ObjectSearch(body, locomotion, self.task.plan, world)
+        ears = self.player.senses.get("audio")
+        noise_power = ears.noise_power if isinstance(ears, AudioSense) else 0.0
+        self._search = ObjectSearch(body, locomotion, self.task.plan, world, noise_power)
 
     def act(self, observation: Mapping[str, NDArray[Any]]) -> Any:
         """Return a command for the player's kind of body, see `Expert.act`."""

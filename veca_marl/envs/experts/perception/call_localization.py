@@ -18,6 +18,7 @@ _ILD = 0.40  # interaural level difference of a call from the side
 _LEVEL_STD, _ILD_STD = 0.15, 0.15
 _GRID_M = 0.4
 _MEMORY = 0.95  # decay of the log-likelihood per update, since callers move
+_LEAST_ENERGY = 1e-16  # of an ear that hears nothing beside its noise
 _AUDIBLE = -5.0  # a call through three walls reaches -4, silence is at -8
 
 
@@ -29,13 +30,17 @@ class CallSourceMap:
 
     Args:
         world: The world, for its rooms and walls.
+        noise_power: Squared magnitude of the receivers' own noise in a bin, which is no call, see
+            `AudioSense.noise_power`.
 
     Attributes:
         heard: Whether a call has been heard.
     """
 
-    def __init__(self, world: World) -> None:
+    def __init__(self, world: World, noise_power: float = 0.0) -> None:
         self._world = world
+        self._noise_power = noise_power
+        self._audible = max(10.0 ** (2.0 * _AUDIBLE), noise_power)
         self._places = np.concatenate([_grid(room) for room in world.playground.rooms])
         self._loss = world.playground.transmission_loss_db / 20.0
         self._log_likelihood = np.zeros(len(self._places))
@@ -48,9 +53,10 @@ class CallSourceMap:
             head: Pose of the listener's head.
             audio: The observation ``audio``, ``(2, 250)``, log10 of magnitudes.
         """
-        if audio.max() < _AUDIBLE:
+        power = sound_power(audio, self._noise_power)
+        if power.max() < self._audible:
             return
-        left, right = loudness(audio)
+        left, right = loudness(power)
         self._places[:, 2] = head.position[2]  # assumes mouths at the height of these ears
         offsets = (self._places - head.position) @ head.rotation
         distances_m = np.maximum(np.linalg.norm(offsets, axis=1), _GRID_M)
@@ -81,12 +87,22 @@ def _grid(room: RoomCfg) -> Floats:
     return np.stack(np.meshgrid(x, y, [0.0]), axis=-1).reshape(-1, 3)
 
 
-def loudness(audio: NDArray[Any]) -> Floats:
-    """Return log10 of the root of each ear's energy, ``(2,)``.
+def sound_power(audio: NDArray[Any], noise_power: float = 0.0) -> Floats:
+    """Return the squared magnitudes of what is heard, ``(2, 250)``.
 
     Args:
         audio: The observation ``audio``, ``(2, 250)``, log10 of magnitudes.
+        noise_power: Squared magnitude of the receivers' own noise in a bin.
     """
-    energy = (10.0 ** (2.0 * audio.astype(np.float64))).sum(axis=1)
-    level: Floats = np.log10(energy) / 2.0
+    power: Floats = np.maximum(10.0 ** (2.0 * audio.astype(np.float64)) - noise_power, 0.0)
+    return power
+
+
+def loudness(power: Floats) -> Floats:
+    """Return log10 of the root of each ear's energy, ``(2,)``.
+
+    Args:
+        power: Squared magnitudes, ``(2, 250)``, not all 0.
+    """
+    level: Floats = np.log10(np.maximum(power.sum(axis=1), _LEAST_ENERGY)) / 2.0
     return level

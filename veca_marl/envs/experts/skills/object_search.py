@@ -30,14 +30,22 @@ class ObjectSearch:
         locomotion: What moves the body.
         plan: Rooms and doors.
         world: The world, for its walls.
+        noise_power: Squared magnitude of the ears' own noise in a bin.
     """
 
-    def __init__(self, body: Body, locomotion: Locomotion, plan: FloorPlan, world: World) -> None:
+    def __init__(
+        self,
+        body: Body,
+        locomotion: Locomotion,
+        plan: FloorPlan,
+        world: World,
+        noise_power: float = 0.0,
+    ) -> None:
         step_s = world.clock.step_s
         self._body, self._plan = body, plan
         detours = detours_in(world, locomotion.clearances.wall_m)
         self._path = PathFollower(body, locomotion, plan, step_s, detours)
-        self._calls = CallSourceMap(world)
+        self._calls = CallSourceMap(world, noise_power)
         self._listen_steps, self._steps = max(1, round(_LISTEN_S / step_s)), 0
         self._found: Floats | None = None
         self._goal = body.position

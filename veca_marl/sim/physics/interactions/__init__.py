@@ -1,5 +1,6 @@
 """Verbs: what bodies do with props when an action names it, and the registry of verbs."""
 
+from veca_marl.sim.physics.interactions.foot import FootInteraction
 from veca_marl.sim.physics.interactions.grab import Grab, Release
 from veca_marl.sim.physics.interactions.grip import Grip
 from veca_marl.sim.physics.interactions.interaction import InteractingBody, Interaction, Verb
@@ -21,6 +22,7 @@ __all__ = [
     "NO_VERB",
     "Close",
     "Crawl",
+    "FootInteraction",
     "Grab",
     "Grip",
     "InteractingBody",

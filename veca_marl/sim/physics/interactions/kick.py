@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from veca_marl.sim.physics.interactions.interaction import InteractingBody, Interaction
+from veca_marl.sim.physics.interactions.foot import FootInteraction
+from veca_marl.sim.physics.interactions.interaction import InteractingBody
 from veca_marl.sim.physics.interactions.registry import register_interaction
 from veca_marl.sim.physics.props.prop import Prop
 
 
 @register_interaction
-class Kick(Interaction):
+class Kick(FootInteraction):
     """Kick a light prop that is ahead and within reach of the foot, see `Walker.can_kick`."""
 
     name: ClassVar[str] = "kick"

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from veca_marl.sim.physics.interactions.interaction import InteractingBody, Interaction, Verb
+from veca_marl.sim.physics.interactions.foot import FootInteraction
+from veca_marl.sim.physics.interactions.interaction import InteractingBody, Verb
 from veca_marl.sim.physics.interactions.registry import register_interaction
 from veca_marl.sim.physics.props.prop import Prop
 
 
 @register_interaction
-class StepOn(Interaction):
+class StepOn(FootInteraction):
     """Step onto the middle of a low, heavy prop, see `Walker.can_step_on`.
 
     The walker walks on its surface, and steps down when it walks over an edge.

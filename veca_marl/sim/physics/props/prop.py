@@ -159,6 +159,17 @@ class Prop:
         return np.array(linear)
 
     @property
+    def angular_velocity(self) -> Floats:
+        """``(3,)`` rad/s, world frame."""
+        if self.joint is not None:
+            state = pybullet.getLinkState(
+                self.body_id, self.link, computeLinkVelocity=1, physicsClientId=self._client
+            )
+            return np.array(state[7])
+        _, angular = pybullet.getBaseVelocity(self.body_id, physicsClientId=self._client)
+        return np.array(angular)
+
+    @property
     def box(self) -> tuple[Floats, Floats]:
         """The corners ``(3,)`` of the box about its shapes, in its own frame, metres."""
         return self._inside

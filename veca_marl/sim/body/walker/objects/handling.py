@@ -59,7 +59,8 @@ class ObjectHandling:
         """
         if not self.can_kick(prop, position):
             return False
-        prop.set_velocity(kicked_velocity(self._cfg, position, prop))
+        velocity = kicked_velocity(self._cfg, position, prop)
+        prop.set_velocity(velocity, prop.angular_velocity)
         self._gait.kick()
         return True
 

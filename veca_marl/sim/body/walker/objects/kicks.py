@@ -44,7 +44,8 @@ def kicked_velocity(cfg: WalkerCfg, here: Floats, prop: Prop) -> Floats:
     """Return the velocity ``(3,)`` m/s of a prop after a kick away from a walker.
 
     The kick adds an impulse of at most `kick_impulse_ns`, away from the walker and upwards, until
-    the prop moves away at `kick_speed_mps`; one that is faster keeps its velocity.
+    the prop moves away at `kick_speed_mps`; one that is faster keeps its velocity. The impulse acts
+    on its centre of mass, so that its angular velocity does not change.
 
     Args:
         cfg: Parameters of the walker.
