@@ -31,7 +31,10 @@ class HelperReward:
       at which the object was visible: turning to and fro adds nothing, also if the object is out
       of sight in between.
 
-    Both are 0 unless the object is visible after the step.
+    Both are 0 unless the object is visible after the step. The sum of ``ahead`` has no bound: an
+    agent that walks in a circle near the object, and sees it on its way there but not on its way
+    back, is paid in every round. With weights several times as large as the paper's that can have
+    a higher return than reaching the object.
 
     Args:
         scene: The scene that eyes see.

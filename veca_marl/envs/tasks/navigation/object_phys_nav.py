@@ -38,7 +38,8 @@ class ObjectPhysNav(ObjectNav):
         reached: 1 on the step in which the target is reached, else 0.
         wrong: 1 on the step in which another object is reached, and the target is not, else 0.
         ahead: Displacement forwards during the step, m (negative backwards), while the target is
-            visible to the agent's eyes. In the paper ``Vis a_f``.
+            visible to the agent's eyes. In the paper ``Vis a_f``. Its sum
+            has no bound: walking in a circle near the object is paid too.
         turn: Decrease of the horizontal angle between the agent's forward direction and the
             direction of the target since the target was last visible, rad, if it is visible after
             the step. In the paper ``Vis a_l L``, see `HelperReward`.
