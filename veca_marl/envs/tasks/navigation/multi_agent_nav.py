@@ -102,8 +102,8 @@ class MultiAgentNav(Task):
             for all agents. The paper's "all agents receive +1 reward when each agent navigates to
             the object" is read as +1 for each agent that arrives.
         ahead: Displacement forwards during the step, m (negative backwards), while the object is
-            visible to the agent's eyes and the agent has not reached it. In the paper ``Vis a_f``. Its sum
-            has no bound: walking in a circle near the object is paid too.
+            visible to the agent's eyes and the agent has not reached it. In the paper ``Vis a_f``.
+            Its sum has no bound: walking in a circle near the object is paid too.
         turn: Decrease of the horizontal angle between the agent's forward direction and the
             direction of the object since the object was last visible, rad, under the same
             conditions. In the paper ``Vis a_l L``.
