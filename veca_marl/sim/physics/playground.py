@@ -84,10 +84,10 @@ class PlaygroundCfg:
         """Check that there is a room, that names are unique, and the numbers."""
         if not self.rooms:
             raise ValueError(f"playground {self.name!r} has no room")
-        self._check_names("props", [prop.name for prop in self.built_props()])
         self._check_names("doors", [door.name for door in self.doors])
         self._check_rooms()
         self._check_doors()
+        self._check_names("props", [prop.name for prop in self.built_props()])
         self._check_floor()
         self._check_sound()
 
