@@ -83,8 +83,9 @@ def wall_props(rooms: Sequence[RoomCfg], doors: Sequence[DoorCfg], cfg: WallsCfg
     Raises:
         ValueError: If a room is not on the floor, two doors overlap, a wall would stand in a room,
             because two rooms are less than one wall thickness apart, a door is not in a wall,
-            reaches beyond one of its rooms or does not lead through to the other, a wall is too thin for the leaf of its door or too
-            short for one that slides into it, or meets another wall there.
+            reaches beyond one of its rooms or does not lead through to the other, a wall is too
+            thin for the leaf of its door or too short for one that slides into it, or meets another
+            wall there.
     """
     _check_floors(rooms)
     lines = wall_lines(rooms, cfg.thickness_m)
