@@ -11,6 +11,7 @@ import numpy as np
 
 from veca_marl.envs.core.task import Player, Task, TaskCfg, Team, register, terms
 from veca_marl.envs.tasks.navigation import places
+from veca_marl.envs.tasks.navigation.connection import check_connected
 from veca_marl.envs.tasks.navigation.doorways import check_doorways
 from veca_marl.envs.tasks.navigation.floor_plan import FloorPlan
 from veca_marl.envs.tasks.navigation.helper_reward import (
@@ -120,6 +121,7 @@ class MultiAgentNav(Task):
     @classmethod
     def check_playground(cls, cfg: Any, playground: PlaygroundCfg) -> None:
         check_rooms(playground, cfg.agents)
+        check_connected(cls.__name__, playground, playground.rooms)
         check_placement(
             lambda rng: _try_start(cfg, playground, rng),
             f"playground {playground.name!r}, task.radius_m={cfg.radius_m:g}, "
