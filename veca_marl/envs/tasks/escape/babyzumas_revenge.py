@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -19,7 +20,7 @@ from veca_marl.envs.tasks.navigation.places import free_place, furniture_of, pla
 from veca_marl.envs.tasks.player_starts import place_player
 from veca_marl.sim.body.walker import WalkerCfg
 from veca_marl.sim.geometry import Floats
-from veca_marl.sim.physics import DoorCfg, LockCfg, PlaygroundCfg, RoomCfg
+from veca_marl.sim.physics import DoorCfg, LockCfg, PlannedProp, PlaygroundCfg, RoomCfg
 from veca_marl.sim.physics.props.library import door_leaf
 from veca_marl.sim.physics.props.library.doors import LEAF_M, LEAF_WALL_M
 from veca_marl.sim.sound import SoundCfg, SoundKind
@@ -91,8 +92,9 @@ class BabyzumasRevenge(Task):
     def check_playground(cls, cfg: Any, playground: PlaygroundCfg) -> None:
         room, door = _start_of(playground)
         _check_thickness(playground, door)
+        furniture, cupboard = planned_furniture(playground), planned_cupboard()
         check_placement(
-            lambda rng: _try_start(playground, room, door, rng),
+            lambda rng: _try_start(room, door, furniture, cupboard, rng),
             f"BabyzumasRevenge in room {room.name!r} of playground {playground.name!r}",
             "a larger room with less furniture, such as playground=two_rooms",
         )
@@ -160,11 +162,14 @@ def direction_out(room: RoomCfg, place: Floats) -> Floats:
 
 
 def _try_start(
-    playground: PlaygroundCfg, room: RoomCfg, door: DoorCfg, rng: np.random.Generator
+    room: RoomCfg,
+    door: DoorCfg,
+    furniture: Sequence[PlannedProp],
+    cupboard: PlannedProp,
+    rng: np.random.Generator,
 ) -> None:
     """Draw the places of the cupboard and of the agent as at the start of an episode."""
-    furniture, doorway = planned_furniture(playground), np.array(door.position_m)
-    cupboard = planned_cupboard()
+    doorway = np.array(door.position_m)
     cupboard.place(*draw_place_at_wall(room, furniture, doorway, _DOOR_APART_M, rng))
     free_place(room, [*furniture, cupboard], _START_CLEAR_M, rng)
 
