@@ -63,7 +63,7 @@ def test_a_placement_that_fails_now_and_then_is_refused():
         if len(seen) == TRIALS:
             raise ValueError("full")
 
-    with pytest.raises(ValueError, match="^a sack: full; choose another$"):
+    with pytest.raises(ValueError, match=r"^a sack: full; choose another$"):
         check_placement(place, "a sack", "another")
     assert len(set(seen)) == TRIALS == 20
 
