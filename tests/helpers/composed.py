@@ -32,6 +32,7 @@ def compose(overrides=()):
         composed.check_teams()
         composed.game.check_bodies()
         composed.game.check_playground()
+        composed.game.check_clock()
     except (OmegaConfBaseException, ValueError) as error:
         raise config.ConfigError(one_line(error)) from error
     return composed

@@ -111,6 +111,7 @@ def to_config(node: DictConfig) -> Config:
         config.check_teams()
         config.game.check_bodies()
         config.game.check_playground()
+        config.game.check_clock()
     except (OmegaConfBaseException, ValueError) as error:
         raise ConfigError(one_line(error)) from error
     return config

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import started
 
+from veca_marl.config import ConfigError
 from veca_marl.envs.core.scripted_episodes import play_to_end
 from veca_marl.envs.core.team import Script
 
@@ -96,3 +97,27 @@ def test_the_expert_escapes_from_a_room_of_a_house(playground, room):
 def test_a_playground_without_a_room_with_one_open_door_is_refused(playground):
     with pytest.raises(ValueError, match=rf"playground '{playground}' has none: choose .*house2"):
         game_of(f"playground={playground}")
+
+
+LOW_DOORS = ("playground=random_house", "playground.seed=2", "playground.walls.door_height_m=1.2")
+
+
+@pytest.mark.parametrize(
+    ("more", "height_m"), [([], 1.2), (["playground.room_height_m=1.0"], 1.0)], ids=["door", "room"]
+)
+def test_the_leaf_is_as_high_as_the_opening_and_opens(more, height_m):
+    """The wall over a door of 1.2 m held a leaf of 2 m."""
+    game = game_of(*LOW_DOORS, *more)
+    leaf = game.task.door
+    assert leaf.cfg.parts[0].size_m[2] == pytest.approx(height_m - 0.02)
+    leaf.unlock(game.task.key)
+    leaf.open()
+    for _ in range(40):
+        game.world.step()
+    assert leaf.opening > 0.95
+    game.close()
+
+
+def test_walls_that_are_too_thin_for_the_leaf_are_refused():
+    with pytest.raises(ConfigError, match=r"walls.thickness_m=0.04 is too thin; choose at least"):
+        game_of(*LOW_DOORS[:2], "playground.walls.thickness_m=0.04")

@@ -7,6 +7,7 @@ import pytest
 import started
 from composed import compose
 
+from veca_marl.config import ConfigError
 from veca_marl.envs.core.game import Game
 from veca_marl.envs.core.team import Script
 from veca_marl.sim.senses import make_senses
@@ -43,6 +44,17 @@ def drive(game, steps):
         walk(game)
         track.append([*game.task.car.prop.position, game.task.car.heading_rad])
     return np.array(track)
+
+
+@pytest.mark.parametrize(
+    ("task", "speed"),
+    [("DodgeCar", "50"), ("ChaseCar", "50"), ("KickTheBall", "[50,60]")],
+)
+def test_a_speed_that_is_too_great_for_the_clock_is_refused_by_the_configuration(task, speed):
+    words = [f"+task={task}", f"task.speed_mps={speed}"]
+    with pytest.raises(ConfigError, match=r"task.speed_mps.* at most .* raise clock.substeps"):
+        compose(words)
+    compose([*words, "clock.substeps=40"])
 
 
 # ---- the car

@@ -142,6 +142,12 @@ def test_what_cannot_be_built_is_refused(override, message):
         Game(compose(["+task=MazeNav", override]).game)
 
 
+def test_a_trial_shorter_than_a_step_is_refused_by_the_configuration():
+    with pytest.raises(ConfigError, match=r"task.trial_s=0.03 is shorter than a step of 0.04 s"):
+        compose(["+task=MazeNav", "task.trial_s=0.03"])
+    compose(["+task=MazeNav", "task.trial_s=0.04"])
+
+
 # ---- trials
 
 

@@ -9,6 +9,7 @@ from seeking import shipped
 
 from veca_marl.config import ConfigError
 from veca_marl.envs.core.game import Game
+from veca_marl.envs.tasks.navigation.placement_check import TRIALS, check_placement
 from veca_marl.envs.tasks.navigation.places import (
     free_pair,
     furniture_of,
@@ -49,6 +50,22 @@ CLEAR_M, APART_M = 0.8, 1.0  # of MultiAgentNav
 def test_what_does_not_fit_is_refused_by_the_configuration(task, overrides, message):
     with pytest.raises(ConfigError, match=message):
         compose([f"+task={task}", *overrides])
+
+
+def test_a_placement_that_fails_now_and_then_is_refused():
+    """A single trial passed, and some reset failed later."""
+    with pytest.raises(ConfigError, match=r"task.apart_m=4\.4 .*; choose fewer"):
+        compose(["+task=ObjectNav", "task.objects=[ball,cube]", "task.apart_m=4.4"])
+    seen = []
+
+    def place(rng):
+        seen.append(rng.random())
+        if len(seen) == TRIALS:
+            raise ValueError("full")
+
+    with pytest.raises(ValueError, match=r"^a sack: full; choose another$"):
+        check_placement(place, "a sack", "another")
+    assert len(set(seen)) == TRIALS == 20
 
 
 @pytest.mark.parametrize("playground", ["single_room", "house2"])

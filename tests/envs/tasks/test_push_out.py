@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from composed import compose
 from contests import episodes, game_of, rest, total_reward
 
 OUTSIDE = (1.3, 0.0, 0.0)
@@ -269,3 +270,16 @@ def test_shirts_have_the_colours_of_the_teams(task):
         assert seen > 20, player.name
         assert other < 20 or task == "PushOut2v2", player.name  # where mates are in view as well
     game.close()
+
+
+@pytest.mark.parametrize("task", ["PushOut1v1", "PushOut2v2"])
+def test_furniture_in_the_ring_is_refused_by_name(task):
+    """A player that backs against it could not be pushed out."""
+    with pytest.raises(
+        ValueError,
+        match=r"'single_room': task.radius_m=2.5: 'bed' is in the ring, 2.05 m from the middle of "
+        "room 'room'; choose a smaller one, or playground=simple",
+    ):
+        compose([f"+task={task}", "playground=single_room", "task.radius_m=2.5"])
+    compose([f"+task={task}", "playground=single_room", "task.radius_m=2.0"])
+    compose([f"+task={task}", "task.radius_m=2.5"])

@@ -12,8 +12,10 @@ from veca_marl.sim.physics import (
     JointKind,
     LockCfg,
     PartCfg,
+    PlaygroundCfg,
     PropCfg,
     PropShape,
+    World,
     pybullet,
 )
 
@@ -362,3 +364,15 @@ def test_a_joint_needs_a_movable_prop_and_a_fixed_parent():
         world.add_prop(drawer())
     with pytest.raises(ValueError, match="'crate' has no joint"):
         world.prop("crate").set_opening(0.5)
+
+
+@pytest.mark.parametrize(("key", "fault"), [("kye", "is no prop"), ("cupboard", "is a fixed prop")])
+def test_a_lock_without_a_key_that_can_be_carried_is_refused_with_the_loose_props(key, fault):
+    world = World(PlaygroundCfg(props=[CUPBOARD, door(lock=LockCfg(key, locked=False))]))
+    for name in ("ball", "key"):
+        world.add_prop(box(name, position=(0.0, 1.0, 1.0)))
+    with pytest.raises(
+        ValueError, match=rf"prop 'door': the key '{key}' of its lock {fault}; .*\['ball', 'key'\]"
+    ):
+        world.freeze()
+    world.close()

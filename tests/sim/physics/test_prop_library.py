@@ -138,3 +138,39 @@ def test_a_fraction_piece_has_its_share_of_the_disc(fraction):
 def test_a_fraction_must_be_one():
     with pytest.raises(ValueError, match=r"fraction=1\.2"):
         fraction_piece("piece", 1.2, (0.0, 0.0))
+
+
+@pytest.mark.parametrize(
+    ("make", "numbers", "message"),
+    [
+        (basket, {"size_m": (0.03, 0.4, 0.15)}, r"size_m=\(0.03, .* above \(0.03, 0.03, 0.015\)"),
+        (basket, {"size_m": (0.4, 0.02, 0.15)}, r"size_m=\(0.4, 0.02, 0.15\)"),
+        (basket, {"size_m": (0.4, 0.4, 0.01)}, r"size_m=\(0.4, 0.4, 0.01\)"),
+        (basket, {"size_m": (0.4, 0.4)}, r"size_m=\(0.4, 0.4\)"),
+        (chest, {"size_m": (0.35, 0.55, 0.045)}, "above .0.03, 0.03, 0.045.*below the lid"),
+        (cupboard_with_drawer, {"size_m": (0.05, 0.45, 0.5)}, r"size_m=\(0.05, .*above \(0.056, "),
+        (cupboard_with_drawer, {"size_m": (0.4, 0.07, 0.5)}, "0.072, 0.232.*drawer_height_m=0.16"),
+        (cupboard_with_drawer, {"size_m": (0.4, 0.45, 0.2)}, r"size_m=\(0.4, 0.45, 0.2\)"),
+        (cupboard_with_drawer, {"drawer_height_m": 0.45}, "drawer_height_m=0.45"),
+        (
+            cupboard_with_drawer,
+            {"drawer_height_m": 0.01},
+            "drawer_height_m=0.01 must be above 0.01",
+        ),
+    ],
+)
+def test_sizes_without_an_interior_are_refused_by_the_name_of_the_argument(make, numbers, message):
+    with pytest.raises(ValueError, match=f"^thing: .*{message}"):
+        make("thing", (0.0, 0.0), **numbers)
+
+
+@pytest.mark.parametrize(
+    ("make", "size_m"),
+    [
+        (lambda *place, **size: [basket(*place, **size)], (0.031, 0.031, 0.016)),
+        (chest, (0.031, 0.031, 0.046)),
+        (cupboard_with_drawer, (0.057, 0.073, 0.233)),
+    ],
+)
+def test_the_smallest_sizes_can_be_built(make, size_m):
+    empty_world(*make("thing", (0.0, 0.0), size_m=size_m)).close()

@@ -65,18 +65,19 @@ class GameCfg:
         return replace(self, senses=replace(self.senses, audio=audio), team=team)
 
     def check(self) -> None:
-        """Check the duration, the teams, the scripts, the bodies and the playground.
+        """Check the duration, the teams, the scripts, the bodies, the playground and the clock.
 
         Raises:
             ValueError: If an episode has no step, a team does not exist or has no players, all
-                teams are scripted, the task has no expert for a script, or a body or the playground
-                does not fit.
+                teams are scripted, the task has no expert for a script, or a body, the playground
+                or the clock does not fit.
         """
         self._check_duration()
         self._check_sizes()
         self._check_teams([team.name for team in self.teams])
         self.check_bodies()
         self.check_playground()
+        self.check_clock()
 
     def check_bodies(self) -> None:
         """Check that the task can be played with the bodies of all teams.
@@ -96,6 +97,14 @@ class GameCfg:
         """
         find_task(self.task.name).check_playground(self.task, self.playground)
         self._check_floor()
+
+    def check_clock(self) -> None:
+        """Check that the numbers of the task fit the time steps.
+
+        Raises:
+            ValueError: If something moves too far in a step, or is shorter than one.
+        """
+        find_task(self.task.name).check_clock(self.task, self.clock)
 
     def _check_duration(self) -> None:
         if self.max_steps < 1:

@@ -16,7 +16,7 @@ from veca_marl.registry import Registry
 from veca_marl.sim.body import Body, BodyCfg
 from veca_marl.sim.body.humanoid import Humanoid, HumanoidCfg
 from veca_marl.sim.body.walker import Walker, WalkerCfg
-from veca_marl.sim.physics import PlaygroundCfg, World
+from veca_marl.sim.physics import ClockCfg, PlaygroundCfg, World
 from veca_marl.sim.sense import Sense
 
 TaskType = TypeVar("TaskType", bound="type[Task]")
@@ -269,6 +269,14 @@ class Task(ABC):
     @classmethod  # noqa: B027  optional
     def check_playground(cls, cfg: Any, playground: PlaygroundCfg) -> None:
         """Check that the task can be played in a playground, before a world is built.
+
+        Raises:
+            ValueError: If not; the message names the value that is impossible and the choices.
+        """
+
+    @classmethod  # noqa: B027  optional
+    def check_clock(cls, cfg: Any, clock: ClockCfg) -> None:
+        """Check that the numbers of the task fit the time steps, before a world is built.
 
         Raises:
             ValueError: If not; the message names the value that is impossible and the choices.

@@ -11,17 +11,22 @@ from dataclasses import dataclass, field
 from itertools import combinations
 
 from veca_marl.registry import Registry
+from veca_marl.sim.physics.houses.door_leaves import leaf_name
 from veca_marl.sim.physics.houses.furniture import furniture_prop
 from veca_marl.sim.physics.houses.furniture_cfg import FurnitureCfg
+from veca_marl.sim.physics.houses.furniture_places import check_furniture
+from veca_marl.sim.physics.houses.leaf_swing import check_swings
 from veca_marl.sim.physics.houses.walls import WallsCfg, floor_coverings, wall_props
 from veca_marl.sim.physics.impacts.cfg import ImpactCfg
-from veca_marl.sim.physics.props import PropCfg, check_appearance
+from veca_marl.sim.physics.props import PropCfg, PropShape, check_appearance
 from veca_marl.sim.physics.rooms import DoorCfg, RoomCfg
 from veca_marl.sim.sound import House, Room
 from veca_marl.sim.sound.rooms import TRANSMISSION_LOSS_DB
 
 THICKEST_WALL_M = 0.5
 """The threshold of a door lies within the wall, at most so far from either room."""
+
+_CENTRED = {PropShape.box, PropShape.sphere, PropShape.cylinder, PropShape.capsule}
 
 SHARED_VOLUME_M3 = 1e-6
 """Greatest volume that two adjacent rooms may share, for rounding errors of their corners."""
@@ -42,7 +47,8 @@ class PlaygroundCfg:
         doors: The openings between rooms.
         walls: How walls are built round the rooms, with openings for the doors; None if the walls
             are among the props.
-        furniture: Pieces of furniture; their sizes are fixed.
+        furniture: Pieces of furniture; their sizes are fixed. Each stands in a room, apart from
+            others, from doors and from leaves that turn.
         props: Everything else: toys, walls where `walls` is None, things of any size.
         floor_size_m: Extent of the drawn floor along x and y.
         floor_centre_m: Its middle.
@@ -81,13 +87,14 @@ class PlaygroundCfg:
         return [*built, *map(furniture_prop, self.furniture), *self.props]
 
     def __post_init__(self) -> None:
-        """Check that there is a room, that names are unique, and the numbers."""
+        """Check that there is a room, that names are unique, the numbers and the furniture."""
         if not self.rooms:
             raise ValueError(f"playground {self.name!r} has no room")
-        self._check_names("props", [prop.name for prop in self.built_props()])
         self._check_names("doors", [door.name for door in self.doors])
         self._check_rooms()
         self._check_doors()
+        self._check_names("props", [prop.name for prop in self.built_props()])
+        self._check_things()
         self._check_floor()
         self._check_sound()
 
@@ -101,6 +108,35 @@ class PlaygroundCfg:
                     f"playground {self.name!r}: rooms {one.name!r} and {other.name!r} overlap by "
                     f"{shared_m3:.3g} m3; a point belongs to at most one room"
                 )
+
+    def _check_things(self) -> None:
+        """Check the places of furniture, that leaves can turn, and that free props are not sunk."""
+        start = f"playground {self.name!r}: "
+        try:
+            check_furniture(self.furniture, self.rooms, self.doors, walled=self.walls is not None)
+            self._check_leaves()
+        except ValueError as error:
+            raise ValueError(f"{start}{error}") from None
+        for prop in self.props:
+            is_free = prop.mass_kg > 0.0 and prop.joint is None
+            if is_free and prop.shape in _CENTRED and prop.position_m[2] < 0.0:
+                raise ValueError(
+                    f"{start}prop {prop.name!r}: position_m={tuple(prop.position_m)} is below the "
+                    "floor, at the height 0, although the prop can move; its position is that of "
+                    "its centre"
+                )
+
+    def _check_leaves(self) -> None:
+        """Check that hinged leaves meet neither walls nor furniture."""
+        doors = [door for door in self.doors if door.leaf is not None]
+        if not doors:
+            return
+        built = {prop.name: prop for prop in self.built_props()}
+        pieces = {piece.name for piece in self.furniture}
+        things = [
+            prop for prop in built.values() if prop.shape is PropShape.wall or prop.name in pieces
+        ]
+        check_swings(doors, [built[leaf_name(door)] for door in doors], things)
 
     def _check_floor(self) -> None:
         """Check the numbers of the drawn floor."""

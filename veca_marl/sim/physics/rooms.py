@@ -113,8 +113,9 @@ class LeafCfg:
     """The leaf of a door, a prop with the name of the door after ``leaf_``.
 
     Attributes:
-        kind: A hinge turns it by 90 degrees, a slide moves it into the wall beside the opening,
-            which has to be as long as the leaf, and must not meet another wall or leaf there.
+        kind: A hinge turns it by 90 degrees, where it must not meet walls or furniture; a slide
+            moves it into the wall beside the opening, which has to be as long as the leaf, and must
+            not meet another wall or leaf there.
         opening: Opening at the start of an episode, from 0 (closed) to 1.
         opens_to_front: Whether it opens to the side of greater x or y, across the wall for a hinge
             and along it for a slide; otherwise to the other.

@@ -15,6 +15,7 @@ from veca_marl.sim.physics.clock import ClockCfg
 from veca_marl.sim.physics.floor import FLOOR_NAME, add_floor
 from veca_marl.sim.physics.impacts.sounds import ImpactSounds
 from veca_marl.sim.physics.interactions.registry import check_interactions
+from veca_marl.sim.physics.keys import check_keys
 from veca_marl.sim.physics.mover import Mover
 from veca_marl.sim.physics.playground import PlaygroundCfg, make_house
 from veca_marl.sim.physics.props import Prop, PropCfg, follow_physics, limit_detection
@@ -129,8 +130,14 @@ class World:
         )
 
     def freeze(self) -> None:
-        """Save the built state, to which `reset` returns. Nothing can be added afterwards."""
+        """Save the built state, to which `reset` returns. Nothing can be added afterwards.
+
+        Raises:
+            ValueError: If the key of a lock is no prop of this world, or a fixed one.
+            RuntimeError: If the world is frozen.
+        """
         self._check_not_frozen("freeze it again")
+        check_keys(self.props)
         # Bullet discards the contacts of the last episode only if the saved state holds contacts:
         # without them, objects that touch at the start move differently than in a fresh world
         self._set_contact_share()

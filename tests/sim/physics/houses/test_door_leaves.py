@@ -1,4 +1,4 @@
-"""A sliding leaf has room in the wall beside its door, or is refused with what is possible."""
+"""A leaf has room to slide or to turn, or is refused with what is possible."""
 
 from itertools import product
 
@@ -8,6 +8,8 @@ from seeking import shipped
 
 from veca_marl.sim.physics import (
     DoorCfg,
+    FurnitureCfg,
+    FurnitureKind,
     JointKind,
     LeafCfg,
     PlaygroundCfg,
@@ -133,3 +135,73 @@ def test_two_leaves_that_would_meet_in_one_wall_are_refused():
 
 def test_the_sliding_door_of_house2_opens():
     assert opening_reached(shipped("house2"), "door_kitchen") == pytest.approx(1.0)
+
+
+# ---- hinged leaves
+
+
+def hinged(at_m=1.5, front=True, furniture=(), turned=False, thickness_m=0.1):
+    """Two rooms of 3 m along a wall, with a hinged door in it; the hinge is at the end in +x."""
+    t = thickness_m
+    turn = slice(None, None, -1 if turned else 1)
+    rooms = [
+        RoomCfg(name, (*(0.0, y)[turn], 0.0), (3.0, 3.0, HEIGHT_M))
+        for name, y in (("a", 0.0), ("b", 3.0 + t))
+    ]
+    door = DoorCfg(
+        "door", ("a", "b"), (at_m, 3.0 + t / 2)[turn], 1.0, LeafCfg(opens_to_front=front)
+    )
+    return PlaygroundCfg("pair", rooms, [door], walls=WallsCfg(t), furniture=list(furniture))
+
+
+@pytest.mark.parametrize(("at_m", "turned"), [(2.49, False), (0.51, True)])
+@pytest.mark.parametrize("front", [True, False])
+def test_a_leaf_whose_handle_would_meet_a_side_wall_is_refused(at_m, turned, front):
+    """The hinge is 1 cm beside the wall; the handle stands out by 3 cm."""
+    with pytest.raises(
+        ValueError,
+        match=r"'pair': door 'door': its leaf of 1 m meets 'wall_\d+' after \d+ of 90 degrees; "
+        "move the door$",
+    ):
+        hinged(at_m, front, turned=turned)
+    inner_m = at_m - 0.03 if not turned else at_m + 0.03
+    assert opening_reached(hinged(inner_m, front, turned=turned)) == pytest.approx(1.0, abs=0.01)
+
+
+def test_a_side_wall_at_the_other_end_of_a_leaf_is_no_hindrance():
+    assert opening_reached(hinged(0.5)) == pytest.approx(1.0, abs=0.01)
+
+
+@pytest.mark.parametrize("front", [True, False])
+def test_a_leaf_that_would_meet_furniture_is_refused_with_the_choices(front):
+    chest = FurnitureCfg("chest", FurnitureKind.toy_chest, (1.5, 3.1 + 0.7 if front else 2.3))
+    with pytest.raises(
+        ValueError,
+        match=r"door 'door': its leaf of 1 m meets 'chest' after \d+ of 90 degrees; choose "
+        rf"leaf.opens_to_front={str(not front).lower()}, or move the door or 'chest'",
+    ):
+        hinged(front=front, furniture=[chest])
+    playground = hinged(front=not front, furniture=[chest])
+    assert opening_reached(playground) == pytest.approx(1.0, abs=0.01)
+
+
+def test_furniture_on_both_sides_leaves_no_choice_of_the_side():
+    chests = [
+        FurnitureCfg(f"chest_{n}", FurnitureKind.toy_chest, (1.5, y))
+        for n, y in ((1, 2.3), (2, 3.8))
+    ]
+    with pytest.raises(ValueError, match="90 degrees; move the door or 'chest_2'"):
+        hinged(furniture=chests)
+
+
+def test_every_hinged_leaf_that_is_accepted_opens():
+    accepted = 0
+    for x, front, thickness_m in product(np.arange(0.5, 2.6, 0.2), (True, False), (0.1, 0.4)):
+        chest = FurnitureCfg("chest", FurnitureKind.toy_chest, (float(x), 3.0 + thickness_m + 0.9))
+        try:
+            playground = hinged(1.5, front, [chest], thickness_m=thickness_m)
+        except ValueError:
+            continue
+        accepted += 1
+        assert opening_reached(playground) == pytest.approx(1.0, abs=0.01), (x, front)
+    assert 20 < accepted < 44

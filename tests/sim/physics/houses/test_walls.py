@@ -162,6 +162,29 @@ def test_an_opening_that_reaches_beyond_a_room_is_refused():
         PlaygroundCfg("flat", rooms, [replace(door, position_m=(2.6, -0.05))], walls=WallsCfg())
 
 
+@pytest.mark.parametrize(("gap_m", "at_m"), [(0.15, 3.05), (0.15, 3.1), (0.3, 3.05)])
+def test_a_door_that_another_wall_fills_is_refused_with_the_gap(gap_m, at_m):
+    """Each room had its own wall, and the door was an opening in one of them only."""
+    door = DoorCfg("door", ("room_0", "room_1"), (at_m, 1.0), 1.0)
+    with pytest.raises(
+        ValueError,
+        match=rf"door 'door': its opening does not lead from room 'room_0' to 'room_1', which are "
+        rf"{gap_m} m apart along x; .* walls.thickness_m=0.1 apart",
+    ):
+        row(2, gap_m, doors=[door])
+    assert len(row(2, gap_m).built_props()) == 8  # without a door rooms may be so far apart
+
+
+def test_a_door_in_a_wall_on_the_far_side_of_a_room_is_refused():
+    rooms = [
+        RoomCfg("narrow", (0.0, 0.0, 0.0), (0.3, 3.0, 2.5)),
+        RoomCfg("wide", (0.4, 0.0, 0.0), (3.0, 3.0, 2.5)),
+    ]
+    door = DoorCfg("door", ("narrow", "wide"), (-0.05, 1.0), 1.0)
+    with pytest.raises(ValueError, match="does not lead from room 'narrow' to 'wide'"):
+        PlaygroundCfg("flat", rooms, [door], walls=WallsCfg())
+
+
 def test_rooms_are_separate_without_a_door_and_connected_by_it():
     door = DoorCfg("door", ("room_0", "room_1"), (3.05, 1.0), 1.0)
     assert FloorMap(row(2)).count == 2

@@ -16,7 +16,7 @@ from veca_marl.envs.tasks.navigation.floors.scattering import Spacing, scattered
 from veca_marl.envs.tasks.navigation.placement_check import check_placement
 from veca_marl.sim.body.walker import WalkerCfg
 from veca_marl.sim.geometry import Floats
-from veca_marl.sim.physics import PlaygroundCfg
+from veca_marl.sim.physics import ClockCfg, PlaygroundCfg
 from veca_marl.sim.sound import SoundCfg, SoundKind
 
 _CLEAR_M = 0.35  # of starting places, from walls and furniture
@@ -79,10 +79,13 @@ class CarGame(Task):
             "a smaller one, or a larger room, such as playground=simple",
         )
 
+    @classmethod
+    def check_clock(cls, cfg: Any, clock: ClockCfg) -> None:
+        check_speed(cfg.speed_mps, clock)
+
     def build(self) -> None:
         self.walker = require_walker(self.players[0])
         self._furniture = places.furniture_of(self.world)
-        check_speed(self.cfg.speed_mps, self.world.clock)
         motion = Motion(self.cfg.speed_mps, math.radians(self.cfg.turn_degps))
         self.car = ToyCar(self.world, motion, self.cfg.sound(), self.interactions)
         self.touched = False

@@ -9,10 +9,20 @@ from itertools import combinations, product
 import numpy as np
 
 from veca_marl.envs.core.task import Player
+from veca_marl.envs.tasks.navigation.floors.clearance import clearances_m
+from veca_marl.envs.tasks.navigation.places import is_furniture
 from veca_marl.envs.tasks.player_starts import place_player
 from veca_marl.sim.body import Body
 from veca_marl.sim.geometry import Floats
-from veca_marl.sim.physics import PlaygroundCfg, PropCfg, PropShape, World, penetration_m
+from veca_marl.sim.physics import (
+    PlannedProp,
+    PlaygroundCfg,
+    PropCfg,
+    PropShape,
+    RoomCfg,
+    World,
+    penetration_m,
+)
 
 Colour = tuple[float, float, float]
 
@@ -23,7 +33,7 @@ _MOST_DRAWS = 200
 
 
 def check_ring(radius_m: float, playground: PlaygroundCfg) -> None:
-    """Check that a ring fits into the first room.
+    """Check that a ring fits into the first room, with all furniture outside of it.
 
     Raises:
         ValueError: If it does not.
@@ -35,6 +45,21 @@ def check_ring(radius_m: float, playground: PlaygroundCfg) -> None:
             f"the room {room.name!r} of {room.size_m[0]:g} x {room.size_m[1]:g} m; choose a "
             "smaller one, or playground=simple or single_room"
         )
+    away_m, nearest = _nearest_furniture(room, playground)
+    if away_m < radius_m:
+        raise ValueError(
+            f"playground {playground.name!r}: task.radius_m={radius_m}: {nearest!r} is in the "
+            f"ring, {away_m:.2f} m from the middle of room {room.name!r}; choose a smaller one, "
+            "or playground=simple"
+        )
+
+
+def _nearest_furniture(room: RoomCfg, playground: PlaygroundCfg) -> tuple[float, str]:
+    """Return the distance of the nearest thing from the middle of a room, metres, and its name."""
+    things = [prop for prop in playground.built_props() if is_furniture(prop)]
+    middle = room.middle_m[:2]
+    away = [(float(clearances_m(PlannedProp(thing), middle)), thing.name) for thing in things]
+    return min(away, default=(math.inf, ""))
 
 
 class Ring:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -19,14 +20,16 @@ from veca_marl.envs.tasks.navigation.places import free_place, furniture_of, pla
 from veca_marl.envs.tasks.player_starts import place_player
 from veca_marl.sim.body.walker import WalkerCfg
 from veca_marl.sim.geometry import Floats
-from veca_marl.sim.physics import DoorCfg, LockCfg, PlaygroundCfg, RoomCfg
+from veca_marl.sim.physics import DoorCfg, LockCfg, PlannedProp, PlaygroundCfg, RoomCfg
 from veca_marl.sim.physics.props.library import door_leaf
+from veca_marl.sim.physics.props.library.doors import LEAF_M, LEAF_WALL_M
 from veca_marl.sim.sound import SoundCfg, SoundKind
 
 OPEN = 0.8
 """Opening from which the drawer and the door count as open."""
 _DOOR_APART_M = 1.3  # of the cupboard from the middle of the door
 _START_CLEAR_M = 0.45  # of the start from walls and things
+_HANDMADE_M = 2.0  # height of the doors in walls that are props
 _THRESHOLD_M = 0.2  # behind the border of the next room it counts as entered
 
 
@@ -88,8 +91,10 @@ class BabyzumasRevenge(Task):
     @classmethod
     def check_playground(cls, cfg: Any, playground: PlaygroundCfg) -> None:
         room, door = _start_of(playground)
+        _check_thickness(playground, door)
+        furniture, cupboard = planned_furniture(playground), planned_cupboard()
         check_placement(
-            lambda rng: _try_start(playground, room, door, rng),
+            lambda rng: _try_start(room, door, furniture, cupboard, rng),
             f"BabyzumasRevenge in room {room.name!r} of playground {playground.name!r}",
             "a larger room with less furniture, such as playground=two_rooms",
         )
@@ -103,8 +108,9 @@ class BabyzumasRevenge(Task):
         self.doorway = np.array(doorway.position_m)
         self.out = direction_out(self.room, self.doorway)
         yaw_deg = math.degrees(math.atan2(self.out[1], self.out[0]))
+        height_m = _leaf_height_m(playground, doorway)
         leaf = door_leaf(
-            "door_leaf", doorway.position_m, yaw_deg, doorway.width_m, lock=LockCfg("key")
+            "door_leaf", doorway.position_m, yaw_deg, doorway.width_m, height_m, lock=LockCfg("key")
         )
         self.door = self.world.add_prop(leaf)
         self.cupboard, self.drawer, self.key = self._drawer = add_key_drawer(
@@ -156,11 +162,14 @@ def direction_out(room: RoomCfg, place: Floats) -> Floats:
 
 
 def _try_start(
-    playground: PlaygroundCfg, room: RoomCfg, door: DoorCfg, rng: np.random.Generator
+    room: RoomCfg,
+    door: DoorCfg,
+    furniture: Sequence[PlannedProp],
+    cupboard: PlannedProp,
+    rng: np.random.Generator,
 ) -> None:
     """Draw the places of the cupboard and of the agent as at the start of an episode."""
-    furniture, doorway = planned_furniture(playground), np.array(door.position_m)
-    cupboard = planned_cupboard()
+    doorway = np.array(door.position_m)
     cupboard.place(*draw_place_at_wall(room, furniture, doorway, _DOOR_APART_M, rng))
     free_place(room, [*furniture, cupboard], _START_CLEAR_M, rng)
 
@@ -180,6 +189,29 @@ def _start_of(playground: PlaygroundCfg) -> tuple[RoomCfg, DoorCfg]:
         f"playground {playground.name!r} has none: choose playground=two_rooms, three_rooms, "
         "seven_rooms or house2, or another playground.seed of random_house"
     )
+
+
+def _check_thickness(playground: PlaygroundCfg, door: DoorCfg) -> None:
+    """Check that the closed leaf is inside its wall, where the walls are built.
+
+    Raises:
+        ValueError: If the walls are too thin.
+    """
+    walls = playground.walls
+    if walls is not None and walls.thickness_m < LEAF_WALL_M:
+        raise ValueError(
+            f"BabyzumasRevenge closes door {door.name!r} of playground {playground.name!r} with a "
+            f"leaf of {LEAF_M} m, for which walls.thickness_m={walls.thickness_m} is too thin; "
+            f"choose at least {LEAF_WALL_M}, or playground=two_rooms"
+        )
+
+
+def _leaf_height_m(playground: PlaygroundCfg, door: DoorCfg) -> float:
+    """Return the clear height of a door, metres: the wall over it would hold a higher leaf."""
+    if playground.walls is None:
+        return _HANDMADE_M
+    rooms_m = [room.size_m[2] for room in playground.rooms if room.name in door.rooms]
+    return min(playground.walls.door_height_m, max(rooms_m))
 
 
 def _room_behind(playground: PlaygroundCfg, door: DoorCfg, room: RoomCfg) -> RoomCfg:

@@ -12,7 +12,7 @@ from veca_marl.envs.core.scoring import cosine, horizontal, norm
 from veca_marl.envs.core.task import Player, Task, TaskCfg, register, require_walker, terms
 from veca_marl.envs.tasks.multimodal.rolling_ball import check_ball_speed, launch_from_side_wall
 from veca_marl.sim.body.walker import WalkerCfg
-from veca_marl.sim.physics import PlaygroundCfg, PropCfg, PropShape, penetration_m
+from veca_marl.sim.physics import ClockCfg, PlaygroundCfg, PropCfg, PropShape, penetration_m
 from veca_marl.sim.sound import SoundCfg, SoundKind
 
 _START_CLEARANCE_M = 1.5  # from the walls
@@ -113,8 +113,11 @@ class KickTheBall(Task):
                 "x and y; choose playground=simple, single_room, house, house2 or random_house"
             )
 
+    @classmethod
+    def check_clock(cls, cfg: Any, clock: ClockCfg) -> None:
+        check_ball_speed(cfg.speed_mps[1], cfg.radius_m, clock)
+
     def build(self) -> None:
-        check_ball_speed(self.cfg.speed_mps[1], self.cfg.radius_m, self.world.clock)
         self.kicker = require_walker(self.players[0])
         self.room = self.world.playground.rooms[0]
         self.ball = self.world.add_prop(

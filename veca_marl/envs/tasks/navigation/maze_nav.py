@@ -19,7 +19,7 @@ from veca_marl.envs.tasks.navigation.mazes.walls import (
     passage_m,
 )
 from veca_marl.sim.body.walker import WalkerCfg
-from veca_marl.sim.physics import PlaygroundCfg
+from veca_marl.sim.physics import ClockCfg, PlaygroundCfg
 
 _RADIUS_M = 0.15  # of the object
 
@@ -30,8 +30,9 @@ class MazeNavCfg(TaskCfg):
 
     Attributes:
         cells: Cells along each side of the maze, at least 2; a cell measures at least 0.7 m.
-        trials: Trials in each maze.
-        trial_s: Time after which a trial ends without success.
+        trials: Trials in each maze. If `max_seconds` is less than ``trials * trial_s``, an episode
+            with slow trials is truncated before the last one, and is not solved.
+        trial_s: Time after which a trial ends without success, at least a step.
         reach_m: Horizontal distance from the pelvis to the surface of the object within which it
             has been reached; so small that it is not reached through a wall: below 0.36 m with
             cells of 0.7 m, below 0.76 m with the default ones.
@@ -81,6 +82,15 @@ class MazeNav(Task):
     def check_playground(cls, cfg: Any, playground: PlaygroundCfg) -> None:
         check_maze(playground, cfg.cells)
         _check_reach(cfg, playground, WalkerCfg().radius_m)
+
+    @classmethod
+    def check_clock(cls, cfg: Any, clock: ClockCfg) -> None:
+        if cfg.trial_s < clock.step_s:
+            raise ValueError(
+                f"task.trial_s={cfg.trial_s:g} is shorter than a step of {clock.step_s:g} s "
+                f"(clock.control_rate_hz={clock.control_rate_hz:g}); choose at least a step, such "
+                "as the default of 30 s"
+            )
 
     def build(self) -> None:
         self.walker = require_walker(self.players[0])

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
+from functools import cache
 from typing import Any, ClassVar
 
 import numpy as np
 
 from veca_marl.envs.core.task import Player, Task, TaskCfg, Team, register, terms
 from veca_marl.envs.tasks.navigation import places
+from veca_marl.envs.tasks.navigation.connection import check_connected
 from veca_marl.envs.tasks.navigation.doorways import check_doorways
 from veca_marl.envs.tasks.navigation.floor_plan import FloorPlan
 from veca_marl.envs.tasks.navigation.helper_reward import (
@@ -21,7 +24,7 @@ from veca_marl.envs.tasks.navigation.helper_reward import (
 from veca_marl.envs.tasks.navigation.placement_check import check_placement
 from veca_marl.envs.tasks.navigation.room_counts import check_rooms
 from veca_marl.envs.tasks.player_starts import direct_gaze_ahead, place_player
-from veca_marl.sim.physics import PlaygroundCfg, RoomCfg
+from veca_marl.sim.physics import PlaygroundCfg, RoomCfg, StandingProp
 
 _PASSAGE_M = 0.2  # width that an agent at the object leaves free towards the walls
 
@@ -121,8 +124,11 @@ class MultiAgentNav(Task):
     @classmethod
     def check_playground(cls, cfg: Any, playground: PlaygroundCfg) -> None:
         check_rooms(playground, cfg.agents)
+        check_connected(cls.__name__, playground, playground.rooms)
+        find_homes = cache(lambda: places.rooms_with_pairs(playground, *_distances_m(cfg)))
+        furniture = places.planned_furniture(playground)
         check_placement(
-            lambda rng: _try_start(cfg, playground, rng),
+            lambda rng: _try_start(cfg, find_homes(), playground.rooms, furniture, rng),
             f"playground {playground.name!r}, task.radius_m={cfg.radius_m:g}, "
             f"task.reach_m={cfg.reach_m:g}",
             "smaller ones, or larger rooms, such as playground=seven_rooms",
@@ -198,9 +204,16 @@ def _distances_m(cfg: MultiAgentNavCfg) -> tuple[float, float]:
     return clear_m, cfg.radius_m + clear_m
 
 
-def _try_start(cfg: MultiAgentNavCfg, playground: PlaygroundCfg, rng: np.random.Generator) -> None:
-    """Look for a room of the object, and for the place of an agent in each room."""
-    furniture, (clear_m, apart_m) = places.planned_furniture(playground), _distances_m(cfg)
-    places.rooms_with_pairs(playground, clear_m, apart_m)
-    for room in playground.rooms:
+def _try_start(
+    cfg: MultiAgentNavCfg,
+    homes: Sequence[RoomCfg],
+    rooms: Sequence[RoomCfg],
+    furniture: Sequence[StandingProp],
+    rng: np.random.Generator,
+) -> None:
+    """Look for places of the object and an agent in a home, and of an agent in each room."""
+    clear_m, apart_m = _distances_m(cfg)
+    home = homes[int(rng.integers(len(homes)))]
+    places.free_pair(home, furniture, clear_m, apart_m, rng)
+    for room in rooms:
         places.free_place(room, furniture, clear_m, rng)

@@ -10,7 +10,12 @@ import numpy as np
 
 from veca_marl.envs.core.task import Player, Task, TaskCfg, register, terms
 from veca_marl.envs.tasks.navigation import places
-from veca_marl.envs.tasks.navigation.floors.scattering import Spacing, scattered_places
+from veca_marl.envs.tasks.navigation.connection import check_connected
+from veca_marl.envs.tasks.navigation.floors.scattering import (
+    Spacing,
+    scattered_places,
+    wide_rooms,
+)
 from veca_marl.envs.tasks.navigation.helper_reward import AHEAD_WEIGHT, TURN_WEIGHT, HelperReward
 from veca_marl.envs.tasks.navigation.object_kinds import ObjectKind, add_object, radius_m
 from veca_marl.envs.tasks.navigation.placement_check import check_placement
@@ -106,6 +111,7 @@ class ObjectNav(Task):
     def check_playground(cls, cfg: Any, playground: PlaygroundCfg) -> None:
         furniture, count = places.planned_furniture(playground), 1 + len(cfg.objects)
         spacing = _spacing(cfg)
+        check_connected(cls.__name__, playground, wide_rooms(playground.rooms, spacing.clear_m))
         check_placement(
             lambda rng: scattered_places(playground, furniture, count, spacing, rng),
             f"{cls.__name__} with {len(cfg.objects)} task.objects, task.apart_m={cfg.apart_m:g} "

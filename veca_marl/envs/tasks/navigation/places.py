@@ -27,15 +27,16 @@ _SAMPLES = 200  # places for an estimate of that share
 
 def furniture_of(world: World) -> list[Prop]:
     """Return the tangible props of a world that are no walls."""
-    return [prop for prop in world.props.values() if _is_furniture(prop.cfg)]
+    return [prop for prop in world.props.values() if is_furniture(prop.cfg)]
 
 
 def planned_furniture(playground: PlaygroundCfg) -> list[PlannedProp]:
     """Return what `furniture_of` returns for a world of a playground, without building one."""
-    return [PlannedProp(prop) for prop in playground.built_props() if _is_furniture(prop)]
+    return [PlannedProp(prop) for prop in playground.built_props() if is_furniture(prop)]
 
 
-def _is_furniture(prop: PropCfg) -> bool:
+def is_furniture(prop: PropCfg) -> bool:
+    """Return whether a prop is tangible and no wall."""
     return prop.tangible and prop.shape is not PropShape.wall
 
 

@@ -10,7 +10,12 @@ from typing import Any, ClassVar
 import numpy as np
 
 from veca_marl.envs.core.task import Player, Task, TaskCfg, register, require_walker, terms
-from veca_marl.envs.tasks.navigation.floors.scattering import Spacing, scattered_places
+from veca_marl.envs.tasks.navigation.connection import check_connected
+from veca_marl.envs.tasks.navigation.floors.scattering import (
+    Spacing,
+    scattered_places,
+    wide_rooms,
+)
 from veca_marl.envs.tasks.navigation.placement_check import check_placement
 from veca_marl.envs.tasks.navigation.places import furniture_of, planned_furniture
 from veca_marl.envs.tasks.player_starts import place_player
@@ -100,6 +105,7 @@ class FillFraction(Task):
     def check_playground(cls, cfg: Any, playground: PlaygroundCfg) -> None:
         count, spacing = 1 + cfg.circles + len(cfg.pieces), _spacing(cfg)
         furniture = planned_furniture(playground)
+        check_connected(cls.__name__, playground, wide_rooms(playground.rooms, spacing.clear_m))
         check_placement(
             lambda rng: scattered_places(playground, furniture, count, spacing, rng),
             f"FillFraction with task.circles={cfg.circles}, {len(cfg.pieces)} task.pieces and "

@@ -11,7 +11,12 @@ from typing import Any, ClassVar
 import numpy as np
 
 from veca_marl.envs.core.task import Player, Task, TaskCfg, require_walker, terms
-from veca_marl.envs.tasks.navigation.floors.scattering import Spacing, scattered_places
+from veca_marl.envs.tasks.navigation.connection import check_connected
+from veca_marl.envs.tasks.navigation.floors.scattering import (
+    Spacing,
+    scattered_places,
+    wide_rooms,
+)
 from veca_marl.envs.tasks.navigation.placement_check import check_placement
 from veca_marl.envs.tasks.navigation.places import furniture_of, planned_furniture
 from veca_marl.envs.tasks.player_starts import place_player
@@ -87,6 +92,7 @@ class SortingTask(Task):
     def check_playground(cls, cfg: Any, playground: PlaygroundCfg) -> None:
         baskets = len(cls.categories_of(cfg))
         toys, furniture, spacing = cfg.items * baskets, planned_furniture(playground), _spacing(cfg)
+        check_connected(cls.__name__, playground, wide_rooms(playground.rooms, spacing.clear_m))
         check_placement(
             lambda rng: scattered_places(playground, furniture, 1 + toys + baskets, spacing, rng),
             f"{cls.__name__} with {toys} toys (task.items={cfg.items} for each of {baskets} "

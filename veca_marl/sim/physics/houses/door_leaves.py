@@ -36,6 +36,11 @@ class WallWithDoors(NamedTuple):
     pieces: Sequence[PropCfg]
 
 
+def leaf_name(door: DoorCfg) -> str:
+    """Return the name of the prop that is the leaf of a door."""
+    return f"leaf_{door.name}"
+
+
 def leaf_props(
     wall: WallWithDoors, walls: Iterable[WallWithDoors], height_m: float
 ) -> list[PropCfg]:
@@ -66,7 +71,7 @@ def _leaf(
     height_m: float,
 ) -> PropCfg:
     """Return the leaf of a door; the opening of a wall of constant x leads along x."""
-    place = (f"leaf_{door.name}", door.position_m, 0.0 if wall.axis == 0 else 90.0)
+    place = (leaf_name(door), door.position_m, 0.0 if wall.axis == 0 else 90.0)
     lock = LockCfg(leaf.key, leaf.locked) if leaf.key or leaf.locked else None
     _check_thickness(door, wall)
     if leaf.kind is JointKind.hinge:

@@ -62,7 +62,8 @@ class RandomHouseCfg(PlaygroundCfg):
         door_width_m: Width of the doors.
         loops: Probability of a door between two adjacent rooms that are connected already.
         pieces_per_room: Least and greatest number of pieces of furniture that are placed in a
-            room; those that find no place are left out.
+            room; those that find no place are left out. A room has each kind of its use at most
+            once: 4 in a bathroom, 6 in the living room, 5 in the others.
     """
 
     rooms: list[RoomCfg] = field(default_factory=list)

@@ -8,10 +8,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from itertools import pairwise
 from typing import NamedTuple
 
 from veca_marl.sim.physics.houses.door_leaves import WallWithDoors, leaf_props
+from veca_marl.sim.physics.houses.door_openings import WallPlane, check_openings
 from veca_marl.sim.physics.props import PropCfg, PropShape, check_appearance
 from veca_marl.sim.physics.rooms import DoorCfg, RoomCfg
 
@@ -38,7 +38,8 @@ class WallsCfg:
     """The walls that are built round the rooms of a playground.
 
     Attributes:
-        thickness_m: Thickness; adjacent rooms have to be so far apart.
+        thickness_m: Thickness; rooms with a door between them have to be so far apart, others at
+            least.
         door_height_m: Height of the openings of doors.
         colours: Colours of the walls in turn, red, green and blue in [0, 1]; empty for eight pale
             ones.
@@ -81,9 +82,10 @@ def wall_props(rooms: Sequence[RoomCfg], doors: Sequence[DoorCfg], cfg: WallsCfg
 
     Raises:
         ValueError: If a room is not on the floor, two doors overlap, a wall would stand in a room,
-            because two rooms are less than one wall thickness apart, a door is not in a wall or
-            reaches beyond one of its rooms, a wall is too thin for the leaf of its door or too
-            short for one that slides into it, or meets another wall there.
+            because two rooms are less than one wall thickness apart, a door is not in a wall,
+            reaches beyond one of its rooms or does not lead through to the other, a wall is too
+            thin for the leaf of its door or too short for one that slides into it, or meets another
+            wall there.
     """
     _check_floors(rooms)
     lines = wall_lines(rooms, cfg.thickness_m)
@@ -95,15 +97,16 @@ def wall_props(rooms: Sequence[RoomCfg], doors: Sequence[DoorCfg], cfg: WallsCfg
         colour = (red, green, blue)
         _check_outside(line, rooms, cfg.thickness_m)
         cut = [door for door in doors if _is_in(door, line)]
-        _check_apart(cut, line.axis)
-        for door in cut:
-            _check_beside(door, line.axis, rooms)
+        check_openings(cut, WallPlane(line.axis, line.at_m, cfg.thickness_m), rooms)
         placed.update(door.name for door in cut)
         pieces = _pieces(f"wall_{number}", line, cut, cfg, colour)
         walls.append(WallWithDoors(line.axis, cut, pieces))
     missing = sorted({door.name for door in doors} - placed)
     if missing:
-        raise ValueError(f"doors {missing} are not in the middle of a wall between rooms")
+        raise ValueError(
+            f"doors {missing} are not in the middle of a wall between rooms, which have to be "
+            f"walls.thickness_m={cfg.thickness_m:g} apart"
+        )
     props: list[PropCfg] = []
     for line, wall in zip(lines, walls, strict=True):
         height_m = min(cfg.door_height_m, line.height_m)
@@ -177,42 +180,6 @@ def _is_in(door: DoorCfg, line: WallLine) -> bool:
         and line.begin_m < along - half
         and along + half < line.end_m
     )
-
-
-def _check_beside(door: DoorCfg, axis: int, rooms: Sequence[RoomCfg]) -> None:
-    """Check that the whole opening of a door leads from one of its rooms to the other.
-
-    Raises:
-        ValueError: If it reaches beyond a room, where another wall would stand in it.
-    """
-    along, half = door.position_m[1 - axis], door.width_m / 2.0
-    for room in rooms:
-        low = room.lower_m[1 - axis]
-        high = low + room.size_m[1 - axis]
-        inside = low - _TOLERANCE_M <= along - half and along + half <= high + _TOLERANCE_M
-        if room.name in door.rooms and not inside:
-            raise ValueError(
-                f"door {door.name!r}: its opening from {along - half:.2f} to {along + half:.2f} m "
-                f"reaches beyond room {room.name!r}, from {low:.2f} to {high:.2f} m; move it, or "
-                f"choose a smaller width_m than {door.width_m:g}"
-            )
-
-
-def _check_apart(doors: Sequence[DoorCfg], axis: int) -> None:
-    """Check that a piece of wall remains between the doors of one wall.
-
-    Raises:
-        ValueError: If two openings overlap or touch.
-    """
-    ordered = sorted(doors, key=lambda door: door.position_m[1 - axis])
-    for first, second in pairwise(ordered):
-        gap_m = second.position_m[1 - axis] - first.position_m[1 - axis]
-        if gap_m - (first.width_m + second.width_m) / 2.0 < _TOLERANCE_M:
-            raise ValueError(
-                f"doors {first.name!r} and {second.name!r} in one wall overlap or touch: their "
-                f"middles are {gap_m:.2f} m apart, with width_m={first.width_m:g} and "
-                f"{second.width_m:g}"
-            )
 
 
 def _pieces(

@@ -19,7 +19,8 @@ class LockCfg:
     """The lock of a joint.
 
     Attributes:
-        key: Name of the prop that unlocks it; empty for a lock that no prop opens.
+        key: Name of the prop that unlocks it, one that is not fixed; empty for a lock that no prop
+            opens.
         locked: Whether it is locked at the start of an episode. A locked joint does not move.
     """
 

@@ -52,7 +52,7 @@ def scattered_places(
     Raises:
         ValueError: If none of 20 attempts succeeds; the message names the playground.
     """
-    rooms = _wide_rooms(playground.rooms, spacing.clear_m)
+    rooms = wide_rooms(playground.rooms, spacing.clear_m)
     clearances = Clearances(furniture)
     for _ in range(_RESTARTS if rooms else 0):
         found: list[Floats] = []
@@ -70,8 +70,8 @@ def scattered_places(
     )
 
 
-def _wide_rooms(rooms: Sequence[RoomCfg], clear_m: float) -> list[RoomCfg]:
-    """Return the rooms that have floor at that distance from their walls."""
+def wide_rooms(rooms: Sequence[RoomCfg], clear_m: float) -> list[RoomCfg]:
+    """Return the rooms with floor at a distance from their walls, in which places are drawn."""
     return [room for room in rooms if min(room.size_m[:2]) > 2.0 * clear_m]
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from veca_marl.sim.physics.props.joint_cfg import JointCfg, LockCfg
+from veca_marl.sim.physics.props.library.sizes import check_size
 from veca_marl.sim.physics.props.part_cfg import PartCfg
 from veca_marl.sim.physics.props.prop_cfg import PropCfg
 from veca_marl.sim.physics.props.prop_shape import PropShape
@@ -30,7 +31,12 @@ def basket(
         size_m: Outer edges along x and y, and height.
         mass_kg: Its mass; 0 for a fixed one.
         colour: Of its walls.
+
+    Raises:
+        ValueError: If the boards of 15 mm leave no interior.
     """
+    sides_m = 2.0 * _BOARD_M
+    check_size(name, size_m, (sides_m, sides_m, _BOARD_M), "an interior between boards")
     return PropCfg(
         name=name,
         shape=PropShape.compound,
@@ -63,9 +69,14 @@ def chest(
         size_m: Depth along x, width along y, height with the lid.
         lock: Lock of the lid.
         colour: Of box and lid.
+
+    Raises:
+        ValueError: If the boards of 15 mm and the lid of 30 mm leave no interior.
     """
+    sides_m = lid_m = 2.0 * _BOARD_M
+    above_m = (sides_m, sides_m, lid_m + _BOARD_M)
+    check_size(name, size_m, above_m, "an interior between boards below the lid")
     depth, width, height = size_m
-    lid_m = 2.0 * _BOARD_M
     box = basket(name, position_m, yaw_deg, (depth, width, height - lid_m), colour=colour)
     lid = PropCfg(
         name=f"{name}.lid",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from veca_marl.sim.physics.props.joint_cfg import JointCfg, JointKind, LockCfg
+from veca_marl.sim.physics.props.library.sizes import check_size
 from veca_marl.sim.physics.props.part_cfg import PartCfg
 from veca_marl.sim.physics.props.prop_cfg import PropCfg
 from veca_marl.sim.physics.props.prop_shape import PropShape
@@ -10,6 +11,8 @@ from veca_marl.sim.physics.props.prop_shape import PropShape
 Colour = tuple[float, float, float]
 
 _BOARD_M = 0.02
+_DRAWER_BOARD_M = 0.01  # of the floor, the sides and the back of a drawer
+_SIDE_SHARE = 0.75  # height of the sides of a drawer as a share of that of its front
 _GAP_M = 0.006
 _METAL: Colour = (0.75, 0.75, 0.78)
 
@@ -37,7 +40,11 @@ def cupboard_with_drawer(
         drawer_height_m: Height of the drawer's front.
         lock: Lock of the drawer.
         colour: Of its boards.
+
+    Raises:
+        ValueError: If the drawer has no interior, or does not fit into the cupboard.
     """
+    _check_sizes(name, size_m, drawer_height_m)
     depth, width, height = size_m
     case = PropCfg(
         name=name,
@@ -71,6 +78,22 @@ def cupboard_with_drawer(
     return [case, drawer]
 
 
+def _check_sizes(name: str, size_m: tuple[float, float, float], drawer_height_m: float) -> None:
+    least_m = _DRAWER_BOARD_M / _SIDE_SHARE
+    if not drawer_height_m > least_m:
+        raise ValueError(
+            f"{name}: drawer_height_m={drawer_height_m:g} must be above {least_m:.3g}, for an "
+            "interior of the drawer"
+        )
+    above_m = (
+        2.0 * _BOARD_M + _GAP_M + _DRAWER_BOARD_M,
+        2.0 * (_BOARD_M + _GAP_M + _DRAWER_BOARD_M),
+        drawer_height_m + 3.0 * _BOARD_M + 2.0 * _GAP_M,
+    )
+    needed = f"boards and a drawer with drawer_height_m={drawer_height_m:g}"
+    check_size(name, size_m, above_m, needed)
+
+
 def _case(depth: float, width: float, height: float, drawer_height: float) -> list[PartCfg]:
     """Return top, bottom, sides, back and the board below the drawer."""
     below = height - 1.5 * _BOARD_M - 2.0 * _GAP_M - drawer_height
@@ -88,9 +111,9 @@ def _case(depth: float, width: float, height: float, drawer_height: float) -> li
 
 def _drawer(depth: float, length: float, width: float, height: float) -> list[PartCfg]:
     """Return floor, sides, back, front and handle; the front is flush with the case."""
-    thin, front = _BOARD_M / 2.0, depth / 2.0
+    thin, front = _DRAWER_BOARD_M, depth / 2.0
     middle = front - length / 2.0
-    side_height = 0.75 * height
+    side_height = _SIDE_SHARE * height
     low = -height / 2.0
     parts = [PartCfg(PropShape.box, [length, width, thin], (middle, 0.0, low + thin / 2.0))]
     for side in (-1.0, 1.0):
