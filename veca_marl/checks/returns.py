@@ -11,7 +11,7 @@ from veca_marl.algos.evaluation.comparison import paired_difference
 from veca_marl.checks.random_play import reward_problems
 from veca_marl.checks.report import Finding, Status, finding
 from veca_marl.envs.core.episodes import Episodes
-from veca_marl.envs.core.expert import find_expert, has_expert, missing_senses
+from veca_marl.envs.core.expert import find_expert, has_expert, missing_needs
 from veca_marl.envs.core.game import Game
 from veca_marl.envs.core.scripted_episodes import first_team, play_to_end
 from veca_marl.envs.core.team import Script
@@ -68,7 +68,8 @@ def _no_expert(game: Game) -> str:
     if not has_expert(game.cfg.task.name):
         return "the task has no expert"
     expert = find_expert(game.cfg.task.name)
-    missing = sorted({sense for p in first_team(game) for sense in missing_senses(expert, p)})
+    clock = game.world.clock
+    missing = sorted({n for p in first_team(game) for n in missing_needs(expert, p, clock)})
     return f"the expert needs {', '.join(missing)}" if missing else ""
 
 
