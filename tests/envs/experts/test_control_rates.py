@@ -60,7 +60,9 @@ def test_experts_that_carry_solve_their_task_at_four_times_the_control_rate(task
 
 @pytest.mark.parametrize("rate_hz", [10, 18, 294])
 def test_experts_that_carry_are_refused_at_control_rates_at_which_they_fail(rate_hz):
-    game = blocks_game("GrabObject", f"clock.control_rate_hz={rate_hz}")
+    substeps = max(1, 150 // rate_hz)
+    clock = (f"clock.control_rate_hz={rate_hz}", f"clock.substeps={substeps}")
+    game = blocks_game("GrabObject", *clock)
     message = f"GrabObjectExpert needs clock.control_rate_hz from 21 to 245, not {rate_hz}"
     with pytest.raises(ValueError, match=message):
         game.expert_of(game.players[0])

@@ -192,7 +192,7 @@ def fixed_at(client, block, place):
 def gripping(palms, block):
     """Yield target angles, endlessly: close both hands round a block, under its top."""
     place = block.position - np.array([0.0, 0.0, 0.02])
-    yield from palms.for_steps(Grip(place, EDGE + 0.06), 60)
+    yield from palms.during(Grip(place, EDGE + 0.06), 2.4)
     while True:
         yield palms.move(Grip(place, EDGE - 0.04))
 
