@@ -58,12 +58,13 @@ def test_experts_that_carry_solve_their_task_at_four_times_the_control_rate(task
     game.close()
 
 
+@pytest.mark.parametrize("task", ["GrabObject", "RotateCube"])
 @pytest.mark.parametrize("rate_hz", [10, 18, 294])
-def test_experts_that_carry_are_refused_at_control_rates_at_which_they_fail(rate_hz):
+def test_experts_that_hold_things_are_refused_at_control_rates_at_which_they_fail(task, rate_hz):
     substeps = max(1, 150 // rate_hz)
     clock = (f"clock.control_rate_hz={rate_hz}", f"clock.substeps={substeps}")
-    game = blocks_game("GrabObject", *clock)
-    message = f"GrabObjectExpert needs clock.control_rate_hz from 21 to 245, not {rate_hz}"
+    game = blocks_game(task, *clock)
+    message = f"{task}Expert needs clock.control_rate_hz from 21 to 245, not {rate_hz}"
     with pytest.raises(ValueError, match=message):
         game.expert_of(game.players[0])
     game.close()

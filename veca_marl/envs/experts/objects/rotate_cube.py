@@ -26,10 +26,12 @@ class RotateCubeExpert(Expert[RotateCube]):
     """Turns shoulder and wrist until the cube on the palm has reached its target orientation.
 
     Flexion of the upper arm keeps the palm level meanwhile. The fingers do not move. Reads the
-    orientation of the cube and of its target from the simulator (privileged).
+    orientation of the cube and of its target from the simulator (privileged). Plays at control
+    rates from 21 to 245 Hz: at 15 Hz it drops the cube in most episodes.
     """
 
     reads = ()
+    control_rates_hz = (21, 245)
 
     def __init__(self, task: RotateCube, player: Player) -> None:
         super().__init__(task, player)
