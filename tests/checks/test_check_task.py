@@ -161,6 +161,11 @@ class TermOfZeros(East):
         return {**super().reward(player), "arrived": 0.0}
 
 
+class NeverPunished(East):
+    def reward(self, player):
+        return {**super().reward(player), "arrived": 0.0}
+
+
 class SilentWorld(East):
     senses = ("audio",)
 
@@ -304,6 +309,29 @@ def test_checks_of_what_a_task_does_not_have_are_skipped(game_of):
     goal = returns(game_of(NoGoal, EastExpert))[2]
     assert goal.status is Status.skipped
     assert "does not define solved()" in goal.message
+
+
+def test_a_punishment_that_no_policy_earned_is_skipped(game_of):
+    cfg = game_of(NeverPunished, EastExpert)
+    cfg.task.weights["arrived"] = -1.0
+    found = returns(cfg)[0]
+    assert found.status is Status.skipped
+    assert found.message == (
+        "no policy earned the punishment 'arrived' in 8 episodes: play more, or test it yourself; "
+        "reached: progress"
+    )
+
+
+def test_beside_an_unreached_punishment_an_unreached_reward_is_a_failure(game_of):
+    class Standing(NeverPunished):
+        def reward(self, player):
+            return {"progress": 0.0, "arrived": 0.0}
+
+    cfg = game_of(Standing)
+    cfg.task.weights["arrived"] = -1.0
+    found = returns(cfg)[0]
+    assert found.status is Status.failed
+    assert found.message == "term 'progress' is 0 in all steps of 4 episodes"
 
 
 def test_an_expert_without_the_sense_that_it_needs_is_skipped():

@@ -76,3 +76,8 @@ def test_what_is_not_refused_is_built(task, name):
 def test_a_configuration_with_another_kind_of_body_is_refused(overrides):
     with pytest.raises(ConfigError, match="agents: this task needs a body with joints; choose"):
         compose(["+task=GrabObject", *overrides])
+
+
+def test_the_body_of_a_task_without_kicks_need_not_kick():
+    with pytest.raises(ConfigError, match="agents: this task needs a body that walks; choose"):
+        compose(["+task=MazeNav", "body=full"])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,7 +11,7 @@ from veca_marl.algos.evaluation.comparison import paired_difference
 from veca_marl.checks.random_play import reward_problems
 from veca_marl.checks.report import Finding, Status, finding
 from veca_marl.envs.core.episodes import Episodes
-from veca_marl.envs.core.expert import find_expert, has_expert, missing_senses
+from veca_marl.envs.core.expert import find_expert, has_expert, missing_needs
 from veca_marl.envs.core.game import Game
 from veca_marl.envs.core.scripted_episodes import first_team, play_to_end
 from veca_marl.envs.core.team import Script
@@ -47,10 +47,11 @@ def check_returns(game: Game, episodes: int, seed: int) -> Iterator[Finding]:
         seed: Seed of the episodes.
 
     Yields:
-        ``reward terms``: each is finite and was not 0 in some step. ``expert``: the 95 % interval
-        of the paired difference of the returns is above 0. ``goal``: the expert ends more episodes
-        solved than the random policy. The last two are skipped without an expert, or without the
-        senses that it needs, and the last one without a goal.
+        ``reward terms``: each is finite and was not 0 in some step; skipped if only punishments,
+        terms of negative weight, were 0 in all: good play avoids them. ``expert``: the 95 %
+        interval of the paired difference of the returns is above 0. ``goal``: the expert ends more
+        episodes solved than the random policy. The last two are skipped without an expert that can
+        play, and the last one without a goal.
     """
     random = _play_all(game, Script.random, episodes, seed)
     reason = _no_expert(game)
@@ -68,7 +69,8 @@ def _no_expert(game: Game) -> str:
     if not has_expert(game.cfg.task.name):
         return "the task has no expert"
     expert = find_expert(game.cfg.task.name)
-    missing = sorted({sense for p in first_team(game) for sense in missing_senses(expert, p)})
+    clock = game.world.clock
+    missing = sorted({n for p in first_team(game) for n in missing_needs(expert, p, clock)})
     return f"the expert needs {', '.join(missing)}" if missing else ""
 
 
@@ -91,13 +93,24 @@ def _play(game: Game, script: Script, rng: np.random.Generator) -> _Played:
 def _terms(game: Game, played: Sequence[_Played]) -> Finding:
     problems = list(dict.fromkeys(text for one in played for text in one.problems))
     reached = frozenset[str]().union(*(one.nonzero for one in played))
-    n = len(played)
+    unreached = {name: weight for name, weight in game.weights.items() if name not in reached}
     problems += [
-        f"term {name!r} is 0 in all steps of {n} episodes"
-        for name in game.weights
-        if name not in reached
+        f"term {name!r} is 0 in all steps of {len(played)} episodes"
+        for name, weight in unreached.items()
+        if weight >= 0.0
     ]
+    if unreached and not problems:
+        return Finding("reward terms", Status.skipped, _unpunished(game, unreached, len(played)))
     return finding("reward terms", problems, f"{', '.join(game.weights)}: each is reached")
+
+
+def _unpunished(game: Game, punishments: Collection[str], episodes: int) -> str:
+    """Return why terms of negative weight that nothing earned could not be checked."""
+    reached = ", ".join(name for name in game.weights if name not in punishments) or "none"
+    return (
+        f"no policy earned the punishment {', '.join(map(repr, punishments))} in {episodes} "
+        f"episodes: play more, or test it yourself; reached: {reached}"
+    )
 
 
 def _expert(expert: Sequence[_Played], random: Sequence[_Played]) -> Finding:

@@ -10,7 +10,7 @@ from veca_marl.algos.evaluation.evaluate import Exploration, evaluate
 from veca_marl.algos.training.evaluations import evaluation_seed
 from veca_marl.envs.adapters.torchrl import ExpertPolicy
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
-from veca_marl.envs.core.expert import find_expert, has_expert, missing_senses
+from veca_marl.envs.core.expert import find_expert, has_expert, missing_needs
 from veca_marl.reports.arms import Arm
 from veca_marl.reports.gather import Row
 
@@ -22,8 +22,8 @@ def expert_rows(arms: Sequence[Arm], episodes: int) -> list[Row]:
     those in which a run with the seed of the arm is evaluated.
 
     Args:
-        arms: The arms; the first one counts in which the players have the senses that the expert
-            needs.
+        arms: The arms; the first one counts in which the expert has the senses and the control rate
+            that it needs.
         episodes: Number of episodes; 0 plays none.
 
     Returns:
@@ -38,11 +38,12 @@ def expert_rows(arms: Sequence[Arm], episodes: int) -> list[Row]:
 
 
 def _rows_of(arm: Arm, episodes: int) -> list[Row]:
-    """Return the rows of one arm; none if its players lack a sense that the expert needs."""
+    """Return the rows of one arm; none if its players lack what the expert needs."""
     cfg, seed = arm.cfg, evaluation_seed(arm.cfg.seed)
     expert = find_expert(cfg.task.name)
     with closing(VecaEnv(cfg.game, min(episodes, cfg.eval.worlds), seed)) as env:
-        if any(missing_senses(expert, player) for player in env.games[0].actors):
+        game = env.games[0]
+        if any(missing_needs(expert, player, game.world.clock) for player in game.actors):
             return []
         scores = evaluate(env, ExpertPolicy(env), episodes, seed, Exploration.deterministic)
     head = {"arm": arm.name, "seed": str(cfg.seed), "state": "finished", "frames": "0"}

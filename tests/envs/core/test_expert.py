@@ -1,5 +1,6 @@
 """The expert registry, and the experts that a game makes."""
 
+from contextlib import closing
 from dataclasses import replace
 
 import numpy as np
@@ -7,9 +8,19 @@ import pytest
 from duels import duel
 from knockouts import knockout
 
-from veca_marl.envs.core.expert import EXPERTS, Expert, find_expert, has_expert, register_expert
+from veca_marl.envs.adapters.torchrl import ExpertPolicy
+from veca_marl.envs.adapters.torchrl.env import VecaEnv
+from veca_marl.envs.core.expert import (
+    EXPERTS,
+    Expert,
+    find_expert,
+    has_expert,
+    missing_needs,
+    register_expert,
+)
 from veca_marl.envs.core.game import Game
 from veca_marl.envs.core.team import Script
+from veca_marl.sim.physics import ClockCfg
 
 
 class Counter(Expert):
@@ -74,6 +85,25 @@ def test_an_expert_that_is_asked_for_during_an_episode_is_reset_then(cfg):
     assert (expert.resets, expert.task) == (1, game.task)
     assert game.expert_of(game.players[0]) is expert
     game.close()
+
+
+def test_an_expert_is_refused_at_a_control_rate_at_which_it_cannot_play(cfg, monkeypatch):
+    monkeypatch.setattr(Counter, "control_rates_hz", (30, 50), raising=False)
+    scripted = {"blue": Script.expert}
+    message = (
+        "Counter needs clock.control_rate_hz from 30 to 50, not 25: its motion fails at other "
+        "control rates; the default is 25"
+    )
+    with pytest.raises(ValueError, match=message):
+        Game(replace(cfg, script=scripted))
+    with closing(VecaEnv(cfg, 1, seed=0)) as env, pytest.raises(ValueError, match=message):
+        ExpertPolicy(env)
+    with closing(Game(cfg)) as game:
+        assert missing_needs(Counter, game.players[0], game.world.clock) == [
+            "clock.control_rate_hz from 30 to 50"
+        ]
+    for rate_hz in (30, 50):
+        Game(replace(cfg, script=scripted, clock=ClockCfg(control_rate_hz=rate_hz))).close()
 
 
 def test_a_player_that_is_eliminated_rests():

@@ -22,7 +22,7 @@ def middles(game, steps):
     for index, block in enumerate((*game.task.blue, game.task.red)):
         block.place((1.5, 1.5 + 0.2 * index, 0.03))
     player = game.players[0]
-    palms = PalmMotion(player.body, posture_gain=0.01)
+    palms = PalmMotion(player.body, game.world.clock.step_s, posture_gain_per_s=0.25)
     path = []
     for _ in range(steps):
         game.step({player.name: player.body.encode(palms.move(SIDE))})

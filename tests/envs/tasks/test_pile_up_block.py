@@ -138,7 +138,11 @@ def test_a_block_that_is_held_up_has_a_lower_return_than_a_pile(game, piling):
     held.place((0.25, 0.0, EDGE / 2))
     other.place(AWAY)
     game.task.blue.place((AWAY[0], -AWAY[1], EDGE / 2))
-    gained, high, commands = 0.0, 0, lift(child, PalmMotion(child), held, height_m=0.2)
+    gained, high, commands = (
+        0.0,
+        0,
+        lift(child, PalmMotion(child, game.world.clock.step_s), held, height_m=0.2),
+    )
     for terms in play_commands(game, commands):
         gained += game.reward_of(terms)
         high += height_in_edges(held) > 2.0 and is_at_rest(held) and child.touches(held)
@@ -188,7 +192,7 @@ def fixed_at(client, block, place):
 def gripping(palms, block):
     """Yield target angles, endlessly: close both hands round a block, under its top."""
     place = block.position - np.array([0.0, 0.0, 0.02])
-    yield from palms.for_steps(Grip(place, EDGE + 0.06), 60)
+    yield from palms.during(Grip(place, EDGE + 0.06), 2.4)
     while True:
         yield palms.move(Grip(place, EDGE - 0.04))
 
@@ -201,7 +205,9 @@ def test_a_block_on_one_that_is_held_up_has_a_lower_return_than_a_pile(game, pil
     block.place((AWAY[0], -AWAY[1], EDGE / 2))
     gained, lying = 0.0, 0
     with fixed_at(game.world.client, base, (0.25, 0.0, 0.2)):
-        for terms in play_commands(game, gripping(PalmMotion(child), base)):
+        for terms in play_commands(
+            game, gripping(PalmMotion(child, game.world.clock.step_s), base)
+        ):
             if game.steps == 100:
                 assert child.touches(base)
                 block.place((0.27, 0.0, 0.2 + EDGE + 0.001))

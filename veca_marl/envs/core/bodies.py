@@ -9,7 +9,7 @@ from veca_marl.sim.body.humanoid import HumanoidCfg
 from veca_marl.sim.body.walker import WalkerCfg
 
 _KINDS: dict[type[BodyCfg], str] = {
-    WalkerCfg: "a body that walks and kicks; choose body=walker",
+    WalkerCfg: "a body that walks; choose body=walker",
     HumanoidCfg: "a body with joints; choose body=full, mitten, full_limbs or mitten_limbs",
 }
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from veca_marl.envs.core.task import Player, Task
 from veca_marl.registry import Registry
+from veca_marl.sim.physics import ClockCfg
 
 TaskT = TypeVar("TaskT", bound=Task)
 ExpertT = TypeVar("ExpertT", bound="type[Expert[Any]]")
@@ -26,12 +27,15 @@ class Expert(ABC, Generic[TaskT]):
         reads: Names of the senses that `act` reads; the game computes no others for it. None is
             all senses of the player.
         needs: Names of the senses without which it cannot play.
+        control_rates_hz: Least and greatest control rate, agent steps per second, at which it can
+            play, see `ClockCfg.control_rate_hz`; None is every rate.
         task: The rules that are played.
         player: The player that the commands are for.
     """
 
     reads: ClassVar[tuple[str, ...] | None] = None
     needs: ClassVar[tuple[str, ...]] = ()
+    control_rates_hz: ClassVar[tuple[int, int] | None] = None
 
     def __init__(self, task: TaskT, player: Player) -> None:
         self.task, self.player = task, player
@@ -93,19 +97,53 @@ def find_expert(task: str) -> type[Expert[Any]]:
     return EXPERTS[task]
 
 
-def missing_senses(expert: type[Expert[Any]], player: Player) -> list[str]:
-    """Return the names of the senses that an expert needs and a player has not."""
-    return [name for name in expert.needs if name not in player.senses]
+def missing_needs(expert: type[Expert[Any]], player: Player, clock: ClockCfg) -> list[str]:
+    """Return what an expert needs to play a player and does not have; empty if it can play.
+
+    Args:
+        expert: The expert.
+        player: The player.
+        clock: The clock of the world.
+
+    Returns:
+        Names of senses, and the control rates at which it can play.
+    """
+    rates = [] if _plays_at(expert, clock) else [_rates(expert)]
+    return [*_missing_senses(expert, player), *rates]
 
 
-def check_senses(expert: type[Expert[Any]], player: Player) -> None:
-    """Check that a player has the senses that an expert needs.
+def check_expert(expert: type[Expert[Any]], player: Player, clock: ClockCfg) -> None:
+    """Check that an expert can play a player.
+
+    Args:
+        expert: The expert.
+        player: The player.
+        clock: The clock of the world.
 
     Raises:
-        ValueError: If one is missing.
+        ValueError: If a sense is missing that it needs, or it cannot play at the control rate.
     """
-    if missing := missing_senses(expert, player):
+    if missing := _missing_senses(expert, player):
         raise ValueError(
             f"{expert.__name__} needs {', '.join(missing)}, which {player.name} has not; "
             f"its senses: {', '.join(player.senses) or 'none'}"
         )
+    if not _plays_at(expert, clock):
+        raise ValueError(
+            f"{expert.__name__} needs {_rates(expert)}, not {clock.control_rate_hz}: its motion "
+            "fails at other control rates; the default is 25"
+        )
+
+
+def _missing_senses(expert: type[Expert[Any]], player: Player) -> list[str]:
+    return [name for name in expert.needs if name not in player.senses]
+
+
+def _plays_at(expert: type[Expert[Any]], clock: ClockCfg) -> bool:
+    rates = expert.control_rates_hz
+    return rates is None or rates[0] <= clock.control_rate_hz <= rates[1]
+
+
+def _rates(expert: type[Expert[Any]]) -> str:
+    low, high = expert.control_rates_hz or (1, 22050)
+    return f"clock.control_rate_hz from {low} to {high}"

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veca_marl.envs.core.actions import to_parts
-from veca_marl.envs.core.expert import Expert, check_senses, find_expert
+from veca_marl.envs.core.expert import Expert, check_expert, find_expert
 from veca_marl.envs.core.game_cfg import GameCfg
 from veca_marl.envs.core.scripts import play_script
 from veca_marl.envs.core.task import Player, Team, find_task
@@ -277,7 +277,8 @@ class Game:
         """Return the expert of a player. It is made at the first call and reset with the game.
 
         Raises:
-            ValueError: If the task has no expert, or it needs a sense that the player has not.
+            ValueError: If the task has no expert, it needs a sense that the player has not, or it
+                cannot play at this control rate.
         """
         if player.name not in self._experts:
             self._experts[player.name] = self._make_expert(player)
@@ -286,7 +287,7 @@ class Game:
 
     def _make_expert(self, player: Player) -> Expert[Any]:
         expert = find_expert(self.cfg.task.name)
-        check_senses(expert, player)
+        check_expert(expert, player, self.world.clock)
         return expert(self.task, player)
 
     def _terms(self, player: Player) -> dict[str, float]:

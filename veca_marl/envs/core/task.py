@@ -59,7 +59,7 @@ class Player(NamedTuple):
 
 
 def require_walker(player: Player) -> Walker:
-    """Return the body of a player, which walks and kicks, see `Task.body_cfg`.
+    """Return the body of a player, which walks, see `Task.body_cfg`.
 
     Raises:
         ValueError: If the body is of another kind.

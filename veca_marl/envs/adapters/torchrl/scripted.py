@@ -13,7 +13,7 @@ from torch import nn
 
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
 from veca_marl.envs.core.actions import from_parts
-from veca_marl.envs.core.expert import check_senses, find_expert
+from veca_marl.envs.core.expert import check_expert, find_expert
 from veca_marl.envs.core.game import Game, Observation
 from veca_marl.envs.core.task import Player
 
@@ -64,14 +64,15 @@ class ExpertPolicy(CommandPolicy):
         env: The environment it plays in. Experts may read privileged state of these worlds.
 
     Raises:
-        ValueError: If the task has no expert, or it needs a sense that a player has not.
+        ValueError: If the task has no expert, it needs a sense that a player has not, or it cannot
+            play at this control rate.
     """
 
     def __init__(self, env: VecaEnv) -> None:
         super().__init__(env)
         expert = find_expert(env.cfg.task.name)
         for player in env.games[0].actors:
-            check_senses(expert, player)
+            check_expert(expert, player, env.games[0].world.clock)
 
     def command(self, game: Game, player: Player, observation: Observation) -> Any:
         """Return the command of the player's expert."""

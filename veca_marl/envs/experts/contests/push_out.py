@@ -21,7 +21,9 @@ class PushOutExpert(Expert[PushOut]):
     """Goes round the nearest opponent and pushes it outwards.
 
     A crawling body moves backwards where a walker turns round, since turning takes space. Reads
-    the positions and headings of all players from the simulator (privileged).
+    the positions and headings of all players, and middle and radius of the ring from the simulator
+    (privileged); on hands and knees also its own joint angles and the orientations of chest and
+    pelvis, with which it gets up after a fall.
     """
 
     reads = ()

@@ -30,7 +30,9 @@ _FREE_M = 0.45  # distance of the chest from walls at which they do not stop the
 class SoccerExpert(Expert[Soccer]):
     """Goes behind the ball and drives it into the goal.
 
-    Reads the positions of the ball and of the players from the simulator (privileged).
+    Reads position and velocity of the ball, the positions of the players, its own heading, and
+    edges and goal of the pitch from the simulator (privileged); on hands and knees also its own
+    joint angles and the orientations of chest and pelvis, with which it gets up after a fall.
     """
 
     reads = ()
@@ -87,7 +89,9 @@ class SoccerExpert(Expert[Soccer]):
 class SoccerTwoPlayerExpert(SoccerExpert):
     """As attacker shoots past the defender; as defender drives the ball away from the goal.
 
-    Reads the positions of the ball and of the players from the simulator (privileged).
+    Reads what `SoccerExpert` reads (privileged): position and velocity of the ball, the positions
+    of the players, its own heading, edges and goal of the pitch; on hands and knees also its own
+    joint angles and the orientations of chest and pelvis.
     """
 
     def point(self, shooter: Shooter) -> Floats:

@@ -23,7 +23,8 @@ class BabyzumasRevengeExpert(Expert[BabyzumasRevenge]):
     """Opens the drawer, takes the key, opens the door, and goes into the next room.
 
     Reads privileged state: its own position and heading, the poses of cupboard and door, how far
-    drawer and door are open, and what its verbs would be applied to.
+    drawer and door are open, what its verbs would be applied to, and for its paths the rooms, the
+    poses and sizes of all fixed props, and which props are light.
     """
 
     reads = ()

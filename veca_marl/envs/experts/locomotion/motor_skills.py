@@ -48,7 +48,8 @@ class SkillExpert(Expert[Task]):
 class TurnBabyExpert(SkillExpert):
     """Swings one leg and one arm across the body, then stretches; see `TurnOver`.
 
-    Reads the orientation of the trunk from the simulator (privileged).
+    Reads the orientations of chest and pelvis, and the joint angles at the start of each swing from
+    the simulator (privileged).
     """
 
     skill_type = TurnOver
@@ -58,7 +59,8 @@ class TurnBabyExpert(SkillExpert):
 class SitBabyExpert(SkillExpert):
     """Turns to the belly, pushes up on the hands, sits back on the heels and rises; see `SitUp`.
 
-    Reads the pose of the trunk from the simulator (privileged).
+    Reads the poses of its bones, and the angles, velocities and strengths of its joints from the
+    simulator (privileged); with position control also the forces on its joints.
     """
 
     skill_type = SitUp
@@ -69,7 +71,8 @@ class CrawlBabyExpert(Expert[CrawlBaby]):
     """Crawls straight ahead with an open-loop gait and feedback from its heading.
 
     After a fall on its back or a side it gets back onto hands and knees; see `GetUp`. Reads
-    position and heading from the simulator (privileged).
+    position, heading, joint angles and the orientations of chest and pelvis from the simulator
+    (privileged).
     """
 
     reads = ()

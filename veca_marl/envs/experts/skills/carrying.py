@@ -14,15 +14,16 @@ from veca_marl.sim.geometry import Floats
 from veca_marl.sim.physics import Prop
 
 _UP = np.array([0.0, 0.0, 1.0])
-# steps at the place before the hands close and after a cube is lifted: the trunk sways up and down,
+# time at the place before the hands close and after a cube is lifted: the trunk sways up and down,
 # palms that close too high lose the cube, and one that sinks while it is moved hits others
-_SETTLED = 5
+_SETTLED_S = 0.2
 _RETREAT = 0.10 * _UP  # the hands leave a cube upwards by this distance
-_HIGH_STEPS, _ABOVE_STEPS, _DOWN_STEPS = 20, 50, 40
-_CLOSE_STEPS, _MOST_CLOSE_STEPS = 22, 36
+# longest durations of the stages; the hands close for at least `_CLOSE_S`
+_HIGH_S, _ABOVE_S, _DOWN_S = 0.8, 2.0, 1.6
+_CLOSE_S, _MOST_CLOSE_S = 0.88, 1.44
 _SKIN_M = 0.008  # the palms' distance from a cube between them with a light grip
-_LIFT_STEPS, _TRANSFER_STEPS, _LOWER_STEPS = 40, 110, 45
-_OPEN_STEPS, _RETREAT_STEPS, _BACK_STEPS, _SPREAD_STEPS = 16, 30, 25, 15
+_LIFT_S, _TRANSFER_S, _LOWER_S = 1.6, 4.4, 1.8
+_OPEN_S, _RETREAT_S, _BACK_S, _SPREAD_S = 0.64, 1.2, 1.0, 0.6
 # Largest errors of a lifted cube and of one that is put down. Only the height counts: a cube that
 # is moved sideways before it is lifted drags the one below it.
 _LIFTED_M, _PLACED_M = np.array([np.inf, np.inf, 0.012]), np.array([np.inf, np.inf, 0.004])
@@ -38,23 +39,23 @@ class CarryCfg:
 
     Attributes:
         squeeze_m: Each palm's target is this far inside the cube, which sets the grip force.
-        speed_m: Motion of a carried cube per step.
+        speed_mps: Largest speed of a carried cube in each direction.
         thumbs_m: Height of the palms above the middle of the cube, so that thumbs clear its top.
         clear_m: Distance between each open palm and the cube.
         above_m: Height above the cube from which the hands approach.
         over_m: Largest error above the target in each direction, metres, before the cube is
             lowered.
-        levelling: Change of the fingers' pitch per step, as a share of the forward tilt of the
-            cube.
+        levelling_per_s: Change of the fingers' pitch per second, as a share of the forward tilt of
+            the cube.
     """
 
     squeeze_m: float = 0.02
-    speed_m: float = 0.006
+    speed_mps: float = 0.15
     thumbs_m: float = 0.008
     clear_m: float = 0.022
     above_m: float = 0.1
     over_m: tuple[float, float, float] = (0.007, 0.007, 0.02)
-    levelling: float = 0.0
+    levelling_per_s: float = 0.0
 
 
 class _Way(NamedTuple):
@@ -63,14 +64,15 @@ class _Way(NamedTuple):
     Attributes:
         to: Returns the target of its centre, ``(3,)`` metres.
         near_m: Largest error in each direction, ``(3,)`` metres.
-        steps: Largest number of steps.
-        settled: Number of consecutive steps for which the cube has to be at the target.
+        most_s: Longest duration.
+        settled_s: Time for which the cube has to be at the target without a break; at least one
+            step.
     """
 
     to: Callable[[], Floats]
     near_m: Floats
-    steps: int
-    settled: int = 1
+    most_s: float
+    settled_s: float = 0.0
 
 
 def carry(
@@ -92,9 +94,9 @@ def carry(
     tight = Grip(cube.position, cube.cfg.size_m[0] - 2 * cfg.squeeze_m, yaw)
     lifted = _at_height(cube.position, height_m)
     for way in (
-        _Way(lambda: lifted, _LIFTED_M, _LIFT_STEPS, _SETTLED),
-        _Way(lambda: _at_height(to(), height_m), np.array(cfg.over_m), _TRANSFER_STEPS),
-        _Way(to, _PLACED_M, _LOWER_STEPS),
+        _Way(lambda: lifted, _LIFTED_M, _LIFT_S, _SETTLED_S),
+        _Way(lambda: _at_height(to(), height_m), np.array(cfg.over_m), _TRANSFER_S),
+        _Way(to, _PLACED_M, _LOWER_S),
     ):
         tight = yield from _bring(palms, cube, way, tight, cfg)
     wide_m = cube.cfg.size_m[0] + 4 * cfg.clear_m
@@ -108,8 +110,8 @@ def return_to_rest(palms: PalmMotion) -> Iterator[Floats]:
     """
     gap_m = palms.gap_m
     back = palms.middle * (0, 1, 1) + _HOME.centre * (1, 0, 0)
-    yield from palms.until_at(lambda: Grip(back, gap_m), _BACK_STEPS)
-    yield from palms.for_steps(Grip(back, _HOME.gap_m), _SPREAD_STEPS)
+    yield from palms.until_at(lambda: Grip(back, gap_m), _BACK_S)
+    yield from palms.during(Grip(back, _HOME.gap_m), _SPREAD_S)
     while True:
         yield palms.move(_HOME)
 
@@ -125,21 +127,20 @@ def _grip(palms: PalmMotion, cube: Prop, yaw: float, cfg: CarryCfg) -> Iterator[
     edge, above, thumbs = cube.cfg.size_m[0], cfg.above_m * _UP, cfg.thumbs_m * _UP
     wide, tight = edge + 2 * cfg.clear_m, edge - 2 * cfg.squeeze_m
     high = _at_height(palms.middle, cube.position[2] + cfg.above_m)
-    yield from palms.until_at(lambda: Grip(high, wide, yaw), _HIGH_STEPS)
-    yield from palms.until_at(lambda: Grip(cube.position + above, wide, yaw), _ABOVE_STEPS)
-    yield from palms.until_at(
-        lambda: Grip(cube.position + thumbs, wide, yaw), _DOWN_STEPS, _SETTLED
-    )
+    yield from palms.until_at(lambda: Grip(high, wide, yaw), _HIGH_S)
+    yield from palms.until_at(lambda: Grip(cube.position + above, wide, yaw), _ABOVE_S)
+    yield from palms.until_at(lambda: Grip(cube.position + thumbs, wide, yaw), _DOWN_S, _SETTLED_S)
     yield from _close(palms, cube, Grip(cube.position + thumbs, tight, yaw))
 
 
 def _close(palms: PalmMotion, cube: Prop, grip: Grip) -> Iterator[Floats]:
     """Close the hands until both press on the cube, which they push forwards."""
     place, touching_m = cube.position, cube.cfg.size_m[0] + _SKIN_M
-    for step in range(_MOST_CLOSE_STEPS):
+    least = palms.steps(_CLOSE_S)
+    for step in range(palms.steps(_MOST_CLOSE_S)):
         pushed = (cube.position - place) * (1, 0, 0)
         yield palms.move(grip._replace(centre=grip.centre - pushed))
-        if step >= _CLOSE_STEPS and palms.gap_m < touching_m:
+        if step >= least and palms.gap_m < touching_m:
             return
 
 
@@ -147,18 +148,19 @@ def _bring(
     palms: PalmMotion, cube: Prop, way: _Way, grip: Grip, cfg: CarryCfg
 ) -> Generator[Floats, None, Grip]:
     """Move the palms until the cube between them is at its target, or lost; return the grip."""
-    there = 0
-    for _ in range(way.steps):
+    there, settled = 0, palms.steps(way.settled_s)
+    levelling = palms.share(cfg.levelling_per_s)
+    for _ in range(palms.steps(way.most_s)):
         slip = palms.middle - cube.position
         lost = np.abs(slip).max() >= cube.cfg.size_m[0] / 2
         there = there + 1 if (np.abs(way.to() - cube.position) < way.near_m).all() else 0
-        if lost or there == way.settled:
+        if lost or there == settled:
             break
-        level_rad = grip.pitch_rad - cfg.levelling * _forward_tilt_rad(cube, grip.yaw_rad)
+        level_rad = grip.pitch_rad - levelling * _forward_tilt_rad(cube, grip.yaw_rad)
         grip = grip._replace(
             centre=way.to() + slip, pitch_rad=float(np.clip(level_rad, *_PITCH_RAD))
         )
-        yield palms.move(grip, cfg.speed_m)
+        yield palms.move(grip, cfg.speed_mps)
     return grip
 
 
@@ -172,9 +174,9 @@ def _forward_tilt_rad(cube: Prop, yaw_rad: float) -> float:
 
 def _release(palms: PalmMotion, opened: Grip) -> Iterator[Floats]:
     """Open the hands, then raise them."""
-    yield from palms.for_steps(opened, _OPEN_STEPS)
+    yield from palms.during(opened, _OPEN_S)
     raised = opened._replace(centre=opened.centre + _RETREAT)
-    yield from palms.until_at(lambda: raised, _RETREAT_STEPS)
+    yield from palms.until_at(lambda: raised, _RETREAT_S)
 
 
 def _at_height(point: Floats, height_m: float) -> Floats:

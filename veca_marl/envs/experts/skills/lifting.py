@@ -21,9 +21,10 @@ _ABOVE = np.array([0.0, 0.0, 0.07])  # the hands approach from here
 # The palms close in front of the centre and below it: they press the cube toward the body and
 # slide up along it.
 _GRIP_OFFSET = np.array([0.02, 0.0, -0.012])
-_LIFT_SPEED_M = 0.005  # per step
+_LIFT_MPS = 0.125
 _LOST_M = 0.06  # distance from the middle between the palms at which the cube counts as lost
-_APPROACH_STEPS, _LOWER_STEPS, _CLOSE_STEPS, _OPEN_STEPS = 35, 30, 20, 12
+# longest durations of approach and lowering; durations of closing and opening
+_APPROACH_S, _LOWER_S, _CLOSE_S, _OPEN_S = 1.4, 1.2, 0.8, 0.48
 
 
 def lift(child: Humanoid, palms: PalmMotion, toy: Prop, height_m: float) -> Iterator[Floats]:
@@ -41,19 +42,18 @@ def lift(child: Humanoid, palms: PalmMotion, toy: Prop, height_m: float) -> Iter
     wide, tight = edge + 2 * _CLEARANCE_M, edge - 2 * _SQUEEZE_M
     while True:
         yaw = quarter_yaw(toy)
-        for offset, steps in ((_ABOVE, _APPROACH_STEPS), (_GRIP_OFFSET, _LOWER_STEPS)):
-            for _ in range(steps):
+        for offset, most_s in ((_ABOVE, _APPROACH_S), (_GRIP_OFFSET, _LOWER_S)):
+            for _ in range(palms.steps(most_s)):
                 goal = Grip(toy.position + offset, wide, yaw)
                 yield palms.move(goal)
                 if palms.is_at(goal):
                     break
         place = toy.position + _GRIP_OFFSET
-        for _ in range(_CLOSE_STEPS):
-            yield palms.move(Grip(place, tight, yaw))
+        yield from palms.during(Grip(place, tight, yaw), _CLOSE_S)
         up = np.array([place[0], place[1], height_m])
         while slip_m(child, toy) < _LOST_M:
-            yield palms.move(Grip(up, tight, yaw), _LIFT_SPEED_M)
-        for _ in range(_OPEN_STEPS):
+            yield palms.move(Grip(up, tight, yaw), _LIFT_MPS)
+        for _ in range(palms.steps(_OPEN_S)):
             yield palms.move(Grip(child.palms().mean(axis=0), wide, yaw))
 
 

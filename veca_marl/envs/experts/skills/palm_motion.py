@@ -15,18 +15,18 @@ from veca_marl.sim.body.humanoid import Humanoid
 from veca_marl.sim.body.humanoid.postures import REACHING, REACHING_DOWN, Posture
 from veca_marl.sim.geometry import Floats
 
-_SPEED_M = 0.010  # largest motion of the middle between the palms, per step
-_CLOSING_M = 0.006  # largest change of the distance between the palms, per step
+_SPEED_MPS = 0.25  # largest speed of the middle between the palms in each direction
+_CLOSING_MPS = 0.15  # largest change of the distance between the palms
 FINGER_PITCH_RAD = math.radians(20.0)  # downwards, unless a cube is levelled
 _UP = np.array([0.0, 0.0, 1.0])
 _SIDES = np.array([1.0, -1.0])
 # Of the inverse kinematics. An arm that is pulled back from near full extension needs fast changes
 # of its joints; where they are limited more, or directions weigh more, the hand sinks by 60 mm.
-_MAX_CHANGE_RAD, _DIRECTION_M = 0.25, 0.03
-_INTEGRAL_GAIN, _MAX_INTEGRAL_M = 0.03, 0.02
+_MAX_CHANGE_RADPS, _DIRECTION_M = 6.25, 0.03
+_INTEGRAL_GAIN_PER_S, _MAX_INTEGRAL_M = 0.75, 0.02
 _ARRIVED_M = 0.008
 _HIGH_M, _LOW_M = 0.10, 0.04  # heights of the palms at which the body sits upright and bent
-_BENDING = 0.1  # largest change of the bend per step; faster, the palms rise or sink by 40 mm
+_BENDING_PER_S = 2.5  # largest change of the bend; faster, the palms rise or sink by 40 mm
 
 
 class Grip(NamedTuple):
@@ -50,21 +50,24 @@ class PalmMotion:
 
     Args:
         body: The body.
+        step_s: Duration of an environment step.
         upright: Posture while the hands are up.
         bent: Posture while the hands are down.
-        posture_gain: Integral gain of the trunk, see `SeatedBalance`.
+        posture_gain_per_s: Integral gain of the trunk, see `SeatedBalance`.
     """
 
     def __init__(
         self,
         body: Humanoid,
+        step_s: float,
         upright: Posture = REACHING,
         bent: Posture = REACHING_DOWN,
-        posture_gain: float = 0.03,
+        posture_gain_per_s: float = 0.75,
     ) -> None:
-        self._hands = ArmKinematics(body, _MAX_CHANGE_RAD, _DIRECTION_M)
-        self._twist = TrunkTwist(body)
-        self._seat = SeatedBalance(body, upright, bent, posture_gain)
+        self._step_s = step_s
+        self._hands = ArmKinematics(body, _MAX_CHANGE_RADPS * step_s, _DIRECTION_M)
+        self._twist = TrunkTwist(body, step_s)
+        self._seat = SeatedBalance(body, step_s, upright, bent, posture_gain_per_s)
         self.reset()
 
     def reset(self) -> None:
@@ -88,16 +91,25 @@ class PalmMotion:
         left, right = self._hands.palms().points
         return math.dist(left, right)
 
-    def move(self, goal: Grip, speed_m: float = _SPEED_M) -> Floats:
+    def steps(self, seconds: float) -> int:
+        """Return the number of steps of a duration, at least 1."""
+        return max(1, round(seconds / self._step_s))
+
+    def share(self, per_s: float) -> float:
+        """Return the change in one step of what changes by ``per_s`` per second."""
+        return per_s * self._step_s
+
+    def move(self, goal: Grip, speed_mps: float = _SPEED_MPS) -> Floats:
         """Return target angles ``(82,)`` rad of a motion toward a grip. One call per step.
 
         Args:
             goal: The grip to move to.
-            speed_m: Largest motion of the middle between the palms.
+            speed_mps: Largest speed of the middle between the palms in each direction.
         """
+        way_m, closing_m = speed_mps * self._step_s, _CLOSING_MPS * self._step_s
         held = self._held or Grip(self.middle, self.gap_m)
-        centre = held.centre + np.clip(goal.centre - held.centre, -speed_m, speed_m)
-        gap = held.gap_m + float(np.clip(goal.gap_m - held.gap_m, -_CLOSING_M, _CLOSING_M))
+        centre = held.centre + np.clip(goal.centre - held.centre, -way_m, way_m)
+        gap = held.gap_m + float(np.clip(goal.gap_m - held.gap_m, -closing_m, closing_m))
         self._held = Grip(centre, gap, goal.yaw_rad, goal.pitch_rad)
         wanted = self._corrected(_palms(self._held))
         trunk = self._twist.filtered_angles()
@@ -108,24 +120,26 @@ class PalmMotion:
         """Return whether the middle between the palms has reached that of a grip."""
         return bool(np.abs(self.middle - goal.centre).max() < _ARRIVED_M)
 
-    def until_at(self, goal: Callable[[], Grip], steps: int, settled: int = 1) -> Iterator[Floats]:
+    def until_at(
+        self, goal: Callable[[], Grip], most_s: float, settled_s: float = 0.0
+    ) -> Iterator[Floats]:
         """Yield target angles until the palms are at the goal.
 
         Args:
             goal: Returns the grip to move to.
-            steps: Largest number of steps.
-            settled: Number of consecutive steps for which they have to be there.
+            most_s: Longest duration.
+            settled_s: Time for which they have to be there without a break; at least one step.
         """
-        there = 0
-        for _ in range(steps):
+        there, settled = 0, self.steps(settled_s)
+        for _ in range(self.steps(most_s)):
             yield self.move(goal())
             there = there + 1 if self.is_at(goal()) else 0
             if there == settled:
                 return
 
-    def for_steps(self, goal: Grip, steps: int) -> Iterator[Floats]:
-        """Yield target angles of a motion toward a grip for a number of steps."""
-        for _ in range(steps):
+    def during(self, goal: Grip, seconds: float) -> Iterator[Floats]:
+        """Yield target angles of a motion toward a grip for some time."""
+        for _ in range(self.steps(seconds)):
             yield self.move(goal)
 
     def _corrected(self, palms: Palms) -> Palms:
@@ -134,15 +148,15 @@ class PalmMotion:
         There is no correction of the distance between them: its compliance sets the grip force.
         """
         error = (palms.points - self._hands.palms().points).mean(axis=0)
-        self._integral = np.clip(
-            self._integral + _INTEGRAL_GAIN * error, -_MAX_INTEGRAL_M, _MAX_INTEGRAL_M
-        )
+        change = _INTEGRAL_GAIN_PER_S * self._step_s * error
+        self._integral = np.clip(self._integral + change, -_MAX_INTEGRAL_M, _MAX_INTEGRAL_M)
         return palms._replace(points=palms.points + self._integral)
 
     def _bend_toward(self, height_m: float) -> float:
         """Return the bend of the trunk, in [0, 1], on its way to that for a height of the palms."""
         goal = min(max((_HIGH_M - height_m) / (_HIGH_M - _LOW_M), 0.0), 1.0)
-        self._bend += min(max(goal - self._bend, -_BENDING), _BENDING)
+        most = _BENDING_PER_S * self._step_s
+        self._bend += min(max(goal - self._bend, -most), most)
         return self._bend
 
 

@@ -74,7 +74,7 @@ class SitUp:
         self._body, self._step_s = body, step_s
         self._get_up = GetUp(body, step_s)
         self._key_poses = KeyPoses(body, _POSES, step_s)
-        self._balance = SeatedBalance(body, _POSES["rise"], _POSES["sit"], integral_gain=0.0)
+        self._balance = SeatedBalance(body, step_s, _POSES["rise"], _POSES["sit"], 0.0)
         self._stage, self._elapsed_s, self._bend = "get up", 0.0, _BENT_AT_FIRST
         self.reset()
 

@@ -15,7 +15,8 @@ class FillFractionExpert(PuttingExpert[FillFraction]):
     """Divides the pieces among the circles, then takes one after the other to its circle.
 
     Reads privileged state: its own position and heading, the positions and sizes of all pieces, the
-    positions of the circles, and what its verbs would be applied to.
+    positions of the circles, which pieces are in which circles, what its verbs would be applied to,
+    and for its paths the rooms, the poses and sizes of all fixed props, and which props are light.
     """
 
     def reset(self) -> None:

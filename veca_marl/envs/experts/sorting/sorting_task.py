@@ -15,7 +15,8 @@ class SortingExpert(PuttingExpert[SortingTask]):
     """Takes the nearest toy to its basket, one after the other.
 
     Reads privileged state: its own position and heading, the positions and categories of all toys
-    and baskets, and what its verbs would be applied to.
+    and baskets, which toys are in which baskets, what its verbs would be applied to, and for its
+    paths the rooms, the poses and sizes of all fixed props, and which props are light.
     """
 
     @property

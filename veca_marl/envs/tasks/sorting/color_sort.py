@@ -45,13 +45,13 @@ class ColorSort(SortingTask):
     the basket. A toy can be taken out of a basket again. The episode terminates when all toys are
     in the baskets of their colours; then the task is solved (`solved`).
 
-    Senses, actions (a continuous or discrete `move` and the discrete `verb`) and the reward for a
-    toy that is put into the basket of its colour are those of the paper (table of tasks in the
-    appendix). The paper does not state the numbers of toys and baskets, nor what a wrong basket
-    costs. Here the reward is the change of a score of the present state, so that taking toys out
-    and putting them in again has no return. The default weight of a wrong basket is chosen such
-    that random choices among three baskets have a return of 0 on average. The head is pitched 25
-    degrees down, to see the floor from half a metre on.
+    Senses, actions (a continuous `move` and the discrete `verb`) and the reward for a toy that is
+    put into the basket of its colour are those of the paper (table of tasks in the appendix); a
+    discrete `move` beside the verb is not in the paper. The paper does not state the numbers of
+    toys and baskets, nor what a wrong basket costs. Here the reward is the change of a score of the
+    present state, so that taking toys out and putting them in again has no return. The default
+    weight of a wrong basket is chosen such that random choices among three baskets have a return of
+    0 on average. The head is pitched 25 degrees down, to see the floor from half a metre on.
 
     Terms:
         sorted: Change of the number of toys in the baskets of their colours.

@@ -83,13 +83,14 @@ class FillFraction(Task):
     overfill the circle is refused: the verb has no effect. A piece can be taken out again. The
     episode terminates when all circles are full; then the task is solved (`solved`).
 
-    Senses, actions (a continuous or discrete `move` and the discrete `verb`), the number of
-    circles, the refusal, and that each piece and a full circle are rewarded are those of the paper
-    (table of tasks in the appendix). The paper does not state the pieces and the amounts. Here the
-    reward for a piece is the fraction that it fills, so that every way to fill the circles has the
-    same return; both rewards are changes of a score of the present state, so that taking pieces out
-    and putting them in again has no return. Pieces are unit fractions, with one colour for each
-    size. The head is pitched 25 degrees down, as in ColorSort.
+    Senses, actions (a continuous `move` and the discrete `verb`), the number of circles, the
+    refusal, and that each piece and a full circle are rewarded are those of the paper (table of
+    tasks in the appendix); a discrete `move` beside the verb is not in the paper. The paper does
+    not state the pieces and the amounts. Here the reward for a piece is the fraction that it fills,
+    so that every way to fill the circles has the same return; both rewards are changes of a score
+    of the present state, so that taking pieces out and putting them in again has no return. Pieces
+    are unit fractions, with one colour for each size. The head is pitched 25 degrees down, as in
+    ColorSort.
 
     Terms:
         filled: Change of the sum of the filled fractions of all circles.

@@ -44,12 +44,13 @@ class ShapeSort(SortingTask):
     episode and says nothing about its basket. The episode terminates when all toys are in the
     baskets of their shapes; then the task is solved (`solved`).
 
-    Senses, actions (a continuous or discrete `move` and the discrete `verb`) and the reward for a
-    toy that is put into the basket of its shape are those of the paper (table of tasks in the
-    appendix). The paper does not state the shapes, the numbers of toys and baskets, how a basket
-    shows its shape, and what a wrong basket costs. As in ColorSort the reward is the change of a
-    score of the present state, so that taking toys out and putting them in again has no return,
-    and random choices among three baskets have a return of 0 on average.
+    Senses, actions (a continuous `move` and the discrete `verb`) and the reward for a toy that is
+    put into the basket of its shape are those of the paper (table of tasks in the appendix); a
+    discrete `move` beside the verb is not in the paper. The paper does not state the shapes, the
+    numbers of toys and baskets, how a basket shows its shape, and what a wrong basket costs. As in
+    ColorSort the reward is the change of a score of the present state, so that taking toys out and
+    putting them in again has no return, and random choices among three baskets have a return of 0
+    on average.
 
     Terms:
         sorted: Change of the number of toys in the baskets of their shapes.

@@ -16,11 +16,15 @@ def register_interaction(verb: VerbT) -> VerbT:
     """Register a verb by its `name`; a class decorator.
 
     Raises:
-        ValueError: If another verb has this name, or the class has no name.
+        ValueError: If another verb has this name, or the class's name is no identifier in text.
     """
     name = getattr(verb, "name", "")
-    if not name or name == NO_VERB:
-        raise ValueError(f"{verb.__name__}.name={name!r} must name the verb, and not {NO_VERB!r}")
+    # the name is a choice in configurations and on command lines, where a space would split it
+    if not isinstance(name, str) or not name.isidentifier() or name == NO_VERB:
+        raise ValueError(
+            f"{verb.__name__}.name={name!r} must name the verb by an identifier in text, such as "
+            f"'lift_up', and not {NO_VERB!r}"
+        )
     INTERACTIONS.add(name, verb)
     return verb
 

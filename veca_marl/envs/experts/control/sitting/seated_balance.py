@@ -34,13 +34,19 @@ class SeatedBalance:
 
     Args:
         body: The body that sits.
+        step_s: Duration of an environment step.
         upright: The upright posture.
         bent: The posture with the trunk bent forwards.
-        integral_gain: Share of the remaining error that is added to the targets per call.
+        gain_per_s: Share of the remaining error that is added to the targets per second.
     """
 
     def __init__(
-        self, body: Humanoid, upright: Posture, bent: Posture, integral_gain: float = 0.03
+        self,
+        body: Humanoid,
+        step_s: float,
+        upright: Posture,
+        bent: Posture,
+        gain_per_s: float = 0.75,
     ) -> None:
         self._body, self._skeleton = body, load_skeleton()
         self.upright, self._bent = body.posture_angles(upright), body.posture_angles(bent)
@@ -53,7 +59,7 @@ class SeatedBalance:
         self._trunk = [joint(bone, label) for label in _LEANS for bone in _TRUNK]
         self._hips = [joint(f"{side}_thigh", "flexion") for side in _SIDES]
         self._bending = [*self._trunk[: len(_TRUNK)], *self._hips]
-        self._integral_gain = integral_gain
+        self._gain = gain_per_s * step_s
         self._integral = np.zeros(len(self._bending))
 
     def reset(self) -> None:
@@ -70,9 +76,8 @@ class SeatedBalance:
         way = self._bent - self.upright
         held = np.where(way == 0.0, targets, self.upright + bend * way)
         error = (held - self._body.joint_angles())[self._bending]
-        self._integral = np.clip(
-            self._integral + self._integral_gain * error, -SATURATION_RAD, SATURATION_RAD
-        )
+        change = self._gain * error
+        self._integral = np.clip(self._integral + change, -SATURATION_RAD, SATURATION_RAD)
         held[self._bending] += self._integral
         held[[*self._trunk, *self._hips]] += self._deflection()
         held[self._trunk] -= _DAMPING_S * self._body.joint_velocities()[self._trunk]

@@ -7,7 +7,7 @@ from veca_marl.sim.geometry import Floats
 
 _TRUNK = ("spine", "chest")
 _TWIST = ("lateral", "rotation")
-_SHARE = 0.15  # of the difference per step: a time constant of 0.25 s
+_SHARE_PER_S = 3.75  # of the difference: a time constant of 0.27 s
 
 
 class TrunkTwist:
@@ -19,10 +19,11 @@ class TrunkTwist:
 
     Args:
         body: The body.
+        step_s: Duration of an environment step.
     """
 
-    def __init__(self, body: Humanoid) -> None:
-        self._body = body
+    def __init__(self, body: Humanoid, step_s: float) -> None:
+        self._body, self._share = body, min(1.0, _SHARE_PER_S * step_s)
         names = body.joint_names
         self._joints = [names.index(f"{bone}.{twist}") for bone in _TRUNK for twist in _TWIST]
         self.reset()
@@ -34,6 +35,6 @@ class TrunkTwist:
     def filtered_angles(self) -> Floats:
         """Return joint angles ``(82,)`` rad, those of the twist filtered. One call per step."""
         angles = self._body.joint_angles()
-        self._filtered = self._filtered + _SHARE * (angles[self._joints] - self._filtered)
+        self._filtered = self._filtered + self._share * (angles[self._joints] - self._filtered)
         angles[self._joints] = self._filtered
         return angles
