@@ -40,7 +40,8 @@ MEANINGS = {
     "of the joint's strength (`action: torque`), angle between the joint's limits (`position`), or "
     "change of the commanded angle (`increment`)",
     "verb": "what is done in this step with the object nearest to the centre of the view that "
-    "declares it, see [interactions](../guides/add_an_interaction.md)",
+    "declares it (`kick` and `step_on`: with what the foot reaches), see "
+    "[interactions](../guides/add_an_interaction.md)",
     "voice": "the call that starts now; a call lasts 0.2 s, and choices made while it lasts are "
     "ignored, see [voices](../guides/voices.md)",
 }
