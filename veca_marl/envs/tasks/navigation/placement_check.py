@@ -7,8 +7,10 @@ from collections.abc import Callable
 import numpy as np
 
 TRIALS = 20
-"""Placements that are tried: where one episode in ten would find none, 20 trials show it with a
-probability of 0.88."""
+"""Number of placements that are tried.
+
+Where one episode in ten would find no places, 20 trials show it with a probability of 0.88.
+"""
 
 
 def check_placement(
