@@ -68,13 +68,14 @@ class BabyzumasRevenge(Task):
     what is nearest to the centre of the view, up to 1.5 m away, of the things that declare it. The
     episode terminates when the agent is in the next room; then the task is solved (`solved`).
 
-    Senses, actions (a continuous or discrete `move` and the discrete `verb`) and the sequence of
-    interactions are those of the paper (table of tasks in the appendix), which gives it as an
-    example of a first room that has to be cleared; further rooms are not described there. The paper
-    does not state the reward, which is sparse. Here entering the next room is the only reward by
-    default; the other terms report the progress and can be given weights. They cannot be had twice.
-    The key emits a quiet buzz, so that the ears tell where the drawer is: what is to be heard is
-    not stated in the paper either. The head is pitched 25 degrees down, as in ColorSort.
+    Senses, actions (a continuous `move` and the discrete `verb`; a discrete `move` beside the verb
+    is not in the paper) and the sequence of interactions are those of the paper (table of tasks in
+    the appendix), which gives it as an example of a first room that has to be cleared; further
+    rooms are not described there. The paper does not state the reward, which is sparse. Here
+    entering the next room is the only reward by default; the other terms report the progress and
+    can be given weights. They cannot be had twice. The key emits a quiet buzz, so that the ears
+    tell where the drawer is: what is to be heard is not stated in the paper either. The head is
+    pitched 25 degrees down, as in ColorSort.
 
     Terms:
         drawer: 1 on the step in which the drawer is open for the first time, else 0.
