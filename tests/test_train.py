@@ -150,7 +150,7 @@ def test_an_existing_run_is_not_overwritten(smoke):
         (["task=KickTheBall"], "error: task has no default to replace: write +task=KickTheBall"),
         (["+task=KickTheBal"], "error: unknown task 'KickTheBal' (did you mean KickTheBall?)"),
         (["+task=KickTheBall", "sede=1"], "error: unknown key 'sede' (did you mean seed?)"),
-        (["+task=KickTheBall", "algo.clip=-1"], "error: algo.clip must be positive, got -1.0"),
+        (["+task=KickTheBall", "algo.clip=-1"], "error: algo.clip must be in (0, 1], got -1.0"),
         (
             ["+task=KickTheBall", "device=tpu"],
             "error: device=tpu is not on this machine; choices: cpu",
