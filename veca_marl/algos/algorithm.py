@@ -76,7 +76,7 @@ class Algorithm(ABC):
 
     @property
     def policy_hidden(self) -> Sequence[int]:
-        """Widths of the hidden layers that its actor has between features and policy heads."""
+        """Widths of the hidden layers of its actor, between features and policy heads."""
         return ()
 
     @property

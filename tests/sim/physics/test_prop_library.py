@@ -173,4 +173,7 @@ def test_sizes_without_an_interior_are_refused_by_the_name_of_the_argument(make,
     ],
 )
 def test_the_smallest_sizes_can_be_built(make, size_m):
-    empty_world(*make("thing", (0.0, 0.0), size_m=size_m)).close()
+    cfgs = make("thing", (0.0, 0.0), size_m=size_m)
+    world = empty_world(*cfgs)
+    assert list(world.props) == [cfg.name for cfg in cfgs]
+    world.close()

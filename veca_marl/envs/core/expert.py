@@ -108,8 +108,7 @@ def missing_needs(expert: type[Expert[Any]], player: Player, clock: ClockCfg) ->
     Returns:
         Names of senses, and the control rates at which it can play.
     """
-    rates = [] if _plays_at(expert, clock) else [_rates(expert)]
-    return [*_missing_senses(expert, player), *rates]
+    return [*_missing_senses(expert, player), *_missing_rates(expert, clock)]
 
 
 def check_expert(expert: type[Expert[Any]], player: Player, clock: ClockCfg) -> None:
@@ -128,10 +127,10 @@ def check_expert(expert: type[Expert[Any]], player: Player, clock: ClockCfg) -> 
             f"{expert.__name__} needs {', '.join(missing)}, which {player.name} has not; "
             f"its senses: {', '.join(player.senses) or 'none'}"
         )
-    if not _plays_at(expert, clock):
+    if rates := _missing_rates(expert, clock):
         raise ValueError(
-            f"{expert.__name__} needs {_rates(expert)}, not {clock.control_rate_hz}: its motion "
-            "fails at other control rates; the default is 25"
+            f"{expert.__name__} needs {rates[0]}, not {clock.control_rate_hz}: its motion fails at "
+            "other control rates; the default is 25"
         )
 
 
@@ -139,11 +138,9 @@ def _missing_senses(expert: type[Expert[Any]], player: Player) -> list[str]:
     return [name for name in expert.needs if name not in player.senses]
 
 
-def _plays_at(expert: type[Expert[Any]], clock: ClockCfg) -> bool:
+def _missing_rates(expert: type[Expert[Any]], clock: ClockCfg) -> list[str]:
+    """Return the control rates at which an expert can play; empty if that of the clock is one."""
     rates = expert.control_rates_hz
-    return rates is None or rates[0] <= clock.control_rate_hz <= rates[1]
-
-
-def _rates(expert: type[Expert[Any]]) -> str:
-    low, high = expert.control_rates_hz or (1, 22050)
-    return f"clock.control_rate_hz from {low} to {high}"
+    if rates is None or rates[0] <= clock.control_rate_hz <= rates[1]:
+        return []
+    return [f"clock.control_rate_hz from {rates[0]} to {rates[1]}"]

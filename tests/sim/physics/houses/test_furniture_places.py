@@ -54,12 +54,15 @@ def test_furniture_outside_of_rooms_is_refused_with_the_nearest_room(outside, wa
 
 
 def test_furniture_may_stand_at_a_wall_and_a_round_piece_may_be_turned():
-    house(piece("bed", 0.95, 0.45), piece("lamp", 0.18, 3.82, 45.0), piece("plant", 7.9, 3.8, 30.0))
+    round_pieces = [piece("lamp", 0.18, 3.82, 45.0), piece("plant", 7.9, 3.8, 30.0)]
+    pieces = [piece("bed", 0.95, 0.45), *round_pieces]
+    assert house(*pieces).furniture == pieces
 
 
 def test_furniture_may_stand_on_the_border_of_rooms_that_touch():
     rooms = [ROOMS[0], replace(ROOMS[1], lower_m=(4.0, 0.0, 0.0))]
-    PlaygroundCfg("open", rooms, furniture=[piece("sofa", 4.0, 2.0)])
+    sofa = piece("sofa", 4.0, 2.0)
+    assert PlaygroundCfg("open", rooms, furniture=[sofa]).furniture == [sofa]
 
 
 @pytest.mark.parametrize(
@@ -72,7 +75,8 @@ def test_furniture_in_other_furniture_is_refused_by_both_names(other):
 
 def test_furniture_may_touch_or_stand_below():
     touching = [piece("bed", 1.0, 1.0), piece("desk", 2.5, 1.0), piece("stool", 1.0, 1.61)]
-    house(*touching, piece("table", 6.0, 3.0), piece("stool", 6.0, 3.1, name="under the table"))
+    below = [piece("table", 6.0, 3.0), piece("stool", 6.0, 3.1, name="under the table")]
+    assert house(*touching, *below).furniture == [*touching, *below]
 
 
 @pytest.mark.parametrize("x", [3.6, 4.5])

@@ -33,8 +33,8 @@ class HelperReward:
 
     Both are 0 unless the object is visible after the step. The sum of ``ahead`` has no bound: an
     agent that walks in a circle near the object, and sees it on its way there but not on its way
-    back, is paid in every round. With weights several times as large as the paper's that can have
-    a higher return than reaching the object.
+    back, is paid in every round. With weights several times as large as the paper's agents may
+    learn that instead of reaching the object.
 
     Args:
         scene: The scene that eyes see.

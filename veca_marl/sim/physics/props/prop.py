@@ -150,24 +150,22 @@ class Prop:
     @property
     def velocity(self) -> Floats:
         """``(3,)`` m/s, world frame, of its centre of mass."""
-        if self.joint is not None:
-            state = pybullet.getLinkState(
-                self.body_id, self.link, computeLinkVelocity=1, physicsClientId=self._client
-            )
-            return np.array(state[6])
-        linear, _ = pybullet.getBaseVelocity(self.body_id, physicsClientId=self._client)
-        return np.array(linear)
+        return np.array(self._velocities()[0])
 
     @property
     def angular_velocity(self) -> Floats:
         """``(3,)`` rad/s, world frame."""
-        if self.joint is not None:
-            state = pybullet.getLinkState(
+        return np.array(self._velocities()[1])
+
+    def _velocities(self) -> tuple[Sequence[float], Sequence[float]]:
+        """Return the velocity and the angular velocity, world frame."""
+        if self.joint is None:
+            linear, angular = pybullet.getBaseVelocity(self.body_id, physicsClientId=self._client)
+        else:
+            *_, linear, angular = pybullet.getLinkState(
                 self.body_id, self.link, computeLinkVelocity=1, physicsClientId=self._client
             )
-            return np.array(state[7])
-        _, angular = pybullet.getBaseVelocity(self.body_id, physicsClientId=self._client)
-        return np.array(angular)
+        return linear, angular
 
     @property
     def box(self) -> tuple[Floats, Floats]:
