@@ -228,3 +228,16 @@ def test_a_beeping_ball_is_heard_for_its_share_of_the_time():
 def test_impossible_beeps_are_refused():
     with pytest.raises(ValueError, match=r"pause_s=-1\.0"):
         compose(["+task=KickTheBall", "task.pause_s=-1.0"])
+
+
+@pytest.mark.parametrize("task", ["KickTheBall", "SoccerOnePlayer", "SoccerTwoPlayer"])
+def test_a_ball_that_is_too_heavy_for_a_walker_is_refused(task):
+    cfg = compose([f"+task={task}", "body=walker", "task.mass_kg=6"]).game
+    with pytest.raises(ValueError, match=r"mass_kg=6: \w+ kicks and pushes at most .*_kg=5$"):
+        Game(cfg)
+
+
+def test_joint_level_bodies_may_have_any_ball():
+    game = Game(compose(["+task=SoccerOnePlayer", "task.mass_kg=6"]).game)
+    assert game.task.ball.cfg.mass_kg == 6.0
+    game.close()

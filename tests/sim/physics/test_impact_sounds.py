@@ -9,8 +9,17 @@ from composed import compose
 from scipy.special import spherical_jn
 
 from veca_marl.sim.body.walker import Walker, WalkerCfg
-from veca_marl.sim.physics import ClockCfg, PlaygroundCfg, World
+from veca_marl.sim.physics import (
+    ClockCfg,
+    JointCfg,
+    JointKind,
+    LockCfg,
+    PlaygroundCfg,
+    World,
+    pybullet,
+)
 from veca_marl.sim.physics.impacts.cfg import ImpactCfg
+from veca_marl.sim.physics.impacts.joint_stops import joint_stop
 from veca_marl.sim.physics.impacts.sounds import prop_modes
 from veca_marl.sim.physics.props import PartCfg, PropCfg, PropShape
 from veca_marl.sim.sound.impacts import Material
@@ -290,3 +299,90 @@ def test_strikes_add_up_to_the_change_of_momentum(substeps):
     hit_s = (highest - lowest) * world.clock.substep_s
     impulse_ns = mass_kg * (speeds[highest] - speeds[lowest] + 9.81 * hit_s)
     assert sum(strikes) == pytest.approx(impulse_ns, rel=0.1)
+
+
+LEAF_M = (0.04, 0.9, 2.0)
+
+
+def leaf(**joint):
+    """A hinged leaf without friction, half open."""
+    hinge = JointCfg(anchor_m=(0.0, -LEAF_M[1] / 2.0, 0.0), friction=0.0, opening=0.5, **joint)
+    place = (1.0, 0.0, 1.05)
+    return PropCfg("leaf", PropShape.box, list(LEAF_M), place, mass_kg=3.0, joint=hinge)
+
+
+def test_the_stop_of_a_hinge_takes_its_angular_momentum_and_that_of_a_slide_its_momentum():
+    """A thin leaf has a moment of inertia m w^2 / 3 about its edge: m w / 3 at the other one."""
+    thickness, width, _ = LEAF_M
+    hinged = joint_stop(leaf())
+    assert hinged.reach == pytest.approx(math.hypot(width, thickness / 2.0))
+    moment = 3.0 * (width**2 + thickness**2 / 4.0) / 3.0
+    assert hinged.impulse * hinged.reach == pytest.approx(moment)
+    sliding = joint_stop(leaf(kind=JointKind.slide))
+    assert (sliding.reach, sliding.impulse) == (1.0, 3.0)
+
+
+def strikes(cfg, act):
+    """The (step, impulse) of each strike of a leaf within 40 steps."""
+    world = world_with(cfg)
+    world.freeze()
+    prop, struck, start = world.prop("leaf"), [], world.step_count
+    prop.impact.sound.strike = lambda impulse, delay: struck.append(
+        (world.step_count - start, impulse)
+    )
+    world.reset(np.random.default_rng(0))
+    act(prop, world.client)
+    for _ in range(40):
+        world.step()
+    opening = prop.opening
+    world.close()
+    return struck, opening
+
+
+def push_at(rate):
+    """Give the joint a speed, as a push does."""
+
+    def push(prop, client):
+        coordinate = prop.opening * prop.joint.cfg.range
+        pybullet.resetJointState(prop.body_id, prop.link, coordinate, rate, physicsClientId=client)
+
+    return push
+
+
+@pytest.mark.parametrize("rate", [1.2, -1.2])
+def test_a_leaf_is_struck_once_when_it_meets_an_end_of_its_range(rate):
+    ((step, impulse),), opening = strikes(leaf(), push_at(rate))
+    assert opening == (1.0 if rate > 0.0 else 0.0)
+    assert step == pytest.approx(math.radians(45.0) / 1.2 / 0.04, abs=1.0)
+    assert impulse == pytest.approx(1.2 * joint_stop(leaf()).impulse, rel=1e-6)
+
+
+def test_what_is_closed_slowly_or_stopped_by_friction_or_locked_is_silent():
+    assert strikes(leaf(range_deg=4.0), push_at(0.1)) == ([], 1.0)
+    braked = replace(leaf().joint, friction=30.0)
+    assert strikes(replace(leaf(), joint=braked), push_at(1.2))[0] == []
+    locked = replace(leaf().joint, lock=LockCfg())
+    assert strikes(replace(leaf(), joint=locked), push_at(1.2)) == ([], 0.5)
+
+
+def test_a_drawer_that_its_motor_opens_is_heard_at_the_end_of_its_slide():
+    drawer = leaf(kind=JointKind.slide, axis=(0.0, 1.0, 0.0), range_m=0.3, open_s=1.0)
+    ((step, impulse),), opening = strikes(drawer, lambda prop, client: prop.open())
+    assert opening == 1.0
+    assert step == pytest.approx(0.5 / 0.04, abs=1.0)
+    assert impulse == pytest.approx(3.0 * 0.3, rel=0.01)
+
+
+def test_the_stop_of_a_leaf_is_heard_from_the_leaf():
+    world = world_with(leaf())
+    world.freeze()
+    prop = world.prop("leaf")
+
+    def push(step):
+        if step == 0:
+            push_at(1.2)(prop, world.client)
+
+    (first, *_) = np.flatnonzero(emitted(world, "leaf.impact", 40, push).any(axis=1))
+    assert first == pytest.approx(math.radians(45.0) / 1.2 / 0.04, abs=1.0)
+    np.testing.assert_allclose(world.sound.sources["leaf.impact"].position, prop.position)
+    world.close()

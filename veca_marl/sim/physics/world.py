@@ -251,7 +251,8 @@ class World:
     def _add_joint(self, prop: Prop, joint: Joint, parent: Prop | None) -> None:
         """Let a joint act after each physics step; the two props that it joins do not collide."""
         if not self._joints:
-            self.after_substep.append(self._after_substep_of_joints)
+            # first: sounds of impacts follow from where joints were stopped
+            self.after_substep.insert(0, self._after_substep_of_joints)
         self._joints.append(joint)
         if parent is None:
             return

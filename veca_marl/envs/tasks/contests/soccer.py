@@ -13,6 +13,7 @@ from veca_marl.envs.core.task import Player, Task
 from veca_marl.envs.tasks.contests.kicking import AutomaticKicks
 from veca_marl.envs.tasks.contests.pitch import Pitch, check_goal, check_start_area
 from veca_marl.envs.tasks.contests.soccer_cfg import SoccerCfg
+from veca_marl.envs.tasks.kickable_ball import check_kickable
 from veca_marl.envs.tasks.player_starts import direct_gaze_ahead, place_player
 from veca_marl.sim.geometry import Floats, horizontal_distance
 from veca_marl.sim.physics import PlaygroundCfg
@@ -53,6 +54,7 @@ class Soccer(Task):
     def build(self) -> None:
         self.pitch = Pitch(self.world, self.cfg)
         self.ball, self.goal = self.pitch.ball, self.pitch.goal
+        check_kickable(self.players, self.ball)
         self._kicks = AutomaticKicks(self.players, self.ball, self.cfg.kick_rest_s)
         self._terms: dict[str, float] = {}
         self._scored = False

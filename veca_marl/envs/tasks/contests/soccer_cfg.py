@@ -17,7 +17,7 @@ class SoccerCfg(TaskCfg):
 
     Attributes:
         radius_m: Radius of the ball.
-        mass_kg: Mass of the ball.
+        mass_kg: Mass of the ball, at most `WalkerCfg.push_limit_kg` of players that walk.
         goal_width_m: Distance between the axes of the posts.
         goal_height_m: Height of the bar.
         goal_from_wall_m: Distance of the goal line from the end of the room, above `radius_m`.

@@ -10,6 +10,7 @@ import numpy as np
 
 from veca_marl.envs.core.scoring import cosine, horizontal, norm
 from veca_marl.envs.core.task import Player, Task, TaskCfg, register, require_walker, terms
+from veca_marl.envs.tasks.kickable_ball import check_kickable
 from veca_marl.envs.tasks.multimodal.rolling_ball import check_ball_speed, launch_from_side_wall
 from veca_marl.sim.body.walker import WalkerCfg
 from veca_marl.sim.physics import ClockCfg, PlaygroundCfg, PropCfg, PropShape, penetration_m
@@ -26,7 +27,7 @@ class KickTheBallCfg(TaskCfg):
 
     Attributes:
         radius_m: Radius of the ball, at most 0.6 m.
-        mass_kg: Mass of the ball.
+        mass_kg: Mass of the ball, at most `WalkerCfg.push_limit_kg` of the player.
         speed_mps: Least and greatest speed at which the ball leaves the wall.
         spread_deg: Largest angle between its direction and the wall's normal, in [0, 90).
         life_s: Time after which a ball that has not been kicked is replaced.
@@ -130,6 +131,7 @@ class KickTheBall(Task):
                 sound=self.cfg.sound(),
             )
         )
+        check_kickable(self.players, self.ball)
         self._kicked = self._kicked_now = False
         self._steps_left = 0
 

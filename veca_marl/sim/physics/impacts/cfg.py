@@ -11,11 +11,13 @@ class ImpactCfg:
     """Sounds of impacts.
 
     Attributes:
-        present: Whether things that hit each other or the floor, and steps of walkers, are heard.
+        present: Whether things that hit each other or the floor, doors and drawers that meet the
+            end of their range, and steps of walkers are heard.
         gain_per_ns: Sound pressure at 1 m per newton second of impulse.
         min_speed_mps: Least change of speed in one physics step that is heard, beside that by
             gravity, and least landing speed of a foot. A contact is silent if its impulse would
-            change the speed of the lighter thing by less, or if neither thing changes by more.
+            change the speed of the lighter thing by less, or if neither thing changes by more. The
+            stop of a joint is silent below that speed of the farthest point of the prop.
     """
 
     present: bool = False

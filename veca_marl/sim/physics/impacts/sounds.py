@@ -1,4 +1,4 @@
-"""Sounds of things that hit each other or the floor, from the contact impulses of Bullet."""
+"""Sounds of things that hit each other, the floor or the stop of their joint."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from veca_marl.sim.geometry import Floats
 from veca_marl.sim.physics.bullet import pybullet
 from veca_marl.sim.physics.clock import ClockCfg
 from veca_marl.sim.physics.impacts.cfg import ImpactCfg
+from veca_marl.sim.physics.impacts.joint_stops import JointStop, joint_stop
 from veca_marl.sim.physics.props import Prop, PropCfg, PropShape
 from veca_marl.sim.physics.props.prop_shapes import bounding_box, prop_geoms
 from veca_marl.sim.sound import SoundField
@@ -27,13 +28,14 @@ _BODY_A, _BODY_B, _NORMAL_FORCE = 1, 2, 9  # in a contact point of PyBullet
 
 
 class ImpactSounds:
-    """Strikes the movable props of a world when a contact changes their velocities.
+    """Strikes the movable props of a world when contacts or stops of joints change their speed.
 
     The impulse of a strike is that of the contact without its impulse while the things were at rest
     or rolling: what lies still is silent. A hit that Bullet distributes over several physics steps
     strikes in each of them. A contact that changes the velocity of neither thing, such as the
-    weight of what has been put on a thing, is silent. Fixed props, the floor and bodies do not
-    sound, and nothing sounds in the first physics step after a reset.
+    weight of what has been put on a thing, is silent. Doors, drawers and lids that meet the end of
+    their range are struck there, at the point farthest from the hinge. Fixed props, the floor and
+    bodies do not sound, and nothing sounds in the first physics step after a reset.
     """
 
     def __init__(self, cfg: ImpactCfg, clock: ClockCfg, client: int, sound: SoundField) -> None:
@@ -46,6 +48,7 @@ class ImpactSounds:
         self._struck: dict[int, StruckBody] = {}
         self._resting: dict[tuple[int, int], float] = {}  # impulses without a hit
         self._velocities: dict[int, Floats] = {}
+        self._stops: list[tuple[Prop, JointStop]] = []
         self._substep = 0
 
     def add(self, prop: Prop) -> None:
@@ -55,6 +58,8 @@ class ImpactSounds:
         body = StruckBody(prop_modes(prop.cfg), self._cfg.gain_per_ns, self._sound.sample_rate_hz)
         self._props[prop.body_id], self._struck[prop.body_id] = prop, body
         prop.impact = self._sound.add_source(f"{prop.name}.impact", body)
+        if prop.joint is not None:
+            self._stops.append((prop, joint_stop(prop.cfg)))
 
     def reset(self) -> None:
         """Forget all contacts."""
@@ -63,7 +68,10 @@ class ImpactSounds:
         self._substep = 0
 
     def after_substep(self) -> None:
-        """Compare the impulses of all contacts with those at rest."""
+        """Compare the impulses of all contacts with those at rest; see which joints were stopped.
+
+        Joints have been stopped before (`Joint.after_substep`).
+        """
         impulses, before = self._contact_impulses(), self._velocities
         self._velocities = {body: prop.velocity for body, prop in self._props.items()}
         delay = int(self._substep * self._samples_per_substep)
@@ -76,7 +84,14 @@ class ImpactSounds:
                 if added_ns > self._threshold_ns(pair):
                     self._strike(pair, added_ns, delay)
         self._resting = resting
+        self._strike_stopped(delay)
         self._substep = (self._substep + 1) % self._clock.substeps
+
+    def _strike_stopped(self, delay_samples: int) -> None:
+        for prop, stop in self._stops:
+            speed = 0.0 if prop.joint is None else prop.joint.stop_speed
+            if speed * stop.reach > self._cfg.min_speed_mps:
+                self._struck[prop.body_id].strike(speed * stop.impulse, delay_samples)
 
     def _contact_impulses(self) -> dict[tuple[int, int], float]:
         impulses: dict[tuple[int, int], float] = {}

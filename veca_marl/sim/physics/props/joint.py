@@ -31,6 +31,8 @@ class Joint:
     Attributes:
         cfg: As above.
         locked: Whether it is locked: it does not move at all.
+        stop_speed: Speed (rad/s or m/s) with which it met an end of its range in the last physics
+            step; 0 if it met none.
     """
 
     def __init__(self, cfg: JointCfg, body_id: int, client: int) -> None:
@@ -40,6 +42,8 @@ class Joint:
         axis = np.asarray(cfg.axis, np.float64)
         self._axis: Floats = axis / np.linalg.norm(axis)
         self.locked = False
+        self.stop_speed = 0.0
+        self._before = (0.0, 0.0)
         self._held = 0.0
         self._built = (False, 0.0)
         self._target: float | None = None
@@ -79,6 +83,8 @@ class Joint:
         """Stop the motor and return to the saved lock; Bullet restores the coordinate."""
         self._release_motor()
         self.locked, self._held = self._built
+        self.stop_speed = 0.0
+        self._before = self._state()
 
     def set_opening(self, opening: float) -> None:
         """Put it at rest at an opening in [0, 1], also if it is locked."""
@@ -142,10 +148,14 @@ class Joint:
     def after_substep(self) -> None:
         """Hold what is locked, stop at the ends of the range and at the motor's target."""
         coordinate, speed = self._state()
+        self.stop_speed = 0.0
         if self.locked:
             if coordinate != self._held or speed != 0.0:
                 self._set_coordinate(self._held)
             return
+        (last, approach), self._before = self._before, (coordinate, speed)
+        if self._at_end(coordinate) and not self._at_end(last):
+            self.stop_speed = abs(approach)
         target = self._target
         if target is not None and (coordinate - target) * self._direction > -_ARRIVED:
             self._set_coordinate(target)
@@ -158,7 +168,12 @@ class Joint:
         state = pybullet.getJointState(self._body_id, LINK, physicsClientId=self._client)
         return float(state[0]), float(state[1])
 
+    def _at_end(self, coordinate: float) -> bool:
+        """Return whether a coordinate is at or beyond an end of the range."""
+        return not _ARRIVED < coordinate < self.cfg.range - _ARRIVED
+
     def _set_coordinate(self, coordinate: float) -> None:
+        self._before = (coordinate, 0.0)
         pybullet.resetJointState(self._body_id, LINK, coordinate, 0.0, physicsClientId=self._client)
 
     def _release_motor(self) -> None:
