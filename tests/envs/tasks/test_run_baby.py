@@ -1,5 +1,7 @@
 """RunBaby: reward, termination, start and expert."""
 
+import math
+
 import numpy as np
 import pytest
 from babies import child_game, hold, play, put, rest, starts
@@ -102,6 +104,44 @@ def test_a_fall_ends_the_episode(game, posture, over):
 def test_kneeling_upright_is_no_fall_by_the_height_of_the_chest(game):
     """Otherwise walking on the knees would be running."""
     assert put(game, UPRIGHT_ON_KNEES).bone("neck").position[2] > game.task.cfg.fallen_m
+
+
+def knee_walk(seconds, hertz):
+    """Posture of a gait on the knees: the thighs swing in turns, the shanks lie on the floor."""
+    swing = 21.0 * math.sin(math.tau * hertz * seconds)
+    return Posture(
+        0.0,
+        UPRIGHT_ON_KNEES.joints_deg
+        | {
+            "spine.flexion": -12.5,
+            "l_thigh.flexion": max(-9.0, -2.0 + swing),
+            "r_thigh.flexion": max(-9.0, -2.0 - swing),
+        },
+    )
+
+
+def knee_walked_m(game, hertz):
+    """Distance that counts of a walk on the knees until the episode ends, and its steps."""
+    body = put(game, knee_walk(0.0, hertz))
+    game.task._begin()
+    covered_m = 0.0
+    for step in range(75):
+        outcome = hold(game, body.posture_angles(knee_walk(0.04 * step, hertz)))
+        covered_m += 0.04 * outcome.terms["agents"]["forward"]
+        if outcome.done:
+            break
+    return covered_m, step + 1
+
+
+def test_walking_on_the_knees_earns_nothing(game):
+    """Without the rule about knees the same gait counts for more than 0.15 m."""
+    rates_hz = (2.1, 2.2, 2.3, 2.4)
+    with child_game("RunBaby", "task.kneeling_m=0.0") as lenient:
+        assert max(knee_walked_m(lenient, hertz)[0] for hertz in rates_hz) > 0.15
+    for hertz in rates_hz:
+        covered_m, steps = knee_walked_m(game, hertz)
+        assert steps == 1
+        assert abs(covered_m) < 0.01
 
 
 def test_the_termination_by_a_fall_can_be_turned_off():
