@@ -13,9 +13,12 @@ RADIUS_M = 0.11
 
 
 class FloorMap:
-    """Cells in the centre of which a disc fits, in the rooms and in the openings of doors."""
+    """Cells in the centre of which a disc fits, in the rooms and in the openings of doors.
 
-    def __init__(self, playground, radius_m=RADIUS_M):
+    Props that can move are not in the way; `also` are further fixed ones.
+    """
+
+    def __init__(self, playground, radius_m=RADIUS_M, also=()):
         low = np.min([room.lower_m[:2] for room in playground.rooms], axis=0)
         high = np.max([np.add(room.lower_m, room.size_m)[:2] for room in playground.rooms], axis=0)
         axes = [np.arange(a + CELL_M / 2, b, CELL_M) for a, b in zip(low, high, strict=True)]
@@ -27,7 +30,7 @@ class FloorMap:
             half = door.width_m / 2
             x, y = door.position_m
             self.free |= (abs(self.x - x) < half) & (abs(self.y - y) < half)
-        for prop in pieces(playground.built_props()):
+        for prop in pieces([*playground.built_props(), *also]):
             if is_in_the_way(prop):
                 self.free &= distance(prop, self.x, self.y) >= radius_m
         self.labels, self.count = ndimage.label(self.free)

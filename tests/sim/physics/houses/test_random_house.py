@@ -1,5 +1,7 @@
 """Generated houses are valid for every seed: connected, passable, furnished, reproducible."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from composed import compose
@@ -8,8 +10,8 @@ from omegaconf import OmegaConf
 
 from veca_marl.config import compose_node, to_config
 from veca_marl.config.stored import body_names, typed
-from veca_marl.sim.physics import RandomHouseCfg, World
-from veca_marl.sim.physics.houses.furnishing import FloorNeeds
+from veca_marl.sim.physics import PropCfg, PropShape, RandomHouseCfg, World
+from veca_marl.sim.physics.houses.free_floor import FloorNeeds
 
 WIDE_M = 0.15
 QUICK, ALL = range(8), range(8, 200)
@@ -21,13 +23,16 @@ SIZES = [
 ]
 
 
-def check(house):
-    """The laws of a generated house."""
-    floor, wide = FloorMap(house), FloorMap(house, radius_m=WIDE_M)
+def check(house, also=(), wide_m=WIDE_M, most_closed_off=5):
+    """The laws of a generated house, with further things in it.
+
+    Places closed off are counted in cells of 4 cm.
+    """
+    floor, wide = FloorMap(house, also=also), FloorMap(house, radius_m=wide_m, also=also)
     reached = set(floor.labels[wide.free])
     assert len(reached) == 1, "a walker reaches every place with some space round it"
     assert {floor.label(door.position_m) for door in house.doors} <= reached
-    assert floor.free.sum() - (floor.labels == reached.pop()).sum() <= 5, "cells of 4 cm"
+    assert floor.free.sum() - (floor.labels == reached.pop()).sum() <= most_closed_off
     for room in house.rooms:
         assert min(room.size_m[:2]) >= house.least_room_m - 1e-5, "but for rounding"
         assert floor.in_box(np.add(room.lower_m, room.size_m), room)[floor.free].any()
@@ -52,6 +57,41 @@ def test_every_seed_gives_a_house_in_which_a_walker_reaches_everything(seeds):
 def test_other_sizes_are_valid_too(numbers):
     for seed in range(3):
         check(RandomHouseCfg(seed=seed, **numbers))
+
+
+def open_leaves(house):
+    """The leaves of a house as fixed boxes where they are at the start."""
+    world, boxes = World(house), []
+    for door in house.doors:
+        if door.leaf is not None:
+            low, high = world.prop(f"leaf_{door.name}").bounds()
+            middle = tuple(((low + high) / 2.0).tolist())
+            boxes.append(PropCfg(door.name, PropShape.box, (high - low).tolist(), middle))
+    world.close()
+    return boxes
+
+
+@pytest.mark.parametrize(
+    "seeds", [pytest.param(QUICK, id="few"), pytest.param(ALL, id="many", marks=pytest.mark.slow)]
+)
+def test_a_walker_reaches_everything_while_leaves_are_open(seeds):
+    """That they can turn is checked by the configuration of every playground."""
+    leaves, doors = 0, 0
+    for seed in seeds:
+        house = RandomHouseCfg(seed=seed, leaves=1.0)
+        boxes = open_leaves(house)
+        check(house, boxes, wide_m=0.2, most_closed_off=20)
+        assert all(house.rooms[0].distance_m(box.position_m[:2]) > 0.2 for box in boxes)
+        leaves, doors = leaves + len(boxes), doors + len(house.doors)
+    assert leaves > 0.8 * doors
+
+
+def test_leaves_change_neither_rooms_nor_places_of_doors():
+    plain, some = (RandomHouseCfg(seed=7, leaves=share) for share in (0.0, 0.5))
+    assert some.rooms == plain.rooms
+    assert [replace(door, leaf=None) for door in some.doors] == plain.doors
+    hung = [door.leaf is not None for door in some.doors]
+    assert 0 < sum(hung) < len(hung)
 
 
 def test_the_first_room_is_the_widest_with_its_middle_at_the_origin_and_free_side_walls():
@@ -121,6 +161,8 @@ def test_sizes_with_many_digits_are_divided(least_m):
         ("walls.door_height_m=0.3", "playground.walls.door_height_m=0.3 must be at least 0.75"),
         ("room_height_m=0.3", "playground.room_height_m=0.3 must be at least 0.75"),
         ("loops=2", r"loops=2.0 must be in \[0, 1\]"),
+        ("leaves=-0.1", r"leaves=-0.1 must be in \[0, 1\]"),
+        ("leaves=1; playground.walls.thickness_m=0.04", r"thickness_m=0.04 is too thin for a leaf"),
         ("pieces_per_room=[3,1]", r"pieces_per_room=\(3, 1\)"),
         ("walls=null", "walls of a random house must not be null"),
         ("rooms=[{name: attic}]", "rooms of a random house cannot be set"),
@@ -129,7 +171,9 @@ def test_sizes_with_many_digits_are_divided(least_m):
 )
 def test_impossible_houses_are_refused_in_the_configuration(numbers, message):
     with pytest.raises(ValueError, match=message):
-        compose(["+task=KickTheBall", "playground=random_house", f"playground.{numbers}"])
+        compose(
+            ["+task=KickTheBall", "playground=random_house", *f"playground.{numbers}".split("; ")]
+        )
 
 
 def test_only_generated_playgrounds_have_a_seed():

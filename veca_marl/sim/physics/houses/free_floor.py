@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,3 +63,24 @@ class FreeFloor:
         if not len(places):
             return 0.0
         return float(np.linalg.norm(np.ptp(places, axis=0))) * CELL_M
+
+
+@dataclass(frozen=True)
+class FloorNeeds:
+    """What furniture and open leaves of doors leave free.
+
+    Attributes:
+        radii_m: Radii of bodies that reach all places with space for them, and all doors.
+        clear_m: Distance from walls and furniture that counts as open floor.
+        extent_m: Least extent of the open floor.
+    """
+
+    radii_m: tuple[float, ...] = (0.12, 0.3)
+    clear_m: float = 0.85
+    extent_m: float = 1.2
+
+    def are_met(self, floor: FreeFloor, fronts: Sequence[tuple[float, float]]) -> bool:
+        """Return whether a floor is open, and the points in front of its doors are reached."""
+        if floor.open_extent_m(self.clear_m) < self.extent_m:
+            return False
+        return all(floor.connects(fronts, radius_m) for radius_m in self.radii_m)

@@ -4,13 +4,20 @@ from __future__ import annotations
 
 import colorsys
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
 from veca_marl.sim.physics.houses.division import Rectangle
-from veca_marl.sim.physics.houses.free_floor import FreeFloor
+from veca_marl.sim.physics.houses.door_fronts import (
+    floor_of,
+    front,
+    kept_free,
+    open_leaf,
+    overlap,
+    turns_into,
+)
+from veca_marl.sim.physics.houses.free_floor import FloorNeeds, FreeFloor
 from veca_marl.sim.physics.houses.furniture import FURNITURE
 from veca_marl.sim.physics.houses.furniture_cfg import FurnitureCfg, FurnitureKind
 from veca_marl.sim.physics.rooms import DoorCfg, RoomCfg
@@ -29,24 +36,7 @@ USES: dict[str, tuple[FurnitureKind, ...]] = {
 """Uses of rooms and the furniture of each. The first room of a house is its living room."""
 
 _TRIES = 12  # places that are drawn for a piece of furniture before it is left out
-_DOOR_DEPTH_M = 0.7  # floor in front of a door that stays free
-_FRONT_M = 0.4  # distance from the wall of the point in front of a door that must be reachable
 _CORNER = 0.5  # probability of a place in a corner
-
-
-@dataclass(frozen=True)
-class FloorNeeds:
-    """What furniture leaves free.
-
-    Attributes:
-        radii_m: Radii of bodies that reach all places with space for them, and all doors.
-        clear_m: Distance from walls and furniture that counts as open floor.
-        extent_m: Least extent of the open floor.
-    """
-
-    radii_m: tuple[float, ...] = (0.12, 0.3)
-    clear_m: float = 0.85
-    extent_m: float = 1.2
 
 
 class _Side(NamedTuple):
@@ -76,12 +66,13 @@ class RoomFurnishing:
         self, room: RoomCfg, doors: Sequence[DoorCfg], needs: FloorNeeds, sides_free: bool
     ) -> None:
         self._room, self._needs = room, needs
-        self._floor = Rectangle(
-            (room.lower_m[0], room.lower_m[1]), (room.size_m[0], room.size_m[1])
-        )
+        self._floor = floor_of(room)
         own = [door for door in doors if room.name in door.rooms]
-        self._kept_free = [_in_front(self._floor, door) for door in own]
-        self._fronts = [_front(self._floor, door) for door in own]
+        self._kept_free = [kept_free(self._floor, door) for door in own]
+        self._fronts = [front(self._floor, door) for door in own]
+        self._leaves = [
+            open_leaf(self._floor, door) for door in own if turns_into(self._floor, door)
+        ]
         self._sides = _X_SIDES if sides_free else (*_X_SIDES, *_Y_SIDES)
         self._taken: list[Rectangle] = []
 
@@ -122,56 +113,10 @@ class RoomFurnishing:
 
     def _is_free(self, area: Rectangle) -> bool:
         """Return whether a piece of furniture may stand there."""
-        if any(_overlap(area, other) for other in (*self._taken, *self._kept_free)):
+        if any(overlap(area, other) for other in (*self._taken, *self._kept_free)):
             return False
-        floor = FreeFloor(self._floor, [*self._taken, area])
-        needs = self._needs
-        if floor.open_extent_m(needs.clear_m) < needs.extent_m:
-            return False
-        return all(floor.connects(self._fronts, radius_m) for radius_m in needs.radii_m)
-
-
-def _overlap(one: Rectangle, other: Rectangle) -> bool:
-    return all(
-        one.lower_m[axis] < other.lower_m[axis] + other.size_m[axis]
-        and other.lower_m[axis] < one.lower_m[axis] + one.size_m[axis]
-        for axis in (0, 1)
-    )
-
-
-def _wall_of(floor: Rectangle, door: DoorCfg) -> tuple[int, bool]:
-    """Return the axis of the wall of a room that a door is in, and whether it is the upper one."""
-    gaps = {
-        (axis, upper): abs(
-            floor.lower_m[axis] + (floor.size_m[axis] if upper else 0.0) - door.position_m[axis]
-        )
-        for axis in (0, 1)
-        for upper in (False, True)
-        if floor.lower_m[1 - axis]
-        < door.position_m[1 - axis]
-        < floor.lower_m[1 - axis] + floor.size_m[1 - axis]
-    }
-    return min(gaps, key=lambda wall: gaps[wall])
-
-
-def _in_front(floor: Rectangle, door: DoorCfg) -> Rectangle:
-    """Return the floor in front of a door that stays free."""
-    axis, upper = _wall_of(floor, door)
-    lower, size = [0.0, 0.0], [door.width_m, door.width_m]
-    size[axis] = _DOOR_DEPTH_M
-    edge = floor.lower_m[axis] + floor.size_m[axis] - _DOOR_DEPTH_M
-    lower[axis] = edge if upper else floor.lower_m[axis]
-    lower[1 - axis] = door.position_m[1 - axis] - door.width_m / 2.0
-    return Rectangle((lower[0], lower[1]), (size[0], size[1]))
-
-
-def _front(floor: Rectangle, door: DoorCfg) -> tuple[float, float]:
-    """Return the point in front of a door from which it is passed straight."""
-    axis, upper = _wall_of(floor, door)
-    place = [door.position_m[0], door.position_m[1]]
-    edge = floor.lower_m[axis] + floor.size_m[axis]
-    place[axis] = edge - _FRONT_M if upper else floor.lower_m[axis] + _FRONT_M
-    return place[0], place[1]
+        floor = FreeFloor(self._floor, [*self._leaves, *self._taken, area])
+        return self._needs.are_met(floor, self._fronts)
 
 
 def uses_of(count: int, rng: np.random.Generator) -> list[str]:

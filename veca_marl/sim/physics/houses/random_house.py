@@ -10,8 +10,10 @@ import numpy as np
 
 from veca_marl.sim.physics.houses.division import Limits, Rectangle, divide
 from veca_marl.sim.physics.houses.door_choice import choose_doors, opening_m
-from veca_marl.sim.physics.houses.furnishing import FloorNeeds, RoomFurnishing, furnish, uses_of
+from veca_marl.sim.physics.houses.free_floor import FloorNeeds
+from veca_marl.sim.physics.houses.furnishing import RoomFurnishing, furnish, uses_of
 from veca_marl.sim.physics.houses.furniture_cfg import FurnitureCfg
+from veca_marl.sim.physics.houses.random_leaves import hang_leaves
 from veca_marl.sim.physics.houses.walls import WallsCfg
 from veca_marl.sim.physics.playground import PLAYGROUND_GENERATORS, PlaygroundCfg
 from veca_marl.sim.physics.rooms import DoorCfg, RoomCfg
@@ -45,9 +47,9 @@ class RandomHouseCfg(PlaygroundCfg):
 
     A rectangle is divided recursively into rooms; a random spanning tree of adjacent rooms, and
     some more pairs, have doors; furniture stands along the walls. A body with a radius of 0.11 m
-    reaches all doors, and every place that is 0.15 m or more away from walls and furniture. The
-    first room is the widest and has furniture at its walls of constant x only, as single-room tasks
-    need it; its middle is the origin.
+    reaches all doors, and every place that is 0.15 m or more away from walls and furniture, 0.2 m
+    where there are leaves. The first room is the widest and has furniture at its walls of constant
+    x only, and no leaf turns into it, as single-room tasks need it; its middle is the origin.
 
     Attributes:
         rooms: Generated; cannot be set.
@@ -61,6 +63,8 @@ class RandomHouseCfg(PlaygroundCfg):
         room_height_m: Height of the rooms.
         door_width_m: Width of the doors.
         loops: Probability of a door between two adjacent rooms that are connected already.
+        leaves: Probability that a door has a hinged leaf, which is open at the start. Doors where
+            one would meet another leaf, or close off a part of the floor, have none.
         pieces_per_room: Least and greatest number of pieces of furniture that are placed in a
             room; those that find no place are left out. A room has each kind of its use at most
             once: 4 in a bathroom, 6 in the living room, 5 in the others.
@@ -76,6 +80,7 @@ class RandomHouseCfg(PlaygroundCfg):
     room_height_m: float = 2.6
     door_width_m: float = 1.0
     loops: float = 0.4
+    leaves: float = 0.0
     pieces_per_room: tuple[int, int] = (3, 5)
 
     def __post_init__(self) -> None:
@@ -98,8 +103,9 @@ class RandomHouseCfg(PlaygroundCfg):
             raise ValueError("playground.walls of a random house must not be null")
         if self.seed < 0:
             raise ValueError(f"playground.seed={self.seed} must be 0 or more")
-        if not 0.0 <= self.loops <= 1.0:
-            raise ValueError(f"playground.loops={self.loops} must be in [0, 1]")
+        for name in ("loops", "leaves"):
+            if not 0.0 <= getattr(self, name) <= 1.0:
+                raise ValueError(f"playground.{name}={getattr(self, name)} must be in [0, 1]")
         least, greatest = self.pieces_per_room
         if not 0 <= least <= greatest:
             raise ValueError(
@@ -181,9 +187,12 @@ def generate_house(cfg: RandomHouseCfg) -> HouseData:
     uses = uses_of(cfg.room_count, rng)
     rooms = _rooms(parts, uses, cfg.room_height_m, rng)
     doors = choose_doors(rooms, limits.wall_m, cfg.door_width_m, cfg.loops, rng)
+    needs = FloorNeeds()
+    # a generator of its own: the same seed has the same rooms and doors with and without leaves
+    doors = hang_leaves(rooms, doors, cfg.leaves, needs, *rng.spawn(1))
     furniture = []
     for number, (room, use) in enumerate(zip(rooms, uses, strict=True)):
-        furnishing = RoomFurnishing(room, doors, FloorNeeds(), sides_free=number == 0)
+        furnishing = RoomFurnishing(room, doors, needs, sides_free=number == 0)
         least, greatest = cfg.pieces_per_room
         count = int(rng.integers(least, greatest + 1))
         furniture += furnish(room, use, furnishing, count, rng)
