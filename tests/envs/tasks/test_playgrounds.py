@@ -82,7 +82,7 @@ def test_tasks_of_the_paper_are_played_in_furnished_houses(task, playground):
             r"GrabObject needs 8.05 m in front .*task.ahead_m=\(4.0, 8.0\).* of 6 x 6 m",
         ),
         (
-            ["+task=MoveToTarget", "task.way_m=[2.0,3.0]", "task.far_m=4"],
+            ["+task=MoveToTarget", "task.target_m=[2.0,3.0]", "task.clip_m=4"],
             r"MoveToTarget needs .* and 3.05 m to its sides .*choose smaller values or",
         ),
         (

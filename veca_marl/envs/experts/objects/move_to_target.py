@@ -34,7 +34,7 @@ class MoveToTargetExpert(CarryingExpert[MoveToTarget]):
     def _script(self) -> Iterator[Floats]:
         cfg = self.task.cfg
         height_m = cfg.edge_m / 2 + _CLEARANCE_M
-        while not self.task.distance_m < 0.5 * cfg.there_m:
+        while not self.task.distance_m < 0.5 * cfg.solved_m:
             yield from carry(self._palms, self.task.toy, self._goal, height_m, CarryCfg())
         yield from return_to_rest(self._palms)
 

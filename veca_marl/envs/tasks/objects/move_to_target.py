@@ -24,29 +24,31 @@ class MoveToTargetCfg(ToyCfg):
     """Parameters of MoveToTarget.
 
     Attributes:
-        way_m: Least and greatest distance of the mark from the toy at the start, to the left or
+        target_m: Least and greatest distance of the mark from the toy at the start, to the left or
             to the right.
-        far_m: Distance between toy and mark at which the distance is clipped.
-        there_m: Distance between toy and mark up to which the task is solved.
+        clip_m: Distance between toy and mark at which the distance is clipped.
+        solved_m: Distance between toy and mark up to which the task is solved.
     """
 
     max_seconds: float = 10.0
     aside_m: float = 0.0
-    way_m: tuple[float, float] = (0.08, 0.12)
-    far_m: float = 0.15
-    there_m: float = 0.05
+    target_m: tuple[float, float] = (0.08, 0.12)
+    clip_m: float = 0.15
+    solved_m: float = 0.05
     weights: dict[str, float] = terms(progress=10.0)
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        near, far = self.way_m
-        if not 0.0 < self.there_m < near <= far < math.inf:
+        near, far = self.target_m
+        if not 0.0 < self.solved_m < near <= far < math.inf:
             raise ValueError(
-                f"task.way_m={(near, far)} must be (least, greatest), above "
-                f"task.there_m={self.there_m}"
+                f"task.target_m={(near, far)} must be (least, greatest), above "
+                f"task.solved_m={self.solved_m}"
             )
-        if not far <= self.far_m < math.inf:
-            raise ValueError(f"task.far_m={self.far_m} must be at least task.way_m={(near, far)}")
+        if not far <= self.clip_m < math.inf:
+            raise ValueError(
+                f"task.clip_m={self.clip_m} must be at least task.target_m={(near, far)}"
+            )
 
 
 @register
@@ -57,15 +59,15 @@ class MoveToTarget(Task):
     reward, "the difference of distance between the target position and the object's position",
     are those of the paper (table of tasks in the appendix); the numbers are not in the paper.
     Departures: touch is limited to the hands and the eyes look at the object, which the paper says
-    of GrabObject only; the distance is horizontal, and clipped at `far_m`, so that a toy that is
+    of GrabObject only; the distance is horizontal, and clipped at `clip_m`, so that a toy that is
     pushed across the room costs no more than one out of reach.
 
     The body is free and can topple. An episode lasts `max_seconds` and never terminates. The task
-    is solved (`solved`) while the toy is within `there_m` of the mark.
+    is solved (`solved`) while the toy is within `solved_m` of the mark.
 
     Terms:
         progress: Decrease during the step of the horizontal distance between toy and mark, m,
-            where the distance is clipped to `far_m`.
+            where the distance is clipped to `clip_m`.
     """
 
     senses = ("vision", "touch", "proprioception")
@@ -76,9 +78,9 @@ class MoveToTarget(Task):
     def check_playground(cls, cfg: Any, playground: PlaygroundCfg) -> None:
         asked = (
             f"task.ahead_m={tuple(cfg.ahead_m)}, task.aside_m={cfg.aside_m:g}, "
-            f"task.way_m={tuple(cfg.way_m)}"
+            f"task.target_m={tuple(cfg.target_m)}"
         )
-        aside_m = cfg.aside_m + cfg.way_m[1]
+        aside_m = cfg.aside_m + cfg.target_m[1]
         check_seat(cls.__name__, playground, cfg.ahead_m[1], aside_m, cfg.edge_m, asked)
 
     def build(self) -> None:
@@ -88,7 +90,7 @@ class MoveToTarget(Task):
             PropCfg(
                 name="mark",
                 shape=PropShape.cylinder,
-                size_m=[self.cfg.there_m, _MARK_HEIGHT_M],
+                size_m=[self.cfg.solved_m, _MARK_HEIGHT_M],
                 colour=(0.1, 0.7, 0.2),
                 tangible=False,
             )
@@ -98,14 +100,14 @@ class MoveToTarget(Task):
     def reset(self, rng: np.random.Generator) -> None:
         self.child.place((0.0, 0.0, 0.0), 0.0, REACHING)
         place_toy(self.toy, self.cfg, rng)
-        offset = rng.choice((-1.0, 1.0)) * rng.uniform(*self.cfg.way_m)
+        offset = rng.choice((-1.0, 1.0)) * rng.uniform(*self.cfg.target_m)
         self.mark.place(horizontal(self.toy.position) + np.array([0.0, offset, _MARK_HEIGHT_M / 2]))
         self.child.look_toward_point(self.toy.position)
         self._clipped_m, self._progress_m = self.distance_m, 0.0
 
     def after_step(self, rng: np.random.Generator) -> None:
         self.child.look_toward_point(self.toy.position)
-        clipped_m = min(self.distance_m, self.cfg.far_m)
+        clipped_m = min(self.distance_m, self.cfg.clip_m)
         self._progress_m = self._clipped_m - clipped_m
         self._clipped_m = clipped_m
 
@@ -119,4 +121,4 @@ class MoveToTarget(Task):
 
     def solved(self, player: Player) -> bool:
         """Return whether the toy is at the mark."""
-        return self.distance_m <= self.cfg.there_m
+        return self.distance_m <= self.cfg.solved_m

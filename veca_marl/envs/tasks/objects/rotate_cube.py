@@ -36,7 +36,7 @@ class RotateCubeCfg(TaskCfg):
             left the hand.
         clear_m: Height of the cube's lowest corner above the floor below which the cube has left
             the hand.
-        there_deg: Angle from the target up to which the task is solved.
+        solved_deg: Angle from the target up to which the task is solved.
     """
 
     max_seconds: float = 8.0
@@ -47,7 +47,7 @@ class RotateCubeCfg(TaskCfg):
     start_deg: float = 10.0
     lost_m: float = 0.08
     clear_m: float = 0.005
-    there_deg: float = 10.0
+    solved_deg: float = 10.0
     weights: dict[str, float] = terms(progress=1.0)
 
     def __post_init__(self) -> None:
@@ -62,10 +62,10 @@ class RotateCubeCfg(TaskCfg):
             raise ValueError(f"task.lost_m={self.lost_m} must be above task.edge_m={self.edge_m}")
         if not 0.0 <= self.start_deg <= 45.0:
             raise ValueError(f"task.start_deg={self.start_deg} must be in [0, 45]")
-        if not 0.0 < self.there_deg < abs(self.turn_deg) <= 180.0:
+        if not 0.0 < self.solved_deg < abs(self.turn_deg) <= 180.0:
             raise ValueError(
                 f"task.turn_deg={self.turn_deg} must be farther than "
-                f"task.there_deg={self.there_deg} and at most half a turn"
+                f"task.solved_deg={self.solved_deg} and at most half a turn"
             )
 
 
@@ -82,7 +82,7 @@ class RotateCube(Task):
     or wrist and arm may rotate the hand with the cube.
 
     An episode lasts `max_seconds` and never terminates. The task is solved (`solved`) while the
-    cube is on the hand and within `there_deg` of the target.
+    cube is on the hand and within `solved_deg` of the target.
 
     Terms:
         progress: Decrease during the step of the angle between the cube and its target, rad. While
@@ -144,5 +144,5 @@ class RotateCube(Task):
         return near and clearance_m(self.cube) > self.cfg.clear_m
 
     def solved(self, player: Player) -> bool:
-        """Return whether the cube is on the hand and within `there_deg` of the target."""
-        return self.on_hand and self.angle_rad <= math.radians(self.cfg.there_deg)
+        """Return whether the cube is on the hand and within `solved_deg` of the target."""
+        return self.on_hand and self.angle_rad <= math.radians(self.cfg.solved_deg)
