@@ -154,9 +154,11 @@ class Joint:
                 self._set_coordinate(self._held)
             return
         (last, approach), self._before = self._before, (coordinate, speed)
+        target = self._target
+        if coordinate == last and speed == 0.0 and target is None:
+            return  # at rest within its range, as doors mostly are
         if self._at_end(coordinate) and not self._at_end(last):
             self.stop_speed = abs(approach)
-        target = self._target
         if target is not None and (coordinate - target) * self._direction > -_ARRIVED:
             self._set_coordinate(target)
             self._release_motor()
