@@ -11,6 +11,7 @@ from omegaconf import OmegaConf
 from veca_marl.config import compose_node, to_config
 from veca_marl.config.stored import body_names, typed
 from veca_marl.sim.physics import PropCfg, PropShape, RandomHouseCfg, World
+from veca_marl.sim.physics.houses.door_fronts import floor_of, open_leaf, turns_into
 from veca_marl.sim.physics.houses.free_floor import FloorNeeds
 
 WIDE_M = 0.15
@@ -84,6 +85,24 @@ def test_a_walker_reaches_everything_while_leaves_are_open(seeds):
         assert all(house.rooms[0].distance_m(box.position_m[:2]) > 0.2 for box in boxes)
         leaves, doors = leaves + len(boxes), doors + len(house.doors)
     assert leaves > 0.8 * doors
+
+
+def test_the_floor_that_open_leaves_cover_is_where_the_leaves_are():
+    """Leaves of both kinds of walls, to either side, against their poses in the simulator."""
+    kinds = set()
+    for seed in QUICK:
+        house = RandomHouseCfg(seed=seed, leaves=1.0)
+        leaves = {box.name: box for box in open_leaves(house)}
+        for door in house.doors:
+            for floor in (floor_of(room) for room in house.rooms if room.name in door.rooms):
+                if not turns_into(floor, door):
+                    continue
+                covered, box = open_leaf(floor, door), leaves[door.name]
+                middle = np.add(covered.lower_m, np.divide(covered.size_m, 2.0))
+                np.testing.assert_allclose(middle, box.position_m[:2], atol=0.06)
+                np.testing.assert_allclose(covered.size_m, box.size_m[:2], atol=0.05)
+                kinds.add((box.size_m[0] > box.size_m[1], door.leaf.opens_to_front))
+    assert len(kinds) == 4
 
 
 def test_leaves_change_neither_rooms_nor_places_of_doors():

@@ -11,6 +11,7 @@ from veca_marl.sim.physics.clock import ClockCfg
 from veca_marl.sim.physics.impacts.cfg import ImpactCfg
 from veca_marl.sim.physics.impacts.joint_stops import JointStop, joint_stop
 from veca_marl.sim.physics.props import Prop, PropCfg, PropShape
+from veca_marl.sim.physics.props.joint import Joint
 from veca_marl.sim.physics.props.prop_shapes import bounding_box, prop_geoms
 from veca_marl.sim.sound import SoundField
 from veca_marl.sim.sound.impacts import (
@@ -48,7 +49,7 @@ class ImpactSounds:
         self._struck: dict[int, StruckBody] = {}
         self._resting: dict[tuple[int, int], float] = {}  # impulses without a hit
         self._velocities: dict[int, Floats] = {}
-        self._stops: list[tuple[Prop, JointStop]] = []
+        self._stops: list[tuple[Joint, JointStop, StruckBody]] = []
         self._substep = 0
 
     def add(self, prop: Prop) -> None:
@@ -59,7 +60,7 @@ class ImpactSounds:
         self._props[prop.body_id], self._struck[prop.body_id] = prop, body
         prop.impact = self._sound.add_source(f"{prop.name}.impact", body)
         if prop.joint is not None:
-            self._stops.append((prop, joint_stop(prop.cfg)))
+            self._stops.append((prop.joint, joint_stop(prop.cfg), body))
 
     def reset(self) -> None:
         """Forget all contacts."""
@@ -88,10 +89,9 @@ class ImpactSounds:
         self._substep = (self._substep + 1) % self._clock.substeps
 
     def _strike_stopped(self, delay_samples: int) -> None:
-        for prop, stop in self._stops:
-            speed = 0.0 if prop.joint is None else prop.joint.stop_speed
-            if speed * stop.reach > self._cfg.min_speed_mps:
-                self._struck[prop.body_id].strike(speed * stop.impulse, delay_samples)
+        for joint, stop, body in self._stops:
+            if joint.stop_speed * stop.reach > self._cfg.min_speed_mps:
+                body.strike(joint.stop_speed * stop.impulse, delay_samples)
 
     def _contact_impulses(self) -> dict[tuple[int, int], float]:
         impulses: dict[tuple[int, int], float] = {}
