@@ -6,8 +6,9 @@ import os
 import pytest
 import torch
 
+from veca_marl.algos.collection.experience import CollectCfg
 from veca_marl.runs import cores, training
-from veca_marl.runs.cores import contention_warning, usable_cores
+from veca_marl.runs.cores import contention_warning, idle_cores_hint, usable_cores
 
 
 @pytest.mark.parametrize(
@@ -39,3 +40,37 @@ def test_the_load_is_the_mean_of_the_last_minute_if_the_system_has_it(monkeypatc
     assert cores.load() == 3.25
     monkeypatch.delattr(os, "getloadavg")
     assert cores.load() == 0.0
+
+
+@pytest.mark.parametrize(
+    ("processes", "worlds", "available", "others"),
+    [(2, 16, 3, 0.0), (2, 16, 16, 12.2), (0, 8, 16, 0.0), (16, 2, 16, 0.0), (2, 1, 16, 0.0)],
+    ids=["three cores", "others use them", "one process on purpose", "all in use", "two worlds"],
+)
+def test_no_hint_without_cores_or_worlds_for_twice_the_processes(
+    processes, worlds, available, others
+):
+    assert not idle_cores_hint(processes, worlds, available, others)
+
+
+@pytest.mark.parametrize(
+    ("available", "others", "remedy"),
+    [
+        (16, 0.0, "collect.processes=16 collect.worlds=2"),
+        (16, 3.2, "collect.processes=8 collect.worlds=4"),
+        (6, 0.0, "collect.processes=4 collect.worlds=8"),
+        (64, 0.0, "collect.processes=32 collect.worlds=1"),
+    ],
+)
+def test_a_hint_names_processes_and_worlds_of_batches_of_the_same_size(available, others, remedy):
+    hint = idle_cores_hint(2, 16, available, others)
+    assert f"2 worker processes step 32 worlds on {available} cores" in hint
+    assert remedy in hint
+
+
+def test_a_run_with_cores_for_more_processes_logs_it(monkeypatch, caplog):
+    monkeypatch.setattr(training, "usable_cores", lambda: 8)
+    monkeypatch.setattr(training, "load", lambda: 0.0)
+    with caplog.at_level(logging.INFO, logger="veca_marl"):
+        training._log_idle_cores(CollectCfg())
+    assert "collect.processes=8 collect.worlds=1" in caplog.text

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 
 
@@ -38,4 +39,30 @@ def contention_warning(threads: int, cores: int, others: float) -> str:
     return (
         f"the machine had a load of {others:.1f} in the last minute, and {threads} threads learn "
         f"on {cores} cores: if other programs go on using them, threads=1 is faster"
+    )
+
+
+def idle_cores_hint(processes: int, worlds: int, cores: int, others: float) -> str:
+    """Return a sentence for the log if more worker processes could step the same worlds.
+
+    The number of processes is part of the configuration of a run, not of the machine: each has its
+    own random numbers, so that a run gives other results with another number.
+
+    Args:
+        processes: Worker processes of the run; with 0 the learner's process steps the worlds.
+        worlds: Worlds of each of them.
+        cores: Cores that they may use.
+        others: Mean number of threads that ran before this run, see `load`.
+
+    Returns:
+        The sentence; empty if there are no cores for at least twice as many processes.
+    """
+    total, free = processes * worlds, cores - math.ceil(others)
+    more = max((n for n in range(1, min(total, free) + 1) if total % n == 0), default=0)
+    if processes == 0 or more < 2 * processes:
+        return ""
+    return (
+        f"{processes} worker processes step {total} worlds on {cores} cores: "
+        f"collect.processes={more} collect.worlds={total // more} makes batches of the same size "
+        "on more of them, from other random numbers"
     )

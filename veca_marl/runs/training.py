@@ -12,13 +12,14 @@ import torch
 from tensordict.nn import TensorDictModuleBase
 from torchrl import timeit
 
+from veca_marl.algos.collection.experience import CollectCfg
 from veca_marl.algos.collection.workers import WorkerError
 from veca_marl.algos.reporting.reporters import MemoryReporter, Reporter, Row
 from veca_marl.algos.training.loop import Trainer
 from veca_marl.config import Config
 from veca_marl.envs.core.game_cfg import GameCfg
 from veca_marl.runs.assembly import make_reporters, make_trainer
-from veca_marl.runs.cores import contention_warning, load, usable_cores
+from veca_marl.runs.cores import contention_warning, idle_cores_hint, load, usable_cores
 from veca_marl.runs.recording import record_episode
 from veca_marl.runs.run_folder import RunFolder
 from veca_marl.runs.run_progress import RunProgress
@@ -120,8 +121,10 @@ def run_training(
         CheckpointError: See `make_trainer`; also if a checkpoint cannot be written.
     """
     trainer = trainer or make_trainer(cfg, folder)
-    if cfg.threads is None and cfg.device == "cpu":
-        _warn_of_contention()
+    if cfg.threads is None:  # a sweep gives each of its runs a share of the cores
+        _log_idle_cores(cfg.collect)
+        if cfg.device == "cpu":
+            _warn_of_contention()
     memory = MemoryReporter()
     with ExitStack() as pending:
         written = [] if folder is None else _make_reporters(cfg, folder, trainer.progress.frames)
@@ -155,6 +158,13 @@ def _warn_of_contention() -> None:
     warning = contention_warning(torch.get_num_threads(), usable_cores(), load())
     if warning:
         _LOG.warning(warning)
+
+
+def _log_idle_cores(collect: CollectCfg) -> None:
+    """Log that more processes could step the worlds, if there are cores for them."""
+    hint = idle_cores_hint(collect.processes, collect.worlds, usable_cores(), load())
+    if hint:
+        _LOG.info(hint)
 
 
 def _make_reporters(cfg: Config, folder: RunFolder, frames: int) -> list[Reporter]:
