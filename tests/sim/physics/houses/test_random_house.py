@@ -11,8 +11,8 @@ from omegaconf import OmegaConf
 from veca_marl.config import compose_node, to_config
 from veca_marl.config.stored import body_names, typed
 from veca_marl.sim.physics import PropCfg, PropShape, RandomHouseCfg, World
-from veca_marl.sim.physics.houses.door_fronts import floor_of, open_leaf, turns_into
-from veca_marl.sim.physics.houses.free_floor import FloorNeeds
+from veca_marl.sim.physics.houses.generated.door_fronts import floor_of, open_leaf, turns_into
+from veca_marl.sim.physics.houses.generated.free_floor import FloorNeeds
 
 WIDE_M = 0.15
 QUICK, ALL = range(8), range(8, 200)

@@ -1,1 +1,1 @@
-"""Houses: walls from rooms and doors, furniture, and houses that are generated from a seed."""
+"""Houses: walls from rooms and doors, leaves of doors, furniture; generated houses."""

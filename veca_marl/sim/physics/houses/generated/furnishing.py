@@ -8,8 +8,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from veca_marl.sim.physics.houses.division import Rectangle
-from veca_marl.sim.physics.houses.door_fronts import (
+from veca_marl.sim.physics.houses.furniture import FURNITURE
+from veca_marl.sim.physics.houses.furniture_cfg import FurnitureCfg, FurnitureKind
+from veca_marl.sim.physics.houses.generated.division import Rectangle
+from veca_marl.sim.physics.houses.generated.door_fronts import (
     floor_of,
     front,
     kept_free,
@@ -17,9 +19,7 @@ from veca_marl.sim.physics.houses.door_fronts import (
     overlap,
     turns_into,
 )
-from veca_marl.sim.physics.houses.free_floor import FloorNeeds, FreeFloor
-from veca_marl.sim.physics.houses.furniture import FURNITURE
-from veca_marl.sim.physics.houses.furniture_cfg import FurnitureCfg, FurnitureKind
+from veca_marl.sim.physics.houses.generated.free_floor import FloorNeeds, FreeFloor
 from veca_marl.sim.physics.rooms import DoorCfg, RoomCfg
 
 Kind = FurnitureKind

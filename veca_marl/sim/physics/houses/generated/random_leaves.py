@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from veca_marl.sim.physics.houses.division import Rectangle
-from veca_marl.sim.physics.houses.door_fronts import (
+from veca_marl.sim.physics.houses.generated.division import Rectangle
+from veca_marl.sim.physics.houses.generated.door_fronts import (
     floor_of,
     front,
     in_front,
@@ -17,7 +17,7 @@ from veca_marl.sim.physics.houses.door_fronts import (
     overlap,
     turns_into,
 )
-from veca_marl.sim.physics.houses.free_floor import FloorNeeds, FreeFloor
+from veca_marl.sim.physics.houses.generated.free_floor import FloorNeeds, FreeFloor
 from veca_marl.sim.physics.rooms import DoorCfg, LeafCfg, RoomCfg
 
 

@@ -8,12 +8,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from veca_marl.sim.physics.houses.division import Limits, Rectangle, divide
-from veca_marl.sim.physics.houses.door_choice import choose_doors, opening_m
-from veca_marl.sim.physics.houses.free_floor import FloorNeeds
-from veca_marl.sim.physics.houses.furnishing import RoomFurnishing, furnish, uses_of
 from veca_marl.sim.physics.houses.furniture_cfg import FurnitureCfg
-from veca_marl.sim.physics.houses.random_leaves import hang_leaves
+from veca_marl.sim.physics.houses.generated.division import Limits, Rectangle, divide
+from veca_marl.sim.physics.houses.generated.door_choice import choose_doors, opening_m
+from veca_marl.sim.physics.houses.generated.free_floor import FloorNeeds
+from veca_marl.sim.physics.houses.generated.furnishing import RoomFurnishing, furnish, uses_of
+from veca_marl.sim.physics.houses.generated.random_leaves import hang_leaves
 from veca_marl.sim.physics.houses.walls import WallsCfg
 from veca_marl.sim.physics.playground import PLAYGROUND_GENERATORS, PlaygroundCfg
 from veca_marl.sim.physics.rooms import DoorCfg, RoomCfg

@@ -1,0 +1,1 @@
+"""Houses that are generated from a seed: rooms, doors, leaves and furniture."""
