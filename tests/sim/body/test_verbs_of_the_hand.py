@@ -205,6 +205,16 @@ def test_a_verb_on_the_wrong_thing_changes_nothing(prop):
     np.testing.assert_array_equal(world.scene.positions, untouched.scene.positions)
 
 
+@pytest.mark.parametrize("method", ["grab", "open", "close", "kick", "step_on"])
+def test_a_method_has_no_effect_where_nothing_is_interactable(method):
+    world = empty_world()
+    walker = seeing(world)
+    begin(world)
+    assert walker.interactable_object() is None
+    assert getattr(walker, method)(walker.interactable_object()) is False
+    assert walker.held is None
+
+
 def test_release_with_empty_hands_and_a_second_grab_are_refused():
     world = empty_world(toy(), toy("second", (0.7, 0.2, 0.05)))
     walker = seeing(world)

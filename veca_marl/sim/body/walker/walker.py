@@ -195,9 +195,9 @@ class Walker(Body):
         """
         return self._handling.can_kick(prop, self.position)
 
-    def kick(self, prop: Prop) -> bool:
+    def kick(self, prop: Prop | None) -> bool:
         """Kick a prop away from the walker; return False, and do nothing, if it cannot."""
-        return self._handling.kick(prop, self.position)
+        return prop is not None and self._handling.kick(prop, self.position)
 
     @property
     def held(self) -> Prop | None:
@@ -212,12 +212,13 @@ class Walker(Body):
         """Return whether a hand is free, and a prop is light, without joint and held by no body."""
         return self._handling.can_grab(prop)
 
-    def grab(self, prop: Prop) -> bool:
+    def grab(self, prop: Prop | None) -> bool:
         """Take a prop into the right hand; return False, and do nothing, if it cannot.
 
-        From now on the prop follows the hand, at any distance at which it was before.
+        From now on the prop follows the hand, at any distance at which it was before. With None,
+        as `interactable_object` returns where there is none, nothing is taken.
         """
-        if not self._handling.grab(prop):
+        if prop is None or not self._handling.grab(prop):
             return False
         self._change_posture()
         self._handling.follow_palm(self.palms()[1])
@@ -231,18 +232,18 @@ class Walker(Body):
         self._change_posture()
         return True
 
-    def open(self, prop: Prop) -> bool:
+    def open(self, prop: Prop | None) -> bool:
         """Open a door, drawer or lid, as the verb `open` does, at any distance.
 
         Returns:
             False, without effect, if it does not declare the interaction `open`, is open, or is
             locked and its key is not in the hand.
         """
-        return Open().attempt(self, prop)
+        return prop is not None and Open().attempt(self, prop)
 
-    def close(self, prop: Prop) -> bool:
+    def close(self, prop: Prop | None) -> bool:
         """Close a door, drawer or lid, as the verb `close` does; see `open`."""
-        return Close().attempt(self, prop)
+        return prop is not None and Close().attempt(self, prop)
 
     def can_step_on(self, prop: Prop) -> bool:
         """Return whether it stands on the floor and a prop is heavy, low and within reach.
@@ -254,12 +255,12 @@ class Walker(Body):
         reached = foot_steps_on(self._world.client, self.cfg, self._motion.ground, prop)
         return reached and self._motion.can_step_on(prop)
 
-    def step_on(self, prop: Prop) -> bool:
+    def step_on(self, prop: Prop | None) -> bool:
         """Step onto the middle of a prop; return False, and do nothing, if it cannot.
 
         The walker walks on its surface, and steps down where it walks over an edge.
         """
-        if not self.can_step_on(prop):
+        if prop is None or not self.can_step_on(prop):
             return False
         self._motion.step_on(prop)
         self._change_posture()
