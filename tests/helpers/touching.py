@@ -97,7 +97,7 @@ def _against(stage, bone, g):
     radii = np.repeat(FIELD * of_index(taxels.gaps, bone)[:, None], 6, axis=1)
     if geoms.objects[g] == stage.body.id:
         radii[of_index(overlapping_triangles(FIELD), bone)] = 0.0
-    thing = _Solid(geoms, g, other - inset)
+    thing = _pressing(geoms, g, inset)
     readings = np.zeros(bases.shape[:2])
     close = thing.distance(bases) < np.hypot(length, radii)
     if close.any():
@@ -150,10 +150,18 @@ def _close(thing, bones, length, inset, bases, normals, radii):
     return np.where(thing.distance(bases) <= 0.0, np.maximum(readings, onto_bone), readings)
 
 
-class _Solid:
-    """A primitive of the scene with some of its outer layer taken off."""
+def _pressing(geoms, g, inset):
+    """The primitive with a layer of its skin, round at the edges of what is below it."""
+    if geoms.shapes[g] in (Shape.BOX, Shape.CYLINDER):
+        return _Solid(geoms, g, geoms.skins[g], layer=inset)
+    return _Solid(geoms, g, geoms.skins[g] - inset)
 
-    def __init__(self, geoms, g, off):
+
+class _Solid:
+    """A primitive of the scene with its outer layer taken off, and another one put on."""
+
+    def __init__(self, geoms, g, off, layer=0.0):
+        self._layer = layer
         self._position, self._rotation = geoms.positions[g], geoms.rotations[g]
         self._shape, size = Shape(geoms.shapes[g]), geoms.sizes[g].astype(float)
         if self._shape is Shape.BOX:
@@ -163,7 +171,7 @@ class _Solid:
             self._size = np.array([size[0] - off, size[1] - cut])
 
     def distance(self, points):
-        return _DISTANCES[self._shape](self._local(points), self._size)[0]
+        return _DISTANCES[self._shape](self._local(points), self._size)[0] - self._layer
 
     def outward(self, points):
         """Direction from the nearest surface."""

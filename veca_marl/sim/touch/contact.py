@@ -11,14 +11,12 @@ from typing import NamedTuple
 
 from numba import njit
 
-from veca_marl.sim.geometry import (
-    DistanceAndGradient,
-    Floats,
-    Solid,
-    Vector,
-    solid_distance,
-    solid_entry,
-    solid_gradient,
+from veca_marl.sim.geometry import DistanceAndGradient, Floats, Vector
+from veca_marl.sim.touch.pressing_solid import (
+    PressingSolid,
+    pressing_distance,
+    pressing_entry,
+    pressing_gradient,
 )
 from veca_marl.sim.touch.rigid_bones import distance_to_placed, moved_to_height
 
@@ -27,7 +25,7 @@ class Column(NamedTuple):
     """What the taxels of one bone have in common, compared with one primitive.
 
     Attributes:
-        solid: The primitive with `inset` of its own skin on, see `solid_of`.
+        solid: The primitive with `inset` of its own skin on.
         length: Metres, t: thickness of the skin, of both skins if the primitive has one.
         depth: Metres from the sensing point down to the base.
         inset: Metres of the primitive's own skin that count as part of it; columns start that
@@ -35,7 +33,7 @@ class Column(NamedTuple):
         bones: Number of rows of placed bones, see `place_bone`.
     """
 
-    solid: Solid
+    solid: PressingSolid
     length: float
     depth: float
     inset: float
@@ -56,7 +54,7 @@ def taxel_reading(
         radius: R, of the receptive field; 0 for a point.
         known: The largest reading from other primitives.
     """
-    away = solid_distance(column.solid, base[0], base[1], base[2])
+    away = pressing_distance(column.solid, base[0], base[1], base[2])
     if away <= 0.0:
         if known < 1.0:
             known = max(_reading_around(column, placed, base, normal, radius, away), known)
@@ -83,9 +81,9 @@ def _reading_around(
     if away + abs(height + column.inset) <= 0.0:  # wherever it is moved to, it is inside
         return 1.0
     moved = moved_to_height(placed, column.bones, base, -column.inset)
-    if solid_distance(column.solid, moved[0], moved[1], moved[2]) <= 0.0:
+    if pressing_distance(column.solid, moved[0], moved[1], moved[2]) <= 0.0:
         return 1.0
-    slope: DistanceAndGradient = solid_gradient(column.solid, base[0], base[1], base[2])
+    slope: DistanceAndGradient = pressing_gradient(column.solid, base[0], base[1], base[2])
     against = -(slope[1] * normal[0] + slope[2] * normal[1] + slope[3] * normal[2])
     straight = min(max(against, 0.0), 1.0) ** 2
     share = min(max(1.0 - (height + column.inset) / column.length, 0.0), 1.0)
@@ -108,12 +106,12 @@ def _column_reading(
 ) -> float:
     """Return ``C = min((1 - e / t) cos(a)^2, x_e)`` or, if that is larger, `known`."""
     (x, y, z), (u, v, w) = base, normal
-    entry = solid_entry(column.solid, base, normal)
+    entry = pressing_entry(column.solid, base, normal, column.length)
     share = 1.0 - entry / column.length
     if share <= known:
         return known
     x, y, z = x + entry * u, y + entry * v, z + entry * w
-    slope: DistanceAndGradient = solid_gradient(column.solid, x, y, z)
+    slope: DistanceAndGradient = pressing_gradient(column.solid, x, y, z)
     against = max(-(slope[1] * u + slope[2] * v + slope[3] * w), 0.0)
     share *= min(against * against, 1.0)
     if share <= known:
@@ -130,7 +128,7 @@ def _field_reading(
     The base has to be outside of the primitive.
     """
     (x, y, z), (u, v, w) = base, normal
-    slope: DistanceAndGradient = solid_gradient(column.solid, x, y, z)
+    slope: DistanceAndGradient = pressing_gradient(column.solid, x, y, z)
     away = slope[0]
     ahead = -(slope[1] * u + slope[2] * v + slope[3] * w)
     height = away * ahead

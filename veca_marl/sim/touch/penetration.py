@@ -25,9 +25,9 @@ reading does not depend on the time step.
 
 A primitive with a skin of its own, such as a bone of another body, is treated as two springs in
 series: t is the sum of both thicknesses, and heights count from rigid bone to rigid bone. With s,
-the smaller of the two thicknesses, the primitive is its bone with a layer of s, and b lies s inside
-the bone, so that b remains inside of thin bones. Other bones of the own body are sensed in the same
-way, see `hidden_overlaps` for an exception.
+the smaller of the two thicknesses, the primitive is its bone with a layer of s, which is round at
+the edges of the bone, and b lies s inside the bone, so that b remains inside of thin bones. Other
+bones of the own body are sensed in the same way, see `hidden_overlaps` for an exception.
 """
 
 from __future__ import annotations
@@ -44,7 +44,6 @@ from veca_marl.sim.geometry import (
     GeomTable,
     Shape,
     Vector,
-    solid_distance,
     solid_of,
 )
 from veca_marl.sim.touch.broad_phase import (
@@ -57,8 +56,9 @@ from veca_marl.sim.touch.broad_phase import (
     to_local,
 )
 from veca_marl.sim.touch.contact import Column, taxel_reading
+from veca_marl.sim.touch.pressing_solid import PressingSolid, core_and_layer, pressing_distance
 from veca_marl.sim.touch.receptive_fields import Fields
-from veca_marl.sim.touch.rigid_bones import RigidBones, is_farther, place_bone, shrunk
+from veca_marl.sim.touch.rigid_bones import RigidBones, is_farther, place_bone
 from veca_marl.sim.touch.taxels import BARYCENTRIC, TaxelTable
 
 _POLYHEDRON = int(Shape.POLYHEDRON)
@@ -162,18 +162,19 @@ def measure_penetration(
                 continue
             thickness, skin = taxels.thickness[bone], geoms.skins[g]
             inset = min(thickness, skin)
-            primitive = _sensed_primitive(geoms, g, skin - inset)
+            primitive, layer = _sensed_primitive(geoms, g, inset)
             count = place_bone(geoms, own, bone, geoms.rotations[g], geoms.positions[g])
-            reach = thickness + skin - inset  # farther from the bone, no skin is displaced
+            # farther from the bone, no skin is displaced
+            reach = thickness + skin - inset + layer
             if not polyhedra and is_farther(primitive[0], primitive[1], own.placed, count, reach):
                 continue
-            solid = solid_of(faces, primitive[0], primitive[1])
+            solid = PressingSolid(solid_of(faces, primitive[0], primitive[1]), layer)
             column = Column(solid, thickness + skin, thickness + inset, inset, count)
             margin = farthest_contact(thickness, skin, fields.largest[bone])
             radii = fields.radii[1 if geoms.objects[g] == fields.body else 0]
             for patch in range(taxels.first_patch[bone], taxels.first_patch[bone + 1]):
                 x, y, z = to_local(primitive, workspace.patches, patch)
-                away = solid_distance(solid, x, y, z)
+                away = pressing_distance(solid, x, y, z)
                 if away > workspace.patches[patch, 3] + margin:
                     continue
                 _read_patch(
@@ -190,10 +191,17 @@ def measure_penetration(
 
 
 @njit(cache=True, error_model="numpy")
-def _sensed_primitive(geoms: GeomTable, g: int, taken_off: float) -> PlacedPrimitive:
-    """Return a row of the table as scalars, with some of its own skin taken off."""
+def _sensed_primitive(geoms: GeomTable, g: int, kept: float) -> tuple[PlacedPrimitive, float]:
+    """Return a row of the table as scalars, its core alone, and the layer of `PressingSolid`.
+
+    Args:
+        geoms: The scene's primitives.
+        g: The row.
+        kept: Metres of its own skin that belong to the solid.
+    """
     shape, size, origin, along_x, along_y, along_z = placed_primitive(geoms, g)
-    return shape, shrunk(shape, size, taken_off), origin, along_x, along_y, along_z
+    core, layer = core_and_layer(shape, size, geoms.skins[g], kept)
+    return (shape, core, origin, along_x, along_y, along_z), layer
 
 
 @njit(cache=True, error_model="numpy", inline="always")
@@ -259,7 +267,7 @@ def _is_outside(
     )
     depth = middle + column.depth - 0.5 * column.length
     x, y, z = x - depth * normal[0], y - depth * normal[1], z - depth * normal[2]
-    beyond = solid_distance(column.solid, x, y, z)
+    beyond = pressing_distance(column.solid, x, y, z)
     along = spread + 0.5 * column.length
     return beyond > math.sqrt(0.25 * farthest + along * along) + radius
 
