@@ -145,8 +145,11 @@ def play(game, policy, seeds):
     return solved / len(seeds)
 
 
-def test_standing_still_and_pressing_all_the_time_does_not_solve_the_task(game):
-    assert play(game, lambda game: act(game, verb="press")[0], range(2)) == 0.0
+@pytest.mark.parametrize(
+    ("forward", "turn"), [(0.0, 0.0), (0.0, 0.3), (0.0, 1.0)], ids=["stand", "turn slowly", "spin"]
+)
+def test_pressing_all_the_time_without_chasing_does_not_solve_the_task(game, forward, turn):
+    assert play(game, lambda game: act(game, forward, turn, verb="press")[0], range(3)) == 0.0
 
 
 def expert(game):

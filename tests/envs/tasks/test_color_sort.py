@@ -183,6 +183,7 @@ def test_all_toys_in_their_baskets_end_the_episode_solved(game):
         (["task.items=0"], "task.items=0"),
         (["task.apart_m=0.3"], "baskets must not overlap"),
         (["body.verbs=[grab]"], r"needs the verbs.*lacks \['put_into'\]"),
+        (["body.interaction_range_m=0"], r"reach nothing with body.interaction_range_m=0"),
         (["task.apart_m=6"], "leaves no 10 places 6.00 m apart"),
     ],
 )

@@ -83,6 +83,7 @@ def make_game(task, override):
         ("GrabObject", "lifted_m=0.0", "lifted_m"),
         ("MoveToTarget", "target_m=[0.03,0.1]", "target_m"),
         ("MoveToTarget", "solved_m=0.0", "solved_m"),
+        ("MoveToTarget", "solved_m=-1.0", "task.solved_m=-1.0 must be positive"),
         ("MoveToTarget", "clip_m=0.1", "clip_m"),
         ("MoveToTarget", "edge_m=-1.0", "edge_m"),
         ("PileUpBlock", "edge_m=0.0", "edge_m=0.0"),

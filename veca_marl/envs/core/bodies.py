@@ -24,7 +24,7 @@ def check_body(owner: str, body: BodyCfg, needed: type[BodyCfg], verbs: Sequence
         verbs: Choices of the action part `verb` that are needed.
 
     Raises:
-        ValueError: If the body is of another kind, or lacks a verb.
+        ValueError: If the body is of another kind, lacks a verb, or its verbs reach nothing.
     """
     if not isinstance(body, needed):
         raise wrong_body(owner, needed)
@@ -33,6 +33,11 @@ def check_body(owner: str, body: BodyCfg, needed: type[BodyCfg], verbs: Sequence
     if missing:
         raise ValueError(
             f"{owner}: this task needs the verbs {list(verbs)}; body.verbs={own} lacks {missing}"
+        )
+    if verbs and not body.interaction_range_m > 0.0:
+        raise ValueError(
+            f"{owner}: this task needs the verbs {list(verbs)}, which reach nothing with "
+            f"body.interaction_range_m={body.interaction_range_m}"
         )
 
 

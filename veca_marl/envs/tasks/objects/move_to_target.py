@@ -40,7 +40,9 @@ class MoveToTargetCfg(ToyCfg):
     def __post_init__(self) -> None:
         super().__post_init__()
         near, far = self.target_m
-        if not 0.0 < self.solved_m < near <= far < math.inf:
+        if not self.solved_m > 0.0:
+            raise ValueError(f"task.solved_m={self.solved_m} must be positive")
+        if not self.solved_m < near <= far < math.inf:
             raise ValueError(
                 f"task.target_m={(near, far)} must be (least, greatest), above "
                 f"task.solved_m={self.solved_m}"

@@ -131,6 +131,11 @@ class RandomHouseCfg(PlaygroundCfg):
                 f"doors of {self.door_width_m} m and an open floor"
             )
         most = self.most_rooms
+        if most < 1:
+            raise ValueError(
+                f"playground.house_size_m={tuple(self.house_size_m)} is too small for one room of "
+                f"least_room_m={self.least_room_m}"
+            )
         if not 1 <= self.room_count <= most:
             raise ValueError(
                 f"playground.room_count={self.room_count} must be from 1 to {most}: so many rooms "
