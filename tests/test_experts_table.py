@@ -19,6 +19,7 @@ from veca_marl.experts_table.command import main
 from veca_marl.experts_table.episode_file import EpisodeFile
 from veca_marl.experts_table.play import Played, digest, game_cfg
 from veca_marl.experts_table.processes import LostProcessError, play_all
+from veca_marl.experts_table.replay import spread
 from veca_marl.experts_table.table import markdown
 from veca_marl.runs.lock import locked
 from veca_marl.sim.physics import PropCfg
@@ -208,3 +209,40 @@ def test_episodes_with_other_starts_are_not_mixed(tmp_path):
     for version in (0, 2):
         with pytest.raises(ValueError, match=rf"starts of version 1, not {version} .*another"):
             file.check([played()], "c", version)
+
+
+def test_replayed_episodes_are_the_same_or_named_with_both_outcomes(tmp_path, capsys):
+    words = [*SHORT, f"to={tmp_path}"]
+    assert main([*words, "episodes=3"]) == 0
+    capsys.readouterr()
+    assert main([*words, "replay=2"]) == 0
+    assert capsys.readouterr().out == "4 stored episodes are the same\n"
+    lines = (tmp_path / "DodgeCar.csv").read_text().splitlines(keepends=True)
+    assert lines[3].startswith("expert,2,")
+    lines[3] = lines[3].replace(",10,", ",11,")  # steps
+    (tmp_path / "DodgeCar.csv").write_text("".join(lines))
+    assert main([*words, "replay=2"]) != 0
+    error = capsys.readouterr().err
+    assert "DodgeCar expert 2: return " in error
+    assert ", 10 steps now, return " in error
+    assert ", 11 steps at " in error
+    assert "1 of 4 stored episodes differ, of ['DodgeCar']" in error
+
+
+def test_what_cannot_be_replayed_is_refused(tmp_path, capsys):
+    assert main(["tasks=[DodgeCar]", "replay=1", f"to={tmp_path}"]) == 2
+    assert "has no episodes of ['DodgeCar']" in capsys.readouterr().err
+    assert main(["replay=1", f"to={tmp_path}"]) == 2
+    assert "has no episodes of any task" in capsys.readouterr().err
+    assert main([*SHORT, f"to={tmp_path}", "episodes=1"]) == 0
+    assert main([*SHORT, "task.aim=0.5", "replay=1", f"to={tmp_path}"]) == 2
+    assert "another configuration" in capsys.readouterr().err
+    assert main(["replay=-1"]) == 2
+    assert "replay must be 0 or more, got -1" in capsys.readouterr().err
+
+
+def test_replayed_episodes_are_spread_over_those_of_each_policy():
+    rows = [played(policy, episode=n) for policy in ("random", "expert") for n in range(10)]
+    chosen = [(row.policy, row.episode) for row in spread(rows, 3)]
+    assert chosen == [(policy, n) for policy in ("expert", "random") for n in (0, 4, 9)]
+    assert len(list(spread(rows[:2], 5))) == 2

@@ -19,6 +19,7 @@ from veca_marl.experts_table.episode_file import EpisodeFile
 from veca_marl.experts_table.options import TableOptions
 from veca_marl.experts_table.play import Job, Played, digest, game_cfg
 from veca_marl.experts_table.processes import LostProcessError, play_all
+from veca_marl.experts_table.replay import StaleEpisodesError, replay
 from veca_marl.experts_table.table import markdown
 from veca_marl.runs.lock import locked
 from veca_marl.runs.provenance import checkout_commit
@@ -32,7 +33,9 @@ returns, success rates and speeds:
 
 The players of other teams act at random (``opponent.TEAM=expert`` for others). Each episode is
 stored when it ends: a second call with the same folder plays those that are missing. A file
-``remarks.csv`` in it (columns task, policy, remark) adds remarks to rows of the table.
+``remarks.csv`` in it (columns task, policy, remark) adds remarks to rows of the table. Rows of
+earlier commits stay; ``replay=5`` plays five of them for each task and policy once more and names
+those that differ.
 """
 TABLE, REMARKS = "table.md", "remarks.csv"
 _REMARK_COLUMNS = ("task", "policy", "remark")
@@ -40,7 +43,7 @@ _REMARK_COLUMNS = ("task", "policy", "remark")
 
 def main(words: Sequence[str] | None = None) -> int:
     """Run the command line; return the exit status."""
-    errors = (WriteError, LostProcessError)
+    errors = (WriteError, LostProcessError, StaleEpisodesError)
     return CommandLine("experts_table", TableOptions, DESCRIPTION, errors).run(run, words)
 
 
@@ -50,8 +53,12 @@ def run(options: TableOptions, overrides: list[str]) -> None:
     Raises:
         ConfigError: If a choice is impossible, stored episodes are of another configuration, or
             another process plays for the same folder.
+        StaleEpisodesError: See `replay`.
     """
     folder = check_folder(options.to, "to")
+    if options.replay:
+        print(_replay(options, folder, overrides))
+        return
     with locked(folder):
         table = _play_missing(options, folder, overrides)
         write_atomically(folder / TABLE, table)
@@ -70,6 +77,23 @@ def _play_missing(options: TableOptions, folder: Path, overrides: list[str]) -> 
             _file(folder, job.task).add(played)
             _report(f"{number}/{len(jobs)} {job.task} {played.policy} {job.episode}", played)
         return markdown(_stored(folder), remarks)
+    except ValueError as error:
+        raise ConfigError(one_line(error)) from error
+
+
+def _replay(options: TableOptions, folder: Path, overrides: list[str]) -> str:
+    """Play stored episodes of the tasks once more; return what was found."""
+    try:
+        prepare(overrides)
+        stored = _stored(folder)
+        if options.tasks != ["all"]:
+            stored = {task: _file(folder, task).read() for task in options.tasks}
+        without = sorted({*options.tasks} - {"all", *(task for task in stored if stored[task])})
+        if without or not stored:
+            raise ValueError(f"to={options.to} has no episodes of {without or 'any task'}")
+        for task, rows in stored.items():
+            _file(folder, task).check(rows, digest(game_cfg(task, overrides)), rows[0].version)
+        return replay(stored, options.replay, overrides, options.processes)
     except ValueError as error:
         raise ConfigError(one_line(error)) from error
 
