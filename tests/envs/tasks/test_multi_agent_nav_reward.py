@@ -64,6 +64,17 @@ def test_turning_round_adds_at_most_one_step_of_turning(game):
     assert abs(turns.sum()) <= 1.01 * turned_rad
 
 
+def test_going_to_and_fro_in_front_of_the_object_is_no_substitute_for_reaching_it(game):
+    """Only the way there is rewarded: on the way back the object is not visible."""
+    half_turn = [(0.0, 1.0)] * round(math.pi / abs(moved(game, 170.0, (0.0, 1.0))[0, 1]))
+    lap = [*[(1.0, 0.0)] * 12, *half_turn, *[(1.0, 0.0)] * 12, *half_turn]
+    steps = round(game.task.cfg.max_seconds / STEP_S)
+    terms = moved(game, 180.0, *(lap * steps)[:steps]).sum(axis=0)
+    weights = game.task.cfg.weights
+    total = weights["ahead"] * terms[0] + weights["turn"] * terms[1]
+    assert 0.02 < total < 0.4 * weights["reached"]
+
+
 def test_turning_quickly_out_of_sight_and_slowly_back_adds_nothing(game):
     """The object leaves the images in one step, and enters them in many."""
     there_and_back = [(0.0, 1.0), *[(0.0, -0.25)] * 4]
