@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any, ClassVar
 
 import numpy as np
@@ -339,14 +339,19 @@ class Body(ABC):
         """Return whether a prop is among `interactable_objects`."""
         return bool(self._interactable([prop]))
 
-    def interactable_objects(self) -> list[Prop]:
+    def interactable_objects(self, where: Callable[[Prop], bool] | None = None) -> list[Prop]:
         """Return the props that can be interacted with, nearest to the centre of the view first.
 
         A prop is interactable if it declares an interaction (`PropCfg.interactions`), a pixel of an
         open eye shows it with no transparent object in front, and its bounding box is nearer to the
         head than `interaction_range_m`. What the body itself holds is left out.
+
+        Args:
+            where: Only props for which it returns True; None for all. It is asked first, since
+                looking for a prop in the images takes longer.
         """
-        return self._interactable(self._world.props.values())
+        props = self._world.props.values()
+        return self._interactable(props if where is None else filter(where, props))
 
     def interactable_object(self) -> Prop | None:
         """Return the interactable prop nearest to the centre of the view; None if there is none."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from typing import TYPE_CHECKING, ClassVar, Protocol
 
 from veca_marl.sim.geometry import Floats
@@ -41,8 +42,8 @@ class InteractingBody(Protocol):
         """The prop in its hand; None if the hand is empty."""
         ...
 
-    def interactable_objects(self) -> list[Prop]:
-        """Return the interactable props, nearest to the centre of the view first."""
+    def interactable_objects(self, where: Callable[[Prop], bool] | None = None) -> list[Prop]:
+        """Return the interactable props that meet a condition, nearest to the centre first."""
         ...
 
     def interactable_object(self) -> Prop | None:
@@ -127,7 +128,7 @@ class Interaction(Verb):
 
     def target(self, body: InteractingBody) -> Prop | None:
         """Return the prop nearest to the centre of the view of those that declare the verb."""
-        return next((prop for prop in body.interactable_objects() if self.declared_by(prop)), None)
+        return next(iter(body.interactable_objects(self.declared_by)), None)
 
     def attempt(self, body: InteractingBody, target: Prop | None) -> bool:
         """Apply the verb to the target if the prop declares it and `allows` returns True."""
