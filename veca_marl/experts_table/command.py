@@ -85,12 +85,12 @@ def _replay(options: TableOptions, folder: Path, overrides: list[str]) -> str:
     """Play stored episodes of the tasks once more; return what was found."""
     try:
         prepare(overrides)
-        stored = _stored(folder)
-        if options.tasks != ["all"]:
-            stored = {task: _file(folder, task).read() for task in options.tasks}
-        without = sorted({*options.tasks} - {"all", *(task for task in stored if stored[task])})
+        stored = {task: rows for task, rows in _stored(folder).items() if rows}
+        asked = list(stored) if options.tasks == ["all"] else options.tasks
+        without = [task for task in asked if task not in stored]
         if without or not stored:
             raise ValueError(f"to={options.to} has no episodes of {without or 'any task'}")
+        stored = {task: stored[task] for task in asked}
         for task, rows in stored.items():
             _file(folder, task).check(rows, digest(game_cfg(task, overrides)), rows[0].version)
         return replay(stored, options.replay, overrides, options.processes)
