@@ -1,7 +1,7 @@
 """Stored episodes that are played once more: does the present code play them the same way?
 
 The configuration of a game says nothing about changes of the code. On another kind of processor
-single digits can differ too, and with them episodes with contacts.
+the last digits can differ, and episodes with contacts then go another way.
 """
 
 from __future__ import annotations
@@ -80,4 +80,4 @@ def _outcome(played: Played) -> tuple[float, float | None, int]:
 
 def _text(played: Played) -> str:
     solved = "" if played.solved is None else f", solved {played.solved:g}"
-    return f"return {played.score:.4f}{solved}, {played.steps} steps"
+    return f"return {played.score}{solved}, {played.steps} steps"
