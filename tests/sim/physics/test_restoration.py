@@ -63,7 +63,7 @@ def test_a_restored_world_equals_a_fresh_one(playground):
             strew(some_world, someone, np.random.default_rng(seed))
             films.append(play_about(some_world, someone, seed, 400 if seed == 0 else 60))
         np.testing.assert_array_equal(*films)
-        assert np.ptp(films[0][:, world.prop("drum")._row, 0]) > 1e-3  # it was pushed
+        assert np.ptp(films[0][:, world.prop("drum").row, 0]) > 1e-3  # it was pushed
         world.close()
     used.close()
 

@@ -58,7 +58,7 @@ def test_a_sliding_box_is_slowed_by_its_friction(friction):
 def test_the_height_of_a_bounce_follows_from_the_restitution(restitution):
     """Height after the bounce = e^2 x height of the fall, within a substep's way."""
     world = empty_world(ball(position=(0.0, 0.0, 1.1), restitution=restitution))
-    heights = film(world, 25)[:, world.prop("ball")._row, 2] - 0.1
+    heights = film(world, 25)[:, world.prop("ball").row, 2] - 0.1
     landed = round(np.sqrt(2.0 / 9.81) / STEP_S)
     assert heights[landed + 1 :].max() == pytest.approx(restitution**2, abs=0.06)
     assert heights.min() > -0.02

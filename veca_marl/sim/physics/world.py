@@ -18,7 +18,13 @@ from veca_marl.sim.physics.interactions.registry import check_interactions
 from veca_marl.sim.physics.keys import check_keys
 from veca_marl.sim.physics.mover import Mover
 from veca_marl.sim.physics.playground import PlaygroundCfg, make_house
-from veca_marl.sim.physics.props import Prop, PropCfg, follow_physics, limit_detection
+from veca_marl.sim.physics.props import (
+    Prop,
+    PropCfg,
+    follow_physics,
+    limit_detection,
+    resting_props,
+)
 from veca_marl.sim.physics.props.joint import Joint
 from veca_marl.sim.sound import SoundField, make_sound
 
@@ -68,6 +74,7 @@ class World:
         self._built: BuiltState | None = None
         self._moving: list[Prop] = []
         self._joints: list[Joint] = []
+        self._resting = resting_props(self.client, self.clock)
         self._configure_physics()
         self._impacts: ImpactSounds | None = None
         if playground.impacts.present:
@@ -100,6 +107,7 @@ class World:
             self._add_joint(prop, prop.joint, parent)
         if self._impacts is not None:
             self._impacts.add(prop)
+        prop.rest = self._resting.add(prop)
         if not prop.fixed:
             self._moving.append(prop)
         return prop
@@ -163,6 +171,7 @@ class World:
             raise RuntimeError("freeze() the world before its first reset()")
         self.version += 1
         self._set_contact_share()
+        self._resting.reset()
         pybullet.restoreState(self._state, physicsClientId=self.client)
         self._built.restore(self.scene)
         self.sound.reset(rng)
@@ -192,10 +201,11 @@ class World:
         for _ in range(self.clock.substeps):
             for mover in self.movers:
                 mover.before_substep(self.clock.substep_s)
-            pybullet.stepSimulation(physicsClientId=self.client)
+            self._resting.simulate()
             for notify in self.after_substep:
                 notify()
         self._update_scene()
+        self._resting.after_step(self.scene)
         self.sound.advance()
         self.step_count += 1
         self.version += 1

@@ -6,6 +6,7 @@ from veca_marl.sim.physics.props.planned_prop import PlannedProp, StandingProp
 from veca_marl.sim.physics.props.prop import Prop, follow_physics
 from veca_marl.sim.physics.props.prop_cfg import PropCfg
 from veca_marl.sim.physics.props.prop_shape import SIZE_NAMES, PropShape, check_appearance
+from veca_marl.sim.physics.props.resting_props import resting_props
 from veca_marl.sim.physics.props.rigid_body import limit_detection
 
 __all__ = [
@@ -22,4 +23,5 @@ __all__ = [
     "check_appearance",
     "follow_physics",
     "limit_detection",
+    "resting_props",
 ]

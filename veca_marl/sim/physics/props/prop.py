@@ -31,6 +31,7 @@ from veca_marl.sim.physics.props.prop_shapes import (
     prop_radius_m,
     sound_obstacles,
 )
+from veca_marl.sim.physics.props.rest import Awake, Rest
 from veca_marl.sim.physics.props.rigid_body import (
     create_attached_body,
     create_prop_body,
@@ -61,6 +62,8 @@ class Prop:
         sound: Its sound source; None for a silent prop.
         impact: The source of its sound when it is hit; None without sounds of impacts.
         holder: Name of the body that holds it; None while it is free.
+        rest: What wakes sleeping props before this one is moved.
+        row: Its first row in the poses of the scene.
         accepts: Whether a body may put a given prop into it (the verb `put_into`); a task may set
             another function when it builds its props.
     """
@@ -77,13 +80,14 @@ class Prop:
         self.sound = sound
         self.impact: Source | None = None
         self.holder: str | None = None
+        self.rest: Rest = Awake()
         self.accepts: Callable[[Prop], bool] = _anything
         self._client = client
         self._scene = scene
         self.geoms = geoms = prop_geoms(cfg)
         shown = scene.add_object(cfg.name, [geoms])
         self.object_id = shown.id
-        self._row = shown.rows.start
+        self.row = shown.rows.start
         self.reach_m = horizontal_radius_m(geoms)
         self._inside = bounding_box(geoms)
         self.extent_m = float(np.linalg.norm(np.abs(self._inside).max(axis=0)))
@@ -129,7 +133,7 @@ class Prop:
     @property
     def position(self) -> Floats:
         """``(3,)`` metres, world frame."""
-        return np.array(self._scene.positions[self._row])
+        return np.array(self._scene.positions[self.row])
 
     @property
     def mass_centre(self) -> Floats:
@@ -139,12 +143,12 @@ class Prop:
     @property
     def rotation(self) -> Floats:
         """``(3, 3)`` rotation to the world frame."""
-        return np.array(self._scene.rotations[self._row])
+        return np.array(self._scene.rotations[self.row])
 
     @property
     def yaw_rad(self) -> float:
         """Angle in [-pi, pi] of its x axis about the vertical."""
-        x, y, _ = self._scene.rotations[self._row][:, 0]
+        x, y, _ = self._scene.rotations[self.row][:, 0]
         return math.atan2(y, x)
 
     @property
@@ -184,16 +188,17 @@ class Prop:
 
     def set_opening(self, opening: float) -> None:
         """Put a door or drawer at rest at an opening in [0, 1]; see also `open`."""
+        self.rest.moved()
         self._joint().set_opening(opening)
         follow_physics([self])
 
     def open(self) -> bool:
         """Let the motor of its joint open it; return False if it is locked or has no joint."""
-        return self.joint is not None and self.joint.drive(1.0)
+        return self._drive(1.0)
 
     def close(self) -> bool:
         """Let the motor of its joint close it; return False if it is locked or has no joint."""
-        return self.joint is not None and self.joint.drive(0.0)
+        return self._drive(0.0)
 
     def takes(self, key: Prop) -> bool:
         """Return whether another prop is the key of the lock of its joint."""
@@ -274,6 +279,7 @@ class Prop:
             ValueError: If a number is not finite.
         """
         x, y, z = _three_finite(self.name, "position", position)
+        self.rest.moved()
         quaternion: Sequence[float] = quaternion_from_yaw(yaw_rad)
         origin = self._centre if self.joint is None else np.asarray(self.joint.cfg.anchor_m)
         if origin is not None:
@@ -298,12 +304,18 @@ class Prop:
         Fixed props stay at rest, and so do props with a joint.
         """
         if not self.fixed and self.joint is None:
+            self.rest.wake()
             pybullet.resetBaseVelocity(
                 self.body_id,
                 _three_finite(self.name, "velocity", velocity),
                 _three_finite(self.name, "angular velocity", angular_velocity),
                 physicsClientId=self._client,
             )
+
+    def _drive(self, opening: float) -> bool:
+        """Start the motor of its joint; return False if it is locked or has no joint."""
+        self.rest.wake()
+        return self.joint is not None and self.joint.drive(opening)
 
     def _joint(self) -> Joint:
         if self.joint is None:
@@ -329,7 +341,7 @@ def follow_physics(props: Sequence[Prop]) -> list[str]:
     valid = (np.abs(origins) < _LARGEST_M).all(axis=1) & np.isfinite(quaternions).all(axis=1)
     if not valid.all():
         return [prop.name for prop, good in zip(props, valid, strict=True) if not good]
-    rows = [prop._row for prop in props]
+    rows = [prop.row for prop in props]
     matrices = np.empty((len(props), 3, 3))
     quaternions_to_matrices(quaternions, matrices)
     positions[rows] = origins

@@ -100,6 +100,8 @@ class JammedProps:
         near = np.hypot(away[:, 0], away[:, 1]) < self._extents_m + reach_m
         self._near = [self._props[number] for number in np.flatnonzero(near).tolist()]
         self._near += leaves
+        for prop in self._near:
+            prop.rest.wake()  # a capsule has no mass, so it does not wake what it touches
 
     def forget(self) -> None:
         """Forget what is behind the things, because they are about to move."""

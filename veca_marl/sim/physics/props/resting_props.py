@@ -1,0 +1,129 @@
+"""The physics steps of a world, with or without sleep of its props."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from veca_marl.sim.geometry import Floats, Scene
+from veca_marl.sim.physics.bullet import pybullet
+from veca_marl.sim.physics.clock import ClockCfg
+from veca_marl.sim.physics.props.prop import Prop
+from veca_marl.sim.physics.props.rest import REST_SPEED, Awake, Rest, Sleep
+
+
+class AwakeProps:
+    """The props of a world in which nothing sleeps.
+
+    Args:
+        client: PyBullet's client id.
+    """
+
+    def __init__(self, client: int) -> None:
+        self._client = client
+
+    def add(self, prop: Prop) -> Rest:
+        """Add a prop; return what it calls before it is moved."""
+        return Awake()
+
+    def simulate(self) -> None:
+        """Let Bullet make a physics step."""
+        pybullet.stepSimulation(physicsClientId=self._client)
+
+    def after_step(self, scene: Scene) -> None:
+        """See which props are at rest.
+
+        Args:
+            scene: Where they are at the end of an agent step.
+        """
+
+    def reset(self) -> None:
+        """Wake all props, before Bullet's state is restored, which does not include sleep."""
+
+
+class RestingProps(AwakeProps):
+    """The props of a world in which they sleep when they are at rest.
+
+    It is itself the `Rest` of the fixed props: when one is put elsewhere, all others wake.
+
+    Args:
+        client: PyBullet's client id.
+        clock: Its `sleep_s` is the time at rest after which a prop sleeps.
+    """
+
+    def __init__(self, client: int, clock: ClockCfg) -> None:
+        super().__init__(client)
+        self._steps = math.ceil(clock.sleep_s / clock.step_s)
+        self._rest_m = REST_SPEED * clock.step_s
+        self._sleeps: list[Sleep] = []
+        self._rows: list[int] = []
+        self._woken: list[Prop] = []
+        self._positions, self._rotations = _unknown_poses(0)
+
+    def add(self, prop: Prop) -> Rest:
+        """Add a prop; return what it calls before it is moved."""
+        if prop.fixed:
+            return self
+        self._sleeps.append(Sleep(prop, self._client, self._steps, self._woken))
+        self._rows.append(prop.row)
+        self._positions, self._rotations = _unknown_poses(len(self._rows))
+        return self._sleeps[-1]
+
+    def wake(self) -> None:
+        """Do nothing: the velocity of a fixed prop is not set."""
+
+    def moved(self) -> None:
+        """Wake all props."""
+        for sleep in self._sleeps:
+            sleep.wake()
+
+    def simulate(self) -> None:
+        """Let Bullet make a physics step.
+
+        Bullet sets the velocity of sleeping props to zero in it, and ends the sleep of those that
+        were woken only afterwards: they get back the velocity that they had.
+        """
+        kept = [(prop, prop.velocity, prop.angular_velocity) for prop in self._woken]
+        self._woken.clear()
+        super().simulate()
+        for prop, velocity, angular_velocity in kept:
+            prop.set_velocity(velocity, angular_velocity)
+
+    def after_step(self, scene: Scene) -> None:
+        """Let the props sleep that have been at rest for long enough.
+
+        Args:
+            scene: Where they are at the end of an agent step.
+        """
+        positions, rotations = scene.positions[self._rows], scene.rotations[self._rows]
+        moved_m = np.abs(positions - self._positions).max(axis=1)
+        turned_rad = np.abs(rotations - self._rotations).max(axis=(1, 2))
+        still = np.maximum(moved_m, turned_rad) < self._rest_m
+        self._positions, self._rotations = positions, rotations
+        for sleep, is_still in zip(self._sleeps, still.tolist(), strict=True):
+            sleep.count(is_still)
+
+    def reset(self) -> None:
+        """Wake all props, before Bullet's state is restored, which does not include sleep."""
+        self.moved()
+        if self._woken:
+            self.simulate()
+        self._positions, self._rotations = _unknown_poses(len(self._rows))
+
+
+def resting_props(client: int, clock: ClockCfg) -> AwakeProps:
+    """Return the physics steps of a world, with sleep if its clock has any.
+
+    Args:
+        client: PyBullet's client id.
+        clock: The clock of the world.
+    """
+    if math.isinf(clock.sleep_s):
+        return AwakeProps(client)
+    return RestingProps(client, clock)
+
+
+def _unknown_poses(count: int) -> tuple[Floats, Floats]:
+    """Return positions and rotations that no pose is near to."""
+    return np.full((count, 3), np.inf), np.full((count, 3, 3), np.inf)
