@@ -6,8 +6,8 @@ from veca_marl.sim.physics.props.planned_prop import PlannedProp, StandingProp
 from veca_marl.sim.physics.props.prop import Prop, follow_physics
 from veca_marl.sim.physics.props.prop_cfg import PropCfg
 from veca_marl.sim.physics.props.prop_shape import SIZE_NAMES, PropShape, check_appearance
-from veca_marl.sim.physics.props.resting_props import resting_props
 from veca_marl.sim.physics.props.rigid_body import limit_detection
+from veca_marl.sim.physics.props.sleeping import resting_props
 
 __all__ = [
     "SIZE_NAMES",
