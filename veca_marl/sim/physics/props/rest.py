@@ -15,8 +15,10 @@ if TYPE_CHECKING:
     from veca_marl.sim.physics.props.prop import Prop
 
 REST_SPEED = 0.01
-"""Speed in m/s and rad/s below which a prop is at rest, as in PhysX: its threshold, 5e-5 J per kg,
-is the kinetic energy at this speed."""
+"""Speed in m/s and rad/s below which a prop is at rest.
+
+It is that of PhysX, whose threshold of 5e-5 J per kg is the kinetic energy at this speed.
+"""
 
 _SLEEP = pybullet.ACTIVATION_STATE_ENABLE_SLEEPING | pybullet.ACTIVATION_STATE_SLEEP
 _WAKE = pybullet.ACTIVATION_STATE_DISABLE_SLEEPING | pybullet.ACTIVATION_STATE_WAKE_UP
