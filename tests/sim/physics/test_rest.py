@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 from walking import ball, box, empty_world, film, let_pass, walker_in
 
+from veca_marl.sim.body.humanoid import Humanoid, HumanoidCfg
+from veca_marl.sim.body.humanoid.postures import ON_BELLY
 from veca_marl.sim.physics import (
     ClockCfg,
     JointCfg,
@@ -213,6 +215,22 @@ def test_a_world_that_slept_returns_to_the_built_state_bit_by_bit():
         let_pass(used, 0.04 * steps)
         used.prop("other").place((0.5, 0.5, 0.4))  # awake in Bullet only from the next step on
         np.testing.assert_array_equal(play(used), first)
+
+
+def test_a_joint_level_body_wakes_what_it_falls_on():
+    """It pushes the block aside or rests on it, but not in it."""
+    world = world_of(replace(BLOCK, position_m=(0.0, 0.0, 0.05)), box("far", position=(3, 0, 0.15)))
+    body = Humanoid("body", HumanoidCfg(), world)
+    world.freeze()
+    world.reset(np.random.default_rng(0))
+    body.place((0.0, 0.0, 5.0), 0.0, ON_BELLY)
+    let_pass(world, ASLEEP_S + 0.2)
+    body.place((0.0, 0.0, 0.3), 0.0, ON_BELLY)
+    before = world.prop("block").position
+    let_pass(world, 1.5)
+    assert np.abs(world.prop("block").position - before).max() > 1e-3
+    assert world.overlap_m(body.body_id, world.prop("block").body_id) < 0.01
+    assert not world.prop("far").velocity.any()
 
 
 def test_a_held_prop_does_not_sleep():
