@@ -70,7 +70,7 @@ def test_a_leaf_that_is_placed_elsewhere_stops_a_walker_there_and_no_longer_here
 
 def test_only_leaves_within_reach_are_near():
     world = empty_world(leaf(), leaf("lid", (-3.0, 0.0, 0.05)))
-    found = leaves.Leaves(world.client, list(world.props.values()))
+    found = leaves.Leaves(list(world.props.values()))
     hinge = np.array([1.0, 0.0]) + 0.45 * np.array([math.sin(0.349), -math.cos(0.349)])
     assert [prop.name for prop in found.near(hinge, 0.0)] == ["door"]
     assert found.near(hinge + np.array([1.2, 0.0]), 0.2) == []

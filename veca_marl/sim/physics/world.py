@@ -241,7 +241,8 @@ class World:
         self.client = -1
 
     def _update_scene(self) -> None:
-        self.broken_props = follow_physics(self._moving) or self.broken_props
+        moved = [prop for prop in self._moving if prop.may_have_moved]
+        self.broken_props = follow_physics(moved) or self.broken_props
         for mover in self.movers:
             mover.write_frames()
         self.scene.update()

@@ -33,6 +33,7 @@ class Joint:
         locked: Whether it is locked: it does not move at all.
         stop_speed: Speed (rad/s or m/s) with which it met an end of its range in the last physics
             step; 0 if it met none.
+        moved: Whether it may have moved since `follow_physics` copied the pose of the prop.
     """
 
     def __init__(self, cfg: JointCfg, body_id: int, client: int) -> None:
@@ -43,6 +44,8 @@ class Joint:
         self._axis: Floats = axis / np.linalg.norm(axis)
         self.locked = False
         self.stop_speed = 0.0
+        self.moved = True
+        self._anchor: Floats | None = None
         self._before = (0.0, 0.0)
         self._held = 0.0
         self._built = (False, 0.0)
@@ -75,12 +78,28 @@ class Joint:
         """Whether its motor moves it."""
         return self._target is not None
 
+    @property
+    def anchor(self) -> Floats:
+        """``(3,)`` metres, world frame: a point of the axis, at the base of the body in Bullet."""
+        if self._anchor is None:
+            anchor, _ = pybullet.getBasePositionAndOrientation(
+                self._body_id, physicsClientId=self._client
+            )
+            self._anchor = np.array(anchor)
+        return self._anchor
+
+    def follow_base(self) -> None:
+        """Note that the base of the body was put elsewhere."""
+        self._anchor = None
+        self.moved = True
+
     def save(self) -> None:
         """Make the present lock and opening the built state, to which `reset` returns."""
         self._built = (self.locked, self._held)
 
     def reset(self) -> None:
-        """Stop the motor and return to the saved lock; Bullet restores the coordinate."""
+        """Stop the motor and return to the saved lock; Bullet restores coordinate and base."""
+        self.follow_base()
         self._release_motor()
         self.locked, self._held = self._built
         self.stop_speed = 0.0
@@ -154,6 +173,7 @@ class Joint:
                 self._set_coordinate(self._held)
             return
         (last, approach), self._before = self._before, (coordinate, speed)
+        self.moved = self.moved or coordinate != last
         target = self._target
         if coordinate == last and speed == 0.0 and target is None:
             return  # at rest within its range, as doors mostly are
@@ -175,6 +195,7 @@ class Joint:
         return not _ARRIVED < coordinate < self.cfg.range - _ARRIVED
 
     def _set_coordinate(self, coordinate: float) -> None:
+        self.moved = True
         self._before = (coordinate, 0.0)
         pybullet.resetJointState(self._body_id, LINK, coordinate, 0.0, physicsClientId=self._client)
 

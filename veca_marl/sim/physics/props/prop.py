@@ -112,6 +112,11 @@ class Prop:
         return self.cfg.mass_kg == 0.0
 
     @property
+    def may_have_moved(self) -> bool:
+        """Whether its pose may have changed since `follow_physics` copied it."""
+        return not self.fixed if self.joint is None else self.joint.moved
+
+    @property
     def radius_m(self) -> float:
         """Horizontal radius of the cylinder about the origin of its frame, untilted, in metres."""
         return prop_radius_m(self.cfg, self.reach_m)
@@ -291,6 +296,8 @@ class Prop:
         pybullet.resetBasePositionAndOrientation(
             self.body_id, (x, y, z), quaternion, physicsClientId=self._client
         )
+        if self.joint is not None:
+            self.joint.follow_base()
         self.set_velocity(velocity, angular_velocity)
         follow_physics([self])
 
@@ -357,6 +364,8 @@ def follow_physics(props: Sequence[Prop]) -> list[str]:
             prop.impact.position = positions[row]
         for obstacle in prop._obstacles:
             obstacle.move(positions[row], rotations[row])
+        if prop.joint is not None:
+            prop.joint.moved = False
     return []
 
 

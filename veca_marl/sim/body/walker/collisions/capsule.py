@@ -88,7 +88,7 @@ class Capsule:
         self._radius_m, self._half_axis_m = form.radius, _half_axis_m(form)
         self._reach_m = self._half_axis_m + form.radius
         self._obstacles = ObstacleBoxes(client, scene, [], [], _LIMB_REACH_M)
-        self._leaves = Leaves(client, [])
+        self._leaves = Leaves([])
         self._jammed = JammedProps(client, scene, self.body_id, [], [])
         self._known = (0, 0)
         self._capsules: Collection[int] = ()
@@ -238,7 +238,7 @@ class Capsule:
         self._obstacles = ObstacleBoxes(self._client, self._scene, things, heavy, _LIMB_REACH_M)
         light = [p for p in solid if not p.fixed and p.cfg.mass_kg <= limit_kg]
         leaves = [p for p in light if p.joint is not None]
-        self._leaves = Leaves(self._client, leaves)
+        self._leaves = Leaves(leaves)
         loose = [p for p in light if p.joint is None]
         self._jammed = JammedProps(self._client, self._scene, self.body_id, loose, leaves)
         for body_id in self._obstacles.ids:
