@@ -224,7 +224,8 @@ def test_several_tasks_and_playgrounds_are_one_table(capsys):
         ["| KickTheBall", "`house`"],
     ]
     for row, most in zip(rows[2:], (0.8, 1.2), strict=True):
-        views, goal = row.strip(" |").split(" | ")[-2:]
+        view_ms, views, goal = row.strip(" |").split(" | ")[-3:]
+        assert 0.1 < float(view_ms) < 1000.0
         assert goal == f"{most}: {'met' if float(views) <= most else 'missed'}"
 
 

@@ -39,7 +39,7 @@ def throughput_table(runs: Sequence[Rollouts]) -> str:
 def task_table(runs: Sequence[Rollouts]) -> str:
     """Return a Markdown table of tasks: the table of the page on performance."""
     header = ["task", "playground", "worlds", "agents", "agent steps/s", "per reference"]
-    header += ["views", "goal"]
+    header += ["view, ms", "views", "goal"]
     rows = [
         (
             run.task,
@@ -48,6 +48,7 @@ def task_table(runs: Sequence[Rollouts]) -> str:
             str(run.agents),
             f"{run.agent_steps_per_s:,.0f}",
             f"{run.agent_steps_per_reference:.2f}",
+            f"{run.view_ms:.2f}",
             f"{run.views_per_agent_step:.2f}",
             _goal(run),
         )

@@ -41,6 +41,7 @@ class Rollouts:
         agent_steps_per_s: Agent steps per second of processor time of the one thread.
         agent_steps_per_reference: Agent steps in the processor time of one run of
             `ReferenceWorkload`, measured in turns with the rollouts; comparable between machines.
+        view_ms: Processor time of a `ReferenceView`; the median of all repeats.
         views_per_agent_step: Processor time of an agent step divided by that of a `ReferenceView`,
             measured in turns with the rollouts likewise.
         most_views_per_agent_step: The goal for it; None for joint-level bodies.
@@ -56,6 +57,7 @@ class Rollouts:
     agents: int
     agent_steps_per_s: float
     agent_steps_per_reference: float
+    view_ms: float
     views_per_agent_step: float
     most_views_per_agent_step: float | None
     wall_agent_steps_per_s: float
@@ -105,6 +107,7 @@ def measure_rollouts(game: GameCfg, worlds: int, steps: int, repeats: int) -> Ro
         agents=agents,
         agent_steps_per_s=agent_steps / median(measured.cpu_s),
         agent_steps_per_reference=agent_steps * median(ref / cpu for ref, cpu in pairs),
+        view_ms=1e3 * median(measured.view_s),
         views_per_agent_step=median(cpu / view for view, cpu in views) / agent_steps,
         most_views_per_agent_step=goal,
         wall_agent_steps_per_s=agent_steps / median(measured.wall_s),
