@@ -217,6 +217,23 @@ def test_a_world_that_slept_returns_to_the_built_state_bit_by_bit():
         np.testing.assert_array_equal(play(used), first)
 
 
+def test_a_prop_at_rest_that_carries_a_moving_one_is_simulated_bit_by_bit_as_without_sleep():
+    """It may sleep, but what touches it moves. A kick adds nothing to its velocity but the kick."""
+    plate = box("plate", (2.0, 1.0, 0.1), 1.0, (1.0, 0.0, 0.05))
+    rolling = replace(ball("rolling", position=(0.4, 0.0, 0.2)), rolling_friction=0.0)
+    films = []
+    for clock in (RESTING, ClockCfg()):
+        world = world_of(plate, rolling, clock=clock)
+        world.freeze()
+        world.reset(np.random.default_rng(0))
+        world.prop("rolling").set_velocity((0.1, 0.0, 0.0), (0.0, 1.0, 0.0))
+        let_pass(world, 2.0 * ASLEEP_S)
+        world.prop("plate").set_velocity((0.0, 1.0, 0.0))
+        films.append(film(world, 20))
+    np.testing.assert_array_equal(*films)
+    assert np.ptp(films[0][:, world.prop("plate").row, 1]) > 0.02
+
+
 def test_a_joint_level_body_wakes_what_it_falls_on():
     """It pushes the block aside or rests on it, but not in it."""
     world = world_of(replace(BLOCK, position_m=(0.0, 0.0, 0.05)), box("far", position=(3, 0, 0.15)))

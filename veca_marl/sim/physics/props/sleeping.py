@@ -82,13 +82,15 @@ class RestingProps(AwakeProps):
         """Let Bullet make a physics step.
 
         Bullet sets the velocity of sleeping props to zero in it, and ends the sleep of those that
-        were woken only afterwards: they get back the velocity that they had.
+        were woken only afterwards: they get back the velocity that they had. A woken prop that
+        has a velocity after the step did not sleep, because something beside it moved.
         """
         kept = [(prop, prop.velocity, prop.angular_velocity) for prop in self._woken]
         self._woken.clear()
         super().simulate()
         for prop, velocity, angular_velocity in kept:
-            prop.set_velocity(velocity, angular_velocity)
+            if not (prop.velocity.any() or prop.angular_velocity.any()):
+                prop.set_velocity(velocity, angular_velocity)
 
     def after_step(self, scene: Scene) -> None:
         """Let the props sleep that have been at rest for long enough.
