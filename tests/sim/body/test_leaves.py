@@ -75,3 +75,14 @@ def test_only_leaves_within_reach_are_near():
     assert [prop.name for prop in found.near(hinge, 0.0)] == ["door"]
     assert found.near(hinge + np.array([1.2, 0.0]), 0.2) == []
     assert [prop.name for prop in found.near(hinge + np.array([1.2, 0.0]), 0.4)] == ["door"]
+
+
+def test_a_leaf_that_was_placed_elsewhere_is_near_its_built_place_after_a_reset():
+    world = empty_world(leaf())
+    found = leaves.Leaves(list(world.props.values()))
+    world.freeze()
+    here, there = np.array([1.0, 0.0]), np.array([6.0, 0.0])
+    world.prop("door").place((6.0, 0.0, 0.55))
+    assert (found.near(here, 0.5), found.near(there, 0.5)) == ([], [world.prop("door")])
+    world.reset(np.random.default_rng(0))
+    assert (found.near(here, 0.5), found.near(there, 0.5)) == ([world.prop("door")], [])
