@@ -45,7 +45,7 @@ def test_former_values_are_those_of_the_types_of_a_configuration():
     assert former["algo.network.kernels"] == [8, 4, 3]
     assert former["learner.agents.network.strides"] == [4, 2, 1]
     names = {key.rpartition(".")[2] for key in former}
-    assert names == {"kernels", "strides", "call_pause_s"}
+    assert names == {"kernels", "strides", "call_pause_s", "sleep_s"}
 
 
 def test_lists_of_other_lengths_differ():
