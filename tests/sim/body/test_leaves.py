@@ -1,4 +1,4 @@
-"""Doors and drawers near a walker: those that are left out cannot touch it."""
+"""Doors and drawers near a walker, and where they are shown: nothing is left out that matters."""
 
 import math
 
@@ -7,7 +7,7 @@ import pytest
 from walking import empty_world, film, let_pass, walker_in
 
 from veca_marl.sim.body.walker.collisions import leaves
-from veca_marl.sim.physics import JointCfg, JointKind, LockCfg, PropCfg, PropShape
+from veca_marl.sim.physics import JointCfg, JointKind, LockCfg, PropCfg, PropShape, pybullet
 from veca_marl.sim.physics.props.prop_shapes import swept_radius_m
 
 JOINTS = {
@@ -86,3 +86,34 @@ def test_a_leaf_that_was_placed_elsewhere_is_near_its_built_place_after_a_reset(
     assert (found.near(here, 0.5), found.near(there, 0.5)) == ([], [world.prop("door")])
     world.reset(np.random.default_rng(0))
     assert (found.near(here, 0.5), found.near(there, 0.5)) == ([world.prop("door")], [])
+
+
+@pytest.mark.parametrize("moves", ["pushed", "driven", "put", "placed", "locked"])
+def test_the_scene_shows_a_leaf_where_bullet_has_it(moves):
+    """Poses of leaves that stand still are not read again: whatever moves one is noticed."""
+    world = empty_world(leaf(friction=0.0))
+    world.freeze()
+    world.reset(np.random.default_rng(0))
+    let_pass(world, 0.2)
+    door = world.prop("door")
+    start = door.mass_centre
+    if moves == "pushed":
+        pybullet.setJointMotorControl2(
+            door.body_id, 1, pybullet.TORQUE_CONTROL, force=5.0, physicsClientId=world.client
+        )
+    elif moves == "driven":
+        assert door.open()
+    elif moves == "put":
+        door.set_opening(0.5)
+    elif moves == "placed":
+        door.place((3.0, 1.0, 1.05))
+    elif moves == "locked":
+        door.joint.lock()
+        door.set_opening(0.3)
+    for _ in range(10):
+        world.step()
+        state = pybullet.getLinkState(
+            door.body_id, 1, computeForwardKinematics=1, physicsClientId=world.client
+        )
+        np.testing.assert_allclose(door.mass_centre, state[0], atol=1e-9)
+    assert np.linalg.norm(door.mass_centre - start) > 1e-3

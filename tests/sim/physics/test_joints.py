@@ -376,33 +376,3 @@ def test_a_lock_without_a_key_that_can_be_carried_is_refused_with_the_loose_prop
     ):
         world.freeze()
     world.close()
-
-
-@pytest.mark.parametrize("moves", ["pushed", "driven", "put", "placed", "locked"])
-def test_the_scene_shows_a_leaf_where_bullet_has_it(moves):
-    """Poses of leaves that stand still are not read again: whatever moves one is noticed."""
-    world = empty_world(door(friction=0.0))
-    world.freeze()
-    world.reset(np.random.default_rng(0))
-    let_pass(world, 0.2)
-    leaf = world.prop("door")
-    if moves == "pushed":
-        pybullet.setJointMotorControl2(
-            leaf.body_id, 1, pybullet.TORQUE_CONTROL, force=5.0, physicsClientId=world.client
-        )
-    elif moves == "driven":
-        assert leaf.open()
-    elif moves == "put":
-        leaf.set_opening(0.5)
-    elif moves == "placed":
-        leaf.place((3.0, 1.0, 1.05))
-    elif moves == "locked":
-        leaf.joint.lock()
-        leaf.set_opening(0.3)
-    for _ in range(10):
-        world.step()
-        state = pybullet.getLinkState(
-            leaf.body_id, 1, computeForwardKinematics=1, physicsClientId=world.client
-        )
-        np.testing.assert_allclose(leaf.mass_centre, state[0], atol=1e-9)
-    assert np.linalg.norm(leaf.mass_centre - [1.0, 0.0, 1.05]) > 1e-3

@@ -4,15 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from functools import partial
-from typing import Any
 
 import numpy as np
 
 from veca_marl.sim.geometry import (
     Floats,
-    Geom,
-    Pose,
     Scene,
     matrix_to_quaternion,
     quaternion_from_yaw,
@@ -21,7 +17,8 @@ from veca_marl.sim.geometry import (
 )
 from veca_marl.sim.physics.bullet import pybullet
 from veca_marl.sim.physics.contacts import are_in_contact
-from veca_marl.sim.physics.props.joint import LINK, Joint
+from veca_marl.sim.physics.props.joint import Joint
+from veca_marl.sim.physics.props.prop_body import create_body, pose_reader
 from veca_marl.sim.physics.props.prop_cfg import PropCfg
 from veca_marl.sim.physics.props.prop_shapes import (
     bounding_box,
@@ -32,11 +29,7 @@ from veca_marl.sim.physics.props.prop_shapes import (
     sound_obstacles,
 )
 from veca_marl.sim.physics.props.rest import Awake, Rest
-from veca_marl.sim.physics.props.rigid_body import (
-    create_attached_body,
-    create_prop_body,
-    is_turned,
-)
+from veca_marl.sim.physics.props.rigid_body import is_turned
 from veca_marl.sim.physics.props.sound_obstacles import make_obstacles
 from veca_marl.sim.sound import Source
 from veca_marl.sim.sound.rooms import Obstacles
@@ -91,9 +84,9 @@ class Prop:
         self.reach_m = horizontal_radius_m(geoms)
         self._inside = bounding_box(geoms)
         self.extent_m = float(np.linalg.norm(np.abs(self._inside).max(axis=0)))
-        self.body_id, self.link, self.joint, frame = _create_body(cfg, client, geoms)
+        self.body_id, self.link, self.joint, frame = create_body(cfg, client, geoms)
         self.links = range(self.link, pybullet.getNumJoints(self.body_id, physicsClientId=client))
-        self._read_pose = _pose_reader(self.body_id, self.link, client)
+        self._read_pose = pose_reader(self.body_id, self.link, client)
         self.centre_of_mass = frame.position
         self._centre = frame.position if frame.position.any() else None
         self._axes = frame.rotation if is_turned(frame) else None
@@ -367,30 +360,6 @@ def follow_physics(props: Sequence[Prop]) -> list[str]:
         if prop.joint is not None:
             prop.joint.moved = False
     return []
-
-
-def _create_body(
-    cfg: PropCfg, client: int, geoms: Sequence[Geom]
-) -> tuple[int, int, Joint | None, Pose]:
-    """Create the body of a prop; return its id and link, its joint and its inertial frame."""
-    if cfg.joint is None:
-        body_id, frame = create_prop_body(cfg, client, geoms)
-        return body_id, -1, None, frame
-    body_id, frame = create_attached_body(cfg, cfg.joint, client, geoms)
-    return body_id, LINK, Joint(cfg.joint, body_id, client), frame
-
-
-def _pose_reader(body_id: int, link: int, client: int) -> Callable[[], tuple[Any, ...]]:
-    """Return a function that reads position and quaternion of the inertial frame first."""
-    if link == -1:
-        return partial(pybullet.getBasePositionAndOrientation, body_id, physicsClientId=client)
-    return partial(
-        pybullet.getLinkState,
-        body_id,
-        link,
-        computeForwardKinematics=1,
-        physicsClientId=client,
-    )
 
 
 def _anything(prop: Prop) -> bool:

@@ -17,7 +17,8 @@ if TYPE_CHECKING:
 REST_SPEED = 0.01
 """Speed in m/s and rad/s below which a prop is at rest.
 
-It is that of PhysX, whose threshold of 5e-5 J per kg is the kinetic energy at this speed.
+The default threshold of Unity and PhysX, 0.005 J per kg, is the kinetic energy at ten times this
+speed.
 """
 
 _SLEEP = pybullet.ACTIVATION_STATE_ENABLE_SLEEPING | pybullet.ACTIVATION_STATE_SLEEP
