@@ -1,4 +1,4 @@
-"""Props at rest sleep: they cost nothing, and nothing that happens to them differs."""
+"""Props at rest sleep, and move as others as soon as something moves them."""
 
 import math
 from dataclasses import replace
@@ -63,7 +63,7 @@ def test_it_sleeps_after_the_time_of_the_clock():
 
 def test_what_moves_is_simulated():
     """A ball at the top of its flight, and one that rolls slowly."""
-    thrown = replace(ball("thrown", position=(0.0, 0.0, 0.5)))
+    thrown = ball("thrown", position=(0.0, 0.0, 0.5))
     rolling = replace(ball("rolling", position=(3.0, 0.0, 0.1)), rolling_friction=0.0)
     film_of = {}
     for clock in (RESTING, ClockCfg()):
@@ -99,7 +99,7 @@ def test_a_sleeping_prop_moves_as_an_awake_one(happens):
     """It ends where it would have ended without sleep, within the way of one physics step."""
     ends = []
     for clock in (RESTING, ClockCfg()):
-        world = world_of(BLOCK, replace(ball("ball", position=(-3.0, 0.0, 0.1))), clock=clock)
+        world = world_of(BLOCK, ball("ball", position=(-3.0, 0.0, 0.1)), clock=clock)
         world.walker = walker_in(world, place=(-2.0, 0.0, 0.0))
         let_sleep(world)
         start = world.prop("block").position
@@ -138,8 +138,7 @@ def test_a_sleeping_prop_falls_when_what_is_under_it_is_taken_away(under_kg):
     assert world.prop("block").position[2] == pytest.approx(0.05, abs=2e-3)
 
 
-def test_a_prop_that_lost_its_support_while_it_was_awake_sleeps_again():
-    """Waking what touches a prop does not keep it awake for ever."""
+def test_a_prop_that_woke_because_the_one_beside_it_was_put_elsewhere_sleeps_again():
     world = world_of(BLOCK, replace(BLOCK, name="other", position_m=(1.1, 0.0, 0.05)))
     let_sleep(world)
     world.prop("other").place((-5.0, 0.0, 0.05))

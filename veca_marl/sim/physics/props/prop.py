@@ -186,7 +186,7 @@ class Prop:
 
     def set_opening(self, opening: float) -> None:
         """Put a door or drawer at rest at an opening in [0, 1]; see also `open`."""
-        self.rest.moved()
+        self.rest.wake_around()
         self._joint().set_opening(opening)
         follow_physics([self])
 
@@ -277,7 +277,7 @@ class Prop:
             ValueError: If a number is not finite.
         """
         x, y, z = _three_finite(self.name, "position", position)
-        self.rest.moved()
+        self.rest.wake_around()
         quaternion: Sequence[float] = quaternion_from_yaw(yaw_rad)
         origin = self._centre if self.joint is None else np.asarray(self.joint.cfg.anchor_m)
         if origin is not None:

@@ -30,10 +30,10 @@ class Rest(Protocol):
     """What a prop calls before it is moved, so that sleeping props notice."""
 
     def wake(self) -> None:
-        """Wake what has to move when the velocity of the prop is set or its motor is started."""
+        """Wake the prop, before its velocity is set or its motor is started."""
 
-    def moved(self) -> None:
-        """Wake what has to move when the prop is put elsewhere."""
+    def wake_around(self) -> None:
+        """Wake the prop and what it may have supported, before it is put elsewhere."""
 
 
 class Awake:
@@ -42,7 +42,7 @@ class Awake:
     def wake(self) -> None:
         """Do nothing."""
 
-    def moved(self) -> None:
+    def wake_around(self) -> None:
         """Do nothing."""
 
 
@@ -76,7 +76,7 @@ class Sleep:
             self._woken.append(self._prop)
             self._set_state(self._prop.body_id, _WAKE)
 
-    def moved(self) -> None:
+    def wake_around(self) -> None:
         """Wake the prop, and what touched it in the last physics step."""
         self.wake()
         points = pybullet.getContactPoints(self._prop.body_id, physicsClientId=self._client)

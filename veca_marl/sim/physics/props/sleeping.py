@@ -73,7 +73,7 @@ class RestingProps(AwakeProps):
     def wake(self) -> None:
         """Do nothing: the velocity of a fixed prop is not set."""
 
-    def moved(self) -> None:
+    def wake_around(self) -> None:
         """Wake all props."""
         for sleep in self._sleeps:
             sleep.wake()
@@ -108,7 +108,7 @@ class RestingProps(AwakeProps):
 
     def reset(self) -> None:
         """Wake all props, before Bullet's state is restored, which does not include sleep."""
-        self.moved()
+        self.wake_around()
         if self._woken:
             self.simulate()
         self._positions, self._rotations = _unknown_poses(len(self._rows))
