@@ -1,4 +1,4 @@
-"""A small SAC that learns the toy problem in some 50 updates."""
+"""A small SAC that learns the toy problem in some 200 updates."""
 
 from dataclasses import replace
 

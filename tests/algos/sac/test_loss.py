@@ -394,3 +394,25 @@ def test_batch_renormalisation_corrects_fully_after_its_warm_up_and_not_more():
     expected = (x - history[0]) / (history[1] + layer.layer.eps).sqrt()
     torch.testing.assert_close(found, expected, atol=0.1, rtol=0.1)
     assert int(layer.layer.num_batches_tracked) == 5
+
+
+def test_running_statistics_are_the_mean_over_all_batches_at_first():
+    torch.manual_seed(0)
+    norm = BatchRenorm(3)
+    batches = torch.randn(20, 64, 3) * 5.0 + 100.0
+    for batch in batches:
+        norm(batch)
+    torch.testing.assert_close(norm.layer.running_mean, batches.mean((0, 1)))
+    torch.testing.assert_close(norm.layer.running_var, batches.var(1).mean(0))
+    norm.eval()
+    rows = norm(batches.flatten(0, 1))
+    assert rows.mean().abs() < 0.1
+    assert (rows.std(0) - 1.0).abs().max() < 0.1
+
+
+def test_running_statistics_forget_one_hundredth_with_each_batch_later():
+    norm = BatchRenorm(1)
+    norm.layer.num_batches_tracked.fill_(500)
+    norm.layer.running_mean.fill_(0.0)
+    norm(torch.randn(64, 1) + 100.0)
+    assert float(norm.layer.running_mean) == pytest.approx(1.0, abs=0.02)

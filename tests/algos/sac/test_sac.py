@@ -6,7 +6,7 @@ import pytest
 import torch
 from fake_env import FakeEnv
 from torchrl.data import Categorical
-from training import SMALL
+from training import SMALL, rewards_until
 
 from veca_marl.algos.networks.action_values import ActionValuesCfg, Normalisation
 from veca_marl.algos.networks.multisense import Critic, MultisenseCfg, Parameters
@@ -23,6 +23,10 @@ from veca_marl.algos.specs import team_specs
 
 FORMS = {"continuous": {}, "discrete": {"discrete": True}, "hybrid": {"hybrid": True}}
 
+# Each test of learning passes with 16 of 16 seeds. With random actions for 64 frames only, one seed
+# in ten keeps an action of which the replay buffer has no other example in a state.
+LEARNING = {"replay": ReplayCfg(2048, warm_up_frames=256), "updates_per_frame": 0.25}
+
 
 @torch.no_grad()
 def return_of(policy, senses=("audio",), **env):
@@ -33,12 +37,21 @@ def return_of(policy, senses=("audio",), **env):
     return float(played["next", "agents", "reward"].mean())
 
 
+def last_return(algorithm, collect, batches=20, **env):
+    """Return the mean reward after as many batches as are needed for 0.9, or after all."""
+    seeds = iter(range(batches))
+
+    def learn():
+        algorithm.learn(collect(algorithm, seed=next(seeds), **env))
+        return return_of(algorithm.actor, **env)
+
+    return rewards_until(0.9, learn, batches)[-1]
+
+
 @pytest.mark.parametrize("form", FORMS.values(), ids=FORMS.keys())
 def test_it_learns_every_form_of_action(make_sac, collect, form):
-    algorithm = make_sac(**form)
-    for seed in range(8):
-        algorithm.learn(collect(algorithm, seed=seed, **form))
-    assert return_of(algorithm.actor, **form) > 0.9
+    algorithm = make_sac(changes=LEARNING, **form)
+    assert last_return(algorithm, collect, **form) > 0.9
 
 
 @pytest.mark.parametrize(
@@ -50,16 +63,20 @@ def test_teams_learn_with_every_kind_of_parameters_and_critic(
 ):
     network = MultisenseCfg(**vars(SMALL) | {"critic": critic, "parameters": parameters})
     team = {"agents": 2, "hybrid": True}
-    algorithm = make_sac(changes={"network": network}, **team)
-    for seed in range(8):
-        algorithm.learn(collect(algorithm, seed=seed, **team))
-    # with separate parameters one of the four parts of the actions is not learnt with 4 of 10 seeds
-    assert return_of(algorithm.actor, **team) > 0.7
+    algorithm = make_sac(changes=LEARNING | {"network": network}, **team)
+    assert last_return(algorithm, collect, **team) > 0.9
+
+
+def test_it_learns_without_target_networks(make_sac, collect):
+    critic = ActionValuesCfg(hidden=[32], normalisation=Normalisation.batch_renorm)
+    changes = LEARNING | {"targets": Targets.same, "critic": critic}
+    algorithm = make_sac(changes=changes, hybrid=True)
+    assert "target" not in algorithm.state_dict()
+    assert last_return(algorithm, collect, hybrid=True) > 0.9
 
 
 def test_it_learns_from_shifted_images_with_an_encoder_trained_by_the_critics(make_sac, collect):
-    changes = {
-        # with half of the updates or of the units, some seeds have not learnt after seven batches
+    changes = LEARNING | {
         "critic": ActionValuesCfg(hidden=[64], normalisation=Normalisation.layer),
         "encoder_gradient": EncoderGradient.critic,
         "temperature": TemperatureCfg(0.1, Adaptation.automatic),
@@ -69,14 +86,12 @@ def test_it_learns_from_shifted_images_with_an_encoder_trained_by_the_critics(ma
         "random_shift": 2,
         "steps": 3,
         "learning_rate": 3e-3,
-        "updates_per_frame": 0.5,
     }
     eyes = {"senses": ("vision",)}
-    algorithm = make_sac(changes=changes, seed=1, **eyes)
-    for seed in range(7):
-        measured = algorithm.learn(collect(algorithm, seed=seed, **eyes))
-    assert return_of(algorithm.actor, **eyes) > 0.9
-    assert measured["alpha"] != 0.1
+    algorithm = make_sac(changes=changes, **eyes)
+    before = algorithm.temperatures.alphas()
+    assert last_return(algorithm, collect, **eyes) > 0.9
+    assert algorithm.temperatures.alphas() != before
 
 
 def test_first_values_are_small_against_the_rewards_of_a_step(make_sac, collect):
@@ -111,16 +126,6 @@ def test_updates_do_not_lower_temperatures_below_their_minimum(make_sac, collect
         alphas[minimum] = list(algorithm.temperatures.alphas().values())
     assert all(float(alpha) < 0.0999 for alpha in alphas[0.0])
     assert all(float(alpha) == pytest.approx(0.1) for alpha in alphas[0.1])
-
-
-def test_it_learns_without_target_networks(make_sac, collect):
-    critic = ActionValuesCfg(hidden=[32], normalisation=Normalisation.batch_renorm)
-    changes = {"targets": Targets.same, "critic": critic, "updates_per_frame": 0.3}
-    algorithm = make_sac(changes=changes, hybrid=True)
-    assert "target" not in algorithm.state_dict()
-    for seed in range(8):
-        algorithm.learn(collect(algorithm, seed=seed, hybrid=True))
-    assert return_of(algorithm.actor, hybrid=True) > 0.8
 
 
 def test_updates_follow_the_frames_and_begin_after_the_warm_up(make_sac, collect):

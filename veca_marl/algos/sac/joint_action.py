@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -49,6 +50,33 @@ class Proposed:
     entropies: dict[str, Tensor]
 
 
+LEAST_PROBABILITY_RATIO = 1e-3
+"""Probability of a choice, relative to the most likely one, below which losses do not lower it."""
+
+
+class _Bounded(torch.autograd.Function):
+    """Logits with a lower bound; gradients that raise a logit below the bound pass unchanged.
+
+    A softmax that is saturated has no gradient: with logits 20 apart that of the lower one is
+    2e-9 of the difference of the values, less than the epsilon of Adam, and a policy that
+    saturated on early, wrong values would keep its choice whatever the critics learn later.
+    """
+
+    @staticmethod
+    def forward(ctx: Any, logits: Tensor) -> Tensor:
+        highest = logits.amax(-1, keepdim=True)
+        bounded = logits.maximum(highest + math.log(LEAST_PROBABILITY_RATIO))
+        ctx.save_for_backward(bounded > logits, logits.argmax(-1, keepdim=True))
+        return bounded
+
+    @staticmethod
+    def backward(ctx: Any, *gradients: Tensor) -> Tensor:
+        """Drop what would lower a logit below the bound further, or raise the highest for it."""
+        below, highest = ctx.saved_tensors
+        kept = gradients[0].masked_fill(below & (gradients[0] > 0.0), 0.0)
+        return kept.scatter_add(-1, highest, -kept.sum(-1, keepdim=True))
+
+
 class JointAction:
     """Joins and splits the parts of a team's action.
 
@@ -76,8 +104,13 @@ class JointAction:
         return Taken(vector, combination, self._encode(vector, combination))
 
     def propose(self, policy: Distribution) -> Proposed:
-        """Return actions of the distribution that the policy heads gave."""
+        """Return actions of the distribution that the policy heads gave.
+
+        Choices have at least `LEAST_PROBABILITY_RATIO` of the probability of the most likely one.
+        """
         dists = self._split(policy)
+        for part in self._choices:
+            dists[part] = Categorical(logits=_Bounded.apply(dists[part].logits))  # type: ignore[no-untyped-call]
         vectors, entropies = [], {}
         for part in self._vectors:
             sample, log_prob = rsample_and_log_prob(dists[part])
