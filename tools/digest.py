@@ -62,7 +62,7 @@ def measure_all(jobs: Sequence[Job], processes: int) -> dict[str, str]:
 
 
 def _measure_apart(job: Job) -> dict[str, str]:
-    """Measure a job in a fresh process: no result depends on what was computed before.
+    """Measure a job in a fresh process.
 
     A pool with `max_tasks_per_child=1` would be shorter, but hangs (CPython issue 115634).
     """

@@ -87,6 +87,8 @@ TRAININGS = (
     ),
     Training("train/crossq", "CrawlBaby", ("algo=crossq", "algo.replay.warm_up_frames=128")),
 )
+TRAINING_JOBS = 4
+"""How many jobs the training runs are distributed over; each job imports everything once."""
 
 
 def quick_jobs() -> list[Job]:
@@ -97,7 +99,7 @@ def quick_jobs() -> list[Job]:
 
 def all_jobs() -> list[Job]:
     """Return everything, what takes longest first."""
-    trainings: list[Job] = [(run,) for run in TRAININGS]
+    trainings: list[Job] = [TRAININGS[first::TRAINING_JOBS] for first in range(TRAINING_JOBS)]
     return [*trainings, _experts(), _variants(), (*_playgrounds(), *_adapters()), *quick_jobs()]
 
 
