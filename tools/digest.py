@@ -7,6 +7,7 @@ hold for one machine with one set of library versions. See ``tools/README.md``.
 from __future__ import annotations
 
 import argparse
+import logging
 import multiprocessing
 import sys
 import time
@@ -26,6 +27,7 @@ import veca_marl
 def measure(job: Job) -> dict[str, str]:
     """Return the digest of each item of a job by its name; report each to stderr."""
     torch.set_num_threads(1)
+    logging.getLogger("torchrl").setLevel(logging.WARNING)  # it informs on the standard output
     return {item.name: _measure(item) for item in job}
 
 
