@@ -17,6 +17,7 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 
 import torch
+import torchrl
 from checkout import check_imported
 from digests.catalogue import Job, all_jobs, quick_jobs
 from digests.hashing import Digest, Item
@@ -27,7 +28,7 @@ import veca_marl
 def measure(job: Job) -> dict[str, str]:
     """Return the digest of each item of a job by its name; report each to stderr."""
     torch.set_num_threads(1)
-    logging.getLogger("torchrl").setLevel(logging.WARNING)  # it informs on the standard output
+    torchrl.logger.setLevel(logging.WARNING)  # it informs on the standard output
     return {item.name: _measure(item) for item in job}
 
 
