@@ -42,7 +42,7 @@ def test_the_wheel_contains_every_configuration_file(wheel):
     expected = {p.relative_to(conf_dir()).as_posix() for p in conf_dir().rglob("*.yaml")}
     assert expected
     assert {n.removeprefix("veca_marl/conf/") for n in names if n.endswith(".yaml")} == expected
-    assert not [n for n in names if n.startswith(("tests/", "conf/", "experiments/"))]
+    assert not [n for n in names if n.startswith(("tests/", "tools/", "conf/", "experiments/"))]
 
 
 PROGRAM = """

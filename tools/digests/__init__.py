@@ -1,0 +1,1 @@
+"""What `digest.py` plays and trains, and how it hashes the results."""
