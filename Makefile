@@ -4,6 +4,8 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 ARGS   ?=
 CORES  ?= 2
+# moves every seed of `make test-all`, another one each day; the tests print it
+SEED_OFFSET ?= $(shell date +%y%j)
 
 .PHONY: help train test test-all checks lint types kernels format bench fidelity docs pages clean
 
@@ -46,8 +48,9 @@ test test-all: export OMP_NUM_THREADS := 1
 test: checks ## lint, types, import contracts and the quick tests
 	$(BIN)/pytest -n $(CORES) -m "not slow" --durations=20 $(ARGS)
 
-test-all: checks ## everything, the slow tests too
-	$(BIN)/pytest -n $(CORES) --durations=20 $(ARGS)
+test-all: checks ## everything, the slow tests too, with the seeds of the day; then what is stored
+	$(BIN)/pytest -n $(CORES) --durations=20 --seed-offset=$(SEED_OFFSET) $(ARGS)
+	$(BIN)/pytest -n $(CORES) -m golden $(ARGS)
 
 format: $(VENV)/installed-test ## format and fix with ruff
 	$(BIN)/ruff format .

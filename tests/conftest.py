@@ -43,6 +43,13 @@ def pytest_report_header(config):
     return f"seed offset: {config.getoption('--seed-offset')}"
 
 
+def pytest_terminal_summary(terminalreporter, exitstatus, config):
+    """Name the offset beside the failures, where it is read."""
+    offset = config.getoption("--seed-offset")
+    if offset and exitstatus:
+        terminalreporter.write_line(f"seeds were moved: --seed-offset={offset}", red=True)
+
+
 def pytest_collection_modifyitems(config, items):
     """Run the longest tests first; leave out stored bytes where seeds are moved."""
     items.sort(key=lambda item: item.path.name not in LONGEST)

@@ -207,10 +207,13 @@ def test_places_accept_any_size(shape):
 
 
 def test_places_learn_a_position_from_fewer_images():
-    """An orange square of 6 x 6 pixels somewhere in grey noise: its column, from 256 images."""
+    """An orange square of 6 x 6 pixels somewhere in grey noise: its column, from 64 images.
+
+    The ratio of the errors is 0.3 to 0.65 with 16 seeds.
+    """
     torch.manual_seed(0)
-    columns = torch.randint(0, 58, (512,))
-    images = torch.randint(60, 120, (512, 3, 64, 64), dtype=torch.uint8)
+    columns = torch.randint(0, 58, (256,))
+    images = torch.randint(60, 120, (256, 3, 64, 64), dtype=torch.uint8)
     for image, left in zip(images, columns, strict=True):
         image[:, 20:26, left : left + 6] = torch.tensor([250, 110, 20])[:, None, None]
     wanted = (columns.float() / 29.0 - 1.0)[:, None]
@@ -219,13 +222,13 @@ def test_places_learn_a_position_from_fewer_images():
         torch.manual_seed(1)
         encoder = ImageEncoder((3, 64, 64), Convolutions((8, 16, 16)), pooling)
         model = torch.nn.Sequential(encoder, torch.nn.Linear(encoder.features, 1))
-        optimizer = torch.optim.Adam(model.parameters(), 1e-3)
-        for batch in torch.randint(0, 256, (100, 64)):
+        optimizer = torch.optim.Adam(model.parameters(), 3e-3)
+        for batch in torch.randint(0, 64, (100, 32)):
             loss = (model(images[batch]) - wanted[batch]).square().mean()
             optimizer.zero_grad()
             loss.backward()
             optimizer.step()
         with torch.no_grad():
-            return (model(images[256:]) - wanted[256:]).square().mean().sqrt().item()
+            return (model(images[64:]) - wanted[64:]).square().mean().sqrt().item()
 
-    assert error(Pooling.places) < 0.6 * error(Pooling.flatten)
+    assert error(Pooling.places) < 0.85 * error(Pooling.flatten)
