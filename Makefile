@@ -7,7 +7,7 @@ CORES  ?= 2
 # moves every seed of `make test-all`, another one each day; the tests print it
 SEED_OFFSET ?= $(shell date +%y%j)
 
-.PHONY: help train test test-all checks lint types kernels format bench fidelity docs pages clean
+.PHONY: help train test test-all checks lint types kernels format bench fidelity docs pages wheel clean
 
 help:
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/'
@@ -68,6 +68,12 @@ docs: $(VENV)/installed-test ## build the documentation site in docs/_build/html
 pages: $(VENV)/installed-test ## rewrite the generated pages and pictures of docs/
 	$(BIN)/python scripts/make_docs.py
 
+WHEEL_BYTES := 4000000
+wheel: $(VENV)/installed-test ## build the wheel in dist/; refuse one of more than 4 MB
+	rm -rf dist
+	$(BIN)/pip wheel --quiet --no-deps --wheel-dir dist .
+	@size=$$(stat --format %s dist/*.whl); echo "$$(ls dist) has $$size bytes"; test $$size -le $(WHEEL_BYTES)
+
 clean: ## remove the virtual environment and all caches; runs stay
-	rm -rf $(VENV) .pytest_cache .mypy_cache .ruff_cache build *.egg-info
+	rm -rf $(VENV) .pytest_cache .mypy_cache .ruff_cache build dist *.egg-info
 	find . -name __pycache__ -type d -exec rm -rf {} +

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 from pathlib import Path
 
@@ -23,7 +24,7 @@ extensions = [
     "sphinx.ext.autodoc",
     "sphinx.ext.napoleon",
 ]
-exclude_patterns = ["_build"]
+exclude_patterns = ["_build", "history"]
 default_role = "code"  # docstrings write `name` for code
 
 html_theme = "furo"
@@ -62,7 +63,10 @@ def copy_pages(_: Sphinx) -> None:
     shutil.copytree(
         ROOT / "experiments", DOCS / "experiments", ignore=shutil.ignore_patterns("*.py", "__*")
     )
-    shutil.copyfile(ROOT / "CHANGELOG.md", DOCS / "changelog.md")
+    text = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+    # pages of history are in the repository only
+    text = re.sub(r"\[(docs/history/\S+?)\]\(\1\)", r"`\1`", text)
+    (DOCS / "changelog.md").write_text(text, encoding="utf-8")
 
 
 def setup(app: Sphinx) -> None:
