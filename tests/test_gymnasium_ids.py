@@ -7,7 +7,7 @@ import gymnasium
 import pytest
 
 import veca_marl
-from veca_marl.envs.core.task import TASKS, Task, register
+from veca_marl.envs.core.task import TASKS, Task, register_task
 from veca_marl.gymnasium_ids import shipped_tasks
 
 ID = "veca_marl/KickTheBall-v0"
@@ -48,7 +48,7 @@ def test_neither_the_package_nor_the_simulator_loads_learning_libraries():
 
 def test_a_task_that_is_registered_later_gets_an_id():
     assert "veca_marl/LaterTask-v0" not in gymnasium.registry
-    register(type("LaterTask", (Task,), {}))
+    register_task(type("LaterTask", (Task,), {}))
     try:
         assert gymnasium.spec("veca_marl/LaterTask-v0").kwargs == {"task": "LaterTask"}
     finally:

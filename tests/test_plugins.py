@@ -52,8 +52,8 @@ def write_package(folder, name, text):
 
 def task_text(name):
     return (
-        "from veca_marl.envs.core.task import Task, register\n"
-        f"@register\nclass {name}(Task):\n"
+        "from veca_marl.envs.core.task import Task, register_task\n"
+        f"@register_task\nclass {name}(Task):\n"
         "    senses = ('proprioception',)\n"
         "    def build(self): ...\n"
         "    def reset(self, rng): ...\n"

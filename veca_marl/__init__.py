@@ -29,4 +29,9 @@ def __getattr__(name: str) -> Any:
     raise AttributeError(f"module 'veca_marl' has no attribute {name!r}; choices: {__all__}")
 
 
+def __dir__() -> list[str]:
+    """Return what can be used, for completion in notebooks."""
+    return [*__all__]
+
+
 register_ids()

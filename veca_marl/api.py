@@ -264,7 +264,7 @@ def check_task(
         raise ConfigError(f"task={task!r} must be a registered class or its name")
     name = task if isinstance(task, str) else task.__name__
     if not isinstance(task, str) and TASKS.get(name) is not task:
-        raise ValueError(f"task {name!r} is not registered; decorate the class with @register")
+        raise ValueError(f"task {name!r} is not registered; decorate the class with @register_task")
     cfg = choose(
         name, playground=playground, body=body, senses=senses, overrides=overrides, plugins=plugins
     )

@@ -7,9 +7,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from veca_marl.envs.core.task import Player, Task, TaskCfg, register, terms
-from veca_marl.sim.physics import PropCfg, PropShape
-from veca_marl.sim.sound import SoundCfg, SoundKind
+from veca_marl.extend import (
+    Player,
+    PropCfg,
+    PropShape,
+    SoundCfg,
+    SoundKind,
+    Task,
+    TaskCfg,
+    register_task,
+    terms,
+)
 
 
 @dataclass
@@ -24,7 +32,7 @@ class FindBeaconCfg(TaskCfg):
     weights: dict[str, float] = terms(reached=1.0, progress=0.1)
 
 
-@register
+@register_task
 class FindBeacon(Task):
     """Walk to a buzzing cylinder; the episode ends when it is reached.
 

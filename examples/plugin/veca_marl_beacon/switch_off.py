@@ -2,12 +2,7 @@
 
 from __future__ import annotations
 
-from veca_marl.sim.physics import Prop
-from veca_marl.sim.physics.interactions import (
-    InteractingBody,
-    Interaction,
-    register_interaction,
-)
+from veca_marl.extend import InteractingBody, Interaction, Prop, register_interaction
 
 
 @register_interaction

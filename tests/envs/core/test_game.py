@@ -5,7 +5,16 @@ import pytest
 from composed import compose
 
 from veca_marl.envs.core.game import Game, player_names
-from veca_marl.envs.core.task import TASKS, Player, Task, TaskCfg, Team, find_task, register, terms
+from veca_marl.envs.core.task import (
+    TASKS,
+    Player,
+    Task,
+    TaskCfg,
+    Team,
+    find_task,
+    register_task,
+    terms,
+)
 from veca_marl.sim.body.walker import Walker
 from veca_marl.sim.spec import ArraySpec
 
@@ -51,7 +60,7 @@ def duel():
 
     cfg = cfg_of()
     cfg.task = TaskCfg(name="Duel")
-    register(Duel)
+    register_task(Duel)
     game = Game(cfg)
     game.reset(np.random.default_rng(0))
     yield game
@@ -136,7 +145,7 @@ def test_an_unknown_task_is_an_error_that_lists_the_tasks():
 def test_a_name_is_registered_once():
     another = type("KickTheBall", (Task,), {"__module__": "elsewhere"})
     with pytest.raises(ValueError, match=r"'KickTheBall' is defined twice: .*elsewhere"):
-        register(another)
+        register_task(another)
 
 
 @pytest.mark.parametrize("weights", [{"kick": 1.0}, {"kick": 1.0, "approch": 0.01}, {}])

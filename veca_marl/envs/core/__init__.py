@@ -5,7 +5,16 @@ from veca_marl.envs.core.episodes import Episodes
 from veca_marl.envs.core.expert import Expert, find_expert, has_expert, register_expert
 from veca_marl.envs.core.game import Game, Observation, Outcome
 from veca_marl.envs.core.game_cfg import GameCfg
-from veca_marl.envs.core.task import SOLVED, Player, Task, TaskCfg, Team, find_task, register, terms
+from veca_marl.envs.core.task import (
+    SOLVED,
+    Player,
+    Task,
+    TaskCfg,
+    Team,
+    find_task,
+    register_task,
+    terms,
+)
 from veca_marl.envs.core.team import Script, TeamCfg, TeamSensesCfg
 
 __all__ = [
@@ -28,8 +37,8 @@ __all__ = [
     "from_parts",
     "has_expert",
     "random_action",
-    "register",
     "register_expert",
+    "register_task",
     "terms",
     "to_parts",
 ]

@@ -303,7 +303,7 @@ def _check_info(names: set[str], players: list[Player]) -> None:
 TASKS: Registry[type[Task]] = Registry("task")
 
 
-def register(task: TaskType) -> TaskType:
+def register_task(task: TaskType) -> TaskType:
     """Register a task by its class name; a class decorator.
 
     Raises:

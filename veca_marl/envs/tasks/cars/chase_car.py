@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from veca_marl.envs.core.task import Player, register, terms
+from veca_marl.envs.core.task import Player, register_task, terms
 from veca_marl.envs.tasks.cars.car_game import CarGame, CarGameCfg
 from veca_marl.sim.geometry import Floats, horizontal_distance
 
@@ -40,7 +40,7 @@ class ChaseCarCfg(CarGameCfg):
                 raise ValueError(f"task.{name}={getattr(self, name)} must be at least 1")
 
 
-@register
+@register_task
 class ChaseCar(CarGame):
     """A toy car drives away from the player. The player has to come near and press it.
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from veca_marl.envs.core.task import Player, register, terms
+from veca_marl.envs.core.task import Player, register_task, terms
 from veca_marl.envs.tasks.cars.car_game import CarGame, CarGameCfg
 from veca_marl.envs.tasks.cars.forecast import Forecast
 from veca_marl.sim.geometry import Floats, horizontal_distance
@@ -44,7 +44,7 @@ class DodgeCarCfg(CarGameCfg):
             raise ValueError(f"task.lead_s={self.lead_s} must be 0 or a positive number")
 
 
-@register
+@register_task
 class DodgeCar(CarGame):
     """A fast toy car drives round the room; the player has to dodge it.
 

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from veca_marl.envs.core.task import Team, register
+from veca_marl.envs.core.task import Team, register_task
 from veca_marl.envs.tasks.contests.push_out import PushOut
 
 
-@register
+@register_task
 class PushOut1v1(PushOut):
     """Two players in a ring that is painted on the floor; the player that leaves it loses.
 

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from veca_marl.envs.core.task import Player, Team, register
+from veca_marl.envs.core.task import Player, Team, register_task
 from veca_marl.envs.tasks.contests.push_out import PushOut
 
 
-@register
+@register_task
 class PushOut2v2(PushOut):
     """Two teams of two players in a ring; a team without players in the ring loses.
 

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from veca_marl.envs.core.task import Team, register
+from veca_marl.envs.core.task import Team, register_task
 from veca_marl.envs.tasks.contests.soccer import ATTACKER, Soccer
 
 
-@register
+@register_task
 class SoccerOnePlayer(Soccer):
     """A player starts behind a ball and has to put it into the goal at the end of the room.
 

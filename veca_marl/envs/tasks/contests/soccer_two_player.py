@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from veca_marl.envs.core.task import Player, Team, register
+from veca_marl.envs.core.task import Player, Team, register_task
 from veca_marl.envs.tasks.contests.soccer import ATTACKER, DEFENDER, Soccer
 from veca_marl.envs.tasks.contests.soccer_cfg import CHILD_M, SoccerCfg
 from veca_marl.sim.geometry import Floats
@@ -35,7 +35,7 @@ class SoccerTwoPlayerCfg(SoccerCfg):
             )
 
 
-@register
+@register_task
 class SoccerTwoPlayer(Soccer):
     """SoccerOnePlayer with a defender between the ball and the goal.
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from veca_marl.envs.core.task import Player, register, require_humanoid, terms
+from veca_marl.envs.core.task import Player, register_task, require_humanoid, terms
 from veca_marl.envs.tasks.locomotion.start_poses import PosedStart, StartCfg, start_anywhere
 from veca_marl.sim.body.humanoid import Humanoid, HumanoidCfg
 from veca_marl.sim.body.humanoid.postures import ON_BACK
@@ -47,7 +47,7 @@ class HandRegardCfg(StartCfg):
             raise ValueError(f"task.half_angle_deg={self.half_angle_deg} must be in (0, 90)")
 
 
-@register
+@register_task
 class HandRegard(PosedStart):
     """A joint-level body lies on its back and keeps both hands before both eyes.
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from veca_marl.envs.core.task import Player, register, require_humanoid, terms
+from veca_marl.envs.core.task import Player, register_task, require_humanoid, terms
 from veca_marl.envs.tasks.developmental.regions import HANDS, regions_of, touched_regions
 from veca_marl.envs.tasks.locomotion.start_poses import PosedStart, StartCfg, start_anywhere
 from veca_marl.sim.body.humanoid import HumanoidCfg
@@ -27,7 +27,7 @@ class SelfTouchCfg(StartCfg):
     weights: dict[str, float] = terms(left_hand=0.5, right_hand=0.5)
 
 
-@register
+@register_task
 class SelfTouch(PosedStart):
     """A joint-level body lies on its back and touches as many regions of itself as possible.
 

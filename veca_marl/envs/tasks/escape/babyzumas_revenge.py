@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from veca_marl.envs.core.task import Player, Task, TaskCfg, register, require_walker, terms
+from veca_marl.envs.core.task import Player, Task, TaskCfg, register_task, require_walker, terms
 from veca_marl.envs.tasks.escape.key_drawer import (
     add_key_drawer,
     draw_place_at_wall,
@@ -57,7 +57,7 @@ class BabyzumasRevengeCfg(TaskCfg):
         return SoundCfg(SoundKind.buzz, self.frequency_hz, self.loudness)
 
 
-@register
+@register_task
 class BabyzumasRevenge(Task):
     """An agent has to find the key that opens the door to the next room.
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from veca_marl.envs.core.task import Player, register, require_humanoid, terms
+from veca_marl.envs.core.task import Player, register_task, require_humanoid, terms
 from veca_marl.envs.tasks.locomotion.progress import ForwardProgress
 from veca_marl.envs.tasks.locomotion.start_poses import (
     PosedStart,
@@ -38,7 +38,7 @@ class CrawlBabyCfg(StartCfg):
         self.check_positive("top_mps")
 
 
-@register
+@register_task
 class CrawlBaby(PosedStart):
     """A joint-level body on hands and knees at the edge of the room has to crawl ahead.
 

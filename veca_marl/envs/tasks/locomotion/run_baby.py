@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from veca_marl.envs.core.scoring import horizontal
-from veca_marl.envs.core.task import Player, register, require_humanoid, terms
+from veca_marl.envs.core.task import Player, register_task, require_humanoid, terms
 from veca_marl.envs.tasks.locomotion.progress import ForwardProgress
 from veca_marl.envs.tasks.locomotion.start_poses import PosedStart, StartCfg, start_near_edge
 from veca_marl.sim.body.humanoid import HumanoidCfg
@@ -50,7 +50,7 @@ class RunBabyCfg(StartCfg):
             raise ValueError(f"task.kneeling_m={self.kneeling_m} must be in [0, 0.15]")
 
 
-@register
+@register_task
 class RunBaby(PosedStart):
     """A joint-level body stands at the edge of the room, faces its middle and has to run.
 

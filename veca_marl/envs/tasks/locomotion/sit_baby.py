@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from veca_marl.envs.core.scoring import clipped_share
-from veca_marl.envs.core.task import Player, register, require_humanoid, terms
+from veca_marl.envs.core.task import Player, register_task, require_humanoid, terms
 from veca_marl.envs.tasks.locomotion.start_poses import (
     PosedStart,
     StartCfg,
@@ -62,7 +62,7 @@ class SitBabyCfg(StartCfg):
             raise ValueError(f"task.starts={self.starts} must be shares: 0 or more, not all 0")
 
 
-@register
+@register_task
 class SitBaby(PosedStart):
     """A joint-level body lies on its back at a random place in the room and has to sit up.
 

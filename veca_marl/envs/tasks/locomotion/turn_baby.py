@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from veca_marl.envs.core.task import Player, register, require_humanoid, terms
+from veca_marl.envs.core.task import Player, register_task, require_humanoid, terms
 from veca_marl.envs.tasks.locomotion.start_poses import (
     PosedStart,
     StartCfg,
@@ -39,7 +39,7 @@ class TurnBabyCfg(StartCfg):
             raise ValueError(f"task.turned_deg={self.turned_deg} must be between 0 and 90")
 
 
-@register
+@register_task
 class TurnBaby(PosedStart):
     """A joint-level body lies on its back at a random place in the room and has to turn over.
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from veca_marl.envs.core.scoring import cosine, horizontal, norm
-from veca_marl.envs.core.task import Player, Task, TaskCfg, register, require_walker, terms
+from veca_marl.envs.core.task import Player, Task, TaskCfg, register_task, require_walker, terms
 from veca_marl.envs.tasks.kickable_ball import check_kickable
 from veca_marl.envs.tasks.multimodal.rolling_ball import check_ball_speed, launch_from_side_wall
 from veca_marl.sim.body.walker import WalkerCfg
@@ -78,7 +78,7 @@ class KickTheBallCfg(TaskCfg):
         )
 
 
-@register
+@register_task
 class KickTheBall(Task):
     """A buzzing ball rolls out of a side wall again and again; the player has to kick it.
 

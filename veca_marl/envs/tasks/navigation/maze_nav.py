@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from veca_marl.envs.core.task import Player, Task, TaskCfg, register, require_walker, terms
+from veca_marl.envs.core.task import Player, Task, TaskCfg, register_task, require_walker, terms
 from veca_marl.envs.tasks.navigation import places
 from veca_marl.envs.tasks.navigation.mazes.maze import Cell, Maze, random_maze
 from veca_marl.envs.tasks.navigation.mazes.trial_sense import TRIAL, TrialSense
@@ -52,7 +52,7 @@ class MazeNavCfg(TaskCfg):
             raise ValueError(f"task.trials={self.trials} must be at least 1")
 
 
-@register
+@register_task
 class MazeNav(Task):
     """An agent has to find an object in a maze, several times in the same maze.
 

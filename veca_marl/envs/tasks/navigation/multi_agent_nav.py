@@ -11,7 +11,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from veca_marl.envs.core.task import Player, Task, TaskCfg, Team, register, terms
+from veca_marl.envs.core.task import Player, Task, TaskCfg, Team, register_task, terms
 from veca_marl.envs.tasks.navigation import places
 from veca_marl.envs.tasks.navigation.connection import check_connected
 from veca_marl.envs.tasks.navigation.doorways import check_doorways
@@ -77,7 +77,7 @@ class MultiAgentNavCfg(TaskCfg):
         self.check_positive("radius_m", "reach_m")
 
 
-@register
+@register_task
 class MultiAgentNav(Task):
     """Agents start in separate rooms, one of which contains an object that all have to reach.
 

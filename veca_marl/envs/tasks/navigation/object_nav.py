@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from veca_marl.envs.core.task import Player, Task, TaskCfg, register, terms
+from veca_marl.envs.core.task import Player, Task, TaskCfg, register_task, terms
 from veca_marl.envs.tasks.navigation import places
 from veca_marl.envs.tasks.navigation.connection import check_connected
 from veca_marl.envs.tasks.navigation.floors.scattering import (
@@ -77,7 +77,7 @@ class ObjectNavCfg(TaskCfg):
             )
 
 
-@register
+@register_task
 class ObjectNav(Task):
     """An agent has to go to the one of several objects that is the target.
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from veca_marl.envs.core.task import register, require_humanoid
+from veca_marl.envs.core.task import register_task, require_humanoid
 from veca_marl.envs.tasks.navigation.object_nav import ObjectNav, ObjectNavCfg
 from veca_marl.sim.body.humanoid import HumanoidCfg
 
@@ -24,7 +24,7 @@ class ObjectPhysNavCfg(ObjectNavCfg):
     apart_m: float = 2.0
 
 
-@register
+@register_task
 class ObjectPhysNav(ObjectNav):
     """ObjectNav with a body that is controlled by its joints and starts on hands and knees.
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from veca_marl.envs.core.task import Player, Task, register, require_humanoid, terms
+from veca_marl.envs.core.task import Player, Task, register_task, require_humanoid, terms
 from veca_marl.envs.tasks.objects.clearance import clearance_m
 from veca_marl.envs.tasks.objects.grasping import (
     ToyCfg,
@@ -41,7 +41,7 @@ class GrabObjectCfg(ToyCfg):
             raise ValueError(f"task.lifted_m={self.lifted_m} must be a positive length")
 
 
-@register
+@register_task
 class GrabObject(Task):
     """A joint-level body sits on the floor in front of a toy and has to lift it with both hands.
 

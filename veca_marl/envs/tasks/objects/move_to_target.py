@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from veca_marl.envs.core.scoring import horizontal
-from veca_marl.envs.core.task import Player, Task, register, require_humanoid, terms
+from veca_marl.envs.core.task import Player, Task, register_task, require_humanoid, terms
 from veca_marl.envs.tasks.objects.grasping import ToyCfg, add_toy, place_toy
 from veca_marl.envs.tasks.objects.seat import check_seat
 from veca_marl.sim.body.humanoid import HumanoidCfg
@@ -53,7 +53,7 @@ class MoveToTargetCfg(ToyCfg):
             )
 
 
-@register
+@register_task
 class MoveToTarget(Task):
     """A joint-level body sits on the floor and has to move a toy to a green mark.
 

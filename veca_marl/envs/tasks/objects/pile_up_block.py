@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from veca_marl.envs.core.task import Player, Task, register, require_humanoid, terms
+from veca_marl.envs.core.task import Player, Task, register_task, require_humanoid, terms
 from veca_marl.envs.tasks.objects.blocks import (
     BLUE,
     RED,
@@ -54,7 +54,7 @@ class PileUpBlockCfg(BlocksCfg):
         self.check_not_negative("blue_aside_m", "turn_deg")
 
 
-@register
+@register_task
 class PileUpBlock(Task):
     """A joint-level body sits in front of three blocks and has to pile up the red ones.
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from veca_marl.envs.core.task import Player, Task, register, require_humanoid, terms
+from veca_marl.envs.core.task import Player, Task, register_task, require_humanoid, terms
 from veca_marl.envs.tasks.objects.blocks import (
     BLUE,
     RED,
@@ -72,7 +72,7 @@ class PutDownBlockCfg(BlocksCfg):
         return _LEAN * height_m + self.edge_m / 2.0
 
 
-@register
+@register_task
 class PutDownBlock(Task):
     """A joint-level body has to take a red block off a tower of blue ones, to the floor.
 

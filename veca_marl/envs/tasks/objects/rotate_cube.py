@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from veca_marl.envs.core.scoring import rotation_angle_rad
-from veca_marl.envs.core.task import Player, Task, TaskCfg, register, require_humanoid, terms
+from veca_marl.envs.core.task import Player, Task, TaskCfg, register_task, require_humanoid, terms
 from veca_marl.envs.tasks.objects.clearance import clearance_m
 from veca_marl.envs.tasks.objects.seat import check_seat
 from veca_marl.sim.body.humanoid import HumanoidCfg
@@ -69,7 +69,7 @@ class RotateCubeCfg(TaskCfg):
             )
 
 
-@register
+@register_task
 class RotateCube(Task):
     """A joint-level body lies on its back with a cube on its right palm and has to rotate the cube.
 

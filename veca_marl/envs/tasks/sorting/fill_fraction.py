@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from veca_marl.envs.core.task import Player, Task, TaskCfg, register, require_walker, terms
+from veca_marl.envs.core.task import Player, Task, TaskCfg, register_task, require_walker, terms
 from veca_marl.envs.tasks.navigation.connection import check_connected
 from veca_marl.envs.tasks.navigation.floors.scattering import (
     Spacing,
@@ -73,7 +73,7 @@ class FillFractionCfg(TaskCfg):
             )
 
 
-@register
+@register_task
 class FillFraction(Task):
     """An agent has to fill three circles with pieces that are fractions of a circle.
 

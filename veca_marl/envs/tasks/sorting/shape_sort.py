@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from veca_marl.envs.core.task import register
+from veca_marl.envs.core.task import register_task
 from veca_marl.envs.tasks.sorting.baskets import Basket, add_basket_with_sample
 from veca_marl.envs.tasks.sorting.items import COLOURS, Item, add_items
 from veca_marl.envs.tasks.sorting.sorting_task import SortingCfg, SortingTask
@@ -35,7 +35,7 @@ class ShapeSortCfg(SortingCfg):
         self.check_categories("shapes", self.shapes, [kind.name for kind in ToyKind])
 
 
-@register
+@register_task
 class ShapeSort(SortingTask):
     """An agent has to put toys into the baskets of their shapes.
 
