@@ -84,7 +84,7 @@ def parts_table(runs: Sequence[Rollouts]) -> str:
 
 def references_table(references: References) -> str:
     """Return the answer to: what do single senses cost?"""
-    eye, skin = references.eye, references.skin
+    eye, skin, body = references.eye, references.skin, references.body
     rows = [
         ["part", "ms"],
         [f"eye, one view of 84x84 with {eye.primitives} primitives", f"{eye.ours_ms:.3f}"],
@@ -96,6 +96,9 @@ def references_table(references: References) -> str:
             for contacts, ms in skin.touch_ms.items()
         ),
         ["skinning of one body", f"{skin.skinning_ms:.3f}"],
+        ["view of 84x84 of the skin of one body", f"{body.skin_ms:.3f}"],
+        ["the same view of its bones", f"{body.bones_ms:.3f}"],
+        ["from its own eye, most triangles out of view", f"{body.own_ms:.3f}"],
     ]
     return f"processor time of single parts:\n{_table(rows)}"
 
