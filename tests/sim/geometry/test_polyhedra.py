@@ -110,10 +110,11 @@ def test_rays_enter_at_the_surface_and_from_outside(name):
     hull, rng = HULLS[name], np.random.default_rng(3)
     faces, size = face_rows(hull), sizes_of(hull, 0)
     hits = 0
-    for _ in range(300):
+    for number in range(300):
         start = rng.normal(size=3)
         start *= 1.2 / np.linalg.norm(start)
-        way = rng.uniform(-0.3, 0.3, 3) - start
+        aims = rng.uniform(-0.3, 0.3, 3), rng.dirichlet(np.ones(len(hull.vertices))) @ hull.vertices
+        way = aims[number % 2] - start  # the second one is inside
         way /= np.linalg.norm(way)
         entry = polyhedron_entry(faces, size, tuple(start), tuple(way))
         on_way = start + np.linspace(0.0, 2.4, 400)[:, None] * way
@@ -121,6 +122,8 @@ def test_rays_enter_at_the_surface_and_from_outside(name):
         if inside.any():
             hits += 1
             assert entry <= 2.4 / 399 * np.argmax(inside)
+        if number % 2 == 1:
+            assert entry < np.linalg.norm(aims[1] - start)
         if entry < 10.0:
             assert distances_to(solid(hull), start + entry * way) == pytest.approx(0.0, abs=1e-12)
     assert hits > 50

@@ -227,10 +227,11 @@ def digest_of_an_observation():
 def digest_elsewhere(**environment):
     """The same hash from another process."""
     code = "import test_vision_sense; print(test_vision_sense.digest_of_an_observation())"
+    paths = [str(HELPERS), str(ROOT), *filter(None, [os.environ.get("PYTHONPATH")])]
     other = subprocess.run(
         [sys.executable, "-c", code],
         cwd=pathlib.Path(__file__).parent,
-        env=os.environ | {"PYTHONPATH": f"{HELPERS}{os.pathsep}{ROOT}"} | environment,
+        env=os.environ | {"PYTHONPATH": os.pathsep.join(paths)} | environment,
         capture_output=True,
         text=True,
         check=True,
