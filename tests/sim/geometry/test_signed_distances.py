@@ -45,9 +45,8 @@ def surface_points(shape, size, ways):
 def test_distance_is_that_to_the_nearest_surface_point(shape):
     size = np.zeros(3, np.float32)
     size[: len(SIZES[shape])] = SIZES[shape]
-    surface = surface_points(
-        shape, SIZES[shape], np.random.default_rng(0).normal(size=(200_000, 3))
-    )
+    ways = np.random.default_rng(0).normal(size=(200_000, 3))
+    surface = surface_points(shape, SIZES[shape], ways)
     for point in np.random.default_rng(1).uniform(-1, 1, (60, 3)):
         boundary = np.linalg.norm(surface_points(shape, SIZES[shape], point[None]))
         nearest = np.linalg.norm(surface - point, axis=1).min()
