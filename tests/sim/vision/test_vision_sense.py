@@ -118,9 +118,7 @@ def test_disparity_is_the_difference_of_vergence_angles():
 
 
 def test_monocular_repeats_the_left_image():
-    scene = clutter(np.random.default_rng(1))
-    scene.add_object("near", [[Geom(Shape.SPHERE, (0.05,), offset=(0.4, 0.0, 0.0))]])
-    scene.update()
+    scene = ball_at((0.5, 0.0, 0.0))
     both = eyes(VisionCfg(**EVERYTHING), body_before(), scene).read()
     one = eyes(VisionCfg(**EVERYTHING, eyes=Eyes.monocular), body_before(), scene).read()
     for name, images in one.items():
