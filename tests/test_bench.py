@@ -140,7 +140,8 @@ def test_results_as_tables_and_json(tmp_path, capsys):
     skin = found["references"]["skin"]
     assert skin["skinning_ms"] > 0
     assert skin["touch_ms"]["20"] > skin["touch_ms"]["0"] > 0
-    for ms in (eye["ours_ms"], eye["tiny_ms"], *found["references"]["body"].values()):
+    single = [eye["ours_ms"], eye["tiny_ms"], skin["distant_ms"]]
+    for ms in (*single, *found["references"]["body"].values()):
         assert 0 < ms < np.inf
         assert f" {ms:.3f}\n" in printed
     assert found["machine"]["cores"] >= 1
@@ -188,9 +189,9 @@ def test_rollouts_at_once_name_a_process_that_was_killed():
         rollouts.frames_per_s()
 
 
-@pytest.mark.parametrize("things", [0, 3])
-def test_the_measured_skin_senses_each_prop_and_nothing_else(things):
-    world, sense = touched_child(PlaygroundCfg(), things)
+@pytest.mark.parametrize(("things", "distant"), [(0, 0), (3, 0), (3, 20)])
+def test_the_measured_skin_senses_each_prop_and_nothing_else(things, distant):
+    world, sense = touched_child(PlaygroundCfg(), things, distant)
     felt = (sense.update_taxels() > 0.0).any(axis=1)
     vertices = world.scene.meshes.vertices
     middles = vertices[world.scene.meshes.triangles].mean(axis=1)
