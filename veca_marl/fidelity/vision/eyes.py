@@ -57,8 +57,8 @@ _TEXT = f"""
 - **Segmentation**: share of equal pixels with TinyRenderer, Bullet's software renderer, for
   {CAMERAS} random cameras, each in a random room of spheres, boxes, cylinders and capsules,
   {CLEAR_M} m or more away from all of them; also of boxes only and of balls only. TinyRenderer
-  draws boxes exactly, balls as polyhedra, cylinders and capsules as coarse polyhedra. The polyhedra of balls are
-  inscribed: no pixel may show a ball in TinyRenderer's image alone.
+  draws boxes exactly, balls as polyhedra, cylinders and capsules as coarse polyhedra. The polyhedra
+  of balls are inscribed: no pixel may show a ball in TinyRenderer's image alone.
 - **Defocus**: a thin lens with a pupil of diameter p that is focused at f spreads a point at z over
   a disc of the angular diameter p |1/z - 1/f| (Smith, Am. J. Optometry 1982). The diameter is
   measured by the contrast that a grating loses, with the variance (diameter / 4)^2 of a disc.
