@@ -13,6 +13,7 @@ from paths import ROOT
 
 from veca_marl.algos.checkpoints.checkpoints import Checkpoints
 from veca_marl.bench.all_cores import SimultaneousRollouts
+from veca_marl.bench.body_views import body_views
 from veca_marl.bench.command import chosen_games, main
 from veca_marl.bench.free_play import free_play
 from veca_marl.bench.options import BenchCfg
@@ -24,7 +25,7 @@ from veca_marl.config import conf_dir
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
 from veca_marl.envs.core.game import Game
 from veca_marl.envs.core.task import TASKS
-from veca_marl.sim.physics import PlaygroundCfg, pybullet
+from veca_marl.sim.physics import PlaygroundCfg, World, pybullet
 from veca_marl.sim.vision import Camera
 
 QUICK = ["bench.steps=3", "bench.repeats=1"]
@@ -139,6 +140,10 @@ def test_results_as_tables_and_json(tmp_path, capsys):
     skin = found["references"]["skin"]
     assert skin["skinning_ms"] > 0
     assert skin["touch_ms"]["20"] > skin["touch_ms"]["0"] > 0
+    single = [eye["ours_ms"], eye["tiny_ms"], skin["distant_ms"]]
+    for ms in (*single, *found["references"]["body"].values()):
+        assert 0 < ms < np.inf
+        assert f" {ms:.3f}\n" in printed
     assert found["machine"]["cores"] >= 1
     assert (found["machine"]["commit"] or "unknown") in printed.splitlines()[0]
 
@@ -184,9 +189,9 @@ def test_rollouts_at_once_name_a_process_that_was_killed():
         rollouts.frames_per_s()
 
 
-@pytest.mark.parametrize("things", [0, 3])
-def test_the_measured_skin_senses_each_prop_and_nothing_else(things):
-    world, sense = touched_child(PlaygroundCfg(), things)
+@pytest.mark.parametrize(("things", "distant"), [(0, 0), (3, 0), (3, 20)])
+def test_the_measured_skin_senses_each_prop_and_nothing_else(things, distant):
+    world, sense = touched_child(PlaygroundCfg(), things, distant)
     felt = (sense.update_taxels() > 0.0).any(axis=1)
     vertices = world.scene.meshes.vertices
     middles = vertices[world.scene.meshes.triangles].mean(axis=1)
@@ -195,6 +200,18 @@ def test_the_measured_skin_senses_each_prop_and_nothing_else(things):
     assert (felt[:, None] & near).any(axis=0).all()
     assert not (felt & ~near.any(axis=1)).any()
     world.close()
+
+
+def test_the_measured_views_show_a_body_from_outside_twice_and_from_its_own_eye():
+    world = World(PlaygroundCfg())
+    skin, bones, own = (render().ids[0] for render in body_views(world))
+    child = world.scene.find("child").id
+    world.close()
+    for ids in (skin, bones, own):
+        assert set(np.unique(ids)) == {-1, child}
+        assert 0.01 < np.mean(ids == child) < 0.5
+    assert np.mean(skin == bones) > 0.95
+    assert not np.array_equal(skin, bones)
 
 
 def test_an_absent_sense_is_not_measured(tmp_path):

@@ -20,7 +20,7 @@ def test_disparity_is_that_of_the_geometry():
 
 
 def test_segmentation_is_that_of_tiny_renderer():
-    shares = {name: vision.equal_shares(12, shapes) for name, (shapes, _) in vision.ROOMS.items()}
+    shares = {name: vision.equal_shares(60, shapes) for name, (shapes, _) in vision.ROOMS.items()}
     broken = [law for law in vision.segmentation_laws(shares) if not law.holds]
     assert not broken
     assert vision.outside_law(vision.pixels_outside_balls(12)).holds

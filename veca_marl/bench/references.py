@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from veca_marl.bench.body_views import BodyViews, measure_body_views
 from veca_marl.bench.skin_costs import SkinCosts, measure_skin
 from veca_marl.bench.stopwatch import thread_ms
 from veca_marl.sim.body.walker import Walker, WalkerCfg
@@ -56,19 +57,22 @@ class References:
         eye: One eye view beside TinyRenderer.
         ears_ms: Milliseconds per step of one listener and one source.
         skin: The skin of one body.
+        body: Views of one body.
     """
 
     eye: EyeCost
     ears_ms: float
     skin: SkinCosts
+    body: BodyViews
 
 
 def measure_references(playground: PlaygroundCfg, steps: int, repeats: int) -> References:
-    """Measure an eye, ears and skin in a playground, one after the other."""
+    """Measure an eye, ears, skin and views of it in a playground, one after the other."""
     return References(
         measure_eye(playground, repeats),
         measure_ears(playground, steps),
         measure_skin(playground, steps),
+        measure_body_views(playground, steps),
     )
 
 

@@ -9,6 +9,7 @@ from dataclasses import asdict
 from veca_marl.bench.learning import Learning
 from veca_marl.bench.references import References
 from veca_marl.bench.rollouts import Rollouts
+from veca_marl.bench.skin_costs import DISTANT
 
 
 def throughput_table(runs: Sequence[Rollouts]) -> str:
@@ -84,7 +85,7 @@ def parts_table(runs: Sequence[Rollouts]) -> str:
 
 def references_table(references: References) -> str:
     """Return the answer to: what do single senses cost?"""
-    eye, skin = references.eye, references.skin
+    eye, skin, body = references.eye, references.skin, references.body
     rows = [
         ["part", "ms"],
         [f"eye, one view of 84x84 with {eye.primitives} primitives", f"{eye.ours_ms:.3f}"],
@@ -95,7 +96,11 @@ def references_table(references: References) -> str:
             [f"touch, 9888 taxels, {contacts} contacts", f"{ms:.3f}"]
             for contacts, ms in skin.touch_ms.items()
         ),
+        [f"touch, 9888 taxels, 3 contacts, {DISTANT} distant balls", f"{skin.distant_ms:.3f}"],
         ["skinning of one body", f"{skin.skinning_ms:.3f}"],
+        ["view of 84x84 of the skin of one body", f"{body.skin_ms:.3f}"],
+        ["the same view of its bones", f"{body.bones_ms:.3f}"],
+        ["from its own eye, most triangles out of view", f"{body.own_ms:.3f}"],
     ]
     return f"processor time of single parts:\n{_table(rows)}"
 

@@ -10,11 +10,12 @@ import numpy as np
 from veca_marl.bench.stopwatch import thread_ms
 from veca_marl.sim.body.humanoid import Humanoid, HumanoidCfg
 from veca_marl.sim.body.humanoid.postures import Posture
-from veca_marl.sim.geometry import deform_meshes
+from veca_marl.sim.geometry import Geom, Shape, deform_meshes
 from veca_marl.sim.physics import PlaygroundCfg, PropCfg, PropShape, World
 from veca_marl.sim.touch import TouchCfg, TouchSense
 
 CONTACTS = (0, 3, 20)
+DISTANT = 300
 _ARMS_OUT = Posture(0.0, {"upper_arm.abduction": 30.0})  # no self-contact
 _RADIUS_M = 0.03
 
@@ -26,23 +27,33 @@ class SkinCosts:
     Attributes:
         skinning_ms: Milliseconds of computing the vertices from the poses of the bones.
         touch_ms: Milliseconds of one reading of all taxels, by the number of contacts.
+        distant_ms: That with 3 contacts, beside `DISTANT` primitives that touch nothing.
     """
 
     skinning_ms: float
     touch_ms: dict[int, float]
+    distant_ms: float
 
 
 def measure_skin(playground: PlaygroundCfg, repeats: int) -> SkinCosts:
     """Measure a `full` body in the air with small balls on its skin."""
     readings = {contacts: _touch_ms(playground, contacts, repeats) for contacts in CONTACTS}
-    return SkinCosts(_skinning_ms(playground, repeats), readings)
+    distant_ms = _touch_ms(playground, 3, repeats, distant=DISTANT)
+    return SkinCosts(_skinning_ms(playground, repeats), readings, distant_ms)
 
 
-def touched_child(playground: PlaygroundCfg, contacts: int) -> tuple[World, TouchSense]:
-    """Return a world with a body in the air and `contacts` balls on its skin, and its touch."""
+def touched_child(
+    playground: PlaygroundCfg, contacts: int, distant: int = 0
+) -> tuple[World, TouchSense]:
+    """Return a world with a body in the air and `contacts` balls on its skin, and its touch.
+
+    `distant` further balls are 5 m away.
+    """
     world = World(playground)
     cfgs = [PropCfg(f"ball_{i}", PropShape.sphere, [_RADIUS_M]) for i in range(contacts)]
     balls = [world.add_prop(cfg) for cfg in cfgs]
+    far = Geom(Shape.SPHERE, (_RADIUS_M,), offset=(5.0, 0.0, 1.0))
+    world.scene.add_object("distant", [[far] * distant])
     child = Humanoid("child", HumanoidCfg(), world)
     child.place((0.0, 0.0, 1.0), posture=_ARMS_OUT)
     world.scene.update()
@@ -54,8 +65,8 @@ def touched_child(playground: PlaygroundCfg, contacts: int) -> tuple[World, Touc
     return world, sense
 
 
-def _touch_ms(playground: PlaygroundCfg, contacts: int, repeats: int) -> float:
-    world, sense = touched_child(playground, contacts)
+def _touch_ms(playground: PlaygroundCfg, contacts: int, repeats: int, distant: int = 0) -> float:
+    world, sense = touched_child(playground, contacts, distant)
     sense.compute()
     cost = median(thread_ms(sense.compute) for _ in range(repeats))
     world.close()

@@ -68,12 +68,20 @@ def test_sectors_of_a_disc_have_its_volume_together():
     assert volumes[0] / volumes[1] == pytest.approx(2.0, rel=0.005)
 
 
+def points_on_edges(hull, count):
+    """So many points on each side of each triangle, ``(N, 3)``, corners included."""
+    ends = hull.corners[:, :, None, :], np.roll(hull.corners, 1, axis=1)[:, :, None, :]
+    along = np.linspace(0.0, 1.0, count)[:, None]
+    return (along * ends[0] + (1.0 - along) * ends[1]).reshape(-1, 3)
+
+
 @pytest.mark.parametrize("name", HULLS)
 def test_distances_are_exact_and_gradients_are_theirs(name):
     """References: nearest of many surface points outside; gradients by finite differences."""
     hull, rng = HULLS[name], np.random.default_rng(2)
-    weights = rng.dirichlet(np.ones(3), (len(hull.triangles), 1500))
+    weights = rng.dirichlet(np.ones(3), (len(hull.triangles), 3000))
     surface = np.einsum("tnk,tkc->tnc", weights, hull.corners).reshape(-1, 3)
+    surface = np.concatenate([surface, points_on_edges(hull, 200)])  # they are nearest to many
     points = rng.uniform(-0.8, 0.8, (300, 3))
     found = distances_to(solid(hull), points)
     height = (points @ hull.normals.T - hull.offsets).max(axis=1)
@@ -110,10 +118,11 @@ def test_rays_enter_at_the_surface_and_from_outside(name):
     hull, rng = HULLS[name], np.random.default_rng(3)
     faces, size = face_rows(hull), sizes_of(hull, 0)
     hits = 0
-    for _ in range(300):
+    for number in range(300):
         start = rng.normal(size=3)
         start *= 1.2 / np.linalg.norm(start)
-        way = rng.uniform(-0.3, 0.3, 3) - start
+        aims = rng.uniform(-0.3, 0.3, 3), rng.dirichlet(np.ones(len(hull.vertices))) @ hull.vertices
+        way = aims[number % 2] - start  # the second one is inside
         way /= np.linalg.norm(way)
         entry = polyhedron_entry(faces, size, tuple(start), tuple(way))
         on_way = start + np.linspace(0.0, 2.4, 400)[:, None] * way
@@ -121,6 +130,8 @@ def test_rays_enter_at_the_surface_and_from_outside(name):
         if inside.any():
             hits += 1
             assert entry <= 2.4 / 399 * np.argmax(inside)
+        if number % 2 == 1:
+            assert entry < np.linalg.norm(aims[1] - start)
         if entry < 10.0:
             assert distances_to(solid(hull), start + entry * way) == pytest.approx(0.0, abs=1e-12)
     assert hits > 50

@@ -1,5 +1,7 @@
 """Primitives: their points, their mass properties and their descriptions are those of one solid."""
 
+import math
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -24,7 +26,7 @@ SIZES = {
     Shape.CAPSULE: (0.2, 0.5),
     Shape.POLYHEDRON: (),
 }
-HULL = convex_hull(np.random.default_rng(5).uniform(-0.3, 0.3, (12, 3)))
+HULL = convex_hull(np.random.default_rng(5).uniform(-0.25, 0.25, (12, 3)))
 
 
 def primitive(shape):
@@ -33,7 +35,7 @@ def primitive(shape):
 
 
 def points_inside(part, count=1_000_000):
-    """Points spread evenly over a primitive."""
+    """Points spread evenly over a primitive, which is within a cube of 0.92 m."""
     points = np.random.default_rng(0).uniform(-0.46, 0.46, (count, 3)) + np.asarray(part.offset)
     return points[distances_to(part, points) < 0.0]
 
@@ -53,8 +55,10 @@ def test_inertia_is_that_of_evenly_spread_points(shape):
 @pytest.mark.parametrize("shape", Shape)
 def test_volume_is_that_of_evenly_spread_points(shape):
     part = primitive(shape)
-    share = len(points_inside(part)) / 1_000_000
-    assert part.volume == pytest.approx(share * 0.92**3, rel=0.01)
+    count = 1_000_000
+    share = len(points_inside(part, count)) / count
+    five_deviations = 5.0 * math.sqrt((1.0 - share) / (share * count))
+    assert part.volume == pytest.approx(share * 0.92**3, rel=five_deviations)
 
 
 def test_joined_parts_have_the_inertia_of_their_points():

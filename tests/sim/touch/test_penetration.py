@@ -1,7 +1,6 @@
 """The penetration model: proportionality, superposition, symmetry, and a dense reference."""
 
 import itertools
-import time
 
 import numpy as np
 import pytest
@@ -239,24 +238,6 @@ def test_the_reading_depends_on_the_present_geometry_only():
     assert not stage.read().any()
     ball.positions[0] = place
     np.testing.assert_array_equal(stage.read(), first)
-
-
-def test_distant_primitives_add_less_than_half_of_the_cost():
-    """The least of several batches, alternating, since other processes disturb single ones."""
-    stages, costs = [], []
-    for count in (0, 300):
-        stages.append(Stage())
-        press_forearm(stages[-1], 0.003)
-        for _ in range(count):
-            stages[-1].add("SPHERE", (0.1,), (5.0, 5.0, 0.5))
-        stages[-1].read()
-    for _ in range(15):
-        for stage in stages:
-            start = time.thread_time()
-            for _ in range(20):
-                stage.sense.update_taxels()
-            costs.append(time.thread_time() - start)
-    assert min(costs[1::2]) < 1.5 * min(costs[::2])
 
 
 def test_no_triangle_that_another_skin_presses_deeply_is_left_out():

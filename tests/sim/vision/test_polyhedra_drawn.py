@@ -24,12 +24,15 @@ def test_every_pixel_agrees_with_a_ray_in_double_precision():
     x = (2 * (np.arange(31) + 0.5) / 31 - 1) * camera.lens.tan_x
     y = (1 - 2 * (np.arange(23) + 0.5) / 23) * camera.lens.tan_y
     differing = shown = 0
-    for _ in range(12):
+    for number in range(12):
         hull = convex_hull(rng.uniform(-0.4, 0.4, (9, 3)))
         where, turn = rng.uniform((-1, -1, 0.5), (1, 1, 1.2)), random_rotations(1, rng)[0]
         scene, item = scene_of(hull, (where, turn))
-        pose = random_pose(rng)
+        middle = where + turn @ hull.centroid
+        ahead = look_at(middle + rng.uniform((-1, -1, 0.3), (1, 1, 1)), middle)
+        pose = ahead if number % 2 else random_pose(rng)
         seen = camera.render(scene, [pose]).ids[0] == item.id
+        assert seen[11, 15] or pose is not ahead
         faces, size = face_rows(hull), sizes_of(hull, 0)
         for j, i in np.ndindex(23, 31):
             ray = pose.rotation @ np.array([1.0, -x[i], y[j]])
@@ -39,7 +42,7 @@ def test_every_pixel_agrees_with_a_ray_in_double_precision():
             floor = pose.position[2] + 1e8 * ray[2] > 0.0
             differing += int(seen[j, i] != hit) if floor else int(seen[j, i] and not hit)
         shown += seen.sum()
-    assert shown > 500
+    assert shown > 100
     assert differing <= 5
 
 

@@ -104,23 +104,32 @@ def test_the_same_pose_gives_the_same_bytes():
         assert one.tobytes() == two.tobytes()
 
 
+WALL = 1
+"""Row of the wall; that of the floor is 0, those of other primitives are more."""
+
+
 @pytest.mark.parametrize(
-    ("shapes", "agreement"),
-    # its boxes are exact; its balls, and more so its cylinders and capsules, are coarse polyhedra
-    [((Shape.BOX,), 0.9995), ((Shape.SPHERE,), 0.99), ((Shape.CYLINDER, Shape.CAPSULE), 0.975)],
+    ("shape", "missing"),
+    # its boxes are exact; the others are polyhedra within the shape, those of capsules the coarsest
+    [(Shape.BOX, 5e-4), (Shape.SPHERE, 0.1), (Shape.CYLINDER, 0.035), (Shape.CAPSULE, 0.35)],
 )
-def test_agrees_with_tiny_renderer(shapes, agreement):
+def test_agrees_with_tiny_renderer(shape, missing):
+    """Of the pixels of all primitives that fraction differs, whatever their size in the picture."""
     rng = np.random.default_rng(2)
-    scene = clutter(rng, shapes=shapes)
+    scene = clutter(rng, shapes=(shape,))
     camera = Camera(84, 84, 60.0, near_m=0.02, far_m=12.0)
-    same = []
+    shown = differing = outside = 0
     with TinyRenderer(scene) as tiny:
         for _ in range(30):
             eye = rng.uniform((-2.8, -2.8, 0.8), (-2.2, 2.8, 1.8))
             pose = look_at(eye, rng.uniform((-0.5, -0.5, 0.2), (0.5, 0.5, 0.6)))
             _, surfaces = draw(scene, camera, pose, bounded=True)
-            same.append(np.mean(surfaces == tiny.segment(camera, pose)))
-    assert np.mean(same) >= agreement
+            theirs = tiny.segment(camera, pose)
+            shown += ((surfaces > WALL) | (theirs > WALL)).sum()
+            differing += (surfaces != theirs).sum()
+            outside += ((surfaces <= WALL) & (theirs > WALL)).sum()
+    assert differing <= missing * shown
+    assert outside <= 0.005 * shown  # rounding at silhouettes
 
 
 def test_pixel_centres_are_symmetric_about_the_optical_axis():

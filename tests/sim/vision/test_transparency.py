@@ -70,12 +70,21 @@ def overlapping_things(rng, order):
     return scene
 
 
+def pose_through(layers, scene, rng):
+    """A random pose from which so many transparent layers cover a pixel."""
+    for _ in range(200):
+        pose = random_pose(rng)
+        if len(small_camera().render(scene, [pose]).glass_ids) >= layers:
+            return pose
+    raise AssertionError(f"no pose with {layers} layers")
+
+
 @pytest.mark.parametrize("seed", range(3))
 def test_the_picture_does_not_depend_on_the_order_of_objects(seed):
     orders = [np.arange(14), np.random.default_rng(seed).permutation(14)]
     scenes = [overlapping_things(np.random.default_rng(100 + seed), order) for order in orders]
     rng = np.random.default_rng(seed)
-    poses = [random_pose(rng) for _ in range(3)]
+    poses = [pose_through(2, scenes[0], rng), random_pose(rng), random_pose(rng)]
     one, other = (small_camera().render(scene, poses) for scene in scenes)
     assert len(one.glass_ids) == len(other.glass_ids) >= 2
     np.testing.assert_array_equal(one.rgb, other.rgb)
@@ -86,13 +95,12 @@ def test_the_picture_does_not_depend_on_the_order_of_objects(seed):
 def test_layers_are_those_of_each_object_alone():
     """Each transparent object is seen where it is seen when the others are absent."""
     scene = overlapping_things(np.random.default_rng(7), range(14))
-    pose = random_pose(np.random.default_rng(1))
+    pose = pose_through(3, scene, np.random.default_rng(1))
     together = small_camera().render(scene, [pose])
     for item in scene.objects[4:]:
         others = np.isin(scene.surfaces.objects, [o.id for o in scene.objects[4:] if o is not item])
         alone = small_camera().render(scene, [pose], others)
         assert (alone.glass_ids == item.id).sum() == (together.glass_ids == item.id).sum()
-    assert together.glass_ids.shape[0] >= 3
 
 
 def test_views_of_one_call_may_have_different_numbers_of_layers():

@@ -118,7 +118,7 @@ def test_disparity_is_the_difference_of_vergence_angles():
 
 
 def test_monocular_repeats_the_left_image():
-    scene = clutter(np.random.default_rng(1))
+    scene = ball_at((0.5, 0.0, 0.0))
     both = eyes(VisionCfg(**EVERYTHING), body_before(), scene).read()
     one = eyes(VisionCfg(**EVERYTHING, eyes=Eyes.monocular), body_before(), scene).read()
     for name, images in one.items():
@@ -227,10 +227,11 @@ def digest_of_an_observation():
 def digest_elsewhere(**environment):
     """The same hash from another process."""
     code = "import test_vision_sense; print(test_vision_sense.digest_of_an_observation())"
+    paths = [str(HELPERS), str(ROOT), *filter(None, [os.environ.get("PYTHONPATH")])]
     other = subprocess.run(
         [sys.executable, "-c", code],
         cwd=pathlib.Path(__file__).parent,
-        env=os.environ | {"PYTHONPATH": f"{HELPERS}{os.pathsep}{ROOT}"} | environment,
+        env=os.environ | {"PYTHONPATH": os.pathsep.join(paths)} | environment,
         capture_output=True,
         text=True,
         check=True,

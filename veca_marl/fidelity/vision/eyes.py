@@ -55,10 +55,10 @@ _TEXT = f"""
   is the difference of the directions in which the eyes see the ball; theory is
   2 (atan(h / d) - atan(h / 0.5)) with half the distance h between the eyes.
 - **Segmentation**: share of equal pixels with TinyRenderer, Bullet's software renderer, for
-  {CAMERAS} random cameras in a room of spheres, boxes, cylinders and capsules, {CLEAR_M} m or more
-  away from all of them; also of boxes alone and of balls alone. TinyRenderer draws boxes exactly,
-  balls as polyhedra, cylinders and capsules as coarse polyhedra. The polyhedra of balls are
-  inscribed: no pixel may show a ball in TinyRenderer's image alone.
+  {CAMERAS} random cameras, each in a random room of spheres, boxes, cylinders and capsules,
+  {CLEAR_M} m or more away from all of them; also of boxes only and of balls only. TinyRenderer
+  draws boxes exactly, balls as polyhedra, cylinders and capsules as coarse polyhedra. The polyhedra
+  of balls are inscribed: no pixel may show a ball in TinyRenderer's image alone.
 - **Defocus**: a thin lens with a pupil of diameter p that is focused at f spreads a point at z over
   a disc of the angular diameter p |1/z - 1/f| (Smith, Am. J. Optometry 1982). The diameter is
   measured by the contrast that a grating loses, with the variance (diameter / 4)^2 of a disc.
@@ -193,17 +193,20 @@ def _free_place(scene: Scene, rng: np.random.Generator) -> Floats:
 def segmentations(
     cameras: int, shapes: Sequence[Shape]
 ) -> Iterator[tuple[NDArray[np.intp], NDArray[np.intp]]]:
-    """Yield images ``(84, 84)`` of object ids by this renderer and by TinyRenderer, -1 for none."""
+    """Yield images ``(84, 84)`` of object ids by this renderer and by TinyRenderer, -1 for none.
+
+    Each camera is in a room of its own: the mean depends on the sizes of the shapes in a room.
+    """
     rng = np.random.default_rng(0)
-    scene = random_room(rng, shapes)
     camera = Camera(84, 84, 60.0, near_m=0.02, far_m=12.0)
-    with TinyRenderer(scene) as tiny:
-        for _ in range(cameras):
-            target = rng.uniform((-0.5, -0.5, 0.2), (0.5, 0.5, 0.6))
-            pose = look_at(_free_place(scene, rng), target)
+    for _ in range(cameras):
+        scene = random_room(rng, shapes)
+        target = rng.uniform((-0.5, -0.5, 0.2), (0.5, 0.5, 0.6))
+        pose = look_at(_free_place(scene, rng), target)
+        with TinyRenderer(scene) as tiny:
             rows = tiny.segment(camera, pose)
-            theirs = np.where(rows >= 0, scene.geoms.objects[rows], -1)
-            yield camera.render(scene, [pose]).ids[0], theirs
+        theirs = np.where(rows >= 0, scene.geoms.objects[rows], -1)
+        yield camera.render(scene, [pose]).ids[0], theirs
 
 
 def equal_shares(cameras: int, shapes: Sequence[Shape]) -> NDArray[np.float64]:
