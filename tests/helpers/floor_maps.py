@@ -10,6 +10,7 @@ from veca_marl.sim.physics import PropCfg, PropShape
 CELL_M = 0.04
 BODY_M = 0.78  # height below which props are in the way
 RADIUS_M = 0.11
+TIE_M = 1e-6  # a distance that is equal to the radius counts as enough, whatever its last digits
 
 
 class FloorMap:
@@ -32,12 +33,28 @@ class FloorMap:
             self.free |= (abs(self.x - x) < half) & (abs(self.y - y) < half)
         for prop in pieces([*playground.built_props(), *also]):
             if is_in_the_way(prop):
-                self.free &= distance(prop, self.x, self.y) >= radius_m
+                near = self.near(prop, radius_m)
+                self.free[near] &= distance(prop, self.x[near], self.y[near]) >= radius_m - TIE_M
         self.labels, self.count = ndimage.label(self.free)
 
     def in_box(self, high, room):
         x, y, _ = room.lower_m
         return (self.x > x) & (self.x < high[0]) & (self.y > y) & (self.y < high[1])
+
+    def near(self, prop, radius_m):
+        """The cells that a prop can be nearer to than a radius, by the square round it."""
+        reach_m = (
+            radius_m
+            + CELL_M
+            + (
+                math.hypot(*prop.size_m[:2]) / 2
+                if prop.shape in (PropShape.wall, PropShape.box)
+                else prop.size_m[0]
+            )
+        )
+        ends = np.add.outer((-reach_m, reach_m), prop.position_m[:2]) - self.low
+        (x, y), (end_x, end_y) = np.maximum(np.floor(ends / CELL_M).astype(int), 0)
+        return slice(x, end_x + 1), slice(y, end_y + 1)
 
     def label(self, point):
         column, row = ((np.asarray(point)[:2] - self.low) / CELL_M).astype(int)

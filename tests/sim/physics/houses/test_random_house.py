@@ -1,27 +1,35 @@
 """Generated houses are valid for every seed: connected, passable, furnished, reproducible."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from composed import compose
-from floor_maps import FloorMap
+from floor_maps import FloorMap, pieces
 from omegaconf import OmegaConf
 
 from veca_marl.config import compose_node, to_config
 from veca_marl.config.stored import body_names, typed
-from veca_marl.sim.physics import PropCfg, PropShape, RandomHouseCfg, World
+from veca_marl.sim.physics import RandomHouseCfg, World
 from veca_marl.sim.physics.houses.generated.door_fronts import floor_of, open_leaf, turns_into
 from veca_marl.sim.physics.houses.generated.free_floor import FloorNeeds
 
 WIDE_M = 0.15
-QUICK, ALL = range(8), range(8, 200)
+FEW_AND_MANY = pytest.mark.parametrize(
+    "count", [pytest.param(8, id="few"), pytest.param(200, id="many", marks=pytest.mark.slow)]
+)
 SIZES = [
     {"room_count": 1, "house_size_m": (3.2, 3.2)},
     {"room_count": 2, "house_size_m": (6.5, 3.2), "pieces_per_room": (4, 4)},
     {"room_count": 9, "house_size_m": (9.8, 9.8), "loops": 0.0},
     {"room_count": 3, "house_size_m": (14.0, 6.0), "loops": 1.0, "door_width_m": 0.7},
 ]
+
+
+def some_seeds(count):
+    """Seeds of houses: the tests hold for all of them."""
+    return np.random.default_rng(0).integers(0, 1_000_000, count).tolist()
 
 
 def check(house, also=(), wide_m=WIDE_M, most_closed_off=5):
@@ -42,79 +50,122 @@ def check(house, also=(), wide_m=WIDE_M, most_closed_off=5):
     assert all(width == house.door_width_m for width in (door.width_m for door in house.doors))
 
 
-@pytest.mark.parametrize(
-    "seeds", [pytest.param(QUICK, id="few"), pytest.param(ALL, id="many", marks=pytest.mark.slow)]
-)
-def test_every_seed_gives_a_house_in_which_a_walker_reaches_everything(seeds):
+@FEW_AND_MANY
+def test_every_seed_gives_a_house_in_which_a_walker_reaches_everything(count):
     pieces = []
-    for seed in seeds:
+    for seed in some_seeds(count):
         house = RandomHouseCfg(seed=seed)
         check(house)
         pieces.append(len(house.furniture))
     assert min(pieces) >= 10, "most of the 15 to 25 pieces find a place"
 
 
+@pytest.mark.parametrize("count", [3, pytest.param(50, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("leaves", [0.0, 1.0], ids=["plain", "leaves"])
 @pytest.mark.parametrize("numbers", SIZES, ids=lambda numbers: str(numbers["room_count"]))
-def test_other_sizes_are_valid_too(numbers):
-    for seed in range(3):
-        check(RandomHouseCfg(seed=seed, **numbers))
-
-
-def open_leaves(house):
-    """The leaves of a house as fixed boxes where they are at the start."""
-    world, boxes = World(house), []
-    for door in house.doors:
-        if door.leaf is not None:
-            low, high = world.prop(f"leaf_{door.name}").bounds()
-            middle = tuple(((low + high) / 2.0).tolist())
-            boxes.append(PropCfg(door.name, PropShape.box, (high - low).tolist(), middle))
-    world.close()
-    return boxes
+def test_other_sizes_are_valid_too(numbers, leaves, count):
+    for seed in some_seeds(count):
+        check_with_leaves(RandomHouseCfg(seed=seed, leaves=leaves, **numbers))
 
 
 @pytest.mark.parametrize(
-    "seeds", [pytest.param(QUICK, id="few"), pytest.param(ALL, id="many", marks=pytest.mark.slow)]
+    ("seed", "numbers"),
+    [
+        *((seed, {}) for seed in (232, 641, 1003)),  # the last piece closed a position off
+        *((seed, SIZES[2]) for seed in (10248, 10265)),
+        *((seed, {"leaves": 1.0}) for seed in (2012, 2499)),
+        *((seed, {"leaves": 1.0}) for seed in (2038, 2121, 2385, 2389, 2453)),  # a leaf met a piece
+    ],
 )
-def test_a_walker_reaches_everything_while_leaves_are_open(seeds):
+def test_houses_that_were_invalid_once(seed, numbers):
+    check_with_leaves(RandomHouseCfg(seed=seed, **numbers))
+
+
+@pytest.mark.parametrize("width_m", [0.3, 0.35, 0.5])
+def test_leaves_that_leave_too_little_of_a_narrow_door_are_left_out(width_m):
+    for seed in some_seeds(3):
+        house = RandomHouseCfg(seed=seed, leaves=1.0, door_width_m=width_m)
+        check_with_leaves(house)
+        assert all(door.leaf is None for door in house.doors) or width_m > 0.3
+
+
+def check_with_leaves(house):
+    """The laws of a generated house with or without leaves; positions beside leaves are tighter."""
+    hung = open_leaves(house)
+    if hung:
+        check(house, hung, wide_m=0.2, most_closed_off=30)
+    else:
+        check(house)
+    return hung
+
+
+def open_leaves(house):
+    """The leaves of a house as fixed props where they are in the simulator at the start."""
+    world, leaves = World(house), []
+    for door in house.doors:
+        if door.leaf is not None:
+            leaf = world.prop(f"leaf_{door.name}")
+            place, yaw_deg = tuple(leaf.position.tolist()), math.degrees(leaf.yaw_rad)
+            fixed = replace(leaf.cfg, joint=None, mass_kg=0.0)
+            leaves.append(replace(fixed, name=door.name, position_m=place, yaw_deg=yaw_deg))
+    world.close()
+    return leaves
+
+
+def box_round(prop):
+    """Middle and size of the rectangle round the boxes that a prop consists of."""
+    corners = []
+    for part in pieces([prop]):
+        c, s = abs(math.cos(math.radians(part.yaw_deg))), abs(math.sin(math.radians(part.yaw_deg)))
+        x, y = np.array(part.size_m[:2]) / 2.0
+        half = np.array([c * x + s * y, s * x + c * y])
+        corners += [np.subtract(part.position_m[:2], half), np.add(part.position_m[:2], half)]
+    low, high = np.min(corners, axis=0), np.max(corners, axis=0)
+    return (low + high) / 2.0, high - low
+
+
+@FEW_AND_MANY
+def test_a_walker_reaches_everything_while_leaves_are_open(count):
     """That they can turn is checked by the configuration of every playground."""
     leaves, doors = 0, 0
-    for seed in seeds:
+    for seed in some_seeds(count):
         house = RandomHouseCfg(seed=seed, leaves=1.0)
-        boxes = open_leaves(house)
-        check(house, boxes, wide_m=0.2, most_closed_off=30)
-        assert all(house.rooms[0].distance_m(box.position_m[:2]) > 0.2 for box in boxes)
-        leaves, doors = leaves + len(boxes), doors + len(house.doors)
-    assert leaves > 0.8 * doors
+        hung = check_with_leaves(house)
+        assert all(house.rooms[0].distance_m(leaf.position_m[:2]) > 0.2 for leaf in hung)
+        leaves, doors = leaves + len(hung), doors + len(house.doors)
+    assert leaves > 0.7 * doors
 
 
 def test_the_floor_that_open_leaves_cover_is_where_the_leaves_are():
     """Leaves of both kinds of walls, to either side, against their poses in the simulator."""
     kinds = set()
-    for seed in QUICK:
+    for seed in some_seeds(8):
         house = RandomHouseCfg(seed=seed, leaves=1.0)
-        leaves = {box.name: box for box in open_leaves(house)}
+        boxes = {leaf.name: box_round(leaf) for leaf in open_leaves(house)}
         for door in house.doors:
             for floor in (floor_of(room) for room in house.rooms if room.name in door.rooms):
                 if not turns_into(floor, door):
                     continue
-                covered, box = open_leaf(floor, door), leaves[door.name]
-                middle = np.add(covered.lower_m, np.divide(covered.size_m, 2.0))
-                np.testing.assert_allclose(middle, box.position_m[:2], atol=0.06)
-                np.testing.assert_allclose(covered.size_m, box.size_m[:2], atol=0.05)
-                kinds.add((box.size_m[0] > box.size_m[1], door.leaf.opens_to_front))
+                covered, (middle, size) = open_leaf(floor, door), boxes[door.name]
+                expected = np.add(covered.lower_m, np.divide(covered.size_m, 2.0))
+                np.testing.assert_allclose(expected, middle, atol=0.06)
+                np.testing.assert_allclose(covered.size_m, size, atol=0.05)
+                kinds.add((size[0] > size[1], door.leaf.opens_to_front))
     assert len(kinds) == 4
 
 
 def test_leaves_change_neither_rooms_nor_places_of_doors():
-    plain, some = (RandomHouseCfg(seed=7, leaves=share) for share in (0.0, 0.5))
-    assert some.rooms == plain.rooms
-    assert [replace(door, leaf=None) for door in some.doors] == plain.doors
-    hung = [door.leaf is not None for door in some.doors]
+    hung = []
+    for seed in some_seeds(8):
+        plain, some = (RandomHouseCfg(seed=seed, leaves=share) for share in (0.0, 0.5))
+        assert some.rooms == plain.rooms
+        assert [replace(door, leaf=None) for door in some.doors] == plain.doors
+        hung += [door.leaf is not None for door in some.doors]
     assert 0 < sum(hung) < len(hung)
 
 
 def test_the_first_room_is_the_widest_with_its_middle_at_the_origin_and_free_side_walls():
-    for seed in QUICK:
+    for seed in some_seeds(8):
         house = RandomHouseCfg(seed=seed)
         first, *others = house.rooms
         assert first.name == "living"
@@ -127,7 +178,7 @@ def test_the_first_room_is_the_widest_with_its_middle_at_the_origin_and_free_sid
 def test_every_room_keeps_an_open_floor():
     """Two places in each room, clear of everything, for the object and an agent."""
     needs = FloorNeeds()
-    for seed in QUICK[:3]:
+    for seed in some_seeds(3):
         house = RandomHouseCfg(seed=seed)
         floor = FloorMap(house, radius_m=0.8)
         for room in house.rooms:
@@ -163,7 +214,7 @@ def test_a_stored_run_is_read_with_its_house():
 
 @pytest.mark.parametrize("least_m", [10.0 / 3.0, 3.3333333, 2.9 + 1e-7])
 def test_sizes_with_many_digits_are_divided(least_m):
-    for seed in range(4):
+    for seed in some_seeds(4):
         check(RandomHouseCfg(seed=seed, least_room_m=least_m))
 
 

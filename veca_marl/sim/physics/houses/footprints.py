@@ -44,6 +44,17 @@ class Footprint(NamedTuple):
         """Radius of the circle about its middle that contains it."""
         return max(self.radius_m, math.hypot(*self.half_m))
 
+    def distance_m(self, point_m: Point) -> float:
+        """Return the distance of a point on the floor plan; 0 inside."""
+        offset = point_m[0] - self.centre_m[0], point_m[1] - self.centre_m[1]
+        if self.radius_m:
+            return max(math.hypot(*offset) - self.radius_m, 0.0)
+        out = (
+            max(abs(offset[0] * axis[0] + offset[1] * axis[1]) - half, 0.0)
+            for axis, half in zip(self.axes, self.half_m, strict=True)
+        )
+        return math.hypot(*out)
+
     def outline(self) -> list[Point]:
         """Return its corners, or the extreme points of a circle along x and y."""
         x, y = self.centre_m
@@ -74,6 +85,8 @@ def overlap_m(one: Footprint, other: Footprint) -> float:
     dx, dy = (b - a for a, b in zip(one.centre_m, other.centre_m, strict=True))
     depth_m = min(one.high_m, other.high_m) - max(one.low_m, other.low_m)
     depth_m = min(depth_m, one.reach_m + other.reach_m - math.hypot(dx, dy))
+    if depth_m <= 0.0:  # most pairs: the axes are not needed
+        return 0.0
     for axis in (*one.axes, *other.axes):
         if depth_m <= 0.0:
             return 0.0

@@ -20,8 +20,13 @@ _TOLERANCE_M = 0.001
 _STEP_DEG = 3.0  # between the angles that are tried
 
 
-class _Hindrance(NamedTuple):
-    """What a leaf meets, and after how many degrees."""
+class Hindrance(NamedTuple):
+    """What a leaf meets, and after how many degrees.
+
+    Attributes:
+        thing: A wall or a piece of furniture.
+        after_deg: How far the leaf has turned then.
+    """
 
     thing: PropCfg
     after_deg: float
@@ -44,13 +49,13 @@ def check_swings(
         assert door.leaf is not None
         if door.leaf.kind is not JointKind.hinge:
             continue
-        met = _hindrance(leaf, things)
+        met = first_met(leaf, things)
         if met is None:
             continue
         name, moves = met.thing.name, "move the door"
         if met.thing.shape is not PropShape.wall:
             moves += f" or {name!r}"
-        if _hindrance(_opening_to_other_side(leaf), things) is None:
+        if first_met(_opening_to_other_side(leaf), things) is None:
             other = str(not door.leaf.opens_to_front).lower()
             moves = f"choose leaf.opens_to_front={other}, or {moves}"
         raise ValueError(
@@ -59,8 +64,13 @@ def check_swings(
         )
 
 
-def _hindrance(leaf: PropCfg, things: Sequence[PropCfg]) -> _Hindrance | None:
-    """Return what a leaf meets first on its way from closed to open; None if nothing."""
+def first_met(leaf: PropCfg, things: Sequence[PropCfg]) -> Hindrance | None:
+    """Return what a hinged leaf meets first on its way from closed to open; None if nothing.
+
+    Args:
+        leaf: The prop of the leaf.
+        things: Walls and furniture.
+    """
     swept = _turned(leaf, 0.0)
     x, y = _hinge(leaf)
     reach_m = max(
@@ -70,7 +80,7 @@ def _hindrance(leaf: PropCfg, things: Sequence[PropCfg]) -> _Hindrance | None:
         (thing, area)
         for thing in things
         for area in footprints(thing)
-        if math.hypot(area.centre_m[0] - x, area.centre_m[1] - y) < reach_m + area.reach_m
+        if area.distance_m((x, y)) < reach_m
     ]
     steps = math.ceil(_range_deg(leaf) / _STEP_DEG)
     for step in range(steps + 1):
@@ -78,8 +88,13 @@ def _hindrance(leaf: PropCfg, things: Sequence[PropCfg]) -> _Hindrance | None:
         parts = _turned(leaf, angle_deg)
         for thing, area in near:
             if any(overlap_m(part, area) > _TOLERANCE_M for part in parts):
-                return _Hindrance(thing, angle_deg)
+                return Hindrance(thing, angle_deg)
     return None
+
+
+def open_footprints(leaf: PropCfg) -> list[Footprint]:
+    """Return the footprints of a hinged leaf and its handles while it is open."""
+    return _turned(leaf, _range_deg(leaf))
 
 
 def _turned(leaf: PropCfg, angle_deg: float) -> list[Footprint]:

@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import colorsys
 from dataclasses import dataclass, field
-from typing import NamedTuple
 
 import numpy as np
 
-from veca_marl.sim.physics.houses.furniture_cfg import FurnitureCfg
 from veca_marl.sim.physics.houses.generated.division import Limits, Rectangle, divide
 from veca_marl.sim.physics.houses.generated.door_choice import choose_doors, opening_m
 from veca_marl.sim.physics.houses.generated.free_floor import FloorNeeds
 from veca_marl.sim.physics.houses.generated.furnishing import RoomFurnishing, furnish, uses_of
+from veca_marl.sim.physics.houses.generated.house_data import HouseData
 from veca_marl.sim.physics.houses.generated.random_leaves import hang_leaves
+from veca_marl.sim.physics.houses.generated.repair import repaired
 from veca_marl.sim.physics.houses.walls import WallsCfg
 from veca_marl.sim.physics.playground import PLAYGROUND_GENERATORS, PlaygroundCfg
-from veca_marl.sim.physics.rooms import DoorCfg, RoomCfg
+from veca_marl.sim.physics.rooms import RoomCfg
 
 GENERATOR = "random_house"
 
@@ -27,29 +27,16 @@ _LARGE = 2.0  # weight of the area of one room; that of the others is 1
 _COVERING = (0.45, 0.75)  # saturation and brightness of the coverings of floors
 
 
-class HouseData(NamedTuple):
-    """A generated house.
-
-    Attributes:
-        rooms: The rooms, the living room first.
-        doors: The doors between them.
-        furniture: What stands in them.
-    """
-
-    rooms: list[RoomCfg]
-    doors: list[DoorCfg]
-    furniture: list[FurnitureCfg]
-
-
 @dataclass
 class RandomHouseCfg(PlaygroundCfg):
     """A furnished house that is generated from a seed: the same numbers give the same house.
 
     A rectangle is divided recursively into rooms; a random spanning tree of adjacent rooms, and
     some more pairs, have doors; furniture stands along the walls. A body with a radius of 0.11 m
-    reaches all doors, and every place that is 0.15 m or more away from walls and furniture, 0.2 m
-    where there are leaves. The first room is the widest and has furniture at its walls of constant
-    x only, and no leaf turns into it, as single-room tasks need it; its middle is the origin.
+    reaches all doors, and every position that is 0.15 m or more away from walls and furniture,
+    0.2 m in houses with leaves; a piece of furniture that would prevent this, or that a leaf would
+    meet, is taken away. The first room is the widest and has furniture at its walls of constant x
+    only, and no leaf turns into it, as single-room tasks need it; its middle is the origin.
 
     Attributes:
         rooms: Generated; cannot be set.
@@ -66,8 +53,8 @@ class RandomHouseCfg(PlaygroundCfg):
         leaves: Probability that a door has a hinged leaf, which is open at the start. Doors where
             one would meet another leaf, or close off a part of the floor, have none.
         pieces_per_room: Least and greatest number of pieces of furniture that are placed in a
-            room; those that find no place are left out. A room has each kind of its use at most
-            once: 4 in a bathroom, 6 in the living room, 5 in the others.
+            room; those that find no place, or close a position off, are left out. A room has each
+            kind of its use at most once: 4 in a bathroom, 6 in the living room, 5 in the others.
     """
 
     rooms: list[RoomCfg] = field(default_factory=list)
@@ -177,8 +164,12 @@ class RandomHouseCfg(PlaygroundCfg):
 
 def limits_of(cfg: RandomHouseCfg) -> Limits:
     """Return the limits of the division into rooms."""
-    thickness_m = WallsCfg().thickness_m if cfg.walls is None else cfg.walls.thickness_m
-    return Limits(cfg.least_room_m, thickness_m)
+    return Limits(cfg.least_room_m, walls_of(cfg).thickness_m)
+
+
+def walls_of(cfg: RandomHouseCfg) -> WallsCfg:
+    """Return the walls, which are never null in a checked configuration."""
+    return WallsCfg() if cfg.walls is None else cfg.walls
 
 
 def generate_house(cfg: RandomHouseCfg) -> HouseData:
@@ -201,7 +192,7 @@ def generate_house(cfg: RandomHouseCfg) -> HouseData:
         least, greatest = cfg.pieces_per_room
         count = int(rng.integers(least, greatest + 1))
         furniture += furnish(room, use, furnishing, count, rng)
-    return HouseData(rooms, doors, furniture)
+    return repaired(HouseData(rooms, doors, furniture), walls_of(cfg))
 
 
 def _rooms(
