@@ -15,8 +15,8 @@ from veca_marl.fidelity.hearing.ears import (
 )
 from veca_marl.sim.body.mounts import MOUNTS_M
 from veca_marl.sim.hearing import AudioCfg, AudioQuality, HrtfTable, kemar_table
+from veca_marl.sim.hearing.audio_sense import make_receiver
 from veca_marl.sim.hearing.hrtf import kemar_response
-from veca_marl.sim.hearing.sense import make_receiver
 
 
 @pytest.mark.parametrize("scale", [0.5, 0.733, 1.2, 1.5])

@@ -4,7 +4,7 @@ import scipy.signal
 from listening import HEAD, RATE, ROOM_SIZE, SOURCES
 
 from veca_marl.sim.sound import Room
-from veca_marl.sim.sound.rooms import acoustics
+from veca_marl.sim.sound import room_acoustics as acoustics
 
 
 @pytest.mark.parametrize(("order", "count"), [(0, 1), (1, 7), (2, 25), (3, 63)])

@@ -6,13 +6,13 @@ from listening import ROOM_SIZE, STEP, make_receiver
 
 from veca_marl.sim.geometry import Pose
 from veca_marl.sim.sound import Clip, House, Room, SoundField
-from veca_marl.sim.sound.rooms.acoustics import image_lattice, image_sources
-from veca_marl.sim.sound.rooms.blocked_paths import (
+from veca_marl.sim.sound.blocked_paths import (
     contains_point,
     count_crossed,
     count_crossed_inside,
     crosses_box,
 )
+from veca_marl.sim.sound.room_acoustics import image_lattice, image_sources
 
 ROOM = Room((1.0, -2.0, 0.5), ROOM_SIZE, 0.7)
 LATTICE = image_lattice(3)

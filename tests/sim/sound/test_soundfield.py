@@ -29,7 +29,7 @@ from paths import HELPERS
 from veca_marl.sim.geometry import Pose
 from veca_marl.sim.hearing import StereoReceiver
 from veca_marl.sim.sound import Clip, Noise, Silence, SoundField, Voice
-from veca_marl.sim.sound.rooms import acoustics
+from veca_marl.sim.sound import room_acoustics as acoustics
 
 QUALITIES = ("hrtf", "stereo", "mono")
 IN_ROOM = {"room": room(), "order": 2}

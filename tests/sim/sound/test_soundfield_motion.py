@@ -7,7 +7,7 @@ from listening import RATE, STEP, STILL, make_receiver, noise, ratio_db, render,
 
 from veca_marl.sim.geometry import Pose
 from veca_marl.sim.sound import Clip, SoundField, Voice
-from veca_marl.sim.sound.rooms import acoustics
+from veca_marl.sim.sound import room_acoustics as acoustics
 
 LATENCY = SoundField().latency_samples
 

@@ -4,7 +4,7 @@ import numpy as np
 
 from veca_marl.sim.geometry import Geom, Pose, Scene, Shape
 from veca_marl.sim.vision import Camera
-from veca_marl.sim.vision.rasterization.contact_shadows import DARKNESS, LARGEST_M, REACH_M
+from veca_marl.sim.vision.contact_shadows import DARKNESS, LARGEST_M, REACH_M
 
 DOWN = np.array([[0, 0, 1], [0, 1, 0], [-1, 0, 0.0]])
 LOW_BOX = Shape.BOX, (0.1, 0.1, 0.02)

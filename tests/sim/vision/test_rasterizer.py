@@ -9,8 +9,8 @@ from eye_scenes import SIMPLE, cast, clutter, random_pose, random_rotations, sma
 from veca_marl.fidelity.vision.tiny_renderer import TinyRenderer
 from veca_marl.sim.geometry import Geom, Pose, Scene, Shape
 from veca_marl.sim.vision import Camera, look_at
-from veca_marl.sim.vision.optics import view_axes
-from veca_marl.sim.vision.rasterization.rasterizer import draw_geoms
+from veca_marl.sim.vision.camera import view_axes
+from veca_marl.sim.vision.rasterizer import draw_geoms
 
 
 def draw(scene, camera, pose, bounded):

@@ -6,7 +6,7 @@ from eye_scenes import random_pose, random_rotations, random_size, small_camera
 
 from veca_marl.sim.geometry import Geom, Pose, Scene, Shape
 from veca_marl.sim.vision import Camera, seen_fraction
-from veca_marl.sim.vision.rasterization.shading import GLASS_OPACITY
+from veca_marl.sim.vision.shading import GLASS_OPACITY
 
 AHEAD = Pose(np.zeros(3), np.eye(3))
 

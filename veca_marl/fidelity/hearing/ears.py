@@ -7,9 +7,9 @@ import numpy as np
 from veca_marl.fidelity.law import Curve, Law, Mark, Plot, Section, at_most, equals
 from veca_marl.sim.geometry import Floats, Pose
 from veca_marl.sim.hearing import AudioCfg, AudioQuality
+from veca_marl.sim.hearing.audio_sense import make_receiver
 from veca_marl.sim.hearing.head_response import HeadResponse
 from veca_marl.sim.hearing.hrtf import kemar_response
-from veca_marl.sim.hearing.sense import make_receiver
 from veca_marl.sim.hearing.spherical_head import woodworth_arrival_s
 from veca_marl.sim.sound import SAMPLE_RATE_HZ, SPEED_OF_SOUND_MPS, Clip, SoundField
 

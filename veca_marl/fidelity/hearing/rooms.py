@@ -12,7 +12,7 @@ from veca_marl.fidelity.law import Curve, Law, Mark, Plot, Section, at_most, bet
 from veca_marl.sim.geometry import Floats, Pose
 from veca_marl.sim.hearing import MonoReceiver
 from veca_marl.sim.sound import SPEED_OF_SOUND_MPS, Clip, House, Room, SoundField
-from veca_marl.sim.sound.rooms import acoustics
+from veca_marl.sim.sound import room_acoustics as acoustics
 
 SAMPLE_RATE_HZ = 22_050
 STEP_SAMPLES = 882

@@ -3,7 +3,7 @@
 from veca_marl.sim.geometry.inertia import Inertia, joined_inertia, primitive_inertia
 from veca_marl.sim.geometry.meshes import Indices, Mesh, MeshTable, empty_meshes, with_mesh
 from veca_marl.sim.geometry.polyhedra import Polyhedron, convex_hull, pyramid, sector_of_disc
-from veca_marl.sim.geometry.pose import Floats, Pose
+from veca_marl.sim.geometry.poses import Floats, Pose
 from veca_marl.sim.geometry.primitives import (
     Primitive,
     Shape,

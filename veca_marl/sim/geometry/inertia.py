@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from veca_marl.sim.geometry.pose import Floats, Pose
+from veca_marl.sim.geometry.poses import Floats, Pose
 from veca_marl.sim.geometry.primitives import Primitive, Shape
 
 

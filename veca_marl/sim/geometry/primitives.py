@@ -15,7 +15,7 @@ from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from veca_marl.sim.geometry.polyhedra.polyhedron import Polyhedron
-from veca_marl.sim.geometry.pose import Floats, Pose
+from veca_marl.sim.geometry.poses import Floats, Pose
 from veca_marl.sim.geometry.rotations import rotation_with_z
 from veca_marl.sim.geometry.vectors import single
 

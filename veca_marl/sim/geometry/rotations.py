@@ -10,7 +10,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from veca_marl.sim.geometry.pose import Floats
+from veca_marl.sim.geometry.poses import Floats
 
 
 @njit(cache=True)

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veca_marl.sim.geometry.meshes import Mesh, empty_meshes, with_mesh
-from veca_marl.sim.geometry.pose import Floats
+from veca_marl.sim.geometry.poses import Floats
 from veca_marl.sim.geometry.skinning import deform_meshes
 from veca_marl.sim.geometry.tables import (
     Bools,

@@ -12,7 +12,7 @@ import math
 from numba import njit
 
 from veca_marl.sim.geometry.meshes import Indices, MeshTable
-from veca_marl.sim.geometry.pose import Floats
+from veca_marl.sim.geometry.poses import Floats
 
 
 @njit(cache=True)

@@ -18,7 +18,7 @@ from veca_marl.sim.geometry.polyhedra.distances import (
     polyhedron_gradient,
 )
 from veca_marl.sim.geometry.polyhedra.table import face_rows, sizes_of
-from veca_marl.sim.geometry.pose import Floats
+from veca_marl.sim.geometry.poses import Floats
 from veca_marl.sim.geometry.primitives import Primitive
 from veca_marl.sim.geometry.ray_entry import entry_distance
 from veca_marl.sim.geometry.signed_distances import (

@@ -11,7 +11,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from veca_marl.sim.geometry.polyhedra.table import joined_rows, sizes_of
-from veca_marl.sim.geometry.pose import Floats
+from veca_marl.sim.geometry.poses import Floats
 from veca_marl.sim.geometry.primitives import Primitive
 
 Bools = NDArray[np.bool_]

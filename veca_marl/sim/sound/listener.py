@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veca_marl.sim.geometry import Pose
-from veca_marl.sim.sound.propagation.mixers import make_mixer
+from veca_marl.sim.sound.mixers import make_mixer
 from veca_marl.sim.sound.propagation.paths import Ears, Propagation
 from veca_marl.sim.sound.propagation.receiver import Receiver
-from veca_marl.sim.sound.rooms.surroundings import Surroundings
 from veca_marl.sim.sound.sound_source import Source
+from veca_marl.sim.sound.surroundings import Surroundings
 
 
 @dataclass

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from veca_marl.sim.sound.delay_lines import HALF_WIDTH
 from veca_marl.sim.sound.listener import Listener, SoundClock
-from veca_marl.sim.sound.propagation.fractional_delay import HALF_WIDTH
 from veca_marl.sim.sound.propagation.receiver import Receiver
 from veca_marl.sim.sound.rooms import FreeField, House, OneRoom, Room, Surroundings
 from veca_marl.sim.sound.sound_source import Source

@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from veca_marl.sim.geometry import Bools, Floats
-from veca_marl.sim.touch.sense import TouchSense
 from veca_marl.sim.touch.taxels import load_taxels, taxel_positions
+from veca_marl.sim.touch.touch_sense import TouchSense
 
 LINE_M = 0.05
 """Length of the debug line of a taxel that reads 1; the value is ours."""

@@ -11,9 +11,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from veca_marl.sim.vision.optics import Camera
-from veca_marl.sim.vision.rasterization.rasterizer import Depths
-from veca_marl.sim.vision.rasterization.shading import Images
+from veca_marl.sim.vision.camera import Camera
+from veca_marl.sim.vision.rasterizer import Depths
+from veca_marl.sim.vision.shading import Images
 
 
 class FilterContext(NamedTuple):

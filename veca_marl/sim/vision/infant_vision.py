@@ -31,7 +31,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veca_marl.sim.vision.image_filters import Blur, FilterContext
-from veca_marl.sim.vision.rasterization.shading import Images
+from veca_marl.sim.vision.shading import Images
 
 _ACUITY_AGES_MONTHS = (0.0, 1.0, 1.5, 2.5, 4.0, 6.0, 9.0, 12.0, 18.0, 24.0, 30.0, 36.0, 48.0)
 _ACUITY_CPD = (0.69, 0.94, 1.11, 2.16, 2.68, 5.65, 6.58, 6.58, 8.59, 9.57, 11.52, 21.81, 24.81)

@@ -12,10 +12,10 @@ from veca_marl.sim.body.mounts import EYES
 from veca_marl.sim.physics import World
 from veca_marl.sim.sense import Sense
 from veca_marl.sim.spec import ArraySpec
-from veca_marl.sim.vision.eye_views import EyeViews
+from veca_marl.sim.vision.camera import Camera
 from veca_marl.sim.vision.image_filters import FilterContext
-from veca_marl.sim.vision.optics import Camera
 from veca_marl.sim.vision.vision_cfg import Eyes, VisionCfg, make_filters
+from veca_marl.sim.vision.vision_sense import EyeViews
 
 
 class VisionSense(Sense):

@@ -13,9 +13,9 @@ from veca_marl.sim.body import Body
 from veca_marl.sim.body.mounts import EYES
 from veca_marl.sim.body.sight import Visible
 from veca_marl.sim.geometry import Pose, Scene
-from veca_marl.sim.vision.eye_views import EyeViews
-from veca_marl.sim.vision.optics import Camera
+from veca_marl.sim.vision.camera import Camera
 from veca_marl.sim.vision.vision_cfg import VisionCfg
+from veca_marl.sim.vision.vision_sense import EyeViews
 
 
 def is_visible(

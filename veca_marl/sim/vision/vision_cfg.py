@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum
 
+from veca_marl.sim.vision.camera import Camera
 from veca_marl.sim.vision.image_filters import Blur, Defocus, Filter, Grey
 from veca_marl.sim.vision.infant_vision import InfantVision
-from veca_marl.sim.vision.optics import Camera
 
 WIDEST_PUPIL_MM = 20.0
 """Greatest pupil, about the diameter of the eyeball."""

@@ -13,7 +13,7 @@ import math
 from numba import njit
 
 from veca_marl.sim.geometry.polyhedra.table import PLANES_COLUMN
-from veca_marl.sim.geometry.pose import Floats
+from veca_marl.sim.geometry.poses import Floats
 from veca_marl.sim.geometry.vectors import Vector
 
 NO_ENTRY_M = 1e9  # as in `ray_entry`

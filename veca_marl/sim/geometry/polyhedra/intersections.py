@@ -7,7 +7,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from veca_marl.sim.geometry.polyhedra.table import PLANES_COLUMN
-from veca_marl.sim.geometry.pose import Floats
+from veca_marl.sim.geometry.poses import Floats
 from veca_marl.sim.geometry.vectors import Vector
 
 _PLANES = int(PLANES_COLUMN)

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from veca_marl.sim.geometry.polyhedra.polyhedron import Polyhedron
-from veca_marl.sim.geometry.pose import Floats
+from veca_marl.sim.geometry.poses import Floats
 
 FACE_COLUMNS = 14
 """Columns of a row, which are outward normal (3), offset of the plane, three corners (9), and, in

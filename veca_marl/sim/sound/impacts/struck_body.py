@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from veca_marl.sim.sound.impacts.modes import Modes
+from veca_marl.sim.sound.modal_synthesis import Modes
 from veca_marl.sim.sound.waveforms import Samples
 
 _INAUDIBLE = 1e-6  # pressure, -120 dB: the decay ends here

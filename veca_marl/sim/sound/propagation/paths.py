@@ -7,13 +7,13 @@ from numba import njit
 from numpy.typing import NDArray
 
 from veca_marl.sim.geometry import Floats, Pose
-from veca_marl.sim.sound.propagation.fractional_delay import KERNEL_TAPS, read_moving
-from veca_marl.sim.sound.propagation.mixers import Mixer
+from veca_marl.sim.sound.delay_lines import KERNEL_TAPS, read_moving
+from veca_marl.sim.sound.mixers import Mixer
 from veca_marl.sim.sound.propagation.receiver import Receiver
 from veca_marl.sim.sound.propagation.signal_memory import SignalMemory
-from veca_marl.sim.sound.rooms.acoustics import SPEED_OF_SOUND_MPS
-from veca_marl.sim.sound.rooms.surroundings import Arrivals, Surroundings
+from veca_marl.sim.sound.room_acoustics import SPEED_OF_SOUND_MPS
 from veca_marl.sim.sound.sound_source import Source
+from veca_marl.sim.sound.surroundings import Arrivals, Surroundings
 
 MAX_SPEED_MPS = 50.0
 """A path of which the length changes faster is cross-faded as a new path, without Doppler shift."""

@@ -5,12 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from veca_marl.sim.sound.propagation.fractional_delay import (
-    DEGREE,
-    KERNEL_TAPS,
-    farrow_coefficients,
-    filter_powers,
-)
+from veca_marl.sim.sound.delay_lines import DEGREE, KERNEL_TAPS, farrow_coefficients, filter_powers
 
 _SHIFT_EVERY = 4096
 

@@ -16,9 +16,9 @@ import numpy as np
 from numba import njit
 
 from veca_marl.sim.geometry import Floats, Pose
-from veca_marl.sim.sound.rooms.acoustics import Room
-from veca_marl.sim.sound.rooms.obstacles import Obstacles
-from veca_marl.sim.sound.rooms.surroundings import Arrivals, OneRoom
+from veca_marl.sim.sound.obstacles import Obstacles
+from veca_marl.sim.sound.room_acoustics import Room
+from veca_marl.sim.sound.surroundings import Arrivals, OneRoom
 
 TRANSMISSION_LOSS_DB = 30.0
 """A limp partition of 15 kg/m2 at 500 Hz by the field-incidence mass law, 20 log10(500 x 15) - 47

@@ -14,7 +14,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from veca_marl.sim.geometry import Floats
-from veca_marl.sim.sound.rooms.blocked_paths import (
+from veca_marl.sim.sound.blocked_paths import (
     contains_point,
     crosses_box,
     extends_into,

@@ -10,9 +10,9 @@ from __future__ import annotations
 from numba import njit
 
 from veca_marl.sim.geometry import Bools, Floats, MeshTable
-from veca_marl.sim.vision.rasterization.mesh_rasterizer import draw_triangles, to_camera_frame
-from veca_marl.sim.vision.rasterization.rasterizer import Depths, Lens, Surfaces, pixel_rectangle
+from veca_marl.sim.vision.mesh_rasterizer import draw_triangles, to_camera_frame
 from veca_marl.sim.vision.rasterization.screen_bounds import box_intervals
+from veca_marl.sim.vision.rasterizer import Depths, Lens, Surfaces, pixel_rectangle
 
 _ROUNDING_M = 1e-4  # depths are stored in single precision
 

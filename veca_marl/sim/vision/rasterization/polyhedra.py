@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from veca_marl.sim.geometry import Floats, GeomTable, Shape
 from veca_marl.sim.geometry.polyhedra.distances import nearest_plane
-from veca_marl.sim.vision.rasterization.rasterizer import (
+from veca_marl.sim.vision.rasterizer import (
     NO_SURFACE,
     Depths,
     Lens,
@@ -16,7 +16,7 @@ from veca_marl.sim.vision.rasterization.rasterizer import (
     into_local,
     local_ray,
 )
-from veca_marl.sim.vision.rasterization.shading import AMBIENT, BOUNCE, SUN, frame_ray, tile_run
+from veca_marl.sim.vision.shading import AMBIENT, BOUNCE, SUN, frame_ray, tile_run
 
 _POLYHEDRON = int(Shape.POLYHEDRON)
 

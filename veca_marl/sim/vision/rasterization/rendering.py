@@ -9,25 +9,13 @@ from numba import njit
 from numpy.typing import NDArray
 
 from veca_marl.sim.geometry import Bools, Floats, GeomTable, MeshTable, SurfaceTable
-from veca_marl.sim.vision.rasterization.contact_shadows import darken_contact_shadows
+from veca_marl.sim.vision.contact_shadows import darken_contact_shadows
+from veca_marl.sim.vision.mesh_rasterizer import illuminate_triangles
 from veca_marl.sim.vision.rasterization.mesh_culling import draw_meshes
-from veca_marl.sim.vision.rasterization.mesh_rasterizer import illuminate_triangles
 from veca_marl.sim.vision.rasterization.polyhedra import illuminate_polyhedra
-from veca_marl.sim.vision.rasterization.rasterizer import (
-    NO_SURFACE,
-    Depths,
-    Lens,
-    Surfaces,
-    draw_geoms,
-)
-from veca_marl.sim.vision.rasterization.shading import (
-    Images,
-    blend_colours,
-    fill_sky,
-    illuminate,
-    to_object_ids,
-)
-from veca_marl.sim.vision.rasterization.transparency import blend_layers, collect_layers
+from veca_marl.sim.vision.rasterizer import NO_SURFACE, Depths, Lens, Surfaces, draw_geoms
+from veca_marl.sim.vision.renderer import blend_layers, collect_layers
+from veca_marl.sim.vision.shading import Images, blend_colours, fill_sky, illuminate, to_object_ids
 
 
 class Views(NamedTuple):

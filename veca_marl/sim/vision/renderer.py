@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from veca_marl.sim.geometry import Bools, Floats, GeomTable, Shape
 from veca_marl.sim.vision.rasterization.polyhedra import illuminate_polyhedra
-from veca_marl.sim.vision.rasterization.rasterizer import (
+from veca_marl.sim.vision.rasterizer import (
     NO_SURFACE,
     Depths,
     Lens,
@@ -27,12 +27,7 @@ from veca_marl.sim.vision.rasterization.rasterizer import (
     draw_rectangle,
     local_ray,
 )
-from veca_marl.sim.vision.rasterization.shading import (
-    GLASS_OPACITY,
-    Images,
-    blend_colours,
-    illuminate,
-)
+from veca_marl.sim.vision.shading import GLASS_OPACITY, Images, blend_colours, illuminate
 
 _POLYHEDRON = int(Shape.POLYHEDRON)
 

@@ -11,8 +11,8 @@ from numba import njit
 from numpy.typing import NDArray
 
 from veca_marl.sim.geometry import Floats, Pose
-from veca_marl.sim.sound.rooms.acoustics import Room, image_gains, image_lattice, image_sources
-from veca_marl.sim.sound.rooms.obstacles import Obstacles
+from veca_marl.sim.sound.obstacles import Obstacles
+from veca_marl.sim.sound.room_acoustics import Room, image_gains, image_lattice, image_sources
 
 
 @dataclass(frozen=True)

@@ -11,13 +11,13 @@ from typing import NamedTuple
 import numpy as np
 
 from veca_marl.sim.geometry import Bools, Floats, Pose, Scene, SceneObject, single
-from veca_marl.sim.vision.rasterization.mesh_rasterizer import (
+from veca_marl.sim.vision.mesh_rasterizer import (
     draw_triangles,
     illuminate_triangles,
     to_camera_frame,
 )
-from veca_marl.sim.vision.rasterization.rasterizer import NO_SURFACE, Depths, Lens, Surfaces
 from veca_marl.sim.vision.rasterization.rendering import DrawMasks, Views, render_views
+from veca_marl.sim.vision.rasterizer import NO_SURFACE, Depths, Lens, Surfaces
 
 
 class MeshView(NamedTuple):

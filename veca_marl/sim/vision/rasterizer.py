@@ -21,7 +21,6 @@ from numba import njit
 from numpy.typing import NDArray
 
 from veca_marl.sim.geometry import Bools, Floats, GeomTable, Shape, Vector, bounding_radius, single
-from veca_marl.sim.geometry.intersections import box_row, capsule_row, cylinder_row, sphere_row
 from veca_marl.sim.geometry.polyhedra.intersections import heights_above, polyhedron_row
 from veca_marl.sim.vision.rasterization.screen_bounds import (
     Interval,
@@ -29,6 +28,7 @@ from veca_marl.sim.vision.rasterization.screen_bounds import (
     disc_interval,
     rod_interval,
 )
+from veca_marl.sim.vision.row_intersections import box_row, capsule_row, cylinder_row, sphere_row
 
 Depths: TypeAlias = NDArray[np.float32]
 Surfaces: TypeAlias = NDArray[np.int16]

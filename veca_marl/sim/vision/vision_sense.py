@@ -9,7 +9,7 @@ import numpy as np
 from veca_marl.sim.body import Body
 from veca_marl.sim.body.mounts import EYES
 from veca_marl.sim.geometry import Bools, Floats, Scene
-from veca_marl.sim.vision.optics import Camera, seen_fraction
+from veca_marl.sim.vision.camera import Camera, seen_fraction
 from veca_marl.sim.vision.rasterization.rendering import Views
 
 

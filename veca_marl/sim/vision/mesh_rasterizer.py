@@ -16,9 +16,9 @@ from numba import njit
 from numpy.typing import NDArray
 
 from veca_marl.sim.geometry import Bools, Floats, Indices, MeshTable, Vector, single
-from veca_marl.sim.vision.rasterization.rasterizer import Depths, Lens, Rectangle, Surfaces
 from veca_marl.sim.vision.rasterization.screen_bounds import Interval
-from veca_marl.sim.vision.rasterization.shading import AMBIENT, BOUNCE, SUN
+from veca_marl.sim.vision.rasterizer import Depths, Lens, Rectangle, Surfaces
+from veca_marl.sim.vision.shading import AMBIENT, BOUNCE, SUN
 
 _MARGIN_PX = 0.01  # covers rounding errors of slopes in single precision
 

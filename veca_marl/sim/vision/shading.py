@@ -16,7 +16,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from veca_marl.sim.geometry import Floats, GeomTable, Shape, Vector, single
-from veca_marl.sim.vision.rasterization.rasterizer import (
+from veca_marl.sim.vision.rasterizer import (
     NO_SURFACE,
     Depths,
     Lens,

@@ -6,12 +6,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from veca_marl.sim.geometry import Floats
-from veca_marl.sim.sound.rooms.acoustics import Room
-from veca_marl.sim.sound.rooms.blocked_paths import (
-    any_extends_into,
-    count_crossed,
-    count_crossed_inside,
-)
+from veca_marl.sim.sound.blocked_paths import any_extends_into, count_crossed, count_crossed_inside
+from veca_marl.sim.sound.room_acoustics import Room
 from veca_marl.sim.sound.rooms.leaf_paths import Boxes, count_leaves, count_leaves_inside
 
 

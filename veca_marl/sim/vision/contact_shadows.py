@@ -26,7 +26,8 @@ from veca_marl.sim.geometry import (
     single,
 )
 from veca_marl.sim.geometry.polyhedra.distances import limited_distance
-from veca_marl.sim.vision.rasterization.rasterizer import (
+from veca_marl.sim.vision.rasterization.screen_bounds import box_intervals
+from veca_marl.sim.vision.rasterizer import (
     NO_SURFACE,
     Depths,
     Lens,
@@ -35,7 +36,6 @@ from veca_marl.sim.vision.rasterization.rasterizer import (
     Surfaces,
     pixel_rectangle,
 )
-from veca_marl.sim.vision.rasterization.screen_bounds import box_intervals
 
 # slopes, depths, surfaces and lights of one row
 Pixels: TypeAlias = tuple[Depths, Depths, Surfaces, NDArray[np.float32]]
