@@ -9,8 +9,7 @@ from stand_in_worlds import SceneWorld
 from veca_marl.sim.body.anatomy import load_skeleton
 from veca_marl.sim.geometry import Geom, Scene, Shape
 from veca_marl.sim.touch import TouchCfg, TouchSense, load_taxels, taxel_positions
-from veca_marl.sim.touch.hidden_overlaps import overlapping_triangles
-from veca_marl.sim.touch.sensed_pairs import unsensed_primitives
+from veca_marl.sim.touch.touch_sense import overlapping_triangles, unsensed_primitives
 
 FIELD = TouchCfg().receptive_field
 # arms away from the trunk: nothing of the body touches the body

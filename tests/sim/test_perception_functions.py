@@ -7,7 +7,7 @@ from walking import ball, empty_world, walker_in
 
 from veca_marl.envs.rendering import draw_tactile_lines
 from veca_marl.sim.touch import get_tactile, load_taxels, taxel_positions
-from veca_marl.sim.touch.tactile import LINE_M
+from veca_marl.sim.touch.touch_sense import LINE_M
 from veca_marl.sim.vision import Camera, EyeViews, get_image, look_at
 
 

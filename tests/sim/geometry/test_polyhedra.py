@@ -17,14 +17,15 @@ from veca_marl.sim.geometry import (
     pyramid,
     sector_of_disc,
 )
-from veca_marl.sim.geometry.polyhedra.distances import (
+from veca_marl.sim.geometry.polyhedra import (
+    MAX_TRIANGLES,
+    face_rows,
     limited_distance,
     polyhedron_distance,
     polyhedron_entry,
     polyhedron_gradient,
+    sizes_of,
 )
-from veca_marl.sim.geometry.polyhedra.polyhedron import MAX_TRIANGLES
-from veca_marl.sim.geometry.polyhedra.table import face_rows, sizes_of
 
 HULLS = {
     "pyramid": pyramid(0.3, 0.4, 0.5),

@@ -6,16 +6,14 @@ from listening import RATE, direction
 from paths import ROOT, SHARED
 
 from veca_marl.sim.hearing import HrtfReceiver, HrtfTable, condition, kemar_table, read_sofa
-from veca_marl.sim.hearing.head_response import HeadResponse
-from veca_marl.sim.hearing.hrtf import direction_vectors
-from veca_marl.sim.hearing.minimum_phase import minimum_phase
+from veca_marl.sim.hearing.head_response import HeadResponse, minimum_phase
+from veca_marl.sim.hearing.hrtf import direction_vectors, stand_ins
 from veca_marl.sim.hearing.spherical_head import (
     HEAD_RADIUS_M,
     ear_incidence,
     sphere_response,
     woodworth_arrival_s,
 )
-from veca_marl.sim.hearing.unmeasured import stand_ins
 
 DATA = ROOT / "veca_marl/data/kemar.npz"
 KEMAR_SOFA = SHARED / "data/hrtf/MIT_KEMAR_normal_pinna.sofa"

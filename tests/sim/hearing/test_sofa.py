@@ -8,8 +8,8 @@ import scipy.signal
 from paths import SHARED
 
 from veca_marl.sim.hearing import SofaError, condition, read_sofa, sofa_table
+from veca_marl.sim.hearing.head_response import minimum_phase
 from veca_marl.sim.hearing.hrtf import direction_vectors
-from veca_marl.sim.hearing.minimum_phase import minimum_phase
 from veca_marl.sim.hearing.spherical_head import ear_incidence, sphere_response, woodworth_arrival_s
 from veca_marl.sim.sound import SPEED_OF_SOUND_MPS
 

@@ -5,11 +5,11 @@ from listening import RATE, ratio_db
 from veca_marl.sim.sound.delay_lines import (
     HALF_WIDTH,
     KERNEL_TAPS,
+    SignalMemory,
     farrow_coefficients,
     interpolation_kernels,
     read_moving,
 )
-from veca_marl.sim.sound.propagation.signal_memory import SignalMemory
 
 HERTZ = 3000.0
 

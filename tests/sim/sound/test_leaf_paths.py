@@ -5,7 +5,7 @@ import pytest
 
 from veca_marl.sim.geometry import Pose
 from veca_marl.sim.sound import House, Room
-from veca_marl.sim.sound.rooms import Obstacles
+from veca_marl.sim.sound.obstacles import Obstacles
 
 HALF = (0.02, 0.5, 1.0)
 ONE, OTHER = np.array([-1.0, 0.1, 0.0]), np.array([1.0, -0.1, 0.0])

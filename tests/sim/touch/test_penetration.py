@@ -12,9 +12,9 @@ from veca_marl.sim.body.humanoid.self_collision import may_collide
 from veca_marl.sim.geometry import Shape
 from veca_marl.sim.touch import TouchCfg, load_taxels, taxel_positions
 from veca_marl.sim.touch.penetration import empty_workspace, read_taxels
-from veca_marl.sim.touch.receptive_fields import fields_of
 from veca_marl.sim.touch.rigid_bones import rigid_bones
-from veca_marl.sim.touch.sensed_pairs import unsensed_bones, unsensed_primitives
+from veca_marl.sim.touch.taxels import fields_of
+from veca_marl.sim.touch.touch_sense import unsensed_bones, unsensed_primitives
 
 
 def press_forearm(stage, depth_m, radius=0.04, side="l"):

@@ -6,9 +6,12 @@ import numpy as np
 import pytest
 
 from veca_marl.sim.vision import Camera
-from veca_marl.sim.vision.image_filters import Blur, Defocus, FilterContext, Grey
-from veca_marl.sim.vision.infant_vision import (
+from veca_marl.sim.vision.image_filters import (
     CONTRAST_AT_LIMIT,
+    Blur,
+    Defocus,
+    FilterContext,
+    Grey,
     InfantVision,
     acuity_blur_deg,
     acuity_cpd,

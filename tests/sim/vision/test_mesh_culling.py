@@ -8,7 +8,7 @@ from skins import add_body, pose, random_angles, random_turn
 from veca_marl.sim.geometry import Geom, Scene, Shape
 from veca_marl.sim.vision import Camera, look_at
 from veca_marl.sim.vision.camera import view_axes
-from veca_marl.sim.vision.rasterization.mesh_culling import draw_meshes
+from veca_marl.sim.vision.mesh_rasterizer import draw_meshes
 from veca_marl.sim.vision.rasterizer import draw_geoms
 
 CAMERA = Camera(48, 40, 60.0)

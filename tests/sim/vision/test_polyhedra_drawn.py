@@ -5,8 +5,7 @@ import pytest
 from eye_scenes import random_pose, random_rotations, small_camera
 
 from veca_marl.sim.geometry import Geom, Scene, Shape, convex_hull, sector_of_disc
-from veca_marl.sim.geometry.polyhedra.distances import polyhedron_entry
-from veca_marl.sim.geometry.polyhedra.table import face_rows, sizes_of
+from veca_marl.sim.geometry.polyhedra import face_rows, polyhedron_entry, sizes_of
 from veca_marl.sim.vision import look_at
 
 

@@ -4,11 +4,7 @@ import numpy as np
 import pytest
 from eye_scenes import random_rotations
 
-from veca_marl.sim.vision.rasterization.screen_bounds import (
-    box_intervals,
-    disc_interval,
-    rod_interval,
-)
+from veca_marl.sim.vision.rasterizer import box_intervals, disc_interval, rod_interval
 
 LIMIT = 1.5
 NEAR = 0.01

@@ -9,8 +9,8 @@ import numpy as np
 from veca_marl.sim.geometry import Floats, Geom, Polyhedron, Scene, Shape
 from veca_marl.sim.touch import TAXELS_PER_TRIANGLE, TaxelTable
 from veca_marl.sim.touch.penetration import empty_workspace, read_taxels
-from veca_marl.sim.touch.receptive_fields import Fields
 from veca_marl.sim.touch.rigid_bones import rigid_bones
+from veca_marl.sim.touch.taxels import Fields
 
 _BONE_M = 0.25  # half edge of the block of bone; exact in single precision
 _TRIANGLE_M = 1e-4  # small, so that the six taxels read nearly the same

@@ -16,8 +16,13 @@ from veca_marl.sim.body.walker import WalkerCfg
 from veca_marl.sim.geometry import Floats, Geom, Scene, Shape, distance, quaternions_to_matrices
 from veca_marl.sim.physics import PlaygroundCfg, PropCfg, PropShape, World
 from veca_marl.sim.vision import Camera, EyeViews, look_at
-from veca_marl.sim.vision.image_filters import Defocus, Filter, FilterContext
-from veca_marl.sim.vision.infant_vision import CONTRAST_AT_LIMIT, InfantVision
+from veca_marl.sim.vision.image_filters import (
+    CONTRAST_AT_LIMIT,
+    Defocus,
+    Filter,
+    FilterContext,
+    InfantVision,
+)
 
 TELLER_CPD: dict[float, float] = {
     1.0: 0.94,

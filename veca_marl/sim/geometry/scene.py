@@ -13,9 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from veca_marl.sim.geometry.meshes import Mesh, empty_meshes, with_mesh
+from veca_marl.sim.geometry.meshes import Mesh, deform_meshes, empty_meshes, with_mesh
 from veca_marl.sim.geometry.poses import Floats
-from veca_marl.sim.geometry.skinning import deform_meshes
 from veca_marl.sim.geometry.tables import (
     Bools,
     Geom,

@@ -10,7 +10,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from veca_marl.sim.geometry.polyhedra.table import joined_rows, sizes_of
+from veca_marl.sim.geometry.polyhedra import joined_rows, sizes_of
 from veca_marl.sim.geometry.poses import Floats
 from veca_marl.sim.geometry.primitives import Primitive
 

@@ -1,12 +1,17 @@
 """Hearing: receivers, head-related transfer functions and the sense of hearing."""
 
-from veca_marl.sim.hearing.audio_sense import AudioCfg, AudioQuality, AudioSense
+from veca_marl.sim.hearing.audio_sense import (
+    AudioCfg,
+    AudioQuality,
+    AudioSense,
+    Window,
+    log_spectrum,
+)
 from veca_marl.sim.hearing.conditioning import condition
 from veca_marl.sim.hearing.hrtf import HrtfTable, kemar_table, sofa_table
 from veca_marl.sim.hearing.receivers import HrtfReceiver, MonoReceiver, StereoReceiver
 from veca_marl.sim.hearing.sofa import SofaError, read_sofa
 from veca_marl.sim.hearing.spatial_audio import get_spatial_audio
-from veca_marl.sim.hearing.spectrum import Window, log_spectrum
 
 __all__ = [
     "AudioCfg",

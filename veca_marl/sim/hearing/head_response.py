@@ -7,10 +7,33 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+import scipy.fft
 from numpy.typing import NDArray
 
 from veca_marl.sim.geometry import Floats
-from veca_marl.sim.hearing.minimum_phase import minimum_phase
+
+_CEPSTRUM_FLOOR = 1e-6
+
+
+def minimum_phase(magnitude: NDArray[np.floating], n_taps: int) -> NDArray[np.floating]:
+    """Return the minimum-phase impulse response of a magnitude response.
+
+    Folds the real cepstrum (Oppenheim & Schafer 2010, section 13.5).
+
+    Args:
+        magnitude: ``(..., n_fft / 2 + 1)`` magnitudes from 0 Hz to the Nyquist frequency.
+        n_taps: Length of the response.
+
+    Returns:
+        ``(..., n_taps)`` of the magnitude's dtype.
+    """
+    n_fft = 2 * (magnitude.shape[-1] - 1)
+    cepstrum = scipy.fft.irfft(np.log(np.maximum(magnitude, _CEPSTRUM_FLOOR)), n_fft)
+    cepstrum[..., 1 : n_fft // 2] *= 2.0
+    cepstrum[..., n_fft // 2 + 1 :] = 0.0
+    response: NDArray[np.floating] = scipy.fft.irfft(np.exp(scipy.fft.rfft(cepstrum)), n_fft)
+    return response[..., :n_taps]
+
 
 SMALLEST_SCALE, LARGEST_SCALE = 0.5, 1.5
 """Range of scales; the head circumference of a newborn is about 0.6 of an adult's."""

@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veca_marl.sim.geometry import Scene
-from veca_marl.sim.sound.sound_source import Source
-from veca_marl.sim.sound.sounds import Sound
+from veca_marl.sim.sound.sounds import Sound, Source
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,7 @@ from veca_marl.sim.physics.impacts.cfg import ImpactCfg
 from veca_marl.sim.physics.props import PropCfg, PropShape, check_appearance
 from veca_marl.sim.physics.rooms import DoorCfg, RoomCfg
 from veca_marl.sim.sound import House, Room
-from veca_marl.sim.sound.rooms import TRANSMISSION_LOSS_DB
+from veca_marl.sim.sound.surroundings import TRANSMISSION_LOSS_DB
 
 THICKEST_WALL_M = 0.5
 """The threshold of a door lies within the wall, at most so far from either room."""

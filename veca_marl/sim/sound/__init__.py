@@ -1,13 +1,31 @@
 """Sound: sources, waveforms, room acoustics and propagation."""
 
-from veca_marl.sim.sound.calls import CALLS, Call, CallCfg, call_waveform
 from veca_marl.sim.sound.propagation import Receiver
-from veca_marl.sim.sound.rooms import NEAR_FIELD_M, SPEED_OF_SOUND_MPS, House, Room
-from veca_marl.sim.sound.sound_cfg import SoundCfg, SoundKind, make_sound
-from veca_marl.sim.sound.sound_source import Source
+from veca_marl.sim.sound.room_acoustics import NEAR_FIELD_M, SPEED_OF_SOUND_MPS, Room
 from veca_marl.sim.sound.soundfield import Listener, SoundField
-from veca_marl.sim.sound.sounds import Clip, Noise, Pulses, Silence, Sound, Voice
-from veca_marl.sim.sound.waveforms import SAMPLE_RATE_HZ, Samples, buzz, tone
+from veca_marl.sim.sound.sounds import (
+    Clip,
+    Noise,
+    Pulses,
+    Silence,
+    Sound,
+    SoundCfg,
+    SoundKind,
+    Source,
+    Voice,
+    make_sound,
+)
+from veca_marl.sim.sound.surroundings import House
+from veca_marl.sim.sound.waveforms import (
+    CALLS,
+    SAMPLE_RATE_HZ,
+    Call,
+    CallCfg,
+    Samples,
+    buzz,
+    call_waveform,
+    tone,
+)
 
 __all__ = [
     "CALLS",

@@ -1,4 +1,4 @@
-"""Reading a signal at delays that are no whole numbers of samples and that may change.
+"""Delay lines: the last samples of a signal, read at any delay that may change.
 
 The interpolation kernels are Kaiser-windowed sincs (Laakso et al. 1996, section 3), and each of
 their taps is a polynomial of the fraction of a sample (Farrow 1988, A continuously variable digital
@@ -138,3 +138,55 @@ def read_moving(
             u = u0 + du * np.float32(j)
             part[j] = p0[j] + u * (p1[j] + u * (p2[j] + u * (p3[j] + u * (p4[j] + u * p5[j]))))
         i += run
+
+
+_SHIFT_EVERY = 4096
+
+
+class SignalMemory:
+    """The last samples of a signal. Reads are late by `fractional_delay.HALF_WIDTH` samples.
+
+    Attributes:
+        n_samples: How many samples it holds.
+        powers: ``(DEGREE + 1, size)`` float32, see `fractional_delay.filter_powers`.
+        end: Column of `powers` after the newest sample.
+    """
+
+    def __init__(self, n_samples: int) -> None:
+        self.n_samples = n_samples
+        self.clear()
+
+    def clear(self) -> None:
+        """Replace all samples by silence."""
+        # columns beyond n_samples are free: samples move to the front when these are used up
+        size = self.n_samples + _SHIFT_EVERY
+        self.powers: NDArray[np.float32] = np.zeros((DEGREE + 1, size), np.float32)
+        self.end = self.n_samples
+        self._newest: NDArray[np.float32] = np.zeros(KERNEL_TAPS - 1, np.float32)
+
+    def extend(self, n_samples: int) -> None:
+        """Hold at least so many samples from now on; those that are not held count as silence."""
+        if n_samples <= self.n_samples:
+            return
+        stored = self.powers[:, self.end - self.n_samples : self.end]
+        self.n_samples, newest = n_samples, self._newest
+        self.clear()
+        self.powers[:, self.end - stored.shape[1] : self.end] = stored
+        self._newest = newest
+
+    def append(self, samples: NDArray[np.float32]) -> None:
+        """Store the next samples ``(n,)``; the oldest are dropped."""
+        n = samples.size
+        if self.end + n > self.powers.shape[1]:
+            self._move_to_front(n)
+        extended = np.concatenate((self._newest, samples))
+        filter_powers(extended, farrow_coefficients(), self.powers, self.end)
+        self.end += n
+        self._newest = extended[n:]
+
+    def _move_to_front(self, n: int) -> None:
+        kept = self.powers[:, self.end - self.n_samples : self.end].copy()
+        if self.n_samples + n > self.powers.shape[1]:
+            self.powers = np.zeros((DEGREE + 1, self.n_samples + n), np.float32)
+        self.powers[:, : self.n_samples] = kept
+        self.end = self.n_samples

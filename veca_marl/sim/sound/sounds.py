@@ -1,9 +1,12 @@
-"""The sounds that sources emit. Levels are those of `waveforms`."""
+"""Sounds, their configuration, and the sources that emit them. Levels are those of `waveforms`."""
 
 from __future__ import annotations
 
 import math
 from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import Enum
 from typing import Protocol
 
 import numpy as np
@@ -11,12 +14,17 @@ import scipy.signal
 from numpy.typing import ArrayLike
 
 from veca_marl.sim.geometry import Floats
+from veca_marl.sim.sound.delay_lines import SignalMemory
 from veca_marl.sim.sound.waveforms import (
     SAMPLE_RATE_HZ,
     Samples,
+    buzz,
     check_level,
+    check_pitch,
     check_waveform,
     high_pass,
+    load_wav,
+    tone,
 )
 
 _RAMP_S = 0.005  # usual in psychoacoustics
@@ -216,3 +224,145 @@ def check_pulses(pulse_s: float, pause_s: float) -> None:
             f"pulse_s={pulse_s} must be finite and at least {least_s}, the duration of its ramps, "
             f"and pause_s={pause_s} finite and positive"
         )
+
+
+class SoundKind(Enum):
+    """Kinds of sounds."""
+
+    buzz = "buzz"
+    tone = "tone"
+    noise = "noise"
+    clip = "clip"
+    voice = "voice"
+    silence = "silence"
+
+
+@dataclass
+class SoundCfg:
+    """A sound as data.
+
+    Attributes:
+        kind: Kind of sound.
+        frequency_hz: Fundamental of a buzz or a tone, at least 80 and below 11 025, half of the
+            sampling rate.
+        level: Rms pressure at 1 m, of a pulse without its ramps; full scale of a WAV file is 1.
+            Not used by a voice.
+        path: WAV file of a clip.
+        loop: Whether a clip repeats without end.
+        pulse_s: Duration of a pulse, at least 0.01, if there are pauses; see `Pulses`.
+        pause_s: Silence between pulses; 0 is a continuous sound.
+    """
+
+    kind: SoundKind = SoundKind.buzz
+    frequency_hz: float = 150.0
+    level: float = 0.1
+    path: str | None = None
+    loop: bool = True
+    pulse_s: float = 0.2
+    pause_s: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Check the numbers, and that a clip and nothing else has a path."""
+        check_pitch(self.frequency_hz, SAMPLE_RATE_HZ)
+        check_level(self.level)
+        if (self.path is None) == (self.kind is SoundKind.clip):
+            raise ValueError(
+                f"sound of kind {self.kind.value} with path={self.path!r}: a clip needs a path, "
+                "other kinds must not have one"
+            )
+        if self.pause_s != 0.0:
+            check_pulses(self.pulse_s, self.pause_s)
+            if self.kind in (SoundKind.voice, SoundKind.silence):
+                raise ValueError(
+                    f"sound of kind {self.kind.value} with pause_s={self.pause_s}: buzz, tone, "
+                    "noise and clip can have pauses"
+                )
+
+
+def make_sound(cfg: SoundCfg, sample_rate_hz: int = SAMPLE_RATE_HZ) -> Sound:
+    """Return a new sound with its own state."""
+    makers: dict[SoundKind, Callable[[], Sound]] = {
+        SoundKind.buzz: lambda: Clip(buzz(cfg.frequency_hz, cfg.level, sample_rate_hz), loop=True),
+        SoundKind.tone: lambda: Clip(tone(cfg.frequency_hz, cfg.level, sample_rate_hz), loop=True),
+        SoundKind.noise: lambda: Noise(cfg.level, sample_rate_hz),
+        SoundKind.clip: lambda: Clip(
+            load_wav(str(cfg.path), sample_rate_hz, cfg.level, cfg.loop), loop=cfg.loop
+        ),
+        SoundKind.voice: lambda: Voice(sample_rate_hz),
+        SoundKind.silence: Silence,
+    }
+    sound = makers[cfg.kind]()
+    if cfg.pause_s == 0.0:
+        return sound
+    return Pulses(sound, cfg.pulse_s, cfg.pause_s, sample_rate_hz)
+
+
+class Source:
+    """One source of a sound field. Made by `SoundField.add_source`.
+
+    Attributes:
+        name: Unique in its field.
+        sound: What it emits; may be exchanged at any time.
+        muted: Whether it emits silence in place of its sound, which continues meanwhile.
+        teleports: How often it was teleported.
+        memory: The samples that it emitted last.
+        silent_samples: How many samples before the present are exactly zero.
+    """
+
+    def __init__(self, name: str, sound: Sound, memory_samples: int) -> None:
+        self.name = name
+        self.sound = sound
+        self.muted = False
+        self.teleports = 0
+        self.memory = SignalMemory(memory_samples)
+        self.silent_samples = memory_samples
+        self._position: Floats = np.zeros(3)
+
+    @property
+    def position(self) -> Floats:
+        """``(3,)`` metres in playground coordinates, at the end of the step.
+
+        Setting it moves the source, with Doppler shift; see `teleport`.
+        """
+        return self._position
+
+    @position.setter
+    def position(self, value: ArrayLike) -> None:
+        position = np.array(value, dtype=np.float64)
+        if position.shape != (3,) or not np.isfinite(position).all():
+            raise ValueError(f"source {self.name!r}: position must be (3,) finite, got {value!r}")
+        self._position = position
+
+    def teleport(self, position: ArrayLike) -> None:
+        """Set the position without motion: the sound is cross-faded, without a Doppler sweep."""
+        self.position = position
+        self.teleports += 1
+
+    def keep(self, memory_samples: int) -> None:
+        """Store at least so many samples from now on; earlier ones count as silence."""
+        if self.silent_samples >= self.memory.n_samples:
+            self.silent_samples = max(self.silent_samples, memory_samples)
+        self.memory.extend(memory_samples)
+
+    def reset(self, rng: np.random.Generator) -> None:
+        """Clear the stored samples and restart the sound."""
+        if self.silent_samples < self.memory.n_samples:
+            self.memory.clear()
+        self.silent_samples = self.memory.n_samples
+        self.sound.reset(rng)
+
+    def advance(self, n_samples: int) -> None:
+        """Emit the samples of one control step."""
+        emitted = self.sound.emit(n_samples)
+        if emitted.shape != (n_samples,):
+            raise ValueError(
+                f"source {self.name!r}: the sound emitted {emitted.shape}, not ({n_samples},)"
+            )
+        if not self.muted and emitted.any():
+            self.silent_samples = 0
+        elif self.silent_samples >= self.memory.n_samples:
+            return  # nothing is stored but silence
+        else:
+            emitted = np.zeros(n_samples, np.float32)
+            self.silent_samples += n_samples
+        self.memory.append(emitted)

@@ -2,7 +2,6 @@
 
 from veca_marl.sim.touch.parts import Part, skin_parts
 from veca_marl.sim.touch.quality import TouchQuality
-from veca_marl.sim.touch.tactile import Tactile, get_tactile
 from veca_marl.sim.touch.taxels import (
     TAXELS_PER_TRIANGLE,
     TaxelTable,
@@ -10,7 +9,7 @@ from veca_marl.sim.touch.taxels import (
     taxel_positions,
     taxels_of,
 )
-from veca_marl.sim.touch.touch_sense import TouchCfg, TouchSense
+from veca_marl.sim.touch.touch_sense import Tactile, TouchCfg, TouchSense, get_tactile
 
 __all__ = [
     "TAXELS_PER_TRIANGLE",

@@ -55,11 +55,15 @@ from veca_marl.sim.touch.broad_phase import (
     squared_length,
     to_local,
 )
-from veca_marl.sim.touch.contact import Column, taxel_reading
-from veca_marl.sim.touch.pressing_solid import PressingSolid, core_and_layer, pressing_distance
-from veca_marl.sim.touch.receptive_fields import Fields
+from veca_marl.sim.touch.contact import (
+    Column,
+    PressingSolid,
+    core_and_layer,
+    pressing_distance,
+    taxel_reading,
+)
 from veca_marl.sim.touch.rigid_bones import RigidBones, is_farther, place_bone
-from veca_marl.sim.touch.taxels import BARYCENTRIC, TaxelTable
+from veca_marl.sim.touch.taxels import BARYCENTRIC, Fields, TaxelTable
 
 _POLYHEDRON = int(Shape.POLYHEDRON)
 

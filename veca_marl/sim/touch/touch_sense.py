@@ -1,26 +1,84 @@
-"""The sense of touch: the readings of 9888 taxels on the skin of a body, or of its parts."""
+"""The sense of touch: the readings of 9888 taxels on the skin of a body, or of its parts.
+
+The primitives of bones overlap inside the body, and the mesh continues inside its joints. With a
+receptive field some taxels there would sense their own body in every pose.
+"""
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from veca_marl.sim.body import Body
-from veca_marl.sim.geometry import Bools, Floats
+from veca_marl.sim.body.anatomy import Skeleton, binding_pose, load_skeleton
+from veca_marl.sim.body.appearance import SKIN, bone_geoms, dressed_skin
+from veca_marl.sim.body.humanoid.self_collision import may_collide
+from veca_marl.sim.geometry import Bools, Floats, GeomTable, Scene, SceneObject
 from veca_marl.sim.physics import World
 from veca_marl.sim.sense import Sense
 from veca_marl.sim.spec import ArraySpec
-from veca_marl.sim.touch.hidden_overlaps import overlapping_triangles
 from veca_marl.sim.touch.parts import PartReadings
 from veca_marl.sim.touch.penetration import empty_workspace, read_taxels
 from veca_marl.sim.touch.quality import TouchQuality, make_transform
-from veca_marl.sim.touch.receptive_fields import fields_of
 from veca_marl.sim.touch.rigid_bones import rigid_bones
-from veca_marl.sim.touch.sensed_pairs import unsensed_primitives
-from veca_marl.sim.touch.taxels import TAXELS_PER_TRIANGLE, load_taxels
+from veca_marl.sim.touch.taxels import TAXELS_PER_TRIANGLE, fields_of, load_taxels, taxel_positions
+
+
+def unsensed_bones(skeleton: Skeleton) -> Bools:
+    """Return the ``(47, 47)`` symmetric mask of pairs of bones that are not sensed.
+
+    These are a bone with itself, its parent, its children and the other children of its parent,
+    which joints keep in contact, unless the two collide in the physics, as thighs and upper arms
+    do.
+    """
+    parents = skeleton.parents
+    near = np.eye(len(parents), dtype=np.bool_) | (parents[:, None] == parents[None, :])
+    child_of: Bools = parents[:, None] == np.arange(len(parents))[None, :]
+    names = [bone.name for bone in skeleton.bones]
+    collide = np.array([[may_collide(a, b) for b in names] for a in names])
+    unsensed: Bools = (near | child_of | child_of.T) & ~collide
+    return unsensed
+
+
+def unsensed_primitives(geoms: GeomTable, body: SceneObject) -> Bools:
+    """Return the mask ``(47, G)`` of intangible primitives and of unsensed bones of the body."""
+    skeleton = load_skeleton()
+    ignored = np.repeat(~geoms.tangible[None], len(skeleton.bones), axis=0)
+    own = np.flatnonzero(geoms.objects == body.id)
+    ignored[:, own] |= unsensed_bones(skeleton)[:, geoms.frames[own] - body.rows.start]
+    return ignored
+
+
+@functools.cache
+def overlapping_triangles(share: float) -> Bools:
+    """Return the mask ``(T,)`` of triangles that read their own body in the binding pose.
+
+    In that pose arms and legs are spread, and no part of the body is in contact with another.
+
+    Args:
+        share: Radius of the receptive fields as a share of `TaxelTable.gaps`.
+    """
+    skeleton, taxels, scene = load_skeleton(), load_taxels(), Scene()
+    body = scene.add_object("body", bone_geoms(skeleton, SKIN), dressed_skin(skeleton, SKIN))
+    body.positions[:], body.rotations[:] = binding_pose(skeleton)
+    scene.update()
+    vertices, readings = scene.meshes.vertices, np.zeros(taxels.depths.shape)
+    read_taxels(
+        taxels,
+        fields_of(taxels, share, body.id),
+        vertices,
+        scene.geoms,
+        rigid_bones(scene.geoms, body, len(skeleton.bones)),
+        unsensed_primitives(scene.geoms, body),
+        empty_workspace(taxels, len(vertices), len(scene.geoms.shapes)),
+        readings,
+    )
+    overlapping: Bools = readings.max(axis=1) > 0.0
+    return overlapping
 
 
 @dataclass
@@ -142,3 +200,59 @@ class TouchSense(Sense):
         """Return the present vertices of the skin, ``(V, 3)`` metres in the world frame."""
         vertices: Floats = self._scene.meshes.vertices[self._object.vertices]
         return vertices
+
+
+LINE_M = 0.05
+"""Length of the debug line of a taxel that reads 1; the value is ours."""
+
+
+class Tactile(NamedTuple):
+    """Readings of the taxels of a body.
+
+    Attributes:
+        readings: ``(9888,)`` in [0, 1], see `TouchSense`; 0 for disabled taxels.
+        lines: ``(n, 2, 3)`` metres, world frame: the debug lines of the enabled taxels with a
+            reading above 0, from the taxel along the direction in which it is pressed, with a
+            length in proportion to the reading. Empty without `debug`.
+    """
+
+    readings: Floats
+    lines: Floats
+
+
+def get_tactile(sense: TouchSense, taxel_ratio: float = 1.0, debug: bool = False) -> Tactile:
+    """Return the present readings of the taxels of a body, whatever the quality of its touch.
+
+    The paper draws a blue line for each taxel, and disables a share of the taxels so that the
+    lines do not hide the body; `veca_marl.envs.rendering.draw_tactile_lines` draws these.
+
+    Args:
+        sense: The sense of touch of the body.
+        taxel_ratio: Share of the taxels that are enabled, in [0, 1], evenly spaced in their order.
+        debug: Whether to compute the lines.
+
+    Raises:
+        ValueError: If the ratio is not in [0, 1].
+    """
+    if not 0.0 <= taxel_ratio <= 1.0:
+        raise ValueError(f"taxel_ratio={taxel_ratio} must be in [0, 1]")
+    readings = sense.update_taxels().ravel().copy()
+    readings[~_enabled(readings.size, taxel_ratio)] = 0.0
+    return Tactile(readings, _lines(sense, readings) if debug else np.zeros((0, 2, 3)))
+
+
+def _enabled(count: int, ratio: float) -> Bools:
+    """Return a mask ``(count,)`` of `ratio` of the elements, evenly spaced."""
+    before: Floats = np.floor(np.arange(count + 1) * ratio + 1e-9)
+    enabled: Bools = np.diff(before) > 0.0
+    return enabled
+
+
+def _lines(sense: TouchSense, readings: Floats) -> Floats:
+    """Return the lines ``(n, 2, 3)`` of all taxels with a reading above 0."""
+    taxels = load_taxels()
+    positions, normals = taxel_positions(taxels, sense.skin_vertices())
+    pressed = np.flatnonzero(readings)
+    starts = positions.reshape(-1, 3)[pressed]
+    inward = -normals[pressed // positions.shape[1]]
+    return np.stack([starts, starts + LINE_M * readings[pressed, None] * inward], axis=1)

@@ -16,8 +16,8 @@ from veca_marl.sim.vision.mesh_rasterizer import (
     illuminate_triangles,
     to_camera_frame,
 )
-from veca_marl.sim.vision.rasterization.rendering import DrawMasks, Views, render_views
 from veca_marl.sim.vision.rasterizer import NO_SURFACE, Depths, Lens, Surfaces
+from veca_marl.sim.vision.renderer import DrawMasks, Views, render_views
 
 
 class MeshView(NamedTuple):

@@ -25,8 +25,7 @@ from veca_marl.sim.geometry import (
     distance,
     single,
 )
-from veca_marl.sim.geometry.polyhedra.distances import limited_distance
-from veca_marl.sim.vision.rasterization.screen_bounds import box_intervals
+from veca_marl.sim.geometry.polyhedra import limited_distance
 from veca_marl.sim.vision.rasterizer import (
     NO_SURFACE,
     Depths,
@@ -34,6 +33,7 @@ from veca_marl.sim.vision.rasterizer import (
     Ray,
     Rectangle,
     Surfaces,
+    box_intervals,
     pixel_rectangle,
 )
 

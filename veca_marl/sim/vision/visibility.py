@@ -14,8 +14,7 @@ from veca_marl.sim.body.mounts import EYES
 from veca_marl.sim.body.sight import Visible
 from veca_marl.sim.geometry import Pose, Scene
 from veca_marl.sim.vision.camera import Camera
-from veca_marl.sim.vision.vision_cfg import VisionCfg
-from veca_marl.sim.vision.vision_sense import EyeViews
+from veca_marl.sim.vision.vision_sense import EyeViews, VisionCfg
 
 
 def is_visible(

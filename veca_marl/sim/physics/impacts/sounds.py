@@ -14,7 +14,7 @@ from veca_marl.sim.physics.props import Prop, PropCfg, PropShape
 from veca_marl.sim.physics.props.joint import Joint
 from veca_marl.sim.physics.props.prop_shapes import bounding_box, prop_geoms
 from veca_marl.sim.sound import SoundField
-from veca_marl.sim.sound.impacts import (
+from veca_marl.sim.sound.modal_synthesis import (
     MATERIALS,
     Modes,
     StruckBody,

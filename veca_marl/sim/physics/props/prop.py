@@ -32,7 +32,7 @@ from veca_marl.sim.physics.props.rest import Awake, Rest
 from veca_marl.sim.physics.props.rigid_body import is_turned
 from veca_marl.sim.physics.props.sound_obstacles import make_obstacles
 from veca_marl.sim.sound import Source
-from veca_marl.sim.sound.rooms import Obstacles
+from veca_marl.sim.sound.obstacles import Obstacles
 
 _LARGEST_M = 1e6  # no playground is as large; the limit of bodies, too
 

@@ -15,7 +15,7 @@ from veca_marl.sim.physics.props.prop_shape import (
     check_shape,
 )
 from veca_marl.sim.sound import SoundCfg
-from veca_marl.sim.sound.impacts import Material
+from veca_marl.sim.sound.modal_synthesis import Material
 
 _BOXES = {PropShape.box, PropShape.wall}
 

@@ -10,7 +10,7 @@ import numpy as np
 from veca_marl.sim.geometry import Floats, Geom
 from veca_marl.sim.physics.bullet import pybullet
 from veca_marl.sim.physics.props.joint_cfg import JointCfg
-from veca_marl.sim.sound.rooms import Obstacles
+from veca_marl.sim.sound.obstacles import Obstacles
 
 
 class SoundObstacle(Protocol):

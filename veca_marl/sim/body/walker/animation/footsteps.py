@@ -9,7 +9,7 @@ import numpy as np
 
 from veca_marl.sim.geometry import Floats
 from veca_marl.sim.physics import World
-from veca_marl.sim.sound.impacts import (
+from veca_marl.sim.sound.modal_synthesis import (
     MATERIALS,
     Material,
     StruckBody,

@@ -1,1 +1,0 @@
-"""Rasterization and deferred shading of primitives, polyhedra and meshes in compiled loops."""
