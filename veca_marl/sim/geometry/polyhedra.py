@@ -22,6 +22,22 @@ from veca_marl.sim.geometry.poses import Floats, Vector
 MAX_TRIANGLES = 128
 """Drawing and touch examine every face; more than this belongs into several props."""
 
+ARC_STEP_DEG = 12.0
+"""Greatest angle of one straight edge of an arc; the edge is 0.6 % of the radius inside the arc."""
+
+FACE_COLUMNS = 14
+"""Columns of a row, which are outward normal (3), offset of the plane, three corners (9), and, in
+the first row of a polyhedron, the number of its planes."""
+
+PLANES_COLUMN = 13
+
+NO_ENTRY_M = 1e9  # as in `ray_entry`
+_PARALLEL = 1e-12
+_TINY_M = 1e-9
+_ROUNDING_M = 1e-6  # bounding radii are stored in single precision
+_FAR_M = 1e9
+_PLANES = int(PLANES_COLUMN)
+
 
 @dataclass(frozen=True, eq=False)
 class Polyhedron:
@@ -144,10 +160,6 @@ def _facing(corners: Floats, normals: Floats) -> Floats:
     return facing
 
 
-ARC_STEP_DEG = 12.0
-"""Greatest angle of one straight edge of an arc; the edge is 0.6 % of the radius inside the arc."""
-
-
 def pyramid(length_x: float, length_y: float, height: float) -> Polyhedron:
     """Return a pyramid with its base below and its tip above the middle of the base, metres."""
     x, y, z = length_x / 2.0, length_y / 2.0, height / 2.0
@@ -179,13 +191,6 @@ def sector_of_disc(radius: float, height: float, angle_deg: float) -> Polyhedron
     return convex_hull(np.vstack(faces))
 
 
-FACE_COLUMNS = 14
-"""Columns of a row, which are outward normal (3), offset of the plane, three corners (9), and, in
-the first row of a polyhedron, the number of its planes."""
-
-PLANES_COLUMN = 13
-
-
 def face_rows(polyhedron: Polyhedron) -> Floats:
     """Return the triangles of a polyhedron as rows ``(T, FACE_COLUMNS)``.
 
@@ -215,14 +220,6 @@ def sizes_of(polyhedron: Polyhedron, first_row: int) -> tuple[float, float, floa
 def joined_rows(polyhedra: Sequence[Polyhedron]) -> Floats:
     """Return the rows of several polyhedra, one below the other."""
     return np.concatenate([np.zeros((0, FACE_COLUMNS)), *map(face_rows, polyhedra)])
-
-
-NO_ENTRY_M = 1e9  # as in `ray_entry`
-_PARALLEL = 1e-12
-_TINY_M = 1e-9
-_ROUNDING_M = 1e-6  # bounding radii are stored in single precision
-_FAR_M = 1e9
-_PLANES = int(PLANES_COLUMN)
 
 
 @njit(cache=True, error_model="numpy")

@@ -16,6 +16,11 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 
+Vector: TypeAlias = tuple[float, float, float]
+
+# a number in single precision; to the type checker a float like any other
+single = cast(Callable[[float], float], np.float32)
+
 
 class Pose(NamedTuple):
     """Position and orientation in the world or on another frame.
@@ -37,12 +42,6 @@ class Pose(NamedTuple):
     def up(self) -> Floats:
         """``(3,)`` unit vector: the local z axis."""
         return np.array(self.rotation[:, 2])
-
-
-Vector: TypeAlias = tuple[float, float, float]
-
-# a number in single precision; to the type checker a float like any other
-single = cast(Callable[[float], float], np.float32)
 
 
 def horizontal_distance(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:

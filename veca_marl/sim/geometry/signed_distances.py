@@ -36,6 +36,18 @@ DistanceAndGradient: TypeAlias = tuple[float, float, float, float]
 _SPHERE, _BOX, _CYLINDER = int(Shape.SPHERE), int(Shape.BOX), int(Shape.CYLINDER)
 _TINY_M = 1e-12
 
+NO_ENTRY_M = 1e9  # returned for a ray that misses; larger than any scene
+_SPHERE_ENTERED, _BOX_ENTERED, _CYLINDER_ENTERED = (
+    int(Shape.SPHERE),
+    int(Shape.BOX),
+    int(Shape.CYLINDER),
+)
+_PARALLEL = 1e-12
+
+Solid: TypeAlias = tuple[int, Vector] | tuple[Floats, Vector]
+
+_OPTIONS: Any = {"error_model": "numpy", "forceinline": True}
+
 
 @njit(cache=True, error_model="numpy", inline="always")
 def distance(shape: int, size: Vector, x: float, y: float, z: float) -> float:
@@ -132,15 +144,6 @@ def _from_cylinder(radius: float, half: float, x: float, y: float, z: float) -> 
     return end, 0.0, 0.0, sz
 
 
-NO_ENTRY_M = 1e9  # returned for a ray that misses; larger than any scene
-_SPHERE_ENTERED, _BOX_ENTERED, _CYLINDER_ENTERED = (
-    int(Shape.SPHERE),
-    int(Shape.BOX),
-    int(Shape.CYLINDER),
-)
-_PARALLEL = 1e-12
-
-
 @njit(cache=True, error_model="numpy")
 def entry_distance(shape: int, size: Vector, point: Vector, direction: Vector) -> float:
     """Return the distance from a point outside a primitive to where a ray enters it.
@@ -218,11 +221,6 @@ def _within_infinite_cylinder(
         return NO_ENTRY_M, -NO_ENTRY_M
     middle, width = -(x * u + y * v) / a, math.sqrt(q) / a
     return middle - width, middle + width
-
-
-Solid: TypeAlias = tuple[int, Vector] | tuple[Floats, Vector]
-
-_OPTIONS: Any = {"error_model": "numpy", "forceinline": True}
 
 
 def distances_to(primitive: Primitive, points: Floats) -> Floats:

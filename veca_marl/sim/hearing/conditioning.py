@@ -32,6 +32,15 @@ _MEDIAN_PLANE = 0.15
 # the radius is fitted to directions with a path difference above 0.4 of the radius
 _LATERAL_M = 0.4
 
+# window around the peak: seconds before it, seconds after it, and length of the fade-out
+_BEFORE_PEAK_S, _AFTER_PEAK_S, _FADE_OUT_S = 1.5e-3, 4.0e-3, 2.0e-3
+_SHORT_S = 0.02
+_FILTER_S = 128 / 22_050
+# below the first frequency the response is that of the sphere, above the second the measured one
+_BLEND_HZ = (150.0, 350.0)
+# fraction of the sampling rate above which the anti-aliasing filter would be equalised
+_TOP_OF_BAND = 0.47
+
 
 def arrival_times(
     measured: MeasuredHead,
@@ -130,16 +139,6 @@ def check_radius(radius_m: float, source: str) -> None:
             "6 to 11 cm; is the sampling rate right?",
             stacklevel=4,
         )
-
-
-# window around the peak: seconds before it, seconds after it, and length of the fade-out
-_BEFORE_PEAK_S, _AFTER_PEAK_S, _FADE_OUT_S = 1.5e-3, 4.0e-3, 2.0e-3
-_SHORT_S = 0.02
-_FILTER_S = 128 / 22_050
-# below the first frequency the response is that of the sphere, above the second the measured one
-_BLEND_HZ = (150.0, 350.0)
-# fraction of the sampling rate above which the anti-aliasing filter would be equalised
-_TOP_OF_BAND = 0.47
 
 
 def condition(

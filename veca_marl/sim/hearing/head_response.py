@@ -14,6 +14,12 @@ from veca_marl.sim.geometry import Floats
 
 _CEPSTRUM_FLOOR = 1e-6
 
+SMALLEST_SCALE, LARGEST_SCALE = 0.5, 1.5
+"""Range of scales; the head circumference of a newborn is about 0.6 of an adult's."""
+
+_N_FFT = 2048
+_MIN_MAGNITUDE = 1e-5
+
 
 def minimum_phase(magnitude: NDArray[np.floating], n_taps: int) -> NDArray[np.floating]:
     """Return the minimum-phase impulse response of a magnitude response.
@@ -33,13 +39,6 @@ def minimum_phase(magnitude: NDArray[np.floating], n_taps: int) -> NDArray[np.fl
     cepstrum[..., n_fft // 2 + 1 :] = 0.0
     response: NDArray[np.floating] = scipy.fft.irfft(np.exp(scipy.fft.rfft(cepstrum)), n_fft)
     return response[..., :n_taps]
-
-
-SMALLEST_SCALE, LARGEST_SCALE = 0.5, 1.5
-"""Range of scales; the head circumference of a newborn is about 0.6 of an adult's."""
-
-_N_FFT = 2048
-_MIN_MAGNITUDE = 1e-5
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,14 @@ from veca_marl.sim.hearing.head_response import HeadResponse, minimum_phase
 from veca_marl.sim.hearing.sofa import read_sofa
 from veca_marl.sim.hearing.spherical_head import ear_incidence, woodworth_arrival_s
 
+GRID_STEP_DEG = 5
+# length of transforms in lengths of the filters: a short cepstrum aliases
+_OVERSAMPLING = 4
+_MIN_MAGNITUDE = 1e-5
+_BATCH = 256
+# directions of the lowest ring are moved up by this angle into the triangles
+_INSIDE_RAD = 1e-6
+
 
 def stand_ins(directions: Floats, lowest_rad: float) -> tuple[Floats, Floats]:
     """Return two directions of the lowest ring for each direction below it, and their weights.
@@ -70,15 +78,6 @@ def _horizontal(directions: Floats) -> Floats:
     """Return the lengths ``(..., 1)`` of the horizontal components of unit vectors."""
     lengths: Floats = np.linalg.norm(directions[..., :2], axis=-1, keepdims=True)
     return lengths
-
-
-GRID_STEP_DEG = 5
-# length of transforms in lengths of the filters: a short cepstrum aliases
-_OVERSAMPLING = 4
-_MIN_MAGNITUDE = 1e-5
-_BATCH = 256
-# directions of the lowest ring are moved up by this angle into the triangles
-_INSIDE_RAD = 1e-6
 
 
 class HrtfTable:

@@ -19,6 +19,30 @@ from scipy.spatial import cKDTree
 
 from veca_marl.sim.geometry import Floats
 
+MOST_VALUES = 1 << 26
+"""Largest number of values of one field, 512 MiB of float64, four times the largest known set."""
+
+# deflate, the compression of netCDF, reaches at most 1032 to 1
+_STRONGEST_COMPRESSION = 1100
+# small fields of which nothing is stored hold the default value of their variable
+_NEVER_WRITTEN_BYTES = 1 << 16
+_LONGEST_ATTRIBUTE = 1 << 16
+
+_METRES = ("metre", "metres", "meter", "meters", "m")
+_ANGLES = {"degree": np.pi / 180.0, "degrees": np.pi / 180.0, "radian": 1.0, "radians": 1.0}
+# a set with several distances: those beyond this share of the longest are kept
+_SAME_DISTANCE = 0.95
+# a loudspeaker closer than that touches the head
+_NEAREST_M = 0.2
+
+_CONVENTIONS = ("SimpleFreeFieldHRIR", "FreeFieldHRIR")
+_FIELDS = ("Data.IR", "Data.SamplingRate", "SourcePosition")
+_SAMPLE_RATES_HZ = (8_000.0, 200_000.0)
+_LATERAL = 0.5
+_FEWEST_DIRECTIONS = 4
+_FEWEST_SAMPLES, _MOST_SAMPLES = 16, 1 << 16
+_LARGEST_GAP_DEG = 40.0
+
 
 class SofaError(ValueError):
     """The file does not contain usable head-related impulse responses; the message says why."""
@@ -43,16 +67,6 @@ class MeasuredHead:
     sample_rate_hz: float
     distance_m: float
     source: str
-
-
-MOST_VALUES = 1 << 26
-"""Largest number of values of one field, 512 MiB of float64, four times the largest known set."""
-
-# deflate, the compression of netCDF, reaches at most 1032 to 1
-_STRONGEST_COMPRESSION = 1100
-# small fields of which nothing is stored hold the default value of their variable
-_NEVER_WRITTEN_BYTES = 1 << 16
-_LONGEST_ATTRIBUTE = 1 << 16
 
 
 @dataclass(frozen=True)
@@ -166,14 +180,6 @@ def open_sofa(path: str | Path) -> Iterator[SofaFile]:
         raise SofaError(f"{name}: cannot be read as SOFA ({error})") from error
 
 
-_METRES = ("metre", "metres", "meter", "meters", "m")
-_ANGLES = {"degree": np.pi / 180.0, "degrees": np.pi / 180.0, "radian": 1.0, "radians": 1.0}
-# a set with several distances: those beyond this share of the longest are kept
-_SAME_DISTANCE = 0.95
-# a loudspeaker closer than that touches the head
-_NEAREST_M = 0.2
-
-
 def source_vectors(file: SofaFile, count: int, name: str) -> Floats:
     """Return where the loudspeaker was, ``(count, 3)`` metres in the frame of the head.
 
@@ -281,15 +287,6 @@ def _unit(vectors: Floats, name: str) -> Floats:
         raise SofaError(f"{name}: ListenerView and ListenerUp do not define the axes of a head")
     unit: Floats = vectors / length
     return unit
-
-
-_CONVENTIONS = ("SimpleFreeFieldHRIR", "FreeFieldHRIR")
-_FIELDS = ("Data.IR", "Data.SamplingRate", "SourcePosition")
-_SAMPLE_RATES_HZ = (8_000.0, 200_000.0)
-_LATERAL = 0.5
-_FEWEST_DIRECTIONS = 4
-_FEWEST_SAMPLES, _MOST_SAMPLES = 16, 1 << 16
-_LARGEST_GAP_DEG = 40.0
 
 
 def read_sofa(path: str | Path, sample_rate_hz: float | None = None) -> MeasuredHead:

@@ -25,6 +25,8 @@ _BEFORE = HALF_WIDTH - 1
 _KAISER_BETA = 9.0
 _FITTED_FRACTIONS = 257
 
+_SHIFT_EVERY = 4096
+
 
 def interpolation_kernels(fraction: Floats) -> Floats:
     """Return kernels that read a signal between two samples.
@@ -138,9 +140,6 @@ def read_moving(
             u = u0 + du * np.float32(j)
             part[j] = p0[j] + u * (p1[j] + u * (p2[j] + u * (p3[j] + u * (p4[j] + u * p5[j]))))
         i += run
-
-
-_SHIFT_EVERY = 4096
 
 
 class SignalMemory:

@@ -16,6 +16,17 @@ from veca_marl.sim.geometry import Floats
 from veca_marl.sim.sound.room_acoustics import SPEED_OF_SOUND_MPS
 from veca_marl.sim.sound.waveforms import Samples
 
+BAR_ROOTS = (4.7300, 7.8532, 10.9956, 14.1372)
+"""Roots of ``cos(x) cosh(x) = 1`` (free-free bar, Fletcher & Rossing 1998, section 2.15)."""
+
+SPHERE_ROOTS = (2.646, 3.937, 5.046)
+"""``2 pi f a / c_s`` of the spheroidal modes with 2, 3 and 4 nodal lines of a solid sphere with
+Poisson's ratio 0.3: first roots of the frequency equation (Lamb 1882; Eringen & Suhubi 1975,
+section 8.14)."""
+
+_INAUDIBLE = 1e-6  # pressure, -120 dB: the decay ends here
+_TOP_OF_BAND = 0.9
+
 
 class Material(Enum):
     """What a thing is made of."""
@@ -67,15 +78,6 @@ MATERIALS = {
 """Typical values of the charts of Ashby (2011), Materials Selection in Mechanical Design; loss
 tangents at the upper end, because things that lie or are held lose energy at their supports. The
 durations of contact are ours, in the order of Hertz's theory for things of 0.1 m at 1 m/s."""
-
-
-BAR_ROOTS = (4.7300, 7.8532, 10.9956, 14.1372)
-"""Roots of ``cos(x) cosh(x) = 1`` (free-free bar, Fletcher & Rossing 1998, section 2.15)."""
-
-SPHERE_ROOTS = (2.646, 3.937, 5.046)
-"""``2 pi f a / c_s`` of the spheroidal modes with 2, 3 and 4 nodal lines of a solid sphere with
-Poisson's ratio 0.3: first roots of the frequency equation (Lamb 1882; Eringen & Suhubi 1975,
-section 8.14)."""
 
 
 @dataclass(frozen=True)
@@ -150,10 +152,6 @@ def _excitation(frequencies_hz: Floats, contact_s: float) -> Floats:
     safe = np.where(near, 0.0, x)
     spectrum: Floats = np.abs(np.cos(0.5 * np.pi * safe) / (1.0 - safe**2))
     return np.where(near, math.pi / 4.0, spectrum)
-
-
-_INAUDIBLE = 1e-6  # pressure, -120 dB: the decay ends here
-_TOP_OF_BAND = 0.9
 
 
 class StruckBody:

@@ -15,6 +15,11 @@ from veca_marl.sim.sound.room_acoustics import SPEED_OF_SOUND_MPS
 from veca_marl.sim.sound.sounds import Source
 from veca_marl.sim.sound.surroundings import Arrivals, Surroundings
 
+MAX_SPEED_MPS = 50.0
+"""A path of which the length changes faster is cross-faded as a new path, without Doppler shift."""
+
+Place = tuple[int, int, int, bytes, bytes, bytes]
+
 
 class Receiver(Protocol):
     """Ears of one quality. Stateless: listeners may share one.
@@ -50,12 +55,6 @@ class Receiver(Protocol):
                 attenuation by distance are included; overwritten.
         """
         ...
-
-
-MAX_SPEED_MPS = 50.0
-"""A path of which the length changes faster is cross-faded as a new path, without Doppler shift."""
-
-Place = tuple[int, int, int, bytes, bytes, bytes]
 
 
 class Ears:

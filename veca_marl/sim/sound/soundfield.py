@@ -20,6 +20,9 @@ from veca_marl.sim.sound.room_acoustics import Room
 from veca_marl.sim.sound.sounds import Sound, Source
 from veca_marl.sim.sound.surroundings import FreeField, House, OneRoom, Surroundings
 
+REACH_M = 200.0
+"""Reach of the free field, where a source of level 1 has an rms pressure of 0.005 (-46 dB)."""
+
 
 @dataclass
 class SoundClock:
@@ -147,10 +150,6 @@ class Listener:
             return np.zeros((2, self._clock.step_samples), np.float32)
         channels = self._mixer.finish()
         return np.repeat(channels, 2, axis=0) if len(channels) == 1 else channels
-
-
-REACH_M = 200.0
-"""Reach of the free field, where a source of level 1 has an rms pressure of 0.005 (-46 dB)."""
 
 
 class SoundField:

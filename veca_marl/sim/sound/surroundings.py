@@ -23,6 +23,15 @@ from veca_marl.sim.geometry import Floats, Pose
 from veca_marl.sim.sound.obstacles import Obstacles
 from veca_marl.sim.sound.room_acoustics import Room, image_gains, image_lattice, image_sources
 
+TRANSMISSION_LOSS_DB = 30.0
+"""A limp partition of 15 kg/m2 at 500 Hz by the field-incidence mass law, 20 log10(500 x 15) - 47
+= 30.5 dB. Authors differ in its constant (Ebbitt & Hansen 2007, Mass Law - Calculations and
+Measurements, SAE 2007-01-2201); 47 is one of those in use, 5 dB below normal incidence, which is
+20 log10(pi f m / (rho c)) with rho c = 415 kg/(m2 s). The same at all frequencies: real walls
+attenuate high frequencies more."""
+
+_BETWEEN_ROOMS = -1  # `paths_id` of the direct path from one room to another; rooms have 0 and up
+
 
 @dataclass(frozen=True)
 class Arrivals:
@@ -176,17 +185,6 @@ def _vectors_to_images(
                 total += (images[k, j] - head) * rotation[j, axis]
             vectors[k, axis] = total
     return vectors
-
-
-TRANSMISSION_LOSS_DB = 30.0
-"""A limp partition of 15 kg/m2 at 500 Hz by the field-incidence mass law, 20 log10(500 x 15) - 47
-= 30.5 dB. Authors differ in its constant (Ebbitt & Hansen 2007, Mass Law - Calculations and
-Measurements, SAE 2007-01-2201); 47 is one of those in use, 5 dB below normal incidence, which is
-20 log10(pi f m / (rho c)) with rho c = 415 kg/(m2 s). The same at all frequencies: real walls
-attenuate high frequencies more."""
-
-
-_BETWEEN_ROOMS = -1  # `paths_id` of the direct path from one room to another; rooms have 0 and up
 
 
 class House:

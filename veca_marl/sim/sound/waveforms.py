@@ -40,6 +40,10 @@ _BUZZ_TOP = 0.9
 
 Samples = NDArray[np.float32]
 
+_HARMONICS = 8
+_TILT = -1.0  # amplitude falls by 6 dB per octave, as a voice at the lips does (Fant 1960)
+_FADE_S = 0.01
+
 
 def tone(frequency_hz: float, level: float, sample_rate_hz: float) -> Samples:
     """Return one second of a pure tone; the frequency is rounded to whole hertz for looping."""
@@ -182,11 +186,6 @@ def check_pitch(frequency_hz: float, sample_rate_hz: float, name: str = "frequen
             f"{sample_rate_hz / 2.0}, half of the sampling rate"
         )
     return round(frequency_hz)
-
-
-_HARMONICS = 8
-_TILT = -1.0  # amplitude falls by 6 dB per octave, as a voice at the lips does (Fant 1960)
-_FADE_S = 0.01
 
 
 @dataclass(frozen=True)

@@ -27,6 +27,9 @@ from veca_marl.sim.touch.quality import TouchQuality, make_transform
 from veca_marl.sim.touch.rigid_bones import rigid_bones
 from veca_marl.sim.touch.taxels import TAXELS_PER_TRIANGLE, fields_of, load_taxels, taxel_positions
 
+LINE_M = 0.05
+"""Length of the debug line of a taxel that reads 1; the value is ours."""
+
 
 def unsensed_bones(skeleton: Skeleton) -> Bools:
     """Return the ``(47, 47)`` symmetric mask of pairs of bones that are not sensed.
@@ -200,10 +203,6 @@ class TouchSense(Sense):
         """Return the present vertices of the skin, ``(V, 3)`` metres in the world frame."""
         vertices: Floats = self._scene.meshes.vertices[self._object.vertices]
         return vertices
-
-
-LINE_M = 0.05
-"""Length of the debug line of a taxel that reads 1; the value is ours."""
 
 
 class Tactile(NamedTuple):

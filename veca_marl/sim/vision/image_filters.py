@@ -38,6 +38,18 @@ from veca_marl.sim.vision.camera import Camera
 from veca_marl.sim.vision.rasterizer import Depths
 from veca_marl.sim.vision.shading import Images
 
+_ACUITY_AGES_MONTHS = (0.0, 1.0, 1.5, 2.5, 4.0, 6.0, 9.0, 12.0, 18.0, 24.0, 30.0, 36.0, 48.0)
+_ACUITY_CPD = (0.69, 0.94, 1.11, 2.16, 2.68, 5.65, 6.58, 6.58, 8.59, 9.57, 11.52, 21.81, 24.81)
+
+_GAIN_AGES_MONTHS = (0.0, 1.0, 2.0, 3.0, 4.0, 6.0, 12.0, 24.0)
+_RED_GREEN_GAINS = (0.10, 0.25, 0.45, 0.60, 0.70, 0.80, 0.90, 1.00)
+_BLUE_YELLOW_GAINS = (0.00, 0.05, 0.15, 0.35, 0.50, 0.70, 0.85, 1.00)
+
+CONTRAST_AT_LIMIT = 0.1
+
+# BT.601: luma, and the two colour differences (red - luma, blue - luma)
+_LUMA = np.array([0.299, 0.587, 0.114])
+
 
 class FilterContext(NamedTuple):
     """What a filter can use besides the images.
@@ -195,19 +207,6 @@ def _gaussian(image: Images, sigma_pixels: float, out: Images) -> None:
     """
     sigma_pixels = min(sigma_pixels, float(max(image.shape[:2])))
     cv2.GaussianBlur(image, (0, 0), sigma_pixels, dst=out, borderType=cv2.BORDER_REPLICATE)
-
-
-_ACUITY_AGES_MONTHS = (0.0, 1.0, 1.5, 2.5, 4.0, 6.0, 9.0, 12.0, 18.0, 24.0, 30.0, 36.0, 48.0)
-_ACUITY_CPD = (0.69, 0.94, 1.11, 2.16, 2.68, 5.65, 6.58, 6.58, 8.59, 9.57, 11.52, 21.81, 24.81)
-
-_GAIN_AGES_MONTHS = (0.0, 1.0, 2.0, 3.0, 4.0, 6.0, 12.0, 24.0)
-_RED_GREEN_GAINS = (0.10, 0.25, 0.45, 0.60, 0.70, 0.80, 0.90, 1.00)
-_BLUE_YELLOW_GAINS = (0.00, 0.05, 0.15, 0.35, 0.50, 0.70, 0.85, 1.00)
-
-CONTRAST_AT_LIMIT = 0.1
-
-# BT.601: luma, and the two colour differences (red - luma, blue - luma)
-_LUMA = np.array([0.299, 0.587, 0.114])
 
 
 def acuity_cpd(age_months: float) -> float:

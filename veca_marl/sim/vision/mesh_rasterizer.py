@@ -33,6 +33,8 @@ from veca_marl.sim.vision.shading import AMBIENT, BOUNCE, SUN
 
 _MARGIN_PX = 0.01  # covers rounding errors of slopes in single precision
 
+_ROUNDING_M = 1e-4  # depths are stored in single precision
+
 
 @njit(cache=True, error_model="numpy")
 def to_camera_frame(vertices: Floats, view: Floats, seen: Floats) -> None:
@@ -240,9 +242,6 @@ def _light(meshes: MeshTable, seen: Floats, t: int, x: float, y: float) -> float
 def _edge(a: Vector, b: Vector, x: float, y: float) -> float:
     normal = _cross(a, b)
     return normal[0] * x + normal[1] * y + normal[2]
-
-
-_ROUNDING_M = 1e-4  # depths are stored in single precision
 
 
 @njit(cache=True, error_model="numpy")

@@ -39,6 +39,18 @@ _EDGES_PER_AXIS = 4
 # tangents beyond this angle from the optical axis (89 degrees) lie outside of every image
 _GRAZING_RAD = 1.5533
 
+Depths: TypeAlias = NDArray[np.float32]
+Surfaces: TypeAlias = NDArray[np.int16]
+Ray: TypeAlias = tuple[Vector, Vector, Vector, Vector]
+Rectangle: TypeAlias = tuple[int, int, int, int]
+
+NO_SURFACE = -1
+
+_SPHERE, _BOX, _CYLINDER = int(Shape.SPHERE), int(Shape.BOX), int(Shape.CYLINDER)
+_POLYHEDRON = int(Shape.POLYHEDRON)
+# a float32 constant keeps the loops in single precision: twice as many vector lanes
+_HALF = single(0.5)
+
 
 @njit(cache=True, error_model="numpy")
 def disc_interval(across: float, forward: float, radius: float, limit: float) -> Interval:
@@ -151,19 +163,6 @@ def box_intervals(
 @njit(cache=True)
 def _dot(a: Vector, b: Vector) -> float:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-Depths: TypeAlias = NDArray[np.float32]
-Surfaces: TypeAlias = NDArray[np.int16]
-Ray: TypeAlias = tuple[Vector, Vector, Vector, Vector]
-Rectangle: TypeAlias = tuple[int, int, int, int]
-
-NO_SURFACE = -1
-
-_SPHERE, _BOX, _CYLINDER = int(Shape.SPHERE), int(Shape.BOX), int(Shape.CYLINDER)
-_POLYHEDRON = int(Shape.POLYHEDRON)
-# a float32 constant keeps the loops in single precision: twice as many vector lanes
-_HALF = single(0.5)
 
 
 class Lens(NamedTuple):

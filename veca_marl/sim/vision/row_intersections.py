@@ -32,6 +32,10 @@ _TINY = single(1e-12)
 _0 = single(0.0)
 _1 = single(1.0)
 
+_PLANES = int(PLANES_COLUMN)
+_PARALLEL = 1e-12
+_FAR_M = 1e9
+
 
 @njit(cache=True, error_model="numpy")
 def sphere_row(
@@ -170,11 +174,6 @@ def capsule_row(
         hit = (q > _0) & (beside | (q_cap > _0)) & (t > near) & (t < depth[i])
         depth[i] = t if hit else depth[i]
         surfaces[i] = surface if hit else surfaces[i]
-
-
-_PLANES = int(PLANES_COLUMN)
-_PARALLEL = 1e-12
-_FAR_M = 1e9
 
 
 @njit(cache=True, error_model="numpy")

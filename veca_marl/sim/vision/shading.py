@@ -45,6 +45,8 @@ _ORIGIN = (0.0, 0.0, 0.0)
 # offset of the tiles from the origin, so that a face in the plane of tile edges does not flicker
 _TILE_SHIFT = 0.01
 
+_POLYHEDRON = int(Shape.POLYHEDRON)
+
 
 @njit(cache=True, error_model="numpy")
 def fill_sky(lens: Lens, rgb: Images) -> None:
@@ -239,9 +241,6 @@ def to_object_ids(objects: Surfaces, surfaces: Surfaces) -> None:
         for i in range(surfaces.shape[1]):
             if surfaces[j, i] != NO_SURFACE:
                 surfaces[j, i] = objects[surfaces[j, i]]
-
-
-_POLYHEDRON = int(Shape.POLYHEDRON)
 
 
 @njit(cache=True, error_model="numpy")

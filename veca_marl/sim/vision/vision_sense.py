@@ -27,6 +27,12 @@ from veca_marl.sim.vision.image_filters import (
 )
 from veca_marl.sim.vision.renderer import Views
 
+WIDEST_PUPIL_MM = 20.0
+"""Greatest pupil, about the diameter of the eyeball."""
+
+STRONGEST_ACCOMMODATION_DPT = 100.0
+"""Greatest accommodation, focus at 1 cm."""
+
 
 class EyeViews:
     """The images of the open eyes of one body, before any filter.
@@ -119,13 +125,6 @@ class EyeViews:
         if len(self._hidden) != len(self._scene.surfaces.objects):
             self._hidden = self._scene.hidden(self._body.object_id, self._body.own_head_frames)
         return self._hidden
-
-
-WIDEST_PUPIL_MM = 20.0
-"""Greatest pupil, about the diameter of the eyeball."""
-
-STRONGEST_ACCOMMODATION_DPT = 100.0
-"""Greatest accommodation, focus at 1 cm."""
 
 
 class Eyes(Enum):
