@@ -1,7 +1,7 @@
 """Convex polyhedra: as data, as rows for compiled loops, and their distances and ray entries.
 
 `faces` is the table of all polyhedra of a scene and `size` the entry of one of them in the table
-of primitives, see `table`. Inside, the distance is that to the nearest plane, which for a convex
+of primitives, see `sizes_of`. Inside, the distance is that to the nearest plane, which for a convex
 solid is the exact Euclidean one. Outside, it is the least distance to the triangles that face the
 point.
 """
@@ -31,7 +31,7 @@ the first row of a polyhedron, the number of its planes."""
 
 PLANES_COLUMN = 13
 
-NO_ENTRY_M = 1e9  # as in `ray_entry`
+NO_ENTRY_M = 1e9  # as in `signed_distances`
 _PARALLEL = 1e-12
 _TINY_M = 1e-9
 _ROUNDING_M = 1e-6  # bounding radii are stored in single precision

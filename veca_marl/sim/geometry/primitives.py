@@ -167,7 +167,7 @@ def bounding_radius(shape: int, size: NDArray[np.float32]) -> float:
     if shape == _BOX:
         return math.sqrt(size[0] * size[0] + size[1] * size[1] + size[2] * size[2])
     if shape == _POLYHEDRON:
-        return float(size[2])  # see `polyhedra.table.sizes_of`
+        return float(size[2])  # see `polyhedra.sizes_of`
     return float(size[0] + _HALF * size[1])
 
 

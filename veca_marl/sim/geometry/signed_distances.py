@@ -1,15 +1,16 @@
 """Signed distances to primitives, their gradients, and where rays enter, in own axes.
 
 Negative inside. Inside and outside they are the exact Euclidean distances (spheres, capsules,
-boxes, cylinders; for polyhedra see `solids`), with a gradient of length 1. The scalar functions
+boxes, cylinders; for polyhedra see `polyhedra`), with a gradient of length 1. The scalar functions
 are inlined into the loops of touch and vision; they work in the precision of their arguments.
 
-The image kernels in `intersections` do the same for rows of rays in single precision. Quadrics are
-solved without the small difference of large numbers ``b^2 - a c``, boxes by the slab test (Kay &
-Kajiya, SIGGRAPH 1986).
+Rays are intersected in double precision; the image kernels of `vision.row_intersections` do the
+same for rows of rays in single precision. Quadrics are solved without the small difference of large
+numbers ``b^2 - a c``, boxes by the slab test (Kay & Kajiya, SIGGRAPH 1986).
 
-The scalar functions of `signed_distances` and `ray_entry` know the primitives that three numbers
-describe. A polyhedron needs the table of faces of its scene as well.
+`distance`, `distance_and_gradient` and `entry_distance` know the primitives that three numbers
+describe. A polyhedron needs the table of faces of its scene as well: the functions of a `Solid`
+take any primitive.
 """
 
 from __future__ import annotations
@@ -32,20 +33,12 @@ from veca_marl.sim.geometry.poses import Floats, Vector
 from veca_marl.sim.geometry.primitives import Primitive, Shape
 
 DistanceAndGradient: TypeAlias = tuple[float, float, float, float]
+Solid: TypeAlias = tuple[int, Vector] | tuple[Floats, Vector]
 
 _SPHERE, _BOX, _CYLINDER = int(Shape.SPHERE), int(Shape.BOX), int(Shape.CYLINDER)
 _TINY_M = 1e-12
-
 NO_ENTRY_M = 1e9  # returned for a ray that misses; larger than any scene
-_SPHERE_ENTERED, _BOX_ENTERED, _CYLINDER_ENTERED = (
-    int(Shape.SPHERE),
-    int(Shape.BOX),
-    int(Shape.CYLINDER),
-)
 _PARALLEL = 1e-12
-
-Solid: TypeAlias = tuple[int, Vector] | tuple[Floats, Vector]
-
 _OPTIONS: Any = {"error_model": "numpy", "forceinline": True}
 
 
@@ -158,16 +151,16 @@ def entry_distance(shape: int, size: Vector, point: Vector, direction: Vector) -
         Metres, at least 0; `NO_ENTRY_M` if the ray misses the primitive.
     """
     (x, y, z), (u, v, w) = point, direction
-    if shape == _SPHERE_ENTERED:
+    if shape == _SPHERE:
         return _sphere_entry(size[0], x, y, z, u, v, w)
-    if shape == _BOX_ENTERED:
+    if shape == _BOX:
         near, far = _between_planes(size[0], x, u)
         near_y, far_y = _between_planes(size[1], y, v)
         near_z, far_z = _between_planes(size[2], z, w)
         return _first_common(max(near, near_y, near_z), min(far, far_y, far_z))
     near, far = _within_infinite_cylinder(size[0], x, y, u, v)
     half = 0.5 * size[1]
-    if shape == _CYLINDER_ENTERED:
+    if shape == _CYLINDER:
         near_z, far_z = _between_planes(half, z, w)
         return _first_common(max(near, near_z), min(far, far_z))
     side = _first_common(near, far)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from veca_marl.sim.geometry import Floats
 
-_CEPSTRUM_FLOOR = 1e-6
+_CEPSTRUM_FLOOR = 1e-6  # least magnitude of which `minimum_phase` takes the logarithm
 
 SMALLEST_SCALE, LARGEST_SCALE = 0.5, 1.5
 """Range of scales; the head circumference of a newborn is about 0.6 of an adult's."""

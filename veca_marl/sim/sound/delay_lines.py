@@ -143,11 +143,11 @@ def read_moving(
 
 
 class SignalMemory:
-    """The last samples of a signal. Reads are late by `fractional_delay.HALF_WIDTH` samples.
+    """The last samples of a signal. Reads are late by `HALF_WIDTH` samples.
 
     Attributes:
         n_samples: How many samples it holds.
-        powers: ``(DEGREE + 1, size)`` float32, see `fractional_delay.filter_powers`.
+        powers: ``(DEGREE + 1, size)`` float32, see `filter_powers`.
         end: Column of `powers` after the newest sample.
     """
 

@@ -152,7 +152,7 @@ class Obstacles:
     """Boxes that attenuate sound. An owner moves its box by the number that `add` has returned.
 
     Leaves of doors are numbered apart: they attenuate only what goes through the openings that they
-    close, see `leaf_paths`.
+    close, see `count_leaves`.
 
     Attributes:
         changes: How many times a box was added, or moved to another pose.

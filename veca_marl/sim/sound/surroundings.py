@@ -3,7 +3,7 @@
 Image sources are right inside one box. A listener in the room of a source hears it with the
 reflections of that room. A listener in another room hears the direct sound alone. Each path is
 attenuated by every obstacle (wall, closed door, wardrobe) that it passes through at that moment. An
-open door is no obstacle, see `leaf_paths`, so that the direct sound through it is not attenuated.
+open door is no obstacle, see `obstacles`, so that the direct sound through it is not attenuated.
 Diffraction round edges and reflections at obstacles are not modelled. When a listener enters
 another room or an obstacle moves into a path, the sound is cross-faded over one control step.
 """

@@ -27,9 +27,10 @@ from numpy.typing import ArrayLike, NDArray
 from veca_marl.sim.geometry import Floats
 
 SAMPLE_RATE_HZ = 22_050
+"""Sampling rate of all sound in a world."""
+
 LOUDEST = 1e6
 """Greatest level and sample of a sound, beyond any and far from the limits of float32."""
-"""Sampling rate of all sound in a world."""
 
 HIGH_PASS_HZ = 80.0
 # the high-pass decays by 120 dB within 40 ms
@@ -40,6 +41,7 @@ _BUZZ_TOP = 0.9
 
 Samples = NDArray[np.float32]
 
+# of calls
 _HARMONICS = 8
 _TILT = -1.0  # amplitude falls by 6 dB per octave, as a voice at the lips does (Fant 1960)
 _FADE_S = 0.01

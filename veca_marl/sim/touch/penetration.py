@@ -27,7 +27,7 @@ A primitive with a skin of its own, such as a bone of another body, is treated a
 series: t is the sum of both thicknesses, and heights count from rigid bone to rigid bone. With s,
 the smaller of the two thicknesses, the primitive is its bone with a layer of s, which is round at
 the edges of the bone, and b lies s inside the bone, so that b remains inside of thin bones. Other
-bones of the own body are sensed in the same way, see `hidden_overlaps` for an exception.
+bones of the own body are sensed in the same way, see `overlapping_triangles` for an exception.
 """
 
 from __future__ import annotations

@@ -1,8 +1,7 @@
 """Filters of the eyes' images, which can be combined in a list: lens, blur, infants, grey.
 
-Acuity and colour vision of infants by age (`InfantVision`):
-
-Sources, and what is our own assumption:
+Sources of the acuity and colour vision of infants by age (`InfantVision`), and what is our own
+assumption:
 
 - *Acuity*: mean monocular grating acuity on the Teller Acuity Cards, table 2 of Mayer, Beiser,
   Warner, Pratt, Raye & Lang, "Monocular acuity norms for the Teller Acuity Cards between ages one
