@@ -3,13 +3,12 @@ import pytest
 import scipy.signal
 from listening import HEAD, RATE, ROOM_SIZE, SOURCES
 
-from veca_marl.sim.sound import Room
-from veca_marl.sim.sound import room_acoustics as acoustics
+from veca_marl.sim.sound import Room, room_acoustics
 
 
 @pytest.mark.parametrize(("order", "count"), [(0, 1), (1, 7), (2, 25), (3, 63)])
 def test_number_of_images_and_direct_sound_first(order, count):
-    lattice = acoustics.image_lattice(order)
+    lattice = room_acoustics.image_lattice(order)
     assert lattice.shape == (count, 3)
     assert not lattice[0].any()
     assert len(np.unique(lattice, axis=0)) == count
@@ -17,9 +16,9 @@ def test_number_of_images_and_direct_sound_first(order, count):
 
 def test_an_image_is_the_source_mirrored_in_the_wall():
     room = Room((-1.0, 2.0, 0.0), (4.0, 3.0, 2.5))
-    lattice = acoustics.image_lattice(1)
+    lattice = room_acoustics.image_lattice(1)
     source = np.array([0.5, 3.0, 1.0])
-    images = acoustics.image_sources(source, room.lower, room.size, lattice)
+    images = room_acoustics.image_sources(source, room.lower, room.size, lattice)
     walls = np.stack([room.lower, room.lower + room.size])
     expected = [source]
     for axis in range(3):
@@ -33,9 +32,9 @@ def test_an_image_is_the_source_mirrored_in_the_wall():
 def test_each_wall_has_its_own_coefficient():
     """Only the floor reflects: one image is left, below the floor."""
     floor_only = Room((0.0, 0.0, 0.0), ROOM_SIZE, (0.0, 0.0, 0.0, 0.0, 0.8, 0.0))
-    lattice = acoustics.image_lattice(3)
-    gains = acoustics.image_gains(floor_only.beta, lattice)
-    images = acoustics.image_sources(SOURCES[0], floor_only.lower, floor_only.size, lattice)
+    lattice = room_acoustics.image_lattice(3)
+    gains = room_acoustics.image_gains(floor_only.beta, lattice)
+    images = room_acoustics.image_sources(SOURCES[0], floor_only.lower, floor_only.size, lattice)
     assert sorted(gains[gains > 0]) == [0.8, 1.0]
     below = images[gains == 0.8][0]
     assert np.allclose(below, SOURCES[0] * (1.0, 1.0, -1.0))
@@ -55,7 +54,7 @@ def test_image_sources_equal_pyroomacoustics(order, beta):
     reference.constants.set("rir_hpf_enable", before)
     theirs = np.asarray(shoebox.rir[0][0])[reference.constants.get("frac_delay_length") // 2 :]
     room = Room(np.zeros(3), ROOM_SIZE, beta)
-    ours = acoustics.room_impulse_response(
+    ours = room_acoustics.room_impulse_response(
         SOURCES[0], HEAD.position, room, order, RATE, len(theirs)
     )
     assert ours @ theirs / np.sqrt((ours @ ours) * (theirs @ theirs)) > 0.9999
@@ -79,12 +78,12 @@ def decay_time(response):
     ],
 )
 def test_decay_time_lies_between_eyring_and_sabine(size, beta):
-    eyring = acoustics.eyring_decay_time(size, beta)
-    sabine = acoustics.sabine_decay_time(size, beta)
+    eyring = room_acoustics.eyring_decay_time(size, beta)
+    sabine = room_acoustics.sabine_decay_time(size, beta)
     n = int(1.2 * eyring * RATE)
-    order = int(np.ceil(n / RATE * acoustics.SPEED_OF_SOUND_MPS / min(size)))
+    order = int(np.ceil(n / RATE * room_acoustics.SPEED_OF_SOUND_MPS / min(size)))
     room = Room(np.zeros(3), size, beta)
-    response = acoustics.room_impulse_response(
+    response = room_acoustics.room_impulse_response(
         (1.3, 2.1, 1.1), (3.9, 3.2, 1.7), room, min(order, 60), RATE, n
     )
     high_pass = scipy.signal.butter(2, 100.0, "highpass", fs=RATE, output="sos")
@@ -93,15 +92,15 @@ def test_decay_time_lies_between_eyring_and_sabine(size, beta):
 
 def test_sabine_and_eyring_agree_for_hard_walls():
     hard = 0.999
-    ratio = acoustics.sabine_decay_time(ROOM_SIZE, hard) / acoustics.eyring_decay_time(
+    ratio = room_acoustics.sabine_decay_time(ROOM_SIZE, hard) / room_acoustics.eyring_decay_time(
         ROOM_SIZE, hard
     )
     assert ratio == pytest.approx(1.0, abs=2e-3)
 
 
 def test_sound_falls_with_distance_but_not_within_reach_of_the_mouth():
-    gain = acoustics.distance_gain([0.01, acoustics.NEAR_FIELD_M, 1.0, 2.0])
-    assert gain[0] == gain[1] == 1.0 / acoustics.NEAR_FIELD_M
+    gain = room_acoustics.distance_gain([0.01, room_acoustics.NEAR_FIELD_M, 1.0, 2.0])
+    assert gain[0] == gain[1] == 1.0 / room_acoustics.NEAR_FIELD_M
     assert gain[2:].tolist() == [1.0, 0.5]
 
 
@@ -124,7 +123,7 @@ def test_impossible_rooms_are_refused(lower, size, beta, what):
 
 def test_negative_order_is_refused():
     with pytest.raises(ValueError, match="-1"):
-        acoustics.image_lattice(-1)
+        room_acoustics.image_lattice(-1)
 
 
 def test_clamping_leaves_what_is_inside_alone():

@@ -28,8 +28,7 @@ from paths import HELPERS
 
 from veca_marl.sim.geometry import Pose
 from veca_marl.sim.hearing import StereoReceiver
-from veca_marl.sim.sound import Clip, Noise, Silence, SoundField, Voice
-from veca_marl.sim.sound import room_acoustics as acoustics
+from veca_marl.sim.sound import Clip, Noise, Silence, SoundField, Voice, room_acoustics
 
 QUALITIES = ("hrtf", "stereo", "mono")
 IN_ROOM = {"room": room(), "order": 2}
@@ -43,7 +42,7 @@ def test_stream_equals_the_offline_room_response(order, quality):
     heard = render_still([sound], SOURCES[:1], quality=quality, room=room(), order=order)
     for row, sign in ((0, 1.0), (1, -1.0)):
         ear = HEAD.position + (sign * EAR * HEAD.rotation[:, 1] if quality == "stereo" else 0.0)
-        response = acoustics.room_impulse_response(SOURCES[0], ear, room(), order, RATE, 4000)
+        response = room_acoustics.room_impulse_response(SOURCES[0], ear, room(), order, RATE, 4000)
         expected = scipy.signal.fftconvolve(sound.astype(float), response)[: sound.size]
         assert ratio_db(expected[3000:-LATENCY], heard[row, 3000 + LATENCY :]) > 48.0
 
@@ -52,9 +51,9 @@ def test_hrtf_stream_equals_the_sum_over_images():
     """Each image apart, in the free field, delayed and weakened by hand; then added up."""
     sound = noise(12 * STEP)
     heard = render_still([sound], SOURCES[:1], room=room(), order=2)
-    lattice = acoustics.image_lattice(2)
-    images = acoustics.image_sources(SOURCES[0], room().lower, room().size, lattice)
-    gains = acoustics.image_gains(room().beta, lattice)
+    lattice = room_acoustics.image_lattice(2)
+    images = room_acoustics.image_sources(SOURCES[0], room().lower, room().size, lattice)
+    gains = room_acoustics.image_gains(room().beta, lattice)
     expected = sum(
         gain * render_still([sound], image[None]) for gain, image in zip(gains, images, strict=True)
     )
@@ -166,7 +165,7 @@ def test_silence_returns_exactly_after_a_sound():
 def test_the_last_echo_is_heard_to_its_end():
     """From one end of a corridor to the other, and there and back again."""
     sound = np.concatenate([noise(300), np.zeros(3700, np.float32)])
-    corridor = acoustics.Room((0.0, 0.0, 0.0), (8.0, 1.0, 1.0), 1.0)
+    corridor = room_acoustics.Room((0.0, 0.0, 0.0), (8.0, 1.0, 1.0), 1.0)
     head = Pose(np.array([7.9, 0.5, 0.5]), yaw(0.3))
     scene = {"quality": "mono", "room": corridor, "order": 2}
     source = [(0.1, 0.5, 0.5)]
@@ -206,7 +205,7 @@ def test_sound_arrives_after_its_propagation_delay():
     pulse[0] = 1.0
     for distance in (1.0, 10.0):
         heard = render_still([pulse], [(distance, 0, 0)], STILL, "mono")[0]
-        expected = distance / acoustics.SPEED_OF_SOUND_MPS * RATE + LATENCY
+        expected = distance / room_acoustics.SPEED_OF_SOUND_MPS * RATE + LATENCY
         assert np.abs(heard).argmax() == pytest.approx(expected, abs=0.6)
 
 
@@ -215,7 +214,7 @@ def test_interaural_time_is_that_of_a_head(azimuth):
     """Woodworth above 1.5 kHz, Kuhn's 3a/c sin below 0.8 kHz; positive: the left ear leads."""
     heard = render_still([noise(8 * STEP)], [2.0 * direction(azimuth)], STILL)[:, 3000:]
     lateral = np.arcsin(np.sin(np.deg2rad(azimuth)))
-    travel_s = EAR / acoustics.SPEED_OF_SOUND_MPS
+    travel_s = EAR / room_acoustics.SPEED_OF_SOUND_MPS
     woodworth = travel_s * (lateral + np.sin(lateral))
     assert interaural_time(heard, 1500, 5000) == pytest.approx(woodworth, abs=60e-6)
     kuhn = 3.0 * travel_s * np.sin(lateral)
@@ -226,8 +225,8 @@ def test_interaural_time_is_that_of_a_head(azimuth):
 def test_a_mirrored_scene_gives_mirrored_signals(quality):
     sound = noise(6 * STEP)
     mirror = np.array([1.0, -1.0, 1.0])
-    box = acoustics.Room((-4.0, -3.0, -1.5), (8.0, 6.0, 3.0), (0.7, 0.6, 0.8, 0.5, 0.4, 0.3))
-    mirrored_box = acoustics.Room(box.lower, box.size, box.beta[[0, 1, 3, 2, 4, 5]].tolist())
+    box = room_acoustics.Room((-4.0, -3.0, -1.5), (8.0, 6.0, 3.0), (0.7, 0.6, 0.8, 0.5, 0.4, 0.3))
+    mirrored_box = room_acoustics.Room(box.lower, box.size, box.beta[[0, 1, 3, 2, 4, 5]].tolist())
     source = np.array([1.1, 1.7, 0.3])
     here = render_still([sound], [source], STILL, quality, room=box, order=2)
     there = render_still([sound], [source * mirror], STILL, quality, room=mirrored_box, order=2)
@@ -352,7 +351,7 @@ def test_a_source_that_passes_the_reach_fades_without_a_click():
 def test_large_rooms_have_no_limit():
     pulse = np.zeros(12 * STEP, np.float32)
     pulse[0] = 1.0
-    hall = acoustics.Room((0.0, 0.0, 0.0), (120.0, 20.0, 10.0), 0.5)
+    hall = room_acoustics.Room((0.0, 0.0, 0.0), (120.0, 20.0, 10.0), 0.5)
     head = Pose(np.array([1.0, 5.0, 2.0]), np.eye(3))
     heard = render_still([pulse], [(119.0, 5.0, 2.0)], head, "mono", room=hall, order=0)[0]
     assert np.abs(heard).argmax() == pytest.approx(118.0 / 343.0 * RATE + LATENCY, abs=1.0)

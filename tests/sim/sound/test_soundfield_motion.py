@@ -6,8 +6,7 @@ import scipy.signal
 from listening import RATE, STEP, STILL, make_receiver, noise, ratio_db, render, yaw
 
 from veca_marl.sim.geometry import Pose
-from veca_marl.sim.sound import Clip, SoundField, Voice
-from veca_marl.sim.sound import room_acoustics as acoustics
+from veca_marl.sim.sound import Clip, SoundField, Voice, room_acoustics
 
 LATENCY = SoundField().latency_samples
 
@@ -26,7 +25,7 @@ def test_doppler(speed):
     heard = render([sound], place, "mono", n_steps=n_steps)[0, 4 * STEP : 20 * STEP]
     spectrum = np.abs(np.fft.rfft(heard * np.hanning(heard.size), 1 << 18))
     found = spectrum.argmax() * RATE / (1 << 18)
-    assert found == pytest.approx(pitch * (1 - speed / acoustics.SPEED_OF_SOUND_MPS), abs=0.1)
+    assert found == pytest.approx(pitch * (1 - speed / room_acoustics.SPEED_OF_SOUND_MPS), abs=0.1)
 
 
 def test_moving_source_equals_an_explicit_time_varying_delay():
@@ -44,7 +43,7 @@ def test_moving_source_equals_an_explicit_time_varying_delay():
     heard = render([sound], place, "mono", n_steps=n_steps)[0]
     time = np.arange(1, n + 1) / RATE
     distance = np.linalg.norm(position(time), axis=1)
-    emitted = np.arange(n) - distance / acoustics.SPEED_OF_SOUND_MPS * RATE
+    emitted = np.arange(n) - distance / room_acoustics.SPEED_OF_SOUND_MPS * RATE
     whole = np.rint(emitted).astype(int)
     offset = np.arange(-40, 41) - (emitted - whole)[:, None]
     kernel = np.sinc(offset) * (0.5 + 0.5 * np.cos(np.pi * np.clip(offset / 40.5, -1, 1)))
