@@ -29,7 +29,7 @@ from veca_marl.sim.physics import (
     World,
 )
 from veca_marl.sim.physics.houses.furniture import FURNITURE
-from veca_marl.sim.physics.props.prop_shapes import prop_geoms
+from veca_marl.sim.physics.props.geoms import prop_geoms
 from veca_marl.sim.vision import Camera
 
 mpl.use("Agg")

@@ -8,7 +8,7 @@ from walking import empty_world, film, let_pass, walker_in
 
 from veca_marl.sim.body.walker.collisions import leaves
 from veca_marl.sim.physics import JointCfg, JointKind, LockCfg, PropCfg, PropShape, pybullet
-from veca_marl.sim.physics.props.prop_shapes import swept_radius_m
+from veca_marl.sim.physics.props.geoms import swept_radius_m
 
 JOINTS = {
     "door": JointCfg(axis=(0.0, 0.0, -1.0), anchor_m=(0.02, -0.45, 0.0), range_deg=100.0),

@@ -13,7 +13,7 @@ from veca_marl.fidelity.hearing.ears import (
     scaling_errors,
     two_points_itd_s,
 )
-from veca_marl.sim.body.mounts import MOUNTS_M
+from veca_marl.sim.body.sense_organs import MOUNTS_M
 from veca_marl.sim.hearing import AudioCfg, AudioQuality, HrtfTable, kemar_table
 from veca_marl.sim.hearing.audio_sense import make_receiver
 from veca_marl.sim.hearing.hrtf import kemar_response

@@ -5,7 +5,7 @@ import pytest
 from scipy.special import eval_legendre
 
 from veca_marl.fidelity.hearing.near_field import ALL_HZ, LOW_HZ, errors_db
-from veca_marl.sim.body.mounts import MOUNTS_M
+from veca_marl.sim.body.sense_organs import MOUNTS_M
 from veca_marl.sim.hearing import HrtfReceiver, MonoReceiver, kemar_table
 from veca_marl.sim.hearing.receivers import near_field_gain, sphere_gain
 from veca_marl.sim.sound import NEAR_FIELD_M, SAMPLE_RATE_HZ

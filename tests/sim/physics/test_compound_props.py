@@ -18,8 +18,8 @@ from veca_marl.sim.physics import (
     World,
     pybullet,
 )
+from veca_marl.sim.physics.props.geoms import prop_geoms
 from veca_marl.sim.physics.props.library import fraction_piece
-from veca_marl.sim.physics.props.prop_shapes import prop_geoms
 
 
 def basket(mass_kg=0.0, edge_m=0.4, height_m=0.2, thickness_m=0.02):

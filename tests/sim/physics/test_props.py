@@ -8,7 +8,7 @@ from walking import ball, box, empty_world, let_pass, wall
 
 from veca_marl.sim.geometry import distances_to
 from veca_marl.sim.physics import SIZE_NAMES, PartCfg, PropCfg, PropShape, pybullet
-from veca_marl.sim.physics.props.prop_shapes import (
+from veca_marl.sim.physics.props.geoms import (
     bounding_box,
     lowest_m,
     prop_geoms,

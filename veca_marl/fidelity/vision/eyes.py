@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from veca_marl.fidelity.law import Curve, Law, Mark, Plot, Section, at_least, at_most
 from veca_marl.fidelity.vision.tiny_renderer import TinyRenderer
 from veca_marl.sim.body import make_body
-from veca_marl.sim.body.mounts import EYES
+from veca_marl.sim.body.sense_organs import EYES
 from veca_marl.sim.body.walker import WalkerCfg
 from veca_marl.sim.geometry import Floats, Geom, Scene, Shape, distance, quaternions_to_matrices
 from veca_marl.sim.physics import PlaygroundCfg, PropCfg, PropShape, World

@@ -5,8 +5,8 @@
 
 from veca_marl.sim.body.base import Body
 from veca_marl.sim.body.body_cfg import BodyCfg
-from veca_marl.sim.body.mounts import MOUNTS
 from veca_marl.sim.body.registry import BODIES, make_body, register_body
+from veca_marl.sim.body.sense_organs import MOUNTS
 from veca_marl.sim.body.voice import VoiceKind
 
 __all__ = ["BODIES", "MOUNTS", "Body", "BodyCfg", "VoiceKind", "make_body", "register_body"]

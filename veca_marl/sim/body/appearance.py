@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veca_marl.sim.body.anatomy import Bone, Skeleton, load_skin
-from veca_marl.sim.body.mounts import EYES, MOUNTS_M
+from veca_marl.sim.body.sense_organs import EYES, MOUNTS_M
 from veca_marl.sim.geometry import Geom, Mesh, Primitive, Shape
 
 SKIN = (0.93, 0.74, 0.62)

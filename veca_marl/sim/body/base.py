@@ -18,7 +18,7 @@ from veca_marl.sim.body.action import Action, checked_action
 from veca_marl.sim.body.anatomy import bone_motion, load_skeleton
 from veca_marl.sim.body.appearance import SHIRTS, bone_geoms, dressed_skin
 from veca_marl.sim.body.body_cfg import BodyCfg
-from veca_marl.sim.body.mounts import EYES, Gaze, palm_centre, resting_mount
+from veca_marl.sim.body.sense_organs import EYES, Gaze, palm_centre, resting_mount
 from veca_marl.sim.body.sight import Sight, Visible, interactable_props
 from veca_marl.sim.body.voice import VOICE, voice_spec
 from veca_marl.sim.geometry import Floats, Pose, cross

@@ -9,7 +9,7 @@ from veca_marl.sim.physics.collision_shapes import (
 )
 from veca_marl.sim.physics.contacts import are_in_contact, is_contact, penetration_m
 from veca_marl.sim.physics.houses.furniture_cfg import FurnitureCfg, FurnitureKind
-from veca_marl.sim.physics.houses.generated.random_house import RandomHouseCfg
+from veca_marl.sim.physics.houses.random_house import RandomHouseCfg
 from veca_marl.sim.physics.houses.walls import WallsCfg
 from veca_marl.sim.physics.mover import Mover
 from veca_marl.sim.physics.playground import PLAYGROUND_GENERATORS, PlaygroundCfg

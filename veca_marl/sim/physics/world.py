@@ -13,7 +13,7 @@ from veca_marl.sim.physics.built_state import BuiltState, built_state
 from veca_marl.sim.physics.bullet import pybullet
 from veca_marl.sim.physics.clock import ClockCfg
 from veca_marl.sim.physics.floor import FLOOR_NAME, add_floor
-from veca_marl.sim.physics.impacts.sounds import ImpactSounds
+from veca_marl.sim.physics.impact_sounds import ImpactSounds
 from veca_marl.sim.physics.interactions.registry import check_interactions
 from veca_marl.sim.physics.keys import check_keys
 from veca_marl.sim.physics.mover import Mover

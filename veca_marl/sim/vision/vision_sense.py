@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veca_marl.sim.body import Body
-from veca_marl.sim.body.mounts import EYES
+from veca_marl.sim.body.sense_organs import EYES
 from veca_marl.sim.geometry import Bools, Floats, Scene
 from veca_marl.sim.physics import World
 from veca_marl.sim.sense import Sense

@@ -7,10 +7,10 @@ import math
 import numpy as np
 
 from veca_marl.sim.body.base import Body
-from veca_marl.sim.body.walker.animation.stances import Stance
-from veca_marl.sim.body.walker.collisions.capsule import Capsule
-from veca_marl.sim.body.walker.collisions.footing import Footing, middle, surface_height_m
-from veca_marl.sim.body.walker.collisions.walker_collisions import WalkerCollisions
+from veca_marl.sim.body.walker.capsule import Capsule
+from veca_marl.sim.body.walker.feet import Footing, middle, surface_height_m
+from veca_marl.sim.body.walker.stances import Stance
+from veca_marl.sim.body.walker.walker_collisions import WalkerCollisions
 from veca_marl.sim.geometry import Floats
 from veca_marl.sim.physics import Prop, World
 

@@ -25,14 +25,14 @@ from veca_marl.sim.body.walker.actions.verb_part import (
 from veca_marl.sim.body.walker.actions.walk_commands import WALK_ACTIONS, WalkCommand
 from veca_marl.sim.body.walker.animation.bone_poses import BonePoses
 from veca_marl.sim.body.walker.animation.footsteps import Footsteps
-from veca_marl.sim.body.walker.animation.gait import Gait
-from veca_marl.sim.body.walker.animation.stances import make_stances
-from veca_marl.sim.body.walker.collisions.footing import foot_steps_on
 from veca_marl.sim.body.walker.collisions.separation import Footprint
-from veca_marl.sim.body.walker.collisions.walker_collisions import walker_collisions
+from veca_marl.sim.body.walker.feet import foot_steps_on
+from veca_marl.sim.body.walker.gait import Gait
 from veca_marl.sim.body.walker.ground_motion import GroundMotion
 from veca_marl.sim.body.walker.objects.handling import ObjectHandling
+from veca_marl.sim.body.walker.stances import make_stances
 from veca_marl.sim.body.walker.walker_cfg import WalkerCfg, greatest_speed_mps
+from veca_marl.sim.body.walker.walker_collisions import walker_collisions
 from veca_marl.sim.geometry import Floats
 from veca_marl.sim.physics import Prop, World
 from veca_marl.sim.physics.interactions import Close, Open

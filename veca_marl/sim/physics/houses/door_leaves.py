@@ -8,14 +8,14 @@ from itertools import combinations
 from typing import NamedTuple
 
 from veca_marl.sim.physics.props import PropCfg
-from veca_marl.sim.physics.props.joint_cfg import JointKind, LockCfg
-from veca_marl.sim.physics.props.library.doors import (
+from veca_marl.sim.physics.props.doors import (
     LEAF_M,
     LEAF_WALL_M,
     door_leaf,
     open_reach_m,
     sliding_leaf,
 )
+from veca_marl.sim.physics.props.joint_cfg import JointKind, LockCfg
 from veca_marl.sim.physics.rooms import DoorCfg, LeafCfg
 
 _TOLERANCE_M = 1e-6

@@ -9,7 +9,7 @@ import numpy as np
 
 from veca_marl.sim.geometry import Floats
 from veca_marl.sim.physics.props import JointKind, PropCfg
-from veca_marl.sim.physics.props.prop_shapes import bounding_box, prop_geoms
+from veca_marl.sim.physics.props.geoms import bounding_box, prop_geoms
 from veca_marl.sim.physics.props.rigid_body import prop_inertia
 
 

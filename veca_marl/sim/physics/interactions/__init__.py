@@ -1,7 +1,7 @@
 """Verbs: what bodies do with props when an action names it, and the registry of verbs."""
 
+from veca_marl.sim.body.verbs import Grab, Release
 from veca_marl.sim.physics.interactions.foot import FootInteraction
-from veca_marl.sim.physics.interactions.grab import Grab, Release
 from veca_marl.sim.physics.interactions.grip import Grip
 from veca_marl.sim.physics.interactions.interaction import InteractingBody, Interaction, Verb
 from veca_marl.sim.physics.interactions.kick import Kick

@@ -17,10 +17,7 @@ from veca_marl.sim.geometry import (
 )
 from veca_marl.sim.physics.bullet import pybullet
 from veca_marl.sim.physics.contacts import are_in_contact
-from veca_marl.sim.physics.props.joint import Joint
-from veca_marl.sim.physics.props.prop_body import create_body, pose_reader
-from veca_marl.sim.physics.props.prop_cfg import PropCfg
-from veca_marl.sim.physics.props.prop_shapes import (
+from veca_marl.sim.physics.props.geoms import (
     bounding_box,
     horizontal_radius_m,
     lowest_m,
@@ -28,6 +25,9 @@ from veca_marl.sim.physics.props.prop_shapes import (
     prop_radius_m,
     sound_obstacles,
 )
+from veca_marl.sim.physics.props.joint import Joint
+from veca_marl.sim.physics.props.prop_body import create_body, pose_reader
+from veca_marl.sim.physics.props.prop_cfg import PropCfg
 from veca_marl.sim.physics.props.rest import Awake, Rest
 from veca_marl.sim.physics.props.rigid_body import is_turned
 from veca_marl.sim.physics.props.sound_obstacles import make_obstacles

@@ -20,6 +20,14 @@ from typing import NamedTuple
 
 import numpy as np
 
+from veca_marl.sim.body.anatomy.link_shapes import (
+    Layer,
+    LinkShape,
+    collision_element,
+    one_link_per_shape,
+    rigid_shapes,
+    soft_shapes,
+)
 from veca_marl.sim.body.anatomy.skeleton import Bone, Joint, Skeleton
 from veca_marl.sim.body.anatomy.skin_springs import SkinLayer, is_finger, skin_layer, skin_spring
 from veca_marl.sim.body.anatomy.urdf.elements import (
@@ -30,14 +38,6 @@ from veca_marl.sim.body.anatomy.urdf.elements import (
     principal_axes,
 )
 from veca_marl.sim.body.anatomy.urdf.hulls import as_obj
-from veca_marl.sim.body.anatomy.urdf.shapes import (
-    Layer,
-    LinkShape,
-    collision_element,
-    one_link_per_shape,
-    rigid_shapes,
-    soft_shapes,
-)
 from veca_marl.sim.geometry import Floats, Inertia, Pose, joined_inertia
 
 SKIN_SUFFIX, THUMB_SUFFIX = "__skin", "__thumb"

@@ -6,9 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from veca_marl.sim.body.humanoid.dynamics.factorisation import dense, factorise, solve
-from veca_marl.sim.body.humanoid.dynamics.implicit_torques import write_torques
-from veca_marl.sim.body.humanoid.dynamics.settling import (
+from veca_marl.sim.body.humanoid.body_dynamics import (
     FREE,
     TOUCHED,
     UNDECIDED,
@@ -16,7 +14,10 @@ from veca_marl.sim.body.humanoid.dynamics.settling import (
     begin,
     settle,
 )
-from veca_marl.sim.body.humanoid.dynamics.state import (
+from veca_marl.sim.body.humanoid.dynamics.factorisation import dense, factorise, solve
+from veca_marl.sim.body.humanoid.dynamics.tree import LinkTree
+from veca_marl.sim.body.humanoid.implicit_torques import write_torques
+from veca_marl.sim.body.humanoid.link_tree import (
     BodyState,
     JointForces,
     JointLimits,
@@ -26,7 +27,6 @@ from veca_marl.sim.body.humanoid.dynamics.state import (
     empty_solver_state,
     empty_state,
 )
-from veca_marl.sim.body.humanoid.dynamics.tree import LinkTree
 from veca_marl.sim.geometry import Floats
 
 

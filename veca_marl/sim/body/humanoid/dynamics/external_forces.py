@@ -5,8 +5,8 @@ from __future__ import annotations
 from numba import njit
 
 from veca_marl.sim.body.humanoid.dynamics.factorisation import add_product
-from veca_marl.sim.body.humanoid.dynamics.state import BodyState, JointForces, SolverState
 from veca_marl.sim.body.humanoid.dynamics.tree import LinkTree
+from veca_marl.sim.body.humanoid.link_tree import BodyState, JointForces, SolverState
 
 
 @njit(cache=True)

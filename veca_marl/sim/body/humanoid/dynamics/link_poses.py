@@ -11,8 +11,8 @@ from veca_marl.sim.body.humanoid.dynamics.small_vectors import (
     cross_into,
     multiply_into,
 )
-from veca_marl.sim.body.humanoid.dynamics.state import LinkArrays
 from veca_marl.sim.body.humanoid.dynamics.tree import LinkTree
+from veca_marl.sim.body.humanoid.link_tree import LinkArrays
 from veca_marl.sim.geometry import Floats
 
 

@@ -6,7 +6,7 @@ import math
 
 from veca_marl.sim.body.anatomy import Skeleton, forward_kinematics
 from veca_marl.sim.body.walker.animation.neck import Neck
-from veca_marl.sim.body.walker.animation.stances import Stance
+from veca_marl.sim.body.walker.stances import Stance
 from veca_marl.sim.geometry import Floats, SceneObject
 
 

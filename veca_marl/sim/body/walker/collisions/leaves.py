@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 from veca_marl.sim.geometry import Floats, horizontal_distance
 from veca_marl.sim.physics import Prop
+from veca_marl.sim.physics.props.geoms import swept_radius_m
 from veca_marl.sim.physics.props.joint import Joint
-from veca_marl.sim.physics.props.prop_shapes import swept_radius_m
 
 
 class Leaves:

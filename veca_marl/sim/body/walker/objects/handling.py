@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from veca_marl.sim.body.walker.animation.gait import Gait
+from veca_marl.sim.body.walker.gait import Gait
 from veca_marl.sim.body.walker.ground_motion import GroundMotion
-from veca_marl.sim.body.walker.objects.hand import Hand
+from veca_marl.sim.body.walker.handling import Hand
 from veca_marl.sim.body.walker.objects.kicks import foot_reaches, kicked_velocity
 from veca_marl.sim.body.walker.walker_cfg import WalkerCfg
 from veca_marl.sim.geometry import Floats

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from veca_marl.sim.physics.houses.generated.division import Rectangle
+from veca_marl.sim.physics.houses.floor_division import Rectangle
 from veca_marl.sim.physics.rooms import DoorCfg, RoomCfg
 
 DOOR_DEPTH_M = 0.7

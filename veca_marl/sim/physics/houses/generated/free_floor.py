@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from veca_marl.sim.geometry import Bools, Floats
-from veca_marl.sim.physics.houses.generated.division import Rectangle
+from veca_marl.sim.physics.houses.floor_division import Rectangle
 
 CELL_M = 0.05
 

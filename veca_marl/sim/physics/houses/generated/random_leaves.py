@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from veca_marl.sim.physics.houses.generated.division import Rectangle
+from veca_marl.sim.physics.houses.floor_division import Rectangle
 from veca_marl.sim.physics.houses.generated.door_fronts import (
     floor_of,
     front,

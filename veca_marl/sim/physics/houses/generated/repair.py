@@ -14,7 +14,7 @@ from veca_marl.sim.physics.houses.door_leaves import leaf_name
 from veca_marl.sim.physics.houses.footprints import Footprint, footprints
 from veca_marl.sim.physics.houses.furniture import furniture_prop
 from veca_marl.sim.physics.houses.generated.house_data import HouseData
-from veca_marl.sim.physics.houses.generated.walker_floor import (
+from veca_marl.sim.physics.houses.house_repair import (
     NODE_M,
     WITH_LEAVES,
     WalkerFloor,

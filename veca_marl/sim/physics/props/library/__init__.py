@@ -1,9 +1,9 @@
 """Configurations of props with several parts or with joints, by name."""
 
+from veca_marl.sim.physics.props.containers import cupboard_with_drawer
+from veca_marl.sim.physics.props.doors import door_leaf, sliding_leaf
 from veca_marl.sim.physics.props.library.containers import basket, chest
-from veca_marl.sim.physics.props.library.cupboards import cupboard_with_drawer
-from veca_marl.sim.physics.props.library.doors import door_leaf, sliding_leaf
-from veca_marl.sim.physics.props.library.toys import ToyKind, fraction_piece, key, toy
+from veca_marl.sim.physics.props.toys import ToyKind, fraction_piece, key, toy
 
 __all__ = [
     "ToyKind",

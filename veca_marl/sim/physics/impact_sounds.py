@@ -11,8 +11,8 @@ from veca_marl.sim.physics.clock import ClockCfg
 from veca_marl.sim.physics.impacts.cfg import ImpactCfg
 from veca_marl.sim.physics.impacts.joint_stops import JointStop, joint_stop
 from veca_marl.sim.physics.props import Prop, PropCfg, PropShape
+from veca_marl.sim.physics.props.geoms import bounding_box, prop_geoms
 from veca_marl.sim.physics.props.joint import Joint
-from veca_marl.sim.physics.props.prop_shapes import bounding_box, prop_geoms
 from veca_marl.sim.sound import SoundField
 from veca_marl.sim.sound.modal_synthesis import (
     MATERIALS,

@@ -10,9 +10,9 @@ import numpy as np
 
 from veca_marl.sim.body.anatomy import Skeleton, Soles
 from veca_marl.sim.body.anatomy.undersides import Underside
-from veca_marl.sim.body.walker.animation.gait import Gait
 from veca_marl.sim.body.walker.animation.neck import Neck
-from veca_marl.sim.body.walker.collisions.capsule import Capsule, lying_capsule, upright_capsule
+from veca_marl.sim.body.walker.capsule import Capsule, lying_capsule, upright_capsule
+from veca_marl.sim.body.walker.gait import Gait
 from veca_marl.sim.body.walker.walker_cfg import WalkerCfg
 from veca_marl.sim.geometry import Floats
 from veca_marl.sim.physics import World

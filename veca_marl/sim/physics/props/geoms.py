@@ -8,11 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from veca_marl.sim.geometry import (
-    Floats,
-    Geom,
-    Shape,
-)
+from veca_marl.sim.geometry import Floats, Geom, Shape
 from veca_marl.sim.physics.props.doll import doll_parts
 from veca_marl.sim.physics.props.joint_cfg import JointCfg, JointKind
 from veca_marl.sim.physics.props.part_cfg import PartCfg

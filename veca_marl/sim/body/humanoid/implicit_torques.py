@@ -11,13 +11,8 @@ import numpy as np
 from numba import njit
 
 from veca_marl.sim.body.humanoid.dynamics.factorisation import factorise, solve
-from veca_marl.sim.body.humanoid.dynamics.state import (
-    BodyState,
-    JointForces,
-    JointLimits,
-    SolverState,
-)
 from veca_marl.sim.body.humanoid.dynamics.tree import LinkTree
+from veca_marl.sim.body.humanoid.link_tree import BodyState, JointForces, JointLimits, SolverState
 
 # inertia of the damper that holds a joint at its limit, relative to the joint's own
 _STOP_INERTIA = 1e6

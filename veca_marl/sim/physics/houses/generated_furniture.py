@@ -8,9 +8,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from veca_marl.sim.physics.houses.floor_division import Rectangle
 from veca_marl.sim.physics.houses.furniture import FURNITURE
 from veca_marl.sim.physics.houses.furniture_cfg import FurnitureCfg, FurnitureKind
-from veca_marl.sim.physics.houses.generated.division import Rectangle
 from veca_marl.sim.physics.houses.generated.door_fronts import (
     floor_of,
     front,

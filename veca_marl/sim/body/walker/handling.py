@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from veca_marl.sim.body.walker.collisions.capsule import Capsule
+from veca_marl.sim.body.walker.capsule import Capsule
 from veca_marl.sim.body.walker.objects.free_place import way_out
 from veca_marl.sim.geometry import Floats, rotation_about_vertical
 from veca_marl.sim.physics import Prop

@@ -17,18 +17,18 @@ from numba import njit
 
 from veca_marl.sim.body.humanoid.dynamics.external_forces import predict, write_external_forces
 from veca_marl.sim.body.humanoid.dynamics.factorisation import add_product, factorise, solve
-from veca_marl.sim.body.humanoid.dynamics.implicit_torques import write_speeds
-from veca_marl.sim.body.humanoid.dynamics.inertial_forces import write_bias, write_mass_matrix
 from veca_marl.sim.body.humanoid.dynamics.link_poses import locate_links
 from veca_marl.sim.body.humanoid.dynamics.small_vectors import add_cross
-from veca_marl.sim.body.humanoid.dynamics.state import (
+from veca_marl.sim.body.humanoid.dynamics.tree import LinkTree
+from veca_marl.sim.body.humanoid.implicit_torques import write_speeds
+from veca_marl.sim.body.humanoid.inertial_forces import write_bias, write_mass_matrix
+from veca_marl.sim.body.humanoid.link_tree import (
     BodyState,
     JointForces,
     JointLimits,
     LinkArrays,
     SolverState,
 )
-from veca_marl.sim.body.humanoid.dynamics.tree import LinkTree
 from veca_marl.sim.geometry import Floats, quaternions_to_matrices
 
 # impulse on the whole body in a physics step below which nothing may touch it; its weight gives

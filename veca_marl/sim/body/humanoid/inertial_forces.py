@@ -6,8 +6,8 @@ import numpy as np
 from numba import njit
 
 from veca_marl.sim.body.humanoid.dynamics.small_vectors import add_cross
-from veca_marl.sim.body.humanoid.dynamics.state import LinkArrays
 from veca_marl.sim.body.humanoid.dynamics.tree import LinkTree
+from veca_marl.sim.body.humanoid.link_tree import LinkArrays
 from veca_marl.sim.geometry import Floats
 
 
