@@ -18,7 +18,7 @@ import numpy as np
 from veca_marl.config import compose
 from veca_marl.envs.core.game import Game
 from veca_marl.envs.core.task import Player
-from veca_marl.sim.body.walker.actions.walk_commands import MOVES
+from veca_marl.sim.body.walker.actions import MOVES
 from veca_marl.sim.geometry import Floats
 
 GAMES = 100

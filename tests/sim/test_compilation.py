@@ -3,8 +3,8 @@
 from numba import njit
 from numba.core.event import install_listener
 
-from veca_marl.sim import compilation
-from veca_marl.sim.compilation import CompilationNotice, announce_compilation
+from veca_marl.sim import kernel_cache as compilation
+from veca_marl.sim.kernel_cache import CompilationNotice, announce_compilation
 
 
 def compile_new_kernel(module):

@@ -1,4 +1,4 @@
-"""The folder in which numba caches the compiled kernels of the simulator.
+"""The folder in which numba caches the compiled kernels, and a message while they are compiled.
 
 numba invalidates a cached kernel when the file that defines it changes, but not when a function
 that it calls in another file does, although that function is compiled into it. The cache folder
@@ -18,11 +18,15 @@ import hashlib
 import logging
 import os
 import shutil
+import sys
 import tempfile
+from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numba
+from numba.core.event import Event, Listener, register
 
 KEPT_FOLDERS = 8
 """Caches of other versions of the sources that are kept; the least recently used are deleted."""
@@ -110,3 +114,38 @@ def _last_use_s(folder: Path) -> float:
         return folder.stat().st_mtime
     except OSError:  # another process has deleted it
         return 0.0
+
+
+class CompilationNotice(Listener):
+    """Writes one line when the first kernel of this package is compiled, not loaded from a cache.
+
+    Args:
+        write: Function that takes the line.
+    """
+
+    def __init__(self, write: Callable[[str], object]) -> None:
+        self._write = write
+        self._is_written = False
+
+    def on_start(self, event: Event) -> None:
+        """See `numba.core.event.Listener`."""
+        module: str = event.data["dispatcher"].py_func.__module__
+        if not self._is_written and module.startswith("veca_marl."):
+            self._is_written = True
+            self._write("compiling kernels (once; they are cached) ...")
+
+    def on_end(self, event: Event) -> None:
+        """See `numba.core.event.Listener`."""
+
+
+@cache
+def announce_compilation() -> None:
+    """Install the notice in this process; further calls have no effect.
+
+    It listens to events of numba's compiler: calls of compiled kernels take no additional time.
+    """
+    register("numba:compile", CompilationNotice(_to_stderr))
+
+
+def _to_stderr(line: str) -> None:
+    print(line, file=sys.stderr)

@@ -7,10 +7,11 @@ import pytest
 from verbs import begin, do, seeing, toy
 from walking import ball, box, empty_world, let_pass, wall
 
+from veca_marl.sim.body.verbs import PutInto
 from veca_marl.sim.physics import PropCfg, PropShape
-from veca_marl.sim.physics.interactions.put_into import PutInto
-from veca_marl.sim.physics.props.joint_cfg import LockCfg
-from veca_marl.sim.physics.props.library import basket, chest, door_leaf, sliding_leaf
+from veca_marl.sim.physics.props.containers import basket, chest
+from veca_marl.sim.physics.props.doors import door_leaf, sliding_leaf
+from veca_marl.sim.physics.props.joint import LockCfg
 
 BASKET = ("basket", (0.3, 0.3, 0.02), 0.0, (0.6, 0.0, 0.01))  # a plate: what is put on it stays
 

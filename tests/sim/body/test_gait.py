@@ -7,8 +7,7 @@ import pytest
 from walking import ball, empty_world, let_pass, walker_in
 
 from veca_marl.sim.body.anatomy import Soles, load_skeleton
-from veca_marl.sim.body.walker.animation.neck import Neck
-from veca_marl.sim.body.walker.gait import Gait
+from veca_marl.sim.body.walker.gait import Gait, Neck
 
 SKELETON = load_skeleton()
 SOLES = Soles(SKELETON)

@@ -7,7 +7,7 @@ import pytest
 from verbs import begin, seeing, toy
 from walking import ball, box, empty_world, walker_in
 
-from veca_marl.sim.body.sight import distance_m, interactable_props
+from veca_marl.sim.body.sense_organs import distance_m, interactable_props
 from veca_marl.sim.physics import PropCfg, PropShape, pybullet
 from veca_marl.sim.physics.props import follow_physics
 

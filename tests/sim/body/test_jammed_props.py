@@ -9,7 +9,7 @@ import pytest
 from walking import ball, box, empty_world, walker_in, wall
 
 from veca_marl.sim.physics import JointCfg, PropCfg, PropShape
-from veca_marl.sim.physics.props.library import fraction_piece, key
+from veca_marl.sim.physics.props.toys import fraction_piece, key
 
 WALL_M = 1.55  # the near face of the wall
 SPEED_MPS = 1.0

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from walking import empty_world, film, let_pass, walker_in
 
-from veca_marl.sim.body.walker.collisions import leaves
+from veca_marl.sim.body.walker import obstacles as leaves
 from veca_marl.sim.physics import JointCfg, JointKind, LockCfg, PropCfg, PropShape, pybullet
 from veca_marl.sim.physics.props.geoms import swept_radius_m
 

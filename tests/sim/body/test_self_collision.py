@@ -6,8 +6,8 @@ from walking import empty_world, let_pass
 
 from veca_marl.sim.body.anatomy import load_skeleton
 from veca_marl.sim.body.humanoid import Humanoid, HumanoidCfg, JointActionKind
+from veca_marl.sim.body.humanoid.articulation import limb, may_collide
 from veca_marl.sim.body.humanoid.postures import Posture, posture_angles
-from veca_marl.sim.body.humanoid.self_collision import limb, may_collide
 from veca_marl.sim.physics import pybullet
 
 BONES = [bone.name for bone in load_skeleton().bones]

@@ -10,7 +10,7 @@ from walking import STEP_S, ball, box, empty_world, let_pass, walker_in, wall
 
 from veca_marl.sim.body.walker import WalkCommand, WalkerCfg
 from veca_marl.sim.hearing import AudioCfg, AudioQuality, AudioSense
-from veca_marl.sim.physics.props.library import fraction_piece, key
+from veca_marl.sim.physics.props.toys import fraction_piece, key
 from veca_marl.sim.sound import SoundCfg, SoundKind
 
 

@@ -6,7 +6,7 @@ from walking import empty_world, walker_in
 
 from veca_marl.sim.body import VoiceKind
 from veca_marl.sim.body.humanoid import JointActionKind, JointCommand
-from veca_marl.sim.body.walker.actions.walk_commands import MOVES, WalkActionKind
+from veca_marl.sim.body.walker.actions import MOVES, WalkActionKind
 from veca_marl.sim.hearing import AudioCfg, AudioSense
 from veca_marl.sim.sound import Call
 

@@ -8,7 +8,7 @@ from walking import ball, empty_world, let_pass, walker_in, wall
 
 from veca_marl.sim.body import MOUNTS
 from veca_marl.sim.body.walker import WalkerCfg
-from veca_marl.sim.body.walker.actions.walk_commands import MOVES, WALK_ACTIONS, WalkActionKind
+from veca_marl.sim.body.walker.actions import MOVES, WALK_ACTIONS, WalkActionKind
 from veca_marl.sim.hearing import AudioCfg, AudioSense
 from veca_marl.sim.physics import ClockCfg
 from veca_marl.sim.senses import SensesCfg, make_senses

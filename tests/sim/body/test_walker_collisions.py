@@ -9,7 +9,7 @@ import pytest
 from walking import empty_world, let_pass, walker_in, wall
 
 from veca_marl.sim.body.humanoid import Detail, Humanoid, HumanoidCfg
-from veca_marl.sim.body.walker.collisions.separation import separate
+from veca_marl.sim.body.walker.walker_collisions import separate
 
 RADIUS_M = 0.11
 SLACK_M = 0.003

@@ -19,7 +19,7 @@ from veca_marl.sim.physics import (
     pybullet,
 )
 from veca_marl.sim.physics.props.geoms import prop_geoms
-from veca_marl.sim.physics.props.library import fraction_piece
+from veca_marl.sim.physics.props.toys import fraction_piece
 
 
 def basket(mass_kg=0.0, edge_m=0.4, height_m=0.2, thickness_m=0.02):

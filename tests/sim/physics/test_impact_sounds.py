@@ -18,9 +18,7 @@ from veca_marl.sim.physics import (
     World,
     pybullet,
 )
-from veca_marl.sim.physics.impact_sounds import prop_modes
-from veca_marl.sim.physics.impacts.cfg import ImpactCfg
-from veca_marl.sim.physics.impacts.joint_stops import joint_stop
+from veca_marl.sim.physics.impact_sounds import ImpactCfg, joint_stop, prop_modes
 from veca_marl.sim.physics.props import PartCfg, PropCfg, PropShape
 from veca_marl.sim.sound.modal_synthesis import SPHERE_ROOTS, Material
 from veca_marl.sim.sound.room_acoustics import SPEED_OF_SOUND_MPS

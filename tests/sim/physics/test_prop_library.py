@@ -7,17 +7,9 @@ import pytest
 from walking import empty_world, let_pass, wall
 
 from veca_marl.sim.physics import LockCfg
-from veca_marl.sim.physics.props.library import (
-    ToyKind,
-    basket,
-    chest,
-    cupboard_with_drawer,
-    door_leaf,
-    fraction_piece,
-    key,
-    sliding_leaf,
-    toy,
-)
+from veca_marl.sim.physics.props.containers import basket, chest, cupboard_with_drawer
+from veca_marl.sim.physics.props.doors import door_leaf, sliding_leaf
+from veca_marl.sim.physics.props.toys import ToyKind, fraction_piece, key, toy
 
 
 def assert_at_rest(world, seconds=1.0):

@@ -8,7 +8,7 @@ from skins import add_body, pose, random_angles, random_turn
 from touching import SPREAD, Stage, dense, of_bone
 
 from veca_marl.sim.body.anatomy import load_skeleton
-from veca_marl.sim.body.humanoid.self_collision import may_collide
+from veca_marl.sim.body.humanoid.articulation import may_collide
 from veca_marl.sim.geometry import Shape
 from veca_marl.sim.touch import TouchCfg, load_taxels, taxel_positions
 from veca_marl.sim.touch.penetration import empty_workspace, read_taxels

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from veca_marl.sim.body import Body
-from veca_marl.sim.body.voice import VOICE
+from veca_marl.sim.body.action import VOICE
 from veca_marl.sim.body.walker import WalkCommand, Walker
 from veca_marl.sim.physics.interactions import NO_VERB
 from veca_marl.sim.sound import Call

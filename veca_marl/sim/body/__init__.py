@@ -3,10 +3,9 @@
 `Body` is the base class; `make_body` makes one from its configuration; `register_body` adds a kind.
 """
 
-from veca_marl.sim.body.base import Body
-from veca_marl.sim.body.body_cfg import BodyCfg
+from veca_marl.sim.body.action import VoiceKind
+from veca_marl.sim.body.base import Body, BodyCfg
 from veca_marl.sim.body.registry import BODIES, make_body, register_body
 from veca_marl.sim.body.sense_organs import MOUNTS
-from veca_marl.sim.body.voice import VoiceKind
 
 __all__ = ["BODIES", "MOUNTS", "Body", "BodyCfg", "VoiceKind", "make_body", "register_body"]

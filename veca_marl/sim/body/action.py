@@ -1,14 +1,16 @@
-"""Checks of actions: a mapping from the names of a body's action parts to their values."""
+"""Checks of actions, which map names of action parts to values, and the part `voice`."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from enum import Enum
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from veca_marl.sim.spec import ArraySpec
+from veca_marl.sim.sound import Call
+from veca_marl.sim.spec import ArraySpec, discrete_spec
 
 Action = Mapping[str, NDArray[Any]]
 
@@ -66,3 +68,20 @@ def _check_vector(part: str, spec: ArraySpec, value: NDArray[Any]) -> None:
 def _listed(names: tuple[str, ...]) -> str:
     """Return the names of a short vector for a message."""
     return f" ({', '.join(names)})" if 0 < len(names) <= 8 else ""
+
+
+VOICE = "voice"  # the part's name
+
+
+class VoiceKind(Enum):
+    """Whether a body's action has a part `voice`. `make_sound` works with either."""
+
+    silent = "silent"
+    calls = "calls"
+
+
+def voice_spec(kind: VoiceKind) -> dict[str, ArraySpec]:
+    """Return the part of the action that chooses a call; empty for a body that has none."""
+    if kind is VoiceKind.silent:
+        return {}
+    return {VOICE: discrete_spec(tuple(call.name for call in Call))}

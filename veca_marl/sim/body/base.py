@@ -1,4 +1,4 @@
-"""The base class of all bodies: 47 bones in the scene, a head with sense organs, a voice.
+"""The base class of all bodies and its parameters: 47 bones in the scene, a head, a voice.
 
 Senses, tasks and experts know bodies by this class. A subclass moves the bones: `Walker` by
 kinematics, `Humanoid` by physics.
@@ -9,22 +9,70 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from enum import Enum
 from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from veca_marl.sim.body.action import Action, checked_action
+from veca_marl.sim.body.action import VOICE, Action, VoiceKind, checked_action, voice_spec
 from veca_marl.sim.body.anatomy import bone_motion, load_skeleton
 from veca_marl.sim.body.appearance import SHIRTS, bone_geoms, dressed_skin
-from veca_marl.sim.body.body_cfg import BodyCfg
-from veca_marl.sim.body.sense_organs import EYES, Gaze, palm_centre, resting_mount
-from veca_marl.sim.body.sight import Sight, Visible, interactable_props
-from veca_marl.sim.body.voice import VOICE, voice_spec
+from veca_marl.sim.body.sense_organs import (
+    EYES,
+    Gaze,
+    Sight,
+    Visible,
+    interactable_props,
+    palm_centre,
+    resting_mount,
+)
 from veca_marl.sim.geometry import Floats, Pose, cross
 from veca_marl.sim.physics import Prop, World
 from veca_marl.sim.sound import CALLS, Call, Voice, call_waveform
 from veca_marl.sim.spec import ArraySpec
+
+
+@dataclass
+class BodyCfg:
+    """Parameters that all bodies have.
+
+    Attributes:
+        eye_range_deg: Largest rotation of the eyes in the head, to each side and up and down, below
+            90.
+        voice: Whether the action has a part `voice` that chooses a call.
+        call_pause_s: Silence after each call, at most 60 s. No other call can begin meanwhile, and
+            other sounds of the mouth wait.
+        interaction_range_m: Objects can be interacted with if their distance from the head is
+            smaller. The paper's main text has 1.5 m, its table of functions 2.5 m.
+    """
+
+    # fields that were added later, with the value that bodies had before
+    formerly: ClassVar[dict[str, Any]] = {"call_pause_s": 0.0}
+
+    eye_range_deg: float = 50.0
+    voice: VoiceKind = VoiceKind.silent
+    call_pause_s: float = 0.0
+    interaction_range_m: float = 1.5
+
+    def __post_init__(self) -> None:
+        """Check that all numbers are finite and not negative."""
+        self._check_choices(voice=VoiceKind)
+        for name, value in vars(self).items():
+            if isinstance(value, (int, float)) and not (math.isfinite(value) and value >= 0):
+                raise ValueError(f"body.{name}={value} must be a finite number, 0 or more")
+        if self.eye_range_deg >= 90.0:
+            raise ValueError(f"body.eye_range_deg={self.eye_range_deg} must be below 90")
+        if self.call_pause_s > 60.0:
+            raise ValueError(f"body.call_pause_s={self.call_pause_s} must be at most 60")
+
+    def _check_choices(self, **kinds: type[Enum]) -> None:
+        """Raise `ValueError` for a field that is no member of its enumeration."""
+        for name, kind in kinds.items():
+            if not isinstance(getattr(self, name), kind):
+                choices = [choice.name for choice in kind]
+                raise ValueError(f"body.{name}={getattr(self, name)!r}; there are {choices}")
 
 
 class Body(ABC):

@@ -1,17 +1,18 @@
 """The PyBullet world, its clock, its props and playgrounds."""
 
-from veca_marl.sim.physics.bullet import pybullet
-from veca_marl.sim.physics.clock import ClockCfg
-from veca_marl.sim.physics.collision_shapes import (
+from veca_marl.sim.physics.bullet import (
+    are_in_contact,
     create_collision_shape,
+    is_contact,
+    penetration_m,
+    pybullet,
     shape_arguments,
     urdf_geometry,
 )
-from veca_marl.sim.physics.contacts import are_in_contact, is_contact, penetration_m
-from veca_marl.sim.physics.houses.furniture_cfg import FurnitureCfg, FurnitureKind
+from veca_marl.sim.physics.clock import ClockCfg
+from veca_marl.sim.physics.houses.furniture import FurnitureCfg, FurnitureKind
 from veca_marl.sim.physics.houses.random_house import RandomHouseCfg
 from veca_marl.sim.physics.houses.walls import WallsCfg
-from veca_marl.sim.physics.mover import Mover
 from veca_marl.sim.physics.playground import PLAYGROUND_GENERATORS, PlaygroundCfg
 from veca_marl.sim.physics.props import (
     SIZE_NAMES,
@@ -26,7 +27,7 @@ from veca_marl.sim.physics.props import (
     StandingProp,
 )
 from veca_marl.sim.physics.rooms import DoorCfg, LeafCfg, RoomCfg
-from veca_marl.sim.physics.world import GRAVITY_MPS2, World
+from veca_marl.sim.physics.world import GRAVITY_MPS2, Mover, World
 
 __all__ = [
     "JointCfg",

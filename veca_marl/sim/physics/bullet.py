@@ -1,10 +1,21 @@
-"""PyBullet, imported without the line about its build that it prints to every terminal."""
+"""PyBullet, imported without its message about its build; its shapes, contacts and rays.
+
+Bullet lists points before two bodies touch, from a distance on that depends on their sizes and on
+`ClockCfg.contact_share`.
+"""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+import tempfile
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from veca_marl.sim.geometry import Floats, Polyhedron, Primitive, Shape, matrix_to_quaternion
 
 
 @contextmanager
@@ -23,4 +34,220 @@ def _silent_stderr() -> Iterator[None]:
 with _silent_stderr():
     import pybullet
 
-__all__ = ["pybullet"]
+
+HULL_MARGIN_M = 0.001
+"""Bullet adds this margin to every hull (`gDefaultCollisionMargin` of its importer)."""
+
+_BULLET_SHAPES: dict[Shape, int] = {
+    Shape.SPHERE: pybullet.GEOM_SPHERE,
+    Shape.BOX: pybullet.GEOM_BOX,
+    Shape.CYLINDER: pybullet.GEOM_CYLINDER,
+    Shape.CAPSULE: pybullet.GEOM_CAPSULE,
+    Shape.POLYHEDRON: pybullet.GEOM_MESH,
+}
+
+
+def shape_arguments(shape: Shape, size: Sequence[float]) -> dict[str, Any]:
+    """Return the arguments that describe a primitive to PyBullet's `createVisualShape`.
+
+    Args:
+        shape: Its shape.
+        size: As in `Primitive`; further entries are not used.
+    """
+    numbers = [float(value) for value in size]
+    arguments: dict[str, Any] = {"shapeType": _BULLET_SHAPES[shape]}
+    if shape is Shape.BOX:
+        return arguments | {"halfExtents": numbers}
+    arguments |= {"radius": numbers[0]}
+    return arguments if shape is Shape.SPHERE else arguments | {"length": numbers[1]}
+
+
+def create_collision_shape(client: int, primitives: Sequence[Primitive]) -> int:
+    """Create one collision shape of one or several primitives on the same frame; return its id.
+
+    Bullet reads hulls from files only when there are several shapes; the files are deleted. A body
+    with such a shape needs a visual shape, see `unused_visual_shape`.
+    """
+    with _folder_of_hulls(primitives) as folder:
+        arguments = [_with_file(part, folder / f"{i}.obj") for i, part in enumerate(primitives)]
+        shape = pybullet.createCollisionShapeArray(
+            shapeTypes=[each["shapeType"] for each in arguments],
+            radii=[each.get("radius", 0.0) for each in arguments],
+            halfExtents=[each.get("halfExtents", [0.0, 0.0, 0.0]) for each in arguments],
+            lengths=[each.get("length", 0.0) for each in arguments],
+            fileNames=[each.get("fileName", "") for each in arguments],
+            meshScales=[[1.0, 1.0, 1.0]] * len(arguments),
+            collisionFramePositions=[np.asarray(part.offset).tolist() for part in primitives],
+            collisionFrameOrientations=[
+                matrix_to_quaternion(np.asarray(part.rotation)).tolist() for part in primitives
+            ],
+            physicsClientId=client,
+        )
+    return int(shape)
+
+
+@contextmanager
+def _folder_of_hulls(primitives: Sequence[Primitive]) -> Iterator[Path]:
+    """Make a folder for the files of hulls and delete it afterwards.
+
+    Without hulls no folder is made: most primitives have none, and making one takes longer than
+    creating the shape. The path is not used then.
+    """
+    if any(part.hull for part in primitives):
+        with tempfile.TemporaryDirectory() as folder:
+            yield Path(folder)
+    else:
+        yield Path()
+
+
+def unused_visual_shape(client: int, primitives: Sequence[Primitive]) -> int:
+    """Return the id of a visual shape for a body with these primitives; -1 if it needs none.
+
+    For a body without one Bullet draws the collision shape itself, and would read the files of
+    hulls again, which are deleted. Its pictures are not used: eyes see the scene.
+    """
+    if not any(part.hull for part in primitives):
+        return -1
+    return int(
+        pybullet.createVisualShape(pybullet.GEOM_SPHERE, radius=0.001, physicsClientId=client)
+    )
+
+
+def _with_file(primitive: Primitive, path: Path) -> dict[str, Any]:
+    """Return the arguments of a primitive for PyBullet; a hull is written to a file first."""
+    if primitive.hull is None:
+        return shape_arguments(primitive.shape, primitive.size)
+    path.write_text(_as_obj(primitive.hull.grown(-HULL_MARGIN_M)))
+    return {"shapeType": pybullet.GEOM_MESH, "fileName": str(path)}
+
+
+def _as_obj(polyhedron: Polyhedron) -> str:
+    """Return a polyhedron as Wavefront OBJ."""
+    rows = [f"v {x:.9g} {y:.9g} {z:.9g}" for x, y, z in polyhedron.vertices]
+    rows += [f"f {a + 1} {b + 1} {c + 1}" for a, b, c in polyhedron.triangles]
+    return "\n".join(rows) + "\n"
+
+
+def urdf_geometry(primitive: Primitive) -> str:
+    """Return the element below ``<geometry>`` that describes a primitive; its pose is elsewhere.
+
+    Raises:
+        ValueError: For a polyhedron, which URDF reads from a file.
+    """
+    if primitive.hull is not None:
+        raise ValueError("a polyhedron has no URDF element of numbers")
+    if primitive.shape is Shape.BOX:
+        edges = " ".join(f"{2.0 * half:.12g}" for half in primitive.size)
+        return f'<box size="{edges}"/>'
+    radius = f'radius="{primitive.radius:.9g}"'
+    if primitive.shape is Shape.SPHERE:
+        return f"<sphere {radius}/>"
+    return f'<{primitive.shape.name.lower()} {radius} length="{primitive.length:.9g}"/>'
+
+
+_DISTANCE, _NORMAL_FORCE = 8, 9  # entries of Bullet's contact points
+
+
+def is_contact(point: tuple[Any, ...]) -> bool:
+    """Return whether two bodies touch at a contact point of the last physics step.
+
+    They do where their surfaces meet, or where they pressed on each other in that step: the force
+    of a contact may have parted them by its end.
+
+    Args:
+        point: A contact point of Bullet.
+    """
+    return bool(point[_DISTANCE] <= 0.0 or point[_NORMAL_FORCE] > 0.0)
+
+
+def penetration_m(client: int, one: int, other: int) -> float:
+    """Return how deep two bodies penetrate each other where they are now, in metres; 0 if apart.
+
+    Collision filters have no influence, and neither body needs a mass: Bullet looks for no contacts
+    between two that have none.
+
+    Args:
+        client: The PyBullet client.
+        one: PyBullet's id of a body.
+        other: That of another one.
+    """
+    points = pybullet.getClosestPoints(one, other, 0.0, physicsClientId=client)
+    return max((-point[_DISTANCE] for point in points), default=0.0)
+
+
+def are_in_contact(client: int, one: int, other: int) -> bool:
+    """Return whether two bodies touched each other in the last physics step.
+
+    Args:
+        client: The PyBullet client.
+        one: PyBullet's id of a body.
+        other: That of the other one.
+    """
+    points = pybullet.getContactPoints(one, other, physicsClientId=client)
+    return any(map(is_contact, points))
+
+
+_MOST_HITS = 8  # a ray is followed through so many things
+_LEAST_COSINE = 0.3  # of the angle between a ray and a normal: at flatter angles it is used instead
+
+
+def free_path_m(
+    client: int, start: Floats, end: Floats, clearance_m: float, ignored_id: int
+) -> float:
+    """Return how far a ball can move along a line before it touches something solid.
+
+    The ray of its centre decides: at a plane that it meets at an angle the distance is exact, and
+    things that the ray misses do not count.
+
+    Args:
+        client: PyBullet's client id.
+        start: ``(3,)`` metres, outside of all things.
+        end: ``(3,)`` metres.
+        clearance_m: Radius of the ball.
+        ignored_id: PyBullet's id of a body that does not count.
+
+    Returns:
+        Metres from `start`, at most the distance to `end`; negative if the ball has to move back.
+    """
+    length_m = float(np.linalg.norm(end - start))
+    way = (end - start) / length_m
+    longer = start + (length_m + clearance_m / _LEAST_COSINE) * way
+    for hit in _hits(client, start, longer):
+        if hit.body_id != ignored_id:
+            cosine = max(abs(float(hit.normal @ way)), _LEAST_COSINE)
+            return min(length_m, hit.distance_m - clearance_m / cosine)
+    return length_m
+
+
+def surface_m(client: int, body_id: int, start: Floats, end: Floats) -> float:
+    """Return the distance from `start` to the surface of one body on the way to `end`.
+
+    Args:
+        client: PyBullet's client id.
+        body_id: PyBullet's id of the body; other things do not count.
+        start: ``(3,)`` metres, outside of it.
+        end: ``(3,)`` metres.
+
+    Returns:
+        Metres; the distance to `end` if the ray misses the body.
+    """
+    its = (hit.distance_m for hit in _hits(client, start, end) if hit.body_id == body_id)
+    return next(its, float(np.linalg.norm(end - start)))
+
+
+class _Hit(NamedTuple):
+    body_id: int
+    distance_m: float
+    normal: Floats
+
+
+def _hits(client: int, start: Floats, end: Floats) -> Iterator[_Hit]:
+    """Yield what a ray hits, the nearest first."""
+    length_m = float(np.linalg.norm(end - start))
+    for number in range(_MOST_HITS):
+        body_id, _, share, _, normal = pybullet.rayTestBatch(
+            [start.tolist()], [end.tolist()], reportHitNumber=number, physicsClientId=client
+        )[0]
+        if body_id == -1:
+            return
+        yield _Hit(body_id, float(share) * length_m, np.array(normal))

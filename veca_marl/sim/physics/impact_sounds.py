@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
 
 from veca_marl.sim.geometry import Floats
 from veca_marl.sim.physics.bullet import pybullet
 from veca_marl.sim.physics.clock import ClockCfg
-from veca_marl.sim.physics.impacts.cfg import ImpactCfg
-from veca_marl.sim.physics.impacts.joint_stops import JointStop, joint_stop
-from veca_marl.sim.physics.props import Prop, PropCfg, PropShape
+from veca_marl.sim.physics.props import JointKind, Prop, PropCfg, PropShape
 from veca_marl.sim.physics.props.geoms import bounding_box, prop_geoms
 from veca_marl.sim.physics.props.joint import Joint
+from veca_marl.sim.physics.props.rigid_body import prop_inertia
 from veca_marl.sim.sound import SoundField
 from veca_marl.sim.sound.modal_synthesis import (
     MATERIALS,
@@ -22,6 +25,73 @@ from veca_marl.sim.sound.modal_synthesis import (
     bar_modes,
     sphere_modes,
 )
+
+
+@dataclass(frozen=True)
+class JointStop:
+    """What stops the motion of a joint, at the point of the prop that is farthest from a hinge.
+
+    Attributes:
+        reach: Speed of that point (m/s) per speed of the coordinate: its distance in metres from
+            the axis of a hinge, 1 for a slide.
+        impulse: Impulse (N s) that stops the prop, per speed of the coordinate: the moment of
+            inertia about the axis divided by the distance for a hinge, the mass for a slide.
+    """
+
+    reach: float
+    impulse: float
+
+
+def joint_stop(cfg: PropCfg) -> JointStop:
+    """Return the stop of a prop with a joint, at either end of its range."""
+    joint = cfg.joint
+    if joint is None:
+        raise ValueError(f"prop {cfg.name!r} has no joint")
+    if joint.kind is JointKind.slide:
+        return JointStop(1.0, cfg.mass_kg)
+    axis = np.asarray(joint.axis, np.float64)
+    axis = axis / np.linalg.norm(axis)
+    anchor = np.asarray(joint.anchor_m, np.float64)
+    geoms = prop_geoms(cfg)
+    corners = np.array(list(itertools.product(*np.transpose(bounding_box(geoms)))))
+    reach = float(_distances_m(corners - anchor, axis).max())
+    inertia = prop_inertia(geoms, cfg.mass_kg)
+    (centre_m,) = _distances_m((inertia.centre - anchor)[None], axis)
+    moment = float(axis @ inertia.matrix @ axis) + cfg.mass_kg * float(centre_m) ** 2
+    return JointStop(reach, moment / reach)
+
+
+def _distances_m(points: Floats, axis: Floats) -> Floats:
+    """Return the distances ``(P,)`` of points ``(P, 3)`` from an axis through the origin."""
+    distances: Floats = np.linalg.norm(np.cross(points, axis), axis=1)
+    return distances
+
+
+@dataclass
+class ImpactCfg:
+    """Sounds of impacts.
+
+    Attributes:
+        present: Whether things that hit each other or the floor, doors and drawers that meet the
+            end of their range, and steps of walkers are heard.
+        gain_per_ns: Sound pressure at 1 m per newton second of impulse.
+        min_speed_mps: Least change of speed in one physics step that is heard, beside that by
+            gravity, and least landing speed of a foot. A contact is silent if its impulse would
+            change the speed of the lighter thing by less, or if neither thing changes by more. The
+            stop of a joint is silent below that speed of the farthest point of the prop.
+    """
+
+    present: bool = False
+    gain_per_ns: float = 0.2
+    min_speed_mps: float = 0.1
+
+    def __post_init__(self) -> None:
+        """Check the numbers."""
+        for name in ("gain_per_ns", "min_speed_mps"):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value > 0.0):
+                raise ValueError(f"impacts.{name}={value} must be positive and finite")
+
 
 _GRAVITY_MPS2 = 9.81
 _EDGES_ARE_SIZES = (PropShape.box, PropShape.wall)

@@ -11,13 +11,10 @@ from dataclasses import dataclass, field
 from itertools import combinations
 
 from veca_marl.registry import Registry
-from veca_marl.sim.physics.houses.door_leaves import leaf_name
-from veca_marl.sim.physics.houses.furniture import furniture_prop
-from veca_marl.sim.physics.houses.furniture_cfg import FurnitureCfg
-from veca_marl.sim.physics.houses.furniture_places import check_furniture
-from veca_marl.sim.physics.houses.leaf_swing import check_swings
+from veca_marl.sim.physics.houses.door_leaves import check_swings, leaf_name
+from veca_marl.sim.physics.houses.furniture import FurnitureCfg, check_furniture, furniture_prop
 from veca_marl.sim.physics.houses.walls import WallsCfg, floor_coverings, wall_props
-from veca_marl.sim.physics.impacts.cfg import ImpactCfg
+from veca_marl.sim.physics.impact_sounds import ImpactCfg
 from veca_marl.sim.physics.props import PropCfg, PropShape, check_appearance
 from veca_marl.sim.physics.rooms import DoorCfg, RoomCfg
 from veca_marl.sim.sound import House, Room

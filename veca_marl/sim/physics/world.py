@@ -1,22 +1,21 @@
-"""A world: a PyBullet client, its clock, its named props, its sound and the bodies in it."""
+"""A world: a PyBullet client, its clock, floor, named props and sound, and the bodies in it."""
 
 from __future__ import annotations
 
 import itertools
 import weakref
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
-from veca_marl.sim.geometry import Scene
-from veca_marl.sim.physics.built_state import BuiltState, built_state
+from veca_marl.sim.geometry import Geom, Scene, Shape
 from veca_marl.sim.physics.bullet import pybullet
 from veca_marl.sim.physics.clock import ClockCfg
-from veca_marl.sim.physics.floor import FLOOR_NAME, add_floor
 from veca_marl.sim.physics.impact_sounds import ImpactSounds
-from veca_marl.sim.physics.interactions.registry import check_interactions
-from veca_marl.sim.physics.keys import check_keys
-from veca_marl.sim.physics.mover import Mover
+from veca_marl.sim.physics.interactions import check_interactions
 from veca_marl.sim.physics.playground import PlaygroundCfg, make_house
 from veca_marl.sim.physics.props import (
     Prop,
@@ -27,6 +26,116 @@ from veca_marl.sim.physics.props import (
 )
 from veca_marl.sim.physics.props.joint import Joint
 from veca_marl.sim.sound import SoundField, make_sound
+from veca_marl.sim.sound.sounds import Sound, Source
+
+
+@dataclass(frozen=True)
+class BuiltSound:
+    """What one source emitted when its world was frozen.
+
+    Attributes:
+        source: The source.
+        sound: Its sound; a source may emit another one later.
+        muted: Whether it was muted.
+    """
+
+    source: Source
+    sound: Sound
+    muted: bool
+
+
+@dataclass(frozen=True)
+class BuiltState:
+    """Colours and sounds of a frozen world, which episodes may change.
+
+    Attributes:
+        colours: ``(S, 3)`` of all surfaces of the scene.
+        sounds: One entry for each source.
+    """
+
+    colours: NDArray[np.float32]
+    sounds: tuple[BuiltSound, ...]
+
+    def restore(self, scene: Scene) -> None:
+        """Set the colours of the scene and the sounds of the sources to those stored here."""
+        scene.surfaces.colours[:] = self.colours
+        for built in self.sounds:
+            built.source.sound, built.source.muted = built.sound, built.muted
+
+
+def built_state(scene: Scene, sources: Mapping[str, Source]) -> BuiltState:
+    """Return the present colours of a scene and the present sounds of the sources."""
+    sounds = tuple(BuiltSound(source, source.sound, source.muted) for source in sources.values())
+    return BuiltState(scene.surfaces.colours.copy(), sounds)
+
+
+FLOOR_NAME = "floor"
+_FLOOR_THICKNESS_M = 0.1
+
+
+def add_floor(client: int, scene: Scene, playground: PlaygroundCfg) -> int:
+    """Add the floor to Bullet and to the scene; return its id in Bullet.
+
+    Its friction and restitution are 1: Bullet multiplies them by those of what touches it.
+    """
+    x, y = playground.floor_size_m
+    half = (x / 2, y / 2, _FLOOR_THICKNESS_M / 2)
+    geom = Geom(
+        Shape.BOX,
+        half,
+        offset=(*playground.floor_centre_m, -half[2]),
+        colour=playground.floor_colour,
+        checker_m=playground.floor_checker_m,
+    )
+    scene.add_object(FLOOR_NAME, [[geom]])
+    plane = pybullet.createCollisionShape(pybullet.GEOM_PLANE, physicsClientId=client)
+    floor_id: int = pybullet.createMultiBody(0, plane, physicsClientId=client)
+    pybullet.changeDynamics(
+        floor_id, -1, lateralFriction=1.0, restitution=1.0, physicsClientId=client
+    )
+    return floor_id
+
+
+def check_keys(props: Mapping[str, Prop]) -> None:
+    """Check that the key of each lock is a prop that can be carried to it.
+
+    Args:
+        props: All props of a world by name.
+
+    Raises:
+        ValueError: If a key is no prop, or a fixed one; the message lists the loose props.
+    """
+    for name, prop in props.items():
+        lock = None if prop.cfg.joint is None else prop.cfg.joint.lock
+        if lock is None or not lock.key:
+            continue
+        key = props.get(lock.key)
+        if key is None or key.fixed:
+            fault = "is no prop" if key is None else "is a fixed prop"
+            loose = sorted(
+                each for each, one in props.items() if not one.fixed and one.joint is None
+            )
+            raise ValueError(
+                f"prop {name!r}: the key {lock.key!r} of its lock {fault}; choose one of the loose "
+                f"props {loose}, or an empty name for a lock that no prop opens"
+            )
+
+
+class Mover(Protocol):
+    """A body, or a group of bodies, that acts in a world: see `World.attach`."""
+
+    def reset(self) -> None:
+        """Return to the state at construction, after Bullet's state has been restored."""
+
+    def before_step(self) -> None:
+        """Prepare an agent step, before its first physics step."""
+
+    def before_substep(self, substep_s: float) -> None:
+        """Move or apply forces, before each physics step of `substep_s` seconds."""
+
+    def write_frames(self) -> None:
+        """Write the frames of the scene and the positions of sounds, once per agent step."""
+
 
 GRAVITY_MPS2 = 9.81
 _CONTACT_BODY, _CONTACT_DISTANCE = 2, 8  # entries of Bullet's contact points

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from veca_marl.sim.body import Body
 from veca_marl.sim.body.anatomy import Skeleton, binding_pose, load_skeleton
 from veca_marl.sim.body.appearance import SKIN, bone_geoms, dressed_skin
-from veca_marl.sim.body.humanoid.self_collision import may_collide
+from veca_marl.sim.body.humanoid.articulation import may_collide
 from veca_marl.sim.geometry import Bools, Floats, GeomTable, Scene, SceneObject
 from veca_marl.sim.physics import World
 from veca_marl.sim.sense import Sense

@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veca_marl.sim.body import Body
-from veca_marl.sim.body.sense_organs import EYES
-from veca_marl.sim.body.sight import Visible
+from veca_marl.sim.body.sense_organs import EYES, Visible
 from veca_marl.sim.geometry import Pose, Scene
 from veca_marl.sim.vision.camera import Camera
 from veca_marl.sim.vision.vision_sense import EyeViews, VisionCfg

@@ -15,8 +15,8 @@ from veca_marl.sim.body.anatomy import (
     skin_layer,
     skin_spring,
 )
-from veca_marl.sim.body.anatomy.urdf.hulls import MARGIN_M
-from veca_marl.sim.body.anatomy.urdf.robot import _Writer
+from veca_marl.sim.body.anatomy.link_shapes import MARGIN_M
+from veca_marl.sim.body.anatomy.urdf import _Writer
 from veca_marl.sim.body.humanoid import Detail, Humanoid, HumanoidCfg
 from veca_marl.sim.geometry import Shape
 from veca_marl.sim.physics import pybullet

@@ -4,12 +4,15 @@ import numpy as np
 import pytest
 
 from veca_marl.sim.physics import RandomHouseCfg
-from veca_marl.sim.physics.houses.furniture import FURNITURE
-from veca_marl.sim.physics.houses.furniture_cfg import FurnitureCfg, FurnitureKind
-from veca_marl.sim.physics.houses.generated.door_fronts import floor_of, in_front, turns_into
-from veca_marl.sim.physics.houses.generated.house_data import HouseData
-from veca_marl.sim.physics.houses.generated.repair import repaired
-from veca_marl.sim.physics.houses.house_repair import NODE_M, WITH_LEAVES, WalkerLaw
+from veca_marl.sim.physics.houses.furniture import FURNITURE, FurnitureCfg, FurnitureKind
+from veca_marl.sim.physics.houses.generated_doors import floor_of, in_front, turns_into
+from veca_marl.sim.physics.houses.house_repair import (
+    NODE_M,
+    WITH_LEAVES,
+    HouseData,
+    WalkerLaw,
+    repaired,
+)
 from veca_marl.sim.physics.houses.walls import WallsCfg
 from veca_marl.sim.physics.rooms import DoorCfg, RoomCfg
 

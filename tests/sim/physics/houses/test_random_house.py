@@ -12,8 +12,8 @@ from omegaconf import OmegaConf
 from veca_marl.config import compose_node, to_config
 from veca_marl.config.stored import body_names, typed
 from veca_marl.sim.physics import RandomHouseCfg, World
-from veca_marl.sim.physics.houses.generated.door_fronts import floor_of, open_leaf, turns_into
-from veca_marl.sim.physics.houses.generated.free_floor import FloorNeeds
+from veca_marl.sim.physics.houses.floor_division import FloorNeeds
+from veca_marl.sim.physics.houses.generated_doors import floor_of, open_leaf, turns_into
 
 WIDE_M = 0.15
 FEW_AND_MANY = pytest.mark.parametrize(

@@ -17,7 +17,7 @@ from veca_marl.envs.core.game import Game, Outcome
 from veca_marl.envs.core.game_cfg import GameCfg
 from veca_marl.envs.core.task import SOLVED
 from veca_marl.envs.rendering.spectator import Spectator
-from veca_marl.sim.compilation import announce_compilation
+from veca_marl.sim.kernel_cache import announce_compilation
 
 
 class VecaEnv(FastStepEnv):

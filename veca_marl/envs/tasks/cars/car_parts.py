@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from veca_marl.sim.physics import PropShape
-from veca_marl.sim.physics.props.part_cfg import PartCfg
+from veca_marl.sim.physics.props.prop_cfg import PartCfg
 
 LENGTH_M, WIDTH_M, HEIGHT_M = 0.34, 0.2, 0.16
 _WHEEL_M, _TYRE_M = 0.04, 0.03  # radius and width of a wheel

@@ -21,8 +21,7 @@ from veca_marl.envs.tasks.player_starts import place_player
 from veca_marl.sim.body.walker import WalkerCfg
 from veca_marl.sim.geometry import Floats
 from veca_marl.sim.physics import DoorCfg, LockCfg, PlannedProp, PlaygroundCfg, RoomCfg
-from veca_marl.sim.physics.props.doors import LEAF_M, LEAF_WALL_M
-from veca_marl.sim.physics.props.library import door_leaf
+from veca_marl.sim.physics.props.doors import LEAF_M, LEAF_WALL_M, door_leaf
 from veca_marl.sim.sound import SoundCfg, SoundKind
 
 OPEN = 0.8

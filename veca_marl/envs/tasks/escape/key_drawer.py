@@ -12,7 +12,8 @@ import numpy as np
 from veca_marl.envs.tasks.navigation.floors.clearance import clearances_m
 from veca_marl.sim.geometry import Floats, rotation_about_vertical
 from veca_marl.sim.physics import PlannedProp, Prop, PropCfg, RoomCfg, StandingProp, World
-from veca_marl.sim.physics.props.library import cupboard_with_drawer, key
+from veca_marl.sim.physics.props.containers import cupboard_with_drawer
+from veca_marl.sim.physics.props.toys import key
 from veca_marl.sim.sound import SoundCfg
 
 _DEPTH_M, _WIDTH_M, _HEIGHT_M = 0.4, 0.45, 0.5

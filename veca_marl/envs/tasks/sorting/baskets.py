@@ -9,7 +9,8 @@ from typing import NamedTuple
 from veca_marl.envs.tasks.sorting.items import Colour, place_on_floor
 from veca_marl.sim.geometry import Floats, rotation_about_vertical
 from veca_marl.sim.physics import Prop, PropCfg, PropShape, World
-from veca_marl.sim.physics.props.library import ToyKind, basket, toy
+from veca_marl.sim.physics.props.containers import basket
+from veca_marl.sim.physics.props.toys import ToyKind, toy
 
 _EDGE_M, _HEIGHT_M = 0.4, 0.15
 _STAND_M = (0.16, 0.3)  # edge and height of the stand of a sample

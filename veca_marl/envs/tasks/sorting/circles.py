@@ -10,7 +10,7 @@ from typing import NamedTuple
 from veca_marl.envs.tasks.sorting.items import Colour, built_at, place_on_floor
 from veca_marl.sim.geometry import Floats
 from veca_marl.sim.physics import Prop, PropCfg, PropShape, World
-from veca_marl.sim.physics.props.library import fraction_piece
+from veca_marl.sim.physics.props.toys import fraction_piece
 
 RADIUS_M = 0.2
 _RIM_M, _PLATE_M, _PIECE_M = 0.02, 0.02, 0.04

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from veca_marl.sim.geometry import Floats
 from veca_marl.sim.physics import Prop, World
-from veca_marl.sim.physics.props.library import ToyKind, toy
+from veca_marl.sim.physics.props.toys import ToyKind, toy
 
 Colour = tuple[float, float, float]
 

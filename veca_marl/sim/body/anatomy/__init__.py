@@ -1,18 +1,21 @@
 """The skeleton, its kinematics, its skin mesh and its URDF."""
 
-from veca_marl.sim.body.anatomy.bone_motion import bone_motion
-from veca_marl.sim.body.anatomy.bone_tables import limit_sources, load_skeleton
-from veca_marl.sim.body.anatomy.kinematics import forward_kinematics, rotate_about_axis
-from veca_marl.sim.body.anatomy.skeleton import Bone, Joint, Skeleton
-from veca_marl.sim.body.anatomy.skin_mesh import binding_pose, load_skin
-from veca_marl.sim.body.anatomy.skin_springs import (
+from veca_marl.sim.body.anatomy.kinematics import (
+    Soles,
+    Underside,
+    bone_motion,
+    forward_kinematics,
+    rotate_about_axis,
+)
+from veca_marl.sim.body.anatomy.link_shapes import (
     SkinLayer,
     SkinSpring,
     is_finger,
     skin_layer,
     skin_spring,
 )
-from veca_marl.sim.body.anatomy.undersides import Soles, Underside
+from veca_marl.sim.body.anatomy.skeleton import Bone, Joint, Skeleton, limit_sources, load_skeleton
+from veca_marl.sim.body.anatomy.skin_mesh import binding_pose, load_skin
 from veca_marl.sim.body.anatomy.urdf import BodyFiles, Build, body_files, bone_of
 
 __all__ = [

@@ -1,13 +1,29 @@
-"""The skeleton: 47 bones and 82 hinge degrees of freedom. `load_skeleton` reads it."""
+"""The skeleton: 47 bones and 82 hinges, read from `data/bones.csv` and `data/dofs.csv`.
+
+Zero angles are the neutral standing posture: arms hanging, palms to the thighs. The frame of the
+pelvis is the base.
+"""
 
 from __future__ import annotations
 
+import csv
+import functools
+import math
+import re
 from dataclasses import dataclass
+from importlib.resources import files
 
 import numpy as np
 from numpy.typing import NDArray
 
-from veca_marl.sim.geometry import Floats, Inertia, Primitive, primitive_inertia
+from veca_marl.sim.geometry import (
+    Floats,
+    Inertia,
+    Primitive,
+    Shape,
+    capsule_between,
+    primitive_inertia,
+)
 
 
 @dataclass(frozen=True)
@@ -104,3 +120,112 @@ class Skeleton:
                 return index
         names = [f"{j.bone}.{j.label}" for j in self.joints]
         raise KeyError(f"no joint {bone}.{label}; there are {names}")
+
+
+_AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+_CAPSULE = re.compile(r"capsule a=\((.+?)\) b=\((.+?)\) r=(\S+)")
+_BOX = re.compile(r"box c=\((.+?)\) half=\((.+?)\)")
+
+
+@functools.cache
+def load_skeleton() -> Skeleton:
+    """Return the skeleton, read once per process. It must not be changed."""
+    joints = _joints()
+    bones = _bones(joints)
+    return Skeleton(
+        bones=bones,
+        joints=joints,
+        parents=np.array([bone.parent for bone in bones]),
+        origins=np.array([bone.origin for bone in bones]),
+        rest_rotations=np.array([bone.rest_rotation for bone in bones]),
+        joint_axes=np.array([joint.axis for joint in joints]),
+        joint_slices=np.array([(b.first_joint, b.first_joint + b.joint_count) for b in bones]),
+    )
+
+
+def _vector(text: str) -> tuple[float, float, float]:
+    x, y, z = (float(part) for part in text.split())
+    return x, y, z
+
+
+def _axis(text: str) -> tuple[float, float, float]:
+    sign = -1.0 if text[0] == "-" else 1.0
+    x, y, z = _AXES[text[1]]
+    return sign * x, sign * y, sign * z
+
+
+def _rotation(roll: float, pitch: float, yaw: float) -> Floats:
+    """Return Rz(yaw) Ry(pitch) Rx(roll), angles in radians (the URDF convention)."""
+    cr, sr, cp, sp = math.cos(roll), math.sin(roll), math.cos(pitch), math.sin(pitch)
+    cy, sy = math.cos(yaw), math.sin(yaw)
+    return np.array(
+        [
+            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+            [-sp, cp * sr, cp * cr],
+        ]
+    )
+
+
+def _colliders(text: str) -> tuple[Primitive, ...]:
+    parts: list[Primitive] = []
+    for part in text.split(" + "):
+        if capsule := _CAPSULE.fullmatch(part):
+            start, end, radius = capsule.groups()
+            parts.append(capsule_between(_vector(start), _vector(end), float(radius)))
+        elif box := _BOX.fullmatch(part):
+            centre, half = box.groups()
+            parts.append(Primitive(Shape.BOX, _vector(half), offset=_vector(centre)))
+        else:
+            raise ValueError(f"bones.csv: cannot read the collider {part!r}")
+    return tuple(parts)
+
+
+def _rows(name: str) -> list[dict[str, str]]:
+    with (files("veca_marl") / "data" / name).open(encoding="utf-8") as table:
+        return list(csv.DictReader(table))
+
+
+def _joints() -> tuple[Joint, ...]:
+    return tuple(
+        Joint(
+            row["bone"],
+            row["label"],
+            _axis(row["axis_in_bone_parent_frame"]),
+            math.radians(float(row["lo_deg"])),
+            math.radians(float(row["hi_deg"])),
+            float(row["tau_Nm"]),
+        )
+        for row in _rows("dofs.csv")
+    )
+
+
+def limit_sources() -> list[tuple[str, str]]:
+    """Return the sources of each joint's lower and upper limit (``docs/reference/body.md``)."""
+    return [(row["lo_from"], row["hi_from"]) for row in _rows("dofs.csv")]
+
+
+def _bones(joints: tuple[Joint, ...]) -> tuple[Bone, ...]:
+    bones: list[Bone] = []
+    names: dict[str, int] = {"": -1}
+    for row in _rows("bones.csv"):
+        name = row["bone"]
+        own = [index for index, joint in enumerate(joints) if joint.bone == name]
+        angles = (math.radians(float(row[f"rest_{a}_deg"])) for a in ("roll", "pitch", "yaw"))
+        bones.append(
+            Bone(
+                name=name,
+                parent=names[row["parent"]],
+                origin=(float(row["origin_x"]), float(row["origin_y"]), float(row["origin_z"])),
+                rest_rotation=_rotation(*angles),
+                tip=(float(row["tip_x"]), float(row["tip_y"]), float(row["tip_z"])),
+                mass_kg=float(row["mass_kg"]),
+                skin_thickness_m=float(row["d_max_mm"]) / 1000.0,
+                skin_force_n=float(row["skin_force_to_bone_N"]),
+                colliders=_colliders(row["bone_colliders"]),
+                first_joint=own[0] if own else 0,
+                joint_count=len(own),
+            )
+        )
+        names[name] = len(bones) - 1
+    return tuple(bones)

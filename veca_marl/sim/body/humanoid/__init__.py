@@ -1,7 +1,6 @@
 """The joint-level body: an articulated multibody driven by joint torques."""
 
-from veca_marl.sim.body.humanoid.humanoid import Humanoid
-from veca_marl.sim.body.humanoid.humanoid_cfg import Detail, HumanoidCfg
+from veca_marl.sim.body.humanoid.humanoid import Detail, Humanoid, HumanoidCfg
 from veca_marl.sim.body.humanoid.joint_control import (
     SATURATION_RAD,
     JointActionKind,

@@ -1,8 +1,19 @@
-"""The joint-level body: 47 bones on 82 hinges, moved by physics and driven by joint torques."""
+"""The joint-level body and its parameters: 47 bones on 82 hinges, driven by joint torques.
+
+A torque command is constant for one agent step (40 ms). A proportional controller as stiff as the
+joints are strong, evaluated with the angles at the start of the step, is unstable; evaluated with
+the predicted angles at its end it is stable at any stiffness: "stable PD control", Tan, Liu & Turk
+2011, IEEE Computer Graphics and Applications 31(4). The prediction contains weight and contact
+forces: without them the stiffness at rest would be K / (1 + h K / D) instead of K, with stiffness
+K, damping D and horizon h; that is a fourth of K for a horizon of one agent step.
+"""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import Enum
 from typing import Any, ClassVar
 
 import numpy as np
@@ -10,10 +21,8 @@ from numpy.typing import NDArray
 
 from veca_marl.sim.body.action import Action, checked_action
 from veca_marl.sim.body.anatomy import Build, Underside, forward_kinematics
-from veca_marl.sim.body.base import Body
-from veca_marl.sim.body.body_cfg import BodyCfg
+from veca_marl.sim.body.base import Body, BodyCfg
 from veca_marl.sim.body.humanoid.articulation import Articulation
-from veca_marl.sim.body.humanoid.humanoid_cfg import Detail, HumanoidCfg
 from veca_marl.sim.body.humanoid.joint_control import (
     JOINT_ACTIONS,
     SATURATION_RAD,
@@ -30,11 +39,87 @@ from veca_marl.sim.body.humanoid.postures import (
     perturbed,
     posture_angles,
 )
-from veca_marl.sim.body.humanoid.predicted_angles import predicted_angles
-from veca_marl.sim.body.humanoid.self_contacts import self_contacts
 from veca_marl.sim.geometry import Floats, Pose, heading_rad
-from veca_marl.sim.physics import World
+from veca_marl.sim.physics import World, is_contact, pybullet
 from veca_marl.sim.spec import ArraySpec, continuous_spec
+
+
+class Detail(Enum):
+    """Level of detail: with all fingers, or with straight fingers fixed to the hands."""
+
+    full = "full"
+    mitten = "mitten"
+
+
+@dataclass
+class HumanoidCfg(BodyCfg):
+    """Parameters of the joint-level body.
+
+    Attributes:
+        detail: `full` moves 82 joints; `mitten`, a body with fixed fingers, moves 40, and an agent
+            step takes half to two thirds of the time. Actions, senses and names are the same: a
+            `mitten` ignores the actions of its fingers.
+        action: Normalised torques, target angles, or increments of target angles.
+        joints: Which joints the action moves: all 82, the 40 that are not in fingers, or the 14 of
+            both arms.
+        strength: Fraction of the torques in the table of joints, above 0 and at most 1.
+        friction: Lateral friction of the skin.
+    """
+
+    detail: Detail = Detail.full
+    action: JointActionKind = JointActionKind.torque
+    joints: JointChoice = JointChoice.all
+    strength: float = 1.0
+    friction: float = 0.8
+
+    def __post_init__(self) -> None:
+        """Check the choices and the numbers."""
+        super().__post_init__()
+        self._check_choices(detail=Detail, action=JointActionKind, joints=JointChoice)
+        if not 0.0 < self.strength <= 1.0:
+            raise ValueError(f"body.strength={self.strength} must be above 0 and at most 1")
+
+
+def predicted_angles(
+    body: Articulation, targets: Floats, stiffness: Floats, horizon_s: float
+) -> Floats:
+    """Return the joint angles ``(82,)``, rad, after springs have acted.
+
+    Weight and contact forces are those that are predicted for the next physics step.
+
+    Args:
+        body: The body, with the state of the last `read`.
+        targets: ``(82,)`` rad, the rest angles of the springs.
+        stiffness: ``(82,)`` N m/rad.
+        horizon_s: Duration.
+    """
+    moving = body.moving
+    spring, damping, speeds = stiffness[moving], body.damping[moving], body.speeds[moving]
+    stretch = targets[moving] - body.angles[moving] - horizon_s * speeds
+    forces = body.dynamics.forces.predicted - body.dynamics.state.bias
+    forces[6:] += spring * stretch - damping * speeds
+    resistance = horizon_s * damping + horizon_s**2 * spring
+    accelerations = body.dynamics.solve_with(resistance, forces)[6:]
+    angles = body.angles.copy()
+    angles[moving] += horizon_s * speeds + horizon_s**2 * accelerations
+    return angles
+
+
+def self_contacts(client: int, body_id: int, bones: Mapping[int, str]) -> set[tuple[str, str]]:
+    """Return the pairs of bones that touched each other in the last physics step.
+
+    Args:
+        client: The PyBullet client.
+        body_id: Bullet's id of the body.
+        bones: Bone of each link that has a collider.
+
+    Returns:
+        Each pair in the order of their names.
+    """
+    points = pybullet.getContactPoints(body_id, body_id, physicsClientId=client)
+    pairs = [(bones[p[3]], bones[p[4]]) for p in points if is_contact(p)]
+    return {(min(pair), max(pair)) for pair in pairs}
+
 
 JOINTS = "joints"  # the part of the action that moves
 

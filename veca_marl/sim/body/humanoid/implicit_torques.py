@@ -1,5 +1,8 @@
 """Joint torques with which Bullet's explicit step has the result of an implicit one.
 
+A mass matrix is zero where two rows are on different branches of the tree. Its lower half is stored
+without these zeros: element d of row i is that of column ``paths[i, d]``, see `LinkTree`.
+
 Joint damping is large relative to the inertia of light links: an explicit damping torque would be
 unstable at physics steps of 8 ms. The torques here are those of springs and dampers at the end of
 the step, see `write_torques`.
@@ -9,10 +12,76 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
-from veca_marl.sim.body.humanoid.dynamics.factorisation import factorise, solve
-from veca_marl.sim.body.humanoid.dynamics.tree import LinkTree
-from veca_marl.sim.body.humanoid.link_tree import BodyState, JointForces, JointLimits, SolverState
+from veca_marl.sim.body.humanoid.link_tree import (
+    BodyState,
+    JointForces,
+    JointLimits,
+    LinkTree,
+    SolverState,
+)
+from veca_marl.sim.geometry import Floats
+
+Indices = NDArray[np.int64]
+
+
+@njit(cache=True)
+def factorise(depths: Indices, paths: Indices, matrix: Floats) -> None:
+    """Replace the lower half of a matrix M by L with ``M = L^T L`` (Featherstone 2008, table 6.3).
+
+    Args:
+        depths: ``(m,)``, see `LinkTree`.
+        paths: ``(m, depth)``.
+        matrix: ``(m, depth)`` lower half of a positive definite matrix.
+    """
+    for k in range(depths.shape[0] - 1, -1, -1):
+        last = depths[k] - 1
+        root = np.sqrt(matrix[k, last])
+        matrix[k, last] = root
+        for d in range(last):
+            matrix[k, d] /= root
+        for d in range(last):
+            share, row = matrix[k, d], paths[k, d]
+            for e in range(d + 1):
+                matrix[row, e] -= share * matrix[k, e]
+
+
+@njit(cache=True)
+def solve(depths: Indices, paths: Indices, factor: Floats, x: Floats) -> None:
+    """Replace the right side ``(m,)`` by the solution, with the factor from `factorise`."""
+    for i in range(depths.shape[0] - 1, -1, -1):
+        last = depths[i] - 1
+        x[i] /= factor[i, last]
+        for d in range(last):
+            x[paths[i, d]] -= factor[i, d] * x[i]
+    for i in range(depths.shape[0]):
+        last = depths[i] - 1
+        for d in range(last):
+            x[i] -= factor[i, d] * x[paths[i, d]]
+        x[i] /= factor[i, last]
+
+
+@njit(cache=True)
+def add_product(depths: Indices, paths: Indices, matrix: Floats, x: Floats, out: Floats) -> None:
+    """Add the product of a matrix and a vector ``(m,)`` to `out`."""
+    for i in range(depths.shape[0]):
+        last = depths[i] - 1
+        out[i] += matrix[i, last] * x[i]
+        for d in range(last):
+            column = paths[i, d]
+            out[i] += matrix[i, d] * x[column]
+            out[column] += matrix[i, d] * x[i]
+
+
+def dense(depths: Indices, paths: Indices, matrix: Floats) -> Floats:
+    """Return a stored matrix as an array ``(m, m)``."""
+    full = np.zeros((len(depths), len(depths)))
+    for row, depth in enumerate(depths):
+        columns = paths[row, :depth]
+        full[row, columns] = full[columns, row] = matrix[row, :depth]
+    return full
+
 
 # inertia of the damper that holds a joint at its limit, relative to the joint's own
 _STOP_INERTIA = 1e6
@@ -155,3 +224,38 @@ def write_speeds(
         if is_held and abs(speed) < abs(solver.velocity[i]) - _SAME_SPEED_RADPS:
             solver.velocity[i] = speed
             solver.changed[i - 6] = True
+
+
+@njit(cache=True)
+def write_external_forces(
+    tree: LinkTree, step_s: float, solver: SolverState, state: BodyState, forces: JointForces
+) -> None:
+    """Write the generalised external forces of a step that has ended: weight and all contacts.
+
+    They are ``M (v' - v) / dt + h - torques`` with mass matrix M and bias h at the pose before the
+    step.
+
+    Args:
+        tree: The tree of n hinges.
+        step_s: Duration dt of the step.
+        solver: Bullet's state after the step.
+        state: The state before the step.
+        forces: `torques` are read, `external` is written.
+    """
+    for i in range(state.velocity.shape[0]):
+        forces.scratch[i] = (solver.velocity[i] - state.velocity[i]) / step_s
+    forces.external[:] = state.bias
+    forces.external[6:] -= forces.torques
+    add_product(tree.depths, tree.paths, state.mass_matrix, forces.scratch, forces.external)
+
+
+@njit(cache=True)
+def predict(forces: JointForces) -> None:
+    """Predict the external forces of the next step: the mean of those of the last two steps.
+
+    A body that rests on the floor is then predicted to stay at rest, so that dampers do not oppose
+    the forces that hold it.
+    """
+    for i in range(forces.external.shape[0]):
+        forces.predicted[i] = 0.5 * (forces.external[i] + forces.before[i])
+    forces.before[:] = forces.external

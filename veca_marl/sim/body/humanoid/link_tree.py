@@ -1,13 +1,21 @@
-"""The arrays in which the kernels keep the state of a body."""
+"""The body as a tree of rigid links on hinges with a free base, and the arrays of its state.
+
+Conventions of this package (Featherstone, "Rigid Body Dynamics Algorithms", Springer 2008): all
+vectors have world axes. A spatial vector is ``(angular, linear)``, its linear part taken at the
+reference point, which is the base's centre of mass; the generalised velocity is ``(angular velocity
+of the base, velocity of its centre of mass, joint speeds)``. Link 0 is the base, link i hangs on
+joint i - 1, and parents precede their children.
+"""
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from veca_marl.sim.geometry import Floats
+from veca_marl.sim.geometry import Floats, Inertia, Pose, joined_inertia
+from veca_marl.sim.physics import pybullet
 
 
 class LinkArrays(NamedTuple):
@@ -173,3 +181,145 @@ def empty_forces(hinges: int, depth: int) -> JointForces:
         matrix,
         scratch,
     )
+
+
+class LinkTree(NamedTuple):
+    """Constants of a tree of n hinges. Links that are fixed to each other are one link.
+
+    Attributes:
+        parents: ``(n + 1,)`` parent link; -1 for the base.
+        depths: ``(6 + n,)`` number of rows on the way from row 0 of the mass matrix to each row,
+            both included.
+        paths: ``(6 + n, depth)`` those rows in this order; -1 after the row itself.
+        positions: ``(n + 1, 3)`` metres, the joint's position in the parent's frame.
+        rotations: ``(n + 1, 3, 3)`` orientation in the parent's frame at angle 0.
+        axes: ``(n + 1, 3)`` axis of the joint in the link's frame.
+        masses: ``(n + 1,)`` kg.
+        centres: ``(n + 1, 3)`` metres, centre of mass in the link's frame.
+        inertias: ``(n + 1, 3, 3)`` kg m^2 about the centre of mass, in the link's frame.
+    """
+
+    parents: NDArray[np.int64]
+    depths: NDArray[np.int64]
+    paths: NDArray[np.int64]
+    positions: Floats
+    rotations: Floats
+    axes: Floats
+    masses: Floats
+    centres: Floats
+    inertias: Floats
+
+    @property
+    def hinges(self) -> int:
+        """Number of hinges."""
+        return len(self.parents) - 1
+
+
+def read_tree(client: int, body_id: int) -> LinkTree:
+    """Read the tree of a body from Bullet, so that both have the same masses and frames.
+
+    Args:
+        client: The PyBullet client.
+        body_id: A body with all joints at 0; its base's inertia is diagonal in the base's frame.
+    """
+    links = _links(client, body_id)
+    groups = _rigid_groups(links)
+    heads = [group[0] for group in groups]
+    row_of = {link.number: i for i, group in enumerate(groups) for link in group}
+    parents = [-1] + [row_of[head.parent] for head in heads[1:]]
+    frames = [head.frame for head in heads]
+    merged = [_merged(group) for group in groups]
+    relative = [frames[0]] + [
+        _seen_from(frames[parent], frame)
+        for parent, frame in zip(parents[1:], frames[1:], strict=True)
+    ]
+    depths, paths = _paths(parents)
+    return LinkTree(
+        parents=np.array(parents),
+        depths=depths,
+        paths=paths,
+        positions=np.array([pose.position for pose in relative]),
+        rotations=np.array([pose.rotation for pose in relative]),
+        axes=np.array([head.axis for head in heads]),
+        masses=np.array([whole.mass_kg for whole in merged]),
+        centres=np.array([whole.centre for whole in merged]),
+        inertias=np.array([whole.matrix for whole in merged]),
+    )
+
+
+def _paths(parents: list[int]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return `depths` and `paths` of a tree: the base has rows 0 to 5, link i has row i + 5."""
+    rows = [list(range(i + 1)) for i in range(6)]
+    for link, parent in enumerate(parents[1:], 1):
+        rows.append([*rows[5 + parent], 5 + link])
+    depths = np.array([len(row) for row in rows])
+    paths = np.full((len(rows), int(depths.max())), -1)
+    for row, path in zip(rows, paths, strict=True):
+        path[: len(row)] = row
+    return depths, paths
+
+
+class _Link(NamedTuple):
+    """A link in Bullet: `frame` and `inertial` are in the world, `axis` is in `frame`."""
+
+    number: int
+    parent: int
+    is_hinge: bool
+    frame: Pose
+    inertial: Pose
+    axis: Floats
+    mass_kg: float
+    moments: Floats
+
+
+def _links(client: int, body_id: int) -> list[_Link]:
+    """Return the base and all links in Bullet's order, in which parents precede their children."""
+    place, turn = pybullet.getBasePositionAndOrientation(body_id, physicsClientId=client)
+    base = Pose(np.array(place), _matrix(turn))
+    dynamics = pybullet.getDynamicsInfo(body_id, -1, physicsClientId=client)
+    found = [_Link(-1, -2, True, base, base, np.zeros(3), dynamics[0], np.array(dynamics[2]))]
+    for index in range(pybullet.getNumJoints(body_id, physicsClientId=client)):
+        info = pybullet.getJointInfo(body_id, index, physicsClientId=client)
+        state = pybullet.getLinkState(body_id, index, 0, 1, physicsClientId=client)
+        inertial = Pose(np.array(state[0]), _matrix(state[1]))
+        frame = Pose(np.array(state[4]), _matrix(state[5]))
+        # Bullet gives the axis in the frame of the principal axes
+        axis = frame.rotation.T @ inertial.rotation @ np.array(info[13])
+        dynamics = pybullet.getDynamicsInfo(body_id, index, physicsClientId=client)
+        is_hinge = info[2] == pybullet.JOINT_REVOLUTE
+        mass, moments = dynamics[0], np.array(dynamics[2])
+        found.append(_Link(index, info[16], is_hinge, frame, inertial, axis, mass, moments))
+    return found
+
+
+def _rigid_groups(links: list[_Link]) -> list[list[_Link]]:
+    """Return the links that move as one; the first of each group is on a hinge, or is the base."""
+    groups: list[list[_Link]] = []
+    row_of: dict[int, int] = {}
+    for link in links:
+        if link.is_hinge:
+            row_of[link.number] = len(groups)
+            groups.append([link])
+        else:
+            row_of[link.number] = row_of[link.parent]
+            groups[row_of[link.number]].append(link)
+    return groups
+
+
+def _merged(group: list[_Link]) -> Inertia:
+    """Return the inertia of a rigid group in the frame of its first link."""
+    parts = []
+    for link in group:
+        pose = _seen_from(group[0].frame, link.inertial)
+        parts.append((pose, Inertia(link.mass_kg, np.zeros(3), np.diag(link.moments))))
+    return joined_inertia(parts)
+
+
+def _seen_from(frame: Pose, pose: Pose) -> Pose:
+    """Return a pose of the world in a frame."""
+    back = frame.rotation.T
+    return Pose(back @ (pose.position - frame.position), back @ pose.rotation)
+
+
+def _matrix(quaternion: Any) -> Floats:
+    return np.array(pybullet.getMatrixFromQuaternion(quaternion)).reshape(3, 3)

@@ -24,10 +24,9 @@ from typing import Any
 
 import numpy as np
 
-from veca_marl.sim.body.walker.collisions.leaves import Leaves
-from veca_marl.sim.body.walker.collisions.separation import Footprint
 from veca_marl.sim.body.walker.jammed import JammedProps
-from veca_marl.sim.body.walker.obstacles import ObstacleBoxes
+from veca_marl.sim.body.walker.obstacles import Leaves, ObstacleBoxes
+from veca_marl.sim.body.walker.walker_collisions import Footprint
 from veca_marl.sim.geometry import (
     Floats,
     Primitive,

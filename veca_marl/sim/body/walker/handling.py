@@ -1,16 +1,101 @@
-"""The right hand of a walker: it holds one light prop at the palm."""
+"""What a walker does with light props: it holds one in its right hand, and kicks."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
 from veca_marl.sim.body.walker.capsule import Capsule
-from veca_marl.sim.body.walker.objects.free_place import way_out
+from veca_marl.sim.body.walker.feet import foot_reaches, kicked_velocity
+from veca_marl.sim.body.walker.gait import Gait
+from veca_marl.sim.body.walker.ground_motion import GroundMotion
+from veca_marl.sim.body.walker.walker_cfg import WalkerCfg
 from veca_marl.sim.geometry import Floats, rotation_about_vertical
-from veca_marl.sim.physics import Prop
-from veca_marl.sim.physics.interactions import Grip, free_path_m, surface_m
+from veca_marl.sim.physics import pybullet
+from veca_marl.sim.physics.bullet import free_path_m, surface_m
+from veca_marl.sim.physics.props.prop import Prop
+
+_TOUCHED_M = 1e-3  # a prop may overlap what it touches by so much
+_ON_OBSTACLE, _NORMAL, _DISTANCE = 6, 7, 8  # entries of PyBullet's points of contact
+
+
+def way_out(client: int, body_id: int, obstacles: Iterable[int], holder: Floats) -> Floats:
+    """Return the displacement ``(3,)`` that moves a body out of obstacles, in metres.
+
+    Each coordinate is that of the deepest overlap along it: several points of one face count once.
+    One displacement ends the overlap with walls that are at right angles; others take several.
+
+    Args:
+        client: PyBullet's client id.
+        body_id: PyBullet's id of the body, where it is now.
+        obstacles: PyBullet's ids of the obstacles.
+        holder: ``(3,)`` metres: a point on the side of all walls on which the body has to be.
+    """
+    out = np.zeros(3)
+    for obstacle in obstacles:
+        for point in pybullet.getClosestPoints(body_id, obstacle, 0.0, physicsClientId=client):
+            depth_m = -float(point[_DISTANCE])
+            if depth_m > _TOUCHED_M:
+                way = depth_m * _towards_holder(point[_NORMAL], point[_ON_OBSTACLE], holder)
+                out = np.where(np.abs(way) > np.abs(out), way, out)
+    return out
+
+
+def _towards_holder(
+    normal: Sequence[float], on_obstacle: Sequence[float], holder: Floats
+) -> Floats:
+    """Return a unit vector out of an obstacle: its normal, or the way to the holder.
+
+    The shortest way out of a thin wall can lead to its other side.
+    """
+    way = holder - np.asarray(on_obstacle)
+    out = np.asarray(normal)
+    return out if float(out @ way) > 0.0 else way / max(float(np.linalg.norm(way)), 1e-9)
+
+
+class Grip:
+    """What one body holds.
+
+    Args:
+        client: PyBullet's client id.
+        holder: Name of the body.
+        body_ids: PyBullet's ids of what the held prop does not collide with.
+
+    Attributes:
+        prop: The held prop; None if the hand is empty.
+    """
+
+    def __init__(self, client: int, holder: str, body_ids: Sequence[int]) -> None:
+        self.prop: Prop | None = None
+        self._client = client
+        self._holder = holder
+        self._body_ids = tuple(body_ids)
+
+    def take(self, prop: Prop) -> None:
+        """Hold a prop from now on. It must be held by no other body, and the hand be empty."""
+        prop.holder, self.prop = self._holder, prop
+        self._set_collision(prop, 0)
+
+    def drop(self) -> None:
+        """Hold nothing from now on; nothing is moved."""
+        if self.prop is not None:
+            self._set_collision(self.prop, 1)
+            self.prop.holder, self.prop = None, None
+
+    def carry(self, position: Floats, yaw_rad: float) -> None:
+        """Move the held prop to a pose, upright and at rest; see `Prop.set_velocity`."""
+        if self.prop is not None:
+            self.prop.carry(position, yaw_rad, (0.0, 0.0, 0.0))
+
+    def _set_collision(self, prop: Prop, enabled: int) -> None:
+        for body_id in self._body_ids:
+            for link in prop.links:
+                pybullet.setCollisionFilterPair(
+                    body_id, prop.body_id, -1, link, enabled, physicsClientId=self._client
+                )
+
 
 _COMPRESSION_M = 0.002  # of the palm's skin by the held prop, so that the palm feels it
 _FLOOR_GAP_M = 0.01  # between the floor and the lowest point of a held prop
@@ -185,3 +270,105 @@ def _limited(velocity: Floats, greatest_mps: float) -> Floats:
     """Return a velocity ``(3,)``, shortened to a speed."""
     speed = float(np.linalg.norm(velocity))
     return velocity if speed <= greatest_mps else velocity * (greatest_mps / speed)
+
+
+class ObjectHandling:
+    """The right hand and the kicking foot of one walker.
+
+    Args:
+        client: PyBullet's client id.
+        name: Name of the walker.
+        cfg: Its parameters.
+        motion: Its motion; a held prop follows it.
+        gait: Its gait, which shows kicks and the arm that holds a prop.
+    """
+
+    def __init__(
+        self, client: int, name: str, cfg: WalkerCfg, motion: GroundMotion, gait: Gait
+    ) -> None:
+        self._client, self._cfg = client, cfg
+        self._motion, self._gait = motion, gait
+        self._hand = Hand(client, name, motion.capsule, cfg.radius_m)
+
+    @property
+    def held(self) -> Prop | None:
+        """The prop in the hand; None if the hand is empty."""
+        return self._hand.prop
+
+    def is_light(self, prop: Prop) -> bool:
+        """Return whether a prop is not fixed and its mass at most `WalkerCfg.push_limit_kg`."""
+        return not prop.fixed and prop.cfg.mass_kg <= self._cfg.push_limit_kg
+
+    def can_kick(self, prop: Prop, position: Floats) -> bool:
+        """Return whether a kick reaches a prop, see `Walker.can_kick`.
+
+        Args:
+            prop: The prop.
+            position: ``(3,)`` metres, of the walker.
+        """
+        if self._motion.crawls or not self._is_loose(prop):
+            return False
+        yaw_rad, capsule_id = self._motion.yaw_rad, self._motion.capsule.body_id
+        return foot_reaches(self._client, self._cfg, capsule_id, position, yaw_rad, prop)
+
+    def kick(self, prop: Prop, position: Floats) -> bool:
+        """Kick a prop; return False, without effect, if the kick does not reach it.
+
+        Args:
+            prop: The prop.
+            position: ``(3,)`` metres, of the walker.
+        """
+        if not self.can_kick(prop, position):
+            return False
+        velocity = kicked_velocity(self._cfg, position, prop)
+        prop.set_velocity(velocity, prop.angular_velocity)
+        self._gait.kick()
+        return True
+
+    def can_grab(self, prop: Prop) -> bool:
+        """Return whether a hand is free, and a prop is light, without joint and held by no body."""
+        return self.held is None and self._motion.stance.hands_are_free and self._is_loose(prop)
+
+    def grab(self, prop: Prop) -> bool:
+        """Hold a prop from now on; return False, without effect, if that is not possible.
+
+        `follow_palm` then moves it to the hand.
+        """
+        if not self.can_grab(prop):
+            return False
+        self._hand.take(prop, self._motion.yaw_rad)
+        self._hand.collect_obstacles(self._motion.ground, 0.0)
+        self._gait.carrying = True
+        return True
+
+    def release(self) -> bool:
+        """Release the held prop, which falls; return False if the hand is empty."""
+        if self.held is None:
+            return False
+        self.drop()
+        self._gait.carrying = False
+        return True
+
+    def drop(self) -> None:
+        """Hold nothing from now on; nothing is moved."""
+        self._hand.drop()
+
+    def before_step(self, step_s: float) -> None:
+        """Collect what a held prop can reach within an agent step of a duration in seconds."""
+        motion = self._motion
+        self._hand.collect_obstacles(motion.ground, abs(motion.speed_mps) * step_s)
+
+    def follow_trunk(self, substep_s: float) -> None:
+        """Move a held prop with the trunk by one physics step of a duration in seconds."""
+        motion = self._motion
+        self._hand.follow(
+            motion.ground, motion.yaw_rad, motion.speed_mps, motion.turn_radps, substep_s
+        )
+
+    def follow_palm(self, palm: Floats) -> None:
+        """Move a held prop to the present place of the palm, ``(3,)`` metres."""
+        self._hand.set_palm(palm, self._motion.ground, self._motion.yaw_rad)
+
+    def _is_loose(self, prop: Prop) -> bool:
+        """Return whether a prop is light, without joint and held by no body."""
+        return prop.holder is None and prop.joint is None and self.is_light(prop)

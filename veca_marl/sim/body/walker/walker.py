@@ -13,29 +13,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veca_marl.sim.body.action import Action
-from veca_marl.sim.body.base import Body
-from veca_marl.sim.body.body_cfg import BodyCfg
-from veca_marl.sim.body.walker.actions.verb_part import (
+from veca_marl.sim.body.base import Body, BodyCfg
+from veca_marl.sim.body.verbs import Close, Open
+from veca_marl.sim.body.walker.actions import (
     REFUSED,
     VERB,
+    WALK_ACTIONS,
     Applied,
     VerbChoice,
+    WalkCommand,
     verb_spec,
 )
-from veca_marl.sim.body.walker.actions.walk_commands import WALK_ACTIONS, WalkCommand
-from veca_marl.sim.body.walker.animation.bone_poses import BonePoses
-from veca_marl.sim.body.walker.animation.footsteps import Footsteps
-from veca_marl.sim.body.walker.collisions.separation import Footprint
 from veca_marl.sim.body.walker.feet import foot_steps_on
 from veca_marl.sim.body.walker.gait import Gait
-from veca_marl.sim.body.walker.ground_motion import GroundMotion
-from veca_marl.sim.body.walker.objects.handling import ObjectHandling
-from veca_marl.sim.body.walker.stances import make_stances
+from veca_marl.sim.body.walker.ground_motion import Footsteps, GroundMotion
+from veca_marl.sim.body.walker.handling import ObjectHandling
+from veca_marl.sim.body.walker.stances import BonePoses, make_stances
 from veca_marl.sim.body.walker.walker_cfg import WalkerCfg, greatest_speed_mps
-from veca_marl.sim.body.walker.walker_collisions import walker_collisions
+from veca_marl.sim.body.walker.walker_collisions import Footprint, walker_collisions
 from veca_marl.sim.geometry import Floats
 from veca_marl.sim.physics import Prop, World
-from veca_marl.sim.physics.interactions import Close, Open
 from veca_marl.sim.spec import ArraySpec
 
 MOVE = "move"  # the part of the action that walks

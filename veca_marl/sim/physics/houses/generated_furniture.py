@@ -8,10 +8,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from veca_marl.sim.physics.houses.floor_division import Rectangle
-from veca_marl.sim.physics.houses.furniture import FURNITURE
-from veca_marl.sim.physics.houses.furniture_cfg import FurnitureCfg, FurnitureKind
-from veca_marl.sim.physics.houses.generated.door_fronts import (
+from veca_marl.sim.physics.houses.floor_division import FloorNeeds, FreeFloor, Rectangle
+from veca_marl.sim.physics.houses.furniture import FURNITURE, FurnitureCfg, FurnitureKind
+from veca_marl.sim.physics.houses.generated_doors import (
     floor_of,
     front,
     kept_free,
@@ -19,7 +18,6 @@ from veca_marl.sim.physics.houses.generated.door_fronts import (
     overlap,
     turns_into,
 )
-from veca_marl.sim.physics.houses.generated.free_floor import FloorNeeds, FreeFloor
 from veca_marl.sim.physics.rooms import DoorCfg, RoomCfg
 
 Kind = FurnitureKind

@@ -7,13 +7,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from veca_marl.sim.physics.houses.floor_division import Limits, Rectangle, divide
-from veca_marl.sim.physics.houses.generated.free_floor import FloorNeeds
-from veca_marl.sim.physics.houses.generated.house_data import HouseData
-from veca_marl.sim.physics.houses.generated.random_leaves import hang_leaves
-from veca_marl.sim.physics.houses.generated.repair import repaired
-from veca_marl.sim.physics.houses.generated_doors import choose_doors, opening_m
+from veca_marl.sim.physics.houses.floor_division import FloorNeeds, Limits, Rectangle, divide
+from veca_marl.sim.physics.houses.generated_doors import choose_doors, hang_leaves, opening_m
 from veca_marl.sim.physics.houses.generated_furniture import RoomFurnishing, furnish, uses_of
+from veca_marl.sim.physics.houses.house_repair import HouseData, repaired
 from veca_marl.sim.physics.houses.walls import WallsCfg
 from veca_marl.sim.physics.playground import PLAYGROUND_GENERATORS, PlaygroundCfg
 from veca_marl.sim.physics.rooms import RoomCfg

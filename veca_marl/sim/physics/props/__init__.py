@@ -1,11 +1,15 @@
 """Props: what they are made from, their shapes, their bodies in Bullet, and where they are."""
 
-from veca_marl.sim.physics.props.joint_cfg import JointCfg, JointKind, LockCfg
-from veca_marl.sim.physics.props.part_cfg import PartCfg
+from veca_marl.sim.physics.props.joint import JointCfg, JointKind, LockCfg
 from veca_marl.sim.physics.props.planned_prop import PlannedProp, StandingProp
 from veca_marl.sim.physics.props.prop import Prop, follow_physics
-from veca_marl.sim.physics.props.prop_cfg import PropCfg
-from veca_marl.sim.physics.props.prop_shape import SIZE_NAMES, PropShape, check_appearance
+from veca_marl.sim.physics.props.prop_cfg import (
+    SIZE_NAMES,
+    PartCfg,
+    PropCfg,
+    PropShape,
+    check_appearance,
+)
 from veca_marl.sim.physics.props.rigid_body import limit_detection
 from veca_marl.sim.physics.props.sleeping import resting_props
 

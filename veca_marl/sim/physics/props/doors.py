@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from veca_marl.sim.physics.props.joint_cfg import JointCfg, JointKind, LockCfg
-from veca_marl.sim.physics.props.part_cfg import PartCfg
-from veca_marl.sim.physics.props.prop_cfg import PropCfg
-from veca_marl.sim.physics.props.prop_shape import PropShape
+from veca_marl.sim.physics.props.joint import JointCfg, JointKind, LockCfg
+from veca_marl.sim.physics.props.prop_cfg import PartCfg, PropCfg, PropShape
 
 Colour = tuple[float, float, float]
 

@@ -1,19 +1,61 @@
-"""The primitives that props are made of, and which of them stop sound."""
+"""The primitives that props are made of, and the boxes among them that stop sound."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
 from veca_marl.sim.geometry import Floats, Geom, Shape
-from veca_marl.sim.physics.props.doll import doll_parts
-from veca_marl.sim.physics.props.joint_cfg import JointCfg, JointKind
-from veca_marl.sim.physics.props.part_cfg import PartCfg
-from veca_marl.sim.physics.props.prop_cfg import PropCfg
-from veca_marl.sim.physics.props.prop_shape import PropShape, hull_of
+from veca_marl.sim.physics.bullet import pybullet
+from veca_marl.sim.physics.props.joint import JointCfg, JointKind
+from veca_marl.sim.physics.props.prop_cfg import PartCfg, PropCfg, PropShape, hull_of
+from veca_marl.sim.sound.obstacles import Obstacles
+
+_DOLL_SKIN = (0.95, 0.78, 0.65)
+_DOLL_HAIR = (0.35, 0.22, 0.12)
+
+
+def doll_parts(height_m: float) -> list[PartCfg]:
+    """Return the parts of a doll that stands with the middle of its height at the origin.
+
+    Its face is turned to x. The proportions are ours; it stands on two flat feet.
+
+    Args:
+        height_m: From the feet to the top of the hair.
+    """
+    h = height_m
+    parts = [
+        PartCfg(PropShape.sphere, [0.15 * h], (0.0, 0.0, 0.34 * h), colour=_DOLL_SKIN),
+        PartCfg(PropShape.sphere, [0.14 * h], (-0.03 * h, 0.0, 0.36 * h), colour=_DOLL_HAIR),
+        PartCfg(PropShape.capsule, [0.12 * h, 0.18 * h], (0.0, 0.0, 0.06 * h)),
+    ]
+    for side in (-1.0, 1.0):
+        parts += _limbs(h, side)
+    return parts
+
+
+def _limbs(h: float, side: float) -> list[PartCfg]:
+    """Return the arm, the leg and the foot of one side."""
+    return [
+        PartCfg(
+            PropShape.capsule,
+            [0.045 * h, 0.22 * h],
+            (0.0, side * 0.18 * h, 0.07 * h),
+            (-side * 25.0, 0.0, 0.0),
+            _DOLL_SKIN,
+        ),
+        PartCfg(PropShape.capsule, [0.06 * h, 0.2 * h], (0.0, side * 0.075 * h, -0.28 * h)),
+        PartCfg(
+            PropShape.box,
+            [0.2 * h, 0.11 * h, 0.06 * h],
+            (0.03 * h, side * 0.075 * h, -0.47 * h),
+            colour=_DOLL_HAIR,
+        ),
+    ]
+
 
 SOUND_OBSTACLE_M = (0.7, 1.0)
 """Least width and height of a box that attenuates sound as a wall does. Sound below 340 Hz, with
@@ -218,3 +260,73 @@ def _goal_geoms(size: tuple[float, ...], surface: dict[str, Any]) -> tuple[Geom,
         Shape.CYLINDER, (radius, width), offset=(0.0, 0.0, height), rotation=along_y, **surface
     )
     return (*posts, bar)
+
+
+class SoundObstacle(Protocol):
+    """A box that follows the pose of its prop."""
+
+    def move(self, position: Floats, rotation: Floats) -> None:
+        """Follow the frame of the prop: its origin ``(3,)`` metres and axes ``(3, 3)``."""
+        ...
+
+
+def make_obstacles(
+    boxes: Sequence[Geom], joint: JointCfg | None, body_id: int, client: int, obstacles: Obstacles
+) -> list[SoundObstacle]:
+    """Add the boxes of a prop to the obstacles of the sound.
+
+    Args:
+        boxes: In the frame of the prop.
+        joint: Its joint; with one it is a leaf.
+        body_id: PyBullet's id of the prop.
+        client: PyBullet's client id.
+        obstacles: Those of its world.
+    """
+    if joint is None:
+        return [_FreeBox(box, obstacles) for box in boxes]
+    return [_Leaf(box, joint, body_id, client, obstacles) for box in boxes]
+
+
+class _FreeBox:
+    """A box of a prop without a joint."""
+
+    def __init__(self, box: Geom, obstacles: Obstacles) -> None:
+        self._offset, self._turn = np.asarray(box.offset), np.asarray(box.rotation)
+        self._obstacles = obstacles
+        self._number = obstacles.add(box.size)
+
+    def move(self, position: Floats, rotation: Floats) -> None:
+        """See `SoundObstacle`."""
+        self._obstacles.move(
+            self._number, position + rotation @ self._offset, rotation @ self._turn
+        )
+
+
+class _Leaf:
+    """A box of a prop with a joint, and the opening that it closes."""
+
+    def __init__(
+        self, box: Geom, joint: JointCfg, body_id: int, client: int, obstacles: Obstacles
+    ) -> None:
+        self._offset, self._turn = np.asarray(box.offset), np.asarray(box.rotation)
+        self._anchor = np.asarray(joint.anchor_m, np.float64)
+        self._body_id, self._client = body_id, client
+        self._obstacles = obstacles
+        self._number = obstacles.add_leaf(box.size)
+        self._base: tuple[object, ...] = ()
+
+    def move(self, position: Floats, rotation: Floats) -> None:
+        """See `SoundObstacle`."""
+        self._obstacles.move_leaf(
+            self._number, position + rotation @ self._offset, rotation @ self._turn
+        )
+        base = pybullet.getBasePositionAndOrientation(self._body_id, physicsClientId=self._client)
+        if base != self._base:
+            self._base = base
+            self._move_opening(*base)
+
+    def _move_opening(self, anchor: Sequence[float], quaternion: Sequence[float]) -> None:
+        """Follow the base of the body: it is at the anchor, with the axes of the closed prop."""
+        axes = np.array(pybullet.getMatrixFromQuaternion(quaternion)).reshape(3, 3)
+        centre = np.array(anchor) + axes @ (self._offset - self._anchor)
+        self._obstacles.move_opening(self._number, centre, axes @ self._turn)

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from veca_marl.sim.geometry import Floats, Geom, rotation_about_vertical
 from veca_marl.sim.physics.props.geoms import horizontal_radius_m, prop_geoms, prop_radius_m
-from veca_marl.sim.physics.props.joint_cfg import JointCfg, JointKind
+from veca_marl.sim.physics.props.joint import JointCfg, JointKind
 from veca_marl.sim.physics.props.prop_cfg import PropCfg
 
 

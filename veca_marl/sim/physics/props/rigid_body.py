@@ -1,15 +1,17 @@
-"""The rigid body of a prop in Bullet: its shape, mass, inertia, friction and restitution."""
+"""The body of a prop in Bullet: its shape, mass, inertia, friction, restitution and pose."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from veca_marl.sim.geometry import (
     Floats,
+    Geom,
     Inertia,
     Pose,
     Primitive,
@@ -17,13 +19,10 @@ from veca_marl.sim.geometry import (
     matrix_to_quaternion,
     primitive_inertia,
 )
-from veca_marl.sim.physics.bullet import pybullet
+from veca_marl.sim.physics.bullet import create_collision_shape, pybullet, unused_visual_shape
 from veca_marl.sim.physics.clock import ClockCfg
-from veca_marl.sim.physics.collision_shapes import create_collision_shape, unused_visual_shape
-from veca_marl.sim.physics.props.joint import LINK
-from veca_marl.sim.physics.props.joint_cfg import JointCfg, JointKind
-from veca_marl.sim.physics.props.prop_cfg import PropCfg
-from veca_marl.sim.physics.props.prop_shape import PropShape
+from veca_marl.sim.physics.props.joint import LINK, Joint, JointCfg, JointKind
+from veca_marl.sim.physics.props.prop_cfg import PropCfg, PropShape
 
 _STEP_S = 0.008  # physics step at which `contact_share` is used as it is
 _ROUNDING = 1e-9  # of products of inertia, relative to the moments
@@ -276,3 +275,27 @@ def prop_dynamics(cfg: PropCfg, moments: Floats | None) -> dict[str, Any]:
     if moments is not None and cfg.shape not in _EXACT_IN_BULLET:
         arguments["localInertiaDiagonal"] = moments.tolist()
     return arguments
+
+
+def create_body(
+    cfg: PropCfg, client: int, geoms: Sequence[Geom]
+) -> tuple[int, int, Joint | None, Pose]:
+    """Create the body of a prop; return its id and link, its joint and its inertial frame."""
+    if cfg.joint is None:
+        body_id, frame = create_prop_body(cfg, client, geoms)
+        return body_id, -1, None, frame
+    body_id, frame = create_attached_body(cfg, cfg.joint, client, geoms)
+    return body_id, LINK, Joint(cfg.joint, body_id, client), frame
+
+
+def pose_reader(body_id: int, link: int, client: int) -> Callable[[], tuple[Any, ...]]:
+    """Return a function that reads position and quaternion of the inertial frame first."""
+    if link == -1:
+        return partial(pybullet.getBasePositionAndOrientation, body_id, physicsClientId=client)
+    return partial(
+        pybullet.getLinkState,
+        body_id,
+        link,
+        computeForwardKinematics=1,
+        physicsClientId=client,
+    )

@@ -9,8 +9,7 @@ import numpy as np
 from veca_marl.sim.geometry import Floats, Scene
 from veca_marl.sim.physics.bullet import pybullet
 from veca_marl.sim.physics.clock import ClockCfg
-from veca_marl.sim.physics.props.prop import Prop
-from veca_marl.sim.physics.props.rest import REST_SPEED, Awake, Rest, Sleep
+from veca_marl.sim.physics.props.prop import REST_SPEED, Awake, Prop, Rest, Sleep
 
 
 class AwakeProps:

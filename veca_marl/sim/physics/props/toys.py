@@ -5,9 +5,7 @@ from __future__ import annotations
 import math
 from enum import Enum
 
-from veca_marl.sim.physics.props.part_cfg import PartCfg
-from veca_marl.sim.physics.props.prop_cfg import PropCfg
-from veca_marl.sim.physics.props.prop_shape import PropShape
+from veca_marl.sim.physics.props.prop_cfg import PartCfg, PropCfg, PropShape
 
 Colour = tuple[float, float, float]
 

@@ -1,4 +1,4 @@
-"""The skeleton as URDF text, from which Bullet makes the joint-level body.
+"""The skeleton as a robot that Bullet reads: URDF text and files of convex hulls.
 
 Every degree of freedom is a hinge. A bone with three of them hangs on two almost massless links
 (``<bone>__0``, ``<bone>__1``), which are written before it: Bullet's solver requires parents first.
@@ -23,21 +23,22 @@ import numpy as np
 from veca_marl.sim.body.anatomy.link_shapes import (
     Layer,
     LinkShape,
+    SkinLayer,
+    as_obj,
+    axes_of_shape,
     collision_element,
+    inertial_element,
+    is_finger,
+    numbers,
     one_link_per_shape,
+    origin_element,
+    principal_axes,
     rigid_shapes,
+    skin_layer,
+    skin_spring,
     soft_shapes,
 )
 from veca_marl.sim.body.anatomy.skeleton import Bone, Joint, Skeleton
-from veca_marl.sim.body.anatomy.skin_springs import SkinLayer, is_finger, skin_layer, skin_spring
-from veca_marl.sim.body.anatomy.urdf.elements import (
-    axes_of_shape,
-    inertial_element,
-    numbers,
-    origin_element,
-    principal_axes,
-)
-from veca_marl.sim.body.anatomy.urdf.hulls import as_obj
 from veca_marl.sim.geometry import Floats, Inertia, Pose, joined_inertia
 
 SKIN_SUFFIX, THUMB_SUFFIX = "__skin", "__thumb"

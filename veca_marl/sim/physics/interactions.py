@@ -1,15 +1,21 @@
-"""The base classes of verbs: what a body does when an action names the verb."""
+"""The base classes of verbs, what they use of a body, and their registry, to which plug-ins add.
+
+The verbs themselves are in `veca_marl.sim.body.verbs`.
+"""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable
-from typing import TYPE_CHECKING, ClassVar, Protocol
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, ClassVar, Protocol, TypeVar
 
+import numpy as np
+
+from veca_marl.registry import Registry, unknown
 from veca_marl.sim.geometry import Floats
 from veca_marl.sim.physics.props.prop import Prop
 
-if TYPE_CHECKING:  # the world checks the names of interactions
+if TYPE_CHECKING:
     from veca_marl.sim.physics.world import World
 
 
@@ -148,3 +154,68 @@ class Interaction(Verb):
     @abstractmethod
     def apply(self, body: InteractingBody, prop: Prop) -> None:
         """Do it. Called before the physics steps of an agent step, only if `allows` is True."""
+
+
+INTERACTIONS: Registry[type[Verb]] = Registry("interaction")
+VerbT = TypeVar("VerbT", bound=type[Verb])
+
+
+def register_interaction(verb: VerbT) -> VerbT:
+    """Register a verb by its `name`; a class decorator.
+
+    Raises:
+        ValueError: If another verb has this name, or the class's name is no identifier in text.
+    """
+    name = getattr(verb, "name", "")
+    # the name is a choice in configurations and on command lines, where a space would split it
+    if not isinstance(name, str) or not name.isidentifier() or name == NO_VERB:
+        raise ValueError(
+            f"{verb.__name__}.name={name!r} must name the verb by an identifier in text, such as "
+            f"'lift_up', and not {NO_VERB!r}"
+        )
+    INTERACTIONS.add(name, verb)
+    return verb
+
+
+NO_VERB = "none"
+"""The choice of the action part `verb` that does nothing."""
+
+
+def check_interactions(field: str, names: Sequence[str]) -> None:
+    """Check names of verbs in a configuration.
+
+    Raises:
+        ValueError: If one is unknown or named twice; the message begins with the field.
+    """
+    for name in names:
+        if name not in INTERACTIONS:
+            raise ValueError(f"{field}: {unknown('interaction', name, INTERACTIONS)}")
+    if len(set(names)) < len(names):
+        raise ValueError(f"{field}={list(names)}: each interaction can be named once")
+
+
+class FootInteraction(Interaction):
+    """An interaction with a prop in front of the feet, which the body need not see.
+
+    What a foot reaches is mostly below the view of an agent that looks ahead.
+    """
+
+    def target(self, body: InteractingBody) -> Prop | None:
+        """Return the prop that is most nearly ahead of those that the foot reaches.
+
+        If it reaches none, it is the one in view, as with other interactions.
+        """
+        reached = [
+            prop
+            for prop in body.world.props.values()
+            if self.declared_by(prop) and self.allows(body, prop)
+        ]
+        if not reached:
+            return super().target(body)
+        return max(reached, key=lambda prop: _cos_ahead(body, prop))
+
+
+def _cos_ahead(body: InteractingBody, prop: Prop) -> float:
+    """Return the cosine of the horizontal angle between heading and direction of a prop."""
+    way = (prop.position - body.position)[:2]
+    return float(way @ body.forward[:2]) / max(float(np.linalg.norm(way)), 1e-9)

@@ -1,15 +1,20 @@
-"""The `verb` part of a walker's action, and the verbs of all walkers of one step."""
+"""The parts of a walker's action: velocities or moves, and verbs."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple, Protocol
+from enum import Enum
+from typing import Any, NamedTuple, Protocol
 
-from veca_marl.sim.body.sight import distance_m
+import numpy as np
+from numpy.typing import NDArray
+
+from veca_marl.sim.body.sense_organs import distance_m
 from veca_marl.sim.geometry import Floats
 from veca_marl.sim.physics import Prop
 from veca_marl.sim.physics.interactions import INTERACTIONS, NO_VERB, InteractingBody, Verb
-from veca_marl.sim.spec import ArraySpec, discrete_spec
+from veca_marl.sim.sound import Call
+from veca_marl.sim.spec import ArraySpec, continuous_spec, discrete_spec
 
 VERB = "verb"  # the part's name
 REFUSED = "refused_verbs"
@@ -124,3 +129,92 @@ def apply_verbs(bodies: Sequence[VerbUser]) -> None:
 
 def _distance_m(position: Floats, target: Prop | None) -> float:
     return 0.0 if target is None else distance_m(target, position)
+
+
+# (forward, turn) as fractions of the greatest speeds; turning left is positive
+MOVES: dict[str, tuple[float, float]] = {
+    "stand": (0.0, 0.0),
+    "forward": (1.0, 0.0),
+    "backward": (-1.0, 0.0),
+    "left": (0.0, 1.0),
+    "right": (0.0, -1.0),
+    "forward_left": (1.0, 1.0),
+    "forward_right": (1.0, -1.0),
+}
+
+
+class WalkCommand(NamedTuple):
+    """What an expert commands a walker to do in the next step.
+
+    Attributes:
+        forward: Walking velocity as a fraction of the greatest, in [-1, 1].
+        turn: Turning velocity likewise, left positive.
+        call: The call; ignored by a body without the action part `voice`.
+        verb: Name of the verb, see `WalkerCfg.verbs`.
+    """
+
+    forward: float
+    turn: float
+    call: Call = Call.none
+    verb: str = NO_VERB
+
+
+class WalkAction(Protocol):
+    """Converts between the `move` part and fractions of the greatest walking and turning speed.
+
+    Attributes:
+        spec: Of the part.
+    """
+
+    spec: ArraySpec
+
+    def decode(self, move: NDArray[Any]) -> tuple[float, float]:
+        """Return (forward, turn), each in [-1, 1], for a value that the spec admits."""
+        ...
+
+    def encode(self, forward: float, turn: float) -> NDArray[Any]:
+        """Return the value of the part that comes nearest to (forward, turn)."""
+        ...
+
+
+class ContinuousWalk:
+    """Two numbers ``(2,)``: forward and turning velocity in [-1, 1], left positive."""
+
+    spec = continuous_spec(("forward", "turn"))
+
+    def decode(self, move: NDArray[Any]) -> tuple[float, float]:
+        """Return the two numbers."""
+        return float(move[0]), float(move[1])
+
+    def encode(self, forward: float, turn: float) -> NDArray[Any]:
+        """Return the two numbers, clipped to [-1, 1]."""
+        return np.clip(np.array([forward, turn], np.float32), self.spec.low, self.spec.high)
+
+
+class DiscreteWalk:
+    """One of `MOVES`, by its index."""
+
+    spec = discrete_spec(tuple(MOVES))
+    _moves = tuple(MOVES.values())
+
+    def decode(self, move: NDArray[Any]) -> tuple[float, float]:
+        """Return the fractions of the chosen move."""
+        return self._moves[int(move)]
+
+    def encode(self, forward: float, turn: float) -> NDArray[Any]:
+        """Return the index of the move with the nearest fractions."""
+        away = np.array(self._moves) - (forward, turn)
+        return np.asarray(np.argmin((away**2).sum(axis=1)), self.spec.dtype)
+
+
+class WalkActionKind(Enum):
+    """Whether the `move` part is continuous or discrete."""
+
+    continuous = "continuous"
+    discrete = "discrete"
+
+
+WALK_ACTIONS: dict[WalkActionKind, WalkAction] = {
+    WalkActionKind.continuous: ContinuousWalk(),
+    WalkActionKind.discrete: DiscreteWalk(),
+}

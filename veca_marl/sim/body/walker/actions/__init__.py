@@ -1,1 +1,0 @@
-"""The parts of a walker's action: velocities or moves, and verbs."""

@@ -1,1 +1,0 @@
-"""The animation of a walker: gait, stances, poses of the bones, and the sound of its steps."""

@@ -1,1 +1,0 @@
-"""Collisions of walkers: with props, doors and walls, with other walkers, and the ground."""

@@ -1,1 +1,0 @@
-"""What a walker does with props: hold one in the hand, and kick."""

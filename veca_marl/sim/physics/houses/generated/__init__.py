@@ -1,1 +1,0 @@
-"""Houses that are generated from a seed: rooms, doors, leaves and furniture."""

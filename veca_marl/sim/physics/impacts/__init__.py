@@ -1,1 +1,0 @@
-"""Sounds of things that hit each other or the floor."""
