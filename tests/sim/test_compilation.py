@@ -3,7 +3,7 @@
 from numba import njit
 from numba.core.event import install_listener
 
-from veca_marl.sim import kernel_cache as compilation
+from veca_marl.sim import kernel_cache
 from veca_marl.sim.kernel_cache import CompilationNotice, announce_compilation
 
 
@@ -34,7 +34,7 @@ def test_kernels_of_other_packages_are_not_announced():
 
 def test_announcing_twice_installs_one_notice(monkeypatch):
     registered = []
-    monkeypatch.setattr(compilation, "register", lambda *what: registered.append(what))
+    monkeypatch.setattr(kernel_cache, "register", lambda *what: registered.append(what))
     announce_compilation.cache_clear()
     announce_compilation()
     announce_compilation()

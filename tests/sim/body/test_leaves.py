@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from walking import empty_world, film, let_pass, walker_in
 
-from veca_marl.sim.body.walker import obstacles as leaves
+from veca_marl.sim.body.walker import obstacles
 from veca_marl.sim.physics import JointCfg, JointKind, LockCfg, PropCfg, PropShape, pybullet
 from veca_marl.sim.physics.props.geoms import swept_radius_m
 
@@ -53,7 +53,7 @@ def test_leaving_out_distant_leaves_does_not_change_a_bit(kind, monkeypatch):
         return film(world, 100), world.prop(kind).opening
 
     culled, opening = positions()
-    monkeypatch.setattr(leaves, "swept_radius_m", lambda geoms, joint: 1e9)
+    monkeypatch.setattr(obstacles, "swept_radius_m", lambda geoms, joint: 1e9)
     assert positions()[0].tobytes() == culled.tobytes()
     assert opening > 0.1
 
@@ -70,7 +70,7 @@ def test_a_leaf_that_is_placed_elsewhere_stops_a_walker_there_and_no_longer_here
 
 def test_only_leaves_within_reach_are_near():
     world = empty_world(leaf(), leaf("lid", (-3.0, 0.0, 0.05)))
-    found = leaves.Leaves(list(world.props.values()))
+    found = obstacles.Leaves(list(world.props.values()))
     hinge = np.array([1.0, 0.0]) + 0.45 * np.array([math.sin(0.349), -math.cos(0.349)])
     assert [prop.name for prop in found.near(hinge, 0.0)] == ["door"]
     assert found.near(hinge + np.array([1.2, 0.0]), 0.2) == []
@@ -79,7 +79,7 @@ def test_only_leaves_within_reach_are_near():
 
 def test_a_leaf_that_was_placed_elsewhere_is_near_its_built_place_after_a_reset():
     world = empty_world(leaf())
-    found = leaves.Leaves(list(world.props.values()))
+    found = obstacles.Leaves(list(world.props.values()))
     world.freeze()
     here, there = np.array([1.0, 0.0]), np.array([6.0, 0.0])
     world.prop("door").place((6.0, 0.0, 0.55))

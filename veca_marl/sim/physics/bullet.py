@@ -34,6 +34,19 @@ def _silent_stderr() -> Iterator[None]:
 with _silent_stderr():
     import pybullet
 
+__all__ = [
+    "HULL_MARGIN_M",
+    "are_in_contact",
+    "create_collision_shape",
+    "free_path_m",
+    "is_contact",
+    "penetration_m",
+    "pybullet",
+    "shape_arguments",
+    "surface_m",
+    "unused_visual_shape",
+    "urdf_geometry",
+]
 
 HULL_MARGIN_M = 0.001
 """Bullet adds this margin to every hull (`gDefaultCollisionMargin` of its importer)."""

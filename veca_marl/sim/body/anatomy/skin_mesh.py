@@ -1,10 +1,8 @@
 """The skin as a mesh: tubes lofted over the bones, exactly 1648 triangles and 894 vertices.
 
-The numbers are our own design.
-
 Rings of points in the frames of the bones are joined by bands of triangles and closed by caps. The
 rims of thighs and fingers are open; they lie inside pelvis, feet and palms. The right side is the
-mirror image of the left.
+mirror image of the left. The numbers are our own design.
 """
 
 from __future__ import annotations

@@ -15,7 +15,7 @@ from veca_marl.sim.physics.houses.door_leaves import WallWithDoors, leaf_props
 from veca_marl.sim.physics.props import PropCfg, PropShape, check_appearance
 from veca_marl.sim.physics.rooms import DoorCfg, RoomCfg
 
-_OPENING_TOLERANCE_M = 1e-6
+_TOLERANCE_M = 1e-6
 
 
 class WallPlane(NamedTuple):
@@ -56,7 +56,7 @@ def _check_apart(doors: Sequence[DoorCfg], axis: int) -> None:
     ordered = sorted(doors, key=lambda door: door.position_m[1 - axis])
     for first, second in pairwise(ordered):
         gap_m = second.position_m[1 - axis] - first.position_m[1 - axis]
-        if gap_m - (first.width_m + second.width_m) / 2.0 < _OPENING_TOLERANCE_M:
+        if gap_m - (first.width_m + second.width_m) / 2.0 < _TOLERANCE_M:
             raise ValueError(
                 f"doors {first.name!r} and {second.name!r} in one wall overlap or touch: their "
                 f"middles are {gap_m:.2f} m apart, with width_m={first.width_m:g} and "
@@ -72,9 +72,7 @@ def _check_beside(door: DoorCfg, axis: int, room: RoomCfg) -> None:
     """
     along, half = door.position_m[1 - axis], door.width_m / 2.0
     low, high = _sides(room, 1 - axis)
-    if not (
-        low - _OPENING_TOLERANCE_M <= along - half and along + half <= high + _OPENING_TOLERANCE_M
-    ):
+    if not (low - _TOLERANCE_M <= along - half and along + half <= high + _TOLERANCE_M):
         raise ValueError(
             f"door {door.name!r}: its opening from {along - half:.2f} to {along + half:.2f} m "
             f"reaches beyond room {room.name!r}, from {low:.2f} to {high:.2f} m; move it, or "
@@ -92,10 +90,7 @@ def _check_through(door: DoorCfg, wall: WallPlane, rooms: Sequence[RoomCfg]) -> 
     one, other = sorted(rooms, key=lambda room: room.lower_m[wall.axis])
     below, above = _sides(one, wall.axis)[1], _sides(other, wall.axis)[0]
     half = wall.thickness_m / 2.0
-    if (
-        max(abs(below - wall.at_m + half), abs(above - wall.at_m - half))
-        > 2.0 * _OPENING_TOLERANCE_M
-    ):
+    if max(abs(below - wall.at_m + half), abs(above - wall.at_m - half)) > 2.0 * _TOLERANCE_M:
         raise ValueError(
             f"door {door.name!r}: its opening does not lead from room {one.name!r} to "
             f"{other.name!r}, which are {above - below:.4g} m apart along {'xy'[wall.axis]}; rooms "
@@ -113,8 +108,6 @@ def _sides(room: RoomCfg, axis: int) -> tuple[float, float]:
 COVERING_M = 0.004
 """Height of the coloured covering of a floor, thinner than what casts contact shadows differently
 (0.01 m), thick enough that depths of single precision tell it from the floor below."""
-
-_TOLERANCE_M = 1e-6
 
 _COLOURS = [
     [0.60, 0.70, 0.85],

@@ -7,6 +7,8 @@ from collections.abc import Sequence
 from veca_marl.sim.physics.props.joint import JointCfg, JointKind, LockCfg
 from veca_marl.sim.physics.props.prop_cfg import PartCfg, PropCfg, PropShape
 
+Colour = tuple[float, float, float]
+
 
 def check_size(name: str, size_m: Sequence[float], above_m: Sequence[float], needed: str) -> None:
     """Check that something is left between the boards of a thing.
@@ -28,13 +30,11 @@ def check_size(name: str, size_m: Sequence[float], above_m: Sequence[float], nee
         raise ValueError(f"{name}: size_m={tuple(size_m)} must be above ({leasts}), for {needed}")
 
 
-CupboardColour = tuple[float, float, float]
-
 _CUPBOARD_BOARD_M = 0.02
 _DRAWER_BOARD_M = 0.01  # of the floor, the sides and the back of a drawer
 _SIDE_SHARE = 0.75  # height of the sides of a drawer as a share of that of its front
 _GAP_M = 0.006
-_METAL: CupboardColour = (0.75, 0.75, 0.78)
+_METAL: Colour = (0.75, 0.75, 0.78)
 
 
 def cupboard_with_drawer(
@@ -45,7 +45,7 @@ def cupboard_with_drawer(
     *,
     drawer_height_m: float = 0.16,
     lock: LockCfg | None = None,
-    colour: CupboardColour = (0.55, 0.38, 0.24),
+    colour: Colour = (0.55, 0.38, 0.24),
 ) -> list[PropCfg]:
     """Return a fixed cupboard, and the drawer at its top, which slides out to +x.
 
@@ -152,8 +152,6 @@ def _drawer(depth: float, length: float, width: float, height: float) -> list[Pa
     parts.append(PartCfg(PropShape.box, [0.03, 0.1, 0.02], knob, colour=_METAL))
     return parts
 
-
-Colour = tuple[float, float, float]
 
 _BOARD_M = 0.015
 
