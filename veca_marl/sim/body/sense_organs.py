@@ -1,9 +1,9 @@
 """Where the sense organs are, and what a body knows of its own eyes.
 
-Distances are those of a child of about one year, in the frame of the head bone (origin at the top
-of the neck). The interpupillary distance of 45 mm and the head breadth of 128 mm are of the order
-that anthropometry reports for that age (quoted from memory, not checked against a table); the rest
-follows from the head of our skeleton.
+Positions of the organs are those of a child of about one year, in the frame of the head bone
+(origin at the top of the neck). The interpupillary distance of 45 mm and the head breadth of 128 mm
+are of the order that anthropometry reports for that age (quoted from memory, not checked against a
+table); the rest follows from the head of our skeleton.
 
 Bodies are below vision in the order of imports. `veca_marl.sim.senses.make_senses` gives each body
 its sight, see `Body.sight`.

@@ -1,7 +1,7 @@
 """PyBullet, imported without its message about its build; its shapes, contacts and rays.
 
-Bullet lists points before two bodies touch, from a distance on that depends on their sizes and on
-`ClockCfg.contact_share`.
+Bullet lists contact points before two bodies touch, from a distance on that depends on their sizes
+and on `ClockCfg.contact_share`.
 """
 
 from __future__ import annotations

@@ -1,11 +1,11 @@
 """Joint torques with which Bullet's explicit step has the result of an implicit one.
 
-A mass matrix is zero where two rows are on different branches of the tree. Its lower half is stored
-without these zeros: element d of row i is that of column ``paths[i, d]``, see `LinkTree`.
-
 Joint damping is large relative to the inertia of light links: an explicit damping torque would be
 unstable at physics steps of 8 ms. The torques here are those of springs and dampers at the end of
 the step, see `write_torques`.
+
+A mass matrix is zero where two rows are on different branches of the tree. Its lower half is stored
+without these zeros: element d of row i is that of column ``paths[i, d]``, see `LinkTree`.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """The body as a tree of rigid links on hinges with a free base, and the arrays of its state.
 
-Conventions of this package (Featherstone, "Rigid Body Dynamics Algorithms", Springer 2008): all
+Conventions of the dynamics (Featherstone, "Rigid Body Dynamics Algorithms", Springer 2008): all
 vectors have world axes. A spatial vector is ``(angular, linear)``, its linear part taken at the
 reference point, which is the base's centre of mass; the generalised velocity is ``(angular velocity
 of the base, velocity of its centre of mass, joint speeds)``. Link 0 is the base, link i hangs on
