@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from blocks import blocks_game, play
 
-from veca_marl.envs.experts.skills.palm_motion import Grip, PalmMotion
+from veca_marl.envs.experts.control.palm_motion import Grip, PalmMotion
 
 ASIDE = Grip(np.array([0.25, 0.2, 0.2]), 0.1)
 # the default clock, and twice its control rate with physics steps of nearly the same duration

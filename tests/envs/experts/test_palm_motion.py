@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from blocks import blocks_game
 
-from veca_marl.envs.experts.skills.palm_motion import Grip, PalmMotion
+from veca_marl.envs.experts.control.palm_motion import Grip, PalmMotion
 
 SIDE = Grip(np.array([0.25, 0.06, 0.16]), 0.1)
 

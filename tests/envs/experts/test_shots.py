@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from veca_marl.envs.experts.control.locomotion import CrawlLocomotion
-from veca_marl.envs.experts.skills.shots import Shooter, feasible_shot, shot_at_goal
+from veca_marl.envs.experts.soccer import Shooter, feasible_shot, shot_at_goal
 
 PITCH = SimpleNamespace(
     low=np.array([-3.0, -3.0]),

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import pytest
 
-from veca_marl.envs.experts.skills.stepping import Balance, SteppingPattern, arm, leg
+from veca_marl.envs.experts.control.stepping import Balance, SteppingPattern, arm, leg
 
 PATTERN = SteppingPattern()
 UPRIGHT = Balance((0.0, 0.0), (0.0, 0.0), (0.0, 0.0), (0.0, 0.0))

@@ -1,6 +1,6 @@
 """Turning over the left or the right side."""
 
-from veca_marl.envs.experts.control.crawling.turn_over import mirrored
+from veca_marl.envs.experts.control.posture_transitions import mirrored
 from veca_marl.sim.body.humanoid.postures import Posture
 
 

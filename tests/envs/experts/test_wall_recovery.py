@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from veca_marl.envs.experts.control.paths.wall_recovery import WallRecovery
+from veca_marl.envs.experts.control.path_following import WallRecovery
 from veca_marl.sim.sound import Call
 
 STEP_S = 0.04

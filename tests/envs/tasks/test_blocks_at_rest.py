@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from composed import compose
 
-from veca_marl.envs.tasks.objects.blocks import RED, BlocksCfg, add_block, rests_on
+from veca_marl.envs.tasks.objects.toys_and_blocks import RED, BlocksCfg, add_block, rests_on
 from veca_marl.sim.physics import World
 
 EDGE = 0.06

@@ -6,7 +6,7 @@ import pytest
 from rollouts import game_cfg
 from seeking import shipped
 
-from veca_marl.envs.tasks.navigation.connection import check_connected
+from veca_marl.envs.tasks.floors.playability import check_connected
 from veca_marl.sim.physics import JointKind, LeafCfg, PlaygroundCfg, RoomCfg
 
 SPREAD = ["ObjectNav", "ObjectPhysNav", "MultiAgentNav", "ColorSort", "ShapeSort", "FillFraction"]

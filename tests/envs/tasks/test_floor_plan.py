@@ -8,7 +8,7 @@ import pytest
 from seeking import shipped, walker_at
 
 from veca_marl.envs.experts.control.paths.steering import walk_to
-from veca_marl.envs.tasks.navigation.floor_plan import DoorApproach, FloorPlan
+from veca_marl.envs.tasks.floors.floor_plan import DoorApproach, FloorPlan
 from veca_marl.sim.physics import DoorCfg, PlaygroundCfg, RoomCfg, World
 
 APPROACH = DoorApproach(before_m=0.4, right_m=0.2)

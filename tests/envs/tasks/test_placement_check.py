@@ -9,13 +9,13 @@ from seeking import shipped
 
 from veca_marl.config import ConfigError
 from veca_marl.envs.core.game import Game
-from veca_marl.envs.tasks.navigation.placement_check import TRIALS, check_placement
-from veca_marl.envs.tasks.navigation.places import (
+from veca_marl.envs.tasks.floors.places import (
     free_pair,
     furniture_of,
     planned_furniture,
     rooms_with_pairs,
 )
+from veca_marl.envs.tasks.navigation.placement_check import TRIALS, check_placement
 from veca_marl.sim.physics import JointCfg, JointKind, PlannedProp, PropCfg, PropShape, World
 
 TINY_ROOMS = (

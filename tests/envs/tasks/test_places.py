@@ -8,8 +8,8 @@ import pytest
 from seeking import BALL_M, ball_at, walker_at, wall_across, world_with
 
 from veca_marl.envs.core.task import Player
+from veca_marl.envs.tasks.floors.places import free_pair, free_place, gap_m
 from veca_marl.envs.tasks.navigation.helper_reward import HelperReward, PropVisibility
-from veca_marl.envs.tasks.navigation.places import free_pair, free_place, gap_m
 from veca_marl.sim.physics import RoomCfg
 from veca_marl.sim.vision import Camera, VisionCfg, VisionSense, look_at, seen_fraction
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from veca_marl.envs.core.expert import Expert, register_expert
 from veca_marl.envs.experts.control.locomotion import locomotion_of
 from veca_marl.envs.experts.control.paths.steering import bearing_rad
-from veca_marl.envs.experts.skills.ring_pushing import pushing_goal
+from veca_marl.envs.experts.push_out import pushing_goal
 from veca_marl.envs.tasks.contests.opponents import nearest
 from veca_marl.envs.tasks.contests.push_out import PushOut
 

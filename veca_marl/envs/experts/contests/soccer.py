@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 
 from veca_marl.envs.core.expert import Expert, register_expert
 from veca_marl.envs.experts.control.locomotion import locomotion_of
+from veca_marl.envs.experts.control.path_following import WallRecovery
 from veca_marl.envs.experts.control.paths.steering import bearing_rad
-from veca_marl.envs.experts.control.paths.wall_recovery import WallRecovery
-from veca_marl.envs.experts.skills.shots import Shooter
 from veca_marl.envs.experts.skills.soccer import attacking_point, clearing_point
+from veca_marl.envs.experts.soccer import Shooter
 from veca_marl.envs.tasks.contests.soccer import ATTACKER, Soccer
 from veca_marl.sim.geometry import Floats
 

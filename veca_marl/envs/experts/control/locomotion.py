@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 from veca_marl.envs.core.task import Player, require_walker
+from veca_marl.envs.experts.control.crawl_gait import BACK, CRAWL, KNEEL, GaitPattern
 from veca_marl.envs.experts.control.crawling.crawl_gait import CrawlGait
 from veca_marl.envs.experts.control.crawling.fall_recovery import FallRecovery
-from veca_marl.envs.experts.control.crawling.gait_patterns import BACK, CRAWL, KNEEL, GaitPattern
 from veca_marl.envs.experts.control.paths.steering import bearing_rad, walk_to
-from veca_marl.envs.tasks.navigation.floor_plan import DoorApproach
+from veca_marl.envs.tasks.floors.floor_plan import DoorApproach
 from veca_marl.sim.body.humanoid import Humanoid, JointCommand
 from veca_marl.sim.body.walker import Walker
 from veca_marl.sim.geometry import Floats

@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from veca_marl.envs.core.expert import Expert, register_expert
 from veca_marl.envs.experts.control.locomotion import WalkerLocomotion
-from veca_marl.envs.experts.control.paths.wall_recovery import WallRecovery
+from veca_marl.envs.experts.control.path_following import WallRecovery
+from veca_marl.envs.tasks.floors.grid_paths import PathsTo
 from veca_marl.envs.tasks.navigation.floors.floor_grid import floor_grid, free_cells
-from veca_marl.envs.tasks.navigation.floors.grid_paths import PathsTo
 from veca_marl.envs.tasks.navigation.maze_nav import MazeNav
 
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from veca_marl.envs.core.expert import Expert, register_expert
 from veca_marl.envs.experts.control.locomotion import locomotion_of
-from veca_marl.envs.experts.skills.object_search import ObjectSearch
+from veca_marl.envs.experts.multi_agent_nav import ObjectSearch
 from veca_marl.envs.tasks.navigation.multi_agent_nav import MultiAgentNav
 from veca_marl.sim.hearing import AudioSense
 

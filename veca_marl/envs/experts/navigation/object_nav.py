@@ -9,14 +9,14 @@ from numpy.typing import NDArray
 
 from veca_marl.envs.core.expert import Expert, register_expert
 from veca_marl.envs.experts.control.locomotion import locomotion_of
-from veca_marl.envs.experts.control.paths.wall_recovery import WallRecovery
+from veca_marl.envs.experts.control.path_following import WallRecovery
+from veca_marl.envs.tasks.floors.grid_paths import PathsTo
 from veca_marl.envs.tasks.navigation.floors.floor_grid import (
     Detour,
     floor_grid,
     free_cells,
     outside,
 )
-from veca_marl.envs.tasks.navigation.floors.grid_paths import PathsTo
 from veca_marl.envs.tasks.navigation.object_nav import ObjectNav
 
 _MARGIN_M = 0.15  # at least, from the distance at which a wrong object is reached

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from veca_marl.envs.core.expert import Expert, TaskT
 from veca_marl.envs.core.task import Player
-from veca_marl.envs.experts.skills.palm_motion import PalmMotion
+from veca_marl.envs.experts.control.palm_motion import PalmMotion
 from veca_marl.sim.geometry import Floats
 
 

@@ -6,9 +6,9 @@ from collections.abc import Iterator
 
 from veca_marl.envs.core.expert import register_expert
 from veca_marl.envs.core.task import Player
+from veca_marl.envs.experts.control.palm_motion import PalmMotion
 from veca_marl.envs.experts.objects.carrying_expert import CarryingExpert
 from veca_marl.envs.experts.skills.lifting import BENT, UPRIGHT, lift
-from veca_marl.envs.experts.skills.palm_motion import PalmMotion
 from veca_marl.envs.tasks.objects.grab_object import GrabObject
 from veca_marl.sim.geometry import Floats
 

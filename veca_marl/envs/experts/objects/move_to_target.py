@@ -9,9 +9,9 @@ import numpy as np
 from veca_marl.envs.core.expert import register_expert
 from veca_marl.envs.core.scoring import horizontal
 from veca_marl.envs.core.task import Player
+from veca_marl.envs.experts.control.carrying import CarryCfg, carry, return_to_rest
+from veca_marl.envs.experts.control.palm_motion import PalmMotion
 from veca_marl.envs.experts.objects.carrying_expert import CarryingExpert
-from veca_marl.envs.experts.skills.carrying import CarryCfg, carry, return_to_rest
-from veca_marl.envs.experts.skills.palm_motion import PalmMotion
 from veca_marl.envs.tasks.objects.move_to_target import MoveToTarget
 from veca_marl.sim.geometry import Floats
 

@@ -10,11 +10,11 @@ import numpy as np
 
 from veca_marl.envs.core.expert import register_expert
 from veca_marl.envs.core.task import Player
+from veca_marl.envs.experts.control.carrying import CarryCfg, carry, return_to_rest
+from veca_marl.envs.experts.control.palm_motion import Grip, PalmMotion
 from veca_marl.envs.experts.objects.carrying_expert import CarryingExpert
-from veca_marl.envs.experts.skills.carrying import CarryCfg, carry, return_to_rest
-from veca_marl.envs.experts.skills.palm_motion import Grip, PalmMotion
-from veca_marl.envs.tasks.objects.blocks import height_in_edges
 from veca_marl.envs.tasks.objects.pile_up_block import PileUpBlock
+from veca_marl.envs.tasks.objects.toys_and_blocks import height_in_edges
 from veca_marl.sim.geometry import Floats
 from veca_marl.sim.physics import Prop
 

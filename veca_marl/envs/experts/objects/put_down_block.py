@@ -9,9 +9,9 @@ import numpy as np
 
 from veca_marl.envs.core.expert import register_expert
 from veca_marl.envs.core.task import Player
+from veca_marl.envs.experts.control.carrying import CarryCfg, carry, return_to_rest
+from veca_marl.envs.experts.control.palm_motion import PalmMotion
 from veca_marl.envs.experts.objects.carrying_expert import CarryingExpert
-from veca_marl.envs.experts.skills.carrying import CarryCfg, carry, return_to_rest
-from veca_marl.envs.experts.skills.palm_motion import PalmMotion
 from veca_marl.envs.tasks.objects.put_down_block import PutDownBlock
 from veca_marl.sim.body.humanoid.postures import reaching
 from veca_marl.sim.geometry import Floats

@@ -6,8 +6,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from veca_marl.envs.experts.skills.carrying import quarter_yaw
-from veca_marl.envs.experts.skills.palm_motion import Grip, PalmMotion
+from veca_marl.envs.experts.control.carrying import quarter_yaw
+from veca_marl.envs.experts.control.palm_motion import Grip, PalmMotion
 from veca_marl.sim.body.humanoid import Humanoid
 from veca_marl.sim.body.humanoid.postures import reaching
 from veca_marl.sim.geometry import Floats

@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 
-from veca_marl.envs.experts.skills.shots import Shooter, feasible_shot, shot_at_goal, unit
-from veca_marl.envs.tasks.contests.pitch import Pitch
+from veca_marl.envs.experts.soccer import Shooter, feasible_shot, shot_at_goal, unit
+from veca_marl.envs.tasks.soccer import Pitch
 from veca_marl.sim.geometry import Floats
 
 _BALL_M = 0.12

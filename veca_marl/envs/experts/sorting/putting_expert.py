@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from veca_marl.envs.core.expert import Expert
 from veca_marl.envs.core.task import Task
-from veca_marl.envs.experts.skills.handling import Handling
+from veca_marl.envs.experts.control.handling import Handling
 from veca_marl.sim.body.walker import WalkCommand, Walker
 from veca_marl.sim.geometry import horizontal_distance
 from veca_marl.sim.physics import Prop

@@ -10,8 +10,8 @@ import numpy as np
 
 from veca_marl.envs.core.task import Player, Task, TaskCfg, terms
 from veca_marl.envs.tasks.contests.opponents import opponents
-from veca_marl.envs.tasks.contests.ring import Ring, check_ring
 from veca_marl.envs.tasks.player_starts import direct_gaze_ahead
+from veca_marl.envs.tasks.push_out import Ring, check_ring
 from veca_marl.sim.physics import PlaygroundCfg
 
 

@@ -11,10 +11,10 @@ import numpy as np
 from veca_marl.envs.core.scoring import horizontal_angle_rad
 from veca_marl.envs.core.task import Player, Task
 from veca_marl.envs.tasks.contests.kicking import AutomaticKicks
-from veca_marl.envs.tasks.contests.pitch import Pitch, check_goal, check_start_area
 from veca_marl.envs.tasks.contests.soccer_cfg import SoccerCfg
 from veca_marl.envs.tasks.kickable_ball import check_kickable
 from veca_marl.envs.tasks.player_starts import direct_gaze_ahead, place_player
+from veca_marl.envs.tasks.soccer import Pitch, check_goal, check_start_area
 from veca_marl.sim.geometry import Floats, horizontal_distance
 from veca_marl.sim.physics import PlaygroundCfg
 

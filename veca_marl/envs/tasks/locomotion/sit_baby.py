@@ -9,7 +9,7 @@ import numpy as np
 
 from veca_marl.envs.core.scoring import clipped_share
 from veca_marl.envs.core.task import Player, register_task, require_humanoid, terms
-from veca_marl.envs.tasks.locomotion.start_poses import (
+from veca_marl.envs.tasks.locomotion.motor_skills import (
     PosedStart,
     StartCfg,
     draw_posture,

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from veca_marl.envs.core.task import Player, register_task, require_humanoid, terms
-from veca_marl.envs.tasks.locomotion.start_poses import (
+from veca_marl.envs.tasks.locomotion.motor_skills import (
     PosedStart,
     StartCfg,
     face_down_cosines,

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from veca_marl.envs.core.task import Player, Task, TaskCfg, register_task, require_walker, terms
-from veca_marl.envs.tasks.navigation import places
+from veca_marl.envs.tasks.floors import places
 from veca_marl.envs.tasks.navigation.mazes.maze import Cell, Maze, random_maze
 from veca_marl.envs.tasks.navigation.mazes.trial_sense import TRIAL, TrialSense
 from veca_marl.envs.tasks.navigation.mazes.walls import (

@@ -12,10 +12,10 @@ from typing import Any, ClassVar
 import numpy as np
 
 from veca_marl.envs.core.task import Player, Task, TaskCfg, Team, register_task, terms
-from veca_marl.envs.tasks.navigation import places
-from veca_marl.envs.tasks.navigation.connection import check_connected
+from veca_marl.envs.tasks.floors import places
+from veca_marl.envs.tasks.floors.floor_plan import FloorPlan
+from veca_marl.envs.tasks.floors.playability import check_connected
 from veca_marl.envs.tasks.navigation.doorways import check_doorways
-from veca_marl.envs.tasks.navigation.floor_plan import FloorPlan
 from veca_marl.envs.tasks.navigation.helper_reward import (
     AHEAD_WEIGHT,
     TURN_WEIGHT,

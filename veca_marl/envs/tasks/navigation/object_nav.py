@@ -9,8 +9,8 @@ from typing import Any, ClassVar
 import numpy as np
 
 from veca_marl.envs.core.task import Player, Task, TaskCfg, register_task, terms
-from veca_marl.envs.tasks.navigation import places
-from veca_marl.envs.tasks.navigation.connection import check_connected
+from veca_marl.envs.tasks.floors import places
+from veca_marl.envs.tasks.floors.playability import check_connected
 from veca_marl.envs.tasks.navigation.floors.scattering import (
     Spacing,
     scattered_places,

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from veca_marl.envs.core.task import Player, Task, register_task, require_humanoid, terms
-from veca_marl.envs.tasks.objects.blocks import (
+from veca_marl.envs.tasks.objects.seat import check_seat
+from veca_marl.envs.tasks.objects.toys_and_blocks import (
     BLUE,
     RED,
     START_GAP_M,
@@ -19,7 +20,6 @@ from veca_marl.envs.tasks.objects.blocks import (
     is_at_rest,
     is_released,
 )
-from veca_marl.envs.tasks.objects.seat import check_seat
 from veca_marl.sim.body.humanoid import HumanoidCfg
 from veca_marl.sim.body.humanoid.postures import REACHING
 from veca_marl.sim.physics import PlaygroundCfg

@@ -10,14 +10,14 @@ from typing import Any, ClassVar
 import numpy as np
 
 from veca_marl.envs.core.task import Player, Task, TaskCfg, register_task, require_walker, terms
-from veca_marl.envs.tasks.navigation.connection import check_connected
+from veca_marl.envs.tasks.floors.places import furniture_of, planned_furniture
+from veca_marl.envs.tasks.floors.playability import check_connected
 from veca_marl.envs.tasks.navigation.floors.scattering import (
     Spacing,
     scattered_places,
     wide_rooms,
 )
 from veca_marl.envs.tasks.navigation.placement_check import check_placement
-from veca_marl.envs.tasks.navigation.places import furniture_of, planned_furniture
 from veca_marl.envs.tasks.player_starts import place_player
 from veca_marl.envs.tasks.sorting.circles import (
     DENOMINATORS,

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from veca_marl.envs.experts.control.crawling.gait_patterns import CRAWL, GaitPattern, LimbPattern
+from veca_marl.envs.experts.control.crawl_gait import CRAWL, GaitPattern, LimbPattern
 from veca_marl.sim.body.humanoid import Humanoid, JointCommand
 from veca_marl.sim.geometry import Floats
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from veca_marl.envs.experts.control.crawling.turn_over import TurnOver
 from veca_marl.envs.experts.control.key_poses import KeyPoses
+from veca_marl.envs.experts.control.posture_transitions import TurnOver
 from veca_marl.sim.body.humanoid import Humanoid, JointCommand
 from veca_marl.sim.body.humanoid.postures import Posture
 from veca_marl.sim.geometry import Floats

@@ -6,8 +6,8 @@ from typing import Protocol
 
 import numpy as np
 
+from veca_marl.envs.tasks.floors.grid_paths import PathsTo
 from veca_marl.envs.tasks.navigation.floors.floor_grid import CELL_M, floor_grid, free_cells
-from veca_marl.envs.tasks.navigation.floors.grid_paths import PathsTo
 from veca_marl.sim.geometry import Floats, horizontal_distance
 from veca_marl.sim.physics import Prop, World
 

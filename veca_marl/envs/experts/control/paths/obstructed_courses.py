@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from scipy.ndimage import map_coordinates
 
+from veca_marl.envs.tasks.floors.places import furniture_of
 from veca_marl.envs.tasks.navigation.floors.clearance import clearances_m
 from veca_marl.envs.tasks.navigation.floors.floor_grid import CELL_M, floor_grid
-from veca_marl.envs.tasks.navigation.places import furniture_of
 from veca_marl.sim.body.walker import Walker
 from veca_marl.sim.geometry import Floats
 from veca_marl.sim.physics import World

@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 from veca_marl.envs.experts.control.locomotion import Locomotion
+from veca_marl.envs.experts.control.path_following import WallRecovery
 from veca_marl.envs.experts.control.paths.furniture_detours import Detours, StraightWays
-from veca_marl.envs.experts.control.paths.wall_recovery import WallRecovery
-from veca_marl.envs.tasks.navigation.floor_plan import FloorPlan
+from veca_marl.envs.tasks.floors.floor_plan import FloorPlan
 from veca_marl.sim.body import Body
 from veca_marl.sim.geometry import Floats, horizontal_distance
 from veca_marl.sim.sound import Call

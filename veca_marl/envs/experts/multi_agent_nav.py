@@ -11,7 +11,7 @@ from veca_marl.envs.experts.control.locomotion import Locomotion
 from veca_marl.envs.experts.control.paths.furniture_detours import detours_in
 from veca_marl.envs.experts.control.paths.path_following import PathFollower
 from veca_marl.envs.experts.perception.call_localization import CallSourceMap
-from veca_marl.envs.tasks.navigation.floor_plan import FloorPlan
+from veca_marl.envs.tasks.floors.floor_plan import FloorPlan
 from veca_marl.sim.body import Body
 from veca_marl.sim.geometry import Floats
 from veca_marl.sim.physics import World

@@ -15,8 +15,8 @@ from veca_marl.envs.tasks.escape.key_drawer import (
     draw_place_at_wall,
     planned_cupboard,
 )
+from veca_marl.envs.tasks.floors.places import free_place, furniture_of, planned_furniture
 from veca_marl.envs.tasks.navigation.placement_check import check_placement
-from veca_marl.envs.tasks.navigation.places import free_place, furniture_of, planned_furniture
 from veca_marl.envs.tasks.player_starts import place_player
 from veca_marl.sim.body.walker import WalkerCfg
 from veca_marl.sim.geometry import Floats

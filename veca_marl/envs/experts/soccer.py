@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from veca_marl.envs.experts.control.locomotion import Clearances
-from veca_marl.envs.tasks.contests.pitch import Pitch
+from veca_marl.envs.tasks.soccer import Pitch
 from veca_marl.sim.geometry import Floats
 
 # lateral distances of aims from the middle of the goal, as shares of its width

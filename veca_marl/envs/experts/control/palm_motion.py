@@ -8,8 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from veca_marl.envs.experts.control.sitting.arm_kinematics import ArmKinematics, Palms
-from veca_marl.envs.experts.control.sitting.seated_balance import SeatedBalance
+from veca_marl.envs.experts.control.arm_kinematics import ArmKinematics, Palms
+from veca_marl.envs.experts.control.seated_balance import SeatedBalance
 from veca_marl.envs.experts.control.sitting.trunk_twist import TrunkTwist
 from veca_marl.sim.body.humanoid import Humanoid
 from veca_marl.sim.body.humanoid.postures import REACHING, REACHING_DOWN, Posture

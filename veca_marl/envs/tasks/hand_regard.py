@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from veca_marl.envs.core.task import Player, register_task, require_humanoid, terms
-from veca_marl.envs.tasks.locomotion.start_poses import PosedStart, StartCfg, start_anywhere
+from veca_marl.envs.tasks.locomotion.motor_skills import PosedStart, StartCfg, start_anywhere
 from veca_marl.sim.body.humanoid import Humanoid, HumanoidCfg
 from veca_marl.sim.body.humanoid.postures import ON_BACK
 from veca_marl.sim.physics import PropCfg, World

@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 
 from veca_marl.envs.core.expert import Expert, register_expert
 from veca_marl.envs.core.task import Player, Task, require_humanoid
-from veca_marl.envs.experts.control.crawling.turn_over import TurnOver
 from veca_marl.envs.experts.control.locomotion import CrawlLocomotion
-from veca_marl.envs.experts.skills.sit_up import SitUp
-from veca_marl.envs.experts.skills.stepping import Stepping
+from veca_marl.envs.experts.control.posture_transitions import TurnOver
+from veca_marl.envs.experts.control.sit_up import SitUp
+from veca_marl.envs.experts.control.stepping import Stepping
 from veca_marl.envs.tasks.locomotion.crawl_baby import CrawlBaby
 from veca_marl.sim.body.humanoid import JointCommand
 from veca_marl.sim.geometry import Floats

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from veca_marl.envs.experts.skills.palm_motion import Grip, PalmMotion
+from veca_marl.envs.experts.control.palm_motion import Grip, PalmMotion
 from veca_marl.sim.geometry import Floats
 from veca_marl.sim.physics import Prop
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veca_marl.envs.core.expert import Expert, register_expert
-from veca_marl.envs.tasks.multimodal.kick_the_ball import KickTheBall
+from veca_marl.envs.tasks.kick_the_ball import KickTheBall
 
 # difference of the ears' mean log10 spectra at which the expert turns at full speed
 _FULL_TURN_LEVEL = 0.05

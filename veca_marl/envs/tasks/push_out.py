@@ -9,8 +9,8 @@ from itertools import combinations, product
 import numpy as np
 
 from veca_marl.envs.core.task import Player
+from veca_marl.envs.tasks.floors.places import is_furniture
 from veca_marl.envs.tasks.navigation.floors.clearance import clearances_m
-from veca_marl.envs.tasks.navigation.places import is_furniture
 from veca_marl.envs.tasks.player_starts import place_player
 from veca_marl.sim.body import Body
 from veca_marl.sim.geometry import Floats

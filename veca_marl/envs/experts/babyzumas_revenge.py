@@ -8,8 +8,8 @@ from typing import Any
 from numpy.typing import NDArray
 
 from veca_marl.envs.core.expert import Expert, register_expert
-from veca_marl.envs.experts.skills.handling import Handling
-from veca_marl.envs.tasks.escape.babyzumas_revenge import OPEN, BabyzumasRevenge
+from veca_marl.envs.experts.control.handling import Handling
+from veca_marl.envs.tasks.babyzumas_revenge import OPEN, BabyzumasRevenge
 from veca_marl.sim.body.walker import WalkCommand
 from veca_marl.sim.geometry import Floats
 

@@ -1,1 +1,0 @@
-"""Experts of the developmental benchmarks: SelfTouch, HandRegard."""

@@ -1,1 +1,0 @@
-"""Experts of motor skills: TurnBaby, SitBaby, CrawlBaby, RunBaby."""
