@@ -12,7 +12,7 @@ from veca_marl.algos.networks.precision import Precision
 from veca_marl.api import choose
 from veca_marl.api_arguments import as_integer
 from veca_marl.config import ConfigError
-from veca_marl.envs.core.team import Script
+from veca_marl.envs.core.game_cfg import Script
 from veca_marl.runs.run_folder import RunFolder
 
 TINY = ["collect=one_process", "collect.worlds=1", "collect.steps=32", "algo.minibatches=2"]

@@ -14,7 +14,7 @@ from veca_marl.envs.core.benchmark import SEED
 from veca_marl.envs.core.episodes import Episodes
 from veca_marl.envs.core.expert import Expert, find_expert
 from veca_marl.envs.core.game import Game
-from veca_marl.envs.core.team import Script
+from veca_marl.envs.core.game_cfg import Script
 from veca_marl.experts_table.command import main
 from veca_marl.experts_table.episode_file import EpisodeFile
 from veca_marl.experts_table.play import Played, digest, game_cfg

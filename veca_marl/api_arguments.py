@@ -9,8 +9,7 @@ from typing import Any
 
 from veca_marl.config import Config, ConfigError
 from veca_marl.config.overrides import parse, root_of
-from veca_marl.envs.core.game_cfg import GameCfg
-from veca_marl.envs.core.team import Script
+from veca_marl.envs.core.game_cfg import GameCfg, Script
 
 # `opponent` is the configuration of `GameCfg.script`
 _ROOTS_OF_GAMES = {f.name for f in fields(GameCfg)} - {"script"} | {"opponent", "plugins"}

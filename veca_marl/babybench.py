@@ -21,8 +21,7 @@ from veca_marl.config import ConfigError, one_line
 from veca_marl.config.command_line import CommandLine
 from veca_marl.config.outputs import check_file
 from veca_marl.envs.core.task import find_task
-from veca_marl.envs.tasks.developmental.regions import HANDS, regions_of
-from veca_marl.envs.tasks.self_touch import SelfTouch
+from veca_marl.envs.tasks.self_touch import HANDS, SelfTouch, regions_of
 from veca_marl.play.policies import EXPERT, choose
 from veca_marl.play.session import Session
 

@@ -17,9 +17,8 @@ from numpy.typing import NDArray
 from veca_marl.config import compose
 from veca_marl.envs.core.game import Game
 from veca_marl.envs.experts.control.locomotion import locomotion_of
-from veca_marl.envs.experts.perception.call_localization import loudness, sound_power
-from veca_marl.envs.tasks.floors.places import free_place
-from veca_marl.envs.tasks.player_starts import place_player
+from veca_marl.envs.experts.multi_agent_nav import loudness, sound_power
+from veca_marl.envs.tasks.floors.places import free_place, place_player
 from veca_marl.sim.sound import Call
 
 CALLS = {"walker_voice": 300, "mitten_voice": 120}  # number of calls by body

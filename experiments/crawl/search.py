@@ -24,9 +24,8 @@ import numpy as np
 
 from veca_marl.config import compose
 from veca_marl.envs.core.game import Game
-from veca_marl.envs.experts.control.crawl_gait import BACK, CRAWL, GaitPattern
-from veca_marl.envs.experts.control.crawling.crawl_gait import CrawlGait
-from veca_marl.envs.experts.control.paths.steering import bearing_rad
+from veca_marl.envs.experts.control.crawl_gait import BACK, CRAWL, CrawlGait, GaitPattern
+from veca_marl.envs.experts.control.locomotion import bearing_rad
 from veca_marl.sim.body.humanoid import JointCommand
 from veca_marl.sim.geometry import Floats
 

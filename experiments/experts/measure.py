@@ -20,8 +20,7 @@ import numpy as np
 import veca_marl
 from veca_marl.config import compose
 from veca_marl.envs.core.game import Game
-from veca_marl.envs.core.game_cfg import GameCfg
-from veca_marl.envs.core.team import Script
+from veca_marl.envs.core.game_cfg import GameCfg, Script
 
 HERE = Path(__file__).parent
 COLUMNS = [

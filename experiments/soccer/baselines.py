@@ -14,9 +14,9 @@ import numpy as np
 
 from veca_marl.config import compose
 from veca_marl.envs.core.game import Game
+from veca_marl.envs.core.game_cfg import Script
 from veca_marl.envs.core.task import Player
-from veca_marl.envs.core.team import Script
-from veca_marl.envs.experts.control.paths.steering import walk_to
+from veca_marl.envs.experts.control.locomotion import walk_to
 
 EPISODES = 48
 Command = tuple[float, float]  # speed ahead and turning rate, as shares of the greatest

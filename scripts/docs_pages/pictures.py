@@ -16,7 +16,7 @@ from veca_marl.api import make
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
 from veca_marl.envs.adapters.torchrl.scripted import ExpertPolicy
 from veca_marl.envs.core.game import Game
-from veca_marl.envs.rendering.touch_image import touch_image
+from veca_marl.envs.rendering import touch_image
 from veca_marl.sim.body.walker import Walker
 from veca_marl.sim.touch import TAXELS_PER_TRIANGLE
 from veca_marl.sim.vision import Camera, look_at

@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from veca_marl.envs.core.game import Game
 from veca_marl.envs.tasks.babyzumas_revenge import BabyzumasRevenge
-from veca_marl.envs.tasks.contests.push_out import PushOut
-from veca_marl.envs.tasks.contests.soccer import Soccer
 from veca_marl.envs.tasks.navigation.object_nav import ObjectNav
+from veca_marl.envs.tasks.push_out import PushOut
+from veca_marl.envs.tasks.soccer import Soccer
 from veca_marl.sim.body.walker import Walker
 from veca_marl.sim.geometry import Floats
 from veca_marl.sim.physics import RoomCfg

@@ -4,7 +4,7 @@ import numpy as np
 from composed import compose
 
 from veca_marl.envs.core.game import Game
-from veca_marl.envs.core.team import Script
+from veca_marl.envs.core.game_cfg import Script
 
 FAST = ("senses/vision=blind", "senses/touch=numb")
 WALKING = ("body=walker", "task.max_seconds=20")

@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 from rollouts import game_cfg
 
-from veca_marl.envs.core.benchmark import EPISODES, find_benchmark, parameters
+from veca_marl.envs.core.benchmark import EPISODES, find_benchmark, parameters, start_values
 from veca_marl.envs.core.episodes import Episodes
-from veca_marl.envs.core.starts import start_values
 
 NUMBERS = (0, 57, 99)
 

@@ -14,8 +14,8 @@ from torchrl.envs import check_env_specs
 from veca_marl.envs.core.actions import random_action
 from veca_marl.envs.core.episodes import Episodes
 from veca_marl.envs.core.game import Game
+from veca_marl.envs.core.game_cfg import Script
 from veca_marl.envs.core.task import SOLVED, TASKS
-from veca_marl.envs.core.team import Script
 
 # a walker, a joint-level body with hands, walkers with voices in a house, verbs and doors;
 # `test_every_start.py` compares the starts of every task with those of another process

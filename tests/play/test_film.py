@@ -8,7 +8,7 @@ from composed import compose
 from veca_marl.algos.evaluation.evaluate import Exploration, seed_episodes
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
 from veca_marl.envs.adapters.torchrl.scripted import ExpertPolicy
-from veca_marl.envs.core.starts import start_state
+from veca_marl.envs.core.benchmark import start_state
 from veca_marl.play.command import main
 from veca_marl.play.screen import HEIGHT, WIDTH
 from veca_marl.play.session import Session

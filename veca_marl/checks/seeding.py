@@ -9,9 +9,9 @@ import numpy as np
 
 from veca_marl.checks.report import Finding, finding
 from veca_marl.envs.core.actions import random_action
+from veca_marl.envs.core.benchmark import start_state
 from veca_marl.envs.core.episodes import Episodes
 from veca_marl.envs.core.game import Game
-from veca_marl.envs.core.starts import start_state
 
 NAMES = ("seeding",)
 

@@ -8,10 +8,10 @@ import numpy as np
 
 from veca_marl.checks.overlaps import overlaps
 from veca_marl.checks.report import Finding, finding
+from veca_marl.envs.core.benchmark import start_state
 from veca_marl.envs.core.episodes import Episodes
 from veca_marl.envs.core.game import Game, Outcome
-from veca_marl.envs.core.starts import start_state
-from veca_marl.envs.core.team import Script
+from veca_marl.envs.core.game_cfg import Script
 from veca_marl.sim.geometry import Floats
 
 NAMES = ("starts", "first step")

@@ -14,9 +14,8 @@ from veca_marl.algos.intrinsic import IntrinsicCfg
 from veca_marl.algos.reporting.loggers import LoggerKind
 from veca_marl.algos.selfplay.self_play import SelfPlayCfg
 from veca_marl.config.experiment import ExperimentCfg
-from veca_marl.envs.core.game_cfg import GameCfg
+from veca_marl.envs.core.game_cfg import GameCfg, Script, TeamCfg
 from veca_marl.envs.core.task import TaskCfg
-from veca_marl.envs.core.team import Script, TeamCfg
 from veca_marl.sim.body import BodyCfg
 from veca_marl.sim.physics import ClockCfg, PlaygroundCfg
 from veca_marl.sim.senses import SensesCfg

@@ -18,8 +18,8 @@ from veca_marl.config.overrides import parse, with_integers
 from veca_marl.config.presets import check_group_values
 from veca_marl.config.schemas import body_types, root_schema
 from veca_marl.config.search_path import conf_dirs
+from veca_marl.envs.core.game_cfg import TeamCfg
 from veca_marl.envs.core.task import find_task
-from veca_marl.envs.core.team import TeamCfg
 from veca_marl.sim.physics import PLAYGROUND_GENERATORS
 
 GAME_KEYS = ("body", "clock", "eval", "opponent", "playground", "senses", "task", "team")

@@ -13,8 +13,8 @@ from veca_marl.config.command_line import CommandLine
 from veca_marl.config.outputs import check_folder
 from veca_marl.envs.core.benchmark import Benchmark, find_benchmark, has_benchmark
 from veca_marl.envs.core.expert import has_expert
+from veca_marl.envs.core.game_cfg import Script
 from veca_marl.envs.core.task import TASKS
-from veca_marl.envs.core.team import Script
 from veca_marl.experts_table.episode_file import EpisodeFile
 from veca_marl.experts_table.options import TableOptions
 from veca_marl.experts_table.play import Job, Played, digest, game_cfg

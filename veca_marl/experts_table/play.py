@@ -15,13 +15,10 @@ from typing import Any
 import numpy as np
 
 from veca_marl.config import ConfigError, compose
-from veca_marl.envs.core.benchmark import SEED, find_benchmark
-from veca_marl.envs.core.episodes import Episodes
+from veca_marl.envs.core.benchmark import SEED, find_benchmark, start_values
+from veca_marl.envs.core.episodes import Episodes, first_team, play_to_end
 from veca_marl.envs.core.game import Game
-from veca_marl.envs.core.game_cfg import GameCfg
-from veca_marl.envs.core.scripted_episodes import first_team, play_to_end
-from veca_marl.envs.core.starts import start_values
-from veca_marl.envs.core.team import Script
+from veca_marl.envs.core.game_cfg import GameCfg, Script
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from itertools import groupby
 
 import numpy as np
 
-from veca_marl.envs.core.team import Script
+from veca_marl.envs.core.game_cfg import Script
 from veca_marl.experts_table.play import Job, Played
 from veca_marl.experts_table.processes import play_all
 

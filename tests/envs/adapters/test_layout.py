@@ -5,7 +5,7 @@ import pytest
 import torch
 from torchrl.data import Bounded, Categorical, Composite, Unbounded
 
-from veca_marl.envs.adapters.torchrl.layout import Layout
+from veca_marl.envs.adapters.torchrl.fast_step import Layout
 
 
 @pytest.fixture

@@ -19,7 +19,7 @@ from veca_marl.envs.core.expert import (
     register_expert,
 )
 from veca_marl.envs.core.game import Game
-from veca_marl.envs.core.team import Script
+from veca_marl.envs.core.game_cfg import Script
 from veca_marl.sim.physics import ClockCfg
 
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from composed import compose
 
+from veca_marl.envs.core.benchmark import NEXT_NUMBER, differences, start_state, start_values
 from veca_marl.envs.core.episodes import Episodes
 from veca_marl.envs.core.game import Game
-from veca_marl.envs.core.starts import NEXT_NUMBER, differences, start_state, start_values
 
 
 @pytest.fixture

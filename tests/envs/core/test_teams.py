@@ -16,7 +16,7 @@ from veca_marl.envs.adapters.pettingzoo import VecaParallelEnv
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
 from veca_marl.envs.adapters.torchrl.scripted import ExpertPolicy
 from veca_marl.envs.core.game import Game
-from veca_marl.envs.core.team import Script, TeamCfg, TeamSensesCfg
+from veca_marl.envs.core.game_cfg import Script, TeamCfg, TeamSensesCfg
 from veca_marl.sim.body.walker import WalkActionKind, WalkerCfg
 from veca_marl.sim.hearing import AudioCfg
 from veca_marl.sim.senses import SensesCfg

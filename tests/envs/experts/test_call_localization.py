@@ -7,11 +7,7 @@ import pytest
 from composed import compose
 
 from veca_marl.envs.core.game import Game
-from veca_marl.envs.experts.perception.call_localization import (
-    CallSourceMap,
-    loudness,
-    sound_power,
-)
+from veca_marl.envs.experts.multi_agent_nav import CallSourceMap, loudness, sound_power
 from veca_marl.sim.sound import Call
 
 STEPS = 10

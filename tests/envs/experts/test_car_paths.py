@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import started
 
-from veca_marl.envs.experts.cars.car_paths import car_paths, room_points
+from veca_marl.envs.experts.cars import car_paths, room_points
 
 STEP_S = 0.04
 

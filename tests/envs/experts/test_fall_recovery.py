@@ -7,8 +7,8 @@ import pytest
 from composed import compose
 
 from veca_marl.envs.core.game import Game
-from veca_marl.envs.core.team import Script
-from veca_marl.envs.experts.control.crawling.fall_recovery import FallRecovery
+from veca_marl.envs.core.game_cfg import Script
+from veca_marl.envs.experts.control.posture_transitions import FallRecovery
 from veca_marl.sim.body.humanoid.postures import ON_ALL_FOURS, ON_BACK, ON_BELLY
 
 

@@ -6,12 +6,8 @@ import numpy as np
 import pytest
 from seeking import walker_at
 
-from veca_marl.envs.experts.control.paths.furniture_detours import (
-    FurnitureDetours,
-    StraightWays,
-    detours_in,
-)
-from veca_marl.envs.experts.control.paths.steering import walk_to
+from veca_marl.envs.experts.control.locomotion import walk_to
+from veca_marl.envs.experts.control.path_following import FurnitureDetours, StraightWays, detours_in
 from veca_marl.sim.physics import (
     FurnitureCfg,
     FurnitureKind,

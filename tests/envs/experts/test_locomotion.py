@@ -8,7 +8,7 @@ from seeking import world_with
 
 from veca_marl.envs.core.task import Player
 from veca_marl.envs.experts.control.locomotion import locomotion_of
-from veca_marl.envs.tasks.player_starts import place_player
+from veca_marl.envs.tasks.floors.places import place_player
 from veca_marl.sim.body.humanoid import Detail, Humanoid, HumanoidCfg, JointActionKind
 from veca_marl.sim.body.walker import Walker, WalkerCfg
 

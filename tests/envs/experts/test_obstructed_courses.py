@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from seeking import walker_at
 
-from veca_marl.envs.experts.control.paths.obstructed_courses import ObstructedCourses
+from veca_marl.envs.experts.cars import ObstructedCourses
 from veca_marl.sim.physics import PlaygroundCfg, PropCfg, PropShape, RoomCfg, World
 
 EDGE_M = 0.5  # the near face of the box is at x = 0.75 m

@@ -5,7 +5,7 @@ import pytest
 from composed import compose
 
 from veca_marl.envs.core.game import Game
-from veca_marl.envs.rendering.spectator import FRAME_HEIGHT, ROOM_WIDTH, Spectator, eye_images
+from veca_marl.envs.rendering import FRAME_HEIGHT, ROOM_WIDTH, Spectator, eye_images
 from veca_marl.sim.touch import taxels_of
 
 

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from touching import Stage, of_bone
 
-from veca_marl.envs.rendering.touch_image import save_touch_image, touch_image
+from veca_marl.envs.rendering import save_touch_image, touch_image
 
 
 def red(picture):

@@ -5,8 +5,8 @@ import pytest
 import started
 
 from veca_marl.config import ConfigError
-from veca_marl.envs.core.scripted_episodes import play_to_end
-from veca_marl.envs.core.team import Script
+from veca_marl.envs.core.episodes import play_to_end
+from veca_marl.envs.core.game_cfg import Script
 
 SMALL = ("senses.vision.width=32", "senses.vision.height=32", "senses.audio.present=false")
 

@@ -8,7 +8,7 @@ import started
 from composed import compose
 
 from veca_marl.envs.core.game import Game
-from veca_marl.envs.core.team import Script
+from veca_marl.envs.core.game_cfg import Script
 from veca_marl.sim.body.walker import WalkCommand
 
 NUMB = "senses/touch=numb"

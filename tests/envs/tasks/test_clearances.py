@@ -7,9 +7,13 @@ import pytest
 from seeking import shipped
 from walking import box, empty_world
 
-from veca_marl.envs.tasks.floors.places import furniture_of
-from veca_marl.envs.tasks.navigation.floors.clearance import Clearances, clearances_m
-from veca_marl.envs.tasks.navigation.floors.scattering import Spacing, scattered_places
+from veca_marl.envs.tasks.floors.places import (
+    Clearances,
+    Spacing,
+    clearances_m,
+    furniture_of,
+    scattered_places,
+)
 from veca_marl.sim.physics import World
 
 CLEAR_M = 0.5

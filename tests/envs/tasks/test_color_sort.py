@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import started
 
-from veca_marl.envs.core.team import Script
-from veca_marl.envs.tasks.sorting.items import COLOURS
+from veca_marl.envs.core.game_cfg import Script
+from veca_marl.envs.tasks.sorting.sorting_task import COLOURS
 from veca_marl.sim.body.walker import WalkCommand
 
 SMALL_EYES = ("senses.vision.width=32", "senses.vision.height=32")

@@ -9,7 +9,7 @@ from composed import compose
 
 from veca_marl.config import ConfigError
 from veca_marl.envs.core.game import Game
-from veca_marl.envs.core.team import Script
+from veca_marl.envs.core.game_cfg import Script
 from veca_marl.sim.senses import make_senses
 
 SMALL_EYES = ("senses.vision.width=16", "senses.vision.height=16")

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 import started
 
-from veca_marl.envs.core.team import Script
-from veca_marl.envs.tasks.sorting.circles import RADIUS_M, division
+from veca_marl.envs.core.game_cfg import Script
+from veca_marl.envs.tasks.sorting.fill_fraction import RADIUS_M, division
 from veca_marl.sim.body.walker import WalkCommand
 
 SMALL_EYES = ("senses.vision.width=32", "senses.vision.height=32")

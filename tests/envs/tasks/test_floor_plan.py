@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from seeking import shipped, walker_at
 
-from veca_marl.envs.experts.control.paths.steering import walk_to
+from veca_marl.envs.experts.control.locomotion import walk_to
 from veca_marl.envs.tasks.floors.floor_plan import DoorApproach, FloorPlan
 from veca_marl.sim.physics import DoorCfg, PlaygroundCfg, RoomCfg, World
 

@@ -8,7 +8,7 @@ import pytest
 from composed import compose
 
 from veca_marl.envs.core.game import Game
-from veca_marl.envs.tasks.objects.grasping import both_hands_near, palm_distances_m
+from veca_marl.envs.tasks.objects.toys_and_blocks import both_hands_near, palm_distances_m
 from veca_marl.sim.physics.props.prop import follow_physics
 from veca_marl.sim.vision import is_visible
 

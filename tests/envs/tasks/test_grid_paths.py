@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from walking import ball, box, empty_world, wall
 
-from veca_marl.envs.tasks.floors.grid_paths import PathsTo
-from veca_marl.envs.tasks.navigation.floors.floor_grid import Detour, FloorGrid, free_cells, outside
+from veca_marl.envs.tasks.floors.grid_paths import Detour, FloorGrid, PathsTo, free_cells, outside
 
 GRID = FloorGrid(np.array([-2.0, -2.0]), (40, 40))
 CLEAR_M = 0.15

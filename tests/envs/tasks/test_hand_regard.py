@@ -9,7 +9,7 @@ from composed import compose
 from veca_marl.config import ConfigError
 from veca_marl.config import compose as compose_anew
 from veca_marl.envs.core.game import Game
-from veca_marl.envs.core.team import Script
+from veca_marl.envs.core.game_cfg import Script
 from veca_marl.envs.tasks.hand_regard import PAIRS, regard_rad
 from veca_marl.sim.geometry import Pose
 

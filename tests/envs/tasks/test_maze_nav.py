@@ -9,10 +9,9 @@ from composed import compose
 
 from veca_marl.config import ConfigError
 from veca_marl.envs.core.game import Game
-from veca_marl.envs.core.team import Script
-from veca_marl.envs.tasks.floors.places import gap_m
-from veca_marl.envs.tasks.navigation.floors.clearance import clearances_m
-from veca_marl.envs.tasks.navigation.mazes.maze import random_maze
+from veca_marl.envs.core.game_cfg import Script
+from veca_marl.envs.tasks.floors.places import clearances_m, gap_m
+from veca_marl.envs.tasks.navigation.mazes import random_maze
 
 SMALL_EYES = ("senses.vision.width=16", "senses.vision.height=16")
 STAND = {"agents": np.zeros(2, np.float32)}

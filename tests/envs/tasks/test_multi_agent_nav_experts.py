@@ -7,12 +7,10 @@ import pytest
 from babies import zero_action
 from seekers import STEP_S, game_of, seconds_needed
 
-from veca_marl.envs.experts.control.locomotion import locomotion_of
-from veca_marl.envs.experts.control.paths.furniture_detours import detours_in
-from veca_marl.envs.experts.control.paths.path_following import PathFollower
-from veca_marl.envs.experts.control.paths.steering import walk_to
+from veca_marl.envs.experts.control.locomotion import locomotion_of, walk_to
+from veca_marl.envs.experts.control.path_following import PathFollower, detours_in
+from veca_marl.envs.tasks.floors.places import place_player
 from veca_marl.envs.tasks.navigation.multi_agent_nav import Muted
-from veca_marl.envs.tasks.player_starts import place_player
 from veca_marl.sim.sound import CALLS, Call, call_waveform
 
 

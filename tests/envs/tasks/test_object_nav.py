@@ -8,10 +8,9 @@ import started
 from composed import compose
 
 from veca_marl.envs.core.game import Game
-from veca_marl.envs.core.team import Script
-from veca_marl.envs.tasks.floors.places import furniture_of
-from veca_marl.envs.tasks.navigation.floors.clearance import clearances_m
-from veca_marl.envs.tasks.navigation.object_kinds import ObjectKind
+from veca_marl.envs.core.game_cfg import Script
+from veca_marl.envs.tasks.floors.places import clearances_m, furniture_of
+from veca_marl.envs.tasks.navigation.object_nav import ObjectKind
 
 SMALL_EYES = ("senses.vision.width=16", "senses.vision.height=16")
 REACH_M = 0.3

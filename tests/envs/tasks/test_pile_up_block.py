@@ -7,8 +7,8 @@ import pybullet
 import pytest
 from blocks import blocks_game, play, sit, sits
 
+from veca_marl.envs.experts.control.carrying import lift
 from veca_marl.envs.experts.control.palm_motion import Grip, PalmMotion
-from veca_marl.envs.experts.skills.lifting import lift
 from veca_marl.envs.tasks.objects.toys_and_blocks import (
     height_in_edges,
     is_at_rest,

@@ -15,7 +15,7 @@ from veca_marl.envs.tasks.floors.places import (
     planned_furniture,
     rooms_with_pairs,
 )
-from veca_marl.envs.tasks.navigation.placement_check import TRIALS, check_placement
+from veca_marl.envs.tasks.floors.playability import TRIALS, check_placement
 from veca_marl.sim.physics import JointCfg, JointKind, PlannedProp, PropCfg, PropShape, World
 
 TINY_ROOMS = (

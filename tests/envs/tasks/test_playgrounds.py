@@ -8,7 +8,7 @@ from veca_marl.checks.overlaps import overlaps
 from veca_marl.config import ConfigError
 from veca_marl.config import compose as check_whole
 from veca_marl.envs.core.game import Game
-from veca_marl.envs.tasks.navigation.room_counts import ROOMS
+from veca_marl.envs.tasks.floors.playability import ROOMS
 
 FURNISHED = [
     *(pytest.param(name, marks=pytest.mark.slow) for name in ("house", "random_house")),

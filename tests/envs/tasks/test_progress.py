@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from babies import child_game, put, rest
 
-from veca_marl.envs.tasks.locomotion.progress import ForwardProgress
+from veca_marl.envs.tasks.locomotion.motor_skills import ForwardProgress
 from veca_marl.sim.body.humanoid.postures import ON_ALL_FOURS, STANDING
 
 STEP_S, TOP_MPS = 0.04, 1.0

@@ -5,7 +5,7 @@ import pytest
 from composed import compose
 
 from veca_marl.envs.core.game import Game
-from veca_marl.envs.tasks.developmental.regions import region_of, regions_of, touched_regions
+from veca_marl.envs.tasks.self_touch import region_of, regions_of, touched_regions
 from veca_marl.sim.body.humanoid.postures import Posture
 
 # the right palm on the left forearm
@@ -88,7 +88,7 @@ def test_a_region_is_rewarded_once_in_an_episode(game):
 
 @pytest.mark.slow
 def test_the_expert_touches_most_regions(game):
-    from veca_marl.envs.core.team import Script
+    from veca_marl.envs.core.game_cfg import Script
 
     game.reset(np.random.default_rng(5))
     for _ in range(500):

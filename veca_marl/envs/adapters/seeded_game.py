@@ -11,12 +11,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from veca_marl.envs.adapters.closed import refuse_closed
 from veca_marl.envs.core.episodes import Episodes
-from veca_marl.envs.core.game import Game, Observation
+from veca_marl.envs.core.game import Game, Observation, refuse_closed
 from veca_marl.envs.core.game_cfg import GameCfg
 from veca_marl.envs.core.task import SOLVED
-from veca_marl.envs.rendering.spectator import Spectator
+from veca_marl.envs.rendering import Spectator
 from veca_marl.sim.kernel_cache import announce_compilation
 
 RENDER_MODES = ("rgb_array",)

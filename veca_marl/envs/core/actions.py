@@ -1,4 +1,4 @@
-"""Actions outside the simulator: the plain array of a body with one part, or a mapping of parts.
+"""Actions outside the simulator: plain arrays or mappings of parts, and those of scripted teams.
 
 A body's action is a mapping from part names to arrays (`Body.action_spec`). Libraries and users
 give the plain array for a body with a single part; these functions convert between the two.
@@ -6,12 +6,14 @@ give the plain array for a body with a single part; these functions convert betw
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from veca_marl.envs.core.game_cfg import Script
+from veca_marl.envs.core.task import Player
 from veca_marl.sim.spec import ArraySpec
 
 ActionSpec = Mapping[str, ArraySpec]
@@ -58,3 +60,25 @@ def _random_part(spec: ArraySpec, rng: np.random.Generator) -> NDArray[Any]:
     if spec.is_discrete:
         return np.asarray(rng.integers(int(spec.high) + 1), spec.dtype)
     return rng.uniform(spec.low, spec.high, spec.shape).astype(spec.dtype)
+
+
+def play_script(
+    script: Script,
+    player: Player,
+    expert_command: Callable[[Player], Any],
+    rng: np.random.Generator,
+) -> None:
+    """Set the action of one player for the next step.
+
+    Args:
+        script: How the action is chosen.
+        player: The player.
+        expert_command: Returns the command of the player's expert; called for `Script.expert` only.
+        rng: Random generator of the game.
+    """
+    if script is Script.idle:
+        player.body.rest()
+    elif script is Script.random:
+        player.body.act(random_action(player.body.action_spec, rng))
+    else:
+        player.body.act(player.body.encode(expert_command(player)))

@@ -13,12 +13,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from veca_marl.envs.core.actions import to_parts
+from veca_marl.envs.core.actions import play_script, to_parts
 from veca_marl.envs.core.expert import Expert, check_expert, find_expert
-from veca_marl.envs.core.game_cfg import GameCfg
-from veca_marl.envs.core.scripts import play_script
+from veca_marl.envs.core.game_cfg import GameCfg, Script
 from veca_marl.envs.core.task import Player, Team, find_task
-from veca_marl.envs.core.team import Script
 from veca_marl.sim.body import make_body
 from veca_marl.sim.physics import World
 from veca_marl.sim.sense import Sense
@@ -328,3 +326,13 @@ def player_names(team: Team) -> list[str]:
     if team.size == 1:
         return [team.name]
     return [f"{team.name}_{index}" for index in range(team.size)]
+
+
+def refuse_closed(is_closed: bool) -> None:
+    """Refuse the use of an environment that is closed.
+
+    Raises:
+        RuntimeError: If it is.
+    """
+    if is_closed:
+        raise RuntimeError("the environment is closed; make a new one")

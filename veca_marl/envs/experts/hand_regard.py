@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from veca_marl.envs.core.expert import Expert, register_expert
 from veca_marl.envs.core.task import Player
-from veca_marl.envs.experts.control.key_poses import KeyPoses
+from veca_marl.envs.experts.control.posture_transitions import KeyPoses
 from veca_marl.envs.tasks.hand_regard import HandRegard
 from veca_marl.sim.body.humanoid.postures import Posture
 from veca_marl.sim.geometry import Floats

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from veca_marl.envs.core.expert import Expert, register_expert
 from veca_marl.envs.core.task import Player
 from veca_marl.envs.experts.control.arm_kinematics import ArmKinematics, Palms
-from veca_marl.envs.experts.control.key_poses import KeyPoses
+from veca_marl.envs.experts.control.posture_transitions import KeyPoses
 from veca_marl.envs.tasks.self_touch import SelfTouch
 from veca_marl.sim.body.anatomy import load_skeleton
 from veca_marl.sim.body.humanoid.postures import Posture

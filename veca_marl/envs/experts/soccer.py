@@ -1,14 +1,19 @@
-"""The direction of a shot at a goal: inside the mouth, free of the keeper, near for the body."""
+"""Experts of SoccerOnePlayer and SoccerTwoPlayer: shots at the goal, and points to steer to."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from veca_marl.envs.experts.control.locomotion import Clearances
-from veca_marl.envs.tasks.soccer import Pitch
+from veca_marl.envs.core.expert import Expert, register_expert
+from veca_marl.envs.experts.control.locomotion import Clearances, bearing_rad, locomotion_of
+from veca_marl.envs.experts.control.path_following import WallRecovery
+from veca_marl.envs.tasks.soccer import ATTACKER, Pitch, Soccer
 from veca_marl.sim.geometry import Floats
 
 # lateral distances of aims from the middle of the goal, as shares of its width
@@ -109,3 +114,175 @@ def _has_run_up(ball: Floats, shot: Floats, clearances: Clearances, pitch: Pitch
 
 def _angle_rad(a: Floats, b: Floats) -> float:
     return abs(math.atan2(float(a[0] * b[1] - a[1] * b[0]), float(a @ b)))
+
+
+_BALL_M = 0.12
+# deceleration of a rolling ball as observed, and the share of its path that a board leaves it
+_ROLLING_MPS2, _REBOUND = 0.25, 0.6
+_SPEED_MPS = 0.4  # of a body on hands and knees
+_LEAST_PREDICTION_S, _MOST_PREDICTION_S = 0.25, 2.5
+
+
+def attacking_point(shooter: Shooter, pitch: Pitch) -> Floats:
+    """Return the point to steer to so that the ball moves into the goal, ``(2,)`` metres.
+
+    Args:
+        shooter: The body that shoots.
+        pitch: The pitch with the ball.
+    """
+    ball = predicted_ball(pitch, shooter)
+    return _pushing_point(shooter, pitch, ball, shot_at_goal(shooter, ball, pitch))
+
+
+def clearing_point(shooter: Shooter, pitch: Pitch) -> Floats:
+    """Return the point to steer to so that the ball moves away from the goal, ``(2,)`` metres.
+
+    Arguments as of `attacking_point`.
+    """
+    ball = predicted_ball(pitch, shooter)
+    return _pushing_point(shooter, pitch, ball, unit(ball - pitch.goal[:2]))
+
+
+def predicted_ball(pitch: Pitch, shooter: Shooter) -> Floats:
+    """Return where the ball will be when a body can reach it, ``(2,)`` metres.
+
+    It decelerates uniformly and rebounds from the edges of the pitch; at most 2.5 s are predicted.
+    """
+    place, velocity = pitch.ball.position[:2], pitch.ball.velocity[:2]
+    speed = float(np.hypot(*velocity))
+    way_m = float(np.hypot(*(place - shooter.here))) - shooter.clearances.ball_m
+    time_s = min(max(way_m / _SPEED_MPS, _LEAST_PREDICTION_S), _MOST_PREDICTION_S)
+    time_s = min(time_s, speed / _ROLLING_MPS2)
+    rolled_m = speed * time_s - _ROLLING_MPS2 * time_s**2 / 2.0
+    ball = place + rolled_m * unit(velocity)
+    low, high = pitch.low + _BALL_M, pitch.high - _BALL_M
+    ball = ball + (1.0 + _REBOUND) * (np.maximum(low - ball, 0.0) - np.maximum(ball - high, 0.0))
+    return np.clip(ball, low, high)
+
+
+def _pushing_point(shooter: Shooter, pitch: Pitch, ball: Floats, shot: Floats) -> Floats:
+    """Return the point to steer to so that the ball moves in a direction, ``(2,)`` metres.
+
+    A body drives a ball in contact away from itself. The path therefore leads round the ball at a
+    distance until the ball lies between the body and the aim, and then through the ball. Where
+    walls leave no space for the run-up, the shot deviates from its direction as little as possible.
+    """
+    clearances, here = shooter.clearances, shooter.here
+    shot = feasible_shot(ball, shot, clearances, pitch)
+    behind, aside = float((ball - here) @ shot), abs(_cross(shot, ball - here))
+    if aside < clearances.aside_m + clearances.funnel * (behind - clearances.ball_m):
+        return ball - max(behind - clearances.look_ahead_m, 0.0) * shot
+    start = ball - clearances.run_up_m * shot
+    if shooter.keeper is not None:
+        start = _around_keeper(shooter, start)
+    return _around(here, ball, start, clearances.clear_m)
+
+
+def _around_keeper(shooter: Shooter, goal: Floats) -> Floats:
+    """Return the next point of a path to a goal past the keeper, ``(2,)`` metres."""
+    keeper = shooter.keeper
+    assert keeper is not None
+    reach_m = min(math.dist(keeper, goal), math.dist(keeper, shooter.here)) - 0.1
+    return _around(shooter.here, keeper, goal, min(shooter.clearances.other_m, reach_m))
+
+
+def _around(here: Floats, obstacle: Floats, goal: Floats, clear_m: float) -> Floats:
+    """Return the next point of a path to a goal that passes an obstacle, ``(2,)`` metres."""
+    way = goal - here
+    length = float(np.hypot(*way))
+    along = unit(way)
+    ahead = float((obstacle - here) @ along)
+    left = np.array([-along[1], along[0]])
+    aside = float((obstacle - here) @ left)
+    if not (0.0 < ahead < length + 0.1 and abs(aside) < clear_m):
+        return goal
+    side = -math.copysign(1.0, aside)
+    return obstacle + side * clear_m * 1.2 * left
+
+
+def _cross(a: Floats, b: Floats) -> float:
+    return float(a[0] * b[1] - a[1] * b[0])
+
+
+_TURNING_S = 2.8  # from beside the ball to behind it
+_CHEST_M = 0.3  # from the pelvis forwards, for bodies on hands and knees
+_KEEPER_M = 0.7  # distance of the chest from the other player, likewise
+_BEHIND_RAD = 2.5  # a body that turns to a place at a greater bearing does not change the side
+_OFF_WALLS_M = 0.45  # distance of the chest from walls at which they do not stop the body
+
+
+@register_expert("SoccerOnePlayer")
+class SoccerExpert(Expert[Soccer]):
+    """Goes behind the ball and drives it into the goal.
+
+    Reads position and velocity of the ball, the positions of the players, its own heading, and
+    edges and goal of the pitch from the simulator (privileged); on hands and knees also its own
+    joint angles and the orientations of chest and pelvis, with which it gets up after a fall.
+    """
+
+    reads = ()
+
+    def reset(self) -> None:
+        """See `Expert.reset`."""
+        step_s = self.task.world.clock.step_s
+        locomotion = locomotion_of(self.player, step_s)
+        self._locomotion = WallRecovery(
+            self.player.body, locomotion, step_s, _TURNING_S, self._has_space
+        )
+        self._side = 0.0
+
+    def act(self, observation: Mapping[str, NDArray[Any]]) -> Any:
+        """Return a command for the player's kind of body, see `Expert.act`."""
+        here = self.player.body.position[:2]
+        shooter = Shooter(here, self._locomotion.clearances, self.keeper())
+        return self._locomotion.to(self._on_one_side(self.point(shooter)))
+
+    def point(self, shooter: Shooter) -> Floats:
+        """Return the point to steer to, ``(2,)`` metres."""
+        return attacking_point(shooter, self.task.pitch)
+
+    def keeper(self) -> Floats | None:
+        """Return the position of the opponent, ``(2,)`` metres; None if there is none."""
+        others = [player for player in self.task.players if player is not self.player]
+        return others[0].body.position[:2] if others else None
+
+    def _on_one_side(self, point: Floats) -> Floats:
+        """Return a point, or one beside the body while it turns to a point behind it.
+
+        On hands and knees the heading swings by about 20 degrees during a stride. The point behind
+        would be on the left and on the right in turn.
+        """
+        body = self.player.body
+        bearing = bearing_rad(body, point)
+        if abs(bearing) < _BEHIND_RAD or self._side == 0.0:
+            self._side = math.copysign(1.0, bearing)
+        if bearing * self._side > 0.0:
+            return point
+        ahead = body.forward[:2]
+        return body.position[:2] + self._side * np.array([-ahead[1], ahead[0]])
+
+    def _has_space(self) -> bool:
+        """Return whether walls and the other player are too far away to stop the body."""
+        body, pitch, keeper = self.player.body, self.task.pitch, self.keeper()
+        chest = body.position[:2] + _CHEST_M * body.forward[:2]
+        if keeper is not None and math.dist(chest, keeper) < _KEEPER_M:
+            return False
+        return bool(
+            (chest > pitch.low + _OFF_WALLS_M).all() and (chest < pitch.high - _OFF_WALLS_M).all()
+        )
+
+
+@register_expert("SoccerTwoPlayer")
+class SoccerTwoPlayerExpert(SoccerExpert):
+    """As attacker shoots past the defender; as defender drives the ball away from the goal.
+
+    Reads what `SoccerExpert` reads (privileged): position and velocity of the ball, the positions
+    of the players, its own heading, edges and goal of the pitch; on hands and knees also its own
+    joint angles and the orientations of chest and pelvis.
+    """
+
+    def point(self, shooter: Shooter) -> Floats:
+        """See `SoccerExpert.point`."""
+        if self.player.team == ATTACKER:
+            return super().point(shooter)
+        return clearing_point(replace(shooter, keeper=None), self.task.pitch)

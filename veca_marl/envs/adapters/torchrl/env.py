@@ -7,16 +7,13 @@ import torch
 from numpy.typing import NDArray
 from tensordict import TensorDict, TensorDictBase
 
-from veca_marl.envs.adapters.closed import refuse_closed
-from veca_marl.envs.adapters.torchrl.actions import ActionReader, TeamActions, action_of
-from veca_marl.envs.adapters.torchrl.fast_step import FastStepEnv
-from veca_marl.envs.adapters.torchrl.layout import Arrays, Layout
-from veca_marl.envs.adapters.torchrl.specs import env_specs
+from veca_marl.envs.adapters.torchrl.fast_step import Arrays, FastStepEnv, Layout
+from veca_marl.envs.adapters.torchrl.specs import ActionReader, TeamActions, action_of, env_specs
 from veca_marl.envs.core.episodes import Episodes, check_integer, fresh_seed
-from veca_marl.envs.core.game import Game, Outcome
+from veca_marl.envs.core.game import Game, Outcome, refuse_closed
 from veca_marl.envs.core.game_cfg import GameCfg
 from veca_marl.envs.core.task import SOLVED
-from veca_marl.envs.rendering.spectator import Spectator
+from veca_marl.envs.rendering import Spectator
 from veca_marl.sim.kernel_cache import announce_compilation
 
 

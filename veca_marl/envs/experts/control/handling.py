@@ -6,12 +6,10 @@ import math
 
 import numpy as np
 
-from veca_marl.envs.experts.control.locomotion import WalkerLocomotion
+from veca_marl.envs.experts.control.locomotion import WalkerLocomotion, bearing_rad
 from veca_marl.envs.experts.control.path_following import WallRecovery
-from veca_marl.envs.experts.control.paths.steering import bearing_rad
-from veca_marl.envs.tasks.floors.grid_paths import PathsTo
+from veca_marl.envs.tasks.floors.grid_paths import PathsTo, floor_grid, free_cells
 from veca_marl.envs.tasks.floors.places import gap_m
-from veca_marl.envs.tasks.navigation.floors.floor_grid import floor_grid, free_cells
 from veca_marl.sim.body.walker import WalkCommand, Walker
 from veca_marl.sim.geometry import Floats, horizontal_distance
 from veca_marl.sim.physics import Prop, World

@@ -7,15 +7,43 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 from veca_marl.envs.core.task import Player, require_walker
-from veca_marl.envs.experts.control.crawl_gait import BACK, CRAWL, KNEEL, GaitPattern
-from veca_marl.envs.experts.control.crawling.crawl_gait import CrawlGait
-from veca_marl.envs.experts.control.crawling.fall_recovery import FallRecovery
-from veca_marl.envs.experts.control.paths.steering import bearing_rad, walk_to
+from veca_marl.envs.experts.control.crawl_gait import BACK, CRAWL, KNEEL, CrawlGait, GaitPattern
+from veca_marl.envs.experts.control.posture_transitions import FallRecovery
 from veca_marl.envs.tasks.floors.floor_plan import DoorApproach
+from veca_marl.sim.body import Body
 from veca_marl.sim.body.humanoid import Humanoid, JointCommand
 from veca_marl.sim.body.walker import Walker
 from veca_marl.sim.geometry import Floats
 from veca_marl.sim.sound import Call
+
+_FULL_TURN_RAD = 0.25  # bearing at which the turning command saturates
+
+
+def bearing_rad(body: Body, point: Floats) -> float:
+    """Return the angle of a point to the left of a body's forward direction, in [-pi, pi].
+
+    Args:
+        body: The body.
+        point: ``(2,)`` or ``(3,)`` metres; the height is ignored.
+    """
+    way, ahead = point[:2] - body.position[:2], body.forward
+    return math.atan2(ahead[0] * way[1] - ahead[1] * way[0], float(ahead[:2] @ way))
+
+
+def walk_to(body: Body, point: Floats, speed: float = 1.0) -> tuple[float, float]:
+    """Return the command (forward, turn) of a walker that moves to a point.
+
+    It turns towards the point and walks with the cosine of the bearing, if that is positive.
+
+    Args:
+        body: The body of the walker.
+        point: ``(2,)`` or ``(3,)`` metres; the height is ignored.
+        speed: Share of the greatest speed.
+    """
+    bearing = bearing_rad(body, point)
+    turn = min(max(bearing / _FULL_TURN_RAD, -1.0), 1.0)
+    return speed * max(0.0, math.cos(bearing)), turn
+
 
 _TURNING_RADIUS_M = 0.35  # a body that crawls in a circle steers back when it is farther away
 

@@ -1,17 +1,19 @@
-"""Recovery from walls, door posts and corners: move backwards after being stuck."""
+"""Path following: through doors to any point of a house, round furniture, away from walls."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
-from veca_marl.envs.experts.control.locomotion import Locomotion
-from veca_marl.envs.experts.control.paths.steering import bearing_rad
+from veca_marl.envs.experts.control.locomotion import Locomotion, bearing_rad
+from veca_marl.envs.tasks.floors.floor_plan import FloorPlan
+from veca_marl.envs.tasks.floors.grid_paths import CELL_M, PathsTo, floor_grid, free_cells
 from veca_marl.sim.body import Body
-from veca_marl.sim.geometry import Floats
+from veca_marl.sim.geometry import Floats, horizontal_distance
+from veca_marl.sim.physics import Prop, World
 from veca_marl.sim.sound import Call
 
 # a body is stuck that has moved and turned by less than this within this time
@@ -103,3 +105,126 @@ class WallRecovery:
         before = self._track[-1 - steps]
         turned = float(before[2:] @ now[2:]) < math.cos(_STUCK_RAD)
         return not turned and math.dist(before[:2], now[:2]) < _STUCK_M
+
+
+_GREATEST_CLEARANCE_M = 0.3  # half of a door 1 m wide, less the cells that a path needs
+_OPEN = 0.5  # a leaf that is further open leaves room to walk through
+
+
+class Detours(Protocol):
+    """Ways to waypoints of a path."""
+
+    def next_point(self, place: Floats, waypoint: Floats) -> Floats:
+        """Return the next point ``(2,)`` of the way from a place to a waypoint, metres."""
+        ...
+
+
+class StraightWays:
+    """No detours: for floors without furniture in the way."""
+
+    def next_point(self, place: Floats, waypoint: Floats) -> Floats:
+        """See `Detours`."""
+        return waypoint
+
+
+class FurnitureDetours:
+    """Shortest ways that keep a distance from walls and furniture.
+
+    Toys and closed doors are walked into, and move. An open door is walked round: a body that comes
+    from behind its leaf would close it, and a leaf that opens towards the body stays closed.
+
+    Args:
+        world: The world; its props are where they are now.
+        clear_m: Least distance, limited so that doors are passable.
+    """
+
+    def __init__(self, world: World, clear_m: float) -> None:
+        self._grid = floor_grid(world.playground)
+        moved = [prop for prop in world.props.values() if _is_pushed_away(prop)]
+        limited_m = min(clear_m, _GREATEST_CLEARANCE_M)
+        self._free = free_cells(self._grid, world, limited_m, passable=moved)
+        self._paths: tuple[Floats, PathsTo] | None = None
+
+    def next_point(self, place: Floats, waypoint: Floats) -> Floats:
+        """See `Detours`."""
+        known = self._paths
+        if known is None or horizontal_distance(waypoint, known[0]) > CELL_M:
+            known = np.array(waypoint), PathsTo(self._grid, self._free, waypoint)
+            self._paths = known
+        return known[1].next_point(place)
+
+
+def _is_pushed_away(prop: Prop) -> bool:
+    if prop.joint is None:
+        return not prop.fixed
+    return prop.opening < _OPEN
+
+
+def detours_in(world: World, clear_m: float) -> Detours:
+    """Return ways round furniture in a furnished playground, else straight ones."""
+    return FurnitureDetours(world, clear_m) if world.playground.furniture else StraightWays()
+
+
+_ARRIVED_M = 0.4
+
+
+class PathFollower:
+    """Moves a body along the shortest path through a known floor plan.
+
+    Args:
+        body: The body; its position and heading are read from the simulator.
+        locomotion: What moves the body.
+        plan: Rooms and doors.
+        step_s: Duration of an environment step.
+        detours: Ways between the points of the path.
+    """
+
+    def __init__(
+        self,
+        body: Body,
+        locomotion: Locomotion,
+        plan: FloorPlan,
+        step_s: float,
+        detours: Detours | None = None,
+    ) -> None:
+        self._body, self._plan = body, plan
+        self._detours = StraightWays() if detours is None else detours
+        self._locomotion = WallRecovery(body, locomotion, step_s)
+        self._beyond_door: Floats | None = None
+
+    @property
+    def room(self) -> int:
+        """Number of the room that the body is in."""
+        return self._plan.room_of(self._body.position)
+
+    def is_at(self, place: Floats) -> bool:
+        """Return whether the body is within 0.4 m of a place, ``(2,)`` or ``(3,)`` metres."""
+        return horizontal_distance(place, self._body.position) < _ARRIVED_M
+
+    def to(self, goal: Floats, call: Call = Call.none) -> Any:
+        """Move towards a place anywhere in the house; arguments as in `Locomotion.to`."""
+        waypoint = self._waypoint(goal)
+        point = self._detours.next_point(self._body.position, waypoint)
+        return self._locomotion.to(point, call)
+
+    def turn_left(self, call: Call = Call.none) -> Any:
+        """Turn to the left on the spot."""
+        return self._locomotion.turn(1.0, call)
+
+    def rest(self, call: Call = Call.none) -> Any:
+        """Stay."""
+        return self._locomotion.rest(call)
+
+    def _waypoint(self, goal: Floats) -> Floats:
+        """Return the next point to steer to, ``(2,)`` metres.
+
+        A point behind a door is kept until it is reached, so that a body does not stop inside the
+        opening.
+        """
+        beyond = self._beyond_door
+        if beyond is not None and not self.is_at(beyond) and not self._locomotion.is_recovering:
+            return beyond
+        approach = self._locomotion.clearances.door_approach
+        point = self._plan.waypoint(self._body.position, goal, approach)
+        self._beyond_door = None if self._plan.room_of(point) == self.room else point
+        return point

@@ -1,15 +1,53 @@
-"""Turning from the back to the belly over the left side, then over the right one."""
+"""Changes of posture by key poses: turning over, and getting up onto hands and knees."""
 
 from __future__ import annotations
 
-from veca_marl.envs.experts.control.key_poses import KeyPoses
-from veca_marl.sim.body.humanoid import Humanoid
+from collections.abc import Mapping
+
+import numpy as np
+
+from veca_marl.sim.body.humanoid import Humanoid, JointCommand
 from veca_marl.sim.body.humanoid.postures import ON_BACK, Posture
 from veca_marl.sim.geometry import Floats
 
+
+class KeyPoses:
+    """Target angles that move to a key pose at a limited speed.
+
+    Args:
+        body: The body.
+        poses: Key poses by name; only their joint angles are used.
+        step_s: Duration of an environment step.
+
+    Attributes:
+        targets: The target angles of the last step, ``(82,)`` rad.
+    """
+
+    def __init__(self, body: Humanoid, poses: Mapping[str, Posture], step_s: float) -> None:
+        self._body, self._step_s = body, step_s
+        self._poses = {name: body.posture_angles(pose) for name, pose in poses.items()}
+        self.reset()
+
+    def reset(self, targets: Floats | None = None) -> None:
+        """Start from target angles, ``(82,)`` rad; None are the present joint angles."""
+        self.targets = self._body.joint_angles() if targets is None else targets.copy()
+
+    def toward(self, name: str, speed_radps: float) -> Floats:
+        """Return the target angles of the next step, ``(82,)`` rad.
+
+        Args:
+            name: Name of the key pose.
+            speed_radps: Speed of each target angle.
+        """
+        limit_rad = speed_radps * self._step_s
+        change = self._poses[name] - self.targets
+        self.targets = self.targets + np.clip(change, -limit_rad, limit_rad)
+        return self.targets.copy()
+
+
 # set by hand, then improved by a random search for the return of TurnBaby, with torque control
 # and with position control
-_POSES = {
+_TURNING_POSES = {
     # legs raised and crossed, trunk bent: the centre of mass moves over the left side
     "swing": Posture(
         joints_deg={
@@ -66,7 +104,7 @@ _POSES = {
     ),
     "rest": ON_BACK,
 }
-_SPEED_RADPS = 12.0
+_TURNING_RADPS = 12.0
 # cosines of the angle between the front of the trunk and straight down
 _ON_SIDE, _NEARLY_OVER, _FALLEN_BACK = -0.2, 0.55, -0.5
 _SWING_S, _REST_S = 2.0, 0.5  # longest swing, rest after it
@@ -89,7 +127,7 @@ def _mirrored(joint: tuple[str, float]) -> tuple[str, float]:
     return name, -angle if bone in _MIDLINE_BONES and label in _MIDLINE else angle
 
 
-_MIRRORED = {name: mirrored(posture) for name, posture in _POSES.items()}
+_MIRRORED = {name: mirrored(posture) for name, posture in _TURNING_POSES.items()}
 
 
 class TurnOver:
@@ -105,7 +143,7 @@ class TurnOver:
 
     def __init__(self, body: Humanoid, step_s: float) -> None:
         self._body, self._step_s = body, step_s
-        self._sides = [KeyPoses(body, _POSES, step_s), KeyPoses(body, _MIRRORED, step_s)]
+        self._sides = [KeyPoses(body, _TURNING_POSES, step_s), KeyPoses(body, _MIRRORED, step_s)]
         self.reset()
 
     def reset(self) -> None:
@@ -120,7 +158,7 @@ class TurnOver:
             self._start(1 - self._side)
         self._elapsed_s = self._elapsed_s + self._step_s if chosen == self._pose else 0.0
         self._pose = chosen
-        return self._sides[self._side].toward(chosen, _SPEED_RADPS)
+        return self._sides[self._side].toward(chosen, _TURNING_RADPS)
 
     def _start(self, side: int) -> None:
         """Move over a side from the present joint angles: 0 is the left one, 1 the right one."""
@@ -138,3 +176,139 @@ class TurnOver:
         if down < _FALLEN_BACK:
             return "swing"
         return "lie" if down > _NEARLY_OVER else self._pose
+
+
+# set by hand, then improved by a random search for the return of SitBaby
+_RISING_POSES = {
+    # on the belly: hands beside the shoulders, knees bent
+    "prepare": Posture(
+        joints_deg={
+            "upper_arm.flexion": 70,
+            "upper_arm.abduction": 33,
+            "upper_arm.internal_rotation": -6,
+            "forearm.flexion": 126,
+            "thigh.flexion": -7,
+            "thigh.abduction": 20,
+            "shank.flexion": 88,
+            "spine.flexion": 12,
+            "neck.flexion": -40,
+            "foot.dorsiflexion": -44,
+        }
+    ),
+    # arms extended, knees under the hips
+    "push": Posture(
+        joints_deg={
+            "upper_arm.flexion": 79,
+            "upper_arm.abduction": 20,
+            "upper_arm.internal_rotation": 3,
+            "forearm.flexion": 38,
+            "hand.flexion": -44,
+            "thigh.flexion": 102,
+            "thigh.abduction": 40,
+            "shank.flexion": 131,
+            "spine.flexion": -15,
+            "neck.flexion": -44,
+            "foot.dorsiflexion": -43,
+        }
+    ),
+}
+_RISING_RADPS = 10.0
+_DURATION_S = {"lie": 0.4, "prepare": 0.5, "push": 1.1}
+_NEXT_STAGE = {"lie": "prepare", "prepare": "push"}
+_ON_BELLY = 0.7  # cosine of the angle between the front of the chest and straight down
+_HORIZON = 0.5  # prediction of the joint angles in agent steps; 1 damps more
+
+
+class GetUp:
+    """Target angles of a body that turns to its belly and pushes itself up, in stages.
+
+    Attributes:
+        is_complete: Whether all stages are over. The body is then on hands and knees, unless the
+            attempt has failed.
+
+    Args:
+        body: The body.
+        step_s: Duration of an environment step.
+    """
+
+    def __init__(self, body: Humanoid, step_s: float) -> None:
+        self._body, self._step_s = body, step_s
+        self._turn = TurnOver(body, step_s)
+        self._key_poses = KeyPoses(body, _RISING_POSES, step_s)
+        self.reset()
+
+    def reset(self) -> None:
+        """Start with turning over."""
+        self._begin("lie")
+        self._turn.reset()
+        self.is_complete = False
+
+    @property
+    def targets(self) -> Floats:
+        """``(82,)`` rad: the target angles of the last step of pushing up."""
+        return self._key_poses.targets
+
+    def command(self) -> JointCommand:
+        """Return the target angles of the next step."""
+        self._elapsed_s += self._step_s
+        targets = self._targets()
+        if self._elapsed_s >= _DURATION_S[self._stage]:
+            self._end_stage()
+        return JointCommand(targets, _HORIZON * self._step_s)
+
+    def _targets(self) -> Floats:
+        if self._stage != "lie":
+            return self._key_poses.toward(self._stage, _RISING_RADPS)
+        if not self._body.bone("chest").forward[2] < -_ON_BELLY:
+            self._elapsed_s = 0.0
+        return self._turn.command()
+
+    def _end_stage(self) -> None:
+        if self._stage in _NEXT_STAGE:
+            self._begin(_NEXT_STAGE[self._stage])
+        else:
+            self.is_complete = True
+
+    def _begin(self, stage: str) -> None:
+        self._stage, self._elapsed_s = stage, 0.0
+        if stage == "prepare":
+            self._key_poses.reset()
+
+
+# vertical component of the front of the chest: -1 on the belly, 1 on the back; at most -0.6 in 20 s
+# of crawling, pushing and dribbling
+_FALLEN = -0.3
+_PATIENCE_S = 0.4  # a body that rolls over by itself has not fallen
+
+
+class FallRecovery:
+    """Notices that a body lies on its back or on a side, and gets it up onto hands and knees.
+
+    Args:
+        body: The body.
+        step_s: Duration of an environment step.
+    """
+
+    def __init__(self, body: Humanoid, step_s: float) -> None:
+        self._body, self._step_s = body, step_s
+        self._get_up = GetUp(body, step_s)
+        self._fallen_s, self._is_rising = 0.0, False
+
+    def command(self) -> JointCommand | None:
+        """Return the target angles of the next step; None for a body that has not fallen.
+
+        Call it once per step.
+        """
+        if not self._is_rising and self._has_fallen():
+            self._is_rising = True
+            self._get_up.reset()
+        if not self._is_rising:
+            return None
+        command = self._get_up.command()
+        self._is_rising = not self._get_up.is_complete
+        return command
+
+    def _has_fallen(self) -> bool:
+        is_down = self._body.bone("chest").forward[2] > _FALLEN
+        self._fallen_s = self._fallen_s + self._step_s if is_down else 0.0
+        return self._fallen_s >= _PATIENCE_S

@@ -7,8 +7,7 @@ from __future__ import annotations
 
 import math
 
-from veca_marl.envs.experts.control.crawling.get_up import GetUp
-from veca_marl.envs.experts.control.key_poses import KeyPoses
+from veca_marl.envs.experts.control.posture_transitions import GetUp, KeyPoses
 from veca_marl.envs.experts.control.seated_balance import SeatedBalance
 from veca_marl.sim.body.humanoid import Humanoid, JointCommand
 from veca_marl.sim.body.humanoid.postures import Posture

@@ -12,8 +12,8 @@ import numpy as np
 from veca_marl.envs.core.task import Task, TaskCfg, require_walker
 from veca_marl.envs.tasks.cars.toy_car import Motion, ToyCar, check_speed
 from veca_marl.envs.tasks.floors import places
-from veca_marl.envs.tasks.navigation.floors.scattering import Spacing, scattered_places
-from veca_marl.envs.tasks.navigation.placement_check import check_placement
+from veca_marl.envs.tasks.floors.places import Spacing, scattered_places
+from veca_marl.envs.tasks.floors.playability import check_placement
 from veca_marl.sim.body.walker import WalkerCfg
 from veca_marl.sim.geometry import Floats
 from veca_marl.sim.physics import ClockCfg, PlaygroundCfg

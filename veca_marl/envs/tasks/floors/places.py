@@ -1,14 +1,19 @@
-"""Places in houses: free floor, the searched object, distances."""
+"""Random positions on the floors of rooms, clear of furniture, and the start of players there."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
-from veca_marl.envs.tasks.navigation.floors.clearance import clearances_m
-from veca_marl.sim.geometry import Bools, Floats, horizontal_distance
+from veca_marl.envs.core.task import Player
+from veca_marl.sim.body.humanoid import Humanoid
+from veca_marl.sim.body.humanoid.postures import ON_ALL_FOURS
+from veca_marl.sim.geometry import Bools, Floats, distances_to, horizontal_distance
 from veca_marl.sim.physics import (
+    DoorCfg,
     PlannedProp,
     PlaygroundCfg,
     Prop,
@@ -18,6 +23,69 @@ from veca_marl.sim.physics import (
     StandingProp,
     World,
 )
+
+WALKER_HEIGHTS_M = np.array([0.05, 0.2, 0.35, 0.5, 0.65])  # of a body of 0.78 m; lintels are above
+_ROUNDING_M = 1e-9  # by which the distance to a circle and to a shape may differ where they touch
+
+
+class Clearances:
+    """Distances from points of the floor to several props, at the poses that these have now.
+
+    Most props are too far away to matter: only those are measured by their shape of which the
+    circle about them on the floor plan is near. Props that can tilt have no such circle.
+
+    Args:
+        props: The props.
+        heights_m: Heights above the floor at which distances are measured, see `clearances_m`.
+    """
+
+    def __init__(self, props: Sequence[StandingProp], heights_m: Floats = WALKER_HEIGHTS_M) -> None:
+        self._props, self._heights_m = list(props), heights_m
+        self._centres = np.array([prop.position[:2] for prop in props]).reshape(-1, 2)
+        self._radii_m = np.array([prop.reach_m if prop.fixed else np.inf for prop in props])
+
+    def all_at_least(self, points: Floats, clear_m: float) -> bool:
+        """Return whether some points are at a least distance from all props.
+
+        Args:
+            points: ``(2,)`` or ``(n, 2)`` metres.
+            clear_m: The distance, see `clearances_m`.
+        """
+        near = self._may_be_nearer(points.reshape(-1, 2), clear_m + _ROUNDING_M)
+        return all(
+            bool((clearances_m(self._props[number], points, self._heights_m) >= clear_m).all())
+            for number in np.flatnonzero(near).tolist()
+        )
+
+    def _may_be_nearer(self, points: Floats, distance_m: float) -> Bools:
+        """Return which of the circles about the props are nearer than a distance to a point."""
+        offsets = points[:, None] - self._centres
+        gaps_m = np.hypot(offsets[..., 0], offsets[..., 1]) - self._radii_m
+        nearer: Bools = (gaps_m < distance_m).any(axis=0)
+        return nearer
+
+
+def clearances_m(
+    prop: StandingProp, points: Floats, heights_m: Floats = WALKER_HEIGHTS_M
+) -> Floats:
+    """Return the least distance to a prop at some heights above points of the floor.
+
+    Args:
+        prop: The prop, at its present pose.
+        points: ``(..., 2)`` metres.
+        heights_m: The heights, ``(n,)`` metres; 0.05 to 0.65 m if they are not given.
+
+    Returns:
+        ``(...)`` metres, negative inside of the prop.
+    """
+    above = np.empty((*points.shape[:-1], len(heights_m), 3))
+    above[..., :2] = points[..., None, :]
+    above[..., 2] = heights_m
+    own = (above - prop.position) @ prop.rotation
+    distances = [distances_to(geom, own).min(axis=-1) for geom in prop.geoms]
+    least: Floats = np.min(distances, axis=0)
+    return least
+
 
 _DRAWS = 1000
 _PAIR_DRAWS = 10_000
@@ -175,3 +243,116 @@ def _is_clear(place: Floats, props: Sequence[StandingProp], clear_m: float) -> b
 def _keeps_away(place: Floats, prop: StandingProp, clear_m: float) -> bool:
     """Return whether a prop is so far away: by the circle round it, or else by its shape."""
     return gap_m(place, prop) >= clear_m or float(clearances_m(prop, place[:2])) >= clear_m
+
+
+_SCATTERED_DRAWS = 300  # of one place, until all places are drawn again
+_RESTARTS = 20
+
+
+class Spacing(NamedTuple):
+    """Least distances of drawn places.
+
+    Attributes:
+        clear_m: From walls and from surfaces of furniture.
+        apart_m: From each other.
+        door_m: From the middles of doors.
+    """
+
+    clear_m: float
+    apart_m: float
+    door_m: float
+
+
+def scattered_places(
+    playground: PlaygroundCfg,
+    furniture: Sequence[StandingProp],
+    count: int,
+    spacing: Spacing,
+    rng: np.random.Generator,
+) -> list[Floats]:
+    """Draw places uniformly on the floors of all rooms, subject to a spacing.
+
+    Args:
+        playground: The rooms and doors.
+        furniture: Props to keep away from.
+        count: Number of places.
+        spacing: Least distances.
+        rng: Random generator of the episode.
+
+    Returns:
+        `count` places, ``(3,)`` metres each.
+
+    Raises:
+        ValueError: If none of 20 attempts succeeds; the message names the playground.
+    """
+    rooms = wide_rooms(playground.rooms, spacing.clear_m)
+    clearances = Clearances(furniture)
+    for _ in range(_RESTARTS if rooms else 0):
+        found: list[Floats] = []
+        for _ in range(_SCATTERED_DRAWS):
+            place = _random_place(rooms, spacing.clear_m, rng)
+            if _keeps(place, found, clearances, playground.doors, spacing):
+                found.append(place)
+            if len(found) == count:
+                return found
+    widest = max(playground.rooms, key=lambda room: min(room.size_m[:2]))
+    raise ValueError(
+        f"playground {playground.name!r} leaves no {count} places {spacing.apart_m:.2f} m apart "
+        f"and {spacing.clear_m:.2f} m away from furniture and walls (its widest room is "
+        f"{widest.extent})"
+    )
+
+
+def wide_rooms(rooms: Sequence[RoomCfg], clear_m: float) -> list[RoomCfg]:
+    """Return the rooms with floor at a distance from their walls, in which places are drawn."""
+    return [room for room in rooms if min(room.size_m[:2]) > 2.0 * clear_m]
+
+
+def _random_place(rooms: Sequence[RoomCfg], clear_m: float, rng: np.random.Generator) -> Floats:
+    """Draw a place uniformly on the floors of rooms, at a distance from their walls."""
+    areas = [math.prod(size - 2.0 * clear_m for size in room.size_m[:2]) for room in rooms]
+    room = rooms[int(rng.choice(len(rooms), p=np.array(areas) / sum(areas)))]
+    return room.sample_floor(rng, clear_m)
+
+
+def _keeps(
+    place: Floats,
+    others: Sequence[Floats],
+    furniture: Clearances,
+    doors: Sequence[DoorCfg],
+    spacing: Spacing,
+) -> bool:
+    return (
+        all(horizontal_distance(place, other) >= spacing.apart_m for other in others)
+        and all(math.dist(place[:2], door.position_m) >= spacing.door_m for door in doors)
+        and furniture.all_at_least(place[:2], spacing.clear_m)
+    )
+
+
+_HORIZON_M = 10.0
+
+
+def place_player(player: Player, place: Floats, heading_rad: float) -> None:
+    """Place a player: a walker standing, a joint-level body on hands and knees.
+
+    Args:
+        player: The player.
+        place: ``(2,)`` or ``(3,)`` metres; the height is ignored.
+        heading_rad: Heading.
+    """
+    position = np.array([place[0], place[1], 0.0])
+    if isinstance(player.body, Humanoid):
+        player.body.place(position, heading_rad, ON_ALL_FOURS)
+    else:
+        player.body.place(position, heading_rad)
+
+
+def direct_gaze_ahead(players: Sequence[Player]) -> None:
+    """Turn the eyes of joint-level bodies to the horizon in front, as far as they turn.
+
+    On hands and knees the face points to the floor.
+    """
+    for player in players:
+        body = player.body
+        if isinstance(body, Humanoid):
+            body.look_toward_point(body.mount("head").position + _HORIZON_M * body.forward)

@@ -1,13 +1,16 @@
-"""A check that bodies get from each room to every other one."""
+"""Checks that a task can be played with a playground, before or after a world is built."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from itertools import combinations
 
-from veca_marl.sim.body.walker import WalkerCfg
-from veca_marl.sim.physics import DoorCfg, JointKind, PlaygroundCfg, RoomCfg
+import numpy as np
+
+from veca_marl.envs.core.task import Player
+from veca_marl.sim.body.walker import Walker, WalkerCfg
+from veca_marl.sim.physics import DoorCfg, JointKind, PlaygroundCfg, Prop, RandomHouseCfg, RoomCfg
 
 _TOUCHING_M = 0.01  # greatest distance of rooms without a wall between them
 
@@ -75,3 +78,122 @@ def _touch(one: RoomCfg, other: RoomCfg) -> bool:
         for axis in (0, 1)
     )
     return gaps_m[0] < 0.0 and gaps_m[1] <= _TOUCHING_M
+
+
+_LEAST_AGENTS = 2
+_RANDOM_HOUSE = "random_house"
+
+ROOMS = {
+    "two_rooms": 2,
+    "three_rooms": 3,
+    "four_rooms": 4,
+    "house": 4,
+    "seven_rooms": 7,
+    "house2": 7,
+}
+"""Number of rooms of the playgrounds that have several."""
+
+
+def check_rooms(playground: PlaygroundCfg, agents: int) -> None:
+    """Check that a playground has a room for each agent.
+
+    Raises:
+        ValueError: If it has too few.
+    """
+    rooms = len(playground.rooms)
+    if agents <= rooms:
+        return
+    raise ValueError(
+        f"task.agents={agents} start in rooms of their own, but playground "
+        f"{playground.name!r} has {rooms}; choose {' or '.join(_choices(rooms, agents))}"
+    )
+
+
+def _choices(rooms: int, agents: int) -> list[str]:
+    """Return what to choose instead of a playground that has too few rooms for the agents."""
+    larger = [name for name, count in ROOMS.items() if count >= agents]
+    choices = [f"playground={', '.join(larger)}"] if larger else []
+    if agents <= RandomHouseCfg(name=_RANDOM_HOUSE).most_rooms:
+        choices.append(f"playground={_RANDOM_HOUSE} playground.room_count={agents}")
+    if rooms >= _LEAST_AGENTS:
+        return [*choices, f"task.agents of at most {rooms}"]
+    if choices:
+        return choices
+    most = max(ROOMS.values())
+    largest = ", ".join(name for name, count in ROOMS.items() if count == most)
+    return [f"playground={largest} with task.agents of at most {most}"]
+
+
+def check_doorways(playground: PlaygroundCfg, players: Sequence[Player]) -> None:
+    """Check that walking bodies fit through all doors.
+
+    Heights are known where the walls are built from `PlaygroundCfg.walls`. Joint-level bodies can
+    crawl and turn: they are not checked.
+
+    Raises:
+        ValueError: If a door is narrower or lower than a body.
+    """
+    for player in players:
+        if isinstance(player.body, Walker):
+            _check(playground, player.body)
+
+
+def _check(playground: PlaygroundCfg, body: Walker) -> None:
+    for door in playground.doors:
+        if door.width_m <= 2.0 * body.cfg.radius_m:
+            raise ValueError(
+                f"playground {playground.name!r}: door {door.name!r} has width_m={door.width_m:g}: "
+                f"{body.name} with body.radius_m={body.cfg.radius_m:g} does not fit through it"
+            )
+    walls = playground.walls
+    if playground.doors and walls is not None and walls.door_height_m <= body.cfg.height_m:
+        raise ValueError(
+            f"playground {playground.name!r}: walls.door_height_m={walls.door_height_m:g} is too "
+            f"low for {body.name} with body.height_m={body.cfg.height_m:g}"
+        )
+
+
+TRIALS = 20
+"""Number of placements that are tried.
+
+Where one episode in ten would find no places, 20 trials show it with a probability of 0.88.
+"""
+
+
+def check_placement(
+    place: Callable[[np.random.Generator], object], asked: str, choice: str
+) -> None:
+    """Try out a random placement with fixed generators.
+
+    A task draws places at the start of an episode until they fit, some hundred times at most. A
+    trial that finds none stands for episodes that would fail at their start.
+
+    Args:
+        place: Draws the places of one episode, and raises `ValueError` if it finds none. It is
+            called `TRIALS` times: what does not depend on the generator is better found before.
+        asked: The values of the task that matter, for the message.
+        choice: What to choose instead, for the message.
+
+    Raises:
+        ValueError: If a trial finds no places.
+    """
+    try:
+        for seed in range(TRIALS):
+            place(np.random.default_rng(seed))
+    except ValueError as error:
+        raise ValueError(f"{asked}: {error}; choose {choice}") from None
+
+
+def check_kickable(players: Iterable[Player], ball: Prop) -> None:
+    """Check that the ball of a task is light enough for all players that walk.
+
+    Raises:
+        ValueError: If a walker cannot kick it.
+    """
+    for player in players:
+        body = player.body
+        if isinstance(body, Walker) and not body.is_light(ball):
+            raise ValueError(
+                f"task.mass_kg={ball.cfg.mass_kg:g}: {player.name} kicks and pushes at most "
+                f"body.push_limit_kg={body.cfg.push_limit_kg:g}"
+            )

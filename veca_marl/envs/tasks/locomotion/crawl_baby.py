@@ -8,12 +8,12 @@ import numpy as np
 
 from veca_marl.envs.core.task import Player, register_task, require_humanoid, terms
 from veca_marl.envs.tasks.locomotion.motor_skills import (
+    ForwardProgress,
     PosedStart,
     StartCfg,
     face_down_cosines,
     start_near_edge,
 )
-from veca_marl.envs.tasks.locomotion.progress import ForwardProgress
 from veca_marl.sim.body.humanoid import HumanoidCfg
 from veca_marl.sim.body.humanoid.postures import ON_ALL_FOURS
 

@@ -8,8 +8,12 @@ import numpy as np
 
 from veca_marl.envs.core.scoring import horizontal
 from veca_marl.envs.core.task import Player, register_task, require_humanoid, terms
-from veca_marl.envs.tasks.locomotion.motor_skills import PosedStart, StartCfg, start_near_edge
-from veca_marl.envs.tasks.locomotion.progress import ForwardProgress
+from veca_marl.envs.tasks.locomotion.motor_skills import (
+    ForwardProgress,
+    PosedStart,
+    StartCfg,
+    start_near_edge,
+)
 from veca_marl.sim.body.humanoid import HumanoidCfg
 from veca_marl.sim.body.humanoid.postures import STANDING
 from veca_marl.sim.geometry import Floats

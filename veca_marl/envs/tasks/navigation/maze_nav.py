@@ -7,19 +7,70 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from veca_marl.envs.core.task import Player, Task, TaskCfg, register_task, require_walker, terms
 from veca_marl.envs.tasks.floors import places
-from veca_marl.envs.tasks.navigation.mazes.maze import Cell, Maze, random_maze
-from veca_marl.envs.tasks.navigation.mazes.trial_sense import TRIAL, TrialSense
-from veca_marl.envs.tasks.navigation.mazes.walls import (
+from veca_marl.envs.tasks.navigation.mazes import (
+    Cell,
+    Maze,
     MazeWalls,
     beyond_walls_m,
     check_maze,
     passage_m,
+    random_maze,
 )
+from veca_marl.sim.body import Body
 from veca_marl.sim.body.walker import WalkerCfg
-from veca_marl.sim.physics import ClockCfg, PlaygroundCfg
+from veca_marl.sim.physics import ClockCfg, PlaygroundCfg, World
+from veca_marl.sim.sense import Sense
+from veca_marl.sim.senses import register_sense
+from veca_marl.sim.spec import ArraySpec
+
+TRIAL = "trial"
+
+
+@dataclass
+class TrialCfg:
+    """Settings of the observation `trial`.
+
+    Attributes:
+        present: Whether the observation has it.
+    """
+
+    present: bool = True
+
+
+@register_sense(TRIAL)
+class TrialSense(Sense):
+    """The progress of the trials of an episode, which the task reports by `show`.
+
+    Observations:
+        trial: ``(3,)`` float32 in [0, 1]: 1 in the last observation of a trial, else 0; the share
+            of the trial's time that has passed; the share of the episode's trials that are over.
+    """
+
+    cfg_type = TrialCfg
+
+    def __init__(self, cfg: TrialCfg, body: Body, world: World) -> None:
+        super().__init__(world)
+        names = ("ended", "elapsed", "completed")
+        self.specs = {TRIAL: ArraySpec((3,), np.float32, 0.0, 1.0, names)}
+        self._state = np.zeros(3, np.float32)
+
+    def reset(self) -> None:
+        """See `Sense.reset`."""
+        super().reset()
+        self._state[:] = 0.0
+
+    def show(self, ended: bool, elapsed: float, completed: float) -> None:
+        """Set the values of this step; called by the task after each step."""
+        self._state[:] = ended, min(elapsed, 1.0), completed
+
+    def compute(self) -> dict[str, NDArray[Any]]:
+        """See `Sense`."""
+        return {TRIAL: self._state.copy()}
+
 
 _RADIUS_M = 0.15  # of the object
 

@@ -14,16 +14,18 @@ import numpy as np
 from veca_marl.envs.core.task import Player, Task, TaskCfg, Team, register_task, terms
 from veca_marl.envs.tasks.floors import places
 from veca_marl.envs.tasks.floors.floor_plan import FloorPlan
-from veca_marl.envs.tasks.floors.playability import check_connected
-from veca_marl.envs.tasks.navigation.doorways import check_doorways
+from veca_marl.envs.tasks.floors.places import direct_gaze_ahead, place_player
+from veca_marl.envs.tasks.floors.playability import (
+    check_connected,
+    check_doorways,
+    check_placement,
+    check_rooms,
+)
 from veca_marl.envs.tasks.navigation.helper_reward import (
     AHEAD_WEIGHT,
     TURN_WEIGHT,
     HelperReward,
 )
-from veca_marl.envs.tasks.navigation.placement_check import check_placement
-from veca_marl.envs.tasks.navigation.room_counts import check_rooms
-from veca_marl.envs.tasks.player_starts import direct_gaze_ahead, place_player
 from veca_marl.sim.physics import PlaygroundCfg, RoomCfg, StandingProp
 
 _PASSAGE_M = 0.2  # width that an agent at the object leaves free towards the walls

@@ -1,26 +1,97 @@
-"""ObjectNav: go to the one object among several that is the target."""
+"""ObjectNav and ObjectPhysNav: go to the one object among several that is the target."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import Any, ClassVar
+from enum import Enum
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from veca_marl.envs.core.task import Player, Task, TaskCfg, register_task, terms
+from veca_marl.envs.core.task import Player, Task, TaskCfg, register_task, require_humanoid, terms
 from veca_marl.envs.tasks.floors import places
-from veca_marl.envs.tasks.floors.playability import check_connected
-from veca_marl.envs.tasks.navigation.floors.scattering import (
+from veca_marl.envs.tasks.floors.places import (
     Spacing,
+    direct_gaze_ahead,
+    place_player,
     scattered_places,
     wide_rooms,
 )
+from veca_marl.envs.tasks.floors.playability import check_connected, check_placement
 from veca_marl.envs.tasks.navigation.helper_reward import AHEAD_WEIGHT, TURN_WEIGHT, HelperReward
-from veca_marl.envs.tasks.navigation.object_kinds import ObjectKind, add_object, radius_m
-from veca_marl.envs.tasks.navigation.placement_check import check_placement
-from veca_marl.envs.tasks.player_starts import direct_gaze_ahead, place_player
-from veca_marl.sim.physics import PlaygroundCfg, Prop
+from veca_marl.sim.body.humanoid import HumanoidCfg
+from veca_marl.sim.geometry import Floats
+from veca_marl.sim.physics import PlannedProp, PlaygroundCfg, Prop, PropCfg, PropShape, World
+
+
+class ObjectKind(Enum):
+    """Kinds of objects, each of one shape and colour.
+
+    Attributes:
+        doll: A child in violet clothes.
+        ball: A red sphere.
+        pyramid: A yellow pyramid.
+        cube: A blue cube.
+        cylinder: A green cylinder.
+    """
+
+    doll = "doll"
+    ball = "ball"
+    pyramid = "pyramid"
+    cube = "cube"
+    cylinder = "cylinder"
+
+
+class _Look(NamedTuple):
+    """Shape, size, height of the centre above the floor, and colour of a kind."""
+
+    shape: PropShape
+    size_m: tuple[float, ...]
+    centre_m: float
+    colour: tuple[float, float, float]
+
+
+_LOOKS = {
+    ObjectKind.doll: _Look(PropShape.doll, (0.36,), 0.18, (0.55, 0.2, 0.65)),
+    ObjectKind.ball: _Look(PropShape.sphere, (0.15,), 0.15, (0.95, 0.15, 0.1)),
+    ObjectKind.pyramid: _Look(PropShape.pyramid, (0.28, 0.28, 0.3), 0.15, (0.95, 0.8, 0.1)),
+    ObjectKind.cube: _Look(PropShape.box, (0.25, 0.25, 0.25), 0.125, (0.1, 0.25, 0.9)),
+    ObjectKind.cylinder: _Look(PropShape.cylinder, (0.12, 0.3), 0.15, (0.1, 0.7, 0.2)),
+}
+
+
+class SearchedObject(NamedTuple):
+    """A fixed object of a kind.
+
+    Attributes:
+        prop: The prop.
+        centre_m: Height of its centre when it stands on the floor.
+    """
+
+    prop: Prop
+    centre_m: float
+
+    def place(self, floor: Floats, yaw_rad: float) -> None:
+        """Stand on a point ``(3,)`` of the floor, metres."""
+        x, y, z = floor
+        self.prop.place((x, y, z + self.centre_m), yaw_rad)
+
+
+def add_object(world: World, name: str, kind: ObjectKind) -> SearchedObject:
+    """Add a fixed object of a kind to a world that is not frozen yet."""
+    return SearchedObject(world.add_prop(_prop_of(name, kind)), _LOOKS[kind].centre_m)
+
+
+def radius_m(kind: ObjectKind) -> float:
+    """Return the horizontal radius of the objects of a kind, see `Prop.radius_m`."""
+    return PlannedProp(_prop_of(kind.name, kind)).radius_m
+
+
+def _prop_of(name: str, kind: ObjectKind) -> PropCfg:
+    look = _LOOKS[kind]
+    return PropCfg(name=name, shape=look.shape, size_m=list(look.size_m), colour=look.colour)
+
 
 _PASSAGE_M = 0.2  # width that an agent at an object leaves free towards furniture and walls
 _DOOR_M = 0.9  # objects nearer to the middle of a door could block it
@@ -173,3 +244,48 @@ class ObjectNav(Task):
 def _spacing(cfg: ObjectNavCfg) -> Spacing:
     largest_m = max(map(radius_m, cfg.objects))
     return Spacing(largest_m + cfg.reach_m + _PASSAGE_M, cfg.apart_m, _DOOR_M)
+
+
+@dataclass
+class ObjectPhysNavCfg(ObjectNavCfg):
+    """Parameters of ObjectPhysNav: those of ObjectNav, for a body that crawls.
+
+    Attributes:
+        reach_m: As in ObjectNav. It is larger, because the head and hands of a body on hands and
+            knees are in front of its pelvis.
+        apart_m: As in ObjectNav. It is larger, because a body that crawls needs floor to turn.
+    """
+
+    max_seconds: float = 60.0
+    reach_m: float = 0.5
+    apart_m: float = 2.0
+
+
+@register_task
+class ObjectPhysNav(ObjectNav):
+    """ObjectNav with a body that is controlled by its joints and starts on hands and knees.
+
+    Objects, rewards and the end of an episode are as in ObjectNav: the task is solved (`solved`)
+    when the target has been reached. The agent feels and senses its own body as well. Senses and
+    joint-level actions are those of the paper (table of tasks in the appendix); sizes and times are
+    not in the paper. Departures: those of ObjectNav's helper reward; the eyes are turned to the
+    horizon ahead in each step, because on hands and knees the face points to the floor.
+
+    Terms:
+        reached: 1 on the step in which the target is reached, else 0.
+        wrong: 1 on the step in which another object is reached, and the target is not, else 0.
+        ahead: Displacement forwards during the step, m (negative backwards), while the target is
+            visible to the agent's eyes. In the paper ``Vis a_f``. Its sum
+            has no bound: walking in a circle near the object is paid too.
+        turn: Decrease of the horizontal angle between the agent's forward direction and the
+            direction of the target since the target was last visible, rad, if it is visible after
+            the step. In the paper ``Vis a_l L``, see `HelperReward`.
+    """
+
+    senses = ("vision", "touch", "proprioception")
+    body_cfg = HumanoidCfg
+    cfg: ObjectPhysNavCfg
+
+    def build(self) -> None:
+        require_humanoid(self.players[0])
+        super().build()

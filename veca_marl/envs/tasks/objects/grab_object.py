@@ -9,15 +9,15 @@ from typing import Any
 import numpy as np
 
 from veca_marl.envs.core.task import Player, Task, register_task, require_humanoid, terms
-from veca_marl.envs.tasks.objects.clearance import clearance_m
-from veca_marl.envs.tasks.objects.grasping import (
+from veca_marl.envs.tasks.objects.toys_and_blocks import (
     ToyCfg,
     add_toy,
     both_hands_near,
+    check_seat,
+    clearance_m,
     palm_distances_m,
     place_toy,
 )
-from veca_marl.envs.tasks.objects.seat import check_seat
 from veca_marl.sim.body.humanoid import HumanoidCfg
 from veca_marl.sim.body.humanoid.postures import REACHING
 from veca_marl.sim.physics import PlaygroundCfg

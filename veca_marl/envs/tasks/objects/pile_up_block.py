@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 
 from veca_marl.envs.core.task import Player, Task, register_task, require_humanoid, terms
-from veca_marl.envs.tasks.objects.seat import check_seat
 from veca_marl.envs.tasks.objects.toys_and_blocks import (
     BLUE,
     RED,
     BlocksCfg,
     add_block,
+    check_seat,
     height_in_edges,
     is_at_rest,
     rests_on,

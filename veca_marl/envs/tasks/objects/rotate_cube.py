@@ -10,8 +10,7 @@ import numpy as np
 
 from veca_marl.envs.core.scoring import rotation_angle_rad
 from veca_marl.envs.core.task import Player, Task, TaskCfg, register_task, require_humanoid, terms
-from veca_marl.envs.tasks.objects.clearance import clearance_m
-from veca_marl.envs.tasks.objects.seat import check_seat
+from veca_marl.envs.tasks.objects.toys_and_blocks import check_seat, clearance_m
 from veca_marl.sim.body.humanoid import HumanoidCfg
 from veca_marl.sim.body.humanoid.postures import OFFERING
 from veca_marl.sim.geometry import rotation_about_vertical

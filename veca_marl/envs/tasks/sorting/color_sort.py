@@ -8,9 +8,15 @@ from typing import Any
 import numpy as np
 
 from veca_marl.envs.core.task import register_task
-from veca_marl.envs.tasks.sorting.baskets import Basket, add_coloured_basket
-from veca_marl.envs.tasks.sorting.items import COLOURS, Item, add_items
-from veca_marl.envs.tasks.sorting.sorting_task import SortingCfg, SortingTask
+from veca_marl.envs.tasks.sorting.sorting_task import (
+    COLOURS,
+    Basket,
+    Item,
+    SortingCfg,
+    SortingTask,
+    add_coloured_basket,
+    add_items,
+)
 from veca_marl.sim.physics.props.toys import ToyKind
 
 _KINDS = (ToyKind.sphere, ToyKind.cube, ToyKind.cylinder)

@@ -8,9 +8,15 @@ from typing import Any
 import numpy as np
 
 from veca_marl.envs.core.task import register_task
-from veca_marl.envs.tasks.sorting.baskets import Basket, add_basket_with_sample
-from veca_marl.envs.tasks.sorting.items import COLOURS, Item, add_items
-from veca_marl.envs.tasks.sorting.sorting_task import SortingCfg, SortingTask
+from veca_marl.envs.tasks.sorting.sorting_task import (
+    COLOURS,
+    Basket,
+    Item,
+    SortingCfg,
+    SortingTask,
+    add_basket_with_sample,
+    add_items,
+)
 from veca_marl.sim.physics.props.toys import ToyKind
 
 _BASKET_COLOUR = (0.72, 0.55, 0.33)

@@ -5,25 +5,141 @@ from __future__ import annotations
 import math
 from abc import abstractmethod
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
-from typing import Any, ClassVar
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
 from veca_marl.envs.core.task import Player, Task, TaskCfg, require_walker, terms
-from veca_marl.envs.tasks.floors.places import furniture_of, planned_furniture
-from veca_marl.envs.tasks.floors.playability import check_connected
-from veca_marl.envs.tasks.navigation.floors.scattering import (
+from veca_marl.envs.tasks.floors.places import (
     Spacing,
+    furniture_of,
+    place_player,
+    planned_furniture,
     scattered_places,
     wide_rooms,
 )
-from veca_marl.envs.tasks.navigation.placement_check import check_placement
-from veca_marl.envs.tasks.player_starts import place_player
-from veca_marl.envs.tasks.sorting.baskets import REACH_M, Basket
-from veca_marl.envs.tasks.sorting.items import Item
+from veca_marl.envs.tasks.floors.playability import check_connected, check_placement
 from veca_marl.sim.body.walker import WalkerCfg
-from veca_marl.sim.physics import PlaygroundCfg
+from veca_marl.sim.geometry import Floats, rotation_about_vertical
+from veca_marl.sim.physics import PlaygroundCfg, Prop, PropCfg, PropShape, World
+from veca_marl.sim.physics.props.containers import basket
+from veca_marl.sim.physics.props.toys import ToyKind, toy
+
+Colour = tuple[float, float, float]
+
+COLOURS: dict[str, Colour] = {
+    "red": (0.9, 0.12, 0.1),
+    "green": (0.1, 0.65, 0.2),
+    "blue": (0.1, 0.25, 0.9),
+    "yellow": (0.95, 0.85, 0.1),
+}
+"""Colours of toys and baskets."""
+
+_ROW = 8  # things in a row in which they are built
+
+
+class Item(NamedTuple):
+    """A toy.
+
+    Attributes:
+        prop: The prop.
+        kind: Its shape.
+    """
+
+    prop: Prop
+    kind: ToyKind
+
+    def place(self, floor: Floats, yaw_rad: float) -> None:
+        """Stand on a point ``(3,)`` of the floor, metres."""
+        place_on_floor(self.prop, floor, yaw_rad)
+
+    def paint(self, world: World, colour: Colour) -> None:
+        """Set the colour of all its parts until the next reset of the world."""
+        world.scene.objects[self.prop.object_id].paint(colour)
+
+
+def add_items(world: World, kinds: Sequence[ToyKind]) -> list[Item]:
+    """Add toys that can be grabbed to a world that is not frozen yet, apart from each other."""
+    return [
+        Item(world.add_prop(toy(f"toy_{number}_{kind.name}", kind, built_at(number, 0.2))), kind)
+        for number, kind in enumerate(kinds)
+    ]
+
+
+def built_at(number: int, spacing_m: float) -> tuple[float, float]:
+    """Return a place ``(x, y)`` of a square grid beside the origin, metres."""
+    return -2.0 + spacing_m * (number % _ROW), 1.0 + spacing_m * (number // _ROW)
+
+
+def place_on_floor(prop: Prop, floor: Floats, yaw_rad: float) -> None:
+    """Place a prop over a point ``(3,)`` of the floor, at the height of its configuration."""
+    x, y, z = floor
+    prop.place((x, y, z + prop.cfg.position_m[2]), yaw_rad)
+
+
+_EDGE_M, _HEIGHT_M = 0.4, 0.15
+_STAND_M = (0.16, 0.3)  # edge and height of the stand of a sample
+_BEHIND_M = (_EDGE_M + _STAND_M[0]) / 2.0
+_PILE_M = 0.4  # toys lie up to this height above the rim
+_QUARTER_RAD = math.pi / 2.0
+_STAND_COLOUR = (0.45, 0.35, 0.25)
+_SAMPLE_COLOUR = (0.95, 0.95, 0.95)
+
+REACH_M = math.hypot(_EDGE_M / 2.0 + _STAND_M[0], _EDGE_M / 2.0)
+"""Radius of a circle about a basket with its stand."""
+
+
+class Basket(NamedTuple):
+    """An open box on the floor, into which toys are put with the verb `put_into`.
+
+    Attributes:
+        prop: The box.
+        sign: A stand behind it with a sample of what it is for; may be empty.
+    """
+
+    prop: Prop
+    sign: tuple[Prop, ...] = ()
+
+    def place(self, floor: Floats, yaw_rad: float) -> None:
+        """Stand on a point ``(3,)`` of the floor, metres, at the nearest multiple of 90 degrees."""
+        yaw_rad = round(yaw_rad / _QUARTER_RAD) * _QUARTER_RAD
+        place_on_floor(self.prop, floor, yaw_rad)
+        behind = floor - _BEHIND_M * rotation_about_vertical(yaw_rad)[:, 0]
+        for prop in self.sign:
+            place_on_floor(prop, behind, yaw_rad)
+
+    def contains(self, prop: Prop) -> bool:
+        """Return whether the centre of a prop that no body holds is in the basket or above it."""
+        if prop.holder is not None:
+            return False
+        x, y, z = self.prop.rotation.T @ (prop.position - self.prop.position)
+        half_m = _EDGE_M / 2.0
+        return bool(abs(x) <= half_m and abs(y) <= half_m and 0.0 <= z <= _HEIGHT_M + _PILE_M)
+
+
+def add_coloured_basket(world: World, name: str, colour: Colour) -> Basket:
+    """Add a basket of a colour to a world that is not frozen yet."""
+    size_m = (_EDGE_M, _EDGE_M, _HEIGHT_M)
+    return Basket(world.add_prop(basket(name, (0.0, 0.0), size_m=size_m, colour=colour)))
+
+
+def add_basket_with_sample(world: World, name: str, kind: ToyKind, colour: Colour) -> Basket:
+    """Add a basket with a white toy on a stand behind it to a world that is not frozen yet."""
+    box = add_coloured_basket(world, name, colour)
+    edge_m, height_m = _STAND_M
+    stand = PropCfg(
+        name=f"{name}.stand",
+        shape=PropShape.box,
+        size_m=[edge_m, edge_m, height_m],
+        position_m=(0.0, 0.0, height_m / 2.0),
+        colour=_STAND_COLOUR,
+    )
+    standing = toy(f"{name}.sample", kind, (0.0, 0.0), mass_kg=0.0, colour=_SAMPLE_COLOUR)
+    x, y, z = standing.position_m
+    sample = replace(standing, position_m=(x, y, z + height_m), interactions=[])
+    return Basket(box.prop, (world.add_prop(stand), world.add_prop(sample)))
+
 
 _PASSAGE_M = 0.3  # from walls and furniture to the surface of a basket: an agent passes
 _DOOR_M = 0.9  # baskets nearer to the middle of a door could block it

@@ -1,4 +1,4 @@
-"""Experts of ObjectNav and ObjectPhysNav: the shortest path round the wrong objects."""
+"""Experts of ObjectNav, ObjectPhysNav and MazeNav: shortest paths."""
 
 from __future__ import annotations
 
@@ -8,15 +8,10 @@ from typing import Any
 from numpy.typing import NDArray
 
 from veca_marl.envs.core.expert import Expert, register_expert
-from veca_marl.envs.experts.control.locomotion import locomotion_of
+from veca_marl.envs.experts.control.locomotion import WalkerLocomotion, locomotion_of
 from veca_marl.envs.experts.control.path_following import WallRecovery
-from veca_marl.envs.tasks.floors.grid_paths import PathsTo
-from veca_marl.envs.tasks.navigation.floors.floor_grid import (
-    Detour,
-    floor_grid,
-    free_cells,
-    outside,
-)
+from veca_marl.envs.tasks.floors.grid_paths import Detour, PathsTo, floor_grid, free_cells, outside
+from veca_marl.envs.tasks.navigation.maze_nav import MazeNav
 from veca_marl.envs.tasks.navigation.object_nav import ObjectNav
 
 _MARGIN_M = 0.15  # at least, from the distance at which a wrong object is reached
@@ -55,3 +50,27 @@ class ObjectPhysNavExpert(ObjectNavExpert):
     Reads privileged state: its own position, heading and joint angles, and the positions of all
     props. Where the gait gets stuck, the body crawls backwards.
     """
+
+
+@register_expert("MazeNav")
+class MazeNavExpert(Expert[MazeNav]):
+    """Takes the shortest path to the object in every trial, the first one included.
+
+    Reads privileged state: its own position and heading, the walls and the position of the object.
+    """
+
+    reads = ()
+
+    def reset(self) -> None:
+        """See `Expert.reset`."""
+        task, walker = self.task, self.task.walker
+        locomotion = WalkerLocomotion(walker)
+        self._locomotion = WallRecovery(walker, locomotion, task.world.clock.step_s)
+        grid = floor_grid(task.world.playground)
+        clear_m = locomotion.clearances.wall_m
+        free = free_cells(grid, task.world, clear_m, passable=(task.target,))
+        self._paths = PathsTo(grid, free, task.target.position)
+
+    def act(self, observation: Mapping[str, NDArray[Any]]) -> Any:
+        """Return a command for a walker, see `Expert.act`."""
+        return self._locomotion.to(self._paths.next_point(self.player.body.position))

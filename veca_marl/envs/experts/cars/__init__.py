@@ -1,1 +1,0 @@
-"""Experts of the tasks with a toy car: DodgeCar, ChaseCar."""

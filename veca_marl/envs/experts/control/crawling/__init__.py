@@ -1,1 +1,0 @@
-"""Moving on hands and knees: gaits, turning over and getting up after a fall."""

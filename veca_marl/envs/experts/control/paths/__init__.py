@@ -1,1 +1,0 @@
-"""Paths of bodies over the floor: steering, detours round furniture, recovery from walls."""

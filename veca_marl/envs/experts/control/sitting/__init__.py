@@ -1,1 +1,0 @@
-"""The upper body of a sitting child: balance, and inverse kinematics of the arms."""

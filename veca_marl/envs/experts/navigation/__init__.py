@@ -1,1 +1,0 @@
-"""Experts of ObjectNav, ObjectPhysNav, MazeNav, MultiAgentNav."""

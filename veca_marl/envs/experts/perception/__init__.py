@@ -1,1 +1,0 @@
-"""What experts estimate from observations: the position of a caller."""

@@ -1,1 +1,0 @@
-"""Skills that experts combine from controllers: carrying, searching, sitting up, shooting."""

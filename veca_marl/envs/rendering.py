@@ -1,0 +1,233 @@
+"""Images and video frames of a game for people: eyes, skin, the room, tactile lines."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from veca_marl.envs.core.game import Game, Observation
+from veca_marl.sim.geometry import Floats, Pose, Scene, SceneObject
+from veca_marl.sim.physics.rooms import RoomCfg
+from veca_marl.sim.touch import TAXELS_PER_TRIANGLE, load_taxels, taxel_positions
+from veca_marl.sim.vision import Camera, look_at
+
+PALE = (0.86, 0.86, 0.84)
+BACKGROUND = (0.13, 0.14, 0.17)
+# colours of readings 0, 0.5 and 1
+_SCALE = np.array([(0.98, 0.93, 0.35), (0.98, 0.55, 0.10), (0.85, 0.05, 0.10)])
+_DISTANCE_M, _RAISED_M, _FOV_DEG = 1.5, 0.35, 36.0
+
+
+def touch_image(
+    scene: Scene, body: SceneObject, readings: Floats, height: int = 252
+) -> NDArray[np.uint8]:
+    """Render front and back of a body with an upright pelvis, its taxels in contact coloured.
+
+    Args:
+        scene: The scene, as of its last `update`.
+        body: The body.
+        readings: ``(1648, 6)`` in [0, 1], as from `TouchSense.update_taxels`.
+        height: Height of the image in pixels.
+
+    Returns:
+        ``(height, 2 * width, 3)`` uint8, with a width of 2/3 of the height.
+
+    Raises:
+        ValueError: If the body has no skin, or the readings have another shape than its taxels.
+    """
+    triangles = body.triangles.stop - body.triangles.start
+    if readings.shape != load_taxels().depths.shape or triangles != len(readings):
+        raise ValueError(
+            f"{body.name} has {triangles} triangles, the readings have shape {readings.shape}: "
+            f"must be {load_taxels().depths.shape}"
+        )
+    camera = Camera(max(height * 2 // 3, 1), height, _FOV_DEG)
+    return np.concatenate(
+        [_portrait(scene, body, readings, camera, pose) for pose in _viewpoints(body)], axis=1
+    )
+
+
+def save_touch_image(
+    path: str | Path, scene: Scene, body: SceneObject, readings: Floats, height: int = 504
+) -> None:
+    """Write `touch_image` as a PNG file.
+
+    Raises:
+        OSError: If the file cannot be written.
+    """
+    image = touch_image(scene, body, readings, height)
+    if not cv2.imwrite(str(path), image[..., ::-1]):
+        raise OSError(f"cannot write {path}")
+
+
+def _viewpoints(body: SceneObject) -> list[Pose]:
+    """Return poses in front of and behind the pelvis, somewhat towards the head."""
+    centre = body.positions.mean(axis=0)
+    ahead, _, up = body.rotations[0].T
+    return [_upright(_DISTANCE_M * way + _RAISED_M * up, centre, up) for way in (ahead, -ahead)]
+
+
+def _upright(offset: Floats, centre: Floats, up: Floats) -> Pose:
+    """Return the pose of a camera that looks at a point, with `up` upwards in the image."""
+    forward = -offset / np.linalg.norm(offset)
+    above = up - up.dot(forward) * forward
+    above /= np.linalg.norm(above)
+    return Pose(centre + offset, np.stack([forward, np.cross(above, forward), above], axis=1))
+
+
+def _portrait(
+    scene: Scene, body: SceneObject, readings: Floats, camera: Camera, pose: Pose
+) -> NDArray[np.uint8]:
+    """Render the body in pale grey, with taxels in contact in the colours of their readings."""
+    view = camera.render_mesh(scene, body, pose)
+    colours = np.where(view.visible[..., None], view.lights[..., None] * np.array(PALE), BACKGROUND)
+    points = pose.position + view.depth[..., None] * _rays(camera, pose)
+    taxels, _ = taxel_positions(load_taxels(), scene.meshes.vertices[body.vertices])
+    own = view.visible
+    felt = _nearest(points[own], view.triangles[own], taxels, readings)
+    touched = felt > 0.0
+    marks = np.stack([np.interp(felt[touched], (0.0, 0.5, 1.0), c) for c in _SCALE.T], axis=1)
+    shades = colours[own]
+    shades[touched] = marks
+    colours[own] = shades
+    image: NDArray[np.uint8] = np.round(255.0 * colours.clip(0.0, 1.0)).astype(np.uint8)
+    return image
+
+
+def _rays(camera: Camera, pose: Pose) -> Floats:
+    """Return the vectors ``(H, W, 3)`` along the rays per metre of depth, world frame."""
+    x, y = np.meshgrid(camera.lens.columns, camera.lens.rows)
+    rays: Floats = np.stack([np.ones_like(x), -x, y], axis=-1) @ pose.rotation.T
+    return rays
+
+
+def _nearest(
+    points: Floats, triangles: NDArray[np.int16], taxels: Floats, readings: Floats
+) -> Floats:
+    """Return the reading ``(N,)`` of the nearest of the six taxels of each point's triangle."""
+    away = np.linalg.norm(points[:, None] - taxels[triangles], axis=2)
+    felt: Floats = readings[triangles, away.argmin(axis=1)]
+    return felt
+
+
+class RoomView:
+    """Renders the room in which the first actor is; it never changes the game.
+
+    Args:
+        game: The game to show.
+        width: Width of the images in pixels.
+        height: Height of the images in pixels.
+    """
+
+    def __init__(self, game: Game, width: int, height: int) -> None:
+        self._game = game
+        self._camera = Camera(width, height, fov_deg=60.0)
+
+    def image(self) -> NDArray[np.uint8]:
+        """Return the room from an upper corner, ``(height, width, 3)`` uint8.
+
+        The camera looks at the point halfway between the centre of the floor and the mean position
+        of the players in this room.
+        """
+        room = self._room()
+        low, size = np.array(room.lower_m), np.array(room.size_m)
+        # inside the room, in an upper corner, where no wall hides the players
+        eye = low + size * (0.04, 0.04, 0.92)
+        centre = low + size * (0.5, 0.5, 0.0)
+        positions = [player.body.position for player in self._game.players]
+        here = [position for position in positions if room.distance_m(tuple(position[:2])) == 0.0]
+        target = 0.5 * centre + 0.5 * np.mean(here or [centre], axis=0)
+        views = self._camera.render(self._game.world.scene, [look_at(eye, target)])
+        image: NDArray[np.uint8] = views.rgb[0].copy()
+        return image
+
+    def _room(self) -> RoomCfg:
+        """Return the room nearest to the first actor: the one that it is in, if there is one."""
+        place = tuple(self._game.actors[0].body.position[:2])
+        return min(self._game.cfg.playground.rooms, key=lambda room: room.distance_m(place))
+
+
+FRAME_HEIGHT = 252
+ROOM_WIDTH = 336
+
+
+class Spectator:
+    """Renders frames for videos; it never changes the game.
+
+    Args:
+        game: The game to show.
+    """
+
+    def __init__(self, game: Game) -> None:
+        self._game = game
+        self._view = RoomView(game, ROOM_WIDTH, FRAME_HEIGHT)
+
+    def room(self) -> NDArray[np.uint8]:
+        """Return the room of the first actor, ``(252, 336, 3)`` uint8, see `RoomView`."""
+        return self._view.image()
+
+    def frame(self, observation: Observation) -> NDArray[np.uint8]:
+        """Return one video frame: left eye, right eye, touched skin, room.
+
+        Args:
+            observation: The present observation of the first actor, as from `Game.observe`;
+                senses that are not in it are left out of the frame.
+
+        Returns:
+            ``(252, width, 3)`` uint8, even width.
+        """
+        images = [self.room()]
+        if "touch" in observation:
+            images.insert(0, self._skin(observation["touch"]))
+        if "vision" in observation:
+            images[:0] = eye_images(observation["vision"])
+        return np.concatenate(images, axis=1)
+
+    def _skin(self, touch: NDArray[Any]) -> NDArray[np.uint8]:
+        """Return the body of the first actor, coloured by its touch readings."""
+        scene = self._game.world.scene
+        body = scene.objects[self._game.actors[0].body.object_id]
+        readings = touch.reshape(-1, TAXELS_PER_TRIANGLE).astype(np.float64)
+        return touch_image(scene, body, readings, FRAME_HEIGHT)
+
+
+def eye_images(vision: NDArray[Any]) -> list[NDArray[np.uint8]]:
+    """Enlarge ``(2, 3, H, W)`` uint8 to two images ``(252, width, 3)`` by nearest neighbours."""
+    images: list[NDArray[np.uint8]] = []
+    for eye in vision:
+        image = np.ascontiguousarray(np.moveaxis(eye, 0, -1))
+        width = round(FRAME_HEIGHT * image.shape[1] / image.shape[0] / 2) * 2
+        size = (width, FRAME_HEIGHT)
+        images.append(np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_NEAREST)))
+    return images
+
+
+BLUE = (40, 90, 255)
+
+
+def draw_tactile_lines(
+    image: NDArray[np.uint8], camera: Camera, pose: Pose, lines: Floats
+) -> NDArray[np.uint8]:
+    """Return an image with lines in blue; they are not hidden by what is in front of them.
+
+    Args:
+        image: ``(H, W, 3)`` uint8 RGB, as rendered by the camera.
+        camera: The camera.
+        pose: Its pose.
+        lines: ``(n, 2, 3)`` metres, as from `get_tactile` with `debug`.
+
+    Raises:
+        ValueError: If the image has not the size of the camera's.
+    """
+    if image.shape != (camera.height, camera.width, 3):
+        raise ValueError(f"image {image.shape}, not {(camera.height, camera.width, 3)}")
+    drawn = np.ascontiguousarray(image).copy()
+    ends = camera.project(pose, lines.reshape(-1, 3)).reshape(-1, 2, 3)
+    for start, end in ends[(ends[..., 2] > camera.near_m).all(axis=1)]:
+        first, last = np.floor(start[:2]).astype(int), np.floor(end[:2]).astype(int)
+        cv2.line(drawn, first.tolist(), last.tolist(), BLUE)
+    return drawn

@@ -1,1 +1,0 @@
-"""Games between players on one floor: PushOut in a ring, Soccer on a pitch."""

@@ -1,1 +1,0 @@
-"""Rules of developmental benchmarks that are not in the VECA paper: SelfTouch, HandRegard."""

@@ -1,1 +1,0 @@
-"""Tasks that need several senses: KickTheBall."""

@@ -1,1 +1,0 @@
-"""The floor of a playground: free cells, shortest paths, random places."""

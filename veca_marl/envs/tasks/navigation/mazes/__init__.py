@@ -1,1 +1,0 @@
-"""Mazes, their walls, and the observation of trials."""
