@@ -1,7 +1,8 @@
 """Scripted policies of the tasks. Importing this package registers them; see `core.expert`.
 
-The expert of a task is in the package of the same name as that of the task in `envs.tasks`.
-`control`, `perception` and `skills` contain what experts share. Tasks do not import this package.
+The expert of a task is in the module of the same name as the task's module or family in
+`envs.tasks`, that of a task of `locomotion` in `motor_skills`. `control` contains what experts
+share. Tasks do not import this package.
 """
 
 import veca_marl.envs.experts.babyzumas_revenge

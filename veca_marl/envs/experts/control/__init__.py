@@ -1,1 +1,1 @@
-"""Controllers that experts share: locomotion, path following, key poses, inverse kinematics."""
+"""Controllers and skills that experts share: locomotion, paths, postures, motion of both palms."""

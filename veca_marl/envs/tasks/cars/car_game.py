@@ -11,8 +11,12 @@ import numpy as np
 
 from veca_marl.envs.core.task import Task, TaskCfg, require_walker
 from veca_marl.envs.tasks.cars.toy_car import Motion, ToyCar, check_speed
-from veca_marl.envs.tasks.floors import places
-from veca_marl.envs.tasks.floors.places import Spacing, scattered_places
+from veca_marl.envs.tasks.floors.places import (
+    Spacing,
+    furniture_of,
+    planned_furniture,
+    scattered_places,
+)
 from veca_marl.envs.tasks.floors.playability import check_placement
 from veca_marl.sim.body.walker import WalkerCfg
 from veca_marl.sim.geometry import Floats
@@ -72,7 +76,7 @@ class CarGame(Task):
                 "rooms; the car drives in one, so that another is a hiding place: choose "
                 "playground=simple or single_room"
             )
-        furniture, spacing = places.planned_furniture(playground), _spacing(cfg)
+        furniture, spacing = planned_furniture(playground), _spacing(cfg)
         check_placement(
             lambda rng: scattered_places(playground, furniture, 2, spacing, rng),
             f"{cls.__name__} with task.apart_m={cfg.apart_m:g}",
@@ -85,7 +89,7 @@ class CarGame(Task):
 
     def build(self) -> None:
         self.walker = require_walker(self.players[0])
-        self._furniture = places.furniture_of(self.world)
+        self._furniture = furniture_of(self.world)
         motion = Motion(self.cfg.speed_mps, math.radians(self.cfg.turn_degps))
         self.car = ToyCar(self.world, motion, self.cfg.sound(), self.interactions)
         self.touched = False

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veca_marl.envs.core.task import Player, Task, TaskCfg, register_task, require_walker, terms
-from veca_marl.envs.tasks.floors import places
+from veca_marl.envs.tasks.floors.places import add_target, gap_m
 from veca_marl.envs.tasks.navigation.mazes import (
     Cell,
     Maze,
@@ -148,7 +148,7 @@ class MazeNav(Task):
         _check_passage(self.cfg, self.world.playground, self.walker.radius_m)
         _check_reach(self.cfg, self.world.playground, self.walker.radius_m)
         self._walls = MazeWalls(self.world, self.cfg.cells)
-        self.target = places.add_target(self.world, _RADIUS_M)
+        self.target = add_target(self.world, _RADIUS_M)
         self._start: Cell = (0, 0)
         self._completed = self._found = 0
         self._elapsed_s = 0.0
@@ -168,8 +168,7 @@ class MazeNav(Task):
 
     def after_step(self, rng: np.random.Generator) -> None:
         self._elapsed_s += self.world.clock.step_s
-        gap_m = places.gap_m(self.walker.position, self.target)
-        self._found_now = gap_m <= self.cfg.reach_m
+        self._found_now = gap_m(self.walker.position, self.target) <= self.cfg.reach_m
         self._ended_now = self._found_now or self._elapsed_s >= self.cfg.trial_s - 1e-9
         self._found += self._found_now
         self._completed += self._ended_now

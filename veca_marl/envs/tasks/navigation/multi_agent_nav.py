@@ -12,9 +12,18 @@ from typing import Any, ClassVar
 import numpy as np
 
 from veca_marl.envs.core.task import Player, Task, TaskCfg, Team, register_task, terms
-from veca_marl.envs.tasks.floors import places
 from veca_marl.envs.tasks.floors.floor_plan import FloorPlan
-from veca_marl.envs.tasks.floors.places import direct_gaze_ahead, place_player
+from veca_marl.envs.tasks.floors.places import (
+    add_target,
+    direct_gaze_ahead,
+    free_pair,
+    free_place,
+    furniture_of,
+    gap_m,
+    place_player,
+    planned_furniture,
+    rooms_with_pairs,
+)
 from veca_marl.envs.tasks.floors.playability import (
     check_connected,
     check_doorways,
@@ -127,8 +136,8 @@ class MultiAgentNav(Task):
     def check_playground(cls, cfg: Any, playground: PlaygroundCfg) -> None:
         check_rooms(playground, cfg.agents)
         check_connected(cls.__name__, playground, playground.rooms)
-        find_homes = cache(lambda: places.rooms_with_pairs(playground, *_distances_m(cfg)))
-        furniture = places.planned_furniture(playground)
+        find_homes = cache(lambda: rooms_with_pairs(playground, *_distances_m(cfg)))
+        furniture = planned_furniture(playground)
         check_placement(
             lambda rng: _try_start(cfg, find_homes(), playground.rooms, furniture, rng),
             f"playground {playground.name!r}, task.radius_m={cfg.radius_m:g}, "
@@ -139,9 +148,9 @@ class MultiAgentNav(Task):
     def build(self) -> None:
         check_doorways(self.world.playground, self.players)
         self.plan = FloorPlan(self.world.playground)
-        self._furniture = places.furniture_of(self.world)
-        self._homes = places.rooms_with_pairs(self.world.playground, *_distances_m(self.cfg))
-        self.target = places.add_target(self.world, self.cfg.radius_m)
+        self._furniture = furniture_of(self.world)
+        self._homes = rooms_with_pairs(self.world.playground, *_distances_m(self.cfg))
+        self.target = add_target(self.world, self.cfg.radius_m)
         self._helper = HelperReward(self.world.scene)
         self.arrived: set[str] = set()
         self._newly_arrived = 0
@@ -151,12 +160,12 @@ class MultiAgentNav(Task):
         self._newly_arrived = 0
         rooms, home = self._draw_rooms(rng)
         clear_m, apart_m = _distances_m(self.cfg)
-        (x, y, floor_m), beside = places.free_pair(home, self._furniture, clear_m, apart_m, rng)
+        (x, y, floor_m), beside = free_pair(home, self._furniture, clear_m, apart_m, rng)
         self.target.place((x, y, floor_m + self.cfg.radius_m))
         for room, player in zip(rooms, self.players, strict=True):
             free = beside
             if room is not home:
-                free = places.free_place(room, self._furniture, clear_m, rng)
+                free = free_place(room, self._furniture, clear_m, rng)
             place_player(player, free, rng.uniform(-math.pi, math.pi))
             if self.cfg.muted is not Muted.none:
                 silent = (Muted.all, Muted.finder if room is home else Muted.seekers)
@@ -180,7 +189,7 @@ class MultiAgentNav(Task):
         direct_gaze_ahead(self.players)
         before = len(self.arrived)
         for player in self.players:
-            if places.gap_m(player.body.position, self.target) <= self.cfg.reach_m:
+            if gap_m(player.body.position, self.target) <= self.cfg.reach_m:
                 self.arrived.add(player.name)
         self._newly_arrived = len(self.arrived) - before
         self._helper.after_step([p for p in self.players if p.name not in self.arrived])
@@ -216,6 +225,6 @@ def _try_start(
     """Look for places of the object and an agent in a home, and of an agent in each room."""
     clear_m, apart_m = _distances_m(cfg)
     home = homes[int(rng.integers(len(homes)))]
-    places.free_pair(home, furniture, clear_m, apart_m, rng)
+    free_pair(home, furniture, clear_m, apart_m, rng)
     for room in rooms:
-        places.free_place(room, furniture, clear_m, rng)
+        free_place(room, furniture, clear_m, rng)

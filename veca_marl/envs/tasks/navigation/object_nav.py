@@ -10,11 +10,13 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 from veca_marl.envs.core.task import Player, Task, TaskCfg, register_task, require_humanoid, terms
-from veca_marl.envs.tasks.floors import places
 from veca_marl.envs.tasks.floors.places import (
     Spacing,
     direct_gaze_ahead,
+    furniture_of,
+    gap_m,
     place_player,
+    planned_furniture,
     scattered_places,
     wide_rooms,
 )
@@ -180,7 +182,7 @@ class ObjectNav(Task):
 
     @classmethod
     def check_playground(cls, cfg: Any, playground: PlaygroundCfg) -> None:
-        furniture, count = places.planned_furniture(playground), 1 + len(cfg.objects)
+        furniture, count = planned_furniture(playground), 1 + len(cfg.objects)
         spacing = _spacing(cfg)
         check_connected(cls.__name__, playground, wide_rooms(playground.rooms, spacing.clear_m))
         check_placement(
@@ -192,7 +194,7 @@ class ObjectNav(Task):
 
     def build(self) -> None:
         self.agent = self.players[0]
-        self._furniture = places.furniture_of(self.world)
+        self._furniture = furniture_of(self.world)
         self._objects = [
             add_object(self.world, f"object_{number}_{kind.name}", kind)
             for number, kind in enumerate(self.cfg.objects)
@@ -238,7 +240,7 @@ class ObjectNav(Task):
         return self._reached
 
     def _is_reached(self, prop: Prop) -> bool:
-        return places.gap_m(self.agent.body.position, prop) <= self.cfg.reach_m
+        return gap_m(self.agent.body.position, prop) <= self.cfg.reach_m
 
 
 def _spacing(cfg: ObjectNavCfg) -> Spacing:

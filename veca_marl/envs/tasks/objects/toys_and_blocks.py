@@ -1,7 +1,7 @@
 """What the tasks with objects share: the toy, the blocks, and the check of the seat.
 
 Piles need more iterations of Bullet's solver (`ClockCfg.solver_iterations`) than its default: see
-the presets of both tasks.
+the presets of PileUpBlock and PutDownBlock.
 """
 
 from __future__ import annotations
@@ -120,9 +120,6 @@ def is_released(block: Prop, child: Humanoid) -> bool:
     return not child.touches(block)
 
 
-_GRASP_SPAN_M = 0.1
-
-
 @dataclass
 class ToyCfg(TaskCfg):
     """Parameters of a cube on the floor in front of a body at the origin that faces +x.
@@ -149,8 +146,8 @@ class ToyCfg(TaskCfg):
         super().__post_init__()
         self.check_positive("edge_m", "mass_kg", "friction", "near_m")
         self.check_not_negative("aside_m", "turn_deg")
-        if self.edge_m > _GRASP_SPAN_M:
-            raise ValueError(f"task.edge_m={self.edge_m}: hands span at most {_GRASP_SPAN_M} m")
+        if self.edge_m > _HAND_SPAN_M:
+            raise ValueError(f"task.edge_m={self.edge_m}: hands span at most {_HAND_SPAN_M} m")
         near, far = self.ahead_m
         if not self.edge_m < near <= far < math.inf:
             raise ValueError(
