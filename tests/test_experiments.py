@@ -8,7 +8,7 @@ import yaml
 from veca_marl.conf_dir import conf_dir
 from veca_marl.reports.arms import compose_arms
 from veca_marl.reports.gather import read_rows
-from veca_marl.reports.runs import runs_of, team_of
+from veca_marl.reports.scores import runs_of, team_of
 
 EXPERIMENTS = Path(__file__).resolve().parent.parent / "experiments"
 DECLARED = {

@@ -36,7 +36,7 @@ from veca_marl.reports.gather import (
     write_rows,
 )
 from veca_marl.reports.page import Report, page, run_remarks
-from veca_marl.reports.runs import expert_score, runs_of, team_of
+from veca_marl.reports.scores import expert_score, runs_of, team_of
 from veca_marl.reports.summary import summarise
 from veca_marl.reports.verdict import Evidence, judge
 

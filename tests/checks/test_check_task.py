@@ -10,7 +10,7 @@ from composed import compose
 
 import veca_marl
 from veca_marl.checks import CheckCfg, Status, check_game
-from veca_marl.checks.random_play import check_random_play
+from veca_marl.checks.episodes import check_random_play
 from veca_marl.checks.returns import check_returns
 from veca_marl.checks.seeding import check_seeding
 from veca_marl.checks.starts import check_starts

@@ -2,7 +2,7 @@
 
 import pytest
 
-from veca_marl.fidelity.physics.collisions import (
+from veca_marl.fidelity.mechanics.collisions import (
     impact_laws,
     rebound_laws,
     rebound_ratio,

@@ -2,7 +2,7 @@
 
 import pytest
 
-from veca_marl.fidelity.physics.inertia import SIZES, inertia_laws, pendulum_law
+from veca_marl.fidelity.mechanics.inertia import SIZES, inertia_laws, pendulum_law
 
 
 @pytest.mark.parametrize("shape", SIZES)

@@ -2,7 +2,12 @@
 
 import pytest
 
-from veca_marl.fidelity.body.joints import drive_against_limits, inertia_law, limit_laws, matrix_law
+from veca_marl.fidelity.mechanics.joints import (
+    drive_against_limits,
+    inertia_law,
+    limit_laws,
+    matrix_law,
+)
 from veca_marl.sim.body.humanoid import Detail
 
 

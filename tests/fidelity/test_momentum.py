@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from veca_marl.fidelity.body.momentum import (
+from veca_marl.fidelity.mechanics.momentum import (
     Flight,
     driven_flight,
     energy_laws,

@@ -2,8 +2,8 @@
 
 import pytest
 
+from veca_marl.fidelity.mechanics.rigid_bodies import laws
 from veca_marl.fidelity.physics.arena import SUBSTEPS
-from veca_marl.fidelity.physics.rigid_bodies import laws
 
 
 @pytest.mark.parametrize("substeps", [SUBSTEPS[0], SUBSTEPS[-1]])

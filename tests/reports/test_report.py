@@ -24,7 +24,7 @@ from veca_marl.reports.gather import (
     write_rows,
 )
 from veca_marl.reports.page import remarks
-from veca_marl.reports.runs import runs_of, team_of
+from veca_marl.reports.scores import runs_of, team_of
 from veca_marl.sweeps.run_state import RunState
 
 

@@ -11,7 +11,7 @@ from veca_marl.config.claims import (
     RunsAbove,
     parse_claim,
 )
-from veca_marl.reports.runs import ExpertScore, Point, Run
+from veca_marl.reports.scores import ExpertScore, Point, Run
 from veca_marl.reports.verdict import Evidence, Judgement, Verdict, judge, overall
 
 

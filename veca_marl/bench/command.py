@@ -16,7 +16,8 @@ from veca_marl.bench.learning import measure_learning
 from veca_marl.bench.machine import machine, machine_line
 from veca_marl.bench.options import BenchCfg, BenchOptions
 from veca_marl.bench.references import measure_references
-from veca_marl.bench.report import (
+from veca_marl.bench.rollouts import Rollouts, measure_first_world, measure_rollouts
+from veca_marl.bench.tables import (
     as_json,
     learning_table,
     parts_table,
@@ -24,7 +25,6 @@ from veca_marl.bench.report import (
     task_table,
     throughput_table,
 )
-from veca_marl.bench.rollouts import Rollouts, measure_first_world, measure_rollouts
 from veca_marl.config import ConfigError, compose, one_line
 from veca_marl.config.command_line import CommandLine
 from veca_marl.config.outputs import check_file

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from veca_marl.algos.evaluation.comparison import paired_difference
-from veca_marl.checks.random_play import reward_problems
-from veca_marl.checks.report import Finding, Status, finding
+from veca_marl.checks.episodes import reward_problems
+from veca_marl.checks.findings import Finding, Status, finding
 from veca_marl.envs.core.episodes import Episodes, first_team, play_to_end
 from veca_marl.envs.core.expert import find_expert, has_expert, missing_needs
 from veca_marl.envs.core.game import Game

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 
 from torchrl.envs import check_env_specs
 
-from veca_marl.checks import random_play, returns, seeding, starts
-from veca_marl.checks.report import Finding, Status, TaskReport, finding, guarded
+from veca_marl.checks import episodes as random_play
+from veca_marl.checks import returns, seeding, starts
+from veca_marl.checks.findings import Finding, Status, TaskReport, finding, guarded
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
 from veca_marl.envs.core.game import Game
 from veca_marl.envs.core.game_cfg import GameCfg

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from veca_marl.checks.report import Finding, finding
+from veca_marl.checks.findings import Finding, finding
 from veca_marl.envs.core.actions import random_action
 from veca_marl.envs.core.benchmark import start_state
 from veca_marl.envs.core.episodes import Episodes

@@ -6,8 +6,8 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from veca_marl.checks.findings import Finding, finding
 from veca_marl.checks.overlaps import overlaps
-from veca_marl.checks.report import Finding, finding
 from veca_marl.envs.core.benchmark import start_state
 from veca_marl.envs.core.episodes import Episodes
 from veca_marl.envs.core.game import Game, Outcome

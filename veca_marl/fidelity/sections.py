@@ -8,15 +8,15 @@ from veca_marl.fidelity.law import Section
 from veca_marl.registry import unknown
 
 SECTIONS: dict[str, str] = {
-    "collisions": "veca_marl.fidelity.physics.collisions",
+    "collisions": "veca_marl.fidelity.mechanics.collisions",
     "doppler": "veca_marl.fidelity.hearing.doppler",
     "ears": "veca_marl.fidelity.hearing.ears",
-    "inertia": "veca_marl.fidelity.physics.inertia",
-    "joints": "veca_marl.fidelity.body.joints",
+    "inertia": "veca_marl.fidelity.mechanics.inertia",
+    "joints": "veca_marl.fidelity.mechanics.joints",
     "localisation": "veca_marl.fidelity.hearing.localisation",
-    "momentum": "veca_marl.fidelity.body.momentum",
+    "momentum": "veca_marl.fidelity.mechanics.momentum",
     "near_field": "veca_marl.fidelity.hearing.near_field",
-    "rigid_bodies": "veca_marl.fidelity.physics.rigid_bodies",
+    "rigid_bodies": "veca_marl.fidelity.mechanics.rigid_bodies",
     "rooms": "veca_marl.fidelity.hearing.rooms",
     "touch": "veca_marl.fidelity.touch",
     "vision": "veca_marl.fidelity.vision.eyes",

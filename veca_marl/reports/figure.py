@@ -8,7 +8,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from veca_marl.reports.runs import Run
+from veca_marl.reports.scores import Run
 from veca_marl.reports.summary import curve
 
 _SIZE_INCHES = (5.5, 3.8)  # of one panel

@@ -10,7 +10,7 @@ from veca_marl.config.claims import Above, Faster, parse_claim
 from veca_marl.config.experiment import ExperimentCfg
 from veca_marl.reports.error_rates import false_order_rate, false_speed_rate
 from veca_marl.reports.gather import Found
-from veca_marl.reports.runs import Point, Run
+from veca_marl.reports.scores import Point, Run
 from veca_marl.reports.summary import ArmSummary
 from veca_marl.reports.verdict import MIN_RUNS, Judgement, Verdict, overall
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from veca_marl.reports.runs import Run, final_scores, random_scores
+from veca_marl.reports.scores import Run, final_scores, random_scores
 from veca_marl.reports.statistics import Interval, bootstrap_interval, interquartile_mean
 
 _SEED = 0

@@ -19,7 +19,7 @@ from veca_marl.algos.networks.action_values import (
     statistics_of,
 )
 from veca_marl.algos.networks.factory import NetworkCfg, NetworkFactory
-from veca_marl.algos.networks.per_agent import PerAgent
+from veca_marl.algos.networks.layers import PerAgent
 from veca_marl.algos.sac.config import Adaptation, EncoderGradient, TemperatureCfg
 from veca_marl.algos.sac.joint_action import JointAction
 from veca_marl.algos.sac.loss import TeamCrossQLoss, TeamSACLoss

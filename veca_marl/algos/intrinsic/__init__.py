@@ -1,11 +1,11 @@
 """Intrinsic rewards: independent of the task and of the algorithm that learns from them."""
 
-from veca_marl.algos.intrinsic.forward_model import ForwardModel, ForwardModelCfg
 from veca_marl.algos.intrinsic.intrinsic_reward import (
     IntrinsicCfg,
     IntrinsicReward,
     register_intrinsic,
 )
+from veca_marl.algos.intrinsic.predictors import ForwardModel, ForwardModelCfg
 from veca_marl.algos.intrinsic.rnd import RND, RNDCfg
 
 __all__ = [

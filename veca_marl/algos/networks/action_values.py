@@ -20,7 +20,7 @@ from veca_marl.algos.networks.factory import (
     freeze,
 )
 from veca_marl.algos.networks.initialisation import perceptron
-from veca_marl.algos.networks.per_agent import PerAgent
+from veca_marl.algos.networks.layers import PerAgent
 from veca_marl.algos.specs import TeamSpec
 
 

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 import torch
 from torch import Tensor, nn
 
-from veca_marl.algos.networks.per_agent import PerAgent
+from veca_marl.algos.networks.layers import PerAgent
 
 
 def independent_parameters(modules: Iterable[nn.Module]) -> list[list[nn.Parameter]]:

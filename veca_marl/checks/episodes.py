@@ -9,7 +9,7 @@ from time import perf_counter
 
 import numpy as np
 
-from veca_marl.checks.report import Finding, finding
+from veca_marl.checks.findings import Finding, finding
 from veca_marl.envs.core.actions import random_action
 from veca_marl.envs.core.episodes import Episodes
 from veca_marl.envs.core.game import Game, Observation, Outcome

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from veca_marl.fidelity.body.momentum import body_in_the_air
 from veca_marl.fidelity.law import Law, Section, at_most
+from veca_marl.fidelity.mechanics.momentum import body_in_the_air
 from veca_marl.sim.body.anatomy import load_skeleton
 from veca_marl.sim.body.humanoid import Detail, Humanoid
 from veca_marl.sim.physics import World, pybullet

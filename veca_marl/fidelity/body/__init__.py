@@ -1,1 +1,0 @@
-"""Laws of joint-level bodies: momentum, energy, joint limits."""

@@ -1,0 +1,1 @@
+"""Laws of rigid bodies: fall, friction, collisions, inertia, momentum, joint limits."""
