@@ -12,8 +12,7 @@ from pathlib import Path
 
 import matplotlib as mpl
 
-from veca_marl.fidelity.touch.fixed_arms import FOREARM, PALM, Ball
-from veca_marl.fidelity.touch.time_steps import clocks, peaks
+from veca_marl.fidelity.touch.fixed_arms import FOREARM, PALM, Ball, clocks, peaks
 
 mpl.use("Agg")
 import matplotlib.pyplot as plt

@@ -6,8 +6,8 @@ import resource
 import pytest
 import torch
 
-from veca_marl.runs import allocation
-from veca_marl.runs.allocation import keep_freed_memory
+from veca_marl.runs import assembly as allocation
+from veca_marl.runs.assembly import keep_freed_memory
 
 
 def test_a_large_array_is_made_again_without_page_faults():

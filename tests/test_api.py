@@ -8,9 +8,8 @@ import pytest
 import torch
 
 import veca_marl
-from veca_marl.algos.networks.precision import Precision
-from veca_marl.api import choose
-from veca_marl.api_arguments import as_integer
+from veca_marl.algos.networks.encoders import Precision
+from veca_marl.api import as_integer, choose
 from veca_marl.config import ConfigError
 from veca_marl.envs.core.game_cfg import Script
 from veca_marl.runs.run_folder import RunFolder

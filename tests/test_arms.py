@@ -3,7 +3,7 @@
 import pytest
 
 from veca_marl.config import ConfigError, compose
-from veca_marl.config.arms import check_contradictions
+from veca_marl.config.experiment import check_contradictions
 
 ARM = ["+experiment=audio_ablation", "experiment.arm=mono"]
 

@@ -11,15 +11,18 @@ import torch
 from composed import compose
 from paths import ROOT
 
-from veca_marl.algos.checkpoints.checkpoints import Checkpoints
-from veca_marl.bench.all_cores import SimultaneousRollouts
+from veca_marl.algos.checkpoints import Checkpoints
 from veca_marl.bench.body_views import body_views
-from veca_marl.bench.command import chosen_games, main
-from veca_marl.bench.free_play import free_play
-from veca_marl.bench.options import BenchCfg
-from veca_marl.bench.references import as_visual_shapes, busy_room, measure_ears, tiny_view
+from veca_marl.bench.command import BenchCfg, chosen_games, free_play, main
+from veca_marl.bench.learning import SimultaneousRollouts
+from veca_marl.bench.references import (
+    as_visual_shapes,
+    busy_room,
+    measure_ears,
+    tiny_view,
+    touched_child,
+)
 from veca_marl.bench.rollouts import measure_rollouts, most_views
-from veca_marl.bench.skin_costs import touched_child
 from veca_marl.bench.stopwatch import Probes, Stopwatch
 from veca_marl.config import conf_dir
 from veca_marl.envs.adapters.torchrl.env import VecaEnv

@@ -8,7 +8,7 @@ import torch
 from omegaconf import OmegaConf
 
 from veca_marl import api
-from veca_marl.algos.checkpoints.checkpoint_file import CheckpointError
+from veca_marl.algos.checkpoints import CheckpointError
 from veca_marl.config import ConfigError, to_config
 from veca_marl.evaluate import main as evaluate
 from veca_marl.runs.assembly import make_trainer

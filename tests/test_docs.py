@@ -28,10 +28,10 @@ from sphinx.ext import napoleon
 
 import veca_marl
 from veca_marl import list_tasks
-from veca_marl.conf_dir import conf_dir
 from veca_marl.config import ConfigError, compose
 from veca_marl.envs.core.game import Game
 from veca_marl.envs.core.task import TASKS, find_task
+from veca_marl.plugins import conf_dir
 from veca_marl.sim.body.anatomy import limit_sources
 from veca_marl.sim.body.humanoid import HumanoidCfg
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from veca_marl.conf_dir import conf_dir
+from veca_marl.plugins import conf_dir
 from veca_marl.reports.arms import compose_arms
 from veca_marl.reports.gather import read_rows
 from veca_marl.reports.scores import runs_of, team_of

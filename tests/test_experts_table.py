@@ -16,12 +16,10 @@ from veca_marl.envs.core.expert import Expert, find_expert
 from veca_marl.envs.core.game import Game
 from veca_marl.envs.core.game_cfg import Script
 from veca_marl.experts_table.command import main
-from veca_marl.experts_table.episode_file import EpisodeFile
-from veca_marl.experts_table.play import Played, digest, game_cfg
-from veca_marl.experts_table.processes import LostProcessError, play_all
-from veca_marl.experts_table.replay import spread
+from veca_marl.experts_table.episode_file import EpisodeFile, spread
+from veca_marl.experts_table.play import LostProcessError, Played, digest, game_cfg, play_all
 from veca_marl.experts_table.table import markdown
-from veca_marl.runs.lock import locked
+from veca_marl.runs.run_folder import locked
 from veca_marl.sim.physics import PropCfg
 
 BENCHMARK = ROOT / "experiments" / "experts" / "benchmark"
@@ -83,7 +81,7 @@ def _kill_itself(share, commit, results):
 
 
 def test_a_process_that_is_killed_is_named_with_its_signal(monkeypatch):
-    monkeypatch.setattr("veca_marl.experts_table.processes._play_share", _kill_itself)
+    monkeypatch.setattr("veca_marl.experts_table.play._play_share", _kill_itself)
     with pytest.raises(LostProcessError, match=r"which played episodes, ended by signal 9"):
         list(play_all([object(), object()], 2, "commit"))
 

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from composed import compose
 
-from veca_marl.bench.options import BenchOptions
+from veca_marl.bench.command import BenchOptions
 from veca_marl.config.command_line import CommandLine
 from veca_marl.envs.core.task import TASKS
 

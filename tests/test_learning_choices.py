@@ -5,16 +5,17 @@ import torch
 from first_seen import FirstSeenCfg
 from toy_dqn import ToyDQNCfg, register
 
-from veca_marl.algos.checkpoints.stored import load_actor
-from veca_marl.algos.intrinsic import ForwardModelCfg, IntrinsicCfg, RNDCfg
+from veca_marl.algos.intrinsic.intrinsic_reward import IntrinsicCfg
+from veca_marl.algos.intrinsic.predictors import ForwardModelCfg, RNDCfg
+from veca_marl.algos.networks.encoders import Precision
 from veca_marl.algos.networks.multisense import Critic, MultisenseCfg
-from veca_marl.algos.networks.precision import Precision
 from veca_marl.algos.ppo import PPOCfg
-from veca_marl.algos.reporting.loggers import LoggerKind
+from veca_marl.algos.reporting import LoggerKind
+from veca_marl.algos.transfer import load_actor
 from veca_marl.config import ConfigError, compose, compose_node, to_config
 from veca_marl.runs.assembly import decide_precision, make_trainer, read_specs
+from veca_marl.runs.continuation import RunProgress
 from veca_marl.runs.run_folder import RunFolder
-from veca_marl.runs.run_progress import RunProgress
 from veca_marl.runs.training import run_training
 from veca_marl.sweeps.run_state import RunState, read_run
 
@@ -75,7 +76,7 @@ def test_a_network_is_chosen_by_name():
 def test_loggers_are_chosen_by_name(monkeypatch):
     assert compose([KICK, "log.logger=[]"]).log.logger == []
     assert compose([KICK]).log.logger == [LoggerKind.csv, LoggerKind.tensorboard]
-    monkeypatch.setattr("veca_marl.algos.reporting.loggers.find_spec", lambda name: None)
+    monkeypatch.setattr("veca_marl.algos.reporting.find_spec", lambda name: None)
     stored = compose([KICK, "log.logger=[wandb]"])  # a run of another machine can be read
     with pytest.raises(ConfigError, match=r"log.logger: wandb is not installed: pip install"):
         make_trainer(stored)

@@ -4,7 +4,7 @@ import subprocess
 
 import pytest
 
-from veca_marl.runs.provenance import checkout_commit
+from veca_marl.runs.run_folder import checkout_commit
 
 
 def git(folder, *arguments):

@@ -7,7 +7,7 @@ from composed import compose
 
 from veca_marl.algos.evaluation.evaluate import random_policy
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
-from veca_marl.runs.recording import record_episode
+from veca_marl.runs.video import record_episode
 
 
 def record(path, *overrides):

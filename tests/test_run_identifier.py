@@ -7,7 +7,7 @@ import random
 import pytest
 import torch
 
-from veca_marl.algos.reporting import loggers
+from veca_marl.algos import reporting as loggers
 from veca_marl.config import compose_node, to_config
 from veca_marl.runs.assembly import make_reporters
 from veca_marl.runs.run_folder import RunFolder

@@ -11,10 +11,10 @@ from hydra.core.utils import setup_globals
 from omegaconf import OmegaConf
 
 from veca_marl import api
-from veca_marl.conf_dir import conf_dir
 from veca_marl.config import ConfigError
-from veca_marl.runs import lock
-from veca_marl.runs.lock import locked
+from veca_marl.plugins import conf_dir
+from veca_marl.runs import run_folder as lock
+from veca_marl.runs.run_folder import locked
 
 SMOKE = ["+experiment=smoke", "senses/vision=blind", "log=silent", "threads=1", "total_frames=64"]
 HOLDER = """
@@ -22,7 +22,7 @@ import sys
 import time
 from pathlib import Path
 
-from veca_marl.runs.lock import locked
+from veca_marl.runs.run_folder import locked
 
 with locked(Path(sys.argv[1])):
     print("held", flush=True)

@@ -9,7 +9,7 @@ import commands
 import pytest
 import torch
 
-from veca_marl.algos.checkpoints.checkpoint_file import CheckpointError
+from veca_marl.algos.checkpoints import CheckpointError
 from veca_marl.algos.evaluation.evaluate import RandomTeams
 from veca_marl.algos.evaluation.evaluate import evaluate as run_episodes
 from veca_marl.algos.specs import team_specs
@@ -20,8 +20,7 @@ from veca_marl.evaluate import EvaluateOptions, evaluate_run
 from veca_marl.evaluate import main as evaluate
 from veca_marl.play.command import main as play
 from veca_marl.runs.assembly import make_trainer
-from veca_marl.runs.run_folder import RunFolder
-from veca_marl.runs.stored_policies import stored_actors, stored_configuration
+from veca_marl.runs.run_folder import RunFolder, stored_actors, stored_configuration
 from veca_marl.tournament import main as tournament
 from veca_marl.tournament import spread
 

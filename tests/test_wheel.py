@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from veca_marl.conf_dir import conf_dir
+from veca_marl.plugins import conf_dir
 
 ROOT = Path(__file__).resolve().parent.parent
 SMALL = ["+experiment=smoke", "senses/vision=blind", "log=silent", "total_frames=128"]

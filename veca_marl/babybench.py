@@ -15,15 +15,13 @@ from dataclasses import asdict, dataclass, field
 import numpy as np
 import torch
 
-from veca_marl.algos.checkpoints.checkpoint_file import CheckpointError
+from veca_marl.algos.checkpoints import CheckpointError
 from veca_marl.algos.files import WriteError, write_atomically
 from veca_marl.config import ConfigError, one_line
-from veca_marl.config.command_line import CommandLine
-from veca_marl.config.outputs import check_file
+from veca_marl.config.command_line import CommandLine, check_file
 from veca_marl.envs.core.task import find_task
 from veca_marl.envs.tasks.self_touch import HANDS, SelfTouch, regions_of
-from veca_marl.play.policies import EXPERT, choose
-from veca_marl.play.session import Session
+from veca_marl.play.session import EXPERT, Session, choose
 
 SUITE = "babybench"
 STEPS = 1000  # of an episode in BabyBench

@@ -22,18 +22,17 @@ from omegaconf import MISSING
 from tensordict.nn import TensorDictSequential
 from torch import nn
 
-from veca_marl.algos.checkpoints.checkpoint_file import CheckpointError
+from veca_marl.algos.checkpoints import CheckpointError
 from veca_marl.algos.evaluation.comparison import comparison_line, interval, solved_rate
 from veca_marl.algos.evaluation.evaluate import Exploration, RandomTeams, Scores, evaluate
 from veca_marl.algos.files import WriteError, write_atomically
 from veca_marl.algos.specs import team_specs
 from veca_marl.config import Config, ConfigError, compose, one_line
-from veca_marl.config.command_line import CommandLine
-from veca_marl.config.outputs import check_file
+from veca_marl.config.command_line import CommandLine, check_file
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
 from veca_marl.envs.core.benchmark import Benchmark, find_benchmark, parameters
 from veca_marl.envs.core.game_cfg import GameCfg
-from veca_marl.runs.stored_policies import stored_actors, stored_configuration
+from veca_marl.runs.run_folder import stored_actors, stored_configuration
 from veca_marl.sweeps.differences import differences
 
 _ERRORS = (CheckpointError, WriteError)

@@ -17,9 +17,9 @@ if TYPE_CHECKING:
     from veca_marl.algos.algorithm import AlgorithmCfg as AlgorithmCfg
     from veca_marl.algos.algorithm import make_algorithm as make_algorithm
     from veca_marl.algos.algorithm import register_algorithm as register_algorithm
-    from veca_marl.algos.intrinsic import IntrinsicCfg as IntrinsicCfg
-    from veca_marl.algos.intrinsic import IntrinsicReward as IntrinsicReward
-    from veca_marl.algos.intrinsic import register_intrinsic as register_intrinsic
+    from veca_marl.algos.intrinsic.intrinsic_reward import IntrinsicCfg as IntrinsicCfg
+    from veca_marl.algos.intrinsic.intrinsic_reward import IntrinsicReward as IntrinsicReward
+    from veca_marl.algos.intrinsic.intrinsic_reward import register_intrinsic as register_intrinsic
     from veca_marl.algos.networks.factory import NetworkCfg as NetworkCfg
     from veca_marl.algos.networks.factory import NetworkFactory as NetworkFactory
     from veca_marl.algos.networks.factory import make_network as make_network

@@ -12,8 +12,7 @@ from importlib.metadata import entry_points
 
 import gymnasium
 
-from veca_marl.conf_dir import conf_dir
-from veca_marl.plugins import GROUP, PluginError, load_plugins
+from veca_marl.plugins import GROUP, PluginError, conf_dir, load_plugins
 
 
 def shipped_tasks() -> list[str]:

@@ -97,3 +97,23 @@ def _load(name: str, source: str) -> None:
             f"plug-in {name!r} ({source}) cannot be imported: {type(error).__name__}: {reason}"
         ) from error
     PLUGINS.add(name, Plugin(name))
+
+
+_PACKAGE = Path(__file__).parent
+
+
+def conf_dir() -> Path:
+    """Return the folder with `config.yaml` and the groups of choices.
+
+    A wheel contains it as `veca_marl/conf`; in a checkout it is `conf` beside the package.
+
+    Raises:
+        FileNotFoundError: If the installation is incomplete.
+    """
+    candidates = (_PACKAGE / "conf", _PACKAGE.parent / "conf")
+    for folder in candidates:
+        if (folder / "config.yaml").is_file():
+            return folder
+    raise FileNotFoundError(
+        f"no configuration files (config.yaml) in {' or '.join(map(str, candidates))}"
+    )

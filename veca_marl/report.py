@@ -19,12 +19,9 @@ import numpy as np
 
 from veca_marl.algos.files import WriteError, write_atomically
 from veca_marl.config import ConfigError
-from veca_marl.config.claims import parse_claim
-from veca_marl.config.command_line import CommandLine
-from veca_marl.config.experiment import ExperimentCfg
-from veca_marl.config.outputs import check_folder
+from veca_marl.config.command_line import CommandLine, check_folder
+from veca_marl.config.experiment import ExperimentCfg, parse_claim
 from veca_marl.reports.arms import Arm, compose_arms
-from veca_marl.reports.expert import expert_rows
 from veca_marl.reports.figure import check_plotting, draw
 from veca_marl.reports.gather import (
     Found,
@@ -36,8 +33,7 @@ from veca_marl.reports.gather import (
     write_rows,
 )
 from veca_marl.reports.page import Report, page, run_remarks
-from veca_marl.reports.scores import expert_score, runs_of, team_of
-from veca_marl.reports.summary import summarise
+from veca_marl.reports.scores import expert_rows, expert_score, runs_of, summarise, team_of
 from veca_marl.reports.verdict import Evidence, judge
 
 FIGURE = "curves.png"

@@ -18,13 +18,11 @@ import numpy as np
 import torch
 from omegaconf import MISSING
 
-from veca_marl.algos.checkpoints.checkpoint_file import CheckpointError
+from veca_marl.algos.checkpoints import CheckpointError
 from veca_marl.algos.files import WriteError, write_errors
-from veca_marl.algos.selfplay.pool import Pool
-from veca_marl.algos.selfplay.tournament import Match, Rating, play_all, rate, table_of_points
+from veca_marl.algos.selfplay import Match, Pool, Rating, play_all, rate, table_of_points
 from veca_marl.config import Config, ConfigError, to_config
-from veca_marl.config.command_line import CommandLine
-from veca_marl.config.outputs import check_file, check_folder
+from veca_marl.config.command_line import CommandLine, check_file, check_folder
 from veca_marl.config.stored import change
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
 from veca_marl.runs.assembly import make_learners, read_specs

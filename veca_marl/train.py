@@ -22,24 +22,22 @@ from omegaconf import DictConfig
 from omegaconf.errors import OmegaConfBaseException
 
 from veca_marl import api
-from veca_marl.algos.checkpoints.checkpoint_file import CheckpointError
-from veca_marl.algos.collection.parent import end_with_parent
+from veca_marl.algos.checkpoints import CheckpointError
+from veca_marl.algos.collection.child_processes import end_with_parent
 from veca_marl.algos.collection.workers import WorkerError
 from veca_marl.algos.files import DISK_FULL, WriteError
 from veca_marl.algos.training.finite import NotFiniteError
 from veca_marl.algos.training.loop import Trainer
 from veca_marl.config import Config, ConfigError, conf_dir, one_line, prepare, to_config
-from veca_marl.config.arms import check_arm
-from veca_marl.config.outputs import check_folder
+from veca_marl.config.command_line import check_folder
+from veca_marl.config.experiment import check_arm
 from veca_marl.config.stored import change
 from veca_marl.runs.assembly import decide_precision, make_trainer
-from veca_marl.runs.continuation import resume_argument
-from veca_marl.runs.lock import locked
-from veca_marl.runs.resumable import RESUMABLE, may_change
-from veca_marl.runs.run_folder import RunFolder, new_run, open_run
+from veca_marl.runs.continuation import RESUMABLE, may_change, resume_argument
+from veca_marl.runs.run_folder import RunFolder, locked, new_run, open_run
 from veca_marl.runs.training import TrainingResult, run_training
 from veca_marl.sweeps.plans import SweepError
-from veca_marl.sweeps.processes import PARENT
+from veca_marl.sweeps.sweep import PARENT
 
 _COMMAND = "python -m veca_marl.train"
 _NO_FOLDER = (errno.EACCES, errno.EPERM, errno.EROFS, errno.ENOTDIR)

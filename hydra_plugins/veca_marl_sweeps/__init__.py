@@ -23,9 +23,8 @@ from omegaconf import DictConfig, OmegaConf, open_dict
 from omegaconf.errors import OmegaConfBaseException
 
 from veca_marl.runs.cores import usable_cores
-from veca_marl.sweeps.body_kinds import former_kinds, with_body_kinds
-from veca_marl.sweeps.former import former_values
 from veca_marl.sweeps.plans import Job, SweepError
+from veca_marl.sweeps.run_state import former_kinds, former_values, with_body_kinds
 from veca_marl.sweeps.sweep import run_sweep
 
 
@@ -84,7 +83,7 @@ class ArmSweeper(BasicSweeper):
 
     def _with_arm(self, job: Sequence[str]) -> list[str]:
         # here, and not above: it imports the simulator, which `train` has loaded
-        from veca_marl.config.arms import check_contradictions
+        from veca_marl.config.experiment import check_contradictions
 
         assert self.config is not None
         arms = self.config.experiment.arms
@@ -150,7 +149,7 @@ class ProcessLauncher(Launcher):
         """Return how many of the jobs fit on the machine together."""
         # here, and not above: they import torch, which `train` has loaded
         from veca_marl.config import to_config
-        from veca_marl.runs.simultaneous import runs_at_once
+        from veca_marl.runs.assembly import runs_at_once
 
         configs = {}
         for job in jobs:

@@ -9,8 +9,8 @@ from typing import get_type_hints
 
 from docs_pages.docstrings import prose
 from docs_pages.tables import field_table, table
-from veca_marl.conf_dir import conf_dir
 from veca_marl.config.root import Config
+from veca_marl.plugins import conf_dir
 
 HEAD = """# Configuration
 

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from docs_pages.config_page import comment
 from docs_pages.docstrings import prose
 from docs_pages.tables import field_table, table
-from veca_marl.conf_dir import conf_dir
 from veca_marl.config import compose
+from veca_marl.plugins import conf_dir
 from veca_marl.sim.geometry import Pose
 from veca_marl.sim.physics import (
     DoorCfg,

@@ -12,11 +12,11 @@ from docs_pages.bodies_of_tasks import departures, discrete_form
 from docs_pages.config_page import comment
 from docs_pages.docstrings import entries, prose
 from docs_pages.tables import field_table, table, text
-from veca_marl.conf_dir import conf_dir
 from veca_marl.config import compose
 from veca_marl.envs.core.expert import find_expert, has_expert
 from veca_marl.envs.core.game_cfg import GameCfg
 from veca_marl.envs.core.task import RATE_STEP_S, TASKS, Task
+from veca_marl.plugins import conf_dir
 
 PAPER_SUITE = "veca"  # the tasks of the paper
 PER_STEP = (

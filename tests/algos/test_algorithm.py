@@ -14,22 +14,20 @@ from veca_marl.algos.algorithm import (
     make_algorithm,
     register_algorithm,
 )
-from veca_marl.algos.checkpoints.checkpoints import Checkpoints
-from veca_marl.algos.checkpoints.identity import Identity
-from veca_marl.algos.checkpoints.stored import load_actor, load_learnt
+from veca_marl.algos.checkpoints import Checkpoints, Identity
 from veca_marl.algos.collection.experience import CollectCfg, Experience
 from veca_marl.algos.evaluation.evaluate import EvalCfg
 from veca_marl.algos.networks.action_values import ActionValuesCfg
 from veca_marl.algos.ppo import PPO, PPOCfg
-from veca_marl.algos.reporting.reporters import CsvReporter, MemoryReporter
+from veca_marl.algos.reporting import CsvReporter, MemoryReporter
 from veca_marl.algos.sac import SACCfg
 from veca_marl.algos.sac.config import ReplayCfg
-from veca_marl.algos.selfplay.pool import Pool
-from veca_marl.algos.selfplay.self_play import SelfPlay, SelfPlayCfg
+from veca_marl.algos.selfplay import Pool, SelfPlay, SelfPlayCfg
 from veca_marl.algos.specs import team_specs
 from veca_marl.algos.training.learners import TeamLearners
 from veca_marl.algos.training.loop import Trainer
-from veca_marl.algos.training.progress import Budget
+from veca_marl.algos.training.schedule import Budget
+from veca_marl.algos.transfer import load_actor, load_learnt
 
 register()
 CPU = torch.device("cpu")

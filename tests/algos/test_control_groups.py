@@ -2,7 +2,7 @@
 
 import pytest
 
-from veca_marl.algos.control_groups import control_group_memory
+from veca_marl.algos.storage import control_group_memory
 
 SLURM = "system.slice/slurmstepd.scope/job_7/step_0"
 

@@ -9,10 +9,8 @@ from fake_env import make_fake_env
 from toy_dqn import ToyDQNCfg, register
 from training import SMALL
 
-from veca_marl.algos.checkpoints.checkpoint_file import CheckpointError
-from veca_marl.algos.checkpoints.checkpoints import Checkpoints
-from veca_marl.algos.checkpoints.identity import Identity
-from veca_marl.algos.intrinsic import RNDCfg
+from veca_marl.algos.checkpoints import CheckpointError, Checkpoints, Identity, to_plain
+from veca_marl.algos.intrinsic.predictors import RNDCfg
 from veca_marl.algos.networks.action_values import ActionValuesCfg
 from veca_marl.algos.networks.encoders import (
     Convolutions,
@@ -22,12 +20,11 @@ from veca_marl.algos.networks.encoders import (
 )
 from veca_marl.algos.networks.memory import with_memory
 from veca_marl.algos.networks.multisense import Memory, MultisenseCfg, Parameters
-from veca_marl.algos.plain import to_plain
 from veca_marl.algos.ppo import PPOCfg
 from veca_marl.algos.ppo.value_normalisation import ValueNormalisation
 from veca_marl.algos.sac import SACCfg
 from veca_marl.algos.sac.config import ReplayCfg
-from veca_marl.algos.sac.replay.buffer import Replay
+from veca_marl.algos.sac.replay import Replay
 from veca_marl.algos.sense_encoders import SenseEncoders, copy_encoders, sense_encoders
 from veca_marl.algos.specs import ArrayLayout, TeamSpec, team_specs
 from veca_marl.algos.training.learners import TeamLearners

@@ -10,10 +10,8 @@ from composed import compose
 
 import veca_marl
 from veca_marl.checks import CheckCfg, Status, check_game
-from veca_marl.checks.episodes import check_random_play
-from veca_marl.checks.returns import check_returns
-from veca_marl.checks.seeding import check_seeding
-from veca_marl.checks.starts import check_starts
+from veca_marl.checks.episodes import check_random_play, check_returns
+from veca_marl.checks.starts import check_seeding, check_starts
 from veca_marl.envs.core.expert import EXPERTS, Expert
 from veca_marl.envs.core.game import Game
 from veca_marl.envs.core.task import TASKS, Task, TaskCfg, Team, terms

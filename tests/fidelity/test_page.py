@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from veca_marl.fidelity import command
+from veca_marl.fidelity.command import SECTIONS
 from veca_marl.fidelity.law import (
     Curve,
     Law,
@@ -18,9 +19,7 @@ from veca_marl.fidelity.law import (
     between,
     equals,
 )
-from veca_marl.fidelity.page import picture_name, write_page
-from veca_marl.fidelity.plots import draw
-from veca_marl.fidelity.sections import SECTIONS
+from veca_marl.fidelity.page import draw, picture_name, write_page
 
 HELD = equals("gravity", "m/s2", 9.81, 9.8, 0.02)
 BROKEN = at_most("speed", "m/s", 1.0, 2.0)

@@ -2,8 +2,7 @@
 
 import pytest
 
-from veca_marl.fidelity.mechanics.rigid_bodies import laws
-from veca_marl.fidelity.physics.arena import SUBSTEPS
+from veca_marl.fidelity.mechanics.rigid_bodies import SUBSTEPS, laws
 
 
 @pytest.mark.parametrize("substeps", [SUBSTEPS[0], SUBSTEPS[-1]])

@@ -5,10 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from veca_marl.fidelity.touch.approaches import Approach, all_approaches, extremes, rotation
-from veca_marl.fidelity.touch.flat_skin import FlatSkin, Thing
+from veca_marl.fidelity.touch.bare_body import noticed_pokes
+from veca_marl.fidelity.touch.flat_skin import (
+    Approach,
+    FlatSkin,
+    Thing,
+    all_approaches,
+    extremes,
+    rotation,
+)
 from veca_marl.fidelity.touch.laws import RADII, plane_error
-from veca_marl.fidelity.touch.pokes import noticed_pokes
 from veca_marl.sim.geometry import Shape
 from veca_marl.sim.touch import TouchCfg
 

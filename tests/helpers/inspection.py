@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from veca_marl.checks.episodes import observation_problems, reward_problems
-from veca_marl.checks.overlaps import overlaps
+from veca_marl.checks.starts import overlaps
 
 BESIDE_ROOMS_M = 0.3  # walls are thinner; what stands in a doorway is between two rooms
 BELOW_FLOOR_M = 0.1  # what is dropped penetrates the floor for a step: 7 cm at its edge were seen

@@ -9,16 +9,15 @@ import torch
 from fake_env import make_fake_env
 from training import FRAMES, SMALL, read
 
-from veca_marl.algos.checkpoints.checkpoints import Checkpoints
-from veca_marl.algos.checkpoints.identity import Identity
+from veca_marl.algos.checkpoints import Checkpoints, Identity
 from veca_marl.algos.collection.experience import CollectCfg
 from veca_marl.algos.evaluation.evaluate import EvalCfg
 from veca_marl.algos.ppo import PPOCfg
-from veca_marl.algos.reporting.reporters import CsvReporter
+from veca_marl.algos.reporting import CsvReporter
 from veca_marl.algos.specs import team_specs
 from veca_marl.algos.training.learners import TeamLearners
 from veca_marl.algos.training.loop import Trainer
-from veca_marl.algos.training.progress import Budget
+from veca_marl.algos.training.schedule import Budget
 
 BATCHES = 6
 make_env = partial(make_fake_env, senses=("audio",))

@@ -14,7 +14,7 @@ from torchrl.data import Categorical, LazyTensorStorage, TensorDictReplayBuffer
 from torchrl.modules import EGreedyModule
 
 from veca_marl.algos.algorithm import Algorithm, AlgorithmCfg, register_algorithm
-from veca_marl.algos.networks.exploration import UniformWarmUp
+from veca_marl.algos.policy import UniformWarmUp
 from veca_marl.algos.specs import PLAIN
 
 

@@ -2,8 +2,8 @@
 
 import csv
 
+from veca_marl.algos.networks.encoders import Precision
 from veca_marl.algos.networks.multisense import MultisenseCfg
-from veca_marl.algos.networks.precision import Precision
 
 # float32: tests compare losses with formulas
 SMALL = MultisenseCfg(

@@ -11,7 +11,7 @@ from rollouts import digest, play
 from torchrl.collectors import RandomPolicy
 from torchrl.envs import SerialEnv, check_env_specs
 
-from veca_marl.bench.free_play import free_play
+from veca_marl.bench.command import free_play
 from veca_marl.config import conf_dir
 from veca_marl.envs.adapters.gymnasium import VecaGymEnv
 from veca_marl.envs.adapters.pettingzoo import VecaParallelEnv

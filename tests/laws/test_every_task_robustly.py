@@ -11,7 +11,7 @@ from inspection import observation_problems, resident_mb, start_problems, step_p
 from rollouts import game_cfg
 from rude_actions import PERIOD, illegal_actions, rude_actions
 
-from veca_marl.checks.seeding import digest
+from veca_marl.checks.starts import digest
 from veca_marl.envs.core.episodes import Episodes
 from veca_marl.envs.core.game import Game
 

@@ -8,10 +8,10 @@ import pytest
 from composed import compose
 from rollouts import game_cfg
 
-from veca_marl.conf_dir import conf_dir
 from veca_marl.config import ConfigError
 from veca_marl.envs.core.game import Game
 from veca_marl.envs.core.task import find_task
+from veca_marl.plugins import conf_dir
 from veca_marl.sim.body import BodyCfg
 
 BODIES = sorted(path.stem for path in (conf_dir() / "body").glob("*.yaml"))

@@ -5,11 +5,16 @@ import pytest
 from composed import compose
 
 from veca_marl.envs.core.game import Game
-from veca_marl.play.panels.drawing import BACKGROUND
-from veca_marl.play.panels.eyes import eye_panels
-from veca_marl.play.panels.reward_bars import GAIN, LOSS, TermBar, reward_bars
-from veca_marl.play.panels.skin import skin_panel
-from veca_marl.play.panels.spectrogram import spectrograms
+from veca_marl.play.screen import (
+    BACKGROUND,
+    GAIN,
+    LOSS,
+    TermBar,
+    eye_panels,
+    reward_bars,
+    skin_panel,
+    spectrograms,
+)
 from veca_marl.sim.touch import taxels_of
 from veca_marl.sim.touch.parts import skin_parts
 

@@ -5,8 +5,7 @@ import pytest
 from composed import compose
 
 from veca_marl.envs.core.game import Game
-from veca_marl.play.steering.gaze import gaze_point
-from veca_marl.play.steering.keyboard import Keyboard, steering_help
+from veca_marl.play.steering import Keyboard, gaze_point, steering_help
 from veca_marl.sim.physics.interactions import NO_VERB
 from veca_marl.sim.sound import Call
 
@@ -62,7 +61,7 @@ def test_the_pointer_is_a_direction_relative_to_the_head(walker):
 
 
 def test_samples_are_scaled_to_16_bits_and_interleaved():
-    loudspeaker = pytest.importorskip("veca_marl.play.window.loudspeaker")
+    loudspeaker = pytest.importorskip("veca_marl.play.window")
     samples = np.frombuffer(loudspeaker.pcm(np.array([[0.5, 0.0], [-0.5, 0.25]]), 0.5), np.int16)
     full = round(0.8 * 32_767)
     np.testing.assert_allclose(samples, [full, -full, 0, full / 2], atol=1)

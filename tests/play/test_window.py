@@ -7,8 +7,7 @@ from composed import compose
 from veca_marl.algos.evaluation.evaluate import Exploration
 from veca_marl.play.command import main
 from veca_marl.play.session import Session
-from veca_marl.play.steering.keyboard import Keyboard
-from veca_marl.play.steering.steered import SteeredPolicy
+from veca_marl.play.steering import Keyboard, SteeredPolicy
 
 pygame = pytest.importorskip("pygame", reason="the window needs the extra [play]")
 
@@ -23,7 +22,7 @@ def no_screen(monkeypatch):
 
 @pytest.fixture
 def window(no_screen):
-    from veca_marl.play.window.window import Window
+    from veca_marl.play.window import Window
 
     keyboard = Keyboard()
     session = Session(

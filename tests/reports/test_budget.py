@@ -7,8 +7,7 @@ from small_experiment import EXPERIMENT, write_all
 from stored_runs import write_run
 
 from veca_marl import report
-from veca_marl.reports.arms import compose_arms
-from veca_marl.reports.budget import FrameBudget
+from veca_marl.reports.arms import FrameBudget, compose_arms
 from veca_marl.reports.gather import run_folder
 from veca_marl.sweeps.run_state import RunState
 

@@ -3,8 +3,12 @@
 import numpy as np
 import pytest
 
-from veca_marl.reports.error_rates import false_order_rate, false_speed_rate
-from veca_marl.reports.statistics import bootstrap_interval, probability_of_improvement
+from veca_marl.reports.statistics import (
+    bootstrap_interval,
+    false_order_rate,
+    false_speed_rate,
+    probability_of_improvement,
+)
 
 
 def test_few_runs_are_told_apart_more_often_than_the_confidence_says():

@@ -1,7 +1,7 @@
 """The expert as a baseline of a report."""
 
 from veca_marl.reports.arms import compose_arms
-from veca_marl.reports.expert import expert_rows
+from veca_marl.reports.scores import expert_rows
 
 SHORT = ["+experiment=audio_ablation", "task.max_seconds=0.2"]
 DEAF = "experiment.arms.hrtf=['senses/audio=deaf']"

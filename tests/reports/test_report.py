@@ -13,7 +13,6 @@ from stored_runs import write_run
 from veca_marl import report
 from veca_marl.algos.files import WriteError
 from veca_marl.reports import figure
-from veca_marl.reports.error_rates import false_order_rate
 from veca_marl.reports.gather import (
     Found,
     gather,
@@ -25,6 +24,7 @@ from veca_marl.reports.gather import (
 )
 from veca_marl.reports.page import remarks
 from veca_marl.reports.scores import runs_of, team_of
+from veca_marl.reports.statistics import false_order_rate
 from veca_marl.sweeps.run_state import RunState
 
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from veca_marl.config.claims import (
+from veca_marl.config.experiment import (
     Above,
     AboveNumber,
     AboveTimes,

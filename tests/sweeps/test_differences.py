@@ -2,9 +2,10 @@
 
 import pytest
 
-from veca_marl.config import compose_node, schemas
+from veca_marl.config import compose_node
+from veca_marl.config import root as schemas
 from veca_marl.sweeps.differences import BY_TEAM, differences, key_patterns
-from veca_marl.sweeps.former import former_values
+from veca_marl.sweeps.run_state import former_values
 
 BALL = {"name": "ball", "mass_kg": 0.3, "size_m": [0.1]}
 BOX = {"name": "box", "mass_kg": 1.0, "size_m": [0.1, 0.2, 0.3]}

@@ -7,10 +7,10 @@ import pytest
 from hydra.core.override_parser.overrides_parser import OverridesParser
 from stored_runs import write_run
 
-from veca_marl.sweeps.body_kinds import former_kinds, with_body_kinds
-from veca_marl.sweeps.cores import cores_of, default_jobs
 from veca_marl.sweeps.differences import differences
 from veca_marl.sweeps.plans import Action, Job, SweepError, plan
+from veca_marl.sweeps.run_state import former_kinds, with_body_kinds
+from veca_marl.sweeps.sweep import cores_of, default_jobs
 
 CONFIG = {
     "task": {"name": "KickTheBall", "weights": {"kick": 1.0}},

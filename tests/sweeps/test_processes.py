@@ -11,9 +11,7 @@ import pytest
 
 from veca_marl.sweeps import sweep
 from veca_marl.sweeps.plans import Action, Job, Plan, SweepError
-from veca_marl.sweeps.processes import PARENT, run_all
-from veca_marl.sweeps.progress import Progress, frames_so_far
-from veca_marl.sweeps.sweep import run_sweep
+from veca_marl.sweeps.sweep import PARENT, Progress, frames_so_far, run_all, run_sweep
 
 
 def make(folder, name, code="pass", action=Action.start):
@@ -78,8 +76,8 @@ def test_a_run_that_another_sweep_still_runs_is_not_started_again(tmp_path):
 SWEEP = """
 import pathlib, signal, sys
 from veca_marl.sweeps.plans import Action, Job, Plan
-from veca_marl.sweeps.processes import run_all
-from veca_marl.sweeps.progress import Progress
+from veca_marl.sweeps.sweep import run_all
+from veca_marl.sweeps.sweep import Progress
 folder = pathlib.Path(sys.argv[1])
 code = f"import os, time; open('{folder}/' + str(os.getpid()), 'w'); time.sleep(60)"
 jobs = [Job(n, folder / n, [], {"total_frames": 1}) for n in ("a", "b", "c")]

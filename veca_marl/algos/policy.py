@@ -1,4 +1,4 @@
-"""What acts for all teams together."""
+"""What acts for all teams together, and the uniform actions with which a team may start."""
 
 from __future__ import annotations
 
@@ -6,12 +6,55 @@ from collections.abc import Mapping
 from copy import deepcopy
 
 import torch
+from tensordict import TensorDictBase
 from tensordict.nn import TensorDictModuleBase, TensorDictSequential
-from torch import nn
+from torch import Tensor, nn
+from torchrl.envs import ExplorationType
+from torchrl.envs.utils import exploration_type
 
-from veca_marl.algos.acting.direct import DirectPolicy
-from veca_marl.algos.networks.exploration import UniformWarmUp
-from veca_marl.algos.networks.precision import for_acting
+from veca_marl.algos.acting import Arrays, DirectPolicy
+from veca_marl.algos.networks.encoders import for_acting
+from veca_marl.algos.specs import ActionLayout, TeamSpec, action_key
+
+
+class UniformWarmUp(TensorDictModuleBase):
+    """Replaces a team's action by a uniformly random one while `active`.
+
+    TorchRL's collectors count ``init_random_frames`` from their own start; here the switch is a
+    buffer, which checkpoints keep and which reaches worker processes with the parameters.
+
+    Args:
+        team: Name of the team.
+        spec: Its arrays.
+
+    Attributes:
+        active: Whether actions are replaced (where the exploration type asks for samples).
+    """
+
+    active: Tensor
+
+    def __init__(self, team: str, spec: TeamSpec) -> None:
+        super().__init__()
+        self._actions = {action_key(team, p): layout for p, layout in spec.actions.items()}
+        self.in_keys = self.out_keys = list(self._actions)
+        self.register_buffer("active", torch.ones((), dtype=torch.bool))
+
+    def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
+        """Replace the action in place and return `tensordict`."""
+        self.write(tensordict)
+        return tensordict
+
+    def write(self, arrays: Arrays) -> None:
+        """See `acting.modules.WritesArrays`."""
+        if bool(self.active) and exploration_type() in (ExplorationType.RANDOM, None):
+            for key, layout in self._actions.items():
+                arrays[key] = _uniform(layout, arrays[key])
+
+
+def _uniform(layout: ActionLayout, like: Tensor) -> Tensor:
+    if layout.discrete:
+        return torch.randint_like(like, layout.size)
+    return torch.rand_like(like) * 2.0 - 1.0
 
 
 class Policy(nn.Module):

@@ -7,9 +7,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 
 from veca_marl.bench.learning import Learning
-from veca_marl.bench.references import References
+from veca_marl.bench.references import DISTANT, References
 from veca_marl.bench.rollouts import Rollouts
-from veca_marl.bench.skin_costs import DISTANT
 
 
 def throughput_table(runs: Sequence[Rollouts]) -> str:

@@ -9,7 +9,9 @@ from dataclasses import dataclass
 from torchrl.envs import check_env_specs
 
 from veca_marl.checks import episodes as random_play
-from veca_marl.checks import returns, seeding, starts
+from veca_marl.checks import episodes as returns
+from veca_marl.checks import starts
+from veca_marl.checks import starts as seeding
 from veca_marl.checks.findings import Finding, Status, TaskReport, finding, guarded
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
 from veca_marl.envs.core.game import Game

@@ -1,20 +1,86 @@
-"""Whether every start of an episode is possible, and how starts are distributed."""
+"""Whether every start of an episode is possible and follows from its seed."""
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Iterator, Sequence
+from itertools import combinations
 
 import numpy as np
 
 from veca_marl.checks.findings import Finding, finding
-from veca_marl.checks.overlaps import overlaps
+from veca_marl.envs.core.actions import random_action
 from veca_marl.envs.core.benchmark import start_state
 from veca_marl.envs.core.episodes import Episodes
 from veca_marl.envs.core.game import Game, Outcome
 from veca_marl.envs.core.game_cfg import Script
+from veca_marl.sim.body.walker import Walker
 from veca_marl.sim.geometry import Floats
+from veca_marl.sim.physics import World, pybullet
 
-NAMES = ("starts", "first step")
+GREATEST_OVERLAP_M = 0.005
+"""Depth up to which contacts are no overlap; skin yields by less, and so do resting props."""
+
+_BODY_A, _BODY_B, _DISTANCE = 1, 2, 8  # entries of Bullet's contact points
+
+
+def overlaps(game: Game, depth_m: float = GREATEST_OVERLAP_M) -> list[str]:
+    """Return what penetrates each other by more than a depth, one entry for each pair.
+
+    Bones of one body count, unless its joints keep them apart. Bullet's contacts are updated.
+
+    Args:
+        game: A game that has just been reset.
+        depth_m: Greatest depth in metres that is no overlap.
+    """
+    names = _names(game)
+    deepest: dict[tuple[str, str], float] = {}
+    for one, other, distance_m in _contacts(game):
+        pair = names[one], names[other]
+        deepest[pair] = min(deepest.get(pair, 0.0), distance_m)
+    return [
+        f"{_described(*pair)} overlap by {-1000.0 * distance_m:.0f} mm"
+        for pair, distance_m in deepest.items()
+        if distance_m < -depth_m
+    ]
+
+
+def _names(game: Game) -> dict[int, str]:
+    names = {player.body.body_id: player.name for player in game.players}
+    names |= {prop.body_id: prop.name for prop in game.world.props.values()}
+    return names | {game.world.floor_id: "floor"}
+
+
+def _contacts(game: Game) -> Iterator[tuple[int, int, float]]:
+    """Yield ids and distance of all contacts.
+
+    Bullet looks for none between walkers and fixed props: neither has a mass.
+    """
+    client = game.world.client
+    pybullet.performCollisionDetection(physicsClientId=client)
+    points = list(pybullet.getContactPoints(physicsClientId=client))
+    for one, other in _massless_pairs(game):
+        points += pybullet.getClosestPoints(one, other, 0.0, physicsClientId=client)
+    for point in points:
+        yield point[_BODY_A], point[_BODY_B], point[_DISTANCE]
+
+
+def _massless_pairs(game: Game) -> Iterator[tuple[int, int]]:
+    walkers = [p.body.body_id for p in game.players if isinstance(p.body, Walker)]
+    yield from combinations(walkers, 2)
+    for walker in walkers:
+        yield from ((walker, body_id) for body_id in _fixed(game.world))
+
+
+def _fixed(world: World) -> list[int]:
+    return [prop.body_id for prop in world.props.values() if prop.fixed and prop.cfg.tangible]
+
+
+def _described(one: str, other: str) -> str:
+    return f"bones of {one}" if one == other else f"{one} and {other}"
+
+
+START_NAMES = ("starts", "first step")
 
 
 def check_starts(game: Game, starts: int, seed: int) -> Iterator[Finding]:
@@ -89,3 +155,62 @@ def _spread(game: Game, positions: list[Floats]) -> str:
         for player, (x, y, _) in zip(game.players, spread, strict=True)
     ]
     return "standard deviations of the positions: " + "; ".join(parts)
+
+
+SEEDING_NAMES = ("seeding",)
+
+
+def check_seeding(used: Game, new: Game, steps: int, seed: int) -> Iterator[Finding]:
+    """Play the same random actions several times and compare observations and rewards.
+
+    Args:
+        used: A game; it plays another episode before it is compared.
+        new: A game that was just built.
+        steps: Number of steps of each rollout.
+        seed: Seed of episodes and actions.
+
+    Yields:
+        ``seeding``: the rollout has the same bytes in a new and in a used world, and another seed
+        starts another episode.
+    """
+    problems = []
+    first = digest(used, steps, seed)
+    other = _start(used, seed + 1)
+    if digest(used, steps, seed) != first:
+        problems.append("the same seed gives other bytes in a world that was used before")
+    if digest(new, steps, seed) != first:
+        problems.append("the same seed gives other bytes in a new world")
+    if _start(used, seed) == other:
+        problems.append(f"the seeds {seed} and {seed + 1} give the same start")
+    yield finding("seeding", problems, f"{steps} steps have equal bytes in a new and a used world")
+
+
+def digest(game: Game, steps: int, seed: int) -> str:
+    """Return a hash of poses, observations, terms and flags of a rollout of random actions."""
+    total, episodes, rng, done = hashlib.sha256(), Episodes(seed), np.random.default_rng(seed), True
+    for _ in range(steps):
+        if done:
+            game.reset(episodes.next())
+            _add_observations(total, game)
+        outcome = game.step({p.name: random_action(p.body.action_spec, rng) for p in game.actors})
+        done = outcome.done
+        _add_observations(total, game)
+        total.update(repr((outcome.terms, done, sorted(outcome.eliminated))).encode())
+    return total.hexdigest()
+
+
+def _start(game: Game, seed: int) -> str:
+    """Return a hash of the start of the first episode; no action has an effect on it."""
+    total = hashlib.sha256()
+    game.reset(Episodes(seed).next())
+    _add_observations(total, game)
+    return total.hexdigest()
+
+
+def _add_observations(total: hashlib._Hash, game: Game) -> None:
+    """Add the poses, which senses need not show, and the observations."""
+    total.update(start_state(game).tobytes())
+    for player in game.actors:
+        for key, array in sorted(game.observe(player).items()):
+            total.update(key.encode())
+            total.update(np.ascontiguousarray(array).tobytes())

@@ -10,25 +10,71 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import fields, is_dataclass
 from pathlib import Path
-from typing import Any, cast
+from typing import Any, cast, get_args, get_origin, get_type_hints
 
 import hydra
 from hydra.core.global_hydra import GlobalHydra
 from hydra.errors import HydraException
-from omegaconf import DictConfig, OmegaConf
+from omegaconf import DictConfig, ListConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
-from veca_marl.conf_dir import conf_dir
-from veca_marl.config.arms import check_arm
 from veca_marl.config.errors import ConfigError, one_line
-from veca_marl.config.lengths import check_lengths
-from veca_marl.config.overrides import plugins_in, with_integers
-from veca_marl.config.presets import check_group_values
-from veca_marl.config.root import Config
-from veca_marl.config.schemas import register_schemas, store_tasks_without_file
-from veca_marl.config.search_path import check_configuration_files, register_search_path
+from veca_marl.config.experiment import check_arm
+from veca_marl.config.overrides import (
+    check_configuration_files,
+    check_group_values,
+    plugins_in,
+    register_search_path,
+    with_integers,
+)
+from veca_marl.config.root import Config, register_schemas, store_tasks_without_file
 from veca_marl.envs.core.task import TASKS, find_task
-from veca_marl.plugins import PluginError, load_plugins
+from veca_marl.plugins import PluginError, conf_dir, load_plugins
+
+
+def check_lengths(node: DictConfig) -> None:
+    """Check every field that is declared as a tuple of so many numbers.
+
+    Args:
+        node: A configuration, whose nodes know their dataclasses.
+
+    Raises:
+        ConfigError: If a value has another length; the message names its key.
+    """
+    for key, length, value in _tuples(node):
+        if len(value) != length:
+            given = list(value)
+            raise ConfigError(f"{key}={given}: {length} values are needed, got {len(given)}")
+
+
+def _tuples(node: DictConfig, path: str = "") -> Iterator[tuple[str, int, ListConfig]]:
+    """Yield key, declared length and value of all fields that are tuples of a fixed length.
+
+    Args:
+        node: A node of the configuration.
+        path: What precedes its keys.
+    """
+    lengths = _declared_lengths(OmegaConf.get_type(node))
+    for name in map(str, node):
+        if OmegaConf.is_missing(node, name) or OmegaConf.is_interpolation(node, name):
+            continue
+        value = node[name]
+        if isinstance(value, DictConfig):
+            yield from _tuples(value, f"{path}{name}.")
+        elif isinstance(value, ListConfig) and name in lengths:
+            yield f"{path}{name}", lengths[name], value
+
+
+def _declared_lengths(owner: Any) -> dict[str, int]:
+    if not is_dataclass(owner):
+        return {}
+    hints = {name: get_args(hint) for name, hint in get_type_hints(owner).items() if _fixed(hint)}
+    return {name: len(parts) for name, parts in hints.items()}
+
+
+def _fixed(hint: Any) -> bool:
+    return get_origin(hint) is tuple and Ellipsis not in get_args(hint)
+
 
 _LONGEST_NAME = 200  # bytes; Linux allows 255
 

@@ -1,15 +1,20 @@
-"""Overrides as text: reading and normalising them before Hydra composes a configuration."""
+"""Overrides as text, and the files and names of presets that they may choose."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from pathlib import Path
 
+from hydra.core.config_search_path import ConfigSearchPath
 from hydra.core.override_parser.overrides_parser import OverridesParser
 from hydra.core.override_parser.types import Override
+from hydra.core.plugins import Plugins
 from hydra.errors import HydraException
+from hydra.plugins.search_path_plugin import SearchPathPlugin
 
 from veca_marl.config.errors import ConfigError, one_line
+from veca_marl.plugins import PLUGINS, PluginError, conf_dir
 
 _EXPONENT = re.compile(r"[+-]?\d+(\.\d*)?[eE]\+?\d+")
 
@@ -70,3 +75,77 @@ def _integer(text: str) -> str:
         return text
     number = float(text)
     return str(int(number)) if number.is_integer() else text
+
+
+class PluginSearchPath(SearchPathPlugin):
+    """Appends the configuration folder of each loaded plug-in to Hydra's search path."""
+
+    def manipulate_search_path(self, search_path: ConfigSearchPath) -> None:
+        """See `SearchPathPlugin`."""
+        for plugin in PLUGINS.values():
+            if plugin.conf is not None:
+                search_path.append(provider=plugin.name, path=f"file://{plugin.conf}")
+
+
+def register_search_path() -> None:
+    """Register `PluginSearchPath` with Hydra; calling it again has no effect."""
+    Plugins.instance().register(PluginSearchPath)
+
+
+def conf_dirs() -> list[Path]:
+    """Return the configuration folders of the project and of the loaded plug-ins."""
+    own = [plugin.conf for plugin in PLUGINS.values() if plugin.conf is not None]
+    return [conf_dir(), *own]
+
+
+def check_configuration_files() -> None:
+    """Refuse a configuration file that two plug-ins, or a plug-in and the project, contain.
+
+    Raises:
+        PluginError: Naming both files.
+    """
+    provided: dict[str, Path] = {}
+    if len(conf_dirs()) < 2:
+        return
+    for folder in conf_dirs():
+        for path in sorted(folder.rglob("*.yaml")):
+            name = path.relative_to(folder).as_posix()
+            if name in provided:
+                raise PluginError(f"{name} is defined twice: by {provided[name]} and {path}")
+            provided[name] = path
+
+
+def check_group_values(words: Sequence[str]) -> None:
+    """Check that overrides of groups, such as ``senses/vision``, give the name of a preset.
+
+    Hydra answers another value with an error of its own code.
+
+    Args:
+        words: Overrides and flags.
+
+    Raises:
+        ConfigError: If one does not; the message lists the presets.
+    """
+    of_groups = [word for word in words if word[:1] not in "~-" and presets_of(_group(word))]
+    for override in parse(of_groups):
+        if override.is_sweep_override():
+            continue
+        value = override.value()
+        names = value if isinstance(value, list) else [value]
+        if not all(isinstance(name, str) for name in names):
+            raise ConfigError(
+                f"{override.input_line}: must be the name of a preset; choices: "
+                f"{', '.join(presets_of(override.key_or_group))}"
+            )
+
+
+def presets_of(group: str) -> list[str]:
+    """Return the names in a group; none if there is no such group."""
+    folders = [folder / group for folder in conf_dirs() if group and (folder / group).is_dir()]
+    return sorted({file.stem for folder in folders for file in folder.glob("*.yaml")})
+
+
+def _group(word: str) -> str:
+    """Return the key of an override without its package; nothing for other words."""
+    key, equals, _ = word.lstrip("+").partition("=")
+    return key.partition("@")[0] if equals else ""

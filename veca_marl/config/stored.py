@@ -14,10 +14,8 @@ from veca_marl.algos.intrinsic.intrinsic_reward import INTRINSICS, NONE, Intrins
 from veca_marl.algos.networks.factory import NETWORKS
 from veca_marl.config.compose import compose_node, load_config_plugins
 from veca_marl.config.errors import ConfigError, one_line
-from veca_marl.config.overrides import parse, with_integers
-from veca_marl.config.presets import check_group_values
-from veca_marl.config.schemas import body_types, root_schema
-from veca_marl.config.search_path import conf_dirs
+from veca_marl.config.overrides import check_group_values, conf_dirs, parse, with_integers
+from veca_marl.config.root import body_types, root_schema
 from veca_marl.envs.core.game_cfg import TeamCfg
 from veca_marl.envs.core.task import find_task
 from veca_marl.sim.physics import PLAYGROUND_GENERATORS

@@ -5,24 +5,59 @@ from __future__ import annotations
 import csv
 import sys
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from veca_marl.algos.files import WriteError, write_atomically
 from veca_marl.config import ConfigError, one_line, prepare
-from veca_marl.config.command_line import CommandLine
-from veca_marl.config.outputs import check_folder
-from veca_marl.envs.core.benchmark import Benchmark, find_benchmark, has_benchmark
+from veca_marl.config.command_line import CommandLine, check_folder
+from veca_marl.envs.core.benchmark import EPISODES, Benchmark, find_benchmark, has_benchmark
 from veca_marl.envs.core.expert import has_expert
 from veca_marl.envs.core.game_cfg import Script
 from veca_marl.envs.core.task import TASKS
-from veca_marl.experts_table.episode_file import EpisodeFile
-from veca_marl.experts_table.options import TableOptions
-from veca_marl.experts_table.play import Job, Played, digest, game_cfg
-from veca_marl.experts_table.processes import LostProcessError, play_all
-from veca_marl.experts_table.replay import StaleEpisodesError, replay
+from veca_marl.experts_table.episode_file import EpisodeFile, StaleEpisodesError, replay
+from veca_marl.experts_table.play import Job, LostProcessError, Played, digest, game_cfg, play_all
 from veca_marl.experts_table.table import markdown
-from veca_marl.runs.lock import locked
-from veca_marl.runs.provenance import checkout_commit
+from veca_marl.runs.run_folder import checkout_commit, locked
+
+
+@dataclass
+class TableOptions:
+    """What is played, and where the results are kept.
+
+    Attributes:
+        to: Folder of the results: a file of episodes for each task, and the table. Episodes that
+            are in it are not played again.
+        tasks: Names of the tasks; ``[all]`` for all.
+        episodes: How many of the frozen episodes of each task are played by each policy, the first
+            ones; 0 plays none and writes the table of the stored ones.
+        processes: Processes that play at the same time.
+        frozen: Whether the starts have to be the frozen ones. False plays the same seeds with
+            another body, playground or parameter of the task, which gives other starts.
+        replay: Stored episodes of each task and policy that are played once more and compared with
+            what is stored; nothing else is played or written. 0 for none.
+    """
+
+    to: str = "runs/experts"
+    tasks: list[str] = field(default_factory=lambda: ["all"])
+    episodes: int = EPISODES
+    processes: int = 1
+    frozen: bool = True
+    replay: int = 0
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.episodes <= EPISODES:
+            raise ValueError(f"episodes must be from 0 to {EPISODES}, got {self.episodes}")
+        if self.processes < 1:
+            raise ValueError(f"processes must be at least 1, got {self.processes}")
+        if self.replay < 0:
+            raise ValueError(f"replay must be 0 or more, got {self.replay}")
+        if not self.tasks:
+            raise ValueError("tasks must name a task; [all] is all")
+        twice = sorted({name for name in self.tasks if self.tasks.count(name) > 1})
+        if twice:
+            raise ValueError(f"tasks={self.tasks} names {twice[0]!r} more than once")
+
 
 DESCRIPTION = """
 Let the expert and the random policy play the frozen episodes of every task, and write a table of

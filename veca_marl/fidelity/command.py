@@ -15,17 +15,50 @@ import time
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass, field
+from importlib import import_module
 from multiprocessing import get_context
 
-from veca_marl.algos.collection.parent import end_with_parent
+from veca_marl.algos.collection.child_processes import end_with_parent
 from veca_marl.config import ConfigError
-from veca_marl.config.command_line import CommandLine
-from veca_marl.config.outputs import check_folder
+from veca_marl.config.command_line import CommandLine, check_folder
 from veca_marl.fidelity.law import Section
 from veca_marl.fidelity.page import number, write_page
-from veca_marl.fidelity.sections import SECTIONS, check_names, measure
+from veca_marl.registry import unknown
 from veca_marl.reports.figure import PlotError, check_plotting
 from veca_marl.runs.cores import usable_cores
+
+SECTIONS: dict[str, str] = {
+    "collisions": "veca_marl.fidelity.mechanics.collisions",
+    "doppler": "veca_marl.fidelity.hearing.doppler",
+    "ears": "veca_marl.fidelity.hearing.ears",
+    "inertia": "veca_marl.fidelity.mechanics.inertia",
+    "joints": "veca_marl.fidelity.mechanics.joints",
+    "localisation": "veca_marl.fidelity.hearing.localisation",
+    "momentum": "veca_marl.fidelity.mechanics.momentum",
+    "near_field": "veca_marl.fidelity.hearing.near_field",
+    "rigid_bodies": "veca_marl.fidelity.mechanics.rigid_bodies",
+    "rooms": "veca_marl.fidelity.hearing.rooms",
+    "touch": "veca_marl.fidelity.touch",
+    "vision": "veca_marl.fidelity.vision",
+}
+"""Module of each section. It has a function ``section() -> Section``."""
+
+
+def check_names(names: list[str]) -> None:
+    """Check that sections exist.
+
+    Raises:
+        ValueError: If one does not; the message lists all.
+    """
+    for name in names:
+        if name not in SECTIONS:
+            raise ValueError(unknown("section", name, list(SECTIONS)))
+
+
+def measure(name: str) -> Section:
+    """Return the measured section with this name."""
+    section: Section = import_module(SECTIONS[name]).section()
+    return section
 
 
 @dataclass

@@ -9,25 +9,64 @@ first agent; the sound is that at its ears. A run is played on its stored config
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
+import numpy as np
 import torch
+from numpy.typing import NDArray
 
-from veca_marl.algos.checkpoints.checkpoint_file import CheckpointError
+from veca_marl.algos.checkpoints import CheckpointError
 from veca_marl.algos.evaluation.evaluate import Exploration
 from veca_marl.algos.files import WriteError, write_errors
 from veca_marl.config import ConfigError, one_line
-from veca_marl.config.command_line import CommandLine
-from veca_marl.config.outputs import check_file
-from veca_marl.play.film import film
-from veca_marl.play.policies import EXPERT, KEYBOARD, Choice, choose
-from veca_marl.play.session import Session
-from veca_marl.play.steering.keyboard import Keyboard
-from veca_marl.play.steering.steered import SteeredPolicy
+from veca_marl.config.command_line import CommandLine, check_file
+from veca_marl.play.screen import HEIGHT, WIDTH, Screen
+from veca_marl.play.session import EXPERT, KEYBOARD, Choice, Moment, Session, choose
+from veca_marl.play.steering import Keyboard, SteeredPolicy
+from veca_marl.runs.video import SAMPLE_RATE_HZ, VideoFile
+
+
+def film(path: Path, session: Session, episodes: int, title: str) -> list[float]:
+    """Play whole episodes and write them one after another into one MP4 file.
+
+    Args:
+        path: The file.
+        session: What is played.
+        episodes: Number of episodes, from episode 0 on.
+        title: A line of text in the picture.
+
+    Returns:
+        The return of each episode.
+    """
+    screen = Screen(session)
+    rate_hz = SAMPLE_RATE_HZ if session.hears else None
+    sound: list[NDArray[Any]] = []
+    returns = []
+    with VideoFile(path, (HEIGHT, WIDTH), session.steps_per_s, rate_hz) as file:
+        for episode in range(episodes):
+            for moment in _moments(session, episode):
+                screen.add(moment)
+                file.add_picture(screen.draw(moment, [title, f"episode {episode}"]))
+                if "waveform" in moment.observation:
+                    sound.append(moment.observation["waveform"])
+            returns.append(sum(moment.sums.values()))
+        if sound:
+            file.add_sound(np.concatenate(sound, axis=1))
+    return returns
+
+
+def _moments(session: Session, episode: int) -> Iterator[Moment]:
+    """Play an episode; return its moments without the start, one per step."""
+    moment = session.begin(episode)
+    while not moment.done:
+        moment = session.step()
+        yield moment
+
 
 _ERRORS = (CheckpointError, WriteError, ModuleNotFoundError)
 
@@ -118,7 +157,7 @@ def _import_window() -> ModuleType:
         ModuleNotFoundError: Without the extra ``[play]``.
     """
     try:
-        return import_module("veca_marl.play.window.window")
+        return import_module("veca_marl.play.window")
     except ModuleNotFoundError as error:
         raise ModuleNotFoundError(
             "a window needs pygame: pip install 'veca_marl[play]'; video=FILE.mp4 needs none",

@@ -1,20 +1,81 @@
-"""The arms of an experiment, composed."""
+"""The arms of an experiment, composed, and the evaluations that their numbers of frames ask for.
+
+A run ends with the first batch at or after ``total_frames``. One that was started with a larger
+number, or continued to it, has later evaluations: they are not compared with those of other runs.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, cast
 
 import yaml
 from omegaconf import OmegaConf
 
+from veca_marl.algos.collection.experience import CollectCfg
 from veca_marl.config import Config, ConfigError, compose_node, to_config
-from veca_marl.config.arms import check_contradictions
+from veca_marl.config.experiment import check_contradictions
 from veca_marl.config.stored import body_names
-from veca_marl.reports.budget import FrameBudget
-from veca_marl.sweeps.body_kinds import former_kinds, with_body_kinds
-from veca_marl.sweeps.former import former_values
+from veca_marl.sweeps.run_state import RunState, former_kinds, former_values, with_body_kinds
+
+
+@dataclass(frozen=True)
+class FrameBudget:
+    """Frames that the runs of an arm are asked to have.
+
+    Attributes:
+        frames: ``total_frames`` of the arm.
+        batch: Frames in a batch; a run may end with up to ``batch - 1`` frames more than asked.
+    """
+
+    frames: int
+    batch: int
+
+    @classmethod
+    def of(cls, config: Mapping[str, Any]) -> FrameBudget:
+        """Return the budget of an arm, from its configuration as plain data."""
+        return cls(int(config["total_frames"]), CollectCfg(**config["collect"]).frames)
+
+    def includes(self, frames: int) -> bool:
+        """Return whether a run on this budget can have so many frames."""
+        return frames < self.frames + self.batch
+
+    def final(self, evaluated: Iterable[int]) -> int | None:
+        """Return the frames of the final evaluation; None if the run was not evaluated there.
+
+        Args:
+            evaluated: Frames of training before each evaluation of the policy.
+        """
+        reached = (at for at in evaluated if at >= self.frames and self.includes(at))
+        return min(reached, default=None)
+
+    def counts(self, state: RunState, evaluated: Iterable[int]) -> bool:
+        """Return whether a run has a final score.
+
+        Args:
+            state: How far the run has come; in a stored table, on the budget of that time.
+            evaluated: As for `final`.
+        """
+        evaluated = list(evaluated)
+        if self.final(evaluated) is not None:
+            # with later evaluations it has passed the budget, whether it goes on or not
+            return state in (RunState.finished, RunState.cut) or self._is_exceeded(evaluated)
+        return state is RunState.cut and not self._is_exceeded(evaluated)
+
+    def remark(self, evaluated: Iterable[int]) -> str:
+        """Return what a reader has to know of a run with more frames; empty for other runs."""
+        evaluated = list(evaluated)
+        if not self._is_exceeded(evaluated):
+            return ""
+        more = f"{max(evaluated)} frames, more than the {self.frames} asked for"
+        final = self.final(evaluated)
+        if final is None:
+            return f"not counted: {more}, and no evaluation at {self.frames}"
+        return f"{more}; its final score is that at {final}"
+
+    def _is_exceeded(self, evaluated: Iterable[int]) -> bool:
+        return not all(map(self.includes, evaluated))
 
 
 @dataclass(frozen=True)

@@ -8,8 +8,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from veca_marl.reports.scores import Run
-from veca_marl.reports.summary import curve
+from veca_marl.reports.scores import Run, curve
 
 _SIZE_INCHES = (5.5, 3.8)  # of one panel
 _DPI = 120

@@ -6,12 +6,10 @@ import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
-from veca_marl.config.claims import Above, Faster, parse_claim
-from veca_marl.config.experiment import ExperimentCfg
-from veca_marl.reports.error_rates import false_order_rate, false_speed_rate
+from veca_marl.config.experiment import Above, ExperimentCfg, Faster, parse_claim
 from veca_marl.reports.gather import Found
-from veca_marl.reports.scores import Point, Run
-from veca_marl.reports.summary import ArmSummary
+from veca_marl.reports.scores import ArmSummary, Point, Run
+from veca_marl.reports.statistics import false_order_rate, false_speed_rate
 from veca_marl.reports.verdict import MIN_RUNS, Judgement, Verdict, overall
 
 EPISODES_OF_FIGURES = 32

@@ -28,7 +28,15 @@ from enum import Enum
 
 import numpy as np
 
-from veca_marl.config.claims import Above, AboveNumber, AboveTimes, Claim, Equal, Faster, RunsAbove
+from veca_marl.config.experiment import (
+    Above,
+    AboveNumber,
+    AboveTimes,
+    Claim,
+    Equal,
+    Faster,
+    RunsAbove,
+)
 from veca_marl.reports.scores import ExpertScore, Run, final_scores, frames_to, random_scores
 from veca_marl.reports.statistics import (
     Interval,

@@ -1,10 +1,52 @@
-"""The argument of a command that continues a run, as Hydra and a shell read it."""
+"""How far a run has come, how it is continued, and what may then be changed."""
 
 from __future__ import annotations
 
+import json
 import re
 import shlex
+from dataclasses import asdict, dataclass
 from pathlib import Path
+
+FILE = "progress.json"
+
+
+@dataclass(frozen=True)
+class RunProgress:
+    """Where a run stands.
+
+    Attributes:
+        frames: Frames learnt from until its last checkpoint, or its end.
+        ended: Whether it has ended by its budget, with all of its files.
+    """
+
+    frames: int
+    ended: bool
+
+    @property
+    def text(self) -> str:
+        """The content of the file."""
+        return json.dumps(asdict(self)) + "\n"
+
+
+def read_progress(folder: Path) -> RunProgress | None:
+    """Return what the file in the folder of a run says.
+
+    Returns:
+        None without a file: the run has no checkpoint yet, or was stored by version 0.2.
+
+    Raises:
+        ValueError: If the file cannot be read.
+    """
+    path = folder / FILE
+    if not path.is_file():
+        return None
+    try:
+        content = json.loads(path.read_text())
+        return RunProgress(int(content["frames"]), bool(content["ended"]))
+    except (ValueError, KeyError, TypeError) as error:
+        raise ValueError(f"{path} is damaged: {' '.join(str(error).split())}") from error
+
 
 _PLAIN = re.compile(r"[\w./-]*/[\w./-]*", re.ASCII)  # a single word may be a number, or null
 
@@ -23,3 +65,11 @@ def quoted(path: str | Path) -> str:
     escaped = re.sub(r"(\\*)'", r"\1\1\\'", str(path))
     escaped = re.sub(r"(\\+)$", r"\1\1", escaped)
     return f"'{escaped}'"
+
+
+RESUMABLE = ("resume", "total_frames", "max_minutes", "device", "threads", "log")
+
+
+def may_change(key: str) -> bool:
+    """Return whether a key of the configuration, such as ``log.video``, may be changed."""
+    return key.partition(".")[0] in RESUMABLE

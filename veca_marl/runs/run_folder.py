@@ -1,24 +1,89 @@
-"""The folder of a run: its files, how it is created and how it is opened again."""
+"""The folder of a run: its files, its lock, where it comes from, and what the run has learnt.
+
+The system releases it when the process ends, however it ends, so that a run that was killed can be
+continued. The file stays then, which has no meaning without the lock.
+"""
 
 from __future__ import annotations
 
+import errno
+import fcntl
 import json
-from collections.abc import Sequence
+import logging
+import os
+import platform
+import subprocess
+import sys
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
+from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import Any, TextIO
 from uuid import uuid4
 
 from omegaconf import DictConfig, OmegaConf
+from tensordict.nn import TensorDictModuleBase
 from yaml import YAMLError
 
-from veca_marl.algos.files import write_atomically
-from veca_marl.config import ConfigError, one_line
-from veca_marl.config.stored import body_names, typed
-from veca_marl.runs.continuation import resume_argument
-from veca_marl.runs.provenance import provenance
-from veca_marl.runs.run_progress import FILE as PROGRESS_FILE
-from veca_marl.runs.run_progress import RunProgress
+from veca_marl.algos.files import write_atomically, write_errors
+from veca_marl.algos.selfplay import SelfPlayCfg
+from veca_marl.algos.specs import TeamSpec
+from veca_marl.algos.transfer import load_actor
+from veca_marl.config import Config, ConfigError, one_line, to_config
+from veca_marl.config.stored import body_names, change, typed
+from veca_marl.runs.continuation import FILE as PROGRESS_FILE
+from veca_marl.runs.continuation import RunProgress, resume_argument
+from veca_marl.version import __version__
+
+_PACKAGES = ("torch", "torchrl", "tensordict", "pybullet", "numpy", "numba")
+
+
+def provenance(overrides: Sequence[str]) -> dict[str, object]:
+    """Return what `provenance.json` of a run contains."""
+    packages = {"veca_marl": __version__}
+    return {
+        "command": sys.orig_argv,
+        "overrides": list(overrides),
+        "commit": checkout_commit(),
+        "python": platform.python_version(),
+        "packages": packages | {name: version(name) for name in _PACKAGES},
+    }
+
+
+def checkout_commit(package: Path = Path(__file__).parents[1]) -> str | None:
+    """Return the commit of the checkout that the package lies in, with `-dirty` if it was changed.
+
+    None for an installed package, also where its environment lies inside another repository: the
+    package has to lie directly in the top folder of the repository and be tracked by it.
+
+    Args:
+        package: The folder of the package.
+    """
+    top = _git(package, "rev-parse", "--show-toplevel")
+    if top is None or Path(top).resolve() != package.parent.resolve():
+        return None
+    if _git(package, "ls-files", "--error-unmatch", "__init__.py") is None:
+        return None
+    return _git(package, "describe", "--always", "--abbrev=40", "--dirty", "--exclude", "*")
+
+
+def _git(folder: Path, *arguments: str) -> str | None:
+    """Return the output of a git command; None if it fails or git is not installed."""
+    environment = {name: text for name, text in os.environ.items() if not name.startswith("GIT_")}
+    try:
+        done = subprocess.run(
+            ["git", *arguments],
+            cwd=folder,
+            env=environment,
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+    except (OSError, subprocess.CalledProcessError):
+        return None
+    return done.stdout.strip()
 
 
 @dataclass(frozen=True)
@@ -169,3 +234,127 @@ def open_run(path: Path, asked_by: str = "") -> RunFolder:
     if not folder.config.is_file():
         raise ConfigError(f"{asked_by}{path} holds no run (no config.yaml)")
     return folder
+
+
+_FILE = ".lock"
+_WAIT_S = 3.0  # worker processes hold the lock too; those of a killed run end within seconds
+_RETRY_S = 0.1
+_NO_LOCKS = (errno.ENOSYS, errno.ENOLCK, errno.EOPNOTSUPP)
+_LOG = logging.getLogger(__name__)
+
+
+@contextmanager
+def locked(folder: Path) -> Iterator[None]:
+    """Hold the lock on a folder, which is created, and removed at the end if it is empty.
+
+    Raises:
+        ConfigError: If another process holds it.
+        WriteError: If no file can be written there.
+    """
+    path = folder / _FILE
+    try:
+        with _acquire(path):
+            try:
+                yield
+            finally:
+                path.unlink(missing_ok=True)
+    finally:
+        remove_if_empty(folder)
+
+
+def _acquire(path: Path) -> TextIO:
+    """Return the open file that holds the lock."""
+    deadline = time.monotonic() + _WAIT_S
+    while True:
+        with write_errors(path):
+            path.parent.mkdir(parents=True, exist_ok=True)
+            file = path.open("a+")
+        if _take(file) and _is_in_place(path, file):
+            break
+        holder = _holder(file)
+        file.close()
+        if time.monotonic() >= deadline:
+            raise ConfigError(
+                f"{path.parent} is in use: {holder} writes to it; "
+                "wait until it has ended, or choose another folder"
+            )
+        time.sleep(_RETRY_S)
+    with write_errors(path):
+        file.truncate(0)
+        file.write(f"process {os.getpid()} on {platform.node()}")
+        file.flush()
+    return file
+
+
+def _take(file: TextIO) -> bool:
+    """Return whether the lock could be taken, or its file system has no locks."""
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    except OSError as error:
+        if error.errno not in _NO_LOCKS:
+            raise
+        _LOG.warning("%s cannot be locked: start no other run in its folder", file.name)
+    return True
+
+
+def _is_in_place(path: Path, file: TextIO) -> bool:
+    """Return whether the file was not removed, by a run that ended, before its lock was taken."""
+    try:
+        return os.path.samestat(path.stat(), os.fstat(file.fileno()))
+    except FileNotFoundError:
+        return False
+
+
+def _holder(file: TextIO) -> str:
+    """Return what the process that holds the lock wrote, in case it has already."""
+    file.seek(0)
+    return file.read() or "another process"
+
+
+def remove_if_empty(path: Path) -> None:
+    """Remove the folder of a run that could not be started."""
+    if path.is_dir() and not any(path.iterdir()):
+        path.rmdir()
+
+
+def stored_configuration(checkpoint: Path, overrides: Sequence[str], asked_by: str) -> Config:
+    """Return the configuration stored with a run, changed by overrides, for playing alone.
+
+    Args:
+        checkpoint: Folder of a run, or a checkpoint in it.
+        overrides: Changes of the configuration.
+        asked_by: The option that named it; error messages begin with it.
+
+    Raises:
+        ConfigError: If there is no run, or a change is impossible.
+    """
+    if checkpoint.is_file() and checkpoint.suffix != ".pt":
+        raise ConfigError(f"{asked_by}{checkpoint} is no checkpoint; give a run, or a checkpoint")
+    folder = open_run(checkpoint.parent.parent if checkpoint.is_file() else checkpoint, asked_by)
+    node = folder.typed_config()
+    # nothing is learnt here
+    node.self_play, node.learner, node.init_from, node.init_encoders = SelfPlayCfg(), {}, {}, {}
+    node.team_intrinsic = {}
+    change(node, overrides)
+    return to_config(node)
+
+
+def stored_actors(
+    cfg: Config, checkpoint: Path, specs: Mapping[str, TeamSpec]
+) -> dict[str, TensorDictModuleBase]:
+    """Return the policy of each team that is not scripted.
+
+    Args:
+        cfg: What `stored_configuration` returned; its `frozen` teams have policies of other runs.
+        checkpoint: Folder of the run, or a checkpoint in it.
+        specs: The arrays of the teams.
+
+    Raises:
+        CheckpointError: If a policy does not fit.
+    """
+    return {
+        team: load_actor(cfg.frozen.get(team, checkpoint), team, spec)
+        for team, spec in specs.items()
+    }

@@ -49,7 +49,7 @@ def differences(
         stored: Content of ``config.yaml`` of a run as plain data.
         asked: The resolved configuration as plain data.
         former: Values of keys that `stored` may be too old to have, by dotted path, see
-            `veca_marl.sweeps.former`.
+            `veca_marl.sweeps.run_state`.
     """
     before, now = dict(_flat(former or {})) | dict(_flat(stored)), dict(_flat(asked))
     return [

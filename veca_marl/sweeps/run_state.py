@@ -1,17 +1,61 @@
-"""How far a run on disk has come, read from its files alone."""
+"""How far a run on disk has come, read from its files alone.
+
+The stored configuration has the numbers of a body, not its class. Two kinds with the same numbers
+are different bodies: their names are compared with the numbers.
+"""
 
 from __future__ import annotations
 
 import csv
+import json
+from collections.abc import Iterator, Mapping
+from copy import deepcopy
 from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
 from typing import Any
 
 import yaml
+from omegaconf import DictConfig, OmegaConf
 
-from veca_marl.runs.run_progress import RunProgress, read_progress
-from veca_marl.sweeps.body_kinds import stored_kinds, with_body_kinds
+from veca_marl.runs.continuation import RunProgress, read_progress
+
+_KEY = "registered_name"
+
+
+def with_body_kinds(plain: Mapping[str, Any], names: Mapping[str, str]) -> dict[str, Any]:
+    """Return a configuration in which each body has its registered name beside its numbers.
+
+    Args:
+        plain: The configuration as plain data.
+        names: Registered name by the dotted path of a body, see `config.stored.body_names`.
+    """
+    marked = deepcopy(dict(plain))
+    for path, name in names.items():
+        node: Any = marked
+        for part in path.split("."):
+            node = node.get(part) if isinstance(node, dict) else None
+        if isinstance(node, dict):
+            node[_KEY] = name
+    return marked
+
+
+def former_kinds(names: Mapping[str, str]) -> dict[str, str]:
+    """Return the names by dotted path, for runs that were stored without: see `differences`."""
+    return {f"{path}.{_KEY}": name for path, name in names.items()}
+
+
+def stored_kinds(provenance: Path) -> dict[str, str]:
+    """Return the names in the ``provenance.json`` of a run; none if it has no such file or entry.
+
+    A damaged file is reported by what needs the rest of it.
+    """
+    try:
+        content = json.loads(provenance.read_text())
+    except (OSError, ValueError):
+        return {}
+    names = content.get("bodies") if isinstance(content, dict) else None
+    return dict(names) if isinstance(names, dict) else {}
 
 
 class RunState(Enum):
@@ -101,3 +145,21 @@ def read_run(folder: Path) -> StoredRun:
         raise ValueError(f"{path} holds no configuration")
     marked = with_body_kinds(config, stored_kinds(folder / "provenance.json"))
     return StoredRun(folder, marked, read_progress(folder))
+
+
+def former_values(node: DictConfig) -> dict[str, Any]:
+    """Return the former values of all fields in a configuration, by dotted path.
+
+    The types of its nodes state them in the class attribute `formerly`, see `NetworkCfg`.
+    """
+    return dict(_former_values(node, ""))
+
+
+def _former_values(node: DictConfig, path: str) -> Iterator[tuple[str, Any]]:
+    for name, value in getattr(OmegaConf.get_type(node), "formerly", {}).items():
+        yield f"{path}{name}", value
+    for key in map(str, node):
+        has_value = not (OmegaConf.is_missing(node, key) or OmegaConf.is_interpolation(node, key))
+        child = node[key] if has_value else None
+        if isinstance(child, DictConfig):
+            yield from _former_values(child, f"{path}{key}.")

@@ -10,8 +10,7 @@ from first_seen import FirstSeenCfg
 from torchrl.envs import ExplorationType, set_exploration_type
 from training import SMALL
 
-from veca_marl.algos.acting.direct import DirectPolicy
-from veca_marl.algos.acting.modules import WritesArrays
+from veca_marl.algos.acting import DirectPolicy, WritesArrays
 from veca_marl.algos.networks.memory import with_memory
 from veca_marl.algos.networks.multisense import Memory, Parameters
 from veca_marl.algos.ppo import PPOCfg

@@ -7,9 +7,7 @@ import pytest
 import torch
 from fake_env import FakeEnv
 
-from veca_marl.algos.checkpoints.checkpoint_file import CheckpointError
-from veca_marl.algos.checkpoints.checkpoints import Checkpoints
-from veca_marl.algos.checkpoints.identity import Identity
+from veca_marl.algos.checkpoints import CheckpointError, Checkpoints, Identity
 from veca_marl.algos.specs import team_specs
 
 CPU = torch.device("cpu")

@@ -301,7 +301,7 @@ import torch
 from fake_env import FakeEnv, make_fake_env
 
 from veca_marl.algos.collection.experience import CollectCfg, Experience
-from veca_marl.algos.ppo.config import PPOCfg
+from veca_marl.algos.ppo.ppo import PPOCfg
 from veca_marl.algos.specs import team_specs
 from veca_marl.algos.training.learners import TeamLearners
 
@@ -331,7 +331,7 @@ import torch
 from fake_env import FakeEnv, make_fake_env
 
 from veca_marl.algos.collection.experience import CollectCfg, Experience
-from veca_marl.algos.ppo.config import PPOCfg
+from veca_marl.algos.ppo.ppo import PPOCfg
 from veca_marl.algos.specs import team_specs
 from veca_marl.algos.training.learners import TeamLearners
 

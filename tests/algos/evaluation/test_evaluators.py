@@ -16,8 +16,7 @@ from fake_env import FakeEnv, make_fake_env
 
 from veca_marl.algos.collection.workers import WorkerError
 from veca_marl.algos.evaluation.evaluate import Exploration
-from veca_marl.algos.evaluation.evaluators import Players, Request
-from veca_marl.algos.evaluation.parallel import make_evaluator
+from veca_marl.algos.evaluation.evaluators import Players, Request, make_evaluator
 
 SEVEN = Request("policy", 7, 5, Exploration.deterministic)
 LIMIT_S = 60.0

@@ -11,27 +11,24 @@ from toy_dqn import ToyDQNCfg, register
 from training import FRAMES, SMALL, Interrupt, read, rewards_until
 
 from veca_marl.algos.algorithm import Algorithm
-from veca_marl.algos.checkpoints.checkpoints import Checkpoints
-from veca_marl.algos.checkpoints.identity import Identity
+from veca_marl.algos.checkpoints import Checkpoints, Identity
 from veca_marl.algos.collection.experience import CollectCfg, Experience
 from veca_marl.algos.evaluation.evaluate import EvalCfg
-from veca_marl.algos.intrinsic import (
-    ForwardModelCfg,
+from veca_marl.algos.intrinsic.bonus import Bonus, ReturnScale
+from veca_marl.algos.intrinsic.intrinsic_reward import (
     IntrinsicCfg,
     IntrinsicReward,
-    RNDCfg,
     register_intrinsic,
 )
-from veca_marl.algos.intrinsic.bonus import Bonus
-from veca_marl.algos.intrinsic.return_scale import ReturnScale
+from veca_marl.algos.intrinsic.predictors import ForwardModelCfg, RNDCfg
 from veca_marl.algos.ppo import PPOCfg
-from veca_marl.algos.reporting.reporters import CsvReporter, MemoryReporter
+from veca_marl.algos.reporting import CsvReporter, MemoryReporter
 from veca_marl.algos.sac import SACCfg
 from veca_marl.algos.sac.config import ReplayCfg
 from veca_marl.algos.specs import team_specs
 from veca_marl.algos.training.learners import TeamLearners
 from veca_marl.algos.training.loop import Trainer
-from veca_marl.algos.training.progress import Budget
+from veca_marl.algos.training.schedule import Budget
 
 register()
 CPU = torch.device("cpu")

@@ -7,8 +7,8 @@ import pytest
 import torch
 from tensordict import TensorDict
 
-from veca_marl.algos.intrinsic import RND, ForwardModel, ForwardModelCfg, RNDCfg
-from veca_marl.algos.intrinsic.observations import NormalisedSenses
+from veca_marl.algos.intrinsic.prediction import NormalisedSenses
+from veca_marl.algos.intrinsic.predictors import RND, ForwardModel, ForwardModelCfg, RNDCfg
 from veca_marl.algos.specs import PLAIN, ActionLayout, ArrayLayout, TeamSpec
 
 CPU = torch.device("cpu")

@@ -4,7 +4,7 @@ import pytest
 import torch
 from torchrl.modules import set_recurrent_mode
 
-from veca_marl.algos.networks.memory.gru import GatedMemory
+from veca_marl.algos.networks.memory import GatedMemory
 
 ROWS, TIME, AGENTS, INPUTS, SIZE = 3, 7, 2, 5, 4
 

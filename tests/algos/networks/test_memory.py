@@ -10,21 +10,19 @@ from fake_env import make_fake_env
 from first_seen import FirstSeenCfg, make_show_once
 from training import FRAMES, SMALL, Interrupt
 
-from veca_marl.algos.checkpoints.checkpoints import Checkpoints
-from veca_marl.algos.checkpoints.identity import Identity
+from veca_marl.algos.checkpoints import Checkpoints, Identity
 from veca_marl.algos.collection.experience import CollectCfg, Experience
 from veca_marl.algos.evaluation.evaluate import EvalCfg, Exploration, RandomTeams, evaluate
 from veca_marl.algos.networks.memory import with_memory
 from veca_marl.algos.networks.multisense import Memory
 from veca_marl.algos.ppo import PPOCfg
-from veca_marl.algos.selfplay.pool import Pool
-from veca_marl.algos.selfplay.tournament import play_all
+from veca_marl.algos.selfplay import Pool, play_all
 from veca_marl.algos.specs import team_specs
 from veca_marl.algos.training.learners import TeamLearners
 from veca_marl.algos.training.loop import Trainer
-from veca_marl.algos.training.progress import Budget
+from veca_marl.algos.training.schedule import Budget
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
-from veca_marl.runs.recording import record_episode
+from veca_marl.runs.video import record_episode
 
 CPU = torch.device("cpu")
 GRU = replace(SMALL, memory=Memory.gru, memory_features=16)

@@ -6,10 +6,12 @@ import torch
 from fake_env import FakeEnv
 from torchrl.data import Bounded, Composite
 
+from veca_marl.algos.checkpoints import from_plain, to_plain
 from veca_marl.algos.networks.encoders import (
     Convolutions,
     ImageEncoder,
     Pooling,
+    Precision,
     SpatialSoftmax,
     VectorEncoder,
     make_encoder,
@@ -17,8 +19,6 @@ from veca_marl.algos.networks.encoders import (
 )
 from veca_marl.algos.networks.factory import make_network
 from veca_marl.algos.networks.multisense import MultisenseCfg, Trunk
-from veca_marl.algos.networks.precision import Precision
-from veca_marl.algos.plain import from_plain, to_plain
 from veca_marl.algos.specs import ArrayLayout, team_specs
 
 IMAGE = ArrayLayout((2, 3, 84, 84), "uint8", 0.0, 255.0)

@@ -7,8 +7,8 @@ import torch
 from fake_env import FakeEnv
 from torchrl.envs import ExplorationType, set_exploration_type
 
+from veca_marl.algos.networks.encoders import Precision, for_acting, has_bfloat16
 from veca_marl.algos.networks.multisense import MultisenseCfg, Trunk
-from veca_marl.algos.networks.precision import Precision, for_acting, has_bfloat16
 from veca_marl.algos.specs import ArrayLayout
 
 CPU = torch.device("cpu")

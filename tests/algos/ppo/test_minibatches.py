@@ -1,7 +1,7 @@
 import torch
 from tensordict import TensorDict
 
-from veca_marl.algos.ppo.minibatches import minibatches
+from veca_marl.algos.ppo.ppo import minibatches
 
 
 def rows(*shape):

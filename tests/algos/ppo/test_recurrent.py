@@ -13,8 +13,8 @@ from training import SMALL
 
 from veca_marl.algos.collection.experience import CollectCfg, Experience
 from veca_marl.algos.evaluation.evaluate import Exploration, evaluate
+from veca_marl.algos.networks.encoders import Precision
 from veca_marl.algos.networks.multisense import Critic, Memory, Parameters
-from veca_marl.algos.networks.precision import Precision
 from veca_marl.algos.ppo import PPO, PPOCfg
 from veca_marl.algos.ppo.advantages import advantages
 from veca_marl.algos.specs import team_specs

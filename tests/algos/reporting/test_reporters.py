@@ -12,9 +12,14 @@ from torchrl import timeit
 
 from veca_marl.algos.evaluation.episodes import TrainingEpisodes
 from veca_marl.algos.files import WriteError
-from veca_marl.algos.reporting.loggers import LoggerKind, check_installed, make_reporter
-from veca_marl.algos.reporting.reporters import CsvReporter, LoggerReporter
-from veca_marl.algos.training.timing import timing_table
+from veca_marl.algos.reporting import (
+    CsvReporter,
+    LoggerKind,
+    LoggerReporter,
+    check_installed,
+    make_reporter,
+)
+from veca_marl.algos.training.schedule import timing_table
 
 
 def rows_of(path):
@@ -178,7 +183,7 @@ def test_points_after_a_checkpoint_are_hidden_when_a_run_resumes(tmp_path):
 
 @pytest.mark.parametrize("kind", [LoggerKind.wandb, LoggerKind.mlflow])
 def test_a_logger_that_is_not_installed_is_refused_by_name(monkeypatch, kind):
-    monkeypatch.setattr("veca_marl.algos.reporting.loggers.find_spec", lambda name: None)
+    monkeypatch.setattr("veca_marl.algos.reporting.find_spec", lambda name: None)
     message = rf"log.logger: {kind.name} is not installed: pip install 'veca_marl\[{kind.name}\]'"
     with pytest.raises(ValueError, match=message):
         check_installed(kind)

@@ -22,9 +22,8 @@ from veca_marl.algos.networks.factory import NetworkCfg, NetworkFactory
 from veca_marl.algos.networks.layers import PerAgent
 from veca_marl.algos.sac.config import Adaptation, EncoderGradient, TemperatureCfg
 from veca_marl.algos.sac.joint_action import JointAction
-from veca_marl.algos.sac.loss import TeamCrossQLoss, TeamSACLoss
-from veca_marl.algos.sac.replay.windows import Transitions
-from veca_marl.algos.sac.temperature import Temperatures
+from veca_marl.algos.sac.loss import TeamCrossQLoss, TeamSACLoss, Temperatures
+from veca_marl.algos.sac.replay import Transitions
 from veca_marl.algos.specs import ActionLayout, ArrayLayout, TeamSpec
 
 WIDTH, GAMMA, ALPHA = 4, 0.9, 0.3

@@ -4,7 +4,7 @@ import pytest
 import torch
 from tensordict import TensorDict
 
-from veca_marl.algos.sac.random_shift import RandomShift, shift
+from veca_marl.algos.sac.readers import RandomShift, shift
 from veca_marl.algos.specs import ActionLayout, ArrayLayout, TeamSpec
 
 PIXELS = 3

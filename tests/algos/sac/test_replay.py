@@ -9,11 +9,9 @@ import torch
 from tensordict import TensorDict
 from timed_batches import SPEC, batch_of
 
+from veca_marl.algos.sac import replay as buffer
 from veca_marl.algos.sac.config import ReplayCfg, Storage
-from veca_marl.algos.sac.replay import buffer
-from veca_marl.algos.sac.replay.buffer import Replay, storage_needed
-from veca_marl.algos.sac.replay.segments import StoredKeys
-from veca_marl.algos.sac.replay.windows import Span
+from veca_marl.algos.sac.replay import Replay, Span, StoredKeys, storage_needed
 from veca_marl.algos.specs import ArrayLayout
 
 KEYS = StoredKeys.of("team", SPEC)

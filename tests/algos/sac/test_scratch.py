@@ -5,11 +5,11 @@ import sys
 
 from paths import ROOT
 
-from veca_marl.algos.sac.replay.scratch import make_scratch_folder
+from veca_marl.algos.sac.replay import make_scratch_folder
 
 MAKE = (
     "import os, pathlib, signal, sys; sys.path.insert(0, sys.argv[2]);"
-    "from veca_marl.algos.sac.replay.scratch import make_scratch_folder;"
+    "from veca_marl.algos.sac.replay import make_scratch_folder;"
     "print(make_scratch_folder(pathlib.Path(sys.argv[1])), flush=True);"
 )
 

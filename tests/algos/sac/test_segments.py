@@ -5,9 +5,7 @@ from fake_env import FakeEnv
 from timed_batches import SPEC, batch_of
 
 from veca_marl.algos.sac.config import ReplayCfg
-from veca_marl.algos.sac.replay.buffer import Replay
-from veca_marl.algos.sac.replay.segments import END, StoredKeys, segment_rows
-from veca_marl.algos.sac.replay.windows import Span, transitions
+from veca_marl.algos.sac.replay import END, Replay, Span, StoredKeys, segment_rows, transitions
 from veca_marl.algos.specs import ActionLayout, ArrayLayout, TeamSpec
 
 GAMMA = 0.5

@@ -15,14 +15,12 @@ from training import SMALL
 from veca_marl.algos.collection.experience import CollectCfg, Experience
 from veca_marl.algos.evaluation.evaluate import Exploration, evaluate
 from veca_marl.algos.networks.action_values import ActionValuesCfg, Normalisation
+from veca_marl.algos.networks.encoders import Precision
 from veca_marl.algos.networks.memory import with_memory
 from veca_marl.algos.networks.multisense import Critic, Memory, Parameters
-from veca_marl.algos.networks.precision import Precision
 from veca_marl.algos.sac.config import EncoderGradient, ReplayCfg, SACCfg, Targets
 from veca_marl.algos.sac.readers import SequenceReader
-from veca_marl.algos.sac.replay.buffer import Replay, storage_needed
-from veca_marl.algos.sac.replay.segments import StoredKeys
-from veca_marl.algos.sac.replay.windows import VALID, Span, transitions
+from veca_marl.algos.sac.replay import VALID, Replay, Span, StoredKeys, storage_needed, transitions
 from veca_marl.algos.sac.sac import SAC
 from veca_marl.algos.specs import team_specs
 

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from veca_marl.algos.evaluation.evaluate import Scores
-from veca_marl.algos.selfplay.elo import elo_ratings
-from veca_marl.algos.selfplay.tournament import make_match
+from veca_marl.algos.selfplay import elo_ratings, make_match
 
 
 def expected_wins(ratings, games):

@@ -6,22 +6,19 @@ from fake_env import make_fake_env
 from torchrl.envs import ExplorationType, set_exploration_type
 from training import FRAMES, SMALL, Interrupt, read
 
-from veca_marl.algos.checkpoints.checkpoint_file import CheckpointError
-from veca_marl.algos.checkpoints.checkpoints import Checkpoints
-from veca_marl.algos.checkpoints.identity import Identity
-from veca_marl.algos.checkpoints.stored import load_actor
+from veca_marl.algos.checkpoints import CheckpointError, Checkpoints, Identity
 from veca_marl.algos.collection.experience import CollectCfg
 from veca_marl.algos.evaluation.evaluate import EvalCfg
 from veca_marl.algos.networks.multisense import MultisenseCfg
-from veca_marl.algos.reporting.reporters import CsvReporter
+from veca_marl.algos.reporting import CsvReporter
 from veca_marl.algos.sac import SACCfg
 from veca_marl.algos.sac.config import ReplayCfg
-from veca_marl.algos.selfplay.pool import Pool
-from veca_marl.algos.selfplay.self_play import SelfPlay, SelfPlayCfg
+from veca_marl.algos.selfplay import Pool, SelfPlay, SelfPlayCfg
 from veca_marl.algos.specs import team_specs
 from veca_marl.algos.training.learners import TeamLearners
 from veca_marl.algos.training.loop import Trainer
-from veca_marl.algos.training.progress import Budget
+from veca_marl.algos.training.schedule import Budget
+from veca_marl.algos.transfer import load_actor
 
 TEAMS = ("red", "blue")
 

@@ -7,16 +7,15 @@ from fake_env import FakeEnv, make_fake_env
 from torch import nn
 from training import FRAMES, SMALL
 
-from veca_marl.algos.checkpoints.checkpoints import Checkpoints
-from veca_marl.algos.checkpoints.identity import Identity
+from veca_marl.algos.checkpoints import Checkpoints, Identity
 from veca_marl.algos.collection.experience import CollectCfg
 from veca_marl.algos.evaluation.evaluate import EvalCfg, Exploration, RandomTeams, evaluate
 from veca_marl.algos.ppo import PPOCfg
-from veca_marl.algos.reporting.reporters import MemoryReporter
+from veca_marl.algos.reporting import MemoryReporter
 from veca_marl.algos.specs import team_specs
 from veca_marl.algos.training.learners import TeamLearners
 from veca_marl.algos.training.loop import Trainer
-from veca_marl.algos.training.progress import Budget
+from veca_marl.algos.training.schedule import Budget
 
 TEAMS = ("red", "blue")
 CPU = torch.device("cpu")

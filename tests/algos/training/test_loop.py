@@ -3,14 +3,13 @@ import torch
 from fake_env import make_fake_env
 from training import FRAMES, Interrupt, read
 
-from veca_marl.algos.checkpoints.checkpoints import Checkpoints
-from veca_marl.algos.checkpoints.identity import Identity
+from veca_marl.algos.checkpoints import Checkpoints, Identity
 from veca_marl.algos.collection.experience import CollectCfg
 from veca_marl.algos.evaluation.evaluate import EvalCfg
-from veca_marl.algos.reporting.reporters import CsvReporter
+from veca_marl.algos.reporting import CsvReporter
 from veca_marl.algos.specs import team_specs
 from veca_marl.algos.training.loop import Trainer
-from veca_marl.algos.training.progress import Budget
+from veca_marl.algos.training.schedule import Budget
 
 
 @pytest.fixture

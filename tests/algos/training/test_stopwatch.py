@@ -3,7 +3,7 @@ import time
 
 import pytest
 
-from veca_marl.algos.training.stopwatch import Stopwatch, processor_seconds
+from veca_marl.algos.training.schedule import Stopwatch, processor_seconds
 
 BUSY_S = 0.3
 

@@ -8,7 +8,7 @@ import pytest
 import torch
 from composed import compose
 
-from veca_marl.bench.free_play import free_play
+from veca_marl.bench.command import free_play
 from veca_marl.envs.adapters.pettingzoo import VecaParallelEnv
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
 from veca_marl.envs.core.game import Game

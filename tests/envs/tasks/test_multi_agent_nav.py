@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from seekers import STEP_S, begin, game_of, put, step
 
-from veca_marl.checks.overlaps import overlaps
+from veca_marl.checks.starts import overlaps
 from veca_marl.envs.tasks.floors.places import gap_m
 
 REACH_M = 0.6  # from the middle of the object: its radius and the task's reach

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from composed import compose
 
-from veca_marl.checks.overlaps import overlaps
+from veca_marl.checks.starts import overlaps
 from veca_marl.config import ConfigError
 from veca_marl.config import compose as check_whole
 from veca_marl.envs.core.game import Game

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from blocks import blocks_game, play, sit, sits
 
-from veca_marl.checks.overlaps import overlaps
+from veca_marl.checks.starts import overlaps
 
 EDGE = 0.06
 EXPERT_SEEDS = (0, 1, 2)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from contests import episodes, game_of, rest, total_reward
 
-from veca_marl.checks.overlaps import overlaps
+from veca_marl.checks.starts import overlaps
 from veca_marl.envs.tasks.soccer import CHILD_M
 
 GAMES = 15

@@ -5,7 +5,7 @@ import pytest
 from composed import compose
 from walking import box, empty_world, walker_in
 
-from veca_marl.bench.free_play import free_play
+from veca_marl.bench.command import free_play
 from veca_marl.envs.core.actions import random_action
 from veca_marl.envs.core.game import Game
 from veca_marl.sim.body import VoiceKind

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from touching import Stage, of_bone
 
-from veca_marl.fidelity.touch.approaches import Approach, extremes
+from veca_marl.fidelity.touch.flat_skin import Approach, extremes
 from veca_marl.sim.body.anatomy import load_skeleton
 from veca_marl.sim.geometry import Geom, Shape, convex_hull, pyramid
 

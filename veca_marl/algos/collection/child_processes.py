@@ -1,15 +1,87 @@
-"""Signals and exit codes of child processes."""
+"""Child processes: their signals, exit codes, and their end with the process that started them.
+
+A terminal sends Ctrl-C to all processes of a command. Workers ignore it: the process that started
+them ends them.
+
+A process that is killed (SIGKILL, out of memory) cannot end its workers, and a forked worker does
+not see the end of its pipes, because its siblings hold copies of the other ends.
+"""
 
 from __future__ import annotations
 
+import ctypes
+import os
 import signal
+import sys
 import threading
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from multiprocessing.process import BaseProcess
 from typing import Any
 
-from veca_marl.algos.collection.interrupts import ignore_interrupts
-from veca_marl.algos.collection.parent import end_with_parent
+_BLOCKED = (signal.SIGINT, signal.SIGTERM)
+
+
+def block_interrupts() -> Callable[[], None]:
+    """Let SIGINT and SIGTERM wait; return what delivers them and receives them as before.
+
+    Processes that are started in between inherit this, until `ignore_interrupts`: they neither end
+    by Ctrl-C before they can ignore it, nor lose a request to end. It has no effect on Windows.
+    """
+    if not hasattr(signal, "pthread_sigmask"):
+        return lambda: None
+    previous = signal.pthread_sigmask(signal.SIG_BLOCK, _BLOCKED)
+    return lambda: _restore(previous)
+
+
+@contextmanager
+def interrupts_blocked() -> Iterator[None]:
+    """Let SIGINT and SIGTERM wait until the end of the block, see `block_interrupts`."""
+    receive = block_interrupts()
+    try:
+        yield
+    finally:
+        receive()
+
+
+def ignore_interrupts() -> None:
+    """Let this process ignore Ctrl-C, and end by SIGTERM. Called by a worker at its start."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    if hasattr(signal, "pthread_sigmask"):
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, _BLOCKED)
+
+
+def _restore(previous: set[int | signal.Signals]) -> None:
+    signal.pthread_sigmask(signal.SIG_SETMASK, previous)
+
+
+_PR_SET_PDEATHSIG = 1  # linux/prctl.h
+_CHECK_S = 1.0
+
+
+def end_with_parent(parent: int) -> None:
+    """Let this process end as soon as its parent has ended.
+
+    On Linux the kernel sends SIGKILL when the thread that started this process ends; elsewhere a
+    thread reads the parent's process id every second.
+
+    Args:
+        parent: Process id of the parent, read by the parent itself.
+    """
+    if sys.platform == "linux":
+        ctypes.CDLL(None, use_errno=True).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+    else:
+        threading.Thread(target=_end_when_orphaned, args=(parent,), daemon=True).start()
+    if os.getppid() != parent:  # it ended before the call above
+        os._exit(1)
+
+
+def _end_when_orphaned(parent: int) -> None:
+    while os.getppid() == parent:
+        time.sleep(_CHECK_S)
+    os._exit(1)
 
 
 def prepare_child(parent: int) -> None:

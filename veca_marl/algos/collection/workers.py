@@ -1,4 +1,4 @@
-"""Supervision of the worker processes of a collector.
+"""Collectors in worker processes, and their supervision.
 
 `MultiSyncCollector` waits without limit for the confirmation of new parameters: if a worker is
 killed, it waits forever. `SupervisedCollector` raises `WorkerError` instead, in two ways:
@@ -26,25 +26,55 @@ from typing import Any
 
 from tensordict import TensorDictBase
 from torch import multiprocessing, nn
-from torchrl.collectors import MultiSyncCollector
+from torchrl.collectors import Collector, MultiSyncCollector
 from torchrl.weight_update import SharedMemWeightSyncScheme
 
-from veca_marl.algos.collection.answers import (
-    CHECK_S,
-    AnswerPipe,
-    BatchQueue,
-    TimeLimit,
-    no_answer,
-)
+from veca_marl.algos.collection.answers import CHECK_S, AnswerPipe, BatchQueue, TimeLimit, no_answer
 from veca_marl.algos.collection.child_processes import (
+    block_interrupts,
     call_when_a_child_ends,
     end_of,
     has_ended,
     is_running,
     prepare_child,
 )
-from veca_marl.algos.collection.interrupts import block_interrupts
-from veca_marl.algos.collection.worker_collector import WorkerCollector
+
+_MESSAGE_CHARS = 1000  # with a pickle's overhead below what a pipe writes at once (4096 bytes)
+
+
+class WorkerCollector(Collector):
+    """The collector in a worker; it sends an exception's message before the worker ends.
+
+    Args:
+        *args: As for `Collector`.
+        exceptions: A queue for the index of the worker and the message.
+        worker_idx: Index of the worker.
+        **kwargs: As for `Collector`.
+    """
+
+    def __init__(self, *args: Any, exceptions: Any, worker_idx: int, **kwargs: Any) -> None:
+        self._exceptions, self._index = exceptions, worker_idx
+        with self._exceptions_sent():
+            super().__init__(*args, worker_idx=worker_idx, **kwargs)
+
+    def iterator(self) -> Iterator[TensorDictBase]:
+        """See the base class."""
+        with self._exceptions_sent():
+            yield from super().iterator()
+
+    def reset(self, *args: Any, **kwargs: Any) -> None:
+        """See the base class."""
+        with self._exceptions_sent():
+            super().reset(*args, **kwargs)
+
+    @contextmanager
+    def _exceptions_sent(self) -> Iterator[None]:
+        try:
+            yield
+        except Exception as error:
+            message = f"{type(error).__name__}: {error}"
+            self._exceptions.put((self._index, message[:_MESSAGE_CHARS]))
+            raise
 
 
 class WorkerError(RuntimeError):

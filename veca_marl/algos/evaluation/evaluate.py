@@ -17,7 +17,12 @@ from torchrl.envs.utils import RandomPolicy
 
 from veca_marl.algos.evaluation.episodes import SOLVED, EpisodeTally
 from veca_marl.algos.networks.memory import with_memory
-from veca_marl.algos.seeds import derived_seed
+
+
+def derived_seed(seed: int, number: int) -> int:
+    """Return an independent 31-bit seed for each pair, of a stage or an episode for example."""
+    return int(np.random.SeedSequence([seed, number]).generate_state(1)[0] >> 1)
+
 
 ActionPolicy = Callable[[TensorDictBase], TensorDictBase]
 

@@ -5,8 +5,7 @@ from veca_marl.algos.intrinsic.intrinsic_reward import (
     IntrinsicReward,
     register_intrinsic,
 )
-from veca_marl.algos.intrinsic.predictors import ForwardModel, ForwardModelCfg
-from veca_marl.algos.intrinsic.rnd import RND, RNDCfg
+from veca_marl.algos.intrinsic.predictors import RND, ForwardModel, ForwardModelCfg, RNDCfg
 
 __all__ = [
     "RND",

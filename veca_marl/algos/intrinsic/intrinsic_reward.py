@@ -17,7 +17,7 @@ import torch
 from tensordict import TensorDictBase
 from torch import Tensor
 
-from veca_marl.algos.choices import ChoiceRegistry
+from veca_marl.algos.algorithm import ChoiceRegistry
 from veca_marl.algos.specs import TeamSpec
 
 NONE = "none"  # the name of no intrinsic reward

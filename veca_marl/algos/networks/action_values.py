@@ -19,8 +19,7 @@ from veca_marl.algos.networks.factory import (
     find_network,
     freeze,
 )
-from veca_marl.algos.networks.initialisation import perceptron
-from veca_marl.algos.networks.layers import PerAgent
+from veca_marl.algos.networks.layers import PerAgent, perceptron
 from veca_marl.algos.specs import TeamSpec
 
 

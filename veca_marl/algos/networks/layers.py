@@ -1,8 +1,9 @@
-"""Modules of a whole team: one for each agent, and what a central critic adds to features."""
+"""Layers: initialisation, one module for each agent, gradients of parts that learn separately."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import math
+from collections.abc import Callable, Iterable, Sequence
 
 import torch
 from torch import Tensor, nn
@@ -61,3 +62,74 @@ def _team_mean(features: Tensor, mask: Tensor | None) -> Tensor:
     present = mask.unsqueeze(-1)
     total = torch.where(present, features, torch.zeros_like(features)).sum(-2, keepdim=True)
     return (total / present.sum(-2, keepdim=True).clamp_min(1)).expand_as(features)
+
+
+def orthogonal(layer: nn.Linear | nn.Conv2d, gain: float = math.sqrt(2.0)) -> nn.Module:
+    """Initialise `layer` with an orthogonal matrix and zero biases, and return it.
+
+    Source: Huang et al. 2022, "The 37 implementation details of PPO", detail 2.
+    """
+    nn.init.orthogonal_(layer.weight, gain)
+    if layer.bias is not None:
+        nn.init.zeros_(layer.bias)
+    return layer
+
+
+def perceptron(
+    inputs: int,
+    hidden: Sequence[int],
+    outputs: int,
+    gain: float = 1.0,
+    norm: Callable[[int], nn.Module] | None = None,
+) -> nn.Module:
+    """Return orthogonally initialised layers with ReLU; one linear layer if `hidden` is empty.
+
+    Args:
+        inputs: Width of the input.
+        hidden: Widths of the hidden layers.
+        outputs: Width of the output.
+        gain: Gain of the last layer.
+        norm: Makes the normalisation before each activation from its width.
+    """
+    layers: list[nn.Module] = []
+    for width in hidden:
+        layers.append(orthogonal(nn.Linear(inputs, width)))
+        layers += [nn.ReLU()] if norm is None else [norm(width), nn.ReLU()]
+        inputs = width
+    last = orthogonal(nn.Linear(inputs, outputs), gain)
+    return nn.Sequential(*layers, last) if layers else last
+
+
+def independent_parameters(modules: Iterable[nn.Module]) -> list[list[nn.Parameter]]:
+    """Return the parameters of some modules in groups that learn independently.
+
+    Parameters that all agents share are one group; those that an agent has for itself
+    (`PerAgent`) are a group for each agent. Parameters without gradient are left out.
+    """
+    of_agents: dict[int, list[nn.Parameter]] = {}
+    everything: list[nn.Parameter] = []
+    for module in modules:
+        everything += module.parameters()
+        for part in module.modules():
+            if isinstance(part, PerAgent):
+                for index, agent in enumerate(part.agents):
+                    of_agents.setdefault(index, []).extend(agent.parameters())
+    own = {id(parameter) for group in of_agents.values() for parameter in group}
+    shared = [parameter for parameter in everything if id(parameter) not in own]
+    groups = [[p for p in group if p.requires_grad] for group in (shared, *of_agents.values())]
+    return [group for group in groups if group]
+
+
+def clip_norms(groups: Iterable[list[nn.Parameter]], most: float) -> Tensor:
+    """Scale the gradient of each group down to a norm, and return the largest norm before it.
+
+    A common norm would let the gradient of one agent determine how much another one learns.
+
+    Args:
+        groups: Parameters, see `independent_parameters`.
+        most: Largest norm of the gradient of a group.
+
+    Returns:
+        A scalar; not finite if a gradient is not.
+    """
+    return torch.stack([nn.utils.clip_grad_norm_(group, most) for group in groups]).amax()

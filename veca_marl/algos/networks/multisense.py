@@ -11,18 +11,17 @@ import torch
 from tensordict.nn import TensorDictModule, TensorDictModuleBase, TensorDictSequential
 from torch import Tensor, nn
 
-from veca_marl.algos.acting.modules import ArrayModule
-from veca_marl.algos.networks.encoders import Convolutions, Pooling, make_encoder
-from veca_marl.algos.networks.factory import NetworkCfg, NetworkFactory, register_network
-from veca_marl.algos.networks.initialisation import orthogonal
-from veca_marl.algos.networks.layers import CentralValue, PerAgent
-from veca_marl.algos.networks.memory.gru import (
-    GatedMemory,
-    TeamMemory,
-    features_and_state,
-    state_alone,
+from veca_marl.algos.acting import ArrayModule
+from veca_marl.algos.networks.encoders import (
+    Arithmetic,
+    Convolutions,
+    Pooling,
+    Precision,
+    make_encoder,
 )
-from veca_marl.algos.networks.precision import Arithmetic, Precision
+from veca_marl.algos.networks.factory import NetworkCfg, NetworkFactory, register_network
+from veca_marl.algos.networks.layers import CentralValue, PerAgent, orthogonal
+from veca_marl.algos.networks.memory import GatedMemory, TeamMemory, features_and_state, state_alone
 from veca_marl.algos.sense_encoders import SenseEncoders
 from veca_marl.algos.specs import ArrayLayout, TeamSpec
 

@@ -20,8 +20,13 @@ from torch import nn
 from torch.distributions import Categorical, Distribution
 from torchrl.modules import TanhNormal
 
-from veca_marl.algos.acting.draws import DrawnPart, draw_categorical, draw_tanh_normal
-from veca_marl.algos.acting.modules import ActionDistribution, ArrayModule
+from veca_marl.algos.acting import (
+    ActionDistribution,
+    ArrayModule,
+    DrawnPart,
+    draw_categorical,
+    draw_tanh_normal,
+)
 from veca_marl.algos.specs import PLAIN, ActionLayout, action_key
 
 _UNIT = {"low": -1.0, "high": 1.0}

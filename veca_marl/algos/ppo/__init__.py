@@ -1,8 +1,7 @@
 """Proximal policy optimisation."""
 
 from veca_marl.algos.algorithm import register_algorithm
-from veca_marl.algos.ppo.config import PPOCfg
-from veca_marl.algos.ppo.ppo import PPO
+from veca_marl.algos.ppo.ppo import PPO, PPOCfg
 
 register_algorithm("ppo", PPOCfg, PPO)
 

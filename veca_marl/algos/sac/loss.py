@@ -2,21 +2,151 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from copy import deepcopy
 from dataclasses import dataclass
 from typing import ClassVar
 
 import torch
 from tensordict import TensorDict, TensorDictBase
+from tensordict.nn import TensorDictModuleBase
 from torch import Tensor, nn
 
-from veca_marl.algos.networks.action_values import ActorCritics, mean_of_others, statistics_of
-from veca_marl.algos.sac.config import EncoderGradient
-from veca_marl.algos.sac.critic import Critic, constant
+from veca_marl.algos.networks.action_values import (
+    ActionValues,
+    ActorCritics,
+    mean_of_others,
+    statistics_of,
+)
+from veca_marl.algos.sac.config import Adaptation, EncoderGradient, TemperatureCfg
 from veca_marl.algos.sac.joint_action import JointAction, Proposed, Taken
-from veca_marl.algos.sac.masks import masked_mean
 from veca_marl.algos.sac.readers import FeatureReader, StepReader
-from veca_marl.algos.sac.replay.windows import Transitions
-from veca_marl.algos.sac.temperature import Temperatures
+from veca_marl.algos.sac.replay import Transitions
+from veca_marl.algos.specs import ActionLayout
+
+
+def masked_mean(x: Tensor, counted: Tensor) -> Tensor:
+    """Return the mean of `x` over the entries that are True in `counted`; 0 if there are none.
+
+    Args:
+        x: Any shape.
+        counted: Shape that `x` has, or one that is broadcast to it.
+    """
+    counted = counted.expand_as(x)
+    return torch.where(counted, x, torch.zeros_like(x)).sum() / counted.sum().clamp_min(1)
+
+
+class Critic(nn.Module):
+    """The modules from observations to action values.
+
+    TorchRL's `LossModule` and `SoftUpdate` swap the parameters of one module by TensorDicts
+    instead of copying it: a quarter of the processor time of an update of the default network.
+
+    Args:
+        encoder: Writes the features.
+        values: Reads them.
+    """
+
+    encoder: TensorDictModuleBase
+    values: ActionValues
+
+    def __init__(self, encoder: TensorDictModuleBase, values: ActionValues) -> None:
+        super().__init__()
+        self.encoder, self.values = encoder, values
+
+    def copy(self) -> Critic:
+        """Return an equal one with parameters of its own, which are never learnt."""
+        return deepcopy(self).requires_grad_(False)
+
+    @torch.no_grad()
+    def approach(self, other: Critic, share: float) -> None:
+        """Move all parameters towards those of `other`, and copy its buffers.
+
+        Args:
+            other: A critic with the same modules.
+            share: Share of the difference, in (0, 1]; 1 copies.
+        """
+        torch._foreach_lerp_([*self.parameters()], [*other.parameters()], share)
+        for own, new in zip(self.buffers(), other.buffers(), strict=True):
+            own.copy_(new)
+
+
+@contextmanager
+def constant(module: nn.Module) -> Iterator[None]:
+    """Let gradients flow through `module` but not into it, and its statistics stay as they are."""
+    learnt = [parameter for parameter in module.parameters() if parameter.requires_grad]
+    for parameter in learnt:
+        parameter.requires_grad_(False)
+    module.eval()  # batch normalisation uses its running statistics
+    try:
+        yield
+    finally:
+        module.train()
+        for parameter in learnt:
+            parameter.requires_grad_(True)
+
+
+class Temperatures(nn.Module):
+    """A temperature alpha for each part of the action, fixed or learnt.
+
+    Args:
+        actions: Part to its layout.
+        cfg: Initial value, adaptation and target entropies.
+
+    Attributes:
+        targets: Part to its target entropy in nats.
+    """
+
+    def __init__(self, actions: Mapping[str, ActionLayout], cfg: TemperatureCfg) -> None:
+        super().__init__()
+        self.targets = {part: _target(layout, cfg) for part, layout in actions.items()}
+        learnt = cfg.adaptation is Adaptation.automatic
+        self._least = math.log(cfg.minimum) if cfg.minimum > 0.0 else -math.inf
+        self._logs = nn.ParameterDict(
+            {
+                part: nn.Parameter(torch.tensor(math.log(cfg.initial)), requires_grad=learnt)
+                for part in actions
+            }
+        )
+
+    def alphas(self) -> dict[str, Tensor]:
+        """Return the temperature of each part, without gradient."""
+        return {part: log.detach().exp() for part, log in self._logs.items()}
+
+    @torch.no_grad()
+    def project(self) -> None:
+        """Raise temperatures below the minimum to it; to be called after each gradient step."""
+        for log in self._logs.values():
+            log.clamp_(min=self._least)
+
+    def bonus(self, entropies: Mapping[str, Tensor]) -> Tensor:
+        """Return the sum of entropies, weighted by their temperatures."""
+        alphas = self.alphas()
+        return sum((alphas[part] * entropy for part, entropy in entropies.items()), torch.zeros(()))
+
+    def loss(self, entropies: Mapping[str, Tensor], counted: Tensor) -> Tensor:
+        """Return the loss that raises a temperature where the entropy is below its target.
+
+        ``log(alpha) * (entropy - target)`` instead of ``alpha * (entropy - target)``: the form of
+        the authors' code and of TorchRL's `SACLoss`.
+
+        Args:
+            entropies: Part to its entropy ``(..., agents)``.
+            counted: ``(..., agents)``, True for the entries that count.
+        """
+        losses = [
+            self._logs[part] * masked_mean(entropy.detach() - self.targets[part], counted)
+            for part, entropy in entropies.items()
+        ]
+        return torch.stack(losses).sum()
+
+
+def _target(layout: ActionLayout, cfg: TemperatureCfg) -> float:
+    if layout.discrete:
+        return cfg.entropy_of_choices * math.log(layout.size)
+    return cfg.entropy_per_dimension * layout.size
 
 
 @dataclass(frozen=True)

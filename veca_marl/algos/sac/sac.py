@@ -13,24 +13,21 @@ from torch import nn
 
 from veca_marl.algos.algorithm import Algorithm
 from veca_marl.algos.networks.action_values import make_actor_critics
-from veca_marl.algos.networks.copies import (
+from veca_marl.algos.networks.factory import (
+    NetworkCfg,
     check_same_network,
     check_same_settings,
     copy_actor,
+    trainable,
 )
-from veca_marl.algos.networks.exploration import UniformWarmUp
-from veca_marl.algos.networks.factory import NetworkCfg, trainable
-from veca_marl.algos.networks.gradients import clip_norms, independent_parameters
+from veca_marl.algos.networks.layers import clip_norms, independent_parameters
 from veca_marl.algos.networks.memory import memory_size
+from veca_marl.algos.policy import UniformWarmUp
 from veca_marl.algos.sac.config import SACCfg, Targets
 from veca_marl.algos.sac.joint_action import JointAction
-from veca_marl.algos.sac.loss import TeamCrossQLoss, TeamSACLoss
-from veca_marl.algos.sac.random_shift import RandomShift
-from veca_marl.algos.sac.readers import make_reader, memory_keys
-from veca_marl.algos.sac.replay.buffer import Replay, storage_needed
-from veca_marl.algos.sac.replay.segments import StoredKeys
-from veca_marl.algos.sac.replay.windows import Span, transitions
-from veca_marl.algos.sac.temperature import Temperatures
+from veca_marl.algos.sac.loss import TeamCrossQLoss, TeamSACLoss, Temperatures
+from veca_marl.algos.sac.readers import RandomShift, make_reader, memory_keys
+from veca_marl.algos.sac.replay import Replay, Span, StoredKeys, storage_needed, transitions
 from veca_marl.algos.sense_encoders import copy_parameters
 from veca_marl.algos.specs import PLAIN, TeamSpec
 from veca_marl.algos.storage import StorageNeeded

@@ -19,27 +19,69 @@ import torch
 from torchrl import timeit
 from tqdm import tqdm
 
-from veca_marl.algos.checkpoints.checkpoint_file import load_errors
-from veca_marl.algos.checkpoints.checkpoints import Checkpoints
+from veca_marl.algos.checkpoints import Checkpoints, load_errors, to_plain
 from veca_marl.algos.collection.experience import CollectCfg, Experience
 from veca_marl.algos.evaluation.comparison import comparison_line, score_rows
 from veca_marl.algos.evaluation.episodes import TrainingEpisodes
-from veca_marl.algos.evaluation.evaluate import EvalCfg, Scores
-from veca_marl.algos.evaluation.evaluators import Evaluator, Players, nothing
-from veca_marl.algos.evaluation.parallel import make_evaluator
-from veca_marl.algos.plain import to_plain
+from veca_marl.algos.evaluation.evaluate import EvalCfg, Scores, derived_seed
+from veca_marl.algos.evaluation.evaluators import (
+    Evaluator,
+    Players,
+    Request,
+    make_evaluator,
+    nothing,
+)
 from veca_marl.algos.policy import Policy
-from veca_marl.algos.reporting.reporters import Reporter
-from veca_marl.algos.seeds import derived_seed
+from veca_marl.algos.reporting import Reporter
 from veca_marl.algos.specs import EnvFactory
-from veca_marl.algos.training.evaluations import Evaluations, evaluation_seed
-from veca_marl.algos.training.finite import check_batch, check_state
-from veca_marl.algos.training.learners import TeamLearners
-from veca_marl.algos.training.matchmaking import AllLearn, Matchmaking
-from veca_marl.algos.training.progress import Budget, Progress
-from veca_marl.algos.training.schedule import Schedule
-from veca_marl.algos.training.stopwatch import Stopwatch
-from veca_marl.algos.training.timing import timing_table
+from veca_marl.algos.training.finite import check_batch, check_scores, check_state
+from veca_marl.algos.training.learners import AllLearn, Matchmaking, TeamLearners
+from veca_marl.algos.training.schedule import Budget, Progress, Schedule, Stopwatch, timing_table
+
+_EVALUATION_STAGE = 2**31 - 1  # in place of a stage number: seeds that no training stage uses
+
+
+def evaluation_seed(seed: int) -> int:
+    """Return the seed of the episodes of all evaluations of a run with the seed `seed`."""
+    return derived_seed(seed, _EVALUATION_STAGE)
+
+
+@dataclass(frozen=True)
+class Evaluations:
+    """Plays the evaluations of a run; all of them begin with the same episodes.
+
+    Each method returns the scores of each team, and raises `NotFiniteError` if one is not finite.
+
+    Attributes:
+        evaluator: Plays the episodes.
+        cfg: Numbers of episodes, and whether actions are sampled.
+        seed: Seed of the run.
+    """
+
+    evaluator: Evaluator
+    cfg: EvalCfg
+    seed: int
+
+    def play_baseline(self) -> dict[str, Scores]:
+        """Play the episodes of the last evaluation with random actions."""
+        return self._play("random", self.cfg.last_episodes)
+
+    def play(self) -> dict[str, Scores]:
+        """Play the evaluation of the policy after a stage that is not the last."""
+        return self._play("policy", self.cfg.episodes)
+
+    def play_last(self, meanwhile: Callable[[], None]) -> dict[str, Scores]:
+        """Play the last evaluation of the policy; call `meanwhile` once, see `Evaluator`."""
+        return self._play("policy", self.cfg.last_episodes, meanwhile)
+
+    def _play(
+        self, player: str, episodes: int, meanwhile: Callable[[], None] = nothing
+    ) -> dict[str, Scores]:
+        request = Request(player, episodes, evaluation_seed(self.seed), self.cfg.exploration)
+        with timeit("evaluate"):
+            scores = self.evaluator.play(request, meanwhile)
+        check_scores(scores)
+        return scores
 
 
 @dataclass

@@ -1,10 +1,79 @@
-"""Batches and stages of a training run."""
+"""How long a run trains, in which batches and stages, and how much time they take."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+import multiprocessing
+import os
+import time
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from pathlib import Path
+
+from torchrl import timeit
+
+
+def processor_seconds() -> float:
+    """Return the processor time of this process and of its children so far, in seconds.
+
+    It hardly depends on what else the machine computes, elapsed time does. Not a number where the
+    system does not tell the processor time of other processes (no `/proc`).
+    """
+    ended = os.times()
+    running = (child.pid for child in multiprocessing.active_children())
+    others = sum(_processor_seconds_of(pid) for pid in running if pid is not None)
+    return time.process_time() + ended.children_user + ended.children_system + others
+
+
+def _processor_seconds_of(process: int) -> float:
+    """Return the processor time of another process so far; not a number without `/proc`."""
+    file = Path(f"/proc/{process}/stat")
+    if not file.is_file():
+        return float("nan")
+    # proc(5): the name in parentheses may contain spaces; utime and stime are the fields 14 and 15
+    fields = file.read_text().rpartition(")")[2].split()
+    ticks = int(fields[11]) + int(fields[12])
+    return ticks / float(os.sysconf("SC_CLK_TCK"))
+
+
+class Stopwatch:
+    """Times of the batches of a run.
+
+    Args:
+        elapsed_s: Returns the seconds since the start of the run.
+        processor_s: Returns the seconds of processor time so far.
+    """
+
+    def __init__(
+        self,
+        elapsed_s: Callable[[], float],
+        processor_s: Callable[[], float] = processor_seconds,
+    ) -> None:
+        self._elapsed_s, self._processor_s = elapsed_s, processor_s
+        self._start_s = 0.0
+        self._end_s: float | None = None
+        self._processor_end_s: float | None = None
+
+    def begin(self) -> None:
+        """Begin a batch."""
+        self._start_s = self._elapsed_s()
+        if self._processor_end_s is None:
+            self._processor_end_s = self._processor_s()
+
+    def end(self, frames: int) -> dict[str, float]:
+        """End a batch of a number of frames.
+
+        Returns:
+            ``frames_per_s`` of the batch, ``between_s``: elapsed seconds of evaluations,
+            checkpoints and restarts since the last batch of this process, and ``processor_s``:
+            seconds of processor time of all processes since the last batch.
+        """
+        now, processor = self._elapsed_s(), self._processor_s()
+        used = processor - (self._processor_end_s or 0.0)
+        between = 0.0 if self._end_s is None else self._start_s - self._end_s
+        rate = frames / (now - self._start_s)
+        self._end_s, self._processor_end_s = now, processor
+        return {"frames_per_s": rate, "between_s": between, "processor_s": used}
 
 
 @dataclass(frozen=True)
@@ -45,3 +114,61 @@ class Schedule:
         """Yield the number of batches of each stage that follows a number of finished batches."""
         for start in range(batches, self.batches, self.batches_per_stage):
             yield min(self.batches_per_stage, self.batches - start)
+
+
+@dataclass
+class Budget:
+    """How long to train.
+
+    Attributes:
+        total_frames: Frames of experience (rounded up to whole batches).
+        max_minutes: Also stop after the stage in which this time runs out, which begins anew when a
+            run is resumed; None for no limit.
+    """
+
+    total_frames: int
+    max_minutes: float | None = None
+
+    def is_spent(self, elapsed_s: float) -> bool:
+        """Return whether the time has run out."""
+        return self.max_minutes is not None and elapsed_s > 60.0 * self.max_minutes
+
+
+@dataclass
+class Progress:
+    """Where a run stands; stored in its checkpoints.
+
+    Attributes:
+        stage: Finished stages.
+        iteration: Finished batches.
+        frames: Frames learnt from.
+        best_return: Best mean return of the evaluations, where one team learns.
+    """
+
+    stage: int = 0
+    iteration: int = 0
+    frames: int = 0
+    best_return: float = -math.inf
+
+
+def timing_table(elapsed_s: float, frames: int) -> str:
+    """Return lines of seconds, share and milliseconds per frame of each part.
+
+    Beyond `timeit.print`: shares of the whole, the time that no part accounts for, and the time
+    per frame. A part of another one, such as ``evaluate/video``, has a line after the total: its
+    time is counted in both.
+
+    Args:
+        elapsed_s: The whole time.
+        frames: Frames learnt from in it.
+    """
+    # `timeit.erase` leaves the names of parts, with no time
+    measured = {name: s for name, s in timeit.todict(percall=False).items() if s > 0.0}
+    parts = {name: s for name, s in measured.items() if "/" not in name}
+    within = [(name, s) for name, s in measured.items() if "/" in name]
+    parts["other"] = max(0.0, elapsed_s - sum(parts.values()))
+    lines = [f"{'part':<16}{'seconds':>10}{'share':>8}{'ms/frame':>10}"]
+    for part, seconds in [*parts.items(), ("total", elapsed_s), *within]:
+        share, each = seconds / elapsed_s, f"{1e3 * seconds / frames:.3f}" if frames else "-"
+        lines.append(f"{part:<16}{seconds:>10.1f}{share:>8.1%}{each:>10}")
+    return "\n".join(lines)

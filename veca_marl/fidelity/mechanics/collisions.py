@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from veca_marl.fidelity.law import Curve, Law, Mark, Plot, Section, at_most, between
-from veca_marl.fidelity.physics.arena import SUBSTEPS, make_arena, simulate
+from veca_marl.fidelity.mechanics.rigid_bodies import SUBSTEPS, make_arena, simulate
 from veca_marl.sim.geometry import Floats
 from veca_marl.sim.physics import GRAVITY_MPS2, Prop, PropCfg, PropShape, World, pybullet
 

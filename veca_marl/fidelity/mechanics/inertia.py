@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from veca_marl.fidelity.law import Curve, Law, Mark, Plot, Section, equals
-from veca_marl.fidelity.physics.arena import SUBSTEPS, make_arena, simulate
+from veca_marl.fidelity.mechanics.rigid_bodies import SUBSTEPS, make_arena, simulate
 from veca_marl.sim.geometry import Floats
 from veca_marl.sim.physics import GRAVITY_MPS2, PropCfg, PropShape, World, pybullet
 

@@ -7,10 +7,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from veca_marl.fidelity.law import Curve, Law, Mark, Plot, Section, at_least, at_most
-from veca_marl.fidelity.touch.approaches import SHAPES, Approach, all_approaches, extremes
-from veca_marl.fidelity.touch.flat_skin import FlatSkin, Thing
-from veca_marl.fidelity.touch.pokes import BONES, noticed_pokes
-from veca_marl.fidelity.touch.time_steps import (
+from veca_marl.fidelity.touch.bare_body import BONES, noticed_pokes, threshold_m
+from veca_marl.fidelity.touch.fixed_arms import (
     DEFAULT_SHARE,
     clocks,
     impact_laws,
@@ -19,7 +17,14 @@ from veca_marl.fidelity.touch.time_steps import (
     readings_at_rest,
     rest_laws,
 )
-from veca_marl.fidelity.touch.two_points import threshold_m
+from veca_marl.fidelity.touch.flat_skin import (
+    SHAPES,
+    Approach,
+    FlatSkin,
+    Thing,
+    all_approaches,
+    extremes,
+)
 from veca_marl.sim.geometry import Shape
 from veca_marl.sim.touch import TouchCfg
 

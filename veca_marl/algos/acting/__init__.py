@@ -1,1 +1,0 @@
-"""Policies in the form in which they act: without gradients, on the few observations of a step."""

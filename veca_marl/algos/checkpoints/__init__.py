@@ -1,1 +1,0 @@
-"""Checkpoints of runs: written so that none is damaged, checked when they are read."""

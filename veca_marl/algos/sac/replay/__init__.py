@@ -1,1 +1,0 @@
-"""The replay buffer of one team: stored segments, sampled windows, memory-mapped files."""

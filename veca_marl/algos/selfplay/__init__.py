@@ -1,1 +1,0 @@
-"""Self-play: pools of past policies, matchmaking, Elo ratings."""

@@ -1,1 +1,0 @@
-"""Laws of props: fall, friction, collisions, inertia."""

@@ -1,1 +1,0 @@
-"""Laws of vision: acuity, disparity, segmentation, defocus."""

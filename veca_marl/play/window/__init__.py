@@ -1,1 +1,0 @@
-"""The window and the loudspeaker. They need the extra ``[play]`` (pygame-ce)."""
