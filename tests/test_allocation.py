@@ -6,7 +6,7 @@ import resource
 import pytest
 import torch
 
-from veca_marl.runs import assembly as allocation
+from veca_marl.runs import assembly
 from veca_marl.runs.assembly import keep_freed_memory
 
 
@@ -25,6 +25,6 @@ def test_a_large_array_is_made_again_without_page_faults():
 
 
 def test_other_allocators_are_left_alone(monkeypatch):
-    monkeypatch.setattr(allocation.platform, "libc_ver", lambda: ("", ""))
+    monkeypatch.setattr(assembly.platform, "libc_ver", lambda: ("", ""))
     monkeypatch.setattr(ctypes, "CDLL", lambda *_: pytest.fail("no library may be opened"))
     assert keep_freed_memory() is False

@@ -7,7 +7,7 @@ import random
 import pytest
 import torch
 
-from veca_marl.algos import reporting as loggers
+from veca_marl.algos import reporting
 from veca_marl.config import compose_node, to_config
 from veca_marl.runs.assembly import make_reporters
 from veca_marl.runs.run_folder import RunFolder
@@ -17,9 +17,9 @@ from veca_marl.runs.run_folder import RunFolder
 def identifiers(monkeypatch):
     """The identifiers that wandb was given; it need not be installed."""
     given = []
-    monkeypatch.setattr(loggers, "WandbLogger", lambda **options: given.append(options["id"]))
+    monkeypatch.setattr(reporting, "WandbLogger", lambda **options: given.append(options["id"]))
     spec = importlib.machinery.ModuleSpec("wandb", None)
-    monkeypatch.setattr(loggers, "find_spec", lambda name: spec)
+    monkeypatch.setattr(reporting, "find_spec", lambda name: spec)
     return given
 
 

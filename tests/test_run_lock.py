@@ -13,7 +13,7 @@ from omegaconf import OmegaConf
 from veca_marl import api
 from veca_marl.config import ConfigError
 from veca_marl.plugins import conf_dir
-from veca_marl.runs import run_folder as lock
+from veca_marl.runs import run_folder
 from veca_marl.runs.run_folder import locked
 
 SMOKE = ["+experiment=smoke", "senses/vision=blind", "log=silent", "threads=1", "total_frames=64"]
@@ -32,7 +32,7 @@ with locked(Path(sys.argv[1])):
 
 @pytest.fixture(autouse=True)
 def short_wait(monkeypatch):
-    monkeypatch.setattr(lock, "_WAIT_S", 0.3)
+    monkeypatch.setattr(run_folder, "_WAIT_S", 0.3)
 
 
 @pytest.fixture
@@ -69,7 +69,7 @@ def test_the_lock_leaves_neither_a_file_nor_an_empty_folder(tmp_path):
 
 def test_a_lock_whose_file_was_removed_in_the_meantime_does_not_count(tmp_path, monkeypatch):
     """A run that ends removes the file; another one may have opened it just before."""
-    flock, calls = lock.fcntl.flock, []
+    flock, calls = run_folder.fcntl.flock, []
 
     def removed_before_the_first_call(file, operation):
         if not calls:
@@ -77,7 +77,7 @@ def test_a_lock_whose_file_was_removed_in_the_meantime_does_not_count(tmp_path, 
         calls.append(file.name)
         flock(file, operation)
 
-    monkeypatch.setattr(lock.fcntl, "flock", removed_before_the_first_call)
+    monkeypatch.setattr(run_folder.fcntl, "flock", removed_before_the_first_call)
     with locked(tmp_path / "run"):
         assert len(calls) == 2
         assert (tmp_path / "run" / ".lock").exists()
@@ -87,7 +87,7 @@ def test_a_file_system_without_locks_is_reported(tmp_path, monkeypatch, caplog):
     def refuse(file, operation):
         raise OSError(errno.ENOSYS, os.strerror(errno.ENOSYS))
 
-    monkeypatch.setattr(lock.fcntl, "flock", refuse)
+    monkeypatch.setattr(run_folder.fcntl, "flock", refuse)
     with locked(tmp_path / "run"):
         assert "cannot be locked: start no other run in its folder" in caplog.text
 

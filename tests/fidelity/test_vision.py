@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from veca_marl.fidelity import vision as vision
+from veca_marl.fidelity import vision
 
 
 @pytest.mark.parametrize("age_months", [1.0, 6.0, 48.0])

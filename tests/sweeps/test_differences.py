@@ -2,8 +2,7 @@
 
 import pytest
 
-from veca_marl.config import compose_node
-from veca_marl.config import root as schemas
+from veca_marl.config import compose_node, root
 from veca_marl.sweeps.differences import BY_TEAM, differences, key_patterns
 from veca_marl.sweeps.run_state import former_values
 
@@ -102,4 +101,4 @@ def test_keys_of_one_version_below_a_name_of_the_user_are_told_apart():
 
 
 def test_all_mappings_from_the_names_of_teams_are_known():
-    assert BY_TEAM == schemas.BY_TEAM
+    assert BY_TEAM == root.BY_TEAM

@@ -8,11 +8,14 @@ from dataclasses import dataclass
 
 from torchrl.envs import check_env_specs
 
-from veca_marl.checks import episodes as random_play
-from veca_marl.checks import episodes as returns
-from veca_marl.checks import starts
-from veca_marl.checks import starts as seeding
+from veca_marl.checks.episodes import (
+    RANDOM_PLAY_NAMES,
+    RETURN_NAMES,
+    check_random_play,
+    check_returns,
+)
 from veca_marl.checks.findings import Finding, Status, TaskReport, finding, guarded
+from veca_marl.checks.starts import SEEDING_NAMES, START_NAMES, check_seeding, check_starts
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
 from veca_marl.envs.core.game import Game
 from veca_marl.envs.core.game_cfg import GameCfg
@@ -71,10 +74,10 @@ def _checks(
     """Return the names and functions of the checks after ``build``; each builds its own games."""
     return [
         (_TORCHRL, lambda: _torchrl(cfg, checks.seed)),
-        (seeding.NAMES, lambda: _seeding(cfg, checks)),
-        (starts.NAMES, lambda: _starts(cfg, checks)),
-        (random_play.NAMES, lambda: _random_play(cfg, checks)),
-        (returns.NAMES, lambda: _returns(cfg, checks)),
+        (SEEDING_NAMES, lambda: _seeding(cfg, checks)),
+        (START_NAMES, lambda: _starts(cfg, checks)),
+        (RANDOM_PLAY_NAMES, lambda: _random_play(cfg, checks)),
+        (RETURN_NAMES, lambda: _returns(cfg, checks)),
     ]
 
 
@@ -92,19 +95,19 @@ def _torchrl(cfg: GameCfg, seed: int) -> Iterator[Finding]:
 
 def _seeding(cfg: GameCfg, checks: CheckCfg) -> Iterator[Finding]:
     with closing(Game(cfg)) as used, closing(Game(cfg)) as new:
-        yield from seeding.check_seeding(used, new, checks.seeding_steps, checks.seed)
+        yield from check_seeding(used, new, checks.seeding_steps, checks.seed)
 
 
 def _starts(cfg: GameCfg, checks: CheckCfg) -> Iterator[Finding]:
     with closing(Game(cfg)) as game:
-        yield from starts.check_starts(game, checks.starts, checks.seed)
+        yield from check_starts(game, checks.starts, checks.seed)
 
 
 def _random_play(cfg: GameCfg, checks: CheckCfg) -> Iterator[Finding]:
     with closing(Game(cfg)) as game:
-        yield from random_play.check_random_play(game, checks.steps, checks.seed)
+        yield from check_random_play(game, checks.steps, checks.seed)
 
 
 def _returns(cfg: GameCfg, checks: CheckCfg) -> Iterator[Finding]:
     with closing(Game(cfg)) as game:
-        yield from returns.check_returns(game, checks.episodes, checks.seed)
+        yield from check_returns(game, checks.episodes, checks.seed)

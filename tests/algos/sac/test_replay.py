@@ -9,7 +9,6 @@ import torch
 from tensordict import TensorDict
 from timed_batches import SPEC, batch_of
 
-from veca_marl.algos.sac import replay as buffer
 from veca_marl.algos.sac.config import ReplayCfg, Storage
 from veca_marl.algos.sac.replay import Replay, Span, StoredKeys, storage_needed
 from veca_marl.algos.specs import ArrayLayout
@@ -81,7 +80,8 @@ def test_memory_mapped_files_hold_the_same_and_are_removed(tmp_path):
 def test_the_memory_is_taken_with_the_first_batch(monkeypatch):
     reserved = []
     monkeypatch.setattr(
-        buffer, "reserve_memory", lambda arrays, _: reserved.extend(a.nbytes for a in arrays)
+        "veca_marl.algos.sac.replay.reserve_memory",
+        lambda arrays, _: reserved.extend(a.nbytes for a in arrays),
     )
     replay = replay_of(CFG, 3)
     rows = TensorDict(replay.state_dict()["rows"]).values(True, True)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from touching import of_bone
 
-from veca_marl.fidelity.touch import fixed_arms as time_steps
+from veca_marl.fidelity.touch import fixed_arms
 from veca_marl.fidelity.touch.fixed_arms import FOREARM, PALM, RIGHT_PALM, Ball, FixedArms
 from veca_marl.sim.body.anatomy import load_skeleton
 from veca_marl.sim.physics import GRAVITY_MPS2, ClockCfg
@@ -13,12 +13,12 @@ from veca_marl.sim.physics import GRAVITY_MPS2, ClockCfg
 @pytest.fixture(scope="module")
 def at_rest():
     """The readings for time steps of 8 and 2 ms."""
-    return time_steps.readings_at_rest(time_steps.clocks(0.02)[::2])
+    return fixed_arms.readings_at_rest(fixed_arms.clocks(0.02)[::2])
 
 
 def check_independence(readings):
     assert min(of_spot.min() for of_spot in readings.values()) > 0.02
-    assert not [law for law in time_steps.rest_laws(readings) if not law.holds]
+    assert not [law for law in fixed_arms.rest_laws(readings) if not law.holds]
 
 
 def test_touch_at_rest_is_independent_of_the_time_step(at_rest):
@@ -27,12 +27,12 @@ def test_touch_at_rest_is_independent_of_the_time_step(at_rest):
 
 def test_a_reading_that_depends_on_the_time_step_breaks_a_law(at_rest):
     wrong = {**at_rest, "palm": at_rest["palm"] * [[1.0], [1.02]]}
-    assert [law.holds for law in time_steps.rest_laws(wrong)] == [False, True]
+    assert [law.holds for law in fixed_arms.rest_laws(wrong)] == [False, True]
 
 
 @pytest.mark.slow
 def test_touch_at_rest_is_independent_of_all_time_steps_from_8_to_1_ms():
-    check_independence(time_steps.readings_at_rest(time_steps.clocks(0.02)))
+    check_independence(fixed_arms.readings_at_rest(fixed_arms.clocks(0.02)))
 
 
 def test_compliant_skin_distinguishes_masses_and_rigid_bone_does_not(at_rest):
@@ -61,7 +61,7 @@ def test_the_reading_on_the_palm_is_weight_over_stiffness():
 
 @pytest.mark.parametrize("mass_kg", [0.2, 0.5])
 def test_the_peak_of_an_impact_is_stable_with_a_larger_contact_margin(mass_kg):
-    touch, force = time_steps.peaks(PALM, Ball(mass_kg), time_steps.clocks(0.1))
+    touch, force = fixed_arms.peaks(PALM, Ball(mass_kg), fixed_arms.clocks(0.1))
     assert touch.min() > 0.3
     assert touch.max() / touch.min() < 1.4
     assert force.max() / force.min() > touch.max() / touch.min()
@@ -69,12 +69,12 @@ def test_the_peak_of_an_impact_is_stable_with_a_larger_contact_margin(mass_kg):
 
 def test_the_peak_of_a_slow_impact_is_stable_by_default():
     """1.6 mm in the longest step, less than half of the skin."""
-    touch, _ = time_steps.peaks(PALM, Ball(0.2), time_steps.clocks(0.02), fall_m=0.002)
+    touch, _ = fixed_arms.peaks(PALM, Ball(0.2), fixed_arms.clocks(0.02), fall_m=0.002)
     assert touch.max() / touch.min() < 1.2
 
 
 def test_on_rigid_bone_the_force_grows_as_the_step_shrinks_and_touch_does_not():
-    touch, force = time_steps.peaks(FOREARM, Ball(0.2), time_steps.clocks(0.02))
+    touch, force = fixed_arms.peaks(FOREARM, Ball(0.2), fixed_arms.clocks(0.02))
     assert force.max() / force.min() > 4.0
     assert touch.max() / touch.min() < 1.05
 
