@@ -173,6 +173,7 @@ def test_every_reward_term_of_a_task_is_documented_and_has_a_picture(name):
     assert (DOCS / "images" / "tasks" / f"{name}.png").exists()
 
 
+@pytest.mark.golden
 @pytest.mark.parametrize("name", make_docs.PAGES)
 def test_a_generated_page_is_current(name):
     assert read(name) == make_docs.PAGES[name](), "run make pages"

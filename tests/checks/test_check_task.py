@@ -28,7 +28,7 @@ class EastCfg(TaskCfg):
 
 
 class East(Task):
-    """Walk 0.1 m to the east."""
+    """Walk 0.4 m to the east."""
 
     senses = ("proprioception",)
     cfg: EastCfg
@@ -47,7 +47,7 @@ class East(Task):
         return {"progress": self.now - self.last, "arrived": float(self.solved(player))}
 
     def solved(self, player):
-        return bool(self.now > self.start + 0.1)
+        return bool(self.now > self.start + 0.4)
 
 
 class EastExpert(Expert):

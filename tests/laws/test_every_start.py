@@ -21,6 +21,7 @@ def test_every_seed_has_a_start_inside_the_rooms(own_game, seeds):
             assert min(room.distance_m((x, y)) for room in rooms) == 0.0, seed
 
 
+@pytest.mark.golden
 def test_frozen_starts_are_those_of_the_task(task, own_game):
     """The stored ones were written by another process."""
     stored, cfg = find_benchmark(task), game_cfg(task)

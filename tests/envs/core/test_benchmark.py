@@ -11,6 +11,7 @@ from veca_marl.envs.core.benchmark import find_benchmark, from_text, read_starts
 QUIET = ("senses/vision=blind",)
 
 
+@pytest.mark.golden
 def test_an_episode_has_its_start_whatever_was_played_before():
     cfg = compose(["+task=KickTheBall", *QUIET]).game
     benchmark = find_benchmark("KickTheBall")
@@ -30,6 +31,7 @@ def test_the_text_of_a_file_is_read_as_it_was_written():
     assert from_text(to_text(one)) == one
 
 
+@pytest.mark.golden
 def test_other_senses_are_accepted():
     cfg = compose(["+task=KickTheBall", "senses/audio=mono", *QUIET]).game
     find_benchmark("KickTheBall").check(cfg)

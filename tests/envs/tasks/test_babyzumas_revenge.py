@@ -1,8 +1,11 @@
 """BabyzumasRevenge: the locked door, the key in the drawer, the order of events, the expert."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 import started
+from composed import compose
 
 from veca_marl.config import ConfigError
 from veca_marl.envs.core.episodes import play_to_end
@@ -13,6 +16,19 @@ SMALL = ("senses.vision.width=32", "senses.vision.height=32", "senses.audio.pres
 
 def game_of(*overrides):
     return started.game_of("BabyzumasRevenge", *SMALL, *overrides)
+
+
+@cache
+def random_house():
+    """The first generated house with a room that one door without a leaf leads into."""
+    for seed in range(50):
+        house = ("playground=random_house", f"playground.seed={seed}")
+        try:
+            compose(["+task=BabyzumasRevenge", *house])
+        except ConfigError:
+            continue
+        return house
+    raise AssertionError("50 houses without such a room")
 
 
 @pytest.fixture(scope="module")
@@ -79,14 +95,14 @@ def test_the_expert_reports_each_event_once_and_only_the_room_is_rewarded(game):
     ("playground", "room"),
     [
         (["playground=house2"], "nursery"),
-        (["playground=random_house", "playground.seed=2"], "living"),
+        (None, None),
         (["playground=seven_rooms"], "south_middle"),
     ],
 )
 def test_the_expert_escapes_from_a_room_of_a_house(playground, room):
-    game = game_of(*playground)
+    game = game_of(*(playground or random_house()))
     game.reset(np.random.default_rng(0))
-    assert game.task.room.name == room
+    assert room in {None, game.task.room.name}
     list(play_to_end(game, Script.expert))
     assert game.task.solved(game.players[0])
     assert not game.task.room.contains(game.task.walker.position)
@@ -99,15 +115,12 @@ def test_a_playground_without_a_room_with_one_open_door_is_refused(playground):
         game_of(f"playground={playground}")
 
 
-LOW_DOORS = ("playground=random_house", "playground.seed=2", "playground.walls.door_height_m=1.2")
-
-
 @pytest.mark.parametrize(
     ("more", "height_m"), [([], 1.2), (["playground.room_height_m=1.0"], 1.0)], ids=["door", "room"]
 )
 def test_the_leaf_is_as_high_as_the_opening_and_opens(more, height_m):
     """The wall over a door of 1.2 m held a leaf of 2 m."""
-    game = game_of(*LOW_DOORS, *more)
+    game = game_of(*random_house(), "playground.walls.door_height_m=1.2", *more)
     leaf = game.task.door
     assert leaf.cfg.parts[0].size_m[2] == pytest.approx(height_m - 0.02)
     leaf.unlock(game.task.key)
@@ -120,4 +133,4 @@ def test_the_leaf_is_as_high_as_the_opening_and_opens(more, height_m):
 
 def test_walls_that_are_too_thin_for_the_leaf_are_refused():
     with pytest.raises(ConfigError, match=r"walls.thickness_m=0.04 is too thin; choose at least"):
-        game_of(*LOW_DOORS[:2], "playground.walls.thickness_m=0.04")
+        game_of(*random_house(), "playground.walls.thickness_m=0.04")

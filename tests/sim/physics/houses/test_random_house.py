@@ -252,7 +252,9 @@ def test_only_generated_playgrounds_have_a_seed():
 
 
 def test_a_generated_house_becomes_a_world():
-    world = World(RandomHouseCfg(seed=7))
-    assert {"wall_0", "living_plant", "floor_living"} <= set(world.props)
+    house = RandomHouseCfg(seed=7)
+    world = World(house)
+    assert {"wall_0", "floor_living"} <= set(world.props)
+    assert {piece.name for piece in house.furniture} <= set(world.props)
     assert not world.prop("floor_living").cfg.tangible
     world.close()
