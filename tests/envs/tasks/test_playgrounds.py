@@ -42,6 +42,28 @@ def test_tasks_of_the_paper_are_played_in_furnished_houses(task, playground):
     game.close()
 
 
+@pytest.mark.parametrize("count", [1, pytest.param(10, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("task", ["KickTheBall", "ObjectNav", "MultiAgentNav", "ColorSort"])
+def test_tasks_start_in_the_random_house_of_any_seed(task, count):
+    for seed in np.random.default_rng(0).integers(0, 1_000_000, count).tolist():
+        words = (f"playground.seed={seed}", "playground.leaves=0.5")
+        game = play(task, "random_house", *words, resets=2, steps=0)
+        assert not overlaps(game), seed
+        game.close()
+
+
+def test_random_houses_without_loops_have_a_room_with_one_door():
+    for seed in np.random.default_rng(1).integers(0, 1_000_000, 5).tolist():
+        compose(
+            [
+                "+task=BabyzumasRevenge",
+                "playground=random_house",
+                f"playground.seed={seed}",
+                "playground.loops=0",
+            ]
+        )
+
+
 @pytest.mark.parametrize(
     ("words", "message"),
     [

@@ -300,8 +300,8 @@ def _start_of(playground: PlaygroundCfg) -> tuple[RoomCfg, DoorCfg]:
     raise ValueError(
         "BabyzumasRevenge starts in a room that has one door, without a leaf of its own; "
         f"playground {playground.name!r} has none: choose playground=two_rooms, three_rooms, "
-        "seven_rooms or house2, or another playground.seed or fewer playground.leaves of "
-        "random_house"
+        "seven_rooms or house2, or random_house with another playground.seed, fewer "
+        "playground.leaves or playground.loops=0"
     )
 
 
