@@ -10,6 +10,7 @@ from veca_marl.sim.physics import PropCfg, PropShape
 CELL_M = 0.04
 BODY_M = 0.78  # height below which props are in the way
 RADIUS_M = 0.11
+THICKEST_M = 0.5  # of walls
 TIE_M = 1e-6  # a distance that is equal to the radius counts as enough, whatever its last digits
 
 
@@ -29,8 +30,11 @@ class FloorMap:
             self.free |= self.in_box(np.add(room.lower_m, room.size_m), room)
         for door in playground.doors:
             half = door.width_m / 2
-            x, y = door.position_m
-            self.free |= (abs(self.x - x) < half) & (abs(self.y - y) < half)
+            x, y = (
+                abs(axis - at) for axis, at in zip((self.x, self.y), door.position_m, strict=True)
+            )
+            # one arm of this cross leads through the wall, the other one lies in it
+            self.free |= (np.minimum(x, y) < half) & (np.maximum(x, y) < max(half, THICKEST_M / 2))
         for prop in pieces([*playground.built_props(), *also]):
             if is_in_the_way(prop):
                 near = self.near(prop, radius_m)

@@ -14,6 +14,7 @@ from veca_marl.config.stored import body_names, typed
 from veca_marl.sim.physics import RandomHouseCfg, World
 from veca_marl.sim.physics.houses.floor_division import FloorNeeds
 from veca_marl.sim.physics.houses.generated_doors import floor_of, open_leaf, turns_into
+from veca_marl.sim.physics.houses.walls import WallsCfg
 
 WIDE_M = 0.15
 FEW_AND_MANY = pytest.mark.parametrize(
@@ -87,6 +88,12 @@ def test_leaves_that_leave_too_little_of_a_narrow_door_are_left_out(width_m):
         house = RandomHouseCfg(seed=seed, leaves=1.0, door_width_m=width_m)
         check_with_leaves(house)
         assert all(door.leaf is None for door in house.doors) or width_m > 0.3
+
+
+def test_narrow_doors_in_thick_walls_are_passed():
+    walls = WallsCfg(thickness_m=0.45)
+    for seed in some_seeds(3):
+        check_with_leaves(RandomHouseCfg(seed=seed, leaves=0.5, door_width_m=0.35, walls=walls))
 
 
 def check_with_leaves(house):
