@@ -1,13 +1,14 @@
 """The interface of a learning algorithm, and registries that find one by name.
 
-Each entry is a dataclass of numbers, with its name in the field ``name``, and a factory.
-
 An algorithm learns one team from batches of experience. Everything around it (training loop,
 evaluation, self-play, checkpoints, configuration) uses this interface and no other property of it.
 Teams that learn at the same time each have an algorithm of their own, possibly different ones.
 
 To add an algorithm: a dataclass of its numbers derived from `AlgorithmCfg`, a class derived from
 `Algorithm`, and ``register_algorithm("name", MyCfg, MyAlgorithm)``.
+
+Each entry of a registry is a dataclass of numbers, with its name in the field ``name``, and a
+factory.
 """
 
 from __future__ import annotations

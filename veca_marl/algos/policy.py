@@ -45,7 +45,7 @@ class UniformWarmUp(TensorDictModuleBase):
         return tensordict
 
     def write(self, arrays: Arrays) -> None:
-        """See `acting.modules.WritesArrays`."""
+        """See `acting.WritesArrays`."""
         if bool(self.active) and exploration_type() in (ExplorationType.RANDOM, None):
             for key, layout in self._actions.items():
                 arrays[key] = _uniform(layout, arrays[key])

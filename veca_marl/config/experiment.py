@@ -1,5 +1,7 @@
 """What an experiment compares, on which seeds, and what it claims.
 
+A claim is one line of text, in a small grammar:
+
 ================================ =====================================================
 ``hrtf > mono``                  the final score of an arm is above that of another arm
 ``hrtf > 1.25 x mono``           ... above a multiple of that of another arm

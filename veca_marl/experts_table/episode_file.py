@@ -1,7 +1,8 @@
 """The file of the episodes of one task, and stored episodes that are played once more.
 
-The configuration of a game says nothing about changes of the code. On another kind of processor
-the last digits can differ, and episodes with contacts then go another way.
+Episodes are played once more because the configuration of a game says nothing about changes of the
+code. On another kind of processor the last digits can differ, and episodes with contacts then go
+another way.
 """
 
 from __future__ import annotations

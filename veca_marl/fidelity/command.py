@@ -38,10 +38,10 @@ SECTIONS: dict[str, str] = {
     "near_field": "veca_marl.fidelity.hearing.near_field",
     "rigid_bodies": "veca_marl.fidelity.mechanics.rigid_bodies",
     "rooms": "veca_marl.fidelity.hearing.rooms",
-    "touch": "veca_marl.fidelity.touch",
+    "touch": "veca_marl.fidelity.touch.laws",
     "vision": "veca_marl.fidelity.vision",
 }
-"""Module of each section. It has a function ``section() -> Section``."""
+"""Module of each section, imported when it is measured: it has ``section() -> Section``."""
 
 
 def check_names(names: list[str]) -> None:

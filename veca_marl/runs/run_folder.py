@@ -1,7 +1,8 @@
 """The folder of a run: its files, its lock, where it comes from, and what the run has learnt.
 
-The system releases it when the process ends, however it ends, so that a run that was killed can be
-continued. The file stays then, which has no meaning without the lock.
+Only one process at a time writes to a folder: it holds a lock on the file `.lock`. The system
+releases it when the process ends, however it ends, so that a run that was killed can be continued.
+The file stays then, which has no meaning without the lock.
 """
 
 from __future__ import annotations

@@ -208,7 +208,7 @@ class TeamMemory(TensorDictModuleBase):
         return tensordict
 
     def write(self, arrays: Arrays) -> None:
-        """See `acting.modules.WritesArrays`."""
+        """See `acting.WritesArrays`."""
         features, state = arrays[self.features], arrays[self.state]
         begins = arrays["is_init"].unsqueeze(-2).expand(*features.shape[:-1], 1)
         present = [arrays[self.team, "mask"].unsqueeze(-1)] if self.masked else []

@@ -1,9 +1,9 @@
 """A body with arms away from the trunk, and points that are pressed into its skin.
 
-Two balls of 3 mm press into the skin. They are resolved if the readings have a maximum at each ball
-and fall below half of the smaller maximum between them, in the middle third of the line, where at
-least one taxel must lie. The threshold of a bone is the smallest distance at which three quarters
-of random pairs are resolved.
+Two-point resolution: two balls of 3 mm press into the skin. They are resolved if the readings have
+a maximum at each ball and fall below half of the smaller maximum between them, in the middle third
+of the line, where at least one taxel must lie. The threshold of a bone is the smallest distance at
+which three quarters of random pairs are resolved.
 """
 
 from __future__ import annotations
