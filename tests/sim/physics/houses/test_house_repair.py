@@ -7,7 +7,6 @@ from veca_marl.sim.physics import RandomHouseCfg
 from veca_marl.sim.physics.houses.furniture import FURNITURE, FurnitureCfg, FurnitureKind
 from veca_marl.sim.physics.houses.generated_doors import floor_of, in_front, turns_into
 from veca_marl.sim.physics.houses.house_repair import (
-    NODE_M,
     WITH_LEAVES,
     HouseData,
     WalkerLaw,
@@ -92,17 +91,12 @@ def test_walls_that_close_a_room_off_are_refused():
 
 
 @pytest.mark.parametrize("law", [WalkerLaw(), WITH_LEAVES], ids=["plain", "leaves"])
-def test_small_areas_without_space_may_be_closed_off(law):
-    """Cells of a strip that is closed off: none has space round it, then one has."""
-    clearance_m = np.full((60, 60), 1.0)
-    clearance_m[:, 30] = 0.0
-    clearance_m[:, 31:] = 0.05
-    few = int(law.closed_off_m2 / NODE_M**2)
-    closed = np.unravel_index(np.arange(few), (60, 29))
-    clearance_m[:, 31:][closed] = 0.12
-    assert not law.closed_off(clearance_m, NODE_M).any()
-    more = clearance_m.copy()
-    more[:, 31:][np.unravel_index(few, (60, 29))] = 0.12
-    assert law.closed_off(more, NODE_M).sum() == few + 1
-    clearance_m[0, 31] = law.space_m
-    assert law.closed_off(clearance_m, NODE_M).sum() == few
+def test_some_points_without_space_may_be_closed_off(law):
+    """Points behind a wall: none of them has space round it, then one has."""
+    clearance_m = np.full((20, 20), 1.0)
+    clearance_m[:, 10:] = 0.0
+    clearance_m[:6, 12] = 0.12
+    assert not law.closed_off(clearance_m, most=6).any()
+    assert law.closed_off(clearance_m, most=5).sum() == 6
+    clearance_m[0, 12] = law.space_m
+    assert law.closed_off(clearance_m, most=6).sum() == 6

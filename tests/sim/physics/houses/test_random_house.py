@@ -140,7 +140,7 @@ def test_a_walker_reaches_everything_while_leaves_are_open(count):
         hung = check_with_leaves(house)
         assert all(house.rooms[0].distance_m(leaf.position_m[:2]) > 0.2 for leaf in hung)
         leaves, doors = leaves + len(hung), doors + len(house.doors)
-    assert leaves > 0.7 * doors
+    assert leaves > 0.6 * doors
 
 
 def test_the_floor_that_open_leaves_cover_is_where_the_leaves_are():

@@ -30,7 +30,7 @@ NODE_M = 0.02
 """Distance of the points at which distances are computed."""
 
 _TIE_M = 1e-6  # distances are often equal to a limit: all lengths are whole centimetres
-_STRIDES = (1, 2)  # a fine grid finds small areas, a coarse one passages that are hardly wide
+_COARSE = 2  # of the points, every second along x and y
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,8 @@ class WalkerLaw:
         radius_m: Its radius.
         height_m: What begins above this height is not in its way.
         space_m: Positions that are so far away from walls and things are all connected.
-        closed_off_m2: Greatest area of the positions that have less space and are closed off.
+        closed_off_m2: Greatest area of the positions that have less space and are closed off, on
+            the coarse grid of `WalkerFloor`.
     """
 
     radius_m: float = 0.11
@@ -49,20 +50,19 @@ class WalkerLaw:
     space_m: float = 0.15
     closed_off_m2: float = 0.008
 
-    def closed_off(self, clearance_m: Floats, cell_m: float) -> Bools:
+    def closed_off(self, clearance_m: Floats, most: float) -> Bools:
         """Return where a walker fits but does not arrive, if this breaks the law.
 
         Args:
             clearance_m: ``(nx, ny)`` distance of points of a square grid from the nearest thing.
-            cell_m: Distance of the points.
+            most: Greatest number of such points if none of them has space round it.
 
         Returns:
             ``(nx, ny)``; all are False where the law holds.
         """
         beyond = _beyond_largest(clearance_m >= self.radius_m - _TIE_M)
         has_space = bool((clearance_m[beyond] >= self.space_m - _TIE_M).any())
-        is_large = float(beyond.sum()) * cell_m**2 > self.closed_off_m2 + _TIE_M
-        return beyond if has_space or is_large else np.zeros_like(beyond)
+        return beyond if has_space or beyond.sum() > most else np.zeros_like(beyond)
 
 
 def _beyond_largest(free: Bools) -> Bools:
@@ -105,16 +105,26 @@ class WalkerFloor:
             self.clearance_m[near] = np.minimum(self.clearance_m[near], self._away_m(thing, near))
 
     def closed_off(self, law: WalkerLaw) -> Floats:
-        """Return the points ``(n, 2)`` that break a law, metres; none where it holds."""
-        found = [np.empty((0, 2))]
-        for stride in _STRIDES:
-            # the points of the coarse grid are the middles of cells from the corner of the house on
-            taken = slice(stride - 1, None, stride)
-            beyond = law.closed_off(self.clearance_m[taken, taken], stride * NODE_M)
-            x, y = np.nonzero(beyond)
-            points = [axis[taken][cells] for axis, cells in zip(self._axes, (x, y), strict=True)]
-            found.append(np.stack(points, axis=-1))
-        return np.concatenate(found)
+        """Return the points ``(n, 2)`` that break a law, metres; none where it holds.
+
+        Positions with space are looked for on all points, and again on every second one: the
+        middles of cells from the corner of the house on, where passages have to be somewhat
+        wider. Areas are measured on these cells.
+        """
+        coarse_m = _COARSE * NODE_M
+        most = round(law.closed_off_m2 / coarse_m**2)
+        return np.concatenate(
+            [
+                self._closed_off(law, slice(None), math.inf),
+                self._closed_off(law, slice(_COARSE - 1, None, _COARSE), most),
+            ]
+        )
+
+    def _closed_off(self, law: WalkerLaw, taken: slice, most: float) -> Floats:
+        """Return those of some points that break a law, see `WalkerLaw.closed_off`."""
+        cells = np.nonzero(law.closed_off(self.clearance_m[taken, taken], most))
+        x, y = (axis[taken][numbers] for axis, numbers in zip(self._axes, cells, strict=True))
+        return np.stack([x, y], axis=-1)
 
     def _near(self, thing: Footprint, reach_m: float) -> tuple[slice, slice]:
         """Return the points that can be nearer to a thing than a distance."""
