@@ -7,8 +7,8 @@ import pytest
 from verbs import begin, do, seeing, toy
 from walking import ball, box, empty_world, let_pass, wall
 
-from veca_marl.sim.body.verbs import PutInto
 from veca_marl.sim.physics import PropCfg, PropShape
+from veca_marl.sim.physics.interactions import PutInto
 from veca_marl.sim.physics.props.containers import basket, chest
 from veca_marl.sim.physics.props.doors import door_leaf, sliding_leaf
 from veca_marl.sim.physics.props.joint import LockCfg

@@ -1,5 +1,8 @@
 """Names under which verbs are registered."""
 
+import subprocess
+import sys
+
 import pytest
 
 from veca_marl.sim.physics.interactions import INTERACTIONS, Interaction, register_interaction
@@ -24,3 +27,14 @@ def test_an_identifier_is_accepted(monkeypatch):
 
     assert register_interaction(Push) is Push
     assert INTERACTIONS["push_over2"] is Push
+
+
+def test_the_verbs_are_known_in_a_world_without_bodies():
+    """In a process that imports no body, as programs may do that use the physics without one."""
+    program = (
+        "import sys\n"
+        "from veca_marl.sim.physics.interactions import check_interactions\n"
+        "check_interactions('prop', ['grab', 'kick', 'step_on', 'put_into'])\n"
+        "assert 'veca_marl.sim.body' not in sys.modules\n"
+    )
+    subprocess.run([sys.executable, "-c", program], check=True)

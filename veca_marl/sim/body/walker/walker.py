@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from veca_marl.sim.body.action import Action
 from veca_marl.sim.body.base import Body, BodyCfg
-from veca_marl.sim.body.verbs import Close, Open
 from veca_marl.sim.body.walker.actions import (
     REFUSED,
     VERB,
@@ -33,6 +32,7 @@ from veca_marl.sim.body.walker.walker_cfg import WalkerCfg, greatest_speed_mps
 from veca_marl.sim.body.walker.walker_collisions import Footprint, walker_collisions
 from veca_marl.sim.geometry import Floats
 from veca_marl.sim.physics import Prop, World
+from veca_marl.sim.physics.interactions import Close, Open
 from veca_marl.sim.spec import ArraySpec
 
 MOVE = "move"  # the part of the action that walks

@@ -37,7 +37,7 @@ class WalkerCfg(BodyCfg):
         crawl_length_m: Its length in crawling, at least its height.
         crawl_share: Speed of crawling as a fraction of that of walking, in [0, 1].
         verbs: Verbs of the discrete action part `verb`, such as ``[grab, release]``; without
-            verbs there is no such part. See `veca_marl.sim.body.verbs`.
+            verbs there is no such part. See `veca_marl.sim.physics.interactions`.
     """
 
     action: WalkActionKind = WalkActionKind.continuous

@@ -251,7 +251,7 @@ class PropCfg:
         joint: How it is attached, see `JointCfg`; None for a prop that is fixed or free.
         material: How it sounds when it is hit, see `ImpactCfg`; it does not change the mass.
         interactions: Names of the verbs that bodies can apply to it, such as ``[grab]``; see
-            `veca_marl.sim.body.verbs`.
+            `veca_marl.sim.physics.interactions`.
     """
 
     # fields that were added later, with the value that props had before
