@@ -41,7 +41,7 @@ SECTIONS: dict[str, str] = {
     "touch": "veca_marl.fidelity.touch.laws",
     "vision": "veca_marl.fidelity.vision",
 }
-"""Module of each section, with a function ``section() -> Section``; imported when it is measured."""
+"""Module of each section, imported when it is measured, with ``section() -> Section``."""
 
 
 def check_names(names: list[str]) -> None:
