@@ -48,9 +48,10 @@ def test_a_body_beyond_a_wall_does_not_reach_the_object(cells, limit_m):
     game = game_of(f"task.cells={cells}", f"task.reach_m={limit_m - 1e-3}")
     target, wall = game.task.target, game.world.prop("maze_wall_0")
     x, y, _ = target.position
-    half_m = 3.0 / cells
-    wall.place((x + half_m, y, 0.0), math.pi / 2.0)
-    game.task.walker.place((x + half_m + wall.cfg.size_m[1] / 2.0 + 0.11, y, 0.0))
+    inward, half_m = (-1.0 if x > 0.0 else 1.0), 3.0 / cells  # away from the wall round the maze
+    wall.place((x + inward * half_m, y, 0.0), math.pi / 2.0)
+    beyond_m = half_m + wall.cfg.size_m[1] / 2.0 + 0.11
+    game.task.walker.place((x + inward * beyond_m, y, 0.0))
     assert gap_m(game.task.walker.position, target) == pytest.approx(limit_m)
     assert clearances_m(wall, game.task.walker.position[:2]) == pytest.approx(0.11)
     game.close()
