@@ -44,10 +44,13 @@ def test_the_tower_is_clear_of_the_body_from_the_least_distance_on(numbers):
 
 def test_the_tower_stands_while_the_body_sits_still(game):
     game.reset(np.random.default_rng(1))
-    for terms in sit(game, 0.4):
+    for terms in sit(game, 0.2):
         assert terms["blue_fell"] == 0.0
-        # it falls through gaps of 0.07 edges, and hands that sink may touch it
-        assert terms["height"] == pytest.approx(2.0, abs=0.15)
+        # it falls through gaps of 0.07 edges
+        assert terms["height"] == pytest.approx(2.0, abs=0.1)
+    for terms in sit(game, 0.2):  # hands that sink may touch and tilt it from now on
+        assert terms["blue_fell"] == 0.0
+        assert terms["height"] > 1.4
     assert sits(game)
     assert not game.task.solved(game.players[0])
 
