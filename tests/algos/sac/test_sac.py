@@ -23,8 +23,8 @@ from veca_marl.algos.specs import team_specs
 
 FORMS = {"continuous": {}, "discrete": {"discrete": True}, "hybrid": {"hybrid": True}}
 
-# Each test of learning passes with 16 of 16 seeds. With random actions for 64 frames only, one seed
-# in ten keeps an action of which the replay buffer has no other example in a state.
+# With random actions for 64 frames only, one seed in sixteen keeps an action of which the replay
+# buffer has no other example in a state.
 LEARNING = {"replay": ReplayCfg(2048, warm_up_frames=256), "updates_per_frame": 0.25}
 
 
