@@ -16,7 +16,7 @@ LAYOUTS = {
     "vision": ArrayLayout((2, 3, 36, 36), "uint8", 0.0, 255.0),
     "audio": ArrayLayout((2, 20), "float32", -8.0, 3.0),
 }
-ROUNDING = 2.0**-8  # of one number; all layers together, forward and back: at most 4.3 times, 9 seeds
+ROUNDING = 2.0**-8  # of one number; errors of all layers add up to at most 4.3 times that (9 seeds)
 
 
 @pytest.fixture
