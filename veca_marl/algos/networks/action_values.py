@@ -46,7 +46,7 @@ class BatchRenorm(nn.Module):
     The running statistics, which the policy's loss uses, are the mean over all batches until
     TorchRL's moving average, which forgets one hundredth with each batch, is the longer one.
     TorchRL starts that average at mean 0 and variance 1, which still are two thirds of it after 40
-    batches: policies were then improved by values of unnormalised units.
+    batches: policies would be improved by values of units that are not normalised.
 
     Args:
         features: Width of the input.
