@@ -74,8 +74,11 @@ _TOP_SPEED_RADPS = 30.0  # of a joint: twice the speed of human limbs
 # Bullet clips the speed of each joint without its reaction on the body, which adds momentum: its
 # limit is so high that it never acts
 _BULLET_TOP_SPEED = 1000.0
-# m, m/s, rad or rad/s: no motion reaches it; what does becomes infinite within a few steps
+# m or rad: no motion reaches it; what does becomes infinite within a few steps
 _LARGEST = 1e6
+# m/s or rad/s: Bullet cuts what is faster to its top speed; joints that are driven with full torque
+# reach 120 rad/s
+_FASTEST = 0.99 * _BULLET_TOP_SPEED
 _STOP_DISTANCE_RAD = 0.05  # 3 degrees, by which Bullet's stops are outside the joint limits
 _FLAGS = (
     pybullet.URDF_USE_INERTIA_FROM_FILE
@@ -137,6 +140,7 @@ class Articulation:
         self._links: list[int] = [found[joint][0] for joint in sorted(found)]
         low = np.array([skeleton.joints[joint].low_rad for joint in self.moving])
         high = np.array([skeleton.joints[joint].high_rad for joint in self.moving])
+        self._limits = _limits(len(found))
         count = len(skeleton.joints)
         self.angles, self.speeds = np.zeros(count), np.zeros(count)
         self.strengths_nm, self.damping = np.zeros(count), np.zeros(count)
@@ -242,7 +246,7 @@ class Articulation:
     def _read(self) -> bool:
         """Read Bullet's state; return whether it is valid, keep the last one if not.
 
-        It is valid if all numbers are finite and below `_LARGEST`.
+        It is valid if all numbers are finite, below `_LARGEST`, speeds below `_FASTEST`.
         """
         states = pybullet.getJointStates(self.body_id, self._links, physicsClientId=self._client)
         position, quaternion = pybullet.getBasePositionAndOrientation(
@@ -252,7 +256,7 @@ class Articulation:
         # zip first: an array of tuples costs three times an array of numbers
         angles, speeds = list(zip(*states, strict=True))[:2]
         row = np.array(position + quaternion + spin + velocity + speeds + angles)
-        if not (np.abs(row) < _LARGEST).all():  # false for numbers that are not finite
+        if not (np.abs(row) < self._limits).all():  # false for numbers that are not finite
             return False
         self.dynamics.solver.numbers[:] = row
         return True
@@ -346,3 +350,9 @@ def _load(client: int, skeleton: Skeleton, build: Build) -> int:
         pybullet.setPhysicsEngineParameter(enableFileCaching=0, physicsClientId=client)
         body_id: int = pybullet.loadURDF(str(path), flags=_FLAGS, physicsClientId=client)
     return body_id
+
+
+def _limits(joints: int) -> Floats:
+    """Return what the numbers of `SolverState` are below in any motion, ``(13 + 2 n,)``."""
+    speeds = np.full(6 + joints, _FASTEST)
+    return np.concatenate([np.full(3 + 4, _LARGEST), speeds, np.full(joints, _LARGEST)])

@@ -211,11 +211,11 @@ class Humanoid(Body):
 
     @property
     def is_finite(self) -> bool:
-        """Whether all its numbers have been finite, and below 1e6, since it was built.
+        """Whether all its numbers have been finite, and in the range of motions, since it was built.
 
         If not, its state is no longer updated: Bullet's collision detection does not recover from
-        numbers that are not finite, whatever is restored, so the world must be rebuilt. Speeds of
-        1e6 m/s are beyond any motion and become infinite within a few steps.
+        numbers that are not finite, whatever is restored, so the world must be rebuilt. Positions
+        of 1e6 m, and speeds that Bullet cuts (1000 m/s, 1000 rad/s), are beyond any motion.
         """
         return self._finite
 
