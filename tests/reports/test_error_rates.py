@@ -39,5 +39,4 @@ def test_runs_that_reach_the_threshold_at_the_same_evaluation_are_part_of_the_ra
         arms = [rng.integers(3, size=(4, 1)).astype(float) for _ in range(2)]
         low, high = bootstrap_interval(probability_of_improvement, arms, rng, 400)
         decided += low > 0.5 or high < 0.5
-    assert decided / trials == pytest.approx(false_speed_rate(4, 4), abs=0.025)
-    assert decided / trials > 0.08
+    assert 0.05 < decided / trials < false_speed_rate(4, 4) + 0.03

@@ -122,4 +122,5 @@ def test_statistics_agree_with_rliable(case):
     interval = bootstrap_interval(interquartile_mean, [one], rng)
     assert interval == pytest.approx(case["iqm_interval"], abs=0.05 * width + 1e-9)
     both = bootstrap_interval(probability_of_improvement, [one, other], rng)
-    assert both == pytest.approx(case["improvement_interval"], abs=0.04)
+    step = 1.0 / (len(one) * len(other))  # of the probability: the ends lie on one of its values
+    assert both == pytest.approx(case["improvement_interval"], abs=0.04 + step)

@@ -24,11 +24,15 @@ LIMIT_S = 60.0
 
 @pytest.fixture
 def policy(make_ppo):
-    policy = make_ppo().policy.copy()
-    with torch.no_grad():  # so that its actions, and the returns, differ between starts
-        for parameter in policy.parameters():
-            parameter.mul_(3.0)
-    return policy
+    """A policy whose actions, and returns, differ between starts."""
+    for seed in range(20):
+        policy = make_ppo(seed).policy.copy()
+        with torch.no_grad():
+            for parameter in policy.parameters():
+                parameter.mul_(3.0)
+        if len(set(returns(0, policy, SEVEN)[0])) > 1:
+            return policy
+    raise AssertionError("20 policies with the same action in each state")
 
 
 def returns(processes, policy, *requests, make_env=make_fake_env):
@@ -53,7 +57,7 @@ def test_new_parameters_reach_the_processes(policy):
         before = evaluator.play(SEVEN)["agents"].returns
         with torch.no_grad():
             for parameter in policy.parameters():
-                parameter.neg_()
+                parameter.zero_()
         after = evaluator.play(SEVEN)["agents"].returns
     assert (before != after).any()
     np.testing.assert_array_equal(after, returns(0, policy, SEVEN)[0])

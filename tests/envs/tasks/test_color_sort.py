@@ -134,6 +134,8 @@ def test_grabbing_and_releasing_has_no_return(game):
     game.reset(np.random.default_rng(0))
     walker = game.players[0].body
     walker.place((0.0, 0.0, 0.0))
+    for number in range(1, len(game.task.items)):  # out of reach
+        game.task.items[number].place(np.array([-2.8, number * 0.3 - 1.0, 0.0]), 0.0)
     game.task.items[0].place(np.array([0.9, 0.0, 0.0]), 0.0)
     game.world.refresh()
     for _ in range(3):

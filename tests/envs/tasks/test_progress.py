@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from babies import child_game, put, rest
+from babies import child_game, rest
 
 from veca_marl.envs.tasks.locomotion.motor_skills import ForwardProgress
 from veca_marl.sim.body.humanoid.postures import ON_ALL_FOURS, STANDING
@@ -73,10 +73,11 @@ def test_no_random_cycle_is_rewarded():
 @pytest.mark.parametrize(("task", "posture"), [("CrawlBaby", ON_ALL_FOURS), ("RunBaby", STANDING)])
 def test_a_body_that_rocks_slowly_forward_and_fast_backward_earns_nothing(task, posture):
     """It is moved 4 x 40 mm forward and 160 mm back, faster than the limit, eight times."""
-    yaw_rad = 0.7
-    ahead = np.array([math.cos(yaw_rad), math.sin(yaw_rad), 0.0])
     with child_game(task) as game:
-        body, earned = put(game, posture), []
+        body, earned = game.players[0].body, []
+        ahead = body.forward  # at the start, the direction that is rewarded
+        yaw_rad = math.atan2(ahead[1], ahead[0])
+        body.place((0.0, 0.0, 0.0), yaw_rad, posture)
         rest(game)  # the reward of the way from the start is not counted
         for place_m in [0.04, 0.08, 0.12, 0.16, 0.0] * 8:
             body.place(place_m * ahead, yaw_rad, posture)

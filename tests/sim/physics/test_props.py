@@ -104,11 +104,11 @@ def test_the_box_and_the_lowest_point_are_tight(cfg):
     low, high = bounding_box(geoms)
     for found, bound, outside in ((points.min(0), low, -1.0), (points.max(0), high, 1.0)):
         assert (outside * (bound - found) >= 0.0).all()
-        np.testing.assert_allclose(found, bound, atol=0.05)
+        np.testing.assert_allclose(found, bound, atol=0.1)
     for degrees in ((0.0, 0.0, 0.0), (45.0, 0.0, 0.0), (20.0, 130.0, 70.0)):
         rotation = rotation_about_axes(degrees)
         lowest = (points @ rotation.T)[:, 2].min()
-        assert lowest - 0.05 <= lowest_m(geoms, rotation) <= lowest
+        assert lowest - 0.1 <= lowest_m(geoms, rotation) <= lowest
 
 
 def test_a_tilted_plate_has_its_lowest_point_at_its_rim():

@@ -118,10 +118,12 @@ def test_boxes_that_collide_move_as_in_the_first_episode_whatever_collided_befor
         world.refresh()
         return film(world, steps=40)
 
-    first = played(1)
-    for other in range(2, 5):
-        played(other)
-        np.testing.assert_array_equal(played(1), first)
+    # after 231, a contact of the built world was found in 230 between boxes that are 0.3 m apart
+    for one, others in ((1, range(2, 5)), (230, [231])):
+        first = played(one)
+        for other in others:
+            played(other)
+            np.testing.assert_array_equal(played(one), first)
     world.close()
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -31,6 +32,7 @@ from veca_marl.sim.physics import (
     StandingProp,
     World,
 )
+from veca_marl.sim.physics.houses.door_leaves import first_met
 from veca_marl.sim.physics.props.containers import cupboard_with_drawer
 from veca_marl.sim.physics.props.doors import LEAF_M, LEAF_WALL_M, door_leaf
 from veca_marl.sim.physics.props.toys import key
@@ -205,6 +207,7 @@ class BabyzumasRevenge(Task):
     def check_playground(cls, cfg: Any, playground: PlaygroundCfg) -> None:
         room, door = _start_of(playground)
         _check_thickness(playground, door)
+        _leaf_of(playground, room, door)
         furniture, cupboard = planned_furniture(playground), planned_cupboard()
         check_placement(
             lambda rng: _try_start(room, door, furniture, cupboard, rng),
@@ -220,12 +223,7 @@ class BabyzumasRevenge(Task):
         self._next = _room_behind(playground, doorway, self.room)
         self.doorway = np.array(doorway.position_m)
         self.out = direction_out(self.room, self.doorway)
-        yaw_deg = math.degrees(math.atan2(self.out[1], self.out[0]))
-        height_m = _leaf_height_m(playground, doorway)
-        leaf = door_leaf(
-            "door_leaf", doorway.position_m, yaw_deg, doorway.width_m, height_m, lock=LockCfg("key")
-        )
-        self.door = self.world.add_prop(leaf)
+        self.door = self.world.add_prop(_leaf_of(playground, self.room, doorway))
         self.cupboard, self.drawer, self.key = self._drawer = add_key_drawer(
             self.world, self.cfg.sound()
         )
@@ -318,6 +316,36 @@ def _check_thickness(playground: PlaygroundCfg, door: DoorCfg) -> None:
             f"leaf of {LEAF_M} m, for which walls.thickness_m={walls.thickness_m} is too thin; "
             f"choose at least {LEAF_WALL_M}, or playground=two_rooms"
         )
+
+
+def _leaf_of(playground: PlaygroundCfg, room: RoomCfg, door: DoorCfg) -> PropCfg:
+    """Return the locked leaf of a door; it opens out of the room, its hinge where it meets nothing.
+
+    Raises:
+        ValueError: If it meets a wall or a piece of furniture with the hinge at either end.
+    """
+    out = direction_out(room, np.array(door.position_m))
+    yaw_deg = math.degrees(math.atan2(out[1], out[0]))
+    leaf = partial(
+        door_leaf,
+        "door_leaf",
+        door.position_m,
+        width_m=door.width_m,
+        height_m=_leaf_height_m(playground, door),
+        lock=LockCfg("key"),
+    )
+    ends = [leaf(yaw_deg=yaw_deg), leaf(yaw_deg=yaw_deg + 180.0, opens_to_front=False)]
+    things = [prop for prop in playground.built_props() if prop.tangible and prop.mass_kg == 0.0]
+    met = [first_met(end, things) for end in ends]
+    for end, hindrance in zip(ends, met, strict=True):
+        if hindrance is None:
+            return end
+    names = " and ".join(repr(hindrance.thing.name) for hindrance in met if hindrance)
+    raise ValueError(
+        f"BabyzumasRevenge closes door {door.name!r} of playground {playground.name!r} with a "
+        f"leaf that meets {names} before it is open; choose another playground.seed, less "
+        "furniture or playground=two_rooms"
+    )
 
 
 def _leaf_height_m(playground: PlaygroundCfg, door: DoorCfg) -> float:

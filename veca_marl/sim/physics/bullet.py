@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import os
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -36,14 +36,17 @@ with _silent_stderr():
 
 __all__ = [
     "HULL_MARGIN_M",
+    "LinkPair",
     "are_in_contact",
     "create_collision_shape",
     "free_path_m",
     "is_contact",
+    "let_collide",
     "penetration_m",
     "pybullet",
     "shape_arguments",
     "surface_m",
+    "touching_links",
     "unused_visual_shape",
     "urdf_geometry",
 ]
@@ -198,6 +201,30 @@ def are_in_contact(client: int, one: int, other: int) -> bool:
     """
     points = pybullet.getContactPoints(one, other, physicsClientId=client)
     return any(map(is_contact, points))
+
+
+LinkPair: TypeAlias = tuple[int, int, int, int]
+"""Two bodies that collide, and the link of each."""
+
+
+def touching_links(client: int, ignored_id: int) -> list[LinkPair]:
+    """Return the links of different bodies that have contacts, in ascending order.
+
+    Args:
+        client: The PyBullet client.
+        ignored_id: PyBullet's id of a body whose contacts are left out.
+    """
+    points = pybullet.getContactPoints(physicsClientId=client)
+    pairs = {tuple(point[1:5]) for point in points if ignored_id not in point[1:3]}
+    return sorted(pair for pair in pairs if pair[0] != pair[1])
+
+
+def let_collide(client: int, pairs: Iterable[LinkPair], collide: bool) -> None:
+    """Let pairs of links collide or not; Bullet forgets the contacts that they have."""
+    for one, other, link, other_link in pairs:
+        pybullet.setCollisionFilterPair(
+            one, other, link, other_link, int(collide), physicsClientId=client
+        )
 
 
 _MOST_HITS = 8  # a ray is followed through so many things
