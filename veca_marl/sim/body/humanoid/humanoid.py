@@ -211,7 +211,7 @@ class Humanoid(Body):
 
     @property
     def is_finite(self) -> bool:
-        """Whether all its numbers have been finite, and in the range of motions, since it was built.
+        """Whether its numbers have been finite, and in the range of motions, since it was built.
 
         If not, its state is no longer updated: Bullet's collision detection does not recover from
         numbers that are not finite, whatever is restored, so the world must be rebuilt. Positions
