@@ -85,7 +85,7 @@ def test_it_learns_from_shifted_images_with_an_encoder_trained_by_the_critics(ma
         "policy_hidden": [32],
         "random_shift": 2,
         "steps": 3,
-        "learning_rate": 3e-3,
+        "learning_rate": 1e-3,
     }
     eyes = {"senses": ("vision",)}
     algorithm = make_sac(changes=changes, **eyes)
