@@ -55,7 +55,7 @@ def test_a_restored_world_equals_a_fresh_one(playground):
         return world, walker
 
     used, its_walker = fresh()
-    for seed in range(5):
+    for seed in (0, *range(5000, 5005)):  # contacts of an episode remained in a later one
         world, walker = fresh()
         films = []
         for some_world, someone in ((world, walker), (used, its_walker)):

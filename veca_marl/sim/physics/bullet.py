@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import os
 import tempfile
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, NamedTuple, TypeAlias
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -36,17 +36,15 @@ with _silent_stderr():
 
 __all__ = [
     "HULL_MARGIN_M",
-    "LinkPair",
+    "BuiltContacts",
     "are_in_contact",
     "create_collision_shape",
     "free_path_m",
     "is_contact",
-    "let_collide",
     "penetration_m",
     "pybullet",
     "shape_arguments",
     "surface_m",
-    "touching_links",
     "unused_visual_shape",
     "urdf_geometry",
 ]
@@ -203,28 +201,56 @@ def are_in_contact(client: int, one: int, other: int) -> bool:
     return any(map(is_contact, points))
 
 
-LinkPair: TypeAlias = tuple[int, int, int, int]
-"""Two bodies that collide, and the link of each."""
+class BuiltContacts:
+    """Keeps contacts of other states out of a restored one, so that it equals a fresh world.
 
-
-def touching_links(client: int, ignored_id: int) -> list[LinkPair]:
-    """Return the links of different bodies that have contacts, in ascending order.
+    What overlaps in the built world is usually placed elsewhere after it has been restored. Bullet
+    would keep its contacts for a while; for how long depends on the episodes before. It discards
+    the contacts of the last episode only if the saved state holds contacts.
 
     Args:
-        client: The PyBullet client.
-        ignored_id: PyBullet's id of a body whose contacts are left out.
+        client: The PyBullet client, after its collision detection in the built state.
+        floor_id: PyBullet's id of the floor, the contacts with which are saved and restored.
     """
-    points = pybullet.getContactPoints(physicsClientId=client)
-    pairs = {tuple(point[1:5]) for point in points if ignored_id not in point[1:3]}
-    return sorted(pair for pair in pairs if pair[0] != pair[1])
+
+    def __init__(self, client: int, floor_id: int) -> None:
+        self._client = client
+        points = pybullet.getContactPoints(physicsClientId=client)
+        touching = {tuple(point[1:5]) for point in points if point[1] != point[2]}
+        overlaps = {pair for pair in touching if floor_id not in pair[:2]}
+        # the same ones at each reset: Bullet numbers the links that are named here anew, and the
+        # numbers decide about the order in which it solves contacts
+        self._forgotten = sorted(overlaps)
+        if touching == overlaps:  # no contact is saved
+            links = sorted(_moving_links(client) - {(floor_id, -1)})
+            self._forgotten += [(floor_id, body, -1, link) for body, link in links]
+
+    @contextmanager
+    def forgotten(self) -> Iterator[None]:
+        """Save or restore the built state without the contacts that must not be kept."""
+        self._let_collide(False)
+        yield
+        self._let_collide(True)
+
+    def _let_collide(self, collide: bool) -> None:
+        """Let links collide or not; Bullet forgets the contacts of those that do not."""
+        for one, other, link, other_link in self._forgotten:
+            pybullet.setCollisionFilterPair(
+                one, other, link, other_link, int(collide), physicsClientId=self._client
+            )
 
 
-def let_collide(client: int, pairs: Iterable[LinkPair], collide: bool) -> None:
-    """Let pairs of links collide or not; Bullet forgets the contacts that they have."""
-    for one, other, link, other_link in pairs:
-        pybullet.setCollisionFilterPair(
-            one, other, link, other_link, int(collide), physicsClientId=client
-        )
+def _moving_links(client: int) -> set[tuple[int, int]]:
+    """Return all links that move and have a collision shape, with their bodies."""
+    count = pybullet.getNumBodies(physicsClientId=client)
+    bodies = [pybullet.getBodyUniqueId(i, physicsClientId=client) for i in range(count)]
+    return {
+        (body, link)
+        for body in bodies
+        for link in range(-1, pybullet.getNumJoints(body, physicsClientId=client))
+        if pybullet.getDynamicsInfo(body, link, physicsClientId=client)[0] > 0.0
+        and pybullet.getCollisionShapeData(body, link, physicsClientId=client)
+    }
 
 
 _MOST_HITS = 8  # a ray is followed through so many things

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veca_marl.sim.geometry import Geom, Scene, Shape
-from veca_marl.sim.physics.bullet import LinkPair, let_collide, pybullet, touching_links
+from veca_marl.sim.physics.bullet import BuiltContacts, pybullet
 from veca_marl.sim.physics.clock import ClockCfg
 from veca_marl.sim.physics.impact_sounds import ImpactSounds
 from veca_marl.sim.physics.interactions import check_interactions
@@ -180,7 +180,7 @@ class World:
         self.step_count = 0
         self.broken_props: list[str] = []
         self._state: int | None = None
-        self._overlaps: list[LinkPair] = []
+        self._contacts: BuiltContacts
         self._built: BuiltState | None = None
         self._moving: list[Prop] = []
         self._joints: list[Joint] = []
@@ -256,16 +256,11 @@ class World:
         """
         self._check_not_frozen("freeze it again")
         check_keys(self.props)
-        # Bullet discards the contacts of the last episode only if the saved state holds contacts:
-        # without them, objects that touch at the start move differently than in a fresh world
         self._set_contact_share()
         pybullet.performCollisionDetection(physicsClientId=self.client)
-        # what overlaps now is usually placed elsewhere after a reset: its contacts would remain for
-        # a while, and for how long depends on the episodes before
-        self._overlaps = touching_links(self.client, self.floor_id)
-        let_collide(self.client, self._overlaps, False)
-        self._state = pybullet.saveState(physicsClientId=self.client)
-        let_collide(self.client, self._overlaps, True)
+        self._contacts = BuiltContacts(self.client, self.floor_id)
+        with self._contacts.forgotten():
+            self._state = pybullet.saveState(physicsClientId=self.client)
         self._built = built_state(self.scene, self.sound.sources)
         for joint in self._joints:
             joint.save()
@@ -287,9 +282,8 @@ class World:
         self.version += 1
         self._set_contact_share()
         self._resting.reset()
-        let_collide(self.client, self._overlaps, False)
-        pybullet.restoreState(self._state, physicsClientId=self.client)
-        let_collide(self.client, self._overlaps, True)
+        with self._contacts.forgotten():
+            pybullet.restoreState(self._state, physicsClientId=self.client)
         self._built.restore(self.scene)
         self.sound.reset(rng)
         if self._impacts is not None:
