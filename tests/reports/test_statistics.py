@@ -120,7 +120,7 @@ def test_statistics_agree_with_rliable(case):
     rng = np.random.default_rng(0)
     width = case["iqm_interval"][1] - case["iqm_interval"][0]
     interval = bootstrap_interval(interquartile_mean, [one], rng)
-    assert interval == pytest.approx(case["iqm_interval"], abs=0.05 * width + 1e-9)
+    assert interval == pytest.approx(case["iqm_interval"], abs=0.1 * width + 1e-9)
     both = bootstrap_interval(probability_of_improvement, [one, other], rng)
     step = 1.0 / (len(one) * len(other))  # of the probability: the ends lie on one of its values
     assert both == pytest.approx(case["improvement_interval"], abs=0.04 + step)

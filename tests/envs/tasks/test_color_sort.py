@@ -152,6 +152,8 @@ def test_put_into_lays_the_held_toy_into_the_basket_ahead(game):
     game.reset(np.random.default_rng(0))
     walker, basket = game.players[0].body, game.task.baskets[game.task.category[0]]
     walker.place((0.0, 0.0, 0.0))
+    for number, other in enumerate(game.task.baskets):  # out of reach
+        other.place(np.array([-2.5, number - 1.0, 0.0]), 0.0)
     basket.place(np.array([0.9, 0.0, 0.0]), 0.0)
     game.world.refresh()
     assert not command(game, "put_into")
