@@ -4,7 +4,6 @@ from functools import partial
 
 import pytest
 import torch
-import torchrl
 from composed import compose
 from duels import duel
 from knockouts import knockout
@@ -14,6 +13,7 @@ from torchrl.data import Unbounded
 from torchrl.envs import ParallelEnv, SerialEnv
 from torchrl.envs.utils import _StepMDP
 
+from veca_marl import private_parts
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
 from veca_marl.envs.adapters.torchrl.fast_step import NextState
 
@@ -208,10 +208,17 @@ def test_types_are_still_checked_where_asked(pair):
         env._step_proc_data(wrong)
 
 
-def test_other_versions_of_torchrl_are_refused(monkeypatch):
-    monkeypatch.setattr(torchrl, "__version__", "0.15.2")
-    with pytest.raises(ValueError, match=r"0\.14, this is 0\.15\.2; choose fast_step=False"):
-        VecaEnv(ball(), worlds=1)
-    env = VecaEnv(ball(), worlds=1, fast_step=False)
-    env.rollout(2)
-    env.close()
+def test_an_untested_version_of_torchrl_steps_on_the_general_path(monkeypatch):
+    with monkeypatch.context() as untested:
+        untested.setattr(private_parts, "TESTED_VERSIONS", ("0.1",))
+        private_parts.torchrl_is_tested.cache_clear()
+        with pytest.warns(UserWarning, match="TorchRL"):
+            general = VecaEnv(ball(), worlds=2, seed=5)
+        assert not general._fast_step
+        slowly = general.rollout(15, RandomPolicy(general))
+        general.close()
+    private_parts.torchrl_is_tested.cache_clear()
+    fast = VecaEnv(ball(), worlds=2, seed=5)
+    assert fast._fast_step
+    assert_same(fast.rollout(15, RandomPolicy(fast)), slowly)
+    fast.close()

@@ -90,8 +90,15 @@ class PixelConv2d(nn.Conv2d):
         device = pixels.device.type
         autocast = torch.is_autocast_enabled(device)
         dtype = torch.get_autocast_dtype(device) if autocast else self.weight.dtype
-        maps: Tensor = self._conv_forward(pixels.to(dtype), self.weight / 255.0, self.bias)
-        return maps
+        return nn.functional.conv2d(
+            pixels.to(dtype),
+            self.weight / 255.0,
+            self.bias,
+            self.stride,
+            self.padding,
+            self.dilation,
+            self.groups,
+        )
 
 
 class ImageEncoder(nn.Module):

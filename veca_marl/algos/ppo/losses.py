@@ -32,8 +32,8 @@ class TeamPPOLoss(ClipPPOLoss):
     - Optionally targets and values are normalised before the value loss. TorchRL's `MAPPOLoss`
       updates the statistics inside the loss; here they are constant while a batch is learnt.
 
-    Overrides the private hooks ``_log_weight``, ``_get_entropy`` and ``_critic_loss_inputs``;
-    `tests/algos/ppo/test_losses.py` compares each with its formula.
+    Overrides the private hooks ``_log_weight``, ``_get_entropy`` and ``_critic_loss_inputs``, see
+    `private_parts`; `tests/algos/ppo/test_losses.py` compares each with its formula.
 
     Attributes:
         value_norm: Running statistics of the value targets, or None; see `NormalisedCritic`.

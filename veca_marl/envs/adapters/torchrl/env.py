@@ -57,11 +57,10 @@ class VecaEnv(FastStepEnv):
         seed: Seed of all randomness; None is fresh entropy.
         first_world: Number of the first world.
         fast_step: Whether to replace two internal methods of TorchRL by shorter ones with the same
-            results, see `fast_step.py`.
+            results, see `fast_step.py`; not done with a version of TorchRL that was not tested.
 
     Raises:
-        ValueError: If there is less than one world, the configuration is impossible, or the fast
-            step was not tested with this version of TorchRL.
+        ValueError: If there is less than one world, or the configuration is impossible.
     """
 
     def __init__(

@@ -6,8 +6,8 @@ next step starts from (`EnvBase._step_mdp`). For a game of 2 ms that is a tenth 
 `FastStepEnv` knows the layout from its specs. Its results are those of TorchRL's own code, which
 stays in use for whatever is not a plain `TensorDict`.
 
-The two methods are not part of TorchRL's documented interface. Therefore the fast step is an option
-that is refused for other versions than those it was tested with.
+The two methods are not part of TorchRL's documented interface: with a version that was not tested,
+TorchRL's own code is used, see `private_parts`.
 """
 
 from __future__ import annotations
@@ -17,34 +17,25 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import torch
-import torchrl
 from tensordict import TensorDict, TensorDictBase
 from torchrl.data import Composite
 from torchrl.envs import EnvBase
 
-TESTED_VERSIONS = ("0.14",)  # of TorchRL: major and minor
+from veca_marl.private_parts import torchrl_is_tested
 
 
 class FastStepEnv(EnvBase):
     """An `EnvBase` whose `_step` returns all keys of its specs, in their shapes, at every step.
 
     Args:
-        fast_step: Whether to use the shorter path; False is TorchRL's own code.
+        fast_step: Whether to use the shorter path, if this version of TorchRL was tested; False is
+            TorchRL's own code.
         batch_size: As for `EnvBase`.
-
-    Raises:
-        ValueError: If `fast_step` is asked for with an untested version of TorchRL.
     """
 
     def __init__(self, fast_step: bool, batch_size: torch.Size) -> None:
-        version = ".".join(torchrl.__version__.split(".")[:2])
-        if fast_step and version not in TESTED_VERSIONS:
-            raise ValueError(
-                f"fast_step=True was tested with TorchRL {', '.join(TESTED_VERSIONS)}, this is "
-                f"{torchrl.__version__}; choose fast_step=False"
-            )
         super().__init__(device=None, batch_size=batch_size)
-        self._fast_step = fast_step
+        self._fast_step = fast_step and torchrl_is_tested()
         self._next_state: NextState | None = None
 
     def _step_proc_data(self, next_tensordict_out: TensorDictBase) -> TensorDictBase:
@@ -212,4 +203,6 @@ class Layout:
             tensors[name] = layout._wrapped(arrays[name])
         # the shapes come from the spec: the constructor would compare each tensor with the batch
         # size again, which costs a third of the time that VecaEnv adds to the games
-        return TensorDict._new_unsafe(tensors, self._batch)
+        if torchrl_is_tested():
+            return TensorDict._new_unsafe(tensors, self._batch)
+        return TensorDict(tensors, self._batch)
