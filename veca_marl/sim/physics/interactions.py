@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Sequence
-from typing import TYPE_CHECKING, ClassVar, Protocol, TypeVar
+from typing import ClassVar, Protocol, TypeVar
 
 import numpy as np
 
@@ -16,8 +16,17 @@ from veca_marl.sim.geometry import Floats
 from veca_marl.sim.physics.props.prop import Prop
 from veca_marl.sim.physics.props.prop_cfg import PropShape
 
-if TYPE_CHECKING:
-    from veca_marl.sim.physics.world import World
+
+class WorldWithProps(Protocol):
+    """What verbs use of a world; `World` has all of it.
+
+    Attributes:
+        client: PyBullet's client id.
+        props: Its props by name.
+    """
+
+    client: int
+    props: dict[str, Prop]
 
 
 class InteractingBody(Protocol):
@@ -30,7 +39,7 @@ class InteractingBody(Protocol):
     name: str
 
     @property
-    def world(self) -> World:
+    def world(self) -> WorldWithProps:
         """The world in which it is."""
         ...
 
