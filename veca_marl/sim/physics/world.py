@@ -22,7 +22,7 @@ from veca_marl.sim.physics.props import (
     PropCfg,
     follow_physics,
     limit_detection,
-    resting_props,
+    prop_sleep,
 )
 from veca_marl.sim.physics.props.joint import Joint
 from veca_marl.sim.sound import SoundField, make_sound
@@ -133,6 +133,9 @@ class Mover(Protocol):
     def before_substep(self, substep_s: float) -> None:
         """Move or apply forces, before each physics step of `substep_s` seconds."""
 
+    def after_substep(self, substep_s: float) -> None:
+        """Read the state after each physics step, and apply limits of the body."""
+
     def write_frames(self) -> None:
         """Write the frames of the scene and the positions of sounds, once per agent step."""
 
@@ -157,7 +160,7 @@ class World:
         floor_id: PyBullet's id of the floor.
         props: Its props by name.
         movers: The bodies in it.
-        after_substep: Functions that are called after every physics step.
+        after_substep: Functions of observers, called at the end of every physics step.
         version: Counts steps, resets and refreshes. A sense computes its values once per version.
         step_count: Agent steps since the world was built; a reset does not set it back.
         broken_props: Names of props whose simulated pose is not finite any more. What eyes and ears
@@ -184,12 +187,11 @@ class World:
         self._built: BuiltState | None = None
         self._moving: list[Prop] = []
         self._joints: list[Joint] = []
-        self._resting = resting_props(self.client, self.clock)
+        self._sleep = prop_sleep(self.client, self.clock)
         self._configure_physics()
         self._impacts: ImpactSounds | None = None
         if playground.impacts.present:
             self._impacts = ImpactSounds(playground.impacts, self.clock, self.client, self.sound)
-            self.after_substep.append(self._impacts.after_substep)
         self.floor_id = add_floor(self.client, self.scene, playground)
         for prop in playground.built_props():
             self.add_prop(prop)
@@ -217,7 +219,7 @@ class World:
             self._add_joint(prop, prop.joint, parent)
         if self._impacts is not None:
             self._impacts.add(prop)
-        prop.rest = self._resting.add(prop)
+        prop.rest = self._sleep.add(prop)
         if not prop.fixed:
             self._moving.append(prop)
         return prop
@@ -281,7 +283,8 @@ class World:
             raise RuntimeError("freeze() the world before its first reset()")
         self.version += 1
         self._set_contact_share()
-        self._resting.reset()
+        if self._sleep.wake_all():
+            self._simulate()
         with self._contacts.forgotten():
             pybullet.restoreState(self._state, physicsClientId=self.client)
         self._built.restore(self.scene)
@@ -310,16 +313,33 @@ class World:
         for mover in self.movers:
             mover.before_step()
         for _ in range(self.clock.substeps):
-            for mover in self.movers:
-                mover.before_substep(self.clock.substep_s)
-            self._resting.simulate()
-            for notify in self.after_substep:
-                notify()
+            self._substep()
         self._update_scene()
-        self._resting.after_step(self.scene)
+        self._sleep.after_step(self.scene)
         self.sound.advance()
         self.step_count += 1
         self.version += 1
+
+    def _substep(self) -> None:
+        """Advance by one physics step: move, simulate, apply limits, observe."""
+        substep_s = self.clock.substep_s
+        for mover in self.movers:
+            mover.before_substep(substep_s)
+        self._simulate()
+        for joint in self._joints:
+            joint.after_substep()
+        if self._impacts is not None:  # sounds follow from where joints were stopped
+            self._impacts.after_substep()
+        for mover in self.movers:
+            mover.after_substep(substep_s)
+        for observe in self.after_substep:
+            observe()
+
+    def _simulate(self) -> None:
+        """Let Bullet make a physics step."""
+        self._sleep.before_substep()
+        pybullet.stepSimulation(physicsClientId=self.client)
+        self._sleep.after_substep()
 
     def overlap_m(self, one: int, other: int) -> float:
         """Return how deep two bodies penetrate each other where they are now, in metres.
@@ -372,9 +392,6 @@ class World:
 
     def _add_joint(self, prop: Prop, joint: Joint, parent: Prop | None) -> None:
         """Let a joint act after each physics step; the two props that it joins do not collide."""
-        if not self._joints:
-            # first: sounds of impacts follow from where joints were stopped
-            self.after_substep.insert(0, self._after_substep_of_joints)
         self._joints.append(joint)
         if parent is None:
             return
@@ -382,10 +399,6 @@ class World:
             pybullet.setCollisionFilterPair(
                 parent.body_id, prop.body_id, theirs, ours, 0, physicsClientId=self.client
             )
-
-    def _after_substep_of_joints(self) -> None:
-        for joint in self._joints:
-            joint.after_substep()
 
     def _check_not_frozen(self, what: str) -> None:
         if self._state is not None:

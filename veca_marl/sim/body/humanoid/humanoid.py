@@ -172,7 +172,6 @@ class Humanoid(Body):
         self._underside = Underside(self._skeleton, self.bone_names, skin=True)
         self._finite = True
         world.attach(self)
-        world.after_substep.append(self._after_substep)
         # Bullet restores the contacts of a saved state wrongly if bodies, or parts of one body,
         # touch in it: until the first reset each is far from all others, arms off the thighs
         self.place((_UNPLACED_M, 3.0 * len(world.movers), 0.0), 0.0, _ARMS_OUT)
@@ -360,8 +359,9 @@ class Humanoid(Body):
         self._pose_bones()
         self._mouth.position = self.mount("mouth").position
 
-    def _after_substep(self) -> None:
-        self._finite = self._finite and self.articulation.settle(self._world.clock.substep_s)
+    def after_substep(self, substep_s: float) -> None:
+        """Read the state, apply the limits of the joints and restore the momentum."""
+        self._finite = self._finite and self.articulation.settle(substep_s)
 
     def _start(self) -> None:
         """Begin at rest in the present pose."""

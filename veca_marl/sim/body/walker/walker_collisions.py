@@ -244,6 +244,9 @@ class WalkerCollisions:
         for (x, y), walker in zip(positions.tolist(), self._walkers, strict=True):
             walker.set_position(x, y, substep_s)
 
+    def after_substep(self, substep_s: float) -> None:
+        """Do nothing: walkers follow no physics, see `Mover`."""
+
     def _separate(self, positions: Floats) -> None:
         """Move walkers apart that overlap or press a thing between them.
 

@@ -11,7 +11,7 @@ from veca_marl.sim.physics.props.prop_cfg import (
     check_appearance,
 )
 from veca_marl.sim.physics.props.rigid_body import limit_detection
-from veca_marl.sim.physics.props.sleeping import resting_props
+from veca_marl.sim.physics.props.sleeping import prop_sleep
 
 __all__ = [
     "SIZE_NAMES",
@@ -27,5 +27,5 @@ __all__ = [
     "check_appearance",
     "follow_physics",
     "limit_detection",
-    "resting_props",
+    "prop_sleep",
 ]

@@ -1,48 +1,72 @@
-"""The physics steps of a world, with or without sleep of its props."""
+"""Sleep of the props of a world while they are at rest, or none."""
 
 from __future__ import annotations
 
 import math
+from typing import Protocol
 
 import numpy as np
 
 from veca_marl.sim.geometry import Floats, Scene
-from veca_marl.sim.physics.bullet import pybullet
 from veca_marl.sim.physics.clock import ClockCfg
 from veca_marl.sim.physics.props.prop import REST_SPEED, Awake, Prop, Rest, Sleep
 
 
-class AwakeProps:
-    """The props of a world in which nothing sleeps.
-
-    Args:
-        client: PyBullet's client id.
-    """
-
-    def __init__(self, client: int) -> None:
-        self._client = client
+class PropSleep(Protocol):
+    """What a world does with its props around each physics step so that they sleep at rest."""
 
     def add(self, prop: Prop) -> Rest:
         """Add a prop; return what it calls before it is moved."""
-        return Awake()
+        ...
 
-    def simulate(self) -> None:
-        """Let Bullet make a physics step."""
-        pybullet.stepSimulation(physicsClientId=self._client)
+    def before_substep(self) -> None:
+        """Prepare a physics step of Bullet."""
+        ...
+
+    def after_substep(self) -> None:
+        """Undo what Bullet did to props that were woken before its physics step."""
+        ...
 
     def after_step(self, scene: Scene) -> None:
-        """See which props are at rest.
+        """Let the props sleep that have been at rest for long enough.
 
         Args:
             scene: Where they are at the end of an agent step.
         """
+        ...
 
-    def reset(self) -> None:
-        """Wake all props, before Bullet's state is restored, which does not include sleep."""
+    def wake_all(self) -> bool:
+        """Wake all props, before Bullet's state is restored, which does not include sleep.
+
+        Returns:
+            Whether a physics step must follow, in which Bullet ends their sleep.
+        """
+        ...
 
 
-class RestingProps(AwakeProps):
-    """The props of a world in which they sleep when they are at rest.
+class NoSleep:
+    """The `PropSleep` of a world in which nothing sleeps."""
+
+    def add(self, prop: Prop) -> Rest:
+        """Return what does nothing before the prop is moved."""
+        return Awake()
+
+    def before_substep(self) -> None:
+        """Do nothing."""
+
+    def after_substep(self) -> None:
+        """Do nothing."""
+
+    def after_step(self, scene: Scene) -> None:
+        """Do nothing."""
+
+    def wake_all(self) -> bool:
+        """Return False: nothing sleeps."""
+        return False
+
+
+class RestingProps:
+    """The `PropSleep` of a world whose props sleep when they are at rest.
 
     It is itself the `Rest` of the fixed props: when one is put elsewhere, all others wake.
 
@@ -52,7 +76,8 @@ class RestingProps(AwakeProps):
     """
 
     def __init__(self, client: int, clock: ClockCfg) -> None:
-        super().__init__(client)
+        self._client = client
+        self._kept: list[tuple[Prop, Floats, Floats]] = []
         self._steps = math.ceil(clock.sleep_s / clock.step_s)
         self._rest_m = REST_SPEED * clock.step_s
         self._sleeps: list[Sleep] = []
@@ -77,17 +102,19 @@ class RestingProps(AwakeProps):
         for sleep in self._sleeps:
             sleep.wake()
 
-    def simulate(self) -> None:
-        """Let Bullet make a physics step.
+    def before_substep(self) -> None:
+        """Note the velocities of props that were woken."""
+        self._kept = [(prop, prop.velocity, prop.angular_velocity) for prop in self._woken]
+        self._woken.clear()
+
+    def after_substep(self) -> None:
+        """Give props that were woken before the physics step the velocity that they had.
 
         Bullet sets the velocity of sleeping props to zero in it, and ends the sleep of those that
-        were woken only afterwards: they get back the velocity that they had. A woken prop that
-        has a velocity after the step did not sleep, because something beside it moved.
+        were woken only afterwards. A woken prop that has a velocity after the step did not sleep,
+        because something beside it moved.
         """
-        kept = [(prop, prop.velocity, prop.angular_velocity) for prop in self._woken]
-        self._woken.clear()
-        super().simulate()
-        for prop, velocity, angular_velocity in kept:
+        for prop, velocity, angular_velocity in self._kept:
             if not (prop.velocity.any() or prop.angular_velocity.any()):
                 prop.set_velocity(velocity, angular_velocity)
 
@@ -105,23 +132,22 @@ class RestingProps(AwakeProps):
         for sleep, is_still in zip(self._sleeps, still.tolist(), strict=True):
             sleep.count(is_still)
 
-    def reset(self) -> None:
-        """Wake all props, before Bullet's state is restored, which does not include sleep."""
+    def wake_all(self) -> bool:
+        """See `PropSleep`."""
         self.wake_around()
-        if self._woken:
-            self.simulate()
         self._positions, self._rotations = _unknown_poses(len(self._rows))
+        return bool(self._woken)
 
 
-def resting_props(client: int, clock: ClockCfg) -> AwakeProps:
-    """Return the physics steps of a world, with sleep if its clock has any.
+def prop_sleep(client: int, clock: ClockCfg) -> PropSleep:
+    """Return the sleep of the props of a world, if its clock has any.
 
     Args:
         client: PyBullet's client id.
         clock: The clock of the world.
     """
     if math.isinf(clock.sleep_s):
-        return AwakeProps(client)
+        return NoSleep()
     return RestingProps(client, clock)
 
 
