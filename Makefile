@@ -60,7 +60,7 @@ bench: $(VENV)/installed ## agent steps per second, and the time of each part of
 	$(BIN)/python -m veca_marl.bench +task=KickTheBall $(ARGS)
 
 fidelity: $(VENV)/installed-test ## measure the laws of physics and senses; rewrite docs/reference/fidelity.md
-	$(BIN)/python -m veca_marl.fidelity to=docs/reference $(ARGS)
+	$(BIN)/python -m tools.fidelity to=docs/reference $(ARGS)
 
 docs: $(VENV)/installed-test ## build the documentation site in docs/_build/html
 	$(BIN)/python -m sphinx --fail-on-warning --keep-going -b html docs docs/_build/html $(ARGS)

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import matplotlib as mpl
 
-from veca_marl.fidelity.touch.fixed_arms import FOREARM, PALM, Ball, clocks, peaks
+from tools.fidelity.touch.fixed_arms import FOREARM, PALM, Ball, clocks, peaks
 
 mpl.use("Agg")
 import matplotlib.pyplot as plt

@@ -2,10 +2,10 @@
 
 import pytest
 
+from tools.experts_table.command import main as experts_table
 from veca_marl.babybench import main as babybench
 from veca_marl.config import ConfigError
 from veca_marl.config.command_line import check_file, check_folder
-from veca_marl.experts_table.command import main as experts_table
 from veca_marl.report import main as report
 
 

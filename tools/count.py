@@ -1,6 +1,6 @@
 """Print how large the modules of veca_marl are, and how they import each other.
 
-``python tools/count.py`` counts the files of this checkout, ``--rev REV`` those of a commit, and
+``python -m tools.count`` counts the files of this checkout, ``--rev REV`` those of a commit, and
 ``--against REV`` prints both side by side. Definitions are in ``tools/README.md``.
 """
 
@@ -16,8 +16,8 @@ from fractions import Fraction
 from itertools import zip_longest
 from pathlib import Path
 
-import counting
-from checkout import ROOT
+from tools import counting
+from tools.checkout import ROOT
 
 PACKAGE = "veca_marl"
 

@@ -1,6 +1,6 @@
 """Print digests of what veca_marl computes: they show whether a change of the code changed bytes.
 
-``python tools/digest.py --save before.txt`` writes them, ``--against before.txt`` compares. They
+``python -m tools.digest --save before.txt`` writes them, ``--against before.txt`` compares. They
 hold for one machine with one set of library versions. See ``tools/README.md``.
 """
 
@@ -18,11 +18,11 @@ from pathlib import Path
 
 import torch
 import torchrl
-from checkout import check_imported
-from digests.catalogue import Job, all_jobs, quick_jobs
-from digests.hashing import Digest, Item
 
 import veca_marl
+from tools.checkout import check_imported
+from tools.digests.catalogue import Job, all_jobs, quick_jobs
+from tools.digests.hashing import Digest, Item
 
 
 def measure(job: Job) -> dict[str, str]:

@@ -1,6 +1,6 @@
 """Print which modules and functions of veca_marl one agent step enters.
 
-``python tools/trace_step.py`` plays KickTheBall in one world with random actions and traces one
+``python -m tools.trace_step`` plays KickTheBall in one world with random actions and traces one
 step of the TorchRL environment after ``--warm`` others; ``--policy`` traces the policy of a short
 training run beside the environment. Compiled kernels are no functions of Python and not counted.
 """
@@ -17,9 +17,9 @@ from types import CodeType, FrameType
 from typing import Any
 
 import torch
-from checkout import check_imported
 
 import veca_marl
+from tools.checkout import check_imported
 
 PACKAGE = "veca_marl"
 Policy = Callable[[Any], Any]

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from veca_marl.fidelity.hearing.localisation import ARMS, localisation
+from tools.fidelity.hearing.localisation import ARMS, localisation
 
 TRAIN = (2_500, 10_000, 40_000)
 TEST = 2_000

@@ -3,9 +3,9 @@
 import subprocess
 from fractions import Fraction
 
-import count
-import counting
 import pytest
+
+from tools import count, counting
 
 GAME = '''"""A game.
 

@@ -2,17 +2,17 @@
 
 from dataclasses import dataclass
 
-import digest
 import numpy as np
 import pytest
 import torch
-from digests.catalogue import all_jobs, quick_jobs
-from digests.hashing import CHARACTERS, Digest
-from digests.plays import random_action
-from digests.trainings import last_state, without_times
 from torchrl.data import Bounded, Categorical
 
 import veca_marl
+from tools import digest
+from tools.digests.catalogue import all_jobs, quick_jobs
+from tools.digests.hashing import CHARACTERS, Digest
+from tools.digests.plays import random_action
+from tools.digests.trainings import last_state, without_times
 
 
 def of(value):

@@ -1,6 +1,6 @@
 """Traces of calls, and of one step of a task."""
 
-import trace_step
+from tools import trace_step
 
 
 def outer():

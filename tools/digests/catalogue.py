@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import veca_marl
-from digests.hashing import Item
-from digests.plays import (
+from tools.digests.hashing import Item
+from tools.digests.plays import (
     Choice,
     ExpertPlay,
     GymnasiumPlay,
@@ -12,7 +12,7 @@ from digests.plays import (
     Picture,
     Rollout,
 )
-from digests.trainings import Training
+from tools.digests.trainings import Training
 
 Job = tuple[Item, ...]
 

@@ -11,7 +11,7 @@ import numpy as np
 import torch
 
 import veca_marl
-from digests.hashing import Digest
+from tools.digests.hashing import Digest
 
 SEED = 3
 WORLDS = 2

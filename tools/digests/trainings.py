@@ -11,7 +11,7 @@ from typing import Any
 import torch
 
 import veca_marl
-from digests.hashing import Digest
+from tools.digests.hashing import Digest
 
 FRAMES = 512
 SHORT = (

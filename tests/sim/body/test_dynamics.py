@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from humanoids import kinetic_energy, random_torques, several_humanoids
 
-from veca_marl.fidelity.mechanics.momentum import totals
+from tools.fidelity.mechanics.momentum import totals
 from veca_marl.sim.body.humanoid import Detail
 
 

@@ -5,7 +5,7 @@ import pytest
 from composed import compose
 from listening import RATE
 
-from veca_marl.fidelity.hearing.ears import (
+from tools.fidelity.hearing.ears import (
     heard_noise,
     interaural_level_db,
     interaural_time_s,

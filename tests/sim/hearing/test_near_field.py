@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.special import eval_legendre
 
-from veca_marl.fidelity.hearing.near_field import ALL_HZ, LOW_HZ, errors_db
+from tools.fidelity.hearing.near_field import ALL_HZ, LOW_HZ, errors_db
 from veca_marl.sim.body.sense_organs import MOUNTS_M
 from veca_marl.sim.hearing import HrtfReceiver, MonoReceiver, kemar_table
 from veca_marl.sim.hearing.receivers import near_field_gain, sphere_gain

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 from touching import Stage, of_bone
 
-from veca_marl.fidelity.touch.flat_skin import Approach, extremes
+from tools.fidelity.touch.flat_skin import Approach, extremes
 from veca_marl.sim.body.anatomy import load_skeleton
 from veca_marl.sim.geometry import Geom, Shape, convex_hull, pyramid
 
 
 def test_readings_rise_until_the_bone_is_reached():
-    """The laws of `veca_marl.fidelity`, for pyramids with their tips and edges ahead."""
+    """The laws of `tools.fidelity`, for pyramids with their tips and edges ahead."""
     rng = np.random.default_rng(0)
     approaches = [
         Approach(Shape.POLYHEDRON, width, skin, path, tilt, float(rng.uniform(0, 360)), radius)

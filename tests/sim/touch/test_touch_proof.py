@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from touching import of_bone
 
-from veca_marl.fidelity.touch import fixed_arms
-from veca_marl.fidelity.touch.fixed_arms import FOREARM, PALM, RIGHT_PALM, Ball, FixedArms
+from tools.fidelity.touch import fixed_arms
+from tools.fidelity.touch.fixed_arms import FOREARM, PALM, RIGHT_PALM, Ball, FixedArms
 from veca_marl.sim.body.anatomy import load_skeleton
 from veca_marl.sim.physics import GRAVITY_MPS2, ClockCfg
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from eye_scenes import SIMPLE, cast, clutter, random_pose, random_rotations, small_camera
 
-from veca_marl.fidelity.vision import TinyRenderer
+from tools.fidelity.vision import TinyRenderer
 from veca_marl.sim.geometry import Geom, Pose, Scene, Shape
 from veca_marl.sim.vision import Camera, look_at
 from veca_marl.sim.vision.camera import view_axes

@@ -1,0 +1,1 @@
+"""Commands for developers, run in a checkout as ``python -m tools.NAME``; not in the wheel."""

@@ -1,0 +1,1 @@
+"""Laws of physics and of the senses, measured: ``python -m tools.fidelity``."""
