@@ -66,7 +66,7 @@ docs: $(VENV)/installed-test ## build the documentation site in docs/_build/html
 	$(BIN)/python -m sphinx --fail-on-warning --keep-going -b html docs docs/_build/html $(ARGS)
 
 pages: $(VENV)/installed-test ## rewrite the generated pages and pictures of docs/
-	$(BIN)/python scripts/make_docs.py
+	$(BIN)/python -m tools.make_docs
 
 WHEEL_BYTES := 4000000
 wheel: $(VENV)/installed-test ## build the wheel in dist/; refuse one of more than 4 MB

@@ -8,7 +8,7 @@ from importlib.metadata import packages_distributions
 
 from paths import ROOT
 
-OWN = {"veca_marl", "hydra_plugins"}
+OWN = {"veca_marl", "hydra_plugins", "tools"}
 
 
 def imported():

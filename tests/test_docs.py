@@ -12,21 +12,21 @@ import subprocess
 import sys
 from pathlib import Path
 
-import make_docs
 import pytest
-from docs_pages.bodies_of_tasks import DISCRETE_BODIES
-from docs_pages.body_tables import body_page
-from docs_pages.docstrings import entries, prose
-from docs_pages.observation_page import MEANINGS, all_specs
-from docs_pages.parts_picture import parts_picture
-from docs_pages.pictures import perception_picture, task_picture, touch_picture
-from docs_pages.playground_page import from_above, playground, playgrounds
-from docs_pages.tables import text
-from docs_pages.task_pages import built_in_tasks, task_page
 from docutils.core import publish_doctree
 from sphinx.ext import napoleon
 
 import veca_marl
+from tools import make_docs
+from tools.docs_pages.bodies_of_tasks import DISCRETE_BODIES
+from tools.docs_pages.body_tables import body_page
+from tools.docs_pages.docstrings import entries, prose
+from tools.docs_pages.observation_page import MEANINGS, all_specs
+from tools.docs_pages.parts_picture import parts_picture
+from tools.docs_pages.pictures import perception_picture, task_picture, touch_picture
+from tools.docs_pages.playground_page import from_above, playground, playgrounds
+from tools.docs_pages.tables import text
+from tools.docs_pages.task_pages import built_in_tasks, task_page
 from veca_marl import list_tasks
 from veca_marl.config import ConfigError, compose
 from veca_marl.envs.core.game import Game

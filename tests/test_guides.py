@@ -23,7 +23,7 @@ WRITTEN = [
     for page in sorted((DOCS / folder).glob("*.md"))
     if page.name != "changelog.md"
 ]
-READMES = sorted((ROOT / "experiments").rglob("README.md"))
+READMES = [*sorted((ROOT / "experiments").rglob("README.md")), ROOT / "tools" / "README.md"]
 CHANGELOG = ROOT / "CHANGELOG.md"  # names what there was
 PYTHON = re.compile(r"^ *```python\n(.*?)^ *```", re.MULTILINE | re.DOTALL)
 NEEDS_MORE = re.compile(r"\.\.\.|<|RUN|my_package|FindBeacon|launcher|glob|run=|resume=")
@@ -104,7 +104,7 @@ def test_links_lead_to_files(page):
 
 @pytest.mark.parametrize("page", [*WRITTEN, *READMES], ids=lambda p: str(p.relative_to(ROOT)))
 def test_modules_and_scripts_of_commands_exist(page):
-    for module in re.findall(r"python -m (veca_marl[\w.]*)", text_of(page)):
+    for module in re.findall(r"python -m ((?:veca_marl|tools|experiments)[\w.]*)", text_of(page)):
         assert find_spec(module), module
     for script in re.findall(r"python ((?:scripts|experiments)/[\w/]+\.py)", text_of(page)):
         assert (ROOT / script).exists(), script
@@ -112,7 +112,9 @@ def test_modules_and_scripts_of_commands_exist(page):
 
 @pytest.mark.parametrize("page", [*WRITTEN, *READMES], ids=lambda p: str(p.relative_to(ROOT)))
 def test_modules_that_pages_name_exist(page):
-    for path in re.findall(r"`((?:veca_marl|tests|conf|scripts)/[\w/]+\.\w+)`", text_of(page)):
+    for path in re.findall(
+        r"`((?:veca_marl|tests|conf|scripts|tools)/[\w/]+\.\w+)`", text_of(page)
+    ):
         assert (ROOT / path).exists(), path
     for name in re.findall(r"`(veca_marl(?:\.[a-z_0-9]+)+)", text_of(page)):
         pkgutil.resolve_name(name)

@@ -1,6 +1,6 @@
 """Error of localisation of each quality of hearing, over the number of scenes learnt from.
 
-python experiments/audio_ablation/localisation.py
+python -m experiments.audio_ablation.localisation
 """
 
 from __future__ import annotations

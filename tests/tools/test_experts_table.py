@@ -12,8 +12,7 @@ from scipy import stats
 from tools.experts_table.command import main
 from tools.experts_table.episode_file import EpisodeFile, spread
 from tools.experts_table.play import LostProcessError, Played, digest, game_cfg, play_all
-from tools.experts_table.table import markdown
-from veca_marl.algos.evaluation.comparison import share_interval
+from tools.experts_table.table import markdown, share_interval
 from veca_marl.envs.core.benchmark import SEED
 from veca_marl.envs.core.episodes import Episodes
 from veca_marl.envs.core.expert import Expert, find_expert

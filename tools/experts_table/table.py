@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import stats
 
 from tools.experts_table.play import Played
-from veca_marl.algos.evaluation.comparison import interval, share_interval
+from veca_marl.algos.evaluation.comparison import interval
 
 _HEAD = ("task", "policy", "episodes", "return", "solved", "agent steps/s", "commit", "remark")
 EXPERT_AT_LEAST, RANDOM_AT_MOST = 0.95, 0.20
@@ -75,6 +77,22 @@ def _solved_cell(episodes: Sequence[Played]) -> str:
         return "no goal"
     low, high = share_interval(sum(shares), len(shares))
     return f"{np.mean(shares):.0%} [{low:.0%}, {high:.0%}]"
+
+
+def share_interval(successes: float, trials: int, confidence: float = 0.95) -> tuple[float, float]:
+    """Return the confidence interval of a share by Wilson (1927), for small samples and shares.
+
+    Args:
+        successes: Number of successes, from 0 to `trials`; not an integer where trials of several
+            players are averaged.
+        trials: Number of independent trials, 1 or more.
+        confidence: Probability that the interval covers the true share.
+    """
+    z2 = float(stats.norm.ppf((1 + confidence) / 2)) ** 2
+    share = successes / trials
+    middle = (share + z2 / (2 * trials)) / (1 + z2 / trials)
+    half = math.sqrt(z2 * (share * (1 - share) + z2 / (4 * trials)) / trials) / (1 + z2 / trials)
+    return max(middle - half, 0.0), min(middle + half, 1.0)
 
 
 def _remarks(task: str, policy: str, episodes: Sequence[Played], remarks: Remarks) -> Iterator[str]:

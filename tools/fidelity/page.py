@@ -57,9 +57,9 @@ def _draw_curve(axis: Any, curve: Curve) -> None:
 PAGE = "fidelity.md"
 _INTRODUCTION = """# Fidelity
 
-Physics and senses against theory and published data. `python -m tools.fidelity` measures each
-law anew and writes this page; it ends with exit status 1 if a law is broken. The tests call the
-same functions. This page was written with veca_marl {version}.
+Physics and senses against theory and published data. `python -m tools.fidelity`, run in a
+checkout, measures each law anew and writes this page; it ends with exit status 1 if a law is
+broken. The tests call the same functions. This page was written with veca_marl {version}.
 """
 _COLUMNS = ("law", "theory", "measured", "tolerance", "verdict")
 

@@ -22,22 +22,6 @@ def interval(values: NDArray[np.float64], confidence: float = 0.95) -> tuple[flo
     return float(values.mean() - half), float(values.mean() + half)
 
 
-def share_interval(successes: float, trials: int, confidence: float = 0.95) -> tuple[float, float]:
-    """Return the confidence interval of a share by Wilson (1927), for small samples and shares.
-
-    Args:
-        successes: Number of successes, from 0 to `trials`; not an integer where trials of several
-            players are averaged.
-        trials: Number of independent trials, 1 or more.
-        confidence: Probability that the interval covers the true share.
-    """
-    z2 = float(stats.norm.ppf((1 + confidence) / 2)) ** 2
-    share = successes / trials
-    middle = (share + z2 / (2 * trials)) / (1 + z2 / trials)
-    half = math.sqrt(z2 * (share * (1 - share) + z2 / (4 * trials)) / trials) / (1 + z2 / trials)
-    return max(middle - half, 0.0), min(middle + half, 1.0)
-
-
 def paired_difference(
     one: NDArray[np.float64], other: NDArray[np.float64], confidence: float = 0.95
 ) -> tuple[float, float, float]:

@@ -4,7 +4,7 @@ Each task of the package has a file ``veca_marl/data/benchmark/<task>.json``: on
 parameters of the task, and all that was drawn for each start. The randomness of an episode depends
 on the seed, its number and the world alone, so that the seed is enough to play the episodes here;
 the values show that they start as they did, and other programs can start from them.
-``scripts/make_benchmark.py`` writes the files.
+``python -m tools.make_benchmark`` writes the files, in a checkout.
 """
 
 from __future__ import annotations

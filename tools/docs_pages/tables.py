@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 from enum import Enum
 from typing import Any, get_args, get_origin, get_type_hints
 
-from docs_pages.docstrings import attributes
+from tools.docs_pages.docstrings import attributes
 
 UNITS = {  # the last part of a field's name
     "m": "m",

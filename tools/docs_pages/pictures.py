@@ -9,9 +9,9 @@ import matplotlib as mpl
 import numpy as np
 from numpy.typing import NDArray
 
-from docs_pages.parts_picture import parts_picture
-from docs_pages.task_pages import built_in_tasks
-from docs_pages.viewpoints import FOV_DEG, viewpoint
+from tools.docs_pages.parts_picture import parts_picture
+from tools.docs_pages.task_pages import built_in_tasks
+from tools.docs_pages.viewpoints import FOV_DEG, viewpoint
 from veca_marl.api import make
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
 from veca_marl.envs.adapters.torchrl.scripted import ExpertPolicy

@@ -6,7 +6,7 @@ import re
 
 import numpy as np
 
-from docs_pages.tables import table
+from tools.docs_pages.tables import table
 from veca_marl.sim.body.anatomy import limit_sources, load_skeleton
 from veca_marl.sim.body.proprioception import ProprioceptionQuality, observed_parts, part_slices
 from veca_marl.sim.touch import taxels_of

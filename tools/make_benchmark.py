@@ -1,6 +1,6 @@
 """Write the frozen episodes of tasks, ``veca_marl/data/benchmark/<task>.json``.
 
-``python scripts/make_benchmark.py`` writes those of all tasks, with names those of some. A file
+``python -m tools.make_benchmark`` writes those of all tasks, with names those of some. A file
 that is current stays as it is; one that is not gets the next version.
 """
 

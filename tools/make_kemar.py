@@ -1,6 +1,6 @@
 """Create `veca_marl/data/kemar.npz` from the SOFA file of the KEMAR measurement.
 
-Run: ``python scripts/make_kemar.py MIT_KEMAR_normal_pinna.sofa``. The file is part of libmysofa
+Run: ``python -m tools.make_kemar MIT_KEMAR_normal_pinna.sofa``. The file is part of libmysofa
 (in Debian: the package libmysofa1, /usr/share/libmysofa/MIT_KEMAR_normal_pinna.sofa).
 """
 

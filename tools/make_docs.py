@@ -9,13 +9,13 @@ import argparse
 from collections.abc import Callable
 from pathlib import Path
 
-from docs_pages.action_page import action_page
-from docs_pages.body_tables import body_page
-from docs_pages.config_page import config_page
-from docs_pages.observation_page import observation_page
-from docs_pages.pictures import write_pictures
-from docs_pages.playground_page import playground_page, write_playground_pictures
-from docs_pages.task_pages import write_task_pages
+from tools.docs_pages.action_page import action_page
+from tools.docs_pages.body_tables import body_page
+from tools.docs_pages.config_page import config_page
+from tools.docs_pages.observation_page import observation_page
+from tools.docs_pages.pictures import write_pictures
+from tools.docs_pages.playground_page import playground_page, write_playground_pictures
+from tools.docs_pages.task_pages import write_task_pages
 
 DOCS = Path(__file__).resolve().parent.parent / "docs"
 PAGES: dict[str, Callable[[], str]] = {
