@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Callable, Iterator, Mapping
+import pkgutil
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from importlib import import_module
 from typing import Generic, TypeVar
 
 Entry = TypeVar("Entry")
@@ -76,6 +78,17 @@ def origin(entry: object) -> str:
     """Return the dotted name of a class or function, or that of the class of another object."""
     named = entry if hasattr(entry, "__qualname__") else type(entry)
     return f"{getattr(named, '__module__', '?')}.{getattr(named, '__qualname__', '?')}"
+
+
+def import_modules(package: str, folders: Iterable[str]) -> None:
+    """Import all modules of a package, so that what they define is registered.
+
+    Args:
+        package: Its dotted name.
+        folders: Its ``__path__``.
+    """
+    for module in sorted(info.name for info in pkgutil.walk_packages(folders, f"{package}.")):
+        import_module(module)
 
 
 def unknown(kind: str, name: str, choices: Mapping[str, object] | list[str]) -> str:

@@ -78,6 +78,14 @@ def test_a_falling_ball_is_heard_when_it_lands_and_not_before_or_when_it_rests(d
     assert not heard[-20:].any()
 
 
+@pytest.mark.parametrize("height_m", [0.4, 0.45, 0.5, 0.55, 0.6])
+def test_an_impact_begins_in_the_physics_step_in_which_it_happens(dropped, height_m):
+    heard, clock = dropped(height_m), ClockCfg()
+    first_s = np.flatnonzero(heard.ravel())[0] * clock.step_s / heard.shape[1]
+    falls_s = math.sqrt(2.0 * (height_m - 0.1) / 9.81)
+    assert first_s == pytest.approx(falls_s, abs=1.5 * clock.substep_s)
+
+
 def test_energy_grows_with_the_square_of_the_impulse(dropped):
     """Twice the speed of impact: four times the energy."""
     energies = []
