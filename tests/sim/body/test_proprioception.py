@@ -86,6 +86,17 @@ def test_free_fall_senses_no_specific_force(child):
     np.testing.assert_allclose(parts(sense)["head_acceleration"], 0.0, atol=0.1)
 
 
+@pytest.mark.parametrize("steps", [1, 2, 5])
+def test_an_acceleration_is_the_mean_over_all_steps_since_the_last_reading(child, steps):
+    """In free fall, whose specific force is 0 however often the sense is read."""
+    world, body = child
+    body.place((0.0, 0.0, 5.0))
+    sense = sense_of(world, body)
+    sense.reset()
+    let_pass(world, steps * STEP_S)
+    np.testing.assert_allclose(parts(sense)["head_acceleration"], 0.0, atol=0.2)
+
+
 def test_weightless_rest_senses_the_specific_force_of_a_rocket(child):
     world, body = child
     remove_gravity(world)
