@@ -415,3 +415,17 @@ def test_running_statistics_forget_one_hundredth_with_each_batch_later():
     norm.layer.running_mean.fill_(0.0)
     norm(torch.randn(64, 1) + 100.0)
     assert float(norm.layer.running_mean) == pytest.approx(1.0, abs=0.02)
+
+
+def test_target_networks_move_by_the_given_fraction():
+    loss, _ = loss_of(HYBRID)
+    with torch.no_grad():
+        for parameter in loss.critic.parameters():
+            parameter.add_(torch.randn_like(parameter))
+    before = [parameter.clone() for parameter in loss.target.parameters()]
+    learnt = [parameter.clone() for parameter in loss.critic.parameters()]
+    loss.target.approach(loss.critic, 0.25)
+    for old, new, own in zip(before, learnt, loss.target.parameters(), strict=True):
+        torch.testing.assert_close(own, 0.75 * old + 0.25 * new)
+    for parameter, same in zip(loss.critic.parameters(), learnt, strict=True):
+        assert torch.equal(parameter, same)

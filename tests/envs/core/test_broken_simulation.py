@@ -48,6 +48,21 @@ def test_the_episode_is_truncated_the_cause_is_logged_and_data_are_finite(cfg, c
     env.close()
 
 
+@pytest.mark.parametrize("speed", [2e3, 1e6])
+def test_a_speed_that_bullet_cuts_is_noticed_in_the_step_in_which_it_occurs(cfg, speed):
+    """Wherever the body stands: high above the floor it touches nothing."""
+    game = Game(cfg)
+    game.reset(np.random.default_rng(0))
+    body = game.players[0].body
+    for height_m in (0.0, 50.0):
+        body.place((0.0, 0.0, height_m))
+        assert body.is_finite
+    break_down(game, speed)
+    game.world.step()
+    assert not body.is_finite
+    game.close()
+
+
 PROPS = [  # tasks whose steps read a prop, and whose bodies collide with it
     (["+task=KickTheBall"], "ball"),
     (["+task=GrabObject"], "toy"),
