@@ -7,7 +7,7 @@ CORES  ?= 2
 # moves every seed of `make test-all`, another one each day; the tests print it
 SEED_OFFSET ?= $(shell date +%y%j)
 
-.PHONY: help train test test-all checks lint types kernels format bench fidelity docs pages wheel clean
+.PHONY: help train test test-all checks lint types kernels format bench fidelity performance docs pages wheel clean
 
 help:
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/'
@@ -61,6 +61,9 @@ bench: $(VENV)/installed ## agent steps per second, and the time of each part of
 
 fidelity: $(VENV)/installed-test ## measure the laws of physics and senses; rewrite docs/reference/fidelity.md
 	$(BIN)/python -m tools.fidelity to=docs/reference $(ARGS)
+
+performance: $(VENV)/installed ## measure rates and the cost of training; rewrite docs/performance.md
+	$(BIN)/python -m tools.performance to=docs/performance.md $(ARGS)
 
 docs: $(VENV)/installed-test ## build the documentation site in docs/_build/html
 	$(BIN)/python -m sphinx --fail-on-warning --keep-going -b html docs docs/_build/html $(ARGS)

@@ -49,7 +49,8 @@ ours too.
 Single-room tasks take place in the first room. In the furnished houses its middle is the origin,
 and its walls of constant y are free of furniture, because balls roll out of them.
 
-What a step costs in each playground is on the page on [performance](../performance.md).
+What a step costs in a playground is measured by `python -m veca_marl.bench
+bench.tasks=[ObjectNav] bench.playgrounds=[simple,house]`, see [performance](../performance.md).
 """
 
 REFUSED = (

@@ -37,7 +37,7 @@ def throughput_table(runs: Sequence[Rollouts]) -> str:
 
 
 def task_table(runs: Sequence[Rollouts]) -> str:
-    """Return a Markdown table of tasks: the table of the page on performance."""
+    """Return a Markdown table with one row per task, playground and number of worlds."""
     header = ["task", "playground", "worlds", "agents", "agent steps/s", "per reference"]
     header += ["view, ms", "views", "goal"]
     rows = [

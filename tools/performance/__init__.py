@@ -1,0 +1,1 @@
+"""The page of rates and costs: ``python -m tools.performance to=docs/performance.md``."""
