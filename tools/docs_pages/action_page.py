@@ -34,11 +34,12 @@ Bodies named `mitten` have fixed fingers, see [body](body.md#presets).
 """
 
 MEANINGS = {
-    "move": "velocity command: forward, and turning to the left, as shares of the greatest speeds "
-    "`body.walk_speed_mps` and `body.turn_speed_degps` (`action: discrete`: one of these moves)",
-    "joints": "command of each joint, in the order of [`joint_names`](body.md): torque as a share "
-    "of the joint's strength (`action: torque`), angle between the joint's limits (`position`), or "
-    "change of the commanded angle (`increment`)",
+    "move": "velocity command: forward, and turning to the left, as fractions of the greatest "
+    "speeds `body.walk_speed_mps` and `body.turn_speed_degps` (`action: discrete`: one of these "
+    "moves)",
+    "joints": "command of each joint, in the order of [`joint_names`](body.md): torque as a "
+    "fraction of the joint's strength (`action: torque`), angle between the joint's limits "
+    "(`position`), or change of the commanded angle (`increment`)",
     "verb": "what is done in this step with the object nearest to the centre of the view that "
     "declares it (`kick` and `step_on`: with what the foot reaches), see "
     "[interactions](../guides/add_an_interaction.md)",

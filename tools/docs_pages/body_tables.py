@@ -15,7 +15,7 @@ PARTS = {
     "bone_orientations": ("", "forward and up axis of each bone in the heading frame"),
     "joint_angles": ("rad", "angle of each joint"),
     "joint_velocities": ("rad/s", "angular velocity of each joint"),
-    "joint_torques": ("", "motor torque as a share of the joint's strength, [-1, 1]"),
+    "joint_torques": ("", "motor torque as a fraction of the joint's strength, [-1, 1]"),
     "head_acceleration": ("m/s²", "mean acceleration in the head frame minus gravity"),
     "head_turning": ("rad/s", "angular velocity in the head frame"),
 }

@@ -51,28 +51,28 @@ MEANINGS = {  # key: sense, unit, meaning, how it is requested
     ),
     "touch": (
         "touch",
-        "share of the skin's thickness",
+        "fraction of the skin's thickness",
         "penetration at each taxel, see [touch](touch.md); [body](body.md) lists the indices",
         "",
     ),
     "touch_parts": (
         "touch",
-        "share of the skin's thickness",
+        "fraction of the skin's thickness",
         "means of the 59 parts of the skin, then their maxima, see [touch](touch.md)",
         "senses.touch.parts=true",
     ),
     "proprioception": (
         "proprioception",
-        "rad, rad/s, m/s² and shares",
+        "rad, rad/s, m/s² and fractions",
         "orientations of bones, angles, velocities and torques of joints, acceleration and angular "
         "velocity of the head; the layout is in [body](body.md)",
         "",
     ),
     "trial": (
         "trial",
-        "shares",
+        "fractions",
         "of [MazeNav](../tasks/MazeNav.md): 1 in the last observation of a trial, else 0; elapsed "
-        "share of the trial's time; share of the episode's trials that are over",
+        "fraction of the trial's time; fraction of the episode's trials that are over",
         "",
     ),
 }

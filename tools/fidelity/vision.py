@@ -141,11 +141,11 @@ _TEXT = f"""
 - **Disparity**: a child fixates a point at 0.5 m while a ball is at other distances. The disparity
   is the difference of the directions in which the eyes see the ball; theory is
   2 (atan(h / d) - atan(h / 0.5)) with half the distance h between the eyes.
-- **Segmentation**: share of equal pixels with TinyRenderer, Bullet's software renderer, for
+- **Segmentation**: fraction of equal pixels with TinyRenderer, Bullet's software renderer, for
   {CAMERAS} random cameras, each in a random room of spheres, boxes, cylinders and capsules,
   {CLEAR_M} m or more away from all of them; also of boxes only and of balls only. TinyRenderer
   draws boxes exactly, balls as polyhedra, cylinders and capsules as coarse polyhedra. The polyhedra
-  of balls are inscribed: no pixel may show a ball in TinyRenderer's image alone.
+  of balls are inscribed: no pixel may show a ball in TinyRenderer's image only.
 - **Defocus**: a thin lens with a pupil of diameter p that is focused at f spreads a point at z over
   a disc of the angular diameter p |1/z - 1/f| (Smith, Am. J. Optometry 1982). The diameter is
   measured by the contrast that a grating loses, with the variance (diameter / 4)^2 of a disc.
@@ -342,7 +342,7 @@ def segmentation_laws(shares: dict[str, NDArray[np.float64]]) -> list[Law]:
 
 def outside_law(pixels: int) -> Law:
     """Return the law of the pixels that show a ball in TinyRenderer's image alone."""
-    return at_most("pixels that show a ball in TinyRenderer's image alone", "", 0.0, float(pixels))
+    return at_most("pixels that show a ball in TinyRenderer's image only", "", 0.0, float(pixels))
 
 
 PUPILS_MM = (2.0, 4.0, 8.0)

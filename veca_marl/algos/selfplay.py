@@ -89,7 +89,7 @@ class SelfPlayCfg:
 
     Attributes:
         teams: The two teams that learn in turns, a stage each; none for no self-play.
-        latest: Share of the stages in which the opponent is the other team's current policy; in
+        latest: Fraction of the stages in which the opponent is the other team's current policy; in
             the others it is drawn uniformly from the pool of its past policies.
     """
 

@@ -21,13 +21,13 @@ A network with one hidden layer of {hidden} units learns sine and cosine of the 
 scenes; {test} others are its test. The same scenes are used for each quality.
 
 - **Azimuth**: mean absolute error, 90 degrees for a random guess.
-- **Front-back confusion**: share of scenes that are found in the wrong half, front or back, among
-  those within 60 degrees of the median plane; 0.5 for a random guess.
+- **Front-back confusion**: fraction of scenes that are found in the wrong half, front or back,
+  among those within 60 degrees of the median plane; 0.5 for a random guess.
 - **Lateral angle**: mean absolute error of the angle to the median plane, which a front-back
   confusion leaves unchanged; 45 degrees if it is always found at 0.
 
 The observation contains magnitudes only: interaural times change it through the interference of
-direct sound and reflections alone. `stereo` depends on how the distances to both ears differ.
+direct sound and reflections only. `stereo` depends on how the distances to both ears differ.
 """
 ARMS: dict[str, AudioCfg] = {
     "hrtf": AudioCfg(),

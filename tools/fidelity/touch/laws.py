@@ -29,16 +29,17 @@ from veca_marl.sim.geometry import Shape
 from veca_marl.sim.touch import TouchCfg
 
 _TEXT = """
-A taxel reads the compression of the skin at its place, 0 without contact and 1 where an object
+A taxel reads the compression of the skin at its position, 0 without contact and 1 where an object
 meets the bone; `docs/reference/touch.md` defines it.
 
 - **Approaches**: a ball, box, cylinder or capsule of 3 to 40 mm moves on a straight line towards
   the bone below a taxel, on flat skin of 1.5, 4 and 10 mm, at 0 to 60 degrees to the normal and
-  tilted by 0 to 75 degrees. The reading must not fall on the way, and must be 1 at the bone.
+  tilted by 0 to 75 degrees. The reading must not fall during the approach, and must be 1 at
+  the bone.
 - **Planes**: under a large plane that is parallel to the skin the reading is depth over thickness
   (the paper's formula), at every depth and for every radius of the receptive field.
 - **Pokes**: a fingertip presses end on at random points of the skin, by a quarter of the thickness
-  of both skins. The share with a reading above 0.02 is counted.
+  of both skins. The fraction with a reading above 0.02 is counted.
 - **Two points**: two balls of 3 mm press by half of the skin. The threshold is the distance at
   which three quarters of the pairs cause two maxima of the readings with a gap between them.
   Values of adults: S. Weinstein in "The Skin Senses", ed. D. R. Kenshalo (1968), rounded.
@@ -92,7 +93,7 @@ def laws() -> Iterator[Law]:
         approaches = list(all_approaches(np.random.default_rng(0), [radius]))
         found = extremes(approaches, _STEPS)
         on = f"{found.count} approaches, radius {radius:g} t"
-        yield at_most(f"largest fall of T on the way, {on}", "", 1e-4, found.largest_fall)
+        yield at_most(f"largest fall of T during the approach, {on}", "", 1e-4, found.largest_fall)
         yield at_least(f"smallest T at the bone, {on}", "", 0.999, found.least_at_bone)
     for radius in (0.0, *RADII):
         name = f"largest |T - depth / t| under a plane, radius {radius:g} t"
@@ -110,7 +111,7 @@ def section() -> Section:
     shares = poke_shares(TouchCfg().receptive_field, _POKES)
     everything = list(laws())
     everything += [
-        at_least(f"share of noticed pokes, {bone}", "", _LEAST_NOTICED, share)
+        at_least(f"fraction of noticed pokes, {bone}", "", _LEAST_NOTICED, share)
         for bone, share in shares.items()
     ]
     resolution = two_point_thresholds_mm(_PAIRS)

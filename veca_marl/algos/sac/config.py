@@ -60,7 +60,7 @@ class TemperatureCfg:
         adaptation: How it changes.
         entropy_per_dimension: Target entropy of a continuous part in nats, for each of its
             dimensions (-1: Haarnoja et al. 2018; the uniform policy on [-1, 1] has 0.69).
-        entropy_of_choices: Target entropy of a discrete part as a share of that of the uniform
+        entropy_of_choices: Target entropy of a discrete part as a fraction of that of the uniform
             policy (ours; Christodoulou 2019 takes 0.98, which is close to a random policy).
         learning_rate: Step size of Adam for the logarithms of automatic temperatures (ours: larger
             than that of the networks, because the right temperature is proportional to the rewards
@@ -165,7 +165,7 @@ class SACCfg(AlgorithmCfg):
         max_gradient_norm: The gradients of critics with encoder, and of policy heads, are each
             scaled down to this norm.
         targets: Which critics give the targets.
-        tau: Share of the critics' parameters in the moving average that gives the targets (ours:
+        tau: Fraction of the critics' parameters in the moving average that gives the targets (ours:
             twice the 0.005 of Haarnoja et al. 2018, because there are fewer updates).
         updates_per_frame: Updates for each frame that is collected.
         random_shift: Largest random shift of images in pixels, the same for both eyes; 0 for none.

@@ -92,7 +92,7 @@ class CrawlBabyExpert(Expert[CrawlBaby]):
 class RunBabyExpert(SkillExpert):
     """Balances, and makes two or three steps forwards before it falls; see `Stepping`.
 
-    Reads the pose and the velocity of the trunk and the places of the feet from the simulator
+    Reads the pose and the velocity of the trunk and the positions of the feet from the simulator
     (privileged).
     """
 

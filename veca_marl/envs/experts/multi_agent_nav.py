@@ -225,9 +225,9 @@ class MultiAgentNavExpert(Expert[MultiAgentNav]):
     for each wall, and differs between the ears with the direction. Without calls it turns round
     once in each room, the nearest first. An agent that is stuck moves backwards.
 
-    Reads privileged state: its own position and heading, the floor plan, the places of walls, doors
-    and things, and whether the object is visible, where it then is, and which agents have reached
-    it. A crawling body needs up to a minute where a walker needs ten seconds.
+    Reads privileged state: its own position and heading, the floor plan, the positions of walls,
+    doors and things, and whether the object is visible, where it then is, and which agents have
+    reached it. A crawling body needs up to a minute where a walker needs ten seconds.
     """
 
     reads = ("audio",)

@@ -176,7 +176,7 @@ class BabyzumasRevenge(Task):
     """An agent has to find the key that opens the door to the next room.
 
     The agent starts in the first room of the playground that has one door, without a leaf of its
-    own. A locked leaf closes that door. A cupboard stands at a wall, at a place drawn for each
+    own. A locked leaf closes that door. A cupboard stands at a wall, at a position drawn for each
     episode. Its drawer is opened with the verb `open`; the key inside can then be seen and taken
     with `grab`. With the key in the hand, `open` unlocks and opens the door. A verb is applied to
     what is nearest to the centre of the view, up to 1.5 m away, of the things that declare it. The

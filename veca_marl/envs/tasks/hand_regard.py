@@ -54,9 +54,9 @@ class HandRegard(PosedStart):
     Not in the VECA paper: the hand-regard task of BabyBench 2025 (suite `babybench`). As there, an
     eye regards a hand while the angle between the axis of the eye and the direction from the eye to
     the wrist is smaller than 15 degrees; what hides the hand does not matter, nor does the field of
-    view of the images. The score is the share of steps in which a hand is regarded, mean over the
-    four pairs of eye and hand; with the default weights the return is the score of the episode, in
-    [0, 1]. BabyBench itself gives no reward, its agents learn by intrinsic rewards: set the four
+    view of the images. The score is the fraction of steps in which a hand is regarded, mean over
+    the four pairs of eye and hand; with the default weights the return is the score of the episode,
+    in [0, 1]. BabyBench itself gives no reward, its agents learn by intrinsic rewards: set the four
     weights to 0 and choose `intrinsic=rnd`. An episode lasts 1000 steps and never terminates.
 
     Departures from BabyBench and its body, MIMo:

@@ -192,7 +192,7 @@ class PushOutCfg(TaskCfg):
 
     Attributes:
         radius_m: Radius of the ring, at least 0.5 m. A player with its pelvis beyond is out.
-        start_share: Distance of the players from the middle at the start, as a share of the
+        start_share: Distance of the players from the middle at the start, as a fraction of the
             radius, in [0.3, 0.9].
         spread_deg: Largest angle at the start between the heading of a player and the direction
             of the middle, in [0, 180].
@@ -315,7 +315,7 @@ class PushOut1v1(PushOut):
     Terms:
         push: 1 on the step in which the opponent is out, else 0.
         out: -1 on the step in which the player itself is out, else 0.
-        ground: Decrease during the step of the share of the ring's area that is nearer to the
+        ground: Decrease during the step of the fraction of the ring's area that is nearer to the
             middle than the player, minus that of the opponent. It is the difference of a
             potential: its sum over an episode depends only on the first and the last positions.
     """
@@ -342,7 +342,7 @@ class PushOut2v2(PushOut):
         out: On the step in which the player itself is out, minus the number of players that its
             team had until this step, divided by 2; on a step in which only its mate is out, -0.5.
             The sum over an episode is thus -1 for a player that is out, whatever its mate does.
-        ground: Decrease during the step of the share of the ring's area that is nearer to the
+        ground: Decrease during the step of the fraction of the ring's area that is nearer to the
             middle than a player, summed over the players that the team had until this step, minus
             that of the opponents, divided by 2.
     """

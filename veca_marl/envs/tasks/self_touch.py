@@ -89,7 +89,7 @@ class SelfTouch(PosedStart):
       two each for palm, fingers, lower legs and toes, three each for upper body and feet. They
       include the own arm and the own fingers, which a hand cannot reach. Scores of the two bodies
       therefore differ by more than the policies.
-    - A hand touches with palm and fingers, in MIMo with the palm alone.
+    - A hand touches with palm and fingers, in MIMo with the palm only.
     - A step lasts 40 ms (1000 steps are 40 s), in MIMo 5 ms (5 s).
     - The body starts on its back with random joint angles about that posture; MIMo starts on its
       back and makes ten steps of random actions.
@@ -97,8 +97,8 @@ class SelfTouch(PosedStart):
       that of MIMo has 44 joints, of which those of feet and eyes are locked.
 
     Terms:
-        left_hand: Regions that the left hand touches for the first time in this episode, as a share
-            of 14.
+        left_hand: Regions that the left hand touches for the first time in this episode, as a
+            fraction of 14.
         right_hand: The same for the right hand.
     """
 

@@ -29,7 +29,7 @@ class ClockCfg:
         substeps: Physics steps per agent step.
         solver_iterations: Iterations of Bullet's constraint solver per physics step; at least 20
             in worlds with a body that holds target angles with moving fingers.
-        contact_share: Distance at which Bullet detects contacts ahead of time, as a share of the
+        contact_share: Distance at which Bullet detects contacts ahead of time, as a fraction of the
             size of the smaller of two objects, in (0, 1]. What moves further in one physics step
             penetrates before its contact is found; 0.1 finds those of a palm-sized object 5 mm
             ahead, at twice the cost of physics. Contacts of movable props with restitution are

@@ -35,7 +35,7 @@ grows with the third power of the order, and so do the memory and time of every 
 
 @dataclass
 class PlaygroundCfg:
-    """A place to play in.
+    """Rooms, walls and furniture in which a game is played.
 
     Attributes:
         name: As on the command line.
@@ -51,7 +51,7 @@ class PlaygroundCfg:
         floor_centre_m: Its middle.
         floor_colour: Red, green, blue in [0, 1].
         floor_checker_m: Edge of the floor's checker pattern.
-        image_order: Greatest number of reflections of a sound, from 0 (the direct sound alone) to
+        image_order: Greatest number of reflections of a sound, from 0 (the direct sound only) to
             `GREATEST_IMAGE_ORDER`.
         transmission_loss_db: Attenuation of a sound by each obstacle that its path passes.
         impacts: Sounds of things that hit each other or the floor.

@@ -116,8 +116,8 @@ class DodgeCar(CarGame):
     drives straight on. So a player is hit that stands still or repeats one motion, and one is
     missed that changes its motion when the car is near. If furniture obstructs the straight line to
     the player, the car first drives to a point from which the line is clear. It is narrower than
-    the player and lower than a table, so that no place of the room is safe for long. A contact of
-    car and player terminates the episode. The task is solved (`solved`) as long as they have not
+    the player and lower than a table, so that no position in the room is safe for long. A contact
+    of car and player terminates the episode. The task is solved (`solved`) as long as they have not
     touched.
 
     The paper states senses, actions and "the toy car moves around in the room fast. The agent must

@@ -64,17 +64,18 @@ class SitBabyCfg(StartCfg):
 
 @register_task
 class SitBaby(PosedStart):
-    """A joint-level body lies on its back at a random place in the room and has to sit up.
+    """A joint-level body lies on its back at a random position in the room and has to sit up.
 
     The paper (table of tasks in the appendix; "Joint-level Locomotion & Control") rewards "the
     position of its torso and head" and gives no numbers. This task rewards their heights, as
-    shares of the heights when sitting upright and clipped to 1, so that standing up has the same
+    fractions of the heights when sitting upright and clipped to 1, so that standing up has the same
     reward as sitting. The torso is measured at its top, since a bridge on neck and feet raises the
     waist. Departure: the heights are multiplied by how upright the chest is, since on hands and
-    knees they are three quarters of those when sitting. Any way of sitting counts: on the bottom,
-    on the heels, supported by the hands. An episode lasts `max_seconds` and never terminates. With
-    the default weights its return is 10 when sitting, 2 on hands and knees and 0 when lying. The
-    task is solved (`solved`) while both terms are at least `sat` and the pelvis is below `seat_m`.
+    knees they are three quarters of those when sitting. Any way of sitting counts: on the
+    bottom, on the heels, supported by the hands. An episode lasts `max_seconds` and never
+    terminates. With the default weights its return is 10 when sitting, 2 on hands and knees and 0
+    when lying. The task is solved (`solved`) while both terms are at least `sat` and the pelvis is
+    below `seat_m`.
 
     Terms:
         torso: Height of the top of the chest divided by `torso_m`, clipped to [0, 1], times the

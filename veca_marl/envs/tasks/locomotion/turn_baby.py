@@ -41,7 +41,7 @@ class TurnBabyCfg(StartCfg):
 
 @register_task
 class TurnBaby(PosedStart):
-    """A joint-level body lies on its back at a random place in the room and has to turn over.
+    """A joint-level body lies on its back at a random position in the room and has to turn over.
 
     The paper (table of tasks in the appendix; "Joint-level Locomotion & Control") rewards "the
     orientation of its torso and hip" and gives no numbers. This task rewards a front that points

@@ -46,8 +46,9 @@ class TrialSense(Sense):
     """The progress of the trials of an episode, which the task reports by `show`.
 
     Observations:
-        trial: ``(3,)`` float32 in [0, 1]: 1 in the last observation of a trial, else 0; the share
-            of the trial's time that has passed; the share of the episode's trials that are over.
+        trial: ``(3,)`` float32 in [0, 1]: 1 in the last observation of a trial, else 0; the
+            fraction of the trial's time that has passed; the fraction of the episode's trials that
+            are over.
     """
 
     cfg_type = TrialCfg
@@ -107,7 +108,7 @@ class MazeNavCfg(TaskCfg):
 class MazeNav(Task):
     """An agent has to find an object in a maze, several times in the same maze.
 
-    Each episode has a new random maze. Its walls, the place of the object and the start stay the
+    Each episode has a new random maze. Its walls, the position of the object and the start stay the
     same for `trials` trials, so that an agent with a memory can walk straight to the object after
     the first trial. A trial ends when the object is reached or after `trial_s`; then the next one
     begins at the start, with a heading drawn anew. The action of the step in which the agent is

@@ -154,7 +154,7 @@ class ObjectNavCfg(TaskCfg):
 class ObjectNav(Task):
     """An agent has to go to the one of several objects that is the target.
 
-    The objects stand at random places of all rooms, at least `apart_m` from each other and from
+    The objects stand at random positions of all rooms, at least `apart_m` from each other and from
     the agent's start. The target is recognised by its shape and colour in the images. Reaching
     the target or a wrong object terminates the episode; the task is solved (`solved`) if it was the
     target.

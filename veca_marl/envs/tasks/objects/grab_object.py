@@ -62,7 +62,7 @@ class GrabObject(Task):
             where the height counts as 0 unless both hands are near.
         approach: Decrease during the step of the sum of the distances of both palms from the
             centre of the toy, m.
-        effort: Sum of the squared torques of all 82 joints, each as a share of its strength.
+        effort: Sum of the squared torques of all 82 joints, each as a fraction of its strength.
     """
 
     senses = ("vision", "touch", "proprioception")

@@ -45,9 +45,9 @@ class ColorSortCfg(SortingCfg):
 class ColorSort(SortingTask):
     """An agent has to put toys into the baskets of their colours.
 
-    Toys and baskets stand at random places. The agent grabs a toy with the verb `grab` and puts it
-    into a basket with `put_into`: the toy, or the basket, nearest to the centre of its view, up to
-    1.5 m away. The colour of each toy is drawn for each episode, so that its shape does not tell
+    Toys and baskets stand at random positions. The agent grabs a toy with the verb `grab` and puts
+    it into a basket with `put_into`: the toy, or the basket, nearest to the centre of its view, up
+    to 1.5 m away. The colour of each toy is drawn for each episode, so that its shape does not tell
     the basket. A toy can be taken out of a basket again. The episode terminates when all toys are
     in the baskets of their colours; then the task is solved (`solved`).
 

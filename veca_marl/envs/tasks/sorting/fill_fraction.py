@@ -219,20 +219,20 @@ class FillFractionCfg(TaskCfg):
 class FillFraction(Task):
     """An agent has to fill three circles with pieces that are fractions of a circle.
 
-    Circles and pieces lie at random places. The agent grabs a piece with the verb `grab` and puts
-    it into a circle with `put_into`: the piece, or the circle, nearest to the centre of its view,
-    up to 1.5 m away. The piece is laid beside those that lie there already. A piece that would
-    overfill the circle is refused: the verb has no effect. A piece can be taken out again. The
-    episode terminates when all circles are full; then the task is solved (`solved`).
+    Circles and pieces lie at random positions. The agent grabs a piece with the verb `grab` and
+    puts it into a circle with `put_into`: the piece, or the circle, nearest to the centre of its
+    view, up to 1.5 m away. The piece is laid beside those that lie there already. A piece that
+    would overfill the circle is refused: the verb has no effect. A piece can be taken out again.
+    The episode terminates when all circles are full; then the task is solved (`solved`).
 
     Senses, actions (a continuous `move` and the discrete `verb`), the number of circles, the
     refusal, and that each piece and a full circle are rewarded are those of the paper (table of
     tasks in the appendix); a discrete `move` beside the verb is not in the paper. The paper does
     not state the pieces and the amounts. Here the reward for a piece is the fraction that it fills,
-    so that every way to fill the circles has the same return; both rewards are changes of a score
-    of the present state, so that taking pieces out and putting them in again has no return. Pieces
-    are unit fractions, with one colour for each size. The head is pitched 25 degrees down, as in
-    ColorSort.
+    so that every way to fill the circles has the same return; both rewards are changes of
+    a score of the present state, so that taking pieces out and putting them in again has no return.
+    Pieces are unit fractions, with one colour for each size. The head is pitched 25 degrees down,
+    as in ColorSort.
 
     Terms:
         filled: Change of the sum of the filled fractions of all circles.

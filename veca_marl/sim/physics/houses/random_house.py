@@ -50,8 +50,9 @@ class RandomHouseCfg(PlaygroundCfg):
         leaves: Probability that a door has a hinged leaf, which is open at the start. Doors where
             one would meet another leaf, or close off a part of the floor, have none.
         pieces_per_room: Least and greatest number of pieces of furniture that are placed in a
-            room; those that find no place, or close a position off, are left out. A room has each
-            kind of its use at most once: 4 in a bathroom, 6 in the living room, 5 in the others.
+            room; those for which there is no space, or that close a position off, are left
+            out. A room has each kind of its use at most once: 4 in a bathroom, 6 in the living
+            room, 5 in the others.
     """
 
     rooms: list[RoomCfg] = field(default_factory=list)
