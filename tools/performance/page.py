@@ -53,9 +53,9 @@ fingers in `full` only.
 
 ## What training costs
 
-KickTheBall with the default network on {cores} cores. Frames are
-environment steps of all worlds. Evaluations and checkpoints are included; starting, the last
-evaluation and the video are not. Core-minutes are cores times elapsed minutes.
+KickTheBall with the default network on {cores} cores. Frames are environment steps of all worlds.
+Evaluations and checkpoints are included; starting, the last evaluation and the video are not.
+Core-minutes are cores times elapsed minutes.
 
 {training}
 
