@@ -88,10 +88,13 @@ def test_it_learns_from_shifted_images_with_an_encoder_trained_by_the_critics(ma
         "learning_rate": 1e-3,
     }
     eyes = {"senses": ("vision",)}
-    algorithm = make_sac(changes=changes, **eyes)
-    before = algorithm.temperatures.alphas()
-    assert last_return(algorithm, collect, batches=40, **eyes) > 0.9
-    assert algorithm.temperatures.alphas() != before
+    returns = []
+    for seed in range(3):  # one network of about 30 stays at one action
+        algorithm = make_sac(seed=seed, changes=changes, **eyes)
+        before = algorithm.temperatures.alphas()
+        returns.append(last_return(algorithm, collect, batches=40, **eyes))
+        assert algorithm.temperatures.alphas() != before
+    assert sorted(returns)[1] > 0.9
 
 
 def test_first_values_are_small_against_the_rewards_of_a_step(make_sac, collect):

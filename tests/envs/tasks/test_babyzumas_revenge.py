@@ -131,6 +131,7 @@ def test_the_leaf_is_as_high_as_the_opening_and_opens(more, height_m):
     game.close()
 
 
+@pytest.mark.golden  # the house of this seed
 def test_the_leaf_opens_beside_furniture_at_its_usual_hinge():
     """In this house a piece of furniture stopped it at 0.76."""
     game = game_of("playground=random_house", "playground.seed=1000")
