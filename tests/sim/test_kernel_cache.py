@@ -110,13 +110,33 @@ def test_without_a_writable_cache_directory_a_temporary_one_is_used_and_named(ti
 def test_only_the_folders_used_last_are_kept(tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     parent = tmp_path / "veca_marl" / "kernels"
-    for age in range(2 * KEPT_FOLDERS):
-        (parent / f"old {age}").mkdir(parents=True)
-        os.utime(parent / f"old {age}", (1e9 - age, 1e9 - age))
+    caches = [f"{age:016x}" for age in range(2 * KEPT_FOLDERS)]
+    for age, name in enumerate(caches):
+        (parent / name).mkdir(parents=True)
+        os.utime(parent / name, (1e9 - age, 1e9 - age))
     monkeypatch.setattr(numba.config, "CACHE_DIR", "")
     configure_kernel_cache(tmp_path)
     kept = {folder.name for folder in parent.iterdir()}
-    assert kept == {source_digest(tmp_path), *(f"old {age}" for age in range(KEPT_FOLDERS - 1))}
+    assert kept == {source_digest(tmp_path), *caches[: KEPT_FOLDERS - 1]}
+
+
+def test_what_is_no_cache_is_never_deleted(tmp_path, monkeypatch):
+    """Folders and files of other names, and links with the name of a cache."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    parent, foreign = tmp_path / "veca_marl" / "kernels", tmp_path / "thesis"
+    parent.mkdir(parents=True)
+    for folder in (foreign, *(parent / f"photos {n}" for n in range(2 * KEPT_FOLDERS))):
+        folder.mkdir()
+        (folder / "kept.txt").touch()
+        os.utime(folder, (1e9, 1e9))
+    for number in range(2 * KEPT_FOLDERS):
+        (parent / f"{number:016x}").symlink_to(foreign)
+        (parent / f"{number + 100:016x}").touch()
+    monkeypatch.setattr(numba.config, "CACHE_DIR", "")
+    before = {path.name for path in parent.iterdir()}
+    configure_kernel_cache(tmp_path)
+    assert {path.name for path in parent.iterdir()} == before | {source_digest(tmp_path)}
+    assert len(list(tmp_path.rglob("kept.txt"))) == 2 * KEPT_FOLDERS + 1
 
 
 def test_the_digest_depends_on_names_and_contents(tmp_path):

@@ -17,6 +17,7 @@ from __future__ import annotations
 import hashlib
 import logging
 import os
+import re
 import shutil
 import sys
 import tempfile
@@ -33,6 +34,7 @@ KEPT_FOLDERS = 8
 
 _LOG = logging.getLogger(__name__)
 _DIGEST_CHARACTERS = 16
+_CACHE_NAME = re.compile(f"[0-9a-f]{{{_DIGEST_CHARACTERS}}}")
 
 
 def configure_kernel_cache(sources: Path) -> None:
@@ -104,14 +106,21 @@ def _is_usable(folder: Path) -> bool:
 
 
 def _delete_old_folders(parent: Path) -> None:
-    folders = sorted(parent.iterdir(), key=_last_use_s, reverse=True)
-    for folder in folders[KEPT_FOLDERS:]:
+    """Delete the caches that were not used for longest, and nothing else that lies beside them."""
+    caches = sorted(filter(_is_cache, parent.iterdir()), key=_last_use_s, reverse=True)
+    for folder in caches[KEPT_FOLDERS:]:
         shutil.rmtree(folder, ignore_errors=True)
+
+
+def _is_cache(folder: Path) -> bool:
+    """Return whether a path has the name of a cache, and is a folder itself, not a link to one."""
+    named = _CACHE_NAME.fullmatch(folder.name) is not None
+    return named and folder.is_dir() and not folder.is_symlink()
 
 
 def _last_use_s(folder: Path) -> float:
     try:
-        return folder.stat().st_mtime
+        return folder.lstat().st_mtime
     except OSError:  # another process has deleted it
         return 0.0
 
