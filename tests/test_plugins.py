@@ -2,6 +2,7 @@
 
 import os
 import pickle
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -14,6 +15,7 @@ from veca_marl.envs.core.game import Game
 from veca_marl.envs.core.task import TASKS
 from veca_marl.plugins import PLUGINS, load_plugins
 from veca_marl.runs.assembly import GameFactory
+from veca_marl.runs.run_folder import open_run
 from veca_marl.sim.body.walker import WalkCommand
 from veca_marl.sim.physics.interactions import INTERACTIONS
 
@@ -173,3 +175,63 @@ def test_a_worker_process_loads_the_plugins_that_a_game_needs(outside):
     env = factory(1, 0)
     assert env.rollout(2).shape == (1, 2)
     env.close()
+
+
+@pytest.fixture(scope="module")
+def stored_run(tmp_path_factory):
+    """A run whose stored configuration names a package that writes a file when it is imported."""
+    folder = tmp_path_factory.mktemp("strangers") / "run"
+    write_package(folder.parent, "payload", "from pathlib import Path\nPath('executed').touch()\n")
+    words = ["plugins=[payload]", "+task=KickTheBall", "senses/vision=blind"]
+    run_module("veca_marl.train", [*words, f"hydra.run.dir={folder}", *SHORT], folder.parent)
+    (folder.parent / "executed").unlink()
+    return folder
+
+
+def run_module(module, words, folder):
+    command = [sys.executable, "-m", module, *words]
+    path = os.pathsep.join([str(ROOT), str(folder)])
+    environment = os.environ | {"PYTHONPATH": path}
+    return subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True)
+
+
+READERS = {
+    "evaluate": ["veca_marl.evaluate", "run={run}", "episodes=1"],
+    "resume": ["veca_marl.train", "resume={run}"],
+    "play": ["veca_marl.play", "policy={run}"],
+}
+
+
+@pytest.mark.parametrize("words", READERS.values(), ids=READERS.keys())
+def test_plugins_that_a_stored_run_names_are_not_imported(stored_run, words):
+    module, *asked = (word.format(run=stored_run) for word in words)
+    done = run_module(module, asked, stored_run.parent)
+    assert done.returncode == 2, done.stderr
+    (line,) = done.stderr.strip().splitlines()
+    assert "payload" in line
+    assert not (stored_run.parent / "executed").exists()
+
+
+def test_plugins_of_a_stored_run_are_imported_on_request(stored_run):
+    words = ["plugins=[payload]", f"run={stored_run}", "episodes=1"]
+    done = run_module("veca_marl.evaluate", words, stored_run.parent)
+    assert done.returncode == 0, done.stderr
+    (stored_run.parent / "executed").unlink()
+
+
+def test_a_run_with_a_plugin_is_resumed_if_the_plugin_is_named(stored_run):
+    words = ["plugins=[payload]", f"resume={stored_run}", "total_frames=256"]
+    done = run_module("veca_marl.train", words, stored_run.parent)
+    assert done.returncode == 0, done.stderr
+    (stored_run.parent / "executed").unlink()
+
+
+@pytest.mark.parametrize("entry", ["payload", "{a: 1}", "[1]"])
+def test_an_entry_that_is_no_list_of_plugins_is_one_line(stored_run, tmp_path, entry):
+    damaged = tmp_path / "damaged"
+    shutil.copytree(stored_run, damaged)
+    config = damaged / "config.yaml"
+    config.write_text(config.read_text().replace("- payload", "").replace("plugins: [payload]", ""))
+    config.write_text(f"{config.read_text()}\nplugins: {entry}\n")
+    with pytest.raises(ConfigError):
+        open_run(damaged).typed_config()

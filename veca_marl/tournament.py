@@ -82,7 +82,7 @@ def tournament(
     Raises:
         ConfigError: If it is not a self-play run, or a team has fewer than two past policies.
     """
-    node = folder.typed_config()
+    node = folder.typed_config(overrides)
     change(node, overrides)
     cfg = to_config(node)
     pool, members = Pool(folder.pool), options.tournament.members

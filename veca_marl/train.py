@@ -8,6 +8,7 @@ from __future__ import annotations
 import errno
 import logging
 import os
+import shlex
 import signal
 import sys
 from contextlib import ExitStack
@@ -55,8 +56,9 @@ def stored_node(folder: RunFolder, overrides: list[str]) -> DictConfig:
     Raises:
         ConfigError: If another key is to be changed, or the run is one of another task.
     """
-    node = folder.typed_config()
-    asked = dict(text.partition("=")[::2] for text in overrides)
+    node = folder.typed_config(overrides)
+    named = [text for text in overrides if not text.lstrip("+").startswith("plugins=")]
+    asked = dict(text.partition("=")[::2] for text in named)
     task = asked.pop("+task", node.task.name)
     if task != node.task.name:
         raise ConfigError(f"{folder.path} is a run of {node.task.name}, not of {task}")
@@ -66,7 +68,7 @@ def stored_node(folder: RunFolder, overrides: list[str]) -> DictConfig:
             f"a resumed run keeps its configuration: cannot change {', '.join(changed)}; "
             f"choices: {', '.join(RESUMABLE)}"
         )
-    change(node, [text for text in overrides if not text.startswith("+task=")], RESUMABLE)
+    change(node, [text for text in named if not text.startswith("+task=")], RESUMABLE)
     return node
 
 
@@ -90,20 +92,22 @@ def _train(cfg: Config, folder: RunFolder, trainer: Trainer) -> None:
         result = run_training(cfg, folder, trainer)
         print(result.timing, *result.comparison, f"run folder: {folder.path}", sep="\n")
     except KeyboardInterrupt:
-        print(f"\ninterrupted; {_continue(path)}", file=sys.stderr)
+        print(f"\ninterrupted; {_continue(cfg, path)}", file=sys.stderr)
         raise SystemExit(130) from None
     except _FAILURES as error:
-        print(f"error: {one_line(error)}; {_continue(path)}", file=sys.stderr)
+        print(f"error: {one_line(error)}; {_continue(cfg, path)}", file=sys.stderr)
         raise SystemExit(1) from error
     except OSError as error:
         if error.errno not in DISK_FULL:
             raise
-        print(f"error: {error}; make room; {_continue(path)}", file=sys.stderr)
+        print(f"error: {error}; make room; {_continue(cfg, path)}", file=sys.stderr)
         raise SystemExit(1) from error
 
 
-def _continue(path: Path) -> str:
-    return f"continue with: {_COMMAND} {resume_argument(path)}"
+def _continue(cfg: Config, path: Path) -> str:
+    """Return the command that continues a run; what it runs of plug-ins must be named again."""
+    plugins = [shlex.quote(f"plugins=[{','.join(cfg.plugins)}]")] if cfg.plugins else []
+    return f"continue with: {' '.join([_COMMAND, *plugins, resume_argument(path)])}"
 
 
 def set_up(node: DictConfig, path: Path) -> tuple[Config, RunFolder, Trainer]:

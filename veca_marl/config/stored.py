@@ -18,6 +18,7 @@ from veca_marl.config.overrides import check_group_values, conf_dirs, parse, wit
 from veca_marl.config.root import body_types, root_schema
 from veca_marl.envs.core.game_cfg import TeamCfg
 from veca_marl.envs.core.task import find_task
+from veca_marl.plugins import PLUGINS
 from veca_marl.sim.physics import PLAYGROUND_GENERATORS
 
 GAME_KEYS = ("body", "clock", "eval", "opponent", "playground", "senses", "task", "team")
@@ -46,9 +47,9 @@ def typed(stored: DictConfig, bodies: Mapping[str, str]) -> DictConfig:
         bodies: What `body_names` returned for the configuration.
 
     Raises:
-        ConfigError: If an entry has no counterpart in this version.
+        ConfigError: If an entry has no counterpart in this version, or a plug-in is not loaded.
     """
-    load_config_plugins(stored.get("plugins", []))
+    _check_plugins(stored.get("plugins", []))
     stored = _of_this_version(stored)
     try:
         node = root_schema()
@@ -69,6 +70,25 @@ def typed(stored: DictConfig, bodies: Mapping[str, str]) -> DictConfig:
         return cast(DictConfig, OmegaConf.merge(node, stored))
     except (OmegaConfBaseException, ValueError, KeyError) as error:
         raise ConfigError(f"stored configuration: {one_line(error)}") from error
+
+
+def _check_plugins(names: Any) -> None:
+    """Check that the plug-ins of a stored configuration are loaded.
+
+    They are never imported because a run names them: the run may come from someone else.
+
+    Raises:
+        ConfigError: If one is not, or the entry is no list of names.
+    """
+    load_config_plugins([])  # those that are installed
+    is_list = isinstance(names, Sequence) and not isinstance(names, str)
+    if not is_list or not all(isinstance(name, str) for name in names):
+        raise ConfigError(f"plugins={names!r} is no list of names")
+    if missing := [name for name in names if name not in PLUGINS]:
+        raise ConfigError(
+            f"this run wants the plug-in {', '.join(missing)}, whose code is only executed on "
+            f"request: add 'plugins=[{','.join(names)}]'"
+        )
 
 
 def _of_this_version(stored: DictConfig) -> DictConfig:
@@ -108,6 +128,8 @@ def change(node: DictConfig, overrides: Sequence[str], allowed: Sequence[str] = 
     """
     for override in parse(with_integers(overrides)):
         path = (override.package or str(override.key_or_group).replace("/", ".")).split(".")
+        if path == ["plugins"]:  # loaded before the configuration was read
+            continue
         if path == ["task"]:
             _require_same_task(node, override)
             continue

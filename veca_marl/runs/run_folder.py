@@ -33,6 +33,8 @@ from veca_marl.algos.selfplay import SelfPlayCfg
 from veca_marl.algos.specs import TeamSpec
 from veca_marl.algos.transfer import load_actor
 from veca_marl.config import Config, ConfigError, one_line, to_config
+from veca_marl.config.compose import load_config_plugins
+from veca_marl.config.overrides import plugins_in
 from veca_marl.config.stored import body_names, change, typed
 from veca_marl.runs.continuation import FILE as PROGRESS_FILE
 from veca_marl.runs.continuation import RunProgress, resume_argument
@@ -161,12 +163,18 @@ class RunFolder:
         stored.resume = None
         write_atomically(self.config, OmegaConf.to_yaml(stored, resolve=True))
 
-    def typed_config(self) -> DictConfig:
+    def typed_config(self, overrides: Sequence[str] = ()) -> DictConfig:
         """Return the configuration stored with the run, with the types that it had.
 
+        Args:
+            overrides: Those of the command line, which must name the plug-ins of the run that are
+                not installed.
+
         Raises:
-            ConfigError: If it cannot be read, or was stored by a version with another one.
+            ConfigError: If it cannot be read, was stored by a version with another one, or needs a
+                plug-in that is not loaded.
         """
+        load_config_plugins(plugins_in(overrides))
         bodies = self._read_provenance().get("bodies")
         if bodies is None:
             raise ConfigError(f"{self.path} was stored by an older version; train it again")
@@ -334,7 +342,7 @@ def stored_configuration(checkpoint: Path, overrides: Sequence[str], asked_by: s
     if checkpoint.is_file() and checkpoint.suffix != ".pt":
         raise ConfigError(f"{asked_by}{checkpoint} is no checkpoint; give a run, or a checkpoint")
     folder = open_run(checkpoint.parent.parent if checkpoint.is_file() else checkpoint, asked_by)
-    node = folder.typed_config()
+    node = folder.typed_config(overrides)
     # nothing is learnt here
     node.self_play, node.learner, node.init_from, node.init_encoders = SelfPlayCfg(), {}, {}, {}
     node.team_intrinsic = {}
