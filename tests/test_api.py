@@ -12,6 +12,7 @@ from veca_marl.algos.networks.encoders import Precision
 from veca_marl.api import as_integer, choose
 from veca_marl.config import ConfigError
 from veca_marl.envs.core.game_cfg import Script
+from veca_marl.runs.continuation import quoted
 from veca_marl.runs.run_folder import RunFolder
 
 TINY = ["collect=one_process", "collect.worlds=1", "collect.steps=32", "algo.minibatches=2"]
@@ -117,7 +118,7 @@ def close_of_closed():
             "overrides: 'total_frames=1e6' is not of the game",
         ),
         (
-            lambda: veca_marl.gym_env("PushOut1v1", overrides=[f"opponent.blue={FOLDER}"]),
+            lambda: veca_marl.gym_env("PushOut1v1", overrides=[f"opponent.blue={quoted(FOLDER)}"]),
             f"opponent.blue={FOLDER}: an environment does not play the policy of a run; choices: ",
         ),
         (lambda: veca_marl.make("KickTheBall", senses="mono"), "senses='mono' must be a mapping"),

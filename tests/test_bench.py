@@ -28,6 +28,7 @@ from veca_marl.config import conf_dir
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
 from veca_marl.envs.core.game import Game
 from veca_marl.envs.core.task import TASKS
+from veca_marl.runs.continuation import quoted
 from veca_marl.sim.physics import PlaygroundCfg, World, pybullet
 from veca_marl.sim.vision import Camera
 
@@ -333,8 +334,11 @@ def test_an_experiment_with_a_scripted_opponent_is_measured(capsys):
         (["+task=KickTheBall", "bench.worlds=[0]"], "bench.worlds must be at least 1"),
         (["+task=KickTheBall", "bench.worlds=[two]"], "bench.worlds[0]: Value 'two'"),
         (["+task=KickTheBall", "bench.wolds=[1]"], "did you mean worlds?"),
-        (["+task=KickTheBall", f"bench.json={__file__}/bench.json"], "is not a folder"),
-        (["+task=KickTheBall", f"bench.json={ROOT}"], "is a folder; give a file"),
+        (
+            ["+task=KickTheBall", f"bench.json={HERE[:-1]}/bench.json'"],
+            "is not a folder",
+        ),
+        (["+task=KickTheBall", f"bench.json={quoted(ROOT)}"], "is a folder; give a file"),
         (["bench.tasks=[KickTheBall]", "senses/vision=blind", "senses/audio=deaf"], "no sense"),
         (["+task=KickTheBall", "bench.loose_props=3"], "need bench.agents"),
         (["+task=KickTheBall", "bench.learning=true", "bench.agents=[2]"], "is not learnt"),

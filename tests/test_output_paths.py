@@ -7,6 +7,7 @@ from veca_marl.babybench import main as babybench
 from veca_marl.config import ConfigError
 from veca_marl.config.command_line import check_file, check_folder
 from veca_marl.report import main as report
+from veca_marl.runs.continuation import quoted
 
 
 def test_new_places_are_accepted(tmp_path):
@@ -30,8 +31,16 @@ def test_impossible_places_are_named(tmp_path):
     ("command", "arguments", "message"),
     [
         (babybench, ["+task=SelfTouch", "json=."], "json=. is a folder"),
-        (experts_table, ["tasks=[KickTheBall]", f"to={__file__}"], "is a file; give a folder"),
-        (report, ["+experiment=audio_ablation", f"to={__file__}"], "is a file; give a folder"),
+        (
+            experts_table,
+            ["tasks=[KickTheBall]", f"to={quoted(__file__)}"],
+            "is a file; give a folder",
+        ),
+        (
+            report,
+            ["+experiment=audio_ablation", f"to={quoted(__file__)}"],
+            "is a file; give a folder",
+        ),
         (report, ["+experiment=audio_ablation", "results=no.csv"], "results=no.csv is no file"),
     ],
 )

@@ -13,6 +13,7 @@ from veca_marl import list_tasks
 from veca_marl.bench.learning import Learning
 from veca_marl.bench.rollouts import Rollouts
 from veca_marl.config import compose
+from veca_marl.runs.continuation import quoted
 
 PAGE = (ROOT / "docs" / "performance.md").read_text(encoding="utf-8")
 SMALL = ("collect=one_process", "collect.worlds=2", "collect.steps=8", "threads=1")
@@ -157,7 +158,7 @@ def test_a_small_plan_is_measured():
         (["tasks=[KickTheBal]"], "KickTheBall"),
         (["steps=0"], "steps"),
         (["senses/audio=mono"], "senses/audio=mono"),
-        ([f"to={ROOT}"], "folder"),
+        ([f"to={quoted(ROOT)}"], "folder"),
     ],
 )
 def test_a_wrong_choice_ends_in_one_line(words, names, capsys):

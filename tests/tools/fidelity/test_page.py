@@ -20,6 +20,7 @@ from tools.fidelity.law import (
     equals,
 )
 from tools.fidelity.page import draw, picture_name, write_page
+from veca_marl.runs.continuation import quoted
 
 HELD = equals("gravity", "m/s2", 9.81, 9.8, 0.02)
 BROKEN = at_most("speed", "m/s", 1.0, 2.0)
@@ -123,7 +124,7 @@ def test_file_names_of_pictures_have_letters_digits_and_underscores_only():
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["sections=[inertia]", f"to={__file__}"], "is a file; give a folder"),
+        (["sections=[inertia]", f"to={quoted(__file__)}"], "is a file; give a folder"),
         (["-m", "sections=[inertia],[momentum]", "to=laws"], "written by 2 combinations"),
         (["-m", "sections=[inertia],[momentum]"], "let them differ in to"),
     ],
