@@ -35,6 +35,8 @@ from veca_marl.sim.vision import Camera
 QUICK = ["bench.steps=3", "bench.repeats=1"]
 ROLLOUTS = [*QUICK, "bench.worlds=[1]", "bench.references=false"]
 
+BELOW_A_FILE = quoted(f"{__file__}/bench.json")
+
 
 EXPERIMENTS = sorted(path.stem for path in (conf_dir() / "experiment").glob("*.yaml"))
 
@@ -335,7 +337,7 @@ def test_an_experiment_with_a_scripted_opponent_is_measured(capsys):
         (["+task=KickTheBall", "bench.worlds=[two]"], "bench.worlds[0]: Value 'two'"),
         (["+task=KickTheBall", "bench.wolds=[1]"], "did you mean worlds?"),
         (
-            ["+task=KickTheBall", f"bench.json={HERE[:-1]}/bench.json'"],
+            ["+task=KickTheBall", f"bench.json={BELOW_A_FILE}"],
             "is not a folder",
         ),
         (["+task=KickTheBall", f"bench.json={quoted(ROOT)}"], "is a folder; give a file"),

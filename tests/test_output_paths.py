@@ -9,6 +9,8 @@ from veca_marl.config.command_line import check_file, check_folder
 from veca_marl.report import main as report
 from veca_marl.runs.continuation import quoted
 
+FILE = quoted(__file__)
+
 
 def test_new_places_are_accepted(tmp_path):
     assert check_file(tmp_path / "new" / "scores.json", "json") == tmp_path / "new" / "scores.json"
@@ -33,12 +35,12 @@ def test_impossible_places_are_named(tmp_path):
         (babybench, ["+task=SelfTouch", "json=."], "json=. is a folder"),
         (
             experts_table,
-            ["tasks=[KickTheBall]", f"to={quoted(__file__)}"],
+            ["tasks=[KickTheBall]", f"to={FILE}"],
             "is a file; give a folder",
         ),
         (
             report,
-            ["+experiment=audio_ablation", f"to={quoted(__file__)}"],
+            ["+experiment=audio_ablation", f"to={FILE}"],
             "is a file; give a folder",
         ),
         (report, ["+experiment=audio_ablation", "results=no.csv"], "results=no.csv is no file"),
