@@ -179,11 +179,13 @@ def test_a_worker_process_loads_the_plugins_that_a_game_needs(outside):
 
 @pytest.fixture(scope="module")
 def stored_run(tmp_path_factory):
-    """A run whose stored configuration names a package that writes a file when it is imported."""
+    """A run of a plug-in that writes a file when it is imported."""
     folder = tmp_path_factory.mktemp("strangers") / "run"
     write_package(folder.parent, "payload", "from pathlib import Path\nPath('executed').touch()\n")
     words = ["plugins=[payload]", "+task=KickTheBall", "senses/vision=blind"]
-    run_module("veca_marl.train", [*words, f"hydra.run.dir={folder}", *SHORT], folder.parent)
+    words += [f"hydra.run.dir={folder}", *SHORT]
+    done = run_module("veca_marl.train", words, folder.parent)
+    assert done.returncode == 0, done.stderr
     (folder.parent / "executed").unlink()
     return folder
 
@@ -195,14 +197,16 @@ def run_module(module, words, folder):
     return subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True)
 
 
-READERS = {
-    "evaluate": ["veca_marl.evaluate", "run={run}", "episodes=1"],
-    "resume": ["veca_marl.train", "resume={run}"],
-    "play": ["veca_marl.play", "policy={run}"],
-}
-
-
-@pytest.mark.parametrize("words", READERS.values(), ids=READERS.keys())
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["veca_marl.evaluate", "run={run}", "episodes=1"],
+        ["veca_marl.train", "resume={run}"],
+        pytest.param(["veca_marl.play", "policy={run}"], marks=pytest.mark.slow),
+        pytest.param(["veca_marl.tournament", "run={run}"], marks=pytest.mark.slow),
+    ],
+    ids=["evaluate", "resume", "play", "tournament"],
+)
 def test_plugins_that_a_stored_run_names_are_not_imported(stored_run, words):
     module, *asked = (word.format(run=stored_run) for word in words)
     done = run_module(module, asked, stored_run.parent)
@@ -212,6 +216,7 @@ def test_plugins_that_a_stored_run_names_are_not_imported(stored_run, words):
     assert not (stored_run.parent / "executed").exists()
 
 
+@pytest.mark.slow
 def test_plugins_of_a_stored_run_are_imported_on_request(stored_run):
     words = ["plugins=[payload]", f"run={stored_run}", "episodes=1"]
     done = run_module("veca_marl.evaluate", words, stored_run.parent)

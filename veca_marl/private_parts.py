@@ -31,8 +31,8 @@ PRIVATE_PARTS = {
         "versions."
     ),
     "torchrl.weight_update.SharedMemWeightSyncScheme._wait_for_ack": (
-        "The same for the transfer of parameters, whose queues are in `_ack_queues`. Without a "
-        "time limit on other versions."
+        "The same for the transfer of parameters; its queues are in `_ack_queues`. Without a time "
+        "limit on other versions."
     ),
     "torchrl.objectives.ClipPPOLoss._log_weight": (
         "The only point at which old and new distribution are both known, for the analytic KL "

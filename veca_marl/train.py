@@ -105,7 +105,7 @@ def _train(cfg: Config, folder: RunFolder, trainer: Trainer) -> None:
 
 
 def _continue(cfg: Config, path: Path) -> str:
-    """Return the command that continues a run; what it runs of plug-ins must be named again."""
+    """Return the command that continues a run; its plug-ins have to be named again."""
     plugins = [shlex.quote(f"plugins=[{','.join(cfg.plugins)}]")] if cfg.plugins else []
     return f"continue with: {' '.join([_COMMAND, *plugins, resume_argument(path)])}"
 

@@ -27,7 +27,7 @@ TRAININGS = {
     "PPO": ("+task=KickTheBall", *_STAGE),
     "SAC": ("+task=KickTheBall", "algo=sac", *_SHORT_STAGE),
 }
-"""Training runs whose speed is measured: evaluations have the default proportion of the frames."""
+"""Training runs that are timed: evaluations have the default proportion of the frames."""
 
 
 @dataclass

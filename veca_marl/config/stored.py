@@ -86,7 +86,7 @@ def _check_plugins(names: Any) -> None:
         raise ConfigError(f"plugins={names!r} is no list of names")
     if missing := [name for name in names if name not in PLUGINS]:
         raise ConfigError(
-            f"this run wants the plug-in {', '.join(missing)}, whose code is only executed on "
+            f"this run needs the plug-in {', '.join(missing)}; its code is executed only on "
             f"request: add 'plugins=[{','.join(names)}]'"
         )
 

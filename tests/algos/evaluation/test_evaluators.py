@@ -24,7 +24,7 @@ LIMIT_S = 60.0
 
 @pytest.fixture
 def policy(make_ppo):
-    """A policy whose actions, and returns, differ between starts."""
+    """A policy with actions, and returns, that differ between starts."""
     for seed in range(20):
         policy = make_ppo(seed).policy.copy()
         with torch.no_grad():

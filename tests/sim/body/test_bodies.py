@@ -59,6 +59,15 @@ class Statue(Body):
     def write_frames(self): ...
 
 
+def test_a_body_without_joints_defines_nothing_after_a_physics_step():
+    world = empty_world()
+    Statue("statue", StatueCfg(), world)
+    world.freeze()
+    world.reset(np.random.default_rng(0))
+    world.step()
+    world.close()
+
+
 @pytest.fixture
 def statue():
     register_body("statue", Statue)

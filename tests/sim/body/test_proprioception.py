@@ -88,7 +88,7 @@ def test_free_fall_senses_no_specific_force(child):
 
 @pytest.mark.parametrize("steps", [1, 2, 5])
 def test_an_acceleration_is_the_mean_over_all_steps_since_the_last_reading(child, steps):
-    """In free fall, whose specific force is 0 however often the sense is read."""
+    """In free fall the specific force is 0, however often the sense is read."""
     world, body = child
     body.place((0.0, 0.0, 5.0))
     sense = sense_of(world, body)

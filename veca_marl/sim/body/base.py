@@ -198,6 +198,9 @@ class Body(ABC):
         """
         self.place((0.0, 0.0, 0.0))
 
+    def after_substep(self, substep_s: float) -> None:  # noqa: B027  optional
+        """Do nothing after a physics step; bodies with simulated joints apply their limits."""
+
     # ---- poses and motion
 
     @property

@@ -210,7 +210,7 @@ class BuiltContacts:
 
     Args:
         client: The PyBullet client, after its collision detection in the built state.
-        floor_id: PyBullet's id of the floor, the contacts with which are saved and restored.
+        floor_id: PyBullet's id of the floor; contacts with it are saved and restored.
     """
 
     def __init__(self, client: int, floor_id: int) -> None:
@@ -229,8 +229,10 @@ class BuiltContacts:
     def forgotten(self) -> Iterator[None]:
         """Save or restore the built state without the contacts that must not be kept."""
         self._let_collide(False)
-        yield
-        self._let_collide(True)
+        try:
+            yield
+        finally:
+            self._let_collide(True)
 
     def _let_collide(self, collide: bool) -> None:
         """Let links collide or not; Bullet forgets the contacts of those that do not."""

@@ -66,7 +66,7 @@ class NoSleep:
 
 
 class RestingProps:
-    """The `PropSleep` of a world whose props sleep when they are at rest.
+    """The `PropSleep` of a world in which props sleep when they are at rest.
 
     It is itself the `Rest` of the fixed props: when one is put elsewhere, all others wake.
 
