@@ -1,6 +1,7 @@
 """The public functions of `veca_marl`."""
 
 from importlib import import_module
+from inspect import Parameter, signature
 from pathlib import Path
 
 import numpy as np
@@ -8,8 +9,9 @@ import pytest
 import torch
 
 import veca_marl
+from veca_marl import api
 from veca_marl.algos.networks.encoders import Precision
-from veca_marl.api import as_integer, choose
+from veca_marl.api import GameChoices, as_integer, choose
 from veca_marl.config import ConfigError
 from veca_marl.envs.core.game_cfg import Script
 from veca_marl.runs.continuation import quoted
@@ -50,8 +52,19 @@ def test_train_stays_a_function_after_the_module_of_the_command_was_imported():
 
 @pytest.mark.parametrize("suite", [["veca"], None, 3])
 def test_a_suite_is_a_name(suite):
-    with pytest.raises(ConfigError, match=r"suite=.* must be a name, as text"):
+    with pytest.raises(ValueError, match="babybench, veca"):
         veca_marl.list_tasks(suite=suite)
+
+
+def test_choices_are_shown_as_arguments():
+    """Also to `help` and to the completion of notebooks."""
+    functions = [api.make, api.gym_env, api.parallel_env, api.train, api.check_task]
+    for function in functions:
+        shown = signature(function).parameters
+        assert set(GameChoices.__annotations__) < set(shown)
+        assert all(one.kind is not Parameter.VAR_KEYWORD for one in shown.values())
+    with pytest.raises(TypeError, match="sense_presets"):
+        veca_marl.make("KickTheBall", sense_presets={})
 
 
 def test_fractions_of_frames_are_refused():
@@ -85,7 +98,7 @@ def close_of_closed():
         ),
         (
             lambda: veca_marl.make("KickTheBall", overrides=["task=MazeNav"]),
-            "overrides: 'task=MazeNav' chooses another task; give it as the argument `task`",
+            "overrides: 'task=MazeNav' is chosen by the argument `task`",
         ),
         (
             lambda: veca_marl.train("KickTheBall", overrides=["seed=3"]),
@@ -102,7 +115,7 @@ def close_of_closed():
         (lambda: veca_marl.check_task("KickTheBall", checks=5), "checks=5 must be a CheckCfg"),
         (
             lambda: veca_marl.make("KickTheBall", overrides=["seed=3"]),
-            "overrides: 'seed=3' is not of the game; give the seed as the argument `seed`",
+            "overrides: 'seed=3' is chosen by the argument `seed`",
         ),
         (
             lambda: veca_marl.gym_env("KickTheBall", overrides=["algo/network=memory"]),

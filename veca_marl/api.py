@@ -7,14 +7,15 @@
 from __future__ import annotations
 
 import operator
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Container, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import fields
+from inspect import Parameter, signature
 from pathlib import Path
-from typing import Any
+from typing import Any, ParamSpec, TypedDict, TypeVar, Unpack
 
 from veca_marl.checks import CheckCfg, TaskReport, check_game
-from veca_marl.config import Config, ConfigError, compose, compose_node, to_config
+from veca_marl.config import ConfigError, compose, compose_node, to_config
 from veca_marl.config.command_line import check_folder
 from veca_marl.config.overrides import parse, root_of
 from veca_marl.envs.adapters.gymnasium import VecaGymEnv
@@ -32,105 +33,114 @@ from veca_marl.runs.run_folder import locked, new_run
 from veca_marl.runs.training import TrainingResult, run_training
 
 # `opponent` is the configuration of `GameCfg.script`
-_ROOTS_OF_GAMES = {f.name for f in fields(GameCfg)} - {"script"} | {"opponent", "plugins"}
+_GAME_ROOTS = {f.name for f in fields(GameCfg)} - {"script"} | {"opponent", "plugins"}
 
 
-def check_name(argument: str, value: Any) -> None:
-    """Check an argument that is a name.
+class GameChoices(TypedDict, total=False):
+    """Arguments that all functions for one task share; `make` describes them."""
 
-    Raises:
-        ConfigError: If it is no text.
-    """
-    if not isinstance(value, str):
-        raise ConfigError(f"{argument}={value!r} must be a name, as text")
+    playground: str | None
+    body: str | None
+    senses: Mapping[str, str] | None
+    overrides: Sequence[str]
+    plugins: Sequence[str]
 
 
-def check_list(argument: str, value: Any, example: str) -> None:
-    """Check an argument that is a list of texts.
-
-    Args:
-        argument: Its name.
-        value: Its value.
-        example: A list that it may be, for the message.
+def choose(task: str, **choices: Unpack[GameChoices]) -> GameCfg:
+    """Return the configuration of the game that `make` makes.
 
     Raises:
-        ConfigError: If it is one text, or another thing than a list of texts.
+        ConfigError: If there is no such choice, or an override is not of the game; the message
+            lists the choices there are.
     """
-    is_list = isinstance(value, Sequence) and not isinstance(value, str)
-    if not is_list or not all(isinstance(entry, str) for entry in value):
-        raise ConfigError(f"{argument}={value!r} must be a list of texts, such as {example}")
-
-
-def check_game_overrides(overrides: Sequence[str]) -> None:
-    """Check that all overrides change the game, which is all that an environment has.
-
-    Raises:
-        ConfigError: If one is of the seed, or of another part of the configuration.
-    """
-    for override in parse(overrides):
-        root = root_of(override)
-        if override.key_or_group == "task":
-            raise ConfigError(
-                f"overrides: {override.input_line!r} chooses another task; give it as the argument "
-                "`task`"
-            )
-        if root == "seed":
-            raise ConfigError(
-                f"overrides: {override.input_line!r} is not of the game; give the seed as the "
-                "argument `seed` (of check_task as checks=CheckCfg(seed=...))"
-            )
-        if root not in _ROOTS_OF_GAMES:
-            raise ConfigError(
-                f"overrides: {override.input_line!r} is not of the game; "
-                f"choices: {', '.join(sorted(_ROOTS_OF_GAMES))}"
-            )
-
-
-def check_run_overrides(overrides: Sequence[str], total_frames: Any) -> None:
-    """Check that no override is of an argument of `train`, or of Hydra.
-
-    Args:
-        overrides: The overrides.
-        total_frames: The argument; None if it was not given.
-
-    Raises:
-        ConfigError: If one is.
-    """
-    given = {"task": "task", "seed": "seed", "hydra": "folder"}
-    if total_frames is not None:
-        given["total_frames"] = "total_frames"
-    for override in parse(overrides):
-        key = override.key_or_group
-        argument = given.get("hydra" if key.partition(".")[0] == "hydra" else key)
-        if argument is not None:
-            raise ConfigError(
-                f"overrides: {override.input_line!r} is chosen by the argument `{argument}`"
-            )
-
-
-def check_scripted(cfg: Config) -> None:
-    """Check that no opponent is the policy of a run, which no environment plays.
-
-    Raises:
-        ConfigError: If one is.
-    """
+    texts = chosen_overrides(task, **choices)
+    _check_overrides(choices.get("overrides", ()), {"task": "task", "seed": "seed"}, _GAME_ROOTS)
+    cfg = compose(texts)
     for team, path in cfg.frozen.items():
         raise ConfigError(
             f"opponent.{team}={path}: an environment does not play the policy of a run; choices: "
             f"{', '.join(script.value for script in Script)}; `train` and "
             "python -m veca_marl.evaluate play it"
         )
+    return cfg.game
 
 
-def check_presets(argument: str, value: Any) -> None:
-    """Check an argument that gives names of senses the names of presets.
+def chosen_overrides(
+    task: str,
+    *,
+    playground: str | None = None,
+    body: str | None = None,
+    senses: Mapping[str, str] | None = None,
+    overrides: Sequence[str] = (),
+    plugins: Sequence[str] = (),
+) -> list[str]:
+    """Return choices as the overrides of a command line.
 
     Raises:
-        ConfigError: If it does not.
+        ConfigError: If one is not of the type that `GameChoices` states.
     """
-    is_mapping = isinstance(value, Mapping)
-    if not is_mapping or not all(isinstance(part, str) for pair in value.items() for part in pair):
-        raise ConfigError(f'{argument}={value!r} must be a mapping, such as {{"audio": "mono"}}')
+    _check_list("plugins", plugins, '["my_tasks"]')
+    _check_list("overrides", overrides, '["task.life_s=4.0"]')
+    if not isinstance(senses or {}, Mapping):
+        raise ConfigError(f'senses={senses!r} must be a mapping, such as {{"audio": "mono"}}')
+    named = {"playground": playground, "body": body}
+    named |= {f"senses/{sense}": preset for sense, preset in (senses or {}).items()}
+    chosen = {"+task": task} | {key: value for key, value in named.items() if value is not None}
+    for key, value in chosen.items():
+        if not isinstance(value, str):
+            raise ConfigError(f"{key.lstrip('+')}={value!r} must be a name, as text")
+    packages = [f"plugins=[{','.join(plugins)}]"] if plugins else []
+    return [*(f"{key}={value}" for key, value in chosen.items()), *packages, *overrides]
+
+
+def _check_list(argument: str, value: Any, example: str) -> None:
+    """Check an argument that is a list of texts, and not one text, whose letters are no names.
+
+    Raises:
+        ConfigError: If it is another thing.
+    """
+    is_list = isinstance(value, Sequence) and not isinstance(value, str)
+    if not is_list or not all(isinstance(entry, str) for entry in value):
+        raise ConfigError(f"{argument}={value!r} must be a list of texts, such as {example}")
+
+
+def _check_overrides(
+    overrides: Sequence[str], arguments: Mapping[str, str], roots: Container[str] | None = None
+) -> None:
+    """Check that overrides leave out what arguments choose.
+
+    Args:
+        overrides: The overrides.
+        arguments: Key of the configuration, or `hydra`, to the argument that chooses it.
+        roots: Roots of keys that can be changed; None is all others.
+
+    Raises:
+        ConfigError: If one does not, or is of another root.
+    """
+    for override in parse(overrides):
+        key, root = override.key_or_group, root_of(override)
+        if argument := arguments.get(root if root == "hydra" else key):
+            raise ConfigError(
+                f"overrides: {override.input_line!r} is chosen by the argument `{argument}`"
+            )
+        if roots is not None and root not in roots:
+            raise ConfigError(
+                f"overrides: {override.input_line!r} is not of the game; "
+                f"choices: {', '.join(sorted(_GAME_ROOTS))}"
+            )
+
+
+Parameters = ParamSpec("Parameters")
+Result = TypeVar("Result")
+
+
+def _with_choices(function: Callable[Parameters, Result]) -> Callable[Parameters, Result]:
+    """Let `help` and the completion of notebooks show `GameChoices` as arguments."""
+    own = signature(function, eval_str=True)
+    named = [one for one in own.parameters.values() if one.kind is not Parameter.VAR_KEYWORD]
+    _, *common = signature(chosen_overrides, eval_str=True).parameters.values()
+    function.__signature__ = own.replace(parameters=named + common)  # type: ignore[attr-defined]
+    return function
 
 
 def as_integer(argument: str, value: Any) -> int:
@@ -165,41 +175,37 @@ def list_tasks(plugins: Sequence[str] = (), suite: str = "veca") -> list[str]:
 
     Raises:
         PluginError: If a plug-in cannot be loaded.
-        ConfigError: If `plugins` is no list of names, or `suite` no name.
+        ConfigError: If `plugins` is no list of names.
         ValueError: If there is no such suite; the message lists those there are.
     """
-    check_list("plugins", plugins, '["my_tasks"] (a suite is suite="babybench")')
-    check_name("suite", suite)
+    _check_list("plugins", plugins, '["my_tasks"] (a suite is suite="babybench")')
     load_plugins(plugins)
     suites = {task.suite for task in TASKS.values()}
-    if suite not in suites:
-        raise ValueError(unknown("suite", suite, sorted(suites)))
+    if not isinstance(suite, str) or suite not in suites:
+        raise ValueError(unknown("suite", str(suite), sorted(suites)))
     return sorted(name for name, task in TASKS.items() if task.suite == suite)
 
 
+@_with_choices
 def make(
     task: str,
     *,
     worlds: int = 1,
-    playground: str | None = None,
-    body: str | None = None,
-    senses: Mapping[str, str] | None = None,
     seed: int | None = None,
-    overrides: Sequence[str] = (),
-    plugins: Sequence[str] = (),
+    **choices: Unpack[GameChoices],
 ) -> VecaEnv:
     """Make a task as a TorchRL environment. What is left out is as on the command line.
 
     Args:
         task: One of `list_tasks`.
         worlds: How many copies of the game, played in one process side by side.
-        playground: A file of `conf/playground`, such as `simple`; None is the task's own.
-        body: A file of `conf/body`, such as `walker_discrete`.
-        senses: Sense to preset, a file of `conf/senses/<sense>`, such as `{"audio": "mono"}`.
         seed: The same seed gives the same worlds, bit by bit; None is fresh entropy.
-        overrides: Anything else of the game that the command line takes, such as
-            `["task.life_s=4.0"]`.
-        plugins: Packages that add tasks or presets and are not installed as plug-ins.
+        **choices: ``playground``, a file of `conf/playground`, such as `simple` (None is the
+            task's own); ``body``, a file of `conf/body`, such as `walker_discrete`; ``senses``,
+            sense to preset, a file of `conf/senses/<sense>`, such as `{"audio": "mono"}`;
+            ``overrides``, anything else of the game that the command line takes, such as
+            `["task.life_s=4.0"]`; ``plugins``, packages that add tasks or presets and are not
+            installed as plug-ins.
 
     Returns:
         An environment with `batch_size=[worlds]`.
@@ -208,106 +214,80 @@ def make(
         ConfigError: If there is no such choice; the message lists those there are.
         ValueError: If a number is impossible.
     """
-    cfg = choose(
-        task, playground=playground, body=body, senses=senses, overrides=overrides, plugins=plugins
-    )
+    cfg = choose(task, **choices)
     return VecaEnv(cfg, worlds=worlds, seed=seed)
 
 
+@_with_choices
 def gym_env(
     task: str,
     *,
-    playground: str | None = None,
-    body: str | None = None,
-    senses: Mapping[str, str] | None = None,
     seed: int | None = None,
-    overrides: Sequence[str] = (),
-    plugins: Sequence[str] = (),
     render_mode: str | None = None,
     layout: str = "arrays",
+    **choices: Unpack[GameChoices],
 ) -> VecaGymEnv:
     """Make a task of one agent: what `gymnasium.make("veca_marl/<task>-v0", ...)` calls.
 
     Args:
         task: One of `list_tasks`.
-        playground: As for `make`.
-        body: As for `make`.
-        senses: As for `make`.
         seed: Used until `reset` is given one; None is fresh entropy.
-        overrides: As for `make`.
-        plugins: As for `make`.
         render_mode: `rgb_array` if `render` is to be called.
         layout: `arrays` gives each sense in its own shape, as TorchRL and PettingZoo get it;
             `stacked` gives both eyes as one image `(6, H, W)` and every other sense as a vector,
             as the CNN of Stable-Baselines3 expects.
+        **choices: As for `make`.
 
     Raises:
         ConfigError: If there is no such choice; the message lists those there are.
         ValueError: If the task is one for several agents, or a number is impossible.
     """
-    cfg = choose(
-        task, playground=playground, body=body, senses=senses, overrides=overrides, plugins=plugins
-    )
+    cfg = choose(task, **choices)
     return VecaGymEnv(cfg, seed, render_mode, SensesLayout.named(layout))
 
 
+@_with_choices
 def parallel_env(
     task: str,
     *,
-    playground: str | None = None,
-    body: str | None = None,
-    senses: Mapping[str, str] | None = None,
     seed: int | None = None,
-    overrides: Sequence[str] = (),
-    plugins: Sequence[str] = (),
     render_mode: str | None = None,
+    **choices: Unpack[GameChoices],
 ) -> VecaParallelEnv:
     """Make a task of any number of agents as a PettingZoo `ParallelEnv`.
 
     Args:
         task: One of `list_tasks`.
-        playground: As for `make`.
-        body: As for `make`.
-        senses: As for `make`.
         seed: Used until `reset` is given one; None is fresh entropy.
-        overrides: As for `make`.
-        plugins: As for `make`.
         render_mode: `rgb_array` if `render` is to be called.
+        **choices: As for `make`.
 
     Raises:
         ConfigError: If there is no such choice; the message lists those there are.
         ValueError: If a number is impossible.
     """
-    cfg = choose(
-        task, playground=playground, body=body, senses=senses, overrides=overrides, plugins=plugins
-    )
+    cfg = choose(task, **choices)
     return VecaParallelEnv(cfg, seed, render_mode)
 
 
+@_with_choices
 def train(
     task: str,
     *,
     total_frames: float | None = None,
-    playground: str | None = None,
-    body: str | None = None,
-    senses: Mapping[str, str] | None = None,
     seed: int = 0,
     folder: str | Path | None = None,
-    overrides: Sequence[str] = (),
-    plugins: Sequence[str] = (),
+    **choices: Unpack[GameChoices],
 ) -> TrainingResult:
     """Train on a task, as ``python -m veca_marl.train`` does.
 
     Args:
         task: One of `list_tasks`.
         total_frames: Frames of experience; None is the default of the command line.
-        playground: As for `make`.
-        body: As for `make`.
-        senses: As for `make`.
         seed: Seed of the run.
         folder: Folder of the run, as the command writes it; None stores nothing.
-        overrides: Anything else the command line takes, such as `["algo=mappo"]`.
-        plugins: As for `make`.
+        **choices: As for `make`; the overrides may change anything that the command line
+            takes, such as `["algo=mappo"]`.
 
     Returns:
         The rows of the metrics and of the evaluations, and the policy.
@@ -320,12 +300,12 @@ def train(
     path = None if folder is None else check_folder(folder, "folder")
     with nullcontext() if path is None else locked(path):
         run = None if path is None else new_run(path)
-        chosen = _choices(task, playground, body, senses, plugins)
+        arguments = {"task": "task", "seed": "seed", "hydra": "folder"}
+        chosen = [*chosen_overrides(task, **choices), f"seed={as_integer('seed', seed)}"]
         if total_frames is not None:
             chosen.append(f"total_frames={as_integer('total_frames', total_frames)}")
-        check_list("overrides", overrides, '["algo=mappo"]')
-        check_run_overrides(overrides, total_frames)
-        chosen += [f"seed={as_integer('seed', seed)}", *overrides]
+            arguments["total_frames"] = "total_frames"
+        _check_overrides(choices.get("overrides", ()), arguments)
         node = compose_node(chosen)
         if node.resume is not None:
             raise ConfigError(
@@ -340,15 +320,12 @@ def train(
         return run_training(cfg, run, trainer)
 
 
+@_with_choices
 def check_task(
     task: type[Task] | str,
     *,
-    playground: str | None = None,
-    body: str | None = None,
-    senses: Mapping[str, str] | None = None,
-    overrides: Sequence[str] = (),
-    plugins: Sequence[str] = (),
     checks: CheckCfg | None = None,
+    **choices: Unpack[GameChoices],
 ) -> TaskReport:
     """Check a task, for people who write one; ``print(check_task(MyTask))`` shows the results.
 
@@ -360,12 +337,8 @@ def check_task(
 
     Args:
         task: A registered class, or its name.
-        playground: As for `make`.
-        body: As for `make`.
-        senses: As for `make`.
-        overrides: As for `make`.
-        plugins: As for `make`.
         checks: How much is played; None is `CheckCfg()`.
+        **choices: As for `make`.
 
     Returns:
         A result for each check. An exception of the task is a failed result with its type, message
@@ -380,51 +353,7 @@ def check_task(
     name = task if isinstance(task, str) else task.__name__
     if not isinstance(task, str) and TASKS.get(name) is not task:
         raise ValueError(f"task {name!r} is not registered; decorate the class with @register_task")
-    cfg = choose(
-        name, playground=playground, body=body, senses=senses, overrides=overrides, plugins=plugins
-    )
+    cfg = choose(name, **choices)
     if checks is not None and not isinstance(checks, CheckCfg):
         raise ConfigError(f"checks={checks!r} must be a CheckCfg, or None")
     return check_game(cfg, checks or CheckCfg())
-
-
-def choose(
-    task: str,
-    *,
-    playground: str | None = None,
-    body: str | None = None,
-    senses: Mapping[str, str] | None = None,
-    overrides: Sequence[str] = (),
-    plugins: Sequence[str] = (),
-) -> GameCfg:
-    """Return the configuration of the game that `make` makes. The arguments are the same.
-
-    Raises:
-        ConfigError: If there is no such choice, or an override is not of the game; the message
-            lists the choices there are.
-    """
-    check_list("overrides", overrides, '["task.life_s=4.0"]')
-    check_game_overrides(overrides)
-    cfg = compose([*_choices(task, playground, body, senses, plugins), *overrides])
-    check_scripted(cfg)
-    return cfg.game
-
-
-def _choices(
-    task: str,
-    playground: str | None,
-    body: str | None,
-    senses: Mapping[str, str] | None,
-    plugins: Sequence[str],
-) -> list[str]:
-    """Return the arguments as overrides."""
-    check_list("plugins", plugins, '["my_tasks"]')
-    check_presets("senses", senses or {})
-    for argument, value in (("task", task), ("playground", playground), ("body", body)):
-        if argument == "task" or value is not None:
-            check_name(argument, value)
-    choices = [f"+task={task}"]
-    choices += [f"plugins=[{','.join(plugins)}]"] if plugins else []
-    choices += [] if playground is None else [f"playground={playground}"]
-    choices += [] if body is None else [f"body={body}"]
-    return choices + [f"senses/{sense}={preset}" for sense, preset in (senses or {}).items()]
