@@ -50,8 +50,12 @@ def pytest_terminal_summary(terminalreporter, exitstatus, config):
         terminalreporter.write_line(f"seeds were moved: --seed-offset={offset}", red=True)
 
 
+@pytest.hookimpl(tryfirst=True)  # before tests are selected by their marks
 def pytest_collection_modifyitems(config, items):
-    """Run the longest tests first; leave out stored bytes where seeds are moved."""
+    """Run the longest tests first; notebooks are slow; leave out stored bytes with moved seeds."""
+    for item in items:
+        if item.path.suffix == ".ipynb":
+            item.add_marker(pytest.mark.slow)
     items.sort(key=lambda item: item.path.name not in LONGEST)
     if config.getoption("--seed-offset") == 0:
         return

@@ -154,6 +154,7 @@ def test_results_as_tables_and_json(tmp_path, capsys):
     assert (found["machine"]["commit"] or "unknown") in printed.splitlines()[0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("every_frames", [16, 20])  # a batch has 16
 def test_learning_is_measured_beside_rollouts(every_frames, tmp_path, capsys, monkeypatch):
     written = []
@@ -179,6 +180,7 @@ def test_learning_is_measured_beside_rollouts(every_frames, tmp_path, capsys, mo
     assert f"{found['ratio']:.2f}" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_rollouts_at_once_name_a_process_that_was_killed():
     game = compose(["+task=KickTheBall", "senses/vision=blind"]).game
     before = set(active_children())
@@ -232,12 +234,14 @@ def test_an_absent_sense_is_not_measured(tmp_path):
     assert "vision" in run["ms_per_part"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("task", ["TurnBaby", "SoccerTwoPlayer", "MultiAgentNav"])
 def test_tasks_with_any_body_and_number_of_agents_are_measured(task, capsys):
     assert main([*ROLLOUTS, f"+task={task}"]) == 0
     assert task in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_several_tasks_and_playgrounds_are_one_table(capsys):
     words = [*ROLLOUTS, "bench.tasks=[KickTheBall]", "bench.playgrounds=[simple,house]"]
     assert main(words) == 0
@@ -252,6 +256,7 @@ def test_several_tasks_and_playgrounds_are_one_table(capsys):
         assert goal == f"{most}: {'met' if float(views) <= most else 'missed'}"
 
 
+@pytest.mark.slow
 def test_tasks_are_measured_with_each_number_of_worlds(capsys):
     words = ["bench.tasks=[ObjectNav]", "bench.worlds=[2,3]", "senses/touch=numb"]
     assert main([*ROLLOUTS, *words]) == 0
@@ -305,6 +310,7 @@ def test_every_task_is_measured(task, capsys):
 BODIES = sorted(path.stem for path in (conf_dir() / "body").glob("*.yaml"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "body", [pytest.param(b, marks=[pytest.mark.slow] * (b != "mitten")) for b in BODIES]
 )

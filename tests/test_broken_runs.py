@@ -129,6 +129,7 @@ def cases(*tables):
     return pytest.mark.parametrize(("damage", "message"), table.values(), ids=table)
 
 
+@pytest.mark.slow
 @cases(FOLDERS, CHECKPOINTS, RESUMED)
 def test_a_run_that_cannot_be_resumed_is_unchanged(run, damage, message):
     damage(run)

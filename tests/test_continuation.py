@@ -34,6 +34,7 @@ def test_a_usual_path_has_no_quotation_marks():
     assert resume_argument("/runs/a-b_c/2026.1") == "resume=/runs/a-b_c/2026.1"
 
 
+@pytest.mark.slow
 def test_the_printed_argument_continues_the_run(tmp_path, capsys):
     start = [*SMOKE, f"hydra.run.dir={tmp_path / 'run'}"]
     assert train(tmp_path, *start) == 0

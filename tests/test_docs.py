@@ -58,6 +58,7 @@ def test_the_site_builds_without_a_warning(tmp_path):
     assert (tmp_path / "html" / "api" / "veca_marl.html").exists()
 
 
+@pytest.mark.slow
 def test_the_written_pages_build_without_a_warning(tmp_path):
     warnings = build_site(tmp_path, "-t", "written_pages")
     (missing,) = warnings
@@ -89,6 +90,7 @@ def as_restructured_text(docstring):
     return str(napoleon.GoogleDocstring(inspect.cleandoc(docstring or ""), style))
 
 
+@pytest.mark.slow
 def test_docstrings_are_valid_restructured_text():
     """Quicker than the API reference, see test_the_site_builds_without_a_warning."""
     for module in map(importlib.import_module, MODULES):
@@ -119,6 +121,7 @@ def test_no_docstring_of_an_attribute_has_a_colon_in_its_first_line():
     assert found == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", built_in_tasks())
 def test_the_page_of_a_task_is_current(name):
     assert read(f"tasks/{name}.md") == task_page(find_task(name)), "run make pages"
@@ -131,6 +134,7 @@ def rows_of(page, section):
     return {name.strip("`"): values for name, *values in cells}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", built_in_tasks())
 def test_the_defaults_on_the_page_of_a_task_are_those_of_its_preset(name):
     page, task = read(f"tasks/{name}.md"), compose([f"+task={name}"]).game.task
@@ -147,6 +151,7 @@ def test_the_defaults_on_the_page_of_a_task_are_those_of_its_preset(name):
     assert rates == set(find_task(name).rates)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", list_tasks())
 def test_the_page_of_a_task_tells_its_default_body_from_that_of_the_paper(name):
     page, body = read(f"tasks/{name}.md"), compose([f"+task={name}"]).game.body

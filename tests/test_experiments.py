@@ -37,6 +37,7 @@ def test_every_arm_of_an_experiment_can_be_chosen(name):
     assert {arm.cfg.experiment.arm for arm in arms} >= set(DECLARED[name]["arms"])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "path", sorted(EXPERIMENTS.glob("*/report.md")), ids=lambda p: p.parent.name
 )

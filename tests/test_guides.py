@@ -54,6 +54,7 @@ def commands(name):
     return [(p, line) for p, line in shown if not NEEDS_MORE.search(line)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("page", "line"), commands("train"))
 def test_what_the_training_commands_choose_can_be_chosen(page, line):
     choices = [word for word in shlex.split(line) if word != "-m" and "hydra." not in word]
@@ -80,6 +81,7 @@ def test_what_the_bench_commands_choose_can_be_chosen(page, line):
             assert compose([*overrides, *([f"+task={task}"] if task else [])]).task.name
 
 
+@pytest.mark.slow
 def test_the_code_of_the_pages_runs(tmp_path):
     pages = [p for p in WRITTEN if PYTHON.search(text_of(p)) and p.name != RUN_BY_OTHERS]
     assert {"add_a_task.md", "add_a_sense.md", "first_steps.md"} <= {page.name for page in pages}

@@ -209,6 +209,7 @@ def test_episodes_that_are_longer_than_the_steps_between_evaluations_are_named(
     assert bool(found) is warned
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("stored", [False, True])
 def test_a_resumed_run_that_ends_before_its_buffer_is_full_again_says_so(tmp_path, caplog, stored):
     choices = [f"algo.replay.in_checkpoint={stored}", "task.max_seconds=0.6"]

@@ -142,6 +142,7 @@ def installed(tmp_path):
     return {**os.environ, "PYTHONPATH": f"{folder}{os.pathsep}{ROOT}"}
 
 
+@pytest.mark.slow
 def test_an_installed_plugin_needs_no_naming_and_trains(installed, tmp_path):
     """In one process: its task is listed, is made by Gymnasium, and is trained by the command."""
     program = (
@@ -201,7 +202,7 @@ def run_module(module, words, folder):
     "words",
     [
         ["veca_marl.evaluate", "run={run}", "episodes=1"],
-        ["veca_marl.train", "resume={run}"],
+        pytest.param(["veca_marl.train", "resume={run}"], marks=pytest.mark.slow),
         pytest.param(["veca_marl.play", "policy={run}"], marks=pytest.mark.slow),
         pytest.param(["veca_marl.tournament", "run={run}"], marks=pytest.mark.slow),
     ],

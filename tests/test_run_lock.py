@@ -47,6 +47,7 @@ def holder(tmp_path):
     process.stdout.close()
 
 
+@pytest.mark.slow
 def test_a_folder_that_another_process_holds_is_refused_until_that_is_killed(tmp_path, holder):
     message = rf"{tmp_path / 'run'} is in use: process {holder.pid} on \S+ writes to it; wait until"
     with pytest.raises(ConfigError, match=message), locked(tmp_path / "run"):
@@ -101,6 +102,7 @@ def test_a_new_run_in_the_folder_of_one_that_starts_is_refused(tmp_path, capsys)
     assert f"error: {tmp_path / 'run'} is in use: process" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_a_run_is_resumed_once_at_a_time(tmp_path, capsys):
     run = tmp_path / "run"
     assert train(tmp_path, *SMOKE, f"hydra.run.dir={run}") == 0

@@ -14,8 +14,9 @@ CHOICES = [
     *([f"+task={name}"] for name in sorted(TASKS)),
     *(["+task=ObjectNav", f"body={name}"] for name in BODIES),
     *([f"+experiment={name}"] for name in EXPERIMENTS),
-    ["+task=PushOut1v1", "+body@team.red.body=mitten", "+algo@learner.blue=mappo"],
 ]
+SEVERAL = ["+task=PushOut1v1", "+body@team.red.body=mitten", "+algo@learner.blue=mappo"]
+SOME = [SEVERAL, ["+task=GrabObject"], ["+experiment=audio_ablation"]]
 
 
 def read_again(node, path):
@@ -23,7 +24,11 @@ def read_again(node, path):
     return typed(OmegaConf.load(path), body_names(node))
 
 
-@pytest.mark.parametrize("overrides", CHOICES, ids=" ".join)
+@pytest.mark.parametrize(
+    "overrides",
+    [*SOME, *(pytest.param(choice, marks=pytest.mark.slow) for choice in CHOICES)],
+    ids=" ".join,
+)
 def test_it_is_read_as_it_was_stored(overrides, tmp_path):
     node = compose_node(overrides)
     assert to_config(read_again(node, tmp_path / "config.yaml")) == to_config(node)

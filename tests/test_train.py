@@ -172,6 +172,7 @@ def test_a_wrong_command_ends_in_one_line_and_leaves_nothing(tmp_path, arguments
     assert not list(tmp_path.glob("runs/*/*"))
 
 
+@pytest.mark.slow
 def test_logged_lines_and_diverged_learning_are_seen(tmp_path):
     sac = ["algo=sac", "algo.replay={capacity: 2000, warm_up_frames: 16}", "algo.batch_size=16"]
     done = train(tmp_path, *SMOKE, *sac, "algo.learning_rate=1e12", "hydra.run.dir=run")

@@ -57,6 +57,7 @@ runpy.run_path(sys.argv[0], run_name="__main__")
 """
 
 
+@pytest.mark.slow
 def test_it_makes_environments_and_trains_outside_the_checkout(python, tmp_path):
     """In one process: a Gymnasium id with its module, `make`, and the console script."""
     script = python.parent / "veca-train"

@@ -15,21 +15,34 @@ from veca_marl.envs.core.task import TASKS
 WITH_OTHER_BODY = ("KickTheBall", "TurnBaby", "PushOut1v1", "MultiAgentNav")
 # games of several joint-level bodies with eyes and skin, which the quick suite plays with walkers
 WITH_WALKERS = ("PushOut2v2", "SoccerTwoPlayer")
+# tasks whose adapters and rude actions the quick suite tests: besides those above, hands, verbs of
+# a door, a task of another suite
+WITH_EVERY_ADAPTER = (*WITH_OTHER_BODY, "GrabObject", "BabyzumasRevenge", "HandRegard")
+NARROW = ("test_every_adapter", "test_every_task_robustly", "test_every_task_with_bodies")
 WORLDS, STEPS = 2, 25
 
 
 def pytest_generate_tests(metafunc):
     """Give a test each task, and each kind of action if it depends on `kind`."""
     if "kind" in metafunc.fixturenames:
-        pairs = [_pair(task, kind) for task in sorted(TASKS) for kind in KINDS]
+        narrow = metafunc.module.__name__.endswith(NARROW)
+        pairs = [_pair(task, kind, narrow) for task in sorted(TASKS) for kind in KINDS]
         metafunc.parametrize(("task", "kind"), pairs, scope="session")
     elif "task" in metafunc.fixturenames:
-        metafunc.parametrize("task", sorted(TASKS), scope="session")
+        narrow = metafunc.module.__name__.endswith(NARROW)
+        tasks = [_one(task, narrow) for task in sorted(TASKS)]
+        metafunc.parametrize("task", tasks, scope="session")
 
 
-def _pair(task, kind):
+def _pair(task, kind, narrow):
     quick = task in WITH_OTHER_BODY or (kind == "own") != (task in WITH_WALKERS)
+    quick = quick and (not narrow or (kind == "own" and task in WITH_EVERY_ADAPTER))
     return pytest.param(task, kind, marks=() if quick else pytest.mark.slow)
+
+
+def _one(task, narrow):
+    quick = not narrow or task in WITH_EVERY_ADAPTER
+    return pytest.param(task, marks=() if quick else pytest.mark.slow)
 
 
 @pytest.fixture(scope="session")

@@ -13,6 +13,10 @@ RATED = sorted(
     for name, task in TASKS.items()
     if task.rates and task.__module__.startswith("veca_marl.envs.tasks.")
 )
+# the first one in the quick suite
+each_rated = pytest.mark.parametrize(
+    "name", [RATED[0], *(pytest.param(name, marks=pytest.mark.slow) for name in RATED[1:])]
+)
 
 
 def game_at(task, rate_hz, *overrides):
@@ -21,7 +25,7 @@ def game_at(task, rate_hz, *overrides):
     return Game(game_cfg(task, "own", *clock, *overrides))
 
 
-@pytest.mark.parametrize("name", RATED)
+@each_rated
 def test_weights_of_rates_are_proportional_to_the_duration_of_a_step(name):
     rates, given = TASKS[name].rates, game_cfg(name).task.weights
     for rate_hz in (25, 50):
@@ -33,7 +37,7 @@ def test_weights_of_rates_are_proportional_to_the_duration_of_a_step(name):
         game.close()
 
 
-@pytest.mark.parametrize("name", RATED)
+@each_rated
 def test_at_the_default_clock_weights_are_those_of_the_configuration(name):
     game = Game(game_cfg(name))
     assert game.weights == game.cfg.task.weights
@@ -60,6 +64,7 @@ def test_the_return_of_a_walk_does_not_depend_on_the_rate():
     assert fast == pytest.approx(slow, rel=0.1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("clock", ["default", "agent4ms"])
 def test_tearing_the_tower_down_is_worse_than_doing_nothing_with_every_clock(clock):
     game = Game(game_cfg("PutDownBlock", "own", f"clock={clock}"))

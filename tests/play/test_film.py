@@ -26,6 +26,7 @@ def pictures_and_streams(path):
         return pictures, [stream.type for stream in container.streams]
 
 
+@pytest.mark.slow
 def test_two_episodes_of_the_expert(tmp_path, capsys):
     path = tmp_path / "new" / "kick.mp4"
     assert play(path, "episodes=2") == 0
@@ -38,6 +39,7 @@ def test_two_episodes_of_the_expert(tmp_path, capsys):
     assert "episode 1: return" in printed
 
 
+@pytest.mark.slow
 def test_a_deaf_agent_has_a_video_without_sound(tmp_path):
     assert play(tmp_path / "deaf.mp4", "policy=random", "senses/audio=deaf") == 0
     assert pictures_and_streams(tmp_path / "deaf.mp4")[1] == ["video"]

@@ -18,6 +18,7 @@ def write_longer(folder, config, points, **options):
     write_run(folder, {**config, "total_frames": points[-1][0]}, points, **options)
 
 
+@pytest.mark.slow
 def test_a_run_with_more_frames_is_compared_at_the_frames_asked_for(tmp_path, arms, run):
     write_all(tmp_path, arms, [("mono", 2)])
     points = [(100, 0.1), (200, 0.2), (200 + BATCH, 9.0)]

@@ -21,6 +21,7 @@ def test_the_rate_of_many_runs_is_that_of_the_confidence():
     assert 0.03 < false_order_rate(12, 12) < 0.08
 
 
+@pytest.mark.slow
 def test_the_rate_is_the_same_each_time_and_does_not_depend_on_the_order():
     first = false_order_rate(3, 5)
     false_order_rate.cache_clear()
@@ -32,6 +33,7 @@ def test_speeds_are_told_apart_by_chance_more_often_than_the_confidence_says_too
     assert 0.14 < false_speed_rate(3, 3) < 0.24
 
 
+@pytest.mark.slow
 def test_runs_that_reach_the_threshold_at_the_same_evaluation_are_part_of_the_rate():
     """Four and four runs, which are evaluated three times each."""
     rng, decided, trials = np.random.default_rng(1), 0, 1500

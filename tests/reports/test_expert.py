@@ -1,5 +1,7 @@
 """The expert as a baseline of a report."""
 
+import pytest
+
 from veca_marl.reports.arms import compose_arms
 from veca_marl.reports.scores import expert_rows
 
@@ -7,6 +9,7 @@ SHORT = ["+experiment=audio_ablation", "task.max_seconds=0.2"]
 DEAF = "experiment.arms.hrtf=['senses/audio=deaf']"
 
 
+@pytest.mark.slow
 def test_the_expert_plays_in_the_first_arm_in_which_it_can():
     arms = [arm for arm in compose_arms([*SHORT, DEAF]) if arm.name in ("hrtf", "mono")]
     (row,) = expert_rows(arms, 1)

@@ -83,6 +83,7 @@ def sac_sweep(tmp_path, monkeypatch):
 SAC_SWEEP = ["+task=KickTheBall", "algo=sac", "seed=0,1,2,3", "algo.replay.capacity=400_000"]
 
 
+@pytest.mark.slow
 def test_runs_that_do_not_fit_into_the_memory_together_wait(sac_sweep, capsys):
     """Four cores; each run takes 0.81 GB for its replay buffer, 1.45 GB for its processes."""
     assert sac_sweep(20.0) == (4, 1)

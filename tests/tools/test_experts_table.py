@@ -54,6 +54,7 @@ def test_a_second_call_plays_the_missing_episodes_only(tmp_path):
     assert "| DodgeCar | expert | 2 (version 0) |" in (tmp_path / "table.md").read_text()
 
 
+@pytest.mark.slow
 def test_tasks_without_frozen_episodes_are_left_out_of_all(tmp_path, capsys):
     with knockout():
         assert main([f"to={tmp_path}", "tasks=[all]", "episodes=0"]) == 0
@@ -182,6 +183,7 @@ def test_the_game_computes_only_the_senses_that_an_expert_reads(monkeypatch):
     game.close()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("path", sorted(BENCHMARK.glob("[A-Z]*.csv")), ids=lambda path: path.stem)
 def test_stored_episodes_are_of_the_present_configuration(path):
     """Otherwise the command of the table refuses them: whoever changes a task plays them again."""

@@ -95,6 +95,7 @@ def test_core_minutes_are_those_of_all_cores():
     assert core_minutes(1000.0, 3) == pytest.approx(3 * 100 / 60)
 
 
+@pytest.mark.slow
 def test_the_first_choice_of_a_comparison_is_its_reference():
     for choices in COMPARISONS.values():
         assert len(choices) > 1

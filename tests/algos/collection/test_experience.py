@@ -89,6 +89,7 @@ def test_no_other_thread_copies_the_policy(make_ppo, monkeypatch):
     assert {*threads} == {threading.main_thread()}
 
 
+@pytest.mark.slow
 def test_spawned_and_forked_workers_collect_the_same(make_ppo, monkeypatch):
     batches = []
     for method in ("fork", "spawn"):

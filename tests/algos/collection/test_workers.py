@@ -224,6 +224,7 @@ def starting(tmp_path):
     main.communicate()
 
 
+@pytest.mark.slow
 def test_a_worker_killed_while_it_starts_ends_the_program(starting):
     """TorchRL's transfer of parameters waited forever for a thread when Python ended."""
     main, workers = starting
@@ -234,6 +235,7 @@ def test_a_worker_killed_while_it_starts_ends_the_program(starting):
     assert not any(is_running(pid) for pid in workers)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
 def test_an_interrupt_while_workers_start_ends_the_program(starting, number, code):
     main, workers = starting
@@ -254,6 +256,7 @@ def test_a_program_that_closes_its_workers_before_any_update_ends(tmp_path):
     assert main.returncode == 0, errors
 
 
+@pytest.mark.slow
 def test_workers_of_several_threads_collect_beside_a_learner_of_several(tmp_path):
     """A forked worker waited forever for the threads of its parent, which a fork does not copy."""
     main = start_script(tmp_path, SEVERAL_THREADS)

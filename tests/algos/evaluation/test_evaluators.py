@@ -187,6 +187,7 @@ def make_slow(worlds, seed):
     return Slow(worlds=worlds, seed=seed)
 
 
+@pytest.mark.slow
 def test_an_evaluation_that_takes_longer_than_the_limit_is_not_ended(policy):
     with closing(make_evaluator(make_slow, Players(policy, ("agents",)), 2, 4, 2.0)) as evaluator:
         begin = time.monotonic()

@@ -75,6 +75,7 @@ def test_it_learns_without_target_networks(make_sac, collect):
     assert last_return(algorithm, collect, hybrid=True) > 0.9
 
 
+@pytest.mark.slow
 def test_it_learns_from_shifted_images_with_an_encoder_trained_by_the_critics(make_sac, collect):
     changes = LEARNING | {
         "critic": ActionValuesCfg(hidden=[64], normalisation=Normalisation.layer),

@@ -6,6 +6,7 @@ from veca_marl.api import make
 from veca_marl.envs.adapters.torchrl.scripted import ExpertPolicy
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("body", ["walker", "walker_discrete"])
 def test_the_expert_kicks_in_most_worlds(body):
     env = make("KickTheBall", worlds=8, body=body, senses={"vision": "blind"}, seed=1)

@@ -77,6 +77,7 @@ def test_a_body_stays_near_while_it_turns(mover):
     assert max(np.linalg.norm(ways, axis=1)) < 1.2
 
 
+@pytest.mark.slow
 def test_a_body_moves_backwards(mover):
     """In 3 s, from rest and after moving forwards: 0.4 m in the mean, and rarely with a turn.
 

@@ -145,6 +145,7 @@ def play(game, policy, seeds):
     return solved / len(seeds)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("forward", "turn"), [(0.0, 0.0), (0.0, 0.3), (0.0, 1.0)], ids=["stand", "turn slowly", "spin"]
 )

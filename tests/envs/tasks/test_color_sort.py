@@ -200,6 +200,7 @@ def test_impossible_values_are_errors_that_name_them(words, message):
 # ---- expert
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("body", ["walker_verbs", "walker_discrete_verbs"])
 def test_the_expert_sorts_with_either_kind_of_move(body):
     game = game_of(f"body={body}", "task.items=1")

@@ -326,6 +326,7 @@ def blind(game, command, seeds, place=None):
     return solved / len(seeds)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "command",
     [
@@ -361,6 +362,7 @@ BESIDE = {
 }
 
 
+@pytest.mark.slow
 def test_standing_beside_furniture_is_hit():
     game = game_of("playground=single_room")
     solved = {

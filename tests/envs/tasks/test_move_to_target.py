@@ -51,6 +51,7 @@ def test_the_mark_has_no_collision(game):
     assert game.task.toy.position[2] == pytest.approx(0.035, abs=0.002)
 
 
+@pytest.mark.slow
 def test_the_expert_moves_the_toy_to_the_mark(game):
     player, solved = game.players[0], 0
     for seed in range(3):

@@ -134,6 +134,7 @@ def play_commands(game, commands):
         yield game.step({player.name: row}).terms[player.name]
 
 
+@pytest.mark.slow
 def test_a_block_that_is_held_up_has_a_lower_return_than_a_pile(game, piling):
     game.reset(np.random.default_rng(0))
     child, (held, other) = game.task.child, game.task.red
@@ -199,6 +200,7 @@ def gripping(palms, block):
         yield palms.move(Grip(place, EDGE - 0.04))
 
 
+@pytest.mark.slow
 def test_a_block_on_one_that_is_held_up_has_a_lower_return_than_a_pile(game, piling):
     """A constraint keeps the lower block level, in the place of a strong grip."""
     game.reset(np.random.default_rng(0))
@@ -251,6 +253,7 @@ def test_a_touched_pile_is_not_solved(game):
         assert not game.task.solved(game.players[0])
 
 
+@pytest.mark.slow
 def test_the_expert_piles_up(game):
     heights, solved = [], 0
     for seed in EXPERT_SEEDS:

@@ -97,6 +97,7 @@ def test_a_collapse_of_the_tower_has_a_lower_return_than_doing_nothing(changes):
     game.close()
 
 
+@pytest.mark.slow
 def test_the_expert_puts_the_red_block_down_and_leaves_the_tower_in_place(game):
     results, moved = [], []
     for seed in EXPERT_SEEDS:

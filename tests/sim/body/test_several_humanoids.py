@@ -38,10 +38,12 @@ def check(seen, speeds, settled_from_s=2.0):
     assert speeds.max() <= 30.0 + 1e-6
 
 
+@pytest.mark.slow
 def test_overlapping_bodies_stay_valid_and_in_their_room():
     check(*run(4, 4.0), settled_from_s=1.0)
 
 
+@pytest.mark.slow
 def test_overlapping_bodies_are_reproducible_to_the_bit():
     first, again = run(2, 2.0)[0], run(2, 2.0)[0]
     np.testing.assert_array_equal(first, again)
