@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import partial
@@ -96,10 +97,15 @@ class PPOCfg(AlgorithmCfg):
             if getattr(self, name) < 1:
                 raise ValueError(f"algo.{name} must be at least 1, got {getattr(self, name)}")
         check_entropy_coefficient(self.entropy_coefficient)
+        if not 0.0 <= self.value_coefficient < math.inf:
+            raise ValueError(
+                f"algo.value_coefficient must be finite, 0 or more, got {self.value_coefficient}"
+            )
         if not self.min_learning_rate <= self.learning_rate <= self.max_learning_rate:
             raise ValueError(
-                f"algo.learning_rate must be in [{self.min_learning_rate}, "
-                f"{self.max_learning_rate}], got {self.learning_rate}"
+                f"algo.learning_rate={self.learning_rate} must be in "
+                f"[algo.min_learning_rate={self.min_learning_rate}, "
+                f"algo.max_learning_rate={self.max_learning_rate}]"
             )
 
     def check_batch(self, worlds: int, steps: int) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from enum import Enum
 
@@ -84,6 +85,10 @@ class TemperatureCfg:
             raise ValueError(
                 f"temperature.minimum must be from 0 to temperature.initial ({self.initial}), got "
                 f"{self.minimum}"
+            )
+        if not math.isfinite(self.entropy_per_dimension):
+            raise ValueError(
+                f"temperature.entropy_per_dimension={self.entropy_per_dimension} must be finite"
             )
         if not 0.0 <= self.entropy_of_choices <= 1.0:
             raise ValueError(

@@ -270,6 +270,8 @@ class SoundCfg:
                 f"sound of kind {self.kind.value} with path={self.path!r}: a clip needs a path, "
                 "other kinds must not have one"
             )
+        if math.isnan(self.pulse_s):
+            raise ValueError(f"pulse_s={self.pulse_s} must be a duration")
         if self.pause_s != 0.0:
             check_pulses(self.pulse_s, self.pause_s)
             if self.kind in (SoundKind.voice, SoundKind.silence):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
@@ -176,7 +177,7 @@ class VisionCfg:
         self.camera()
         if not isinstance(self.eyes, Eyes):
             raise ValueError(f"eyes {self.eyes!r}; choices: {[eyes.name for eyes in Eyes]}")
-        if self.blur_deg < 0.0:
+        if not 0.0 <= self.blur_deg < math.inf:
             raise ValueError(f"blur_deg {self.blur_deg} must be 0 (none) or a positive angle")
         self._check_lens()
         make_filters(self)
