@@ -245,6 +245,8 @@ def test_a_further_sense_is_registered_and_configured_in_one_place(extra, smelt,
 
 def test_a_sense_without_settings_has_its_defaults():
     assert SensesCfg().of("audio") == AudioCfg()
+    assert SensesCfg.complete().audio == AudioCfg()
+    assert not SensesCfg.complete().unset
     assert SensesCfg(audio=AudioCfg(present=False)).unset == {"vision", "proprioception", "touch"}
 
 

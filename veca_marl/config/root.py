@@ -97,7 +97,7 @@ class Config:
     task: TaskCfg = MISSING
     playground: PlaygroundCfg = field(default_factory=PlaygroundCfg)
     body: BodyCfg = MISSING
-    senses: SensesCfg = field(default_factory=SensesCfg)
+    senses: SensesCfg = field(default_factory=SensesCfg.complete)
     clock: ClockCfg = field(default_factory=ClockCfg)
     team: dict[str, TeamCfg] = field(default_factory=dict)
     opponent: dict[str, str] = field(default_factory=dict)

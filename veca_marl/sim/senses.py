@@ -111,6 +111,11 @@ class SensesCfg:
     def _own_fields(cls) -> set[str]:
         return {f.name for f in fields(cls)} - {"extra"}
 
+    @classmethod
+    def complete(cls) -> SensesCfg:
+        """Return settings in which each sense that has a field here has its defaults."""
+        return cls(**{name: cls().of(name) for name in cls._own_fields()})
+
     @property
     def unset(self) -> set[str]:
         """Names of the senses that have a field and no settings."""

@@ -67,7 +67,7 @@ class GameCfg:
     task: TaskCfg = field(default_factory=TaskCfg)
     playground: PlaygroundCfg = field(default_factory=PlaygroundCfg)
     body: BodyCfg = field(default_factory=WalkerCfg)
-    senses: SensesCfg = field(default_factory=SensesCfg)
+    senses: SensesCfg = field(default_factory=SensesCfg.complete)
     clock: ClockCfg = field(default_factory=ClockCfg)
     team: dict[str, TeamCfg] = field(default_factory=dict)
     script: dict[str, Script] = field(default_factory=dict)
