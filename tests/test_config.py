@@ -85,7 +85,7 @@ def test_files_hold_only_what_differs_from_the_dataclasses():
     for sense in SENSES:
         for path in (conf_dir() / "senses" / sense).glob("*.yaml"):
             everything = path.read_text().startswith("# @package _global_")
-            default = OmegaConf.structured(Config if everything else getattr(SensesCfg(), sense))
+            default = OmegaConf.structured(Config if everything else SensesCfg().of(sense))
             for key, value in (OmegaConf.load(path) or {}).items():
                 merged = OmegaConf.merge({"x": default}, {"x": {key: value}})
                 assert merged.x[key] != default[key], f"{path} restates {key}"
@@ -129,6 +129,7 @@ def test_files_hold_only_what_differs_from_the_dataclasses():
             [KICK, "senses.audio=mono"],
             r"senses.audio is a group of values, .*: choose a preset with senses/audio=NAME",
         ),
+        ([KICK, "senses.audio=null"], r"senses.audio is null: choose a preset with senses/audio="),
         ([KICK, "+senses.extra.compas.noisy=true"], r"unknown sense 'compas'; choices: audio"),
         ([KICK, "+senses.extra.audio.quality=mono"], r"senses.extra.audio: set senses.audio, "),
         (

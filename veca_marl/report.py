@@ -108,7 +108,7 @@ def _read(
         return found, rows, Path(options.to or path.parent)
     runs = Path(options.runs or f"runs/{name}")
     asked = {arm.name: arm.plain for arm in arms}
-    found, rows = gather(runs, asked, seeds, {arm.name: arm.former for arm in arms})
+    found, rows = gather(runs, asked, seeds)
     if rows:
         rows += expert_rows(arms, options.expert_episodes)
     return found, rows, Path(options.to or runs)

@@ -24,7 +24,7 @@ from omegaconf.errors import OmegaConfBaseException
 
 from veca_marl.runs.cores import usable_cores
 from veca_marl.sweeps.plans import Job, SweepError
-from veca_marl.sweeps.run_state import former_kinds, former_values, with_body_kinds
+from veca_marl.sweeps.run_state import with_body_kinds
 from veca_marl.sweeps.sweep import run_sweep
 
 
@@ -176,9 +176,8 @@ class ProcessLauncher(Launcher):
             del config["hydra"]
         asked = yaml.safe_load(OmegaConf.to_yaml(config, resolve=True))
         self._nodes[sweep / name] = config
-        kinds = body_names(config)
-        asked, former = with_body_kinds(asked, kinds), former_values(config) | former_kinds(kinds)
-        return Job(name, sweep / name, [*shared, *overrides], asked, former)
+        asked = with_body_kinds(asked, body_names(config))
+        return Job(name, sweep / name, [*shared, *overrides], asked)
 
 
 def _store(group: str, name: str, plugin: type, fields: dict[str, Any]) -> None:

@@ -243,6 +243,13 @@ def test_a_further_sense_is_registered_and_configured_in_one_place(extra, smelt,
     assert senses["smell"].read()["smell"] == [smelt]
 
 
+def test_a_sense_without_settings_has_its_defaults():
+    assert SensesCfg().of("audio") == AudioCfg()
+    assert SensesCfg.complete().audio == AudioCfg()
+    assert not SensesCfg.complete().unset
+    assert SensesCfg(audio=AudioCfg(present=False)).unset == {"vision", "proprioception", "touch"}
+
+
 @pytest.mark.usefixtures("smell")
 def test_a_further_sense_can_be_absent(stage):
     scenario = stage("walker")

@@ -1,10 +1,12 @@
 """How the configuration of a stored run is compared with the one that is asked for."""
 
 import pytest
+from stored_runs import write_run
 
-from veca_marl.config import compose_node, root
+from veca_marl.config import root
+from veca_marl.migrations import CONFIG_VERSION, numbered
 from veca_marl.sweeps.differences import BY_TEAM, differences, key_patterns
-from veca_marl.sweeps.run_state import former_values
+from veca_marl.sweeps.run_state import read_run
 
 BALL = {"name": "ball", "mass_kg": 0.3, "size_m": [0.1]}
 BOX = {"name": "box", "mass_kg": 1.0, "size_m": [0.1, 0.2, 0.3]}
@@ -30,22 +32,21 @@ def network(**fields):
     return {"algo": {"network": {"name": "multisense", **fields}}}
 
 
-def test_a_key_that_a_run_is_too_old_to_have_has_its_former_value():
-    former = {"algo.network.kernels": [8, 4, 3]}
-    assert differences(network(), network(kernels=[8, 4, 3]), former) == []
-    (changed,) = differences(network(), network(kernels=[4, 4, 3]), former)
-    assert not changed.of_version
-    assert str(changed) == "algo.network.kernels is [8, 4, 3] in the run, [4, 4, 3] is asked for"
-    assert differences(network(kernels=[4, 4, 3]), network(kernels=[4, 4, 3]), former) == []
+@pytest.mark.parametrize(("version", "differs"), [({}, True), (numbered({}), False)])
+def test_a_stored_run_is_compared_in_the_form_of_this_version(tmp_path, version, differs):
+    """An entry that only later versions have is that of the early run; else it is not compared."""
+    write_run(tmp_path / "run", {**network(), **version}, [(100, 1.0)])
+    stored = read_run(tmp_path / "run").config
+    found = differences(stored, {**stored, **network(kernels=[4, 4, 3], strides=[4, 2, 1])})
+    changed = [str(d) for d in found if not d.of_version]
+    text = "algo.network.kernels is [8, 4, 3] in the run, [4, 4, 3] is asked for"
+    assert changed == [text] * differs
 
 
-def test_former_values_are_those_of_the_types_of_a_configuration():
-    node = compose_node(["+task=KickTheBall", "+algo@learner.agents=sac"])
-    former = former_values(node)
-    assert former["algo.network.kernels"] == [8, 4, 3]
-    assert former["learner.agents.network.strides"] == [4, 2, 1]
-    names = {key.rpartition(".")[2] for key in former}
-    assert names == {"kernels", "strides", "call_pause_s", "sleep_s"}
+def test_a_run_of_a_newer_version_is_refused(tmp_path):
+    write_run(tmp_path / "run", {**network(), "config_version": CONFIG_VERSION + 1}, [(100, 1.0)])
+    with pytest.raises(ValueError, match=r"config.yaml: config_version=.* is newer"):
+        read_run(tmp_path / "run")
 
 
 def test_lists_of_other_lengths_differ():

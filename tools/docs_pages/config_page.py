@@ -5,7 +5,8 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterator
 from pathlib import Path
-from typing import get_type_hints
+from types import UnionType
+from typing import Any, get_args, get_origin, get_type_hints
 
 from tools.docs_pages.docstrings import prose
 from tools.docs_pages.tables import field_table, table
@@ -41,8 +42,9 @@ def config_page() -> str:
     lines += ["## Fields\n"]
     for path, cfg_type in sections(Config, ""):
         lines += [f"### {heading(path, cfg_type)}\n", first_line(cfg_type), ""]
-        if set(names(cfg_type)) - set(nested(cfg_type)):
-            lines += [*field_table(cfg_type, leave_out=nested(cfg_type)), ""]
+        inner = nested(cfg_type, path)
+        if set(names(cfg_type)) - set(inner):
+            lines += [*field_table(cfg_type, leave_out=inner), ""]
     return "\n".join(lines)
 
 
@@ -79,9 +81,9 @@ def sections(cfg_type: type, path: str) -> Iterator[tuple[str, type]]:
     yield path, cfg_type
     hints = get_type_hints(cfg_type)
     for field in dataclasses.fields(cfg_type):
-        if field.name == "task" or field.name not in nested(cfg_type):
+        if field.name == "task" or field.name not in nested(cfg_type, path):
             continue
-        base = hints[field.name]
+        base = _of_optional(hints[field.name])
         kinds = [kind for kind in base.__subclasses__() if is_built_in(kind)]
         if not kinds or field.default_factory is base:
             kinds.insert(0, base)
@@ -89,10 +91,28 @@ def sections(cfg_type: type, path: str) -> Iterator[tuple[str, type]]:
             yield from sections(kind, f"{path}.{field.name}".strip("."))
 
 
-def nested(cfg_type: type) -> list[str]:
-    """Return the fields of a dataclass that are sections themselves."""
-    hints = get_type_hints(cfg_type)
-    return [f.name for f in dataclasses.fields(cfg_type) if dataclasses.is_dataclass(hints[f.name])]
+def nested(cfg_type: type, path: str) -> list[str]:
+    """Return the fields of a dataclass that are sections themselves.
+
+    One that may be None is a section if it is a group of presets.
+
+    Args:
+        cfg_type: The dataclass.
+        path: Its path in the configuration.
+    """
+    folder, hints = conf_dir().joinpath(*path.split(".")), get_type_hints(cfg_type)
+    return [
+        name
+        for name in names(cfg_type)
+        if dataclasses.is_dataclass(hints[name])
+        or (dataclasses.is_dataclass(_of_optional(hints[name])) and (folder / name).is_dir())
+    ]
+
+
+def _of_optional(hint: Any) -> Any:
+    """Return the type of a field that may be None; other types as they are."""
+    named = [part for part in get_args(hint) if part is not type(None)]
+    return named[0] if get_origin(hint) is UnionType and len(named) == 1 else hint
 
 
 def is_built_in(kind: type) -> bool:

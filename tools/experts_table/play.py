@@ -7,13 +7,12 @@ import json
 import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import closing
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import asdict, dataclass
 from enum import Enum
 from itertools import groupby
 from multiprocessing import get_context
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
-from typing import Any
 
 import numpy as np
 
@@ -22,6 +21,7 @@ from veca_marl.envs.core.benchmark import SEED, find_benchmark, start_values
 from veca_marl.envs.core.episodes import Episodes, first_team, play_to_end
 from veca_marl.envs.core.game import Game
 from veca_marl.envs.core.game_cfg import GameCfg, Script
+from veca_marl.migrations import first_form
 
 
 @dataclass(frozen=True)
@@ -76,28 +76,10 @@ class Played:
 def digest(cfg: GameCfg) -> str:
     """Return 16 hexadecimal digits that change with the configuration of a game.
 
-    A field that a class has got later, and names in its ``formerly``, does not change them while it
-    has its former value there: rows that were stored before stay valid.
+    They are those of its first form: rows that an earlier version stored stay valid.
     """
-    text = json.dumps(_known_fields(cfg), default=_plain, sort_keys=True)
+    text = json.dumps(first_form(asdict(cfg)), default=_plain, sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()[:16]
-
-
-def _known_fields(value: Any) -> Any:
-    """Return what `asdict` returns, without fields at their former values."""
-    if is_dataclass(value):
-        former = getattr(value, "formerly", {})
-        named = ((field.name, getattr(value, field.name)) for field in fields(value))
-        return {
-            name: _known_fields(inner)
-            for name, inner in named
-            if name not in former or inner != former[name]
-        }
-    if isinstance(value, dict):
-        return {key: _known_fields(inner) for key, inner in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_known_fields(inner) for inner in value]
-    return value
 
 
 def _plain(value: object) -> object:

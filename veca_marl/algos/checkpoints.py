@@ -17,6 +17,7 @@ import torch
 
 from veca_marl.algos.files import WriteError, write_atomically
 from veca_marl.algos.specs import TeamSpec
+from veca_marl.migrations import CONFIG_VERSION, KEY, VersionError, migrated_checkpoint
 
 # 3: actions have named parts, and each team an algorithm of its own
 FORMAT = 3
@@ -52,7 +53,7 @@ def map_checkpoint(path: Path) -> dict[str, Any]:
 
 
 def _checked(path: Path, content: Any) -> dict[str, Any]:
-    """Return the content of a file if it is a checkpoint of this version."""
+    """Return the content of a file, in the form of this version, if it is a checkpoint of it."""
     if not isinstance(content, dict) or "format" not in content:
         raise CheckpointError(f"{path} is not a checkpoint of a run")
     if content["format"] != FORMAT:
@@ -62,8 +63,10 @@ def _checked(path: Path, content: Any) -> dict[str, Any]:
     missing = sorted(_KEYS - set(content))
     if missing:
         raise CheckpointError(f"{path} is incomplete: no {', '.join(missing)}")
-    checked: dict[str, Any] = content
-    return checked
+    try:
+        return migrated_checkpoint(content)
+    except VersionError as error:
+        raise CheckpointError(f"{path}: {error}") from error
 
 
 def load_file(path: Path, device: torch.device) -> Any:
@@ -221,8 +224,8 @@ def interrupts_wait() -> Iterator[None]:
 class Checkpoints:
     """The checkpoints of one run.
 
-    Each file holds the format, the identity, the configuration of the run, the numbers of each
-    team's algorithm, and under ``state`` what `save` was given.
+    Each file holds the format, the version of its configurations, the identity, the configuration
+    of the run, the numbers of each team's algorithm, and under ``state`` what `save` was given.
 
     Args:
         folder: Where they are; created at the first save. None keeps nothing.
@@ -271,6 +274,7 @@ class Checkpoints:
         path = self.folder / f"frames_{frames:012d}.pt"
         content = {
             "format": FORMAT,
+            KEY: CONFIG_VERSION,
             "identity": self.identity.to_dict(),
             "config": self.config,
             "algorithms": dict(algorithms or {}),
@@ -363,14 +367,13 @@ def from_plain(kind: type[T], plain: dict[str, Any], find: Callable[[type, str],
         kind: Its type, or the base class of it.
         plain: What `to_plain` returned.
         find: Returns the type for a base class and the `name` that the plain data hold, for
-            dataclasses that are chosen from a registry. If that type has an attribute
-            `formerly`, it holds the values of fields that `plain` may be too old to have.
+            dataclasses that are chosen from a registry. Fields
+            that `plain` does not have take their defaults.
 
     Raises:
         ValueError: If a field is unknown.
     """
     actual = find(kind, plain["name"]) if "name" in plain else kind
-    plain = getattr(actual, "formerly", {}) | plain
     hints = get_type_hints(actual)
     unknown = sorted(set(plain) - set(hints))
     if unknown:

@@ -97,7 +97,7 @@ class Config:
     task: TaskCfg = MISSING
     playground: PlaygroundCfg = field(default_factory=PlaygroundCfg)
     body: BodyCfg = MISSING
-    senses: SensesCfg = field(default_factory=SensesCfg)
+    senses: SensesCfg = field(default_factory=SensesCfg.complete)
     clock: ClockCfg = field(default_factory=ClockCfg)
     team: dict[str, TeamCfg] = field(default_factory=dict)
     opponent: dict[str, str] = field(default_factory=dict)
@@ -123,6 +123,8 @@ class Config:
     def __post_init__(self) -> None:
         for team, player in self.opponent.items():
             _check_opponent(team, player)
+        for sense in sorted(self.senses.unset):  # only in those of a team it means something
+            raise ValueError(f"senses.{sense} is null: choose a preset with senses/{sense}=NAME")
         if self.total_frames < 1:
             raise ValueError(f"total_frames must be at least 1, got {self.total_frames}")
         if self.seed < 0:

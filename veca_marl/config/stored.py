@@ -18,6 +18,7 @@ from veca_marl.config.overrides import check_group_values, conf_dirs, parse, wit
 from veca_marl.config.root import body_types, root_schema
 from veca_marl.envs.core.game_cfg import TeamCfg
 from veca_marl.envs.core.task import find_task
+from veca_marl.migrations import migrated
 from veca_marl.plugins import PLUGINS
 from veca_marl.sim.physics import PLAYGROUND_GENERATORS
 
@@ -47,11 +48,12 @@ def typed(stored: DictConfig, bodies: Mapping[str, str]) -> DictConfig:
         bodies: What `body_names` returned for the configuration.
 
     Raises:
-        ConfigError: If an entry has no counterpart in this version, or a plug-in is not loaded.
+        ConfigError: If an entry has no counterpart in this version, a newer version has stored it,
+            or a plug-in is not loaded.
     """
     _check_plugins(stored.get("plugins", []))
-    stored = _of_this_version(stored)
     try:
+        stored = OmegaConf.create(migrated(cast(dict[str, Any], OmegaConf.to_container(stored))))
         node = root_schema()
         node.task = OmegaConf.structured(find_task(stored.task.name).cfg_type())
         node.algo = _algorithm(stored.algo)
@@ -91,20 +93,10 @@ def _check_plugins(names: Any) -> None:
         )
 
 
-def _of_this_version(stored: DictConfig) -> DictConfig:
-    """Return a stored configuration with the keys that were renamed or added since version 0.2."""
-    current = stored.copy()
-    if "warm_start" in current:
-        current.init_from = current.pop("warm_start")
-    added = {"intrinsic": {"name": NONE}, "team_intrinsic": {}}
-    return cast(DictConfig, OmegaConf.merge(added, current))
-
-
 def _algorithm(stored: DictConfig) -> Any:
     node = OmegaConf.structured(ALGORITHMS.find(stored.name).cfg_type)
     if "network" in node:
-        network = NETWORKS.find(stored.network.name).cfg_type
-        node.network = OmegaConf.merge(OmegaConf.structured(network), network.formerly)
+        node.network = OmegaConf.structured(NETWORKS.find(stored.network.name).cfg_type)
     return node
 
 

@@ -17,7 +17,7 @@ from veca_marl.algos.collection.experience import CollectCfg
 from veca_marl.config import Config, ConfigError, compose_node, to_config
 from veca_marl.config.experiment import check_contradictions
 from veca_marl.config.stored import body_names
-from veca_marl.sweeps.run_state import RunState, former_kinds, former_values, with_body_kinds
+from veca_marl.sweeps.run_state import RunState, with_body_kinds
 
 
 @dataclass(frozen=True)
@@ -86,13 +86,11 @@ class Arm:
         name: Its name.
         cfg: Its configuration.
         plain: The same as stored with a run, with the kinds of bodies (`with_body_kinds`).
-        former: Values of keys that a stored run may be too old to have, see `former_values`.
     """
 
     name: str
     cfg: Config
     plain: dict[str, Any]
-    former: dict[str, Any]
 
     @property
     def budget(self) -> FrameBudget:
@@ -118,6 +116,4 @@ def _compose_arm(overrides: Sequence[str], name: str, own: Sequence[str]) -> Arm
     check_contradictions(name, own, overrides)
     node = compose_node([*overrides, f"experiment.arm={name}", *own])
     plain = cast(dict[str, Any], yaml.safe_load(OmegaConf.to_yaml(node, resolve=True)))
-    kinds = body_names(node)
-    former = former_values(node) | former_kinds(kinds)
-    return Arm(name, to_config(node), with_body_kinds(plain, kinds), former)
+    return Arm(name, to_config(node), with_body_kinds(plain, body_names(node)))

@@ -158,7 +158,6 @@ def gather(
     runs: Path,
     asked: Mapping[str, Mapping[str, Any]],
     seeds: Sequence[int],
-    former: Mapping[str, Mapping[str, Any]] | None = None,
 ) -> tuple[list[Found], list[Row]]:
     """Return what there is of each run, and the evaluations of those that fit.
 
@@ -169,40 +168,34 @@ def gather(
         runs: Folder of the experiment's runs.
         asked: Configuration of each arm as plain data.
         seeds: Seeds of each arm.
-        former: Values of keys that runs of each arm may be too old to have, see `differences`.
     """
     found, rows = [], []
     for arm, config in asked.items():
-        earlier = (former or {}).get(arm, {})
         for seed in seeds:
             folder = run_folder(runs, arm, seed)
-            status, own = _gather_run(folder, arm, {**config, "seed": seed}, earlier)
+            status, own = _gather_run(folder, arm, {**config, "seed": seed})
             found.append(status)
             rows += own
     return found, rows
 
 
-def _gather_run(
-    folder: Path, arm: str, asked: Mapping[str, Any], former: Mapping[str, Any]
-) -> tuple[Found, list[Row]]:
+def _gather_run(folder: Path, arm: str, asked: Mapping[str, Any]) -> tuple[Found, list[Row]]:
     try:
         run, commit = read_checked_run(folder)
     except DamagedRunError as error:
         remark = f"not counted, damaged: {error}"
         return Found(arm, int(asked["seed"]), folder, RunState.missing, False, remark), []
-    status, fits = _status(run, arm, asked, former)
+    status, fits = _status(run, arm, asked)
     status = replace(status, commit=commit)
     return status, _rows(run, status) if fits else []
 
 
-def _status(
-    run: StoredRun, arm: str, asked: Mapping[str, Any], former: Mapping[str, Any]
-) -> tuple[Found, bool]:
+def _status(run: StoredRun, arm: str, asked: Mapping[str, Any]) -> tuple[Found, bool]:
     state = run.state(asked["total_frames"], asked["max_minutes"])
     base = (arm, int(asked["seed"]), run.folder, state)
     if run.config is None:
         return Found(*base, False, f"missing: no run in {run.folder}"), False
-    differing = [d for d in differences(run.config, asked, former) if not may_change(d.key)]
+    differing = [d for d in differences(run.config, asked) if not may_change(d.key)]
     changed = [str(d) for d in differing if not d.of_version]
     if changed:
         return Found(*base, False, f"not counted: {'; '.join(changed)}"), False

@@ -21,7 +21,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any, TextIO
+from typing import Any, TextIO, cast
 from uuid import uuid4
 
 from omegaconf import DictConfig, OmegaConf
@@ -36,6 +36,7 @@ from veca_marl.config import Config, ConfigError, one_line, to_config
 from veca_marl.config.compose import load_config_plugins
 from veca_marl.config.overrides import plugins_in
 from veca_marl.config.stored import body_names, change, typed
+from veca_marl.migrations import numbered
 from veca_marl.runs.continuation import FILE as PROGRESS_FILE
 from veca_marl.runs.continuation import RunProgress, resume_argument
 from veca_marl.version import __version__
@@ -141,7 +142,7 @@ class RunFolder:
         # from the system's entropy: no generator of the run is touched
         content = {"id": uuid4().hex, **provenance(overrides), "bodies": body_names(node)}
         self._write_json(self.provenance, content)
-        write_atomically(self.config, OmegaConf.to_yaml(node, resolve=True))  # last: it is a run
+        self._write_config(node)  # last: it is a run
 
     def begin_again(self, node: DictConfig, overrides: Sequence[str], frames: int) -> None:
         """Store how a run is continued.
@@ -161,7 +162,11 @@ class RunFolder:
         self.write_progress(RunProgress(frames, ended=False))  # before a budget that it may reach
         stored = node.copy()
         stored.resume = None
-        write_atomically(self.config, OmegaConf.to_yaml(stored, resolve=True))
+        self._write_config(stored)
+
+    def _write_config(self, node: DictConfig) -> None:
+        plain = cast(dict[str, Any], OmegaConf.to_container(node, resolve=True))
+        write_atomically(self.config, OmegaConf.to_yaml(numbered(plain)))
 
     def typed_config(self, overrides: Sequence[str] = ()) -> DictConfig:
         """Return the configuration stored with the run, with the types that it had.

@@ -24,7 +24,7 @@ settings where they differ from the defaults.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from typing import Any, Protocol, TypeVar
 
 from veca_marl.registry import Registry
@@ -77,10 +77,11 @@ def register_sense(name: str) -> Callable[[SenseT], SenseT]:
 
 @dataclass
 class SensesCfg:
-    """Settings of all senses. The task names the senses, this sets their quality.
+    """Settings of senses. The task names the senses, this sets their quality.
 
     Quality changes what an observation contains, never its shape; a sense that is not `present`
-    is left out of the observation.
+    is left out of the observation. A sense without settings here has the defaults of its dataclass,
+    and in the settings of one team those of all teams.
 
     Attributes:
         vision: Settings of the eyes.
@@ -88,17 +89,16 @@ class SensesCfg:
         proprioception: Settings of proprioception.
         touch: Settings of the skin.
         extra: Settings of registered senses that have no field here, by name: an instance of the
-            sense's own dataclass or a mapping of its fields. A sense that is not in it has its
-            defaults.
+            sense's own dataclass or a mapping of its fields.
 
     Raises:
         ValueError: If a name in `extra` is not that of a registered sense without a field here.
     """
 
-    vision: VisionCfg = field(default_factory=VisionCfg)
-    audio: AudioCfg = field(default_factory=AudioCfg)
-    proprioception: ProprioceptionCfg = field(default_factory=ProprioceptionCfg)
-    touch: TouchCfg = field(default_factory=TouchCfg)
+    vision: VisionCfg | None = None
+    audio: AudioCfg | None = None
+    proprioception: ProprioceptionCfg | None = None
+    touch: TouchCfg | None = None
     extra: dict[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -111,6 +111,16 @@ class SensesCfg:
     def _own_fields(cls) -> set[str]:
         return {f.name for f in fields(cls)} - {"extra"}
 
+    @classmethod
+    def complete(cls) -> SensesCfg:
+        """Return settings in which each sense that has a field here has its defaults."""
+        return cls(**{name: cls().of(name) for name in cls._own_fields()})
+
+    @property
+    def unset(self) -> set[str]:
+        """Names of the senses that have a field and no settings."""
+        return {name for name in self._own_fields() if getattr(self, name) is None}
+
     def of(self, name: str) -> Any:
         """Return the settings of one registered sense.
 
@@ -118,13 +128,20 @@ class SensesCfg:
             ValueError: If no sense of that name is registered, or its settings in `extra` have
                 a field that its dataclass has not.
         """
-        if name in self._own_fields():
-            return getattr(self, name)
         cfg_type = SENSES.find(name).cfg_type
-        given = self.extra.get(name, {})
-        if isinstance(given, cfg_type):
-            return given
-        return _from_mapping(name, cfg_type, given)
+        given = getattr(self, name) if name in self._own_fields() else self.extra.get(name)
+        if given is None:
+            return cfg_type()
+        return given if isinstance(given, cfg_type) else _from_mapping(name, cfg_type, given)
+
+    def replaced_by(self, own: SensesCfg) -> SensesCfg:
+        """Return these settings, of all teams, with those of the senses that one team has set.
+
+        Args:
+            own: Settings of the team.
+        """
+        given = {name: getattr(own, name) for name in self._own_fields() - own.unset}
+        return replace(self, **given, extra={**self.extra, **own.extra})
 
 
 def _from_mapping(name: str, cfg_type: type[Any], given: Any) -> Any:
@@ -158,7 +175,7 @@ def make_senses(body: Body, names: Sequence[str], cfg: SensesCfg, world: World) 
     if isinstance(vision, VisionSense):
         body.sight = vision.eyes
     else:
-        open_eyes(world.scene, body, cfg.vision.camera())
+        open_eyes(world.scene, body, cfg.of("vision").camera())
     return senses
 
 

@@ -38,20 +38,16 @@ class Difference:
         return f"{self.key} is {self.stored} in the run, {self.asked} is asked for"
 
 
-def differences(
-    stored: Mapping[str, Any], asked: Mapping[str, Any], former: Mapping[str, Any] | None = None
-) -> list[Difference]:
+def differences(stored: Mapping[str, Any], asked: Mapping[str, Any]) -> list[Difference]:
     """Return all keys with different values, in alphabetical order.
 
     A value ``auto`` that is asked for differs from no other value.
 
     Args:
-        stored: Content of ``config.yaml`` of a run as plain data.
+        stored: Configuration of a run as plain data, in the form of this version.
         asked: The resolved configuration as plain data.
-        former: Values of keys that `stored` may be too old to have, by dotted path, see
-            `veca_marl.sweeps.run_state`.
     """
-    before, now = dict(_flat(former or {})) | dict(_flat(stored)), dict(_flat(asked))
+    before, now = dict(_flat(stored)), dict(_flat(asked))
     return [
         Difference(
             key,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
 from typing import Any
@@ -38,14 +38,12 @@ class Job:
         folder: Its folder.
         overrides: The overrides that choose its configuration.
         asked: Its resolved configuration as plain data.
-        former: Values of keys that a stored run may be too old to have, see `differences`.
     """
 
     name: str
     folder: Path
     overrides: Sequence[str]
     asked: Mapping[str, Any]
-    former: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def log(self) -> Path:
@@ -107,7 +105,7 @@ def _changed(job: Job, stored: StoredRun) -> list[Difference]:
     Raises:
         SweepError: If a value differs that has to stay.
     """
-    differing = differences(stored.config or {}, job.asked, job.former)
+    differing = differences(stored.config or {}, job.asked)
     other = [str(d) for d in differing if not d.of_version and not may_change(d.key)]
     if other:
         raise SweepError(

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import csv
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from copy import deepcopy
 from dataclasses import dataclass
 from enum import Enum
@@ -16,8 +16,8 @@ from pathlib import Path
 from typing import Any
 
 import yaml
-from omegaconf import DictConfig, OmegaConf
 
+from veca_marl.migrations import VersionError, migrated
 from veca_marl.runs.continuation import RunProgress, read_progress
 
 _KEY = "registered_name"
@@ -38,11 +38,6 @@ def with_body_kinds(plain: Mapping[str, Any], names: Mapping[str, str]) -> dict[
         if isinstance(node, dict):
             node[_KEY] = name
     return marked
-
-
-def former_kinds(names: Mapping[str, str]) -> dict[str, str]:
-    """Return the names by dotted path, for runs that were stored without: see `differences`."""
-    return {f"{path}.{_KEY}": name for path, name in names.items()}
 
 
 def stored_kinds(provenance: Path) -> dict[str, str]:
@@ -80,8 +75,8 @@ class StoredRun:
 
     Attributes:
         folder: Its folder.
-        config: Its configuration as plain data, with the kinds of bodies (`with_body_kinds`); None
-            if there is no run.
+        config: Its configuration as plain data, in the form of this version (`migrated`) and with
+            the kinds of bodies (`with_body_kinds`); None if there is no run.
         stored_progress: Content of its ``progress.json``; None without one.
     """
 
@@ -132,7 +127,8 @@ def read_run(folder: Path) -> StoredRun:
     """Return the run in a folder, which may be missing.
 
     Raises:
-        ValueError: If its ``config.yaml`` or its ``progress.json`` cannot be read.
+        ValueError: If its ``config.yaml`` or its ``progress.json`` cannot be read, or a newer
+            version has stored it.
     """
     path = folder / "config.yaml"
     if not path.is_file():
@@ -143,23 +139,9 @@ def read_run(folder: Path) -> StoredRun:
         raise ValueError(f"{path} cannot be read: {' '.join(str(error).split())}") from error
     if not isinstance(config, dict):
         raise ValueError(f"{path} holds no configuration")
+    try:
+        config = migrated(config)
+    except VersionError as error:
+        raise ValueError(f"{path}: {error}") from error
     marked = with_body_kinds(config, stored_kinds(folder / "provenance.json"))
     return StoredRun(folder, marked, read_progress(folder))
-
-
-def former_values(node: DictConfig) -> dict[str, Any]:
-    """Return the former values of all fields in a configuration, by dotted path.
-
-    The types of its nodes state them in the class attribute `formerly`, see `NetworkCfg`.
-    """
-    return dict(_former_values(node, ""))
-
-
-def _former_values(node: DictConfig, path: str) -> Iterator[tuple[str, Any]]:
-    for name, value in getattr(OmegaConf.get_type(node), "formerly", {}).items():
-        yield f"{path}{name}", value
-    for key in map(str, node):
-        has_value = not (OmegaConf.is_missing(node, key) or OmegaConf.is_interpolation(node, key))
-        child = node[key] if has_value else None
-        if isinstance(child, DictConfig):
-            yield from _former_values(child, f"{path}{key}.")

@@ -16,9 +16,9 @@ from veca_marl.envs.adapters.pettingzoo import VecaParallelEnv
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
 from veca_marl.envs.adapters.torchrl.scripted import ExpertPolicy
 from veca_marl.envs.core.game import Game
-from veca_marl.envs.core.game_cfg import Script, TeamCfg, TeamSensesCfg
+from veca_marl.envs.core.game_cfg import Script, TeamCfg
 from veca_marl.sim.body.walker import WalkActionKind, WalkerCfg
-from veca_marl.sim.hearing import AudioCfg
+from veca_marl.sim.hearing import AudioCfg, AudioQuality
 from veca_marl.sim.senses import SensesCfg
 
 STEPS = 13  # two games of 6 steps, and one of a third
@@ -177,7 +177,7 @@ def test_teams_have_their_own_senses(env):
 
 def test_a_team_can_have_its_own_body_and_senses(cfg):
     discrete = TeamCfg(WalkerCfg(action=WalkActionKind.discrete))
-    deaf = TeamCfg(senses=TeamSensesCfg(audio=AudioCfg(present=False)))
+    deaf = TeamCfg(senses=SensesCfg(audio=AudioCfg(present=False)))
     env = VecaEnv(replace(cfg, team={"red": discrete, "blue": deaf}), 2)
     assert env.full_action_spec["red", "action"].dtype is torch.int64
     assert env.full_action_spec["blue", "action"].shape == (2, 2, 2)
@@ -204,8 +204,18 @@ def test_the_configuration_has_choices_for_single_teams():
     assert cfg.script == {"defender": Script.random}
 
 
-def test_each_sense_can_differ_by_team():
-    assert set(vars(TeamSensesCfg())) == set(vars(SensesCfg()))
+def test_a_team_differs_only_in_the_senses_that_it_sets():
+    words = ["+task=SoccerTwoPlayer", "+senses.extra.trial.present=false"]
+    words += ["+senses/audio@team.attacker.senses.audio=mono"]
+    words += ["+team.attacker.senses.extra.trial.present=true"]
+    cfg = compose(words).game
+    own, common = cfg.senses_of("attacker"), cfg.senses_of("defender")
+    assert common == cfg.senses
+    assert own.of("trial").present
+    assert not common.of("trial").present
+    assert own.of("audio").quality is AudioQuality.mono
+    assert common.of("audio").quality is not AudioQuality.mono
+    assert own.of("vision") == common.of("vision")
 
 
 # ---- scripts

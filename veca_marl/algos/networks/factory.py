@@ -35,12 +35,10 @@ class NetworkCfg:
             Greater than 0.01.
         not_parameters: Fields that a network with the same parameters may have differently.
         critics_only: Fields that do not concern the actor.
-        formerly: Fields that were added later, and their values in runs that were stored before.
     """
 
     not_parameters: ClassVar[tuple[str, ...]] = ("frozen",)
     critics_only: ClassVar[tuple[str, ...]] = ()
-    formerly: ClassVar[dict[str, Any]] = {}
 
     name: str = ""
     frozen: list[str] = field(default_factory=list)

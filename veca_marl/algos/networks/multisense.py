@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
-from typing import Any, ClassVar
 
 import torch
 from tensordict.nn import TensorDictModule, TensorDictModuleBase, TensorDictSequential
@@ -82,7 +81,6 @@ class MultisenseCfg(NetworkCfg):
 
     not_parameters = ("frozen", "precision")
     critics_only = ("critic",)
-    formerly: ClassVar[dict[str, Any]] = {"kernels": [8, 4, 3], "strides": [4, 2, 1]}
 
     name: str = "multisense"
     channels: list[int] = field(default_factory=lambda: [16, 32, 32])

@@ -136,8 +136,7 @@ class Trainer:
         self.checkpoints.remove_old()
         with load_errors(path):
             self.learners.load_state_dict(state["algorithm"])
-            # runs of version 0.2 have no intrinsic rewards and no such entry
-            self.learners.load_intrinsic_state(state.get("intrinsic", {}))
+            self.learners.load_intrinsic_state(state["intrinsic"])
             self.progress = Progress(**state["progress"])
         self.policy.take_over(self.learners.policy)
         self._resumed_frames = self.progress.frames

@@ -4,7 +4,7 @@ from veca_marl.envs.core.actions import from_parts, random_action, to_parts
 from veca_marl.envs.core.episodes import Episodes
 from veca_marl.envs.core.expert import Expert, find_expert, has_expert, register_expert
 from veca_marl.envs.core.game import Game, Observation, Outcome
-from veca_marl.envs.core.game_cfg import GameCfg, Script, TeamCfg, TeamSensesCfg
+from veca_marl.envs.core.game_cfg import GameCfg, Script, TeamCfg
 from veca_marl.envs.core.task import (
     SOLVED,
     Player,
@@ -30,7 +30,6 @@ __all__ = [
     "TaskCfg",
     "Team",
     "TeamCfg",
-    "TeamSensesCfg",
     "find_expert",
     "find_task",
     "from_parts",

@@ -25,6 +25,7 @@ from veca_marl.envs.core.episodes import Episodes
 from veca_marl.envs.core.game import Game
 from veca_marl.envs.core.game_cfg import GameCfg
 from veca_marl.envs.core.task import TaskCfg
+from veca_marl.migrations import KEY, migrated, numbered
 from veca_marl.sim.body import Body
 from veca_marl.sim.geometry import Floats, Scene, matrix_to_quaternion
 from veca_marl.sim.physics import Prop
@@ -171,12 +172,10 @@ class Benchmark:
     def check_parameters(self, cfg: TaskCfg) -> None:
         """Check that the parameters of a task are those of the benchmark.
 
-        Parameters that the task has got since must have their former values.
-
         Raises:
             ValueError: If one differs; the message names them.
         """
-        own, stored = parameters(cfg), {**cfg.formerly, **self.parameters}
+        own, stored = parameters(cfg), self.parameters
         differing = sorted(name for name in {*own, *stored} if own.get(name) != stored.get(name))
         if differing:
             changes = [f"task.{n}={own.get(n)} (not {stored.get(n)})" for n in differing]
@@ -249,21 +248,26 @@ def to_text(benchmark: Benchmark) -> str:
         json.dumps({name: value for name, value in start.items() if name not in constant})
         for start in benchmark.starts
     ]
-    head = {key: value for key, value in vars(benchmark).items() if key != "starts"}
+    head = numbered({key: value for key, value in vars(benchmark).items() if key != "starts"})
     entries = [f'"{key}": {json.dumps(value)}' for key, value in head.items()]
     entries += [f'"constant": {json.dumps(constant)}', '"starts": [\n' + ",\n".join(lines) + "\n]"]
     return "{\n" + ",\n".join(entries) + "\n}\n"
 
 
 def from_text(text: str) -> Benchmark:
-    """Return the frozen episodes that `to_text` wrote."""
+    """Return the frozen episodes that `to_text` wrote.
+
+    Raises:
+        ValueError: If a newer version of the package has written them.
+    """
     stored = json.loads(text)
+    task = {KEY: stored.pop(KEY, 0), "task": stored.pop("parameters")}
     constant = stored.pop("constant")
     starts = [
         {name: tuple(value) for name, value in {**constant, **start}.items()}
         for start in stored.pop("starts")
     ]
-    return Benchmark(**stored, starts=tuple(starts))
+    return Benchmark(**stored, parameters=migrated(task)["task"], starts=tuple(starts))
 
 
 def parameters(cfg: TaskCfg | GameCfg) -> dict[str, Any]:

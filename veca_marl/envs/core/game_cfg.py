@@ -2,36 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from enum import Enum
-from typing import Any
 
 from veca_marl.envs.core.expert import find_expert
 from veca_marl.envs.core.task import TaskCfg, Team, check_body, find_task
 from veca_marl.sim.body import BodyCfg
-from veca_marl.sim.body.proprioception import ProprioceptionCfg
 from veca_marl.sim.body.walker import WalkerCfg
-from veca_marl.sim.hearing import AudioCfg
 from veca_marl.sim.physics import ClockCfg, PlaygroundCfg
 from veca_marl.sim.senses import SensesCfg
-from veca_marl.sim.touch import TouchCfg
-from veca_marl.sim.vision import VisionCfg
-
-
-@dataclass
-class TeamSensesCfg:
-    """The senses of one team; None is as for all teams. The fields are those of `SensesCfg`."""
-
-    vision: VisionCfg | None = None
-    audio: AudioCfg | None = None
-    proprioception: ProprioceptionCfg | None = None
-    touch: TouchCfg | None = None
-    extra: dict[str, Any] | None = None
-
-    def replace_in(self, common: SensesCfg) -> SensesCfg:
-        """Return the senses of all teams with those of this team replaced."""
-        own = {f.name: getattr(self, f.name) for f in fields(self)}
-        return replace(common, **{name: cfg for name, cfg in own.items() if cfg is not None})
 
 
 @dataclass
@@ -40,11 +19,11 @@ class TeamCfg:
 
     Attributes:
         body: Body of its players; None is as for all teams.
-        senses: Senses of its players.
+        senses: Senses of its players; those without settings here are as for all teams.
     """
 
     body: BodyCfg | None = None
-    senses: TeamSensesCfg = field(default_factory=TeamSensesCfg)
+    senses: SensesCfg = field(default_factory=SensesCfg)
 
     def with_waveform(self) -> TeamCfg:
         """Return this team with the samples at the ears, if it has an audio setting of its own."""
@@ -88,7 +67,7 @@ class GameCfg:
     task: TaskCfg = field(default_factory=TaskCfg)
     playground: PlaygroundCfg = field(default_factory=PlaygroundCfg)
     body: BodyCfg = field(default_factory=WalkerCfg)
-    senses: SensesCfg = field(default_factory=SensesCfg)
+    senses: SensesCfg = field(default_factory=SensesCfg.complete)
     clock: ClockCfg = field(default_factory=ClockCfg)
     team: dict[str, TeamCfg] = field(default_factory=dict)
     script: dict[str, Script] = field(default_factory=dict)
@@ -111,11 +90,11 @@ class GameCfg:
     def senses_of(self, team: str) -> SensesCfg:
         """Return the quality of the senses of a team."""
         own = self.team.get(team)
-        return self.senses if own is None else own.senses.replace_in(self.senses)
+        return self.senses if own is None else self.senses.replaced_by(own.senses)
 
     def with_waveform(self) -> GameCfg:
         """Return this game with the samples at the ears among what hearing players observe."""
-        audio = replace(self.senses.audio, waveform=True)
+        audio = replace(self.senses.of("audio"), waveform=True)
         team = {name: own.with_waveform() for name, own in self.team.items()}
         return replace(self, senses=replace(self.senses, audio=audio), team=team)
 

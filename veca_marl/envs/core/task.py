@@ -136,11 +136,7 @@ class TaskCfg:
         max_seconds: Simulated time after which an episode is truncated.
         weights: Weight of each reward term by its name; the reward is the weighted sum. For the
             terms in `Task.rates` it is that of a step of 40 ms.
-        formerly: Fields that were added later, with the value that the task had before: episodes
-            and runs that were stored without them stay comparable.
     """
-
-    formerly: ClassVar[dict[str, Any]] = {}
 
     name: str = ""
     max_seconds: float = 20.0

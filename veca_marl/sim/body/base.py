@@ -48,9 +48,6 @@ class BodyCfg:
             smaller. The paper's main text has 1.5 m, its table of functions 2.5 m.
     """
 
-    # fields that were added later, with the value that bodies had before
-    formerly: ClassVar[dict[str, Any]] = {"call_pause_s": 0.0}
-
     eye_range_deg: float = 50.0
     voice: VoiceKind = VoiceKind.silent
     call_pause_s: float = 0.0

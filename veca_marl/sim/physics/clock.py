@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any, ClassVar
 
 from veca_marl.sim.sound import SAMPLE_RATE_HZ
 
@@ -44,8 +43,6 @@ class ClockCfg:
     solver_iterations: int = 10
     contact_share: float = 0.02
     sleep_s: float = math.inf
-
-    formerly: ClassVar[dict[str, Any]] = {"sleep_s": math.inf}
 
     def __post_init__(self) -> None:
         """Check the rate and the numbers."""

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
 from functools import cache
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
@@ -68,8 +68,6 @@ class MultiAgentNavCfg(TaskCfg):
         separate_finder: Whether the agent that starts in the room of the object is a team of its
             own, `finder`, before the team `seekers` of the others.
     """
-
-    formerly: ClassVar[dict[str, Any]] = {"separate_finder": False}
 
     agents: int = 2
     radius_m: float = 0.2

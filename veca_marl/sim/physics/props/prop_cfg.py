@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from enum import Enum
-from typing import Any, ClassVar, Protocol
+from typing import Protocol
 
 from veca_marl.sim.geometry import Polyhedron, convex_hull, pyramid, sector_of_disc
 from veca_marl.sim.physics.bullet import HULL_MARGIN_M
@@ -253,9 +253,6 @@ class PropCfg:
         interactions: Names of the verbs that bodies can apply to it, such as ``[grab]``; see
             `veca_marl.sim.physics.interactions`.
     """
-
-    # fields that were added later, with the value that props had before
-    formerly: ClassVar[dict[str, Any]] = {"partition": False}
 
     name: str = ""
     shape: PropShape = PropShape.box

@@ -1,0 +1,266 @@
+"""Configurations that older versions stored, brought to the form of this version.
+
+Each stored configuration has a number, `CONFIG_VERSION` of the code that stored it, under the key
+`KEY`. One without a number has version 0: version 0.2.0 stored it, or a later commit before there
+were numbers, which knew some of the fields that step 1 adds.
+
+`STEPS` are the only record of what changed. They name fields by their paths in the configuration
+of a run; whatever else is stored (the algorithms in a checkpoint, the parameters of a task) is
+passed with the keys that lead to it there, such as ``{"task": parameters}``. A field that is absent
+and in no step takes the default of its dataclass: a new field whose default does what was done
+before needs no step, which is how plug-ins add fields.
+
+All functions take and return plain data (mappings, lists, numbers, texts). This module imports
+nothing of the package, so that every layer can use it.
+"""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Iterator, Mapping, Sequence
+from copy import deepcopy
+from dataclasses import dataclass, field
+from typing import Any
+
+KEY = "config_version"
+Plain = dict[str, Any]
+
+
+class VersionError(ValueError):
+    """A stored configuration has a version that this code does not know."""
+
+
+@dataclass(frozen=True)
+class Change(ABC):
+    """One change of the nodes at a path.
+
+    Attributes:
+        path: Dotted path in the configuration of a run; empty is its root, ``*`` stands for each
+            key of a mapping and each element of a list.
+    """
+
+    path: str
+
+    @abstractmethod
+    def apply(self, node: Plain) -> None:
+        """Bring a node to the form of the next version."""
+
+    @abstractmethod
+    def undo(self, node: Plain) -> None:
+        """Bring a node to the form of the version before, as far as that can express it."""
+
+
+@dataclass(frozen=True)
+class Added(Change):
+    """Fields that were added.
+
+    Attributes:
+        values: The fields, with the values that do what was done before.
+        name: Name of the entry of a registry that has them, which the node has as `name`; None
+            for nodes of any name.
+    """
+
+    values: Mapping[str, Any]
+    name: str | None = None
+
+    def apply(self, node: Plain) -> None:
+        """See `Change`; fields that are present stay as they are."""
+        if self._concerns(node):
+            node |= deepcopy(dict(self.values)) | node
+
+    def undo(self, node: Plain) -> None:
+        """See `Change`; fields with other values stay."""
+        if self._concerns(node):
+            for key, value in self.values.items():
+                if key in node and node[key] == value:
+                    del node[key]
+
+    def _concerns(self, node: Plain) -> bool:
+        return self.name is None or node.get("name") == self.name
+
+
+@dataclass(frozen=True)
+class Renamed(Change):
+    """A field that got another name.
+
+    Attributes:
+        before: Its name before.
+        now: Its name since.
+    """
+
+    before: str
+    now: str
+
+    def apply(self, node: Plain) -> None:
+        """See `Change`."""
+        _rename(node, self.before, self.now)
+
+    def undo(self, node: Plain) -> None:
+        """See `Change`."""
+        _rename(node, self.now, self.before)
+
+
+def _rename(node: Plain, before: str, now: str) -> None:
+    if before in node:
+        node[now] = node.pop(before)
+
+
+@dataclass(frozen=True)
+class Replaced(Change):
+    """A value of a field that is written in another way.
+
+    Attributes:
+        key: The field.
+        before: The value before.
+        now: The value since.
+    """
+
+    key: str
+    before: Any
+    now: Any
+
+    def apply(self, node: Plain) -> None:
+        """See `Change`."""
+        _replace(node, self.key, self.before, self.now)
+
+    def undo(self, node: Plain) -> None:
+        """See `Change`."""
+        _replace(node, self.key, self.now, self.before)
+
+
+def _replace(node: Plain, key: str, before: Any, now: Any) -> None:
+    if key in node and node[key] == before:
+        node[key] = deepcopy(now)
+
+
+@dataclass(frozen=True)
+class Step:
+    """From one version to the next.
+
+    Attributes:
+        changes: Changes of configurations, in their order.
+        state: Entries that the states in checkpoints got, with the values of runs without.
+    """
+
+    changes: Sequence[Change]
+    state: Mapping[str, Any] = field(default_factory=dict)
+
+
+_IMAGE_WINDOWS = {"kernels": [8, 4, 3], "strides": [4, 2, 1]}
+_CALLS = {"call_pause_s": 0.0}
+
+STEPS: tuple[Step, ...] = (
+    Step(
+        changes=(
+            Renamed("", "warm_start", "init_from"),
+            Added("", {"init_encoders": {}, "intrinsic": {"name": "none"}, "team_intrinsic": {}}),
+            Added("task", {"separate_finder": False}, name="MultiAgentNav"),
+            Added("body", _CALLS),
+            Added("team.*.body", _CALLS),
+            Replaced("team.*.senses", "extra", before=None, now={}),
+            Added("clock", {"sleep_s": math.inf}),
+            Added("playground.props.*", {"partition": False}),
+            Added("algo.network", _IMAGE_WINDOWS, name="multisense"),
+            Added("learner.*.network", _IMAGE_WINDOWS, name="multisense"),
+        ),
+        state={"intrinsic": {}},
+    ),
+)
+"""Entry `n` leads from version `n` to version ``n + 1``."""
+
+CONFIG_VERSION = len(STEPS)
+"""Version of the configurations that this code stores."""
+
+
+def numbered(config: Mapping[str, Any]) -> Plain:
+    """Return a configuration as it is stored: with its version."""
+    return {KEY: CONFIG_VERSION, **config}
+
+
+def migrated(stored: Mapping[str, Any]) -> Plain:
+    """Return a stored configuration, or a part of one, in the form of this version.
+
+    Args:
+        stored: Plain data with their version; without one they have version 0.
+
+    Returns:
+        A copy without the version.
+
+    Raises:
+        VersionError: If the version is newer than this code, or no version.
+    """
+    config = deepcopy(dict(stored))
+    for step in STEPS[_version(config.pop(KEY, 0)) :]:
+        for change in step.changes:
+            for node in _nodes(config, change.path):
+                change.apply(node)
+    return config
+
+
+def migrated_checkpoint(content: Mapping[str, Any]) -> Plain:
+    """Return the content of a checkpoint with configurations and a state of this version.
+
+    Args:
+        content: Has `config`, the configuration of the run; `algorithms`, those of its teams; and
+            `state`, whose tensors are not copied.
+
+    Raises:
+        VersionError: See `migrated`.
+    """
+    stored = {KEY: content.get(KEY, 0)}
+    added: Plain = {}
+    for step in STEPS[_version(stored[KEY]) :]:
+        added |= step.state
+    return {
+        **content,
+        KEY: CONFIG_VERSION,
+        "config": migrated({**content["config"], **stored}),
+        "algorithms": migrated({"learner": content["algorithms"], **stored})["learner"],
+        "state": {**deepcopy(added), **content["state"]},
+    }
+
+
+def first_form(config: Mapping[str, Any]) -> Plain:
+    """Return a configuration of this version as version 0 would have stored it.
+
+    What version 0 cannot express stays as it is. Digests of this form do not change when a step is
+    added, as long as the configuration does what it did before.
+    """
+    first = deepcopy(dict(config))
+    for step in reversed(STEPS):
+        for change in reversed(step.changes):
+            for node in _nodes(first, change.path):
+                change.undo(node)
+    return first
+
+
+def _version(stored: object) -> int:
+    """Return the version of a configuration, from 0 to `CONFIG_VERSION`."""
+    if not isinstance(stored, int) or isinstance(stored, bool) or stored < 0:
+        raise VersionError(f"{KEY}={stored!r} is no version: 0 to {CONFIG_VERSION}")
+    if stored > CONFIG_VERSION:
+        raise VersionError(
+            f"{KEY}={stored} is newer than this version of veca_marl, which reads 0 to "
+            f"{CONFIG_VERSION}: update veca_marl"
+        )
+    return stored
+
+
+def _nodes(node: Any, path: str) -> Iterator[Plain]:
+    """Yield the mappings at a path; none where there is nothing, or something else."""
+    if not path:
+        if isinstance(node, dict):
+            yield node
+        return
+    key, _, rest = path.partition(".")
+    for child in _children(node, key):
+        yield from _nodes(child, rest)
+
+
+def _children(node: Any, key: str) -> list[Any]:
+    if isinstance(node, list) and key == "*":
+        return node
+    if not isinstance(node, dict):
+        return []
+    return list(node.values()) if key == "*" else [node[key]] if key in node else []
