@@ -109,8 +109,9 @@ def make_none(_):
 
 
 def test_a_server_that_cannot_be_made_is_named():
-    with closing(ProcessPool("failing process", make_none, 1, method="fork")) as pool:
-        pytest.raises(WorkerError, answer_all, pool, 1).match("ValueError: no server")
+    pool = ProcessPool("failing process", make_none, 1, method="fork")
+    with closing(pool), pytest.raises(WorkerError, match="ValueError: no server"):
+        answer_all(pool, 1)
 
 
 def test_processes_that_cannot_be_started_leave_none_behind():
