@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from veca_marl.algos.collection.workers import WorkerError
+from veca_marl.processes.supervision import WorkerError
 from veca_marl.runs import training
 from veca_marl.runs.training import LastVideo
 

@@ -67,7 +67,8 @@ def measure_all(jobs: Sequence[Job], processes: int) -> dict[str, str]:
 def _measure_apart(job: Job) -> dict[str, str]:
     """Measure a job in a fresh process.
 
-    A pool with `max_tasks_per_child=1` would be shorter, but hangs (CPython issue 115634).
+    The processes of a `ProcessPool` keep what earlier jobs have loaded. Python's own pool with
+    `max_tasks_per_child=1` would be shorter, but hangs (CPython issue 115634).
     """
     with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as pool:
         return pool.submit(measure, job).result()

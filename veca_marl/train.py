@@ -24,8 +24,6 @@ from omegaconf.errors import OmegaConfBaseException
 
 from veca_marl import api
 from veca_marl.algos.checkpoints import CheckpointError
-from veca_marl.algos.collection.child_processes import end_with_parent
-from veca_marl.algos.collection.workers import WorkerError
 from veca_marl.algos.files import DISK_FULL, WriteError
 from veca_marl.algos.training.finite import NotFiniteError
 from veca_marl.algos.training.loop import Trainer
@@ -33,6 +31,8 @@ from veca_marl.config import Config, ConfigError, conf_dir, one_line, prepare, t
 from veca_marl.config.command_line import check_folder
 from veca_marl.config.experiment import check_arm
 from veca_marl.config.stored import change
+from veca_marl.processes.children import end_with_parent
+from veca_marl.processes.supervision import WorkerError
 from veca_marl.runs.assembly import decide_precision, make_trainer
 from veca_marl.runs.continuation import RESUMABLE, may_change, resume_argument
 from veca_marl.runs.run_folder import RunFolder, locked, new_run, open_run

@@ -83,12 +83,6 @@ def test_an_unknown_size_of_memory_refuses_nothing(monkeypatch):
     assert check_storage({"red": StorageNeeded(10**15)}) == ["replay: 1000000.00 GB of memory"]
 
 
-def test_memory_of_the_system_is_read(tmp_path):
-    file = tmp_path / "meminfo"
-    file.write_text("MemTotal:  99 kB\nMemAvailable:   50 kB\n")
-    assert storage._system_memory(file) == 50 * 1024
-
-
 def test_a_folder_that_does_not_exist_yet_is_on_the_disk_of_its_parent(tmp_path):
     assert storage.available_disk(tmp_path / "new" / "folder") > 0
 

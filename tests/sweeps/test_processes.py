@@ -33,9 +33,10 @@ def test_a_process_that_fails_does_not_stop_the_others(tmp_path):
     ]
     failed, shown = run(plans)
     assert [plan.job.name for plan in failed] == ["a/seed_0", "a/seed_2"]
-    assert "failed a/seed_0 with exit status 1: error: no luck" in shown
+    assert "failed a/seed_0, which ended with exit code 1: error: no luck" in shown
     assert "finished a/seed_1" in shown
-    assert f"failed a/seed_2 with signal 9: see {tmp_path / 'a' / 'seed_2.log'}" in shown
+    assert "failed a/seed_2, which was killed by SIGKILL" in shown
+    assert f": see {tmp_path / 'a' / 'seed_2.log'}" in shown
     assert "a/seed_3" not in shown
     assert "error: no luck" in (tmp_path / "a" / "seed_0.log").read_text()
 

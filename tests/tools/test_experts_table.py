@@ -11,13 +11,14 @@ from scipy import stats
 
 from tools.experts_table.command import main
 from tools.experts_table.episode_file import EpisodeFile, spread
-from tools.experts_table.play import LostProcessError, Played, digest, game_cfg, play_all
+from tools.experts_table.play import Job, Played, digest, game_cfg, play_all
 from tools.experts_table.table import markdown, share_interval
 from veca_marl.envs.core.benchmark import SEED
 from veca_marl.envs.core.episodes import Episodes
 from veca_marl.envs.core.expert import Expert, find_expert
 from veca_marl.envs.core.game import Game
 from veca_marl.envs.core.game_cfg import Script
+from veca_marl.processes.supervision import WorkerError
 from veca_marl.runs.run_folder import locked
 from veca_marl.sim.physics import PropCfg
 
@@ -76,14 +77,23 @@ def test_two_processes_play_the_same_episodes(tmp_path):
     assert scores(alone) == scores(together)
 
 
-def _kill_itself(share, commit, results):
-    os.kill(os.getpid(), signal.SIGKILL)
+class Deadly:
+    """Kills the process that reads it."""
+
+    @property
+    def task(self):
+        os.kill(os.getpid(), signal.SIGKILL)
 
 
-def test_a_process_that_is_killed_is_named_with_its_signal(monkeypatch):
-    monkeypatch.setattr("tools.experts_table.play._play_share", _kill_itself)
-    with pytest.raises(LostProcessError, match=r"which played episodes, ended by signal 9"):
-        list(play_all([object(), object()], 2, "commit"))
+def test_a_process_that_is_killed_is_named_with_its_signal():
+    with pytest.raises(WorkerError, match=r"process [01] .* was killed by SIGKILL"):
+        list(play_all([Deadly(), Deadly()], 2, "commit"))
+
+
+def test_a_start_that_is_not_the_frozen_one_is_named_by_its_process():
+    job = Job("DodgeCar", ("playground=single_room",), Script.random, 0, frozen=True)
+    with pytest.raises(WorkerError, match=r"process 0 .*: ValueError: "):
+        list(play_all([job], 2, "commit"))
 
 
 def test_the_stored_return_is_that_of_the_frozen_episode(tmp_path):

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from tools.experts_table.episode_file import EpisodeFile, StaleEpisodesError, replay
-from tools.experts_table.play import Job, LostProcessError, Played, digest, game_cfg, play_all
+from tools.experts_table.play import Job, Played, digest, game_cfg, play_all
 from tools.experts_table.table import markdown
 from veca_marl.algos.files import WriteError, write_atomically
 from veca_marl.config import ConfigError, one_line, prepare
@@ -18,6 +18,7 @@ from veca_marl.envs.core.benchmark import EPISODES, Benchmark, find_benchmark, h
 from veca_marl.envs.core.expert import has_expert
 from veca_marl.envs.core.game_cfg import Script
 from veca_marl.envs.core.task import TASKS
+from veca_marl.processes.supervision import WorkerError
 from veca_marl.runs.run_folder import checkout_commit, locked
 
 
@@ -78,7 +79,7 @@ _REMARK_COLUMNS = ("task", "policy", "remark")
 
 def main(words: Sequence[str] | None = None) -> int:
     """Run the command line; return the exit status."""
-    errors = (WriteError, LostProcessError, StaleEpisodesError)
+    errors = (WriteError, WorkerError, StaleEpisodesError)
     return CommandLine("experts_table", TableOptions, DESCRIPTION, errors).run(run, words)
 
 

@@ -144,7 +144,7 @@ def replay(
 
     Raises:
         StaleEpisodesError: If a return, the goal or the number of steps differs.
-        LostProcessError: See `play_all`.
+        WorkerError: See `play_all`.
     """
     chosen = {
         (task, row.policy, row.episode): row

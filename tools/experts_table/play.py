@@ -5,14 +5,11 @@ from __future__ import annotations
 import hashlib
 import json
 import time
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import closing
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, closing
 from dataclasses import asdict, dataclass
 from enum import Enum
-from itertools import groupby
-from multiprocessing import get_context
-from multiprocessing.connection import Connection, wait
-from multiprocessing.process import BaseProcess
+from functools import partial
 
 import numpy as np
 
@@ -22,6 +19,7 @@ from veca_marl.envs.core.episodes import Episodes, first_team, play_to_end
 from veca_marl.envs.core.game import Game
 from veca_marl.envs.core.game_cfg import GameCfg, Script
 from veca_marl.migrations import first_form
+from veca_marl.processes.pool import ProcessPool
 
 
 @dataclass(frozen=True)
@@ -86,21 +84,35 @@ def _plain(value: object) -> object:
     return value.name if isinstance(value, Enum) else str(value)
 
 
-def play_in_order(jobs: Iterable[Job], commit: str) -> Iterator[tuple[Job, Played]]:
-    """Play episodes one after the other and yield each when it has ended.
+class Player:
+    """Plays episodes, consecutive ones of one task in one world.
 
     Args:
-        jobs: The episodes. Consecutive ones of one task are played in one world.
         commit: Commit of the code.
-
-    Raises:
-        ValueError: If a start is not the frozen one.
     """
-    for (task, overrides), group in groupby(jobs, lambda job: (job.task, job.overrides)):
-        cfg = game_cfg(task, overrides)
-        with closing(Game(cfg)) as game:
-            for job in group:
-                yield job, _play(game, job, commit)
+
+    def __init__(self, commit: str) -> None:
+        self._commit = commit
+        self._world: tuple[str, tuple[str, ...]] | None = None
+        self._pending = ExitStack()
+
+    def play(self, job: Job) -> Played:
+        """Play an episode.
+
+        Raises:
+            ValueError: If the start is not the frozen one.
+        """
+        if (job.task, job.overrides) != self._world:
+            self.close()
+            game = Game(game_cfg(job.task, job.overrides))
+            self._game = self._pending.enter_context(closing(game))
+            self._world = job.task, job.overrides
+        return _play(self._game, job, self._commit)
+
+    def close(self) -> None:
+        """Close the world."""
+        self._world = None
+        self._pending.close()
 
 
 def game_cfg(task: str, overrides: Sequence[str]) -> GameCfg:
@@ -150,10 +162,6 @@ def _reset(game: Game, job: Job) -> int:
     return benchmark.version
 
 
-class LostProcessError(RuntimeError):
-    """A process ended before it had played its episodes."""
-
-
 def play_all(jobs: Sequence[Job], processes: int, commit: str) -> Iterator[tuple[Job, Played]]:
     """Play episodes and yield each when it has ended, those of several processes in any order.
 
@@ -163,60 +171,20 @@ def play_all(jobs: Sequence[Job], processes: int, commit: str) -> Iterator[tuple
         commit: Commit of the code.
 
     Raises:
-        ValueError: If a start is not the frozen one.
-        LostProcessError: If a process ends before its episodes are played.
+        ValueError: If a start is not the frozen one, in this process.
+        WorkerError: If a process ends before its episodes are played, or raises an exception.
     """
     if processes == 1:
-        yield from play_in_order(jobs, commit)
+        with closing(Player(commit)) as player:
+            for job in jobs:
+                yield job, player.play(job)
         return
-    context = get_context("spawn")  # this process may have threads, which a fork would break
-    running = {}
-    for share in (jobs[n::processes] for n in range(processes)):
-        receiver, sender = context.Pipe(duplex=False)
-        process = context.Process(target=_play_share, args=(share, commit, sender), daemon=True)
-        process.start()
-        sender.close()
-        running[receiver] = process
-    try:
-        yield from _received(running)
-    finally:
-        for process in running.values():
-            process.terminate()
-            process.join()
+    serve = partial(_serve_episodes, commit)
+    with closing(ProcessPool("playing process", serve, min(processes, len(jobs)))) as pool:
+        for number, played in pool.answers(jobs):
+            yield jobs[number], played
 
 
-def _play_share(share: Sequence[Job], commit: str, results: Connection) -> None:
-    """Play in a process of its own and send each episode, then None, or else the error."""
-    try:
-        for played in play_in_order(share, commit):
-            results.send(played)
-        results.send(None)
-    except ValueError as error:
-        results.send(error)
-
-
-def _received(running: Mapping[Connection, BaseProcess]) -> Iterator[tuple[Job, Played]]:
-    connections = list(running)
-    while connections:
-        for connection in wait(connections):
-            assert isinstance(connection, Connection)
-            try:
-                message = connection.recv()
-            except EOFError:
-                raise _lost(running[connection]) from None
-            if isinstance(message, ValueError):
-                raise message
-            if message is None:
-                connections.remove(connection)
-            else:
-                yield message
-
-
-def _lost(process: BaseProcess) -> LostProcessError:
-    process.join()
-    code = process.exitcode or 0
-    how = f"by signal {-code}" if code < 0 else f"with exit status {code}"
-    return LostProcessError(
-        f"the process {process.pid}, which played episodes, ended {how}; the episodes before are "
-        "stored, and the same command plays the others"
-    )
+def _serve_episodes(commit: str, _: Callable[[], None]) -> Callable[[Job], Played]:
+    """Return what plays in a process of a pool."""
+    return Player(commit).play

@@ -9,20 +9,18 @@ Broken laws are named at the end, and the exit status is 1.
 
 from __future__ import annotations
 
-import os
 import sys
 import time
-from collections.abc import Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import closing
 from dataclasses import dataclass, field
 from importlib import import_module
-from multiprocessing import get_context
 
 from tools.fidelity.law import Section
 from tools.fidelity.page import number, write_page
-from veca_marl.algos.collection.child_processes import end_with_parent
 from veca_marl.config import ConfigError
 from veca_marl.config.command_line import CommandLine, check_folder
+from veca_marl.processes.pool import ProcessPool
 from veca_marl.registry import unknown
 from veca_marl.reports.figure import PlotError, check_plotting
 from veca_marl.runs.cores import usable_cores
@@ -57,7 +55,11 @@ def check_names(names: list[str]) -> None:
 
 def measure(name: str) -> Section:
     """Return the measured section with this name."""
-    section: Section = import_module(SECTIONS[name]).section()
+    try:
+        section: Section = import_module(SECTIONS[name]).section()
+    except Exception as error:
+        error.add_note(f"in the section {name!r}")
+        raise
     return section
 
 
@@ -84,7 +86,8 @@ class FidelityOptions:
 def measure_all(names: Sequence[str], processes: int) -> dict[str, Section]:
     """Measure sections in processes, print the progress, return them in the order of `names`.
 
-    An exception in a section is raised with the name of the section as a note.
+    Raises:
+        WorkerError: If a section raises an exception; a note has its name and the traceback.
     """
     done: dict[str, Section] = {}
     start = time.monotonic()
@@ -97,21 +100,15 @@ def measure_all(names: Sequence[str], processes: int) -> dict[str, Section]:
 
 
 def _measured(names: Sequence[str], processes: int) -> Iterator[tuple[str, Section]]:
-    pool = ProcessPoolExecutor(
-        processes,
-        mp_context=get_context("spawn"),
-        initializer=end_with_parent,
-        initargs=(os.getpid(),),
-    )
-    with pool:
-        futures = {pool.submit(measure, name): name for name in names}
-        for future in as_completed(futures):
-            error = future.exception()
-            if error is not None:
-                pool.shutdown(cancel_futures=True)
-                error.add_note(f"in the section {futures[future]!r}")
-                raise error
-            yield futures[future], future.result()
+    pool = ProcessPool("measuring process", _serve, min(processes, len(names)))
+    with closing(pool):
+        for number, section in pool.answers(names):
+            yield names[number], section
+
+
+def _serve(_: Callable[[], None]) -> Callable[[str], Section]:
+    """Return what measures in a process of a pool."""
+    return measure
 
 
 def broken_laws(sections: dict[str, Section]) -> list[str]:
@@ -131,6 +128,7 @@ def run(options: FidelityOptions, overrides: list[str]) -> list[str]:
         ConfigError: If there are other overrides.
         PlotError: If matplotlib is missing.
         OSError: If a file cannot be written.
+        WorkerError: See `measure_all`.
     """
     if overrides:
         raise ConfigError(f"{overrides[0]}: fidelity has the options sections, to and processes")

@@ -7,14 +7,12 @@ of them alone: the rate of all of them at once is the most that learning could r
 from __future__ import annotations
 
 import math
-import os
 import time
 from collections.abc import Callable
 from contextlib import closing
 from dataclasses import dataclass, replace
 from functools import partial
 from multiprocessing import get_context
-from multiprocessing.connection import Connection
 from multiprocessing.synchronize import Barrier
 from pathlib import Path
 from statistics import median
@@ -23,12 +21,12 @@ from tempfile import TemporaryDirectory
 import torch
 from torchrl import timeit
 
-from veca_marl.algos.collection.child_processes import end_with_parent
 from veca_marl.algos.reporting import Row
 from veca_marl.algos.training.schedule import Schedule, processor_seconds
 from veca_marl.bench.rollouts import RandomActions
 from veca_marl.config import Config
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
+from veca_marl.processes.pool import ProcessPool
 from veca_marl.runs.assembly import GameFactory, make_trainer
 from veca_marl.runs.cores import usable_cores
 from veca_marl.runs.run_folder import RunFolder
@@ -46,55 +44,42 @@ class SimultaneousRollouts:
     """
 
     def __init__(self, make_env: Callable[[], VecaEnv], steps: int, processes: int) -> None:
-        context = get_context("spawn")  # this process may have threads, which a fork would break
         # kept: its shared memory is given to other arrays as soon as this process drops it
-        self._begin = context.Barrier(processes)
-        self._processes, self._connections = [], []
-        for _ in range(processes):
-            own_end, process_end = context.Pipe()
-            arguments = (process_end, self._begin, make_env, steps, os.getpid())
-            process = context.Process(target=_roll_out_on_request, args=arguments, daemon=True)
-            process.start()
-            process_end.close()
-            self._processes.append(process)
-            self._connections.append(own_end)
+        self._begin = get_context("spawn").Barrier(processes)
+        self._requests = [None] * processes
+        serve = partial(_serve_rollouts, self._begin, make_env, steps)
+        self._pool = ProcessPool("measuring process", serve, processes)
         self.frames_per_s()  # fills caches
 
     def frames_per_s(self) -> float:
         """Make one rollout in each process and return the sum of their rates.
 
         Raises:
-            RuntimeError: If a process has ended.
+            WorkerError: If a process has ended.
         """
-        try:
-            for connection in self._connections:
-                connection.send(True)
-            return math.fsum(connection.recv() for connection in self._connections)
-        except (EOFError, ConnectionError) as error:
-            raise RuntimeError("a process that measures rollouts has ended") from error
+        return math.fsum(rate for _, rate in self._pool.answers(self._requests))
 
     def close(self) -> None:
         """End the processes."""
-        for connection, process in zip(self._connections, self._processes, strict=True):
-            connection.send(False)
-            process.join()
-            connection.close()
+        self._pool.close()
 
 
-def _roll_out_on_request(
-    requests: Connection, begin: Barrier, make_env: Callable[[], VecaEnv], steps: int, parent: int
-) -> None:
-    """Answer each request by the frames per second of a rollout, until one is False."""
-    end_with_parent(parent)
+def _serve_rollouts(
+    begin: Barrier, make_env: Callable[[], VecaEnv], steps: int, _: Callable[[], None]
+) -> Callable[[None], float]:
+    """Return what makes a rollout in a process, together with others, and measures its rate."""
     torch.set_num_threads(1)
     env = make_env()
     actions = RandomActions(env, steps)
-    while requests.recv():
+
+    def frames_per_s(_: None) -> float:
         begin.wait(_WAIT_S)
         start = time.perf_counter()
         env.rollout(steps, actions, break_when_any_done=False)
-        requests.send(steps * env.batch_size[0] / (time.perf_counter() - start))
-    env.close()
+        frames: int = steps * env.batch_size[0]
+        return frames / (time.perf_counter() - start)
+
+    return frames_per_s
 
 
 @dataclass

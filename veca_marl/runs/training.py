@@ -13,11 +13,11 @@ from tensordict.nn import TensorDictModuleBase
 from torchrl import timeit
 
 from veca_marl.algos.collection.experience import CollectCfg
-from veca_marl.algos.collection.workers import WorkerError
 from veca_marl.algos.reporting import MemoryReporter, Reporter, Row
 from veca_marl.algos.training.loop import Trainer
 from veca_marl.config import Config
 from veca_marl.envs.core.game_cfg import GameCfg
+from veca_marl.processes.supervision import WorkerError
 from veca_marl.runs.assembly import make_reporters, make_trainer
 from veca_marl.runs.continuation import RunProgress
 from veca_marl.runs.cores import contention_warning, idle_cores_hint, load, usable_cores

@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, BinaryIO, TextIO
 
+from veca_marl.processes.children import end_all, end_of
 from veca_marl.runs.continuation import read_progress
 from veca_marl.sweeps.plans import Action, Job, Plan, SweepError, plan
 
@@ -116,7 +117,7 @@ class Progress:
 PARENT = "VECA_MARL_PARENT_PID"
 """Environment variable with the process that a run must not outlive."""
 
-_POLL_S = 0.5
+_POLL_S = 0.5  # commands, not functions: no pipe tells of them, and the display changes meanwhile
 _GRACE_S = 60.0  # until interrupted runs are killed; a checkpoint is written within seconds
 
 
@@ -216,11 +217,7 @@ def _end(one: Running, failed: list[Plan], progress: Progress) -> None:
         progress.event(f"finished {job.name} after {one.minutes:.1f} min")
     else:
         failed.append(one.plan)
-        progress.event(f"failed {job.name} with {_status(status)}: {last_line(one.plan)}")
-
-
-def _status(code: int) -> str:
-    return f"exit status {code}" if code > 0 else f"signal {-code}"
+        progress.event(f"failed {job.name}, which {end_of(status)}: {last_line(one.plan)}")
 
 
 def last_line(plan: Plan) -> str:
@@ -252,15 +249,8 @@ def _interrupt(running: Sequence[Running], progress: Progress) -> None:
     if not running:
         return
     progress.event(f"interrupting {len(running)} runs; the same command continues them")
-    for one in running:
-        one.process.terminate()  # `train` takes SIGTERM as Ctrl-C
-    deadline = time.monotonic() + _GRACE_S
-    for one in running:
-        try:
-            one.process.wait(max(deadline - time.monotonic(), 0.0))
-        except subprocess.TimeoutExpired:
-            one.process.kill()
-            one.process.wait()
+    # `train` takes SIGTERM as Ctrl-C
+    end_all([one.process for one in running], _GRACE_S)
 
 
 def cores_of(config: Mapping[str, Any]) -> int:

@@ -16,7 +16,7 @@ from fake_env import FakeEnv, make_fake_env
 from paths import HELPERS, ROOT
 
 from veca_marl.algos.collection.experience import CollectCfg, Experience, start_method
-from veca_marl.algos.collection.workers import WorkerError
+from veca_marl.processes.supervision import WorkerError
 
 KILLED = r"worker process 1 \(of 0 to 1\) was killed by SIGKILL"
 STEPS = 4
@@ -98,7 +98,7 @@ def test_a_worker_killed_during_other_work_interrupts_it(start):
 def test_without_the_signal_every_call_raises_an_error(start, use):
     """In threads other than the main one Python calls no signal handlers."""
     experience = start(only_audio)
-    experience._collector._restore_handler()
+    signal.signal(signal.SIGCHLD, signal.SIG_DFL)  # `close` restores that of before
     end(experience)
     with pytest.raises(WorkerError, match=KILLED):
         getattr(experience, use)(*([3] if use == "restart" else []))

@@ -11,7 +11,7 @@ from killed_runs import Child, assert_equal, die, make_trainer, stored
 from training import FRAMES
 
 from veca_marl.algos import files
-from veca_marl.algos.collection.workers import WorkerError
+from veca_marl.processes.supervision import WorkerError
 
 
 @pytest.fixture(scope="module")

@@ -1,55 +1,13 @@
-"""Time limits for the answers of worker processes: a process that hangs does not end."""
+"""Time limits in the pipes and the queue of TorchRL's workers, which wait without limit."""
 
 from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
 from queue import Empty
 from typing import Any
 
-CHECK_S = 1.0
-"""Seconds between two checks of processes that are waited for."""
-
-
-class TimeLimit:
-    """Ends the wait for workers that do not answer in time.
-
-    Args:
-        seconds: Longest time that an answer may take.
-        abandon: Called with the indices of the workers that have not answered; raises an error.
-    """
-
-    def __init__(self, seconds: float, abandon: Callable[[list[int]], None]) -> None:
-        self.seconds = seconds
-        self._abandon = abandon
-        self._begin = time.monotonic()
-
-    def begin(self) -> None:
-        """Start to measure the time."""
-        self._begin = time.monotonic()
-
-    def check(self, silent: list[int]) -> None:
-        """Abandon the workers in `silent` if the time is over."""
-        if time.monotonic() - self._begin > self.seconds:
-            self._abandon(silent)
-
-
-def no_answer(kind: str, silent: list[int], workers: int, seconds: float) -> str:
-    """Return the message about workers that were killed because they did not answer.
-
-    Args:
-        kind: What they are, such as ``worker process``.
-        silent: Their indices.
-        workers: Number of all workers of this kind.
-        seconds: The time limit.
-    """
-    names = " and ".join(map(str, silent))
-    plural, was = ("es", "were") if len(silent) > 1 else ("", "was")
-    return (
-        f"{kind}{plural} {names} (of 0 to {workers - 1}) did not answer for {seconds:g} s "
-        f"(collect.answer_limit_s) and {was} killed"
-    )
+from veca_marl.processes.supervision import CHECK_S, ProcessGroup, TimeLimit
 
 
 class AnswerPipe:
@@ -60,13 +18,12 @@ class AnswerPipe:
     Args:
         pipe: The pipe of `MultiSyncCollector`.
         index: Index of the worker.
-        check: Raises an error if a worker has ended.
-        limit: Time limit of an answer.
+        group: The workers.
     """
 
-    def __init__(self, pipe: Any, index: int, check: Callable[[], None], limit: TimeLimit) -> None:
+    def __init__(self, pipe: Any, index: int, group: ProcessGroup) -> None:
         self._pipe, self._index = pipe, index
-        self._check, self._limit = check, limit
+        self._check, self._limit = group.check, group.time_limit()
 
     def send(self, message: Any) -> None:
         """Send a message; the time limit of its answer begins."""

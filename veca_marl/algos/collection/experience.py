@@ -18,6 +18,7 @@ from torchrl.envs import Compose, EnvBase
 from veca_marl.algos.collection.workers import SupervisedCollector
 from veca_marl.algos.networks.memory import memory_of, with_transform
 from veca_marl.algos.specs import EnvFactory
+from veca_marl.processes.supervision import Limit
 
 
 @dataclass
@@ -52,6 +53,11 @@ class CollectCfg:
                 raise ValueError(f"collect.{name} must be at least 1, got {getattr(self, name)}")
         if not self.answer_limit_s > 0:
             raise ValueError(f"collect.answer_limit_s must be positive, got {self.answer_limit_s}")
+
+    @property
+    def limit(self) -> Limit:
+        """Limit for the silence of a process."""
+        return Limit(self.answer_limit_s, "collect.answer_limit_s")
 
     @property
     def all_worlds(self) -> int:
@@ -96,7 +102,7 @@ class Experience:
                     cat_results="stack",
                     num_threads=threads,
                     num_sub_threads=cfg.threads,
-                    answer_limit_s=cfg.answer_limit_s,
+                    limit=cfg.limit,
                     **common,
                 )
         self._batches: Iterator[TensorDictBase] = iter(self._collector)

@@ -6,11 +6,13 @@ killed, it waits forever. `SupervisedCollector` raises `WorkerError` instead, in
 - The signal SIGCHLD, which the system sends when a worker ends, raises it in the main thread at
   once: also while the main process learns or evaluates.
 - Every wait for a worker checks each second whether all workers are alive. In other threads and on
-  Windows, where the signal is not received, and while workers start, this is the only way: Python
-  drops an exception that a signal handler raises within a fork.
+  Windows, where the signal is not received, and while workers start, this is the only way.
 
 A worker that hangs does not end: every wait has a time limit, after which the workers that have not
 answered are named and all are killed.
+
+The workers are no `ProcessPool`: TorchRL starts and ends them, and speaks with them through its own
+pipes. What names and kills them is the same `ProcessGroup`.
 """
 
 from __future__ import annotations
@@ -29,16 +31,10 @@ from torch import multiprocessing, nn
 from torchrl.collectors import Collector, MultiSyncCollector
 from torchrl.weight_update import SharedMemWeightSyncScheme
 
-from veca_marl.algos.collection.answers import CHECK_S, AnswerPipe, BatchQueue, TimeLimit, no_answer
-from veca_marl.algos.collection.child_processes import (
-    block_interrupts,
-    call_when_a_child_ends,
-    end_of,
-    has_ended,
-    is_running,
-    prepare_child,
-)
+from veca_marl.algos.collection.answers import AnswerPipe, BatchQueue
 from veca_marl.private_parts import torchrl_is_tested
+from veca_marl.processes.children import block_interrupts, prepare_child
+from veca_marl.processes.supervision import CHECK_S, Limit, ProcessGroup, WorkerError
 
 _MESSAGE_CHARS = 1000  # with a pickle's overhead below what a pipe writes at once (4096 bytes)
 
@@ -78,10 +74,6 @@ class WorkerCollector(Collector):
             raise
 
 
-class WorkerError(RuntimeError):
-    """A worker process ended that should still collect, or did not answer in time."""
-
-
 class SupervisedCollector(MultiSyncCollector):
     """TorchRL's collector, which raises `WorkerError` as soon as one of its processes ends.
 
@@ -90,9 +82,12 @@ class SupervisedCollector(MultiSyncCollector):
     Args:
         make_envs: As for `MultiSyncCollector`.
         policy: As for `MultiSyncCollector`.
-        answer_limit_s: Seconds that a worker may take to start, for a batch, a reset or new
+        limit: Limit for the time that a worker takes to start, for a batch, a reset or new
             parameters.
         **kwargs: As for `MultiSyncCollector`.
+
+    Attributes:
+        group: The workers.
 
     Raises:
         WorkerError: If a worker ends before all are ready, or is not ready in time.
@@ -100,19 +95,16 @@ class SupervisedCollector(MultiSyncCollector):
 
     procs: Sequence[BaseProcess] = ()  # torchrl replaces it while it starts them
     queue_out: Any  # torchrl makes it
-    _checking = False
-    _failure = ""
 
     def __init__(
         self,
         make_envs: Sequence[Callable[[], Any]],
         policy: Any,
-        answer_limit_s: float,
+        limit: Limit,
         **kwargs: Any,
     ) -> None:
-        self._limit_s = answer_limit_s
         self._exceptions: SimpleQueue[tuple[int, str]] = multiprocessing.SimpleQueue()
-        self._restore_handler: Callable[[], None] = lambda: None
+        self.group = ProcessGroup("worker process", lambda: self.procs, limit, self._raised)
         self._weights = _SupervisedWeights()
         schemes = {}
         if isinstance(policy, nn.Module):
@@ -138,8 +130,8 @@ class SupervisedCollector(MultiSyncCollector):
             raise
         finally:
             self.receive_interrupts()
-        self.queue_out = BatchQueue(self.queue_out, len(self.procs), self.time_limit())
-        self._restore_handler = call_when_a_child_ends(self.check)
+        self.queue_out = BatchQueue(self.queue_out, len(self.procs), self.group.time_limit())
+        self.group.watch()
 
     @property
     def pipes(self) -> Sequence[AnswerPipe]:
@@ -148,44 +140,7 @@ class SupervisedCollector(MultiSyncCollector):
 
     @pipes.setter
     def pipes(self, made: Sequence[Any]) -> None:
-        self._pipes = [
-            AnswerPipe(pipe, index, self.check, self.time_limit())
-            for index, pipe in enumerate(made)
-        ]
-
-    def time_limit(self) -> TimeLimit:
-        """Return a limit for a wait that begins now; beyond it `WorkerError` is raised."""
-        return TimeLimit(self._limit_s, self._abandon)
-
-    def _abandon(self, silent: list[int]) -> None:
-        """Kill all workers and raise `WorkerError`, which names those that have not answered."""
-        self._failure = no_answer("worker process", silent, len(self.procs), self._limit_s)
-        self.check()
-
-    def check(self) -> None:
-        """Raise `WorkerError` if a worker has ended; the others are killed."""
-        if self._checking:  # called by the signal in the middle of a call of this method
-            return
-        self._checking = True
-        try:
-            self._failure = self._failure or self._find_failure()
-        finally:
-            self._checking = False
-        if self._failure:
-            self._restore_handler()  # the others end too
-            for process in self.procs:
-                if is_running(process):
-                    process.kill()
-            raise WorkerError(self._failure)
-
-    def _find_failure(self) -> str:
-        ended = {i: end_of(p) for i, p in enumerate(self.procs) if has_ended(p)}
-        raised = self._raised() if ended else {}
-        return "; ".join(self._sentence(i, ended[i], raised) for i in ended)
-
-    def _sentence(self, index: int, end: str, raised: dict[int, str]) -> str:
-        reason = f": {raised[index]}" if index in raised else ""
-        return f"worker process {index} (of 0 to {len(self.procs) - 1}) {end}{reason}"
+        self._pipes = [AnswerPipe(pipe, index, self.group) for index, pipe in enumerate(made)]
 
     def _raised(self) -> dict[int, str]:
         """Return the exceptions that workers have sent, by index."""
@@ -229,13 +184,13 @@ class SupervisedCollector(MultiSyncCollector):
         if isinstance(error, WorkerError):  # of this collector, or of another group of processes
             return
         try:
-            self.check()
+            self.group.check()
         except WorkerError as found:
             raise found from error
 
     def shutdown(self, *args: Any, **kwargs: Any) -> None:
         """End the workers."""
-        self._restore_handler()
+        self.group.release()
         super().shutdown(*args, **kwargs)
         # otherwise done when it is collected as garbage: it may start a thread, which, when Python
         # ends, waits for ever
@@ -258,9 +213,9 @@ class _SupervisedWeights(SharedMemWeightSyncScheme):
             super()._wait_for_ack(worker_ids, timeout)
             return
         for index, queue in self._ack_queues.items():
-            limit = self.context.time_limit()
+            limit = self.context.group.time_limit()
             while not _received(queue):
-                self.context.check()
+                self.context.group.check()
                 limit.check([index])
 
 

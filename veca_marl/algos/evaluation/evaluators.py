@@ -3,29 +3,17 @@
 from __future__ import annotations
 
 import math
-import os
-import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import pairwise
-from multiprocessing.connection import Connection, wait
-from multiprocessing.process import BaseProcess
-from typing import Any, Protocol
+from typing import Protocol
 
 import torch
-from torch import multiprocessing, nn
+from torch import nn
 from torchrl.envs import EnvBase
 
-from veca_marl.algos.collection.answers import CHECK_S, no_answer
-from veca_marl.algos.collection.child_processes import (
-    call_when_a_child_ends,
-    end_of,
-    interrupts_blocked,
-    prepare_child,
-)
 from veca_marl.algos.collection.experience import start_method
-from veca_marl.algos.collection.workers import WorkerError
 from veca_marl.algos.evaluation.evaluate import (
     Exploration,
     RandomTeams,
@@ -35,6 +23,8 @@ from veca_marl.algos.evaluation.evaluate import (
 )
 from veca_marl.algos.policy import Policy
 from veca_marl.algos.specs import EnvFactory
+from veca_marl.processes.pool import ProcessPool
+from veca_marl.processes.supervision import Limit
 
 
 @dataclass(frozen=True)
@@ -112,14 +102,10 @@ class LocalEvaluator:
         self._env = make_env(worlds, 0)
         self._players = players(self._env)
 
-    def count_steps(self, steps: Any) -> None:
-        """Add 1 to ``steps.value`` before each action: another process sees that this one plays."""
-
-        def count(*_: Any) -> None:
-            steps.value += 1
-
+    def count_steps(self, count: Callable[[], None]) -> None:
+        """Call a function before each action."""
         for player in self._players.values():
-            player.register_forward_pre_hook(count)
+            player.register_forward_pre_hook(lambda *_: count())
 
     def play(self, request: Request, meanwhile: Callable[[], None] = nothing) -> dict[str, Scores]:
         """See `Evaluator`."""
@@ -138,215 +124,57 @@ class LocalEvaluator:
         self._env.close()
 
 
-END_S = 3.0
-"""Seconds until a process that does not follow SIGTERM is killed; others end at once."""
 _THREADS = 1  # of each process
 
 
-@dataclass(frozen=True)
-class EvaluationProcess:
-    """A process that plays, as seen from the one that started it.
-
-    Attributes:
-        process: The process.
-        connection: Requests go there, answers come from it.
-        steps: Shared with the process, which counts its steps in it.
-    """
-
-    process: BaseProcess
-    connection: Connection[Any, Any]
-    steps: Any
-
-    @property
-    def waitables(self) -> list[Any]:
-        """What becomes ready when it answers or ends."""
-        return [self.connection, self.process.sentinel]
-
-    def kill(self) -> None:
-        """Kill the process, also one that is stopped and receives no SIGTERM."""
-        self.process.kill()
-        self.process.join(END_S)
-
-
-class IdleTimer:
-    """Measures for how long a process has made no step.
-
-    Args:
-        worker: The process.
-    """
-
-    def __init__(self, worker: EvaluationProcess) -> None:
-        self._worker = worker
-        self._steps, self._since = worker.steps.value, time.monotonic()
-
-    def idle_s(self) -> float:
-        """Return the seconds since this method, or the constructor, first saw the last step."""
-        steps = self._worker.steps.value
-        if steps != self._steps:
-            self._steps, self._since = steps, time.monotonic()
-        return time.monotonic() - self._since
-
-
-def start_process(make_env: EnvFactory, players: Players, worlds: int) -> EvaluationProcess:
-    """Start a process; it ends with this one.
-
-    Args:
-        make_env: Makes the worlds.
-        players: Makes the policies for an environment.
-        worlds: Number of worlds.
-    """
-    context: Any = multiprocessing.get_context(start_method(_THREADS))
-    connection, child_connection = context.Pipe()
-    steps = context.RawValue("Q", 0)
-    arguments = (child_connection, steps, os.getpid(), make_env, players, worlds)
-    process = context.Process(target=_serve, args=arguments, daemon=True)
-    process.start()
-    child_connection.close()
-    return EvaluationProcess(process, connection, steps)
-
-
-def _serve(connection: Connection[Any, Any], steps: Any, parent: int, *arguments: Any) -> None:
-    """Answer requests with scores, or with the text of an exception, until this process ends.
-
-    Args:
-        connection: Requests come from it, answers go there.
-        steps: Shared with the parent; its value grows by 1 with each step.
-        parent: Process id of the parent.
-        *arguments: Of `LocalEvaluator`.
-    """
-    prepare_child(parent)
+def _serve_episodes(
+    make_env: EnvFactory, players: Players, worlds: int, count_step: Callable[[], None]
+) -> Callable[[Request], dict[str, Scores]]:
+    """Return what plays in a process of a pool."""
     torch.set_num_threads(_THREADS)
-    try:
-        evaluator = LocalEvaluator(*arguments)
-        evaluator.count_steps(steps)
-        while True:
-            connection.send(evaluator.play(connection.recv()))
-    except EOFError:  # the other end was closed
-        return
-    except Exception as error:
-        connection.send(f"{type(error).__name__}: {error}")
-        _wait_for_the_end(connection)  # ending before the text is read would hide it
-
-
-def _wait_for_the_end(connection: Connection[Any, Any]) -> None:
-    """Ignore requests until the other end is closed."""
-    with suppress(EOFError):
-        while True:
-            connection.recv()
+    evaluator = LocalEvaluator(make_env, players, worlds)
+    evaluator.count_steps(count_step)
+    return evaluator.play
 
 
 class ParallelEvaluator:
     """Plays equal parts of the episodes in several processes.
 
     The parameters and buffers of the policies are in shared memory: a change in this process
-    reaches the others. So are the numbers of steps that the processes have made, by which one that
-    hangs is told from one that plays long episodes.
+    reaches the others.
 
     Args:
         make_env: Makes the worlds.
         players: Makes the policies for an environment, in each process.
         processes: Number of processes.
         worlds: Number of worlds of all processes, rounded up to equal numbers.
-        answer_limit_s: Seconds that a process may take for its worlds, for a step of them, or for
+        limit: Limit for the time that a process takes for its worlds, for a step of them, or for
             its answer after the last one.
 
     Raises:
-        WorkerError: If a process ends, from every method, or does not answer in time.
+        WorkerError: See `ProcessPool`.
     """
 
     def __init__(
-        self,
-        make_env: EnvFactory,
-        players: Players,
-        processes: int,
-        worlds: int,
-        answer_limit_s: float,
+        self, make_env: EnvFactory, players: Players, processes: int, worlds: int, limit: Limit
     ) -> None:
         players.policy.share_memory()
-        self._limit_s = answer_limit_s
-        worlds_each = math.ceil(worlds / processes)
-        with interrupts_blocked():
-            self._workers = [
-                start_process(make_env, players, worlds_each) for _ in range(processes)
-            ]
-        self._expected = True  # whether all processes should run
-        self._restore_handler = call_when_a_child_ends(self.check)
-
-    def check(self) -> None:
-        """Raise `WorkerError` if a process has ended; called as soon as one does."""
-        for index, worker in enumerate(self._workers):
-            if self._expected and worker.process.exitcode is not None:
-                self._expected = False
-                raise WorkerError(f"evaluation process {index} {end_of(worker.process)}")
+        self._processes = processes
+        serve = partial(_serve_episodes, make_env, players, math.ceil(worlds / processes))
+        method = start_method(_THREADS)
+        self._pool = ProcessPool("evaluation process", serve, processes, limit, method)
 
     def play(self, request: Request, meanwhile: Callable[[], None] = nothing) -> dict[str, Scores]:
         """See `Evaluator`."""
-        parts = _split(request, len(self._workers))
-        for index, part in enumerate(parts):
-            with self._worker_errors(index):
-                self._workers[index].connection.send(part)
+        parts = _split(request, self._processes)
+        answers = self._pool.answers(parts)
         meanwhile()
-        answers = self._answers(len(parts))
-        return joined_scores([answers[index] for index in range(len(parts))])
-
-    def _answers(self, parts: int) -> dict[int, dict[str, Scores]]:
-        """Return the answers of the first processes by index; raise if some do not answer."""
-        answers: dict[int, dict[str, Scores]] = {}
-        playing = {i: IdleTimer(worker) for i, worker in enumerate(self._workers[:parts])}
-        while playing:
-            waitables = [one for index in playing for one in self._workers[index].waitables]
-            ready = wait(waitables, CHECK_S)
-            for index in list(playing):
-                if any(one in ready for one in self._workers[index].waitables):
-                    answers[index] = self._receive(index)
-                    del playing[index]
-            silent = [i for i, timer in playing.items() if timer.idle_s() > self._limit_s]
-            if silent:
-                self._abandon(silent)
-        return answers
-
-    def _abandon(self, silent: list[int]) -> None:
-        """Kill all processes and raise `WorkerError`, which names those that have not answered."""
-        self._expected = False  # the signal that they have ended is to raise no other error
-        for worker in self._workers:
-            worker.kill()
-        raise WorkerError(
-            no_answer("evaluation process", silent, len(self._workers), self._limit_s)
-        )
-
-    def _receive(self, index: int) -> dict[str, Scores]:
-        """Return the answer of a process that has answered or ended."""
-        with self._worker_errors(index):
-            if not self._workers[index].connection.poll():
-                raise EOFError
-            answer = self._workers[index].connection.recv()
-        if isinstance(answer, str):
-            self._expected = False
-            raise WorkerError(f"evaluation process {index}: {answer}")
-        scores: dict[str, Scores] = answer
-        return scores
-
-    @contextmanager
-    def _worker_errors(self, index: int) -> Iterator[None]:
-        """Raise `WorkerError` instead of an error of the pipe if the process has ended."""
-        try:
-            yield
-        except (EOFError, BrokenPipeError, ConnectionResetError):
-            self._workers[index].process.join(END_S)
-            self.check()
-            raise
+        scores = dict(answers)
+        return joined_scores([scores[number] for number in range(len(parts))])
 
     def close(self) -> None:
         """End the processes."""
-        self._expected = False
-        self._restore_handler()
-        for worker in self._workers:
-            worker.connection.close()
-            worker.process.terminate()
-        for worker in self._workers:
-            worker.process.join(END_S)
-            if worker.process.is_alive():
-                worker.kill()
+        self._pool.close()
 
 
 def _split(request: Request, parts: int) -> list[Request]:
@@ -360,7 +188,7 @@ def _split(request: Request, parts: int) -> list[Request]:
 
 
 def make_evaluator(
-    make_env: EnvFactory, players: Players, processes: int, worlds: int, answer_limit_s: float
+    make_env: EnvFactory, players: Players, processes: int, worlds: int, limit: Limit
 ) -> Evaluator:
     """Return an evaluator with a number of processes; with none it plays in this process.
 
@@ -369,8 +197,8 @@ def make_evaluator(
         players: Makes the policies for an environment.
         processes: Number of worker processes.
         worlds: Number of worlds of all processes.
-        answer_limit_s: See `ParallelEvaluator`; not used without worker processes.
+        limit: See `ParallelEvaluator`; not used without worker processes.
     """
     if processes == 0:
         return LocalEvaluator(make_env, players, worlds)
-    return ParallelEvaluator(make_env, players, min(processes, worlds), worlds, answer_limit_s)
+    return ParallelEvaluator(make_env, players, min(processes, worlds), worlds, limit)

@@ -183,7 +183,7 @@ class Trainer:
             players,
             self.collect.processes,
             self.evaluation.worlds,
-            self.collect.answer_limit_s,
+            self.collect.limit,
         )
 
     def _notes(self) -> list[str]:

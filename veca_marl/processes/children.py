@@ -15,9 +15,10 @@ import signal
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from multiprocessing.process import BaseProcess
+from subprocess import Popen, TimeoutExpired
 from typing import Any
 
 _BLOCKED = (signal.SIGINT, signal.SIGTERM)
@@ -59,6 +60,7 @@ def _restore(previous: set[int | signal.Signals]) -> None:
 
 _PR_SET_PDEATHSIG = 1  # linux/prctl.h
 _CHECK_S = 1.0
+_KILL_S = 3.0  # a killed process that waits for a device cannot be waited for
 
 
 def end_with_parent(parent: int) -> None:
@@ -125,30 +127,44 @@ def call_when_a_child_ends(call: Callable[[], None]) -> Callable[[], None]:
     return restore
 
 
-def has_ended(process: BaseProcess) -> bool:
-    """Return whether a process has ended that has not been closed."""
-    try:
-        return process.exitcode is not None
-    except ValueError:  # torchrl has ended and closed it, because another one had ended
-        return False
+def end_of(code: int | None) -> str:
+    """Return how a process has ended, as the rest of a sentence.
 
-
-def is_running(process: BaseProcess) -> bool:
-    """Return whether a process has not ended."""
-    try:
-        return process.is_alive()
-    except ValueError:  # closed
-        return False
-
-
-def end_of(process: BaseProcess) -> str:
-    """Return how a process has ended, as the rest of a sentence."""
-    code = process.exitcode or 0
-    if code >= 0:
-        return f"ended with exit code {code}"
+    Args:
+        code: ``exitcode`` or ``returncode`` of the process.
+    """
+    if code is None or code >= 0:
+        return f"ended with exit code {code or 0}"
     try:
         name = signal.Signals(-code).name
     except ValueError:
         name = f"signal {-code}"
     hint = ", which the system sends when memory runs out" if name == "SIGKILL" else ""
     return f"was killed by {name}{hint}"
+
+
+def end_all(processes: Sequence[BaseProcess | Popen[bytes]], grace_s: float) -> None:
+    """End processes by SIGTERM and wait for them; kill those that do not follow it.
+
+    A process that is stopped (SIGSTOP) receives SIGTERM only when it continues.
+
+    Args:
+        processes: The processes; some may have ended.
+        grace_s: Seconds from SIGTERM until processes are killed, the same for all.
+    """
+    for process in processes:
+        process.terminate()
+    deadline = time.monotonic() + grace_s
+    for process in processes:
+        if not _ends_within(process, max(deadline - time.monotonic(), 0.0)):
+            process.kill()
+            _ends_within(process, _KILL_S)
+
+
+def _ends_within(process: BaseProcess | Popen[bytes], seconds: float) -> bool:
+    if isinstance(process, Popen):
+        with suppress(TimeoutExpired):
+            process.wait(seconds)
+        return process.returncode is not None
+    process.join(seconds)
+    return process.exitcode is not None

@@ -1,23 +1,27 @@
-"""Limits of control groups as the files of the system state them, in a temporary folder."""
+"""Memory that is left, by the files of the system in a temporary folder."""
+
+import sys
 
 import pytest
 
-from veca_marl.algos.storage import control_group_memory
+from veca_marl.algos.memory import available_memory
 
 SLURM = "system.slice/slurmstepd.scope/job_7/step_0"
 
 
 @pytest.fixture
 def machine(tmp_path):
-    """Write the files of groups; return what their limits leave."""
+    """Write the files of a machine with 50 kB and of groups; return the bytes that are left."""
 
     def left(membership, groups=None):
-        (tmp_path / "cgroup").write_text(membership)
+        (tmp_path / "proc/self").mkdir(parents=True)
+        (tmp_path / "proc/self/cgroup").write_text(membership)
+        (tmp_path / "proc/meminfo").write_text("MemTotal:  99 kB\nMemAvailable:   50 kB\n")
         for folder, files in (groups or {}).items():
-            (tmp_path / "fs" / folder).mkdir(parents=True, exist_ok=True)
+            (tmp_path / "sys/fs/cgroup" / folder).mkdir(parents=True, exist_ok=True)
             for name, text in files.items():
-                (tmp_path / "fs" / folder / name).write_text(f"{text}\n")
-        return control_group_memory(tmp_path / "cgroup", tmp_path / "fs")
+                (tmp_path / "sys/fs/cgroup" / folder / name).write_text(f"{text}\n")
+        return available_memory(tmp_path)
 
     return left
 
@@ -34,11 +38,20 @@ def first(limit, used=400, cache=100):
 
 def test_in_a_namespace_the_limit_is_at_the_root(machine):
     assert machine("0::/\n", {".": second(1000)}) == 700
-    assert machine("0::/\n", {".": second("max")}) is None
 
 
-def test_without_a_namespace_the_limit_is_in_the_folder_of_the_group(machine):
-    assert machine(f"0::/{SLURM}\n", {SLURM: second(1000)}) == 700
+@pytest.mark.parametrize(
+    ("membership", "groups"),
+    [
+        ("0::/\n", {".": second("max")}),
+        ("0::/\n", {".": second(10**6)}),
+        ("0::/a:b\n", {"a:b": {"memory.max": "max"}}),
+        ("4:memory:/a\n", {"memory/a": first(9223372036854771712)}),
+        ("", {}),
+    ],
+)
+def test_without_a_smaller_limit_the_memory_of_the_system_counts(machine, membership, groups):
+    assert machine(membership, groups) == 50 * 1024
 
 
 @pytest.mark.parametrize("limited", [SLURM, "system.slice/slurmstepd.scope", "system.slice"])
@@ -54,24 +67,15 @@ def test_the_first_version_has_a_hierarchy_of_its_own(machine, controllers):
     assert machine(membership, groups) == 700
 
 
-def test_a_limit_as_large_as_the_first_version_writes_without_one_is_none(machine):
-    assert machine("4:memory:/a\n", {"memory/a": first(9223372036854771712)}) is None
-
-
-def test_both_versions_on_one_machine(machine):
-    groups = {"memory/a": first(2000), "unified/b": second(1000)}
-    assert machine("4:memory:/a\n0::/b\n", groups) == 700
-
-
 @pytest.mark.parametrize("group", ["/docker/0123", "/../../outside", "/"])
 def test_in_a_container_the_mount_is_the_group_where_its_path_is_not_mounted(machine, group):
     assert machine(f"4:memory:{group}\n", {"memory": first(1000)}) == 700
 
 
-def test_paths_do_not_lead_out_of_the_mount(machine):
-    assert machine("0::/../outside\n", {"../outside": second(10), ".": second(1000)}) == 700
+def test_a_system_without_these_files_does_not_say(tmp_path):
+    assert available_memory(tmp_path) is None
 
 
-def test_a_group_without_limits_and_a_system_without_groups(machine, tmp_path):
-    assert machine("0::/a:b\n", {"a:b": {"memory.max": "max"}}) is None
-    assert control_group_memory(tmp_path / "absent", tmp_path) is None
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems have no /proc")
+def test_this_machine_has_memory_left():
+    assert available_memory() > 0

@@ -1,0 +1,55 @@
+"""Messages about processes that have ended or do not answer, and their ends."""
+
+import signal
+import subprocess
+import sys
+import time
+from multiprocessing import get_context
+
+import pytest
+
+from veca_marl.processes.children import end_all, end_of
+from veca_marl.processes.supervision import Limit, ProcessGroup, WorkerError
+
+
+@pytest.mark.parametrize(
+    ("silent", "message"),
+    [
+        ([1], "worker process 1 (of 0 to 2) did not answer for 2 s (limit_s) and was killed"),
+        ([0, 2], "worker processes 0 and 2 (of 0 to 2) did not answer for 2 s (limit_s) and were"),
+    ],
+)
+def test_the_message_agrees_in_number(silent, message):
+    processes = [get_context("spawn").Process() for _ in range(3)]
+    group = ProcessGroup("worker process", lambda: processes, Limit(2.0, "limit_s"))
+    with pytest.raises(WorkerError) as found:
+        group.abandon(silent)
+    assert str(found.value).startswith(message)
+
+
+def test_an_end_is_described_by_its_code_or_its_signal():
+    assert "3" in end_of(3)
+    assert "SIGTERM" in end_of(-signal.SIGTERM)
+    assert "memory" in end_of(-signal.SIGKILL)
+    assert "99" in end_of(-99)
+
+
+DEAF = "import signal, time; signal.signal(signal.SIGTERM, signal.SIG_IGN); print(flush=True);"
+
+
+def test_processes_that_ignore_the_request_to_end_are_killed_after_a_common_grace():
+    commands = [
+        subprocess.Popen([sys.executable, "-S", "-c", f"{code} time.sleep(60)"], stdout=-1)
+        for code in (DEAF, DEAF, "import time; print(flush=True);")
+    ]
+    for command in commands:
+        command.stdout.readline()
+    child = get_context("fork").Process(target=time.sleep, args=(60,))
+    child.start()
+    begin = time.monotonic()
+    end_all([*commands, child], 2.0)
+    assert 2.0 <= time.monotonic() - begin < 3.9
+    assert [command.returncode for command in commands] == [-9, -9, -15]
+    assert child.exitcode == -15
+    for command in commands:
+        command.stdout.close()
