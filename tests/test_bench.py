@@ -30,7 +30,7 @@ from veca_marl.envs.core.game import Game
 from veca_marl.envs.core.task import TASKS
 from veca_marl.processes.supervision import WorkerError
 from veca_marl.runs.continuation import quoted
-from veca_marl.sim.physics import PlaygroundCfg, World, pybullet
+from veca_marl.sim.physics import PlaygroundCfg, World
 from veca_marl.sim.vision import Camera
 
 QUICK = ["bench.steps=3", "bench.repeats=1"]
@@ -387,7 +387,7 @@ def test_tiny_renderer_draws_the_scene_that_we_draw():
     eye, camera = watcher.mount("eye_left"), Camera()
     client, objects_of = as_visual_shapes(world.scene, hidden)
     _, bodies = tiny_view(client, camera, eye)
-    pybullet.disconnect(client)
+    client.close()
     objects = np.array([*objects_of, -1])  # -1, the sky, is the last one
     theirs = objects[np.reshape(bodies, (camera.height, camera.width))]
     ours = camera.render(world.scene, [eye], hidden).ids[0]

@@ -5,7 +5,7 @@ from walking import empty_world, wall
 
 from veca_marl.sim.body.humanoid import Detail, Humanoid, HumanoidCfg
 from veca_marl.sim.body.humanoid.postures import ON_BACK, ON_BELLY
-from veca_marl.sim.physics import pybullet
+from veca_marl.sim.physics.bullet_client import pybullet
 
 # a room of 3 m x 3 m
 WALLS = [
@@ -45,7 +45,7 @@ def random_torques(world, bodies, seconds, seed=0):
 
 def remove_gravity(world):
     """Set gravity to zero."""
-    pybullet.setGravity(0.0, 0.0, 0.0, physicsClientId=world.client)
+    world.client.setGravity(0.0, 0.0, 0.0)
 
 
 def set_random_joint_speeds(world, body, speed_radps, seed=0):
@@ -59,18 +59,20 @@ def set_random_joint_speeds(world, body, speed_radps, seed=0):
 def kinetic_energy(world, body):
     """Return the kinetic energy of all links of a body, J."""
     body_id, client = body.body_id, world.client
-    links = range(pybullet.getNumJoints(body_id, physicsClientId=client))
-    states = pybullet.getLinkStates(body_id, links, 1, 1, physicsClientId=client)
-    velocity, spin = pybullet.getBaseVelocity(body_id, physicsClientId=client)
-    turn = pybullet.getBasePositionAndOrientation(body_id, physicsClientId=client)[1]
+    links = range(client.getNumJoints(body_id))
+    states = client.getLinkStates(body_id, links, 1, 1)
+    velocity, spin = client.getBaseVelocity(body_id)
+    _, turn = client.getBasePositionAndOrientation(body_id)
     energy = _energy(world, body_id, -1, turn, velocity, spin)
     for link, state in zip(links, states, strict=True):
-        energy += _energy(world, body_id, link, state[1], state[6], state[7])
+        energy += _energy(
+            world, body_id, link, state.centre_orientation, state.velocity, state.angular_velocity
+        )
     return energy
 
 
 def _energy(world, body_id, link, turn, velocity, spin):
-    info = pybullet.getDynamicsInfo(body_id, link, physicsClientId=world.client)
+    info = world.client.getDynamicsInfo(body_id, link)
     rotation = np.reshape(pybullet.getMatrixFromQuaternion(turn), (3, 3))
     local_spin = rotation.T @ spin
-    return 0.5 * (info[0] * np.dot(velocity, velocity) + np.dot(info[2], local_spin**2))
+    return 0.5 * (info.mass_kg * np.dot(velocity, velocity) + np.dot(info.moments, local_spin**2))

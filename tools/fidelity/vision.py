@@ -24,14 +24,8 @@ from veca_marl.sim.geometry import (
     matrix_to_quaternion,
     quaternions_to_matrices,
 )
-from veca_marl.sim.physics import (
-    PlaygroundCfg,
-    PropCfg,
-    PropShape,
-    World,
-    pybullet,
-    shape_arguments,
-)
+from veca_marl.sim.physics import PlaygroundCfg, PropCfg, PropShape, World, shape_arguments
+from veca_marl.sim.physics.bullet_client import BulletClient, pybullet
 from veca_marl.sim.vision import Camera, EyeViews, look_at
 from veca_marl.sim.vision.image_filters import (
     CONTRAST_AT_LIMIT,
@@ -52,7 +46,7 @@ class TinyRenderer:
     """
 
     def __init__(self, scene: Scene) -> None:
-        self._client: int = pybullet.connect(pybullet.DIRECT)
+        self._client = BulletClient()
         for g in range(len(scene.geoms.shapes)):
             self._add(scene.geoms, g)
 
@@ -67,31 +61,28 @@ class TinyRenderer:
         trace: TracebackType | None,
     ) -> None:
         """Disconnect from PyBullet."""
-        pybullet.disconnect(self._client)
+        self._client.close()
 
     def segment(self, camera: Camera, pose: Pose) -> NDArray[np.int32]:
         """Return the row of the visible primitive per pixel, ``(H, W)``, -1 for none."""
         forward, _, up = pose.rotation.T
         view = pybullet.computeViewMatrix(pose.position, pose.position + forward, up)
         projection = pybullet.computeProjectionMatrix(*_frustum(camera))
-        *_, segmentation = pybullet.getCameraImage(
+        *_, segmentation = self._client.getCameraImage(
             camera.width,
             camera.height,
             view,
             projection,
             shadow=0,
             renderer=pybullet.ER_TINY_RENDERER,
-            physicsClientId=self._client,
         )
         return np.reshape(segmentation, (camera.height, camera.width)).astype(np.int32)
 
     def _add(self, geoms: GeomTable, g: int) -> None:
         kind = shape_arguments(Shape(geoms.shapes[g]), geoms.sizes[g])
-        visual = pybullet.createVisualShape(**kind, physicsClientId=self._client)
+        visual = self._client.createVisualShape(**kind)
         orientation = matrix_to_quaternion(geoms.rotations[g])
-        pybullet.createMultiBody(
-            0.0, -1, visual, geoms.positions[g], orientation, physicsClientId=self._client
-        )
+        self._client.createMultiBody(0.0, -1, visual, geoms.positions[g], orientation)
 
 
 def _frustum(camera: Camera) -> tuple[float, float, float, float, float, float]:

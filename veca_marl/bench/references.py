@@ -26,14 +26,8 @@ from veca_marl.sim.geometry import (
     matrix_to_quaternion,
 )
 from veca_marl.sim.hearing import AudioCfg, AudioSense
-from veca_marl.sim.physics import (
-    PlaygroundCfg,
-    PropCfg,
-    PropShape,
-    World,
-    pybullet,
-    shape_arguments,
-)
+from veca_marl.sim.physics import PlaygroundCfg, PropCfg, PropShape, World, shape_arguments
+from veca_marl.sim.physics.bullet_client import BulletClient, pybullet
 from veca_marl.sim.sound import SoundCfg, SoundKind, make_sound
 from veca_marl.sim.touch import TouchCfg, TouchSense
 from veca_marl.sim.vision import Camera
@@ -170,7 +164,7 @@ def measure_eye(playground: PlaygroundCfg, repeats: int) -> EyeCost:
         ours = thread_ms(lambda: camera.render(world.scene, poses, hidden))
         tiny = thread_ms(lambda: [tiny_view(client, camera, pose) for pose in poses])
         costs.append((ours / VIEWS, tiny / VIEWS))
-    pybullet.disconnect(client)
+    client.close()
     world.close()
     ours_ms, tiny_ms = zip(*costs[1:], strict=True)  # the first compiles and fills caches
     ratio = median(tiny / ours for ours, tiny in costs[1:])
@@ -204,7 +198,7 @@ class ReferenceView:
 
     def close(self) -> None:
         """Disconnect from PyBullet."""
-        pybullet.disconnect(self._client)
+        self._client.close()
 
 
 def busy_room(playground: PlaygroundCfg) -> tuple[World, Walker]:
@@ -266,23 +260,22 @@ def _turned(pose: Pose, yaw_rad: float) -> Pose:
     return pose._replace(rotation=about_z @ pose.rotation)
 
 
-def as_visual_shapes(scene: Scene, hidden: Bools) -> tuple[int, list[int]]:
+def as_visual_shapes(scene: Scene, hidden: Bools) -> tuple[BulletClient, list[int]]:
     """Show a PyBullet client the surfaces of a scene that are not hidden.
 
     Returns:
         The client, and the id of the scene's object for each of the client's bodies in turn.
     """
-    client: int = pybullet.connect(pybullet.DIRECT)
+    client = BulletClient()
     geoms, objects = scene.geoms, []
     for g in np.flatnonzero(~hidden[: len(geoms.shapes)] & geoms.visible):
         shape = _visual_shape(client, Shape(geoms.shapes[g]), geoms.sizes[g], geoms.colours[g])
-        pybullet.createMultiBody(
+        client.createMultiBody(
             0.0,
             -1,
             shape,
             basePosition=geoms.positions[g].tolist(),
             baseOrientation=matrix_to_quaternion(geoms.rotations[g]).tolist(),
-            physicsClientId=client,
         )
         objects.append(int(geoms.objects[g]))
     for item in scene.objects:
@@ -290,46 +283,41 @@ def as_visual_shapes(scene: Scene, hidden: Bools) -> tuple[int, list[int]]:
         corners = scene.meshes.triangles[item.triangles][~hidden[triangles]]
         if len(corners):
             mesh = _visual_mesh(client, scene, corners)
-            pybullet.createMultiBody(0.0, -1, mesh, physicsClientId=client)
+            client.createMultiBody(0.0, -1, mesh)
             objects.append(item.id)
     return client, objects
 
 
-def _visual_mesh(client: int, scene: Scene, triangles: NDArray[np.int64]) -> int:
+def _visual_mesh(client: BulletClient, scene: Scene, triangles: NDArray[np.int64]) -> int:
     """Give PyBullet some triangles of a scene, where they are now."""
     corners = triangles.ravel()
-    made = pybullet.createVisualShape(
+    made = client.createVisualShape(
         pybullet.GEOM_MESH,
         vertices=scene.meshes.vertices[corners].tolist(),
         normals=scene.meshes.normals[corners].tolist(),
         indices=list(range(len(corners))),
-        physicsClientId=client,
     )
     return int(made)
 
 
-def _visual_shape(client: int, shape: Shape, size: Sequence[float], colour: Sequence[float]) -> int:
+def _visual_shape(
+    client: BulletClient, shape: Shape, size: Sequence[float], colour: Sequence[float]
+) -> int:
     rgba = [*(float(value) for value in colour), 1.0]
-    made = pybullet.createVisualShape(
-        **shape_arguments(shape, size), rgbaColor=rgba, physicsClientId=client
-    )
+    made = client.createVisualShape(**shape_arguments(shape, size), rgbaColor=rgba)
     return int(made)
 
 
-def tiny_view(client: int, camera: Camera, pose: Pose) -> tuple[NDArray[Any], NDArray[Any]]:
+def tiny_view(
+    client: BulletClient, camera: Camera, pose: Pose
+) -> tuple[NDArray[Any], NDArray[Any]]:
     """Return TinyRenderer's picture ``(H, W, 4)`` and segmentation ``(H, W)``, -1 for the sky."""
     lens = pybullet.computeProjectionMatrixFOV(
         camera.fov_deg, camera.width / camera.height, camera.near_m, camera.far_m
     )
     forward, up = pose.rotation[:, 0], pose.rotation[:, 2]
     view = pybullet.computeViewMatrix(pose.position, pose.position + forward, up)
-    _, _, rgba, _, segmentation = pybullet.getCameraImage(
-        camera.width,
-        camera.height,
-        view,
-        lens,
-        shadow=0,
-        renderer=pybullet.ER_TINY_RENDERER,
-        physicsClientId=client,
+    _, _, rgba, _, segmentation = client.getCameraImage(
+        camera.width, camera.height, view, lens, shadow=0, renderer=pybullet.ER_TINY_RENDERER
     )
     return rgba, segmentation

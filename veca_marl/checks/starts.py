@@ -16,12 +16,10 @@ from veca_marl.envs.core.game import Game, Outcome
 from veca_marl.envs.core.game_cfg import Script
 from veca_marl.sim.body.walker import Walker
 from veca_marl.sim.geometry import Floats
-from veca_marl.sim.physics import World, pybullet
+from veca_marl.sim.physics import World
 
 GREATEST_OVERLAP_M = 0.005
 """Depth up to which contacts are no overlap; skin yields by less, and so do resting props."""
-
-_BODY_A, _BODY_B, _DISTANCE = 1, 2, 8  # entries of Bullet's contact points
 
 
 def overlaps(game: Game, depth_m: float = GREATEST_OVERLAP_M) -> list[str]:
@@ -57,12 +55,12 @@ def _contacts(game: Game) -> Iterator[tuple[int, int, float]]:
     Bullet looks for none between walkers and fixed props: neither has a mass.
     """
     client = game.world.client
-    pybullet.performCollisionDetection(physicsClientId=client)
-    points = list(pybullet.getContactPoints(physicsClientId=client))
+    client.performCollisionDetection()
+    points = list(client.getContactPoints())
     for one, other in _massless_pairs(game):
-        points += pybullet.getClosestPoints(one, other, 0.0, physicsClientId=client)
+        points += client.getClosestPoints(one, other, 0.0)
     for point in points:
-        yield point[_BODY_A], point[_BODY_B], point[_DISTANCE]
+        yield point.body_a, point.body_b, point.distance_m
 
 
 def _massless_pairs(game: Game) -> Iterator[tuple[int, int]]:

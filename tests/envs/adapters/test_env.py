@@ -229,7 +229,7 @@ def test_a_closed_env_has_closed_its_worlds(env):
     other = VecaEnv(cfg_of(*CHEAP), worlds=2)
     games, state = other.games, with_action(other, torch.zeros(2, 1, 2))
     other.close()
-    assert all(game.world.client == -1 for game in games)
+    assert all(not game.world.client.isConnected() for game in games)
     for use in (other.reset, lambda: other.step(state), other.render):
         with pytest.raises(RuntimeError, match="the environment is closed; make a new one"):
             use()

@@ -12,7 +12,6 @@ from veca_marl.bench.command import free_play
 from veca_marl.envs.adapters.pettingzoo import VecaParallelEnv
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
 from veca_marl.envs.core.game import Game
-from veca_marl.sim.physics import pybullet
 
 CFG = compose(["+task=ObjectNav", "body=mitten"]).game
 SENSES = ("vision", "audio", "proprioception")
@@ -28,7 +27,7 @@ def break_down(game, speed=math.nan):
     """Give a body a velocity as that of an unstable simulation."""
     body = game.players[0].body
     velocity = (speed,) * 3
-    pybullet.resetBaseVelocity(body.body_id, velocity, velocity, physicsClientId=game.world.client)
+    game.world.client.resetBaseVelocity(body.body_id, velocity, velocity)
 
 
 @pytest.mark.parametrize("speed", [math.nan, math.inf, 1e10, 1e100])
@@ -77,7 +76,7 @@ def test_a_broken_prop_ends_the_episode_as_a_broken_body_does(words, prop, speed
     sound = VecaEnv(env.cfg, worlds=1, seed=0)
     state, game = env.reset(), env.games[0]
     body_id, client = game.world.prop(prop).body_id, game.world.client
-    pybullet.resetBaseVelocity(body_id, (speed,) * 3, physicsClientId=client)
+    client.resetBaseVelocity(body_id, (speed,) * 3)
     with caplog.at_level(logging.WARNING):
         after = env.step(env.rand_action(state))["next"]
     assert bool(after["truncated"].all())

@@ -3,7 +3,6 @@
 import math
 
 import numpy as np
-import pybullet
 import pytest
 from composed import compose
 
@@ -101,9 +100,7 @@ def test_tipping_the_toy_between_the_hands_is_not_rewarded(game):
 def tip(prop, position, pitch_rad):
     """Place a prop with a pitch, which `Prop.place` does not set."""
     turn = (0.0, math.sin(pitch_rad / 2), 0.0, math.cos(pitch_rad / 2))
-    pybullet.resetBasePositionAndOrientation(
-        prop.body_id, position, turn, physicsClientId=prop._client
-    )
+    prop._client.resetBasePositionAndOrientation(prop.body_id, position, turn)
     follow_physics([prop])
 
 

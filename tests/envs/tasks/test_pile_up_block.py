@@ -3,7 +3,6 @@
 from contextlib import contextmanager
 
 import numpy as np
-import pybullet
 import pytest
 from blocks import blocks_game, play, sit, sits
 
@@ -15,6 +14,7 @@ from veca_marl.envs.tasks.objects.toys_and_blocks import (
     is_released,
     rests_on,
 )
+from veca_marl.sim.physics.bullet_client import pybullet
 
 EDGE = 0.06
 # at which the expert succeeds; its share of successes is that of the frozen episodes
@@ -177,19 +177,11 @@ def test_a_block_between_two_that_are_pressed_to_its_sides_is_not_released(game,
 def fixed_at(client, block, place):
     """Keep a block at a place by a constraint."""
     block.place(place)
-    constraint = pybullet.createConstraint(
-        block.body_id,
-        -1,
-        -1,
-        -1,
-        pybullet.JOINT_FIXED,
-        (0, 0, 0),
-        (0, 0, 0),
-        place,
-        physicsClientId=client,
+    constraint = client.createConstraint(
+        block.body_id, -1, -1, -1, pybullet.JOINT_FIXED, (0, 0, 0), (0, 0, 0), place
     )
     yield
-    pybullet.removeConstraint(constraint, physicsClientId=client)
+    client.removeConstraint(constraint)
 
 
 def gripping(palms, block):

@@ -7,7 +7,6 @@ from walking import empty_world
 from veca_marl.sim.body.humanoid import Detail, Humanoid, HumanoidCfg
 from veca_marl.sim.body.humanoid.joint_control import JointActionKind
 from veca_marl.sim.body.humanoid.postures import POSTURES
-from veca_marl.sim.physics import pybullet
 
 SETTLING_S, MEASURED_S = 3.0, 1.0
 
@@ -118,6 +117,6 @@ def test_a_mitten_stays_on_all_fours_for_8_s_from_nine_of_ten_starts():
 def test_only_bodies_that_hold_angles_with_fingers_raise_the_iterations(detail, action, iterations):
     world = empty_world()
     Humanoid("child", HumanoidCfg(detail=detail, action=action), world)
-    parameters = pybullet.getPhysicsEngineParameters(physicsClientId=world.client)
+    parameters = world.client.getPhysicsEngineParameters()
     world.close()
     assert parameters["numSolverIterations"] == iterations

@@ -17,7 +17,6 @@ from veca_marl.sim.body.humanoid import (
     JointActionKind,
 )
 from veca_marl.sim.body.humanoid.postures import ON_BACK, POSTURES, Posture, posture_angles
-from veca_marl.sim.physics import pybullet
 
 SKELETON = load_skeleton()
 ALL = [bone.name for bone in SKELETON.bones]
@@ -74,16 +73,16 @@ def test_velocities_equal_those_of_bullet(make_child):
         pass
     velocities, spins = body.velocities(), body.angular_velocities()
     assert np.abs(spins).max() > 5.0
-    for link in range(pybullet.getNumJoints(body_id, physicsClientId=client)):
-        name = pybullet.getJointInfo(body_id, link, physicsClientId=client)[12].decode()
+    for link in range(client.getNumJoints(body_id)):
+        name = client.getJointInfo(body_id, link).link_name.decode()
         if name not in body.bone_names:
             continue
-        state = pybullet.getLinkState(body_id, link, 1, 1, physicsClientId=client)
+        state = client.getLinkState(body_id, link, 1, 1)
         bone = body.bone_names.index(name)
-        lever = np.subtract(state[0], state[4])  # Bullet gives that of the centre of mass
-        np.testing.assert_allclose(spins[bone], state[7], atol=1e-6)
+        lever = np.subtract(state.centre, state.position)  # Bullet gives that of the centre of mass
+        np.testing.assert_allclose(spins[bone], state.angular_velocity, atol=1e-6)
         np.testing.assert_allclose(
-            velocities[bone] + np.cross(spins[bone], lever), state[6], atol=1e-3
+            velocities[bone] + np.cross(spins[bone], lever), state.velocity, atol=1e-3
         )
 
 
@@ -157,9 +156,9 @@ def test_fingers_palms_and_soles_are_compliant(make_child):
     world, body = make_child()
     client, body_id = world.client, body.body_id
     stiff = {}
-    for link in range(pybullet.getNumJoints(body_id, physicsClientId=client)):
-        name = pybullet.getJointInfo(body_id, link, physicsClientId=client)[12].decode()
-        stiff[name] = pybullet.getDynamicsInfo(body_id, link, physicsClientId=client)[9]
+    for link in range(client.getNumJoints(body_id)):
+        name = client.getJointInfo(body_id, link).link_name.decode()
+        stiff[name] = client.getDynamicsInfo(body_id, link).contact_stiffness
     for name in ("l_hand__skin", "r_foot__skin", "l_index_distal"):
         bone = SKELETON.bones[SKELETON.bone(name.removesuffix("__skin"))]
         assert stiff[name] == pytest.approx(skin_spring(bone).stiffness_npm)
@@ -175,10 +174,10 @@ def test_loaded_skin_is_compressed_by_hookes_law(make_child):
     let_pass(world, 6.0)
     client, body_id = world.client, body.body_id
     pressed = 0
-    for point in pybullet.getContactPoints(body_id, world.floor_id, physicsClientId=client):
-        stiffness = pybullet.getDynamicsInfo(body_id, point[3], physicsClientId=client)[9]
-        if stiffness > 0.0 and point[9] > 0.5:
-            assert point[9] == pytest.approx(-stiffness * point[8], rel=0.04)
+    for point in client.getContactPoints(body_id, world.floor_id):
+        stiffness = client.getDynamicsInfo(body_id, point.link_a).contact_stiffness
+        if stiffness > 0.0 and point.normal_force_n > 0.5:
+            assert point.normal_force_n == pytest.approx(-stiffness * point.distance_m, rel=0.04)
             pressed += 1
     assert pressed >= 2
 
@@ -223,13 +222,9 @@ def test_a_body_with_nan_is_reported_and_shows_finite_numbers(make_child, what):
     world.step()
     nan = math.nan
     if what == "base":
-        pybullet.resetBaseVelocity(
-            body.body_id, (nan,) * 3, (0, 0, 0), physicsClientId=world.client
-        )
+        world.client.resetBaseVelocity(body.body_id, (nan,) * 3, (0, 0, 0))
     else:
-        pybullet.resetJointStatesMultiDof(
-            body.body_id, [3], [[nan]], [[0.0]], physicsClientId=world.client
-        )
+        world.client.resetJointStatesMultiDof(body.body_id, [3], [[nan]], [[0.0]])
     assert body.is_finite
     world.step()
     assert not body.is_finite

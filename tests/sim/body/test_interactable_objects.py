@@ -8,7 +8,7 @@ from verbs import begin, seeing, toy
 from walking import ball, box, empty_world, walker_in
 
 from veca_marl.sim.body.sense_organs import distance_m, interactable_props
-from veca_marl.sim.physics import PropCfg, PropShape, pybullet
+from veca_marl.sim.physics import PropCfg, PropShape
 from veca_marl.sim.physics.props import follow_physics
 
 
@@ -48,11 +48,10 @@ def test_props_at_any_pose_are_near_if_their_boxes_are():
         for prop in world.props.values():
             prop.place((*rng.uniform(-3.0, 3.0, 2), 1.0))
             orientation = rng.normal(size=4)
-            pybullet.resetBasePositionAndOrientation(
+            world.client.resetBasePositionAndOrientation(
                 prop.body_id,
                 prop.position.tolist(),
                 (orientation / np.linalg.norm(orientation)).tolist(),
-                physicsClientId=world.client,
             )
         follow_physics(list(world.props.values()))
         eyes, props = np.array([0.0, 0.0, 0.6]), list(world.props.values())

@@ -4,7 +4,6 @@ import math
 from dataclasses import replace
 
 import numpy as np
-import pybullet
 import pytest
 from walking import ball, box, empty_world, walker_in, wall
 
@@ -24,13 +23,12 @@ def thin(kind):
 
 
 def depth_m(world, one, other):
-    points = pybullet.getClosestPoints(
+    points = world.client.getClosestPoints(
         world.props[one].body_id if isinstance(one, str) else one.body_id,
         world.props[other].body_id,
         0.0,
-        physicsClientId=world.client,
     )
-    return max((-point[8] for point in points), default=0.0)
+    return max((-point.distance_m for point in points), default=0.0)
 
 
 def door(mass_kg=4.0):

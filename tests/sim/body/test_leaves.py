@@ -7,7 +7,8 @@ import pytest
 from walking import empty_world, film, let_pass, walker_in
 
 from veca_marl.sim.body.walker import obstacles
-from veca_marl.sim.physics import JointCfg, JointKind, LockCfg, PropCfg, PropShape, pybullet
+from veca_marl.sim.physics import JointCfg, JointKind, LockCfg, PropCfg, PropShape
+from veca_marl.sim.physics.bullet_client import pybullet
 from veca_marl.sim.physics.props.geoms import swept_radius_m
 
 JOINTS = {
@@ -98,9 +99,7 @@ def test_the_scene_shows_a_leaf_where_bullet_has_it(moves):
     door = world.prop("door")
     start = door.mass_centre
     if moves == "pushed":
-        pybullet.setJointMotorControl2(
-            door.body_id, 1, pybullet.TORQUE_CONTROL, force=5.0, physicsClientId=world.client
-        )
+        world.client.setJointMotorControl2(door.body_id, 1, pybullet.TORQUE_CONTROL, force=5.0)
     elif moves == "driven":
         assert door.open()
     elif moves == "put":
@@ -112,8 +111,6 @@ def test_the_scene_shows_a_leaf_where_bullet_has_it(moves):
         door.set_opening(0.3)
     for _ in range(10):
         world.step()
-        state = pybullet.getLinkState(
-            door.body_id, 1, computeForwardKinematics=1, physicsClientId=world.client
-        )
-        np.testing.assert_allclose(door.mass_centre, state[0], atol=1e-9)
+        state = world.client.getLinkState(door.body_id, 1, computeForwardKinematics=1)
+        np.testing.assert_allclose(door.mass_centre, state.centre, atol=1e-9)
     assert np.linalg.norm(door.mass_centre - start) > 1e-3

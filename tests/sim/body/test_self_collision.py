@@ -8,7 +8,6 @@ from veca_marl.sim.body.anatomy import load_skeleton
 from veca_marl.sim.body.humanoid import Humanoid, HumanoidCfg, JointActionKind
 from veca_marl.sim.body.humanoid.articulation import limb, may_collide
 from veca_marl.sim.body.humanoid.postures import Posture, posture_angles
-from veca_marl.sim.physics import pybullet
 
 BONES = [bone.name for bone in load_skeleton().bones]
 
@@ -40,7 +39,7 @@ def floating():
     """Return a position-controlled body without gravity, far from the floor."""
     world = empty_world()
     body = Humanoid("child", HumanoidCfg(action=JointActionKind.position), world)
-    pybullet.setGravity(0.0, 0.0, 0.0, physicsClientId=world.client)
+    world.client.setGravity(0.0, 0.0, 0.0)
     world.freeze()
     world.reset(np.random.default_rng(0))
     body.place((0.0, 0.0, 2.0))
@@ -49,8 +48,8 @@ def floating():
 
 
 def contacts(world, body):
-    found = pybullet.getContactPoints(body.body_id, body.body_id, physicsClientId=world.client)
-    return [contact for contact in found if contact[8] < 0.0]
+    found = world.client.getContactPoints(body.body_id, body.body_id)
+    return [contact for contact in found if contact.distance_m < 0.0]
 
 
 def go_to(world, body, **degrees):
@@ -65,8 +64,8 @@ def test_a_standing_body_has_contacts_of_hands_and_thighs_only(floating):
     let_pass(world, 0.2)
     hands = [body.bone(f"{side}_hand").position for side in "lr"]
     for contact in contacts(world, body):
-        assert min(np.linalg.norm(contact[5] - hand) for hand in hands) < 0.06
-        assert -contact[8] < 0.0035, "no deeper than the skin of the hand"
+        assert min(np.linalg.norm(contact.position_on_a - hand) for hand in hands) < 0.06
+        assert -contact.distance_m < 0.0035, "no deeper than the skin of the hand"
 
 
 def test_the_legs_do_not_pass_through_each_other(floating):

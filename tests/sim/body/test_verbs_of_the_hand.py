@@ -3,7 +3,6 @@
 import math
 
 import numpy as np
-import pybullet
 import pytest
 from verbs import begin, do, seeing, toy
 from walking import STEP_S, ball, box, empty_world, let_pass, walker_in, wall
@@ -97,7 +96,7 @@ def test_a_held_prop_has_the_velocity_with_which_it_moves(fraction):
     mean = (after - before) / STEP_S
     now = np.array([c * mean[0] - s * mean[1], s * mean[0] + c * mean[1], 0.0])
     np.testing.assert_allclose(piece.velocity, now, atol=0.02)
-    _, spin = pybullet.getBaseVelocity(piece.body_id, physicsClientId=world.client)
+    _, spin = world.client.getBaseVelocity(piece.body_id)
     assert spin[2] == pytest.approx(1.5)
     released = centre_of_mass(piece)
     assert walker.release()
@@ -155,10 +154,10 @@ def test_a_prop_held_in_a_corner_stays_out_of_its_walls_and_falls_there(kind):
             walker.walk(0.9, rng.uniform(0.0, 0.5) if step < 50 else rng.uniform(-2.0, 2.0))
             world.step()
             overlaps = [
-                -point[8]
+                -point.distance_m
                 for one in ("east", "north")
-                for point in pybullet.getClosestPoints(
-                    held.body_id, world.prop(one).body_id, 0.0, physicsClientId=world.client
+                for point in world.client.getClosestPoints(
+                    held.body_id, world.prop(one).body_id, 0.0
                 )
             ]
             assert max(overlaps, default=0.0) < 0.01
@@ -179,10 +178,8 @@ def test_a_held_prop_stays_out_of_another_walker(place, yaw_deg):
     piece.place((0.4, 0.0, piece.position[2]), math.radians(yaw_deg))
     assert walker.grab(piece)
     let_pass(world, 0.2)
-    points = pybullet.getClosestPoints(
-        piece.body_id, other.body_id, 0.0, physicsClientId=world.client
-    )
-    assert max((-point[8] for point in points), default=0.0) < 0.01
+    points = world.client.getClosestPoints(piece.body_id, other.body_id, 0.0)
+    assert max((-point.distance_m for point in points), default=0.0) < 0.01
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,6 @@ import math
 from itertools import combinations
 
 import numpy as np
-import pybullet
 import pytest
 from walking import empty_world, let_pass, walker_in, wall
 
@@ -164,10 +163,8 @@ def test_crawling_walkers_do_not_pass_through_each_other(start, yaw_deg):
     gaps = []
     for _ in range(100):
         world.step()
-        points = pybullet.getClosestPoints(
-            one.body_id, other.body_id, 2.0, physicsClientId=world.client
-        )
-        gaps.append(min(point[8] for point in points))
+        points = world.client.getClosestPoints(one.body_id, other.body_id, 2.0)
+        gaps.append(min(point.distance_m for point in points))
     assert min(gaps) == pytest.approx(0.0, abs=SLACK_M)
 
 
@@ -209,13 +206,8 @@ def standing_humanoid(world, place=(0.5, 0.0, 0.0)):
 
 def gap_m(world, walker, humanoid):
     """Return the distance of the capsule from the nearest bone, negative for penetration."""
-    points = pybullet.getClosestPoints(
-        walker.body_id,
-        humanoid.body_id,
-        1.0,
-        physicsClientId=world.client,
-    )
-    return min(point[8] for point in points)
+    points = world.client.getClosestPoints(walker.body_id, humanoid.body_id, 1.0)
+    return min(point.distance_m for point in points)
 
 
 def test_a_joint_level_body_stops_a_walker_and_is_not_moved():
@@ -239,7 +231,7 @@ def test_a_moving_joint_level_body_displaces_the_walker():
     world = empty_world()
     humanoid = standing_humanoid(world, (0.0, 0.0, 0.0))
     walker = walker_in(world, place=(0.45, 0.0, 0.0))
-    pybullet.resetBaseVelocity(humanoid.body_id, (1.5, 0.0, 0.0), physicsClientId=world.client)
+    world.client.resetBaseVelocity(humanoid.body_id, (1.5, 0.0, 0.0))
     let_pass(world, 0.6)
     assert walker.position[0] > 0.5
     assert gap_m(world, walker, humanoid) > -0.02

@@ -9,15 +9,8 @@ from composed import compose
 from walking import ball, box, empty_world, film, let_pass, walker_in
 
 from veca_marl.sim.geometry import joined_inertia, primitive_inertia
-from veca_marl.sim.physics import (
-    ClockCfg,
-    PartCfg,
-    PlaygroundCfg,
-    PropCfg,
-    PropShape,
-    World,
-    pybullet,
-)
+from veca_marl.sim.physics import ClockCfg, PartCfg, PlaygroundCfg, PropCfg, PropShape, World
+from veca_marl.sim.physics.bullet_client import pybullet
 from veca_marl.sim.physics.props.geoms import prop_geoms
 from veca_marl.sim.physics.props.toys import fraction_piece
 
@@ -52,17 +45,15 @@ def test_an_asymmetric_compound_turns_as_its_parts_together():
         for geom, mass in zip(geoms, masses, strict=True)
     ]
     whole = joined_inertia(parts)
-    centre, quaternion = pybullet.getBasePositionAndOrientation(
-        prop.body_id, physicsClientId=world.client
-    )
+    centre, quaternion = world.client.getBasePositionAndOrientation(prop.body_id)
     np.testing.assert_allclose(
         prop.rotation.T @ (np.array(centre) - prop.position), whole.centre, atol=1e-9
     )
     axes = np.array(pybullet.getMatrixFromQuaternion(quaternion)).reshape(3, 3)
-    info = pybullet.getDynamicsInfo(prop.body_id, -1, physicsClientId=world.client)
-    matrix = axes @ np.diag(info[2]) @ axes.T
+    info = world.client.getDynamicsInfo(prop.body_id, -1)
+    matrix = axes @ np.diag(info.moments) @ axes.T
     np.testing.assert_allclose(prop.rotation.T @ matrix @ prop.rotation, whole.matrix, atol=1e-9)
-    assert info[0] == pytest.approx(1.5)
+    assert info.mass_kg == pytest.approx(1.5)
 
 
 def test_a_compound_that_falls_and_spins_keeps_its_angular_momentum():
@@ -71,12 +62,10 @@ def test_a_compound_that_falls_and_spins_keeps_its_angular_momentum():
     prop.set_velocity((0.0, 0.0, 0.0), (3.0, -2.0, 4.0))
 
     def momentum():
-        _, quaternion = pybullet.getBasePositionAndOrientation(
-            prop.body_id, physicsClientId=world.client
-        )
+        _, quaternion = world.client.getBasePositionAndOrientation(prop.body_id)
         axes = np.array(pybullet.getMatrixFromQuaternion(quaternion)).reshape(3, 3)
-        moments = pybullet.getDynamicsInfo(prop.body_id, -1, physicsClientId=world.client)[2]
-        _, spin = pybullet.getBaseVelocity(prop.body_id, physicsClientId=world.client)
+        moments = world.client.getDynamicsInfo(prop.body_id, -1).moments
+        _, spin = world.client.getBaseVelocity(prop.body_id)
         return axes @ (np.array(moments) * (axes.T @ np.array(spin)))
 
     before = momentum()

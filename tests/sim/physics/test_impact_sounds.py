@@ -9,15 +9,7 @@ from composed import compose
 from scipy.special import spherical_jn
 
 from veca_marl.sim.body.walker import Walker, WalkerCfg
-from veca_marl.sim.physics import (
-    ClockCfg,
-    JointCfg,
-    JointKind,
-    LockCfg,
-    PlaygroundCfg,
-    World,
-    pybullet,
-)
+from veca_marl.sim.physics import ClockCfg, JointCfg, JointKind, LockCfg, PlaygroundCfg, World
 from veca_marl.sim.physics.impact_sounds import ImpactCfg, joint_stop, prop_modes
 from veca_marl.sim.physics.props import PartCfg, PropCfg, PropShape
 from veca_marl.sim.sound.modal_synthesis import SPHERE_ROOTS, Material
@@ -349,7 +341,7 @@ def push_at(rate):
 
     def push(prop, client):
         coordinate = prop.opening * prop.joint.cfg.range
-        pybullet.resetJointState(prop.body_id, prop.link, coordinate, rate, physicsClientId=client)
+        client.resetJointState(prop.body_id, prop.link, coordinate, rate)
 
     return push
 

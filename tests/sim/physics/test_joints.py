@@ -16,8 +16,8 @@ from veca_marl.sim.physics import (
     PropCfg,
     PropShape,
     World,
-    pybullet,
 )
+from veca_marl.sim.physics.bullet_client import pybullet
 
 HEIGHT_M, WIDTH_M, THICKNESS_M, MASS_KG = 2.0, 0.9, 0.04, 3.0
 INERTIA = MASS_KG * (WIDTH_M**2 + THICKNESS_M**2) / 12.0 + MASS_KG * (WIDTH_M / 2.0) ** 2
@@ -63,12 +63,8 @@ def swinging(world, speed):
     """Give the door a speed (rad/s) by an angular impulse in its first physics step."""
     prop = world.prop("door")
     torque = INERTIA * speed / world.clock.substep_s
-    pybullet.applyExternalTorque(
-        prop.body_id,
-        prop.link,
-        (0.0, 0.0, torque),
-        pybullet.WORLD_FRAME,
-        physicsClientId=world.client,
+    world.client.applyExternalTorque(
+        prop.body_id, prop.link, (0.0, 0.0, torque), pybullet.WORLD_FRAME
     )
     return prop
 

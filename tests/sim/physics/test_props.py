@@ -7,7 +7,8 @@ import pytest
 from walking import ball, box, empty_world, let_pass, wall
 
 from veca_marl.sim.geometry import distances_to
-from veca_marl.sim.physics import SIZE_NAMES, PartCfg, PropCfg, PropShape, pybullet
+from veca_marl.sim.physics import SIZE_NAMES, PartCfg, PropCfg, PropShape
+from veca_marl.sim.physics.bullet_client import pybullet
 from veca_marl.sim.physics.props.geoms import (
     bounding_box,
     lowest_m,
@@ -58,19 +59,13 @@ def test_the_drawn_shape_is_the_collision_shape(shape):
     for geom in prop_geoms(world.prop("thing").cfg):
         own = (points - world.prop("thing").position) @ world.prop("thing").rotation
         inside |= distances_to(geom, own) < 0.0
-    probe = pybullet.createCollisionShape(
-        pybullet.GEOM_SPHERE, radius=0.001, physicsClientId=world.client
-    )
-    needle = pybullet.createMultiBody(0, probe, physicsClientId=world.client)
+    probe = world.client.createCollisionShape(pybullet.GEOM_SPHERE, radius=0.001)
+    needle = world.client.createMultiBody(0, probe)
     solid = []
     for point in points:
-        pybullet.resetBasePositionAndOrientation(
-            needle, point, (0, 0, 0, 1), physicsClientId=world.client
-        )
-        near = pybullet.getClosestPoints(
-            needle, world.prop("thing").body_id, 0.5, physicsClientId=world.client
-        )
-        solid.append(bool(near) and min(n[8] for n in near) < -0.001)
+        world.client.resetBasePositionAndOrientation(needle, point, (0, 0, 0, 1))
+        near = world.client.getClosestPoints(needle, world.prop("thing").body_id, 0.5)
+        solid.append(bool(near) and min(n.distance_m for n in near) < -0.001)
     assert inside.sum() > 10
     assert np.mean(inside != np.array(solid)) < 0.003
 
@@ -117,9 +112,7 @@ def test_a_tilted_plate_has_its_lowest_point_at_its_rim():
     plate = world.prop("plate")
     assert plate.lowest_m == pytest.approx(0.99)
     turned = pybullet.getQuaternionFromEuler([math.pi / 2.0, 0.0, 0.0])
-    pybullet.resetBasePositionAndOrientation(
-        plate.body_id, (0.0, 0.0, 1.0), turned, physicsClientId=world.client
-    )
+    world.client.resetBasePositionAndOrientation(plate.body_id, (0.0, 0.0, 1.0), turned)
     world.refresh()
     assert plate.lowest_m == pytest.approx(0.7, abs=1e-3)
 
@@ -283,7 +276,7 @@ def test_a_movable_wall_is_placed_by_its_foot_and_turns_about_its_centre():
     thing = world.prop("wall")
     thing.place((1.0, 2.0, 3.0), 0.7)
     np.testing.assert_allclose(thing.position, (1.0, 2.0, 3.0), atol=1e-12)
-    low, high = pybullet.getAABB(thing.body_id, physicsClientId=world.client)
+    low, high = world.client.getAABB(thing.body_id)
     assert (low[2] + high[2]) / 2 == pytest.approx(3.25, abs=1e-3)
     world.reset(np.random.default_rng(0))
     np.testing.assert_allclose(thing.position, cfg.position_m, atol=1e-12)

@@ -9,15 +9,7 @@ from walking import ball, box, empty_world, film, let_pass, walker_in
 
 from veca_marl.sim.body.humanoid import Humanoid, HumanoidCfg
 from veca_marl.sim.body.humanoid.postures import ON_BELLY
-from veca_marl.sim.physics import (
-    ClockCfg,
-    JointCfg,
-    JointKind,
-    PropCfg,
-    PropShape,
-    World,
-    pybullet,
-)
+from veca_marl.sim.physics import ClockCfg, JointCfg, JointKind, PropCfg, PropShape, World
 
 ASLEEP_S = 0.4
 RESTING = ClockCfg(sleep_s=ASLEEP_S)
@@ -38,7 +30,7 @@ def let_sleep(world):
 
 def is_simulated(world, name):
     """Return whether a prop would fly up without weight; the world is of no use afterwards."""
-    pybullet.setGravity(0.0, 0.0, 5.0, physicsClientId=world.client)
+    world.client.setGravity(0.0, 0.0, 5.0)
     before = world.prop(name).position
     let_pass(world, 0.2)
     return bool(np.abs(world.prop(name).position - before).max() > 1e-3)

@@ -9,7 +9,8 @@ import pytest
 from composed import compose
 from walking import ball, box, empty_world, film, let_pass, walker_in, wall
 
-from veca_marl.sim.physics import World, pybullet
+from veca_marl.sim.physics import World
+from veca_marl.sim.physics.bullet_client import pybullet
 from veca_marl.sim.sound import SoundCfg, make_sound
 from veca_marl.sim.vision import Camera, look_at
 
@@ -173,8 +174,8 @@ def test_a_reset_restores_everything():
 
 def bullet_counts(world):
     client = world.client
-    bodies = pybullet.getNumBodies(physicsClientId=client)
-    return bodies, pybullet.getNumConstraints(physicsClientId=client)
+    bodies = client.getNumBodies()
+    return bodies, client.getNumConstraints()
 
 
 def resident_kb():
@@ -206,17 +207,17 @@ def test_ten_thousand_resets_leak_nothing():
 def test_closed_worlds_release_their_client():
     for _ in range(3):
         world = empty_world()
-        client = world.client
+        number = world.client.id
         world.close()
         world.close()
-        assert not pybullet.isConnected(client)
+        assert not pybullet.isConnected(number)
 
 
 def test_a_world_that_is_not_referenced_any_more_releases_its_client():
     world = empty_world(ball())
     walker_in(world)
-    client = world.client
-    assert pybullet.isConnected(client)
+    number = world.client.id
+    assert pybullet.isConnected(number)
     del world
     gc.collect()
-    assert not pybullet.isConnected(client)
+    assert not pybullet.isConnected(number)

@@ -11,7 +11,7 @@ import numpy as np
 from tools.fidelity.law import Curve, Law, Mark, Plot, Section, at_most, between
 from tools.fidelity.mechanics.rigid_bodies import SUBSTEPS, make_arena, simulate
 from veca_marl.sim.geometry import Floats
-from veca_marl.sim.physics import GRAVITY_MPS2, Prop, PropCfg, PropShape, World, pybullet
+from veca_marl.sim.physics import GRAVITY_MPS2, Prop, PropCfg, PropShape, World
 
 _TEXT = """
 - **Momentum**: two bodies (0.3 and 0.6 kg) collide off centre in free fall; the sums of linear and
@@ -105,8 +105,8 @@ def _totals(world: World) -> tuple[Floats, Floats, float]:
 
 def _spin(world: World, prop: Prop) -> tuple[Floats, Floats]:
     """Return the angular velocity and the angular momentum of a prop about its centre."""
-    _, spin = pybullet.getBaseVelocity(prop.body_id, physicsClientId=world.client)
-    moments = pybullet.getDynamicsInfo(prop.body_id, -1, physicsClientId=world.client)[2]
+    _, spin = world.client.getBaseVelocity(prop.body_id)
+    moments = world.client.getDynamicsInfo(prop.body_id, -1).moments
     rotation = prop.rotation
     return np.array(spin), rotation @ (np.array(moments) * (rotation.T @ np.array(spin)))
 
@@ -118,9 +118,7 @@ def rebound_ratio(substeps: int, restitution: float, height_m: float) -> float:
 
     def record() -> None:
         speeds.append(ball.velocity[2])
-        place, _ = pybullet.getBasePositionAndOrientation(
-            ball.body_id, physicsClientId=world.client
-        )
+        place, _ = world.client.getBasePositionAndOrientation(ball.body_id)
         heights.append(place[2])
 
     simulate(world, 2.4 * math.sqrt(2.0 * height_m / GRAVITY_MPS2), record)

@@ -10,7 +10,8 @@ import numpy as np
 from tools.fidelity.law import Curve, Law, Mark, Plot, Section, equals
 from tools.fidelity.mechanics.rigid_bodies import SUBSTEPS, make_arena, simulate
 from veca_marl.sim.geometry import Floats
-from veca_marl.sim.physics import GRAVITY_MPS2, PropCfg, PropShape, World, pybullet
+from veca_marl.sim.physics import GRAVITY_MPS2, PropCfg, PropShape, World
+from veca_marl.sim.physics.bullet_client import pybullet
 
 _TEXT = """
 - **Response to a torque**: a torque about an axis of symmetry acts on a prop of 1 kg for one
@@ -50,11 +51,9 @@ def measured_inertia(shape: PropShape) -> Floats:
     for axis in range(3):
         prop.place((0.0, 0.0, _HEIGHT_M))
         torque = (_TORQUE_NM * np.eye(3)[axis]).tolist()
-        pybullet.applyExternalTorque(
-            prop.body_id, -1, torque, pybullet.WORLD_FRAME, physicsClientId=world.client
-        )
-        pybullet.stepSimulation(physicsClientId=world.client)
-        _, spin = pybullet.getBaseVelocity(prop.body_id, physicsClientId=world.client)
+        world.client.applyExternalTorque(prop.body_id, -1, torque, pybullet.WORLD_FRAME)
+        world.client.stepSimulation()
+        _, spin = world.client.getBaseVelocity(prop.body_id)
         moments[axis] = _TORQUE_NM * world.clock.substep_s / spin[axis]
     world.close()
     return moments
@@ -140,7 +139,7 @@ def pendulum_period(substeps: int) -> float:
     body_id, path = world.prop("rod").body_id, []
 
     def record() -> None:
-        place, _ = pybullet.getBasePositionAndOrientation(body_id, physicsClientId=world.client)
+        place, _ = world.client.getBasePositionAndOrientation(body_id)
         path.append(place[0])
 
     simulate(world, _PERIODS_S, record)
@@ -156,15 +155,11 @@ def _hang(world: World) -> None:
     up = np.array([0.0, 0.0, _ROD[1] / 2.0])
     pivot = np.array([0.0, 0.0, _HEIGHT_M])
     body_id = world.prop("rod").body_id
-    pybullet.createConstraint(
-        body_id, -1, -1, -1, pybullet.JOINT_POINT2POINT, (0, 0, 0), up, pivot,
-        physicsClientId=world.client,
-    )  # fmt: skip
+    world.client.createConstraint(
+        body_id, -1, -1, -1, pybullet.JOINT_POINT2POINT, (0, 0, 0), up, pivot)  # fmt: skip
     turned = pybullet.getQuaternionFromEuler((0.0, _AMPLITUDE_RAD, 0.0))
     rotation = np.array(pybullet.getMatrixFromQuaternion(turned)).reshape(3, 3)
-    pybullet.resetBasePositionAndOrientation(
-        body_id, (pivot - rotation @ up).tolist(), turned, physicsClientId=world.client
-    )
+    world.client.resetBasePositionAndOrientation(body_id, (pivot - rotation @ up).tolist(), turned)
 
 
 def expected_period() -> float:

@@ -11,7 +11,7 @@ from tools.fidelity.law import Law, Section, at_most
 from tools.fidelity.mechanics.momentum import body_in_the_air
 from veca_marl.sim.body.anatomy import load_skeleton
 from veca_marl.sim.body.humanoid import Detail, Humanoid
-from veca_marl.sim.physics import World, pybullet
+from veca_marl.sim.physics import World
 
 _TEXT = """
 - **Limits**: full torques of random sign drive the joints of a body in the air; angles and speeds
@@ -68,13 +68,13 @@ def drive_against_limits(detail: Detail, seed: int, seconds: float) -> Extremes:
 def _joints_in_bullet(world: World, body: Humanoid) -> tuple[list[float], list[float]]:
     """Return angles and speeds of the moving joints, in the order of all joints."""
     names, found = list(body.joint_names), {}
-    for link in range(pybullet.getNumJoints(body.body_id, physicsClientId=world.client)):
-        name = pybullet.getJointInfo(body.body_id, link, physicsClientId=world.client)[1].decode()
+    for link in range(world.client.getNumJoints(body.body_id)):
+        name = world.client.getJointInfo(body.body_id, link).name.decode()
         if name in names:
-            state = pybullet.getJointState(body.body_id, link, physicsClientId=world.client)
+            state = world.client.getJointState(body.body_id, link)
             found[names.index(name)] = state
     ordered = [found[index] for index in sorted(found)]
-    return [state[0] for state in ordered], [state[1] for state in ordered]
+    return [state.position for state in ordered], [state.velocity for state in ordered]
 
 
 def mass_matrix_error(detail: Detail, postures: int) -> float:
@@ -86,7 +86,7 @@ def mass_matrix_error(detail: Detail, postures: int) -> float:
         body.place((0.0, 0.0, 1.0), 1.0, rng.uniform(low, high))
         ours = body.articulation.dynamics.mass_matrix()[6:, 6:]
         angles = body.joint_angles()[body.articulation.moving].tolist()
-        theirs = pybullet.calculateMassMatrix(body.body_id, angles, physicsClientId=world.client)
+        theirs = world.client.calculateMassMatrix(body.body_id, angles)
         # the base's rows have other axes in Bullet
         difference = ours - np.array(theirs)[6:, 6:]
         errors.append(np.abs(difference / np.sqrt(np.outer(np.diag(ours), np.diag(ours)))).max())

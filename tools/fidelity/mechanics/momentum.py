@@ -10,7 +10,8 @@ import numpy as np
 from tools.fidelity.law import Curve, Law, Plot, Section, at_most
 from veca_marl.sim.body.humanoid import Detail, Humanoid, HumanoidCfg
 from veca_marl.sim.geometry import Floats
-from veca_marl.sim.physics import GRAVITY_MPS2, PlaygroundCfg, World, pybullet
+from veca_marl.sim.physics import GRAVITY_MPS2, PlaygroundCfg, World
+from veca_marl.sim.physics.bullet_client import pybullet
 
 _TEXT = """
 A joint-level body far above the floor. Momentum, angular momentum about the centre of mass and
@@ -81,18 +82,19 @@ def totals(world: World, body: Humanoid) -> Totals:
 def _link_rows(world: World, body: Humanoid) -> list[tuple[float, Floats, Floats, Floats, Floats]]:
     """Return mass, centre, velocity, angular velocity and inertia of each link, world axes."""
     client, body_id = world.client, body.body_id
-    links = list(range(pybullet.getNumJoints(body_id, physicsClientId=client)))
-    place, turn = pybullet.getBasePositionAndOrientation(body_id, physicsClientId=client)
-    velocity, spin = pybullet.getBaseVelocity(body_id, physicsClientId=client)
-    states = pybullet.getLinkStates(body_id, links, 1, 1, physicsClientId=client)
+    links = list(range(client.getNumJoints(body_id)))
+    place, turn = client.getBasePositionAndOrientation(body_id)
+    velocity, spin = client.getBaseVelocity(body_id)
+    states = client.getLinkStates(body_id, links, 1, 1)
     motions = [(place, turn, velocity, spin)]
-    motions += [(state[0], state[1], state[6], state[7]) for state in states]
+    motions += [(s.centre, s.centre_orientation, s.velocity, s.angular_velocity) for s in states]
     rows = []
     for link, (centre, quaternion, *speeds) in zip([-1, *links], motions, strict=True):
-        dynamics = pybullet.getDynamicsInfo(body_id, link, physicsClientId=client)
+        dynamics = client.getDynamicsInfo(body_id, link)
         axes = np.reshape(pybullet.getMatrixFromQuaternion(quaternion), (3, 3))
-        inertia = axes @ np.diag(dynamics[2]) @ axes.T
-        rows.append((dynamics[0], np.array(centre), *map(np.array, speeds), inertia))
+        inertia = axes @ np.diag(dynamics.moments) @ axes.T
+        linear, angular = map(np.array, speeds)
+        rows.append((dynamics.mass_kg, np.array(centre), linear, angular, inertia))
     return rows
 
 
@@ -132,7 +134,7 @@ def body_in_the_air(detail: Detail, gravity_mps2: float) -> tuple[World, Humanoi
     body = Humanoid("child", HumanoidCfg(detail=detail), world)
     world.freeze()
     world.reset(np.random.default_rng(0))
-    pybullet.setGravity(0.0, 0.0, -gravity_mps2, physicsClientId=world.client)
+    world.client.setGravity(0.0, 0.0, -gravity_mps2)
     body.place((0.0, 0.0, _HEIGHT_M))
     return world, body
 

@@ -25,8 +25,8 @@ from veca_marl.sim.physics import (
     PropShape,
     RoomCfg,
     World,
-    pybullet,
 )
+from veca_marl.sim.physics.bullet_client import pybullet
 from veca_marl.sim.touch import TouchCfg, TouchSense, load_taxels
 
 _FIXING_N = 1e5
@@ -110,7 +110,7 @@ class FixedArms:
         body.place((0.0, 0.0, 1.0), 0.0, Posture(0.0, _POSTURE))
         for i, prop in enumerate(self._props.values()):
             prop.place((_ASIDE_M + i, 0.0, 1.0))
-        pybullet.setGravity(0.0, 0.0, 0.0, physicsClientId=world.client)
+        world.client.setGravity(0.0, 0.0, 0.0)
         constraints = [self._fix(spot.bone) for spot, _ in pressed]
         falls = [_Fall(self, spot, self._props[ball], ball, fall_m) for spot, ball in pressed]
         world.after_substep.extend(fall.note if watch else fall.accelerate for fall in falls)
@@ -118,7 +118,7 @@ class FixedArms:
             world.step()
         del world.after_substep[-len(falls) :]
         for constraint in constraints:
-            pybullet.removeConstraint(constraint, physicsClientId=world.client)
+            world.client.removeConstraint(constraint)
         readings = self.read().copy()
         return [Press(np.array(f.touch), np.array(f.force_n), readings) for f in falls]
 
@@ -140,25 +140,23 @@ class FixedArms:
 
     def force_n(self, prop: Prop) -> float:
         """Return the normal forces between a ball and the body."""
-        points = pybullet.getContactPoints(
-            prop.body_id, self._body.body_id, physicsClientId=self.world.client
-        )
-        return math.fsum(point[9] for point in points)
+        points = self.world.client.getContactPoints(prop.body_id, self._body.body_id)
+        return math.fsum(point.normal_force_n for point in points)
 
     def _fix(self, bone: str) -> int:
         """Fix a bone in its present pose."""
         client, body_id = self.world.client, self._body.body_id
         names = [
-            pybullet.getJointInfo(body_id, link, physicsClientId=client)[12].decode()
-            for link in range(pybullet.getNumJoints(body_id, physicsClientId=client))
+            client.getJointInfo(body_id, link).link_name.decode()
+            for link in range(client.getNumJoints(body_id))
         ]
         link = names.index(bone)
-        state = pybullet.getLinkState(body_id, link, 0, 1, physicsClientId=client)
-        ends = ((0.0, 0.0, 0.0), state[0], (0.0, 0.0, 0.0, 1.0), state[1])
-        constraint = pybullet.createConstraint(
-            body_id, link, -1, -1, pybullet.JOINT_FIXED, (0, 0, 0), *ends, physicsClientId=client
+        state = client.getLinkState(body_id, link, 0, 1)
+        ends = ((0.0, 0.0, 0.0), state.centre, (0.0, 0.0, 0.0, 1.0), state.centre_orientation)
+        constraint = client.createConstraint(
+            body_id, link, -1, -1, pybullet.JOINT_FIXED, (0, 0, 0), *ends
         )
-        pybullet.changeConstraint(constraint, maxForce=_FIXING_N, physicsClientId=client)
+        client.changeConstraint(constraint, maxForce=_FIXING_N)
         return int(constraint)
 
 
@@ -184,16 +182,12 @@ class _Fall:
     def accelerate(self) -> None:
         """Accelerate the ball towards the skin by g, and constrain it to the normal."""
         world, body_id = self._arms.world, self._prop.body_id
-        velocity, _ = pybullet.getBaseVelocity(body_id, physicsClientId=world.client)
+        velocity, _ = world.client.getBaseVelocity(body_id)
         along = np.dot(velocity, self._out) - GRAVITY_MPS2 * world.clock.substep_s
-        centre, turn = pybullet.getBasePositionAndOrientation(body_id, physicsClientId=world.client)
+        centre, turn = world.client.getBasePositionAndOrientation(body_id)
         on_normal = self._point + np.dot(centre - self._point, self._out) * self._out
-        pybullet.resetBasePositionAndOrientation(
-            body_id, on_normal, turn, physicsClientId=world.client
-        )
-        pybullet.resetBaseVelocity(
-            body_id, along * self._out, (0.0, 0.0, 0.0), physicsClientId=world.client
-        )
+        world.client.resetBasePositionAndOrientation(body_id, on_normal, turn)
+        world.client.resetBaseVelocity(body_id, along * self._out, (0.0, 0.0, 0.0))
 
 
 def _prop(ball: Ball) -> PropCfg:

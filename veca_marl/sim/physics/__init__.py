@@ -5,10 +5,10 @@ from veca_marl.sim.physics.bullet import (
     create_collision_shape,
     is_contact,
     penetration_m,
-    pybullet,
     shape_arguments,
     urdf_geometry,
 )
+from veca_marl.sim.physics.bullet_client import BulletClient, pybullet
 from veca_marl.sim.physics.clock import ClockCfg
 from veca_marl.sim.physics.houses.furniture import FurnitureCfg, FurnitureKind
 from veca_marl.sim.physics.houses.random_house import RandomHouseCfg
@@ -38,6 +38,7 @@ __all__ = [
     "GRAVITY_MPS2",
     "PLAYGROUND_GENERATORS",
     "SIZE_NAMES",
+    "BulletClient",
     "ClockCfg",
     "DoorCfg",
     "FurnitureCfg",

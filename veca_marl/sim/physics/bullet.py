@@ -1,4 +1,4 @@
-"""PyBullet, imported without its message about its build; its shapes, contacts and rays.
+"""Shapes, contacts and rays of PyBullet.
 
 Bullet lists contact points before two bodies touch, from a distance on that depends on their sizes
 and on `ClockCfg.contact_share`.
@@ -6,7 +6,6 @@ and on `ClockCfg.contact_share`.
 
 from __future__ import annotations
 
-import os
 import tempfile
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -16,23 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from veca_marl.sim.geometry import Floats, Polyhedron, Primitive, Shape, matrix_to_quaternion
-
-
-@contextmanager
-def _silent_stderr() -> Iterator[None]:
-    """Turn file descriptor 2 away: the line is printed in C, past `sys.stderr`."""
-    kept, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
-    os.dup2(nowhere, 2)
-    try:
-        yield
-    finally:
-        os.dup2(kept, 2)
-        os.close(kept)
-        os.close(nowhere)
-
-
-with _silent_stderr():
-    import pybullet
+from veca_marl.sim.physics.bullet_client import BulletClient, ContactPoint, pybullet
 
 __all__ = [
     "HULL_MARGIN_M",
@@ -42,7 +25,6 @@ __all__ = [
     "free_path_m",
     "is_contact",
     "penetration_m",
-    "pybullet",
     "shape_arguments",
     "surface_m",
     "unused_visual_shape",
@@ -76,7 +58,7 @@ def shape_arguments(shape: Shape, size: Sequence[float]) -> dict[str, Any]:
     return arguments if shape is Shape.SPHERE else arguments | {"length": numbers[1]}
 
 
-def create_collision_shape(client: int, primitives: Sequence[Primitive]) -> int:
+def create_collision_shape(client: BulletClient, primitives: Sequence[Primitive]) -> int:
     """Create one collision shape of one or several primitives on the same frame; return its id.
 
     Bullet reads hulls from files only when there are several shapes; the files are deleted. A body
@@ -84,7 +66,7 @@ def create_collision_shape(client: int, primitives: Sequence[Primitive]) -> int:
     """
     with _folder_of_hulls(primitives) as folder:
         arguments = [_with_file(part, folder / f"{i}.obj") for i, part in enumerate(primitives)]
-        shape = pybullet.createCollisionShapeArray(
+        shape = client.createCollisionShapeArray(
             shapeTypes=[each["shapeType"] for each in arguments],
             radii=[each.get("radius", 0.0) for each in arguments],
             halfExtents=[each.get("halfExtents", [0.0, 0.0, 0.0]) for each in arguments],
@@ -95,7 +77,6 @@ def create_collision_shape(client: int, primitives: Sequence[Primitive]) -> int:
             collisionFrameOrientations=[
                 matrix_to_quaternion(np.asarray(part.rotation)).tolist() for part in primitives
             ],
-            physicsClientId=client,
         )
     return int(shape)
 
@@ -114,7 +95,7 @@ def _folder_of_hulls(primitives: Sequence[Primitive]) -> Iterator[Path]:
         yield Path()
 
 
-def unused_visual_shape(client: int, primitives: Sequence[Primitive]) -> int:
+def unused_visual_shape(client: BulletClient, primitives: Sequence[Primitive]) -> int:
     """Return the id of a visual shape for a body with these primitives; -1 if it needs none.
 
     For a body without one Bullet draws the collision shape itself, and would read the files of
@@ -122,9 +103,7 @@ def unused_visual_shape(client: int, primitives: Sequence[Primitive]) -> int:
     """
     if not any(part.hull for part in primitives):
         return -1
-    return int(
-        pybullet.createVisualShape(pybullet.GEOM_SPHERE, radius=0.001, physicsClientId=client)
-    )
+    return int(client.createVisualShape(pybullet.GEOM_SPHERE, radius=0.001))
 
 
 def _with_file(primitive: Primitive, path: Path) -> dict[str, Any]:
@@ -159,22 +138,19 @@ def urdf_geometry(primitive: Primitive) -> str:
     return f'<{primitive.shape.name.lower()} {radius} length="{primitive.length:.9g}"/>'
 
 
-_DISTANCE, _NORMAL_FORCE = 8, 9  # entries of Bullet's contact points
-
-
-def is_contact(point: tuple[Any, ...]) -> bool:
+def is_contact(point: ContactPoint) -> bool:
     """Return whether two bodies touch at a contact point of the last physics step.
 
     They do where their surfaces meet, or where they pressed on each other in that step: the force
     of a contact may have parted them by its end.
 
     Args:
-        point: A contact point of Bullet.
+        point: A contact point of the last physics step.
     """
-    return bool(point[_DISTANCE] <= 0.0 or point[_NORMAL_FORCE] > 0.0)
+    return point.distance_m <= 0.0 or point.normal_force_n > 0.0
 
 
-def penetration_m(client: int, one: int, other: int) -> float:
+def penetration_m(client: BulletClient, one: int, other: int) -> float:
     """Return how deep two bodies penetrate each other where they are now, in metres; 0 if apart.
 
     Collision filters have no influence, and neither body needs a mass: Bullet looks for no contacts
@@ -185,11 +161,11 @@ def penetration_m(client: int, one: int, other: int) -> float:
         one: PyBullet's id of a body.
         other: That of another one.
     """
-    points = pybullet.getClosestPoints(one, other, 0.0, physicsClientId=client)
-    return max((-point[_DISTANCE] for point in points), default=0.0)
+    points = client.getClosestPoints(one, other, 0.0)
+    return max((-point.distance_m for point in points), default=0.0)
 
 
-def are_in_contact(client: int, one: int, other: int) -> bool:
+def are_in_contact(client: BulletClient, one: int, other: int) -> bool:
     """Return whether two bodies touched each other in the last physics step.
 
     Args:
@@ -197,7 +173,7 @@ def are_in_contact(client: int, one: int, other: int) -> bool:
         one: PyBullet's id of a body.
         other: That of the other one.
     """
-    points = pybullet.getContactPoints(one, other, physicsClientId=client)
+    points = client.getContactPoints(one, other)
     return any(map(is_contact, points))
 
 
@@ -213,10 +189,13 @@ class BuiltContacts:
         floor_id: PyBullet's id of the floor; contacts with it are saved and restored.
     """
 
-    def __init__(self, client: int, floor_id: int) -> None:
+    def __init__(self, client: BulletClient, floor_id: int) -> None:
         self._client = client
-        points = pybullet.getContactPoints(physicsClientId=client)
-        touching = {tuple(point[1:5]) for point in points if point[1] != point[2]}
+        touching = {
+            (point.body_a, point.body_b, point.link_a, point.link_b)
+            for point in client.getContactPoints()
+            if point.body_a != point.body_b
+        }
         overlaps = {pair for pair in touching if floor_id not in pair[:2]}
         # the same ones at each reset: Bullet numbers the links that are named here anew, and the
         # numbers decide about the order in which it solves contacts
@@ -237,21 +216,19 @@ class BuiltContacts:
     def _let_collide(self, collide: bool) -> None:
         """Let links collide or not; Bullet forgets the contacts of those that do not."""
         for one, other, link, other_link in self._forgotten:
-            pybullet.setCollisionFilterPair(
-                one, other, link, other_link, int(collide), physicsClientId=self._client
-            )
+            self._client.setCollisionFilterPair(one, other, link, other_link, int(collide))
 
 
-def _moving_links(client: int) -> set[tuple[int, int]]:
+def _moving_links(client: BulletClient) -> set[tuple[int, int]]:
     """Return all links that move and have a collision shape, with their bodies."""
-    count = pybullet.getNumBodies(physicsClientId=client)
-    bodies = [pybullet.getBodyUniqueId(i, physicsClientId=client) for i in range(count)]
+    count = client.getNumBodies()
+    bodies = [client.getBodyUniqueId(i) for i in range(count)]
     return {
         (body, link)
         for body in bodies
-        for link in range(-1, pybullet.getNumJoints(body, physicsClientId=client))
-        if pybullet.getDynamicsInfo(body, link, physicsClientId=client)[0] > 0.0
-        and pybullet.getCollisionShapeData(body, link, physicsClientId=client)
+        for link in range(-1, client.getNumJoints(body))
+        if client.getDynamicsInfo(body, link).mass_kg > 0.0
+        and client.getCollisionShapeData(body, link)
     }
 
 
@@ -260,7 +237,7 @@ _LEAST_COSINE = 0.3  # of the angle between a ray and a normal: at flatter angle
 
 
 def free_path_m(
-    client: int, start: Floats, end: Floats, clearance_m: float, ignored_id: int
+    client: BulletClient, start: Floats, end: Floats, clearance_m: float, ignored_id: int
 ) -> float:
     """Return how far a ball can move along a line before it touches something solid.
 
@@ -268,7 +245,7 @@ def free_path_m(
     things that the ray misses do not count.
 
     Args:
-        client: PyBullet's client id.
+        client: The PyBullet client.
         start: ``(3,)`` metres, outside of all things.
         end: ``(3,)`` metres.
         clearance_m: Radius of the ball.
@@ -287,11 +264,11 @@ def free_path_m(
     return length_m
 
 
-def surface_m(client: int, body_id: int, start: Floats, end: Floats) -> float:
+def surface_m(client: BulletClient, body_id: int, start: Floats, end: Floats) -> float:
     """Return the distance from `start` to the surface of one body on the way to `end`.
 
     Args:
-        client: PyBullet's client id.
+        client: The PyBullet client.
         body_id: PyBullet's id of the body; other things do not count.
         start: ``(3,)`` metres, outside of it.
         end: ``(3,)`` metres.
@@ -309,13 +286,11 @@ class _Hit(NamedTuple):
     normal: Floats
 
 
-def _hits(client: int, start: Floats, end: Floats) -> Iterator[_Hit]:
+def _hits(client: BulletClient, start: Floats, end: Floats) -> Iterator[_Hit]:
     """Yield what a ray hits, the nearest first."""
     length_m = float(np.linalg.norm(end - start))
     for number in range(_MOST_HITS):
-        body_id, _, share, _, normal = pybullet.rayTestBatch(
-            [start.tolist()], [end.tolist()], reportHitNumber=number, physicsClientId=client
-        )[0]
-        if body_id == -1:
+        (hit,) = client.rayTestBatch([start.tolist()], [end.tolist()], reportHitNumber=number)
+        if hit.body_id == -1:
             return
-        yield _Hit(body_id, float(share) * length_m, np.array(normal))
+        yield _Hit(hit.body_id, hit.fraction * length_m, np.array(hit.normal))

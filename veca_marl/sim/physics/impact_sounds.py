@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from veca_marl.sim.geometry import Floats
-from veca_marl.sim.physics.bullet import pybullet
+from veca_marl.sim.physics.bullet_client import BulletClient
 from veca_marl.sim.physics.clock import ClockCfg
 from veca_marl.sim.physics.props import JointKind, Prop, PropCfg, PropShape
 from veca_marl.sim.physics.props.geoms import bounding_box, prop_geoms
@@ -95,7 +95,6 @@ class ImpactCfg:
 
 _GRAVITY_MPS2 = 9.81
 _EDGES_ARE_SIZES = (PropShape.box, PropShape.wall)
-_BODY_A, _BODY_B, _NORMAL_FORCE = 1, 2, 9  # in a contact point of PyBullet
 
 
 class ImpactSounds:
@@ -109,7 +108,9 @@ class ImpactSounds:
     bodies do not sound, and nothing sounds in the first physics step after a reset.
     """
 
-    def __init__(self, cfg: ImpactCfg, clock: ClockCfg, client: int, sound: SoundField) -> None:
+    def __init__(
+        self, cfg: ImpactCfg, clock: ClockCfg, client: BulletClient, sound: SoundField
+    ) -> None:
         self._cfg = cfg
         self._clock = clock
         self._client = client
@@ -165,10 +166,10 @@ class ImpactSounds:
 
     def _contact_impulses(self) -> dict[tuple[int, int], float]:
         impulses: dict[tuple[int, int], float] = {}
-        for point in pybullet.getContactPoints(physicsClientId=self._client):
-            pair = (point[_BODY_A], point[_BODY_B])
+        for point in self._client.getContactPoints():
+            pair = (point.body_a, point.body_b)
             if pair[0] in self._struck or pair[1] in self._struck:
-                impulse = point[_NORMAL_FORCE] * self._clock.substep_s
+                impulse = point.normal_force_n * self._clock.substep_s
                 impulses[pair] = impulses.get(pair, 0.0) + impulse
         return impulses
 

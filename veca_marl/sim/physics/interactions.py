@@ -13,6 +13,7 @@ import numpy as np
 
 from veca_marl.registry import Registry, unknown
 from veca_marl.sim.geometry import Floats
+from veca_marl.sim.physics.bullet_client import BulletClient
 from veca_marl.sim.physics.props.prop import Prop
 from veca_marl.sim.physics.props.prop_cfg import PropShape
 
@@ -21,11 +22,11 @@ class WorldWithProps(Protocol):
     """What verbs use of a world; `World` has all of it.
 
     Attributes:
-        client: PyBullet's client id.
+        client: The PyBullet client.
         props: Its props by name.
     """
 
-    client: int
+    client: BulletClient
     props: dict[str, Prop]
 
 

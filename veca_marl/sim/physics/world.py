@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import weakref
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Protocol
@@ -12,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veca_marl.sim.geometry import Geom, Scene, Shape
-from veca_marl.sim.physics.bullet import BuiltContacts, pybullet
+from veca_marl.sim.physics.bullet import BuiltContacts
+from veca_marl.sim.physics.bullet_client import BulletClient, pybullet
 from veca_marl.sim.physics.clock import ClockCfg
 from veca_marl.sim.physics.impact_sounds import ImpactSounds
 from veca_marl.sim.physics.interactions import check_interactions
@@ -73,7 +73,7 @@ FLOOR_NAME = "floor"
 _FLOOR_THICKNESS_M = 0.1
 
 
-def add_floor(client: int, scene: Scene, playground: PlaygroundCfg) -> int:
+def add_floor(client: BulletClient, scene: Scene, playground: PlaygroundCfg) -> int:
     """Add the floor to Bullet and to the scene; return its id in Bullet.
 
     Its friction and restitution are 1: Bullet multiplies them by those of what touches it.
@@ -88,11 +88,9 @@ def add_floor(client: int, scene: Scene, playground: PlaygroundCfg) -> int:
         checker_m=playground.floor_checker_m,
     )
     scene.add_object(FLOOR_NAME, [[geom]])
-    plane = pybullet.createCollisionShape(pybullet.GEOM_PLANE, physicsClientId=client)
-    floor_id: int = pybullet.createMultiBody(0, plane, physicsClientId=client)
-    pybullet.changeDynamics(
-        floor_id, -1, lateralFriction=1.0, restitution=1.0, physicsClientId=client
-    )
+    plane = client.createCollisionShape(pybullet.GEOM_PLANE)
+    floor_id: int = client.createMultiBody(0, plane)
+    client.changeDynamics(floor_id, -1, lateralFriction=1.0, restitution=1.0)
     return floor_id
 
 
@@ -141,7 +139,6 @@ class Mover(Protocol):
 
 
 GRAVITY_MPS2 = 9.81
-_CONTACT_BODY, _CONTACT_DISTANCE = 2, 8  # entries of Bullet's contact points
 
 
 class World:
@@ -156,7 +153,7 @@ class World:
         scene: What eyes see and skins feel.
         house: Its rooms and what stands between them, as sound meets them.
         sound: Its sound sources and listeners.
-        client: PyBullet's client id; -1 after `close`.
+        client: The PyBullet client.
         floor_id: PyBullet's id of the floor.
         props: Its props by name.
         movers: The bodies in it.
@@ -174,8 +171,7 @@ class World:
         self.scene = Scene()
         self.house = make_house(playground)
         self.sound = SoundField(self.house, step_samples=self.clock.step_samples)
-        self.client: int = pybullet.connect(pybullet.DIRECT)
-        self._disconnect = weakref.finalize(self, pybullet.disconnect, physicsClientId=self.client)
+        self.client = BulletClient()
         self.props: dict[str, Prop] = {}
         self.movers: list[Mover] = []
         self.after_substep: list[Callable[[], None]] = []
@@ -243,10 +239,9 @@ class World:
             RuntimeError: If the world is frozen.
         """
         self._check_not_frozen("change its solver")
-        current = pybullet.getPhysicsEngineParameters(physicsClientId=self.client)
-        pybullet.setPhysicsEngineParameter(
-            numSolverIterations=max(count, current["numSolverIterations"]),
-            physicsClientId=self.client,
+        current = self.client.getPhysicsEngineParameters()
+        self.client.setPhysicsEngineParameter(
+            numSolverIterations=max(count, current["numSolverIterations"])
         )
 
     def freeze(self) -> None:
@@ -259,10 +254,10 @@ class World:
         self._check_not_frozen("freeze it again")
         check_keys(self.props)
         self._set_contact_share()
-        pybullet.performCollisionDetection(physicsClientId=self.client)
+        self.client.performCollisionDetection()
         self._contacts = BuiltContacts(self.client, self.floor_id)
         with self._contacts.forgotten():
-            self._state = pybullet.saveState(physicsClientId=self.client)
+            self._state = self.client.saveState()
         self._built = built_state(self.scene, self.sound.sources)
         for joint in self._joints:
             joint.save()
@@ -286,7 +281,7 @@ class World:
         if self._sleep.wake_all():
             self._simulate()
         with self._contacts.forgotten():
-            pybullet.restoreState(self._state, physicsClientId=self.client)
+            self.client.restoreState(self._state)
         self._built.restore(self.scene)
         self.sound.reset(rng)
         if self._impacts is not None:
@@ -338,7 +333,7 @@ class World:
     def _simulate(self) -> None:
         """Let Bullet make a physics step."""
         self._sleep.before_substep()
-        pybullet.stepSimulation(physicsClientId=self.client)
+        self.client.stepSimulation()
         self._sleep.after_substep()
 
     def overlap_m(self, one: int, other: int) -> float:
@@ -351,25 +346,23 @@ class World:
         Returns:
             The greatest depth; 0 if they are apart, or if Bullet does not let them collide.
         """
-        pybullet.performCollisionDetection(physicsClientId=self.client)
-        contacts = pybullet.getContactPoints(one, other, physicsClientId=self.client)
-        return max((-contact[_CONTACT_DISTANCE] for contact in contacts), default=0.0)
+        self.client.performCollisionDetection()
+        contacts = self.client.getContactPoints(one, other)
+        return max((-contact.distance_m for contact in contacts), default=0.0)
 
     def touches_props(self, body_id: int) -> bool:
         """Return whether a body penetrates a prop where it is now."""
-        pybullet.performCollisionDetection(physicsClientId=self.client)
-        contacts = pybullet.getContactPoints(body_id, physicsClientId=self.client)
-        touched = {contact[_CONTACT_BODY] for contact in contacts if contact[_CONTACT_DISTANCE] < 0}
+        self.client.performCollisionDetection()
+        contacts = self.client.getContactPoints(body_id)
+        touched = {contact.body_b for contact in contacts if contact.distance_m < 0}
         return any(prop.body_id in touched for prop in self.props.values())
 
     def close(self) -> None:
         """Disconnect from PyBullet. Closing twice is harmless.
 
-        A world that is no longer referenced disconnects by itself: PyBullet has a limited number
-        of clients.
+        A world that is no longer referenced disconnects by itself, see `BulletClient`.
         """
-        self._disconnect()
-        self.client = -1
+        self.client.close()
 
     def _update_scene(self) -> None:
         moved = [prop for prop in self._moving if prop.may_have_moved]
@@ -396,9 +389,7 @@ class World:
         if parent is None:
             return
         for ours, theirs in itertools.product(prop.links, parent.links):
-            pybullet.setCollisionFilterPair(
-                parent.body_id, prop.body_id, theirs, ours, 0, physicsClientId=self.client
-            )
+            self.client.setCollisionFilterPair(parent.body_id, prop.body_id, theirs, ours, 0)
 
     def _check_not_frozen(self, what: str) -> None:
         if self._state is not None:
@@ -406,13 +397,11 @@ class World:
 
     def _set_contact_share(self) -> None:
         """Set Bullet's detection distance of contacts: it keeps one number for all its clients."""
-        pybullet.setPhysicsEngineParameter(
-            contactBreakingThreshold=self.clock.contact_share, physicsClientId=self.client
-        )
+        self.client.setPhysicsEngineParameter(contactBreakingThreshold=self.clock.contact_share)
 
     def _configure_physics(self) -> None:
-        pybullet.setGravity(0.0, 0.0, -GRAVITY_MPS2, physicsClientId=self.client)
-        pybullet.setPhysicsEngineParameter(
+        self.client.setGravity(0.0, 0.0, -GRAVITY_MPS2)
+        self.client.setPhysicsEngineParameter(
             fixedTimeStep=self.clock.substep_s,
             numSolverIterations=self.clock.solver_iterations,
             # Bullet would stop earlier for all bodies that it solves together; which these are
@@ -420,5 +409,4 @@ class World:
             solverResidualThreshold=0.0,
             # without it a restored world drifts away from a fresh one
             deterministicOverlappingPairs=1,
-            physicsClientId=self.client,
         )

@@ -6,7 +6,7 @@ from scipy.spatial.transform import Rotation
 
 from veca_marl.sim.body.anatomy import Soles, forward_kinematics, load_skeleton
 from veca_marl.sim.geometry import Shape
-from veca_marl.sim.physics import pybullet
+from veca_marl.sim.physics.bullet_client import BulletClient, pybullet
 
 SKELETON = load_skeleton()
 LOW = np.array([joint.low_rad for joint in SKELETON.joints])
@@ -95,7 +95,7 @@ def bullet_chain(client):
             parent = len(parents)
         last[index] = parent
     count = len(parents)
-    body = pybullet.createMultiBody(
+    body = client.createMultiBody(
         1.0,
         linkMasses=[1.0] * count,
         linkCollisionShapeIndices=[-1] * count,
@@ -108,28 +108,25 @@ def bullet_chain(client):
         linkJointTypes=kinds,
         linkJointAxis=[list(a) for a in axes],
         flags=pybullet.URDF_MAINTAIN_LINK_ORDER,
-        physicsClientId=client,
     )
     return body, kinds, {bone: link - 1 for bone, link in last.items()}
 
 
 def test_forward_kinematics_equals_pybullets():
-    client = pybullet.connect(pybullet.DIRECT)
+    client = BulletClient()
     body, kinds, last_link = bullet_chain(client)
     angles = random_angles(11)
     hinges = [link for link, kind in enumerate(kinds) if kind == pybullet.JOINT_REVOLUTE]
     assert len(hinges) == 82
     for link, angle in zip(hinges, angles, strict=True):
-        pybullet.resetJointState(body, link, angle, physicsClientId=client)
+        client.resetJointState(body, link, angle)
     positions, rotations = pose(angles)
     for bone in range(1, 47):  # Bullet's own sines are good to about 1e-7
-        state = pybullet.getLinkState(
-            body, last_link[bone], computeForwardKinematics=True, physicsClientId=client
-        )
-        np.testing.assert_allclose(positions[bone], state[4], atol=1e-6)
-        turn = np.reshape(pybullet.getMatrixFromQuaternion(state[5]), (3, 3))
+        state = client.getLinkState(body, last_link[bone], computeForwardKinematics=True)
+        np.testing.assert_allclose(positions[bone], state.position, atol=1e-6)
+        turn = np.reshape(pybullet.getMatrixFromQuaternion(state.orientation), (3, 3))
         np.testing.assert_allclose(rotations[bone], turn, atol=1e-6)
-    pybullet.disconnect(client)
+    client.close()
 
 
 def test_bones_keep_their_lengths():

@@ -19,7 +19,7 @@ from veca_marl.sim.body.anatomy.link_shapes import MARGIN_M
 from veca_marl.sim.body.anatomy.urdf import _Writer
 from veca_marl.sim.body.humanoid import Detail, Humanoid, HumanoidCfg
 from veca_marl.sim.geometry import Shape
-from veca_marl.sim.physics import pybullet
+from veca_marl.sim.physics.bullet_client import pybullet
 
 SKELETON = load_skeleton()
 LOW = np.array([joint.low_rad for joint in SKELETON.joints])
@@ -97,33 +97,32 @@ def test_ten_kilograms_and_no_impossible_inertia(robots, fingers):
 
 def test_bullet_reads_the_table(humanoid):
     client, body = humanoid._world.client, humanoid.articulation
-    for joint in range(pybullet.getNumJoints(body.body_id, physicsClientId=client)):
-        info = pybullet.getJointInfo(body.body_id, joint, physicsClientId=client)
-        if info[2] != pybullet.JOINT_REVOLUTE:
+    for joint in range(client.getNumJoints(body.body_id)):
+        info = client.getJointInfo(body.body_id, joint)
+        if info.kind != pybullet.JOINT_REVOLUTE:
             continue
-        ours = SKELETON.joints[humanoid.joint_names.index(info[1].decode())]
-        assert (info[8], info[9], info[10]) == (ours.low_rad, ours.high_rad, ours.torque_nm)
-        assert info[16] < joint
+        ours = SKELETON.joints[humanoid.joint_names.index(info.name.decode())]
+        assert (info.lower_limit, info.upper_limit, info.max_force) == (
+            ours.low_rad,
+            ours.high_rad,
+            ours.torque_nm,
+        )
+        assert info.parent < joint
 
 
 def test_bones_are_where_bullet_has_them(humanoid):
     client, body = humanoid._world.client, humanoid.body_id
-    count = pybullet.getNumJoints(body, physicsClientId=client)
-    links = {
-        pybullet.getJointInfo(body, link, physicsClientId=client)[12].decode(): link
-        for link in range(count)
-    }
+    count = client.getNumJoints(body)
+    links = {client.getJointInfo(body, link).link_name.decode(): link for link in range(count)}
     for seed in range(20):
         rng = np.random.default_rng(seed)
         humanoid.place(rng.uniform(0.0, 2.0, 3), rng.uniform(-3.0, 3.0), rng.uniform(LOW, HIGH))
         for name, link in links.items():
             if name in humanoid.bone_names:
-                state = pybullet.getLinkState(
-                    body, link, computeForwardKinematics=1, physicsClientId=client
-                )
-                turn = np.reshape(pybullet.getMatrixFromQuaternion(state[5]), (3, 3))
+                state = client.getLinkState(body, link, computeForwardKinematics=1)
+                turn = np.reshape(pybullet.getMatrixFromQuaternion(state.orientation), (3, 3))
                 bone = humanoid.bone(name)
-                np.testing.assert_allclose(bone.position, state[4], atol=1e-6)
+                np.testing.assert_allclose(bone.position, state.position, atol=1e-6)
                 np.testing.assert_allclose(bone.rotation, turn, atol=5e-6)
 
 
@@ -131,14 +130,15 @@ def shapes_of_bullet(humanoid):
     """Kind, centre and rotation of every collision shape, by bone, out of Bullet."""
     where, client = humanoid.body_id, humanoid._world.client
     shapes = {}
-    for link in range(-1, pybullet.getNumJoints(where, physicsClientId=client)):
+    for link in range(-1, client.getNumJoints(where)):
         if link < 0:
             name = humanoid.bone_names[0]
-            frame = pybullet.getBasePositionAndOrientation(where, physicsClientId=client)
+            frame = client.getBasePositionAndOrientation(where)
         else:
-            name = bone_of(pybullet.getJointInfo(where, link, physicsClientId=client)[12].decode())
-            frame = pybullet.getLinkState(where, link, 0, 1, physicsClientId=client)[:2]
-        for shape in pybullet.getCollisionShapeData(where, link, physicsClientId=client):
+            name = bone_of(client.getJointInfo(where, link).link_name.decode())
+            state = client.getLinkState(where, link, 0, 1)
+            frame = (state.centre, state.centre_orientation)
+        for shape in client.getCollisionShapeData(where, link):
             place, turn = pybullet.multiplyTransforms(*frame, *shape[5:7])
             turn = np.reshape(pybullet.getMatrixFromQuaternion(turn), (3, 3))
             bone = shapes.setdefault(name.partition("__")[0], [])

@@ -6,7 +6,7 @@ import itertools
 import tempfile
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +15,7 @@ from veca_marl.sim.body.anatomy import Build, Skeleton, body_files, bone_of
 from veca_marl.sim.body.humanoid.body_dynamics import NEW_POSE, BodyDynamics
 from veca_marl.sim.body.humanoid.link_tree import JointLimits, read_tree
 from veca_marl.sim.geometry import Floats, Pose, cross, matrix_to_quaternion
-from veca_marl.sim.physics import pybullet
+from veca_marl.sim.physics.bullet_client import BulletClient, JointInfo, pybullet
 
 _LEG = ("thigh", "shank", "foot")
 _TRUNK = ("pelvis", "spine", "chest", "neck", "head")
@@ -42,7 +42,9 @@ def may_collide(a: str, b: str) -> bool:
     return not (roots and "trunk" in (limb(a), limb(b)))
 
 
-def allow_self_collision(client: int, body_id: int, links: Sequence[tuple[int, str]]) -> None:
+def allow_self_collision(
+    client: BulletClient, body_id: int, links: Sequence[tuple[int, str]]
+) -> None:
     """Disable Bullet's contacts for the pairs of links that must not collide.
 
     Args:
@@ -52,10 +54,10 @@ def allow_self_collision(client: int, body_id: int, links: Sequence[tuple[int, s
     """
     for (a, bone_a), (b, bone_b) in itertools.combinations(links, 2):
         if not may_collide(bone_a, bone_b):
-            pybullet.setCollisionFilterPair(body_id, body_id, a, b, 0, physicsClientId=client)
+            client.setCollisionFilterPair(body_id, body_id, a, b, 0)
 
 
-def exclude_from_collisions(client: int, body_id: int, links: Iterable[int]) -> None:
+def exclude_from_collisions(client: BulletClient, body_id: int, links: Iterable[int]) -> None:
     """Exclude links without shapes from collision detection.
 
     Bullet gives such a link an empty shape with a bounding box of twice the detection distance,
@@ -67,7 +69,7 @@ def exclude_from_collisions(client: int, body_id: int, links: Iterable[int]) -> 
         links: Indices of its links without shapes.
     """
     for link in links:
-        pybullet.setCollisionFilterGroupMask(body_id, link, 0, 0, physicsClientId=client)
+        client.setCollisionFilterGroupMask(body_id, link, 0, 0)
 
 
 _TOP_SPEED_RADPS = 30.0  # of a joint: twice the speed of human limbs
@@ -125,28 +127,28 @@ class Articulation:
     """
 
     def __init__(
-        self, client: int, skeleton: Skeleton, build: Build, limit_margin_rad: float
+        self, client: BulletClient, skeleton: Skeleton, build: Build, limit_margin_rad: float
     ) -> None:
         self._client = client
         self.body_id = _load(client, skeleton, build)
         names = {f"{j.bone}.{j.label}": i for i, j in enumerate(skeleton.joints)}
         infos = [
-            pybullet.getJointInfo(self.body_id, link, physicsClientId=client)
-            for link in range(pybullet.getNumJoints(self.body_id, physicsClientId=client))
+            client.getJointInfo(self.body_id, link)
+            for link in range(client.getNumJoints(self.body_id))
         ]
         # Bullet has its own order of joints: they are found by name
-        found = {names[i[1].decode()]: i for i in infos if i[2] == pybullet.JOINT_REVOLUTE}
+        found = {names[i.name.decode()]: i for i in infos if i.kind == pybullet.JOINT_REVOLUTE}
         self.moving: NDArray[np.int64] = np.array(sorted(found))
-        self._links: list[int] = [found[joint][0] for joint in sorted(found)]
+        self._links: list[int] = [found[joint].joint for joint in sorted(found)]
         low = np.array([skeleton.joints[joint].low_rad for joint in self.moving])
         high = np.array([skeleton.joints[joint].high_rad for joint in self.moving])
         self._limits = _limits(len(found))
         count = len(skeleton.joints)
         self.angles, self.speeds = np.zeros(count), np.zeros(count)
         self.strengths_nm, self.damping = np.zeros(count), np.zeros(count)
-        self.strengths_nm[self.moving] = [found[joint][10] for joint in self.moving]
-        self.damping[self.moving] = [found[joint][6] for joint in self.moving]
-        self._base_centre = np.array(self._dynamics(-1)[3])
+        self.strengths_nm[self.moving] = [found[joint].max_force for joint in self.moving]
+        self.damping[self.moving] = [found[joint].damping for joint in self.moving]
+        self._base_centre = np.array(client.getDynamicsInfo(self.body_id, -1).local_centre)
         self._release(low, high)
         limits = JointLimits(low, high, _TOP_SPEED_RADPS, limit_margin_rad)
         tree = read_tree(client, self.body_id)
@@ -157,31 +159,26 @@ class Articulation:
         self._prepare(infos, {bone.name for bone in skeleton.bones})
         self.read()
 
-    def _prepare(self, infos: list[tuple[Any, ...]], bones: set[str]) -> None:
+    def _prepare(self, infos: list[JointInfo], bones: set[str]) -> None:
         """Disable Bullet's motors, limit the joint speeds and choose which links collide."""
         colliders = [(-1, "pelvis")]
         for info in infos:
-            bone = bone_of(info[12].decode())
+            bone = bone_of(info.link_name.decode())
             if bone in bones:
-                colliders.append((info[0], bone))
+                colliders.append((info.joint, bone))
         self.bones_of_links = dict(colliders)
-        shapeless = [info[0] for info in infos if info[0] not in self.bones_of_links]
+        shapeless = [info.joint for info in infos if info.joint not in self.bones_of_links]
         exclude_from_collisions(self._client, self.body_id, shapeless)
         allow_self_collision(self._client, self.body_id, colliders)
-        pybullet.changeDynamics(
+        self._client.changeDynamics(
             self.body_id,
             -1,
             linearDamping=0.0,
             angularDamping=0.0,
             maxJointVelocity=_BULLET_TOP_SPEED,
-            physicsClientId=self._client,
         )
-        pybullet.setJointMotorControlArray(
-            self.body_id,
-            self._links,
-            pybullet.VELOCITY_CONTROL,
-            forces=np.zeros(len(self._links)),
-            physicsClientId=self._client,
+        self._client.setJointMotorControlArray(
+            self.body_id, self._links, pybullet.VELOCITY_CONTROL, forces=np.zeros(len(self._links))
         )
 
     def _release(self, low: Floats, high: Floats) -> None:
@@ -191,13 +188,12 @@ class Articulation:
         that rest at one of its stops vibrate.
         """
         for link, lower, upper in zip(self._links, low, high, strict=True):
-            pybullet.changeDynamics(
+            self._client.changeDynamics(
                 self.body_id,
                 link,
                 jointLowerLimit=float(lower) - _STOP_DISTANCE_RAD,
                 jointUpperLimit=float(upper) + _STOP_DISTANCE_RAD,
                 jointDamping=0.0,
-                physicsClientId=self._client,
             )
 
     # ---- reading
@@ -235,26 +231,24 @@ class Articulation:
 
     def read_gravity(self) -> None:
         """Read the client's gravity; call it before each agent step."""
-        world = pybullet.getPhysicsEngineParameters(physicsClientId=self._client)
+        world = self._client.getPhysicsEngineParameters()
         gravity = [world[f"gravityAcceleration{axis}"] for axis in "XYZ"]
         self._weight = self._mass_kg * np.array(gravity)
 
     def _touches_others(self) -> bool:
-        found = pybullet.getContactPoints(bodyA=self.body_id, physicsClientId=self._client)
-        return any(contact[1] != contact[2] for contact in found)
+        found = self._client.getContactPoints(bodyA=self.body_id)
+        return any(contact.body_a != contact.body_b for contact in found)
 
     def _read(self) -> bool:
         """Read Bullet's state; return whether it is valid, keep the last one if not.
 
         It is valid if all numbers are finite, below `_LARGEST`, speeds below `_FASTEST`.
         """
-        states = pybullet.getJointStates(self.body_id, self._links, physicsClientId=self._client)
-        position, quaternion = pybullet.getBasePositionAndOrientation(
-            self.body_id, physicsClientId=self._client
-        )
-        velocity, spin = pybullet.getBaseVelocity(self.body_id, physicsClientId=self._client)
+        states = self._client.getJointStates(self.body_id, self._links)
+        position, quaternion = self._client.getBasePositionAndOrientation(self.body_id)
+        velocity, spin = self._client.getBaseVelocity(self.body_id)
         # zip first: an array of tuples costs three times an array of numbers
-        angles, speeds = list(zip(*states, strict=True))[:2]
+        angles, speeds, _, _ = zip(*states, strict=True)
         row = np.array(position + quaternion + spin + velocity + speeds + angles)
         if not (np.abs(row) < self._limits).all():  # false for numbers that are not finite
             return False
@@ -286,12 +280,11 @@ class Articulation:
         """
         forces = self.dynamics.forces
         forces.drive[:], forces.stiffness[:] = torques_nm[self.moving], stiffness[self.moving]
-        pybullet.setJointMotorControlArray(
+        self._client.setJointMotorControlArray(
             self.body_id,
             self._links,
             pybullet.TORQUE_CONTROL,
             forces=self.dynamics.torques(step_s).tolist(),
-            physicsClientId=self._client,
         )
 
     def place(self, pose: Pose, angles: Floats) -> None:
@@ -309,36 +302,27 @@ class Articulation:
 
     def _set_pose(self, position: Floats, quaternion: Floats) -> None:
         """Set position and orientation of the base; Bullet sets its velocity to 0."""
-        pybullet.resetBasePositionAndOrientation(
-            self.body_id, position.tolist(), quaternion.tolist(), physicsClientId=self._client
+        self._client.resetBasePositionAndOrientation(
+            self.body_id, position.tolist(), quaternion.tolist()
         )
 
     def _set_velocity(self, velocity: Floats) -> None:
         """Set angular and linear velocity ``(6,)`` of the base; more numbers are ignored."""
         numbers = velocity[:6].tolist()
-        pybullet.resetBaseVelocity(
-            self.body_id, numbers[3:], numbers[:3], physicsClientId=self._client
-        )
+        self._client.resetBaseVelocity(self.body_id, numbers[3:], numbers[:3])
 
     def _set_joints(self, chosen: NDArray[np.int64]) -> None:
         """Set chosen rows of `moving` to `angles` and `speeds`."""
         joints = self.moving[chosen, None]
-        pybullet.resetJointStatesMultiDof(
+        self._client.resetJointStatesMultiDof(
             self.body_id,
             [self._links[row] for row in chosen],
             self.angles[joints].tolist(),
             self.speeds[joints].tolist(),
-            physicsClientId=self._client,
         )
 
-    def _dynamics(self, link: int) -> tuple[Any, ...]:
-        info: tuple[Any, ...] = pybullet.getDynamicsInfo(
-            self.body_id, link, physicsClientId=self._client
-        )
-        return info
 
-
-def _load(client: int, skeleton: Skeleton, build: Build) -> int:
+def _load(client: BulletClient, skeleton: Skeleton, build: Build) -> int:
     """Load the multibody; Bullet reads URDF from files only."""
     with tempfile.TemporaryDirectory() as folder:
         files = body_files(skeleton, build)
@@ -347,8 +331,8 @@ def _load(client: int, skeleton: Skeleton, build: Build) -> int:
         for name, content in files.hulls.items():
             (Path(folder) / name).write_text(content, encoding="utf-8")
         # Bullet would cache the files by their names, which are never used again
-        pybullet.setPhysicsEngineParameter(enableFileCaching=0, physicsClientId=client)
-        body_id: int = pybullet.loadURDF(str(path), flags=_FLAGS, physicsClientId=client)
+        client.setPhysicsEngineParameter(enableFileCaching=0)
+        body_id: int = client.loadURDF(str(path), flags=_FLAGS)
     return body_id
 
 

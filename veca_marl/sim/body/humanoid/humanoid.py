@@ -40,7 +40,8 @@ from veca_marl.sim.body.humanoid.postures import (
     posture_angles,
 )
 from veca_marl.sim.geometry import Floats, Pose, heading_rad
-from veca_marl.sim.physics import World, is_contact, pybullet
+from veca_marl.sim.physics import World, is_contact
+from veca_marl.sim.physics.bullet_client import BulletClient
 from veca_marl.sim.spec import ArraySpec, continuous_spec
 
 
@@ -105,7 +106,9 @@ def predicted_angles(
     return angles
 
 
-def self_contacts(client: int, body_id: int, bones: Mapping[int, str]) -> set[tuple[str, str]]:
+def self_contacts(
+    client: BulletClient, body_id: int, bones: Mapping[int, str]
+) -> set[tuple[str, str]]:
     """Return the pairs of bones that touched each other in the last physics step.
 
     Args:
@@ -116,8 +119,8 @@ def self_contacts(client: int, body_id: int, bones: Mapping[int, str]) -> set[tu
     Returns:
         Each pair in the order of their names.
     """
-    points = pybullet.getContactPoints(body_id, body_id, physicsClientId=client)
-    pairs = [(bones[p[3]], bones[p[4]]) for p in points if is_contact(p)]
+    points = client.getContactPoints(body_id, body_id)
+    pairs = [(bones[p.link_a], bones[p.link_b]) for p in points if is_contact(p)]
     return {(min(pair), max(pair)) for pair in pairs}
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veca_marl.sim.geometry import Floats, Inertia, Pose, joined_inertia
-from veca_marl.sim.physics import pybullet
+from veca_marl.sim.physics.bullet_client import BulletClient, pybullet
 
 
 class LinkArrays(NamedTuple):
@@ -215,7 +215,7 @@ class LinkTree(NamedTuple):
         return len(self.parents) - 1
 
 
-def read_tree(client: int, body_id: int) -> LinkTree:
+def read_tree(client: BulletClient, body_id: int) -> LinkTree:
     """Read the tree of a body from Bullet, so that both have the same masses and frames.
 
     Args:
@@ -272,23 +272,24 @@ class _Link(NamedTuple):
     moments: Floats
 
 
-def _links(client: int, body_id: int) -> list[_Link]:
+def _links(client: BulletClient, body_id: int) -> list[_Link]:
     """Return the base and all links in Bullet's order, in which parents precede their children."""
-    place, turn = pybullet.getBasePositionAndOrientation(body_id, physicsClientId=client)
+    place, turn = client.getBasePositionAndOrientation(body_id)
     base = Pose(np.array(place), _matrix(turn))
-    dynamics = pybullet.getDynamicsInfo(body_id, -1, physicsClientId=client)
-    found = [_Link(-1, -2, True, base, base, np.zeros(3), dynamics[0], np.array(dynamics[2]))]
-    for index in range(pybullet.getNumJoints(body_id, physicsClientId=client)):
-        info = pybullet.getJointInfo(body_id, index, physicsClientId=client)
-        state = pybullet.getLinkState(body_id, index, 0, 1, physicsClientId=client)
-        inertial = Pose(np.array(state[0]), _matrix(state[1]))
-        frame = Pose(np.array(state[4]), _matrix(state[5]))
+    dynamics = client.getDynamicsInfo(body_id, -1)
+    mass, moments = dynamics.mass_kg, np.array(dynamics.moments)
+    found = [_Link(-1, -2, True, base, base, np.zeros(3), mass, moments)]
+    for index in range(client.getNumJoints(body_id)):
+        info = client.getJointInfo(body_id, index)
+        state = client.getLinkState(body_id, index, 0, 1)
+        inertial = Pose(np.array(state.centre), _matrix(state.centre_orientation))
+        frame = Pose(np.array(state.position), _matrix(state.orientation))
         # Bullet gives the axis in the frame of the principal axes
-        axis = frame.rotation.T @ inertial.rotation @ np.array(info[13])
-        dynamics = pybullet.getDynamicsInfo(body_id, index, physicsClientId=client)
-        is_hinge = info[2] == pybullet.JOINT_REVOLUTE
-        mass, moments = dynamics[0], np.array(dynamics[2])
-        found.append(_Link(index, info[16], is_hinge, frame, inertial, axis, mass, moments))
+        axis = frame.rotation.T @ inertial.rotation @ np.array(info.axis)
+        dynamics = client.getDynamicsInfo(body_id, index)
+        is_hinge = info.kind == pybullet.JOINT_REVOLUTE
+        mass, moments = dynamics.mass_kg, np.array(dynamics.moments)
+        found.append(_Link(index, info.parent, is_hinge, frame, inertial, axis, mass, moments))
     return found
 
 

@@ -20,7 +20,6 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Iterable, Iterator, Sequence
 from itertools import chain
-from typing import Any
 
 import numpy as np
 
@@ -35,7 +34,8 @@ from veca_marl.sim.geometry import (
     horizontal_distance,
     quaternion_from_yaw,
 )
-from veca_marl.sim.physics import Prop, World, create_collision_shape, pybullet
+from veca_marl.sim.physics import Prop, World, create_collision_shape
+from veca_marl.sim.physics.bullet_client import BulletClient, ContactPoint
 
 _ROUNDS = 3  # two for the walls of a corner, one spare
 _LIMB_REACH_M = 1.0  # from the pelvis of a joint-level body to its stretched toes
@@ -43,7 +43,6 @@ _PARKED_M = -100.0  # height of a capsule that is not in use
 _MARGIN_M = 0.06  # an obstacle may displace the capsule by so much within one agent step
 _CARPET_M = 0.02  # what is lower is walked over
 _DEPTH_M = 1e-6  # less is rounding
-_ON_BODY, _NORMAL, _DISTANCE = 6, 7, 8  # entries of PyBullet's points of contact
 
 _Overlap = tuple[Sequence[float], float]  # direction towards the capsule, and metres
 
@@ -68,7 +67,7 @@ class Capsule:
 
     def __init__(
         self,
-        client: int,
+        client: BulletClient,
         scene: Scene,
         form: Primitive,
         centre_height_m: float,
@@ -80,10 +79,8 @@ class Capsule:
         self._client, self._scene = client, scene
         self._push_limit_kg = push_limit_kg
         shape = create_collision_shape(client, [form])
-        self.body_id: int = pybullet.createMultiBody(0, shape, physicsClientId=client)
-        pybullet.changeDynamics(
-            self.body_id, -1, lateralFriction=0.2, restitution=0.0, physicsClientId=client
-        )
+        self.body_id: int = client.createMultiBody(0, shape)
+        client.changeDynamics(self.body_id, -1, lateralFriction=0.2, restitution=0.0)
         self._radius_m, self._half_axis_m = form.radius, _half_axis_m(form)
         self._reach_m = self._half_axis_m + form.radius
         self._obstacles = ObstacleBoxes(client, scene, [], [], _LIMB_REACH_M)
@@ -168,9 +165,7 @@ class Capsule:
         if self._jammed.found:
             vx = vy = turn_radps = 0.0
         self._jammed.forget()
-        pybullet.resetBaseVelocity(
-            self.body_id, (vx, vy, 0.0), (0.0, 0.0, turn_radps), physicsClientId=self._client
-        )
+        self._client.resetBaseVelocity(self.body_id, (vx, vy, 0.0), (0.0, 0.0, turn_radps))
 
     def overlaps(self, x: float, y: float) -> bool:
         """Move it to a place, and return whether it penetrates an obstacle there.
@@ -182,11 +177,11 @@ class Capsule:
             return True
         # in the middle of something wide the nearest way out is vertical
         high = [body_id for body_id in self._near if self._rises(body_id)]
-        return any(-c[_DISTANCE] > _DEPTH_M for body_id in high for c in self._contacts(body_id))
+        return any(-c.distance_m > _DEPTH_M for body_id in high for c in self._contacts(body_id))
 
     def _rises(self, body_id: int) -> bool:
         """Return whether a body is higher than the surface on which the walker is."""
-        _, highest = pybullet.getAABB(body_id, physicsClientId=self._client)
+        _, highest = self._client.getAABB(body_id)
         return float(highest[2]) > self.base_m + _CARPET_M
 
     def park(self) -> None:
@@ -201,31 +196,26 @@ class Capsule:
 
     def _put(self, position: tuple[float, float, float]) -> None:
         orientation = quaternion_from_yaw(self.yaw_rad)
-        pybullet.resetBasePositionAndOrientation(
-            self.body_id, position, orientation, physicsClientId=self._client
-        )
+        self._client.resetBasePositionAndOrientation(self.body_id, position, orientation)
 
     def _centre(self, body_id: int) -> Floats:
         """Return the position ``(3,)`` of a body, metres."""
-        position, _ = pybullet.getBasePositionAndOrientation(body_id, physicsClientId=self._client)
+        position, _ = self._client.getBasePositionAndOrientation(body_id)
         return np.array(position)
 
     def _overlaps(self) -> Iterator[_Overlap]:
         """Yield how deep it is in obstacles, and in doors and drawers that cannot yield."""
         for body_id in self._near:
             for contact in self._contacts(body_id):
-                yield contact[_NORMAL], -contact[_DISTANCE]
+                yield contact.normal_on_b, -contact.distance_m
         for leaf in self._near_leaves:
             for contact in self._contacts(leaf.body_id):
-                if not leaf.yields(contact[_ON_BODY], [-axis for axis in contact[_NORMAL]]):
-                    yield contact[_NORMAL], -contact[_DISTANCE]
+                if not leaf.yields(contact.position_on_b, [-axis for axis in contact.normal_on_b]):
+                    yield contact.normal_on_b, -contact.distance_m
 
-    def _contacts(self, body_id: int) -> tuple[tuple[Any, ...], ...]:
+    def _contacts(self, body_id: int) -> tuple[ContactPoint, ...]:
         """Return PyBullet's points of contact with a body; normals point to the capsule."""
-        found: tuple[tuple[Any, ...], ...] = pybullet.getClosestPoints(
-            self.body_id, body_id, 0.0, physicsClientId=self._client
-        )
-        return found
+        return self._client.getClosestPoints(self.body_id, body_id, 0.0)
 
     def _find_obstacles(self, props: dict[str, Prop], bodies: Sequence[int]) -> None:
         """Find everything that cannot be pushed and disable Bullet's contacts with it."""
@@ -241,10 +231,8 @@ class Capsule:
         loose = [p for p in light if p.joint is None]
         self._jammed = JammedProps(self._client, self._scene, self.body_id, loose, leaves)
         for body_id in self._obstacles.ids:
-            for link in range(-1, pybullet.getNumJoints(body_id, physicsClientId=self._client)):
-                pybullet.setCollisionFilterPair(
-                    self.body_id, body_id, -1, link, 0, physicsClientId=self._client
-                )
+            for link in range(-1, self._client.getNumJoints(body_id)):
+                self._client.setCollisionFilterPair(self.body_id, body_id, -1, link, 0)
 
 
 def _depenetration(overlaps: Iterable[_Overlap]) -> tuple[float, float]:
@@ -299,10 +287,10 @@ def _half_axis_m(form: Primitive) -> float:
     return float(np.linalg.norm((ends[0] - ends[-1])[:2])) / 2.0
 
 
-def _mass_kg(client: int, body_id: int) -> float:
+def _mass_kg(client: BulletClient, body_id: int) -> float:
     """Return the mass of a body with all its links."""
-    links = range(-1, pybullet.getNumJoints(body_id, physicsClientId=client))
-    masses = [pybullet.getDynamicsInfo(body_id, n, physicsClientId=client)[0] for n in links]
+    links = range(-1, client.getNumJoints(body_id))
+    masses = [client.getDynamicsInfo(body_id, n).mass_kg for n in links]
     return float(sum(masses))
 
 

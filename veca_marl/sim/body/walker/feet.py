@@ -9,15 +9,16 @@ import numpy as np
 from veca_marl.sim.body.sense_organs import distance_m
 from veca_marl.sim.body.walker.walker_cfg import WalkerCfg
 from veca_marl.sim.geometry import Floats, horizontal_distance
-from veca_marl.sim.physics import Prop, pybullet
+from veca_marl.sim.physics import Prop
 from veca_marl.sim.physics.bullet import surface_m
+from veca_marl.sim.physics.bullet_client import BulletClient
 
 # the ray begins so far outside of the walker's own capsule, which it must not hit
 _CLEARANCE_M = 1e-4
 
 
 def is_first_hit(
-    client: int, body_id: int, start: Floats, end: Floats, skip_m: float, height_m: float
+    client: BulletClient, body_id: int, start: Floats, end: Floats, skip_m: float, height_m: float
 ) -> bool:
     """Return whether a horizontal ray meets a body before any other solid thing.
 
@@ -41,8 +42,8 @@ def is_first_hit(
     share = skip_m / length_m
     x, y = (float(start[i] + share * (end[i] - start[i])) for i in range(2))
     goal = (float(end[0]), float(end[1]), height_m)
-    hit_id = pybullet.rayTest((x, y, height_m), goal, physicsClientId=client)[0][0]
-    return hit_id in (-1, body_id)
+    (hit,) = client.rayTest((x, y, height_m), goal)
+    return hit.body_id in (-1, body_id)
 
 
 _ABOVE_M = 0.1  # a ray begins so far above a prop
@@ -52,14 +53,14 @@ class Footing:
     """The prop under a walker, and the height of its surface.
 
     Args:
-        client: PyBullet's client id.
+        client: The PyBullet client.
 
     Attributes:
         prop: What the walker stands on; None on the floor.
         height_m: Height of the surface under the walker's axis; 0 on the floor.
     """
 
-    def __init__(self, client: int) -> None:
+    def __init__(self, client: BulletClient) -> None:
         self._client = client
         self.leave()
 
@@ -83,7 +84,7 @@ class Footing:
             self.height_m = height_m
 
 
-def surface_height_m(client: int, prop: Prop, x: float, y: float) -> float | None:
+def surface_height_m(client: BulletClient, prop: Prop, x: float, y: float) -> float | None:
     """Return the height of the upper surface of a prop at a place; None beside it."""
     low, high = prop.bounds()
     top, bottom = np.array([x, y, high[2] + _ABOVE_M]), np.array([x, y, low[2] - _ABOVE_M])
@@ -91,11 +92,11 @@ def surface_height_m(client: int, prop: Prop, x: float, y: float) -> float | Non
     return height_m if height_m > bottom[2] + 1e-6 else None
 
 
-def foot_steps_on(client: int, cfg: WalkerCfg, ground: Floats, prop: Prop) -> bool:
+def foot_steps_on(client: BulletClient, cfg: WalkerCfg, ground: Floats, prop: Prop) -> bool:
     """Return whether a tangible prop is low and near enough, and nothing solid is before it.
 
     Args:
-        client: PyBullet's client id.
+        client: The PyBullet client.
         cfg: Parameters of the walker.
         ground: ``(2,)`` metres: its place on the floor.
         prop: The prop.
@@ -120,20 +121,20 @@ _LIFT = 0.2  # vertical velocity of a kicked prop as a fraction of the horizonta
 
 
 def foot_reaches(
-    client: int, cfg: WalkerCfg, capsule_id: int, here: Floats, yaw_rad: float, prop: Prop
+    client: BulletClient, cfg: WalkerCfg, capsule_id: int, here: Floats, yaw_rad: float, prop: Prop
 ) -> bool:
     """Return whether a prop is near enough, low enough and ahead, and nothing solid is before it.
 
     Args:
-        client: PyBullet's client id.
+        client: The PyBullet client.
         cfg: Parameters of the walker.
         capsule_id: PyBullet's id of its capsule.
         here: ``(3,)`` metres: position of the walker.
         yaw_rad: Its heading.
         prop: The prop.
     """
-    if prop.lowest_m > cfg.kick_height_m or not pybullet.getClosestPoints(
-        capsule_id, prop.body_id, cfg.kick_reach_m, physicsClientId=client
+    if prop.lowest_m > cfg.kick_height_m or not client.getClosestPoints(
+        capsule_id, prop.body_id, cfg.kick_reach_m
     ):
         return False
     there = prop.mass_centre

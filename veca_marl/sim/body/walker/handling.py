@@ -13,32 +13,31 @@ from veca_marl.sim.body.walker.gait import Gait
 from veca_marl.sim.body.walker.ground_motion import GroundMotion
 from veca_marl.sim.body.walker.walker_cfg import WalkerCfg
 from veca_marl.sim.geometry import Floats, rotation_about_vertical
-from veca_marl.sim.physics import pybullet
 from veca_marl.sim.physics.bullet import free_path_m, surface_m
+from veca_marl.sim.physics.bullet_client import BulletClient
 from veca_marl.sim.physics.props.prop import Prop
 
 _TOUCHED_M = 1e-3  # a prop may overlap what it touches by so much
-_ON_OBSTACLE, _NORMAL, _DISTANCE = 6, 7, 8  # entries of PyBullet's points of contact
 
 
-def way_out(client: int, body_id: int, obstacles: Iterable[int], holder: Floats) -> Floats:
+def way_out(client: BulletClient, body_id: int, obstacles: Iterable[int], holder: Floats) -> Floats:
     """Return the displacement ``(3,)`` that moves a body out of obstacles, in metres.
 
     Each coordinate is that of the deepest overlap along it: several points of one face count once.
     One displacement ends the overlap with walls that are at right angles; others take several.
 
     Args:
-        client: PyBullet's client id.
+        client: The PyBullet client.
         body_id: PyBullet's id of the body, where it is now.
         obstacles: PyBullet's ids of the obstacles.
         holder: ``(3,)`` metres: a point on the side of all walls on which the body has to be.
     """
     out = np.zeros(3)
     for obstacle in obstacles:
-        for point in pybullet.getClosestPoints(body_id, obstacle, 0.0, physicsClientId=client):
-            depth_m = -float(point[_DISTANCE])
+        for point in client.getClosestPoints(body_id, obstacle, 0.0):
+            depth_m = -point.distance_m
             if depth_m > _TOUCHED_M:
-                way = depth_m * _towards_holder(point[_NORMAL], point[_ON_OBSTACLE], holder)
+                way = depth_m * _towards_holder(point.normal_on_b, point.position_on_b, holder)
                 out = np.where(np.abs(way) > np.abs(out), way, out)
     return out
 
@@ -59,7 +58,7 @@ class Grip:
     """What one body holds.
 
     Args:
-        client: PyBullet's client id.
+        client: The PyBullet client.
         holder: Name of the body.
         body_ids: PyBullet's ids of what the held prop does not collide with.
 
@@ -67,7 +66,7 @@ class Grip:
         prop: The held prop; None if the hand is empty.
     """
 
-    def __init__(self, client: int, holder: str, body_ids: Sequence[int]) -> None:
+    def __init__(self, client: BulletClient, holder: str, body_ids: Sequence[int]) -> None:
         self.prop: Prop | None = None
         self._client = client
         self._holder = holder
@@ -92,9 +91,7 @@ class Grip:
     def _set_collision(self, prop: Prop, enabled: int) -> None:
         for body_id in self._body_ids:
             for link in prop.links:
-                pybullet.setCollisionFilterPair(
-                    body_id, prop.body_id, -1, link, enabled, physicsClientId=self._client
-                )
+                self._client.setCollisionFilterPair(body_id, prop.body_id, -1, link, enabled)
 
 
 _COMPRESSION_M = 0.002  # of the palm's skin by the held prop, so that the palm feels it
@@ -119,13 +116,15 @@ class Hand:
     they are nearer than the hand would hold it, it is held nearer to the trunk.
 
     Args:
-        client: PyBullet's client id.
+        client: The PyBullet client.
         holder: Name of the walker.
         capsule: The upright capsule of the walker.
         radius_m: Its radius.
     """
 
-    def __init__(self, client: int, holder: str, capsule: Capsule, radius_m: float) -> None:
+    def __init__(
+        self, client: BulletClient, holder: str, capsule: Capsule, radius_m: float
+    ) -> None:
         self._client, self._radius_m = client, radius_m
         self._capsule = capsule
         self._grip = Grip(client, holder, [capsule.body_id])
@@ -276,7 +275,7 @@ class ObjectHandling:
     """The right hand and the kicking foot of one walker.
 
     Args:
-        client: PyBullet's client id.
+        client: The PyBullet client.
         name: Name of the walker.
         cfg: Its parameters.
         motion: Its motion; a held prop follows it.
@@ -284,7 +283,7 @@ class ObjectHandling:
     """
 
     def __init__(
-        self, client: int, name: str, cfg: WalkerCfg, motion: GroundMotion, gait: Gait
+        self, client: BulletClient, name: str, cfg: WalkerCfg, motion: GroundMotion, gait: Gait
     ) -> None:
         self._client, self._cfg = client, cfg
         self._motion, self._gait = motion, gait

@@ -12,12 +12,13 @@ the row ends at the capsule of another walker, both walkers make room, see `Jamm
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from veca_marl.sim.geometry import Floats, Scene
-from veca_marl.sim.physics import Prop, pybullet
+from veca_marl.sim.physics import Prop
+from veca_marl.sim.physics.bullet_client import BulletClient, ContactPoint
 
 # a thing that can move overlaps the capsule by less than 1 mm and the floor by 2 mm
 _PRESSED_M = 4e-3
@@ -25,7 +26,6 @@ _PRESSED_M = 4e-3
 _GAP_M = 1e-3
 _BEHIND = 0.1  # least cosine of the angle between the push and what it is supported against
 _SQUEEZED_M = 1e-4  # what two walkers press together may overlap by so much more
-_OTHER_BODY, _ON_BODY, _NORMAL, _DISTANCE = 2, 5, 7, 8  # entries of PyBullet's points of contact
 
 _Overlap = tuple[Sequence[float], float]  # direction towards the capsule, and metres
 
@@ -62,7 +62,7 @@ class JammedProps:
 
     def __init__(
         self,
-        client: int,
+        client: BulletClient,
         scene: Scene,
         capsule_id: int,
         props: Sequence[Prop],
@@ -120,7 +120,7 @@ class JammedProps:
             excess_m = self._overlap_m(prop, point, self._holds_firm) - _PRESSED_M
             if excess_m > 0.0:
                 self.found = True
-                yield point[_NORMAL], min(excess_m, _GAP_M - point[_DISTANCE])
+                yield point.normal_on_b, min(excess_m, _GAP_M - point.distance_m)
 
     def squeezes(self) -> Iterator[_Overlap]:
         """Yield by how much the capsule makes room for what it and another walker press together.
@@ -135,20 +135,18 @@ class JammedProps:
         for prop, point in self._pressed(self._touched.values()):
             excess_m = self._overlap_m(prop, point, self._is_walker) - _PRESSED_M
             if excess_m > _SQUEEZED_M:
-                yield point[_NORMAL], min(excess_m / 2.0, _GAP_M - point[_DISTANCE])
+                yield point.normal_on_b, min(excess_m / 2.0, _GAP_M - point.distance_m)
 
-    def _pressed(self, props: Iterable[Prop]) -> Iterator[tuple[Prop, tuple[Any, ...]]]:
+    def _pressed(self, props: Iterable[Prop]) -> Iterator[tuple[Prop, ContactPoint]]:
         """Yield PyBullet's closest points of the capsule and things that are in its way."""
         for prop in props:
             if prop.holder is not None:
                 continue  # its pose is set at each physics step
-            for point in pybullet.getClosestPoints(
-                self._capsule_id, prop.body_id, _GAP_M, physicsClientId=self._client
-            ):
+            for point in self._client.getClosestPoints(self._capsule_id, prop.body_id, _GAP_M):
                 yield prop, point
 
     def _overlap_m(
-        self, prop: Prop, point: tuple[Any, ...], ends: Callable[[_Backing], bool]
+        self, prop: Prop, point: ContactPoint, ends: Callable[[_Backing], bool]
     ) -> float:
         """Return how far a capsule and what is behind a thing overlap the thing together.
 
@@ -160,8 +158,8 @@ class JammedProps:
         Returns:
             Metres along the normal of the point; minus infinity where nothing is behind the thing.
         """
-        behind_m = self._behind_m(prop.body_id, point[_NORMAL], ends, {prop.body_id})
-        return behind_m - float(point[_DISTANCE])
+        behind_m = self._behind_m(prop.body_id, point.normal_on_b, ends, {prop.body_id})
+        return behind_m - point.distance_m
 
     def _behind_m(
         self,
@@ -210,14 +208,12 @@ class JammedProps:
         """Return where other bodies than the capsule touch a body."""
         if body_id not in self._backings:
             # the contacts of the last physics step say which bodies, but not how deep they are now
-            contacts = pybullet.getContactPoints(body_id, physicsClientId=self._client)
-            others = sorted({contact[_OTHER_BODY] for contact in contacts} - {self._capsule_id})
+            contacts = self._client.getContactPoints(body_id)
+            others = sorted({contact.body_b for contact in contacts} - {self._capsule_id})
             self._backings[body_id] = [
-                _Backing(other, point[_ON_BODY], point[_NORMAL], -point[_DISTANCE])
+                _Backing(other, point.position_on_a, point.normal_on_b, -point.distance_m)
                 for other in others
-                for point in pybullet.getClosestPoints(
-                    body_id, other, _GAP_M, physicsClientId=self._client
-                )
+                for point in self._client.getClosestPoints(body_id, other, _GAP_M)
             ]
         return self._backings[body_id]
 

@@ -9,7 +9,8 @@ from numba import njit
 from numpy.typing import NDArray
 
 from veca_marl.sim.geometry import Floats, Scene, horizontal_distance
-from veca_marl.sim.physics import Prop, pybullet
+from veca_marl.sim.physics import Prop
+from veca_marl.sim.physics.bullet_client import BulletClient
 from veca_marl.sim.physics.props.geoms import swept_radius_m
 from veca_marl.sim.physics.props.joint import Joint
 
@@ -33,7 +34,7 @@ class ObstacleBoxes:
 
     def __init__(
         self,
-        client: int,
+        client: BulletClient,
         scene: Scene,
         props: Sequence[Prop],
         bodies: Sequence[int],
@@ -79,7 +80,7 @@ class ObstacleBoxes:
 
     def _box(self, number: int, link: int) -> tuple[Sequence[float], Sequence[float]]:
         """Return the corners of Bullet's box about one link of an obstacle."""
-        low, high = pybullet.getAABB(self.ids[number], link, physicsClientId=self._client)
+        low, high = self._client.getAABB(self.ids[number], link)
         return low, high
 
 

@@ -9,7 +9,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from veca_marl.sim.geometry import Floats, Geom, Shape
-from veca_marl.sim.physics.bullet import pybullet
+from veca_marl.sim.physics.bullet_client import BulletClient, pybullet
 from veca_marl.sim.physics.props.joint import JointCfg, JointKind
 from veca_marl.sim.physics.props.prop_cfg import PartCfg, PropCfg, PropShape, hull_of
 from veca_marl.sim.sound.obstacles import Obstacles
@@ -271,7 +271,11 @@ class SoundObstacle(Protocol):
 
 
 def make_obstacles(
-    boxes: Sequence[Geom], joint: JointCfg | None, body_id: int, client: int, obstacles: Obstacles
+    boxes: Sequence[Geom],
+    joint: JointCfg | None,
+    body_id: int,
+    client: BulletClient,
+    obstacles: Obstacles,
 ) -> list[SoundObstacle]:
     """Add the boxes of a prop to the obstacles of the sound.
 
@@ -279,7 +283,7 @@ def make_obstacles(
         boxes: In the frame of the prop.
         joint: Its joint; with one it is a leaf.
         body_id: PyBullet's id of the prop.
-        client: PyBullet's client id.
+        client: The PyBullet client.
         obstacles: Those of its world.
     """
     if joint is None:
@@ -306,7 +310,7 @@ class _Leaf:
     """A box of a prop with a joint, and the opening that it closes."""
 
     def __init__(
-        self, box: Geom, joint: JointCfg, body_id: int, client: int, obstacles: Obstacles
+        self, box: Geom, joint: JointCfg, body_id: int, client: BulletClient, obstacles: Obstacles
     ) -> None:
         self._offset, self._turn = np.asarray(box.offset), np.asarray(box.rotation)
         self._anchor = np.asarray(joint.anchor_m, np.float64)
@@ -320,7 +324,7 @@ class _Leaf:
         self._obstacles.move_leaf(
             self._number, position + rotation @ self._offset, rotation @ self._turn
         )
-        base = pybullet.getBasePositionAndOrientation(self._body_id, physicsClientId=self._client)
+        base = self._client.getBasePositionAndOrientation(self._body_id)
         if base != self._base:
             self._base = base
             self._move_opening(*base)

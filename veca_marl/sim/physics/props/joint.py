@@ -10,7 +10,7 @@ from enum import Enum
 import numpy as np
 
 from veca_marl.sim.geometry import Floats
-from veca_marl.sim.physics.bullet import pybullet
+from veca_marl.sim.physics.bullet_client import BulletClient, pybullet
 
 
 class JointKind(Enum):
@@ -115,7 +115,7 @@ class Joint:
     Args:
         cfg: The joint.
         body_id: PyBullet's id of the attached prop.
-        client: PyBullet's client id.
+        client: The PyBullet client.
 
     Attributes:
         cfg: As above.
@@ -125,7 +125,7 @@ class Joint:
         moved: Whether it may have moved since `follow_physics` copied the pose of the prop.
     """
 
-    def __init__(self, cfg: JointCfg, body_id: int, client: int) -> None:
+    def __init__(self, cfg: JointCfg, body_id: int, client: BulletClient) -> None:
         self.cfg = cfg
         self._body_id = body_id
         self._client = client
@@ -140,13 +140,8 @@ class Joint:
         self._built = (False, 0.0)
         self._target: float | None = None
         self._direction = 1.0
-        pybullet.changeDynamics(
-            body_id,
-            LINK,
-            jointLowerLimit=0.0,
-            jointUpperLimit=cfg.range,
-            jointDamping=0.0,
-            physicsClientId=client,
+        client.changeDynamics(
+            body_id, LINK, jointLowerLimit=0.0, jointUpperLimit=cfg.range, jointDamping=0.0
         )
         self.locked = cfg.lock is not None and cfg.lock.locked
         self.set_opening(cfg.opening)
@@ -171,9 +166,7 @@ class Joint:
     def anchor(self) -> Floats:
         """``(3,)`` metres, world frame: a point of the axis, at the base of the body in Bullet."""
         if self._anchor is None:
-            anchor, _ = pybullet.getBasePositionAndOrientation(
-                self._body_id, physicsClientId=self._client
-            )
+            anchor, _ = self._client.getBasePositionAndOrientation(self._body_id)
             self._anchor = np.array(anchor)
         return self._anchor
 
@@ -241,9 +234,7 @@ class Joint:
         """
         if self.locked:
             return False
-        base, quaternion = pybullet.getBasePositionAndOrientation(
-            self._body_id, physicsClientId=self._client
-        )
+        base, quaternion = self._client.getBasePositionAndOrientation(self._body_id)
         turn = np.array(pybullet.getMatrixFromQuaternion(quaternion)).reshape(3, 3)
         axis, push = turn @ self._axis, np.asarray(force, np.float64)
         if self.cfg.kind is JointKind.hinge:
@@ -276,8 +267,8 @@ class Joint:
 
     def _state(self) -> tuple[float, float]:
         """Return coordinate and speed."""
-        state = pybullet.getJointState(self._body_id, LINK, physicsClientId=self._client)
-        return float(state[0]), float(state[1])
+        state = self._client.getJointState(self._body_id, LINK)
+        return state.position, state.velocity
 
     def _at_end(self, coordinate: float) -> bool:
         """Return whether a coordinate is at or beyond an end of the range."""
@@ -286,7 +277,7 @@ class Joint:
     def _set_coordinate(self, coordinate: float) -> None:
         self.moved = True
         self._before = (coordinate, 0.0)
-        pybullet.resetJointState(self._body_id, LINK, coordinate, 0.0, physicsClientId=self._client)
+        self._client.resetJointState(self._body_id, LINK, coordinate, 0.0)
 
     def _release_motor(self) -> None:
         """Leave only friction: a motor that holds the speed 0 with a limited force."""
@@ -294,13 +285,8 @@ class Joint:
         self._set_motor(0.0, self.cfg.friction)
 
     def _set_motor(self, speed: float, force: float) -> None:
-        pybullet.setJointMotorControl2(
-            self._body_id,
-            LINK,
-            pybullet.VELOCITY_CONTROL,
-            targetVelocity=speed,
-            force=force,
-            physicsClientId=self._client,
+        self._client.setJointMotorControl2(
+            self._body_id, LINK, pybullet.VELOCITY_CONTROL, targetVelocity=speed, force=force
         )
 
     def _checked(self, opening: float) -> float:

@@ -21,7 +21,8 @@ from veca_marl.sim.geometry import (
     quaternions_to_matrices,
     rotation_about_vertical,
 )
-from veca_marl.sim.physics.bullet import are_in_contact, pybullet
+from veca_marl.sim.physics.bullet import are_in_contact
+from veca_marl.sim.physics.bullet_client import BulletClient, pybullet
 from veca_marl.sim.physics.props.geoms import (
     bounding_box,
     horizontal_radius_m,
@@ -46,7 +47,6 @@ speed.
 
 _SLEEP = pybullet.ACTIVATION_STATE_ENABLE_SLEEPING | pybullet.ACTIVATION_STATE_SLEEP
 _WAKE = pybullet.ACTIVATION_STATE_DISABLE_SLEEPING | pybullet.ACTIVATION_STATE_WAKE_UP
-_OTHER_BODY = 2  # entry of PyBullet's contact points
 
 
 class Rest(Protocol):
@@ -74,12 +74,12 @@ class Sleep:
 
     Args:
         prop: The prop.
-        client: PyBullet's client id.
+        client: The PyBullet client.
         steps: Agent steps at rest after which it sleeps.
         woken: The props that were woken since the last physics step; it is added when it wakes.
     """
 
-    def __init__(self, prop: Prop, client: int, steps: int, woken: list[Prop]) -> None:
+    def __init__(self, prop: Prop, client: BulletClient, steps: int, woken: list[Prop]) -> None:
         self._prop = prop
         self._client = client
         self._steps = steps
@@ -87,9 +87,7 @@ class Sleep:
         self._still_steps = 0
         self._allowed = False
         # Bullet compares the sum of the squares of all velocities
-        pybullet.changeDynamics(
-            prop.body_id, -1, sleepThreshold=REST_SPEED**2, physicsClientId=client
-        )
+        client.changeDynamics(prop.body_id, -1, sleepThreshold=REST_SPEED**2)
 
     def wake(self) -> None:
         """Let Bullet simulate the prop, from the second physics step on; the first does not."""
@@ -102,8 +100,8 @@ class Sleep:
     def wake_around(self) -> None:
         """Wake the prop, and what touched it in the last physics step."""
         self.wake()
-        points = pybullet.getContactPoints(self._prop.body_id, physicsClientId=self._client)
-        for other in sorted({point[_OTHER_BODY] for point in points}):
+        points = self._client.getContactPoints(self._prop.body_id)
+        for other in sorted({point.body_b for point in points}):
             self._set_state(other, pybullet.ACTIVATION_STATE_WAKE_UP)
 
     def count(self, still: bool) -> None:
@@ -119,7 +117,7 @@ class Sleep:
             self._set_state(self._prop.body_id, _SLEEP)
 
     def _set_state(self, body_id: int, state: int) -> None:
-        pybullet.changeDynamics(body_id, -1, activationState=state, physicsClientId=self._client)
+        self._client.changeDynamics(body_id, -1, activationState=state)
 
 
 _LARGEST_M = 1e6  # no playground is as large; the limit of bodies, too
@@ -152,7 +150,7 @@ class Prop:
     def __init__(
         self,
         cfg: PropCfg,
-        client: int,
+        client: BulletClient,
         scene: Scene,
         sound: Source | None,
         obstacles: Obstacles,
@@ -173,7 +171,7 @@ class Prop:
         self._inside = bounding_box(geoms)
         self.extent_m = float(np.linalg.norm(np.abs(self._inside).max(axis=0)))
         self.body_id, self.link, self.joint, frame = create_body(cfg, client, geoms)
-        self.links = range(self.link, pybullet.getNumJoints(self.body_id, physicsClientId=client))
+        self.links = range(self.link, client.getNumJoints(self.body_id))
         self._read_pose = pose_reader(self.body_id, self.link, client)
         self.centre_of_mass = frame.position
         self._centre = frame.position if frame.position.any() else None
@@ -209,10 +207,7 @@ class Prop:
 
     def bounds(self) -> tuple[Floats, Floats]:
         """Return the corners ``(3,)`` of Bullet's box about it, along the axes of the world."""
-        boxes = [
-            pybullet.getAABB(self.body_id, link, physicsClientId=self._client)
-            for link in self.links
-        ]
+        boxes = [self._client.getAABB(self.body_id, link) for link in self.links]
         low, high = np.array(boxes).swapaxes(0, 1)
         return low.min(axis=0), high.max(axis=0)
 
@@ -250,11 +245,10 @@ class Prop:
     def _velocities(self) -> tuple[Sequence[float], Sequence[float]]:
         """Return the velocity and the angular velocity, world frame."""
         if self.joint is None:
-            linear, angular = pybullet.getBaseVelocity(self.body_id, physicsClientId=self._client)
+            linear, angular = self._client.getBaseVelocity(self.body_id)
         else:
-            *_, linear, angular = pybullet.getLinkState(
-                self.body_id, self.link, computeLinkVelocity=1, physicsClientId=self._client
-            )
+            state = self._client.getLinkState(self.body_id, self.link, computeLinkVelocity=1)
+            linear, angular = state.velocity, state.angular_velocity
         return linear, angular
 
     @property
@@ -374,9 +368,7 @@ class Prop:
             quaternion = matrix_to_quaternion(
                 rotation_about_vertical(yaw_rad) @ self._axes
             ).tolist()
-        pybullet.resetBasePositionAndOrientation(
-            self.body_id, (x, y, z), quaternion, physicsClientId=self._client
-        )
+        self._client.resetBasePositionAndOrientation(self.body_id, (x, y, z), quaternion)
         if self.joint is not None:
             self.joint.follow_base()
         self.set_velocity(velocity, angular_velocity)
@@ -393,11 +385,10 @@ class Prop:
         """
         if not self.fixed and self.joint is None:
             self.rest.wake()
-            pybullet.resetBaseVelocity(
+            self._client.resetBaseVelocity(
                 self.body_id,
                 _three_finite(self.name, "velocity", velocity),
                 _three_finite(self.name, "angular velocity", angular_velocity),
-                physicsClientId=self._client,
             )
 
     def _drive(self, opening: float) -> bool:
@@ -423,8 +414,8 @@ def follow_physics(props: Sequence[Prop]) -> list[str]:
     if not props:
         return []
     positions, rotations = props[0]._scene.positions, props[0]._scene.rotations
-    poses = [prop._read_pose()[:2] for prop in props]
-    origins, quaternions = np.array([pose[0] for pose in poses]), np.array([p[1] for p in poses])
+    centres, orientations = zip(*[prop._read_pose() for prop in props], strict=True)
+    origins, quaternions = np.array(centres), np.array(orientations)
     # false for numbers that are not finite
     valid = (np.abs(origins) < _LARGEST_M).all(axis=1) & np.isfinite(quaternions).all(axis=1)
     if not valid.all():

@@ -19,7 +19,8 @@ from veca_marl.sim.geometry import (
     matrix_to_quaternion,
     primitive_inertia,
 )
-from veca_marl.sim.physics.bullet import create_collision_shape, pybullet, unused_visual_shape
+from veca_marl.sim.physics.bullet import create_collision_shape, unused_visual_shape
+from veca_marl.sim.physics.bullet_client import BulletClient, Quaternion, Vector, pybullet
 from veca_marl.sim.physics.clock import ClockCfg
 from veca_marl.sim.physics.props.joint import LINK, Joint, JointCfg, JointKind
 from veca_marl.sim.physics.props.prop_cfg import PropCfg, PropShape
@@ -32,12 +33,14 @@ _JOINTS = {JointKind.hinge: pybullet.JOINT_REVOLUTE, JointKind.slide: pybullet.J
 _EXACT_IN_BULLET = (PropShape.sphere, PropShape.box, PropShape.cylinder)
 
 
-def create_prop_body(cfg: PropCfg, client: int, geoms: Sequence[Primitive]) -> tuple[int, Pose]:
+def create_prop_body(
+    cfg: PropCfg, client: BulletClient, geoms: Sequence[Primitive]
+) -> tuple[int, Pose]:
     """Create the rigid body of a prop, with its frame at the origin.
 
     Args:
         cfg: The prop.
-        client: PyBullet's client id.
+        client: The PyBullet client.
         geoms: Its primitives, in its frame.
 
     Returns:
@@ -47,24 +50,23 @@ def create_prop_body(cfg: PropCfg, client: int, geoms: Sequence[Primitive]) -> t
     frame, moments = inertial_frame(inertia)
     shapes = _collision_shapes(cfg, client, [_on_frame(geom, frame) for geom in geoms])
     visual = unused_visual_shape(client, geoms)
-    body_id: int = pybullet.createMultiBody(
+    body_id: int = client.createMultiBody(
         cfg.mass_kg,
         shapes[0],
         visual,
         basePosition=frame.position.tolist(),
         baseOrientation=matrix_to_quaternion(frame.rotation).tolist(),
-        physicsClientId=client,
         **_links([_welded(shape, parent=-1) for shape in shapes[1:]], visual),
     )
-    pybullet.changeDynamics(body_id, -1, **prop_dynamics(cfg, moments), physicsClientId=client)
+    client.changeDynamics(body_id, -1, **prop_dynamics(cfg, moments))
     _prepare_links(body_id, 0, len(shapes) - 1, cfg, client)
     if not cfg.tangible:
-        pybullet.setCollisionFilterGroupMask(body_id, -1, 0, 0, physicsClientId=client)
+        client.setCollisionFilterGroupMask(body_id, -1, 0, 0)
     return body_id, frame
 
 
 def create_attached_body(
-    cfg: PropCfg, joint: JointCfg, client: int, geoms: Sequence[Primitive]
+    cfg: PropCfg, joint: JointCfg, client: BulletClient, geoms: Sequence[Primitive]
 ) -> tuple[int, Pose]:
     """Create the body of a prop with a joint: a fixed base, a spacer, and the link that moves.
 
@@ -76,7 +78,7 @@ def create_attached_body(
     Args:
         cfg: The prop.
         joint: Its joint.
-        client: PyBullet's client id.
+        client: The PyBullet client.
         geoms: Its primitives, in its frame.
 
     Returns:
@@ -97,16 +99,15 @@ def create_attached_body(
         axis=axis / np.linalg.norm(axis),
     )
     spacer = _Link(shape=-1)
-    body_id: int = pybullet.createMultiBody(
+    body_id: int = client.createMultiBody(
         baseMass=0.0,
         basePosition=anchor.tolist(),
-        physicsClientId=client,
         **_links([spacer, leaf, *(_welded(shape, parent=LINK) for shape in shapes[1:])], visual),
     )
     dynamics = prop_dynamics(cfg, moments)
     if moments is not None:
         dynamics["localInertiaDiagonal"] = moments.tolist()
-    pybullet.changeDynamics(body_id, LINK, **dynamics, physicsClientId=client)
+    client.changeDynamics(body_id, LINK, **dynamics)
     _prepare_links(body_id, LINK + 1, LINK + len(shapes), cfg, client)
     return body_id, frame
 
@@ -190,17 +191,17 @@ def _links(links: Sequence[_Link], visual: int) -> dict[str, Any]:
     }
 
 
-def _collision_shapes(cfg: PropCfg, client: int, geoms: Sequence[Primitive]) -> list[int]:
+def _collision_shapes(cfg: PropCfg, client: BulletClient, geoms: Sequence[Primitive]) -> list[int]:
     """Return the collision shapes of a prop, one for each link; see `_welded`."""
     if cfg.shape in _SEVERAL_LINKS and cfg.mass_kg > 0.0:
         return [create_collision_shape(client, [geom]) for geom in geoms]
     return [create_collision_shape(client, geoms)]
 
 
-def _prepare_links(body_id: int, first: int, end: int, cfg: PropCfg, client: int) -> None:
+def _prepare_links(body_id: int, first: int, end: int, cfg: PropCfg, client: BulletClient) -> None:
     """Set the dynamics of the links `first` to `end` - 1, which have no mass."""
     for link in range(first, end):
-        pybullet.changeDynamics(body_id, link, **prop_dynamics(cfg, None), physicsClientId=client)
+        client.changeDynamics(body_id, link, **prop_dynamics(cfg, None))
 
 
 def _on_frame(geom: Primitive, frame: Pose) -> Primitive:
@@ -220,7 +221,7 @@ def is_turned(frame: Pose) -> bool:
 
 
 def limit_detection(
-    body_id: int, links: Iterable[int], cfg: PropCfg, client: int, clock: ClockCfg
+    body_id: int, links: Iterable[int], cfg: PropCfg, client: BulletClient, clock: ClockCfg
 ) -> None:
     """Limit how far ahead a movable prop with restitution has contacts at short physics steps.
 
@@ -232,13 +233,10 @@ def limit_detection(
     if cfg.mass_kg == 0.0 or cfg.restitution == 0.0 or shortening >= 1.0:
         return
     for link in links:
-        low, high = pybullet.getAABB(body_id, link, physicsClientId=client)
+        low, high = client.getAABB(body_id, link)
         size = float(np.linalg.norm(np.subtract(high, low))) / 2.0
-        pybullet.changeDynamics(
-            body_id,
-            link,
-            contactProcessingThreshold=clock.contact_share * shortening * size,
-            physicsClientId=client,
+        client.changeDynamics(
+            body_id, link, contactProcessingThreshold=clock.contact_share * shortening * size
         )
 
 
@@ -278,7 +276,7 @@ def prop_dynamics(cfg: PropCfg, moments: Floats | None) -> dict[str, Any]:
 
 
 def create_body(
-    cfg: PropCfg, client: int, geoms: Sequence[Geom]
+    cfg: PropCfg, client: BulletClient, geoms: Sequence[Geom]
 ) -> tuple[int, int, Joint | None, Pose]:
     """Create the body of a prop; return its id and link, its joint and its inertial frame."""
     if cfg.joint is None:
@@ -288,14 +286,15 @@ def create_body(
     return body_id, LINK, Joint(cfg.joint, body_id, client), frame
 
 
-def pose_reader(body_id: int, link: int, client: int) -> Callable[[], tuple[Any, ...]]:
-    """Return a function that reads position and quaternion of the inertial frame first."""
+def pose_reader(
+    body_id: int, link: int, client: BulletClient
+) -> Callable[[], tuple[Vector, Quaternion]]:
+    """Return a function that reads position and quaternion of the inertial frame."""
     if link == -1:
-        return partial(pybullet.getBasePositionAndOrientation, body_id, physicsClientId=client)
-    return partial(
-        pybullet.getLinkState,
-        body_id,
-        link,
-        computeForwardKinematics=1,
-        physicsClientId=client,
-    )
+        return partial(client.getBasePositionAndOrientation, body_id)
+
+    def read() -> tuple[Vector, Quaternion]:
+        state = client.getLinkState(body_id, link, computeForwardKinematics=1)
+        return state.centre, state.centre_orientation
+
+    return read

@@ -8,6 +8,7 @@ from typing import Protocol
 import numpy as np
 
 from veca_marl.sim.geometry import Floats, Scene
+from veca_marl.sim.physics.bullet_client import BulletClient
 from veca_marl.sim.physics.clock import ClockCfg
 from veca_marl.sim.physics.props.prop import REST_SPEED, Awake, Prop, Rest, Sleep
 
@@ -71,11 +72,11 @@ class RestingProps:
     It is itself the `Rest` of the fixed props: when one is put elsewhere, all others wake.
 
     Args:
-        client: PyBullet's client id.
+        client: The PyBullet client.
         clock: Its `sleep_s` is the time at rest after which a prop sleeps.
     """
 
-    def __init__(self, client: int, clock: ClockCfg) -> None:
+    def __init__(self, client: BulletClient, clock: ClockCfg) -> None:
         self._client = client
         self._kept: list[tuple[Prop, Floats, Floats]] = []
         self._steps = math.ceil(clock.sleep_s / clock.step_s)
@@ -139,11 +140,11 @@ class RestingProps:
         return bool(self._woken)
 
 
-def prop_sleep(client: int, clock: ClockCfg) -> PropSleep:
+def prop_sleep(client: BulletClient, clock: ClockCfg) -> PropSleep:
     """Return the sleep of the props of a world, if its clock has any.
 
     Args:
-        client: PyBullet's client id.
+        client: The PyBullet client.
         clock: The clock of the world.
     """
     if math.isinf(clock.sleep_s):
