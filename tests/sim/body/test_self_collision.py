@@ -64,7 +64,7 @@ def test_a_standing_body_has_contacts_of_hands_and_thighs_only(floating):
     let_pass(world, 0.2)
     hands = [body.bone(f"{side}_hand").position for side in "lr"]
     for contact in contacts(world, body):
-        assert min(np.linalg.norm(contact[5] - hand) for hand in hands) < 0.06
+        assert min(np.linalg.norm(contact.position_on_a - hand) for hand in hands) < 0.06
         assert -contact.distance_m < 0.0035, "no deeper than the skin of the hand"
 
 

@@ -53,7 +53,7 @@ def test_an_asymmetric_compound_turns_as_its_parts_together():
     info = world.client.getDynamicsInfo(prop.body_id, -1)
     matrix = axes @ np.diag(info.moments) @ axes.T
     np.testing.assert_allclose(prop.rotation.T @ matrix @ prop.rotation, whole.matrix, atol=1e-9)
-    assert info[0] == pytest.approx(1.5)
+    assert info.mass_kg == pytest.approx(1.5)
 
 
 def test_a_compound_that_falls_and_spins_keeps_its_angular_momentum():

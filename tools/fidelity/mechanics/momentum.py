@@ -93,7 +93,8 @@ def _link_rows(world: World, body: Humanoid) -> list[tuple[float, Floats, Floats
         dynamics = client.getDynamicsInfo(body_id, link)
         axes = np.reshape(pybullet.getMatrixFromQuaternion(quaternion), (3, 3))
         inertia = axes @ np.diag(dynamics.moments) @ axes.T
-        rows.append((dynamics.mass_kg, np.array(centre), *map(np.array, speeds), inertia))
+        linear, angular = map(np.array, speeds)
+        rows.append((dynamics.mass_kg, np.array(centre), linear, angular, inertia))
     return rows
 
 

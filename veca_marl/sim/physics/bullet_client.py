@@ -296,7 +296,11 @@ class BulletClient:
         rayToPositions: Sequence[Sequence[float]],
         reportHitNumber: int = -1,
     ) -> tuple[RayHit, ...]:
-        """Return what each of several rays hits: the first thing, or that of a number."""
+        """Return what each of several rays hits first.
+
+        With a `reportHitNumber` of 0 or more it is one of all things on the ray, in Bullet's order,
+        which is not that of their distance.
+        """
         hits = pybullet.rayTestBatch(
             rayFromPositions,
             rayToPositions,
