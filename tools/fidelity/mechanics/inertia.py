@@ -156,7 +156,8 @@ def _hang(world: World) -> None:
     pivot = np.array([0.0, 0.0, _HEIGHT_M])
     body_id = world.prop("rod").body_id
     world.client.createConstraint(
-        body_id, -1, -1, -1, pybullet.JOINT_POINT2POINT, (0, 0, 0), up, pivot)  # fmt: skip
+        body_id, -1, -1, -1, pybullet.JOINT_POINT2POINT, (0, 0, 0), up, pivot
+    )
     turned = pybullet.getQuaternionFromEuler((0.0, _AMPLITUDE_RAD, 0.0))
     rotation = np.array(pybullet.getMatrixFromQuaternion(turned)).reshape(3, 3)
     world.client.resetBasePositionAndOrientation(body_id, (pivot - rotation @ up).tolist(), turned)
