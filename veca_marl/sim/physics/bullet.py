@@ -9,6 +9,7 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from itertools import count
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -221,8 +222,7 @@ class BuiltContacts:
 
 def _moving_links(client: BulletClient) -> set[tuple[int, int]]:
     """Return all links that move and have a collision shape, with their bodies."""
-    count = client.getNumBodies()
-    bodies = [client.getBodyUniqueId(i) for i in range(count)]
+    bodies = [client.getBodyUniqueId(i) for i in range(client.getNumBodies())]
     return {
         (body, link)
         for body in bodies
@@ -232,7 +232,6 @@ def _moving_links(client: BulletClient) -> set[tuple[int, int]]:
     }
 
 
-_MOST_HITS = 8  # a ray is followed through so many things
 _LEAST_COSINE = 0.3  # of the angle between a ray and a normal: at flatter angles it is used instead
 
 
@@ -257,11 +256,12 @@ def free_path_m(
     length_m = float(np.linalg.norm(end - start))
     way = (end - start) / length_m
     longer = start + (length_m + clearance_m / _LEAST_COSINE) * way
+    free_m = length_m
     for hit in _hits(client, start, longer):
         if hit.body_id != ignored_id:
             cosine = max(abs(float(hit.normal @ way)), _LEAST_COSINE)
-            return min(length_m, hit.distance_m - clearance_m / cosine)
-    return length_m
+            free_m = min(free_m, hit.distance_m - clearance_m / cosine)
+    return free_m
 
 
 def surface_m(client: BulletClient, body_id: int, start: Floats, end: Floats) -> float:
@@ -277,7 +277,7 @@ def surface_m(client: BulletClient, body_id: int, start: Floats, end: Floats) ->
         Metres; the distance to `end` if the ray misses the body.
     """
     its = (hit.distance_m for hit in _hits(client, start, end) if hit.body_id == body_id)
-    return next(its, float(np.linalg.norm(end - start)))
+    return min(its, default=float(np.linalg.norm(end - start)))
 
 
 class _Hit(NamedTuple):
@@ -287,9 +287,9 @@ class _Hit(NamedTuple):
 
 
 def _hits(client: BulletClient, start: Floats, end: Floats) -> Iterator[_Hit]:
-    """Yield what a ray hits, the nearest first."""
+    """Yield all that a ray hits, in Bullet's order, which is not that of the distance."""
     length_m = float(np.linalg.norm(end - start))
-    for number in range(_MOST_HITS):
+    for number in count():
         (hit,) = client.rayTestBatch([start.tolist()], [end.tolist()], reportHitNumber=number)
         if hit.body_id == -1:
             return
