@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from veca_marl.envs.rendering import RoomView, touch_image
 from veca_marl.play.session import Moment, Session
 from veca_marl.sim.geometry import Floats, Scene, SceneObject
+from veca_marl.sim.hearing import AudioSense
 from veca_marl.sim.touch import TAXELS_PER_TRIANGLE, load_taxels
 from veca_marl.sim.touch.parts import skin_parts
 
@@ -181,7 +182,7 @@ def spectrograms(
     Time runs to the right and ends with the present step, frequency runs upwards.
 
     Args:
-        spectra: One array ``(2, bins)`` per step, the observation `audio`, the present one last.
+        spectra: One array ``(2, bins)`` of log10 of magnitudes per step, the present one last.
             Without any the panels state that the agent does not hear.
         columns: Number of steps that are shown; earlier ones are left out, missing ones dark.
         height: Height of a panel in pixels.
@@ -238,8 +239,9 @@ class Screen:
         """Take note of a moment; call it once for each, also for those that are not drawn."""
         if moment.steps == 0:
             self._spectra.clear()
-        if "audio" in moment.observation:
-            self._spectra.append(moment.observation["audio"])
+        ears = self._session.game.actors[0].senses.get("audio")
+        if isinstance(ears, AudioSense):
+            self._spectra.append(ears.log_magnitudes(moment.observation["audio"]))
         for name, value in moment.terms.items():
             self._largest[name] = max(self._largest[name], abs(value))
 

@@ -61,7 +61,7 @@ class CallSourceMap:
 
         Args:
             head: Pose of the listener's head.
-            audio: The observation ``audio``, ``(2, 250)``, log10 of magnitudes.
+            audio: ``(2, bins)`` log10 of magnitudes, see `AudioSense.log_magnitudes`.
         """
         power = sound_power(audio, self._noise_power)
         if power.max() < self._audible:
@@ -98,10 +98,10 @@ def _grid(room: RoomCfg) -> Floats:
 
 
 def sound_power(audio: NDArray[Any], noise_power: float = 0.0) -> Floats:
-    """Return the squared magnitudes of what is heard, ``(2, 250)``.
+    """Return the squared magnitudes of what is heard, ``(2, bins)``.
 
     Args:
-        audio: The observation ``audio``, ``(2, 250)``, log10 of magnitudes.
+        audio: ``(2, bins)`` log10 of magnitudes, see `AudioSense.log_magnitudes`.
         noise_power: Squared magnitude of the receivers' own noise in a bin.
     """
     power: Floats = np.maximum(10.0 ** (2.0 * audio.astype(np.float64)) - noise_power, 0.0)
@@ -237,11 +237,13 @@ class MultiAgentNavExpert(Expert[MultiAgentNav]):
         body, world = self.player.body, self.task.world
         locomotion = locomotion_of(self.player, world.clock.step_s)
         ears = self.player.senses.get("audio")
-        noise_power = ears.noise_power if isinstance(ears, AudioSense) else 0.0
+        self._ears = ears if isinstance(ears, AudioSense) else None
+        noise_power = 0.0 if self._ears is None else self._ears.noise_power
         self._search = ObjectSearch(body, locomotion, self.task.plan, world, noise_power)
 
     def act(self, observation: Mapping[str, NDArray[Any]]) -> Any:
         """Return a command for the player's kind of body, see `Expert.act`."""
         task, player = self.task, self.player
         seen = task.target.position if task.sees_target(player) else None
-        return self._search.command(observation.get("audio"), seen, player.name in task.arrived)
+        audio = None if self._ears is None else self._ears.log_magnitudes(observation["audio"])
+        return self._search.command(audio, seen, player.name in task.arrived)

@@ -1,4 +1,4 @@
-"""The sense of hearing: magnitude spectra and waveforms at the two ears of a body."""
+"""The sense of hearing: what the two ears of a body receive, see `encodings.py` for its form."""
 
 from __future__ import annotations
 
@@ -8,11 +8,18 @@ from enum import Enum
 from typing import Any
 
 import numpy as np
-import scipy.fft
 from numpy.typing import NDArray
 
 from veca_marl.sim.body import Body
 from veca_marl.sim.geometry import Floats, Pose
+from veca_marl.sim.hearing.encodings import (
+    MOST_BINS,
+    N_BINS,
+    WINDOW_SAMPLES,
+    Encoding,
+    Window,
+    make_encoder,
+)
 from veca_marl.sim.hearing.head_response import HeadResponse, check_scale
 from veca_marl.sim.hearing.hrtf import kemar_response, kemar_table, sofa_response, sofa_table
 from veca_marl.sim.hearing.receivers import HrtfReceiver, MonoReceiver, StereoReceiver
@@ -20,60 +27,6 @@ from veca_marl.sim.physics import World
 from veca_marl.sim.sense import Sense
 from veca_marl.sim.sound import NEAR_FIELD_M, Receiver
 from veca_marl.sim.spec import ArraySpec
-
-WINDOW_SAMPLES = 1024
-N_BINS = 250
-MAGNITUDE_FLOOR = 1e-8
-"""Added to each magnitude before the logarithm, as in the paper's code."""
-
-SILENCE = -8.0
-"""``log10(MAGNITUDE_FLOOR)``, the observed value of exact silence."""
-
-
-class Window(Enum):
-    """Weights of the samples before the Fourier transform; the paper's is rectangular."""
-
-    rectangular = "rectangular"
-    hann = "hann"
-
-
-def window_weights(window: Window) -> NDArray[np.float32]:
-    """Return the ``(1024,)`` weights of a window (Hann: periodic, as for spectral analysis)."""
-    if window is Window.hann:
-        return np.hanning(WINDOW_SAMPLES + 1)[:-1].astype(np.float32)
-    return np.ones(WINDOW_SAMPLES, np.float32)
-
-
-def noise_power(noise_floor_db: float | None, weights: NDArray[np.float32]) -> float:
-    """Return the expected squared magnitude of white noise in one bin.
-
-    Args:
-        noise_floor_db: Level of the noise relative to an rms pressure of 1; None for no noise.
-        weights: ``(1024,)`` weights of the window.
-    """
-    if noise_floor_db is None:
-        return 0.0
-    return float(10.0 ** (noise_floor_db / 10.0) * (weights**2).sum())
-
-
-def log_spectrum(samples: NDArray[np.float32], noise_power: float = 0.0) -> NDArray[np.float32]:
-    """Return ``log10(|rfft(samples)| + 1e-8)`` of the first 250 bins.
-
-    Args:
-        samples: ``(..., 1024)`` windowed sound pressure.
-        noise_power: Expected squared magnitude of the receiver's own noise; it is added to the
-            squared magnitude of each bin.
-
-    Returns:
-        ``(..., 250)`` float32, at least -8.
-    """
-    magnitude = np.abs(scipy.fft.rfft(samples)[..., :N_BINS])
-    if noise_power > 0.0:
-        magnitude = np.sqrt(magnitude**2 + np.float32(noise_power))
-    spectrum = np.log10(magnitude + np.float32(MAGNITUDE_FLOOR))
-    # the float32 logarithm of the floor may round to just below the lower bound of the spec
-    observation: NDArray[np.float32] = np.maximum(spectrum, np.float32(SILENCE))
-    return observation
 
 
 class AudioQuality(Enum):
@@ -100,7 +53,11 @@ class AudioCfg:
     Attributes:
         present: Whether the observation contains the sense.
         quality: See `AudioQuality`. It changes the content of the observation, never its shape.
-        waveform: Whether the samples of each step are observed too.
+        encoding: What the observation contains, see `Encoding`.
+        bins: Number of bins of the spectra, 21.5 Hz each: 250 end at 5.4 kHz, 513 at 11 kHz. The
+            frontal notches of KEMAR's pinnae, which depend on the elevation, are between 6.7 and
+            10.5 kHz.
+        waveform: Whether the samples of each step are observed too, as ``waveform``.
         sofa_path: SOFA file of a measured head in place of KEMAR. Needs the extra ``[sofa]``.
         sofa_sample_rate_hz: Sampling rate to use instead of the one that the SOFA file states.
         head_scale: Size of the head relative to the measured one, from 0.5 to 1.5: spectral
@@ -114,6 +71,8 @@ class AudioCfg:
 
     present: bool = True
     quality: AudioQuality = AudioQuality.hrtf
+    encoding: Encoding = Encoding.magnitude
+    bins: int = N_BINS
     waveform: bool = False
     sofa_path: str | None = None
     sofa_sample_rate_hz: float | None = None
@@ -124,6 +83,9 @@ class AudioCfg:
     def __post_init__(self) -> None:
         _check_choice("quality", self.quality, AudioQuality)
         _check_choice("window", self.window, Window)
+        _check_choice("encoding", self.encoding, Encoding)
+        if not 1 <= self.bins <= MOST_BINS:
+            raise ValueError(f"senses.audio.bins={self.bins} must be from 1 to {MOST_BINS}")
         check_scale(self.head_scale)
         if self.sofa_sample_rate_hz is not None and self.sofa_path is None:
             raise ValueError(
@@ -148,14 +110,11 @@ class AudioSense(Sense):
     moved; what moved lacks its Doppler shift in those steps (see `Listener.rejoin`).
 
     Observations:
-        audio: ``(2, 250)`` float32, left ear first: log10 of the magnitude of the first 250 bins
-            of the Fourier transform of the last 1024 samples (the formula of the paper's code).
-            At 22 050 Hz these are 0 to 5.4 kHz in steps of 21.5 Hz. Exact silence is -8; a
-            full-scale sine is 2.7.
+        audio: ``(2, 250)`` float32 by default, left ear first: log10 of the magnitude of the first
+            250 bins of the Fourier transform of the last 1024 samples (the formula of the paper's
+            code). At 22 050 Hz these are 0 to 5.4 kHz in steps of 21.5 Hz. Exact silence is -8; a
+            full-scale sine is 2.7. `AudioCfg.encoding` and `AudioCfg.bins` change its form.
         waveform: ``(2, step_samples)`` float32 sound pressure of this step, on request.
-
-    Attributes:
-        noise_power: Squared magnitude of the receivers' own noise in each bin; 0 without noise.
     """
 
     cfg_type = AudioCfg
@@ -170,12 +129,24 @@ class AudioSense(Sense):
             make_receiver(cfg, field.sample_rate_hz, nearest_m), self._steps_in_window
         )
         self._teleports = body.teleports
-        self._weights = window_weights(cfg.window)
-        self.noise_power = noise_power(cfg.noise_floor_db, self._weights)
+        self._encoder = make_encoder(cfg.encoding, cfg.window, cfg.noise_floor_db, cfg.bins)
         self._recent = np.zeros((2, max(WINDOW_SAMPLES, field.step_samples)), np.float32)
-        self.specs = {"audio": ArraySpec((2, N_BINS), np.float32, low=SILENCE)}
+        self.specs = {"audio": self._encoder.spec}
         if cfg.waveform:
             self.specs["waveform"] = ArraySpec((2, field.step_samples), np.float32)
+
+    @property
+    def noise_power(self) -> float:
+        """Squared magnitude of the receivers' own noise in each bin; 0 without noise."""
+        return self._encoder.noise_power
+
+    def log_magnitudes(self, audio: NDArray[Any]) -> NDArray[Any]:
+        """Return the log10 of the magnitudes in an observation ``audio``, ``(2, bins)``.
+
+        Args:
+            audio: In the encoding of this sense.
+        """
+        return self._encoder.log_magnitudes(audio)
 
     def reset(self) -> None:
         """See `Sense`."""
@@ -196,8 +167,7 @@ class AudioSense(Sense):
             self._append(self._listener.rejoin(centre, min(missed, self._steps_in_window)))
         waveform = self._listener.render(centre)
         self._append(waveform)
-        windowed = self._recent[:, -WINDOW_SAMPLES:] * self._weights
-        observation = {"audio": log_spectrum(windowed, self.noise_power)}
+        observation = {"audio": self._encoder.encode(self._recent[:, -WINDOW_SAMPLES:])}
         if "waveform" in self.specs:
             observation["waveform"] = waveform
         return observation
