@@ -110,7 +110,11 @@ def test_fingers_of_a_mitten_are_straight_and_follow_the_hand(make_child):
         ((0.0, 0.0, math.nan), ON_BACK, ("(0.0, 0.0, nan)",)),
         ((0.0, 0.0), ON_BACK, ("(0.0, 0.0)",)),
         ((0.0, 0.0, 0.0), Posture(0.0, {"knee.flexion": 5.0}), ("'knee.flexion'",)),
-        ((0.0, 0.0, 0.0), Posture(0.0, {"l_shank.flexion": -5.0}), ("l_shank.flexion", "148")),
+        (
+            (0.0, 0.0, 0.0),
+            Posture(0.0, {"l_shank.flexion": -5.0}),
+            ("l_shank.flexion", "-5 degrees", "148"),
+        ),
         ((0.0, 0.0, 0.0), np.full(82, np.nan), ("spine.flexion", "nan")),
         ((0.0, 0.0, 0.0), np.zeros(40), ("angles", "(40,)", "(82,)")),
     ],

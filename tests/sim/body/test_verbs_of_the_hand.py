@@ -288,8 +288,9 @@ def test_a_ball_that_does_not_declare_it_is_not_kicked_by_the_verb():
 
 
 def test_unknown_verbs_are_refused_where_they_are_named():
-    with pytest.raises(ValueError, match=naming("body.verbs", "'grap'", "grab")):
+    with pytest.raises(ValueError, match=naming("body.verbs", "'grap'", "grab")) as refusal:
         WalkerCfg(verbs=["grap"])
+    assert str(refusal.value).count("grab") == 2  # as the nearest one and among all
     with pytest.raises(ValueError, match=naming("body.verbs=['grab', 'grab']")):
         WalkerCfg(verbs=["grab", "grab"])
     with pytest.raises(ValueError, match=naming("prop 'ball'", "interactions", "'throw'")):

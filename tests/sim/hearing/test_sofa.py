@@ -195,7 +195,7 @@ def broken(fields):
         ("tf", fields, {"DataType": "TF"}, ("DataType", "TF", "FIR")),
         ("mono", {**fields, "Data.IR": responses[:, :1]}, {}, ("Data.IR", responses[:, :1].shape)),
         ("nan", {**fields, "Data.IR": responses * np.nan}, {}, ("Data.IR", "finite")),
-        ("zero", {**fields, "Data.IR": responses * 0.0}, {}, ("Data.IR", "zero")),
+        ("mute", {**fields, "Data.IR": responses * 0.0}, {}, ("Data.IR", "zero")),
         ("few", {**fields, "Data.IR": responses[:3]}, {}, ("3 directions",)),
         ("count", {**fields, "Data.IR": responses[:-1]}, {}, ("SourcePosition", positions.shape)),
         ("slow", {**fields, "Data.SamplingRate": np.array([100.0])}, {}, ("100.0 Hz",)),
@@ -227,7 +227,7 @@ def broken(fields):
             {},
             ("source", "0.00 m"),
         ),
-        ("side", only(fields, lambda a, e: a < 170.0), {}, ("directions", "side")),
+        ("half", only(fields, lambda a, e: a < 170.0), {}, ("directions", "side")),
         (
             "frontal",
             only(fields, lambda a, e: np.cos(np.deg2rad(a)) >= -1e-9),

@@ -114,7 +114,7 @@ def test_impossible_playgrounds_are_refused():
         ({"rooms": [RoomCfg(), RoomCfg(name="b")]}, ("'room'", "'b'", "93.6 m3")),
         (
             {"rooms": [RoomCfg(), RoomCfg(name="b", lower_m=(2.9, 0.0, 0.0))]},
-            ("'room'", "'b'", "1.56 m3"),
+            ("'room'", "'b'", "0.78 m3"),
         ),
     ],
 )

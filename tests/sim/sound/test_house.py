@@ -156,7 +156,7 @@ def walls(field, source, head):
 def test_impossible_losses_are_refused(wrong):
     with pytest.raises(ValueError, match="transmission_loss_db"):
         house(loss_db=wrong)
-    with pytest.raises(ValueError, match=naming("room")):
+    with pytest.raises(ValueError, match=naming("house", "room")):
         House([])
 
 

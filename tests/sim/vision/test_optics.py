@@ -180,9 +180,9 @@ def test_look_at_has_a_level_horizon():
         ({"width": 0}, "0x84"),
         ({"width": 84.5}, "84.5x84"),
         ({"fov_deg": 180.0}, "180.0"),
-        ({"fov_deg": np.nan}, "nan"),
+        ({"fov_deg": np.nan}, "fov_deg nan"),
         ({"near_m": 0.0}, "near_m 0.0"),
-        ({"near_m": 2.0, "far_m": 1.0}, "near"),
+        ({"near_m": 2.0, "far_m": 1.0}, "near_m 2.0"),
     ],
 )
 def test_invalid_cameras_are_refused(numbers, named):
