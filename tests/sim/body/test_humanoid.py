@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from humanoids import random_torques
+from refusals import naming
 from walking import empty_world, let_pass
 
 from veca_marl.sim.body import MOUNTS, Body, BodyCfg, make_body
@@ -42,7 +43,7 @@ def test_it_is_made_by_its_configuration():
     world = empty_world()
     body: Body = make_body("child", HumanoidCfg(), world)
     assert isinstance(body, Humanoid)
-    with pytest.raises(ValueError, match=r"no body is registered for BodyCfg.*WalkerCfg"):
+    with pytest.raises(ValueError, match=naming("BodyCfg", "WalkerCfg")):
         make_body("nobody", BodyCfg(), world)
     world.close()
 
@@ -104,39 +105,39 @@ def test_fingers_of_a_mitten_are_straight_and_follow_the_hand(make_child):
 
 
 @pytest.mark.parametrize(
-    ("position", "posture", "message"),
+    ("position", "posture", "parts"),
     [
-        ((0.0, 0.0, math.nan), ON_BACK, "cannot be at"),
-        ((0.0, 0.0), ON_BACK, "cannot be at"),
-        ((0.0, 0.0, 0.0), Posture(0.0, {"knee.flexion": 5.0}), "no joint 'knee.flexion'"),
-        ((0.0, 0.0, 0.0), Posture(0.0, {"l_shank.flexion": -5.0}), "it moves from 0 to 148"),
-        ((0.0, 0.0, 0.0), np.full(82, np.nan), "cannot be at nan degrees"),
-        ((0.0, 0.0, 0.0), np.zeros(40), r"angles \(40,\), not \(82,\)"),
+        ((0.0, 0.0, math.nan), ON_BACK, ("(0.0, 0.0, nan)",)),
+        ((0.0, 0.0), ON_BACK, ("(0.0, 0.0)",)),
+        ((0.0, 0.0, 0.0), Posture(0.0, {"knee.flexion": 5.0}), ("'knee.flexion'",)),
+        (
+            (0.0, 0.0, 0.0),
+            Posture(0.0, {"l_shank.flexion": -5.0}),
+            ("l_shank.flexion", "-5 degrees", "148"),
+        ),
+        ((0.0, 0.0, 0.0), np.full(82, np.nan), ("spine.flexion", "nan")),
+        ((0.0, 0.0, 0.0), np.zeros(40), ("angles", "(40,)", "(82,)")),
     ],
 )
-def test_impossible_places_are_refused(make_child, position, posture, message):
+def test_impossible_places_are_refused(make_child, position, posture, parts):
     _, body = make_child()
-    with pytest.raises(ValueError, match=message):
+    with pytest.raises(ValueError, match=naming(*parts)):
         body.place(position, 0.0, posture)
 
 
 @pytest.mark.parametrize(
-    ("numbers", "message"),
+    ("numbers", "parts"),
     [
-        ({"detail": "stick"}, r"body.detail='stick'; there are \['full', 'mitten'\]"),
-        (
-            {"action": "muscles"},
-            r"body.action='muscles'; there are \['torque', 'position', 'increment'\]",
-        ),
-        ({"joints": "some"}, r"body.joints='some'"),
-        ({"strength": 0.0}, r"body.strength=0.0"),
-        ({"strength": 2.0}, r"body.strength=2.0"),
-        ({"friction": math.nan}, r"body.friction=nan"),
-        ({"eye_range_deg": -1.0}, r"body.eye_range_deg=-1.0"),
+        ({"detail": "stick"}, ("body.detail='stick'", "full", "mitten")),
+        ({"action": "muscles"}, ("body.action='muscles'", "torque", "position")),
+        ({"joints": "some"}, ("body.joints='some'",)),
+        ({"strength": 0.0}, ("body.strength=0.0",)),
+        ({"strength": 2.0}, ("body.strength=2.0",)),
+        ({"eye_range_deg": -1.0}, ("body.eye_range_deg=-1.0",)),
     ],
 )
-def test_impossible_parameters_are_refused(numbers, message):
-    with pytest.raises(ValueError, match=message):
+def test_impossible_parameters_are_refused(numbers, parts):
+    with pytest.raises(ValueError, match=naming(*parts)):
         HumanoidCfg(**numbers)
 
 

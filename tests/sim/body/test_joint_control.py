@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 from humanoids import remove_gravity
+from refusals import naming
 from walking import let_pass
 
 from veca_marl.sim.body.anatomy import load_skeleton
@@ -164,23 +165,23 @@ def test_the_action_may_move_the_arms_alone(make_child):
 
 
 @pytest.mark.parametrize(
-    ("row", "message"),
+    ("row", "parts"),
     [
-        (np.zeros(81), r"'joints' is float64 of shape \(81,\), not numbers of shape \(82,\)"),
-        (np.full(82, np.nan), r"spine.flexion is nan, not in \[-1, 1\]"),
-        (np.full(82, np.inf), r"spine.flexion is inf"),
-        (np.full(82, 1.01), r"spine.flexion is 1.01"),
+        (np.zeros(81), ("'joints'", "(81,)", "(82,)")),
+        (np.full(82, np.nan), ("'joints'", "spine.flexion", "nan")),
+        (np.full(82, np.inf), ("'joints'", "spine.flexion", "inf")),
+        (np.full(82, 1.01), ("'joints'", "spine.flexion", "1.01")),
     ],
 )
-def test_impossible_actions_are_refused(make_child, row, message):
+def test_impossible_actions_are_refused(make_child, row, parts):
     _, body = make_child()
-    with pytest.raises(ValueError, match=message):
+    with pytest.raises(ValueError, match=naming(*parts)):
         body.act({"joints": row})
-    with pytest.raises(ValueError, match=message):
+    with pytest.raises(ValueError, match=naming(*parts)):
         body.apply_torque(row)
 
 
 def test_apply_torque_needs_a_torque_controlled_body(make_child):
     _, body = make_child(action=JointActionKind.position)
-    with pytest.raises(ValueError, match=r"needs body.action=torque"):
+    with pytest.raises(ValueError, match=naming("apply_torque", "body.action=torque")):
         body.apply_torque(np.zeros(82))

@@ -9,6 +9,7 @@ from humanoids import (
     set_random_joint_speeds,
     several_humanoids,
 )
+from refusals import naming
 from walking import empty_world
 
 from veca_marl.sim.body.anatomy import load_skeleton
@@ -139,8 +140,6 @@ def test_damping_takes_energy_at_any_step(alone, step_s):
 
 def test_too_long_physics_steps_are_refused():
     world = empty_world(clock=ClockCfg(substeps=3))
-    with pytest.raises(
-        ValueError, match=r"steps of 13.3 ms are too long for the contacts .* raise clock.substeps"
-    ):
+    with pytest.raises(ValueError, match=naming("child", "13.3 ms", "clock.substeps")):
         Humanoid("child", HumanoidCfg(), world)
     world.close()

@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 from humanoids import remove_gravity
+from refusals import naming
 from walking import empty_world, let_pass, walker_in
 
 from veca_marl.sim.body.humanoid import Detail, Humanoid, HumanoidCfg
@@ -215,5 +216,7 @@ def test_a_crawling_walker_that_turns_moves_its_pelvis_sideways():
 
 
 def test_an_unknown_quality_is_refused():
-    with pytest.raises(ValueError, match=r"senses.proprioception.quality='sharp'; choices"):
+    with pytest.raises(
+        ValueError, match=naming("senses.proprioception.quality='sharp'", "vestibular")
+    ):
         ProprioceptionCfg(quality="sharp")

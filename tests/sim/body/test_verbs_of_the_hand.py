@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from refusals import naming
 from verbs import begin, do, seeing, toy
 from walking import STEP_S, ball, box, empty_world, let_pass, walker_in, wall
 
@@ -287,13 +288,14 @@ def test_a_ball_that_does_not_declare_it_is_not_kicked_by_the_verb():
 
 
 def test_unknown_verbs_are_refused_where_they_are_named():
-    with pytest.raises(ValueError, match=r"body.verbs: .*'grap'.*did you mean grab"):
+    with pytest.raises(ValueError, match=naming("body.verbs", "'grap'", "grab")) as refusal:
         WalkerCfg(verbs=["grap"])
-    with pytest.raises(ValueError, match="once"):
+    assert str(refusal.value).count("grab") == 2  # as the nearest one and among all
+    with pytest.raises(ValueError, match=naming("body.verbs=['grab', 'grab']")):
         WalkerCfg(verbs=["grab", "grab"])
-    with pytest.raises(ValueError, match=r"prop 'ball': interactions: .*'throw'"):
+    with pytest.raises(ValueError, match=naming("prop 'ball'", "interactions", "'throw'")):
         empty_world(ball(interactions=["throw"]))
-    with pytest.raises(ValueError, match=r"verb 'grab'.*none"):
+    with pytest.raises(ValueError, match=naming("'grab'", "none", "body.verbs")):
         walker_in(empty_world()).encode(WalkCommand(0.0, 0.0, verb="grab"))
 
 

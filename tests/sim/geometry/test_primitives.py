@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from refusals import naming
 from scipy.spatial.transform import Rotation
 
 from veca_marl.sim.geometry import (
@@ -115,7 +116,7 @@ def test_the_corners_of_a_box_lie_on_its_surface_and_farthest_from_its_centre():
 
 
 def test_what_a_shape_does_not_have_is_refused():
-    with pytest.raises(ValueError, match="no radius"):
+    with pytest.raises(ValueError, match=naming("BOX", "radius")):
         _ = primitive(Shape.BOX).radius
-    with pytest.raises(ValueError, match="no corners"):
+    with pytest.raises(ValueError, match=naming("CAPSULE", "corners")):
         primitive(Shape.CAPSULE).corners()

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from eye_scenes import random_rotations
+from refusals import naming
 
 from veca_marl.sim.geometry import Geom, Scene, Shape
 
@@ -94,8 +95,8 @@ def test_painting_changes_the_triangles_of_one_object(make_child):
         ({"shape": Shape.BOX}, "half x, half y, half z"),
         ({"colour": (0.0, 1.5, 0.0)}, "1.5"),
         ({"offset": (0.0, np.inf, 0.0)}, "inf"),
-        ({"rotation": 2 * np.eye(3)}, "orthonormal"),
-        ({"rotation": np.diag((1.0, 1.0, -1.0))}, "right-handed"),
+        ({"rotation": 2 * np.eye(3)}, "rotation"),
+        ({"rotation": np.diag((1.0, 1.0, -1.0))}, "rotation"),
         ({"checker_m": -1.0}, "-1.0"),
     ],
 )
@@ -107,9 +108,9 @@ def test_impossible_primitives_are_refused(numbers, named):
 def test_impossible_objects_are_refused():
     scene = Scene()
     scene.add_object("ball", [[BALL]])
-    with pytest.raises(ValueError, match="'ball' is already"):
+    with pytest.raises(ValueError, match=naming("'ball'")):
         scene.add_object("ball", [[BALL]])
-    with pytest.raises(ValueError, match="no frame"):
+    with pytest.raises(ValueError, match=naming("'ghost'", "frame")):
         scene.add_object("ghost", [])
     with pytest.raises(ValueError, match=r"object id 7"):
         scene.hidden(7, ())
@@ -118,5 +119,5 @@ def test_impossible_objects_are_refused():
 
 
 def test_a_scene_can_be_full():
-    with pytest.raises(ValueError, match=r"40000 primitives.*32767"):
+    with pytest.raises(ValueError, match=naming("'dust'", "40000", "32767")):
         Scene().add_object("dust", [[BALL] * 40_000])

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import scipy.signal
 from paths import SHARED
+from refusals import naming
 
 from veca_marl.sim.hearing import SofaError, condition, read_sofa, sofa_table
 from veca_marl.sim.hearing.head_response import minimum_phase
@@ -105,7 +106,7 @@ def test_other_sampling_rates_give_the_same_responses(fields, head, tmp_path):
 def test_swapped_ears_are_detected_by_their_energy(fields, head, tmp_path):
     swapped = {**fields, "Data.IR": fields["Data.IR"][:, ::-1]}
     path = write(tmp_path / "swapped.sofa", swapped)
-    with pytest.warns(UserWarning, match=r"swapped\.sofa: ReceiverPosition contradicts"):
+    with pytest.warns(UserWarning, match=naming("swapped.sofa", "ReceiverPosition")):
         found = condition(read_sofa(path), 22_050)
     assert np.array_equal(found.filters, head.filters)
     swapped["ReceiverPosition"] = -fields["ReceiverPosition"]
@@ -154,7 +155,7 @@ def test_a_wrong_sampling_rate_is_detected_by_the_head_radius(fields, tmp_path):
     with pytest.warns(UserWarning, match=r"radius 5\.\d cm"):
         small = condition(read_sofa(path, sample_rate_hz=70_560.0), 22_050)
     assert small.head_radius_m == pytest.approx(RADIUS * FILE_RATE / 70_560.0, abs=0.002)
-    with pytest.raises(SofaError, match=r"rate\.sofa.*not that of a head"):
+    with pytest.raises(SofaError, match=naming("rate.sofa", "radius")):
         condition(read_sofa(path, sample_rate_hz=176_400.0), 22_050)
 
 
@@ -179,60 +180,75 @@ def only(fields, directions):
 
 
 def broken(fields):
-    """Name, fields, attributes and the expected message."""
+    """Name, fields, attributes and what the message has to name."""
     responses, positions = fields["Data.IR"], fields["SourcePosition"]
     without = {key: value for key, value in fields.items() if key != "Data.IR"}
     return [
-        ("lacks", without, {}, "lacks Data.IR"),
-        ("netcdf", fields, {"Conventions": "CF"}, "SOFA"),
-        ("room", fields, {"SOFAConventions": "SingleRoomDRIR"}, "SingleRoomDRIR"),
-        ("tf", fields, {"DataType": "TF"}, "DataType is TF"),
-        ("mono", {**fields, "Data.IR": responses[:, :1]}, {}, "Data.IR has shape"),
-        ("nan", {**fields, "Data.IR": responses * np.nan}, {}, "not finite"),
-        ("zero", {**fields, "Data.IR": responses * 0.0}, {}, "zero"),
-        ("few", {**fields, "Data.IR": responses[:3]}, {}, "3 directions"),
-        ("count", {**fields, "Data.IR": responses[:-1]}, {}, "SourcePosition has shape"),
-        ("slow", {**fields, "Data.SamplingRate": np.array([100.0])}, {}, "sampling rate 100"),
+        ("lacks", without, {}, ("Data.IR",)),
+        ("netcdf", fields, {"Conventions": "CF"}, ("attribute", "Conventions")),
+        (
+            "room",
+            fields,
+            {"SOFAConventions": "SingleRoomDRIR"},
+            ("SOFAConventions", "SingleRoomDRIR"),
+        ),
+        ("tf", fields, {"DataType": "TF"}, ("DataType", "TF", "FIR")),
+        ("mono", {**fields, "Data.IR": responses[:, :1]}, {}, ("Data.IR", responses[:, :1].shape)),
+        ("nan", {**fields, "Data.IR": responses * np.nan}, {}, ("Data.IR", "finite")),
+        ("mute", {**fields, "Data.IR": responses * 0.0}, {}, ("Data.IR", "zero")),
+        ("few", {**fields, "Data.IR": responses[:3]}, {}, ("3 directions",)),
+        ("count", {**fields, "Data.IR": responses[:-1]}, {}, ("SourcePosition", positions.shape)),
+        ("slow", {**fields, "Data.SamplingRate": np.array([100.0])}, {}, ("100.0 Hz",)),
         (
             "rates",
             {**fields, "Data.SamplingRate": np.array([44.1e3, 48e3])},
             {},
-            "SamplingRate has",
+            ("Data.SamplingRate", "(2,)"),
         ),
-        ("delay", {**fields, "Data.Delay": np.zeros((3, 2))}, {}, "Data.Delay has shape"),
-        ("text", {**fields, "Data.IR": "none"}, {}, "Data.IR is not an array of numbers"),
-        ("untyped", fields, {"kind": "", "units": "degree"}, "SourcePosition has Type ''"),
-        ("unitless", fields, {"units": ""}, "SourcePosition has Type 'spherical' and Units ''"),
-        ("feet", fields, {"units": "degree, degree, foot"}, "Units 'degree, degree, foot'"),
+        ("delay", {**fields, "Data.Delay": np.zeros((3, 2))}, {}, ("Data.Delay", "(3, 2)")),
+        ("text", {**fields, "Data.IR": "none"}, {}, ("Data.IR", "numbers")),
+        ("untyped", fields, {"kind": "", "units": "degree"}, ("SourcePosition", "Type ''")),
+        ("unitless", fields, {"units": ""}, ("SourcePosition", "'spherical'", "Units ''")),
+        (
+            "feet",
+            fields,
+            {"units": "degree, degree, foot"},
+            ("SourcePosition", "'degree, degree, foot'"),
+        ),
         (
             "colatitude",
             {**fields, "SourcePosition": positions + np.array([0.0, 90.0, 0.0])},
             {},
-            "elevations up to",
+            ("SourcePosition", "elevations"),
         ),
         (
             "near",
             {**fields, "SourcePosition": positions * (1, 1, 0)},
             {},
-            "longest distance of a source is 0.00 m",
+            ("source", "0.00 m"),
         ),
-        ("side", only(fields, lambda a, e: a < 170.0), {}, "one side"),
+        ("half", only(fields, lambda a, e: a < 170.0), {}, ("directions", "side")),
         (
             "frontal",
             only(fields, lambda a, e: np.cos(np.deg2rad(a)) >= -1e-9),
             {},
-            "90 degrees away",
+            ("azimuth", "elevation", "90 degrees"),
         ),
-        ("horizontal", only(fields, lambda a, e: e == 0.0), {}, "90 degrees away"),
-        ("rad", {**fields, "SourcePosition": np.deg2rad(positions)}, {}, "longest distance of"),
+        (
+            "horizontal",
+            only(fields, lambda a, e: e == 0.0),
+            {},
+            ("azimuth", "elevation", "90 degrees"),
+        ),
+        ("rad", {**fields, "SourcePosition": np.deg2rad(positions)}, {}, ("source", "0.02 m")),
     ]
 
 
 @pytest.mark.parametrize("case", range(22))
 def test_errors_of_invalid_files_name_the_file(fields, tmp_path, case):
-    name, content, attributes, message = broken(fields)[case]
+    name, content, attributes, parts = broken(fields)[case]
     path = write(tmp_path / f"{name}.sofa", content, **attributes)
-    with pytest.raises(SofaError, match=rf"{name}\.sofa.*{message}"):
+    with pytest.raises(SofaError, match=naming(f"{name}.sofa", *parts)):
         read_sofa(path)
 
 
@@ -278,7 +294,7 @@ def test_of_several_distances_the_longest_is_used(fields, tmp_path):
         "Data.IR": np.concatenate([0.5 * fields["Data.IR"], fields["Data.IR"]]),
         "SourcePosition": np.concatenate([near, fields["SourcePosition"]]),
     }
-    with pytest.warns(UserWarning, match=r"both\.sofa: of 120 measurements the 60"):
+    with pytest.warns(UserWarning, match=naming("both.sofa", "120", "60")):
         found = read_sofa(write(tmp_path / "both.sofa", content))
     expected = read_sofa(write(tmp_path / "far.sofa", fields))
     assert found.distance_m == pytest.approx(1.4)
@@ -305,7 +321,7 @@ def test_declared_sizes_that_are_not_stored_are_refused_before_allocation(fields
 
     path = replaced(fields, tmp_path / "large.sofa", key, create)
     assert path.stat().st_size < 1_000_000
-    with pytest.raises(SofaError, match=rf"large\.sofa: {key} declares \d+ values"):
+    with pytest.raises(SofaError, match=naming("large.sofa", key, 3 << 47)):
         read_sofa(path)
 
 
@@ -316,7 +332,9 @@ def test_a_moderate_size_that_is_not_stored_is_refused(fields, tmp_path):
         "Data.IR",
         lambda file, name: file.create_dataset(name, (60, 2, 65_536), "f8", chunks=(1, 2, 1024)),
     )
-    with pytest.raises(SofaError, match=r"declares \d+ values but only 0 bytes are stored"):
+    with pytest.raises(
+        SofaError, match=naming("hollow.sofa", "Data.IR", 60 * 2 * 65_536, "0 bytes")
+    ):
         read_sofa(path)
 
 
@@ -337,18 +355,18 @@ def test_links_and_external_data_are_refused(fields, tmp_path):
     def linked(file, name):
         file[name] = h5py.ExternalLink(str(tmp_path / "other.sofa"), name)
 
-    for create, message in ((linked, "is a link"), (external, "another"), (virtual, "another")):
-        path = replaced(fields, tmp_path / "linked.sofa", "Data.IR", create)
-        with pytest.raises(SofaError, match=message):
+    for create, place in ((linked, "link"), (external, "file"), (virtual, "file")):
+        path = replaced(fields, tmp_path / "elsewhere.sofa", "Data.IR", create)
+        with pytest.raises(SofaError, match=naming("elsewhere.sofa", "Data.IR", place)):
             read_sofa(path)
 
 
 def test_missing_files_and_files_that_are_not_hdf5_are_refused(tmp_path):
     path = tmp_path / "page.sofa"
     path.write_text("<html>404</html>")
-    with pytest.raises(SofaError, match=r"page\.sofa: cannot be read"):
+    with pytest.raises(SofaError, match=naming("page.sofa", "SOFA")):
         read_sofa(path)
-    with pytest.raises(SofaError, match="no such file"):
+    with pytest.raises(SofaError, match=naming("nowhere.sofa")):
         read_sofa(tmp_path / "nowhere.sofa")
 
 
@@ -362,7 +380,7 @@ def test_a_file_of_the_listen_set():
     """IRCAM's page says 44 100 Hz; the file says 48 000 and has the receivers reversed."""
     if not LISTEN.exists():
         pytest.skip("the LISTEN file is not here")
-    with pytest.warns(UserWarning, match="ReceiverPosition contradicts"):
+    with pytest.warns(UserWarning, match=naming(LISTEN.name, "ReceiverPosition")):
         table = sofa_table(str(LISTEN), 22_050, 44_100.0)
     assert table.head_radius_m == pytest.approx(0.085, abs=0.003)
     left = table.filters[18, 18]  # azimuth 90, elevation 0

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from refusals import naming
 from walking import box, empty_world, film, let_pass, walker_in
 
 from veca_marl.sim.physics import (
@@ -336,19 +337,19 @@ def test_yields_tells_apart_pushes_that_move_and_pushes_against_the_stop():
 
 
 @pytest.mark.parametrize(
-    ("numbers", "reason"),
+    ("numbers", "parts"),
     [
-        ({"kind": "ball"}, "kind='ball'.*hinge"),
-        ({"axis": (0, 0, 0)}, "axis"),
-        ({"range_deg": 0.0}, "range_deg=0"),
-        ({"range_deg": 270.0}, "at most 180"),
-        ({"range_m": math.nan}, "range_m"),
-        ({"friction": -1.0}, "friction"),
-        ({"opening": 1.5}, "opening=1.5"),
+        ({"kind": "ball"}, ("kind='ball'", "hinge")),
+        ({"axis": (0, 0, 0)}, ("axis=(0, 0, 0)",)),
+        ({"range_deg": 0.0}, ("range_deg=0.0",)),
+        ({"range_deg": 270.0}, ("range_deg=270.0", "180")),
+        ({"range_m": math.nan}, ("range_m=nan",)),
+        ({"friction": -1.0}, ("friction=-1.0",)),
+        ({"opening": 1.5}, ("opening=1.5",)),
     ],
 )
-def test_impossible_joints_are_refused(numbers, reason):
-    with pytest.raises(ValueError, match=reason):
+def test_impossible_joints_are_refused(numbers, parts):
+    with pytest.raises(ValueError, match=naming(*parts)):
         JointCfg(**numbers)
 
 
@@ -356,19 +357,19 @@ def test_a_joint_needs_a_movable_prop_and_a_fixed_parent():
     with pytest.raises(ValueError, match=r"'door': mass_kg=0\.0"):
         PropCfg("door", PropShape.box, [1.0, 1.0, 1.0], joint=JointCfg())
     world = empty_world(box("crate"))
-    with pytest.raises(ValueError, match=r"'drawer': joint.parent='cupboard'.*there are \[\]"):
+    with pytest.raises(ValueError, match=naming("'drawer'", "joint.parent='cupboard'", "[]")):
         world.add_prop(drawer())
-    with pytest.raises(ValueError, match="'crate' has no joint"):
+    with pytest.raises(ValueError, match=naming("'crate'", "joint")):
         world.prop("crate").set_opening(0.5)
 
 
-@pytest.mark.parametrize(("key", "fault"), [("kye", "is no prop"), ("cupboard", "is a fixed prop")])
+@pytest.mark.parametrize(("key", "fault"), [("kye", ""), ("cupboard", "fixed")])
 def test_a_lock_without_a_key_that_can_be_carried_is_refused_with_the_loose_props(key, fault):
     world = World(PlaygroundCfg(props=[CUPBOARD, door(lock=LockCfg(key, locked=False))]))
     for name in ("ball", "key"):
         world.add_prop(box(name, position=(0.0, 1.0, 1.0)))
     with pytest.raises(
-        ValueError, match=rf"prop 'door': the key '{key}' of its lock {fault}; .*\['ball', 'key'\]"
+        ValueError, match=naming("'door'", f"'{key}'", "lock", fault, "['ball', 'key']")
     ):
         world.freeze()
     world.close()

@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 from composed import compose
+from refusals import naming
 from walking import ball, let_pass, walker_in
 
 from veca_marl.config import conf_dir
@@ -74,7 +75,7 @@ def test_a_margin_may_not_be_wider_than_the_room():
 
 @pytest.mark.parametrize("wrong", [(0.0, 1.0, 1.0), (1.0, -1.0, 1.0), (1.0, 1.0, math.nan)])
 def test_impossible_sizes_are_refused(wrong):
-    with pytest.raises(ValueError, match="'attic': size_m"):
+    with pytest.raises(ValueError, match=naming("'attic'", "size_m")):
         RoomCfg(name="attic", size_m=wrong)
 
 
@@ -90,32 +91,35 @@ def test_positions_of_rooms_must_be_finite():
 
 
 def test_impossible_playgrounds_are_refused():
-    with pytest.raises(ValueError, match="no room"):
+    with pytest.raises(ValueError, match=naming("'void'", "room")):
         PlaygroundCfg(name="void", rooms=[])
-    with pytest.raises(ValueError, match=r"share the names \['ball'\]"):
+    with pytest.raises(ValueError, match=naming("'twins'", "props", "['ball']")):
         PlaygroundCfg(name="twins", props=[ball(), ball()])
     with pytest.raises(ValueError, match="image_order=-1"):
         PlaygroundCfg(name="early", image_order=-1)
 
 
 @pytest.mark.parametrize(
-    ("numbers", "named"),
+    ("numbers", "parts"),
     [
-        ({"image_order": 1000}, r"image_order=1000 .*from 0 \(direct sound\) to 12"),
-        ({"image_order": 1.5}, "image_order=1.5"),
-        ({"image_order": math.inf}, "image_order=inf"),
-        ({"floor_colour": (1.2, 0.5, 0.5)}, r"floor_colour=\(1.2, 0.5, 0.5\) .*in \[0, 1\]"),
-        ({"floor_colour": (0.5, 0.5)}, "floor_colour"),
-        ({"floor_checker_m": -0.5}, "floor_checker_m=-0.5"),
-        ({"floor_size_m": (0.0, 6.0)}, "floor_size_m"),
-        ({"floor_centre_m": (math.nan, 0.0)}, "floor_centre_m"),
-        ({"rooms": [RoomCfg(), RoomCfg(lower_m=(5.0, 0.0, 0.0))]}, r"rooms share.*\['room'\]"),
-        ({"rooms": [RoomCfg(), RoomCfg(name="b")]}, "'room' and 'b' overlap by 93.6 m3"),
-        ({"rooms": [RoomCfg(), RoomCfg(name="b", lower_m=(2.9, 0.0, 0.0))]}, "overlap by"),
+        ({"image_order": 1000}, ("image_order=1000", "12")),
+        ({"image_order": 1.5}, ("image_order=1.5",)),
+        ({"image_order": math.inf}, ("image_order=inf",)),
+        ({"floor_colour": (1.2, 0.5, 0.5)}, ("floor_colour=(1.2, 0.5, 0.5)",)),
+        ({"floor_colour": (0.5, 0.5)}, ("floor_colour=(0.5, 0.5)",)),
+        ({"floor_checker_m": -0.5}, ("floor_checker_m=-0.5",)),
+        ({"floor_size_m": (0.0, 6.0)}, ("floor_size_m=(0.0, 6.0)",)),
+        ({"floor_centre_m": (math.nan, 0.0)}, ("floor_centre_m=(nan, 0.0)",)),
+        ({"rooms": [RoomCfg(), RoomCfg(lower_m=(5.0, 0.0, 0.0))]}, ("rooms", "['room']")),
+        ({"rooms": [RoomCfg(), RoomCfg(name="b")]}, ("'room'", "'b'", "93.6 m3")),
+        (
+            {"rooms": [RoomCfg(), RoomCfg(name="b", lower_m=(2.9, 0.0, 0.0))]},
+            ("'room'", "'b'", "0.78 m3"),
+        ),
     ],
 )
-def test_numbers_out_of_range_are_refused_by_name(numbers, named):
-    with pytest.raises(ValueError, match=named):
+def test_numbers_out_of_range_are_refused_by_name(numbers, parts):
+    with pytest.raises(ValueError, match=naming(*parts)):
         PlaygroundCfg(name="odd", **numbers)
 
 
@@ -129,13 +133,13 @@ def test_rooms_may_touch():
 @pytest.mark.parametrize(
     ("numbers", "named"),
     [
-        ({"colour": (0.5, 0.5, 255.0)}, r"prop 'ball': colour=\(0.5, 0.5, 255.0\)"),
-        ({"colour": (0.5, 0.5, math.nan)}, "colour"),
-        ({"checker_m": -0.1}, "prop 'ball': checker_m=-0.1"),
+        ({"colour": (0.5, 0.5, 255.0)}, "colour=(0.5, 0.5, 255.0)"),
+        ({"colour": (0.5, 0.5, math.nan)}, "colour=(0.5, 0.5, nan)"),
+        ({"checker_m": -0.1}, "checker_m=-0.1"),
     ],
 )
 def test_an_impossible_appearance_of_a_prop_is_refused(numbers, named):
-    with pytest.raises(ValueError, match=named):
+    with pytest.raises(ValueError, match=naming("prop 'ball'", named)):
         ball(**numbers)
 
 
@@ -156,5 +160,5 @@ def test_a_start_faces_the_middle():
 
 
 def test_a_start_needs_a_room_of_some_size():
-    with pytest.raises(ValueError, match="leaves no floor"):
+    with pytest.raises(ValueError, match=naming("size_m=(1.0, 1.0, 1.0)", "0.6 m")):
         RoomCfg(size_m=(1.0, 1.0, 1.0)).sample_start(np.random.default_rng(0), margin_m=0.6)

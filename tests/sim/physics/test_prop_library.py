@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from refusals import naming
 from walking import empty_world, let_pass, wall
 
 from veca_marl.sim.physics import LockCfg
@@ -133,26 +134,34 @@ def test_a_fraction_must_be_one():
 
 
 @pytest.mark.parametrize(
-    ("make", "numbers", "message"),
+    ("make", "numbers", "parts"),
     [
-        (basket, {"size_m": (0.03, 0.4, 0.15)}, r"size_m=\(0.03, .* above \(0.03, 0.03, 0.015\)"),
-        (basket, {"size_m": (0.4, 0.02, 0.15)}, r"size_m=\(0.4, 0.02, 0.15\)"),
-        (basket, {"size_m": (0.4, 0.4, 0.01)}, r"size_m=\(0.4, 0.4, 0.01\)"),
-        (basket, {"size_m": (0.4, 0.4)}, r"size_m=\(0.4, 0.4\)"),
-        (chest, {"size_m": (0.35, 0.55, 0.045)}, "above .0.03, 0.03, 0.045.*below the lid"),
-        (cupboard_with_drawer, {"size_m": (0.05, 0.45, 0.5)}, r"size_m=\(0.05, .*above \(0.056, "),
-        (cupboard_with_drawer, {"size_m": (0.4, 0.07, 0.5)}, "0.072, 0.232.*drawer_height_m=0.16"),
-        (cupboard_with_drawer, {"size_m": (0.4, 0.45, 0.2)}, r"size_m=\(0.4, 0.45, 0.2\)"),
-        (cupboard_with_drawer, {"drawer_height_m": 0.45}, "drawer_height_m=0.45"),
+        (
+            basket,
+            {"size_m": (0.03, 0.4, 0.15)},
+            ("size_m=(0.03, 0.4, 0.15)", "(0.03, 0.03, 0.015)"),
+        ),
+        (basket, {"size_m": (0.4, 0.02, 0.15)}, ("size_m=(0.4, 0.02, 0.15)",)),
+        (basket, {"size_m": (0.4, 0.4, 0.01)}, ("size_m=(0.4, 0.4, 0.01)",)),
+        (basket, {"size_m": (0.4, 0.4)}, ("size_m=(0.4, 0.4)",)),
+        (chest, {"size_m": (0.35, 0.55, 0.045)}, ("(0.03, 0.03, 0.045)", "lid")),
         (
             cupboard_with_drawer,
-            {"drawer_height_m": 0.01},
-            "drawer_height_m=0.01 must be above 0.01",
+            {"size_m": (0.05, 0.45, 0.5)},
+            ("size_m=(0.05, 0.45, 0.5)", "(0.056, 0.072, 0.232)"),
         ),
+        (
+            cupboard_with_drawer,
+            {"size_m": (0.4, 0.07, 0.5)},
+            ("size_m=(0.4, 0.07, 0.5)", "0.072", "drawer_height_m=0.16"),
+        ),
+        (cupboard_with_drawer, {"size_m": (0.4, 0.45, 0.2)}, ("size_m=(0.4, 0.45, 0.2)",)),
+        (cupboard_with_drawer, {"drawer_height_m": 0.45}, ("drawer_height_m=0.45",)),
+        (cupboard_with_drawer, {"drawer_height_m": 0.01}, ("drawer_height_m=0.01", "0.0133")),
     ],
 )
-def test_sizes_without_an_interior_are_refused_by_the_name_of_the_argument(make, numbers, message):
-    with pytest.raises(ValueError, match=f"^thing: .*{message}"):
+def test_sizes_without_an_interior_are_refused_by_the_name_of_the_argument(make, numbers, parts):
+    with pytest.raises(ValueError, match=naming("thing", *parts)):
         make("thing", (0.0, 0.0), **numbers)
 
 

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from refusals import naming
 from walking import ball, box, empty_world, let_pass, wall
 
 from veca_marl.sim.geometry import distances_to
@@ -180,9 +181,10 @@ def test_returned_positions_are_copies():
 def test_sizes_are_counted_and_named(shape):
     some = [-1.0] * (len(SIZES[shape]) or 1)
     for wrong in ([*SIZES[shape], 1.0], some, [math.nan] * 3):
-        with pytest.raises(ValueError, match=", ".join(SIZE_NAMES[shape]) or "none") as refusal:
+        with pytest.raises(
+            ValueError, match=naming("'thing'", f"size_m={wrong}", *SIZE_NAMES[shape])
+        ):
             PropCfg(name="thing", shape=shape, size_m=wrong)
-        assert "'thing'" in str(refusal.value)
 
 
 @pytest.mark.parametrize(
@@ -204,45 +206,48 @@ def test_impossible_numbers_are_refused(field, wrong):
 
 
 @pytest.mark.parametrize(
-    ("numbers", "message"),
+    ("numbers", "parts"),
     [
-        ({"shape": PropShape.pyramid, "size_m": [0.1, 0.1, 0.0015]}, "size_m=.* a pyramid"),
+        (
+            {"shape": PropShape.pyramid, "size_m": [0.1, 0.1, 0.0015]},
+            ("size_m=[0.1, 0.1, 0.0015]", "pyramid"),
+        ),
         (
             {"shape": PropShape.sector, "size_m": [0.2, 0.04], "angle_deg": 0.4},
-            "size_m=.*angle_deg=0.4",
+            ("size_m=[0.2, 0.04]", "angle_deg=0.4"),
         ),
         (
             {
                 "shape": PropShape.convex,
                 "points_m": [[0, 0, 0], [0.1, 0, 0], [0, 0.1, 0], [0, 0, 0.002]],
             },
-            "points_m=.* a convex",
+            ("points_m=", "[0, 0, 0.002]", "convex"),
         ),
     ],
 )
-def test_a_polyhedron_too_thin_to_collide_is_refused_by_its_name(numbers, message):
-    with pytest.raises(ValueError, match=f"prop 'thin': {message}.* that thin cannot collide"):
+def test_a_polyhedron_too_thin_to_collide_is_refused_by_its_name(numbers, parts):
+    with pytest.raises(ValueError, match=naming("prop 'thin'", "1 mm", *parts)):
         PropCfg("thin", **numbers)
-    with pytest.raises(ValueError, match=f"part: {message}.* that thin cannot collide"):
+    with pytest.raises(ValueError, match=naming("part", "1 mm", *parts)):
         PartCfg(**numbers)
 
 
 def test_the_error_for_an_unknown_shape_lists_the_shapes():
-    with pytest.raises(ValueError, match=r"'thing': shape='torus'.*'sphere'"):
+    with pytest.raises(ValueError, match=naming("'thing'", "shape='torus'", "sphere")):
         PropCfg(name="thing", shape="torus", size_m=[1.0])
 
 
 def test_a_prop_needs_a_name():
-    with pytest.raises(ValueError, match="without a name"):
+    with pytest.raises(ValueError, match=naming("sphere", "name")):
         PropCfg(shape=PropShape.sphere, size_m=[0.1])
 
 
 def test_a_position_must_be_finite():
     thing = empty_world(ball()).prop("ball")
     for wrong in ((0.0, 0.0), (0.0, math.nan, 0.0)):
-        with pytest.raises(ValueError, match="'ball': position"):
+        with pytest.raises(ValueError, match=naming("'ball'", "position")):
             thing.place(wrong)
-        with pytest.raises(ValueError, match="'ball': velocity"):
+        with pytest.raises(ValueError, match=naming("'ball'", "velocity")):
             thing.set_velocity(wrong)
 
 

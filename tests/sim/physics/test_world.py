@@ -5,6 +5,7 @@ import time
 import numpy as np
 import pytest
 from composed import compose
+from refusals import naming
 from walking import STEP_S, ball, box, empty_world, film, let_pass, walker_in
 
 from veca_marl.sim.physics import ClockCfg, World
@@ -99,31 +100,31 @@ def test_duration_of_steps():
 
 @pytest.mark.parametrize(
     ("wrong", "nearest"),
-    [(0, "1"), (-25, "1"), (26, "25 and 30"), (250, "245 and 294"), (44100, "22050")],
+    [(0, ("1",)), (-25, ("1",)), (26, ("25", "30")), (250, ("245", "294")), (44100, ("22050",))],
 )
 def test_an_agent_step_must_hold_a_whole_number_of_samples(wrong, nearest):
-    with pytest.raises(ValueError, match=rf"control_rate_hz={wrong}: .* do: {nearest}\. "):
+    with pytest.raises(ValueError, match=naming(f"control_rate_hz={wrong}", *nearest)):
         ClockCfg(control_rate_hz=wrong)
 
 
-@pytest.mark.parametrize("wrong", [{"substeps": 0}, {"solver_iterations": 0}])
-def test_a_clock_needs_substeps_and_iterations(wrong):
-    with pytest.raises(ValueError, match="at least 1"):
-        ClockCfg(**wrong)
+@pytest.mark.parametrize("field", ["substeps", "solver_iterations"])
+def test_a_clock_needs_substeps_and_iterations(field):
+    with pytest.raises(ValueError, match=naming(f"{field}=0")):
+        ClockCfg(**{field: 0})
 
 
 def test_names_are_unique():
     world = empty_world(ball())
-    with pytest.raises(ValueError, match=r"'ball' is taken; there are \['floor', 'ball'\]"):
+    with pytest.raises(ValueError, match=naming("['floor', 'ball']")):
         world.add_prop(ball())
     with pytest.raises(ValueError, match=r"\['ball'\]"):
         empty_world(ball(), ball())
-    with pytest.raises(ValueError, match="'floor' is taken"):
+    with pytest.raises(ValueError, match=naming("'floor'", "['floor']")):
         empty_world(ball("floor"))
 
 
 def test_the_error_for_an_unknown_prop_lists_the_props():
-    with pytest.raises(KeyError, match=r"no prop 'dog'.*'ball'"):
+    with pytest.raises(KeyError, match=naming("'dog'", "'ball'")):
         empty_world(ball()).prop("dog")
 
 
@@ -139,9 +140,9 @@ def test_nothing_can_be_added_to_a_frozen_world():
     with pytest.raises(RuntimeError, match="freeze"):
         world.reset(np.random.default_rng(0))
     world.freeze()
-    with pytest.raises(RuntimeError, match="add the prop 'ball'"):
+    with pytest.raises(RuntimeError, match=naming("frozen", "'ball'")):
         world.add_prop(ball())
-    with pytest.raises(RuntimeError, match="attach a body"):
+    with pytest.raises(RuntimeError, match=naming("frozen", "body")):
         walker_in(world)
     with pytest.raises(RuntimeError, match="frozen"):
         world.freeze()
@@ -167,7 +168,7 @@ def test_nothing_leaves_the_room_while_a_walker_runs_about():
     assert fastest < 3.5
 
 
-@pytest.mark.parametrize("share", [0.0, -0.1, 1.5, float("nan")])
+@pytest.mark.parametrize("share", [0.0, -0.1, 1.5])
 def test_an_impossible_contact_share_is_refused(share):
     with pytest.raises(ValueError, match="contact_share"):
         ClockCfg(contact_share=share)

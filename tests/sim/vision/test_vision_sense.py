@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from eye_scenes import EYE_SPACING_M, FakeBody, ball_at, clutter
 from paths import HELPERS, ROOT
+from refusals import naming
 from stand_in_worlds import SceneWorld
 
 from veca_marl.sim.geometry import Geom, Scene, Shape
@@ -73,7 +74,7 @@ def test_what_only_one_eye_sees_is_visible():
     assert is_visible(scene, body, Target(0))
     assert eyes(VisionCfg(), body, scene).eyes.is_visible(0)
     assert not eyes(VisionCfg(eyes=Eyes.monocular), body, scene).eyes.is_visible(0)
-    with pytest.raises(ValueError, match=r"no eyes \[\].*eye_left"):
+    with pytest.raises(ValueError, match=naming("eyes", "[]", "eye_left")):
         is_visible(scene, body, Target(0), [])
 
 
@@ -252,21 +253,20 @@ def test_freshly_compiled_kernels_compute_the_same_bytes(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("numbers", "named"),
+    ("numbers", "parts"),
     [
-        ({"width": 0}, "0x84"),
-        ({"height": 84.5}, "84x84.5 must be whole numbers"),
-        ({"fov_deg": 200.0}, "fov_deg 200.0"),
-        ({"eyes": "three"}, "binocular.*monocular"),
-        ({"blur_deg": -1.0}, "blur_deg -1.0"),
-        ({"pupil_mm": 0.0}, "pupil_mm 0.0"),
-        ({"pupil_mm": 25.0}, "pupil_mm 25.0 must be above 0 and at most 20"),
-        ({"pupil_mm": math.nan}, "pupil_mm nan"),
-        ({"accommodation_dpt": -1.0}, r"accommodation_dpt -1.0 must be from 0 \(infinity\) to 100"),
-        ({"accommodation_dpt": 200.0}, "accommodation_dpt 200.0"),
-        ({"infant_age_months": -2.0}, "age_months -2.0"),
+        ({"width": 0}, ("0x84",)),
+        ({"height": 84.5}, ("84x84.5",)),
+        ({"fov_deg": 200.0}, ("fov_deg", "200.0")),
+        ({"eyes": "three"}, ("eyes", "'three'", "binocular", "monocular")),
+        ({"blur_deg": -1.0}, ("blur_deg", "-1.0")),
+        ({"pupil_mm": 0.0}, ("pupil_mm", "0.0")),
+        ({"pupil_mm": 25.0}, ("pupil_mm", "25.0", "20")),
+        ({"accommodation_dpt": -1.0}, ("accommodation_dpt", "-1.0", "100")),
+        ({"accommodation_dpt": 200.0}, ("accommodation_dpt", "200.0")),
+        ({"infant_age_months": -2.0}, ("age_months", "-2.0")),
     ],
 )
-def test_invalid_settings_are_refused(numbers, named):
-    with pytest.raises(ValueError, match=named):
+def test_invalid_settings_are_refused(numbers, parts):
+    with pytest.raises(ValueError, match=naming(*parts)):
         VisionCfg(**numbers)

@@ -4,6 +4,7 @@ from itertools import product
 
 import numpy as np
 import pytest
+from refusals import naming
 from seeking import shipped
 
 from veca_marl.sim.physics import (
@@ -70,9 +71,9 @@ def test_a_leaf_that_would_meet_another_wall_is_refused_with_the_other_side(at_m
     other_side = "true" if not front else "false"
     with pytest.raises(
         ValueError,
-        match=r"door 'door': its leaf of 1.0 m slides into the wall beside it, where 'wall_\d+' "
-        rf"meets it after 0\.40 m; choose leaf.opens_to_front={other_side}, a narrower door or "
-        "leaf.kind=hinge",
+        match=naming(
+            "'door'", "'wall_", "0.40 m", f"leaf.opens_to_front={other_side}", "leaf.kind=hinge"
+        ),
     ):
         junction(at_m, front, turned=turned)
     assert opening_reached(junction(at_m, not front, turned=turned)) == pytest.approx(1.0)
@@ -84,8 +85,9 @@ def test_a_side_that_is_no_better_is_not_advised():
     rooms += [RoomCfg(f"room_{n}", (2.0 * n, 0.0, 0.0), (1.9, 3.0, HEIGHT_M)) for n in range(3)]
     for front in (True, False):
         door = DoorCfg("door", ("hall", "room_1"), (2.95, -0.05), 1.0, sliding(front))
-        with pytest.raises(ValueError, match=r"after 0\.45 m; choose a narrower door or leaf"):
+        with pytest.raises(ValueError, match=naming("0.45 m", "leaf.kind=hinge")) as refusal:
             PlaygroundCfg("rooms", rooms, [door], walls=WallsCfg())
+        assert "opens_to_front" not in str(refusal.value)
 
 
 @pytest.mark.parametrize("turned", [False, True])
@@ -103,7 +105,7 @@ def test_every_sliding_leaf_that_is_accepted_opens_and_closes(turned):
 
 def test_the_corner_of_a_thick_wall_counts():
     """The wall of 0.6 m is as long as the leaf, but half of its thickness is that of the corner."""
-    with pytest.raises(ValueError, match=r"'wall_\d+' meets it after 0\.75 m"):
+    with pytest.raises(ValueError, match=naming("'wall_", "0.75 m")):
         junction(1.25, False, thickness_m=0.6)
 
 
@@ -123,9 +125,7 @@ def row_with_two_doors(first, second, apart_m, front, other_front):
 
 
 def test_two_leaves_that_would_meet_in_one_wall_are_refused():
-    with pytest.raises(
-        ValueError, match=r"doors 'one' and 'two': their leaves slide to the same place in the wall"
-    ):
+    with pytest.raises(ValueError, match=naming("'one'", "'two'", "leaf.opens_to_front")):
         row_with_two_doors("one", "two", 2.6, True, False)
     for numbers in ((2.8, True, False), (2.6, True, True), (2.6, False, True)):
         playground = row_with_two_doors("one", "two", *numbers)
@@ -158,12 +158,11 @@ def hinged(at_m=1.5, front=True, furniture=(), turned=False, thickness_m=0.1):
 @pytest.mark.parametrize("front", [True, False])
 def test_a_leaf_whose_handle_would_meet_a_side_wall_is_refused(at_m, turned, front):
     """The hinge is 1 cm beside the wall; the handle stands out by 3 cm."""
-    with pytest.raises(
-        ValueError,
-        match=r"'pair': door 'door': its leaf of 1 m meets 'wall_\d+' after \d+ of 90 degrees; "
-        "move the door$",
-    ):
+    parts = ("'pair'", "'door'", "'wall_", "90 degrees")
+    with pytest.raises(ValueError, match=naming(*parts)) as refusal:
         hinged(at_m, front, turned=turned)
+    assert "opens_to_front" not in str(refusal.value)
+    assert str(refusal.value).count("'wall_") == 1  # walls are no choice of what to move
     inner_m = at_m - 0.03 if not turned else at_m + 0.03
     assert opening_reached(hinged(inner_m, front, turned=turned)) == pytest.approx(1.0, abs=0.01)
 
@@ -177,8 +176,9 @@ def test_a_leaf_that_would_meet_furniture_is_refused_with_the_choices(front):
     chest = FurnitureCfg("chest", FurnitureKind.toy_chest, (1.5, 3.1 + 0.7 if front else 2.3))
     with pytest.raises(
         ValueError,
-        match=r"door 'door': its leaf of 1 m meets 'chest' after \d+ of 90 degrees; choose "
-        rf"leaf.opens_to_front={str(not front).lower()}, or move the door or 'chest'",
+        match=naming(
+            "'door'", "'chest'", "90 degrees", f"leaf.opens_to_front={str(not front).lower()}"
+        ),
     ):
         hinged(front=front, furniture=[chest])
     playground = hinged(front=not front, furniture=[chest])
@@ -190,8 +190,9 @@ def test_furniture_on_both_sides_leaves_no_choice_of_the_side():
         FurnitureCfg(f"chest_{n}", FurnitureKind.toy_chest, (1.5, y))
         for n, y in ((1, 2.3), (2, 3.8))
     ]
-    with pytest.raises(ValueError, match="90 degrees; move the door or 'chest_2'"):
+    with pytest.raises(ValueError, match=naming("90 degrees", "'chest_2'")) as refusal:
         hinged(furniture=chests)
+    assert "opens_to_front" not in str(refusal.value)
 
 
 def test_every_hinged_leaf_that_is_accepted_opens():

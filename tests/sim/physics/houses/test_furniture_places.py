@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import pytest
+from refusals import naming
 
 from veca_marl.sim.physics import (
     DoorCfg,
@@ -33,23 +34,21 @@ def house(*furniture, **numbers):
 
 
 @pytest.mark.parametrize(
-    "outside",
+    ("outside", "nearest"),
     [
-        piece("bed", 100.0, 1.0),
-        piece("bed", 4.05, 3.0),  # across the wall between the rooms
-        piece("bed", 0.4, 3.5),  # 0.55 m of it in the outer wall
-        piece("lamp", 0.1, 3.0),  # its shade
-        piece("table", 0.55, 1.0, 45.0),  # a corner, turned
+        (piece("bed", 100.0, 1.0), "east"),
+        (piece("bed", 4.05, 3.0), "west"),  # across the wall between the rooms
+        (piece("bed", 0.4, 3.5), "west"),  # 0.55 m of it in the outer wall
+        (piece("lamp", 0.1, 3.0), "west"),  # its shade
+        (piece("table", 0.55, 1.0, 45.0), "west"),  # a corner, turned
     ],
     ids=["far", "across", "in the wall", "shade", "corner"],
 )
 @pytest.mark.parametrize("walls", [WallsCfg(), None], ids=["built", "props"])
-def test_furniture_outside_of_rooms_is_refused_with_the_nearest_room(outside, walls):
-    with pytest.raises(
-        ValueError,
-        match=r"'house': furniture '\w+': a \w+ at position_m=.* is not inside a room; the nearest "
-        r"one, '\w+', extends from (0|4.1) to (4|8.1) m along x and from 0 to 4 m along y",
-    ):
+def test_furniture_outside_of_rooms_is_refused_with_the_nearest_room(outside, nearest, walls):
+    extent = {"west": ("4 m",), "east": ("4.1", "8.1 m")}[nearest]
+    parts = ("'house'", f"'{outside.name}'", f"position_m={outside.position_m}", f"'{nearest}'")
+    with pytest.raises(ValueError, match=naming(*parts, *extent)):
         house(outside, walls=walls)
 
 
@@ -66,10 +65,15 @@ def test_furniture_may_stand_on_the_border_of_rooms_that_touch():
 
 
 @pytest.mark.parametrize(
-    "other", [piece("desk", 1.7, 1.0), piece("chair", 1.0, 1.3), piece("desk", 1.6, 1.5, 45.0)]
+    ("other", "depth_m"),
+    [
+        (piece("desk", 1.7, 1.0), "0.45"),
+        (piece("chair", 1.0, 1.3), "0.30"),
+        (piece("desk", 1.6, 1.5, 45.0), "0.45"),
+    ],
 )
-def test_furniture_in_other_furniture_is_refused_by_both_names(other):
-    with pytest.raises(ValueError, match=rf"'bed' at .* and '{other.name}' at .* overlap by 0\.\d"):
+def test_furniture_in_other_furniture_is_refused_by_both_names(other, depth_m):
+    with pytest.raises(ValueError, match=naming("'bed'", f"'{other.name}'", f"{depth_m} m")):
         house(piece("bed", 1.0, 1.0), other)
 
 
@@ -83,7 +87,7 @@ def test_furniture_may_touch_or_stand_below():
 @pytest.mark.parametrize("walls", [WallsCfg(), None], ids=["built", "props"])
 def test_furniture_in_a_door_is_refused_on_both_sides(x, walls):
     in_front = piece("armchair", x, 2.7)
-    with pytest.raises(ValueError, match=r"'armchair' .* opening of door 'door' at \(4.05, 2.0\)"):
+    with pytest.raises(ValueError, match=naming("'armchair'", "door 'door'", "(4.05, 2.0)")):
         house(in_front, walls=walls)
     house(replace(in_front, position_m=(x, 2.85)), walls=walls)
 
@@ -92,6 +96,6 @@ BALL = PropCfg("ball", PropShape.sphere, [0.2], (1.0, 1.0, -0.1), mass_kg=0.5)
 
 
 def test_a_free_prop_below_the_floor_is_refused():
-    with pytest.raises(ValueError, match=r"prop 'ball': position_m=\(1.0, 1.0, -0.1\) is below"):
+    with pytest.raises(ValueError, match=naming("prop 'ball'", "position_m=(1.0, 1.0, -0.1)")):
         house(props=[BALL])
     house(props=[replace(BALL, mass_kg=0.0)])  # a low mound

@@ -8,6 +8,7 @@ import pytest
 from composed import compose
 from floor_maps import FloorMap, pieces
 from omegaconf import OmegaConf
+from refusals import naming
 
 from veca_marl.config import compose_node, to_config
 from veca_marl.config.stored import body_names, typed
@@ -226,35 +227,35 @@ def test_sizes_with_many_digits_are_divided(least_m):
 
 
 @pytest.mark.parametrize(
-    ("numbers", "message"),
+    ("numbers", "parts"),
     [
-        ("seed=-1", "playground.seed=-1"),
-        ("room_count=7", "from 1 to 6: so many rooms of 3.2 m fit into"),
-        ("room_count=0", "room_count=0 must be from 1"),
-        ("house_size_m=[3,9]", r"house_size_m=\(3.0, 9.0\) is too small for one room of"),
-        ("least_room_m=2", r"least_room_m=2.0 must be at least 2.90"),
-        ("door_width_m=3", r"least_room_m=3.2 must be at least 3.50, for doors of 3.0 m"),
-        ("door_width_m=0.1", "playground.door_width_m=0.1 must be at least 0.3, for a body"),
-        ("walls.door_height_m=0.3", "playground.walls.door_height_m=0.3 must be at least 0.75"),
-        ("room_height_m=0.3", "playground.room_height_m=0.3 must be at least 0.75"),
-        ("loops=2", r"loops=2.0 must be in \[0, 1\]"),
-        ("leaves=-0.1", r"leaves=-0.1 must be in \[0, 1\]"),
-        ("leaves=1; playground.walls.thickness_m=0.04", r"thickness_m=0.04 is too thin for a leaf"),
-        ("pieces_per_room=[3,1]", r"pieces_per_room=\(3, 1\)"),
-        ("walls=null", "walls of a random house must not be null"),
-        ("rooms=[{name: attic}]", "rooms of a random house cannot be set"),
-        ("generator=other", "generator='other' must be 'random_house'"),
+        ("seed=-1", ("playground.seed=-1",)),
+        ("room_count=7", ("room_count=7", "6", "house_size_m=(11.0, 9.0)")),
+        ("room_count=0", ("room_count=0",)),
+        ("house_size_m=[3,9]", ("house_size_m=(3.0, 9.0)", "least_room_m=3.2")),
+        ("least_room_m=2", ("least_room_m=2.0", "2.90")),
+        ("door_width_m=3", ("least_room_m=3.2", "3.50", "3.0 m")),
+        ("door_width_m=0.1", ("playground.door_width_m=0.1", "0.3")),
+        ("walls.door_height_m=0.3", ("playground.walls.door_height_m=0.3", "0.75")),
+        ("room_height_m=0.3", ("playground.room_height_m=0.3", "0.75")),
+        ("loops=2", ("loops=2.0",)),
+        ("leaves=-0.1", ("leaves=-0.1",)),
+        ("leaves=1; playground.walls.thickness_m=0.04", ("walls.thickness_m=0.04", "leaf")),
+        ("pieces_per_room=[3,1]", ("pieces_per_room=(3, 1)",)),
+        ("walls=null", ("playground.walls", "null")),
+        ("rooms=[{name: attic}]", ("playground.rooms", "playground.seed")),
+        ("generator=other", ("generator='other'", "'random_house'")),
     ],
 )
-def test_impossible_houses_are_refused_in_the_configuration(numbers, message):
-    with pytest.raises(ValueError, match=message):
+def test_impossible_houses_are_refused_in_the_configuration(numbers, parts):
+    with pytest.raises(ValueError, match=naming(*parts)):
         compose(
             ["+task=KickTheBall", "playground=random_house", *f"playground.{numbers}".split("; ")]
         )
 
 
 def test_only_generated_playgrounds_have_a_seed():
-    with pytest.raises(ValueError, match=r"unknown key 'playground\.seed'"):
+    with pytest.raises(ValueError, match=naming("'playground.seed'")):
         compose(["+task=KickTheBall", "playground=house", "playground.seed=7"])
 
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from refusals import naming
 from seeking import shipped
 
 from veca_marl.sim.body.walker import Walker, WalkerCfg
@@ -145,7 +146,7 @@ def test_the_leaves_of_a_house_are_open_and_close_the_doors_for_sound():
 def test_a_leaf_needs_walls():
     door = DoorCfg("door", ("a", "b"), (3.05, 1.0), leaf=LeafCfg())
     rooms = [RoomCfg("a", (0.0, 0.0, 0.0), (3.0, 3.0, 2.5)), RoomCfg("b", (3.1, 0.0, 0.0))]
-    with pytest.raises(ValueError, match="door 'door': a leaf needs walls"):
+    with pytest.raises(ValueError, match=naming("'door'", "leaf", "walls")):
         PlaygroundCfg("flat", rooms, [door])
-    with pytest.raises(ValueError, match=r"opening=2 is not in \[0, 1\]"):
+    with pytest.raises(ValueError, match=naming("opening=2")):
         LeafCfg(opening=2)
