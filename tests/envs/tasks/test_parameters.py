@@ -106,9 +106,9 @@ def make_game(task, override):
         (
             "SoccerTwoPlayer",
             "ball_from_goal_m=[2.0,5.0]",
-            ("task.ball_from_goal_m", "'room'", "playground=simple"),
+            ("6.6 m", "task.ball_from_goal_m", "'room'"),
         ),
-        ("SoccerTwoPlayer", "aside_m=2.9", ("task.aside_m", "'room'", "playground=simple")),
+        ("SoccerTwoPlayer", "aside_m=2.9", ("5.8 m", "task.aside_m", "'room'")),
         ("SoccerTwoPlayer", "ball_from_goal_m=[3.0,2.0]", ("task.ball_from_goal_m=(3.0, 2.0)",)),
         ("SoccerTwoPlayer", "radius_m=0.7", ("task.goal_width_m=", "task.radius_m=0.7")),
         ("SoccerTwoPlayer", "kick_rest_s=0", ("task.kick_rest_s=0",)),
@@ -144,12 +144,16 @@ def make_game(task, override):
         ("RotateCube", "edge_m=0.5", ("task.edge_m=0.5", "0.1")),
         ("MultiAgentNav", "agents=1", ("task.agents=1", "2")),
         ("MultiAgentNav", "radius_m=0", ("task.radius_m=0.0",)),
-        ("MultiAgentNav", "muted=most", ("muted",)),
     ],
 )
 def test_impossible_parameters_are_refused(task, override, parts):
     with pytest.raises(ValueError, match=naming(*parts)):
         make_game(task, override)
+
+
+def test_an_unknown_choice_is_refused_with_the_choices():
+    with pytest.raises(ValueError, match=naming("muted", "'most'", "finder", "seekers")):
+        compose(["+task=MultiAgentNav", "task.muted=most"])
 
 
 @pytest.mark.parametrize("task", HUMANOID_TASKS)
