@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 from composed import compose
+from refusals import naming
 
 import veca_marl
 from veca_marl.checks import CheckCfg, Status, check_game
@@ -229,48 +230,48 @@ def test_a_sound_task_passes_every_check(game_of):
     assert report.passed, report
     assert {finding.status for finding in report.findings} == {Status.passed}
     assert str(report).startswith("East: 12 passed, 0 failed, 0 skipped\npassed  build: players")
-    assert "solved at the end by the expert 100%" in report["goal"].message
-    with pytest.raises(KeyError, match="no check 'beauty'; there are"):
+    assert "100%" in report["goal"].message
+    with pytest.raises(KeyError, match=naming("'beauty'", "'build'")):
         report["beauty"]
 
 
 @pytest.mark.parametrize(
-    ("task", "check", "name", "message"),
+    ("task", "check", "name", "pattern"),
     [
-        (UnseededStart, seeding, "seeding", "other bytes in a world that was used .* in a new"),
-        (StateOfTheLastEpisode, seeding, "seeding", "other bytes in a world that was used"),
-        (FixedStart, seeding, "seeding", "seeds 0 and 1 give the same start"),
-        (FixedStart, starts, "starts", "all 5 starts are equal"),
-        (
-            StartOutside,
-            starts,
-            "starts",
-            r"with agents outside the rooms at \(50.00, .* and 2 more",
-        ),
-        (StartsInAThing, starts, "starts", "where agents and crate overlap by 1[5-7]. mm"),
-        (EndsAtOnce, starts, "first step", "episode 0 terminates in its first step"),
-        (SomeSolvedAtOnce, starts, "first step", "[1-4] of 5 episodes are solved for agents at"),
-        (InfiniteTerm, random_play, "rewards", "term 'progress' of agents is nan"),
-        (InfiniteTerm, returns, "reward terms", "term 'progress' of agents is nan"),
-        (TooGreatForFloat32, random_play, "rewards", r"term 'progress' of agents is 1e\+39"),
-        (TooGreatForFloat32, returns, "reward terms", r"term 'progress' of agents is 1e\+39"),
+        (UnseededStart, seeding, "seeding", naming("used", "new")),
+        (StateOfTheLastEpisode, seeding, "seeding", naming("used")),
+        (FixedStart, seeding, "seeding", naming("seeds", " 0 ", " 1 ")),
+        (FixedStart, starts, "starts", naming("5 starts", "reset(rng)")),
+        (StartOutside, starts, "starts", r"\bagents\b.*\(50\.00, .*; \D*2\D*$"),
+        (StartsInAThing, starts, "starts", r"\bagents\b.*\bcrate\b.* 1[5-7]. mm"),
+        (EndsAtOnce, starts, "first step", naming("episode 0 ")),
+        (SomeSolvedAtOnce, starts, "first step", r"\b[1-4]\b.*\b5 episodes\b.*\bagents\b"),
+        (InfiniteTerm, random_play, "rewards", naming("'progress'", "agents", "nan")),
+        (InfiniteTerm, returns, "reward terms", naming("'progress'", "agents", "nan")),
+        (TooGreatForFloat32, random_play, "rewards", naming("'progress'", "agents", "1e+39")),
+        (TooGreatForFloat32, returns, "reward terms", naming("'progress'", "agents", "1e+39")),
         (
             TermOfAnArray,
             random_play,
             "rewards",
-            "^term 'progress' of agents is of type ndarray, not a number$",
+            "^[^;]*'progress'[^;]*ndarray[^;]*$",
         ),
-        (TooGreatWithItsWeight, random_play, "rewards", r"the reward of agents is 1e\+40"),
-        (SolvedIsForgotten, random_play, "rewards", r"solved\(\) of agents is None"),
-        (TermMissing, random_play, "rewards", r"agents has the terms \['progress'\], weights"),
-        (TermOfZeros, returns, "reward terms", "term 'arrived' is 0 in all steps of 4 episodes"),
-        (SilentWorld, random_play, "no constant observation", "'audio' of agents is equal in all"),
+        (TooGreatWithItsWeight, random_play, "rewards", naming("reward", "agents", "1e+40")),
+        (SolvedIsForgotten, random_play, "rewards", naming("solved()", "agents", "None")),
+        (
+            TermMissing,
+            random_play,
+            "rewards",
+            naming("agents", "['progress']", "['arrived', 'progress']"),
+        ),
+        (TermOfZeros, returns, "reward terms", naming("'arrived'", "4 episodes")),
+        (SilentWorld, random_play, "no constant observation", naming("'audio'", "agents")),
     ],
 )
-def test_a_fault_is_reported(game_of, task, check, name, message):
+def test_a_fault_is_reported(game_of, task, check, name, pattern):
     found = {finding.check: finding for finding in check(game_of(task))}
     assert found[name].status is Status.failed
-    assert re.search(message, found[name].message), found[name].message
+    assert re.search(pattern, found[name].message), found[name].message
 
 
 def test_a_goal_that_holds_from_the_start_on_is_no_fault_of_the_starts(game_of):
@@ -284,29 +285,29 @@ def test_observations_that_do_not_fit_their_specs_are_reported(game_of, monkeypa
         (sense,) = game.senses["agents"].values()
         (key,) = sense.specs
         good = sense.compute()[key]
-        for wrong, message in (
-            (good[:-1], "specified is"),
-            (good.astype(np.float64), "float64, specified is"),
-            (np.full_like(good, np.nan), "is not finite"),
+        for wrong, parts in (
+            (good[:-1], (good[:-1].shape, good.shape)),
+            (good.astype(np.float64), ("float64", good.dtype)),
+            (np.full_like(good, np.nan), ("finite",)),
         ):
             monkeypatch.setattr(sense, "compute", lambda wrong=wrong: {key: wrong.copy()})
             finding = next(check_random_play(game, 2, seed=0))
             assert finding.status is Status.failed
-            assert message in finding.message
+            assert re.search(naming(repr(key), *parts), finding.message)
 
 
 def test_an_expert_that_is_worse_than_the_random_policy_is_reported(game_of):
     _, expert, goal = returns(game_of(East, WalksWest))
     assert (expert.status, goal.status) == (Status.failed, Status.failed)
     assert "difference -" in expert.message
-    assert "by the expert 0%" in goal.message
+    assert re.search(r"\b0%", goal.message)
 
 
 def test_checks_of_what_a_task_does_not_have_are_skipped(game_of):
     assert [f.status for f in returns(game_of(NoGoal))[1:]] == [Status.skipped] * 2
     goal = returns(game_of(NoGoal, EastExpert))[2]
     assert goal.status is Status.skipped
-    assert "does not define solved()" in goal.message
+    assert "solved()" in goal.message
 
 
 def test_a_punishment_that_no_policy_earned_is_skipped(game_of):
@@ -314,10 +315,7 @@ def test_a_punishment_that_no_policy_earned_is_skipped(game_of):
     cfg.task.weights["arrived"] = -1.0
     found = returns(cfg)[0]
     assert found.status is Status.skipped
-    assert found.message == (
-        "no policy earned the punishment 'arrived' in 8 episodes: play more, or test it yourself; "
-        "reached: progress"
-    )
+    assert re.search(naming("'arrived'", "8 episodes", "progress"), found.message)
 
 
 def test_beside_an_unreached_punishment_an_unreached_reward_is_a_failure(game_of):
@@ -329,13 +327,15 @@ def test_beside_an_unreached_punishment_an_unreached_reward_is_a_failure(game_of
     cfg.task.weights["arrived"] = -1.0
     found = returns(cfg)[0]
     assert found.status is Status.failed
-    assert found.message == "term 'progress' is 0 in all steps of 4 episodes"
+    assert re.search(naming("'progress'", "4 episodes"), found.message)
+    assert "arrived" not in found.message
 
 
 def test_an_expert_without_the_sense_that_it_needs_is_skipped():
     cfg = compose(["+task=KickTheBall", "senses/audio=deaf", "task.max_seconds=0.2"]).game
     for finding in returns(cfg)[1:]:
-        assert (finding.status, finding.message) == (Status.skipped, "the expert needs audio")
+        assert finding.status is Status.skipped
+        assert re.search(naming("expert", "audio"), finding.message)
 
 
 def test_an_exception_of_the_task_is_reported_with_its_place(game_of):
@@ -344,30 +344,30 @@ def test_an_exception_of_the_task_is_reported_with_its_place(game_of):
     assert report["build"].status is Status.passed
     for name in ("seeding", "first step", "rewards", "reward terms", "expert"):
         assert report[name].status is Status.failed
-        assert report[name].message.startswith("ZeroDivisionError: float division by zero (")
+        assert report[name].message.startswith("ZeroDivisionError: ")
         assert "test_check_task.py" in report[name].message
-        assert "in reward)" in report[name].message
+        assert re.search(r"\breward\b", report[name].message)
 
 
 @pytest.mark.parametrize(
-    ("task", "message"),
+    ("task", "parts"),
     [
-        (FailsInBuild, "RuntimeError: no such furniture"),
-        (EliminatesNobody, "EliminatesNobody defines is_eliminated, but has eliminates=False"),
-        (TeamOfNobody, "team 'red' of TeamOfNobody has size=0"),
+        (FailsInBuild, ("RuntimeError", "no such furniture")),
+        (EliminatesNobody, ("EliminatesNobody", "is_eliminated", "eliminates=False")),
+        (TeamOfNobody, ("'red'", "TeamOfNobody", "size=0")),
     ],
 )
-def test_what_cannot_be_built_is_not_played(game_of, task, message):
+def test_what_cannot_be_built_is_not_played(game_of, task, parts):
     report = check_game(game_of(task), QUICK)
-    assert message in report["build"].message
+    assert re.search(naming(*parts), report["build"].message)
     assert [f.check for f in report.failed] == ["build"]
     assert {f.status for f in report.findings[1:]} == {Status.skipped}
 
 
 def test_classes_that_are_not_registered_and_impossible_numbers_are_refused():
-    with pytest.raises(ValueError, match="task 'East' is not registered; decorate"):
+    with pytest.raises(ValueError, match=naming("'East'", "@register_task")):
         veca_marl.check_task(East)
-    with pytest.raises(ValueError, match="episodes=1 must be at least 2"):
+    with pytest.raises(ValueError, match=naming("episodes=1", "2")):
         CheckCfg(episodes=1)
-    with pytest.raises(ValueError, match="seed=-1 must be 0 or more"):
+    with pytest.raises(ValueError, match=naming("seed=-1")):
         CheckCfg(seed=-1)

@@ -7,6 +7,7 @@ import pytest
 from composed import compose
 from gymnasium import spaces
 from pettingzoo.test import parallel_api_test
+from refusals import naming
 from rollouts import digest, play
 from torchrl.collectors import RandomPolicy
 from torchrl.envs import SerialEnv, check_env_specs
@@ -131,7 +132,7 @@ def test_eyes_turn_to_a_point_and_the_voice_is_heard(game):
 
 
 def test_impossible_places_are_refused(game):
-    with pytest.raises(ValueError, match="cannot"):
+    with pytest.raises(ValueError, match=naming("agents_0", "nan")):
         game.players[0].body.place((math.nan, 0.0, 0.0))
 
 
@@ -167,9 +168,9 @@ def test_impossible_values_are_refused_with_agent_part_and_range_and_nothing_mov
         actions = {p.name: random_action(p.body.action_spec, rng) for p in game.players}
         wrong = np.asarray(spec.high + 1, spec.dtype) if spec.is_discrete else spec.high + 0.5
         actions["agents_1"][part] = np.full(spec.shape, wrong)
-        choices = spec.names[-1] if spec.is_discrete else rf"{spec.names[0]}.* \[-1, 1\]"
+        choices = (spec.names[-1],) if spec.is_discrete else (spec.names[0], "[-1, 1]")
         before = body.bone_positions()
-        with pytest.raises(ValueError, match=rf"agents_1: action part '{part}'.*{choices}"):
+        with pytest.raises(ValueError, match=naming("agents_1", f"'{part}'", *choices)):
             game.step(actions)
         np.testing.assert_array_equal(body.bone_positions(), before)
 
@@ -179,14 +180,14 @@ def test_wrong_shapes_and_parts_are_refused(game):
     actions = {
         p.name: random_action(p.body.action_spec, np.random.default_rng(0)) for p in game.players
     }
-    parts = actions["agents_1"]
-    for wrong, message in (
-        ({**parts, "tail": np.zeros(1)}, "tail"),
-        ({part: np.zeros((*spec.shape, 3)) for part, spec in body.action_spec.items()}, "part"),
-        ({}, "needs"),
+    parts, first = actions["agents_1"], repr(next(iter(body.action_spec)))
+    for wrong, named in (
+        ({**parts, "tail": np.zeros(1)}, "'tail'"),
+        ({part: np.zeros((*spec.shape, 3)) for part, spec in body.action_spec.items()}, "action"),
+        ({}, "[]"),
         (None, "action"),
     ):
-        with pytest.raises(ValueError, match=rf"agents_1: .*{message}"):
+        with pytest.raises(ValueError, match=naming("agents_1", first, named)):
             game.command({**actions, "agents_1": wrong})
 
 

@@ -26,7 +26,7 @@ REFUSED = {
     "MazeNav": {*HOUSES, "single_room"},
     "SoccerOnePlayer": HOUSES - {"house", "house2", "two_rooms"} | {"single_room"},
 }
-CHOICES = re.compile(r"choose .*playground=\w+")
+CHOICES = re.compile(r"\bplayground=\w+")
 
 
 @cache

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from refusals import naming
 from rollouts import game_cfg
 
 from veca_marl.envs.core.episodes import Episodes
@@ -78,5 +79,5 @@ def test_tearing_the_tower_down_is_worse_than_doing_nothing_with_every_clock(clo
 
 def test_a_rate_that_is_no_term_is_refused(monkeypatch):
     monkeypatch.setattr(TASKS["TurnBaby"], "rates", ("torso", "speed"))
-    with pytest.raises(ValueError, match=r"TurnBaby.rates names \['speed'\]; .*'hip', 'torso'"):
+    with pytest.raises(ValueError, match=naming("TurnBaby.rates", "['speed']", "'hip'", "'torso'")):
         Game(game_cfg("TurnBaby"))

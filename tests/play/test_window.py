@@ -136,5 +136,5 @@ def test_without_a_screen_the_message_names_the_video(monkeypatch, capsys):
 def test_a_body_without_keys_is_refused_with_what_can_be_done(no_screen, capsys):
     assert main(["+task=TurnBaby", "senses/touch=numb"]) == 2
     message = capsys.readouterr().err
-    assert "keys steer walking bodies" in message
+    assert "body=walker" in message
     assert "policy=expert" in message

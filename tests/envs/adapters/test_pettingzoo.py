@@ -7,6 +7,7 @@ from duels import STEPS, duel
 from gymnasium import spaces
 from pettingzoo.test import api_test, parallel_api_test, parallel_seed_test
 from pettingzoo.utils import parallel_to_aec
+from refusals import naming
 
 from veca_marl.api import parallel_env
 from veca_marl.bench.command import free_play
@@ -110,7 +111,7 @@ def test_spaces_are_those_of_the_specs():
 
 def test_a_picture_shows_the_eyes_and_the_room():
     env = parallel_env("KickTheBall", render_mode="rgb_array")
-    with pytest.raises(RuntimeError, match=r"reset\(\) before render"):
+    with pytest.raises(RuntimeError, match=naming("reset()", "render()")):
         env.render()
     env.reset(seed=0)
     picture = env.render()
@@ -129,19 +130,19 @@ def test_render_needs_a_render_mode(env):
 
 
 @pytest.mark.parametrize(
-    ("actions", "said"),
+    ("actions", "parts"),
     [
-        ({"green": np.zeros(2)}, r"unknown agents \['green'\]; there are .*'blue_0'"),
-        ({"blue_0": None}, r"no action for \['blue_0'\]; each of .*'red'"),
-        ({"blue_0": np.zeros(3)}, r"blue_0: action .* not numbers of shape \(2,\)"),
-        ({"blue_1": np.full(2, np.nan)}, r"blue_1: action .*\[-1, 1\]"),
-        ({"red": "forward"}, r"red: action part 'move' is <U7"),
+        ({"green": np.zeros(2)}, ("['green']", "'blue_0'")),
+        ({"blue_0": None}, ("['blue_0']", "'red'")),
+        ({"blue_0": np.zeros(3)}, ("blue_0", "(3,)", "(2,)")),
+        ({"blue_1": np.full(2, np.nan)}, ("blue_1", "nan", "[-1, 1]")),
+        ({"red": "forward"}, ("red", "'move'", "<U7")),
     ],
 )
-def test_invalid_actions_are_errors_that_name_agent_and_part(env, actions, said):
+def test_invalid_actions_are_errors_that_name_agent_and_part(env, actions, parts):
     env.reset()
     actions = still(env) | actions
-    with pytest.raises(ValueError, match=said):
+    with pytest.raises(ValueError, match=naming(*parts)):
         env.step({name: row for name, row in actions.items() if row is not None})
     env.step(still(env))  # and the game goes on
 
@@ -151,36 +152,36 @@ def test_a_closed_environment_says_so(cfg):
     env.reset()
     env.close()
     for use in (env.reset, lambda: env.step({name: np.zeros(2) for name in AGENTS})):
-        with pytest.raises(RuntimeError, match="the environment is closed; make a new one"):
+        with pytest.raises(RuntimeError, match=naming("environment")):
             use()
 
 
 def test_there_is_no_step_without_an_episode(env):
     actions = {name: np.zeros(2) for name in AGENTS}
-    with pytest.raises(RuntimeError, match=r"reset\(\) before step"):
+    with pytest.raises(RuntimeError, match=naming("reset()", "step()")):
         env.step(actions)
     env.reset()
     for _ in range(STEPS):
         env.step(actions)
-    with pytest.raises(RuntimeError, match=r"reset\(\) before step"):
+    with pytest.raises(RuntimeError, match=naming("reset()", "step()")):
         env.step(actions)
 
 
 @pytest.mark.parametrize("space", ["observation_space", "action_space"])
 def test_an_unknown_agent_is_an_error_that_lists_the_agents(env, space):
-    with pytest.raises(ValueError, match=r"unknown agent 'green'; there are \['red'"):
+    with pytest.raises(ValueError, match=naming("'green'", "'red'", "'blue_0'")):
         getattr(env, space)("green")
 
 
 @pytest.mark.parametrize(
-    ("task", "choices", "said"),
+    ("task", "choices", "parts"),
     [
-        ("Chess", {}, "unknown task 'Chess'.*choices:.*KickTheBall"),
-        ("KickTheBall", {"body": "bird"}, "unknown body 'bird'.*choices:.*walker"),
-        ("KickTheBall", {"render_mode": "human"}, "render_mode='human'.*rgb_array"),
-        ("KickTheBall", {"seed": -1}, "seed=-1"),
+        ("Chess", {}, ("'Chess'", "KickTheBall")),
+        ("KickTheBall", {"body": "bird"}, ("'bird'", "walker")),
+        ("KickTheBall", {"render_mode": "human"}, ("render_mode='human'", "rgb_array")),
+        ("KickTheBall", {"seed": -1}, ("seed=-1",)),
     ],
 )
-def test_unknown_choices_are_errors_that_list_the_choices(task, choices, said):
-    with pytest.raises(ValueError, match=said):
+def test_unknown_choices_are_errors_that_list_the_choices(task, choices, parts):
+    with pytest.raises(ValueError, match=naming(*parts)):
         parallel_env(task, **choices)

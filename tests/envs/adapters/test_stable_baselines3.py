@@ -4,6 +4,7 @@ import gymnasium
 import numpy as np
 import pytest
 from gymnasium import spaces
+from refusals import naming
 
 import veca_marl  # noqa: F401  registers the ids
 
@@ -41,7 +42,7 @@ def test_stacked_observations_are_images_and_vectors(env):
 
 
 def test_an_unknown_layout_is_an_error_that_lists_the_choices():
-    with pytest.raises(ValueError, match="unknown layout 'flat'; choices: arrays, stacked"):
+    with pytest.raises(ValueError, match=naming("'flat'", "arrays", "stacked")):
         gymnasium.make(ID, layout="flat")
 
 

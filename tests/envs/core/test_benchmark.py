@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import pytest
 from composed import compose
+from refusals import naming
 
 from veca_marl.envs.core.benchmark import find_benchmark, from_text, read_starts, to_text
 
@@ -38,31 +39,28 @@ def test_other_senses_are_accepted():
 
 
 @pytest.mark.parametrize(
-    ("overrides", "message"),
+    ("overrides", "parts"),
     [
-        (["task.max_seconds=3"], r"version 2, differs in task.max_seconds=3.0 \(not 20.0\)"),
-        (
-            ["playground=two_rooms"],
-            "100 of 100 starts are not those of the benchmark of KickTheBall, version 2, "
-            r"in episode 0 .* and [0-9]+ others: another playground or body was chosen",
-        ),
+        (["task.max_seconds=3"], ("KickTheBall", "version 2", "task.max_seconds=3.0", "20.0")),
+        (["playground=two_rooms"], ("KickTheBall", "version 2", "100 starts", "episode 0 ")),
     ],
 )
-def test_other_parameters_and_playgrounds_are_refused(overrides, message):
+def test_other_parameters_and_playgrounds_are_refused(overrides, parts):
     cfg = compose(["+task=KickTheBall", *QUIET, *overrides]).game
-    with pytest.raises(ValueError, match=message):
+    with pytest.raises(ValueError, match=naming(*parts)):
         find_benchmark("KickTheBall").check(cfg)
 
 
 def test_the_first_start_that_differs_is_named():
     benchmark = find_benchmark("KickTheBall")
     moved = {**benchmark.starts[8], "ball/position": (0.0, 0.0, 0.15)}
-    with pytest.raises(ValueError, match=r"1 of 2 starts .* in episode 8 ball/position is 0, 0, "):
+    named = naming("KickTheBall", " 1 ", "2 starts", "episode 8 ", "ball/position", "0, 0, ")
+    with pytest.raises(ValueError, match=named):
         benchmark.check_starts([benchmark.starts[7], moved], first=7)
 
 
 def test_a_task_without_frozen_episodes_is_refused():
-    with pytest.raises(ValueError, match="task 'Chess' has no frozen episodes"):
+    with pytest.raises(ValueError, match=naming("'Chess'", "episodes")):
         find_benchmark("Chess")
 
 
@@ -72,5 +70,5 @@ def test_parameters_that_a_task_has_got_since_have_their_former_values():
     assert benchmark.parameters["separate_finder"] is False, "its file is older than the field"
     benchmark.check_parameters(compose(["+task=MultiAgentNav", *quiet]).game.task)
     changed = compose(["+task=MultiAgentNav", "task.separate_finder=true", *quiet]).game.task
-    with pytest.raises(ValueError, match=r"task.separate_finder=True \(not False\)"):
+    with pytest.raises(ValueError, match=naming("task.separate_finder=True", "False")):
         benchmark.check_parameters(changed)

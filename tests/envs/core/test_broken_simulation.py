@@ -43,7 +43,6 @@ def test_the_episode_is_truncated_the_cause_is_logged_and_data_are_finite(cfg, c
         assert torch.isfinite(value).all(), key
     (record,) = [r for r in caplog.records if r.name == "veca_marl.envs.core.game"]
     assert "agents_0" in record.getMessage()
-    assert "not finite" in record.getMessage()
     env.close()
 
 
@@ -80,7 +79,8 @@ def test_a_broken_prop_ends_the_episode_as_a_broken_body_does(words, prop, speed
     with caplog.at_level(logging.WARNING):
         after = env.step(env.rand_action(state))["next"]
     assert bool(after["truncated"].all())
-    assert f"the simulation of {prop} is not finite" in caplog.text
+    (record,) = [r for r in caplog.records if r.name == "veca_marl.envs.core.game"]
+    assert f" {prop} " in record.getMessage()
     for key, value in after.items(True, True):
         assert torch.isfinite(value).all(), key
     for team in env.group_map:

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from composed import compose
+from refusals import naming
 
 from veca_marl.envs.core.game import Game, player_names
 from veca_marl.envs.core.task import (
@@ -103,7 +104,7 @@ def test_an_invalid_action_stops_the_step_of_all_players(duel):
     before = duel.world.scene.positions.copy()
     actions = {name: np.ones(2, np.float32) for name in ("red", "blue_0", "blue_1")}
     actions["blue_1"][0] = np.nan
-    with pytest.raises(ValueError, match=r"blue_1: action .*nan"):
+    with pytest.raises(ValueError, match=naming("blue_1", "nan", "[-1, 1]")):
         duel.step(actions)
     np.testing.assert_array_equal(duel.world.scene.positions, before)
     assert duel.steps == 0
@@ -115,17 +116,17 @@ def test_an_invalid_action_stops_the_step_of_all_players(duel):
 def test_every_actor_needs_an_action(duel):
     actions = still(duel)
     del actions["blue_0"]
-    with pytest.raises(ValueError, match=r"no action for \['blue_0'\]"):
+    with pytest.raises(ValueError, match=naming("['blue_0']", "'red'")):
         duel.step(actions)
     with pytest.raises(ValueError, match="'green'"):
         duel.step({**still(duel), "green": np.zeros(2)})
-    with pytest.raises(ValueError, match=r"unknown agents \[3, None\]"):
+    with pytest.raises(ValueError, match=naming("[3, None]", "'red'")):
         duel.step({**still(duel), None: np.zeros(2), 3: np.zeros(2)})
 
 
 @pytest.mark.parametrize("actions", [None, 5, [1.0]])
 def test_actions_are_a_mapping(duel, actions):
-    with pytest.raises(ValueError, match=r"actions are \w+, not a mapping with one for each of"):
+    with pytest.raises(ValueError, match=naming(type(actions).__name__, "'red'", "'blue_0'")):
         duel.step(actions)
 
 
@@ -134,7 +135,7 @@ def test_the_reward_is_the_weighted_sum_of_the_terms(game):
 
 
 def test_an_unknown_task_is_an_error_that_lists_the_tasks():
-    with pytest.raises(ValueError, match=r"unknown task 'Chess'.*KickTheBall"):
+    with pytest.raises(ValueError, match=naming("'Chess'", "KickTheBall")):
         find_task("Chess")
     cfg = cfg_of()
     cfg.task = TaskCfg(name="Chess")
@@ -144,7 +145,7 @@ def test_an_unknown_task_is_an_error_that_lists_the_tasks():
 
 def test_a_name_is_registered_once():
     another = type("KickTheBall", (Task,), {"__module__": "elsewhere"})
-    with pytest.raises(ValueError, match=r"'KickTheBall' is defined twice: .*elsewhere"):
+    with pytest.raises(ValueError, match=naming("'KickTheBall'", "elsewhere")):
         register_task(another)
 
 
@@ -152,7 +153,9 @@ def test_a_name_is_registered_once():
 def test_weights_must_be_those_of_the_tasks_terms(weights):
     cfg = cfg_of()
     cfg.task.weights = weights
-    with pytest.raises(ValueError, match=r"KickTheBall has \['approach', 'kick'\]"):
+    with pytest.raises(
+        ValueError, match=naming("task.weights", "KickTheBall", "['approach', 'kick']")
+    ):
         Game(cfg)
 
 
@@ -164,25 +167,27 @@ def test_the_length_of_an_episode_is_positive_and_finite(seconds):
 
 @pytest.mark.parametrize("seconds", [0.01, 0.019])
 def test_an_episode_has_a_step(seconds):
-    with pytest.raises(ValueError, match=f"task.max_seconds={seconds} is no step: .* 0.04 s "):
+    with pytest.raises(ValueError, match=naming(f"task.max_seconds={seconds}", "0.04 s")):
         Game(cfg_of(f"task.max_seconds={seconds}"))
 
 
 def test_a_team_without_players_is_refused(monkeypatch):
     monkeypatch.setattr(find_task("KickTheBall"), "teams", (Team("agents"), Team("red", 0)))
-    with pytest.raises(ValueError, match="team 'red' of KickTheBall has size=0; it must be at"):
+    with pytest.raises(ValueError, match=naming("'red'", "KickTheBall", "size=0")):
         Game(cfg_of())
 
 
 def test_a_task_that_would_eliminate_nobody_is_refused(monkeypatch):
     monkeypatch.setattr(find_task("KickTheBall"), "is_eliminated", lambda *_: True)
-    with pytest.raises(ValueError, match="is_eliminated, but has eliminates=False: no player"):
+    with pytest.raises(
+        ValueError, match=naming("KickTheBall", "is_eliminated", "eliminates=False")
+    ):
         Game(cfg_of())
 
 
 def test_a_term_has_not_the_name_of_another_entry_of_info(monkeypatch):
     monkeypatch.setattr(Walker, "info", lambda body: {"kick": 0.0})
-    with pytest.raises(ValueError, match=r"\['kick'\] are the names of other .* of 'agents' rep"):
+    with pytest.raises(ValueError, match=naming("task.weights", "['kick']", "'agents'")):
         Game(cfg_of())
 
 

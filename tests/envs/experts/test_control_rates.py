@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from blocks import blocks_game, play
+from refusals import naming
 
 from veca_marl.envs.experts.control.palm_motion import Grip, PalmMotion
 
@@ -64,7 +65,7 @@ def test_experts_that_hold_things_are_refused_at_control_rates_at_which_they_fai
     substeps = max(1, 150 // rate_hz)
     clock = (f"clock.control_rate_hz={rate_hz}", f"clock.substeps={substeps}")
     game = blocks_game(task, *clock)
-    message = f"{task}Expert needs clock.control_rate_hz from 21 to 245, not {rate_hz}"
-    with pytest.raises(ValueError, match=message):
+    named = naming(f"{task}Expert", "clock.control_rate_hz", " 21 ", " 245", f" {rate_hz}")
+    with pytest.raises(ValueError, match=named):
         game.expert_of(game.players[0])
     game.close()

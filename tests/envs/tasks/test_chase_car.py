@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import started
 from composed import compose
+from refusals import naming
 
 from veca_marl.envs.core.game import Game
 from veca_marl.envs.core.game_cfg import Script
@@ -92,19 +93,16 @@ def test_a_contact_ends_the_episode_unsolved(game):
 
 
 @pytest.mark.parametrize(
-    ("override", "message"),
+    ("override", "parts"),
     [
-        (
-            "body.verbs=[grab]",
-            r"needs the verbs \['press'\]; body.verbs=\['grab'\] lacks \['press'\]",
-        ),
-        ("task.presses=0", "task.presses=0 must be at least 1"),
-        ("task.rest_s=0", "task.rest_s"),
-        ("playground=four_rooms", "choose playground=simple or single_room"),
+        ("body.verbs=[grab]", ("body.verbs=['grab']", "['press']")),
+        ("task.presses=0", ("task.presses=0",)),
+        ("task.rest_s=0", ("task.rest_s",)),
+        ("playground=four_rooms", ("'four_rooms'", "playground=simple", "single_room")),
     ],
 )
-def test_what_cannot_be_played_is_refused(override, message):
-    with pytest.raises(ValueError, match=message):
+def test_what_cannot_be_played_is_refused(override, parts):
+    with pytest.raises(ValueError, match=naming(*parts)):
         Game(compose(["+task=ChaseCar", override]).game)
 
 

@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 import started
+from refusals import naming
 
 from veca_marl.envs.core.episodes import play_to_end
 from veca_marl.envs.core.game_cfg import Script
@@ -180,20 +181,20 @@ def test_all_toys_in_their_baskets_end_the_episode_solved(game):
 
 
 @pytest.mark.parametrize(
-    ("words", "message"),
+    ("words", "parts"),
     [
-        (["task.colours=[red]"], r"task.colours=\['red'\] must be at least 2"),
-        (["task.colours=[red,red]"], "different ones"),
-        (["task.colours=[red,pink]"], r"pink.*\['red', 'green', 'blue', 'yellow'\]"),
-        (["task.items=0"], "task.items=0"),
-        (["task.apart_m=0.3"], "baskets must not overlap"),
-        (["body.verbs=[grab]"], r"needs the verbs.*lacks \['put_into'\]"),
-        (["body.interaction_range_m=0"], r"reach nothing with body.interaction_range_m=0"),
-        (["task.apart_m=6"], "leaves no 10 places 6.00 m apart"),
+        (["task.colours=[red]"], ("task.colours=['red']", "'green'", "'blue'")),
+        (["task.colours=[red,red]"], ("task.colours=['red', 'red']",)),
+        (["task.colours=[red,pink]"], ("'pink'", "'green'", "'blue'")),
+        (["task.items=0"], ("task.items=0",)),
+        (["task.apart_m=0.3"], ("task.apart_m=0.3",)),
+        (["body.verbs=[grab]"], ("body.verbs=['grab']", "['put_into']")),
+        (["body.interaction_range_m=0"], ("body.interaction_range_m=0", "put_into")),
+        (["task.apart_m=6"], ("task.apart_m=6", " 10 ", "6.00 m")),
     ],
 )
-def test_impossible_values_are_errors_that_name_them(words, message):
-    with pytest.raises(ValueError, match=message):
+def test_impossible_values_are_errors_that_name_them(words, parts):
+    with pytest.raises(ValueError, match=naming(*parts)):
         game_of(*words)
 
 

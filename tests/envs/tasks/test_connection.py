@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import pytest
+from refusals import naming
 from rollouts import game_cfg
 from seeking import shipped
 
@@ -23,11 +24,9 @@ def with_leaves(leaf, playground="house"):
 def test_rooms_that_no_door_leads_to_are_refused_by_name(task):
     game = game_cfg(task)
     for place in (with_leaves(SHUT), replace(shipped("house"), doors=[])):
-        with pytest.raises(
-            ValueError,
-            match=rf"^{task}: no doors of playground 'house' lead from room 'living' to \["
-            "'kitchen', 'nursery', 'bedroom'.; add doors .*choose .*playground=house",
-        ):
+        beyond = "['kitchen', 'nursery', 'bedroom']"
+        parts = (task, "'house'", "'living'", beyond, "playground.doors", "playground=house")
+        with pytest.raises(ValueError, match=naming(*parts)):
             replace(game, playground=place).check_playground()
     replace(game, playground=shipped("house")).check_playground()
 
@@ -37,7 +36,8 @@ def test_the_doors_that_are_locked_are_named():
     first, *others = house.doors
     check_connected("Task", replace(house, doors=[replace(first, leaf=SHUT), *others]), house.rooms)
     shut = [replace(first, leaf=SHUT), replace(others[-1], leaf=SHUT), *others[:-1]]
-    with pytest.raises(ValueError, match=r"locked=false for \['door_bedroom', 'door_kitchen'\]"):
+    named = naming("leaf.locked=false", "['door_bedroom', 'door_kitchen']")
+    with pytest.raises(ValueError, match=named):
         check_connected("Task", replace(house, doors=shut), house.rooms)
     check_connected("Task", replace(house, doors=shut), house.rooms[1:])
 
@@ -62,7 +62,7 @@ def test_a_sliding_leaf_that_is_locked_ajar_is_shut():
     door = next(each for each in house.doors if each.leaf and each.leaf.kind is JointKind.slide)
     ajar = replace(door, leaf=replace(door.leaf, opening=0.2, locked=True))
     bedroom = next(each for each in house.doors if each.name == "door_bedroom")
-    with pytest.raises(ValueError, match="no doors"):
+    with pytest.raises(ValueError, match=naming("'house2'", door.name)):
         check_connected("Task", replace(house, doors=[ajar, bedroom]), house.rooms)
 
 
@@ -70,5 +70,5 @@ def test_rooms_that_touch_without_walls_are_connected():
     rooms = [RoomCfg("west"), RoomCfg("east", lower_m=(3.0, -3.0, 0.0))]
     check_connected("Task", PlaygroundCfg("open", rooms), rooms)
     corner = [rooms[0], replace(rooms[1], lower_m=(3.0, 3.0, 0.0))]
-    with pytest.raises(ValueError, match=r"from room 'west' to \['east'\]"):
+    with pytest.raises(ValueError, match=naming("'corner'", "'west'", "['east']")):
         check_connected("Task", PlaygroundCfg("corner", corner), corner)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import started
 from composed import compose
+from refusals import naming
 
 from veca_marl.config import ConfigError
 from veca_marl.envs.core.game import Game
@@ -52,7 +53,7 @@ def drive(game, steps):
 )
 def test_a_speed_that_is_too_great_for_the_clock_is_refused_by_the_configuration(task, speed):
     words = [f"+task={task}", f"task.speed_mps={speed}"]
-    with pytest.raises(ConfigError, match=r"task.speed_mps.* at most .* raise clock.substeps"):
+    with pytest.raises(ConfigError, match=naming("task.speed_mps", "m/s", "clock.substeps")):
         compose(words)
     compose([*words, "clock.substeps=40"])
 
@@ -276,18 +277,18 @@ def test_without_a_contact_the_task_is_solved():
 
 
 @pytest.mark.parametrize(
-    ("override", "message"),
+    ("override", "parts"),
     [
-        ("task.aim=1.5", r"task.aim=1.5 must be in \[0, 1\]"),
-        ("task.speed_mps=0", "task.speed_mps"),
-        ("task.speed_mps=50", "task.speed_mps=50.* at most 21.25 m/s, or raise clock.substeps"),
-        ("task.lead_s=-1", "task.lead_s=-1.0 must be 0 or a positive number"),
-        ("playground=four_rooms", "'four_rooms' has 4 rooms; .* choose playground=simple"),
-        ("body=mitten", "choose body=walker"),
+        ("task.aim=1.5", ("task.aim=1.5", "[0, 1]")),
+        ("task.speed_mps=0", ("task.speed_mps",)),
+        ("task.speed_mps=50", ("task.speed_mps=50", "21.25 m/s", "clock.substeps")),
+        ("task.lead_s=-1", ("task.lead_s=-1.0",)),
+        ("playground=four_rooms", ("'four_rooms'", " 4 ", "playground=simple")),
+        ("body=mitten", ("body=walker",)),
     ],
 )
-def test_what_cannot_be_played_is_refused(override, message):
-    with pytest.raises(ValueError, match=message):
+def test_what_cannot_be_played_is_refused(override, parts):
+    with pytest.raises(ValueError, match=naming(*parts)):
         Game(compose(["+task=DodgeCar", override]).game)
 
 

@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 from composed import compose
+from refusals import naming
 from seeking import shipped
 
 from veca_marl.config import ConfigError
@@ -28,33 +29,33 @@ CLEAR_M, APART_M = 0.8, 1.0  # of MultiAgentNav
 
 
 @pytest.mark.parametrize(
-    ("task", "overrides", "message"),
+    ("task", "overrides", "parts"),
     [
-        ("ObjectNav", ["task.apart_m=9"], "task.apart_m=9 .*'simple'.* 6 x 6 m.*; choose fewer"),
+        ("ObjectNav", ["task.apart_m=9"], ("task.apart_m=9", "'simple'", "6 x 6 m")),
         (
             "ObjectNav",
             ["task.reach_m=5", "task.apart_m=6"],
-            "task.reach_m=5: .* 5.40 m away.*playground=house",
+            ("task.reach_m=5", "5.40 m", "playground=house"),
         ),
-        ("ObjectNav", [f"task.objects=[ball{18 * ',cube'}]"], "19 task.objects.* no 20 places"),
-        ("ObjectPhysNav", ["task.apart_m=7"], "ObjectPhysNav .*task.apart_m=7"),
-        ("MultiAgentNav", ["task.radius_m=3"], "task.radius_m=3, .*no room leaves two .*hall 9.2"),
-        ("ColorSort", ["task.items=8"], r"24 toys \(task.items=8 for each of 3 baskets\)"),
-        ("ShapeSort", ["task.apart_m=4"], "ShapeSort with 6 toys .*task.apart_m=4"),
-        ("FillFraction", ["task.apart_m=3"], "task.circles=3, 8 task.pieces and task.apart_m=3"),
-        ("DodgeCar", ["task.apart_m=12"], "DodgeCar with task.apart_m=12: .*a smaller one"),
-        ("ChaseCar", ["task.apart_m=12"], "ChaseCar with task.apart_m=12: "),
-        ("BabyzumasRevenge", TINY_ROOMS, "room 'a' of 1.1 x 1.1 m leaves no place for a cupboard"),
+        ("ObjectNav", [f"task.objects=[ball{18 * ',cube'}]"], ("19 task.objects", " 20 ")),
+        ("ObjectPhysNav", ["task.apart_m=7"], ("ObjectPhysNav", "task.apart_m=7")),
+        ("MultiAgentNav", ["task.radius_m=3"], ("task.radius_m=3", "hall 9.2")),
+        ("ColorSort", ["task.items=8"], ("24 ", "task.items=8", "3 baskets")),
+        ("ShapeSort", ["task.apart_m=4"], ("ShapeSort", "6 toys", "task.apart_m=4")),
+        ("FillFraction", ["task.apart_m=3"], ("task.circles=3", "8 task.pieces", "task.apart_m=3")),
+        ("DodgeCar", ["task.apart_m=12"], ("DodgeCar", "task.apart_m=12")),
+        ("ChaseCar", ["task.apart_m=12"], ("ChaseCar", "task.apart_m=12")),
+        ("BabyzumasRevenge", TINY_ROOMS, ("'a'", "1.1 x 1.1 m", "cupboard")),
     ],
 )
-def test_what_does_not_fit_is_refused_by_the_configuration(task, overrides, message):
-    with pytest.raises(ConfigError, match=message):
+def test_what_does_not_fit_is_refused_by_the_configuration(task, overrides, parts):
+    with pytest.raises(ConfigError, match=naming(*parts)):
         compose([f"+task={task}", *overrides])
 
 
 def test_a_placement_that_fails_now_and_then_is_refused():
     """A single trial passed, and some reset failed later."""
-    with pytest.raises(ConfigError, match=r"task.apart_m=4\.4 .*; choose fewer"):
+    with pytest.raises(ConfigError, match=naming("ObjectNav", "task.apart_m=4.4")):
         compose(["+task=ObjectNav", "task.objects=[ball,cube]", "task.apart_m=4.4"])
     seen = []
 
@@ -63,7 +64,7 @@ def test_a_placement_that_fails_now_and_then_is_refused():
         if len(seen) == TRIALS:
             raise ValueError("full")
 
-    with pytest.raises(ValueError, match=r"^a sack: full; choose another$"):
+    with pytest.raises(ValueError, match=naming("a sack", "full", "another")):
         check_placement(place, "a sack", "another")
     assert len(set(seen)) == TRIALS == 20
 

@@ -5,6 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from refusals import naming
 from seeking import BALL_M, ball_at, walker_at, wall_across, world_with
 
 from veca_marl.envs.core.task import Player
@@ -84,7 +85,7 @@ def test_free_places_are_clear_of_props_and_walls():
     assert 0.3 <= min(gaps) < 0.34
     np.testing.assert_allclose(places.min(axis=0)[:2], 0.3, atol=0.05)
     np.testing.assert_allclose(places.max(axis=0)[:2], 1.7, atol=0.05)
-    with pytest.raises(ValueError, match=r"leaves no floor 0\.95 m away from everything"):
+    with pytest.raises(ValueError, match=naming("2 x 2 m", "0.95 m")):
         free_place(room, [thing], 0.95, rng)
     world.close()
 
@@ -100,7 +101,7 @@ def test_pairs_of_places_are_clear_and_apart_in_a_small_room():
     for place in np.concatenate(pairs):
         assert gap_m(place, thing) >= 0.8
         assert room.contains(place + np.array([0.0, 0.0, 1.0]), 0.8)
-    with pytest.raises(ValueError, match=r"leaves no two places 2 m apart and 0\.8 m away"):
+    with pytest.raises(ValueError, match=naming("3 x 3 m", " 2 m ", "0.8 m")):
         free_pair(room, [thing], 0.8, 2.0, rng)
     world.close()
 

@@ -1,8 +1,11 @@
 """Tasks that the paper runs in several playgrounds can be played in all of those that fit."""
 
+import re
+
 import numpy as np
 import pytest
 from composed import compose
+from refusals import naming
 
 from veca_marl.checks.starts import overlaps
 from veca_marl.config import ConfigError
@@ -61,64 +64,64 @@ def test_random_houses_without_loops_have_a_room_with_one_door():
 
 
 @pytest.mark.parametrize(
-    ("words", "message"),
+    ("words", "parts"),
     [
         (
             ["+task=KickTheBall", "playground.rooms=[{name: den, size_m: [2.0, 4.0, 2.6]}]"],
-            r"room 'den' .*needs 3.0 m along x and y; choose playground=simple, .*house2",
+            ("KickTheBall", "'den'", "3.0 m", "playground=simple", "house2"),
         ),
         (
             ["+task=MultiAgentNav", "playground=single_room"],
-            r"playground 'single_room' has 1; .*playground=two_rooms, .*random_house",
+            ("task.agents=", "'single_room'", "playground=two_rooms", "random_house"),
         ),
         (
             ["+task=SoccerOnePlayer", "playground=seven_rooms"],
-            r"'seven_rooms': 4.4 m of task.ball_from_goal_m .* do not fit .*playground=simple",
+            ("'seven_rooms'", "4.4 m", "task.ball_from_goal_m", "playground=simple"),
         ),
         (
             ["+task=SoccerTwoPlayer", "playground=single_room"],
-            r"'single_room': 'bed' stands between the goal .*; choose playground=simple",
+            ("'single_room'", "'bed'", "goal", "playground=simple"),
         ),
         (
             ["+task=PushOut1v1", "playground=seven_rooms", "task.radius_m=1.6"],
-            r"'seven_rooms': task.radius_m=1.6: the ring does not fit .*playground=simple",
+            ("'seven_rooms'", "task.radius_m=1.6", "playground=simple", "single_room"),
         ),
         (
             ["+task=MultiAgentNav", "playground=house", "task.agents=5"],
-            r"task.agents=5 .*'house' has 4; choose playground=seven_rooms, house2 or .* at most 4",
+            ("task.agents=5", "'house'", " 4", "playground=seven_rooms", "house2"),
         ),
         (
             ["+task=MultiAgentNav", "task.agents=9"],
-            r"task.agents=9 .*'seven_rooms' has 7; choose task.agents of at most 7$",
+            ("task.agents=9", "'seven_rooms'", " 7"),
         ),
         (
             ["+task=MultiAgentNav", "playground=simple"],
-            r"'simple' has 1; choose playground=two_rooms, .*playground.room_count=2$",
+            ("'simple'", "playground=two_rooms", "playground.room_count=2"),
         ),
         (
             ["+task=GrabObject", "task.ahead_m=[4.0,8.0]"],
-            r"GrabObject needs 8.05 m in front .*task.ahead_m=\(4.0, 8.0\).* of 6 x 6 m",
+            ("GrabObject", "8.05 m", "task.ahead_m=(4.0, 8.0)", "6 x 6 m"),
         ),
         (
             ["+task=MoveToTarget", "task.target_m=[2.0,3.0]", "task.clip_m=4"],
-            r"MoveToTarget needs .* and 3.05 m to its sides .*choose smaller values or",
+            ("MoveToTarget", "3.05 m", "'simple'"),
         ),
         (
             ["+task=PileUpBlock", "task.blue_ahead_m=[2.9,3.0]"],
-            r"PileUpBlock needs 3.04 m in front",
+            ("PileUpBlock", "3.04 m"),
         ),
         (
             ["+task=PutDownBlock", "task.aside_m=[5,9]"],
-            r"PutDownBlock needs .* 9.04 m to its sides",
+            ("PutDownBlock", "9.04 m"),
         ),
         (
             ["+task=RotateCube", "playground.rooms=[{lower_m: [1.0, 1.0, 0.0]}]"],
-            r"RotateCube needs 0.6 m .*has no room; choose playground=simple",
+            ("RotateCube", "0.6 m", "playground=simple"),
         ),
     ],
 )
-def test_what_does_not_fit_is_refused_in_the_configuration(words, message):
-    with pytest.raises(ConfigError, match=message):
+def test_what_does_not_fit_is_refused_in_the_configuration(words, parts):
+    with pytest.raises(ConfigError, match=naming(*parts)):
         compose(words)
 
 
@@ -127,13 +130,13 @@ def test_what_does_not_fit_is_refused_in_the_configuration(words, message):
 )
 def test_a_room_that_is_too_small_to_lie_in_is_refused_in_the_configuration(task):
     room = "playground.rooms=[{name: den, size_m: [1.9, 4.0, 2.6]}]"
-    with pytest.raises(ConfigError, match=rf"{task} needs 2 m .*room 'den' .*1.9 x 4 m; choose "):
+    with pytest.raises(ConfigError, match=naming(task, " 2 m ", "'den'", "1.9 x 4 m")):
         compose([f"+task={task}", room])
 
 
 def test_more_agents_than_any_playground_has_rooms_are_told_how_many_fit():
-    choice = r"choose playground=seven_rooms, house2 with task.agents of at most 7$"
-    with pytest.raises(ConfigError, match=choice):
+    named = naming("task.agents=9", "playground=seven_rooms", "house2", " 7")
+    with pytest.raises(ConfigError, match=named):
         check_whole(["+task=MultiAgentNav", "playground=simple", "task.agents=9"])
 
 
@@ -141,12 +144,10 @@ def test_more_agents_than_any_playground_has_rooms_are_told_how_many_fit():
 def test_the_playgrounds_that_are_offered_to_more_agents_can_be_composed(agents):
     with pytest.raises(ConfigError) as refusal:
         check_whole(["+task=MultiAgentNav", "playground=two_rooms", f"task.agents={agents}"])
-    offered = str(refusal.value).split("choose ")[1].split(" or ")
+    offered = re.findall(r"playground=\w+(?: playground\.\w+=\w+)*", str(refusal.value))
     assert any("seven_rooms" in choice for choice in offered)
     for choice in offered:
-        if choice.startswith("playground="):
-            words = [word.rstrip(",") for word in choice.split() if "=" in word]
-            check_whole(["+task=MultiAgentNav", f"task.agents={agents}", *words])
+        check_whole(["+task=MultiAgentNav", f"task.agents={agents}", *choice.split()])
 
 
 @pytest.mark.parametrize("playground", ROOMS)
