@@ -98,7 +98,7 @@ CHECKPOINTS = {
     "another format": (lambda r: change_checkpoint(r, format=2), ("0008.pt", "format 2")),
     "another file": (lambda r: torch.save({"x": 1}, latest(r)), ("0008.pt", "checkpoint")),
     "entry missing": (lambda r: change_checkpoint(r, state=None), ("0008.pt", "state")),
-    "other content": (lambda r: change_checkpoint(r, state={"x": 1}), ("0008.pt", "KeyError")),
+    "other content": (lambda r: change_checkpoint(r, state={"x": 1}), ("run", "KeyError")),
 }
 RESUMED = {
     "another algorithm": (

@@ -45,7 +45,7 @@ def test_equal_weights_are_one_number():
 
 @pytest.mark.parametrize("wrong", [{"move": 0.1}, {**BOTH, "fly": 0.1}])
 def test_other_names_than_the_parts_are_refused(wrong):
-    with pytest.raises(ValueError, match=naming(list(wrong), "['move', 'voice']")):
+    with pytest.raises(ValueError, match=naming(sorted(wrong), "['move', 'voice']")):
         losses(wrong, hybrid=True)
 
 
