@@ -300,7 +300,7 @@ def test_walkers_have_a_goal_in_views_that_is_greater_in_several_rooms(task, mos
         (["bench.tasks=[all]", "bench.playgrounds=[garden]"], ("garden", "single_room")),
         (
             ["bench.tasks=[MultiAgentNav]", "bench.playgrounds=[simple]"],
-            ("MultiAgentNav", "'simple'"),
+            ("task.agents=2", "'simple'", "two_rooms"),
         ),
     ],
 )
@@ -349,7 +349,7 @@ def test_an_experiment_with_a_scripted_opponent_is_measured(capsys):
         ([], ("+task=NAME", "KickTheBall")),
         (["+task=KickTheBall", "senses/audio=nono"], ("nono", "hrtf")),
         (["+task=KickTheBall", "playground=garden"], ("garden", "single_room")),
-        (["+task=KickTheBall", "bench.worlds=[0]"], ("bench.worlds", " 0")),
+        (["+task=KickTheBall", "bench.worlds=[0]"], ("bench.worlds", "[0]")),
         (["+task=KickTheBall", "bench.worlds=[two]"], ("bench.worlds[0]", "'two'")),
         (["+task=KickTheBall", "bench.wolds=[1]"], ("bench.wolds", "worlds")),
         (["+task=KickTheBall", f"bench.json={BELOW_A_FILE}"], ("bench.json", __file__)),
