@@ -354,7 +354,10 @@ def test_an_experiment_with_a_scripted_opponent_is_measured(capsys):
         (["+task=KickTheBall", "bench.wolds=[1]"], ("bench.wolds", "worlds")),
         (["+task=KickTheBall", f"bench.json={BELOW_A_FILE}"], ("bench.json", __file__)),
         (["+task=KickTheBall", f"bench.json={quoted(ROOT)}"], ("bench.json", str(ROOT))),
-        (["bench.tasks=[KickTheBall]", "senses/vision=blind", "senses/audio=deaf"], ("sense",)),
+        (
+            ["bench.tasks=[KickTheBall]", "senses/vision=blind", "senses/audio=deaf"],
+            ("sense", "vision", "audio"),
+        ),
         (["+task=KickTheBall", "bench.loose_props=3"], ("bench.loose_props", "bench.agents")),
         (
             ["+task=KickTheBall", "bench.learning=true", "bench.agents=[2]"],

@@ -128,7 +128,7 @@ def test_file_names_of_pictures_have_letters_digits_and_underscores_only():
     [
         (["sections=[inertia]", f"to={quoted(__file__)}"], (f"to={__file__}",)),
         (["-m", "sections=[inertia],[momentum]", "to=laws"], ("to=laws", "2")),
-        (["-m", "sections=[inertia],[momentum]"], (" to",)),
+        (["-m", "sections=[inertia],[momentum]"], ("folder", " to")),
     ],
 )
 def test_a_folder_that_cannot_take_the_page_is_refused_before_the_first_law(
