@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+from refusals import naming
 
 import veca_marl
 from veca_marl import api
@@ -40,19 +41,19 @@ def test_train_returns_metrics_and_a_policy_and_stores_the_run(tmp_path):
     env = veca_marl.make("KickTheBall", senses=BLIND, seed=0)
     assert "action" in result.policy(env.reset())["agents"]
     env.close()
-    with pytest.raises(ConfigError, match="holds a run already"):
+    with pytest.raises(ConfigError, match=naming(tmp_path / "run", "resume=")):
         veca_marl.train("KickTheBall", folder=tmp_path / "run", senses=BLIND, overrides=TINY)
 
 
 def test_train_stays_a_function_after_the_module_of_the_command_was_imported():
     assert import_module("veca_marl.train") is veca_marl.train
-    with pytest.raises(ConfigError, match="unknown task 'Chess'; choices: BabyzumasRevenge"):
+    with pytest.raises(ConfigError, match=naming("'Chess'", "BabyzumasRevenge", "KickTheBall")):
         veca_marl.train("Chess")
 
 
 @pytest.mark.parametrize("suite", [["veca"], None, 3])
 def test_a_suite_is_a_name(suite):
-    with pytest.raises(ValueError, match="babybench, veca"):
+    with pytest.raises(ValueError, match=naming(suite, "babybench", "veca")):
         veca_marl.list_tasks(suite=suite)
 
 
@@ -68,7 +69,7 @@ def test_choices_are_shown_as_arguments():
 
 
 def test_fractions_of_frames_are_refused():
-    with pytest.raises(ConfigError, match=r"total_frames=1.5 must be an integral number"):
+    with pytest.raises(ConfigError, match=naming("total_frames=1.5")):
         veca_marl.train("KickTheBall", total_frames=1.5)
 
 
@@ -87,69 +88,68 @@ def close_of_closed():
 
 
 @pytest.mark.parametrize(
-    ("call", "message"),
+    ("call", "parts"),
     [
-        (lambda: veca_marl.list_tasks("babybench"), "plugins='babybench' must be a list of texts"),
-        (lambda: veca_marl.make("KickTheBall", plugins="mine"), "plugins='mine' must be a list"),
-        (lambda: veca_marl.make("KickTheBall", overrides="seed=3"), "overrides='seed=3' must be"),
+        (lambda: veca_marl.list_tasks("babybench"), ("plugins='babybench'",)),
+        (lambda: veca_marl.make("KickTheBall", plugins="mine"), ("plugins='mine'",)),
+        (lambda: veca_marl.make("KickTheBall", overrides="seed=3"), ("overrides='seed=3'",)),
         (
             lambda: veca_marl.make("KickTheBall", overrides=[3]),
-            r"overrides=\[3\] must be a list of",
+            ("overrides=[3]",),
         ),
         (
             lambda: veca_marl.make("KickTheBall", overrides=["task=MazeNav"]),
-            "overrides: 'task=MazeNav' is chosen by the argument `task`",
+            ("overrides", "'task=MazeNav'", "`task`"),
         ),
         (
             lambda: veca_marl.train("KickTheBall", overrides=["seed=3"]),
-            "overrides: 'seed=3' is chosen by the argument `seed`",
+            ("overrides", "'seed=3'", "`seed`"),
         ),
         (
             lambda: veca_marl.train("KickTheBall", overrides=["hydra.run.dir=x"]),
-            "overrides: 'hydra.run.dir=x' is chosen by the argument `folder`",
+            ("overrides", "'hydra.run.dir=x'", "`folder`"),
         ),
         (
             lambda: veca_marl.train("KickTheBall", total_frames=9, overrides=["total_frames=8"]),
-            "overrides: 'total_frames=8' is chosen by the argument `total_frames`",
+            ("overrides", "'total_frames=8'", "`total_frames`"),
         ),
-        (lambda: veca_marl.check_task("KickTheBall", checks=5), "checks=5 must be a CheckCfg"),
+        (lambda: veca_marl.check_task("KickTheBall", checks=5), ("checks=5", "CheckCfg")),
         (
             lambda: veca_marl.make("KickTheBall", overrides=["seed=3"]),
-            "overrides: 'seed=3' is chosen by the argument `seed`",
+            ("overrides", "'seed=3'", "`seed`"),
         ),
         (
             lambda: veca_marl.gym_env("KickTheBall", overrides=["algo/network=memory"]),
-            "overrides: 'algo/network=memory' is not of the game; choices: body, clock, opponent, "
-            "playground, plugins, senses, task, team",
+            ("overrides", "'algo/network=memory'", "body", "clock", "opponent"),
         ),
         (
             lambda: veca_marl.parallel_env("PushOut1v1", overrides=["+algo@learner.red=mappo"]),
-            r"overrides: '\+algo@learner.red=mappo' is not of the game",
+            ("overrides", "'+algo@learner.red=mappo'", "playground"),
         ),
         (
             lambda: veca_marl.check_task("KickTheBall", overrides=["total_frames=1e6"]),
-            "overrides: 'total_frames=1e6' is not of the game",
+            ("overrides", "'total_frames=1e6'", "playground"),
         ),
         (
             lambda: veca_marl.gym_env("PushOut1v1", overrides=[f"opponent.blue={quoted(FOLDER)}"]),
-            f"opponent.blue={FOLDER}: an environment does not play the policy of a run; choices: ",
+            (f"opponent.blue={FOLDER}", "idle", "random"),
         ),
-        (lambda: veca_marl.make("KickTheBall", senses="mono"), "senses='mono' must be a mapping"),
-        (lambda: veca_marl.make(3), "task=3 must be a name"),
-        (lambda: veca_marl.make("KickTheBall", worlds=2.5), "worlds=2.5 must be an integer"),
-        (lambda: veca_marl.make("KickTheBall", worlds=0), "worlds=0 must be 1 or more"),
-        (lambda: veca_marl.make("KickTheBall", seed="a"), "seed='a' must be an integer"),
+        (lambda: veca_marl.make("KickTheBall", senses="mono"), ("senses='mono'",)),
+        (lambda: veca_marl.make(3), ("task=3",)),
+        (lambda: veca_marl.make("KickTheBall", worlds=2.5), ("worlds=2.5",)),
+        (lambda: veca_marl.make("KickTheBall", worlds=0), ("worlds=0",)),
+        (lambda: veca_marl.make("KickTheBall", seed="a"), ("seed='a'",)),
         (
             lambda: veca_marl.train("KickTheBall", total_frames="many"),
-            "total_frames='many' must",
+            ("total_frames='many'",),
         ),
-        (lambda: veca_marl.train("KickTheBall", folder=__file__), "is a file; give a folder"),
-        (lambda: veca_marl.check_task(3), "task=3 must be a registered class or its name"),
-        (close_of_closed, "the environment is closed; make a new one"),
+        (lambda: veca_marl.train("KickTheBall", folder=__file__), (__file__,)),
+        (lambda: veca_marl.check_task(3), ("task=3", "registered")),
+        (close_of_closed, ("environment",)),
     ],
 )
-def test_wrong_arguments_are_named(call, message):
-    with pytest.raises((ValueError, RuntimeError), match=message):
+def test_wrong_arguments_are_named(call, parts):
+    with pytest.raises((ValueError, RuntimeError), match=naming(*parts)):
         call()
 
 

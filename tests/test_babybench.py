@@ -3,6 +3,7 @@
 import json
 
 import pytest
+from refusals import naming
 
 import veca_marl
 from veca_marl.babybench import Result, lines, main
@@ -11,7 +12,7 @@ from veca_marl.babybench import Result, lines, main
 def test_the_suite_is_not_among_the_tasks_of_the_paper():
     assert veca_marl.list_tasks(suite="babybench") == ["HandRegard", "SelfTouch"]
     assert not {"HandRegard", "SelfTouch"} & set(veca_marl.list_tasks())
-    with pytest.raises(ValueError, match="choices: babybench, veca"):
+    with pytest.raises(ValueError, match=naming("atari", "babybench", "veca")):
         veca_marl.list_tasks(suite="atari")
 
 
@@ -41,10 +42,13 @@ def test_episodes_are_played_and_written(tmp_path, capsys):
 
 def test_another_task_is_refused(capsys):
     assert main(["+task=KickTheBall"]) == 2
-    assert "SelfTouch, HandRegard" in capsys.readouterr().err
+    error = capsys.readouterr().err
+    assert all(name in error for name in ("KickTheBall", "SelfTouch", "HandRegard"))
 
 
 def test_a_game_without_senses_is_refused_in_one_line(capsys):
     words = ["+task=SelfTouch", "senses/touch=numb", "senses/proprioception=none", "episodes=1"]
     assert main(words) == 2
-    assert "no sense is left" in capsys.readouterr().err
+    error = capsys.readouterr().err
+    assert all(name in error for name in ("sense", "touch", "proprioception"))
+    assert error.count("\n") == 1

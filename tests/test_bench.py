@@ -10,6 +10,7 @@ import pytest
 import torch
 from composed import compose
 from paths import ROOT
+from refusals import naming
 
 from veca_marl.algos.checkpoints import Checkpoints
 from veca_marl.bench.body_views import body_views
@@ -197,7 +198,7 @@ def test_rollouts_at_once_name_a_process_that_was_killed():
     assert rollouts.frames_per_s() > 0.0
     assert all(list(array) == [7] * 8 for array in shared)
     (process,) = set(active_children()) - before
-    with pytest.raises(WorkerError, match="was killed by SIGKILL"):
+    with pytest.raises(WorkerError, match=naming("SIGKILL")):
         measure_without(process, rollouts)
     rollouts.close()
 
@@ -291,18 +292,22 @@ def test_walkers_have_a_goal_in_views_that_is_greater_in_several_rooms(task, mos
 
 
 @pytest.mark.parametrize(
-    ("words", "message"),
+    ("words", "parts"),
     [
-        (["bench.tasks=[KickTheBall]", "bench.agents=[2]"], "neither free play nor learning"),
-        (["bench.playgrounds=[house]", "+task=KickTheBall"], "needs bench.tasks"),
-        (["bench.tasks=[Kick]"], "unknown task 'Kick'"),
-        (["bench.tasks=[all]", "bench.playgrounds=[garden]"], "single_room"),
-        (["bench.tasks=[MultiAgentNav]", "bench.playgrounds=[simple]"], "'simple' has 1"),
+        (["bench.tasks=[KickTheBall]", "bench.agents=[2]"], ("bench.tasks",)),
+        (["bench.playgrounds=[house]", "+task=KickTheBall"], ("bench.playgrounds", "bench.tasks")),
+        (["bench.tasks=[Kick]"], ("'Kick'",)),
+        (["bench.tasks=[all]", "bench.playgrounds=[garden]"], ("garden", "single_room")),
+        (
+            ["bench.tasks=[MultiAgentNav]", "bench.playgrounds=[simple]"],
+            ("task.agents=2", "'simple'", "two_rooms"),
+        ),
     ],
 )
-def test_impossible_tables_are_refused(words, message, capsys):
+def test_impossible_tables_are_refused(words, parts, capsys):
     assert main([*ROLLOUTS, *words]) == 2
-    assert message in capsys.readouterr().err
+    error = capsys.readouterr().err
+    assert all(part in error for part in parts)
 
 
 @pytest.mark.slow
@@ -338,34 +343,37 @@ def test_an_experiment_with_a_scripted_opponent_is_measured(capsys):
 
 
 @pytest.mark.parametrize(
-    ("words", "message"),
+    ("words", "parts"),
     [
-        (["+task=Kick"], "KickTheBall"),
-        ([], "no task: add +task=NAME"),
-        (["+task=KickTheBall", "senses/audio=nono"], "hrtf"),
-        (["+task=KickTheBall", "playground=garden"], "single_room"),
-        (["+task=KickTheBall", "bench.worlds=[0]"], "bench.worlds must be at least 1"),
-        (["+task=KickTheBall", "bench.worlds=[two]"], "bench.worlds[0]: Value 'two'"),
-        (["+task=KickTheBall", "bench.wolds=[1]"], "did you mean worlds?"),
+        (["+task=Kick"], ("'Kick'", "KickTheBall")),
+        ([], ("+task=NAME", "KickTheBall")),
+        (["+task=KickTheBall", "senses/audio=nono"], ("nono", "hrtf")),
+        (["+task=KickTheBall", "playground=garden"], ("garden", "single_room")),
+        (["+task=KickTheBall", "bench.worlds=[0]"], ("bench.worlds", "[0]")),
+        (["+task=KickTheBall", "bench.worlds=[two]"], ("bench.worlds[0]", "'two'")),
+        (["+task=KickTheBall", "bench.wolds=[1]"], ("bench.wolds", "worlds")),
+        (["+task=KickTheBall", f"bench.json={BELOW_A_FILE}"], ("bench.json", __file__)),
+        (["+task=KickTheBall", f"bench.json={quoted(ROOT)}"], ("bench.json", str(ROOT))),
         (
-            ["+task=KickTheBall", f"bench.json={BELOW_A_FILE}"],
-            "is not a folder",
+            ["bench.tasks=[KickTheBall]", "senses/vision=blind", "senses/audio=deaf"],
+            ("sense", "vision", "audio"),
         ),
-        (["+task=KickTheBall", f"bench.json={quoted(ROOT)}"], "is a folder; give a file"),
-        (["bench.tasks=[KickTheBall]", "senses/vision=blind", "senses/audio=deaf"], "no sense"),
-        (["+task=KickTheBall", "bench.loose_props=3"], "need bench.agents"),
-        (["+task=KickTheBall", "bench.learning=true", "bench.agents=[2]"], "is not learnt"),
-        (["+task=TurnBaby", "body=walker"], "this task needs a body with joints"),
+        (["+task=KickTheBall", "bench.loose_props=3"], ("bench.loose_props", "bench.agents")),
+        (
+            ["+task=KickTheBall", "bench.learning=true", "bench.agents=[2]"],
+            ("bench.agents", "bench.learning=true"),
+        ),
+        (["+task=TurnBaby", "body=walker"], ("joints", "body=full")),
         (
             ["+task=KickTheBall", "playground=simple", "bench.agents=[99]"],
-            "99 players are too many",
+            ("99", "'simple'"),
         ),
     ],
 )
-def test_a_wrong_choice_ends_in_one_line(words, message, capsys):
+def test_a_wrong_choice_ends_in_one_line(words, parts, capsys):
     assert main([*ROLLOUTS, *words]) == 2
     error = capsys.readouterr().err
-    assert message in error
+    assert all(part in error for part in parts)
     assert error.count("\n") == 1
 
 

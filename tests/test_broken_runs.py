@@ -6,6 +6,7 @@ import shutil
 import pytest
 import torch
 from omegaconf import OmegaConf
+from refusals import naming
 
 from veca_marl import api
 from veca_marl.algos.checkpoints import CheckpointError
@@ -76,41 +77,41 @@ def remove_checkpoints(run):
 
 
 FOLDERS = {
-    "configuration missing": (lambda r: r.config.unlink(), r"run holds no run \(no config.yaml\)"),
-    "configuration empty": (lambda r: r.config.write_text(""), "config.yaml is damaged: it names"),
+    "configuration missing": (lambda r: r.config.unlink(), ("run", "config.yaml")),
+    "configuration empty": (lambda r: r.config.write_text(""), ("config.yaml",)),
     "configuration is no YAML": (
         lambda r: r.config.write_text("task: [KickTheBall"),
-        "config.yaml is damaged or cannot be read: .*expected",
+        ("config.yaml", "expected"),
     ),
-    "unknown task": (lambda r: change_config(r, "task.name", "Chess"), "unknown task 'Chess'"),
-    "unknown key": (lambda r: change_config(r, "algo.clip_it", 3), "config.yaml: .*'algo.clip_it'"),
-    "provenance missing": (lambda r: r.provenance.unlink(), "provenance.json is damaged or cannot"),
-    "provenance cut off": (lambda r: cut_off(r.provenance), "provenance.json is damaged or cannot"),
-    "older version": (change_provenance, "was stored by an older version; train it again"),
+    "unknown task": (lambda r: change_config(r, "task.name", "Chess"), ("'Chess'", "KickTheBall")),
+    "unknown key": (
+        lambda r: change_config(r, "algo.clip_it", 3),
+        ("config.yaml", "'algo.clip_it'"),
+    ),
+    "provenance missing": (lambda r: r.provenance.unlink(), ("provenance.json",)),
+    "provenance cut off": (lambda r: cut_off(r.provenance), ("provenance.json",)),
+    "older version": (change_provenance, ("run", "version")),
 }
 CHECKPOINTS = {
-    "checkpoint cut off": (lambda r: cut_off(latest(r)), r"cannot read .*0008\.pt \(cut off"),
-    "checkpoint empty": (lambda r: latest(r).write_bytes(b""), r"cannot read .*0008\.pt \(cut off"),
-    "another format": (
-        lambda r: change_checkpoint(r, format=2),
-        "has format 2, this version",
-    ),
-    "another file": (lambda r: torch.save({"x": 1}, latest(r)), "is not a checkpoint of a run"),
-    "entry missing": (lambda r: change_checkpoint(r, state=None), "is incomplete: no state"),
-    "other content": (lambda r: change_checkpoint(r, state={"x": 1}), "does not fit: KeyError"),
+    "checkpoint cut off": (lambda r: cut_off(latest(r)), ("0008.pt", "cut off")),
+    "checkpoint empty": (lambda r: latest(r).write_bytes(b""), ("0008.pt", "cut off")),
+    "another format": (lambda r: change_checkpoint(r, format=2), ("0008.pt", "format 2")),
+    "another file": (lambda r: torch.save({"x": 1}, latest(r)), ("0008.pt", "checkpoint")),
+    "entry missing": (lambda r: change_checkpoint(r, state=None), ("0008.pt", "state")),
+    "other content": (lambda r: change_checkpoint(r, state={"x": 1}), ("run", "KeyError")),
 }
 RESUMED = {
     "another algorithm": (
         lambda r: change_config(r, "algo.clip", 0.7),
-        r"another configuration: algo.clip was 0.2, is 0.7; a resumed run may change resume, .*log",
+        ("algo.clip", "0.2", "0.7", "total_frames", "log"),
     ),
     "another seed": (
         lambda r: change_config(r, "seed", 9),
-        "configuration: seed was 0, is 9",
+        ("seed", " 0", " 9", "total_frames"),
     ),
     "another task": (
         lambda r: change_config(r, "task.name", "MoveToTarget"),
-        "stored configuration: unknown key 'task",
+        ("config.yaml", "'task."),
     ),
 }
 
@@ -126,20 +127,20 @@ def resume(run, *overrides):
 
 def cases(*tables):
     table = {name: case for part in tables for name, case in part.items()}
-    return pytest.mark.parametrize(("damage", "message"), table.values(), ids=table)
+    return pytest.mark.parametrize(("damage", "parts"), table.values(), ids=table)
 
 
 @pytest.mark.slow
 @cases(FOLDERS, CHECKPOINTS, RESUMED)
-def test_a_run_that_cannot_be_resumed_is_unchanged(run, damage, message):
+def test_a_run_that_cannot_be_resumed_is_unchanged(run, damage, parts):
     damage(run)
     before = files(run)
-    with pytest.raises((ConfigError, CheckpointError), match=message):
+    with pytest.raises((ConfigError, CheckpointError), match=naming(*parts)):
         resume(run)
     assert files(run) == before
 
 
-NO_CHECKPOINT = {"no checkpoint": (remove_checkpoints, "neither a checkpoint nor the folder of a")}
+NO_CHECKPOINT = {"no checkpoint": (remove_checkpoints, ("run", "checkpoint"))}
 
 
 @cases(
@@ -147,31 +148,32 @@ NO_CHECKPOINT = {"no checkpoint": (remove_checkpoints, "neither a checkpoint nor
     {name: CHECKPOINTS[name] for name in ("checkpoint cut off", "other content")},
     NO_CHECKPOINT,
 )
-def test_evaluate_ends_in_one_line(run, capsys, damage, message):
+def test_evaluate_ends_in_one_line(run, capsys, damage, parts):
     damage(run)
     before = files(run)
     assert evaluate([f"run={run.path}", "episodes=1"]) == 2
-    check_one_line(capsys, message)
+    check_one_line(capsys, parts)
     assert files(run) == before
 
 
 @cases({name: FOLDERS[name] for name in ("configuration missing", "older version")})
-def test_tournament_ends_in_one_line(run, capsys, damage, message):
+def test_tournament_ends_in_one_line(run, capsys, damage, parts):
     damage(run)
     assert tournament([f"run={run.path}", "episodes=1"]) == 2
-    check_one_line(capsys, message)
+    check_one_line(capsys, parts)
 
 
-def check_one_line(capsys, message):
+def check_one_line(capsys, parts):
     (line,) = capsys.readouterr().err.splitlines()
     assert line.startswith("error: ")
-    with pytest.raises(ConfigError, match=message):
+    with pytest.raises(ConfigError, match=naming(*parts)):
         raise ConfigError(line)
 
 
 def test_the_checkpoint_before_a_damaged_one_is_named(run):
+    before, damaged = (path.name for path in sorted(run.checkpoints.glob("frames_*.pt"))[-2:])
     cut_off(latest(run))
-    with pytest.raises(CheckpointError, match=r"remove it to continue from frames_0+4\.pt"):
+    with pytest.raises(CheckpointError, match=naming(damaged, before)):
         resume(run)
     latest(run).unlink()
     assert resume(run).progress.frames == 4
@@ -201,23 +203,25 @@ def test_changed_budgets_are_kept_when_a_run_is_continued_once_more(run):
 
 
 def test_training_from_python_does_not_ignore_a_run_to_be_resumed(run):
-    with pytest.raises(ConfigError, match=r"resume=.*begins a new run; continue one with"):
+    with pytest.raises(
+        ConfigError, match=naming(f"resume={run.path}", "python -m veca_marl.train")
+    ):
         api.train("KickTheBall", overrides=[f"resume={run.path}"])
 
 
 @pytest.mark.parametrize(
-    ("override", "message"),
+    ("override", "parts"),
     [
-        ("seed=3", "cannot change seed; choices: resume, total_frames, max_minutes, device, thr"),
-        ("algo=mappo", "cannot change algo; choices"),
-        ("senses/audio=mono", "cannot change senses/audio; choices"),
-        ("+task=TurnBaby", "is a run of KickTheBall, not of TurnBaby"),
-        ("device=tpu", "device=tpu is not on this machine; choices: cpu"),
-        ("total_frames=0", "total_frames must be"),
+        ("seed=3", ("seed", "total_frames", "max_minutes")),
+        ("algo=mappo", ("algo", "total_frames", "max_minutes")),
+        ("senses/audio=mono", ("senses/audio", "total_frames", "max_minutes")),
+        ("+task=TurnBaby", ("KickTheBall", "TurnBaby")),
+        ("device=tpu", ("device=tpu", "cpu")),
+        ("total_frames=0", ("total_frames", " 0")),
     ],
 )
-def test_other_changes_are_refused(run, override, message):
+def test_other_changes_are_refused(run, override, parts):
     before = files(run)
-    with pytest.raises(ConfigError, match=message):
+    with pytest.raises(ConfigError, match=naming(*parts)):
         resume(run, override)
     assert files(run) == before

@@ -3,6 +3,7 @@
 import pytest
 import torch
 from first_seen import FirstSeenCfg
+from refusals import naming
 from toy_dqn import ToyDQNCfg, register
 
 from veca_marl.algos.intrinsic.intrinsic_reward import IntrinsicCfg
@@ -51,9 +52,9 @@ def test_the_arithmetic_of_every_network_is_decided_before_a_run_is_stored(monke
 def test_an_algorithm_without_a_file_is_chosen_by_name():
     cfg = compose([KICK, "algo=toy_dqn", "algo.batch=16"])
     assert cfg.algo == ToyDQNCfg(batch=16)
-    with pytest.raises(ConfigError, match=r"unknown key 'algo.clip'|Key 'clip'|'clip'"):
+    with pytest.raises(ConfigError, match=naming("clip")):
         compose([KICK, "algo=toy_dqn", "algo.clip=0.1"])
-    with pytest.raises(ConfigError, match=r"unknown algo 'pop'.*ppo"):
+    with pytest.raises(ConfigError, match=naming("'pop'", "ppo")):
         compose([KICK, "algo=pop"])
 
 
@@ -78,14 +79,14 @@ def test_loggers_are_chosen_by_name(monkeypatch):
     assert compose([KICK]).log.logger == [LoggerKind.csv, LoggerKind.tensorboard]
     monkeypatch.setattr("veca_marl.algos.reporting.find_spec", lambda name: None)
     stored = compose([KICK, "log.logger=[wandb]"])  # a run of another machine can be read
-    with pytest.raises(ConfigError, match=r"log.logger: wandb is not installed: pip install"):
+    with pytest.raises(ConfigError, match=naming("log.logger", "wandb", "pip install")):
         make_trainer(stored)
     with pytest.raises(ConfigError, match=r"wandbb"):
         compose([KICK, "log.logger=[wandbb]"])
 
 
 def test_a_batch_that_an_algorithm_cannot_learn_from_is_refused():
-    with pytest.raises(ConfigError, match="toy_dqn needs batches of at least 4 frames, got 2"):
+    with pytest.raises(ConfigError, match=r"toy_dqn .*\b4\b.*\b2$"):
         compose([*SMALL, "algo=toy_dqn", "collect.worlds=1", "collect.steps=2"])
 
 
@@ -146,8 +147,7 @@ def test_an_action_of_two_parts_is_learnt_from_a_replay_buffer(tmp_path):
 
 
 def test_a_replay_buffer_that_does_not_fit_is_refused_before_the_run():
-    message = r"the replay buffers take \d+\.\d+ GB of memory.*change algo.replay.capacity"
-    with pytest.raises(ConfigError, match=message):
+    with pytest.raises(ConfigError, match=naming("memory", "GB", "algo.replay.capacity")):
         run_training(compose([*SMALL, "algo=sac", "algo.replay.capacity=10_000_000_000"]))
 
 
@@ -188,15 +188,15 @@ def sac(warm_up_frames):
 
 
 def test_a_budget_without_an_update_is_refused_before_the_run(tmp_path):
-    message = r"total_frames=63: team 'agents': the 64 frames end before .*warm_up_frames=65"
-    with pytest.raises(ConfigError, match=message):
+    parts = ("total_frames=63", "'agents'", "algo.replay.warm_up_frames=65")
+    with pytest.raises(ConfigError, match=naming(*parts)):
         run_training(compose([*sac(65), "total_frames=63"]), RunFolder(tmp_path))
     assert not list(tmp_path.iterdir())
 
 
 def test_a_run_that_starts_from_another_one_needs_frames_for_an_update_too(tmp_path):
     run_training(compose(sac(16)), RunFolder(tmp_path))
-    with pytest.raises(ConfigError, match=r"total_frames=64: .*warm_up_frames=65"):
+    with pytest.raises(ConfigError, match=naming("total_frames=64", "warm_up_frames=65")):
         make_trainer(compose([*sac(65), f"init_from.agents={tmp_path}"]))
 
 
@@ -236,9 +236,9 @@ def test_intrinsic_rewards_are_chosen_by_name_also_for_a_team():
     assert chosen.intrinsic == ForwardModelCfg(senses=["vision"])
     own = compose([push, "+intrinsic@team_intrinsic.red=rnd", "team_intrinsic.red.cells=7"])
     assert (own.intrinsic, own.team_intrinsic) == (IntrinsicCfg(), {"red": RNDCfg(cells=7)})
-    with pytest.raises(ConfigError, match=r"unknown intrinsic 'rdn' \(did you mean rnd\?\)"):
+    with pytest.raises(ConfigError, match=naming("intrinsic", "'rdn'", "rnd")):
         compose([push, "intrinsic=rdn"])
-    with pytest.raises(ConfigError, match=r"team_intrinsic: no \['green'\] in PushOut1v1"):
+    with pytest.raises(ConfigError, match=naming("team_intrinsic", "green", "red", "blue")):
         compose([push, "+intrinsic@team_intrinsic.green=rnd"])
 
 

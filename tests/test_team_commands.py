@@ -2,12 +2,12 @@
 
 import csv
 import json
-import re
 import shutil
 
 import commands
 import pytest
 import torch
+from refusals import naming
 
 from veca_marl.algos.checkpoints import CheckpointError
 from veca_marl.algos.evaluation.evaluate import RandomTeams
@@ -107,7 +107,7 @@ def test_a_tournament_without_a_place_for_its_picture_is_refused_before_it_is_pl
     picture.unlink(missing_ok=True)
     picture.mkdir()
     assert tournament([f"run={played / 'run'}", "tournament.members=2", "episodes=4"]) == 2
-    assert "cross_play.png is a folder" in capsys.readouterr().err
+    assert "cross_play.png" in capsys.readouterr().err
     picture.rmdir()
 
 
@@ -116,7 +116,8 @@ def test_a_tournament_needs_two_past_policies_of_a_team(played, tmp_path, capsys
     for path in sorted((run / "pool").glob("blue_*"))[1:]:
         path.unlink()
     assert tournament([f"run={run}"]) == 2
-    assert "past policies of blue: 1, and 2 are needed" in capsys.readouterr().err
+    error = capsys.readouterr().err
+    assert all(part in error for part in ("policies", "blue: 1", " 2 "))
 
 
 def test_a_policy_of_another_run_is_an_opponent(played, tmp_path, capsys):
@@ -150,25 +151,25 @@ def test_a_team_starts_from_the_parameters_of_another_run(played, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("arguments", "message"),
+    ("arguments", "parts"),
     [
-        (["init_from.green={run}"], "no ['green'] in PushOut1v1; choices: ['red', 'blue']"),
-        (["init_from.blue={run}", "opponent.blue=idle"], "no ['blue']"),
-        (["init_from.red=nowhere"], "nowhere is neither a checkpoint nor the folder of a run"),
+        (["init_from.green={run}"], ("init_from", "green", "red", "blue")),
+        (["init_from.blue={run}", "opponent.blue=idle"], ("init_from", "['blue']", "red")),
+        (["init_from.red=nowhere"], ("nowhere", "checkpoint")),
         (
             ["init_from.red={run}", "algo.network.vector_features=7"],
-            "another network: vector_features=64 in the stored run, 7 in this one",
+            ("vector_features=64", "7"),
         ),
-        (["init_from.red={run}", "senses/vision=monocular"], "vision: absent in the checkpoint"),
-        (["init_encoders.red.vision={run}", "senses/vision=monocular"], "no encoder of vision"),
-        (["init_encoders.green.audio={run}"], "init_encoders: no ['green'] in PushOut1v1"),
-        (["init_from.red={run}:green"], "has learnt the teams ['blue', 'red'], not 'green'"),
-        (["algo.network.frozen=[smell]"], "no encoder of smell; choices: proprioception"),
+        (["init_from.red={run}", "senses/vision=monocular"], ("vision", "absent")),
+        (["init_encoders.red.vision={run}", "senses/vision=monocular"], ("encoder", "vision")),
+        (["init_encoders.green.audio={run}"], ("init_encoders", "green", "red")),
+        (["init_from.red={run}:green"], ("run", "'green'", "'blue'", "'red'")),
+        (["algo.network.frozen=[smell]"], ("smell", "proprioception")),
     ],
 )
-def test_a_source_that_does_not_fit_is_refused(played, tmp_path, arguments, message):
+def test_a_source_that_does_not_fit_is_refused(played, tmp_path, arguments, parts):
     overrides = [text.format(run=played / "run") for text in arguments]
-    with pytest.raises((ConfigError, CheckpointError), match=re.escape(message)):
+    with pytest.raises((ConfigError, CheckpointError), match=naming(*parts)):
         make_trainer(compose([*TASK, *SMALL, *overrides]), RunFolder(tmp_path / "run"))
     assert not (tmp_path / "run").exists()
 
@@ -194,21 +195,22 @@ def test_a_run_is_evaluated_against_another_opponent(played, tmp_path, capsys):
 
 
 @pytest.mark.parametrize(
-    ("override", "message"),
+    ("override", "parts"),
     [
-        ("senses/vision=monocular", "other specs"),
-        ("senses/audio=lout", "unknown senses/audio 'lout'"),
-        ("algo.clip=1", "of a run, only body, clock, eval"),
-        ("task=KickTheBall", "task=KickTheBall: it is a run of PushOut1v1"),
-        ("opponent.green=idle", "opponent: no ['green'] in PushOut1v1"),
-        ("evaluate.exploration=loud", "expected one of [deterministic, stochastic]"),
-        ("episodes=0", "episodes must be at least 1"),
-        ("episode=4", "unknown key 'episode' (did you mean episodes?)"),
+        ("senses/vision=monocular", ("specs", "vision")),
+        ("senses/audio=lout", ("senses/audio", "'lout'", "mono")),
+        ("algo.clip=1", ("algo.clip=1", "body", "clock")),
+        ("task=KickTheBall", ("task=KickTheBall", "PushOut1v1")),
+        ("opponent.green=idle", ("opponent", "green", "red")),
+        ("evaluate.exploration=loud", ("exploration", "loud", "deterministic")),
+        ("episodes=0", ("episodes", " 0")),
+        ("episode=4", ("'episode'", "episodes")),
     ],
 )
-def test_a_change_that_does_not_fit_is_refused(played, capsys, override, message):
+def test_a_change_that_does_not_fit_is_refused(played, capsys, override, parts):
     assert evaluate([f"run={played / 'run'}", override]) == 2
-    assert message in capsys.readouterr().err
+    error = capsys.readouterr().err
+    assert all(part in error for part in parts)
 
 
 def test_frozen_episodes_are_those_of_their_seed(played, tmp_path, capsys, monkeypatch):
@@ -229,16 +231,17 @@ def test_frozen_episodes_are_those_of_their_seed(played, tmp_path, capsys, monke
 
 
 @pytest.mark.parametrize(
-    ("words", "message"),
+    ("words", "parts"),
     [
-        (["episodes=benchmark"], "differs in task.max_seconds=1.0 (not "),
-        (["episodes=benchmark", "seed=2"], "seed=2: the benchmark has a seed of its own"),
-        (["episodes=all"], "episodes must be a number or 'benchmark', got 'all'"),
+        (["episodes=benchmark"], ("task.max_seconds=1.0",)),
+        (["episodes=benchmark", "seed=2"], ("seed=2", "benchmark")),
+        (["episodes=all"], ("episodes", "'benchmark'", "'all'")),
     ],
 )
-def test_other_games_than_the_benchmark_are_refused(played, capsys, words, message):
+def test_other_games_than_the_benchmark_are_refused(played, capsys, words, parts):
     assert evaluate([f"run={played / 'run'}", *words]) == 2
-    assert message in capsys.readouterr().err
+    error = capsys.readouterr().err
+    assert all(part in error for part in parts)
 
 
 def test_a_self_play_run_is_evaluated_against_an_expert(played, tmp_path, capsys):
@@ -293,7 +296,7 @@ def test_a_folder_that_is_no_run_is_refused(tmp_path, capsys):
     nowhere = tmp_path / "nowhere"
     for command in (tournament, evaluate):
         assert command([f"run={nowhere}"]) == 2
-        assert "nowhere does not exist; give the folder of a run" in capsys.readouterr().err
+        assert f"run={nowhere}" in capsys.readouterr().err
 
 
 def test_past_policies_are_chosen_evenly():
@@ -302,16 +305,17 @@ def test_past_policies_are_chosen_evenly():
 
 
 @pytest.mark.parametrize(
-    ("arguments", "message"),
+    ("arguments", "parts"),
     [
-        (["eval.every_frames=128"], "total_frames=128: team 'blue' would not learn"),
+        (["eval.every_frames=128"], ("total_frames=128", "'blue'")),
         (
             ["eval.every_frames=64", "algo=sac", "algo.replay.warm_up_frames=100"],
-            "team 'red': the 64 frames end before the first update",
+            ("'red'", "64", "algo.replay.warm_up_frames=100"),
         ),
     ],
 )
-def test_self_play_in_which_a_team_would_not_learn_is_refused(tmp_path, capsys, arguments, message):
+def test_self_play_in_which_a_team_would_not_learn_is_refused(tmp_path, capsys, arguments, parts):
     turns = ["self_play.teams=[red,blue]", "total_frames=128", *arguments]
     assert train(tmp_path, "run", *turns) == 2
-    assert message in capsys.readouterr().err
+    error = capsys.readouterr().err
+    assert all(part in error for part in parts)

@@ -3,6 +3,7 @@
 import csv
 import os
 import random
+import re
 import shutil
 import signal
 import subprocess
@@ -14,6 +15,7 @@ import pytest
 import torch
 import yaml
 from killed_runs import assert_equal
+from refusals import naming
 from training import TIMES
 
 from veca_marl.config import ConfigError
@@ -44,11 +46,11 @@ def rows(path):
 def test_available_devices_are_found_and_others_raise_an_error(monkeypatch):
     assert find_device("cpu") == torch.device("cpu")
     monkeypatch.setattr(torch.cuda, "device_count", lambda: 0)
-    with pytest.raises(ConfigError, match=r"device=cuda is not on this machine; choices: cpu$"):
+    with pytest.raises(ConfigError, match=r"device=cuda\b.*: cpu$"):
         find_device("cuda")
     monkeypatch.setattr(torch.cuda, "device_count", lambda: 2)
     assert find_device("cuda:1") == torch.device("cuda:1")
-    with pytest.raises(ConfigError, match="choices: cpu, cuda, cuda:0, cuda:1"):
+    with pytest.raises(ConfigError, match=naming("device=cuda:2", "cpu, cuda, cuda:0, cuda:1")):
         find_device("cuda:2")
 
 
@@ -131,43 +133,40 @@ def test_interrupted_and_resumed_equals_uninterrupted(smoke, tmp_path, start):
 def test_an_existing_run_is_not_overwritten(smoke):
     run, _ = smoke
     before = {path: path.read_bytes() for path in run.rglob("*") if path.is_file()}
-    for arguments, message in (
-        ([*SMOKE, f"hydra.run.dir={run}"], "holds a run already; continue it with resume="),
-        ([f"resume={run}", "senses/audio=mono"], "cannot change senses/audio; choices: resume"),
-        ([f"resume={run}", "seed=3"], "cannot change seed; choices: resume, total_frames"),
+    for arguments, parts in (
+        ([*SMOKE, f"hydra.run.dir={run}"], (f"resume={run}",)),
+        ([f"resume={run}", "senses/audio=mono"], ("senses/audio", "total_frames")),
+        ([f"resume={run}", "seed=3"], ("seed", "total_frames", "max_minutes")),
     ):
         done = train(run.parent, *arguments)
         assert done.returncode == 2
-        assert message in done.stderr
+        assert all(part in done.stderr for part in parts)
     assert {path: path.read_bytes() for path in run.rglob("*") if path.is_file()} == before
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("arguments", "message"),
+    ("arguments", "parts"),
     [
-        ([], "error: no task: add +task=NAME; choices: BabyzumasRevenge, ChaseCar, ColorSort"),
-        (["task=KickTheBall"], "error: task has no default to replace: write +task=KickTheBall"),
-        (["+task=KickTheBal"], "error: unknown task 'KickTheBal' (did you mean KickTheBall?)"),
-        (["+task=KickTheBall", "sede=1"], "error: unknown key 'sede' (did you mean seed?)"),
-        (["+task=KickTheBall", "algo.clip=-1"], "error: algo.clip must be in (0, 1], got -1.0"),
-        (
-            ["+task=KickTheBall", "device=tpu"],
-            "error: device=tpu is not on this machine; choices: cpu",
-        ),
-        (["resume=nowhere"], "error: resume="),
-        ([f"resume={__file__}"], f"error: resume={__file__} is a file; give the folder of a run"),
+        ([], ("+task=NAME", "BabyzumasRevenge", "ChaseCar")),
+        (["task=KickTheBall"], ("+task=KickTheBall",)),
+        (["+task=KickTheBal"], ("'KickTheBal'", "KickTheBall", "MazeNav")),
+        (["+task=KickTheBall", "sede=1"], ("'sede'", "seed", "playground")),
+        (["+task=KickTheBall", "algo.clip=-1"], ("algo.clip", "-1.0")),
+        (["+task=KickTheBall", "device=tpu"], ("device=tpu", "cpu")),
+        (["resume=nowhere"], ("resume=", "nowhere")),
+        ([f"resume={__file__}"], (f"resume={__file__}", "folder")),
         (
             ["+task=KickTheBall", "hydra.run.dir=/dev/null/run"],
-            "error: hydra.run.dir=/dev/null/run cannot be written: /dev/null is not a folder",
+            ("hydra.run.dir=/dev/null/run", " /dev/null "),
         ),
     ],
 )
-def test_a_wrong_command_ends_in_one_line_and_leaves_nothing(tmp_path, arguments, message):
+def test_a_wrong_command_ends_in_one_line_and_leaves_nothing(tmp_path, arguments, parts):
     done = train(tmp_path, *arguments)
     assert done.returncode == 2
     (line,) = done.stderr.strip().splitlines()
-    assert line.startswith(message)
+    assert re.match(naming("error: ", *parts), line)
     assert not [path for path in tmp_path.rglob("*") if path.is_file()]
     assert not list(tmp_path.glob("runs/*/*"))
 
@@ -179,7 +178,7 @@ def test_logged_lines_and_diverged_learning_are_seen(tmp_path):
     assert done.returncode == 1
     assert "replay: 0." in done.stderr  # the memory that it takes
     *_, last = done.stderr.strip().splitlines()
-    assert "error: team 'agents': the gradient is" in last
+    assert re.search(naming("error: ", "'agents'", "gradient"), last)
     assert last.endswith(f"continue with: python -m veca_marl.train resume={tmp_path}/run")
 
 
@@ -269,7 +268,7 @@ def test_a_killed_process_ends_the_command_with_its_name(tmp_path, start, number
     assert time.monotonic() - begin < 20
     assert running.returncode == 1
     (line,) = errors.strip().splitlines()
-    assert line.startswith(f"error: {name} was killed by SIGKILL")
+    assert re.match(naming("error: ", name, "SIGKILL"), line)
     assert f"continue with: python -m veca_marl.train resume={tmp_path / 'run'}" in line
     assert not any(map(is_running, workers))
     done = train(tmp_path, f"resume={tmp_path / 'run'}", "total_frames=256", "log.video=false")

@@ -5,6 +5,7 @@ import resource
 from contextlib import contextmanager
 
 import pytest
+from refusals import naming
 
 from veca_marl.algos import files
 from veca_marl.algos.files import WriteError, temporary_of, write_atomically
@@ -32,8 +33,8 @@ def test_content_is_written_and_replaced(tmp_path):
 def test_a_full_disk_leaves_the_file_and_no_temporary_one(tmp_path):
     path = tmp_path / "run.txt"
     write_atomically(path, "before")
-    message = r"cannot write .*run.txt: File too large \([\d,.]+ MB free, 1.0 MB needed\)"
-    with pytest.raises(WriteError, match=message), full_disk():
+    parts = (path, "File too large", "1.0 MB")
+    with pytest.raises(WriteError, match=naming(*parts)), full_disk():
         write_atomically(path, b"x" * 1_000_000)
     assert path.read_text() == "before"
     assert list(tmp_path.iterdir()) == [path]
@@ -41,7 +42,7 @@ def test_a_full_disk_leaves_the_file_and_no_temporary_one(tmp_path):
 
 def test_a_folder_that_cannot_be_created_is_named(tmp_path):
     (tmp_path / "file").write_text("")
-    with pytest.raises(WriteError, match=r"cannot write .*file/run.txt: (Not a dir|File exists)"):
+    with pytest.raises(WriteError, match=r"file/run\.txt.*(Not a dir|File exists)"):
         write_atomically(tmp_path / "file" / "run.txt", "content")
 
 
@@ -50,7 +51,7 @@ def test_a_folder_without_permission_is_named(tmp_path, monkeypatch):
         raise PermissionError(13, "Permission denied")
 
     monkeypatch.setattr(files.os, "replace", refused)
-    with pytest.raises(WriteError, match=r"run.txt: Permission denied$"):
+    with pytest.raises(WriteError, match=r"run\.txt.*Permission denied$"):
         write_atomically(tmp_path / "run.txt", "content")
     assert not list(tmp_path.iterdir())
 

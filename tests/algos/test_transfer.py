@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 import torch
 from fake_env import make_fake_env
+from refusals import naming
 from toy_dqn import ToyDQNCfg, register
 from training import SMALL
 
@@ -99,9 +100,7 @@ def test_an_encoder_is_copied_to_each_agent_with_one_of_its_own(tmp_path):
 
 def test_the_encoders_of_separate_agents_do_not_fit_a_shared_one(tmp_path):
     there, here = make_learners(seed=1, parameters=Parameters.separate), make_learners(seed=2)
-    with pytest.raises(
-        CheckpointError, match="one for each of 2 agents in the stored run, for 1 in this one"
-    ):
+    with pytest.raises(CheckpointError, match=naming("agents.audio", " 2 ", " 1 ")):
         init_teams(here, {}, {"agents": {"audio": store(there, tmp_path)}})
 
 
@@ -109,7 +108,7 @@ def test_teams_are_found_by_name_or_named_by_the_source(tmp_path):
     there = make_learners(seed=1, teams=("red", "blue"))
     source = store(there, tmp_path)
     here = make_learners(seed=2)
-    with pytest.raises(CheckpointError, match=r"teams \['blue', 'red'\], not 'agents'; write"):
+    with pytest.raises(CheckpointError, match=naming("'agents'", "'blue'", "'red'")):
         init_teams(here, {"agents": source}, {})
     init_teams(here, {"agents": f"{source}:blue"}, {})
     assert torch.equal(encoders(here)["vision"][0], encoders(there, "blue")["vision"][0])
@@ -120,33 +119,31 @@ def test_teams_are_found_by_name_or_named_by_the_source(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("numbers", "sense", "message"),
+    ("numbers", "sense", "parts"),
     [
         (
             {"channels": [4, 8, 9]},
             "vision",
-            r"encoder of vision: layers.4.bias is \(9,\) in the stored run",
+            ("layers.4.bias", "(9,)"),
         ),
-        ({}, "smell", "no encoder of smell; choices: audio, vision"),
+        ({}, "smell", ("audio", "vision")),
     ],
 )
-def test_an_encoder_that_does_not_fit_is_refused(tmp_path, numbers, sense, message):
+def test_an_encoder_that_does_not_fit_is_refused(tmp_path, numbers, sense, parts):
     source = store(make_learners(**numbers), tmp_path)
-    with pytest.raises(CheckpointError, match=message):
+    with pytest.raises(CheckpointError, match=naming(f"init_encoders.agents.{sense}", *parts)):
         init_teams(make_learners(), {}, {"agents": {sense: source}})
 
 
 def test_an_actor_of_another_algorithm_with_another_network_is_refused(tmp_path):
     there = make_learners(algo=ToyDQNCfg(), discrete=True)
-    with pytest.raises(
-        CheckpointError, match=r"init_from.agents=.*: .* in the stored run, absent in this one"
-    ):
+    with pytest.raises(CheckpointError, match=naming("init_from.agents=", "absent")):
         init_teams(make_learners(discrete=True), {"agents": store(there, tmp_path)}, {})
 
 
 def test_further_layers_of_the_actor_of_sac_are_named(tmp_path):
     source = store(make_learners(algo=small_sac(network=network())), tmp_path)
-    with pytest.raises(CheckpointError, match=r"policy_hidden=\[\d+\] in the stored run, \[\]"):
+    with pytest.raises(CheckpointError, match=r"policy_hidden=\[\d+\].* \[\]"):
         init_teams(make_learners(), {"agents": source}, {})
 
 
@@ -155,16 +152,16 @@ def test_a_critic_with_normalised_values_fits_none_without(tmp_path):
     there, here = (
         make_learners(algo=PPOCfg(network=network(), value_normalisation=kind)) for kind in kinds
     )
-    message = "algo.value_normalisation=running in the stored run, none in this one"
-    with pytest.raises(CheckpointError, match=message):
+    parts = ("algo.value_normalisation=running", " none ")
+    with pytest.raises(CheckpointError, match=naming(*parts)):
         init_teams(here, {"agents": store(there, tmp_path)}, {})
 
 
 @pytest.mark.parametrize(
     ("teams", "senses", "option"),
     [
-        ({"agents": "nowhere"}, {}, "init_from.agents=nowhere: nowhere is neither"),
-        ({}, {"agents": {"audio": "nowhere"}}, "init_encoders.agents.audio=nowhere: nowhere is"),
+        ({"agents": "nowhere"}, {}, "init_from.agents=nowhere"),
+        ({}, {"agents": {"audio": "nowhere"}}, "init_encoders.agents.audio=nowhere"),
     ],
 )
 def test_a_source_that_is_missing_is_named_with_its_option(teams, senses, option):
@@ -212,9 +209,7 @@ def test_an_actor_with_another_scale_of_actions_is_refused(tmp_path):
     """Equal parameters would be another policy: the initial scale is not one of them."""
     cfg = small_sac(network=network(initial_scale=0.1), policy_hidden=[])
     there, here = make_learners(seed=1), make_learners(seed=2, algo=cfg)
-    with pytest.raises(
-        CheckpointError, match=r"initial_scale=1.0 in the stored run, 0.1 in this one"
-    ):
+    with pytest.raises(CheckpointError, match=naming("initial_scale=1.0", " 0.1 ")):
         init_teams(here, {"agents": store(there, tmp_path)}, {})
 
 
@@ -229,18 +224,18 @@ def test_an_encoder_with_another_scale_of_its_input_is_refused(low, high, compre
         return SenseEncoders({"audio": VectorEncoder(layout, 4, compressed)})
 
     copy_encoders(encoder(), {"audio": [encoder()["audio"]]})
-    with pytest.raises(ValueError, match=r"audio: its scale is [a-zA-Z][^<]* in the stored run, "):
+    with pytest.raises(ValueError, match=r"audio: [^<]*\bscale\b[^<]*$"):
         copy_encoders(encoder(), {"audio": [encoder(low, high, compressed)["audio"]]})
 
 
 @pytest.mark.parametrize(
-    ("size", "strides", "message"),
+    ("size", "strides", "parts"),
     [
-        (64, (4, 2, 1), r"vision: its input is \(3, 64, 64\) in the stored run, \(3, 84, 84\) in"),
-        (84, (2, 2, 1), r"vision: its strides are \(2, 2, 1\) in the stored run, \(4, 2, 1\) in"),
+        (64, (4, 2, 1), ("input", "(3, 64, 64)", "(3, 84, 84)")),
+        (84, (2, 2, 1), ("strides", "(2, 2, 1)", "(4, 2, 1)")),
     ],
 )
-def test_an_encoder_of_other_images_or_strides_is_refused(size, strides, message):
+def test_an_encoder_of_other_images_or_strides_is_refused(size, strides, parts):
     """Pooled to places, the parameters are equal: the images are not the same to them."""
 
     def encoder(size=84, strides=(4, 2, 1)):
@@ -250,35 +245,35 @@ def test_an_encoder_of_other_images_or_strides_is_refused(size, strides, message
         )
 
     copy_encoders(encoder(), {"vision": [encoder()["vision"]]})
-    with pytest.raises(ValueError, match=message):
+    with pytest.raises(ValueError, match=naming("vision", *parts)):
         copy_encoders(encoder(), {"vision": [encoder(size, strides)["vision"]]})
 
 
 def test_the_message_names_the_layers_of_an_actor_that_another_algorithm_has_not(tmp_path):
     there, here = make_learners(), make_learners(algo=SACCfg(network=network()))
-    message = r"algo.policy_hidden=\[\] in the stored run, \[256\] in this one; actors of PPO have"
-    with pytest.raises(CheckpointError, match=message):
+    parts = ("algo.policy_hidden=[]", "[256]", "PPO")
+    with pytest.raises(CheckpointError, match=naming(*parts)):
         init_teams(here, {"agents": store(there, tmp_path)}, {})
 
 
 @pytest.mark.parametrize(
-    ("sizes", "message"),
+    ("sizes", "parts"),
     [
         (
             {"policy_hidden": [16]},
-            r"algo.policy_hidden=\[\] in the stored run, \[16\] in this one$",
+            ("algo.policy_hidden=[]", "[16]"),
         ),
-        ({"critic": ActionValuesCfg(critics=3)}, r"algo.critic.critics=2 in the stored run, 3 in"),
+        ({"critic": ActionValuesCfg(critics=3)}, ("algo.critic.critics=2", " 3 ")),
         (
             {"critic": ActionValuesCfg(hidden=[9])},
-            r"algo.critic.hidden=.*stored run, \[9\] in this",
+            ("algo.critic.hidden=", "[9]"),
         ),
     ],
 )
-def test_the_message_names_the_other_sizes_of_the_same_algorithm(tmp_path, sizes, message):
+def test_the_message_names_the_other_sizes_of_the_same_algorithm(tmp_path, sizes, parts):
     there = make_learners(algo=SACCfg(network=network(), policy_hidden=[]))
     here = make_learners(algo=SACCfg(network=network(), **{"policy_hidden": []} | sizes))
-    with pytest.raises(CheckpointError, match=message):
+    with pytest.raises(CheckpointError, match=naming(*parts)):
         init_teams(here, {"agents": store(there, tmp_path)}, {})
 
 
@@ -319,7 +314,7 @@ def test_a_frozen_team_starts_from_a_run_that_was_not_frozen(tmp_path):
 
 
 def test_a_frozen_sense_without_encoder_is_refused():
-    with pytest.raises(ValueError, match=r"frozen of team 'agents': no encoder of smell; choices"):
+    with pytest.raises(ValueError, match=naming("'agents'", "smell", "vision")):
         make_learners(frozen=["smell"])
 
 

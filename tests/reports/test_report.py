@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from refusals import naming
 from small_experiment import EXPERIMENT, write_all
 from stored_runs import write_run
 
@@ -62,21 +63,21 @@ def test_runs_that_a_table_of_results_lacks_are_named(tmp_path, arms, run):
 
 
 @pytest.mark.parametrize(
-    ("row", "message"),
+    ("row", "parts"),
     [
-        ("hrtf,0,finished,0,expert", "line 3: the row has another number of cells"),
-        ("hrtf,0,fin,0,policy,agents,1.0", "line 3: state 'fin'; choices: "),
-        ("hrtf,0,finished,1e3,policy,agents,1.0", "line 3: frames '1e3' is no whole number"),
+        ("hrtf,0,finished,0,expert", ("cells",)),
+        ("hrtf,0,fin,0,policy,agents,1.0", ("state", "'fin'", "finished")),
+        ("hrtf,0,finished,1e3,policy,agents,1.0", ("frames", "'1e3'")),
     ],
 )
-def test_a_damaged_row_of_a_table_of_results_is_named(tmp_path, run, row, message):
+def test_a_damaged_row_of_a_table_of_results_is_named(tmp_path, run, row, parts):
     table = tmp_path / "results.csv"
     head, good = "arm,seed,state,frames,player,team,return", "hrtf,0,finished,0,policy,agents,1.0"
     table.write_text(f"{head}\n{good}\n{row}\n")
     status, _, errors = run(f"results={table}")
     assert status == 2
     assert len(errors.splitlines()) == 1
-    assert f"{table}, {message}" in errors
+    assert all(part in errors for part in (str(table), "line 3", *parts))
 
 
 def rows_of(arm, seed, *scores, episodes=32):
@@ -219,39 +220,40 @@ def test_a_half_written_last_row_is_left_out(tmp_path, arms):
 
 
 @pytest.mark.parametrize(
-    ("words", "message"),
+    ("words", "parts"),
     [
-        (["runs=nowhere"], "no run of audio_ablation has been evaluated: missing: no run in"),
-        (["results=nowhere.csv"], "results=nowhere.csv is no file"),
-        (["expert_episodes=x"], "could not be converted to Integer"),
-        (["expert_episodes=-1"], "expert_episodes must be 0 or more, got -1"),
-        (["runs=a", "results=b"], "runs and results: choose one of both"),
-        (["-m", "experiment.metric=return,length"], "would write to one folder"),
-        (["-m", "experiment.metric=return,length", "to=x"], "to=x would be written by 2"),
-        (["-m", "seed=glob(*)"], "seed=glob(*): glob is for train; list the values here"),
+        (["runs=nowhere"], ("audio_ablation", "nowhere")),
+        (["results=nowhere.csv"], ("results=nowhere.csv",)),
+        (["expert_episodes=x"], ("expert_episodes", "'x'")),
+        (["expert_episodes=-1"], ("expert_episodes", "-1")),
+        (["runs=a", "results=b"], ("runs", "results")),
+        (["-m", "experiment.metric=return,length"], ("folder", " to")),
+        (["-m", "experiment.metric=return,length", "to=x"], ("to=x", "2")),
+        (["-m", "seed=glob(*)"], ("seed=glob(*)",)),
     ],
 )
-def test_wrong_words_end_in_one_line(run, words, message):
+def test_wrong_words_end_in_one_line(run, words, parts):
     status, _, errors = run(*words)
     assert status == 2
     assert len(errors.splitlines()) == 1
-    assert message in errors
+    assert all(part in errors for part in parts)
 
 
 def test_an_experiment_without_arms_has_no_report(capsys):
     assert report.main(["+experiment=smoke"]) == 2
-    assert "no experiment with arms: add +experiment=NAME" in capsys.readouterr().err
+    error = capsys.readouterr().err
+    assert all(part in error for part in ("arms", "+experiment=NAME"))
 
 
 def test_the_metric_and_the_team_must_exist():
     rows = [{"team": "red", "player": "policy", "arm": "a", "seed": "0", "return": "1"}]
-    with pytest.raises(ValueError, match=r"experiment.team=blue: choices: red"):
+    with pytest.raises(ValueError, match=naming("experiment.team=blue", "red")):
         team_of(rows, "blue")
-    with pytest.raises(ValueError, match=r"experiment.team=None: choices: blue, red"):
+    with pytest.raises(ValueError, match=naming("experiment.team=None", "blue", "red")):
         team_of([*rows, {**rows[0], "team": "blue"}], None)
     assert team_of([*rows, {**rows[0], "team": "blue"}], None, {"blue": "runs/other"}) == "red"
     for metric in ("goals", "player"):
-        with pytest.raises(ValueError, match=rf"experiment.metric={metric}: choices: return$"):
+        with pytest.raises(ValueError, match=rf"experiment.metric={metric}: .* return$"):
             runs_of(rows, metric, "red", {})
 
 
@@ -325,7 +327,7 @@ def test_a_table_without_rows_of_the_experiment_is_refused(
     monkeypatch.setattr(report, "compose_arms", lambda overrides: other)
     status, _, errors = run(f"results={tmp_path / 'results.csv'}")
     assert status == 2
-    assert "no run of audio_ablation has been evaluated: missing in the table" in errors
+    assert all(part in errors for part in ("audio_ablation", "table"))
 
 
 def rows_with_episodes(path, episodes):

@@ -99,15 +99,15 @@ def test_a_run_that_does_not_fit_alone_ends_the_sweep_before_anything_is_started
         sac_sweep(0.8)
     assert ended.value.code == 2
     message = capsys.readouterr().err
-    assert "seed_0: the replay buffers take 0.81 GB of memory, and 0.80 GB are available" in message
-    assert "change algo.replay.capacity" in message
+    parts = ("seed_0", "memory", "0.81 GB", "0.80 GB", "algo.replay.capacity")
+    assert all(part in message for part in parts)
 
 
 def test_an_impossible_run_is_named(sac_sweep, capsys):
     with pytest.raises(SystemExit) as ended:
         sac_sweep(20.0, "task.max_seconds=-1")
     assert ended.value.code == 2
-    assert "/seed_0: task.max_seconds=-1.0 must be" in capsys.readouterr().err
+    assert "/seed_0: task.max_seconds=-1.0" in capsys.readouterr().err
 
 
 def test_runs_that_have_ended_need_no_memory(sac_sweep, monkeypatch):
@@ -119,33 +119,32 @@ def test_runs_that_have_ended_need_no_memory(sac_sweep, monkeypatch):
 def test_several_experiments_in_one_command_are_refused(sweep, capsys):
     with pytest.raises(SystemExit):
         sweep("+experiment=smoke,first_light")
-    message = "error: +experiment=smoke,first_light: one experiment per command"
-    assert message in capsys.readouterr().err
+    assert "error: +experiment=smoke,first_light" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
-    ("words", "message"),
+    ("words", "parts"),
     [
-        (["seed=0,1"], "error: seed: an experiment has experiment.seeds=[...]"),
-        (["experiment.arm=deaf"], "error: experiment.arm=deaf: choices: hrtf, stereo, mono"),
+        (["seed=0,1"], ("error: seed", "experiment.seeds=[...]")),
+        (["experiment.arm=deaf"], ("error: ", "experiment.arm=deaf", "hrtf", "stereo")),
         (["experiment.seeds=[]"], "error: experiment audio_ablation has no seeds: give"),
         (
             ["total_frames=1e4"],
-            "error: total_frames=10000: arm stereo sets total_frames=245_760; "
-            "give experiment.arms.stereo=[...] instead",
+            ("error: ", "=10000", "total_frames=245_760", "experiment.arms.stereo=[...]"),
         ),
         (
             ["experiment.arms.mono=['senses/audio=none']"],
-            "senses/audio=none: unknown senses/audio 'none'",
+            ("error: ", "senses/audio=none", "'none'"),
         ),
         (
             ["experiment.arm=hrtf", "experiment.seeds=[0]", "hydra.launcher.jobs=0"],
-            "error: hydra.launcher.jobs must be at least 1, got 0",
+            ("error: ", "hydra.launcher.jobs", " 0"),
         ),
     ],
 )
-def test_wrong_words_end_in_one_line(sweep, words, message, capsys):
+def test_wrong_words_end_in_one_line(sweep, words, parts, capsys):
     with pytest.raises(SystemExit) as ended:
         sweep("+experiment=audio_ablation", *words)
     assert ended.value.code == 2
-    assert message in capsys.readouterr().err
+    error = capsys.readouterr().err
+    assert all(part in error for part in parts)

@@ -7,6 +7,7 @@ import signal
 import pytest
 from knockouts import knockout
 from paths import ROOT
+from refusals import naming
 from scipy import stats
 
 from tools.experts_table.command import main
@@ -61,8 +62,8 @@ def test_tasks_without_frozen_episodes_are_left_out_of_all(tmp_path, capsys):
         assert main([f"to={tmp_path}", "tasks=[all]", "episodes=0"]) == 0
         assert "left out, without frozen episodes: Knockout\n" in capsys.readouterr().err
         assert main([f"to={tmp_path}", "tasks=[Knockout]", "episodes=0"]) == 2
-        message = "task 'Knockout' has no frozen episodes; frozen=false plays other starts"
-        assert message in capsys.readouterr().err
+        error = capsys.readouterr().err
+        assert all(part in error for part in ("error: ", "'Knockout'", "frozen=false"))
 
 
 @pytest.mark.slow
@@ -86,7 +87,7 @@ class Deadly:
 
 
 def test_a_process_that_is_killed_is_named_with_its_signal():
-    with pytest.raises(WorkerError, match=r"process [01] .* was killed by SIGKILL"):
+    with pytest.raises(WorkerError, match=r"process [01] .*SIGKILL"):
         list(play_all([Deadly(), Deadly()], 2, "commit"))
 
 
@@ -111,27 +112,29 @@ def test_the_stored_return_is_that_of_the_frozen_episode(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("words", "message"),
+    ("words", "parts"),
     [
-        (["tasks=[Dodge]"], "Dodge"),
-        (["tasks=[DodgeCar]", "episodes=101"], "episodes must be from 0 to 100, got 101"),
-        (["tasks=[DodgeCar,DodgeCar]"], "names 'DodgeCar' more than once"),
-        (["processes=0"], "processes must be at least 1, got 0"),
-        (["tasks=[DodgeCar]", "task.aim=0.5"], "task.aim=0.5 (not 0.6)"),
-        (["tasks=[DodgeCar]", "playground=single_room"], "starts are not those of the benchmark"),
-        (["tasks=[SoccerTwoPlayer]", "opponent.defender=runs/x"], "runs/x"),
+        (["tasks=[Dodge]"], ("'Dodge'", "DodgeCar")),
+        (["tasks=[DodgeCar]", "episodes=101"], ("episodes", "100", "101")),
+        (["tasks=[DodgeCar,DodgeCar]"], ("tasks", "'DodgeCar'")),
+        (["processes=0"], ("processes", " 0")),
+        (["tasks=[DodgeCar]", "task.aim=0.5"], ("task.aim=0.5", "0.6")),
+        (["tasks=[DodgeCar]", "playground=single_room"], ("benchmark", "DodgeCar", "starts")),
+        (["tasks=[SoccerTwoPlayer]", "opponent.defender=runs/x"], ("runs/x",)),
     ],
 )
-def test_what_cannot_be_played_is_refused(tmp_path, capsys, words, message):
+def test_what_cannot_be_played_is_refused(tmp_path, capsys, words, parts):
     assert main([*words, f"to={tmp_path}"]) == 2
-    assert message in capsys.readouterr().err
+    error = capsys.readouterr().err
+    assert all(part in error for part in parts)
     assert not (tmp_path / "table.md").exists()
 
 
 def test_remarks_without_their_columns_are_refused_before_the_first_episode(tmp_path, capsys):
     (tmp_path / "remarks.csv").write_text("task,who\nDodgeCar,me\n")
     assert main([*SHORT, f"to={tmp_path}", "episodes=1"]) == 2
-    assert "remarks.csv has no column 'policy'" in capsys.readouterr().err
+    error = capsys.readouterr().err
+    assert all(part in error for part in ("remarks.csv", "'policy'"))
     assert not (tmp_path / "DodgeCar.csv").exists()
 
 
@@ -141,13 +144,15 @@ def test_an_episode_that_is_stored_twice_is_refused(tmp_path, capsys):
     file = tmp_path / "DodgeCar.csv"
     file.write_text(file.read_text() + file.read_text().splitlines()[1] + "\n")
     assert main(words) == 2
-    assert "has episode 0 of policy expert 2 times" in capsys.readouterr().err
+    error = capsys.readouterr().err
+    assert all(part in error for part in (str(file), "episode 0", "expert", " 2 "))
 
 
 def test_two_commands_do_not_play_for_one_folder_at_once(tmp_path, capsys):
     with locked(tmp_path):
         assert main([*SHORT, f"to={tmp_path}", "episodes=1"]) == 2
-    assert "is in use" in capsys.readouterr().err
+    error = capsys.readouterr().err
+    assert all(part in error for part in (str(tmp_path), str(os.getpid())))
     assert not (tmp_path / "DodgeCar.csv").exists()
 
 
@@ -159,7 +164,8 @@ def test_episodes_of_another_configuration_are_not_mixed(tmp_path, capsys):
     words = [*SHORT, f"to={tmp_path}", "episodes=1"]
     assert main(words) == 0
     assert main([*words, "task.aim=0.5"]) == 2
-    assert "episodes of another configuration: choose another folder" in capsys.readouterr().err
+    error = capsys.readouterr().err
+    assert all(part in error for part in ("DodgeCar.csv", "configuration", "folder"))
 
 
 def test_the_table_has_rates_with_intervals_and_marks_low_ones():
@@ -215,7 +221,7 @@ def test_episodes_with_other_starts_are_not_mixed(tmp_path):
     file = EpisodeFile(tmp_path / "DodgeCar.csv")
     file.check([played()], "c", version=1)
     for version in (0, 2):
-        with pytest.raises(ValueError, match=rf"starts of version 1, not {version} .*another"):
+        with pytest.raises(ValueError, match=naming("DodgeCar.csv", "version 1", f" {version} ")):
             file.check([played()], "c", version)
 
 
@@ -231,22 +237,23 @@ def test_replayed_episodes_are_the_same_or_named_with_both_outcomes(tmp_path, ca
     (tmp_path / "DodgeCar.csv").write_text("".join(lines))
     assert main([*words, "replay=2"]) != 0
     error = capsys.readouterr().err
-    assert "DodgeCar expert 2: return " in error
-    assert ", 10 steps now, return " in error
-    assert ", 11 steps at " in error
-    assert "1 of 4 stored episodes differ, of ['DodgeCar']" in error
+    parts = ("DodgeCar expert 2", " 10 steps", " 11 steps", "1 of 4", "['DodgeCar']")
+    assert all(part in error for part in parts)
 
 
 def test_what_cannot_be_replayed_is_refused(tmp_path, capsys):
     assert main(["tasks=[DodgeCar]", "replay=1", f"to={tmp_path}"]) == 2
-    assert "has no episodes of ['DodgeCar']" in capsys.readouterr().err
+    error = capsys.readouterr().err
+    assert all(part in error for part in (f"to={tmp_path}", "['DodgeCar']"))
     assert main(["replay=1", f"to={tmp_path}"]) == 2
-    assert "has no episodes of any task" in capsys.readouterr().err
+    assert f"to={tmp_path}" in capsys.readouterr().err
     assert main([*SHORT, f"to={tmp_path}", "episodes=1"]) == 0
     assert main([*SHORT, "task.aim=0.5", "replay=1", f"to={tmp_path}"]) == 2
-    assert "another configuration" in capsys.readouterr().err
+    error = capsys.readouterr().err
+    assert all(part in error for part in ("DodgeCar.csv", "configuration"))
     assert main(["replay=-1"]) == 2
-    assert "replay must be 0 or more, got -1" in capsys.readouterr().err
+    error = capsys.readouterr().err
+    assert all(part in error for part in ("replay", "-1"))
 
 
 def test_replayed_episodes_are_spread_over_those_of_each_policy():

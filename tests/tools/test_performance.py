@@ -159,7 +159,7 @@ def test_a_small_plan_is_measured():
         (["tasks=[KickTheBal]"], "KickTheBall"),
         (["steps=0"], "steps"),
         (["senses/audio=mono"], "senses/audio=mono"),
-        ([f"to={quoted(ROOT)}"], "folder"),
+        ([f"to={quoted(ROOT)}"], f"to={ROOT}"),
     ],
 )
 def test_a_wrong_choice_ends_in_one_line(words, names, capsys):

@@ -6,6 +6,7 @@ from dataclasses import replace
 import pytest
 import torch
 from fake_env import FakeEnv
+from refusals import naming
 
 from veca_marl.algos.checkpoints import CheckpointError, Checkpoints, Identity
 from veca_marl.algos.specs import team_specs
@@ -52,30 +53,30 @@ def test_the_latest_and_the_best_are_kept(checkpoints, identity):
 
 def test_another_task_raises_an_error_with_both_names(checkpoints, identity):
     path = checkpoints.save({}, 10, best=False)
-    with pytest.raises(CheckpointError, match=r"is of task Toy, wanted: Other"):
+    with pytest.raises(CheckpointError, match=naming(path, "Toy", "Other")):
         belonging_to(replace(identity, task="Other")).load(path, CPU)
 
 
 @pytest.mark.parametrize(
-    ("other", "message"),
+    ("other", "parts"),
     [
         (
             {"image": 20},
-            r"vision\.shape: \[2, 3, 16, 16\] in the checkpoint, \[2, 3, 20, 20\] in this run",
+            ("vision.shape", "[2, 3, 16, 16]", "[2, 3, 20, 20]"),
         ),
-        ({"senses": ("audio",)}, r"agents\.observations\.vision: .* absent in this run"),
+        ({"senses": ("audio",)}, ("agents.observations.vision", "absent")),
         (
             {"discrete": True},
-            r"agents\.actions\.action\.discrete: False in the checkpoint, True in this run",
+            ("agents.actions.action.discrete", "False", "True"),
         ),
-        ({"agents": 2}, r"agents\.agents: 1 in the checkpoint, 2 in this run"),
-        ({"teams": ("red",)}, r"agents: .* absent in this run; red: absent in the checkpoint"),
+        ({"agents": 2}, ("agents.agents", " 1 ", " 2 ")),
+        ({"teams": ("red",)}, ("agents: ", "red: ", "absent")),
     ],
 )
-def test_other_specs_raise_an_error_with_the_differences(checkpoints, other, message):
+def test_other_specs_raise_an_error_with_the_differences(checkpoints, other, parts):
     path = checkpoints.save({}, 10, best=False)
     specs = team_specs(FakeEnv(**other))
-    with pytest.raises(CheckpointError, match=f"made for other specs: .*{message}"):
+    with pytest.raises(CheckpointError, match=naming(path, "specs", *parts)):
         belonging_to(Identity("Toy", specs)).load(path, CPU)
 
 
@@ -96,8 +97,8 @@ def full_disk():
 def test_full_disk_leaves_the_old_checkpoint_intact(checkpoints, identity):
     path = checkpoints.save({"w": torch.zeros(3)}, 10, best=True)
     before = path.read_bytes()
-    refused = r"cannot write .*best.pt: .* MB free, 0.4 MB needed.* intact .*000010.pt"
-    with pytest.raises(CheckpointError, match=refused), full_disk():
+    parts = (path.with_name("best.pt"), "0.4 MB", path)
+    with pytest.raises(CheckpointError, match=naming(*parts)), full_disk():
         checkpoints.save({"w": torch.zeros(100_000)}, 20, best=True)
     assert path.read_bytes() == before
     assert names(checkpoints) == ["best.pt", "frames_000000000010.pt"]
@@ -118,12 +119,12 @@ def test_unreadable_files_are_named(tmp_path, identity, content):
 def test_a_truncated_file_is_named(checkpoints, identity):
     path = checkpoints.save({"w": torch.zeros(1000)}, 10, best=False)
     path.write_bytes(path.read_bytes()[:500])
-    with pytest.raises(CheckpointError, match=r"cannot read .*frames_0.*cut off"):
+    with pytest.raises(CheckpointError, match=naming(path, "cut off")):
         belonging_to(identity).load(path, CPU)
 
 
 def test_a_folder_without_checkpoints_is_named(checkpoints):
-    with pytest.raises(CheckpointError, match="no checkpoint in"):
+    with pytest.raises(CheckpointError, match=naming("checkpoint", checkpoints.folder)):
         checkpoints.latest()
 
 
@@ -155,7 +156,7 @@ def test_an_entry_that_is_added_to_a_mapping_by_team_is_refused(tmp_path, identi
         )
 
     load(stored | {"algo": {"gamma": 0.9, "clip": 0.2}, "new": 1})
-    with pytest.raises(CheckpointError, match=r"learner\.red was absent, is "):
+    with pytest.raises(CheckpointError, match=naming("learner.red", "absent", "0.5")):
         load(stored | {"learner": {"red": {"gamma": 0.5}}})
-    with pytest.raises(CheckpointError, match=r"opponent\.red was absent, is idle"):
+    with pytest.raises(CheckpointError, match=naming("opponent.red", "absent", "idle")):
         load(stored | {"opponent": {"blue": "expert", "red": "idle"}})

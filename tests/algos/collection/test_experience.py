@@ -4,6 +4,7 @@ import threading
 import pytest
 import torch
 from fake_env import make_fake_env
+from refusals import naming
 
 from veca_marl.algos.collection.experience import CollectCfg, Experience
 
@@ -107,6 +108,6 @@ def test_spawned_and_forked_workers_collect_the_same(make_ppo, monkeypatch):
 
 @pytest.mark.parametrize("wrong", [{"processes": -1}, {"worlds": 0}, {"steps": 0}, {"threads": 0}])
 def test_invalid_numbers_raise_an_error_with_their_name(wrong):
-    (name,) = wrong
-    with pytest.raises(ValueError, match=f"collect.{name} must be"):
+    ((name, number),) = wrong.items()
+    with pytest.raises(ValueError, match=naming(f"collect.{name}", number)):
         CollectCfg(**wrong)

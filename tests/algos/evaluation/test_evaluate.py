@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 import torch
 from fake_env import FakeEnv
+from refusals import naming
 from scipy import stats
 from tensordict import TensorDict
 
@@ -113,7 +114,7 @@ def test_difference_is_the_paired_t_interval():
     mean, low, high = paired_difference(one, other)
     assert mean == pytest.approx(one.mean() - other.mean())
     assert (low, high) == pytest.approx((expected.low, expected.high))
-    with pytest.raises(ValueError, match="equally many episodes, got 12 and 3"):
+    with pytest.raises(ValueError, match=naming("episodes", "12", "3")):
         paired_difference(one, other[:3])
 
 
@@ -205,12 +206,12 @@ def test_the_last_evaluation_has_four_times_as_many_episodes_or_what_is_asked_fo
     assert EvalCfg().last_episodes == 32
     assert EvalCfg(episodes=2).last_episodes == 8
     assert EvalCfg(final_episodes=100).last_episodes == 100
-    with pytest.raises(ValueError, match=r"eval.final_episodes must be at least eval.episodes=8"):
+    with pytest.raises(ValueError, match=naming("eval.final_episodes", "eval.episodes=8")):
         EvalCfg(final_episodes=7)
 
 
 @pytest.mark.parametrize("wrong", [{"every_frames": 0}, {"episodes": 0}, {"worlds": 0}])
 def test_invalid_numbers_raise_an_error_with_their_name(wrong):
-    (name,) = wrong
-    with pytest.raises(ValueError, match=f"eval.{name} must be"):
+    ((name, number),) = wrong.items()
+    with pytest.raises(ValueError, match=naming(f"eval.{name}", number)):
         EvalCfg(**wrong)

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 import torch
 from fake_env import FakeEnv, make_fake_env
+from refusals import naming
 
 from veca_marl.algos.evaluation.evaluate import Exploration
 from veca_marl.algos.evaluation.evaluators import Players, Request, make_evaluator
@@ -73,7 +74,7 @@ def test_a_process_that_is_killed_is_noticed_at_once(policy):
     with closing(make_evaluator(make_fake_env, players, 2, 4, LIMIT)) as evaluator:
         evaluator.play(SEVEN)
         multiprocessing.active_children()[0].kill()
-        with pytest.raises(WorkerError, match=r"evaluation process [01] .* was killed by SIGKILL"):
+        with pytest.raises(WorkerError, match=r"evaluation process [01] .*SIGKILL"):
             wait()
     assert not multiprocessing.active_children()
 
@@ -122,7 +123,7 @@ def make_killed(worlds, seed):
     ("make_env", "message"),
     [
         (make_failing, "evaluation process [01] .*: ArithmeticError: a force is not finite"),
-        (make_killed, "evaluation process [01] .* was killed by SIGKILL"),
+        (make_killed, "evaluation process [01] .*SIGKILL"),
     ],
 )
 def test_a_process_that_fails_ends_the_evaluation(policy, make_env, message):
@@ -144,10 +145,7 @@ def check_that_it_ends(action, seconds):
     assert not thread.is_alive()
 
 
-HANGS = (
-    r"^evaluation process 1 \(of 0 to 1\) did not answer for 2 s \(collect.answer_limit_s\) and "
-    r"was killed$"
-)
+HANGS = naming("evaluation process 1 ", " 2 s ", "collect.answer_limit_s")
 
 
 def test_a_process_that_hangs_is_named_and_killed(policy):

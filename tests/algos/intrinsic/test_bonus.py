@@ -7,6 +7,7 @@ import pytest
 import torch
 from chain_env import make_chain
 from fake_env import make_fake_env
+from refusals import naming
 from toy_dqn import ToyDQNCfg, register
 from training import FRAMES, SMALL, Interrupt, read, rewards_until
 
@@ -241,7 +242,7 @@ def test_an_intrinsic_reward_of_a_user_is_found_by_name():
     spec = team_specs(make_env(1, 0))["red"]
     cfg = ConstantCfg("constant", coefficient=1.0)
     assert isinstance(Bonus("red", spec, cfg, CPU).source, Constant)
-    with pytest.raises(ValueError, match=r"unknown intrinsic reward 'rnf' .*did you mean rnd"):
+    with pytest.raises(ValueError, match=naming("intrinsic", "'rnf'", "rnd")):
         Bonus("red", spec, IntrinsicCfg("rnf"), CPU)
-    with pytest.raises(ValueError, match=r"intrinsic.name=rnd takes RNDCfg, got IntrinsicCfg"):
+    with pytest.raises(ValueError, match=naming("intrinsic.name=rnd", "RNDCfg", "IntrinsicCfg")):
         Bonus("red", spec, IntrinsicCfg("rnd"), CPU)

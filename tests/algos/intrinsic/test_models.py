@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 import torch
+from refusals import naming
 from tensordict import TensorDict
 
 from veca_marl.algos.intrinsic.prediction import NormalisedSenses
@@ -205,9 +206,7 @@ def test_senses_are_all_but_proprioception_unless_they_are_named():
     assert list(make("rnd", SPEC, senses=["proprioception"]).senses.widths) == ["proprioception"]
     alone = TeamSpec(1, {"proprioception": SPEC.observations["proprioception"]}, VECTOR.actions)
     assert list(make("rnd", alone).senses.widths) == ["proprioception"]
-    with pytest.raises(
-        ValueError, match=r"team 'team' has no smell; choices: proprioception, vision, touch"
-    ):
+    with pytest.raises(ValueError, match=naming("'team'", "smell", "vision", "touch")):
         make("rnd", SPEC, senses=["smell"])
 
 
@@ -215,8 +214,8 @@ def test_senses_are_all_but_proprioception_unless_they_are_named():
     "wrong", [{"cells": 0}, {"learning_rate": 0.0}, {"coefficient": -1.0}, {"gamma": 1.0}]
 )
 def test_invalid_numbers_raise_an_error_with_their_name(wrong):
-    (name,) = wrong
-    with pytest.raises(ValueError, match=f"intrinsic.{name} must be"):
+    ((name, number),) = wrong.items()
+    with pytest.raises(ValueError, match=naming(f"intrinsic.{name}", number)):
         RNDCfg(**wrong)
 
 

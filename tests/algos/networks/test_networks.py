@@ -1,9 +1,9 @@
 import math
-import re
 
 import pytest
 import torch
 from fake_env import FakeEnv
+from refusals import naming
 from torchrl.data import Bounded, Composite
 
 from veca_marl.algos.checkpoints import from_plain, to_plain
@@ -42,7 +42,7 @@ def test_encoder_is_chosen_by_type_and_shape():
         ),
         VectorEncoder,
     )
-    with pytest.raises(ValueError, match=r"touch: no encoder for int64\(3,\); choices: uint8"):
+    with pytest.raises(ValueError, match=naming("touch", "int64(3,)", "uint8")):
         make_encoder("touch", ArrayLayout((3,), "int64", 0, 1), Convolutions(), 64, Pooling.flatten)
 
 
@@ -71,8 +71,7 @@ def test_sizes_of_convolutions_are_chosen():
 @pytest.mark.parametrize("name", ["channels", "kernels", "strides"])
 @pytest.mark.parametrize("numbers", [[4, 4], [4, 0, 3]])
 def test_impossible_sizes_of_convolutions_are_refused(name, numbers):
-    message = rf"network\.{name}: need 3 positive numbers, got {re.escape(str(numbers))}"
-    with pytest.raises(ValueError, match=message):
+    with pytest.raises(ValueError, match=naming(f"network.{name}", numbers)):
         MultisenseCfg(**{name: numbers})
 
 
@@ -167,20 +166,20 @@ def test_unsupported_actions_raise_an_error_with_the_choices():
     env = FakeEnv(worlds=1)
     wide = Bounded(-2.0, 2.0, shape=(1, 1, 2))
     env.action_spec = Composite(agents=Composite(action=wide, shape=(1, 1)), shape=(1,))
-    with pytest.raises(ValueError, match=r"(?s)team 'agents': cannot learn .* choices: Bounded in"):
+    with pytest.raises(ValueError, match=r"(?s)'agents'.*Bounded.*Categorical"):
         team_specs(env)
 
 
 @pytest.mark.parametrize(
-    ("kwargs", "message"),
+    ("kwargs", "parts"),
     [
-        ({"trunk_features": 0}, "must be positive"),
-        ({"initial_scale": 0.0}, "initial_scale must be finite and above 0.01, got 0.0"),
-        ({"initial_scale": math.inf}, "initial_scale must be finite and above 0.01, got inf"),
+        ({"trunk_features": 0}, ("network", "trunk_features=0")),
+        ({"initial_scale": 0.0}, ("initial_scale", "0.01", "0.0")),
+        ({"initial_scale": math.inf}, ("initial_scale", "0.01", " inf")),
     ],
 )
-def test_invalid_sizes_raise_an_error(kwargs, message):
-    with pytest.raises(ValueError, match=message):
+def test_invalid_sizes_raise_an_error(kwargs, parts):
+    with pytest.raises(ValueError, match=naming(*parts)):
         MultisenseCfg(**kwargs)
 
 

@@ -3,6 +3,7 @@
 import pytest
 import torch
 from fake_env import FakeEnv
+from refusals import naming
 from torchrl.envs import ExplorationType, set_exploration_type
 from training import SMALL
 
@@ -44,13 +45,13 @@ def test_equal_weights_are_one_number():
 
 @pytest.mark.parametrize("wrong", [{"move": 0.1}, {**BOTH, "fly": 0.1}])
 def test_other_names_than_the_parts_are_refused(wrong):
-    with pytest.raises(ValueError, match=r"the parts of its action are \['move', 'voice'\]"):
+    with pytest.raises(ValueError, match=naming(sorted(wrong), "['move', 'voice']")):
         losses(wrong, hybrid=True)
 
 
 @pytest.mark.parametrize("wrong", ["high", None, True, float("nan"), {}, {"move": "low"}])
 def test_what_is_not_a_number_is_refused(wrong):
-    with pytest.raises(ValueError, match=r"algo\.entropy_coefficient must be a number"):
+    with pytest.raises(ValueError, match=naming("algo.entropy_coefficient", repr(wrong))):
         PPOCfg(entropy_coefficient=wrong)
 
 
@@ -58,7 +59,5 @@ def test_the_command_line_takes_a_mapping_and_checks_it():
     words = ["+task=KickTheBall", "senses/vision=blind", "algo.entropy_coefficient={move:0.01}"]
     cfg = compose(words)
     assert cfg.algo.entropy_coefficient == {"move": 0.01}
-    with pytest.raises(
-        ConfigError, match=r"got a weight for \['move'\], the parts .* \['action'\]"
-    ):
+    with pytest.raises(ConfigError, match=naming("['move']", "['action']")):
         make_trainer(cfg, None)

@@ -6,6 +6,7 @@ import pytest
 import torch
 from fake_env import FakeEnv
 from gae import gae_by_hand
+from refusals import naming
 from torchrl.envs import ExplorationType, set_exploration_type
 from training import SMALL, rewards_until
 
@@ -112,7 +113,7 @@ def test_rewards_that_are_not_finite_raise_an_error(make_ppo):
         batch = FakeEnv(2).rollout(8, ppo.policy.collect, break_when_any_done=False)
     batch["next", "agents", "reward"][:] = math.nan  # whichever minibatch is the first
     before = torch.cat([p.flatten() for p in ppo.policy.parameters()])
-    with pytest.raises(FloatingPointError, match="team 'agents': the gradient is nan"):
+    with pytest.raises(FloatingPointError, match=naming("'agents'", "gradient", "nan")):
         ppo.learn(batch)
     assert torch.equal(before, torch.cat([p.flatten() for p in ppo.policy.parameters()]))
 
@@ -181,8 +182,8 @@ def test_learning_continues_exactly_from_a_state(make_ppo):
     ],
 )
 def test_invalid_numbers_raise_an_error_with_their_name(wrong):
-    (name,) = wrong
-    with pytest.raises(ValueError, match=f"algo.{name} must be"):
+    ((name, number),) = wrong.items()
+    with pytest.raises(ValueError, match=naming(f"algo.{name}", number)):
         PPOCfg(**wrong)
 
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import torch
 from fake_env import FakeEnv
+from refusals import naming
 from tensordict import TensorDict
 from tensordict.nn import TensorDictModule
 from torch import nn
@@ -135,5 +136,5 @@ def test_learning_continues_exactly_from_a_state(make_ppo, kind):
 
 def test_popart_needs_a_linear_layer_with_one_output():
     critic = TensorDictModule(nn.Tanh(), in_keys=[("agents", "features")], out_keys=[KEY])
-    with pytest.raises(ValueError, match=r"popart rescales a linear layer .*choices: none, run"):
+    with pytest.raises(ValueError, match=naming("popart", "linear", "none", "running")):
         NormalisedCritic(critic, KEY, preserve=True)

@@ -5,6 +5,7 @@ import math
 import pytest
 import torch
 from fake_env import FakeEnv
+from refusals import naming
 from torchrl.data import Categorical
 from training import SMALL, rewards_until
 
@@ -149,8 +150,7 @@ def test_a_budget_of_the_warm_up_alone_is_the_least_with_updates(make_sac, colle
     cfg.check_budget(64)
     row = make_sac(changes={"replay": cfg.replay}).learn(collect(make_sac()))
     assert row["updates"] > 0.0
-    message = r"the 63 frames end before the first update, .* algo.replay.warm_up_frames=64"
-    with pytest.raises(ValueError, match=message):
+    with pytest.raises(ValueError, match=naming("63", "algo.replay.warm_up_frames=64")):
         cfg.check_budget(63)
 
 
@@ -212,30 +212,30 @@ def test_a_gradient_that_is_not_finite_is_reported(make_sac, collect):
     algorithm = make_sac()
     batch = collect(algorithm)
     batch["next", "agents", "reward"][:] = math.nan
-    with pytest.raises(FloatingPointError, match="team 'agents': the gradient is nan"):
+    with pytest.raises(FloatingPointError, match=naming("'agents'", "gradient", "nan")):
         algorithm.learn(batch)
 
 
 @pytest.mark.parametrize(
-    ("numbers", "message"),
+    ("numbers", "parts"),
     [
-        ({"gamma": 1.5}, r"algo.gamma must be in \[0, 1\], got 1.5"),
-        ({"tau": 0.0}, r"algo.tau must be in \(0, 0.5\], got 0.0"),
-        ({"batch_size": 0}, "algo.batch_size must be at least 1, got 0"),
-        ({"learning_rate": -1.0}, "algo.learning_rate must be positive, got -1.0"),
-        ({"random_shift": -1}, "algo.random_shift must be 0 or more, got -1"),
+        ({"gamma": 1.5}, ("algo.gamma", "1.5")),
+        ({"tau": 0.0}, ("algo.tau", "0.0")),
+        ({"batch_size": 0}, ("algo.batch_size", " 0")),
+        ({"learning_rate": -1.0}, ("algo.learning_rate", "-1.0")),
+        ({"random_shift": -1}, ("algo.random_shift", "-1")),
         (
             {"critic": ActionValuesCfg(normalisation=Normalisation.batch_renorm)},
-            "batch_renorm needs algo.targets=same",
+            ("batch_renorm", "algo.targets=same"),
         ),
-        ({"policy_hidden": [0]}, r"algo.policy_hidden: widths must be positive, got \[0\]"),
+        ({"policy_hidden": [0]}, ("algo.policy_hidden", "[0]")),
     ],
 )
-def test_impossible_numbers_are_refused(numbers, message):
-    with pytest.raises(ValueError, match=message):
+def test_impossible_numbers_are_refused(numbers, parts):
+    with pytest.raises(ValueError, match=naming(*parts)):
         SACCfg(**numbers)
 
 
 def test_a_replay_buffer_that_is_too_small_for_a_batch_is_refused():
-    with pytest.raises(ValueError, match="capacity=100 must be at least twice the 64 frames"):
+    with pytest.raises(ValueError, match=naming("capacity=100", "64")):
         SACCfg(replay=ReplayCfg(100, 10)).check_batch(4, 16)

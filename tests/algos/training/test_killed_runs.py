@@ -86,7 +86,7 @@ class KillAWorker:
 def test_a_run_that_loses_a_worker_keeps_its_checkpoint(tmp_path):
     trainer = make_trainer(tmp_path, processes=2)
     trainer.reporters.append(KillAWorker(3 * FRAMES))
-    with pytest.raises(WorkerError, match="was killed by SIGKILL"):
+    with pytest.raises(WorkerError, match=r"process \d .*SIGKILL"):
         trainer.run()
     assert not multiprocessing.active_children()
     assert trainer.checkpoints.latest().name == f"frames_{2 * FRAMES:012d}.pt"

@@ -5,6 +5,7 @@ import re
 
 import pytest
 from paths import ROOT
+from refusals import naming
 
 from tools.fidelity import command
 from tools.fidelity.command import SECTIONS
@@ -48,13 +49,13 @@ def test_a_law_holds_in_its_interval(law, holds):
 def test_impossible_laws_and_sections_are_refused():
     with pytest.raises(ValueError, match="tolerance=-1"):
         equals("a", "m", 2.0, 2.0, -1.0)
-    with pytest.raises(ValueError, match="no value"):
+    with pytest.raises(ValueError, match=naming("'a'", "[1.0, -1.0]")):
         Law("a", "m", 0.0, 1.0, -1.0)
-    with pytest.raises(ValueError, match="has no law"):
+    with pytest.raises(ValueError, match=naming("'Empty'")):
         Section("Empty", "", [])
-    with pytest.raises(ValueError, match="share a name"):
+    with pytest.raises(ValueError, match=naming("'Twice'", HELD.name)):
         Section("Twice", "", [HELD, HELD])
-    with pytest.raises(ValueError, match="2 x and 1 y"):
+    with pytest.raises(ValueError, match=naming("'a'", "2 x", "1 y")):
         Curve("a", [1.0, 2.0], [1.0])
 
 
@@ -88,22 +89,23 @@ def test_the_exit_status_is_1_if_a_law_is_broken(tmp_path, monkeypatch, capsys):
     verdicts[next(iter(SECTIONS))] = Section("Bad", "", [HELD, BROKEN])
     assert command.main([f"to={tmp_path}"]) == 1
     name = next(iter(SECTIONS))
-    assert f"broken: {name}: speed: 2 m/s is not in [-inf, 1]" in capsys.readouterr().err
+    error = capsys.readouterr().err
+    assert all(part in error for part in (name, "speed", "2 m/s", "[-inf, 1]"))
 
 
 @pytest.mark.parametrize(
-    ("words", "message"),
+    ("words", "parts"),
     [
-        (["sections=[rigid_body]"], "did you mean rigid_bodies?"),
-        (["processes=-1"], "processes must be 0 or more"),
-        (["seed=3"], "fidelity has the options"),
-        (["too=x"], "unknown key 'too'"),
+        (["sections=[rigid_body]"], ("'rigid_body'", "rigid_bodies")),
+        (["processes=-1"], ("processes", "-1")),
+        (["seed=3"], ("seed=3", "sections", "processes")),
+        (["too=x"], ("'too'", "sections")),
     ],
 )
-def test_bad_arguments_end_in_one_line(words, message, capsys):
+def test_bad_arguments_end_in_one_line(words, parts, capsys):
     assert command.main(words) == 2
     error = capsys.readouterr().err
-    assert message in error
+    assert all(part in error for part in parts)
     assert error.count("\n") == 1
 
 
@@ -122,16 +124,17 @@ def test_file_names_of_pictures_have_letters_digits_and_underscores_only():
 
 
 @pytest.mark.parametrize(
-    ("words", "message"),
+    ("words", "parts"),
     [
-        (["sections=[inertia]", f"to={quoted(__file__)}"], "is a file; give a folder"),
-        (["-m", "sections=[inertia],[momentum]", "to=laws"], "written by 2 combinations"),
-        (["-m", "sections=[inertia],[momentum]"], "let them differ in to"),
+        (["sections=[inertia]", f"to={quoted(__file__)}"], (f"to={__file__}",)),
+        (["-m", "sections=[inertia],[momentum]", "to=laws"], ("to=laws", "2")),
+        (["-m", "sections=[inertia],[momentum]"], ("folder", " to")),
     ],
 )
 def test_a_folder_that_cannot_take_the_page_is_refused_before_the_first_law(
-    words, message, capsys, monkeypatch
+    words, parts, capsys, monkeypatch
 ):
     monkeypatch.setattr(command, "measure_all", None)  # would be called
     assert command.main(words) == 2
-    assert message in capsys.readouterr().err
+    error = capsys.readouterr().err
+    assert all(part in error for part in parts)
