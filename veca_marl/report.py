@@ -149,7 +149,7 @@ def _report(
 
 
 def _nothing_evaluated(experiment: ExperimentCfg, found: Sequence[Found]) -> ConfigError:
-    remarks = [run.remark for run in found if run.remark]
+    remarks = [f"{run.arm}, seed {run.seed}: {run.remark}" for run in found if run.remark]
     more = f"; and {len(remarks) - 3} more" if len(remarks) > 3 else ""
     named = "; ".join(remarks[:3])
     return ConfigError(f"no run of {experiment.name} has been evaluated: {named}{more}")

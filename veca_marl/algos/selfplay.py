@@ -202,7 +202,7 @@ def elo_ratings(
         ValueError: If `wins` is not a square table of numbers that are 0 or more.
     """
     if wins.ndim != 2 or wins.shape[0] != wins.shape[1] or not (wins >= 0.0).all():
-        raise ValueError(f"wins must be a square table of numbers, 0 or more; got {wins!r}")
+        raise ValueError(f"wins must be a square table of numbers, 0 or more; got {wins.tolist()}")
     if not prior_games > 0.0:
         raise ValueError(f"prior_games={prior_games} must be positive")
 

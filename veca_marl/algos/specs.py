@@ -150,6 +150,6 @@ def _action_layout(owner: str, spec: TensorSpec) -> ActionLayout:
         if bool((spec.space.low == -unit).all()) and bool((spec.space.high == unit).all()):
             return ActionLayout(discrete=False, size=int(spec.shape[-1]))
     raise ValueError(
-        f"{owner}: cannot learn {spec}; "
+        f"{owner}: cannot learn {' '.join(str(spec).split())}; "
         "choices: Bounded in [-1, 1] (continuous), Categorical (discrete)"
     )

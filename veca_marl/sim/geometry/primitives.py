@@ -79,7 +79,7 @@ class Primitive:
             raise ValueError(f"offset {self.offset}: must be three finite metres")
         if not _is_rotation(rotation):
             raise ValueError(
-                f"rotation {self.rotation}: must be an orthonormal right-handed matrix"
+                f"rotation {rotation.tolist()}: must be an orthonormal right-handed matrix"
             )
 
     @property

@@ -230,7 +230,7 @@ class OmnidirectionalReceivers:
     def __init__(self, ears: ArrayLike, nearest_m: float = NEAR_FIELD_M) -> None:
         self.ears: Floats = np.array(ears, np.float64)
         if self.ears.ndim != 2 or self.ears.shape[1] != 3:
-            raise ValueError(f"an ear must be three numbers, got {ears!r}")
+            raise ValueError(f"an ear must be three numbers, got {self.ears.tolist()}")
         self.n_channels = len(self.ears)
         self.extent_m = float(np.linalg.norm(self.ears, axis=1).max())
         self._nearest_m = nearest_m
