@@ -149,6 +149,7 @@ class Step:
 
 _IMAGE_WINDOWS = {"kernels": [8, 4, 3], "strides": [4, 2, 1]}
 _CALLS = {"call_pause_s": 0.0}
+_SPECTRA = {"encoding": "magnitude", "bins": 250}
 
 STEPS: tuple[Step, ...] = (
     Step(
@@ -158,6 +159,8 @@ STEPS: tuple[Step, ...] = (
             Added("task", {"separate_finder": False}, name="MultiAgentNav"),
             Added("body", _CALLS),
             Added("team.*.body", _CALLS),
+            Added("senses.audio", _SPECTRA),
+            Added("team.*.senses.audio", _SPECTRA),
             Replaced("team.*.senses", "extra", before=None, now={}),
             Added("clock", {"sleep_s": math.inf}),
             Added("playground.props.*", {"partition": False}),

@@ -199,7 +199,6 @@ def test_the_game_computes_only_the_senses_that_an_expert_reads(monkeypatch):
     game.close()
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("path", sorted(BENCHMARK.glob("[A-Z]*.csv")), ids=lambda path: path.stem)
 def test_stored_episodes_are_of_the_present_configuration(path):
     """Otherwise the command of the table refuses them: whoever changes a task plays them again."""

@@ -76,7 +76,8 @@ def digest(cfg: GameCfg) -> str:
 
     They are those of its first form: rows that an earlier version stored stay valid.
     """
-    text = json.dumps(first_form(asdict(cfg)), default=_plain, sort_keys=True)
+    plain = json.loads(json.dumps(asdict(cfg), default=_plain))
+    text = json.dumps(first_form(plain), sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
