@@ -94,7 +94,7 @@ def chosen_overrides(
 
 
 def _check_list(argument: str, value: Any, example: str) -> None:
-    """Check an argument that is a list of texts, and not one text, whose letters are no names.
+    """Check an argument that is a list of texts; one text alone would be read letter by letter.
 
     Raises:
         ConfigError: If it is another thing.

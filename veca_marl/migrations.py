@@ -7,8 +7,9 @@ were numbers, which knew some of the fields that step 1 adds.
 `STEPS` are the only record of what changed. They name fields by their paths in the configuration
 of a run; whatever else is stored (the algorithms in a checkpoint, the parameters of a task) is
 passed with the keys that lead to it there, such as ``{"task": parameters}``. A field that is absent
-and in no step takes the default of its dataclass: a new field whose default does what was done
-before needs no step, which is how plug-ins add fields.
+and in no step takes the default of its dataclass: a new field whose default keeps the former
+behaviour needs no step for runs to be read, which is how plug-ins add fields. A step keeps digests
+of configurations valid as well, see `first_form`.
 
 All functions take and return plain data (mappings, lists, numbers, texts). This module imports
 nothing of the package, so that every layer can use it.

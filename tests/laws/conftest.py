@@ -15,8 +15,8 @@ from veca_marl.envs.core.task import TASKS
 WITH_OTHER_BODY = ("KickTheBall", "TurnBaby", "PushOut1v1", "MultiAgentNav")
 # games of several joint-level bodies with eyes and skin, which the quick suite plays with walkers
 WITH_WALKERS = ("PushOut2v2", "SoccerTwoPlayer")
-# tasks whose adapters and rude actions the quick suite tests: besides those above, hands, verbs of
-# a door, a task of another suite
+# tasks that the quick suite plays with every adapter and with extreme actions: besides those above
+# one with hands, one with verbs and doors, and one of another suite
 WITH_EVERY_ADAPTER = (*WITH_OTHER_BODY, "GrabObject", "BabyzumasRevenge", "HandRegard")
 NARROW = ("test_every_adapter", "test_every_task_robustly", "test_every_task_with_bodies")
 WORLDS, STEPS = 2, 25

@@ -6,7 +6,7 @@ import hashlib
 import json
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack, closing
+from contextlib import closing
 from dataclasses import asdict, dataclass
 from enum import Enum
 from functools import partial
@@ -85,7 +85,7 @@ def _plain(value: object) -> object:
     return value.name if isinstance(value, Enum) else str(value)
 
 
-class Player:
+class EpisodePlayer:
     """Plays episodes, consecutive ones of one task in one world.
 
     Args:
@@ -94,8 +94,8 @@ class Player:
 
     def __init__(self, commit: str) -> None:
         self._commit = commit
-        self._world: tuple[str, tuple[str, ...]] | None = None
-        self._pending = ExitStack()
+        self._chosen: tuple[str, tuple[str, ...]] | None = None
+        self._game: Game | None = None
 
     def play(self, job: Job) -> Played:
         """Play an episode.
@@ -103,17 +103,17 @@ class Player:
         Raises:
             ValueError: If the start is not the frozen one.
         """
-        if (job.task, job.overrides) != self._world:
+        if self._game is None or (job.task, job.overrides) != self._chosen:
             self.close()
-            game = Game(game_cfg(job.task, job.overrides))
-            self._game = self._pending.enter_context(closing(game))
-            self._world = job.task, job.overrides
+            self._game = Game(game_cfg(job.task, job.overrides))
+            self._chosen = job.task, job.overrides
         return _play(self._game, job, self._commit)
 
     def close(self) -> None:
         """Close the world."""
-        self._world = None
-        self._pending.close()
+        if self._game is not None:
+            self._game.close()
+        self._game = None
 
 
 def game_cfg(task: str, overrides: Sequence[str]) -> GameCfg:
@@ -176,7 +176,7 @@ def play_all(jobs: Sequence[Job], processes: int, commit: str) -> Iterator[tuple
         WorkerError: If a process ends before its episodes are played, or raises an exception.
     """
     if processes == 1:
-        with closing(Player(commit)) as player:
+        with closing(EpisodePlayer(commit)) as player:
             for job in jobs:
                 yield job, player.play(job)
         return
@@ -188,4 +188,4 @@ def play_all(jobs: Sequence[Job], processes: int, commit: str) -> Iterator[tuple
 
 def _serve_episodes(commit: str, _: Callable[[], None]) -> Callable[[Job], Played]:
     """Return what plays in a process of a pool."""
-    return Player(commit).play
+    return EpisodePlayer(commit).play

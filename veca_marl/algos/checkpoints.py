@@ -367,8 +367,8 @@ def from_plain(kind: type[T], plain: dict[str, Any], find: Callable[[type, str],
         kind: Its type, or the base class of it.
         plain: What `to_plain` returned.
         find: Returns the type for a base class and the `name` that the plain data hold, for
-            dataclasses that are chosen from a registry. Fields
-            that `plain` does not have take their defaults.
+            dataclasses that are chosen from a registry. Fields that `plain` does not have take
+            their defaults.
 
     Raises:
         ValueError: If a field is unknown.

@@ -29,8 +29,8 @@ It is given a function that tells this process of progress; a server may call it
 class ProcessPool:
     """Processes that serve requests, each one at a time.
 
-    They end with this process. Progress is counted in shared memory, by which a process that hangs
-    is told from one whose answer takes long.
+    They end with this process. Each counts its progress in shared memory, which distinguishes a
+    process that hangs from one that computes for long.
 
     Args:
         kind: What a process is, for error messages, such as ``evaluation process``.

@@ -79,9 +79,10 @@ def register_sense(name: str) -> Callable[[SenseT], SenseT]:
 class SensesCfg:
     """Settings of senses. The task names the senses, this sets their quality.
 
-    Quality changes what an observation contains, never its shape; a sense that is not `present`
-    is left out of the observation. A sense without settings here has the defaults of its dataclass,
-    and in the settings of one team those of all teams.
+    Presets of quality change what an observation contains, never its shape; resolution, encoding
+    and number of bins change its shape. A sense that is not `present` is left out. A sense without
+    settings here has the defaults of its dataclass, and in the settings of one team those of all
+    teams.
 
     Attributes:
         vision: Settings of the eyes.

@@ -18,13 +18,6 @@ RADIUS_M = 0.1
 MASS_KG = 2.0
 
 
-@pytest.fixture
-def client():
-    client = BulletClient()
-    yield client
-    client.close()
-
-
 def add_ball(client, position):
     shape = client.createCollisionShape(pybullet.GEOM_SPHERE, radius=RADIUS_M)
     return client.createMultiBody(MASS_KG, shape, basePosition=position)

@@ -6,22 +6,15 @@ import numpy as np
 import pytest
 
 from veca_marl.sim.physics.bullet import free_path_m, surface_m
-from veca_marl.sim.physics.bullet_client import BulletClient, pybullet
+from veca_marl.sim.physics.bullet_client import pybullet
 
 HALF_M, CLEARANCE_M = 0.1, 0.05
 NEAREST_M = (0.5, 1.0, 1.5)
 START, END = np.zeros(3), np.array([3.0, 0.0, 0.0])
 
 
-@pytest.fixture
-def client():
-    client = BulletClient()
-    yield client
-    client.close()
-
-
 def add_cube(client, x_m):
-    """A fixed cube whose nearest face is at `x_m`."""
+    """Add a fixed cube; its face towards the origin is at `x_m`."""
     shape = client.createCollisionShape(pybullet.GEOM_BOX, halfExtents=[HALF_M] * 3)
     return client.createMultiBody(0.0, shape, basePosition=(x_m + HALF_M, 0.0, 0.0))
 
