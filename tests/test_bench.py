@@ -126,6 +126,7 @@ def test_probes_leave_no_trace():
     assert watch.nanoseconds["acting"] > 0
 
 
+@pytest.mark.slow
 def test_results_as_tables_and_json(tmp_path, capsys):
     file = tmp_path / "bench.json"
     words = ["+task=KickTheBall", "bench.worlds=[1,2]", f"bench.json={file}"]
@@ -228,6 +229,7 @@ def test_the_measured_views_show_a_body_from_outside_twice_and_from_its_own_eye(
     assert not np.array_equal(skin, bones)
 
 
+@pytest.mark.slow
 def test_an_absent_sense_is_not_measured(tmp_path):
     file = tmp_path / "bench.json"
     words = ["+task=KickTheBall", "senses/audio=deaf", "playground=simple", f"bench.json={file}"]
@@ -271,6 +273,7 @@ def test_tasks_are_measured_with_each_number_of_worlds(capsys):
     assert [row.split(" | ")[column] for row in rows[2:]] == ["2", "3"]
 
 
+@pytest.mark.slow
 def test_of_all_tasks_those_are_measured_that_fit_a_playground(capsys, monkeypatch):
     monkeypatch.setattr("veca_marl.bench.command.TASKS", ("MultiAgentNav", "ObjectNav"))
     games = chosen_games(BenchCfg(tasks=["all"], playgrounds=["simple", "house"]), [])
@@ -337,6 +340,7 @@ def test_every_experiment_is_measured(name, capsys):
     assert "agent steps/s" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_an_experiment_with_a_scripted_opponent_is_measured(capsys):
     assert main([*ROLLOUTS, "+experiment=soccer"]) == 0
     assert "SoccerTwoPlayer" in capsys.readouterr().out

@@ -1,3 +1,4 @@
+from functools import cache
 from itertools import chain, zip_longest
 
 import hydra
@@ -36,10 +37,15 @@ TOGETHER = zip_longest(*([f"{g}={p}" for g, p in PRESETS if g == group] for grou
 EXPERIMENTS = sorted(path.stem for path in (conf_dir() / "experiment").glob("*.yaml"))
 
 
+@cache
+def composed_task(name):
+    return compose([f"+task={name}"])
+
+
 @pytest.mark.parametrize("task", sorted(TASKS))
 def test_episodes_end_before_the_worlds_start_new_ones(task):
     """What comes later in an episode would not be learnt from."""
-    cfg = compose([f"+task={task}"])
+    cfg = composed_task(task)
     stage = Schedule.of(cfg.total_frames, cfg.eval.every_frames, cfg.collect.frames)
     steps = [batches * cfg.collect.steps for batches in stage.stages_after(0)]
     assert min(steps) >= cfg.game.max_steps
@@ -47,7 +53,7 @@ def test_episodes_end_before_the_worlds_start_new_ones(task):
 
 @pytest.mark.parametrize("task", sorted(TASKS))
 def test_every_task_composes_to_its_own_type(task):
-    cfg = compose([f"+task={task}"])
+    cfg = composed_task(task)
     assert type(cfg.task) is TASKS[task].cfg_type()
     assert cfg.task.name == task
 
@@ -138,6 +144,7 @@ def test_errors_are_one_line_with_the_choices(overrides, parts):
         compose(overrides)
 
 
+@pytest.mark.slow
 def test_compose_does_not_depend_on_earlier_calls():
     assert compose([KICK, "seed=5"]).seed == 5
     assert compose([KICK]).seed == 0

@@ -232,6 +232,7 @@ def test_a_docstring_is_read_section_by_section():
     assert entries(Documented, "Returns") == {}
 
 
+@pytest.mark.slow
 def test_the_pictures_can_be_drawn(tmp_path):
     task_picture("KickTheBall", tmp_path / "walker.png")
     task_picture("TurnBaby", tmp_path / "joints.png")

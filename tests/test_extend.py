@@ -26,6 +26,7 @@ def test_an_unknown_name_lists_the_choices():
         extend.Tusk  # noqa: B018
 
 
+@pytest.mark.slow
 def test_a_task_needs_no_learning_library():
     code = (
         "import sys\nfrom veca_marl.extend import Task, register_task, PropCfg\n"

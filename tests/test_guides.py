@@ -73,6 +73,7 @@ def combinations(choices):
     return [first] if first == last else [first, last]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("page", "line"), commands("bench"))
 def test_what_the_bench_commands_choose_can_be_chosen(page, line):
     for options, overrides in CommandLine("bench", BenchOptions, "").jobs(shlex.split(line)):

@@ -38,6 +38,7 @@ def test_the_ids_exist_after_both_imports(imports):
     assert found == "True"
 
 
+@pytest.mark.slow
 def test_neither_the_package_nor_the_simulator_loads_learning_libraries():
     program = (
         "import sys, veca_marl.sim.physics.world;"

@@ -65,6 +65,7 @@ def test_a_team_learns_by_an_algorithm_of_its_own():
     assert cfg.learner == {"blue": ToyDQNCfg()}
 
 
+@pytest.mark.slow
 def test_a_network_is_chosen_by_name():
     assert compose([KICK]).algo.network == MultisenseCfg()
     assert compose([KICK, "algo=mappo"]).algo.network == MultisenseCfg(critic=Critic.central)
@@ -74,6 +75,7 @@ def test_a_network_is_chosen_by_name():
     assert own.learner["red"].network == MultisenseCfg(critic=Critic.central)
 
 
+@pytest.mark.slow
 def test_loggers_are_chosen_by_name(monkeypatch):
     assert compose([KICK, "log.logger=[]"]).log.logger == []
     assert compose([KICK]).log.logger == [LoggerKind.csv, LoggerKind.tensorboard]
@@ -90,6 +92,7 @@ def test_a_batch_that_an_algorithm_cannot_learn_from_is_refused():
         compose([*SMALL, "algo=toy_dqn", "collect.worlds=1", "collect.steps=2"])
 
 
+@pytest.mark.slow
 def test_training_from_python_returns_rows_and_a_policy_and_stores_nothing(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     result = run_training(compose(SMALL))
@@ -101,6 +104,7 @@ def test_training_from_python_returns_rows_and_a_policy_and_stores_nothing(tmp_p
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.slow
 def test_a_recurrent_policy_is_trained_recorded_and_loaded(tmp_path):
     memory = ["algo.network.memory=gru", "algo.sequence_steps=8", "algo.minibatches=2"]
     cfg = compose([*SMALL, *memory, "log.video=true", "log.keep_checkpoints=1"])
@@ -137,6 +141,7 @@ def test_verbs_are_learnt_from_a_replay_buffer():
     assert row["agents/refused_verbs"] > 0.0  # KickTheBall has nothing that declares a verb
 
 
+@pytest.mark.slow
 def test_an_action_of_two_parts_is_learnt_from_a_replay_buffer(tmp_path):
     small = ["algo.replay.capacity=100", "algo.replay.warm_up_frames=20", "algo.batch_size=8"]
     cfg = compose([*SMALL, "algo=sac_fast", "body=walker_voice", *small])
@@ -151,6 +156,7 @@ def test_a_replay_buffer_that_does_not_fit_is_refused_before_the_run():
         run_training(compose([*SMALL, "algo=sac", "algo.replay.capacity=10_000_000_000"]))
 
 
+@pytest.mark.slow
 def test_a_run_without_loggers_stores_how_far_it_has_come(tmp_path, monkeypatch):
     stored = []
     monkeypatch.setattr(
@@ -171,6 +177,7 @@ def rest(folder):
     return {path.name for path in folder.iterdir()}
 
 
+@pytest.mark.slow
 def test_a_sweep_knows_that_a_run_without_loggers_has_ended(tmp_path):
     node = compose_node([*SMALL, "log.logger=[]"])
     folder = RunFolder(tmp_path)
@@ -194,6 +201,7 @@ def test_a_budget_without_an_update_is_refused_before_the_run(tmp_path):
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.slow
 def test_a_run_that_starts_from_another_one_needs_frames_for_an_update_too(tmp_path):
     run_training(compose(sac(16)), RunFolder(tmp_path))
     with pytest.raises(ConfigError, match=naming("total_frames=64", "warm_up_frames=65")):
@@ -229,6 +237,7 @@ def warnings(caplog):
     return [record.getMessage() for record in caplog.records if record.levelname == "WARNING"]
 
 
+@pytest.mark.slow
 def test_intrinsic_rewards_are_chosen_by_name_also_for_a_team():
     push = "+task=PushOut1v1"
     assert compose([push]).intrinsic == IntrinsicCfg()
@@ -242,6 +251,7 @@ def test_intrinsic_rewards_are_chosen_by_name_also_for_a_team():
         compose([push, "+intrinsic@team_intrinsic.green=rnd"])
 
 
+@pytest.mark.slow
 def test_a_run_with_intrinsic_rewards_is_stored_with_their_type(tmp_path):
     """Every part of the action and every sense of a task are read by the forward model."""
     overrides = [*SMALL, "intrinsic=forward", "body=walker_voice"]

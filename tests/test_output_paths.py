@@ -30,6 +30,7 @@ def test_impossible_places_are_named(tmp_path):
         check_file(file / "scores.json", "json")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("command", "arguments", "place"),
     [

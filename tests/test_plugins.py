@@ -228,6 +228,7 @@ def test_plugins_of_a_stored_run_are_imported_on_request(stored_run):
     (stored_run.parent / "executed").unlink()
 
 
+@pytest.mark.slow
 def test_a_run_with_a_plugin_is_resumed_if_the_plugin_is_named(stored_run):
     words = ["plugins=[payload]", f"resume={stored_run}", "total_frames=256"]
     done = run_module("veca_marl.train", words, stored_run.parent)

@@ -62,6 +62,7 @@ def test_video_has_one_frame_per_step_and_the_sound_at_the_ears(tmp_path):
     assert not game.senses.audio.waveform, "the configuration of the run is unchanged"
 
 
+@pytest.mark.slow
 def test_mono_gives_equal_channels_and_deaf_none(tmp_path):
     _, _, mono = record(tmp_path / "mono.mp4", "senses/audio=mono")
     assert difference_of_ears(mono) < 0.05

@@ -94,6 +94,7 @@ def test_a_file_system_without_locks_is_reported(tmp_path, monkeypatch, caplog):
         assert "cannot be locked: start no other run in its folder" in caplog.text
 
 
+@pytest.mark.slow
 def test_a_new_run_in_the_folder_of_one_that_starts_is_refused(tmp_path, capsys):
     with locked(tmp_path / "run"):
         assert train(tmp_path, *SMOKE, f"hydra.run.dir={tmp_path / 'run'}") == 2

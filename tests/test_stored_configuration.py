@@ -79,6 +79,7 @@ def test_values_of_teams_and_opponents_are_changed(stored):
     assert to_config(stored).opponent == {}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("override", "parts"),
     [

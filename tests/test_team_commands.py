@@ -61,6 +61,7 @@ def played(tmp_path_factory):
     return folder
 
 
+@pytest.mark.slow
 def test_past_policies_of_both_teams_are_stored(played):
     kept = sorted(path.name for path in (played / "run" / "pool").iterdir())
     frames = {"red": (0, 32, 96), "blue": (0, 64, 128)}
@@ -83,6 +84,7 @@ def test_a_run_is_played_into_a_video(played, tmp_path, capsys):
     assert "policy=" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_a_tournament_writes_the_matches_the_ratings_and_the_picture(played, capsys):
     pytest.importorskip("matplotlib", reason="the picture needs the extra [plot]")
     run = played / "run"
@@ -120,6 +122,7 @@ def test_a_tournament_needs_two_past_policies_of_a_team(played, tmp_path, capsys
     assert all(part in error for part in ("policies", "blue: 1", " 2 "))
 
 
+@pytest.mark.slow
 def test_a_policy_of_another_run_is_an_opponent(played, tmp_path, capsys):
     assert train(tmp_path, "run", f"opponent.blue={played / 'run'}", "total_frames=32") == 0
     with (tmp_path / "run" / "metrics.csv").open() as file:
@@ -134,6 +137,7 @@ def test_a_policy_of_another_run_is_an_opponent(played, tmp_path, capsys):
     assert "self_play.teams" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_a_team_starts_from_the_parameters_of_another_run(played, tmp_path):
     other = shutil.copytree(played / "run", tmp_path / "other")
     first = [f"init_from.red={other}", "opponent.blue=idle", "algo.learning_rate=1e-6"]
@@ -150,6 +154,7 @@ def test_a_team_starts_from_the_parameters_of_another_run(played, tmp_path):
     assert commands.train(tmp_path, f"resume={tmp_path / 'run'}", "total_frames=64") == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("arguments", "parts"),
     [
@@ -174,6 +179,7 @@ def test_a_source_that_does_not_fit_is_refused(played, tmp_path, arguments, part
     assert not (tmp_path / "run").exists()
 
 
+@pytest.mark.slow
 def test_a_run_is_evaluated_against_another_opponent(played, tmp_path, capsys):
     table = tmp_path / "table.json"
     run, more = f"run={played / 'run'}", ["episodes=4", f"evaluate.json={table}"]
@@ -213,6 +219,7 @@ def test_a_change_that_does_not_fit_is_refused(played, capsys, override, parts):
     assert all(part in error for part in parts)
 
 
+@pytest.mark.slow
 def test_frozen_episodes_are_those_of_their_seed(played, tmp_path, capsys, monkeypatch):
     run, table = f"run={played / 'run'}", tmp_path / "table.json"
     assert evaluate([run, "episodes=2", "seed=77", f"evaluate.json={table}"]) == 0
@@ -251,6 +258,7 @@ def test_a_self_play_run_is_evaluated_against_an_expert(played, tmp_path, capsys
     assert [row["team"] for row in json.loads(table.read_text())] == ["red", "red"]
 
 
+@pytest.mark.slow
 def test_each_team_that_learnt_acts_at_random_against_the_policies_of_the_others(played):
     """If all acted at random at once, a team would meet other opponents than its own."""
     folder, seed = played / "run", 5

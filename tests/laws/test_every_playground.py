@@ -43,6 +43,7 @@ def refusal(game):
     return ""
 
 
+@pytest.mark.slow
 def test_a_misfit_is_refused_with_names_and_choices(task):
     own = game_cfg(task)
     assert not refusal(own)

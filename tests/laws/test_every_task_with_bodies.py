@@ -43,6 +43,7 @@ def refusal(task, name):
     return ""
 
 
+@pytest.mark.slow
 def test_a_misfit_is_refused_with_the_kind_of_body_or_the_verbs_that_are_needed(task):
     game_cfg(task).check_bodies()
     for name in BODIES:

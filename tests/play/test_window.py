@@ -122,6 +122,7 @@ def test_the_pointer_turns_the_eyes_and_the_right_button_releases_them(window):
     np.testing.assert_allclose(body.mount("eye_left").rotation[:, 0], ahead, atol=1e-6)
 
 
+@pytest.mark.slow
 def test_the_command_watches_a_policy_in_a_window(no_screen):
     assert main([*TASK, "policy=expert", "episodes=1", "play.sound=false"]) == 0
 

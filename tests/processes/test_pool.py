@@ -50,6 +50,7 @@ def make_patient(count_progress):
     return serve
 
 
+@pytest.mark.slow
 def test_only_a_process_without_progress_is_silent():
     limit = Limit(1.5, "group.limit_s")
     with closing(ProcessPool("patient process", make_patient, 2, limit, "fork")) as pool:

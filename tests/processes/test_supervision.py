@@ -43,6 +43,7 @@ def sleep_until_terminated(ready):
     time.sleep(60)
 
 
+@pytest.mark.slow
 def test_processes_that_ignore_the_request_to_end_are_killed_after_a_common_grace():
     commands = [
         subprocess.Popen([sys.executable, "-S", "-c", f"{code} time.sleep(60)"], stdout=-1)

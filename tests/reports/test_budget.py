@@ -39,6 +39,7 @@ def test_a_run_with_more_frames_is_compared_at_the_frames_asked_for(tmp_path, ar
     assert "| mono | 2 | yes | 200 | 0.20 |" in again
 
 
+@pytest.mark.slow
 def test_a_run_with_more_frames_and_no_evaluation_there_does_not_count(tmp_path, arms, run):
     write_all(tmp_path, arms, [("mono", 2)])
     points = [(100, 0.1), (200 + BATCH, 9.0)]
@@ -81,6 +82,7 @@ def test_a_run_that_goes_on_to_a_larger_budget_counts_at_the_asked_one():
     assert not budget.counts(RunState.cut, [100, 2000])
 
 
+@pytest.mark.slow
 def test_each_arm_has_its_own_budget():
     words = [text for text in EXPERIMENT if text != "total_frames=200"]
     words.append("experiment.arms.stereo=['senses/audio=stereo','total_frames=300']")

@@ -29,6 +29,7 @@ def test_the_rate_is_the_same_each_time_and_does_not_depend_on_the_order():
     assert false_order_rate(5, 3) == pytest.approx(first, abs=0.05)
 
 
+@pytest.mark.slow
 def test_speeds_are_told_apart_by_chance_more_often_than_the_confidence_says_too():
     assert 0.14 < false_speed_rate(3, 3) < 0.24
 

@@ -16,6 +16,7 @@ def test_the_expert_plays_in_the_first_arm_in_which_it_can():
     assert (row["arm"], row["player"]) == ("mono", "expert")
 
 
+@pytest.mark.slow
 def test_without_the_sense_that_it_needs_in_any_arm_there_are_no_rows():
     (arm, *_) = compose_arms([*SHORT, DEAF])
     assert expert_rows([arm], 1) == []

@@ -274,6 +274,7 @@ def with_experiment(composed, **changes):
     ]
 
 
+@pytest.mark.slow
 def test_rows_of_seeds_that_are_not_planned_are_named_and_not_counted(
     tmp_path, arms, composed, run, monkeypatch
 ):

@@ -72,6 +72,7 @@ def tiny(tmp_path):
     return TinyPackage(tmp_path)
 
 
+@pytest.mark.slow
 def test_a_read_only_package_is_cached_elsewhere_and_not_written_to(tiny):
     before = tiny.files()
     assert tiny.call() == (1, 0, 1)
@@ -80,6 +81,7 @@ def test_a_read_only_package_is_cached_elsewhere_and_not_written_to(tiny):
     assert list((tiny.cache / "veca_marl" / "kernels").rglob("caller.caller*.nbc"))
 
 
+@pytest.mark.slow
 def test_an_edit_of_a_called_function_in_another_file_is_noticed(tiny):
     assert tiny.call() == (1, 0, 1)
     tiny.write("called.py", value=2)
@@ -88,6 +90,7 @@ def test_an_edit_of_a_called_function_in_another_file_is_noticed(tiny):
     assert tiny.call() == (1, 1, 0), "the kernels of the earlier sources are kept"
 
 
+@pytest.mark.slow
 def test_processes_that_start_at_the_same_time_share_the_folder(tiny):
     with ThreadPoolExecutor() as pool:
         values = [value for value, *_ in pool.map(lambda _: tiny.call(), range(2))]

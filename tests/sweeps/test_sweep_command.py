@@ -43,6 +43,7 @@ def test_every_arm_is_run_with_every_seed_in_a_folder_of_its_own(sweep):
     assert {"+experiment=audio_ablation", "experiment.arm=stereo", "seed=5"} < {*jobs[0].overrides}
 
 
+@pytest.mark.slow
 def test_a_sweep_without_experiment_has_folders_named_by_its_overrides(sweep):
     jobs, _, _ = sweep("+task=KickTheBall", "seed=1", "senses/audio=mono,hrtf")
     assert [str(job.folder) for job in jobs] == [
@@ -51,6 +52,7 @@ def test_a_sweep_without_experiment_has_folders_named_by_its_overrides(sweep):
     ]
 
 
+@pytest.mark.slow
 def test_the_jobs_find_presets_in_the_folder_of_config_dir(sweep, tmp_path):
     own = tmp_path / "own presets"
     (own / "clock").mkdir(parents=True)
@@ -94,6 +96,7 @@ def test_runs_that_do_not_fit_into_the_memory_together_wait(sac_sweep, capsys):
     assert sac_sweep(1.5) == (1, 4)
 
 
+@pytest.mark.slow
 def test_a_run_that_does_not_fit_alone_ends_the_sweep_before_anything_is_started(sac_sweep, capsys):
     with pytest.raises(SystemExit) as ended:
         sac_sweep(0.8)
@@ -103,6 +106,7 @@ def test_a_run_that_does_not_fit_alone_ends_the_sweep_before_anything_is_started
     assert all(part in message for part in parts)
 
 
+@pytest.mark.slow
 def test_an_impossible_run_is_named(sac_sweep, capsys):
     with pytest.raises(SystemExit) as ended:
         sac_sweep(20.0, "task.max_seconds=-1")
@@ -110,6 +114,7 @@ def test_an_impossible_run_is_named(sac_sweep, capsys):
     assert "/seed_0: task.max_seconds=-1.0" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_runs_that_have_ended_need_no_memory(sac_sweep, monkeypatch):
     job = import_module("veca_marl.sweeps.plans")
     monkeypatch.setattr(sweep_module, "plan", lambda one: job.Plan(one, job.Action.skip))
@@ -122,6 +127,7 @@ def test_several_experiments_in_one_command_are_refused(sweep, capsys):
     assert "error: +experiment=smoke,first_light" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("words", "parts"),
     [

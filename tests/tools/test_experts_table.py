@@ -86,11 +86,13 @@ class Deadly:
         os.kill(os.getpid(), signal.SIGKILL)
 
 
+@pytest.mark.slow
 def test_a_process_that_is_killed_is_named_with_its_signal():
     with pytest.raises(WorkerError, match=r"process [01] .*SIGKILL"):
         list(play_all([Deadly(), Deadly()], 2, "commit"))
 
 
+@pytest.mark.slow
 def test_a_start_that_is_not_the_frozen_one_is_named_by_its_process():
     job = Job("DodgeCar", ("playground=single_room",), Script.random, 0, frozen=True)
     with pytest.raises(WorkerError, match=r"process 0 .*: ValueError: "):
@@ -148,6 +150,7 @@ def test_an_episode_that_is_stored_twice_is_refused(tmp_path, capsys):
     assert all(part in error for part in (str(file), "episode 0", "expert", " 2 "))
 
 
+@pytest.mark.slow
 def test_two_commands_do_not_play_for_one_folder_at_once(tmp_path, capsys):
     with locked(tmp_path):
         assert main([*SHORT, f"to={tmp_path}", "episodes=1"]) == 2
@@ -224,6 +227,7 @@ def test_episodes_with_other_starts_are_not_mixed(tmp_path):
             file.check([played()], "c", version)
 
 
+@pytest.mark.slow
 def test_replayed_episodes_are_the_same_or_named_with_both_outcomes(tmp_path, capsys):
     words = [*SHORT, f"to={tmp_path}"]
     assert main([*words, "episodes=3"]) == 0

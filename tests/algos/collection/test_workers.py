@@ -108,6 +108,7 @@ def test_without_the_signal_every_call_raises_an_error(start, use):
 HANGS = naming("process 1 ", " 2 s ", "collect.answer_limit_s")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("use", ["update_policy", "restart", "collect"])
 def test_a_worker_that_hangs_is_named_and_killed(start, use):
     """SIGSTOP stops a process without ending it."""
@@ -138,6 +139,7 @@ def in_a_new_count(monkeypatch):
     monkeypatch.setattr(multiprocessing.process, "_process_counter", itertools.count(1))
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("in_a_new_count")
 def test_a_worker_that_hangs_while_it_starts_is_named_and_killed(start):
     """TorchRL waits for the first answer without limit."""
@@ -170,6 +172,7 @@ if hasattr(os, "register_at_fork"):
     os.register_at_fork(after_in_parent=lambda: time.sleep(pause_after_fork_s[0]))
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="other systems never fork")
 def test_a_worker_that_ends_before_its_fork_has_returned_is_reported(start):
     """An exception that a signal handler raises within a fork is printed and dropped."""
@@ -202,6 +205,7 @@ def start_script(folder, text):
     )
 
 
+@pytest.mark.slow
 def test_workers_end_when_the_main_process_is_killed(tmp_path):
     main = start_script(tmp_path, MAIN_PROCESS)
     processes = [int(word) for word in main.stdout.readline().split()]
@@ -247,6 +251,7 @@ def test_an_interrupt_while_workers_start_ends_the_program(starting, number, cod
     assert not any(is_running(pid) for pid in workers)
 
 
+@pytest.mark.slow
 def test_a_program_that_closes_its_workers_before_any_update_ends(tmp_path):
     """TorchRL's transfer of parameters tried to start a thread when Python ended, and waited."""
     main = start_script(tmp_path, CLOSING_PROCESS)

@@ -148,6 +148,7 @@ def check_that_it_ends(action, seconds):
 HANGS = naming("evaluation process 1 ", " 2 s ", "collect.answer_limit_s")
 
 
+@pytest.mark.slow
 def test_a_process_that_hangs_is_named_and_killed(policy):
     players = Players(policy, ("agents",))
     raised = []
@@ -168,6 +169,7 @@ def test_a_process_that_hangs_is_named_and_killed(policy):
     assert not multiprocessing.active_children()
 
 
+@pytest.mark.slow
 def test_an_evaluator_with_a_process_that_hangs_can_be_closed(policy):
     evaluator = make_evaluator(make_fake_env, Players(policy, ("agents",)), 2, 4, LIMIT)
     evaluator.play(SEVEN)

@@ -148,6 +148,7 @@ SMALL_SAC = SACCfg(
 )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("algo", [PPOCfg(network=SMALL), SMALL_SAC], ids=["ppo", "sac"])
 def test_returns_are_logged_apart(make_trainer, algo):
     memory = MemoryReporter()
@@ -172,6 +173,7 @@ def test_a_team_that_does_not_learn_in_a_stage_has_blank_numbers():
     assert batch["next", "blue", "info", "intrinsic_return"].isnan().all()
 
 
+@pytest.mark.slow
 def test_resuming_is_exact(make_trainer, tmp_path):
     cfg = RNDCfg()
     whole = make_trainer("whole", {"red": cfg}, 4, ToyDQNCfg())

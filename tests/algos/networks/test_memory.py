@@ -82,6 +82,7 @@ def make_trainer(folder, reporters=()):
     )
 
 
+@pytest.mark.slow
 def test_a_resumed_run_with_memory_equals_one_without_interruption(tmp_path):
     whole = make_trainer(tmp_path / "whole")
     whole.run()

@@ -3,6 +3,7 @@
 import subprocess
 import sys
 
+import pytest
 from paths import ROOT
 
 from veca_marl.algos.sac.replay import make_scratch_folder
@@ -14,6 +15,7 @@ MAKE = (
 )
 
 
+@pytest.mark.slow
 def test_the_folder_of_a_killed_process_is_removed_by_the_next(tmp_path):
     killed = subprocess.run(
         [sys.executable, "-c", f"{MAKE} os.kill(os.getpid(), signal.SIGKILL)", tmp_path, ROOT],

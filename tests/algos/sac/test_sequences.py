@@ -209,6 +209,7 @@ def trained_return(memory, batches):
     return scores["agents"].returns.mean()
 
 
+@pytest.mark.slow
 def test_a_task_that_needs_memory_is_learnt_with_a_gru_and_not_without():
     assert trained_return(Memory.gru, 4) > 0.9
     assert abs(trained_return(Memory.none, 4)) < 0.3

@@ -136,6 +136,7 @@ def test_logs_contain_team_and_age_of_the_opponent(make, tmp_path):
         assert row[f"{rests}/kl"] == ""
 
 
+@pytest.mark.slow
 def test_a_resumed_run_plays_against_the_same_opponents(make, tmp_path):
     make("whole").run()
     with pytest.raises(KeyboardInterrupt):

@@ -58,6 +58,7 @@ def test_a_run_killed_while_files_are_written_stores_the_same(whole, tmp_path, p
     assert_equal(stored(tmp_path / "run"), whole[0])
 
 
+@pytest.mark.slow
 def test_a_run_killed_at_random_moments_stores_the_same(whole, tmp_path):
     rng = np.random.default_rng(0)
     for _ in range(2):

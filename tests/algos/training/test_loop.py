@@ -37,6 +37,7 @@ def parameters(trainer):
     return torch.cat([p.flatten() for p in trainer.learners.policy.parameters()])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("processes", [0, 2], ids=["in_process", "two_processes"])
 def test_interrupted_and_resumed_equals_uninterrupted(make_trainer, tmp_path, processes):
     whole = make_trainer("whole", 6, processes)
@@ -64,6 +65,7 @@ def test_interrupted_and_resumed_equals_uninterrupted(make_trainer, tmp_path, pr
         assert read(tmp_path / "whole" / name) == read(tmp_path / "resumed" / name)
 
 
+@pytest.mark.slow
 def test_a_larger_budget_after_a_run_that_ended_between_evaluations_is_noted(make_trainer):
     for batches, noted in ((4, False), (3, True)):
         name = f"longer_{batches}"
@@ -134,6 +136,7 @@ def test_a_run_writes_a_row_per_batch_and_per_evaluation(make_trainer, tmp_path)
     assert {"collect", "learn", "transfer", "evaluate", "checkpoint"} < set(parts)
 
 
+@pytest.mark.slow
 def test_time_limit_stops_at_a_checkpoint(make_trainer):
     trainer = make_trainer("run", 1000, max_minutes=1e-9)
     trainer.run()

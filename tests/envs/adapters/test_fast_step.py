@@ -118,6 +118,7 @@ def test_collected_batches_are_those_of_torchrl(pair):
         assert_same(*batch)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", [SerialEnv, ParallelEnv])
 def test_batches_of_envs_are_those_of_torchrl(kind):
     options = {"mp_start_method": "fork"} if kind is ParallelEnv else {}

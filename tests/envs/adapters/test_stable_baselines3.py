@@ -46,6 +46,7 @@ def test_an_unknown_layout_is_an_error_that_lists_the_choices():
         gymnasium.make(ID, layout="flat")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "numbers"), [("PPO", SMALL_PPO), ("SAC", SMALL_SAC)])
 def test_it_learns_with_its_cnn(env, name, numbers):
     model = getattr(stable_baselines3, name)("MultiInputPolicy", env, seed=0, **numbers)

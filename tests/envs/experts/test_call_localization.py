@@ -65,6 +65,7 @@ def test_a_call_is_localized_with_several_headings(game, call_map, listener, cal
     assert math.dist(call_map.best()[:2], caller) < 0.4 + 0.25 * away_m
 
 
+@pytest.mark.slow
 def test_the_later_of_two_callers_is_localized(game, call_map):
     for caller in ((0.5, 0.8), (-0.5, -1.0)):
         for yaw_deg in np.linspace(0.0, 720.0, 40):

@@ -92,6 +92,7 @@ def test_the_expert_reports_each_event_once_and_only_the_room_is_rewarded(game):
     assert reward == 1.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("playground", "room"),
     [

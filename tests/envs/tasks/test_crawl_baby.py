@@ -56,6 +56,7 @@ def test_the_start_holds_if_the_posture_is_held(game):
         assert body.bone("chest").forward[2] < -0.8
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("body", BODIES)
 def test_the_expert_crawls_ahead(body):
     rng, ways_m, speeds_mps = np.random.default_rng(3), [], []

@@ -381,6 +381,7 @@ def test_standing_still_is_hit_also_in_a_corner(game, place):
     assert mean < -0.3
 
 
+@pytest.mark.slow
 def test_the_expert_dodges():
     game = game_of("task.max_seconds=10")
     solved, mean = episodes(game, Script.expert, range(100, 108))
@@ -402,6 +403,7 @@ def is_hit(game, seed):
     return False
 
 
+@pytest.mark.slow
 def test_the_expert_expects_the_car_to_draw_another_point_near_it(game):
     assert sum(is_hit(game, seed) for seed in range(40)) <= 3
 

@@ -122,6 +122,7 @@ def arrives(world, plan, walker, goal):
     return False
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("house", HOUSES)
 def test_a_walker_reaches_every_neighbouring_room(house):
     world = World(shipped(house))

@@ -212,6 +212,7 @@ def kicks_of_expert(audio, episodes):
     return np.array(kicks)
 
 
+@pytest.mark.slow
 def test_the_expert_needs_both_ears():
     hrtf, mono = kicks_of_expert("hrtf", 3), kicks_of_expert("mono", 3)
     assert hrtf.mean() > 2.0

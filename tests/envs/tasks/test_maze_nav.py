@@ -225,6 +225,7 @@ def test_the_start_is_far_from_the_object(game):
 # ---- the expert
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("overrides", [("task.trials=2",), ("task.cells=8", "task.trials=1")])
 def test_the_expert_finds_the_object_in_every_trial(overrides):
     game = game_of(*overrides)

@@ -33,6 +33,7 @@ def test_the_experts_solve_every_house(playground, agents):
     game.close()
 
 
+@pytest.mark.slow
 def test_an_expert_behind_the_leaf_of_an_open_door_walks_round_it():
     game = game_of("task.max_seconds=20", playground="house2")
     game.reset(np.random.default_rng(0))
@@ -114,6 +115,7 @@ def test_the_experts_on_hands_and_knees_solve_a_house(body):
     game.close()
 
 
+@pytest.mark.slow
 def test_a_crawling_path_follower_recovers_from_a_wall():
     """On hands and knees with the head against a wall, the body first has to move backwards."""
     game = game_of("body=mitten_voice", playground="two_rooms")
@@ -135,6 +137,7 @@ def test_a_crawling_path_follower_recovers_from_a_wall():
     game.close()
 
 
+@pytest.mark.slow
 def test_the_experts_are_deterministic():
     times = []
     for _ in range(2):

@@ -113,6 +113,7 @@ def test_rooms_without_floor_for_a_pair_are_left_out_and_the_others_have_one():
         assert math.dist(one, other) >= APART_M
 
 
+@pytest.mark.slow
 def test_multi_agent_nav_starts_in_a_house_with_a_full_room():
     """12 of these 60 starts failed: the object was to lie in the bedroom or the study."""
     small = ("senses.vision.width=8", "senses.vision.height=8", "senses.audio.present=false")

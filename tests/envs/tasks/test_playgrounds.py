@@ -55,6 +55,7 @@ def test_tasks_start_in_the_random_house_of_any_seed(task, count):
         game.close()
 
 
+@pytest.mark.slow
 def test_random_houses_without_loops_have_a_room_with_one_door():
     for seed in np.random.default_rng(1).integers(0, 1_000_000, 5).tolist():
         words = ["playground=random_house", f"playground.seed={seed}", "playground.loops=0"]
@@ -140,6 +141,7 @@ def test_more_agents_than_any_playground_has_rooms_are_told_how_many_fit():
         check_whole(["+task=MultiAgentNav", "playground=simple", "task.agents=9"])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("agents", [5, 6, 7])
 def test_the_playgrounds_that_are_offered_to_more_agents_can_be_composed(agents):
     with pytest.raises(ConfigError) as refusal:

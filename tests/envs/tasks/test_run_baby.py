@@ -160,6 +160,7 @@ def test_it_starts_standing_with_the_room_ahead(game):
         assert not outcome.terminated
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("body", ["mitten_limbs", "full"])
 def test_the_expert_makes_steps_before_it_falls(body):
     """Both feet and the chest come ahead; a body that falls like a plank leaves its feet behind."""

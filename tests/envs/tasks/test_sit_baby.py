@@ -80,6 +80,7 @@ def test_it_starts_on_the_back_at_rest(game):
         assert body.bone("chest").forward[2] > 0.8
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("body", "solved"), [("mitten_limbs", 4), ("mitten_position", 0)])
 def test_the_expert_sits_upright_on_its_heels(body, solved):
     """A body that is controlled by target angles leans on its hands in most episodes."""

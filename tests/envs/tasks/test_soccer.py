@@ -263,6 +263,7 @@ def test_joint_level_bodies_can_play(task, body):
     game.close()
 
 
+@pytest.mark.slow
 def test_the_expert_on_hands_and_knees_pushes_the_ball():
     game = game_of("SoccerOnePlayer", "body=mitten", "senses/touch=numb", "task.max_seconds=16.0")
     received = {"approach": 0.0, "progress": 0.0}

@@ -59,6 +59,7 @@ def test_a_used_world_equals_a_fresh_one():
     world.close()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("detail", Detail)
 def test_earlier_episodes_do_not_change_an_episode(detail):
     """Contacts within and between bodies are the hardest case for restoring a saved state."""

@@ -106,6 +106,7 @@ def test_level_difference_grows_with_frequency():
     assert d[3] > 12.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("head", "low", "high"), [("kemar", 3.0, 9.0), ("sphere", 0.0, 0.05)])
 def test_front_and_back_differ_by_the_pinna_only(head, low, high):
     table = kemar_table() if head == "kemar" else HrtfTable(sphere_head())
@@ -120,6 +121,7 @@ def test_arrival_times_are_continuous_at_the_lowest_ring():
     assert steps[:10].max() < 1e-3 * RATE * 0.03
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("n_taps", [100, 300, 700])
 def test_filters_of_any_length_keep_their_magnitudes(n_taps):
     """At 96 kHz a head has filters of 557 samples; all of them are interpolated alike."""
@@ -138,6 +140,7 @@ def test_arrival_times_at_the_nadir_depend_neither_on_azimuth_nor_ear():
     assert np.allclose(times, times[0, 0], atol=1e-6)
 
 
+@pytest.mark.slow
 def test_arrival_times_below_the_ring_of_a_sphere_are_those_of_the_sphere():
     head = sphere_head()
     kept = head.directions[:, 2] > np.sin(np.deg2rad(-41.0))
@@ -243,6 +246,7 @@ def test_minimum_phase_keeps_the_magnitude_and_has_the_least_delay():
     assert minimum_phase(late, 4)[0] == pytest.approx(1.0, abs=1e-6)
 
 
+@pytest.mark.slow
 def test_a_saved_head_response_is_loaded_unchanged(tmp_path):
     head = sphere_head(32)
     head.save(tmp_path / "head.npz")

@@ -81,6 +81,7 @@ def head(fields, tmp_path_factory):
     return condition(read_sofa(path), 22_050)
 
 
+@pytest.mark.slow
 def test_a_spherical_head_is_recovered(head):
     assert head.head_radius_m == pytest.approx(RADIUS, abs=0.003)
     expected = woodworth_arrival_s(ear_incidence(head.directions), RADIUS)
@@ -136,6 +137,7 @@ def test_the_response_of_the_loudspeaker_is_removed(fields, head, tmp_path):
     assert np.abs(20.0 * np.log10(low)).max() < 1.5
 
 
+@pytest.mark.slow
 def test_delays_in_their_own_field_are_used(head, tmp_path):
     path = write(tmp_path / "delay.sofa", sphere_fields(delays_in_field=True))
     found = condition(read_sofa(path), 22_050)

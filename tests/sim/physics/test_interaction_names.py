@@ -30,6 +30,7 @@ def test_an_identifier_is_accepted(monkeypatch):
     assert INTERACTIONS["push_over2"] is Push
 
 
+@pytest.mark.slow
 def test_the_verbs_are_known_in_a_world_without_bodies():
     """In a process that imports no body, as programs may do that use the physics without one."""
     program = (

@@ -43,6 +43,7 @@ def test_an_edge_with_a_skin_reads_the_share_by_which_both_skins_are_compressed(
     assert largest > share - 0.15  # the nearest taxel is not exactly below the edge
 
 
+@pytest.mark.slow
 def test_no_skin_reads_more_than_the_share_by_which_the_bones_compress_both():
     """A foot, which has a box, at random poses beside a forearm, which is a capsule."""
     rng, found = np.random.default_rng(0), 0

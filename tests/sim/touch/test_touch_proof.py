@@ -21,6 +21,7 @@ def check_independence(readings):
     assert not [law for law in fixed_arms.rest_laws(readings) if not law.holds]
 
 
+@pytest.mark.slow
 def test_touch_at_rest_is_independent_of_the_time_step(at_rest):
     check_independence(at_rest)
 
@@ -59,6 +60,7 @@ def test_the_reading_on_the_palm_is_weight_over_stiffness():
     arms.world.close()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mass_kg", [0.2, 0.5])
 def test_the_peak_of_an_impact_is_stable_with_a_larger_contact_margin(mass_kg):
     touch, force = fixed_arms.peaks(PALM, Ball(mass_kg), fixed_arms.clocks(0.1))

@@ -50,6 +50,7 @@ def test_bounding_boxes_are_tight():
         np.testing.assert_array_equal(upper, vertices.max(axis=0))
 
 
+@pytest.mark.slow
 def test_culling_does_not_change_a_bit_of_the_image():
     """Random cameras, also inside the bounding boxes and between the limbs."""
     rng, left_out, shown = np.random.default_rng(1), 0, 0

@@ -26,6 +26,7 @@ def test_the_difference_of_azimuths_is_wrapped():
     assert found.confused == 0.0
 
 
+@pytest.mark.slow
 def test_the_direction_is_found_with_a_head_and_not_with_one_receiver():
     hrtf, stereo, mono = (
         localisation(ARMS[name], train=600, test=300) for name in ("hrtf", "stereo", "mono")

@@ -19,6 +19,7 @@ def test_disparity_is_that_of_the_geometry():
     assert pairs[0, 0] > 5.0 > 0.0 > pairs[1, 0]
 
 
+@pytest.mark.slow
 def test_segmentation_is_that_of_tiny_renderer():
     shares = {name: vision.equal_shares(60, shapes) for name, (shapes, _) in vision.ROOMS.items()}
     broken = [law for law in vision.segmentation_laws(shares) if not law.holds]

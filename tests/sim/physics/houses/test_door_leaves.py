@@ -90,6 +90,7 @@ def test_a_side_that_is_no_better_is_not_advised():
         assert "opens_to_front" not in str(refusal.value)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("turned", [False, True])
 def test_every_sliding_leaf_that_is_accepted_opens_and_closes(turned):
     accepted = 0

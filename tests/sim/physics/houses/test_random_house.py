@@ -132,6 +132,7 @@ def box_round(prop):
     return (low + high) / 2.0, high - low
 
 
+@pytest.mark.slow
 @FEW_AND_MANY
 def test_a_walker_reaches_everything_while_leaves_are_open(count):
     """That they can turn is checked by the configuration of every playground."""
