@@ -94,7 +94,8 @@ def perception_picture(path: Path) -> None:
     for _ in range(6):
         game.step({player.name: np.zeros(2, np.float32)})
         observation = game.observe(player)
-    draw_perception(env.render(), observation["audio"], path)
+    magnitudes = observation["audio"][:2]
+    draw_perception(env.render(), magnitudes, path)
     env.close()
 
 

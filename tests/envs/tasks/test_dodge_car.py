@@ -73,7 +73,7 @@ def loudness_of_ears(game, side_m):
     for _ in range(10):
         task.car.prop.place((0.0, side_m, 0.08))
         walk(game)
-    return game.observe(player)["audio"].mean(axis=-1)
+    return game.observe(player)["audio"][:2].mean(axis=-1)
 
 
 @pytest.mark.parametrize("side_m", [1.0, -1.0])

@@ -193,7 +193,7 @@ def test_the_ball_is_heard_from_its_side(game, side, y):
     for _ in range(5):
         game.task.ball.place((0.0, y, 0.15))
         game.step({"agents": np.zeros(2, np.float32)})
-        left, right = game.observe(game.players[0])["audio"].mean(axis=-1)
+        left, right = game.observe(game.players[0])["audio"][:2].mean(axis=-1)
     assert (left > right) == (side == "left")
 
 

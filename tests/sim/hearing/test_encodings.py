@@ -36,10 +36,9 @@ def test_the_encoding_and_not_the_quality_gives_the_shape(encoding, quality):
 
 @pytest.mark.parametrize("encoding", Encoding)
 def test_magnitudes_can_be_read_from_every_encoding(encoding):
-    _, plain = noise_from((1.0, 0.5, 0.0), noise_floor_db=-60.0, window=Window.hann)
-    scene, heard = noise_from(
-        (1.0, 0.5, 0.0), noise_floor_db=-60.0, window=Window.hann, encoding=encoding
-    )
+    settings = {"noise_floor_db": -60.0, "window": Window.hann}
+    _, plain = noise_from((1.0, 0.5, 0.0), encoding=Encoding.magnitude, **settings)
+    scene, heard = noise_from((1.0, 0.5, 0.0), encoding=encoding, **settings)
     np.testing.assert_array_equal(scene.sense.log_magnitudes(heard["audio"]), plain["audio"])
 
 

@@ -71,7 +71,7 @@ class AudioCfg:
 
     present: bool = True
     quality: AudioQuality = AudioQuality.hrtf
-    encoding: Encoding = Encoding.magnitude
+    encoding: Encoding = Encoding.magnitude_phase
     bins: int = N_BINS
     waveform: bool = False
     sofa_path: str | None = None
@@ -110,10 +110,12 @@ class AudioSense(Sense):
     moved; what moved lacks its Doppler shift in those steps (see `Listener.rejoin`).
 
     Observations:
-        audio: ``(2, 250)`` float32 by default, left ear first: log10 of the magnitude of the first
-            250 bins of the Fourier transform of the last 1024 samples (the formula of the paper's
-            code). At 22 050 Hz these are 0 to 5.4 kHz in steps of 21.5 Hz. Exact silence is -8; a
-            full-scale sine is 2.7. `AudioCfg.encoding` and `AudioCfg.bins` change its form.
+        audio: ``(4, 250)`` float32 by default, of the first 250 bins of the Fourier transform of
+            the last 1024 samples: log10 of the magnitude at the left and at the right ear (the
+            formula of the paper's code), cosine and sine of the interaural phase. At 22 050 Hz
+            these are 0 to 5.4 kHz in steps of 21.5 Hz. Exact silence is a magnitude of -8 and a
+            phase of (0, 0); a full-scale sine is 2.7. `AudioCfg.encoding` and `AudioCfg.bins`
+            change its form.
         waveform: ``(2, step_samples)`` float32 sound pressure of this step, on request.
     """
 
