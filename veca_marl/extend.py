@@ -64,16 +64,16 @@ if TYPE_CHECKING:
     from veca_marl.sim.physics.rooms import LeafCfg as LeafCfg
     from veca_marl.sim.physics.rooms import RoomCfg as RoomCfg
     from veca_marl.sim.physics.world import World as World
+    from veca_marl.sim.sense import ArraySpec as ArraySpec
     from veca_marl.sim.sense import Sense as Sense
     from veca_marl.sim.senses import register_sense as register_sense
     from veca_marl.sim.sound import SoundCfg as SoundCfg
     from veca_marl.sim.sound import SoundKind as SoundKind
-    from veca_marl.sim.spec import ArraySpec as ArraySpec
 
 _HOMES = {
     "Algorithm": "veca_marl.algos.algorithm",
     "AlgorithmCfg": "veca_marl.algos.algorithm",
-    "ArraySpec": "veca_marl.sim.spec",
+    "ArraySpec": "veca_marl.sim.sense",
     "Body": "veca_marl.sim.body.base",
     "BodyCfg": "veca_marl.sim.body.base",
     "DoorCfg": "veca_marl.sim.physics.rooms",

@@ -12,9 +12,8 @@ import torch
 from composed import compose
 
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
-from veca_marl.envs.core.actions import random_action
 from veca_marl.envs.core.episodes import Episodes
-from veca_marl.envs.core.game import Game
+from veca_marl.envs.core.game import Game, random_action
 from veca_marl.envs.core.game_cfg import Script
 from veca_marl.sim.body import VoiceKind
 from veca_marl.sim.body.walker import WalkerCfg

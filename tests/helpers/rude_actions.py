@@ -4,7 +4,7 @@ from itertools import cycle, islice
 
 import numpy as np
 
-from veca_marl.envs.core.actions import random_action
+from veca_marl.envs.core.game import random_action
 
 PERIOD = 25  # steps for which a player keeps a way of acting
 

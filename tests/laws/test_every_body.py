@@ -17,8 +17,7 @@ from veca_marl.config import conf_dir
 from veca_marl.envs.adapters.gymnasium import VecaGymEnv
 from veca_marl.envs.adapters.pettingzoo import VecaParallelEnv
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
-from veca_marl.envs.core.actions import from_parts, random_action
-from veca_marl.envs.core.game import Game
+from veca_marl.envs.core.game import Game, from_parts, random_action
 from veca_marl.sim.body import MOUNTS
 from veca_marl.sim.body.humanoid import Humanoid
 

@@ -11,9 +11,8 @@ from paths import HELPERS
 from rollouts import CONTESTS, EPISODE, digest, digests, game_cfg, play, returns
 from torchrl.envs import check_env_specs
 
-from veca_marl.envs.core.actions import random_action
 from veca_marl.envs.core.episodes import Episodes
-from veca_marl.envs.core.game import Game
+from veca_marl.envs.core.game import Game, random_action
 from veca_marl.envs.core.game_cfg import Script
 from veca_marl.envs.core.task import SOLVED, TASKS
 

@@ -13,10 +13,9 @@ from veca_marl.sim.body.proprioception import ProprioceptionCfg, ProprioceptionQ
 from veca_marl.sim.body.walker import Walker, WalkerCfg
 from veca_marl.sim.hearing import AudioCfg, AudioQuality
 from veca_marl.sim.physics import PropCfg
-from veca_marl.sim.sense import Sense
+from veca_marl.sim.sense import ArraySpec, Sense
 from veca_marl.sim.senses import SENSES, SensesCfg, make_senses, register_sense
 from veca_marl.sim.sound import SoundCfg
-from veca_marl.sim.spec import ArraySpec
 from veca_marl.sim.touch import TouchCfg, TouchQuality
 from veca_marl.sim.vision import Eyes, VisionCfg
 

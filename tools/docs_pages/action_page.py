@@ -8,7 +8,7 @@ from veca_marl.algos.ppo import PPOCfg
 from veca_marl.api import choose
 from veca_marl.config import conf_dir
 from veca_marl.envs.core.game import Game
-from veca_marl.sim.spec import ArraySpec
+from veca_marl.sim.sense import ArraySpec
 
 HEAD = f"""# Actions
 

@@ -10,7 +10,7 @@ from tools.docs_pages.tables import table
 from tools.docs_pages.task_pages import built_in_tasks
 from veca_marl.api import choose
 from veca_marl.envs.core.game import Game
-from veca_marl.sim.spec import ArraySpec
+from veca_marl.sim.sense import ArraySpec
 
 HEAD = """# Observations
 

@@ -11,12 +11,11 @@ import numpy as np
 
 from veca_marl.algos.evaluation.comparison import paired_difference
 from veca_marl.checks.findings import Finding, Status, finding
-from veca_marl.envs.core.actions import random_action
 from veca_marl.envs.core.episodes import Episodes, first_team, play_to_end
 from veca_marl.envs.core.expert import find_expert, has_expert, missing_needs
-from veca_marl.envs.core.game import Game, Observation, Outcome
+from veca_marl.envs.core.game import Game, Observation, Outcome, random_action
 from veca_marl.envs.core.game_cfg import Script
-from veca_marl.sim.spec import ArraySpec
+from veca_marl.sim.sense import ArraySpec
 
 _GREATEST = float(np.finfo(np.float32).max)  # TorchRL's rewards are float32
 RANDOM_PLAY_NAMES = ("observations", "rewards", "no constant observation", "cost per step")

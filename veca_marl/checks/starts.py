@@ -9,10 +9,9 @@ from itertools import combinations
 import numpy as np
 
 from veca_marl.checks.findings import Finding, finding
-from veca_marl.envs.core.actions import random_action
 from veca_marl.envs.core.benchmark import start_state
 from veca_marl.envs.core.episodes import Episodes
-from veca_marl.envs.core.game import Game, Outcome
+from veca_marl.envs.core.game import Game, Outcome, random_action
 from veca_marl.envs.core.game_cfg import Script
 from veca_marl.sim.body.walker import Walker
 from veca_marl.sim.geometry import Floats

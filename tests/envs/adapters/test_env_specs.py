@@ -5,8 +5,8 @@ import pytest
 import torch
 from torchrl.data import Bounded, Categorical, Unbounded
 
-from veca_marl.envs.adapters.torchrl.specs import action_spec, done_spec, to_torchrl
-from veca_marl.sim.spec import ArraySpec
+from veca_marl.envs.adapters.torchrl.env import action_spec, done_spec, to_torchrl
+from veca_marl.sim.sense import ArraySpec
 
 
 def test_bounds_are_kept():

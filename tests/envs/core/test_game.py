@@ -17,7 +17,7 @@ from veca_marl.envs.core.task import (
     terms,
 )
 from veca_marl.sim.body.walker import Walker
-from veca_marl.sim.spec import ArraySpec
+from veca_marl.sim.sense import ArraySpec
 
 
 def cfg_of(*overrides):

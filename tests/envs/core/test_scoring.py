@@ -3,12 +3,7 @@
 import numpy as np
 import pytest
 
-from veca_marl.envs.core.scoring import (
-    clipped_share,
-    cosine,
-    horizontal,
-    rotation_angle_rad,
-)
+from veca_marl.envs.core.task import clipped_share, cosine, horizontal, rotation_angle_rad
 from veca_marl.sim.geometry import rotation_about_vertical
 
 EAST, NORTH = np.array([1.0, 0.0, 0.0]), np.array([0.0, 2.0, 0.0])

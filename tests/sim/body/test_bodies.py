@@ -11,7 +11,7 @@ from walking import ball, empty_world
 from veca_marl.sim.body import BODIES, Body, BodyCfg, VoiceKind, make_body, register_body
 from veca_marl.sim.body.humanoid import HumanoidCfg
 from veca_marl.sim.body.walker import Walker, WalkerCfg
-from veca_marl.sim.spec import discrete_spec
+from veca_marl.sim.sense import discrete_spec
 
 CFGS = {"walker": WalkerCfg(voice=VoiceKind.calls), "humanoid": HumanoidCfg()}
 

@@ -6,8 +6,7 @@ from composed import compose
 from walking import box, empty_world, walker_in
 
 from veca_marl.bench.command import free_play
-from veca_marl.envs.core.actions import random_action
-from veca_marl.envs.core.game import Game
+from veca_marl.envs.core.game import Game, random_action
 from veca_marl.sim.body import VoiceKind
 from veca_marl.sim.body.anatomy import load_skeleton
 from veca_marl.sim.senses import SensesCfg, make_senses

@@ -6,7 +6,7 @@ from heard_scenes import Scene, tone_at
 from listening import RATE
 
 from veca_marl.sim.hearing import AudioQuality, Encoding, log_spectrum
-from veca_marl.sim.hearing.encodings import Window, interaural_phase, make_encoder
+from veca_marl.sim.hearing.audio_sense import Window, interaural_phase, make_encoder
 from veca_marl.sim.sense import check_spec
 from veca_marl.sim.sound import Clip, Noise
 

@@ -12,10 +12,9 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import DTypeLike
 
-from veca_marl.envs.core.actions import from_parts
-from veca_marl.envs.core.game import Game, Observation
+from veca_marl.envs.core.game import Game, Observation, from_parts
 from veca_marl.envs.core.task import Player
-from veca_marl.sim.spec import ArraySpec
+from veca_marl.sim.sense import ArraySpec
 
 Space = gymnasium.Space[Any]
 

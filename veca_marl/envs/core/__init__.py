@@ -1,9 +1,8 @@
 """The core of a game: tasks, teams, reward terms, actions, episodes, and the game itself."""
 
-from veca_marl.envs.core.actions import from_parts, random_action, to_parts
 from veca_marl.envs.core.episodes import Episodes
 from veca_marl.envs.core.expert import Expert, find_expert, has_expert, register_expert
-from veca_marl.envs.core.game import Game, Observation, Outcome
+from veca_marl.envs.core.game import Game, Observation, Outcome, from_parts, random_action, to_parts
 from veca_marl.envs.core.game_cfg import GameCfg, Script, TeamCfg
 from veca_marl.envs.core.task import (
     SOLVED,

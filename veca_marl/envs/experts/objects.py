@@ -13,8 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veca_marl.envs.core.expert import Expert, TaskT, register_expert
-from veca_marl.envs.core.scoring import horizontal
-from veca_marl.envs.core.task import Player
+from veca_marl.envs.core.task import Player, horizontal
 from veca_marl.envs.experts.control.carrying import (
     BENT,
     UPRIGHT,

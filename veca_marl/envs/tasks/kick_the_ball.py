@@ -8,8 +8,17 @@ from typing import Any
 
 import numpy as np
 
-from veca_marl.envs.core.scoring import cosine, horizontal, norm
-from veca_marl.envs.core.task import Player, Task, TaskCfg, register_task, require_walker, terms
+from veca_marl.envs.core.task import (
+    Player,
+    Task,
+    TaskCfg,
+    cosine,
+    horizontal,
+    norm,
+    register_task,
+    require_walker,
+    terms,
+)
 from veca_marl.envs.tasks.floors.playability import check_kickable
 from veca_marl.sim.body.walker import WalkerCfg
 from veca_marl.sim.physics import (

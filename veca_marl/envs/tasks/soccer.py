@@ -9,8 +9,15 @@ from typing import Any
 
 import numpy as np
 
-from veca_marl.envs.core.scoring import horizontal_angle_rad
-from veca_marl.envs.core.task import Player, Task, TaskCfg, Team, register_task, terms
+from veca_marl.envs.core.task import (
+    Player,
+    Task,
+    TaskCfg,
+    Team,
+    horizontal_angle_rad,
+    register_task,
+    terms,
+)
 from veca_marl.envs.tasks.floors.places import direct_gaze_ahead, place_player
 from veca_marl.envs.tasks.floors.playability import check_kickable
 from veca_marl.sim.body.walker import Walker

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from veca_marl.sim.sense import ArraySpec, discrete_spec
 from veca_marl.sim.sound import Call
-from veca_marl.sim.spec import ArraySpec, discrete_spec
 
 Action = Mapping[str, NDArray[Any]]
 

@@ -30,8 +30,8 @@ from veca_marl.sim.body.sense_organs import (
 )
 from veca_marl.sim.geometry import Floats, Pose, cross
 from veca_marl.sim.physics import Prop, World
+from veca_marl.sim.sense import ArraySpec
 from veca_marl.sim.sound import CALLS, Call, Voice, call_waveform
-from veca_marl.sim.spec import ArraySpec
 
 
 @dataclass

@@ -18,8 +18,7 @@ from numpy.typing import NDArray
 from veca_marl.sim.body.base import Body
 from veca_marl.sim.geometry import Floats, heading_rad
 from veca_marl.sim.physics import GRAVITY_MPS2, World
-from veca_marl.sim.sense import Sense
-from veca_marl.sim.spec import ArraySpec
+from veca_marl.sim.sense import ArraySpec, Sense
 
 _UP = np.array([0.0, 0.0, 1.0])
 

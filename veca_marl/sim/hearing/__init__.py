@@ -4,9 +4,11 @@ from veca_marl.sim.hearing.audio_sense import (
     AudioCfg,
     AudioQuality,
     AudioSense,
+    Encoding,
+    Window,
+    log_spectrum,
 )
 from veca_marl.sim.hearing.conditioning import condition
-from veca_marl.sim.hearing.encodings import Encoding, Window, log_spectrum
 from veca_marl.sim.hearing.hrtf import HrtfTable, kemar_table, sofa_table
 from veca_marl.sim.hearing.receivers import HrtfReceiver, MonoReceiver, StereoReceiver
 from veca_marl.sim.hearing.sofa import SofaError, read_sofa

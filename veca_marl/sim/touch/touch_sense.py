@@ -19,8 +19,7 @@ from veca_marl.sim.body.appearance import SKIN, bone_geoms, dressed_skin
 from veca_marl.sim.body.humanoid.articulation import may_collide
 from veca_marl.sim.geometry import Bools, Floats, GeomTable, Scene, SceneObject
 from veca_marl.sim.physics import World
-from veca_marl.sim.sense import Sense
-from veca_marl.sim.spec import ArraySpec
+from veca_marl.sim.sense import ArraySpec, Sense
 from veca_marl.sim.touch.parts import PartReadings
 from veca_marl.sim.touch.penetration import empty_workspace, read_taxels
 from veca_marl.sim.touch.quality import TouchQuality, make_transform

@@ -15,8 +15,7 @@ from veca_marl.sim.body import Body
 from veca_marl.sim.body.sense_organs import EYES
 from veca_marl.sim.geometry import Bools, Floats, Scene
 from veca_marl.sim.physics import World
-from veca_marl.sim.sense import Sense
-from veca_marl.sim.spec import ArraySpec
+from veca_marl.sim.sense import ArraySpec, Sense
 from veca_marl.sim.vision.camera import Camera, seen_fraction
 from veca_marl.sim.vision.image_filters import (
     Blur,

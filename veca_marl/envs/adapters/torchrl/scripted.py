@@ -12,9 +12,8 @@ from tensordict import TensorDict, TensorDictBase
 from torch import nn
 
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
-from veca_marl.envs.core.actions import from_parts
 from veca_marl.envs.core.expert import check_expert, find_expert
-from veca_marl.envs.core.game import Game, Observation
+from veca_marl.envs.core.game import Game, Observation, from_parts
 from veca_marl.envs.core.task import Player
 
 

@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from veca_marl.envs.core.scoring import horizontal
-from veca_marl.envs.core.task import Task, TaskCfg
+from veca_marl.envs.core.task import Task, TaskCfg, horizontal
 from veca_marl.sim.body.humanoid import Humanoid
 from veca_marl.sim.body.humanoid.postures import POSTURES, Posture
 from veca_marl.sim.geometry import Floats

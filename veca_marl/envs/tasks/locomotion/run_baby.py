@@ -6,8 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from veca_marl.envs.core.scoring import horizontal
-from veca_marl.envs.core.task import Player, register_task, require_humanoid, terms
+from veca_marl.envs.core.task import Player, horizontal, register_task, require_humanoid, terms
 from veca_marl.envs.tasks.locomotion.motor_skills import (
     ForwardProgress,
     PosedStart,

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from veca_marl.envs.core.scoring import clipped_share
-from veca_marl.envs.core.task import Player, register_task, require_humanoid, terms
+from veca_marl.envs.core.task import Player, clipped_share, register_task, require_humanoid, terms
 from veca_marl.envs.tasks.locomotion.motor_skills import (
     PosedStart,
     StartCfg,

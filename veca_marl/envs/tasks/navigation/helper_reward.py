@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from veca_marl.envs.core.scoring import horizontal_angle_rad
-from veca_marl.envs.core.task import Player
+from veca_marl.envs.core.task import Player, horizontal_angle_rad
 from veca_marl.sim.geometry import Floats, Scene
 from veca_marl.sim.physics import Prop
 from veca_marl.sim.vision import EyeViews, VisionCfg, VisionSense

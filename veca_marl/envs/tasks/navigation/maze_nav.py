@@ -23,9 +23,8 @@ from veca_marl.envs.tasks.navigation.mazes import (
 from veca_marl.sim.body import Body
 from veca_marl.sim.body.walker import WalkerCfg
 from veca_marl.sim.physics import ClockCfg, PlaygroundCfg, World
-from veca_marl.sim.sense import Sense
+from veca_marl.sim.sense import ArraySpec, Sense
 from veca_marl.sim.senses import register_sense
-from veca_marl.sim.spec import ArraySpec
 
 TRIAL = "trial"
 

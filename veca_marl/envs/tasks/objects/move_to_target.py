@@ -8,8 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from veca_marl.envs.core.scoring import horizontal
-from veca_marl.envs.core.task import Player, Task, register_task, require_humanoid, terms
+from veca_marl.envs.core.task import (
+    Player,
+    Task,
+    horizontal,
+    register_task,
+    require_humanoid,
+    terms,
+)
 from veca_marl.envs.tasks.objects.toys_and_blocks import ToyCfg, add_toy, check_seat, place_toy
 from veca_marl.sim.body.humanoid import HumanoidCfg
 from veca_marl.sim.body.humanoid.postures import REACHING

@@ -8,8 +8,15 @@ from typing import Any
 
 import numpy as np
 
-from veca_marl.envs.core.scoring import rotation_angle_rad
-from veca_marl.envs.core.task import Player, Task, TaskCfg, register_task, require_humanoid, terms
+from veca_marl.envs.core.task import (
+    Player,
+    Task,
+    TaskCfg,
+    register_task,
+    require_humanoid,
+    rotation_angle_rad,
+    terms,
+)
 from veca_marl.envs.tasks.objects.toys_and_blocks import check_seat, clearance_m
 from veca_marl.sim.body.humanoid import HumanoidCfg
 from veca_marl.sim.body.humanoid.postures import OFFERING

@@ -42,7 +42,7 @@ from veca_marl.sim.body.humanoid.postures import (
 from veca_marl.sim.geometry import Floats, Pose, heading_rad
 from veca_marl.sim.physics import World, is_contact
 from veca_marl.sim.physics.bullet_client import BulletClient
-from veca_marl.sim.spec import ArraySpec, continuous_spec
+from veca_marl.sim.sense import ArraySpec, continuous_spec
 
 
 class Detail(Enum):

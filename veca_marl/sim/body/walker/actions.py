@@ -13,8 +13,8 @@ from veca_marl.sim.body.sense_organs import distance_m
 from veca_marl.sim.geometry import Floats
 from veca_marl.sim.physics import Prop
 from veca_marl.sim.physics.interactions import INTERACTIONS, NO_VERB, InteractingBody, Verb
+from veca_marl.sim.sense import ArraySpec, continuous_spec, discrete_spec
 from veca_marl.sim.sound import Call
-from veca_marl.sim.spec import ArraySpec, continuous_spec, discrete_spec
 
 VERB = "verb"  # the part's name
 REFUSED = "refused_verbs"

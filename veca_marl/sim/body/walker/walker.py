@@ -33,7 +33,7 @@ from veca_marl.sim.body.walker.walker_collisions import Footprint, walker_collis
 from veca_marl.sim.geometry import Floats
 from veca_marl.sim.physics import Prop, World
 from veca_marl.sim.physics.interactions import Close, Open
-from veca_marl.sim.spec import ArraySpec
+from veca_marl.sim.sense import ArraySpec
 
 MOVE = "move"  # the part of the action that walks
 _LOWEST_EDGE_M = 0.02
