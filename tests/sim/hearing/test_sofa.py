@@ -392,3 +392,75 @@ def test_a_file_of_the_listen_set():
     with warnings.catch_warnings():
         warnings.simplefilter("error")  # cached: read once, warned once
         assert sofa_table(str(LISTEN), 22_050, 44_100.0) is table
+
+
+# ---- emitters (FreeFieldHRIR, data of the type FIR-E)
+
+
+def emitter_fields(fields, measurements=1):
+    """The same directions as emitters of a source in the centre of the head."""
+    rows = fields["Data.IR"]
+    delays = np.broadcast_to(fields["Data.Delay"], rows.shape[:2])
+    return {
+        "Data.IR": np.stack(np.moveaxis(np.split(rows, measurements), 1, 3)),
+        "Data.SamplingRate": fields["Data.SamplingRate"],
+        "Data.Delay": np.stack(np.moveaxis(np.split(delays, measurements), 1, 2)),
+        "SourcePosition": np.zeros((1, 3)),
+        "EmitterPosition": np.stack(np.split(fields["SourcePosition"], measurements), axis=-1),
+        "ReceiverPosition": fields["ReceiverPosition"],
+    }
+
+
+def write_emitters(path, fields, kind="spherical", units="degree, degree, metre"):
+    write(path, fields, SOFAConventions="FreeFieldHRIR", DataType="FIR-E")
+    with h5py.File(path, "r+") as file:
+        stated = {"Type": kind, "Units": units}
+        file["EmitterPosition"].attrs.update({k: np.bytes_(v) for k, v in stated.items()})
+    return path
+
+
+@pytest.mark.parametrize("measurements", [1, 3])
+@pytest.mark.parametrize("delays_in_field", [False, True])
+def test_emitters_are_directions(delays_in_field, measurements, tmp_path):
+    fields = sphere_fields(delays_in_field)
+    expected = read_sofa(write(tmp_path / "plain.sofa", fields))
+    emitters = emitter_fields(fields, measurements)
+    found = read_sofa(write_emitters(tmp_path / "emitters.sofa", emitters))
+    for name in ("impulse_responses", "directions", "delays_s", "distance_m"):
+        np.testing.assert_allclose(getattr(found, name), getattr(expected, name), atol=1e-12)
+
+
+def test_emitters_are_relative_to_the_source(fields, tmp_path):
+    """A source that moves along with the head changes no direction."""
+    emitters = emitter_fields(fields)
+    emitters["ListenerPosition"] = np.array([[1.0, -2.0, 0.5]])
+    emitters["SourcePosition"] = np.array([[1.0, -2.0, 0.5]])
+    path = write_emitters(tmp_path / "moved.sofa", emitters)
+    with h5py.File(path, "r+") as file:
+        for name in ("ListenerPosition", "SourcePosition"):
+            file[name].attrs.update(Type=np.bytes_("cartesian"), Units=np.bytes_("metre"))
+    expected = read_sofa(write(tmp_path / "plain.sofa", fields))
+    np.testing.assert_allclose(read_sofa(path).directions, expected.directions, atol=1e-12)
+
+
+def test_coefficients_of_spherical_harmonics_are_refused(fields, tmp_path):
+    path = write_emitters(tmp_path / "sh.sofa", emitter_fields(fields), "spherical harmonics")
+    with pytest.raises(SofaError, match=naming("sh.sofa", "spherical harmonics")):
+        read_sofa(path)
+
+
+@pytest.mark.parametrize(
+    ("convention", "data_type"), [("FreeFieldHRIR", "FIR"), ("SimpleFreeFieldHRIR", "FIR-E")]
+)
+def test_a_convention_has_its_own_type_of_data(fields, tmp_path, convention, data_type):
+    path = write(tmp_path / "f.sofa", fields, SOFAConventions=convention, DataType=data_type)
+    with pytest.raises(SofaError, match=naming("f.sofa", data_type, convention)):
+        read_sofa(path)
+
+
+def test_emitters_of_another_number_than_the_responses_are_refused(fields, tmp_path):
+    emitters = emitter_fields(fields)
+    emitters["EmitterPosition"] = emitters["EmitterPosition"][:-1]
+    path = write_emitters(tmp_path / "few.sofa", emitters)
+    with pytest.raises(SofaError, match=naming("few.sofa", "EmitterPosition")):
+        read_sofa(path)

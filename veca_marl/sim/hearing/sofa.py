@@ -35,8 +35,12 @@ _SAME_DISTANCE = 0.95
 # a loudspeaker closer than that touches the head
 _NEAREST_M = 0.2
 
-_CONVENTIONS = ("SimpleFreeFieldHRIR", "FreeFieldHRIR")
-_FIELDS = ("Data.IR", "Data.SamplingRate", "SourcePosition")
+# convention: its type of data, and its fields that are read; AES69-2022
+_CONVENTIONS = {"SimpleFreeFieldHRIR": "FIR", "FreeFieldHRIR": "FIR-E"}
+_FIELDS = {
+    "FIR": ("Data.IR", "Data.SamplingRate", "SourcePosition"),
+    "FIR-E": ("Data.IR", "Data.SamplingRate", "SourcePosition", "EmitterPosition"),
+}
 _SAMPLE_RATES_HZ = (8_000.0, 200_000.0)
 _LATERAL = 0.5
 _FEWEST_DIRECTIONS = 4
@@ -180,20 +184,69 @@ def open_sofa(path: str | Path) -> Iterator[SofaFile]:
         raise SofaError(f"{name}: cannot be read as SOFA ({error})") from error
 
 
-def source_vectors(file: SofaFile, count: int, name: str) -> Floats:
-    """Return where the loudspeaker was, ``(count, 3)`` metres in the frame of the head.
+@dataclass(frozen=True)
+class Sizes:
+    """Sizes of a set of responses.
+
+    Attributes:
+        measurements: Positions of the source and of the head.
+        samples: Of each response.
+        emitters: Of the source, each of which is a direction; None in data of the type FIR, which
+            have one response of each measurement.
+    """
+
+    measurements: int
+    samples: int
+    emitters: int | None
+
+    @property
+    def directions(self) -> int:
+        """Number of pairs of responses."""
+        return self.measurements * (self.emitters or 1)
+
+
+def source_vectors(file: SofaFile, sizes: Sizes, name: str) -> Floats:
+    """Return where the loudspeaker was, ``(directions, 3)`` metres in the frame of the head.
 
     Positions in a SOFA file are those of a room; ListenerPosition, ListenerView and ListenerUp
-    state where the head was in it and where it faced.
+    state where the head was in it and where it faced. Emitters, which data of the type FIR-E have,
+    are at positions relative to the source.
 
     Raises:
         SofaError: If a position is missing, of unknown type or units, or not finite.
     """
+    count = sizes.measurements
     to_source = _vectors(file, "SourcePosition", count, name)
     if "ListenerPosition" in file:
         to_source = to_source - _vectors(file, "ListenerPosition", count, name)
-    if "ListenerView" not in file:
-        return to_source
+    vectors = to_source[:, None] + _emitters(file, sizes, name)
+    if "ListenerView" in file:
+        vectors = np.einsum("mij,mej->mei", _head_axes(file, count, name), vectors)
+    return vectors.reshape(-1, 3)
+
+
+def _emitters(file: SofaFile, sizes: Sizes, name: str) -> Floats:
+    """Return the positions of the emitters relative to the source, ``(1 or M, emitters, 3)``."""
+    if sizes.emitters is None:
+        return np.zeros((1, 1, 3))
+    key, count = "EmitterPosition", sizes.emitters
+    shape, field = file.shape(key), file.read(key)
+    if shape not in ((count, 3), (count, 3, 1), (count, 3, sizes.measurements)):
+        raise SofaError(
+            f"{name}: {key} has shape {shape}, must be ({count}, 3, 1 or {sizes.measurements})"
+        )
+    if field.kind == "spherical harmonics":
+        raise SofaError(
+            f"{name}: contains coefficients of spherical harmonics ({key} has that Type); only "
+            "responses of directions are read, Type 'cartesian' or 'spherical'"
+        )
+    rows = np.moveaxis(field.values.reshape(count, 3, -1), 2, 0)
+    flat = Field(rows.reshape(-1, 3), field.kind, field.units)
+    return _converted(flat, key, rows.shape[0] * count, name).reshape(-1, count, 3)
+
+
+def _head_axes(file: SofaFile, count: int, name: str) -> Floats:
+    """Return the axes of the head, ``(count, 3, 3)``: rows are forward, left and up."""
     view_kind = file.read("ListenerView")
     forward = _unit(_vectors(file, "ListenerView", count, name), name)
     up = np.tile((0.0, 0.0, 1.0), (count, 1))
@@ -203,9 +256,7 @@ def source_vectors(file: SofaFile, count: int, name: str) -> Floats:
         frame = Field(stated.values, stated.kind or view_kind.kind, stated.units or view_kind.units)
         up = _converted(frame, "ListenerUp", count, name)
     left = _unit(np.cross(up, forward), name)
-    axes = np.stack([forward, left, np.cross(forward, left)], axis=1)
-    in_head: Floats = np.einsum("mij,mj->mi", axes, to_source)
-    return in_head
+    return np.stack([forward, left, np.cross(forward, left)], axis=1)
 
 
 def far_field(vectors: Floats, name: str) -> tuple[NDArray[np.int64], Floats, float]:
@@ -313,16 +364,14 @@ def read_sofa(path: str | Path, sample_rate_hz: float | None = None) -> Measured
 
 
 def _measured_head(file: SofaFile, sample_rate_hz: float | None, name: str) -> MeasuredHead:
-    _check_convention(file, name)
-    shape = file.shape("Data.IR")
-    _check_shape(shape, name)
-    used, directions, distance_m = far_field(source_vectors(file, shape[0], name), name)
+    sizes = _sizes(file, _data_type(file, name), name)
+    used, directions, distance_m = far_field(source_vectors(file, sizes, name), name)
     _check_coverage(directions, name)
     rate = _sample_rate(file, name) if sample_rate_hz is None else sample_rate_hz
     if not _SAMPLE_RATES_HZ[0] <= rate <= _SAMPLE_RATES_HZ[1]:
         raise SofaError(f"{name}: sampling rate {rate} Hz is outside {_SAMPLE_RATES_HZ}")
-    delays = _delays(file, shape[0], name)[used] / rate
-    responses = _responses(file, name)[used]
+    delays = _delays(file, sizes, name)[used] / rate
+    responses = _responses(file, sizes, name)[used]
     swapped = _ears_are_swapped(responses, directions, name)
     if swapped:
         responses, delays = responses[:, ::-1], delays[:, ::-1]
@@ -330,28 +379,39 @@ def _measured_head(file: SofaFile, sample_rate_hz: float | None, name: str) -> M
     return MeasuredHead(responses, directions, delays, rate, distance_m, name)
 
 
-def _check_convention(file: SofaFile, name: str) -> None:
+def _data_type(file: SofaFile, name: str) -> str:
+    """Return the type of the data, which is that of the convention; check that fields exist."""
     if file.attribute("Conventions") != "SOFA":
         raise SofaError(f"{name}: the attribute Conventions is not SOFA")
     convention = file.attribute("SOFAConventions") or "missing"
     if convention not in _CONVENTIONS:
-        raise SofaError(f"{name}: SOFAConventions is {convention}, must be one of {_CONVENTIONS}")
-    data_type = file.attribute("DataType") or "missing"
-    if data_type != "FIR":
-        raise SofaError(f"{name}: DataType is {data_type}, must be FIR")
-    missing = [field for field in _FIELDS if field not in file]
+        raise SofaError(
+            f"{name}: SOFAConventions is {convention}, must be one of {', '.join(_CONVENTIONS)}"
+        )
+    expected, stated = _CONVENTIONS[convention], file.attribute("DataType") or "missing"
+    if stated != expected:
+        raise SofaError(f"{name}: DataType is {stated}, that of {convention} is {expected}")
+    missing = [field for field in _FIELDS[expected] if field not in file]
     if missing:
         raise SofaError(f"{name}: lacks {', '.join(missing)}")
+    return expected
 
 
-def _check_shape(shape: tuple[int, ...], name: str) -> None:
-    if len(shape) != 3 or shape[1] != 2 or not _FEWEST_SAMPLES <= shape[2] <= _MOST_SAMPLES:
+def _sizes(file: SofaFile, data_type: str, name: str) -> Sizes:
+    shape = file.shape("Data.IR")
+    axes = 3 if data_type == "FIR" else 4
+    if len(shape) != axes or shape[1] != 2 or not _FEWEST_SAMPLES <= shape[2] <= _MOST_SAMPLES:
+        form = "(directions, 2, samples)" if axes == 3 else "(measurements, 2, samples, emitters)"
         raise SofaError(
-            f"{name}: Data.IR has shape {shape}, must be (directions, 2, samples) with "
-            f"{_FEWEST_SAMPLES} to {_MOST_SAMPLES} samples"
+            f"{name}: Data.IR has shape {shape}, must be {form} with {_FEWEST_SAMPLES} to "
+            f"{_MOST_SAMPLES} samples"
         )
-    if shape[0] < _FEWEST_DIRECTIONS:
-        raise SofaError(f"{name}: {shape[0]} directions, at least {_FEWEST_DIRECTIONS} are needed")
+    sizes = Sizes(shape[0], shape[2], None if axes == 3 else shape[3])
+    if sizes.directions < _FEWEST_DIRECTIONS:
+        raise SofaError(
+            f"{name}: {sizes.directions} directions, at least {_FEWEST_DIRECTIONS} are needed"
+        )
+    return sizes
 
 
 def _check_coverage(directions: Floats, name: str) -> None:
@@ -388,22 +448,28 @@ def _sample_rate(file: SofaFile, name: str) -> float:
     return float(np.ravel(rates.values)[0])
 
 
-def _delays(file: SofaFile, count: int, name: str) -> Floats:
-    """Return the delays ``(count, 2)`` in samples, zero if the file states none."""
+def _delays(file: SofaFile, sizes: Sizes, name: str) -> Floats:
+    """Return the delays ``(directions, 2)`` in samples, zero if the file states none."""
     if "Data.Delay" not in file:
-        return np.zeros((count, 2))
-    if file.shape("Data.Delay") not in ((2,), (1, 2), (count, 2)):
-        raise SofaError(
-            f"{name}: Data.Delay has shape {file.shape('Data.Delay')}, must be (1 or {count}, 2)"
-        )
+        return np.zeros((sizes.directions, 2))
+    count, emitters = sizes.measurements, sizes.emitters or 1
+    shape = file.shape("Data.Delay")
+    of_each = shape if sizes.emitters is not None and len(shape) == 3 else (*shape, 1)
+    if of_each not in ((2, 1), *((m, 2, e) for m in (1, count) for e in (1, emitters))):
+        form = f"(1 or {count}, 2)" if sizes.emitters is None else f"(1 or {count}, 2, {emitters})"
+        raise SofaError(f"{name}: Data.Delay has shape {shape}, must be {form}")
     delays = file.read("Data.Delay").values
     if not np.isfinite(delays).all():
         raise SofaError(f"{name}: Data.Delay is not finite")
-    return np.broadcast_to(delays.reshape(-1, 2), (count, 2))
+    delays = np.broadcast_to(delays.reshape(of_each), (count, 2, emitters))
+    return np.moveaxis(delays, 2, 1).reshape(-1, 2)
 
 
-def _responses(file: SofaFile, name: str) -> Floats:
-    responses = file.read("Data.IR").values
+def _responses(file: SofaFile, sizes: Sizes, name: str) -> Floats:
+    """Return the responses ``(directions, 2, samples)``."""
+    stored = file.read("Data.IR").values
+    of_each = stored.reshape(sizes.measurements, 2, sizes.samples, -1)
+    responses = np.moveaxis(of_each, 3, 1).reshape(-1, 2, sizes.samples)
     if not np.isfinite(responses).all():
         raise SofaError(f"{name}: Data.IR is not finite")
     if not (responses != 0.0).any(axis=-1).all():
