@@ -15,7 +15,7 @@ from veca_marl.algos.networks.encoders import Precision
 from veca_marl.api import GameChoices, as_integer, choose
 from veca_marl.config import ConfigError
 from veca_marl.envs.core.game_cfg import Script
-from veca_marl.runs.continuation import quoted
+from veca_marl.override_text import quoted
 from veca_marl.runs.run_folder import RunFolder
 
 TINY = ["collect=one_process", "collect.worlds=1", "collect.steps=32", "algo.minibatches=2"]

@@ -29,8 +29,8 @@ from veca_marl.config import conf_dir
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
 from veca_marl.envs.core.game import Game
 from veca_marl.envs.core.task import TASKS
+from veca_marl.override_text import quoted
 from veca_marl.processes.supervision import WorkerError
-from veca_marl.runs.continuation import quoted
 from veca_marl.sim.physics import PlaygroundCfg, World
 from veca_marl.sim.vision import Camera
 

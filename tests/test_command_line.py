@@ -6,8 +6,9 @@ import pytest
 from omegaconf import MISSING
 from refusals import naming
 
-from veca_marl.config import ConfigError
+from veca_marl.config import ConfigError, compose
 from veca_marl.config.command_line import CommandLine
+from veca_marl.override_text import normalised, quoted
 
 
 @dataclass
@@ -86,3 +87,51 @@ def test_help_lists_the_options(capsys):
     printed = capsys.readouterr().out
     assert "Does something." in printed
     assert "episodes: 16" in printed
+
+
+# ---- paths
+
+AWKWARD = [
+    "/data/a (1)",
+    "/data/köpfe/a",
+    "/a/b=c",
+    "/a/it's",
+    "/a/b[1]{2}",
+    "/a/b  c",
+    "./x~y",
+    "/a\\",
+]
+
+
+@pytest.mark.parametrize("path", AWKWARD)
+def test_a_path_is_read_as_it_is(path):
+    ((options, _),) = LINE.jobs([f"run={path}"])
+    assert options.run == path
+
+
+def test_home_is_expanded(monkeypatch):
+    monkeypatch.setenv("HOME", "/home/jo (b)")
+    ((options, _),) = LINE.jobs(["run=~/runs/x"])
+    assert options.run == "/home/jo (b)/runs/x"
+    assert [o.run for o, _ in LINE.jobs(["-m", "run=~/a,~/b"])] == [
+        "/home/jo (b)/a",
+        "/home/jo (b)/b",
+    ]
+
+
+@pytest.mark.parametrize("path", AWKWARD)
+def test_a_quoted_path_stays_as_it_is(path):
+    ((options, _),) = LINE.jobs([f"run={quoted(path)}"])
+    assert options.run == path
+    assert normalised([f"run={quoted('~/a')}"]) == ["run='~/a'"]
+
+
+def test_paths_of_a_configuration_are_read_like_those_of_commands(tmp_path):
+    path = tmp_path / "köpfe (neu)" / "it's.sofa"
+    cfg = compose(["+task=KickTheBall", f"senses.audio.sofa_path={path}"])
+    assert cfg.senses.audio.sofa_path == str(path)
+
+
+def test_the_error_about_another_text_names_the_quoted_one():
+    with pytest.raises(ConfigError, match=naming("run=köpfe", "run='köpfe'")):
+        next(LINE.jobs(["run=köpfe"]))

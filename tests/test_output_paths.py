@@ -7,8 +7,8 @@ from tools.experts_table.command import main as experts_table
 from veca_marl.babybench import main as babybench
 from veca_marl.config import ConfigError
 from veca_marl.config.command_line import check_file, check_folder
+from veca_marl.override_text import quoted
 from veca_marl.report import main as report
-from veca_marl.runs.continuation import quoted
 
 FILE = quoted(__file__)
 

@@ -15,7 +15,8 @@ from omegaconf.errors import OmegaConfBaseException
 
 from veca_marl import config
 from veca_marl.config.errors import one_line
-from veca_marl.config.overrides import parse, with_integers
+from veca_marl.config.overrides import parse
+from veca_marl.override_text import normalised
 
 NUMBER = re.compile(r"(?!playground\.)\w+(\.\w+)+=")
 
@@ -23,7 +24,7 @@ NUMBER = re.compile(r"(?!playground\.)\w+(\.\w+)+=")
 def compose(overrides=()):
     """Return a copy of what `veca_marl.config.compose` returns for the overrides."""
     presets = tuple(text for text in overrides if not NUMBER.match(text))
-    numbers = parse(with_integers([text for text in overrides if NUMBER.match(text)]))
+    numbers = parse(normalised([text for text in overrides if NUMBER.match(text)]))
     composed = deepcopy(_composed(presets))
     if not numbers:
         return composed

@@ -13,7 +13,7 @@ from veca_marl import list_tasks
 from veca_marl.bench.learning import Learning
 from veca_marl.bench.rollouts import Rollouts
 from veca_marl.config import compose
-from veca_marl.runs.continuation import quoted
+from veca_marl.override_text import quoted
 
 PAGE = (ROOT / "docs" / "performance.md").read_text(encoding="utf-8")
 SMALL = ("collect=one_process", "collect.worlds=2", "collect.steps=8", "threads=1")

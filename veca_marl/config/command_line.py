@@ -20,8 +20,9 @@ from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
 from veca_marl.config.errors import ConfigError, one_line
-from veca_marl.config.overrides import parse, with_integers
+from veca_marl.config.overrides import parse
 from veca_marl.config.root import Config
+from veca_marl.override_text import normalised
 from veca_marl.registry import unknown
 
 Options = TypeVar("Options")
@@ -90,7 +91,7 @@ class CommandLine(Generic[Options]):
         flags = [text for text in texts if text.startswith("-")]
         if flags:
             raise ConfigError(f"unknown flag {flags[0]!r}; choices: --help, --multirun, KEY=VALUE")
-        combinations = _combinations(parse(with_integers(texts)), len(texts) < len(words))
+        combinations = _combinations(parse(normalised(texts)), len(texts) < len(words))
         self._check_outputs(combinations)
         for combination in combinations:
             own = [text for text in combination if _root(text) in self._names]

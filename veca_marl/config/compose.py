@@ -25,10 +25,10 @@ from veca_marl.config.overrides import (
     check_group_values,
     plugins_in,
     register_search_path,
-    with_integers,
 )
 from veca_marl.config.root import Config, register_schemas, store_tasks_without_file
 from veca_marl.envs.core.task import TASKS, find_task
+from veca_marl.override_text import normalised
 from veca_marl.plugins import PluginError, conf_dir, load_plugins
 
 
@@ -113,14 +113,14 @@ def prepare(overrides: Sequence[str]) -> list[str]:
     """Load the plug-ins, the installed ones and those named in `overrides`, before composition.
 
     Returns:
-        The overrides, with integral numbers in exponent notation (1e6) written as integers.
+        The overrides, see `normalised`.
 
     Raises:
         ConfigError: If a plug-in cannot be loaded, or a group has another value than a name.
     """
     load_config_plugins(plugins_in(overrides))
     check_group_values(overrides)
-    return with_integers(overrides)
+    return normalised(overrides)
 
 
 def load_config_plugins(names: Sequence[str]) -> None:

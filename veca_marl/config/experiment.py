@@ -20,7 +20,7 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 
 from veca_marl.config.errors import ConfigError
-from veca_marl.config.overrides import with_integers
+from veca_marl.override_text import normalised
 
 BASELINES = ("random", "expert")
 """Policies that do not learn, to which an arm can be compared."""
@@ -218,10 +218,10 @@ def check_arm(experiment: ExperimentCfg, overrides: Sequence[str]) -> None:
     Raises:
         ConfigError: If some are missing: ``experiment.arm`` alone changes nothing.
     """
-    arm, given = experiment.arm, with_integers(overrides)
+    arm, given = experiment.arm, normalised(overrides)
     if arm is None or arm not in experiment.arms:
         return
-    missing = [text for text in with_integers(experiment.arms[arm]) if text not in given]
+    missing = [text for text in normalised(experiment.arms[arm]) if text not in given]
     if missing:
         raise ConfigError(
             f"experiment.arm={arm} is a run without {', '.join(missing)}: "

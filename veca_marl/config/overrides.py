@@ -14,9 +14,8 @@ from hydra.errors import HydraException
 from hydra.plugins.search_path_plugin import SearchPathPlugin
 
 from veca_marl.config.errors import ConfigError, one_line
+from veca_marl.override_text import quoted
 from veca_marl.plugins import PLUGINS, PluginError, conf_dir
-
-_EXPONENT = re.compile(r"[+-]?\d+(\.\d*)?[eE]\+?\d+")
 
 
 def parse(overrides: Sequence[str]) -> list[Override]:
@@ -25,11 +24,18 @@ def parse(overrides: Sequence[str]) -> list[Override]:
     Raises:
         ConfigError: If one does not follow the grammar.
     """
+    parser = OverridesParser.create()
+    return [_parse(parser, text) for text in overrides]
+
+
+def _parse(parser: OverridesParser, text: str) -> Override:
     try:
-        parsed: list[Override] = OverridesParser.create().parse_overrides(list(overrides))
+        return parser.parse_override(text)
     except HydraException as error:
-        raise ConfigError(one_line(error)) from error
-    return parsed
+        key, equals, value = text.partition("=")
+        advice = f"; quoted it is a text: {key}={quoted(value)}" if equals and value else ""
+        reason = one_line(error).partition(" See https://hydra.cc")[0]
+        raise ConfigError(f"{text} cannot be read as an override ({reason}){advice}") from error
 
 
 def root_of(override: Override) -> str:
@@ -51,30 +57,6 @@ def plugins_in(overrides: Sequence[str]) -> list[str]:
             raise ConfigError(f"{override.input_line}: expected names: plugins=[my_package]")
         names += value
     return names
-
-
-def with_integers(overrides: Sequence[str]) -> list[str]:
-    """Write integral numbers in exponent notation with digits alone.
-
-    ``total_frames=1e6`` becomes ``total_frames=1000000``, which fields of type int accept as well
-    as those of type float; so do the values of a sweep. Everything else stays as it is.
-    """
-    return [_with_integers(text) for text in overrides]
-
-
-def _with_integers(text: str) -> str:
-    key, equals, value = text.partition("=")
-    parts = value.split(",")
-    if not equals or not all(parts):
-        return text
-    return f"{key}={','.join(map(_integer, parts))}"
-
-
-def _integer(text: str) -> str:
-    if not _EXPONENT.fullmatch(text.strip()):
-        return text
-    number = float(text)
-    return str(int(number)) if number.is_integer() else text
 
 
 class PluginSearchPath(SearchPathPlugin):

@@ -14,11 +14,12 @@ from veca_marl.algos.intrinsic.intrinsic_reward import INTRINSICS, NONE, Intrins
 from veca_marl.algos.networks.factory import NETWORKS
 from veca_marl.config.compose import compose_node, load_config_plugins
 from veca_marl.config.errors import ConfigError, one_line
-from veca_marl.config.overrides import check_group_values, conf_dirs, parse, with_integers
+from veca_marl.config.overrides import check_group_values, conf_dirs, parse
 from veca_marl.config.root import body_types, root_schema
 from veca_marl.envs.core.game_cfg import TeamCfg
 from veca_marl.envs.core.task import find_task
 from veca_marl.migrations import migrated
+from veca_marl.override_text import normalised
 from veca_marl.plugins import PLUGINS
 from veca_marl.sim.physics import PLAYGROUND_GENERATORS
 
@@ -118,7 +119,7 @@ def change(node: DictConfig, overrides: Sequence[str], allowed: Sequence[str] = 
     Raises:
         ConfigError: If another key is to be changed, or a choice or a value does not exist.
     """
-    for override in parse(with_integers(overrides)):
+    for override in parse(normalised(overrides)):
         path = (override.package or str(override.key_or_group).replace("/", ".")).split(".")
         if path == ["plugins"]:  # loaded before the configuration was read
             continue

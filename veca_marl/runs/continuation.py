@@ -8,6 +8,8 @@ import shlex
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
+from veca_marl.override_text import quoted
+
 FILE = "progress.json"
 
 
@@ -55,16 +57,6 @@ def resume_argument(path: str | Path) -> str:
     """Return what continues the run in a folder, to be copied into a shell."""
     value = str(path) if _PLAIN.fullmatch(str(path)) else quoted(path)
     return shlex.quote(f"resume={value}")
-
-
-def quoted(path: str | Path) -> str:
-    """Return a path as a quoted word of Hydra's grammar.
-
-    In it a backslash is one, except before a quotation mark.
-    """
-    escaped = re.sub(r"(\\*)'", r"\1\1\\'", str(path))
-    escaped = re.sub(r"(\\+)$", r"\1\1", escaped)
-    return f"'{escaped}'"
 
 
 RESUMABLE = ("resume", "total_frames", "max_minutes", "device", "threads", "log")

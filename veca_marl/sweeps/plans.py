@@ -9,7 +9,8 @@ from enum import Enum
 from pathlib import Path
 from typing import Any
 
-from veca_marl.runs.continuation import may_change, quoted
+from veca_marl.override_text import quoted
+from veca_marl.runs.continuation import may_change
 from veca_marl.sweeps.differences import Difference, differences
 from veca_marl.sweeps.run_state import RunState, StoredRun, read_run
 

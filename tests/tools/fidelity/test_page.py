@@ -21,7 +21,7 @@ from tools.fidelity.law import (
     equals,
 )
 from tools.fidelity.page import draw, picture_name, write_page
-from veca_marl.runs.continuation import quoted
+from veca_marl.override_text import quoted
 
 HELD = equals("gravity", "m/s2", 9.81, 9.8, 0.02)
 BROKEN = at_most("speed", "m/s", 1.0, 2.0)

@@ -1,0 +1,61 @@
+"""Overrides as text: paths and numbers, written so that Hydra's grammar reads what was meant.
+
+This module imports nothing of the package, so that commands can use it before anything is loaded.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Sequence
+from pathlib import Path
+
+_PATH = re.compile(r"(~|/|\./|\.\./)")
+_PLAIN = re.compile(r"[\w./:@+ -]*", re.ASCII)  # read unchanged without quotation marks
+_EXPONENT = re.compile(r"[+-]?\d+(\.\d*)?[eE]\+?\d+")
+
+
+def normalised(overrides: Sequence[str]) -> list[str]:
+    """Write paths and integers in overrides so that they are read as what they are.
+
+    - A value that begins with ``/``, ``./``, ``../`` or ``~`` is a path: ``~`` becomes the home
+      directory, and a path with characters of the grammar (``run=/data/a (1)``) is quoted. A comma
+      separates the values of a sweep, so that a path with one has to be quoted by hand:
+      ``"run='/data/a,b'"``.
+    - An integral number in exponent notation (``total_frames=1e6``) gets digits only, which fields
+      of type int accept as well as those of type float; so do the values of a sweep.
+
+    Everything else stays as it is.
+    """
+    return [_normalised(text) for text in overrides]
+
+
+def _normalised(text: str) -> str:
+    key, equals, value = text.partition("=")
+    parts = value.split(",")
+    if not equals or not all(parts):
+        return text
+    written = [_path(part) if _PATH.match(part) else _integer(part) for part in parts]
+    return f"{key}={','.join(written)}"
+
+
+def _path(text: str) -> str:
+    path = os.path.expanduser(text)
+    return path if _PLAIN.fullmatch(path) else quoted(path)
+
+
+def _integer(text: str) -> str:
+    if not _EXPONENT.fullmatch(text.strip()):
+        return text
+    number = float(text)
+    return str(int(number)) if number.is_integer() else text
+
+
+def quoted(path: str | Path) -> str:
+    """Return a path as a quoted word of Hydra's grammar.
+
+    In it a backslash is one, except before a quotation mark.
+    """
+    escaped = re.sub(r"(\\*)'", r"\1\1\\'", str(path))
+    escaped = re.sub(r"(\\+)$", r"\1\1", escaped)
+    return f"'{escaped}'"
