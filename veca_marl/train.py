@@ -12,6 +12,7 @@ import shlex
 import signal
 import sys
 from contextlib import ExitStack
+from dataclasses import asdict
 from pathlib import Path
 from types import ModuleType
 from typing import Any, NoReturn
@@ -19,6 +20,7 @@ from typing import Any, NoReturn
 import hydra
 from hydra.core.hydra_config import HydraConfig
 from hydra.errors import HydraException
+from hydra.types import RunMode
 from omegaconf import DictConfig
 from omegaconf.errors import OmegaConfBaseException
 
@@ -38,6 +40,7 @@ from veca_marl.runs.continuation import RESUMABLE, may_change, resume_argument
 from veca_marl.runs.run_folder import RunFolder, locked, new_run, open_run
 from veca_marl.runs.training import TrainingResult, run_training
 from veca_marl.sweeps.plans import SweepError
+from veca_marl.sweeps.run_state import final_score
 from veca_marl.sweeps.sweep import PARENT
 
 _COMMAND = "python -m veca_marl.train"
@@ -73,8 +76,8 @@ def stored_node(folder: RunFolder, overrides: list[str]) -> DictConfig:
 
 
 @hydra.main(version_base="1.3", config_path=str(conf_dir()), config_name="config")
-def run(node: DictConfig) -> None:
-    """Train in the folder that Hydra has created."""
+def run(node: DictConfig) -> float | None:
+    """Train in the folder that Hydra has created; return the score for a sweeper."""
     path = Path(HydraConfig.get().runtime.output_dir)
     with ExitStack() as pending:
         try:
@@ -82,15 +85,23 @@ def run(node: DictConfig) -> None:
             cfg, folder, trainer = set_up(node, path)
         except _CONFIGURATION_ERRORS as error:
             give_up(error)
-        _train(cfg, folder, trainer)
+        result = _train(cfg, folder, trainer)
+    if HydraConfig.get().mode is not RunMode.MULTIRUN:
+        return None
+    try:  # in this process: `hydra/launcher=basic`, or one of another package
+        return final_score(result.evaluations, asdict(cfg.experiment))
+    except ValueError as error:  # sweepers that only list combinations need none
+        print(f"{path} has no score for the sweeper: {error}", file=sys.stderr)
+        return None
 
 
-def _train(cfg: Config, folder: RunFolder, trainer: Trainer) -> None:
+def _train(cfg: Config, folder: RunFolder, trainer: Trainer) -> TrainingResult:
     """Train, print the results; failures end in one line and exit status 1."""
     path = folder.path
     try:
         result = run_training(cfg, folder, trainer)
         print(result.timing, *result.comparison, f"run folder: {folder.path}", sep="\n")
+        return result
     except KeyboardInterrupt:
         print(f"\ninterrupted; {_continue(cfg, path)}", file=sys.stderr)
         raise SystemExit(130) from None

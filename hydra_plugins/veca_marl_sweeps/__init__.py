@@ -19,12 +19,13 @@ from hydra.core.utils import JobReturn, JobStatus, setup_globals
 from hydra.errors import HydraException
 from hydra.plugins.launcher import Launcher
 from hydra.types import HydraContext, TaskFunction
+from hydra.utils import get_class
 from omegaconf import DictConfig, OmegaConf, open_dict
 from omegaconf.errors import OmegaConfBaseException
 
 from veca_marl.runs.cores import usable_cores
 from veca_marl.sweeps.plans import Job, SweepError
-from veca_marl.sweeps.run_state import with_body_kinds
+from veca_marl.sweeps.run_state import final_score, read_run, with_body_kinds
 from veca_marl.sweeps.sweep import run_sweep
 
 
@@ -143,7 +144,22 @@ class ProcessLauncher(Launcher):
             for number, overrides in enumerate(job_overrides)
         ]
         run_sweep(jobs, self._jobs, usable_cores(), self._fit)
-        return [JobReturn(job.overrides, status=JobStatus.COMPLETED) for job in jobs]
+        return [self._result(job) for job in jobs]
+
+    def _result(self, job: Job) -> JobReturn:
+        """Return what a sweeper learns of a job that has ended: its final score.
+
+        Sweepers that optimise need it; those that only list combinations do not.
+        """
+        done = JobReturn(job.overrides, status=JobStatus.COMPLETED)
+        if not issubclass(get_class(self._config.hydra.sweeper["_target_"]), BasicSweeper):
+            try:
+                done.return_value = final_score(
+                    read_run(job.folder).rows("evaluations"), job.asked["experiment"]
+                )
+            except ValueError as error:
+                raise SweepError(f"{job.name} has no score for the sweeper: {error}") from error
+        return done
 
     def _fit(self, jobs: Sequence[Job]) -> int:
         """Return how many of the jobs fit on the machine together."""

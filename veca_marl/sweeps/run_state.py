@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import csv
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from copy import deepcopy
 from dataclasses import dataclass
 from enum import Enum
@@ -121,6 +121,31 @@ class StoredRun:
         of_its_own = int(self.config.get("total_frames", total_frames))
         limited = max_minutes is not None and self.config.get("max_minutes") == max_minutes
         return RunState.cut if limited and progress.frames < of_its_own else RunState.unfinished
+
+
+def final_score(rows: Iterable[Mapping[str, Any]], experiment: Mapping[str, Any]) -> float:
+    """Return what a run is optimised by: the last evaluation of its policy.
+
+    Args:
+        rows: Rows of ``evaluations.csv``.
+        experiment: Node ``experiment`` of its configuration, which names `metric` and `team`.
+
+    Raises:
+        ValueError: If the policy was not evaluated, there is no such metric or team, or several
+            teams were evaluated and none is named.
+    """
+    of_policy = [row for row in rows if row["player"] == "policy"]
+    teams, asked = sorted({str(row["team"]) for row in of_policy}), experiment["team"]
+    if not teams:
+        raise ValueError("no evaluation of its policy is stored (log.logger needs csv)")
+    if asked not in teams and (asked is not None or len(teams) > 1):
+        raise ValueError(f"experiment.team={asked}: choices: {', '.join(teams)}")
+    last = [row for row in of_policy if asked in (None, row["team"])][-1]
+    metric = experiment["metric"]
+    if last.get(metric) in (None, ""):
+        choices = ", ".join(key for key in last if key not in ("frames", "player", "team"))
+        raise ValueError(f"experiment.metric={metric}: choices: {choices}")
+    return float(last[metric])
 
 
 def read_run(folder: Path) -> StoredRun:
