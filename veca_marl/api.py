@@ -20,7 +20,7 @@ from veca_marl.config.command_line import check_folder
 from veca_marl.config.overrides import parse, root_of
 from veca_marl.envs.adapters.gymnasium import VecaGymEnv
 from veca_marl.envs.adapters.pettingzoo import VecaParallelEnv
-from veca_marl.envs.adapters.spaces import SensesLayout
+from veca_marl.envs.adapters.spaces import SpaceLayout
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
 from veca_marl.envs.core.game_cfg import GameCfg, Script
 from veca_marl.envs.core.task import TASKS, Task
@@ -235,7 +235,8 @@ def gym_env(
         render_mode: `rgb_array` if `render` is to be called.
         layout: `arrays` gives each sense in its own shape, as TorchRL and PettingZoo get it;
             `stacked` gives both eyes as one image `(6, H, W)` and every other sense as a vector,
-            as the CNN of Stable-Baselines3 expects.
+            as the CNN of Stable-Baselines3 expects; `flat` gives one vector of all senses. In both
+            an action of several parts is one array, see `SpaceLayout`.
         **choices: As for `make`.
 
     Raises:
@@ -243,7 +244,7 @@ def gym_env(
         ValueError: If the task is one for several agents, or a number is impossible.
     """
     cfg = choose(task, **choices)
-    return VecaGymEnv(cfg, seed, render_mode, SensesLayout.named(layout))
+    return VecaGymEnv(cfg, seed, render_mode, SpaceLayout.named(layout))
 
 
 @_with_choices
@@ -252,6 +253,7 @@ def parallel_env(
     *,
     seed: int | None = None,
     render_mode: str | None = None,
+    layout: str = "arrays",
     **choices: Unpack[GameChoices],
 ) -> VecaParallelEnv:
     """Make a task of any number of agents as a PettingZoo `ParallelEnv`.
@@ -260,6 +262,7 @@ def parallel_env(
         task: One of `list_tasks`.
         seed: Used until `reset` is given one; None is fresh entropy.
         render_mode: `rgb_array` if `render` is to be called.
+        layout: As for `gym_env`.
         **choices: As for `make`.
 
     Raises:
@@ -267,7 +270,7 @@ def parallel_env(
         ValueError: If a number is impossible.
     """
     cfg = choose(task, **choices)
-    return VecaParallelEnv(cfg, seed, render_mode)
+    return VecaParallelEnv(cfg, seed, render_mode, SpaceLayout.named(layout))
 
 
 @_with_choices

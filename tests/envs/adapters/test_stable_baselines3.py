@@ -42,8 +42,8 @@ def test_stacked_observations_are_images_and_vectors(env):
 
 
 def test_an_unknown_layout_is_an_error_that_lists_the_choices():
-    with pytest.raises(ValueError, match=naming("'flat'", "arrays", "stacked")):
-        gymnasium.make(ID, layout="flat")
+    with pytest.raises(ValueError, match=naming("'round'", "arrays", "stacked")):
+        gymnasium.make(ID, layout="round")
 
 
 @pytest.mark.slow

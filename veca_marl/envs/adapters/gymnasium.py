@@ -8,25 +8,24 @@ import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 
-from veca_marl.envs.adapters.seeded_game import SeededGame
-from veca_marl.envs.adapters.spaces import SensesLayout, Space, action_space
-from veca_marl.envs.core.game import Observation
+from veca_marl.envs.adapters.seeded_game import NotCopied, SeededGame
+from veca_marl.envs.adapters.spaces import Observed, Space, SpaceLayout
 from veca_marl.envs.core.game_cfg import GameCfg
 
 
-class VecaGymEnv(gymnasium.Env[Observation, Any]):
+class VecaGymEnv(NotCopied, gymnasium.Env[Observed, Any]):
     """One game of one agent.
 
-    Observations are dicts with one array per sense; `info["terms"]` contains the unweighted reward
-    terms by name, and `info["solved"]` whether the goal of the task is reached, if it has one; the
-    entries of `Body.info` are beside them. The same seed gives the same bytes as in the first world
-    of a `VecaEnv`.
+    Observations are dicts with one array per sense, or one vector (`SpaceLayout.flat`);
+    `info["terms"]` contains the unweighted reward terms by name, and `info["solved"]` whether the
+    goal of the task is reached, if it has one; the entries of `Body.info` are beside them. The same
+    seed gives the same bytes as in the first world of a `VecaEnv`.
 
     Args:
         cfg: What to play.
         seed: Used until `reset` is given one; None is fresh entropy.
         render_mode: `rgb_array` if `render` is to be called.
-        layout: Shapes of the observations.
+        layout: Shapes of observations and actions.
 
     Raises:
         ValueError: If the task has several agents.
@@ -37,7 +36,7 @@ class VecaGymEnv(gymnasium.Env[Observation, Any]):
         cfg: GameCfg,
         seed: int | None = None,
         render_mode: str | None = None,
-        layout: SensesLayout = SensesLayout.arrays,
+        layout: SpaceLayout = SpaceLayout.arrays,
     ) -> None:
         self._played = SeededGame(cfg, seed, render_mode)
         game = self._played.game
@@ -49,11 +48,12 @@ class VecaGymEnv(gymnasium.Env[Observation, Any]):
         self.metadata = self._played.metadata
         self.render_mode = render_mode
         self.observation_space: Space = layout.space(game, player)
-        self.action_space = action_space(player)
+        self._actions = layout.actions(player)
+        self.action_space = self._actions.space
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[Observation, dict[str, Any]]:
+    ) -> tuple[Observed, dict[str, Any]]:
         """Begin an episode.
 
         Args:
@@ -61,22 +61,22 @@ class VecaGymEnv(gymnasium.Env[Observation, Any]):
             options: `{"episode": number}` begins the episode of this number.
 
         Returns:
-            The observation and an empty info.
+            The observation, and an info with the entries of that of a step: terms are 0.
         """
         observations = self._played.reset(seed, options)
         # the generator of this episode, not the one that Gymnasium would make of the same seed
         if self._played.rng is not None:
             self.np_random = self._played.rng
-        return self._layout.arrange(observations[self._agent]), {}
+        return self._layout.arrange(observations[self._agent]), self._played.first_info(self._agent)
 
-    def step(self, action: Any) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
+    def step(self, action: Any) -> tuple[Observed, float, bool, bool, dict[str, Any]]:
         """Play one step.
 
         Raises:
             RuntimeError: If no episode is running, or the environment is closed.
             ValueError: If the action is invalid.
         """
-        step = self._played.step({self._agent: action})
+        step = self._played.step({self._agent: self._actions.parts(action)})
         return (
             self._layout.arrange(step.observations[self._agent]),
             step.rewards[self._agent],

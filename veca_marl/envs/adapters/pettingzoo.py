@@ -9,30 +9,36 @@ import numpy as np
 from numpy.typing import NDArray
 from pettingzoo import ParallelEnv
 
-from veca_marl.envs.adapters.seeded_game import SeededGame
-from veca_marl.envs.adapters.spaces import SensesLayout, Space, action_space
+from veca_marl.envs.adapters.seeded_game import NotCopied, SeededGame
+from veca_marl.envs.adapters.spaces import Observed, Space, SpaceLayout
 from veca_marl.envs.core.game import Observation
 from veca_marl.envs.core.game_cfg import GameCfg
 
 Infos = dict[str, dict[str, Any]]
 
 
-class VecaParallelEnv(ParallelEnv[str, Observation, Any]):
+class VecaParallelEnv(NotCopied, ParallelEnv[str, Observed, Any]):
     """One game; the agents are its players. An eliminated player is no longer in `agents`.
 
-    Observations are dicts with one array per sense; `infos[agent]["terms"]` contains the unweighted
-    reward terms by name, and `infos[agent]["solved"]` whether the goal of the task is reached, if
-    it has one; the entries of `Body.info` are beside them. The same seed gives the same bytes as in
-    the first world of a `VecaEnv`.
+    Observations are dicts with one array per sense, or vectors (`SpaceLayout.flat`);
+    `infos[agent]["terms"]` contains the unweighted reward terms by name, and
+    `infos[agent]["solved"]` whether the goal of the task is reached, if it has one; the entries of
+    `Body.info` are beside them. The same seed gives the same bytes as in the first world of a
+    `VecaEnv`.
 
     Args:
         cfg: What to play.
         seed: Used until `reset` is given one; None is fresh entropy.
         render_mode: `rgb_array` if `render` is to be called.
+        layout: Shapes of observations and actions.
     """
 
     def __init__(
-        self, cfg: GameCfg, seed: int | None = None, render_mode: str | None = None
+        self,
+        cfg: GameCfg,
+        seed: int | None = None,
+        render_mode: str | None = None,
+        layout: SpaceLayout = SpaceLayout.arrays,
     ) -> None:
         self._played = SeededGame(cfg, seed, render_mode)
         game = self._played.game
@@ -40,15 +46,17 @@ class VecaParallelEnv(ParallelEnv[str, Observation, Any]):
         self.render_mode = render_mode
         self.possible_agents = list(self._played.names)
         self.agents: list[str] = []
-        self.observation_spaces = {p.name: SensesLayout.arrays.space(game, p) for p in game.actors}
-        self.action_spaces = {p.name: action_space(p) for p in game.actors}
+        self._layout = layout
+        self._actions = {player.name: layout.actions(player) for player in game.actors}
+        self.observation_spaces = {p.name: layout.space(game, p) for p in game.actors}
+        self.action_spaces = {name: actions.space for name, actions in self._actions.items()}
 
     def observation_space(self, agent: str) -> Space:
-        """Return the space of an agent's observations: a `Dict` with one space per sense."""
+        """Return the space of an agent's observations: by default a `Dict` with one per sense."""
         return self.observation_spaces[self._known(agent)]
 
     def action_space(self, agent: str) -> Space:
-        """Return the space of an agent's actions: `Box`, `Discrete`, or a `Dict` of them."""
+        """Return the space of an agent's actions, see `SpaceLayout.actions`."""
         return self.action_spaces[self._known(agent)]
 
     def _known(self, agent: str) -> str:
@@ -58,7 +66,7 @@ class VecaParallelEnv(ParallelEnv[str, Observation, Any]):
 
     def reset(
         self, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[dict[str, Observation], Infos]:
+    ) -> tuple[dict[str, Observed], Infos]:
         """Begin an episode.
 
         Args:
@@ -66,31 +74,40 @@ class VecaParallelEnv(ParallelEnv[str, Observation, Any]):
             options: `{"episode": number}` begins the episode of this number.
 
         Returns:
-            Observations and empty infos, by agent.
+            Observations, and infos with the entries of those of a step (terms are 0), by agent.
         """
         observations = self._played.reset(seed, options)
         self.agents = list(self.possible_agents)
-        return observations, {name: {} for name in self.agents}
+        infos = {name: self._played.first_info(name) for name in self.agents}
+        return self._arranged(observations), infos
 
     def step(
         self, actions: Mapping[str, Any]
-    ) -> tuple[dict[str, Observation], dict[str, float], dict[str, bool], dict[str, bool], Infos]:
+    ) -> tuple[dict[str, Observed], dict[str, float], dict[str, bool], dict[str, bool], Infos]:
         """Play one step of those in `agents`; when the episode is over, `agents` is empty.
 
         Raises:
             RuntimeError: If no episode is running, or the environment is closed.
             ValueError: If an action is missing, invalid, or for an unknown agent.
         """
-        step = self._played.step(actions)
+        step = self._played.step(
+            {
+                name: self._actions[name].parts(action) if name in self._actions else action
+                for name, action in actions.items()
+            }
+        )
         names = self.agents
         self.agents = [] if step.done else self._played.playing
         return (
-            step.observations,
+            self._arranged(step.observations),
             step.rewards,
             step.terminated,
             dict.fromkeys(names, step.truncated),
             {name: step.info(name) for name in names},
         )
+
+    def _arranged(self, observations: Mapping[str, Observation]) -> dict[str, Observed]:
+        return {name: self._layout.arrange(one) for name, one in observations.items()}
 
     def render(self) -> NDArray[np.uint8]:
         """Return a picture ``(252, width, 3)``: the first agent's eyes and skin, and the room."""

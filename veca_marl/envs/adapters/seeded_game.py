@@ -6,7 +6,7 @@ The order of observations and rewards is that of `VecaEnv`: the same seed gives 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,6 +50,22 @@ class Step(NamedTuple):
         if name in self.solved:
             info[SOLVED] = self.solved[name]
         return info
+
+
+class NotCopied:
+    """An environment that is neither copied nor pickled: its world is in the memory of PyBullet."""
+
+    def __reduce_ex__(self, protocol: object) -> NoReturn:
+        """Refuse `copy.copy`, `copy.deepcopy` and `pickle`.
+
+        Raises:
+            TypeError: Always; it says what to do instead.
+        """
+        raise TypeError(
+            f"{type(self).__name__} cannot be copied or pickled: its world is in the memory of "
+            "PyBullet. Pass a function that makes it to other processes; make it again with the "
+            "same arguments and seed, and reset it to the same episode, for the same world"
+        )
 
 
 class SeededGame:
@@ -112,6 +128,13 @@ class SeededGame:
         self.game.reset(rng)
         self._running = True
         return self._observe(self.names)
+
+    def first_info(self, name: str) -> dict[str, Any]:
+        """Return the info of a player at a reset: the entries of `Step.info`, with terms of 0."""
+        player = next(one for one in self.game.actors if one.name == name)
+        terms = dict.fromkeys(self.game.weights, 0.0)
+        info: dict[str, Any] = {"terms": terms, **player.body.info()}
+        return info | ({SOLVED: False} if self.game.task.has_goal() else {})
 
     def step(self, actions: Mapping[str, Any]) -> Step:
         """Play one step.

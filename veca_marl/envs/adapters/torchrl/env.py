@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from tensordict import TensorDict, TensorDictBase
 from torchrl.data import Bounded, Categorical, Composite, TensorSpec, Unbounded
 
+from veca_marl.envs.adapters.seeded_game import NotCopied
 from veca_marl.envs.adapters.torchrl.fast_step import Arrays, FastStepEnv, Layout
 from veca_marl.envs.core.episodes import Episodes, check_integer, fresh_seed
 from veca_marl.envs.core.game import ActionSpec, Game, Outcome, from_parts, refuse_closed
@@ -168,7 +169,7 @@ def _to_numpy(what: str, action: Any, spec: TensorSpec) -> NDArray[Any]:
     return array
 
 
-class VecaEnv(FastStepEnv):
+class VecaEnv(NotCopied, FastStepEnv):
     """W equal games in one process, `batch_size=[W]`, one TorchRL group per team.
 
     Keys, with n players in a team::
