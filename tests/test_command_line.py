@@ -1,6 +1,8 @@
 """The grammar of the commands that are not Hydra applications."""
 
+import sys
 from dataclasses import dataclass, field
+from importlib import import_module
 
 import pytest
 from omegaconf import MISSING
@@ -9,6 +11,7 @@ from refusals import naming
 from veca_marl.config import ConfigError, compose
 from veca_marl.config.command_line import CommandLine
 from veca_marl.override_text import normalised, quoted
+from veca_marl.version import __version__
 
 
 @dataclass
@@ -135,3 +138,19 @@ def test_paths_of_a_configuration_are_read_like_those_of_commands(tmp_path):
 def test_the_error_about_another_text_names_the_quoted_one():
     with pytest.raises(ConfigError, match=naming("run=köpfe", "run='köpfe'")):
         next(LINE.jobs(["run=köpfe"]))
+
+
+def test_the_version_is_that_of_this_package(capsys):
+    assert LINE.run(lambda *_: None, ["--version"]) == 0
+    assert capsys.readouterr().out.split() == ["veca_marl", __version__]
+
+
+@pytest.mark.parametrize("words", ["--config-name nope", "-cn nope", "--config-name=nope"])
+def test_an_unknown_configuration_is_refused_with_the_choices(words, monkeypatch, capsys):
+    train = import_module("veca_marl.train")
+    monkeypatch.setattr(sys, "argv", ["train", *words.split(), "+task=KickTheBall"])
+    with pytest.raises(SystemExit):
+        train.main()
+    (line,) = capsys.readouterr().err.strip().splitlines()
+    assert "nope" in line
+    assert "config" in line

@@ -71,7 +71,7 @@ def test_fields_that_are_present_stay(step):
 
 
 def test_fields_belong_to_one_registered_name():
-    other = {"task": {"name": "KickTheBall"}, "algo": {"network": {"name": "ears"}}}
+    other = {"task": {"name": "ObjectNav"}, "algo": {"network": {"name": "ears"}}}
     assert {**migrated(other), **other} == migrated(other)
     assert "separate_finder" in migrated({"task": {"name": "MultiAgentNav"}})["task"]
 

@@ -25,6 +25,7 @@ from veca_marl.envs.adapters.torchrl.env import VecaEnv
 from veca_marl.envs.core.game_cfg import GameCfg, Script
 from veca_marl.envs.core.task import TASKS, Task
 from veca_marl.gymnasium_ids import register_task
+from veca_marl.override_text import normalised
 from veca_marl.plugins import load_plugins
 from veca_marl.registry import unknown
 from veca_marl.runs.assembly import decide_precision, make_trainer
@@ -117,7 +118,7 @@ def _check_overrides(
     Raises:
         ConfigError: If one does not, or is of another root.
     """
-    for override in parse(overrides):
+    for override in parse(normalised(overrides)):
         key, root = override.key_or_group, root_of(override)
         if argument := arguments.get(root if root == "hydra" else key):
             raise ConfigError(

@@ -158,6 +158,7 @@ STEPS: tuple[Step, ...] = (
             Renamed("", "warm_start", "init_from"),
             Added("", {"init_encoders": {}, "intrinsic": {"name": "none"}, "team_intrinsic": {}}),
             Added("task", {"separate_finder": False}, name="MultiAgentNav"),
+            Added("task", {"sound_path": None}, name="KickTheBall"),
             Added("body", _CALLS),
             Added("team.*.body", _CALLS),
             Added("senses.audio", _SPECTRA),

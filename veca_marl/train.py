@@ -5,6 +5,7 @@ From Python, `veca_marl.train("KickTheBall")` does the same; see `veca_marl.api`
 
 from __future__ import annotations
 
+import argparse
 import errno
 import logging
 import os
@@ -30,11 +31,12 @@ from veca_marl.algos.files import DISK_FULL, WriteError
 from veca_marl.algos.training.finite import NotFiniteError
 from veca_marl.algos.training.loop import Trainer
 from veca_marl.config import Config, ConfigError, conf_dir, one_line, prepare, to_config
-from veca_marl.config.command_line import check_folder
+from veca_marl.config.command_line import VERSION, check_folder, print_version
 from veca_marl.config.experiment import check_arm
 from veca_marl.config.stored import change
 from veca_marl.processes.children import end_with_parent
 from veca_marl.processes.supervision import WorkerError
+from veca_marl.registry import unknown
 from veca_marl.runs.assembly import decide_precision, make_trainer
 from veca_marl.runs.continuation import RESUMABLE, may_change, resume_argument
 from veca_marl.runs.run_folder import RunFolder, locked, new_run, open_run
@@ -150,6 +152,22 @@ def _check_folders(overrides: list[str]) -> None:
             check_folder(path, option)
 
 
+def _check_config_name(words: list[str]) -> None:
+    """Raise `ConfigError` for a configuration that does not exist; Hydra's lists no choices."""
+    flags = argparse.ArgumentParser(add_help=False, allow_abbrev=False)
+    flags.add_argument("--config-name", "-cn", default="config")
+    flags.add_argument("--config-dir", "-cd", type=Path)
+    flags.add_argument("--config-path", "-cp")
+    known, _ = flags.parse_known_args(words)
+    if known.config_path is not None:
+        return
+    folders = [folder for folder in (conf_dir(), known.config_dir) if folder is not None]
+    names = sorted({file.stem for folder in folders for file in folder.glob("*.yaml")})
+    name = known.config_name.removesuffix(".yaml")
+    if name not in names and not any((folder / f"{name}.yaml").is_file() for folder in folders):
+        raise ConfigError(unknown("configuration", name, names))
+
+
 def give_up(error: Exception) -> NoReturn:
     """Print the error as one line and exit with status 2."""
     print(f"error: {one_line(error)}", file=sys.stderr)
@@ -165,7 +183,11 @@ def main() -> None:
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # schedulers stop jobs with SIGTERM
     if PARENT in os.environ:  # a run of a sweep ends with it
         end_with_parent(int(os.environ.pop(PARENT)))
+    if VERSION in sys.argv[1:]:
+        print_version()
+        return
     try:
+        _check_config_name(sys.argv[1:])
         sys.argv[1:] = prepare(sys.argv[1:])
         _check_folders(sys.argv[1:])
         run()

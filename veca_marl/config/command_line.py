@@ -24,12 +24,19 @@ from veca_marl.config.overrides import parse
 from veca_marl.config.root import Config
 from veca_marl.override_text import normalised
 from veca_marl.registry import unknown
+from veca_marl.version import __version__
 
 Options = TypeVar("Options")
 
 _MULTIRUN = ("-m", "--multirun")
 _HELP = ("-h", "--help")
+VERSION = "--version"
 _STATUS_INTERRUPTED = 130
+
+
+def print_version() -> None:
+    """Print the version of this package, and not that of Hydra."""
+    sys.stdout.write(f"veca_marl {__version__}\n")
 
 
 @dataclass(frozen=True)
@@ -69,6 +76,9 @@ class CommandLine(Generic[Options]):
         if any(word in _HELP for word in words):
             sys.stdout.write(self.help())
             return 0
+        if VERSION in words:
+            print_version()
+            return 0
         expected: tuple[type[Exception], ...] = (ConfigError, *self.errors)
         try:
             for options, overrides in self.jobs(words):
@@ -90,7 +100,9 @@ class CommandLine(Generic[Options]):
         texts = [word for word in words if word not in _MULTIRUN]
         flags = [text for text in texts if text.startswith("-")]
         if flags:
-            raise ConfigError(f"unknown flag {flags[0]!r}; choices: --help, --multirun, KEY=VALUE")
+            raise ConfigError(
+                f"unknown flag {flags[0]!r}; choices: --help, --version, --multirun, KEY=VALUE"
+            )
         combinations = _combinations(parse(normalised(texts)), len(texts) < len(words))
         self._check_outputs(combinations)
         for combination in combinations:

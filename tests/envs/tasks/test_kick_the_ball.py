@@ -4,9 +4,11 @@ import math
 
 import numpy as np
 import pytest
+import scipy.io.wavfile
 from composed import compose
 from refusals import naming
 
+import veca_marl
 from veca_marl.envs.core.game import Game
 
 
@@ -243,3 +245,18 @@ def test_joint_level_bodies_may_have_any_ball():
     game = Game(compose(["+task=SoccerOnePlayer", "task.mass_kg=6"]).game)
     assert game.task.ball.cfg.mass_kg == 6.0
     game.close()
+
+
+def test_the_ball_can_sound_like_a_wav_file(tmp_path):
+    """A tone on a bin of the observation is the largest magnitude at both ears."""
+    path = tmp_path / "tone (1).wav"
+    tone = 0.5 * np.sin(2.0 * np.pi * 47 * 22_050 / 1024 * np.arange(22_050) / 22_050)
+    scipy.io.wavfile.write(path, 22_050, tone.astype(np.float32))
+    env = veca_marl.gym_env(
+        "KickTheBall", senses={"vision": "blind"}, overrides=[f"task.sound_path={path}"]
+    )
+    env.reset(seed=0)
+    for _ in range(5):
+        observation, *_ = env.step(np.zeros(2, np.float32))
+    assert abs(int(observation["audio"][0].argmax()) - 47) <= 1
+    env.close()

@@ -297,3 +297,25 @@ def test_every_kind_can_be_made(tmp_path):
         path = str(tmp_path / "a.wav") if kind is SoundKind.clip else None
         assert emit(make_sound(SoundCfg(kind, path=path)), 2).shape == (2 * STEP,)
     assert not emit(Silence()).any()
+
+
+def test_a_wav_file_that_is_cut_off_is_refused_at_any_length(tmp_path):
+    scipy.io.wavfile.write(tmp_path / "tone.wav", RATE, np.ones(8, np.float32))
+    whole = (tmp_path / "tone.wav").read_bytes()
+    for length in range(len(whole) - 32):
+        cut = tmp_path / "cut.wav"
+        cut.write_bytes(whole[:length])
+        with pytest.raises(ValueError, match=naming("cut.wav")):
+            waveforms.load_wav(cut, RATE)
+
+
+def test_a_wav_file_with_samples_that_are_not_finite_is_refused(tmp_path):
+    samples = np.array([0.1, np.nan, 0.2], np.float32)
+    scipy.io.wavfile.write(tmp_path / "nan.wav", RATE, samples)
+    with pytest.raises(ValueError, match=naming("nan.wav", "finite")):
+        waveforms.load_wav(tmp_path / "nan.wav", RATE)
+
+
+def test_a_missing_wav_file_is_one_line(tmp_path):
+    with pytest.raises(ValueError, match=naming("none.wav")):
+        waveforms.load_wav(tmp_path / "none.wav", RATE)

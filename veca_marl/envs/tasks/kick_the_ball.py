@@ -99,6 +99,8 @@ class KickTheBallCfg(TaskCfg):
         life_s: Time after which a ball that has not been kicked is replaced.
         rest_s: Time after which a kicked ball is replaced.
         loudness: Level of the ball's sound, see `SoundCfg`.
+        sound_path: WAV file that the ball sounds like, repeated without end and scaled to
+            `loudness`; None is a buzz.
         pulse_s: Duration of a pulse of its sound, if there are pauses.
         pause_s: Silence between pulses: an agent then needs memory; 0 is a continuous sound.
         walking_mps: Speed of the player below which the term `approach` is 0.
@@ -111,6 +113,7 @@ class KickTheBallCfg(TaskCfg):
     life_s: float = 6.0
     rest_s: float = 0.4
     loudness: float = 0.1
+    sound_path: str | None = None
     pulse_s: float = 0.2
     pause_s: float = 0.0
     walking_mps: float = 0.35
@@ -140,7 +143,11 @@ class KickTheBallCfg(TaskCfg):
     def sound(self) -> SoundCfg:
         """Return the sound of the ball."""
         return SoundCfg(
-            SoundKind.buzz, level=self.loudness, pulse_s=self.pulse_s, pause_s=self.pause_s
+            SoundKind.buzz if self.sound_path is None else SoundKind.clip,
+            level=self.loudness,
+            path=self.sound_path,
+            pulse_s=self.pulse_s,
+            pause_s=self.pause_s,
         )
 
 

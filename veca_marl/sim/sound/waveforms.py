@@ -14,6 +14,7 @@ the direction of the glide. Their meaning is not given: it has to be learnt.
 from __future__ import annotations
 
 import math
+import struct
 from dataclasses import dataclass
 from enum import IntEnum
 from functools import cache
@@ -90,16 +91,20 @@ def load_wav(
             that there is no transient at the seam.
 
     Raises:
-        ValueError: If the file is not a WAV file, has no samples, or is silent and a level is
-            given.
+        ValueError: If the file cannot be read as a WAV file, has no samples, samples that are not
+            finite, or is silent and a level is given.
     """
     try:
         rate, samples = scipy.io.wavfile.read(path)
-    except ValueError as error:
+    except OSError as error:
+        raise ValueError(f"{path}: {error.strerror}; give the path of a WAV file") from error
+    except (ValueError, struct.error) as error:
         raise ValueError(f"{path}: cannot be read as a WAV file ({error})") from error
     if samples.size == 0:
         raise ValueError(f"{path}: has no samples")
     mono = _full_scale(samples)
+    if not np.isfinite(mono).all():
+        raise ValueError(f"{path}: has samples that are not finite")
     if mono.ndim == 2:
         mono = mono.mean(axis=1)
     filtered = _high_passed(_resampled(mono, rate, sample_rate_hz, loop), sample_rate_hz, loop)

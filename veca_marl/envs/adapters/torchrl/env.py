@@ -158,9 +158,11 @@ def action_of(actions: TeamActions, world: int, player: int) -> Any:
 
 
 def _to_numpy(what: str, action: Any, spec: TensorSpec) -> NDArray[Any]:
-    if not isinstance(action, torch.Tensor) or action.shape != spec.shape:
-        got = tuple(action.shape) if isinstance(action, torch.Tensor) else type(action).__name__
-        raise ValueError(f"{what}: shape {got}, not {tuple(spec.shape)}")
+    if not isinstance(action, torch.Tensor):
+        got = "missing" if action is None else f"a {type(action).__name__}"
+        raise ValueError(f"{what} is {got}: it must be a tensor of shape {tuple(spec.shape)}")
+    if action.shape != spec.shape:
+        raise ValueError(f"{what}: shape {tuple(action.shape)}, not {tuple(spec.shape)}")
     plain = action.is_cpu and not action.requires_grad
     try:
         array: NDArray[Any] = action.numpy() if plain else action.numpy(force=True)
