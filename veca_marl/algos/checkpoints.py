@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import pickle
+import re
 import signal
 import threading
 from collections.abc import Callable, Collection, Iterator, Mapping
@@ -15,7 +16,7 @@ from typing import Any, TypeVar, get_type_hints
 
 import torch
 
-from veca_marl.algos.files import WriteError, write_atomically
+from veca_marl.algos.files import WriteError, left_behind, write_atomically
 from veca_marl.algos.specs import TeamSpec
 from veca_marl.migrations import CONFIG_VERSION, KEY, VersionError, migrated_checkpoint
 
@@ -221,6 +222,16 @@ def interrupts_wait() -> Iterator[None]:
         signal.raise_signal(number)
 
 
+_BEST = "best.pt"
+_BY_FRAMES = re.compile(r"frames_(\d{12,})\.pt", re.ASCII)
+_NAMES = re.compile(f"{_BY_FRAMES.pattern}|{re.escape(_BEST)}", re.ASCII)
+
+
+def checkpoints_in(folder: Path) -> list[Path]:
+    """Return the checkpoints in a folder by their frames, in ascending order, without the best."""
+    return sorted(path for path in folder.glob("frames_*.pt") if _BY_FRAMES.fullmatch(path.name))
+
+
 class Checkpoints:
     """The checkpoints of one run.
 
@@ -284,7 +295,7 @@ class Checkpoints:
             file = io.BytesIO()
             torch.save(content, file)
             if best:  # first: a run that is killed in between writes both again
-                self._write(file.getbuffer(), self.folder / "best.pt")
+                self._write(file.getbuffer(), self.folder / _BEST)
             self._write(file.getbuffer(), path)
         self.remove_old()
         return path
@@ -320,7 +331,7 @@ class Checkpoints:
         for old in self._files()[: -self.keep_last]:
             old.unlink()
         if self.folder is not None:
-            for unfinished in self.folder.glob(".*.tmp"):
+            for unfinished in left_behind(self.folder, _NAMES):
                 unfinished.unlink()
 
     def latest(self) -> Path:
@@ -335,7 +346,7 @@ class Checkpoints:
         return files[-1]
 
     def _files(self) -> list[Path]:
-        return [] if self.folder is None else sorted(self.folder.glob("frames_*.pt"))
+        return [] if self.folder is None else checkpoints_in(self.folder)
 
     def _write(self, content: memoryview, path: Path) -> None:
         try:

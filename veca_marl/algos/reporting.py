@@ -15,7 +15,7 @@ from typing import Any, Protocol
 
 from torchrl.record.loggers import Logger, MLFlowLogger, TensorboardLogger, WandbLogger
 
-from veca_marl.algos.files import WriteError, write_atomically, write_errors
+from veca_marl.algos.files import WriteError, open_to_append, write_atomically, write_errors
 
 Row = Mapping[str, float | int | str]
 
@@ -96,7 +96,7 @@ class CsvReporter:
             _add_columns(path, added)
         cells = {name: _cell(value) for name, value in full.items()}
         row_text = _table([*columns, *added], [cells], header=not columns)
-        with write_errors(path), path.open("a", newline="") as file:
+        with write_errors(path), open_to_append(path) as file:
             file.write(row_text)
         self._columns[kind] = [*columns, *added]
 
@@ -104,7 +104,7 @@ class CsvReporter:
         """See `Reporter`."""
         for path in (self._folder / f"{kind}.csv" for kind in self.KINDS):
             if path.exists():
-                with write_errors(path), path.open("a") as file:
+                with write_errors(path), open_to_append(path) as file:
                     os.fsync(file.fileno())
 
     def close(self) -> None:

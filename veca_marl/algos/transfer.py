@@ -14,6 +14,7 @@ from torch import nn
 from veca_marl.algos.algorithm import ALGORITHMS, Algorithm, AlgorithmCfg, make_algorithm
 from veca_marl.algos.checkpoints import (
     CheckpointError,
+    checkpoints_in,
     from_plain,
     load_errors,
     map_checkpoint,
@@ -119,7 +120,7 @@ def _find_type(base: type, name: str) -> type:
 def _file(path: Path) -> Path:
     if path.is_file():
         return path
-    found = sorted((path / "checkpoints").glob("frames_*.pt"))
+    found = checkpoints_in(path / "checkpoints")
     if not found:
         raise CheckpointError(f"{path} is neither a checkpoint nor the folder of a run with one")
     return found[-1]
