@@ -3,101 +3,48 @@
 from __future__ import annotations
 
 import io
-import pickle
 import re
 import signal
 import threading
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, fields, is_dataclass
 from enum import Enum
 from pathlib import Path
-from typing import Any, TypeVar, get_type_hints
+from types import UnionType
+from typing import Any, TypeVar, Union, get_args, get_origin, get_type_hints
 
 import torch
 
+from veca_marl.algos.checkpoint_files import (
+    FORMAT,
+    CheckpointError,
+    load_errors,
+    load_file,
+    map_checkpoint,
+    read_checkpoint,
+)
 from veca_marl.algos.files import WriteError, left_behind, write_atomically
 from veca_marl.algos.specs import TeamSpec
-from veca_marl.migrations import CONFIG_VERSION, KEY, VersionError, migrated_checkpoint
+from veca_marl.migrations import CONFIG_VERSION, KEY
 
-# 3: actions have named parts, and each team an algorithm of its own
-FORMAT = 3
-_KEYS = {"identity", "config", "algorithms", "state"}
-_CPU = torch.device("cpu")
-# what torch.load raises for files that are cut off or have other content
-_UNREADABLE = (RuntimeError, EOFError, pickle.UnpicklingError, ValueError, KeyError, TypeError)
-
-
-class CheckpointError(RuntimeError):
-    """A checkpoint that cannot be written, read, or used here."""
-
-
-def read_checkpoint(path: Path, device: torch.device) -> dict[str, Any]:
-    """Return everything that is in the file of a checkpoint.
-
-    Raises:
-        CheckpointError: If it cannot be read, or is not a checkpoint of this version.
-    """
-    return _checked(path, load_file(path, device))
-
-
-def map_checkpoint(path: Path) -> dict[str, Any]:
-    """Return what `read_checkpoint` returns; of its tensors, the disk is read when they are used.
-
-    A replay buffer in a checkpoint thus takes neither memory nor time where only a network is
-    wanted. The file has to stay as it is until the tensors have been copied.
-
-    Raises:
-        CheckpointError: See `read_checkpoint`.
-    """
-    return _checked(path, _load(path, map_location=_CPU, mmap=True))
-
-
-def _checked(path: Path, content: Any) -> dict[str, Any]:
-    """Return the content of a file, in the form of this version, if it is a checkpoint of it."""
-    if not isinstance(content, dict) or "format" not in content:
-        raise CheckpointError(f"{path} is not a checkpoint of a run")
-    if content["format"] != FORMAT:
-        raise CheckpointError(
-            f"{path} has format {content['format']}, this version reads format {FORMAT}"
-        )
-    missing = sorted(_KEYS - set(content))
-    if missing:
-        raise CheckpointError(f"{path} is incomplete: no {', '.join(missing)}")
-    try:
-        return migrated_checkpoint(content)
-    except VersionError as error:
-        raise CheckpointError(f"{path}: {error}") from error
-
-
-def load_file(path: Path, device: torch.device) -> Any:
-    """Return the tensors and plain data in a file that `torch.save` wrote.
-
-    Raises:
-        CheckpointError: If it cannot be read.
-    """
-    return _load(path, map_location=device)
-
-
-def _load(path: Path, **options: Any) -> Any:
-    try:
-        return torch.load(path, weights_only=True, **options)
-    except FileNotFoundError as error:
-        raise CheckpointError(f"{path} does not exist") from error
-    except (OSError, *_UNREADABLE) as error:
-        reason = str(error).partition("\n")[0] or type(error).__name__
-        raise CheckpointError(f"cannot read {path} (cut off or no checkpoint): {reason}") from error
-
-
-@contextmanager
-def load_errors(path: Path) -> Iterator[None]:
-    """Raise `CheckpointError` where a state that is loaded inside the block does not fit."""
-    try:
-        yield
-    except (RuntimeError, KeyError, TypeError, ValueError) as error:
-        reason = " ".join(str(error).split())
-        raise CheckpointError(f"{path} does not fit: {type(error).__name__}: {reason}") from error
-
+__all__ = [
+    "FORMAT",
+    "CheckpointError",
+    "Checkpoints",
+    "Identity",
+    "check_config",
+    "check_identity",
+    "checkpoints_in",
+    "from_plain",
+    "interrupts_wait",
+    "load_errors",
+    "load_file",
+    "map_checkpoint",
+    "read_checkpoint",
+    "spec_differences",
+    "to_plain",
+]
 
 _ABSENT = "absent"
 
@@ -382,13 +329,16 @@ def from_plain(kind: type[T], plain: dict[str, Any], find: Callable[[type, str],
             their defaults.
 
     Raises:
-        ValueError: If a field is unknown.
+        ValueError: If a field is unknown, or a value is not of its type.
     """
-    actual = find(kind, plain["name"]) if "name" in plain else kind
+    actual: Any = find(kind, plain["name"]) if "name" in plain else kind
     hints = get_type_hints(actual)
-    unknown = sorted(set(plain) - set(hints))
+    unknown = sorted(set(plain) - {field.name for field in fields(actual)})
     if unknown:
         raise ValueError(f"{actual.__name__} has no fields {unknown}")
+    for name, value in plain.items():
+        if not _fits(hints[name], value):
+            raise ValueError(f"{actual.__name__}.{name}={value!r:.80} is of another type")
     values = {name: _restore(hints[name], value, find) for name, value in plain.items()}
     made: T = actual(**values)
     return made
@@ -400,3 +350,23 @@ def _restore(hint: Any, value: Any, find: Callable[[type, str], type]) -> Any:
     if is_dataclass(hint) and isinstance(hint, type):
         return from_plain(hint, value, find)
     return value
+
+
+def _fits(hint: Any, value: Any) -> bool:
+    """Return whether `to_plain` can have made `value` of a value with the annotation `hint`."""
+    origin, parts = get_origin(hint), get_args(hint)
+    if origin in (Union, UnionType):
+        return any(_fits(part, value) for part in parts)
+    if origin in (list, tuple, Sequence):
+        return isinstance(value, list) and all(_fits(parts[0], each) for each in value)
+    if origin in (dict, Mapping):
+        return isinstance(value, dict) and all(_fits(parts[1], each) for each in value.values())
+    if hint is float:
+        return type(value) in (int, float)
+    if hint is int:
+        return type(value) is int
+    if hint is Any or not isinstance(hint, type):
+        return True
+    if issubclass(hint, Enum):
+        return isinstance(value, str) and value in hint.__members__
+    return isinstance(value, dict if is_dataclass(hint) else hint)

@@ -13,7 +13,7 @@ import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TextIO
+from typing import TextIO, cast
 
 Content = bytes | memoryview
 DISK_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
@@ -96,7 +96,7 @@ def open_to_append(path: Path, mode: str = "a") -> TextIO:
     Raises:
         OSError: If it is a symbolic link, or cannot be opened.
     """
-    return open(path, mode, newline="", opener=_open_in_place)
+    return cast(TextIO, open(path, mode, newline="", opener=_open_in_place))
 
 
 def _open_in_place(path: str, flags: int) -> int:

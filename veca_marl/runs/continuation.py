@@ -8,6 +8,8 @@ import shlex
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
+from veca_marl.stored_files import StoredFileError, read_json
+
 FILE = "progress.json"
 
 
@@ -36,16 +38,16 @@ def read_progress(folder: Path) -> RunProgress | None:
         None without a file: the run has no checkpoint yet, or was stored by version 0.2.
 
     Raises:
-        ValueError: If the file cannot be read.
+        StoredFileError: If the file cannot be read.
     """
     path = folder / FILE
     if not path.is_file():
         return None
-    try:
-        content = json.loads(path.read_text())
-        return RunProgress(int(content["frames"]), bool(content["ended"]))
-    except (ValueError, KeyError, TypeError) as error:
-        raise ValueError(f"{path} is damaged: {' '.join(str(error).split())}") from error
+    content = read_json(path)
+    frames, ended = content.get("frames"), content.get("ended")
+    if type(frames) is not int or frames < 0 or type(ended) is not bool:
+        raise StoredFileError(path, "it has no number of 'frames', or not whether it has 'ended'")
+    return RunProgress(frames, ended)
 
 
 _PLAIN = re.compile(r"[\w./-]*/[\w./-]*", re.ASCII)  # a single word may be a number, or null

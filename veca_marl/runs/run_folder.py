@@ -17,13 +17,12 @@ from uuid import uuid4
 
 from omegaconf import DictConfig, OmegaConf
 from tensordict.nn import TensorDictModuleBase
-from yaml import YAMLError
 
 from veca_marl.algos.files import left_behind, write_atomically
 from veca_marl.algos.selfplay import SelfPlayCfg
 from veca_marl.algos.specs import TeamSpec
 from veca_marl.algos.transfer import load_actor
-from veca_marl.config import Config, ConfigError, one_line, to_config
+from veca_marl.config import Config, ConfigError, to_config
 from veca_marl.config.compose import load_config_plugins
 from veca_marl.config.overrides import plugins_in
 from veca_marl.config.stored import body_names, change, typed
@@ -31,6 +30,7 @@ from veca_marl.migrations import numbered
 from veca_marl.runs.continuation import FILE as PROGRESS_FILE
 from veca_marl.runs.continuation import RunProgress, resume_argument
 from veca_marl.runs.lock import check_links
+from veca_marl.stored_files import StoredFileError, read_json, read_yaml
 from veca_marl.version import __version__
 
 _PACKAGES = ("torch", "torchrl", "tensordict", "pybullet", "numpy", "numba")
@@ -185,11 +185,9 @@ class RunFolder:
         if bodies is None:
             raise ConfigError(f"{self.path} was stored by an older version; train it again")
         try:
-            stored = OmegaConf.load(self.config)
-        except (OSError, YAMLError, UnicodeDecodeError) as error:
-            raise _damaged(self.config, error) from error
-        if not isinstance(stored, DictConfig) or OmegaConf.select(stored, "task.name") is None:
-            raise ConfigError(f"{self.config} is damaged: it names no task")
+            stored = read_yaml(self.config)
+        except StoredFileError as error:
+            raise ConfigError(str(error)) from error
         try:
             return typed(stored, bodies)
         except ConfigError as error:
@@ -197,11 +195,10 @@ class RunFolder:
 
     def _read_provenance(self) -> dict[str, Any]:
         try:
-            content = json.loads(self.provenance.read_text())
-        except (OSError, ValueError) as error:
-            raise _damaged(self.provenance, error) from error
-        if not isinstance(content, dict):
-            raise ConfigError(f"{self.provenance} is damaged: it is no table")
+            content = read_json(self.provenance)
+            check_provenance(self.provenance, content)
+        except StoredFileError as error:
+            raise ConfigError(str(error)) from error
         return content
 
     @staticmethod
@@ -217,8 +214,29 @@ class RunFolder:
         write_atomically(self.path / name, text + "\n")
 
 
-def _damaged(path: Path, error: Exception) -> ConfigError:
-    return ConfigError(f"{path} is damaged or cannot be read: {one_line(error)}")
+_IDENTIFIER = re.compile(r"[\w.-]{1,128}")  # it is part of paths and queries of loggers
+
+
+def check_provenance(path: Path, content: Mapping[str, Any]) -> None:
+    """Check the types of what is read of a `provenance.json`; any entry may be absent.
+
+    Args:
+        path: The file.
+        content: What it holds.
+
+    Raises:
+        StoredFileError: If one is of another type.
+    """
+    bodies, again = content.get("bodies"), content.get("resumed", [])
+    identifier = content.get("id", "none")
+    if bodies is not None and not (
+        isinstance(bodies, dict) and all(isinstance(name, str) for name in bodies.values())
+    ):
+        raise StoredFileError(path, "'bodies' does not map the keys of bodies to their names")
+    if not isinstance(again, list):
+        raise StoredFileError(path, "'resumed' is no list")
+    if not (isinstance(identifier, str) and _IDENTIFIER.fullmatch(identifier)):
+        raise StoredFileError(path, "'id' is no identifier of a run")
 
 
 _WRITTEN = (
