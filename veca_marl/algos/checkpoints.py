@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import io
 import re
+import reprlib
 import signal
 import threading
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, fields, is_dataclass
 from enum import Enum
@@ -73,24 +74,49 @@ def check_identity(path: Path, stored: dict[str, Any], wanted: dict[str, Any]) -
         CheckpointError: If the checkpoint at `path` is of another task or other specs.
     """
     if stored["task"] != wanted["task"]:
-        raise CheckpointError(f"{path} is of task {stored['task']}, wanted: {wanted['task']}")
-    differing = [
-        f"{name}: {in_file} in the checkpoint, {in_run} in this run"
-        for name, in_file, in_run in _differences(stored["specs"], wanted["specs"])
-    ]
-    if differing:
-        raise CheckpointError(f"{path} was made for other specs: {'; '.join(differing)}")
+        raise CheckpointError(
+            f"{path} is of task {_shown(stored['task'])}, wanted: {wanted['task']}"
+        )
+    if differing := _in_words(stored["specs"], wanted["specs"]):
+        raise CheckpointError(f"{path} was made for other specs: {differing}")
 
 
 def spec_differences(stored: dict[str, Any], spec: TeamSpec) -> str:
     """Return how a stored specification differs from `spec`; empty if it does not."""
-    return "; ".join(
-        f"{name}: {in_file} in the checkpoint, {in_run} in this run"
-        for name, in_file, in_run in _differences(stored, spec.to_dict())
+    return _in_words(stored, spec.to_dict())
+
+
+def _in_words(stored: dict[str, Any], wanted: dict[str, Any]) -> str:
+    return _listed(
+        f"{name}: {_shown(in_file)} in the checkpoint, {_shown(in_run)} in this run"
+        for name, in_file, in_run in _differences(stored, wanted)
     )
 
 
+_MOST_LISTED = 8
+
+
+def _listed(texts: Iterable[str]) -> str:
+    every = list(texts)
+    more = f"; and {len(every) - _MOST_LISTED} more" if len(every) > _MOST_LISTED else ""
+    return "; ".join(every[:_MOST_LISTED]) + more
+
+
+_BRIEF = reprlib.Repr()
+_BRIEF.maxstring = _BRIEF.maxother = 80
+_BRIEF.maxlevel = 2
+
+
+def _shown(value: Any) -> str:
+    """Return a value as it is written in a message: a stored one may have any size."""
+    return value if isinstance(value, str) and len(value) <= 80 else _BRIEF.repr(value)
+
+
 def _differences(one: Any, other: Any, name: str = "") -> list[tuple[str, Any, Any]]:
+    """Return the dotted key, and both values, wherever two plain values differ.
+
+    Lists of mappings, such as the props of a playground, are compared element by element.
+    """
     if isinstance(one, dict) and isinstance(other, dict):
         return [
             found
@@ -99,7 +125,19 @@ def _differences(one: Any, other: Any, name: str = "") -> list[tuple[str, Any, A
                 one.get(key, _ABSENT), other.get(key, _ABSENT), f"{name}.{key}".lstrip(".")
             )
         ]
+    if _has_mappings(one) and _has_mappings(other):
+        if len(one) != len(other):
+            return [(name, f"{len(one)} entries", f"{len(other)} entries")]
+        return [
+            found
+            for index, (before, now) in enumerate(zip(one, other, strict=True))
+            for found in _differences(before, now, f"{name}.{index}")
+        ]
     return [] if one == other else [(name, one, other)]
+
+
+def _has_mappings(value: Any) -> bool:
+    return isinstance(value, list) and any(isinstance(entry, dict) for entry in value)
 
 
 def check_config(
@@ -107,38 +145,37 @@ def check_config(
     stored: dict[str, Any],
     config: dict[str, Any],
     may_change: Collection[str],
-    by_team: Collection[str] = (),
+    is_default: Callable[[str], bool],
 ) -> None:
-    """Check that a configuration is the stored one; fields of newer versions are ignored.
+    """Check that a configuration is the stored one.
+
+    A field that the stored one does not have is one of a newer version: with its default value,
+    it is no difference.
 
     Args:
         path: The checkpoint.
         stored: Its configuration as plain data.
         config: That of the run that is to continue.
         may_change: First parts of the keys in which they may differ.
-        by_team: Keys of mappings from the names of teams: an entry that the stored ones do not
-            have is a difference.
+        is_default: Whether a dotted key of `config` is a field, with its default value.
 
     Raises:
-        CheckpointError: If they differ elsewhere.
+        CheckpointError: If they differ elsewhere; the message names the keys that do.
     """
     differing = [
-        f"{name} was {before}, is {now}"
+        f"{name} was {_shown(before)}, is {_shown(now)}"
         for name, before, now in _differences(stored, config)
-        if (before != _ABSENT or _is_entry(name, by_team))
-        and name.partition(".")[0] not in may_change
+        if name.partition(".")[0] not in may_change and not (before == _ABSENT and is_default(name))
     ]
     if differing:
         raise CheckpointError(
-            f"{path} is of another configuration: {'; '.join(differing)}; "
+            f"{path} is of another configuration: {_listed(differing)}; "
             f"a resumed run may change {', '.join(may_change) or 'nothing'}"
         )
 
 
-def _is_entry(name: str, mappings: Collection[str]) -> bool:
-    """Return whether a key is that of an entry of one of some mappings."""
-    mapping, _, entry = name.partition(".")
-    return mapping in mappings and "." not in entry
+def _of_a_newer_version(key: str) -> bool:
+    return True
 
 
 _DELAYED = [
@@ -191,7 +228,8 @@ class Checkpoints:
         config: The run's configuration as plain data.
         keep_last: Number of the latest that are kept, beside the best one.
         may_change: Keys of `config` in which a checkpoint that is loaded may differ from it.
-        by_team: Keys of `config` that are mappings from the names of teams.
+        is_default: Whether a key of `config` that a checkpoint does not have is a field with its
+            default value, see `check_config`. By default, every such key is one.
     """
 
     def __init__(
@@ -201,10 +239,10 @@ class Checkpoints:
         config: dict[str, Any],
         keep_last: int = 3,
         may_change: Collection[str] = (),
-        by_team: Collection[str] = (),
+        is_default: Callable[[str], bool] = _of_a_newer_version,
     ) -> None:
         self.folder, self.identity, self.config = folder, identity, config
-        self.keep_last, self.may_change, self.by_team = keep_last, may_change, by_team
+        self.keep_last, self.may_change, self.is_default = keep_last, may_change, is_default
 
     def save(
         self,
@@ -264,7 +302,7 @@ class Checkpoints:
                 f"{error}; remove it to continue from {earlier[-1].name}"
             ) from error
         check_identity(path, content["identity"], self.identity.to_dict())
-        check_config(path, content["config"], self.config, self.may_change, self.by_team)
+        check_config(path, content["config"], self.config, self.may_change, self.is_default)
         state: dict[str, Any] = content["state"]
         return state
 

@@ -5,8 +5,9 @@ from __future__ import annotations
 import json
 import re
 import shlex
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields, is_dataclass
 from pathlib import Path
+from typing import Any
 
 from veca_marl.stored_files import StoredFileError, read_json
 
@@ -75,3 +76,30 @@ RESUMABLE = ("resume", "total_frames", "max_minutes", "device", "threads", "log"
 def may_change(key: str) -> bool:
     """Return whether a key of the configuration, such as ``log.video``, may be changed."""
     return key.partition(".")[0] in RESUMABLE
+
+
+def is_default(cfg: Any, key: str) -> bool:
+    """Return whether a value of a configuration is that of a field which nobody has set.
+
+    Args:
+        cfg: Dataclasses, mappings and lists.
+        key: Dotted path: ``playground.props.3.partition``.
+
+    Returns:
+        False for an entry of a mapping or a list, and for a field that has no default.
+    """
+    *path, name = key.split(".")
+    owner = cfg
+    for part in path:
+        if is_dataclass(owner):
+            owner = getattr(owner, part)
+        else:
+            owner = owner[int(part) if isinstance(owner, list) else part]
+    if not is_dataclass(owner) or isinstance(owner, type):
+        return False
+    others = {f.name: getattr(owner, f.name) for f in fields(owner) if f.init and f.name != name}
+    try:
+        unset = type(owner)(**others)  # also a default that depends on the other fields
+    except (TypeError, ValueError):
+        return False
+    return bool(getattr(unset, name) == getattr(owner, name))
