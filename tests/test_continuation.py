@@ -1,12 +1,13 @@
 """The printed argument that continues a run, for folders of any name."""
 
 import shlex
+from dataclasses import dataclass, field
 
 import pytest
 from commands import train
 from hydra.core.override_parser.overrides_parser import OverridesParser
 
-from veca_marl.runs.continuation import resume_argument
+from veca_marl.runs.continuation import is_default, resume_argument
 
 SMOKE = ["+experiment=smoke", "senses/vision=blind", "log=silent", "threads=1", "total_frames=64"]
 ODD = "algo.gamma=0.9, (it's odd)"
@@ -55,3 +56,42 @@ def interrupted(folder, capsys, run):
         patch.setattr("veca_marl.runs.training.make_reporters", interrupt)
         assert train(folder, *shlex.split(resume_argument(run)), "total_frames=128") == 130
     return capsys.readouterr().err.strip().splitlines()[-1]
+
+
+@dataclass
+class Leaf:
+    """A field whose default depends on another one."""
+
+    width_m: float
+    partition: bool = False
+    height_m: float = 0.0
+
+    def __post_init__(self):
+        self.height_m = self.height_m or 2.0 * self.width_m
+
+
+@dataclass
+class Rooms:
+    props: list[Leaf] = field(default_factory=list)
+    named: dict[str, Leaf] = field(default_factory=dict)
+    seed: int = 0
+
+
+@pytest.mark.parametrize(
+    ("key", "expected"),
+    [
+        ("seed", False),
+        ("named", False),
+        ("props.0.partition", True),
+        ("props.1.partition", False),
+        ("props.0.height_m", True),
+        ("props.1.height_m", False),
+        ("props.0.width_m", False),
+        ("named.door.partition", True),
+        ("named.door", False),
+    ],
+)
+def test_a_field_that_was_not_set_is_told_from_others(key, expected):
+    props = [Leaf(0.9), Leaf(0.9, partition=True, height_m=3.0)]
+    cfg = Rooms(props, {"door": Leaf(0.9)}, seed=3)
+    assert is_default(cfg, key) is expected

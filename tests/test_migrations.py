@@ -34,7 +34,7 @@ BODIES = json.loads((DATA / "push_out_bodies.json").read_text())
 
 def test_a_configuration_that_version_0_2_0_wrote_is_read():
     """``+task=PushOut1v1 warm_start.red=...`` with own hearing of one team, own learner of one."""
-    cfg = to_config(typed(OmegaConf.create(OLD), BODIES))
+    cfg = to_config(typed(OLD, BODIES))
     assert cfg.init_from == {"red": "runs/there"}
     assert cfg.intrinsic.name == "none"
     assert cfg.body.call_pause_s == 0.0
@@ -87,7 +87,7 @@ def test_a_version_that_is_not_known_is_refused(version):
     with pytest.raises(VersionError, match=KEY):
         migrated({KEY: version})
     with pytest.raises(ConfigError, match=KEY):
-        typed(OmegaConf.create({**OLD, KEY: version}), BODIES)
+        typed({**OLD, KEY: version}, BODIES)
 
 
 def test_nodes_of_another_kind_than_expected_are_left_to_the_types():

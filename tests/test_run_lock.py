@@ -14,8 +14,8 @@ from refusals import naming
 from veca_marl import api
 from veca_marl.config import ConfigError
 from veca_marl.plugins import conf_dir
-from veca_marl.runs import run_folder
-from veca_marl.runs.run_folder import locked
+from veca_marl.runs import lock
+from veca_marl.runs.lock import locked
 
 SMOKE = ["+experiment=smoke", "senses/vision=blind", "log=silent", "threads=1", "total_frames=64"]
 HOLDER = """
@@ -23,7 +23,7 @@ import sys
 import time
 from pathlib import Path
 
-from veca_marl.runs.run_folder import locked
+from veca_marl.runs.lock import locked
 
 with locked(Path(sys.argv[1])):
     print("held", flush=True)
@@ -33,7 +33,7 @@ with locked(Path(sys.argv[1])):
 
 @pytest.fixture(autouse=True)
 def short_wait(monkeypatch):
-    monkeypatch.setattr(run_folder, "_WAIT_S", 0.3)
+    monkeypatch.setattr(lock, "_WAIT_S", 0.3)
 
 
 @pytest.fixture
@@ -71,7 +71,7 @@ def test_the_lock_leaves_neither_a_file_nor_an_empty_folder(tmp_path):
 
 def test_a_lock_whose_file_was_removed_in_the_meantime_does_not_count(tmp_path, monkeypatch):
     """A run that ends removes the file; another one may have opened it just before."""
-    flock, calls = run_folder.fcntl.flock, []
+    flock, calls = lock.fcntl.flock, []
 
     def removed_before_the_first_call(file, operation):
         if not calls:
@@ -79,7 +79,7 @@ def test_a_lock_whose_file_was_removed_in_the_meantime_does_not_count(tmp_path, 
         calls.append(file.name)
         flock(file, operation)
 
-    monkeypatch.setattr(run_folder.fcntl, "flock", removed_before_the_first_call)
+    monkeypatch.setattr(lock.fcntl, "flock", removed_before_the_first_call)
     with locked(tmp_path / "run"):
         assert len(calls) == 2
         assert (tmp_path / "run" / ".lock").exists()
@@ -89,7 +89,7 @@ def test_a_file_system_without_locks_is_reported(tmp_path, monkeypatch, caplog):
     def refuse(file, operation):
         raise OSError(errno.ENOSYS, os.strerror(errno.ENOSYS))
 
-    monkeypatch.setattr(run_folder.fcntl, "flock", refuse)
+    monkeypatch.setattr(lock.fcntl, "flock", refuse)
     with locked(tmp_path / "run"):
         assert "cannot be locked: start no other run in its folder" in caplog.text
 

@@ -8,6 +8,7 @@ from veca_marl.config import ConfigError, compose_node, conf_dir, to_config
 from veca_marl.config.stored import body_names, change, typed
 from veca_marl.envs.core.task import TASKS
 from veca_marl.sim.hearing import AudioQuality
+from veca_marl.stored_files import read_yaml
 
 BODIES = sorted(path.stem for path in (conf_dir() / "body").glob("*.yaml"))
 EXPERIMENTS = sorted(path.stem for path in (conf_dir() / "experiment").glob("*.yaml"))
@@ -22,7 +23,7 @@ SOME = [SEVERAL, ["+task=GrabObject"], ["+experiment=audio_ablation"]]
 
 def read_again(node, path):
     path.write_text(OmegaConf.to_yaml(node, resolve=True))
-    return typed(OmegaConf.load(path), body_names(node))
+    return typed(read_yaml(path), body_names(node))
 
 
 @pytest.mark.parametrize(
@@ -42,7 +43,7 @@ def test_a_run_of_version_0_2_is_read(tmp_path):
     plain["warm_start"] = plain.pop("init_from")
     for key in ("intrinsic", "team_intrinsic", "init_encoders"):
         del plain[key]
-    read = typed(OmegaConf.create(plain), body_names(node))
+    read = typed(plain, body_names(node))
     assert to_config(read) == to_config(node)
 
 
@@ -50,7 +51,7 @@ def test_a_run_without_kernels_has_those_it_was_trained_with(tmp_path):
     node = compose_node(["+task=KickTheBall"])
     plain = OmegaConf.to_container(node, resolve=True, enum_to_str=True)
     del plain["algo"]["network"]["kernels"], plain["algo"]["network"]["strides"]
-    network = to_config(typed(OmegaConf.create(plain), body_names(node))).algo.network
+    network = to_config(typed(plain, body_names(node))).algo.network
     assert (network.kernels, network.strides) == ([8, 4, 3], [4, 2, 1])
 
 

@@ -30,7 +30,8 @@ from veca_marl.plugins import load_plugins
 from veca_marl.registry import unknown
 from veca_marl.runs.assembly import decide_precision, make_trainer
 from veca_marl.runs.continuation import resume_argument
-from veca_marl.runs.run_folder import locked, new_run
+from veca_marl.runs.lock import locked
+from veca_marl.runs.run_folder import new_run
 from veca_marl.runs.training import TrainingResult, run_training
 
 # `opponent` is the configuration of `GameCfg.script`

@@ -7,26 +7,25 @@ extra ``[plot]``, ``cross_play.png`` (the matrix of points) into the folder of t
 from __future__ import annotations
 
 import csv
+import io
 import sys
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TextIO
 
 import numpy as np
 import torch
 from omegaconf import MISSING
 
 from veca_marl.algos.checkpoints import CheckpointError
-from veca_marl.algos.files import WriteError, write_errors
+from veca_marl.algos.files import WriteError, write_atomically
 from veca_marl.algos.selfplay import Match, Pool, Rating, play_all, rate, table_of_points
 from veca_marl.config import Config, ConfigError, to_config
 from veca_marl.config.command_line import CommandLine, check_file, check_folder
 from veca_marl.config.stored import change
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
 from veca_marl.runs.assembly import make_learners, read_specs
-from veca_marl.runs.run_folder import RunFolder, open_run
+from veca_marl.runs.run_folder import RunFolder, writable_run
 
 _MATCHES, _RATINGS, _PICTURE = "cross_play.csv", "elo.csv", "cross_play.png"
 
@@ -121,22 +120,20 @@ def spread(frames: Sequence[int], count: int) -> list[int]:
 def write_results(path: Path, matches: list[Match], ratings: list[Rating]) -> None:
     """Write the matches and the ratings as CSV into a folder."""
     first, second = matches[0].members
-    with _created(path / _MATCHES) as file:
-        writer = csv.writer(file)
-        columns = [f"{first}_frames", f"{second}_frames", "episodes"]
-        writer.writerow([*columns, f"{first}_wins", f"{second}_wins", "ahead"])
-        for m in matches:
-            writer.writerow([*m.members.values(), m.episodes, *m.wins.values(), f"{m.ahead:.6g}"])
-    with _created(path / _RATINGS) as file:
-        writer = csv.writer(file)
-        writer.writerow(["team", "frames", "elo"])
-        writer.writerows([r.team, r.frames, f"{r.elo:.1f}"] for r in ratings)
+    head = [f"{first}_frames", f"{second}_frames", "episodes"]
+    head += [f"{first}_wins", f"{second}_wins", "ahead"]
+    played = [
+        [*m.members.values(), m.episodes, *m.wins.values(), f"{m.ahead:.6g}"] for m in matches
+    ]
+    write_atomically(path / _MATCHES, _table([head, *played]))
+    rated = [[r.team, r.frames, f"{r.elo:.1f}"] for r in ratings]
+    write_atomically(path / _RATINGS, _table([["team", "frames", "elo"], *rated]))
 
 
-@contextmanager
-def _created(path: Path) -> Iterator[TextIO]:
-    with write_errors(path), path.open("w", newline="") as file:
-        yield file
+def _table(rows: Iterable[Iterable[object]]) -> str:
+    text = io.StringIO(newline="")
+    csv.writer(text).writerows(rows)
+    return text.getvalue()
 
 
 def draw_matrix(path: Path, matches: list[Match]) -> None:
@@ -164,14 +161,15 @@ def draw_matrix(path: Path, matches: list[Match]) -> None:
         axis.set_ticks(range(len(frames)), [f"{n / 1000:.0f}k" for n in frames])
     axes.set(xlabel=f"training frames of {second}", ylabel=f"training frames of {first}")
     figure.colorbar(image, label=f"points of {first} (win 1, draw 1/2)")
-    with write_errors(path):
-        figure.savefig(path, dpi=120, bbox_inches="tight")
+    picture = io.BytesIO()
+    figure.savefig(picture, format="png", dpi=120, bbox_inches="tight")
+    write_atomically(path, picture.getbuffer())
 
 
 def run(options: TournamentOptions, overrides: list[str]) -> None:
     """Play the tournament, print the ratings and write the results into the folder of the run."""
     torch.set_num_threads(1)
-    folder = open_run(Path(options.run), "run=")
+    folder = writable_run(Path(options.run), "run=")
     check_folder(folder.path, "run")
     for name in (_MATCHES, _RATINGS, _PICTURE):
         check_file(folder.path / name, "run")

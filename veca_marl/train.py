@@ -12,7 +12,7 @@ import os
 import shlex
 import signal
 import sys
-from contextlib import ExitStack
+from contextlib import AbstractContextManager, ExitStack
 from dataclasses import asdict
 from pathlib import Path
 from types import ModuleType
@@ -39,7 +39,8 @@ from veca_marl.processes.supervision import WorkerError
 from veca_marl.registry import unknown
 from veca_marl.runs.assembly import decide_precision, make_trainer
 from veca_marl.runs.continuation import RESUMABLE, may_change, resume_argument
-from veca_marl.runs.run_folder import RunFolder, locked, new_run, open_run
+from veca_marl.runs.lock import locked, remove_if_empty
+from veca_marl.runs.run_folder import RunFolder, new_run, writable_run
 from veca_marl.runs.training import TrainingResult, run_training
 from veca_marl.sweeps.plans import SweepError
 from veca_marl.sweeps.run_state import final_score
@@ -83,7 +84,7 @@ def run(node: DictConfig) -> float | None:
     path = Path(HydraConfig.get().runtime.output_dir)
     with ExitStack() as pending:
         try:
-            pending.enter_context(locked(path))
+            pending.enter_context(_lock(node, path))
             cfg, folder, trainer = set_up(node, path)
         except _CONFIGURATION_ERRORS as error:
             give_up(error)
@@ -95,6 +96,17 @@ def run(node: DictConfig) -> float | None:
     except ValueError as error:  # sweepers that only list combinations need none
         print(f"{path} has no score for the sweeper: {error}", file=sys.stderr)
         return None
+
+
+def _lock(node: DictConfig, path: Path) -> AbstractContextManager[None]:
+    """Return the lock on the folder of a run; that of an earlier one has to be a run first."""
+    if node.resume is not None:
+        try:
+            writable_run(path, "resume=")
+        except ConfigError:
+            remove_if_empty(path)  # Hydra creates what does not exist
+            raise
+    return locked(path)
 
 
 def _train(cfg: Config, folder: RunFolder, trainer: Trainer) -> TrainingResult:
@@ -126,7 +138,7 @@ def _continue(cfg: Config, path: Path) -> str:
 def set_up(node: DictConfig, path: Path) -> tuple[Config, RunFolder, Trainer]:
     """Return what starts or continues the run in `path`; a new folder is written last."""
     if node.resume is not None:
-        folder = open_run(path, "resume=")
+        folder = writable_run(path, "resume=")
         overrides = list(HydraConfig.get().overrides.task)
         stored = stored_node(folder, overrides)
         cfg = to_config(stored)

@@ -1,6 +1,7 @@
 """Files are complete or absent, and errors name them."""
 
 import os
+import re
 import resource
 from contextlib import contextmanager
 
@@ -8,7 +9,14 @@ import pytest
 from refusals import naming
 
 from veca_marl.algos import files
-from veca_marl.algos.files import WriteError, temporary_of, write_atomically
+from veca_marl.algos.files import (
+    WriteError,
+    left_behind,
+    new_temporary,
+    open_to_append,
+    write_atomically,
+    write_errors,
+)
 
 
 @contextmanager
@@ -65,9 +73,31 @@ def test_the_content_is_on_the_disk_before_it_replaces_the_file(tmp_path, monkey
     assert calls == ["fsync", "replace", "fsync"]  # the last one is that of the folder
 
 
-def test_what_a_killed_process_left_is_overwritten(tmp_path):
+def test_what_a_killed_process_left_is_found_by_the_name_of_the_file(tmp_path):
     path = tmp_path / "run.txt"
-    temporary_of(path).write_text("half of the con")
+    left = new_temporary(path)
+    left.write_text("half of the con")
+    of_earlier_versions = path.with_name(".run.txt.tmp")
+    for other in (of_earlier_versions, path.with_name(".notes.tmp"), path.with_name("run.txt.tmp")):
+        other.touch()
     write_atomically(path, "content")
     assert path.read_text() == "content"
-    assert list(tmp_path.iterdir()) == [path]
+    assert left_behind(tmp_path, re.compile(r"run\.txt")) == sorted([left, of_earlier_versions])
+
+
+def test_nothing_is_written_through_a_link(tmp_path):
+    """Neither one with the name of the file, nor one with the former name of the temporary file."""
+    own, path = tmp_path / "own.txt", tmp_path / "folder" / "run.txt"
+    own.write_text("own")
+    path.parent.mkdir()
+    for link in (path, path.with_name(".run.txt.tmp")):
+        link.symlink_to(own)
+    with pytest.raises(WriteError, match=naming(path, "link")), write_errors(path):
+        open_to_append(path)
+    write_atomically(path, "content")
+    assert (own.read_text(), path.read_text()) == ("own", "content")
+    assert not path.is_symlink()
+
+
+def test_a_temporary_file_has_a_name_that_cannot_be_foreseen(tmp_path):
+    assert len({new_temporary(tmp_path / "run.txt") for _ in range(9)}) == 9

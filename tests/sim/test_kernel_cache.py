@@ -4,6 +4,7 @@ import os
 import shutil
 import subprocess
 import sys
+import time
 from concurrent.futures import ThreadPoolExecutor
 
 import numba
@@ -46,16 +47,21 @@ class TinyPackage:
         (self.folder / name).write_text(SOURCES[name].format(**values))
         self.folder.chmod(0o555)
 
-    def call(self, **environment):
-        """Return the value, the hits and the misses of the cache of one call in a new process."""
+    def words(self, before=""):
+        """Return the command that calls a kernel, after some other lines."""
+        return [sys.executable, "-B", "-c", f"{before}\n{PROGRAM}"]
+
+    def environment(self, **others):
         folders = {"XDG_CACHE_HOME": str(self.cache), "TMPDIR": str(self.root)}
+        of_package = {"PYTHONPATH": str(self.folder.parent), "NUMBA_CACHE_DIR": ""}
+        return os.environ | of_package | folders | others
+
+    def call(self, before="", **environment):
+        """Return the value, the hits and the misses of the cache of one call in a new process."""
         done = subprocess.run(
-            [sys.executable, "-B", "-c", PROGRAM],
+            self.words(before),
             cwd=self.root,
-            env=os.environ
-            | {"PYTHONPATH": str(self.folder.parent), "NUMBA_CACHE_DIR": ""}
-            | folders
-            | environment,
+            env=self.environment(**environment),
             capture_output=True,
             text=True,
         )
@@ -151,3 +157,121 @@ def test_the_digest_depends_on_names_and_contents(tmp_path):
     assert len(digests) == 5
     (tmp_path / "notes.txt").touch()
     assert source_digest(tmp_path) in digests
+
+
+def entries(tiny, kind):
+    return sorted((tiny.cache / "veca_marl" / "kernels").rglob(f"*.{kind}"))
+
+
+def cut(path):
+    path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
+
+
+def change_a_byte(path):
+    content = bytearray(path.read_bytes())
+    content[len(content) // 2] ^= 1
+    path.write_bytes(content)
+
+
+DAMAGES = {
+    "cut": cut,
+    "empty": lambda path: path.write_bytes(b""),
+    "changed": change_a_byte,
+    "foreign": lambda path: path.write_bytes(b"text"),
+}
+
+
+QUICK = (("empty", "nbi"), ("cut", "nbc"))
+
+
+@pytest.mark.parametrize(
+    ("damage", "kind"),
+    [
+        pytest.param(damage, kind, marks=() if (damage, kind) in QUICK else pytest.mark.slow)
+        for damage in DAMAGES
+        for kind in ("nbi", "nbc")
+    ],
+)
+def test_a_damaged_entry_is_named_and_compiled_again(tiny, kind, damage):
+    assert tiny.call() == (1, 0, 1)
+    for path in entries(tiny, kind):
+        DAMAGES[damage](path)
+    damaged = next(path for path in entries(tiny, kind) if path.name.startswith("caller"))
+    assert tiny.call() == (1, 0, 1)
+    assert str(damaged) in tiny.messages
+    assert tiny.call() == (1, 1, 0)
+    assert not tiny.messages
+
+
+NO_ROOM = """
+import errno, os, tempfile
+def refuse(*_, **__):
+    raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+"""
+REFUSALS = {
+    "a new folder": "os.makedirs = os.mkdir = refuse\n",
+    "a file of the cache": (
+        "from numba.core.caching import IndexDataCacheFile\n"
+        "IndexDataCacheFile._save_data = refuse\n"
+    ),
+    "any temporary file": "tempfile.TemporaryFile = tempfile.mkdtemp = refuse\n",
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("refusal", REFUSALS.values(), ids=REFUSALS)
+def test_on_a_full_disk_kernels_are_compiled_without_a_cache(tiny, refusal):
+    assert tiny.call(before=NO_ROOM + refusal) == (1, 0, 1)
+    assert "not cached" in tiny.messages
+    assert tiny.call() == (1, 0, 1)
+    assert not tiny.messages
+    assert tiny.call() == (1, 1, 0)
+
+
+SLOW_COMPILER = """
+import time
+from pathlib import Path
+from numba.core.compiler import CompilerBase
+compile_extra = CompilerBase.compile_extra
+def slowly(self, function):
+    with Path("compiled").open("a") as file:
+        file.write(function.__name__ + "\\n")
+    time.sleep(2.0)
+    return compile_extra(self, function)
+CompilerBase.compile_extra = slowly
+"""
+
+
+def test_of_processes_that_start_together_one_compiles(tiny):
+    with ThreadPoolExecutor() as pool:
+        calls = [pool.submit(tiny.call, before=SLOW_COMPILER) for _ in range(3)]
+    assert [call.result()[0] for call in calls] == [1, 1, 1]
+    assert sorted((tiny.root / "compiled").read_text().split()) == ["called", "caller"]
+
+
+def test_a_process_that_was_killed_while_it_compiled_is_not_waited_for(tiny):
+    first = subprocess.Popen(
+        tiny.words(SLOW_COMPILER.replace("2.0", "600.0")), cwd=tiny.root, env=tiny.environment()
+    )
+    while not (tiny.root / "compiled").exists():
+        time.sleep(0.05)
+    with ThreadPoolExecutor() as pool:
+        second = pool.submit(tiny.call)
+        time.sleep(1.0)
+        first.kill()
+        first.wait()
+        assert second.result() == (1, 0, 1)
+
+
+@pytest.mark.slow
+def test_a_process_that_hangs_is_waited_for_only_so_long(tiny):
+    first = subprocess.Popen(
+        tiny.words(SLOW_COMPILER.replace("2.0", "600.0")), cwd=tiny.root, env=tiny.environment()
+    )
+    while not (tiny.root / "compiled").exists():
+        time.sleep(0.05)
+    shorter = "import tiny.kernel_cache\ntiny.kernel_cache._LONGEST_WAIT_S = 0.5\n"
+    assert tiny.call(before=shorter) == (1, 0, 1)
+    assert "waiting" in tiny.messages
+    first.kill()
+    first.wait()

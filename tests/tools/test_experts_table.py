@@ -20,7 +20,7 @@ from veca_marl.envs.core.expert import Expert, find_expert
 from veca_marl.envs.core.game import Game
 from veca_marl.envs.core.game_cfg import Script
 from veca_marl.processes.supervision import WorkerError
-from veca_marl.runs.run_folder import locked
+from veca_marl.runs.lock import locked
 from veca_marl.sim.physics import PropCfg
 
 BENCHMARK = ROOT / "experiments" / "experts" / "benchmark"

@@ -19,7 +19,8 @@ from veca_marl.envs.core.expert import has_expert
 from veca_marl.envs.core.game_cfg import Script
 from veca_marl.envs.core.task import TASKS
 from veca_marl.processes.supervision import WorkerError
-from veca_marl.runs.run_folder import checkout_commit, locked
+from veca_marl.runs.lock import locked
+from veca_marl.runs.run_folder import checkout_commit
 
 
 @dataclass

@@ -3,100 +3,49 @@
 from __future__ import annotations
 
 import io
-import pickle
+import re
+import reprlib
 import signal
 import threading
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, fields, is_dataclass
 from enum import Enum
 from pathlib import Path
-from typing import Any, TypeVar, get_type_hints
+from types import UnionType
+from typing import Any, TypeVar, Union, get_args, get_origin, get_type_hints
 
 import torch
 
-from veca_marl.algos.files import WriteError, write_atomically
+from veca_marl.algos.checkpoint_files import (
+    FORMAT,
+    CheckpointError,
+    load_errors,
+    load_file,
+    map_checkpoint,
+    read_checkpoint,
+)
+from veca_marl.algos.files import WriteError, left_behind, write_atomically
 from veca_marl.algos.specs import TeamSpec
-from veca_marl.migrations import CONFIG_VERSION, KEY, VersionError, migrated_checkpoint
+from veca_marl.migrations import CONFIG_VERSION, KEY
 
-# 3: actions have named parts, and each team an algorithm of its own
-FORMAT = 3
-_KEYS = {"identity", "config", "algorithms", "state"}
-_CPU = torch.device("cpu")
-# what torch.load raises for files that are cut off or have other content
-_UNREADABLE = (RuntimeError, EOFError, pickle.UnpicklingError, ValueError, KeyError, TypeError)
-
-
-class CheckpointError(RuntimeError):
-    """A checkpoint that cannot be written, read, or used here."""
-
-
-def read_checkpoint(path: Path, device: torch.device) -> dict[str, Any]:
-    """Return everything that is in the file of a checkpoint.
-
-    Raises:
-        CheckpointError: If it cannot be read, or is not a checkpoint of this version.
-    """
-    return _checked(path, load_file(path, device))
-
-
-def map_checkpoint(path: Path) -> dict[str, Any]:
-    """Return what `read_checkpoint` returns; of its tensors, the disk is read when they are used.
-
-    A replay buffer in a checkpoint thus takes neither memory nor time where only a network is
-    wanted. The file has to stay as it is until the tensors have been copied.
-
-    Raises:
-        CheckpointError: See `read_checkpoint`.
-    """
-    return _checked(path, _load(path, map_location=_CPU, mmap=True))
-
-
-def _checked(path: Path, content: Any) -> dict[str, Any]:
-    """Return the content of a file, in the form of this version, if it is a checkpoint of it."""
-    if not isinstance(content, dict) or "format" not in content:
-        raise CheckpointError(f"{path} is not a checkpoint of a run")
-    if content["format"] != FORMAT:
-        raise CheckpointError(
-            f"{path} has format {content['format']}, this version reads format {FORMAT}"
-        )
-    missing = sorted(_KEYS - set(content))
-    if missing:
-        raise CheckpointError(f"{path} is incomplete: no {', '.join(missing)}")
-    try:
-        return migrated_checkpoint(content)
-    except VersionError as error:
-        raise CheckpointError(f"{path}: {error}") from error
-
-
-def load_file(path: Path, device: torch.device) -> Any:
-    """Return the tensors and plain data in a file that `torch.save` wrote.
-
-    Raises:
-        CheckpointError: If it cannot be read.
-    """
-    return _load(path, map_location=device)
-
-
-def _load(path: Path, **options: Any) -> Any:
-    try:
-        return torch.load(path, weights_only=True, **options)
-    except FileNotFoundError as error:
-        raise CheckpointError(f"{path} does not exist") from error
-    except (OSError, *_UNREADABLE) as error:
-        reason = str(error).partition("\n")[0] or type(error).__name__
-        raise CheckpointError(f"cannot read {path} (cut off or no checkpoint): {reason}") from error
-
-
-@contextmanager
-def load_errors(path: Path) -> Iterator[None]:
-    """Raise `CheckpointError` where a state that is loaded inside the block does not fit."""
-    try:
-        yield
-    except (RuntimeError, KeyError, TypeError, ValueError) as error:
-        reason = " ".join(str(error).split())
-        raise CheckpointError(f"{path} does not fit: {type(error).__name__}: {reason}") from error
-
+__all__ = [
+    "FORMAT",
+    "CheckpointError",
+    "Checkpoints",
+    "Identity",
+    "check_config",
+    "check_identity",
+    "checkpoints_in",
+    "from_plain",
+    "interrupts_wait",
+    "load_errors",
+    "load_file",
+    "map_checkpoint",
+    "read_checkpoint",
+    "spec_differences",
+    "to_plain",
+]
 
 _ABSENT = "absent"
 
@@ -125,24 +74,49 @@ def check_identity(path: Path, stored: dict[str, Any], wanted: dict[str, Any]) -
         CheckpointError: If the checkpoint at `path` is of another task or other specs.
     """
     if stored["task"] != wanted["task"]:
-        raise CheckpointError(f"{path} is of task {stored['task']}, wanted: {wanted['task']}")
-    differing = [
-        f"{name}: {in_file} in the checkpoint, {in_run} in this run"
-        for name, in_file, in_run in _differences(stored["specs"], wanted["specs"])
-    ]
-    if differing:
-        raise CheckpointError(f"{path} was made for other specs: {'; '.join(differing)}")
+        raise CheckpointError(
+            f"{path} is of task {_shown(stored['task'])}, wanted: {wanted['task']}"
+        )
+    if differing := _in_words(stored["specs"], wanted["specs"]):
+        raise CheckpointError(f"{path} was made for other specs: {differing}")
 
 
 def spec_differences(stored: dict[str, Any], spec: TeamSpec) -> str:
     """Return how a stored specification differs from `spec`; empty if it does not."""
-    return "; ".join(
-        f"{name}: {in_file} in the checkpoint, {in_run} in this run"
-        for name, in_file, in_run in _differences(stored, spec.to_dict())
+    return _in_words(stored, spec.to_dict())
+
+
+def _in_words(stored: dict[str, Any], wanted: dict[str, Any]) -> str:
+    return _listed(
+        f"{name}: {_shown(in_file)} in the checkpoint, {_shown(in_run)} in this run"
+        for name, in_file, in_run in _differences(stored, wanted)
     )
 
 
+_MOST_LISTED = 8
+
+
+def _listed(texts: Iterable[str]) -> str:
+    every = list(texts)
+    more = f"; and {len(every) - _MOST_LISTED} more" if len(every) > _MOST_LISTED else ""
+    return "; ".join(every[:_MOST_LISTED]) + more
+
+
+_BRIEF = reprlib.Repr()
+_BRIEF.maxstring = _BRIEF.maxother = 80
+_BRIEF.maxlevel = 2
+
+
+def _shown(value: Any) -> str:
+    """Return a value as it is written in a message: a stored one may have any size."""
+    return value if isinstance(value, str) and len(value) <= 80 else _BRIEF.repr(value)
+
+
 def _differences(one: Any, other: Any, name: str = "") -> list[tuple[str, Any, Any]]:
+    """Return the dotted key, and both values, wherever two plain values differ.
+
+    Lists of mappings, such as the props of a playground, are compared element by element.
+    """
     if isinstance(one, dict) and isinstance(other, dict):
         return [
             found
@@ -151,7 +125,19 @@ def _differences(one: Any, other: Any, name: str = "") -> list[tuple[str, Any, A
                 one.get(key, _ABSENT), other.get(key, _ABSENT), f"{name}.{key}".lstrip(".")
             )
         ]
+    if _has_mappings(one) and _has_mappings(other):
+        if len(one) != len(other):
+            return [(name, f"{len(one)} entries", f"{len(other)} entries")]
+        return [
+            found
+            for index, (before, now) in enumerate(zip(one, other, strict=True))
+            for found in _differences(before, now, f"{name}.{index}")
+        ]
     return [] if one == other else [(name, one, other)]
+
+
+def _has_mappings(value: Any) -> bool:
+    return isinstance(value, list) and any(isinstance(entry, dict) for entry in value)
 
 
 def check_config(
@@ -159,38 +145,37 @@ def check_config(
     stored: dict[str, Any],
     config: dict[str, Any],
     may_change: Collection[str],
-    by_team: Collection[str] = (),
+    is_default: Callable[[str], bool],
 ) -> None:
-    """Check that a configuration is the stored one; fields of newer versions are ignored.
+    """Check that a configuration is the stored one.
+
+    A field that the stored one does not have is one of a newer version: with its default value,
+    it is no difference.
 
     Args:
         path: The checkpoint.
         stored: Its configuration as plain data.
         config: That of the run that is to continue.
         may_change: First parts of the keys in which they may differ.
-        by_team: Keys of mappings from the names of teams: an entry that the stored ones do not
-            have is a difference.
+        is_default: Whether a dotted key of `config` is a field, with its default value.
 
     Raises:
-        CheckpointError: If they differ elsewhere.
+        CheckpointError: If they differ elsewhere; the message names the keys that do.
     """
     differing = [
-        f"{name} was {before}, is {now}"
+        f"{name} was {_shown(before)}, is {_shown(now)}"
         for name, before, now in _differences(stored, config)
-        if (before != _ABSENT or _is_entry(name, by_team))
-        and name.partition(".")[0] not in may_change
+        if name.partition(".")[0] not in may_change and not (before == _ABSENT and is_default(name))
     ]
     if differing:
         raise CheckpointError(
-            f"{path} is of another configuration: {'; '.join(differing)}; "
+            f"{path} is of another configuration: {_listed(differing)}; "
             f"a resumed run may change {', '.join(may_change) or 'nothing'}"
         )
 
 
-def _is_entry(name: str, mappings: Collection[str]) -> bool:
-    """Return whether a key is that of an entry of one of some mappings."""
-    mapping, _, entry = name.partition(".")
-    return mapping in mappings and "." not in entry
+def _of_a_newer_version(key: str) -> bool:
+    return True
 
 
 _DELAYED = [
@@ -221,6 +206,16 @@ def interrupts_wait() -> Iterator[None]:
         signal.raise_signal(number)
 
 
+_BEST = "best.pt"
+_BY_FRAMES = re.compile(r"frames_(\d{12,})\.pt", re.ASCII)
+_NAMES = re.compile(f"{_BY_FRAMES.pattern}|{re.escape(_BEST)}", re.ASCII)
+
+
+def checkpoints_in(folder: Path) -> list[Path]:
+    """Return the checkpoints in a folder by their frames, in ascending order, without the best."""
+    return sorted(path for path in folder.glob("frames_*.pt") if _BY_FRAMES.fullmatch(path.name))
+
+
 class Checkpoints:
     """The checkpoints of one run.
 
@@ -233,7 +228,8 @@ class Checkpoints:
         config: The run's configuration as plain data.
         keep_last: Number of the latest that are kept, beside the best one.
         may_change: Keys of `config` in which a checkpoint that is loaded may differ from it.
-        by_team: Keys of `config` that are mappings from the names of teams.
+        is_default: Whether a key of `config` that a checkpoint does not have is a field with its
+            default value, see `check_config`. By default, every such key is one.
     """
 
     def __init__(
@@ -243,10 +239,10 @@ class Checkpoints:
         config: dict[str, Any],
         keep_last: int = 3,
         may_change: Collection[str] = (),
-        by_team: Collection[str] = (),
+        is_default: Callable[[str], bool] = _of_a_newer_version,
     ) -> None:
         self.folder, self.identity, self.config = folder, identity, config
-        self.keep_last, self.may_change, self.by_team = keep_last, may_change, by_team
+        self.keep_last, self.may_change, self.is_default = keep_last, may_change, is_default
 
     def save(
         self,
@@ -284,7 +280,7 @@ class Checkpoints:
             file = io.BytesIO()
             torch.save(content, file)
             if best:  # first: a run that is killed in between writes both again
-                self._write(file.getbuffer(), self.folder / "best.pt")
+                self._write(file.getbuffer(), self.folder / _BEST)
             self._write(file.getbuffer(), path)
         self.remove_old()
         return path
@@ -306,7 +302,7 @@ class Checkpoints:
                 f"{error}; remove it to continue from {earlier[-1].name}"
             ) from error
         check_identity(path, content["identity"], self.identity.to_dict())
-        check_config(path, content["config"], self.config, self.may_change, self.by_team)
+        check_config(path, content["config"], self.config, self.may_change, self.is_default)
         state: dict[str, Any] = content["state"]
         return state
 
@@ -320,7 +316,7 @@ class Checkpoints:
         for old in self._files()[: -self.keep_last]:
             old.unlink()
         if self.folder is not None:
-            for unfinished in self.folder.glob(".*.tmp"):
+            for unfinished in left_behind(self.folder, _NAMES):
                 unfinished.unlink()
 
     def latest(self) -> Path:
@@ -335,7 +331,7 @@ class Checkpoints:
         return files[-1]
 
     def _files(self) -> list[Path]:
-        return [] if self.folder is None else sorted(self.folder.glob("frames_*.pt"))
+        return [] if self.folder is None else checkpoints_in(self.folder)
 
     def _write(self, content: memoryview, path: Path) -> None:
         try:
@@ -371,13 +367,16 @@ def from_plain(kind: type[T], plain: dict[str, Any], find: Callable[[type, str],
             their defaults.
 
     Raises:
-        ValueError: If a field is unknown.
+        ValueError: If a field is unknown, or a value is not of its type.
     """
-    actual = find(kind, plain["name"]) if "name" in plain else kind
+    actual: Any = find(kind, plain["name"]) if "name" in plain else kind
     hints = get_type_hints(actual)
-    unknown = sorted(set(plain) - set(hints))
+    unknown = sorted(set(plain) - {field.name for field in fields(actual)})
     if unknown:
         raise ValueError(f"{actual.__name__} has no fields {unknown}")
+    for name, value in plain.items():
+        if not _fits(hints[name], value):
+            raise ValueError(f"{actual.__name__}.{name}={value!r:.80} is of another type")
     values = {name: _restore(hints[name], value, find) for name, value in plain.items()}
     made: T = actual(**values)
     return made
@@ -389,3 +388,23 @@ def _restore(hint: Any, value: Any, find: Callable[[type, str], type]) -> Any:
     if is_dataclass(hint) and isinstance(hint, type):
         return from_plain(hint, value, find)
     return value
+
+
+def _fits(hint: Any, value: Any) -> bool:
+    """Return whether `to_plain` can have made `value` of a value with the annotation `hint`."""
+    origin, parts = get_origin(hint), get_args(hint)
+    if origin in (Union, UnionType):
+        return any(_fits(part, value) for part in parts)
+    if origin in (list, tuple, Sequence):
+        return isinstance(value, list) and all(_fits(parts[0], each) for each in value)
+    if origin in (dict, Mapping):
+        return isinstance(value, dict) and all(_fits(parts[1], each) for each in value.values())
+    if hint is float:
+        return type(value) in (int, float)
+    if hint is int:
+        return type(value) is int
+    if hint is Any or not isinstance(hint, type):
+        return True
+    if issubclass(hint, Enum):
+        return isinstance(value, str) and value in hint.__members__
+    return isinstance(value, dict if is_dataclass(hint) else hint)

@@ -1,13 +1,19 @@
-"""Files that are complete or absent, and errors that name the file and, if it is full, its disk."""
+"""Files that are complete or absent, and errors that name the file and, if it is full, its disk.
+
+Nothing is written through a symbolic link: a folder of somebody else could lead to any file.
+"""
 
 from __future__ import annotations
 
 import errno
 import os
+import re
+import secrets
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import TextIO, cast
 
 Content = bytes | memoryview
 DISK_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
@@ -21,7 +27,8 @@ class WriteError(RuntimeError):
 def write_atomically(path: Path, content: Content | str) -> None:
     """Write a file so that it has either the new content or the old one, also after a power cut.
 
-    The content goes to a temporary file beside it, which replaces it when it is on the disk.
+    The content goes to a temporary file beside it, which replaces it when it is on the disk. A
+    symbolic link is replaced; what it leads to stays as it is.
 
     Args:
         path: The file; missing folders are created.
@@ -31,9 +38,8 @@ def write_atomically(path: Path, content: Content | str) -> None:
         WriteError: If it cannot be written; the file is unchanged, no temporary file is left.
     """
     data = content.encode() if isinstance(content, str) else content
-    temporary = temporary_of(path)
     with write_errors(path, len(data)):
-        path.parent.mkdir(parents=True, exist_ok=True)
+        temporary = new_temporary(path)
         try:
             with temporary.open("wb") as file:
                 file.write(data)
@@ -45,9 +51,56 @@ def write_atomically(path: Path, content: Content | str) -> None:
         _sync_folder(path.parent)
 
 
-def temporary_of(path: Path) -> Path:
-    """Return the file that becomes `path` when it is complete; a killed process may leave it."""
-    return path.with_name(f".{path.name}.tmp")
+def new_temporary(path: Path) -> Path:
+    """Create an empty file that becomes `path` when it is complete; a killed process may leave it.
+
+    Its name cannot be foreseen, and it is created by this call, or the call fails: no file, and no
+    link to one, can lie there before.
+
+    Args:
+        path: The file that is to be written; missing folders are created.
+
+    Raises:
+        OSError: If it cannot be created.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    temporary = path.with_name(f".{path.name}.{secrets.token_hex(4)}.tmp")
+    os.close(os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL | _NOT_A_LINK, 0o666))
+    return temporary
+
+
+_NOT_A_LINK = getattr(os, "O_NOFOLLOW", 0)
+_TEMPORARY = re.compile(r"\.(.+?)(\.[0-9a-f]{8})?\.tmp")  # of earlier versions without digits
+
+
+def left_behind(folder: Path, names: re.Pattern[str]) -> list[Path]:
+    """Return the temporary files that killed processes have left in a folder.
+
+    Args:
+        folder: The folder, which may be missing.
+        names: Names of the files that were to be written.
+    """
+    if not folder.is_dir():
+        return []
+    files = [(_TEMPORARY.fullmatch(path.name), path) for path in sorted(folder.iterdir())]
+    return [path for name, path in files if name and names.fullmatch(name.group(1))]
+
+
+def open_to_append(path: Path, mode: str = "a") -> TextIO:
+    """Open a text file itself, never what a symbolic link leads to, and without waiting for it.
+
+    Args:
+        path: The file, which is created if it is absent.
+        mode: ``a``, or ``a+`` to read it too.
+
+    Raises:
+        OSError: If it is a symbolic link, or cannot be opened.
+    """
+    return cast(TextIO, open(path, mode, newline="", opener=_open_in_place))
+
+
+def _open_in_place(path: str, flags: int) -> int:
+    return os.open(path, flags | _NOT_A_LINK | getattr(os, "O_NONBLOCK", 0), 0o666)
 
 
 @contextmanager
@@ -62,7 +115,10 @@ def write_errors(path: Path, size: int = 0) -> Iterator[None]:
         yield
     except OSError as error:
         space = _space(path, size) if error.errno in DISK_FULL else ""
-        raise WriteError(f"cannot write {path}: {error.strerror or error}{space}") from error
+        # the system's own words speak of too many levels
+        is_link = error.errno == errno.ELOOP and path.is_symlink()
+        reason = "it is a symbolic link" if is_link else error.strerror or error
+        raise WriteError(f"cannot write {path}: {reason}{space}") from error
 
 
 def _space(path: Path, size: int) -> str:

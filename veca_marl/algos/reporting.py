@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 import csv
-import io
 import math
 import os
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from enum import Enum
 from importlib.util import find_spec
+from io import StringIO
 from pathlib import Path
 from typing import Any, Protocol
 
 from torchrl.record.loggers import Logger, MLFlowLogger, TensorboardLogger, WandbLogger
 
-from veca_marl.algos.files import WriteError, write_atomically, write_errors
+from veca_marl.algos.files import WriteError, open_to_append, write_atomically, write_errors
+from veca_marl.stored_files import read_text
 
 Row = Mapping[str, float | int | str]
 
@@ -96,7 +98,7 @@ class CsvReporter:
             _add_columns(path, added)
         cells = {name: _cell(value) for name, value in full.items()}
         row_text = _table([*columns, *added], [cells], header=not columns)
-        with write_errors(path), path.open("a", newline="") as file:
+        with write_errors(path), open_to_append(path) as file:
             file.write(row_text)
         self._columns[kind] = [*columns, *added]
 
@@ -104,7 +106,7 @@ class CsvReporter:
         """See `Reporter`."""
         for path in (self._folder / f"{kind}.csv" for kind in self.KINDS):
             if path.exists():
-                with write_errors(path), path.open("a") as file:
+                with write_errors(path), open_to_append(path) as file:
                     os.fsync(file.fileno())
 
     def close(self) -> None:
@@ -147,14 +149,14 @@ def _columns(path: Path) -> list[str]:
     """Return the names in the first line of a table; nothing if there is no such file."""
     if not path.exists():
         return []
-    with write_errors(path), path.open(newline="") as file:
-        return next(csv.reader(file), [])
+    with _table_errors(path):
+        return next(csv.reader(StringIO(read_text(path), newline="")), [])
 
 
 def _add_columns(path: Path, names: Sequence[str]) -> None:
     """Add columns to a table, which are blank in its rows."""
-    with write_errors(path), path.open(newline="") as file:
-        reader = csv.DictReader(file)
+    with _table_errors(path):
+        reader = csv.DictReader(StringIO(read_text(path), newline=""))
         rows = list(reader)
     write_atomically(path, _table([*(reader.fieldnames or []), *names], rows, header=True))
 
@@ -168,7 +170,7 @@ def _cell(value: float | int | str) -> str | int:
 
 
 def _table(columns: Iterable[str], rows: Iterable[Mapping[str, Any]], header: bool) -> str:
-    text = io.StringIO(newline="")
+    text = StringIO(newline="")
     writer = csv.DictWriter(text, list(columns))
     if header:
         writer.writeheader()
@@ -176,18 +178,29 @@ def _table(columns: Iterable[str], rows: Iterable[Mapping[str, Any]], header: bo
     return text.getvalue()
 
 
+@contextmanager
+def _table_errors(path: Path) -> Iterator[None]:
+    """Raise `WriteError` where a stored table cannot be read: it is to be continued."""
+    try:
+        yield
+    except (KeyError, TypeError, ValueError, csv.Error) as error:
+        reason = str(error) if isinstance(error, ValueError) else repr(error)
+        named = reason if str(path) in reason else f"{path} is damaged ({reason})"
+        raise WriteError(f"{named}: move it away to continue") from error
+
+
 def _drop_rows_after(path: Path, frames: int) -> None:
     """Keep the rows up to `frames`, without a row that was cut off while it was written."""
     if not path.exists():
         return
-    whole, end, _ = path.read_text().rpartition("\n")
-    if frames and not end:
-        raise WriteError(f"{path} is damaged (no line is complete): move it away to continue")
-    reader = csv.DictReader(whole.splitlines())
-    try:
+    with _table_errors(path):
+        whole, end, _ = read_text(path).rpartition("\n")
+        if frames and not end:
+            raise ValueError("no line is complete")
+        reader = csv.DictReader(whole.splitlines())
         kept = [row for row in reader if frames and int(row["frames"]) <= frames]
-    except (KeyError, TypeError, ValueError) as error:
-        raise WriteError(f"{path} is damaged ({error!r}): move it away to continue") from error
+        if any(None in row or None in row.values() for row in kept):
+            raise ValueError("a row has another number of cells than the head")
     if kept:
         write_atomically(path, _table(reader.fieldnames or [], kept, header=True))
     else:

@@ -26,6 +26,7 @@ from veca_marl.algos.checkpoints import CheckpointError, load_errors, load_file
 from veca_marl.algos.evaluation.evaluate import Exploration, Scores, evaluate
 from veca_marl.algos.files import WriteError, write_atomically
 from veca_marl.algos.policy import Policy
+from veca_marl.algos.training.finite import check_stored
 from veca_marl.algos.training.learners import TeamLearners
 
 _DIGITS = 12  # of the frames in the name of a file
@@ -74,6 +75,7 @@ class Pool:
         path = self._path(team, frames)
         state = load_file(path, torch.device("cpu"))
         with load_errors(path):
+            check_stored(state)
             actor.load_state_dict(state)
 
     def _path(self, team: str, frames: int) -> Path:

@@ -89,13 +89,40 @@ class TeamSpec:
 
     @classmethod
     def from_dict(cls, plain: Mapping[str, Any]) -> TeamSpec:
-        """Return what `to_dict` was called on."""
-        observations = {
-            sense: ArrayLayout(**{**layout, "shape": tuple(layout["shape"])})
-            for sense, layout in plain["observations"].items()
-        }
-        actions = {part: ActionLayout(**layout) for part, layout in plain["actions"].items()}
-        return cls(**{**plain, "observations": observations, "actions": actions})
+        """Return what `to_dict` was called on.
+
+        Raises:
+            ValueError: If it is something else.
+        """
+        try:
+            observations = {
+                sense: ArrayLayout(**{**layout, "shape": tuple(layout["shape"])})
+                for sense, layout in plain["observations"].items()
+            }
+            actions = {part: ActionLayout(**layout) for part, layout in plain["actions"].items()}
+            spec = cls(**{**plain, "observations": observations, "actions": actions})
+        except (LookupError, TypeError, AttributeError) as error:
+            raise ValueError(f"no specification: {error!r}") from error
+        spec._check_types()
+        return spec
+
+    def _check_types(self) -> None:
+        sizes = [self.agents, *(part.size for part in self.actions.values())]
+        sizes += [length for array in self.observations.values() for length in array.shape]
+        bounds = [bound for a in self.observations.values() for bound in (a.low, a.high)]
+        flags = [self.masked, *(part.discrete for part in self.actions.values())]
+        dtypes = [array.dtype for array in self.observations.values()]
+        kinds: list[tuple[list[Any], tuple[type, ...]]] = [
+            (sizes, (int,)),
+            (bounds, (int, float)),
+            (flags, (bool,)),
+            (dtypes, (str,)),
+        ]
+        for values, kind in kinds:
+            if wrong := [value for value in values if type(value) not in kind]:
+                raise ValueError(f"no specification: {wrong[0]!r:.80}, and no {kind[-1].__name__}")
+        if min(sizes) < 0:
+            raise ValueError(f"no specification: {min(sizes)} in place of a size")
 
 
 def action_key(team: str, part: str) -> tuple[str, ...]:

@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+import math
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import torch
 from tensordict.nn import TensorDictModuleBase
 from torch import nn
+from torch.utils._python_dispatch import TorchDispatchMode
 
 from veca_marl.algos.algorithm import ALGORITHMS, Algorithm, AlgorithmCfg, make_algorithm
+from veca_marl.algos.checkpoint_files import Verify
 from veca_marl.algos.checkpoints import (
     CheckpointError,
+    checkpoints_in,
     from_plain,
     load_errors,
     map_checkpoint,
@@ -23,6 +28,7 @@ from veca_marl.algos.networks.encoders import for_acting
 from veca_marl.algos.networks.factory import NETWORKS, NetworkCfg
 from veca_marl.algos.sense_encoders import sense_encoders
 from veca_marl.algos.specs import TeamSpec
+from veca_marl.algos.training.finite import check_stored
 from veca_marl.algos.training.learners import TeamLearners
 
 
@@ -37,9 +43,8 @@ def load_actor(path: Path, team: str, spec: TeamSpec) -> TensorDictModuleBase:
     Raises:
         CheckpointError: If there is no such checkpoint, or it does not hold this team.
     """
-    algorithm, content = _make(path, team, spec)
-    with load_errors(path):
-        algorithm.actor.load_state_dict(content["state"]["actors"][team])
+    algorithm, stored = _make(path, team, spec)
+    _load_actor(path, algorithm, stored, team)
     return for_acting(algorithm.actor.requires_grad_(False))
 
 
@@ -54,9 +59,9 @@ def load_learnt(path: Path, team: str, spec: TeamSpec) -> Algorithm:
     Raises:
         CheckpointError: See `load_actor`.
     """
-    algorithm, content = _make(path, team, spec)
+    algorithm, stored = _make(path, team, spec)
     with load_errors(path):
-        algorithm.load_learnt(content["state"]["algorithm"][team])
+        algorithm.load_learnt(_Checked(stored.state["algorithm"][team], stored.check))
     return algorithm
 
 
@@ -73,10 +78,62 @@ def load_encoders(path: Path, team: str) -> dict[str, list[nn.Module]]:
     Raises:
         CheckpointError: If there is no such checkpoint, or it does not hold this team.
     """
-    algorithm, content = _make(path, team, None)
-    with load_errors(path):
-        algorithm.actor.load_state_dict(content["state"]["actors"][team])
+    algorithm, stored = _make(path, team, None)
+    _load_actor(path, algorithm, stored, team)
     return sense_encoders(algorithm.actor)
+
+
+def _load_actor(path: Path, algorithm: Algorithm, stored: _Stored, team: str) -> None:
+    with load_errors(path):
+        state = stored.state["actors"][team]
+        stored.check(state)
+        algorithm.actor.load_state_dict(state)
+
+
+@dataclass(frozen=True)
+class _Stored:
+    """The state in the file of a checkpoint.
+
+    Attributes:
+        state: Its content; each entry has to be checked before it is used.
+        verify: See `map_checkpoint`.
+    """
+
+    state: Mapping[str, Any]
+    verify: Verify
+
+    def check(self, entry: Any) -> None:
+        """Check that the numbers in an entry are those that were stored, and finite."""
+        self.verify(entry)
+        check_stored({"state": entry})
+
+
+class _Checked(dict[str, Any]):
+    """A state whose entries are checked when they are taken: of a large file, the others stay.
+
+    Args:
+        state: The entries.
+        check: Raises an exception for a damaged one.
+    """
+
+    def __init__(self, state: Mapping[str, Any], check: Callable[[Any], None]) -> None:
+        super().__init__(state)
+        self._check = check
+
+    def __getitem__(self, key: str) -> Any:
+        entry = super().__getitem__(key)
+        self._check(entry)
+        return entry
+
+    def get(self, key: str, default: Any = None) -> Any:
+        """Return an entry, checked, or the default."""
+        if key not in self:
+            return default
+        return self[key]
+
+    def items(self) -> Any:
+        """Return all entries, checked."""
+        return [(key, self[key]) for key in self]
 
 
 def teams_learnt(path: Path) -> list[str]:
@@ -85,29 +142,67 @@ def teams_learnt(path: Path) -> list[str]:
     Raises:
         CheckpointError: If there is no such checkpoint.
     """
-    return sorted(map_checkpoint(_file(path))["algorithms"])
+    return sorted(map_checkpoint(_file(path))[0]["algorithms"])
 
 
-def _make(path: Path, team: str, spec: TeamSpec | None) -> tuple[Algorithm, dict[str, Any]]:
-    """Return the algorithm of a team, not yet loaded, and the content of the checkpoint.
+def _make(path: Path, team: str, spec: TeamSpec | None) -> tuple[Algorithm, _Stored]:
+    """Return the algorithm of a team, not yet loaded, and the state in the checkpoint.
 
     Args:
         path: See `load_actor`.
         team: Name of the team there.
         spec: What its arrays have to be; None for any.
     """
-    content = map_checkpoint(_file(path))
+    file = _file(path)
+    content, verify = map_checkpoint(file)
     stored, learnt = content["identity"]["specs"], content["algorithms"]
-    if team not in learnt:
+    if team not in learnt or team not in stored:
         raise CheckpointError(f"{path} has learnt the teams {sorted(learnt)}, not {team!r}")
     if spec is not None and (differing := spec_differences(stored[team], spec)):
         raise CheckpointError(f"{path}: team {team!r} has other specs there: {differing}")
     spec = spec or TeamSpec.from_dict(stored[team])
     try:
-        cfg = from_plain(AlgorithmCfg, learnt[team], _find_type)
-        return make_algorithm(team, spec, cfg, torch.device("cpu")), content
-    except ValueError as error:
-        raise CheckpointError(f"{path}: team {team!r}: {error}") from error
+        with load_errors(path), _Allocations(file.stat().st_size):
+            cfg = from_plain(AlgorithmCfg, learnt[team], _find_type)
+            algorithm = make_algorithm(team, spec, cfg, torch.device("cpu"))
+    except CheckpointError as error:
+        raise CheckpointError(f"{error} (team {team!r})") from error
+    return algorithm, _Stored(content["state"], verify)
+
+
+_aten = torch.ops.aten
+_ALLOCATING = (
+    _aten.empty.memory_format,
+    _aten.empty_strided.default,
+    _aten.zeros.default,
+    _aten.ones.default,
+    _aten.full.default,
+    _aten.rand.default,
+    _aten.randn.default,
+)
+
+
+class _Allocations(TorchDispatchMode):
+    """Refuses to make networks that are far larger than the file that holds their parameters.
+
+    The numbers of a stored algorithm could ask for more memory than there is.
+
+    Args:
+        size: Bytes of the file.
+    """
+
+    def __init__(self, size: int) -> None:
+        super().__init__()  # type: ignore[no-untyped-call]
+        self._left = 16 * size + 2**28
+
+    def __torch_dispatch__(
+        self, func: Any, types: Any, args: tuple[Any, ...] = (), kwargs: Any = None
+    ) -> Any:
+        if func in _ALLOCATING:
+            self._left -= 4 * math.prod(args[0])
+            if self._left < 0:
+                raise ValueError(f"its networks, such as {list(args[0])}, do not fit into the file")
+        return func(*args, **(kwargs or {}))
 
 
 def _find_type(base: type, name: str) -> type:
@@ -119,7 +214,7 @@ def _find_type(base: type, name: str) -> type:
 def _file(path: Path) -> Path:
     if path.is_file():
         return path
-    found = sorted((path / "checkpoints").glob("frames_*.pt"))
+    found = checkpoints_in(path / "checkpoints")
     if not found:
         raise CheckpointError(f"{path} is neither a checkpoint nor the folder of a run with one")
     return found[-1]

@@ -21,6 +21,7 @@ from veca_marl.envs.core.task import find_task
 from veca_marl.migrations import migrated
 from veca_marl.override_text import normalised
 from veca_marl.plugins import PLUGINS
+from veca_marl.sim.body import BODIES
 from veca_marl.sim.physics import PLAYGROUND_GENERATORS
 
 GAME_KEYS = ("body", "clock", "eval", "opponent", "playground", "senses", "task", "team")
@@ -41,7 +42,7 @@ def body_names(node: DictConfig) -> dict[str, str]:
     }
 
 
-def typed(stored: DictConfig, bodies: Mapping[str, str]) -> DictConfig:
+def typed(stored: Mapping[str, Any], bodies: Mapping[str, str]) -> DictConfig:
     """Return a stored configuration with the types that it had.
 
     Args:
@@ -54,25 +55,68 @@ def typed(stored: DictConfig, bodies: Mapping[str, str]) -> DictConfig:
     """
     _check_plugins(stored.get("plugins", []))
     try:
-        stored = OmegaConf.create(migrated(cast(dict[str, Any], OmegaConf.to_container(stored))))
+        config = migrated(stored)
+        _check_groups(config)
+        _check_bodies(config, bodies)
         node = root_schema()
-        node.task = OmegaConf.structured(find_task(stored.task.name).cfg_type())
-        node.algo = _algorithm(stored.algo)
-        for team, algo in stored.learner.items():
+        node.task = OmegaConf.structured(find_task(config["task"]["name"]).cfg_type())
+        node.algo = _algorithm(config["algo"])
+        for team, algo in config["learner"].items():
             node.learner[team] = _algorithm(algo)
-        node.intrinsic = _intrinsic(stored.intrinsic)
-        for team, intrinsic in stored.team_intrinsic.items():
+        node.intrinsic = _intrinsic(config["intrinsic"])
+        for team, intrinsic in config["team_intrinsic"].items():
             node.team_intrinsic[team] = _intrinsic(intrinsic)
-        for team in stored.team:
+        for team in config["team"]:
             node.team[team] = OmegaConf.structured(TeamCfg)
-        if "generator" in stored.playground:
-            generator = PLAYGROUND_GENERATORS.find(stored.playground.generator)
+        if "generator" in config["playground"]:
+            generator = PLAYGROUND_GENERATORS.find(config["playground"]["generator"])
             node.playground = OmegaConf.structured(generator)
         for key, name in bodies.items():
-            OmegaConf.update(node, key, body_types()[name]())
-        return cast(DictConfig, OmegaConf.merge(node, stored))
-    except (OmegaConfBaseException, ValueError, KeyError) as error:
+            OmegaConf.update(node, key, BODIES.find(name).cfg_type())
+        return cast(DictConfig, OmegaConf.merge(node, OmegaConf.create(config)))
+    except (OmegaConfBaseException, ValueError, TypeError, AttributeError) as error:
         raise ConfigError(f"stored configuration: {one_line(error)}") from error
+
+
+_GROUPS = ("task", "algo", "intrinsic", "playground", "learner", "team_intrinsic", "team")
+
+
+def _check_groups(config: Mapping[str, Any]) -> None:
+    """Check that what decides the types of the others is there, and of the right kind.
+
+    Raises:
+        ConfigError: If it is not; the message names the key.
+    """
+    for group in _GROUPS:
+        if not isinstance(config.get(group), dict):
+            raise ConfigError(f"{group} is no group of values, but {config.get(group)!r:.80}")
+    named = {key: config[key] for key in ("task", "algo", "intrinsic")}
+    for group in ("learner", "team_intrinsic"):
+        named |= {f"{group}.{team}": entry for team, entry in config[group].items()}
+    for key, entry in list(named.items()):
+        if isinstance(entry, dict) and "network" in entry:
+            named[f"{key}.network"] = entry["network"]
+    named = {f"{key}.name": _name(entry) for key, entry in named.items()}
+    if "generator" in config["playground"]:
+        named["playground.generator"] = config["playground"]["generator"]
+    for key, name in named.items():
+        if not isinstance(name, str):
+            raise ConfigError(f"{key} is no name, but {name!r:.80}")
+
+
+def _name(entry: Any) -> Any:
+    return entry.get("name") if isinstance(entry, dict) else None
+
+
+def _check_bodies(config: Mapping[str, Any], bodies: Mapping[str, str]) -> None:
+    """Check that names of bodies belong to bodies of the configuration.
+
+    Raises:
+        ConfigError: If one does not.
+    """
+    keys = ["body", *(f"team.{team}.body" for team in config["team"])]
+    if unknown := sorted(set(bodies) - set(keys)):
+        raise ConfigError(f"there is no body {unknown[0]!r}; choices: {', '.join(keys)}")
 
 
 def _check_plugins(names: Any) -> None:
@@ -94,16 +138,18 @@ def _check_plugins(names: Any) -> None:
         )
 
 
-def _algorithm(stored: DictConfig) -> Any:
-    node = OmegaConf.structured(ALGORITHMS.find(stored.name).cfg_type)
+def _algorithm(stored: Mapping[str, Any]) -> Any:
+    node = OmegaConf.structured(ALGORITHMS.find(stored["name"]).cfg_type)
     if "network" in node:
-        node.network = OmegaConf.structured(NETWORKS.find(stored.network.name).cfg_type)
+        if "network" not in stored:
+            raise ConfigError(f"the algorithm {stored['name']} has no network")
+        node.network = OmegaConf.structured(NETWORKS.find(stored["network"]["name"]).cfg_type)
     return node
 
 
-def _intrinsic(stored: DictConfig) -> Any:
-    none = stored.name == NONE
-    return OmegaConf.structured(IntrinsicCfg if none else INTRINSICS.find(stored.name).cfg_type)
+def _intrinsic(stored: Mapping[str, Any]) -> Any:
+    none = stored["name"] == NONE
+    return OmegaConf.structured(IntrinsicCfg if none else INTRINSICS.find(stored["name"]).cfg_type)
 
 
 def change(node: DictConfig, overrides: Sequence[str], allowed: Sequence[str] = GAME_KEYS) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import json
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -17,6 +16,7 @@ import numpy as np
 from veca_marl.algos.files import write_atomically
 from veca_marl.reports.arms import FrameBudget
 from veca_marl.runs.continuation import may_change
+from veca_marl.stored_files import read_json, read_text
 from veca_marl.sweeps.differences import differences, key_patterns
 from veca_marl.sweeps.run_state import RunState, StoredRun, read_run
 
@@ -80,10 +80,9 @@ def _check_table(path: Path, numbers: Sequence[str], words: Sequence[str]) -> No
     """
     if not path.is_file():
         return
-    with path.open(newline="") as file:
-        reader = csv.DictReader(file)
-        columns = reader.fieldnames or ()
-        rows: list[dict[Any, Any]] = list(reader)
+    reader = csv.DictReader(StringIO(read_text(path), newline=""))
+    columns = reader.fieldnames or ()
+    rows: list[dict[Any, Any]] = list(reader)
     absent = [name for name in (*numbers, *words) if name not in columns]
     if absent:
         raise ValueError(f"no column {absent[0]!r}")
@@ -113,9 +112,7 @@ def _check_number(cell: str, name: str, whole: bool) -> None:
 def _commit(path: Path) -> str:
     if not path.is_file():
         return ""
-    stored = json.loads(path.read_text())
-    if not isinstance(stored, dict):
-        raise ValueError("holds no object")
+    stored = read_json(path)
     packages = stored.get("packages")
     version = packages.get("veca_marl") if isinstance(packages, dict) else None
     if not (commit := stored.get("commit") or version):

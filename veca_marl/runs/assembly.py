@@ -24,11 +24,10 @@ from veca_marl.algos.training.loop import Trainer
 from veca_marl.algos.training.schedule import Budget
 from veca_marl.algos.transfer import init_teams, load_actor
 from veca_marl.config import Config, ConfigError, one_line
-from veca_marl.config.root import BY_TEAM
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
 from veca_marl.envs.core.game_cfg import GameCfg
 from veca_marl.plugins import load_plugins
-from veca_marl.runs.continuation import RESUMABLE
+from veca_marl.runs.continuation import RESUMABLE, is_default
 from veca_marl.runs.run_folder import RunFolder
 
 # parameters of mallopt(3)
@@ -223,7 +222,7 @@ def _make_checkpoints(
         cast(dict[str, Any], plain),
         cfg.log.keep_checkpoints,
         RESUMABLE,
-        BY_TEAM,
+        lambda key: is_default(cfg, key),
     )
 
 

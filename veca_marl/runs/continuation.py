@@ -5,10 +5,12 @@ from __future__ import annotations
 import json
 import re
 import shlex
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields, is_dataclass
 from pathlib import Path
+from typing import Any
 
 from veca_marl.override_text import quoted
+from veca_marl.stored_files import StoredFileError, read_json
 
 FILE = "progress.json"
 
@@ -38,16 +40,16 @@ def read_progress(folder: Path) -> RunProgress | None:
         None without a file: the run has no checkpoint yet, or was stored by version 0.2.
 
     Raises:
-        ValueError: If the file cannot be read.
+        StoredFileError: If the file cannot be read.
     """
     path = folder / FILE
     if not path.is_file():
         return None
-    try:
-        content = json.loads(path.read_text())
-        return RunProgress(int(content["frames"]), bool(content["ended"]))
-    except (ValueError, KeyError, TypeError) as error:
-        raise ValueError(f"{path} is damaged: {' '.join(str(error).split())}") from error
+    content = read_json(path)
+    frames, ended = content.get("frames"), content.get("ended")
+    if type(frames) is not int or frames < 0 or type(ended) is not bool:
+        raise StoredFileError(path, "it has no number of 'frames', or not whether it has 'ended'")
+    return RunProgress(frames, ended)
 
 
 _PLAIN = re.compile(r"[\w./-]*/[\w./-]*", re.ASCII)  # a single word may be a number, or null
@@ -65,3 +67,30 @@ RESUMABLE = ("resume", "total_frames", "max_minutes", "device", "threads", "log"
 def may_change(key: str) -> bool:
     """Return whether a key of the configuration, such as ``log.video``, may be changed."""
     return key.partition(".")[0] in RESUMABLE
+
+
+def is_default(cfg: Any, key: str) -> bool:
+    """Return whether a value of a configuration is that of a field which nobody has set.
+
+    Args:
+        cfg: Dataclasses, mappings and lists.
+        key: Dotted path: ``playground.props.3.partition``.
+
+    Returns:
+        False for an entry of a mapping or a list, and for a field that has no default.
+    """
+    *path, name = key.split(".")
+    owner = cfg
+    for part in path:
+        if is_dataclass(owner):
+            owner = getattr(owner, part)
+        else:
+            owner = owner[int(part) if isinstance(owner, list) else part]
+    if not is_dataclass(owner) or isinstance(owner, type):
+        return False
+    others = {f.name: getattr(owner, f.name) for f in fields(owner) if f.init and f.name != name}
+    try:
+        unset = type(owner)(**others)  # also a default that depends on the other fields
+    except (TypeError, ValueError):
+        return False
+    return bool(getattr(unset, name) == getattr(owner, name))

@@ -1,44 +1,36 @@
-"""The folder of a run: its files, its lock, where it comes from, and what the run has learnt.
-
-Only one process at a time writes to a folder: it holds a lock on the file `.lock`. The system
-releases it when the process ends, however it ends, so that a run that was killed can be continued.
-The file stays then, which has no meaning without the lock.
-"""
+"""The folder of a run: its files, where it comes from, and what the run has learnt."""
 
 from __future__ import annotations
 
-import errno
-import fcntl
 import json
-import logging
 import os
 import platform
+import re
 import subprocess
 import sys
-import time
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any, TextIO, cast
+from typing import Any, cast
 from uuid import uuid4
 
 from omegaconf import DictConfig, OmegaConf
 from tensordict.nn import TensorDictModuleBase
-from yaml import YAMLError
 
-from veca_marl.algos.files import write_atomically, write_errors
+from veca_marl.algos.files import left_behind, write_atomically
 from veca_marl.algos.selfplay import SelfPlayCfg
 from veca_marl.algos.specs import TeamSpec
 from veca_marl.algos.transfer import load_actor
-from veca_marl.config import Config, ConfigError, one_line, to_config
+from veca_marl.config import Config, ConfigError, to_config
 from veca_marl.config.compose import load_config_plugins
 from veca_marl.config.overrides import plugins_in
 from veca_marl.config.stored import body_names, change, typed
 from veca_marl.migrations import numbered
 from veca_marl.runs.continuation import FILE as PROGRESS_FILE
 from veca_marl.runs.continuation import RunProgress, resume_argument
+from veca_marl.runs.lock import check_links
+from veca_marl.stored_files import StoredFileError, read_json, read_yaml
 from veca_marl.version import __version__
 
 _PACKAGES = ("torch", "torchrl", "tensordict", "pybullet", "numpy", "numba")
@@ -155,6 +147,7 @@ class RunFolder:
             overrides: Those of the command line.
             frames: Number of frames after which the run continues.
         """
+        self._remove_left_behind()
         content = self._read_provenance()
         again = {"frames": frames, **provenance(overrides)}
         content.setdefault("resumed", []).append(again)
@@ -163,6 +156,14 @@ class RunFolder:
         stored = node.copy()
         stored.resume = None
         self._write_config(stored)
+
+    def _remove_left_behind(self) -> None:
+        """Remove the temporary files of processes that were killed: this one holds the lock."""
+        ours = (self.config, self.provenance, self.progress, self.video)
+        names = re.compile("|".join(re.escape(path.name) for path in ours))
+        for folder in (self.path, self.video.parent):
+            for path in left_behind(folder, names):
+                path.unlink()
 
     def _write_config(self, node: DictConfig) -> None:
         plain = cast(dict[str, Any], OmegaConf.to_container(node, resolve=True))
@@ -184,11 +185,9 @@ class RunFolder:
         if bodies is None:
             raise ConfigError(f"{self.path} was stored by an older version; train it again")
         try:
-            stored = OmegaConf.load(self.config)
-        except (OSError, YAMLError, UnicodeDecodeError) as error:
-            raise _damaged(self.config, error) from error
-        if not isinstance(stored, DictConfig) or OmegaConf.select(stored, "task.name") is None:
-            raise ConfigError(f"{self.config} is damaged: it names no task")
+            stored = read_yaml(self.config)
+        except StoredFileError as error:
+            raise ConfigError(str(error)) from error
         try:
             return typed(stored, bodies)
         except ConfigError as error:
@@ -196,11 +195,10 @@ class RunFolder:
 
     def _read_provenance(self) -> dict[str, Any]:
         try:
-            content = json.loads(self.provenance.read_text())
-        except (OSError, ValueError) as error:
-            raise _damaged(self.provenance, error) from error
-        if not isinstance(content, dict):
-            raise ConfigError(f"{self.provenance} is damaged: it is no table")
+            content = read_json(self.provenance)
+            check_provenance(self.provenance, content)
+        except StoredFileError as error:
+            raise ConfigError(str(error)) from error
         return content
 
     @staticmethod
@@ -216,19 +214,76 @@ class RunFolder:
         write_atomically(self.path / name, text + "\n")
 
 
-def _damaged(path: Path, error: Exception) -> ConfigError:
-    return ConfigError(f"{path} is damaged or cannot be read: {one_line(error)}")
+_IDENTIFIER = re.compile(r"[\w.-]{1,128}")  # it is part of paths and queries of loggers
+
+
+def check_provenance(path: Path, content: Mapping[str, Any]) -> None:
+    """Check the types of what is read of a `provenance.json`; any entry may be absent.
+
+    Args:
+        path: The file.
+        content: What it holds.
+
+    Raises:
+        StoredFileError: If one is of another type.
+    """
+    bodies, again = content.get("bodies"), content.get("resumed", [])
+    identifier = content.get("id", "none")
+    if bodies is not None and not (
+        isinstance(bodies, dict) and all(isinstance(name, str) for name in bodies.values())
+    ):
+        raise StoredFileError(path, "'bodies' does not map the keys of bodies to their names")
+    if not isinstance(again, list):
+        raise StoredFileError(path, "'resumed' is no list")
+    if not (isinstance(identifier, str) and _IDENTIFIER.fullmatch(identifier)):
+        raise StoredFileError(path, "'id' is no identifier of a run")
+
+
+_WRITTEN = (
+    "progress.json",
+    "metrics.csv",
+    "evaluations.csv",
+    "timing.txt",
+    "comparison.txt",
+    "checkpoints",
+    "pool",
+    "videos/final.mp4",
+)
+_LINKABLE = ("provenance.json", "videos", "tensorboard", "wandb", "mlflow.db")
 
 
 def new_run(path: Path) -> RunFolder:
     """Return the folder of a new run.
 
     Raises:
-        ConfigError: If there is a run in it already.
+        ConfigError: If there is a run in it already, a file that the run would overwrite, or a
+            symbolic link in place of one.
     """
     folder = RunFolder(path)
     if folder.config.exists():
         raise ConfigError(f"{path} holds a run already; continue it with {resume_argument(path)}")
+    check_links(path, (folder.config.name, *_LINKABLE, *_WRITTEN))
+    for name in _WRITTEN:
+        if (path / name).exists():
+            raise ConfigError(
+                f"{path / name} exists, and {path} holds no run (no config.yaml): nothing is "
+                "overwritten; choose another folder"
+            )
+    return folder
+
+
+def writable_run(path: Path, asked_by: str) -> RunFolder:
+    """Return the folder of an earlier run, to write to it.
+
+    Args:
+        path: See `open_run`.
+        asked_by: See `open_run`.
+
+    Raises:
+        ConfigError: If there is no run in `path`, or a symbolic link in its folder.
+    """
+    folder = open_run(path, asked_by)
+    check_links(path)
     return folder
 
 
@@ -248,89 +303,6 @@ def open_run(path: Path, asked_by: str = "") -> RunFolder:
     if not folder.config.is_file():
         raise ConfigError(f"{asked_by}{path} holds no run (no config.yaml)")
     return folder
-
-
-_FILE = ".lock"
-_WAIT_S = 3.0  # worker processes hold the lock too; those of a killed run end within seconds
-_RETRY_S = 0.1
-_NO_LOCKS = (errno.ENOSYS, errno.ENOLCK, errno.EOPNOTSUPP)
-_LOG = logging.getLogger(__name__)
-
-
-@contextmanager
-def locked(folder: Path) -> Iterator[None]:
-    """Hold the lock on a folder, which is created, and removed at the end if it is empty.
-
-    Raises:
-        ConfigError: If another process holds it.
-        WriteError: If no file can be written there.
-    """
-    path = folder / _FILE
-    try:
-        with _acquire(path):
-            try:
-                yield
-            finally:
-                path.unlink(missing_ok=True)
-    finally:
-        remove_if_empty(folder)
-
-
-def _acquire(path: Path) -> TextIO:
-    """Return the open file that holds the lock."""
-    deadline = time.monotonic() + _WAIT_S
-    while True:
-        with write_errors(path):
-            path.parent.mkdir(parents=True, exist_ok=True)
-            file = path.open("a+")
-        if _take(file) and _is_in_place(path, file):
-            break
-        holder = _holder(file)
-        file.close()
-        if time.monotonic() >= deadline:
-            raise ConfigError(
-                f"{path.parent} is in use: {holder} writes to it; "
-                "wait until it has ended, or choose another folder"
-            )
-        time.sleep(_RETRY_S)
-    with write_errors(path):
-        file.truncate(0)
-        file.write(f"process {os.getpid()} on {platform.node()}")
-        file.flush()
-    return file
-
-
-def _take(file: TextIO) -> bool:
-    """Return whether the lock could be taken, or its file system has no locks."""
-    try:
-        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        return False
-    except OSError as error:
-        if error.errno not in _NO_LOCKS:
-            raise
-        _LOG.warning("%s cannot be locked: start no other run in its folder", file.name)
-    return True
-
-
-def _is_in_place(path: Path, file: TextIO) -> bool:
-    """Return whether the file was not removed, by a run that ended, before its lock was taken."""
-    try:
-        return os.path.samestat(path.stat(), os.fstat(file.fileno()))
-    except FileNotFoundError:
-        return False
-
-
-def _holder(file: TextIO) -> str:
-    """Return what the process that holds the lock wrote, in case it has already."""
-    file.seek(0)
-    return file.read() or "another process"
-
-
-def remove_if_empty(path: Path) -> None:
-    """Remove the folder of a run that could not be started."""
-    if path.is_dir() and not any(path.iterdir()):
-        path.rmdir()
 
 
 def stored_configuration(checkpoint: Path, overrides: Sequence[str], asked_by: str) -> Config:

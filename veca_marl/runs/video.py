@@ -18,6 +18,7 @@ from tensordict import TensorDictBase
 from torchrl.envs import ExplorationType, set_exploration_type
 
 from veca_marl.algos.evaluation.evaluate import ActionPolicy
+from veca_marl.algos.files import new_temporary
 from veca_marl.algos.networks.memory import with_memory
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
 from veca_marl.envs.core.game_cfg import GameCfg
@@ -74,8 +75,7 @@ class VideoFile:
     def __init__(
         self, path: Path, size: tuple[int, ...], fps: int, sample_rate_hz: int | None
     ) -> None:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        self._path, self._temporary = path, path.with_name(f".{path.name}.tmp")
+        self._path, self._temporary = path, new_temporary(path)
         self._container = av.open(str(self._temporary), "w", format="mp4")
         self._pictures = _add_pictures(self._container, size, fps)
         self._sample_rate_hz = sample_rate_hz

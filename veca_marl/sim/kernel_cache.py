@@ -10,24 +10,41 @@ packages that are defined after the import of the simulator are cached in the sa
 kernels of plug-ins, which may contain functions of the simulator, are invalidated together with
 them. A directory that the user has chosen (`NUMBA_CACHE_DIR`) is used as it is; it has to be
 emptied by hand after an update.
+
+A cache is never fatal. numba reads its entries as they are: one that was cut off, by a full disk or
+a crash, raises exceptions of pickle, or ends the process inside LLVM. Here each entry ends with a
+digest of its content: what has another one is deleted and compiled again, and where nothing can be
+written, kernels are compiled without a cache. Of processes that need the same kernel at once, one
+compiles it and the others wait for it. For that, classes of `numba.core.caching` are extended; the
+files stay such as numba reads them.
 """
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
+import inspect
+import io
 import logging
 import os
+import pickle
 import re
 import shutil
 import sys
 import tempfile
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Iterator
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numba
+from numba.core import dispatcher
+from numba.core.caching import FunctionCache, IndexDataCacheFile, NullCache
 from numba.core.event import Event, Listener, register
+
+if sys.platform != "win32":
+    import fcntl
 
 KEPT_FOLDERS = 8
 """Caches of other versions of the sources that are kept; the least recently used are deleted."""
@@ -40,14 +57,21 @@ _CACHE_NAME = re.compile(f"[0-9a-f]{{{_DIGEST_CHARACTERS}}}")
 def configure_kernel_cache(sources: Path) -> None:
     """Let numba cache kernels in a folder that belongs to the sources as they are now.
 
-    Has to run before the first kernel is defined. Does nothing if a cache directory is set already.
+    Has to run before the first kernel is defined. A cache directory that is set already stays.
 
     Args:
         sources: The folder of the sources that contain kernels or functions that kernels call.
     """
     config: Any = numba.config  # numba sets its attributes at run time
-    if not config.CACHE_DIR:
+    user: Any = dispatcher
+    user.FunctionCache = _make_cache
+    if config.CACHE_DIR:
+        return
+    try:
         config.CACHE_DIR = str(_prepare_folder(source_digest(sources)))
+    except OSError as error:
+        _report_uncached(str(error))
+        config.CACHE_DIR = os.devnull  # no folder: nothing can be cached there
 
 
 def source_digest(sources: Path) -> str:
@@ -123,6 +147,198 @@ def _last_use_s(folder: Path) -> float:
         return folder.lstat().st_mtime
     except OSError:  # another process has deleted it
         return 0.0
+
+
+@cache
+def _report_uncached(reason: str) -> None:
+    """Log once that kernels are compiled without a cache."""
+    _LOG.warning("compiled kernels are not cached, each process compiles its own: %s", reason)
+
+
+def _make_cache(function: Any) -> Any:
+    """Return the cache of a kernel: what numba calls in place of its `FunctionCache`.
+
+    A kernel whose folder cannot be written has none: numba would go on to the folder of the
+    sources, or end with an exception.
+    """
+    try:
+        made = KernelCache(function)
+    except (OSError, RuntimeError) as error:  # of numba: there is no folder that can be written
+        _report_uncached(" ".join(str(error).split()))
+        return NullCache()
+    config: Any = numba.config
+    in_a_file = os.path.exists(inspect.getfile(function))  # a cell of a notebook is in none
+    if in_a_file and not Path(made.cache_path).is_relative_to(config.CACHE_DIR):
+        _report_uncached(f"{config.CACHE_DIR} cannot be written")
+        return NullCache()
+    return made
+
+
+_Cache: Any = FunctionCache
+_Files: Any = IndexDataCacheFile
+
+
+class KernelCache(_Cache):  # type: ignore[misc]
+    """The cache of one kernel, in which a damaged entry counts as none.
+
+    Args:
+        function: The function that is compiled.
+    """
+
+    def __init__(self, function: Any) -> None:
+        super().__init__(function)
+        self._cache_file = EntryFile(
+            self.cache_path, self._impl.filename_base, self._impl.locator.get_source_stamp()
+        )
+
+    def save_overload(self, signature: Any, compiled: Any) -> None:
+        """Store what was compiled, where there is room, and let waiting processes go on."""
+        try:
+            super().save_overload(signature, compiled)
+        except OSError as error:
+            _report_uncached(f"{error.strerror or error} ({self.cache_path})")
+        finally:
+            self._cache_file.end_turn()
+
+
+class DamagedEntryError(Exception):
+    """A file in the cache has another content than was written."""
+
+
+_LONGEST_WAIT_S = 180.0  # a kernel is compiled within 30 s, on a machine that is busy as well
+_POLL_S = 0.1
+_DIGEST_BYTES = hashlib.sha256().digest_size
+
+
+class EntryFile(_Files):  # type: ignore[misc]
+    """The files of one kernel: an index of its signatures, and what was compiled for each.
+
+    Each ends with a digest, which numba itself does not read.
+    """
+
+    _turn: int | None = None  # the open file that holds the lock while this process compiles
+
+    def load(self, key: Any) -> Any:
+        """Return what is stored for a signature; None if this process is to compile it.
+
+        Another process that compiles this kernel is waited for, unless it takes too long.
+        """
+        self.end_turn()
+        stored = self._load_sound(key)
+        if stored is None and self._wait_for_turn():
+            stored = self._load_sound(key)
+            if stored is not None:
+                self.end_turn()
+        return stored
+
+    def save(self, key: Any, data: Any) -> None:
+        """Store what was compiled for a signature.
+
+        Raises:
+            OSError: If it cannot be written.
+        """
+        try:
+            super().save(key, data)
+        except (DamagedEntryError, *_PICKLE_ERRORS) as error:
+            self._discard(error)
+            super().save(key, data)
+
+    def _load_sound(self, key: Any) -> Any:
+        try:
+            return super().load(key)
+        except (DamagedEntryError, *_PICKLE_ERRORS) as error:
+            self._discard(error)
+        except OSError as error:
+            _report_uncached(str(error))
+        return None
+
+    def _load_index(self) -> Any:
+        if not os.path.exists(self._index_path):
+            return {}
+        _check_digest(self._index_path)
+        return super()._load_index()
+
+    def _load_data(self, name: str) -> Any:
+        _check_digest(self._data_path(name))
+        return super()._load_data(name)
+
+    @contextlib.contextmanager
+    def _open_for_write(self, filepath: str) -> Iterator[BinaryIO]:
+        with super()._open_for_write(filepath) as file:
+            content = io.BytesIO()
+            yield content
+            file.write(content.getvalue())
+            file.write(hashlib.sha256(content.getvalue()).digest())
+
+    def _discard(self, error: Exception) -> None:
+        """Delete a damaged file; without its index, the others of the kernel are not read."""
+        path = str(error) if isinstance(error, DamagedEntryError) else self._index_path
+        _LOG.warning("a damaged entry of the cache of kernels is compiled again: %s", path)
+        try:
+            os.unlink(path)
+        except OSError as reason:
+            _report_uncached(str(reason))
+
+    def _wait_for_turn(self) -> bool:
+        """Return whether something may have been stored since: this process waited, or could."""
+        try:
+            turn = os.open(f"{self._index_path}.lock", os.O_RDWR | os.O_CREAT, 0o600)
+        except OSError:  # what is compiled cannot be stored either, which is reported then
+            return False
+        deadline, waits = time.monotonic() + _LONGEST_WAIT_S, False
+        while not (taken := _take(turn)) and time.monotonic() < deadline:
+            if not waits:
+                waits = True
+                _to_stderr("another process compiles kernels; waiting for it ...")
+            time.sleep(_POLL_S)
+        if taken:
+            self._turn = turn
+        else:
+            os.close(turn)
+        return True
+
+    def end_turn(self) -> None:
+        """Let the next process compile this kernel; the system does so if this one dies."""
+        if self._turn is not None:
+            os.close(self._turn)
+            self._turn = None
+
+
+_PICKLE_ERRORS = (
+    pickle.UnpicklingError,
+    EOFError,
+    AttributeError,
+    ImportError,
+    LookupError,
+    TypeError,
+    ValueError,
+)
+"""What pickle raises for entries that were written by other versions."""
+
+
+def _check_digest(path: str) -> None:
+    """Raise `DamagedEntryError`, with the path, if a file does not end with its digest.
+
+    Raises:
+        OSError: If it cannot be read.
+    """
+    content = Path(path).read_bytes()
+    body, digest = content[:-_DIGEST_BYTES], content[-_DIGEST_BYTES:]
+    if hashlib.sha256(body).digest() != digest:
+        raise DamagedEntryError(path)
+
+
+def _take(file: int) -> bool:
+    """Return whether the lock was taken, or there are no locks here."""
+    if sys.platform == "win32":
+        return True
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    except OSError:  # a file system without locks: each process compiles for itself
+        return True
+    return True
 
 
 class CompilationNotice(Listener):

@@ -7,18 +7,17 @@ are different bodies: their names are compared with the numbers.
 from __future__ import annotations
 
 import csv
-import json
 from collections.abc import Iterable, Mapping
 from copy import deepcopy
 from dataclasses import dataclass
 from enum import Enum
+from io import StringIO
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from veca_marl.migrations import VersionError, migrated
 from veca_marl.runs.continuation import RunProgress, read_progress
+from veca_marl.stored_files import StoredFileError, read_json, read_text, read_yaml
 
 _KEY = "registered_name"
 
@@ -46,10 +45,9 @@ def stored_kinds(provenance: Path) -> dict[str, str]:
     A damaged file is reported by what needs the rest of it.
     """
     try:
-        content = json.loads(provenance.read_text())
-    except (OSError, ValueError):
+        names = read_json(provenance).get("bodies")
+    except StoredFileError:
         return {}
-    names = content.get("bodies") if isinstance(content, dict) else None
     return dict(names) if isinstance(names, dict) else {}
 
 
@@ -100,8 +98,8 @@ class StoredRun:
         path = self.folder / f"{kind}.csv"
         if not path.is_file():
             return []
-        with path.open(newline="") as file:
-            return [row for row in csv.DictReader(file) if None not in row.values()]
+        table = csv.DictReader(StringIO(read_text(path), newline=""))
+        return [row for row in table if None not in row.values()]
 
     def state(self, total_frames: int, max_minutes: float | None) -> RunState:
         """Return how far it has come on the way to a budget.
@@ -158,12 +156,7 @@ def read_run(folder: Path) -> StoredRun:
     path = folder / "config.yaml"
     if not path.is_file():
         return StoredRun(folder, None)
-    try:
-        config = yaml.safe_load(path.read_text())
-    except yaml.YAMLError as error:
-        raise ValueError(f"{path} cannot be read: {' '.join(str(error).split())}") from error
-    if not isinstance(config, dict):
-        raise ValueError(f"{path} holds no configuration")
+    config = read_yaml(path)
     try:
         config = migrated(config)
     except VersionError as error:

@@ -145,13 +145,13 @@ def test_an_interruption_is_delayed_until_the_file_is_written(checkpoints, ident
         signal.raise_signal(signal.SIGINT)
 
 
-def test_an_entry_that_is_added_to_a_mapping_by_team_is_refused(tmp_path, identity):
-    """A field that is new in this version is not: it has no value in the stored run."""
+def test_a_key_that_is_added_is_refused_unless_it_is_a_field_with_its_default(tmp_path, identity):
     stored = {"learner": {}, "opponent": {"blue": "expert"}, "algo": {"gamma": 0.9}}
     path = Checkpoints(tmp_path, identity, stored).save({}, 10, best=False)
 
     def load(config):
-        return Checkpoints(tmp_path, identity, config, by_team=("learner", "opponent")).load(
+        fields = ("algo.clip", "new")
+        return Checkpoints(tmp_path, identity, config, is_default=fields.__contains__).load(
             path, CPU
         )
 
@@ -160,3 +160,32 @@ def test_an_entry_that_is_added_to_a_mapping_by_team_is_refused(tmp_path, identi
         load(stored | {"learner": {"red": {"gamma": 0.5}}})
     with pytest.raises(CheckpointError, match=naming("opponent.red", "absent", "idle")):
         load(stored | {"opponent": {"blue": "expert", "red": "idle"}})
+
+
+def test_lists_of_mappings_are_compared_element_by_element(tmp_path, identity):
+    """Props that got a field since a run was stored are the same props."""
+    props = [{"name": f"prop {number}", "size_m": [1.0, 2.0]} for number in range(200)]
+    stored = {"playground": {"props": props}, "seed": 3}
+    path = Checkpoints(tmp_path, identity, stored).save({}, 10, best=False)
+
+    def load(props):
+        config = {"playground": {"props": props}, "seed": 3}
+        return Checkpoints(tmp_path, identity, config).load(path, CPU)
+
+    newer = [{**prop, "partition": False} for prop in props]
+    assert load(newer) == {}
+    with pytest.raises(CheckpointError) as refusal:
+        load([*newer[:7], {**newer[7], "size_m": [1.0, 3.0]}, *newer[8:]])
+    message = str(refusal.value)
+    assert all(part in message for part in ("playground.props.7.size_m", "2.0", "3.0"))
+    assert message.count("playground") == 1
+    with pytest.raises(CheckpointError, match=naming("playground.props", "200", "199")):
+        load(newer[1:])
+
+
+def test_a_message_names_some_of_many_differences_and_their_number(tmp_path, identity):
+    stored = {f"key {number:03}": number for number in range(100)}
+    path = Checkpoints(tmp_path, identity, stored).save({}, 10, best=False)
+    with pytest.raises(CheckpointError, match=naming("key 000", "92 more")) as refusal:
+        Checkpoints(tmp_path, identity, dict.fromkeys(stored, -1)).load(path, CPU)
+    assert len(str(refusal.value)) < 1000

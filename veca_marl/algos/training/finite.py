@@ -110,10 +110,29 @@ def check_state(state: Mapping[str, Any], frames: int) -> None:
     Raises:
         NotFiniteError: With the team and the name of the tensor.
     """
+    if found := not_finite(state):
+        raise NotFiniteError(f"{found} after {frames} frames: learning has diverged")
+
+
+def check_stored(state: Mapping[str, Any]) -> None:
+    """Check that all numbers of a stored state are finite.
+
+    Args:
+        state: Nested tensors and plain data.
+
+    Raises:
+        ValueError: With the name of the tensor.
+    """
+    if found := not_finite(state):
+        raise ValueError(found)
+
+
+def not_finite(state: Mapping[str, Any]) -> str:
+    """Return the name of the first tensor with NaN or infinity, and the value; empty if none."""
     for name, tensor in _tensors(state):
         if tensor.is_floating_point() and not (finite := tensor.isfinite()).all():
-            value = tensor[~finite][0].item()
-            raise NotFiniteError(f"{name} is {value} after {frames} frames: learning has diverged")
+            return f"{name} is {tensor[~finite][0].item()}"
+    return ""
 
 
 def _tensors(state: Any, name: str = "") -> Iterator[tuple[str, torch.Tensor]]:

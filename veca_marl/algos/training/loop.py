@@ -34,7 +34,7 @@ from veca_marl.algos.evaluation.evaluators import (
 from veca_marl.algos.policy import Policy
 from veca_marl.algos.reporting import Reporter
 from veca_marl.algos.specs import EnvFactory
-from veca_marl.algos.training.finite import check_batch, check_scores, check_state
+from veca_marl.algos.training.finite import check_batch, check_scores, check_state, check_stored
 from veca_marl.algos.training.learners import AllLearn, Matchmaking, TeamLearners
 from veca_marl.algos.training.schedule import Budget, Progress, Schedule, Stopwatch, timing_table
 
@@ -135,9 +135,10 @@ class Trainer:
         state = self.checkpoints.load(path, torch.device("cpu"))
         self.checkpoints.remove_old()
         with load_errors(path):
+            check_stored({key: state[key] for key in ("algorithm", "intrinsic")})
             self.learners.load_state_dict(state["algorithm"])
             self.learners.load_intrinsic_state(state["intrinsic"])
-            self.progress = Progress(**state["progress"])
+            self.progress = Progress.stored(state["progress"])
         self.policy.take_over(self.learners.policy)
         self._resumed_frames = self.progress.frames
         within_stage = self.progress.iteration % self.schedule.batches_per_stage != 0

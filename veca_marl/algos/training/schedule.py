@@ -6,9 +6,10 @@ import math
 import multiprocessing
 import os
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from torchrl import timeit
 
@@ -149,6 +150,22 @@ class Progress:
     iteration: int = 0
     frames: int = 0
     best_return: float = -math.inf
+
+    @classmethod
+    def stored(cls, content: Mapping[str, Any]) -> Progress:
+        """Return the progress in a checkpoint.
+
+        Raises:
+            KeyError: If an entry is missing.
+            ValueError: If one is something else.
+        """
+        counted: dict[str, Any] = {key: content[key] for key in ("stage", "iteration", "frames")}
+        best: Any = content["best_return"]
+        if any(type(count) is not int or count < 0 for count in counted.values()):
+            raise ValueError(f"no progress: {counted}")
+        if type(best) not in (int, float) or math.isnan(best):
+            raise ValueError(f"no progress: best_return={best!r:.80}")
+        return cls(**counted, best_return=best)
 
 
 def timing_table(elapsed_s: float, frames: int) -> str:

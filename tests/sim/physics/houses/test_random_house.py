@@ -215,7 +215,7 @@ def test_the_command_line_chooses_seed_and_size():
 def test_a_stored_run_is_read_with_its_house():
     words = ["+task=KickTheBall", "playground=random_house", "playground.seed=7"]
     node = compose_node(words)
-    stored = OmegaConf.create(OmegaConf.to_yaml(node))
+    stored = OmegaConf.to_container(node, resolve=True, enum_to_str=True)
     again = to_config(typed(stored, body_names(node))).playground
     assert isinstance(again, RandomHouseCfg)
     assert again.rooms == RandomHouseCfg(seed=7).rooms
