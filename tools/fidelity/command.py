@@ -37,6 +37,7 @@ SECTIONS: dict[str, str] = {
     "rigid_bodies": "tools.fidelity.mechanics.rigid_bodies",
     "rooms": "tools.fidelity.hearing.rooms",
     "touch": "tools.fidelity.touch.laws",
+    "towers": "tools.fidelity.mechanics.towers",
     "vision": "tools.fidelity.vision",
 }
 """Module of each section, imported when it is measured, with ``section() -> Section``."""

@@ -24,6 +24,7 @@ from veca_marl.sim.physics.props import (
     limit_detection,
     prop_sleep,
 )
+from veca_marl.sim.physics.props.fast_props import FastProps
 from veca_marl.sim.physics.props.joint import Joint
 from veca_marl.sim.sound import SoundField, make_sound
 from veca_marl.sim.sound.sounds import Sound, Source
@@ -184,6 +185,7 @@ class World:
         self._moving: list[Prop] = []
         self._joints: list[Joint] = []
         self._sleep = prop_sleep(self.client, self.clock)
+        self._fast = FastProps(self.client, self.scene, self.clock.substep_s)
         self._configure_physics()
         self._impacts: ImpactSounds | None = None
         if playground.impacts.present:
@@ -216,6 +218,7 @@ class World:
         if self._impacts is not None:
             self._impacts.add(prop)
         prop.rest = self._sleep.add(prop)
+        self._fast.add(prop)
         if not prop.fixed:
             self._moving.append(prop)
         return prop
@@ -307,6 +310,7 @@ class World:
         self._set_contact_share()
         for mover in self.movers:
             mover.before_step()
+        self._fast.before_step()
         for _ in range(self.clock.substeps):
             self._substep()
         self._update_scene()
@@ -320,6 +324,7 @@ class World:
         substep_s = self.clock.substep_s
         for mover in self.movers:
             mover.before_substep(substep_s)
+        self._fast.before_substep()
         self._simulate()
         for joint in self._joints:
             joint.after_substep()

@@ -13,18 +13,30 @@ disabled in Bullet; here the capsule is moved horizontally until it no longer pe
 A joint-level body counts with its whole mass of 10 kg, which is above the default limit: it is a
 heavy obstacle that walkers do not move and that displaces them when it moves or falls. With a limit
 above its mass walkers push it.
+
+What moves displaces a walker only as far as fixed things allow: these it neither enters nor passes,
+whatever pushes it. A heavy thing that presses it against one is stopped, see `Stop`.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from itertools import chain
 
 import numpy as np
 
 from veca_marl.sim.body.walker.jammed import JammedProps
+from veca_marl.sim.body.walker.making_way import (
+    FIRM_M,
+    Overlap,
+    deepest_m,
+    depenetration,
+    make_way,
+    may_reach,
+)
 from veca_marl.sim.body.walker.obstacles import Leaves, ObstacleBoxes
+from veca_marl.sim.body.walker.stop import PARKED_M, Stop
 from veca_marl.sim.body.walker.walker_collisions import Footprint
 from veca_marl.sim.geometry import (
     Floats,
@@ -39,12 +51,9 @@ from veca_marl.sim.physics.bullet_client import BulletClient, ContactPoint
 
 _ROUNDS = 3  # two for the walls of a corner, one spare
 _LIMB_REACH_M = 1.0  # from the pelvis of a joint-level body to its stretched toes
-_PARKED_M = -100.0  # height of a capsule that is not in use
 _MARGIN_M = 0.06  # an obstacle may displace the capsule by so much within one agent step
 _CARPET_M = 0.02  # what is lower is walked over
 _DEPTH_M = 1e-6  # less is rounding
-
-_Overlap = tuple[Sequence[float], float]  # direction towards the capsule, and metres
 
 
 class Capsule:
@@ -60,6 +69,7 @@ class Capsule:
     Attributes:
         body_id: PyBullet's id.
         base_m: Height of the surface on which the walker is; 0 on the floor.
+        radius_m: Radius about its axis.
         yaw_rad: Rotation about the vertical.
         support_id: PyBullet's id of the prop on which the walker stands, which is no obstacle; -1
             on the floor.
@@ -81,21 +91,25 @@ class Capsule:
         shape = create_collision_shape(client, [form])
         self.body_id: int = client.createMultiBody(0, shape)
         client.changeDynamics(self.body_id, -1, lateralFriction=0.2, restitution=0.0)
-        self._radius_m, self._half_axis_m = form.radius, _half_axis_m(form)
+        self.radius_m, self._half_axis_m = form.radius, _half_axis_m(form)
         self._reach_m = self._half_axis_m + form.radius
         self._obstacles = ObstacleBoxes(client, scene, [], [], _LIMB_REACH_M)
         self._leaves = Leaves([])
         self._jammed = JammedProps(client, scene, self.body_id, [], [])
+        self._stop = Stop(client, shape)
         self._known = (0, 0)
         self._capsules: Collection[int] = ()
+        # heavy things that move by themselves: their leaves, and None for loose ones and bodies
+        self._heavy: dict[int, Prop | None] = {}
         self._near: list[int] = []
         self._near_leaves: list[Prop] = []
+        self._squeezed = False
 
     @property
     def footprint(self) -> Footprint:
         """Its outline on the floor plan, at its present heading."""
         x, y = math.cos(self.yaw_rad), math.sin(self.yaw_rad)
-        return Footprint(self._radius_m, (self._half_axis_m * x, self._half_axis_m * y))
+        return Footprint(self.radius_m, (self._half_axis_m * x, self._half_axis_m * y))
 
     def collect_obstacles(
         self,
@@ -141,29 +155,51 @@ class Capsule:
         ]
         return [*self._obstacles.near(position, reach_m), *leaves, *others]
 
-    def resolve_contacts(self, x: float, y: float) -> tuple[float, float]:
-        """Set the position and move the capsule out of obstacles; return the new position."""
+    def resolve_contacts(
+        self, x: float, y: float, last: tuple[float, float] | None = None
+    ) -> tuple[float, float]:
+        """Set the position and move the capsule out of obstacles; return the new position.
+
+        Args:
+            x: Metres.
+            y: Metres.
+            last: Position at the end of the last physics step: the capsule stays on that side of
+                fixed things. None if it is placed: then there is no side.
+        """
+        asked = x, y
         self.move_to(x, y)
+        self._squeezed = False
         for _ in range(_ROUNDS):
-            out_x, out_y = _depenetration(chain(self._overlaps(), self._jammed.overlaps()))
+            out_x, out_y = depenetration(chain(self._overlaps(), self._jammed.overlaps()))
             if out_x == 0.0 and out_y == 0.0:
+                if last is None or may_reach(self, (x, y), last):
+                    return x, y
                 break
             x, y = x + out_x, y + out_y
             self.move_to(x, y)
+        if last is None:
+            return x, y
+        x, y = make_way(self, asked, (x, y), last)
+        self._squeezed = deepest_m(self.pushes()) > FIRM_M
         return x, y
 
     def room_for_others(self) -> tuple[float, float]:
         """Return by how much it makes room for what it and other walkers press together, metres."""
-        return _depenetration(self._jammed.squeezes())
+        return depenetration(self._jammed.squeezes())
 
     def set_velocity(self, vx: float, vy: float, turn_radps: float) -> None:
         """Set the velocity with which Bullet computes contacts with light props.
 
         Bullet moves the capsule by this velocity in the physics step, which would press a jammed
-        thing further: then it is at rest.
+        thing further: then it is at rest. So it is if something heavy presses it against something
+        fixed; that is stopped in the physics step.
         """
-        if self._jammed.found:
+        if self._jammed.found or self._squeezed:
             vx = vy = turn_radps = 0.0
+        if self._squeezed:
+            self._stop.put(*self._client.getBasePositionAndOrientation(self.body_id))
+        else:
+            self._stop.park()
         self._jammed.forget()
         self._client.resetBaseVelocity(self.body_id, (vx, vy, 0.0), (0.0, 0.0, turn_radps))
 
@@ -173,7 +209,7 @@ class Capsule:
         A carpet, which is as low as what it stands on, does not count.
         """
         self.move_to(x, y)
-        if _depenetration(self._overlaps()) != (0.0, 0.0):
+        if depenetration(self._overlaps()) != (0.0, 0.0):
             return True
         # in the middle of something wide the nearest way out is vertical
         high = [body_id for body_id in self._near if self._rises(body_id)]
@@ -187,7 +223,8 @@ class Capsule:
     def park(self) -> None:
         """Move it far below the floor, where it collides with nothing."""
         self._jammed.forget()
-        self._put((0.0, 0.0, _PARKED_M))
+        self._squeezed = False
+        self._put((0.0, 0.0, PARKED_M))
         self.set_velocity(0.0, 0.0, 0.0)
 
     def move_to(self, x: float, y: float) -> None:
@@ -203,15 +240,37 @@ class Capsule:
         position, _ = self._client.getBasePositionAndOrientation(body_id)
         return np.array(position)
 
-    def _overlaps(self) -> Iterator[_Overlap]:
+    def _overlaps(self) -> Iterator[Overlap]:
         """Yield how deep it is in obstacles, and in doors and drawers that cannot yield."""
         for body_id in self._near:
             for contact in self._contacts(body_id):
                 yield contact.normal_on_b, -contact.distance_m
         for leaf in self._near_leaves:
             for contact in self._contacts(leaf.body_id):
-                if not leaf.yields(contact.position_on_b, [-axis for axis in contact.normal_on_b]):
+                if not _yields(leaf, contact):
                     yield contact.normal_on_b, -contact.distance_m
+
+    def firm_overlaps(self) -> Iterator[Overlap]:
+        """Yield how deep it is in what is fixed, or a door or drawer that cannot yield."""
+        for body_id in self._near:
+            if body_id not in self._heavy:
+                for contact in self._contacts(body_id):
+                    yield contact.normal_on_b, -contact.distance_m
+        heavy = (self._heavy.get(body_id) for body_id in self._near)
+        for leaf in chain(self._near_leaves, (prop for prop in heavy if prop is not None)):
+            for contact in self._contacts(leaf.body_id):
+                if not _yields(leaf, contact):
+                    yield contact.normal_on_b, -contact.distance_m
+
+    def pushes(self) -> Iterator[Overlap]:
+        """Yield by how much heavy things that move, and jammed things, displace it."""
+        for body_id in self._near:
+            if body_id in self._heavy:
+                leaf = self._heavy[body_id]
+                for contact in self._contacts(body_id):
+                    if leaf is None or _yields(leaf, contact):
+                        yield contact.normal_on_b, -contact.distance_m
+        yield from self._jammed.overlaps()
 
     def _contacts(self, body_id: int) -> tuple[ContactPoint, ...]:
         """Return PyBullet's points of contact with a body; normals point to the capsule."""
@@ -230,22 +289,18 @@ class Capsule:
         self._leaves = Leaves(leaves)
         loose = [p for p in light if p.joint is None]
         self._jammed = JammedProps(self._client, self._scene, self.body_id, loose, leaves)
+        self._heavy = {p.body_id: None if p.joint is None else p for p in things if not p.fixed}
+        self._heavy |= dict.fromkeys(heavy)
         for body_id in self._obstacles.ids:
             for link in range(-1, self._client.getNumJoints(body_id)):
                 self._client.setCollisionFilterPair(self.body_id, body_id, -1, link, 0)
+                if body_id in self._heavy:
+                    self._stop.let_stop(body_id, link)
 
 
-def _depenetration(overlaps: Iterable[_Overlap]) -> tuple[float, float]:
-    """Return the horizontal displacement that ends all overlaps, metres."""
-    out_x = out_y = 0.0
-    for normal, depth in overlaps:
-        length = math.hypot(normal[0], normal[1])
-        if depth > _DEPTH_M and length > 0.1:
-            # several points of one face give the same direction: the deepest counts
-            away_x, away_y = normal[0] / length * depth, normal[1] / length * depth
-            out_x = _larger(out_x, away_x)
-            out_y = _larger(out_y, away_y)
-    return out_x, out_y
+def _yields(leaf: Prop, contact: ContactPoint) -> bool:
+    """Return whether a door or drawer gives way to a capsule that presses on it."""
+    return leaf.yields(contact.position_on_b, [-axis for axis in contact.normal_on_b])
 
 
 def upright_capsule(
@@ -292,8 +347,3 @@ def _mass_kg(client: BulletClient, body_id: int) -> float:
     links = range(-1, client.getNumJoints(body_id))
     masses = [client.getDynamicsInfo(body_id, n).mass_kg for n in links]
     return float(sum(masses))
-
-
-def _larger(a: float, b: float) -> float:
-    """Return the number with the larger absolute value."""
-    return a if abs(a) >= abs(b) else b

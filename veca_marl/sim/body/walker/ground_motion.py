@@ -112,6 +112,11 @@ class GroundMotion:
         self.stance.turn(self.yaw_rad)
         return x, y
 
+    def resolve_contacts(self, x: float, y: float) -> tuple[float, float]:
+        """Return the position nearest to ``(x, y)``, on its side of walls, outside obstacles."""
+        last_x, last_y = self.ground.tolist()
+        return self.capsule.resolve_contacts(x, y, (last_x, last_y))
+
     def set_position(self, x: float, y: float, substep_s: float) -> None:
         """Set the position at the end of a physics step."""
         vx, vy = (x - self.ground[0]) / substep_s, (y - self.ground[1]) / substep_s

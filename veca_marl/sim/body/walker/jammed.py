@@ -16,6 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from veca_marl.sim.body.walker.making_way import Overlap
 from veca_marl.sim.geometry import Floats, Scene
 from veca_marl.sim.physics import Prop
 from veca_marl.sim.physics.bullet_client import BulletClient, ContactPoint
@@ -26,8 +27,6 @@ _PRESSED_M = 4e-3
 _GAP_M = 1e-3
 _BEHIND = 0.1  # least cosine of the angle between the push and what it is supported against
 _SQUEEZED_M = 1e-4  # what two walkers press together may overlap by so much more
-
-_Overlap = tuple[Sequence[float], float]  # direction towards the capsule, and metres
 
 
 class _Backing(NamedTuple):
@@ -109,7 +108,7 @@ class JammedProps:
         self._touched = {}
         self.found = False
 
-    def overlaps(self) -> Iterator[_Overlap]:
+    def overlaps(self) -> Iterator[Overlap]:
         """Yield by how much the capsule has to move out of what is jammed, where it is now.
 
         Yields:
@@ -122,7 +121,7 @@ class JammedProps:
                 self.found = True
                 yield point.normal_on_b, min(excess_m, _GAP_M - point.distance_m)
 
-    def squeezes(self) -> Iterator[_Overlap]:
+    def squeezes(self) -> Iterator[Overlap]:
         """Yield by how much the capsule makes room for what it and another walker press together.
 
         It is half of what both overlap too much, where they are now: the other makes as much room.

@@ -341,7 +341,7 @@ class Walker(Body):
 
     def resolve_contacts(self, x: float, y: float) -> tuple[float, float]:
         """Return the position nearest to ``(x, y)`` outside walls and heavy things."""
-        return self._motion.capsule.resolve_contacts(x, y)
+        return self._motion.resolve_contacts(x, y)
 
     def room_for_others(self) -> tuple[float, float]:
         """Return by how much it makes room for what it and other walkers press together, metres."""

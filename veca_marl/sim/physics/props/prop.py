@@ -135,6 +135,8 @@ class Prop:
         reach_m: Horizontal radius of the cylinder about the origin of its frame that contains them
             while it is not tilted.
         extent_m: Greatest distance of a corner of the box about them from that origin.
+        half_size_m: Half of the shortest edge of that box.
+        was_launched: Whether its velocity has been set; `FastProps` sets it back.
         centre_of_mass: ``(3,)`` metres, in its frame; the origin of a fixed prop.
         object_id: Its value in segmentation images.
         joint: Its hinge or slide; None for a prop that is fixed or free.
@@ -170,6 +172,8 @@ class Prop:
         self.reach_m = horizontal_radius_m(geoms)
         self._inside = bounding_box(geoms)
         self.extent_m = float(np.linalg.norm(np.abs(self._inside).max(axis=0)))
+        self.half_size_m = float((self._inside[1] - self._inside[0]).min()) / 2.0
+        self.was_launched = False
         self.body_id, self.link, self.joint, frame = create_body(cfg, client, geoms)
         self.links = range(self.link, client.getNumJoints(self.body_id))
         self._read_pose = pose_reader(self.body_id, self.link, client)
@@ -385,6 +389,7 @@ class Prop:
         """
         if not self.fixed and self.joint is None:
             self.rest.wake()
+            self.was_launched = True
             self._client.resetBaseVelocity(
                 self.body_id,
                 _three_finite(self.name, "velocity", velocity),
