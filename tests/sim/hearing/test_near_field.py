@@ -6,7 +6,7 @@ from scipy.special import eval_legendre
 
 from tools.fidelity.hearing.near_field import ALL_HZ, LOW_HZ, errors_db
 from veca_marl.sim.body.sense_organs import MOUNTS_M
-from veca_marl.sim.hearing import HrtfReceiver, MonoReceiver, kemar_table
+from veca_marl.sim.hearing import HrtfReceiver, MonoReceiver, StereoReceiver, kemar_table
 from veca_marl.sim.hearing.receivers import near_field_gain, sphere_gain
 from veca_marl.sim.sound import NEAR_FIELD_M, SAMPLE_RATE_HZ
 
@@ -39,6 +39,41 @@ def levels(receiver, arrival):
     assert np.isfinite(filters).all()
     assert (delays >= 0.0).all()
     return np.linalg.norm(filters[0], axis=1)
+
+
+def sphere_of_directions(n):
+    """Directions ``(n, 3)`` all round, evenly spaced."""
+    height = 1.0 - (2.0 * np.arange(n) + 1.0) / n
+    azimuth = np.pi * (1.0 + np.sqrt(5.0)) * np.arange(n)
+    flat = np.sqrt(1.0 - height**2)
+    return np.stack([flat * np.cos(azimuth), flat * np.sin(azimuth), height], axis=1)
+
+
+@pytest.mark.parametrize("scale", [0.733, 1.0, 1.4])
+@pytest.mark.parametrize("quality", ["hrtf", "stereo", "mono"])
+def test_a_source_that_comes_closer_is_never_softer_at_the_near_ear(quality, scale):
+    """From 2 m to the head of the bodies, the ears of which are 0.064 m from its centre."""
+    table = kemar_table(SAMPLE_RATE_HZ, scale)
+    ear = np.array([0.0, table.head_radius_m, 0.0])
+    receiver = {
+        "hrtf": lambda: HrtfReceiver(table),
+        "stereo": lambda: StereoReceiver(ear, -ear),
+        "mono": MonoReceiver,
+    }[quality]()
+    skin_m = min(table.head_radius_m, MOUNTS_M["ear_left"][1])
+    distances_m = np.geomspace(2.0, skin_m, 60)
+    for direction in [*np.eye(3), *-np.eye(3), *sphere_of_directions(40)]:
+        near = [
+            levels(receiver, d * direction)[0 if direction[1] >= 0.0 else -1] for d in distances_m
+        ]
+        assert (np.diff(near) > -1e-6 * near[-1]).all(), direction
+
+
+def test_the_difference_of_the_ears_is_continuous_through_the_centre_of_the_head():
+    head = HrtfReceiver(kemar_table())
+    lateral_m = np.linspace(-0.02, 0.02, 401)
+    ratio_db = [20.0 * np.log10(np.divide(*levels(head, (0.05, y, 0.0)))) for y in lateral_m]
+    assert np.abs(np.diff(ratio_db)).max() < 0.5
 
 
 @pytest.mark.parametrize("arrival", [(0.0, 0.0, 0.0), (0.0, 0.0873, 0.0), (1e-6, -1e-9, 0.05)])

@@ -19,6 +19,10 @@ NEAREST_RADII = 1.25
 """Distance of a source from the centre of the head, in radii of the head, below which its level is
 constant; that of the nearest source that Duda & Martens (1998) consider."""
 
+_CENTRE_RADII = 0.1
+"""Distance from the centre of the head, in its radii, below which its direction fades out: there is
+none at the centre, and no real source is there."""
+
 
 @njit(cache=True)
 def sphere_gain(radius_over_distance: float, cosine: float) -> float:
@@ -144,7 +148,8 @@ def head_related_paths(
         w00, w10 = (1.0 - along) * (1.0 - up), along * (1.0 - up)
         w01, w11 = (1.0 - along) * up, along * up
         limited = max(distance, NEAREST_RADII * radius_m)
-        to_left = arrivals[k, 1] / limited
+        # the true distance: the angle does not depend on what is held constant
+        to_left = arrivals[k, 1] / max(distance, _CENTRE_RADII * radius_m)
         for ear in range(n_ears):
             cosine = to_left if ear == 0 else -to_left
             near = near_field_gain(radius_m, limited, measured_at_m, cosine)
