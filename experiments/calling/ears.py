@@ -56,9 +56,9 @@ def listen(game: Game, together: bool, rng: np.random.Generator) -> NDArray[np.f
     head, caller = ears.body.mount("head"), mouth.body.mount("mouth").position
     way = (caller - head.position) @ head.rotation
     away_m = float(np.linalg.norm(way))
-    walls = world.house.obstacles_between(head.position, caller)
     left, right = loudness(sound_power(ears.senses["audio"].log_magnitudes(heard["audio"])))
-    loss = world.playground.transmission_loss_db / 20.0 * walls
+    energy = world.house.direct_energy(caller, head.position)
+    loss = -math.log10(energy[2:6].mean()) / 2.0
     return np.array(
         [(left + right) / 2.0 + math.log10(away_m) + loss, left - right, way[1] / away_m]
     )

@@ -77,9 +77,8 @@ REFUSED = (
 SENSES = """## Sight and sound
 
 Walls, furniture and leaves of doors hide what is behind them. A sound in the same room is heard
-with its reflections; one from another room is heard by its direct path, attenuated by
-`transmission_loss_db` at each wall, closed door (of any size) or large box (0.7 m wide and 1 m
-high) that the path passes, and not attenuated by an open door. Diffraction is not modelled.
+with its reflections; one from another room is heard through walls and closed doors, which take
+`transmission_loss_db` at 500 Hz, and round their edges and through open doors by diffraction.
 
 ## Houses of your own
 

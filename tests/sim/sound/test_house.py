@@ -1,4 +1,4 @@
-"""Sound between rooms: walls attenuate it, open doors do not, changes of room do not click."""
+"""Sound between rooms: walls attenuate it, open doors hardly, changes of room do not click."""
 
 import numpy as np
 import pytest
@@ -71,15 +71,16 @@ def test_inside_one_room_a_house_is_that_room(quality):
 
 
 @pytest.mark.parametrize("loss_db", [0.0, 10.0, 30.0])
-def test_each_wall_attenuates_by_its_loss(loss_db):
+def test_each_wall_attenuates_by_its_loss_at_500_hz(loss_db):
     source, head = (1.0, 0.5, 1.0), pose(5.0, -0.3, 1.0)
-    second = ((4.0, 0.0, 1.3), np.eye(3), (0.05, 3.0, 1.3))
+    second = ((4.5, 0.0, 1.3), np.eye(3), (0.05, 3.0, 1.3))
+    tone = np.sin(2.0 * np.pi * 500.0 * np.arange(12 * STEP) / RATE).astype(np.float32)
     levels = [
-        level_db(hear(house(*walls, loss_db=loss_db), source, head))
+        level_db(hear(house(*walls, loss_db=loss_db), source, head, sound=tone))
         for walls in ((), (BETWEEN,), (BETWEEN, second))
     ]
-    assert levels[0] - levels[1] == pytest.approx(loss_db, abs=0.01)
-    assert levels[0] - levels[2] == pytest.approx(2.0 * loss_db, abs=0.01)
+    assert levels[0] - levels[1] == pytest.approx(loss_db, abs=1.0)
+    assert levels[0] - levels[2] == pytest.approx(2.0 * loss_db, abs=2.0)
 
 
 def test_without_a_wall_between_sound_of_another_room_is_that_of_the_free_field():
@@ -271,4 +272,5 @@ def test_a_walker_in_the_next_room_hears_a_voice_through_the_door_or_through_the
             loudest.append(np.abs(ears.read()["waveform"]).max())
     world.close()
     wall, door = max(loudest[:8]), max(loudest[8:])
-    assert 20.0 * np.log10(door / wall) == pytest.approx(30.0, abs=1.0)
+    # behind the wall what comes round the edge of the door is louder than what passes the wall
+    assert 10.0 < 20.0 * np.log10(door / wall) < 33.0

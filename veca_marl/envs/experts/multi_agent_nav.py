@@ -29,6 +29,7 @@ _LEVEL_STD, _ILD_STD = 0.15, 0.15
 _GRID_M = 0.4
 _MEMORY = 0.95  # decay of the log-likelihood per update, since callers move
 _LEAST_ENERGY = 1e-16  # of an ear that hears nothing beside its noise
+_BANDS = slice(2, 6)  # octaves from 500 Hz to 4 kHz, those of the calls
 _AUDIBLE = -5.0  # a call through three walls reaches -4, silence is at -8
 
 
@@ -52,7 +53,6 @@ class CallSourceMap:
         self._noise_power = noise_power
         self._audible = max(10.0 ** (2.0 * _AUDIBLE), noise_power)
         self._places = np.concatenate([_grid(room) for room in world.playground.rooms])
-        self._loss = world.playground.transmission_loss_db / 20.0
         self._log_likelihood = np.zeros(len(self._places))
         self.heard = False
 
@@ -70,7 +70,7 @@ class CallSourceMap:
         self._places[:, 2] = head.position[2]  # assumes mouths at the height of these ears
         offsets = (self._places - head.position) @ head.rotation
         distances_m = np.maximum(np.linalg.norm(offsets, axis=1), _GRID_M)
-        level = _LEVEL_AT_1_M - np.log10(distances_m) - self._loss * self._walls(head.position)
+        level = _LEVEL_AT_1_M - np.log10(distances_m) + self._losses(head.position)
         level_error = (level - (left + right) / 2.0) / _LEVEL_STD
         ild_error = (_ILD * offsets[:, 1] / distances_m - (left - right)) / _ILD_STD
         self._log_likelihood *= _MEMORY
@@ -82,10 +82,12 @@ class CallSourceMap:
         place: Floats = self._places[int(np.argmax(self._log_likelihood))]
         return place
 
-    def _walls(self, ears: Floats) -> NDArray[Any]:
-        """Return the number of walls between the ears and each place, ``(n,)``."""
-        between = self._world.house.obstacles_between
-        return np.array([between(ears, place) for place in self._places])
+    def _losses(self, ears: Floats) -> NDArray[Any]:
+        """Return the log10 of what obstacles leave of the pressure from each place, ``(n,)``."""
+        energy = self._world.house.direct_energy
+        left = np.array([energy(place, ears)[_BANDS].mean() for place in self._places])
+        losses: Floats = np.log10(np.maximum(left, _LEAST_ENERGY)) / 2.0
+        return losses
 
 
 def _grid(room: RoomCfg) -> Floats:

@@ -18,7 +18,7 @@ from veca_marl.sim.physics.impact_sounds import ImpactCfg
 from veca_marl.sim.physics.props import PropCfg, PropShape, check_appearance
 from veca_marl.sim.physics.rooms import DoorCfg, RoomCfg
 from veca_marl.sim.sound import House, Room
-from veca_marl.sim.sound.surroundings import TRANSMISSION_LOSS_DB
+from veca_marl.sim.sound.partitions import TRANSMISSION_LOSS_DB
 
 THICKEST_WALL_M = 0.5
 """The threshold of a door lies within the wall, at most so far from either room."""
@@ -53,7 +53,7 @@ class PlaygroundCfg:
         floor_checker_m: Edge of the floor's checker pattern.
         image_order: Greatest number of reflections of a sound, from 0 (the direct sound only) to
             `GREATEST_IMAGE_ORDER`.
-        transmission_loss_db: Attenuation of a sound by each obstacle that its path passes.
+        transmission_loss_db: Loss of a sound at 500 Hz that passes through an obstacle.
         impacts: Sounds of things that hit each other or the floor.
     """
 

@@ -1,36 +1,24 @@
 """Obstacles to sound: walls and furniture as boxes, and the leaves of doors.
 
-A leaf attenuates what goes through the opening that it closes. Elsewhere it is a free panel in
-front of a wall, in a wall, or in a room, with air all round it: the screen of 1 x 2 m of an open
-leaf takes a few dB by diffraction (Maekawa 1968), not the loss of a partition. So a leaf attenuates
-a path only if this passes the leaf now and would pass it closed: an open door never attenuates more
-than a closed one.
+What they take from a sound is the matter of `diffraction` and `partitions`. Here are their poses,
+and how many of them a straight line passes: a leaf counts only for a line that passes it now and
+would pass it closed, since an open leaf is a free panel with air all round it.
 """
 
 from __future__ import annotations
 
 import numpy as np
 from numba import njit
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from veca_marl.sim.geometry import Floats
 from veca_marl.sim.sound.blocked_paths import (
-    any_extends_into,
     contains_point,
     count_crossed,
-    count_crossed_inside,
     crosses_box,
-    extends_into,
-    folded_paths,
-    polygon_crosses,
     stretch_in_box,
-    within_bounds,
 )
-from veca_marl.sim.sound.room_acoustics import Room
-
-Boxes = tuple[Floats, Floats, Floats]
-"""Centres ``(n, 3)``, rotations ``(n, 3, 3)`` and halves of edges ``(n, 3)`` of boxes, see
-`blocked_paths`."""
+from veca_marl.sim.sound.screens import Boxes, ScreenSets, find_screens
 
 _FRAME_M = 0.05
 """With less air than that between them, the closed leaf and a wall that a path passes are one
@@ -59,64 +47,6 @@ def count_leaves(one: Floats, other: Floats, walls: Boxes, leaves: Boxes, closed
             continue
         count += _passes_opening(one, other, closed[0][n], closed[1][n], closed[2][n], walls)
     return count
-
-
-@njit(cache=True)
-def count_leaves_inside(
-    source: Floats,
-    head: Floats,
-    bounds: tuple[Floats, Floats],
-    lower: Floats,
-    size: Floats,
-    lattice: NDArray[np.int64],
-    walls: Boxes,
-    leaves: Boxes,
-    closed: Boxes,
-) -> NDArray[np.int64]:
-    """Return how many leaves attenuate each path inside a room, in addition to the walls.
-
-    The leaves of doors between rooms attenuate none of them: their openings are outside.
-
-    Args:
-        source: See `count_crossed_inside`.
-        head: Likewise.
-        bounds: Likewise.
-        lower: Likewise.
-        size: Likewise.
-        lattice: Likewise.
-        walls: See `count_leaves`.
-        leaves: Likewise.
-        closed: Likewise.
-
-    Returns:
-        ``(K,)``.
-    """
-    counts = np.zeros(len(lattice), np.int64)
-    begin, end = within_bounds(source, bounds), within_bounds(head, bounds)
-    for n in range(len(leaves[0])):
-        shut = closed[0][n], closed[1][n], closed[2][n]
-        if not extends_into(*shut, lower, size):
-            continue
-        leaf = leaves[0][n], leaves[1][n], leaves[2][n]
-        if contains_point(begin, *leaf) or contains_point(end, *leaf):
-            continue
-        corners, n_corners = folded_paths(begin, end, lower, size, lattice)
-        for k in range(len(lattice)):
-            path = corners[k, : n_corners[k]]
-            if polygon_crosses(path, *leaf):
-                counts[k] += _polygon_passes_opening(path, *shut, walls)
-    return counts
-
-
-@njit(cache=True)
-def _polygon_passes_opening(
-    corners: Floats, centre: Floats, rotation: Floats, half: Floats, walls: Boxes
-) -> bool:
-    """Return whether a segment between corners ``(n, 3)`` does, see `_passes_opening`."""
-    for n in range(len(corners) - 1):
-        if _passes_opening(corners[n], corners[n + 1], centre, rotation, half, walls):
-            return True
-    return False
 
 
 @njit(cache=True)
@@ -228,39 +158,10 @@ class Obstacles:
             count += int(count_leaves(one, other, walls, leaves, closed))
         return count
 
-    def reach_into(self, room: Room) -> bool:
-        """Return whether any box, or a closed leaf, is inside a room, not only next to it."""
-        return any(
-            any_extends_into(*boxes.arrays, room.lower, room.size)
-            for boxes in (self._boxes, self._closed)
-        )
-
-    def inside(
-        self,
-        room: Room,
-        bounds: tuple[Floats, Floats],
-        lattice: NDArray[np.int64],
-        source: Floats,
-        head: Floats,
-    ) -> NDArray[np.int64]:
-        """Return how many obstacles in a room each path inside it passes.
-
-        See `count_crossed_inside` and `count_leaves_inside`.
-
-        Args:
-            room: The room.
-            bounds: Its `Room.bounds`.
-            lattice: ``(K, 3)`` reflections of the paths, from `image_lattice`.
-            source: ``(3,)`` metres.
-            head: ``(3,)`` metres.
-        """
-        paths = source, head, bounds, room.lower, room.size, lattice
-        walls = self._boxes.arrays
-        counts: NDArray[np.int64] = count_crossed_inside(*paths, *walls)
-        if any_extends_into(*self._closed.arrays, room.lower, room.size):
-            leaves, closed = self._leaves.arrays, self._closed.arrays
-            counts = counts + count_leaves_inside(*paths, walls, leaves, closed)
-        return counts
+    def screens(self, lower: Floats, upper: Floats) -> ScreenSets:
+        """Return where and how they attenuate sound in rooms, see `find_screens`."""
+        boxes = self._boxes.arrays, self._leaves.arrays, self._closed.arrays
+        return find_screens(*boxes, lower, upper)
 
 
 class _Boxes:

@@ -11,7 +11,9 @@ from numpy.typing import NDArray
 from veca_marl.sim.geometry import Floats, Pose
 from veca_marl.sim.sound.delay_lines import KERNEL_TAPS, SignalMemory, read_moving
 from veca_marl.sim.sound.mixers import Mixer
+from veca_marl.sim.sound.octave_bands import N_BANDS, shelf_filters, unshaded
 from veca_marl.sim.sound.room_acoustics import SPEED_OF_SOUND_MPS
+from veca_marl.sim.sound.shading import SETTLING_SAMPLES, Sections, read_shaded_block, settle
 from veca_marl.sim.sound.sounds import Source
 from veca_marl.sim.sound.surroundings import Arrivals, Surroundings
 
@@ -115,6 +117,12 @@ class Ears:
         )
         return delays, filters
 
+    def shades(self, arrivals: Arrivals) -> Sections | None:
+        """Return the filters ``(K, S, 3)`` of what obstacles leave; None if they take nothing."""
+        if arrivals.energies is None:
+            return None
+        return shelf_filters(arrivals.energies, self._sample_rate_hz)
+
     def blocks(self, n_paths: int) -> NDArray[np.float32]:
         """Return a buffer ``(2, K, C, block_samples)`` for signals and filters of K paths.
 
@@ -148,10 +156,13 @@ class _Paths:
         # the end of the signals of the last step, with which the block of the next one begins
         kept = ears.mixer.block_samples - ears.step_samples
         self._ends: NDArray[np.float32] = np.empty((*delays.shape, kept), np.float32)
+        self._shades = ears.shades(arrivals)
+        self._states: NDArray[np.float32] = np.zeros((*delays.shape, N_BANDS - 1), np.float32)
 
     def _place(self, arrivals: Arrivals, delays: Floats) -> None:
         self.arrivals, self.delays = arrivals, delays
-        self.reach_samples = self._ears.reach_of(float(delays.max()))
+        filtered = 0 if arrivals.energies is None else SETTLING_SAMPLES
+        self.reach_samples = self._ears.reach_of(float(delays.max())) + filtered
 
     def begin(self, memory: SignalMemory, n_samples: int, age_samples: int = 0) -> None:
         """Read the whole block at constant delays.
@@ -162,7 +173,11 @@ class _Paths:
             age_samples: How many samples before the newest the block ends.
         """
         start = memory.end - min(n_samples, memory.n_samples)
-        self._read(memory, start, self.delays, self._signals.shape[-1], age_samples)
+        n_block, constant = self._signals.shape[-1], (self._shades, self._shades)
+        if self._shades is not None:
+            before = memory.end - age_samples - n_block
+            settle(memory.powers, start, before, self.delays, self._shades, self._states)
+        self._read(memory, constant, start, self.delays, n_block, age_samples)
 
     def start(self) -> None:
         """Add sound that was never heard before: without a fade, from its beginning."""
@@ -174,12 +189,14 @@ class _Paths:
 
     def fade_out(self, memory: SignalMemory) -> None:
         """Add the step at the delays of the last one, ending in silence."""
-        self._read(memory, 0, self.delays, self._ears.step_samples)
+        constant = self._shades, self._shades
+        self._read(memory, constant, 0, self.delays, self._ears.step_samples)
         self._ears.mixer.add(self._signals, self._response, None)
 
     def stay(self, memory: SignalMemory) -> None:
         """Add the step with the delays and filters of the last one."""
-        self._read(memory, 0, self.delays, self._ears.step_samples)
+        constant = self._shades, self._shades
+        self._read(memory, constant, 0, self.delays, self._ears.step_samples)
         self._ears.mixer.add(self._signals, self._response, self._response)
 
     def move(
@@ -190,7 +207,9 @@ class _Paths:
         filters: NDArray[np.float32],
     ) -> None:
         """Add the step with delays and filters that change to those given, see `Ears.paths`."""
-        self._read(memory, 0, delays, self._ears.step_samples)
+        shades = self._ears.shades(arrivals)
+        before, self._shades = self._shades, shades
+        self._read(memory, (before, shades), 0, delays, self._ears.step_samples)
         self._place(arrivals, delays)
         self._filters[:] = filters
         self._ears.mixer.add_changed(self._blocks, self._response)
@@ -198,16 +217,25 @@ class _Paths:
     def _read(
         self,
         memory: SignalMemory,
+        shades: tuple[Sections | None, Sections | None],
         start: int,
         delays: Floats,
         n_samples: int,
         age_samples: int = 0,
     ) -> None:
+        """Read new samples; filters change from the first of `shades` to the second."""
         start = max(start, memory.end - memory.n_samples)
         end = memory.end - age_samples
-        _read_block(
-            memory.powers, start, end, self.delays, delays, n_samples, self._ends, self._signals
-        )
+        block = (
+            memory.powers, start, end, self.delays, delays, n_samples, self._ends, self._signals,
+        )  # fmt: skip
+        before, after = shades
+        if before is None and after is None:
+            read_block(*block)
+            return
+        nothing = unshaded(len(delays)) if before is None or after is None else before
+        sections = nothing if before is None else before, nothing if after is None else after
+        read_shaded_block(*block, sections, self._states)
 
 
 class Propagation:
@@ -303,7 +331,7 @@ class Propagation:
 
 
 @njit(cache=True, error_model="numpy")
-def _read_block(
+def read_block(
     powers: NDArray[np.float32],
     start: int,
     end: int,

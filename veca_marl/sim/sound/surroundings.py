@@ -1,11 +1,10 @@
 """The surroundings that sound propagates in: a free field, one room, or a house of several.
 
 Image sources are right inside one box. A listener in the room of a source hears it with the
-reflections of that room. A listener in another room hears the direct sound alone. Each path is
-attenuated by every obstacle (wall, closed door, wardrobe) that it passes through at that moment. An
-open door is no obstacle, see `obstacles`, so that the direct sound through it is not attenuated.
-Diffraction round edges and reflections at obstacles are not modelled. When a listener enters
-another room or an obstacle moves into a path, the sound is cross-faded over one control step.
+reflections of that room. A listener in another room hears the direct sound alone. Obstacles (walls,
+leaves of doors, furniture) leave a fraction of the energy of each path in each octave band, see
+`diffraction`, at their present poses. Reflections at obstacles are not modelled. When a listener
+enters another room, the sound is cross-faded over one control step.
 """
 
 from __future__ import annotations
@@ -20,17 +19,14 @@ from numba import njit
 from numpy.typing import NDArray
 
 from veca_marl.sim.geometry import Floats, Pose
+from veca_marl.sim.sound.attenuated_paths import energies_between, energies_inside
 from veca_marl.sim.sound.obstacles import Obstacles
+from veca_marl.sim.sound.octave_bands import N_BANDS
+from veca_marl.sim.sound.partitions import TRANSMISSION_LOSS_DB, surface_ratio
 from veca_marl.sim.sound.room_acoustics import Room, image_gains, image_lattice, image_sources
+from veca_marl.sim.sound.screens import ScreenSets
 
-TRANSMISSION_LOSS_DB = 30.0
-"""A limp partition of 15 kg/m2 at 500 Hz by the field-incidence mass law, 20 log10(500 x 15) - 47
-= 30.5 dB. Authors differ in its constant (Ebbitt & Hansen 2007, Mass Law - Calculations and
-Measurements, SAE 2007-01-2201); 47 is one of those in use, 5 dB below normal incidence, which is
-20 log10(pi f m / (rho c)) with rho c = 415 kg/(m2 s). The same at all frequencies: real walls
-attenuate high frequencies more."""
-
-_BETWEEN_ROOMS = -1  # `paths_id` of the direct path from one room to another; rooms have 0 and up
+_BETWEEN_ROOMS = -1  # `paths_id` of paths between rooms is this and below; rooms have 0 and up
 
 
 @dataclass(frozen=True)
@@ -39,7 +35,9 @@ class Arrivals:
 
     Attributes:
         vectors: ``(K, 3)`` metres from the head to the source and its images, in the head frame.
-        gains: ``(K,)`` pressure gains by walls and obstacles.
+        gains: ``(K,)`` pressure gains by the walls that reflect it.
+        energies: ``(K, N_BANDS)`` fraction of the energy that obstacles leave in each octave band;
+            None where they take nothing.
         paths_id: Arrivals of equal id have the same paths in the same order: path k of one
             continues path k of the other.
     """
@@ -47,6 +45,7 @@ class Arrivals:
     vectors: Floats
     gains: Floats
     paths_id: int
+    energies: Floats | None = None
 
     def same_as(self, other: Arrivals) -> bool:
         """Return whether all numbers are equal."""
@@ -54,7 +53,14 @@ class Arrivals:
             self.paths_id == other.paths_id
             and bool((self.vectors == other.vectors).all())
             and (self.gains is other.gains or bool((self.gains == other.gains).all()))
+            and _equal(self.energies, other.energies)
         )
+
+
+def _equal(one: Floats | None, other: Floats | None) -> bool:
+    if one is None or other is None:
+        return one is other
+    return bool((one == other).all())
 
 
 class Surroundings(Protocol):
@@ -144,11 +150,10 @@ class OneRoom:
         )
         return Arrivals(vectors, self.gains, 0)
 
-    def paths_through(
-        self, obstacles: Obstacles, source: Floats, head: Floats
-    ) -> NDArray[np.int64]:
-        """Return how many obstacles each path passes, ``(K,)``; see `Obstacles.inside`."""
-        return obstacles.inside(self.room, self._bounds, self._lattice, source, head)
+    def bounded(self, position: Floats) -> Floats:
+        """Return the nearest point ``(3,)`` of sources and heads inside the room."""
+        nearest: Floats = np.minimum(np.maximum(position, self._bounds[0]), self._bounds[1])
+        return nearest
 
 
 @njit(cache=True)
@@ -218,13 +223,17 @@ class House:
             raise ValueError(f"transmission_loss_db={transmission_loss_db} must be finite, 0 or up")
         self.obstacles = Obstacles()
         self._rooms = [OneRoom(room, image_order) for room in rooms]
-        self._lower = np.array([room.lower for room in rooms])
-        self._upper = np.array([room.lower + room.size for room in rooms])
-        self._lowest, self._highest = self._lower.min(axis=0), self._upper.max(axis=0)
+        self._lattice = image_lattice(image_order)
+        self._corners = (
+            np.array([room.lower for room in rooms]),
+            np.array([room.lower + room.size for room in rooms]),
+        )
+        self._lowest, self._highest = self._corners[0].min(axis=0), self._corners[1].max(axis=0)
         self.size: Floats = self._highest - self._lowest
         longest_m = [room.longest_path_m for room in self._rooms]
         self.longest_path_m = max(float(np.linalg.norm(self.size)), *longest_m)
-        self._obstacle_gain = 10.0 ** (-transmission_loss_db / 20.0)
+        self._surface_ratio = surface_ratio(transmission_loss_db)
+        self._screens_of: tuple[int, ScreenSets] | None = None
 
     @property
     def changes(self) -> int:
@@ -233,7 +242,7 @@ class House:
 
     def room_of(self, position: Floats) -> int:
         """Return the number of the room that contains a point ``(3,)``, or else of the nearest."""
-        return int(nearest_box(position, self._lower, self._upper))
+        return int(nearest_box(position, *self._corners))
 
     def obstacles_between(self, one: Floats, other: Floats) -> int:
         """Return how many obstacles the straight line between two points ``(3,)`` passes."""
@@ -241,22 +250,84 @@ class House:
 
     def arrivals(self, source: Floats, head: Pose) -> Arrivals:
         """See `Surroundings`."""
-        room = self.room_of(head.position)
-        if self.room_of(source) == room:
-            inside = self._rooms[room].arrivals(source, head)
-            gains = self._attenuated(inside.gains, self._rooms[room], source, head.position)
-            return Arrivals(inside.vectors, gains, room)
-        source, position = self._clamp(source), self._clamp(head.position)
-        direct: Floats = ((source - position) @ head.rotation)[None]
-        gain = self._obstacle_gain ** self.obstacles_between(source, position)
-        return Arrivals(direct, np.array([gain]), _BETWEEN_ROOMS)
+        room, other = self.room_of(source), self.room_of(head.position)
+        if room != other:
+            return self._arrivals_between(room, other, source, head)
+        inside = self._rooms[room].arrivals(source, head)
+        energies = self._energies_inside(room, source, head.position, self._lattice)
+        return Arrivals(inside.vectors, inside.gains, room, energies)
 
-    def _attenuated(self, gains: Floats, one: OneRoom, source: Floats, head: Floats) -> Floats:
-        """Return the gains of all paths in a room after the obstacles in it."""
-        if not self.obstacles.reach_into(one.room):
-            return gains
-        counts = one.paths_through(self.obstacles, source, head)
-        return gains * self._obstacle_gain**counts if counts.any() else gains
+    def _energies_inside(
+        self, room: int, source: Floats, head: Floats, lattice: NDArray[np.int64]
+    ) -> Floats | None:
+        """Return the energies ``(K, N_BANDS)`` of paths in a room, None if nothing is lost."""
+        sets, one = self._screens, self._rooms[room]
+        if not len(sets.inside[room]):
+            return None
+        energies: Floats = energies_inside(
+            one.bounded(source),
+            one.bounded(head),
+            one.room.lower,
+            one.room.size,
+            lattice,
+            sets.inside[room],
+            sets.screens,
+            self._surface_ratio,
+        )
+        return None if (energies == 1.0).all() else energies
+
+    def _arrivals_between(self, room: int, other: int, source: Floats, head: Pose) -> Arrivals:
+        """Return how a source in one room arrives at a head in another one."""
+        source, position = self._clamp(source), self._clamp(head.position)
+        energies = self._energies_between(room, other, source, position, image_lattice(0))
+        direct: Floats = ((source - position) @ head.rotation)[None]
+        paths_id = _BETWEEN_ROOMS - room * len(self._rooms) - other
+        return Arrivals(direct, np.ones(1), paths_id, energies)
+
+    def _energies_between(
+        self, room: int, other: int, source: Floats, head: Floats, lattice: NDArray[np.int64]
+    ) -> Floats:
+        """Return the energies of paths between rooms, see `energies_between`."""
+        sets = self._screens
+        one, two = self._rooms[room].room, self._rooms[other].room
+        energies: Floats = energies_between(
+            source,
+            head,
+            (one.lower, one.size, sets.inside[room]),
+            (two.lower, two.size, sets.inside[other]),
+            lattice,
+            sets.between,
+            self._corners,
+            sets.screens,
+            self._surface_ratio,
+        )
+        return energies
+
+    def direct_energy(self, source: Floats, head: Floats) -> Floats:
+        """Return which fraction of the energy obstacles leave of the direct sound.
+
+        Args:
+            source: ``(3,)`` metres.
+            head: ``(3,)`` metres.
+
+        Returns:
+            ``(N_BANDS,)`` from 0 to 1, see `octave_bands.BANDS_HZ`.
+        """
+        room, other = self.room_of(source), self.room_of(head)
+        if room != other:
+            ends = self._clamp(source), self._clamp(head)
+            between: Floats = self._energies_between(room, other, *ends, image_lattice(0))[0]
+            return between
+        energies = self._energies_inside(room, source, head, image_lattice(0))
+        return np.ones(N_BANDS) if energies is None else energies[0]
+
+    @property
+    def _screens(self) -> ScreenSets:
+        """The screens at the present poses of the obstacles."""
+        if self._screens_of is None or self._screens_of[0] != self.obstacles.changes:
+            found = self.obstacles.screens(*self._corners)
+            self._screens_of = self.obstacles.changes, found
+        return self._screens_of[1]
 
     def _clamp(self, position: Floats) -> Floats:
         """Return the nearest point in the box round all rooms."""

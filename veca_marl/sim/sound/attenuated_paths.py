@@ -1,0 +1,268 @@
+"""The energy that arrives by every path from a source to a head, in one room or between two.
+
+A reflected path is a straight line to an image (Allen & Berkley 1979), unfolded: in the copies of
+the room that it passes stand mirror images of the obstacles. Between two rooms there are the direct
+sound, what the walls of the source's room reflect before it passes the opening, and what those of
+the head's room reflect after it: coupled rooms (Kuttruff 2016, Room Acoustics, section 5.8) as
+images. A path exists if its reflections are in the room that reflects it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from veca_marl.sim.geometry import Floats
+from veca_marl.sim.sound.blocked_paths import contains_point, next_wall
+from veca_marl.sim.sound.diffraction import (
+    Line,
+    Screens,
+    Work,
+    add_silhouette,
+    energy_past,
+    line_between,
+)
+from veca_marl.sim.sound.octave_bands import N_BANDS
+
+Numbers = NDArray[np.int64]
+
+
+@njit(cache=True, error_model="numpy")
+def energies_inside(
+    source: Floats,
+    head: Floats,
+    lower: Floats,
+    size: Floats,
+    lattice: Numbers,
+    numbers: Numbers,
+    screens: Screens,
+    surface_ratio: float,
+) -> Floats:
+    """Return the energy that arrives by all paths in one room, relative to that without obstacles.
+
+    Args:
+        source: ``(3,)`` metres in the room.
+        head: ``(3,)`` metres in the room.
+        lower: ``(3,)`` metres, the room's lower corner.
+        size: ``(3,)`` metres.
+        lattice: ``(K, 3)`` from `image_lattice`.
+        numbers: Of the screens in the room.
+        screens: All screens.
+        surface_ratio: See `partitions.energy_through`.
+
+    Returns:
+        ``(K, N_BANDS)`` from 0 to 1. Obstacles round the source or the head take nothing.
+    """
+    used = _not_round(numbers, source, head, screens)
+    energies = np.ones((len(lattice), N_BANDS))
+    whole = np.zeros((0, 3))
+    for k in range(len(lattice)):
+        image = _image(source, lower, size, lattice[k])
+        _write_energy(
+            head, image, lower, size, lattice[k], used, used, screens, whole, whole, surface_ratio,
+            energies[k],
+        )  # fmt: skip
+    return energies
+
+
+@njit(cache=True, error_model="numpy")
+def energies_between(
+    source: Floats,
+    head: Floats,
+    room: tuple[Floats, Floats, Numbers],
+    other: tuple[Floats, Floats, Numbers],
+    lattice: Numbers,
+    between: Numbers,
+    rooms: tuple[Floats, Floats],
+    screens: Screens,
+    surface_ratio: float,
+) -> Floats:
+    """Return the energy that arrives by all paths from one room to another one.
+
+    Args:
+        source: ``(3,)`` metres.
+        head: ``(3,)`` metres.
+        room: Lower corner and size of the source's room, and the numbers of the screens in it.
+        other: Those of the head's room.
+        lattice: ``(K, 3)`` from `image_lattice`.
+        between: Numbers of the screens that count between rooms.
+        rooms: Lower and upper corners ``(rooms, 3)`` of all rooms.
+        screens: All screens.
+        surface_ratio: See `partitions.energy_through`.
+
+    Returns:
+        ``(2 K - 1, N_BANDS)`` from 0 to 1: of the direct sound, of the images in the source's room
+        and of those in the head's room. 0 for paths that do not exist.
+    """
+    n = len(lattice)
+    energies = np.zeros((2 * n - 1, N_BANDS))
+    first = _not_round(between, source, head, screens)
+    later = _not_round(room[2], source, head, screens)
+    for k in range(n):
+        image = _image(source, room[0], room[1], lattice[k])
+        _write_energy(
+            head, image, room[0], room[1], lattice[k], first, later, screens, rooms[0], rooms[1],
+            surface_ratio, energies[k],
+        )  # fmt: skip
+    later = _not_round(other[2], source, head, screens)
+    back = np.empty(3, np.int64)
+    for k in range(1, n):
+        for axis in range(3):  # an even number of reflections begins at the opposite wall
+            back[axis] = lattice[k, axis] if lattice[k, axis] % 2 else -lattice[k, axis]
+        image = _image(head, other[0], other[1], back)
+        _write_energy(
+            source, image, other[0], other[1], back, first, later, screens, rooms[0], rooms[1],
+            surface_ratio, energies[n - 1 + k],
+        )  # fmt: skip
+    return energies
+
+
+@njit(cache=True, error_model="numpy")
+def _not_round(numbers: Numbers, one: Floats, other: Floats, screens: Screens) -> Numbers:
+    """Return the screens without those that contain one of two points.
+
+    A source in a box is part of it, such as a loudspeaker in a cabinet.
+    """
+    kept = np.empty(len(numbers), np.int64)
+    n_kept = 0
+    for n in numbers:
+        box = screens.centres[n], screens.rotations[n], screens.halves[n]
+        if contains_point(one, *box) or contains_point(other, *box):
+            continue
+        kept[n_kept] = n
+        n_kept += 1
+    return kept[:n_kept]
+
+
+@njit(cache=True, error_model="numpy")
+def _image(point: Floats, lower: Floats, size: Floats, reflections: Numbers) -> Floats:
+    """Return the image ``(3,)`` of a point, see `image_sources`."""
+    image = np.empty(3)
+    for axis in range(3):
+        sign, offset = _mirror(lower[axis], size[axis], reflections[axis])
+        image[axis] = sign * point[axis] + offset
+    return image
+
+
+@njit(cache=True, error_model="numpy")
+def _mirror(lower: float, size: float, n: int) -> tuple[float, float]:
+    """Return the sign and the offset of the coordinates in a copy of a room."""
+    if n % 2 == 0:
+        return 1.0, n * size
+    return -1.0, 2.0 * lower + (n + 1) * size
+
+
+@njit(cache=True, error_model="numpy")
+def _write_energy(
+    start: Floats,
+    image: Floats,
+    lower: Floats,
+    size: Floats,
+    reflections: Numbers,
+    first: Numbers,
+    later: Numbers,
+    screens: Screens,
+    rooms_lower: Floats,
+    rooms_upper: Floats,
+    surface_ratio: float,
+    energy: Floats,
+) -> None:
+    """Write the energy ``(N_BANDS,)`` that arrives by one path.
+
+    Args:
+        start: ``(3,)`` metres, the end of the path before its reflections; it may be in another
+            room.
+        image: ``(3,)`` metres, the image of its other end.
+        lower: Lower corner of the room that reflects it.
+        size: Its size.
+        reflections: ``(3,)`` copy of the room in which the image is.
+        first: Numbers of the screens before the first reflection.
+        later: Those after it.
+        screens: All screens.
+        rooms_lower: Corners of all rooms: before the first reflection furniture counts only for
+            the part of the path that is in its room; none if all of it is in one room.
+        rooms_upper: Likewise.
+        surface_ratio: See `partitions.energy_through`.
+        energy: Overwritten.
+    """
+    line = (
+        line_between(start, image)
+        if (start != image).any()
+        else line_between(start, start + np.array([1e-6, 0.0, 0.0]))
+    )
+    n_legs = 1 + np.abs(reflections).sum()
+    most = len(first) + (n_legs - 1) * len(later)
+    rectangles, numbers, depths = np.empty((most, 4)), np.empty(most, np.int64), np.empty(most)
+    begin, way = start - lower, image - start
+    cell, sign, offset = np.zeros(3, np.int64), np.ones(3), np.zeros(3)
+    work = Work(np.empty((8, 3)), np.empty(4), np.empty(4))
+    count, share = 0, 0.0
+    for leg in range(n_legs):
+        until, crossed = next_wall(begin, way, size, cell, reflections)
+        if (
+            leg == 0
+            and crossed >= 0
+            and not _is_reflected(begin, way, size, reflections, until, crossed)
+        ):
+            energy[:] = 0.0
+            return
+        for axis in range(3):
+            sign[axis], offset[axis] = _mirror(lower[axis], size[axis], cell[axis])
+        for n in first if leg == 0 else later:
+            low_m, high_m = share * line.length_m, until * line.length_m
+            room = screens.rooms[n]
+            if leg == 0 and 0 <= room < len(rooms_lower):
+                enter_m, leave_m = _stretch_inside(line, rooms_lower[room], rooms_upper[room])
+                low_m, high_m = max(low_m, enter_m), min(high_m, leave_m)
+            depth = add_silhouette(
+                line, low_m, high_m, screens, n, (sign, offset), work, rectangles[count]
+            )
+            if depth < np.inf:
+                numbers[count], depths[count] = n, depth
+                count += 1
+        if crossed < 0:
+            break
+        cell[crossed] += 1 if way[crossed] > 0.0 else -1
+        share = until
+    energy_past(rectangles[:count], numbers[:count], depths[:count], screens, surface_ratio, energy)
+
+
+@njit(cache=True, error_model="numpy")
+def _is_reflected(
+    begin: Floats, way: Floats, size: Floats, reflections: Numbers, share: float, crossed: int
+) -> bool:
+    """Return whether a path meets the first wall that reflects it within its room.
+
+    Args:
+        begin: ``(3,)`` metres, start of the path in the coordinates of the room.
+        way: ``(3,)`` metres to its end.
+        size: ``(3,)`` metres, of the room.
+        reflections: ``(3,)`` copy of the room in which it ends.
+        share: Of the way up to that wall.
+        crossed: Axis of that wall.
+    """
+    if not 0.0 < share < 1.0:
+        return False
+    for axis in range(3):
+        if reflections[axis] != 0 and (way[axis] > 0.0) != (reflections[axis] > 0):
+            return False
+        at = begin[axis] + share * way[axis]
+        if axis != crossed and not -1e-9 <= at <= size[axis] + 1e-9:
+            return False
+    return True
+
+
+@njit(cache=True, error_model="numpy")
+def _stretch_inside(line: Line, lower: Floats, upper: Floats) -> tuple[float, float]:
+    """Return between which distances along a line it is in a room; the first greater if never."""
+    enter_m, leave_m = 0.0, line.length_m
+    for axis in range(3):
+        along, at = line.frame[0, axis], line.start[axis]
+        if abs(along) < 1e-12:
+            if not lower[axis] <= at <= upper[axis]:
+                return 1.0, 0.0
+            continue
+        one, other = (lower[axis] - at) / along, (upper[axis] - at) / along
+        enter_m, leave_m = max(enter_m, min(one, other)), min(leave_m, max(one, other))
+    return enter_m, leave_m
