@@ -22,6 +22,7 @@ from veca_marl.sim.sound.diffraction import (
     add_silhouette,
     energy_past,
     line_between,
+    make_work,
 )
 from veca_marl.sim.sound.octave_bands import N_BANDS
 
@@ -57,11 +58,12 @@ def energies_inside(
     used = _not_round(numbers, source, head, screens)
     energies = np.ones((len(lattice), N_BANDS))
     whole = np.zeros((0, 3))
+    work = make_work(_most_silhouettes(len(used), len(used), lattice))
     for k in range(len(lattice)):
         image = _image(source, lower, size, lattice[k])
         _write_energy(
             head, image, lower, size, lattice[k], used, used, screens, whole, whole, surface_ratio,
-            energies[k],
+            work, energies[k],
         )  # fmt: skip
     return energies
 
@@ -99,11 +101,13 @@ def energies_between(
     energies = np.zeros((2 * n - 1, N_BANDS))
     first = _not_round(between, source, head, screens)
     later = _not_round(room[2], source, head, screens)
+    most = max(len(room[2]), len(other[2]))
+    work = make_work(_most_silhouettes(len(first), most, lattice))
     for k in range(n):
         image = _image(source, room[0], room[1], lattice[k])
         _write_energy(
             head, image, room[0], room[1], lattice[k], first, later, screens, rooms[0], rooms[1],
-            surface_ratio, energies[k],
+            surface_ratio, work, energies[k],
         )  # fmt: skip
     later = _not_round(other[2], source, head, screens)
     back = np.empty(3, np.int64)
@@ -113,9 +117,18 @@ def energies_between(
         image = _image(head, other[0], other[1], back)
         _write_energy(
             source, image, other[0], other[1], back, first, later, screens, rooms[0], rooms[1],
-            surface_ratio, energies[n - 1 + k],
+            surface_ratio, work, energies[n - 1 + k],
         )  # fmt: skip
     return energies
+
+
+@njit(cache=True, error_model="numpy")
+def _most_silhouettes(n_first: int, n_later: int, lattice: Numbers) -> int:
+    """Return how many silhouettes a path can have, see `_write_energy`."""
+    most = 0
+    for k in range(len(lattice)):
+        most = max(most, np.abs(lattice[k]).sum())
+    return n_first + most * n_later
 
 
 @njit(cache=True, error_model="numpy")
@@ -166,6 +179,7 @@ def _write_energy(
     rooms_lower: Floats,
     rooms_upper: Floats,
     surface_ratio: float,
+    work: Work,
     energy: Floats,
 ) -> None:
     """Write the energy ``(N_BANDS,)`` that arrives by one path.
@@ -184,6 +198,7 @@ def _write_energy(
             the part of the path that is in its room; none if all of it is in one room.
         rooms_upper: Likewise.
         surface_ratio: See `partitions.energy_through`.
+        work: Overwritten.
         energy: Overwritten.
     """
     line = (
@@ -192,11 +207,8 @@ def _write_energy(
         else line_between(start, start + np.array([1e-6, 0.0, 0.0]))
     )
     n_legs = 1 + np.abs(reflections).sum()
-    most = len(first) + (n_legs - 1) * len(later)
-    rectangles, numbers, depths = np.empty((most, 4)), np.empty(most, np.int64), np.empty(most)
     begin, way = start - lower, image - start
     cell, sign, offset = np.zeros(3, np.int64), np.ones(3), np.zeros(3)
-    work = Work(np.empty((8, 3)), np.empty(4), np.empty(4))
     count, share = 0, 0.0
     for leg in range(n_legs):
         until, crossed = next_wall(begin, way, size, cell, reflections)
@@ -216,16 +228,16 @@ def _write_energy(
                 enter_m, leave_m = _stretch_inside(line, rooms_lower[room], rooms_upper[room])
                 low_m, high_m = max(low_m, enter_m), min(high_m, leave_m)
             depth = add_silhouette(
-                line, low_m, high_m, screens, n, (sign, offset), work, rectangles[count]
+                line, low_m, high_m, screens, n, (sign, offset), work, work.rectangles[count]
             )
             if depth < np.inf:
-                numbers[count], depths[count] = n, depth
+                work.numbers[count], work.depths[count] = n, depth
                 count += 1
         if crossed < 0:
             break
         cell[crossed] += 1 if way[crossed] > 0.0 else -1
         share = until
-    energy_past(rectangles[:count], numbers[:count], depths[:count], screens, surface_ratio, energy)
+    energy_past(count, screens, surface_ratio, work, energy)
 
 
 @njit(cache=True, error_model="numpy")

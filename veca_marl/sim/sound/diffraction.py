@@ -43,6 +43,7 @@ _STRADDLED_M = 0.05  # a joint with another wall closes a wall that the path mee
 _FAR_M, _FAR_RATIO = 6.0, 0.5  # beyond that beside a path obstacles are left out
 _MOST = 62  # silhouettes of one path; they are bits of an integer
 _NOTHING = 1e-9  # measure
+_MASKS = 128  # sets of silhouettes that one composite remembers
 _ROOT_BANDS: Floats = np.sqrt(BANDS_HZ)
 
 
@@ -89,17 +90,58 @@ class Line(NamedTuple):
 
 
 class Work(NamedTuple):
-    """Arrays that are used again for each silhouette.
+    """Arrays that are used again for each path: memory is not allocated for each.
 
     Attributes:
         corners: ``(8, 3)`` metres, of a box in the frame of a line.
         extent: ``(4,)`` metres, least and greatest offsets across the line and above it.
         detour: ``(4,)`` metres, by which the ways round these are longer, with their signs.
+        rectangles: ``(m, 4)`` silhouettes of a path, see `add_silhouette`.
+        numbers: ``(m,)`` of which screen each is; one screen can have several.
+        depths: ``(m,)`` metres along the line.
+        below: ``(m, 4, N_BANDS)`` fraction of the energy below each edge of these.
+        chosen: ``(m,)`` the silhouettes of one composite, those at the least depth first.
+        edges: ``(2, 2 m)`` numbers of their edges in order, ``2 * silhouette + side``, across and
+            above.
+        ordered: ``(2, 2 m + 2, N_BANDS)`` fraction of the energy below each of these edges in order, from 0 to 1.
+        masks: ``(n,)`` sets of silhouettes of which the transmission is known.
+        through: ``(n, N_BANDS)`` energy that passes these.
+        part: ``(4, N_BANDS)`` the energy of a composite, and measures.
     """
 
     corners: Floats
     extent: Floats
     detour: Floats
+    rectangles: Floats
+    numbers: NDArray[np.int64]
+    depths: Floats
+    below: Floats
+    chosen: NDArray[np.int64]
+    edges: NDArray[np.int64]
+    ordered: Floats
+    masks: NDArray[np.int64]
+    through: Floats
+    part: Floats
+
+
+@njit(cache=True, error_model="numpy")
+def make_work(most: int) -> Work:
+    """Return arrays for paths with at most so many silhouettes."""
+    return Work(
+        np.empty((8, 3)),
+        np.empty(4),
+        np.empty(4),
+        np.empty((most, 4)),
+        np.empty(most, np.int64),
+        np.empty(most),
+        np.empty((most, 4, N_BANDS)),
+        np.empty(most, np.int64),
+        np.empty((2, 2 * most), np.int64),
+        np.empty((2, 2 * most + 2, N_BANDS)),
+        np.empty(_MASKS, np.int64),
+        np.empty((_MASKS, N_BANDS)),
+        np.empty((4, N_BANDS)),
+    )
 
 
 @njit(cache=True, error_model="numpy")
@@ -155,9 +197,13 @@ def add_silhouette(
     for side in range(4):
         extent[side] = detour[side] = np.inf if side % 2 == 0 else -np.inf
     for corner in range(8):
-        for k in range(3):
-            if not corner & (1 << k):
-                _add_edge(line.length_m, begin_m, end_m, corner, corner | 1 << k, work)
+        at = corners[corner, 0]
+        if begin_m - 1e-9 <= at <= end_m + 1e-9:
+            _add_point(line.length_m, at, corners[corner, 1], corners[corner, 2], work)
+    if reach[0] < begin_m:
+        _add_section(line.length_m, begin_m, work)
+    if reach[1] > end_m:
+        _add_section(line.length_m, end_m, work)
     if extent[1] < extent[0]:
         return np.inf
     for side in range(4):
@@ -201,44 +247,44 @@ def _write_corners(
 
 
 @njit(cache=True, error_model="numpy")
-def _add_edge(
-    length_m: float, begin_m: float, end_m: float, low: int, high: int, work: Work
-) -> None:
-    """Extend a silhouette by the part of a box's edge between two planes.
+def _add_section(length_m: float, at_m: float, work: Work) -> None:
+    """Extend a silhouette by the section of a box with a plane across the line.
 
     Args:
         length_m: Length of the line.
-        begin_m: See `add_silhouette`.
-        end_m: Likewise.
-        low: Number of the corner at one end of the edge.
-        high: That at the other end.
+        at_m: Distance of the plane from the start of the line.
         work: Has the corners, and the silhouette that is updated.
     """
-    corners, extent, detour = work.corners, work.extent, work.detour
-    first, last = 0.0, 1.0
-    begin, way = corners[low, 0], corners[high, 0] - corners[low, 0]
-    if abs(way) < 1e-12:
-        if begin < begin_m - 1e-9 or begin > end_m + 1e-9:
-            return
-    else:
-        one, other = (begin_m - begin) / way, (end_m - begin) / way
-        first, last = max(first, min(one, other)), min(last, max(one, other))
-        if first > last:
-            return
-    for end in range(2):
-        share = first if end == 0 else last
-        along = min(max(begin + share * way, 0.0), length_m)
-        rest = length_m - along
-        for axis in range(2):
-            offset = corners[low, axis + 1]
-            offset += share * (corners[high, axis + 1] - offset)
-            square = offset * offset
-            more = math.sqrt(along * along + square) + math.sqrt(rest * rest + square)
-            more = math.copysign(max(more - length_m, 0.0), offset)
-            least, most = 2 * axis, 2 * axis + 1
-            extent[least] = min(extent[least], offset)
-            extent[most] = max(extent[most], offset)
-            detour[least], detour[most] = min(detour[least], more), max(detour[most], more)
+    corners = work.corners
+    for low in range(8):
+        for k in range(3):
+            high = low | 1 << k
+            if high == low:
+                continue
+            begin, end = corners[low, 0], corners[high, 0]
+            if (begin < at_m) == (end < at_m):
+                continue
+            ratio = (at_m - begin) / (end - begin)
+            across = corners[low, 1] + ratio * (corners[high, 1] - corners[low, 1])
+            above = corners[low, 2] + ratio * (corners[high, 2] - corners[low, 2])
+            _add_point(length_m, at_m, across, above, work)
+
+
+@njit(cache=True, error_model="numpy")
+def _add_point(length_m: float, along: float, across: float, above: float, work: Work) -> None:
+    """Extend a silhouette by a point of a box, in metres in the frame of the line."""
+    extent, detour = work.extent, work.detour
+    along = min(max(along, 0.0), length_m)
+    rest = length_m - along
+    for axis in range(2):
+        offset = across if axis == 0 else above
+        square = offset * offset
+        more = math.sqrt(along * along + square) + math.sqrt(rest * rest + square)
+        more = math.copysign(max(more - length_m, 0.0), offset)
+        least, most = 2 * axis, 2 * axis + 1
+        extent[least] = min(extent[least], offset)
+        extent[most] = max(extent[most], offset)
+        detour[least], detour[most] = min(detour[least], more), max(detour[most], more)
 
 
 @njit(cache=True, error_model="numpy")
@@ -268,12 +314,7 @@ def _seal(
 
 @njit(cache=True, error_model="numpy")
 def energy_past(
-    rectangles: Floats,
-    numbers: NDArray[np.int64],
-    depths: Floats,
-    screens: Screens,
-    surface_ratio: float,
-    energy: Floats,
+    count: int, screens: Screens, surface_ratio: float, work: Work, energy: Floats
 ) -> None:
     """Write the fraction of the energy that arrives in each octave band.
 
@@ -282,135 +323,76 @@ def energy_past(
     of the leaf: the channel that a leaf opens at its frame is no straight way through it.
 
     Args:
-        rectangles: ``(m, 4)`` silhouettes, see `add_silhouette`; overwritten.
-        numbers: ``(m,)`` of which screen each is; one screen can have several; overwritten.
-        depths: ``(m,)`` metres along the line; overwritten.
+        count: How many silhouettes there are.
         screens: All screens.
         surface_ratio: See `partitions.energy_through`.
+        work: Has the silhouettes; the rest is overwritten.
         energy: ``(N_BANDS,)``, overwritten.
     """
+    count = _keep_those_that_matter(count, work)
     openness = -1.0
-    for m in range(len(numbers)):
-        if screens.kinds[numbers[m]] != BOX and _matters(rectangles[m]):
-            each = screens.opens[numbers[m]]
+    for m in range(count):
+        if screens.kinds[work.numbers[m]] != BOX:
+            each = screens.opens[work.numbers[m]]
             openness = each if openness < 0.0 else min(openness, each)
     energy[:] = 1.0
-    part = np.empty(N_BANDS)
-    solid = screens.kinds[numbers] == BOX
-    if openness > 0.0:
-        for number in _leaves_of(numbers, screens):
-            chosen = numbers == number if number >= 0 else solid
-            _write_composite(
-                rectangles[chosen], numbers[chosen], depths[chosen], screens, surface_ratio, part
-            )
-            energy *= part
+    if count == 0:
+        return
+    if openness <= 0.0:
+        _write_composite(_choose(count, LEAF, False, screens, work), screens, surface_ratio, work)
+        energy[:] = work.part[0]
+        return
+    _write_composite(_choose(count, BOX, True, screens, work), screens, surface_ratio, work)
+    energy[:] = work.part[0]
+    for m in range(count):
+        number = work.numbers[m]
+        if screens.kinds[number] == LEAF and not (work.numbers[:m] == number).any():
+            n_chosen = 0
+            for other in range(m, count):
+                if work.numbers[other] == number:
+                    work.chosen[n_chosen] = other
+                    n_chosen += 1
+            _write_composite(n_chosen, screens, surface_ratio, work)
+            energy *= work.part[0]
     if openness < 1.0:
-        chosen = screens.kinds[numbers] != LEAF
-        _write_composite(
-            rectangles[chosen], numbers[chosen], depths[chosen], screens, surface_ratio, part
-        )
-        apart = max(openness, 0.0)
+        _write_composite(_choose(count, LEAF, False, screens, work), screens, surface_ratio, work)
         for band in range(N_BANDS):
-            energy[band] = energy[band] ** apart * part[band] ** (1.0 - apart)
+            energy[band] = energy[band] ** openness * work.part[0, band] ** (1.0 - openness)
 
 
 @njit(cache=True, error_model="numpy")
-def _leaves_of(numbers: NDArray[np.int64], screens: Screens) -> NDArray[np.int64]:
-    """Return -1, for all that are no leaves, and the numbers of the leaves."""
-    leaves = np.full(len(numbers) + 1, -1)
-    count = 1
-    for number in numbers:
-        if screens.kinds[number] == LEAF and not (leaves[:count] == number).any():
-            leaves[count] = number
-            count += 1
-    return leaves[:count]
-
-
-@njit(cache=True, error_model="numpy")
-def _write_composite(
-    rectangles: Floats,
-    numbers: NDArray[np.int64],
-    depths: Floats,
-    screens: Screens,
-    surface_ratio: float,
-    energy: Floats,
-) -> None:
-    """Write the energy that passes all screens as rectangles in one plane; see `energy_past`."""
-    known, bits, n_kept = _distinct(rectangles, numbers, depths)
-    energy[:] = 0.0
-    across, above = _sorted(rectangles, n_kept, 0), _sorted(rectangles, n_kept, 2)
-    widths, heights = _measures(across), _measures(above)
-    n = 2 * n_kept + 1
-    cover = np.zeros((n, n), np.int64)
-    for m in range(n_kept):
-        for i in range(_index(across, rectangles[m, 0]), _index(across, rectangles[m, 1])):
-            for j in range(_index(above, rectangles[m, 2]), _index(above, rectangles[m, 3])):
-                cover[i + 1, j + 1] |= np.int64(1) << bits[m]
-    masks, through = np.empty(n * n, np.int64), np.empty((n * n, N_BANDS))
-    n_masks = mask = 0
-    for i in range(n):
-        if widths[i].max() < _NOTHING:
-            continue
-        for j in range(n):
-            if heights[j].max() < _NOTHING:
-                continue
-            if n_masks == 0 or masks[mask] != cover[i, j]:
-                mask = 0
-                while mask < n_masks and masks[mask] != cover[i, j]:
-                    mask += 1
-            if mask == n_masks:
-                masks[mask] = cover[i, j]
-                n_masks += 1
-                _energy_through_all(cover[i, j], known, screens, surface_ratio, through[mask])
-            for band in range(N_BANDS):
-                energy[band] += widths[i, band] * heights[j, band] * through[mask, band]
-    for band in range(N_BANDS):
-        energy[band] = min(energy[band] / (1.0 - NEGLIGIBLE), 1.0)
-
-
-@njit(cache=True, error_model="numpy")
-def _distinct(
-    rectangles: Floats, numbers: NDArray[np.int64], depths: Floats
-) -> tuple[NDArray[np.int64], NDArray[np.int64], int]:
+def _keep_those_that_matter(count: int, work: Work) -> int:
     """Move the silhouettes that matter to the front, those at the least depth first.
 
-    Args:
-        rectangles: See `energy_past`; sorted.
-        numbers: Likewise.
-        depths: Likewise.
+    Writes `Work.below` for these.
 
     Returns:
-        The screens in that order, the bit of each silhouette, and how many silhouettes matter.
+        How many there are.
     """
-    n_kept = 0
-    for m in range(len(numbers)):
+    rectangles, numbers, depths = work.rectangles, work.numbers, work.depths
+    below, n_kept = work.below, 0
+    for m in range(count):
         if not _matters(rectangles[m]):
             continue
         left, right, low, high = rectangles[m]
         number, depth, at = numbers[m], depths[m], n_kept
         while at > 0 and depths[at - 1] > depth:
-            rectangles[at], numbers[at], depths[at] = (
-                rectangles[at - 1],
-                numbers[at - 1],
-                depths[at - 1],
-            )
+            rectangles[at], numbers[at] = rectangles[at - 1], numbers[at - 1]
+            depths[at] = depths[at - 1]
             at -= 1
         rectangles[at, 0], rectangles[at, 1] = left, right
         rectangles[at, 2], rectangles[at, 3] = low, high
         numbers[at], depths[at] = number, depth
         n_kept += 1
     n_kept = min(n_kept, _MOST)
-    known, bits = np.empty(n_kept, np.int64), np.empty(n_kept, np.int64)
-    n_known = 0
     for m in range(n_kept):
-        bit = 0
-        while bit < n_known and known[bit] != numbers[m]:
-            bit += 1
-        if bit == n_known:
-            known[bit] = numbers[m]
-            n_known += 1
-        bits[m] = bit
-    return known[:n_known], bits, n_kept
+        for side in range(4):
+            square = rectangles[m, side] ** 2
+            half = 0.5 if rectangles[m, side] >= 0.0 else -0.5
+            for band in range(N_BANDS):
+                each = square * BANDS_HZ[band]
+                below[m, side, band] = 0.5 + half * math.sqrt(each / (each + _SPREAD))
+    return n_kept
 
 
 @njit(cache=True, error_model="numpy")
@@ -426,66 +408,145 @@ def _matters(rectangle: Floats) -> bool:
 
 
 @njit(cache=True, error_model="numpy")
-def _sorted(rectangles: Floats, n: int, first: int) -> Floats:
-    """Return the edges ``(2 n,)`` of the first n silhouettes in two columns, in order."""
-    edges = np.empty(2 * n)
-    for m in range(2 * n):
-        edge, at = rectangles[m // 2, first + m % 2], m
-        while at > 0 and edges[at - 1] > edge:
-            edges[at] = edges[at - 1]
-            at -= 1
-        edges[at] = edge
-    return edges
-
-
-@njit(cache=True, error_model="numpy")
-def _index(edges: Floats, edge: float) -> int:
-    """Return the position of the first of equal edges."""
-    m = 0
-    while edges[m] < edge:
-        m += 1
-    return m
-
-
-@njit(cache=True, error_model="numpy")
 def _below(nu: float) -> float:
     """Return the fraction of the energy on the side of an edge below it, F in the module."""
     return 0.5 * (1.0 + nu / math.sqrt(nu * nu + _SPREAD))
 
 
 @njit(cache=True, error_model="numpy")
-def _measures(edges: Floats) -> Floats:
-    """Return the measures of the intervals between edges ``(m,)``, ``(m + 1, N_BANDS)``."""
-    measures = np.empty((len(edges) + 1, N_BANDS))
+def _choose(count: int, kind: int, is_kind: bool, screens: Screens, work: Work) -> int:
+    """Choose the silhouettes of one kind of screen, or of all others; return how many these are."""
+    n_chosen = 0
+    for m in range(count):
+        if (screens.kinds[work.numbers[m]] == kind) == is_kind:
+            work.chosen[n_chosen] = m
+            n_chosen += 1
+    return n_chosen
+
+
+@njit(cache=True, error_model="numpy")
+def _write_composite(n: int, screens: Screens, surface_ratio: float, work: Work) -> None:
+    """Write the energy that passes the n chosen silhouettes, in one plane, to ``part[0]``.
+
+    The plane is gone through in columns between two edges, and each of these from below: what
+    covers a cell is the set of silhouettes whose lower edge was passed, but not their upper one.
+    """
+    part, ordered, edges = work.part, work.ordered, work.edges
+    masks, through = work.masks, work.through
+    if _cover_nothing(n, work):
+        part[0] = 1.0
+        return
+    part[0] = 0.0
+    _sort_edges(n, work)
+    n_masks, columns = 0, np.int64(0)
+    for i in range(2 * n + 1):
+        widest = 0.0
+        for band in range(N_BANDS):
+            part[2, band] = ordered[0, i + 1, band] - ordered[0, i, band]
+            widest = max(widest, part[2, band])
+        mask, last = np.int64(0), 0
+        for j in range(2 * n + 1 if widest > _NOTHING else 0):
+            if j < 2 * n and not (columns >> (edges[1, j] >> 1)) & 1:
+                continue
+            highest = 0.0
+            for band in range(N_BANDS):
+                part[3, band] = ordered[1, j + 1, band] - ordered[1, last, band]
+                highest = max(highest, part[3, band])
+            if highest > _NOTHING:
+                known = n_masks - 1
+                while known >= 0 and masks[known] != mask:
+                    known -= 1
+                if known < 0:
+                    known = min(n_masks, _MASKS - 1)
+                    n_masks = known + 1
+                    masks[known] = mask
+                    _energy_through_all(mask, screens, surface_ratio, work, known)
+                for band in range(N_BANDS):
+                    part[0, band] += part[2, band] * part[3, band] * through[known, band]
+            last = j + 1
+            if j < 2 * n:
+                mask ^= np.int64(1) << (edges[1, j] >> 1)
+        if i < 2 * n:
+            columns ^= np.int64(1) << (edges[0, i] >> 1)
     for band in range(N_BANDS):
-        last = 0.0
-        for m in range(len(edges)):
-            below = _below(_ROOT_BANDS[band] * edges[m])
-            measures[m, band] = below - last
-            last = below
-        measures[len(edges), band] = 1.0 - last
-    return measures
+        part[0, band] = min(part[0, band] / (1.0 - NEGLIGIBLE), 1.0)
+
+
+@njit(cache=True, error_model="numpy")
+def _cover_nothing(n: int, work: Work) -> bool:
+    """Return whether the n chosen silhouettes together take a negligible part of the energy."""
+    below, chosen, covered = work.below, work.chosen, work.part
+    for band in range(N_BANDS):
+        covered[1, band] = 0.0
+    for k in range(n):
+        m = chosen[k]
+        for band in range(N_BANDS):
+            width = below[m, 1, band] - below[m, 0, band]
+            covered[1, band] += width * (below[m, 3, band] - below[m, 2, band])
+    most = 0.0
+    for band in range(N_BANDS):
+        most = max(most, covered[1, band])
+    return most <= NEGLIGIBLE
+
+
+@njit(cache=True, error_model="numpy")
+def _sort_edges(n: int, work: Work) -> None:
+    """Sort the edges of the n chosen silhouettes, see `Work.edges` and `Work.ordered`."""
+    edges, rectangles, chosen, ordered = work.edges, work.rectangles, work.chosen, work.ordered
+    for axis in range(2):
+        for m in range(2 * n):
+            value, at = rectangles[chosen[m >> 1], 2 * axis + (m & 1)], m
+            while at > 0:
+                before = edges[axis, at - 1]
+                if rectangles[chosen[before >> 1], 2 * axis + (before & 1)] <= value:
+                    break
+                edges[axis, at] = before
+                at -= 1
+            edges[axis, at] = m
+        for band in range(N_BANDS):
+            ordered[axis, 0, band], ordered[axis, 2 * n + 1, band] = 0.0, 1.0
+        for i in range(2 * n):
+            m, side = chosen[edges[axis, i] >> 1], 2 * axis + (edges[axis, i] & 1)
+            for band in range(N_BANDS):
+                ordered[axis, i + 1, band] = work.below[m, side, band]
 
 
 @njit(cache=True, error_model="numpy")
 def _energy_through_all(
-    mask: int,
-    known: NDArray[np.int64],
-    screens: Screens,
-    surface_ratio: float,
-    energy: Floats,
+    mask: int, screens: Screens, surface_ratio: float, work: Work, known: int
 ) -> None:
-    """Write the energy ``(N_BANDS,)`` that passes the screens of a mask one after another."""
-    solid = np.empty(len(known), np.int64)
-    n_solid = 0
-    for bit in range(len(known)):
-        if (mask >> bit) & 1:
-            solid[n_solid] = known[bit]
+    """Write the energy that passes the screens of a mask one after another to a row of `through`.
+
+    Args:
+        mask: The set, one bit for each chosen silhouette.
+        screens: All screens.
+        surface_ratio: See `partitions.energy_through`.
+        work: Has the silhouettes.
+        known: Number of the row.
+    """
+    if mask == 0:
+        work.through[known] = 1.0
+        return
+    solid, gaps = np.empty(_MOST, np.int64), np.empty(_MOST)
+    n_solid = bit = 0
+    while mask >> bit:
+        number = work.numbers[work.chosen[bit]]
+        if (mask >> bit) & 1 and not _contains(solid, n_solid, number):
+            if n_solid > 0:
+                gaps[n_solid - 1] = gap_between(screens, solid[n_solid - 1], number)
+            solid[n_solid] = number
             n_solid += 1
-    gaps = np.empty(max(n_solid - 1, 0))
-    for n in range(n_solid - 1):
-        gaps[n] = gap_between(screens, solid[n], solid[n + 1])
-    energy_through(n_solid, gaps, surface_ratio, energy)
+        bit += 1
+    energy_through(n_solid, gaps, surface_ratio, work.through[known])
+
+
+@njit(cache=True, error_model="numpy")
+def _contains(numbers: NDArray[np.int64], n: int, number: int) -> bool:
+    """Return whether a number is one of the first n."""
+    for m in range(n):
+        if numbers[m] == number:
+            return True
+    return False
 
 
 @njit(cache=True, error_model="numpy")

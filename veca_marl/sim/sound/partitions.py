@@ -46,7 +46,7 @@ def energy_through(n: int, gaps_m: Floats, ratio: float, energy: Floats) -> None
 
     Args:
         n: How many partitions.
-        gaps_m: ``(n - 1,)`` air between neighbours.
+        gaps_m: ``(n - 1,)`` or more: air between neighbours.
         ratio: See `surface_ratio`.
         energy: ``(N_BANDS,)``, overwritten.
     """
