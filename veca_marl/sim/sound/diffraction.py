@@ -103,7 +103,8 @@ class Work(NamedTuple):
         chosen: ``(m,)`` the silhouettes of one composite, those at the least depth first.
         edges: ``(2, 2 m)`` numbers of their edges in order, ``2 * silhouette + side``, across and
             above.
-        ordered: ``(2, 2 m + 2, N_BANDS)`` fraction of the energy below each of these edges in order, from 0 to 1.
+        ordered: ``(2, 2 m + 2, N_BANDS)`` fraction of the energy below each of these edges in
+            order, from 0 to 1.
         masks: ``(n,)`` sets of silhouettes of which the transmission is known.
         through: ``(n, N_BANDS)`` energy that passes these.
         part: ``(4, N_BANDS)`` the energy of a composite, and measures.
@@ -513,7 +514,7 @@ def _sort_edges(n: int, work: Work) -> None:
 
 @njit(cache=True, error_model="numpy")
 def _energy_through_all(
-    mask: int, screens: Screens, surface_ratio: float, work: Work, known: int
+    mask: np.int64, screens: Screens, surface_ratio: float, work: Work, known: int
 ) -> None:
     """Write the energy that passes the screens of a mask one after another to a row of `through`.
 
@@ -543,10 +544,10 @@ def _energy_through_all(
 @njit(cache=True, error_model="numpy")
 def _contains(numbers: NDArray[np.int64], n: int, number: int) -> bool:
     """Return whether a number is one of the first n."""
+    found = False
     for m in range(n):
-        if numbers[m] == number:
-            return True
-    return False
+        found = found or numbers[m] == number
+    return found
 
 
 @njit(cache=True, error_model="numpy")
