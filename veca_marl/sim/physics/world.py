@@ -310,6 +310,7 @@ class World:
         self._set_contact_share()
         for mover in self.movers:
             mover.before_step()
+        self._sleep.before_step()
         self._fast.before_step()
         for _ in range(self.clock.substeps):
             self._substep()
