@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from walking import ball, box, empty_world
+from walking import ball, box, empty_world, walker_in
 
 from veca_marl.sim.geometry import quaternions_to_matrices
 from veca_marl.sim.physics import GRAVITY_MPS2, ClockCfg
@@ -76,4 +76,20 @@ def test_a_collision_off_centre_adds_no_energy_and_keeps_the_momentum(block_kg, 
     if block_kg:
         momentum = 0.1 * world.prop("cube").velocity + block_kg * world.prop("block").velocity
         np.testing.assert_allclose(momentum, (0.2, 0.0, 0.0), atol=1e-9)
+    world.close()
+
+
+@pytest.mark.parametrize(("of_body", "expected"), [(0.0, 0.0), (1.0, 0.5)])
+def test_a_ball_rebounds_from_a_walker_as_their_restitutions_say(of_body, expected):
+    rolling = ball("ball", 0.1, 0.3, (0.6, 0.0, 0.5), restitution=0.5, friction=0.0)
+    world = empty_world(rolling)
+    walker = walker_in(world, restitution=of_body)
+    world.freeze()
+    world.reset(np.random.default_rng(0))
+    walker.place((0.0, 0.0, 0.0))
+    world.client.setGravity(0.0, 0.0, 0.0)
+    world.prop("ball").set_velocity((-2.0, 0.0, 0.0))
+    for _ in range(12):
+        world.step()
+    assert world.prop("ball").velocity[0] == pytest.approx(2.0 * expected, abs=0.25)
     world.close()

@@ -65,6 +65,7 @@ class Capsule:
         form: The capsule, in a frame with the walker's heading as x axis.
         centre_height_m: Height of its centre above the surface on which the walker is.
         push_limit_kg: Props up to this mass are pushed.
+        restitution: Multiplied by that of what touches it.
 
     Attributes:
         body_id: PyBullet's id.
@@ -82,6 +83,7 @@ class Capsule:
         form: Primitive,
         centre_height_m: float,
         push_limit_kg: float,
+        restitution: float,
     ) -> None:
         self._centre_height_m = centre_height_m
         self.base_m = self.yaw_rad = 0.0
@@ -90,7 +92,7 @@ class Capsule:
         self._push_limit_kg = push_limit_kg
         shape = create_collision_shape(client, [form])
         self.body_id: int = client.createMultiBody(0, shape)
-        client.changeDynamics(self.body_id, -1, lateralFriction=0.2, restitution=0.0)
+        client.changeDynamics(self.body_id, -1, lateralFriction=0.2, restitution=restitution)
         self.radius_m, self._half_axis_m = form.radius, _half_axis_m(form)
         self._reach_m = self._half_axis_m + form.radius
         self._obstacles = ObstacleBoxes(client, scene, [], [], _LIMB_REACH_M)
@@ -304,7 +306,7 @@ def _yields(leaf: Prop, contact: ContactPoint) -> bool:
 
 
 def upright_capsule(
-    world: World, radius_m: float, height_m: float, push_limit_kg: float
+    world: World, radius_m: float, height_m: float, push_limit_kg: float, restitution: float
 ) -> Capsule:
     """Return the capsule of a walker that stands.
 
@@ -313,15 +315,18 @@ def upright_capsule(
         radius_m: Radius.
         height_m: Height of its upper end above the floor.
         push_limit_kg: Props up to this mass are pushed.
+        restitution: Multiplied by that of what touches it.
     """
     # the lower cap is beneath the floor, with which it does not collide: a rounded lower end would
     # press props into the floor
     length_m = height_m - radius_m
     form = Primitive(Shape.CAPSULE, (radius_m, length_m))
-    return Capsule(world.client, world.scene, form, length_m / 2, push_limit_kg)
+    return Capsule(world.client, world.scene, form, length_m / 2, push_limit_kg, restitution)
 
 
-def lying_capsule(world: World, height_m: float, length_m: float, push_limit_kg: float) -> Capsule:
+def lying_capsule(
+    world: World, height_m: float, length_m: float, push_limit_kg: float, restitution: float
+) -> Capsule:
     """Return the capsule of a walker that crawls: it lies along the heading.
 
     Args:
@@ -329,11 +334,12 @@ def lying_capsule(world: World, height_m: float, length_m: float, push_limit_kg:
         height_m: Its diameter.
         length_m: From end to end.
         push_limit_kg: Props up to this mass are pushed.
+        restitution: Multiplied by that of what touches it.
     """
     size = (height_m / 2.0, length_m - height_m)
     along_x = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
     form = Primitive(Shape.CAPSULE, size, rotation=along_x)
-    return Capsule(world.client, world.scene, form, height_m / 2.0, push_limit_kg)
+    return Capsule(world.client, world.scene, form, height_m / 2.0, push_limit_kg, restitution)
 
 
 def _half_axis_m(form: Primitive) -> float:

@@ -207,11 +207,13 @@ def make_stances(
         cfg: Its parameters.
         world: The world.
     """
-    upright = upright_capsule(world, cfg.radius_m, cfg.height_m, cfg.push_limit_kg)
+    upright = upright_capsule(world, cfg.radius_m, cfg.height_m, cfg.push_limit_kg, cfg.restitution)
     standing = Upright(skeleton, gait, upright)
     if Crawl.name not in cfg.verbs:
         return standing, None
-    lying = lying_capsule(world, cfg.crawl_height_m, cfg.crawl_length_m, cfg.push_limit_kg)
+    lying = lying_capsule(
+        world, cfg.crawl_height_m, cfg.crawl_length_m, cfg.push_limit_kg, cfg.restitution
+    )
     return standing, OnAllFours(skeleton, gait, lying, cfg.crawl_share)
 
 

@@ -24,6 +24,9 @@ class WalkerCfg(BodyCfg):
         height_m: Height of the capsule.
         push_limit_kg: Props up to this mass are light: they are pushed, kicked and carried. Heavier
             ones stop the walker.
+        restitution: 0 (nothing rebounds from the body) to 1 (things rebound as from the floor);
+            multiplied by that of the prop. Above 0 props also leave a walking body faster than it
+            walks.
         kick_reach_m: Largest distance from the capsule's surface to that of a prop it can kick.
         kick_angle_deg: Largest angle between the walker's heading and the direction of the prop's
             centre of mass.
@@ -47,6 +50,7 @@ class WalkerCfg(BodyCfg):
     radius_m: float = 0.11
     height_m: float = 0.72
     push_limit_kg: float = 5.0
+    restitution: float = 0.0
     kick_reach_m: float = 0.15
     kick_angle_deg: float = 60.0
     kick_height_m: float = 0.25
@@ -75,7 +79,7 @@ class WalkerCfg(BodyCfg):
                 f"body.crawl_length_m={self.crawl_length_m}: the height must be positive and "
                 "smaller than the length"
             )
-        for name in ("backward_share", "crawl_share"):
+        for name in ("backward_share", "restitution", "crawl_share"):
             if getattr(self, name) > 1.0:
                 raise ValueError(f"body.{name}={getattr(self, name)} is not in [0, 1]")
         check_interactions("body.verbs", self.verbs)
