@@ -74,6 +74,7 @@ class Capsule:
         yaw_rad: Rotation about the vertical.
         support_id: PyBullet's id of the prop on which the walker stands, which is no obstacle; -1
             on the floor.
+        walked_over: Likewise of the things that it walks over.
     """
 
     def __init__(
@@ -88,6 +89,7 @@ class Capsule:
         self._centre_height_m = centre_height_m
         self.base_m = self.yaw_rad = 0.0
         self.support_id = -1
+        self.walked_over: Collection[int] = ()
         self._client, self._scene = client, scene
         self._push_limit_kg = push_limit_kg
         shape = create_collision_shape(client, [form])
@@ -136,8 +138,20 @@ class Capsule:
         reach_m = self._reach_m + _MARGIN_M + distance_m
         near = self._obstacles.near(position, reach_m)
         self._near = [body_id for body_id in near if body_id != self.support_id]
+        self.leave_out(self.walked_over)
         self._near_leaves = self._leaves.near(position, reach_m)
         self._jammed.collect(position, reach_m, self._near_leaves, capsules)
+
+    @property
+    def near(self) -> Sequence[int]:
+        """PyBullet's ids of the obstacles that can be reached within this agent step."""
+        return self._near
+
+    def leave_out(self, walked_over: Collection[int]) -> None:
+        """Take things that the walker walks over from the obstacles."""
+        self.walked_over = walked_over
+        if walked_over:
+            self._near = [body_id for body_id in self._near if body_id not in walked_over]
 
     def solid_near(self, position: Floats, reach_m: float) -> list[int]:
         """Return PyBullet's ids of what is within a horizontal distance and is not pushed.

@@ -54,7 +54,9 @@ class Walker(Body):
         self._greatest_speed_mps = greatest_speed_mps(cfg, world.clock)
         self._walk_action = WALK_ACTIONS[cfg.action]
         self._gait = Gait(self._skeleton)
-        self._motion = GroundMotion(world, *make_stances(self._skeleton, self._gait, cfg, world))
+        self._motion = GroundMotion(
+            world, cfg, *make_stances(self._skeleton, self._gait, cfg, world)
+        )
         self._handling = ObjectHandling(world.client, name, cfg, self._motion, self._gait)
         self._bone_poses = BonePoses(self._skeleton, self._drawn)
         self.verb_choice = VerbChoice(cfg.verbs)

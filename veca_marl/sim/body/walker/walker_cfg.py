@@ -34,6 +34,8 @@ class WalkerCfg(BodyCfg):
         kick_speed_mps: Speed away from the walker up to which a kick accelerates a prop.
         kick_impulse_ns: Largest impulse of a kick; heavy props do not reach that speed.
         head_pitch_deg: Pitch of the head at the start of an episode; down is positive.
+        stride_height_m: Height of the highest fixed or heavy thing over which it walks, and rise of
+            the steepest slope within its radius and 6 cm; 0.05: 16 degrees. 0: all stop it.
         step_height_m: Height of the highest prop onto which it steps.
         step_reach_m: Largest distance from the capsule's surface to such a prop.
         crawl_height_m: Height and width of the body in crawling.
@@ -57,6 +59,7 @@ class WalkerCfg(BodyCfg):
     kick_speed_mps: float = 3.0
     kick_impulse_ns: float = 3.0
     head_pitch_deg: float = 12.0
+    stride_height_m: float = 0.05
     step_height_m: float = 0.2
     step_reach_m: float = 0.3
     crawl_height_m: float = 0.36
