@@ -9,6 +9,8 @@ the whole velocity. The prop is early by less than a physics step.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from veca_marl.sim.geometry import Scene
@@ -79,7 +81,7 @@ class FastProps:
         velocity, spin = self._client.getBaseVelocity(prop.body_id)
         way = np.array(velocity) * self._substep_s
         length_m = float(np.linalg.norm(way))
-        if length_m <= half_m:
+        if not half_m < length_m < math.inf:  # a broken simulation is noticed after the step
             return
         position, orientation = self._client.getBasePositionAndOrientation(prop.body_id)
         start = np.array(position)
