@@ -1,4 +1,4 @@
-"""Folders of runs that somebody else made: each ends in one line, executes nothing, is quick.
+"""Folders of runs of unknown origin: each ends in one line, executes nothing, is quick.
 
 Whatever a folder holds, `evaluate` and `resume` either do their work, or end with one line and exit
 status 1 or 2. No file outside of the folder changes, and nothing is imported.
