@@ -24,9 +24,8 @@ from veca_marl.sim.physics.props import (
     limit_detection,
     prop_sleep,
 )
-from veca_marl.sim.physics.props.fast_props import FastProps
+from veca_marl.sim.physics.props.contact_corrections import FastProps, Rebounds
 from veca_marl.sim.physics.props.joint import Joint
-from veca_marl.sim.physics.props.rebounds import Rebounds
 from veca_marl.sim.sound import SoundField, make_sound
 from veca_marl.sim.sound.sounds import Sound, Source
 

@@ -26,17 +26,16 @@ from itertools import chain
 
 import numpy as np
 
-from veca_marl.sim.body.walker.jammed import JammedProps
-from veca_marl.sim.body.walker.making_way import (
+from veca_marl.sim.body.walker.jammed import (
     FIRM_M,
+    JammedProps,
     Overlap,
     deepest_m,
     depenetration,
     make_way,
     may_reach,
 )
-from veca_marl.sim.body.walker.obstacles import Leaves, ObstacleBoxes
-from veca_marl.sim.body.walker.stop import PARKED_M, Stop
+from veca_marl.sim.body.walker.obstacles import PARKED_M, Leaves, ObstacleBoxes, Stop
 from veca_marl.sim.body.walker.walker_collisions import Footprint
 from veca_marl.sim.geometry import (
     Floats,
