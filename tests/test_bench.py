@@ -388,7 +388,7 @@ def test_free_play_has_the_number_of_agents_asked_for_and_is_unregistered_afterw
         env = VecaEnv(played, seed=0)
         rollout = env.rollout(3)
         env.close()
-    assert rollout["next", "agents", "observation", "audio"].shape == (1, 3, 3, 4, 250)
+    assert rollout["next", "agents", "observation", "audio"].shape == (1, 3, 3, 2, 250)
     assert rollout["next", "agents", "reward"].abs().max() > 0
     assert before == dict(TASKS)
 

@@ -7,6 +7,7 @@ import pytest
 import torch
 from omegaconf import OmegaConf
 from refusals import naming
+from stored_runs import train_tiny
 
 from veca_marl import api
 from veca_marl.algos.checkpoints import CheckpointError
@@ -18,27 +19,12 @@ from veca_marl.tournament import main as tournament
 from veca_marl.train import stored_node
 
 FRAMES = 8
-CHOICES = [
-    "algo.minibatches=2",
-    "collect=one_process",
-    "collect.worlds=1",
-    "collect.steps=4",
-    "eval.every_frames=4",
-    "eval.episodes=1",
-    "eval.worlds=1",
-    "log=silent",
-    "threads=1",
-    "algo.epochs=1",
-    "task.max_seconds=0.2",
-]
-SENSES = {"vision": "blind", "touch": "numb"}
 
 
 @pytest.fixture(scope="module")
 def complete(tmp_path_factory):
     folder = tmp_path_factory.mktemp("broken") / "complete"
-    api.train("KickTheBall", total_frames=FRAMES, senses=SENSES, folder=folder, overrides=CHOICES)
-    return folder
+    return train_tiny(folder, FRAMES, "log=silent")
 
 
 @pytest.fixture

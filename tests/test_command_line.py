@@ -129,6 +129,14 @@ def test_a_quoted_path_stays_as_it_is(path):
     assert normalised([f"run={quoted('~/a')}"]) == ["run='~/a'"]
 
 
+@pytest.mark.parametrize(
+    "value",
+    ["[~/a,/b (1)]", "['a',./b]", "'/data/a,/b'", '"/a,~/b"', "choice(/a,/b)", "{a:/x,b:/y}"],
+)
+def test_paths_within_other_values_stay_as_they_are(value):
+    assert normalised([f"key={value}"]) == [f"key={value}"]
+
+
 def test_paths_of_a_configuration_are_read_like_those_of_commands(tmp_path):
     path = tmp_path / "köpfe (neu)" / "it's.sofa"
     cfg = compose(["+task=KickTheBall", f"senses.audio.sofa_path={path}"])

@@ -1,4 +1,4 @@
-"""Folders of runs that somebody else made: each ends in one line, executes nothing, is quick.
+"""Folders of runs of unknown origin: each ends in one line, executes nothing, is quick.
 
 Whatever a folder holds, `evaluate` and `resume` either do their work, or end with one line and exit
 status 1 or 2. No file outside of the folder changes, and nothing is imported.
@@ -17,30 +17,14 @@ import numpy as np
 import pytest
 import torch
 from commands import train
+from stored_runs import train_tiny
 
-from veca_marl import api
 from veca_marl.algos.checkpoints import CheckpointError, map_checkpoint, read_checkpoint
 from veca_marl.algos.specs import TeamSpec
 from veca_marl.algos.transfer import load_actor
 from veca_marl.evaluate import main as evaluate
 from veca_marl.tournament import main as tournament
 
-CHOICES = [
-    "algo.minibatches=2",
-    "collect=one_process",
-    "collect.worlds=1",
-    "collect.steps=4",
-    "eval.every_frames=4",
-    "eval.episodes=1",
-    "eval.worlds=1",
-    "log=csv",
-    "log.video=false",
-    "log.progress_bar=false",
-    "threads=1",
-    "algo.epochs=1",
-    "task.max_seconds=0.2",
-]
-SENSES = {"vision": "blind", "touch": "numb"}
 LIMIT_S = 5.0  # of processor time
 SECRET = "s3cr3t-token"
 
@@ -48,8 +32,7 @@ SECRET = "s3cr3t-token"
 @pytest.fixture(scope="module")
 def complete(tmp_path_factory):
     folder = tmp_path_factory.mktemp("hostile") / "complete"
-    api.train("KickTheBall", total_frames=8, senses=SENSES, folder=folder, overrides=CHOICES)
-    return folder
+    return train_tiny(folder, 8, "log=csv", "log.video=false", "log.progress_bar=false")
 
 
 @pytest.fixture

@@ -1,4 +1,4 @@
-"""Nothing is written through links in the folder of a run, which may come from somebody else."""
+"""Nothing is written through links in the folder of a run, which may be of unknown origin."""
 
 import os
 from pathlib import Path

@@ -65,9 +65,9 @@ def test_another_value_than_before_stays_in_the_first_form():
 def test_fields_that_are_present_stay(step):
     for change in step.changes:
         if isinstance(change, Added):
-            node = {"name": change.name, **dict.fromkeys(change.values, "own")}
-            change.apply(node)
-            assert node == {"name": change.name, **dict.fromkeys(change.values, "own")}
+            before = {"name": change.name, change.beside: 1, **dict.fromkeys(change.values, "own")}
+            change.apply(node := dict(before))
+            assert node == before
 
 
 def test_fields_belong_to_one_registered_name():

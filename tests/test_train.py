@@ -86,8 +86,9 @@ def start():
     """A function that starts a command; what still runs at the end of the test is killed."""
     started = []
 
-    def begin(words, folder):
-        started.append(subprocess.Popen(words, cwd=folder, stderr=subprocess.PIPE, text=True))
+    def begin(words, folder, new_group=False):
+        options = {"stderr": subprocess.PIPE, "text": True, "start_new_session": new_group}
+        started.append(subprocess.Popen(words, cwd=folder, **options))
         return started[-1]
 
     yield begin
@@ -95,6 +96,22 @@ def start():
         process.kill()
         process.wait()
         process.stderr.close()
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no groups of processes")
+def test_a_job_is_ended_by_sigterm_to_all_of_its_processes(tmp_path, start):
+    """Slurm and systemd send it so; the workers may end before the process that started them."""
+    workers = ["collect.processes=2", "collect.worlds=1", "total_frames=1000000"]
+    running = start(command(*SMOKE, *workers, "hydra.run.dir=run"), tmp_path, new_group=True)
+    deadline = time.monotonic() + 300
+    while not list(tmp_path.glob("run/checkpoints/frames_*")) and time.monotonic() < deadline:
+        time.sleep(0.05)
+    os.killpg(running.pid, signal.SIGTERM)
+    _, errors = running.communicate(timeout=120)
+    assert running.returncode == 130, errors
+    assert "continue with: python -m veca_marl.train resume=" in errors
+    assert "Traceback" not in errors
 
 
 @pytest.mark.slow

@@ -119,16 +119,13 @@ def _check_overrides(
     Raises:
         ConfigError: If one does not, or is of another root.
     """
-    for override in parse(normalised(overrides)):
+    for text, override in zip(overrides, parse(normalised(overrides)), strict=True):
         key, root = override.key_or_group, root_of(override)
         if argument := arguments.get(root if root == "hydra" else key):
-            raise ConfigError(
-                f"overrides: {override.input_line!r} is chosen by the argument `{argument}`"
-            )
+            raise ConfigError(f"overrides: {text!r} is chosen by the argument `{argument}`")
         if roots is not None and root not in roots:
             raise ConfigError(
-                f"overrides: {override.input_line!r} is not of the game; "
-                f"choices: {', '.join(sorted(_GAME_ROOTS))}"
+                f"overrides: {text!r} is not of the game; choices: {', '.join(sorted(_GAME_ROOTS))}"
             )
 
 

@@ -60,10 +60,12 @@ class Added(Change):
         values: The fields, with the values that do what was done before.
         name: Name of the entry of a registry that has them, which the node has as `name`; None
             for nodes of any name.
+        beside: A field of the nodes that have them, where their type has no name; None for all.
     """
 
     values: Mapping[str, Any]
     name: str | None = None
+    beside: str | None = None
 
     def apply(self, node: Plain) -> None:
         """See `Change`; fields that are present stay as they are."""
@@ -78,7 +80,8 @@ class Added(Change):
                     del node[key]
 
     def _concerns(self, node: Plain) -> bool:
-        return self.name is None or node.get("name") == self.name
+        named = self.name is None or node.get("name") == self.name
+        return named and (self.beside is None or self.beside in node)
 
 
 @dataclass(frozen=True)
@@ -150,6 +153,7 @@ class Step:
 
 _IMAGE_WINDOWS = {"kernels": [8, 4, 3], "strides": [4, 2, 1]}
 _CALLS = {"call_pause_s": 0.0}
+_WALKS = {"restitution": 0.0, "stride_height_m": 0.0}
 _SPECTRA = {"encoding": "magnitude", "bins": 250}
 
 STEPS: tuple[Step, ...] = (
@@ -161,6 +165,8 @@ STEPS: tuple[Step, ...] = (
             Added("task", {"sound_path": None}, name="KickTheBall"),
             Added("body", _CALLS),
             Added("team.*.body", _CALLS),
+            Added("body", _WALKS, beside="push_limit_kg"),
+            Added("team.*.body", _WALKS, beside="push_limit_kg"),
             Added("senses.audio", _SPECTRA),
             Added("team.*.senses.audio", _SPECTRA),
             Replaced("team.*.senses", "extra", before=None, now={}),

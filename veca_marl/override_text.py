@@ -21,7 +21,7 @@ def normalised(overrides: Sequence[str]) -> list[str]:
     - A value that begins with ``/``, ``./``, ``../`` or ``~`` is a path: ``~`` becomes the home
       directory, and a path with characters of the grammar (``run=/data/a (1)``) is quoted. A comma
       separates the values of a sweep, so that a path with one has to be quoted by hand:
-      ``"run='/data/a,b'"``.
+      ``"run='/data/a,b'"``. Lists, functions and quoted texts stay as they are.
     - An integral number in exponent notation (``total_frames=1e6``) gets digits only, which fields
       of type int accept as well as those of type float; so do the values of a sweep.
 
@@ -35,7 +35,10 @@ def _normalised(text: str) -> str:
     parts = value.split(",")
     if not equals or not all(parts):
         return text
-    written = [_path(part) if _PATH.match(part) else _integer(part) for part in parts]
+    if _PATH.match(value):  # a path, or several of a sweep; no list, function or quoted text
+        written = [_path(part) if _PATH.match(part) else part for part in parts]
+    else:
+        written = [_integer(part) for part in parts]
     return f"{key}={','.join(written)}"
 
 

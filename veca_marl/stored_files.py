@@ -1,4 +1,4 @@
-"""Files that somebody else may have written: read within limits, and checked before they are used.
+"""Files of unknown origin: read within limits, and checked before they are used.
 
 A file may be damaged, or made so that reading it takes all memory, never ends, or executes code.
 Each function reads plain files only (a pipe would be waited for), up to a size, and raises

@@ -5,6 +5,30 @@ import json
 
 import yaml
 
+from veca_marl import api
+
+TINY = (
+    "algo.minibatches=2",
+    "algo.epochs=1",
+    "collect=one_process",
+    "collect.worlds=1",
+    "collect.steps=4",
+    "eval.every_frames=4",
+    "eval.episodes=1",
+    "eval.worlds=1",
+    "task.max_seconds=0.2",
+    "threads=1",
+)
+
+
+def train_tiny(folder, frames, *log):
+    """Train PPO on KickTheBall for some frames, by ears only; return the folder of the run."""
+    senses = {"vision": "blind", "touch": "numb"}
+    api.train(
+        "KickTheBall", total_frames=frames, senses=senses, folder=folder, overrides=[*TINY, *log]
+    )
+    return folder
+
 
 def write_run(folder, config, evaluations, ended=True, seconds_per_frame=0.01, random=-0.5):
     """Write a run folder.

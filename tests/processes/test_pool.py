@@ -2,8 +2,11 @@
 
 import multiprocessing
 import os
+import signal
+import sys
 import time
 from contextlib import closing
+from threading import Timer
 
 import pytest
 
@@ -115,3 +118,77 @@ def test_processes_that_cannot_be_started_leave_none_behind():
     with pytest.raises((AttributeError, TypeError), match=r"pickle|local"):
         ProcessPool("process", lambda _: None, 2)
     assert not multiprocessing.active_children()
+
+
+def make_idle(_):
+    return time.sleep
+
+
+@pytest.fixture
+def terminating():
+    """SIGTERM raises `KeyboardInterrupt` in this process, as in the commands."""
+    former = signal.signal(signal.SIGTERM, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGTERM, former)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no SIGTERM of other processes")
+@pytest.mark.usefixtures("terminating")
+@pytest.mark.parametrize("wait", [lambda pool: answer_all(pool, 60.0), lambda _: time.sleep(60.0)])
+def test_a_request_to_end_that_reaches_the_workers_first_is_no_failure_of_them(wait):
+    """A job is ended by SIGTERM to all of its processes, in any order."""
+    with closing(ProcessPool("idle process", make_idle, 2, method="fork")) as pool:
+        end_this = Timer(0.3, os.kill, (os.getpid(), signal.SIGTERM))
+        end_this.start()
+        try:
+            with pytest.raises(KeyboardInterrupt):
+                end_all_and(wait, pool)
+        finally:
+            end_this.cancel()
+            end_this.join()
+    assert not multiprocessing.active_children()
+
+
+def end_all_and(wait, pool):
+    end(multiprocessing.active_children())
+    wait(pool)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no SIGTERM of other processes")
+@pytest.mark.usefixtures("terminating")
+def test_workers_that_end_while_this_process_ends_are_no_failure():
+    handler = signal.getsignal(signal.SIGINT)
+    pool = ProcessPool("idle process", make_idle, 2, method="fork")
+    with closing(pool), pytest.raises(KeyboardInterrupt):
+        end_this_before_its_workers(pool)
+    assert signal.getsignal(signal.SIGINT) is handler
+    assert signal.getsignal(signal.SIGTERM) is signal.default_int_handler
+
+
+def end_this_before_its_workers(pool):
+    try:
+        os.kill(os.getpid(), signal.SIGTERM)
+        answer_all(pool, 60.0)
+    finally:
+        children = multiprocessing.active_children()
+        end(children)
+        for child in children:
+            child.join(30.0)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no SIGTERM of other processes")
+def test_a_worker_that_is_asked_to_end_by_itself_is_named():
+    pool = ProcessPool("idle process", make_idle, 2, method="fork")
+    with closing(pool), pytest.raises(WorkerError, match=r"idle process 1 .*SIGTERM"):
+        end_one_and_wait(pool)
+
+
+def end_one_and_wait(pool):
+    end(pool._group._processes()[1:])
+    time.sleep(60.0)
+
+
+def end(processes):
+    """Send SIGTERM to processes."""
+    for process in processes:
+        os.kill(process.pid, signal.SIGTERM)

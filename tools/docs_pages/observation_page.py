@@ -38,10 +38,9 @@ MEANINGS = {  # key: sense, unit, meaning, how it is requested
     ),
     "audio": (
         "audio",
-        "log10 of magnitude; 1",
-        "spectra at the left and the right ear, then cosine and sine of their phase difference: "
-        "the first 250 bins of the Fourier transform of the last 1024 samples at 22 050 Hz, 0 to "
-        "5.4 kHz in steps of 21.5 Hz; silence is -8 and a phase of (0, 0)",
+        "log10 of magnitude",
+        "spectrum at the left and the right ear: the first 250 bins of the Fourier transform of "
+        "the last 1024 samples at 22 050 Hz, 0 to 5.4 kHz in steps of 21.5 Hz; -8 is silence",
         "",
     ),
     "waveform": (

@@ -1,6 +1,6 @@
 """The file of a checkpoint: read without executing code, verified, and checked before it is used.
 
-A checkpoint may come from somebody else, or be damaged on a disk or on the way. `torch.load` reads
+A checkpoint may be of unknown origin, or be damaged on a disk or on the way. `torch.load` reads
 tensors and plain data only, but does not notice a changed bit: here the checksum (CRC-32) of each
 record, which `torch.save` stores, is verified.
 """

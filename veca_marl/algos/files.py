@@ -1,6 +1,6 @@
 """Files that are complete or absent, and errors that name the file and, if it is full, its disk.
 
-Nothing is written through a symbolic link: a folder of somebody else could lead to any file.
+Nothing is written through a symbolic link: a folder of unknown origin could lead to any file.
 """
 
 from __future__ import annotations

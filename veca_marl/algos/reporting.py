@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import logging
 import math
 import os
 from collections import defaultdict
@@ -18,6 +19,8 @@ from torchrl.record.loggers import Logger, MLFlowLogger, TensorboardLogger, Wand
 
 from veca_marl.algos.files import WriteError, open_to_append, write_atomically, write_errors
 from veca_marl.stored_files import read_text
+
+_LOG = logging.getLogger(__name__)
 
 Row = Mapping[str, float | int | str]
 
@@ -70,7 +73,8 @@ class CsvReporter:
 
     TorchRL's `CSVLogger` writes a file for each number; here one table holds a run, and a resumed
     run drops the rows that it writes again. Numbers that the first row does not have become columns
-    when they are first written.
+    when they are first written. A table that was deleted or cut off during the run is written again
+    with all of its rows, which are kept in memory, and a warning is logged.
 
     Args:
         folder: Folder of the files.
@@ -84,12 +88,14 @@ class CsvReporter:
 
     def __init__(self, folder: Path, resumed_frames: int = 0) -> None:
         self._folder = folder
-        for kind in self.KINDS:
-            _drop_rows_after(folder / f"{kind}.csv", resumed_frames)
-        self._columns = {kind: _columns(folder / f"{kind}.csv") for kind in self.KINDS}
+        paths = {kind: folder / f"{kind}.csv" for kind in self.KINDS}
+        self._rows = {kind: _kept_rows(paths[kind], resumed_frames) for kind in self.KINDS}
+        self._columns = {kind: _columns(paths[kind]) for kind in self.KINDS}
+        self._bytes = {kind: _bytes(paths[kind]) for kind in self.KINDS}
 
     def write(self, kind: str, frames: int, row: Row) -> None:
         """Append `row` to ``<kind>.csv``; not-a-number is left blank."""
+        self._write_lost_rows(kind)
         path = self._folder / f"{kind}.csv"
         full = {"frames": frames, **row}
         columns = self._columns[kind] if path.exists() else []
@@ -100,17 +106,39 @@ class CsvReporter:
         row_text = _table([*columns, *added], [cells], header=not columns)
         with write_errors(path), open_to_append(path) as file:
             file.write(row_text)
+            file.flush()
+            self._bytes[kind] = os.fstat(file.fileno()).st_size
         self._columns[kind] = [*columns, *added]
+        self._rows[kind].append(cells)
+
+    def _write_lost_rows(self, kind: str) -> None:
+        """Write a table again that is shorter than it was after the last row."""
+        path = self._folder / f"{kind}.csv"
+        # a missing folder and a link are errors of the next row
+        if _bytes(path) >= self._bytes[kind] or path.is_symlink() or not self._folder.is_dir():
+            return
+        text = _table(self._columns[kind], self._rows[kind], header=True)
+        write_atomically(path, text)
+        self._bytes[kind] = len(text.encode())
+        _LOG.warning(
+            "%s was deleted or cut off during the run: its %d rows are written again",
+            path,
+            len(self._rows[kind]),
+        )
 
     def sync(self) -> None:
         """See `Reporter`."""
-        for path in (self._folder / f"{kind}.csv" for kind in self.KINDS):
+        for kind in self.KINDS:
+            self._write_lost_rows(kind)
+            path = self._folder / f"{kind}.csv"
             if path.exists():
                 with write_errors(path), open_to_append(path) as file:
                     os.fsync(file.fileno())
 
     def close(self) -> None:
-        """See `Reporter`; nothing is pending: each row is written at once."""
+        """See `Reporter`; each row is written at once, so that only lost ones are pending."""
+        for kind in self.KINDS:
+            self._write_lost_rows(kind)
 
 
 class LoggerReporter:
@@ -143,6 +171,14 @@ class LoggerReporter:
         """Write pending points."""
         with write_errors(self._path):
             self._logger.close()
+
+
+def _bytes(path: Path) -> int:
+    """Return the size of a file, 0 if there is none."""
+    try:
+        return path.stat().st_size
+    except FileNotFoundError:
+        return 0
 
 
 def _columns(path: Path) -> list[str]:
@@ -189,10 +225,13 @@ def _table_errors(path: Path) -> Iterator[None]:
         raise WriteError(f"{named}: move it away to continue") from error
 
 
-def _drop_rows_after(path: Path, frames: int) -> None:
-    """Keep the rows up to `frames`, without a row that was cut off while it was written."""
+def _kept_rows(path: Path, frames: int) -> list[dict[str, Any]]:
+    """Drop the rows after `frames`, and one that was cut off while it was written; return the rest.
+
+    The file is removed if none is left: the next row writes the header.
+    """
     if not path.exists():
-        return
+        return []
     with _table_errors(path):
         whole, end, _ = read_text(path).rpartition("\n")
         if frames and not end:
@@ -204,7 +243,8 @@ def _drop_rows_after(path: Path, frames: int) -> None:
     if kept:
         write_atomically(path, _table(reader.fieldnames or [], kept, header=True))
     else:
-        path.unlink()  # the next row writes the header
+        path.unlink()
+    return kept
 
 
 _TAG = "veca_marl.run"  # of a run in MLflow: the identifier by which it is continued

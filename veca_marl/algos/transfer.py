@@ -109,7 +109,7 @@ class _Stored:
 
 
 class _Checked(dict[str, Any]):
-    """A state whose entries are checked when they are taken: of a large file, the others stay.
+    """A state whose entries are checked when they are used; others are not read from the disk.
 
     Args:
         state: The entries.

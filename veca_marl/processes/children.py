@@ -21,7 +21,7 @@ from multiprocessing.process import BaseProcess
 from subprocess import Popen, TimeoutExpired
 from typing import Any
 
-_BLOCKED = (signal.SIGINT, signal.SIGTERM)
+_INTERRUPTS = (signal.SIGINT, signal.SIGTERM)
 
 
 def block_interrupts() -> Callable[[], None]:
@@ -32,7 +32,7 @@ def block_interrupts() -> Callable[[], None]:
     """
     if not hasattr(signal, "pthread_sigmask"):
         return lambda: None
-    previous = signal.pthread_sigmask(signal.SIG_BLOCK, _BLOCKED)
+    previous = signal.pthread_sigmask(signal.SIG_BLOCK, _INTERRUPTS)
     return lambda: _restore(previous)
 
 
@@ -51,7 +51,7 @@ def ignore_interrupts() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     if hasattr(signal, "pthread_sigmask"):
-        signal.pthread_sigmask(signal.SIG_UNBLOCK, _BLOCKED)
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, _INTERRUPTS)
 
 
 def _restore(previous: set[int | signal.Signals]) -> None:
@@ -125,6 +125,53 @@ def call_when_a_child_ends(call: Callable[[], None]) -> Callable[[], None]:
             previous = None
 
     return restore
+
+
+def call_when_interrupted(call: Callable[[], None]) -> Callable[[], None]:
+    """Call a function first when this process receives SIGINT or SIGTERM.
+
+    Only where the program handles the signal itself: one that ends it, or is ignored, is left so.
+
+    Returns:
+        A function that restores the former handlers. It does nothing, and none is installed,
+        outside the main thread.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        return lambda: None
+    restores = [_call_before(number, call) for number in _INTERRUPTS]
+
+    def restore() -> None:
+        while restores:
+            restores.pop()()
+
+    return restore
+
+
+def _call_before(number: signal.Signals, call: Callable[[], None]) -> Callable[[], None]:
+    previous = signal.getsignal(number)
+    if not callable(previous):
+        return lambda: None
+
+    def handle(received: int, frame: Any) -> None:
+        call()
+        previous(received, frame)
+
+    def restore() -> None:
+        # a handler that was installed later calls this one
+        if signal.getsignal(number) is handle:
+            signal.signal(number, previous)
+
+    signal.signal(number, handle)
+    return restore
+
+
+def ended_by_interrupt(code: int | None) -> bool:
+    """Return whether a process has ended by SIGINT or SIGTERM.
+
+    Args:
+        code: ``exitcode`` of the process.
+    """
+    return code is not None and -code in _INTERRUPTS
 
 
 def end_of(code: int | None) -> str:

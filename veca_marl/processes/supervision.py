@@ -12,10 +12,18 @@ from dataclasses import dataclass
 from multiprocessing.process import BaseProcess
 from typing import NoReturn
 
-from veca_marl.processes.children import call_when_a_child_ends, end_of
+from veca_marl.processes.children import (
+    call_when_a_child_ends,
+    call_when_interrupted,
+    end_of,
+    ended_by_interrupt,
+)
 
 CHECK_S = 1.0
 """Seconds between two checks of processes that are waited for."""
+
+INTERRUPT_S = 2.0
+"""Seconds from the end of a process by SIGTERM until the same signal has reached this process."""
 
 
 class WorkerError(RuntimeError):
@@ -71,6 +79,9 @@ class TimeLimit:
 class ProcessGroup:
     """Processes that all should work: if one fails, the others are killed.
 
+    A job is ended by SIGTERM to all of its processes at once, in any order: that the group ends
+    then is no failure. Where the handler of this process raises an error, that error is raised.
+
     Args:
         kind: What they are, such as ``worker process``.
         processes: Returns them; their order gives their indices.
@@ -88,8 +99,8 @@ class ProcessGroup:
         self._kind, self._processes = kind, processes
         self._limit, self._exceptions = limit, exceptions
         self._failure = ""
-        self._checking = self._released = False
-        self._unwatch: Callable[[], None] = lambda: None
+        self._checking = self._released = self._interrupted = False
+        self._restores: list[Callable[[], None]] = []
 
     def watch(self) -> None:
         """Call `check` as soon as a process ends, whatever the main thread does then.
@@ -98,12 +109,23 @@ class ProcessGroup:
         processes have been started: Python drops an exception that a signal handler raises within
         a fork.
         """
-        self._unwatch = call_when_a_child_ends(self._on_an_end)
+        self._restores = [
+            call_when_a_child_ends(self._on_an_end),
+            call_when_interrupted(self._on_an_interrupt),
+        ]
+
+    def _unwatch(self) -> None:
+        while self._restores:
+            self._restores.pop()()
 
     def _on_an_end(self) -> None:
         # after a failure, which was raised, the others are killed
-        if not (self._failure or self._released):
+        if not (self._failure or self._released or self._interrupted):
             self.check()
+
+    def _on_an_interrupt(self) -> None:
+        # what its handler raises ends this process: an error about the group would replace it
+        self._interrupted = True
 
     def release(self) -> None:
         """Let the processes end from now on; only calls of `check` report that they have."""
@@ -120,6 +142,8 @@ class ProcessGroup:
             return
         self._checking = True
         try:
+            if not self._failure and self._asked_to_end():
+                time.sleep(INTERRUPT_S)  # the handler of this process's own signal raises from here
             failure = self._failure or self._found()
         finally:
             self._checking = False
@@ -173,6 +197,10 @@ class ProcessGroup:
 
     def _all(self) -> str:
         return f"(of 0 to {len(self._processes()) - 1})"
+
+    def _asked_to_end(self) -> bool:
+        """Return whether a process has ended as they do where all of a job are asked to end."""
+        return any(_has_ended(p) and ended_by_interrupt(p.exitcode) for p in self._processes())
 
     def _found(self) -> str:
         """Return which processes have ended, and how; empty if all run."""

@@ -70,7 +70,7 @@ def may_change(key: str) -> bool:
 
 
 def is_default(cfg: Any, key: str) -> bool:
-    """Return whether a value of a configuration is that of a field which nobody has set.
+    """Return whether a value of a configuration is that of a field that was not set.
 
     Args:
         cfg: Dataclasses, mappings and lists.

@@ -3,6 +3,7 @@ import errno
 import math
 import os
 import resource
+import shutil
 
 import pytest
 import torch
@@ -114,6 +115,43 @@ def test_a_damaged_table_is_named_and_kept(tmp_path, text):
     with pytest.raises(WriteError, match=naming(path)):
         CsvReporter(tmp_path, resumed_frames=20)
     assert path.read_text() == text
+
+
+@pytest.mark.parametrize("resumed", [False, True])
+@pytest.mark.parametrize("harm", ["delete", "empty", "cut"])
+@pytest.mark.parametrize("noticed", ["write", "sync", "close"])
+def test_rows_of_a_table_that_is_lost_during_a_run_are_written_again(
+    tmp_path, resumed, harm, noticed, caplog
+):
+    whole, lost = tmp_path / "whole", tmp_path / "lost"
+    for folder in (whole, lost):
+        folder.mkdir()
+        path = folder / "metrics.csv"
+        reporter = CsvReporter(folder)
+        reporter.write("metrics", 10, {"a/return": 1.5})
+        reporter.write("metrics", 20, {"a/return": math.nan, "a/kl": 0.25})
+        if resumed:
+            reporter = CsvReporter(folder, 20)
+        if folder is lost and harm == "delete":
+            path.unlink()
+        elif folder is lost:
+            os.truncate(path, 0 if harm == "empty" else path.stat().st_size - 3)
+        if noticed == "write":
+            reporter.write("metrics", 30, {"a/kl": 0.5, "a/loss": 1.0})
+        getattr(reporter, "sync" if noticed == "sync" else "close")()
+    assert (lost / "metrics.csv").read_bytes() == (whole / "metrics.csv").read_bytes()
+    assert [str(lost / "metrics.csv") in record.getMessage() for record in caplog.records] == [True]
+
+
+def test_a_deleted_folder_is_not_made_again(tmp_path):
+    folder = tmp_path / "run"
+    folder.mkdir()
+    reporter = CsvReporter(folder)
+    reporter.write("metrics", 10, {"a/return": 1.5})
+    shutil.rmtree(folder)
+    with pytest.raises(WriteError, match=r"metrics\.csv"):
+        reporter.write("metrics", 20, {"a/return": 1.5})
+    assert not folder.exists()
 
 
 def test_tables_of_other_commands_are_left_alone(tmp_path):

@@ -38,7 +38,7 @@ def test_leaves_have_the_shapes_worlds_players_array(env):
     played = env.step(env.rand_action(env.reset()))
     assert played.batch_size == (3,)
     assert played["agents", "action"].shape == (3, 1, 2)
-    assert played["next", "agents", "observation", "audio"].shape == (3, 1, 4, 250)
+    assert played["next", "agents", "observation", "audio"].shape == (3, 1, 2, 250)
     assert played["next", "agents", "reward"].shape == (3, 1, 1)
     assert played["next", "agents", "info", "kick"].shape == (3, 1, 1)
     assert played["next", "done"].shape == (3, 1)

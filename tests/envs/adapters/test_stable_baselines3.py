@@ -30,7 +30,7 @@ def cnn_of(model):
 
 def test_stacked_observations_are_images_and_vectors(env):
     assert env.observation_space["vision"] == spaces.Box(0, 255, (6, 84, 84), np.uint8)
-    assert env.observation_space["audio"].shape == (1000,)
+    assert env.observation_space["audio"].shape == (500,)
     observation, _ = env.reset(seed=1)
     assert observation in env.observation_space
     arrays, _ = (plain := gymnasium.make(ID, playground="simple")).reset(seed=1)

@@ -37,7 +37,7 @@ def test_the_lowest_sole_is_on_the_floor(walk):
 def test_joint_angles_are_within_the_limits_before_clipping(walk):
     gait = Gait(SKELETON)
     gait._low, gait._high = np.full(82, -np.inf), np.full(82, np.inf)
-    gait._neck.turn = lambda *_: None
+    gait._neck.turn = lambda *_, **__: None
     for step in range(100):
         gait.advance(*walk, 0.04)
         if step == 50:

@@ -167,6 +167,52 @@ def test_head_angles_are_clipped_to_the_range_of_the_neck():
     assert bearing_deg(walker.mount("head")) == pytest.approx(110.0)
 
 
+def attitude_deg(walker):
+    """Bearing, pitch and roll of the head; its pose is a view that the next step overwrites."""
+    head = walker.mount("head")
+    return bearing_deg(head), down_deg(head), math.degrees(math.asin(head.rotation[2, 1]))
+
+
+@pytest.mark.parametrize("crawls", [False, True])
+@pytest.mark.parametrize("turned_deg", [-40.0, 20.0, 40.0, 80.0])
+def test_a_turned_head_nods_about_its_own_axis(turned_deg, crawls):
+    """Heading and roll stay; on all fours the turn may be smaller than commanded."""
+    world = empty_world()
+    walker = walker_in(world, verbs=["crawl"])
+    let_pass(world, 0.04)
+    if crawls:
+        assert walker.crawl()
+    walker.rotate_left_right_head(turned_deg)
+    let_pass(world, 0.04)
+    if not crawls or abs(turned_deg) <= 40.0:
+        assert attitude_deg(walker)[0] == pytest.approx(-turned_deg)
+    for nod_deg in (20.0, -20.0):
+        bearing, before_deg, _ = attitude_deg(walker)
+        walker.rotate_up_down_head(nod_deg)
+        let_pass(world, 0.04)
+        after, down, roll = attitude_deg(walker)
+        assert down - before_deg == pytest.approx(nod_deg)
+        assert after == pytest.approx(bearing)
+        assert roll == pytest.approx(0.0, abs=1e-4)
+
+
+def test_turns_and_nods_in_small_steps_end_within_the_range_of_the_neck():
+    """The nearest attitude to the commands is level, and nods back reverse nods."""
+    world = empty_world()
+    walker = walker_in(world)
+    for _ in range(13):
+        walker.rotate_left_right_head(9.0)
+        walker.rotate_up_down_head(6.0)
+    let_pass(world, 0.04)
+    bearing, down, roll = attitude_deg(walker)
+    assert roll == pytest.approx(0.0, abs=1e-4)
+    assert bearing < -60.0
+    assert down > 40.0
+    walker.rotate_up_down_head(-30.0)
+    let_pass(world, 0.04)
+    assert down - attitude_deg(walker)[1] == pytest.approx(30.0)
+
+
 @pytest.mark.parametrize("wrong", [math.nan, math.inf])
 def test_head_angles_must_be_finite(wrong):
     walker = walker_in(empty_world())

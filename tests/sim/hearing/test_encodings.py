@@ -6,11 +6,17 @@ from heard_scenes import Scene, tone_at
 from listening import RATE
 
 from veca_marl.sim.hearing import AudioQuality, Encoding, log_spectrum
-from veca_marl.sim.hearing.audio_sense import Window, interaural_phase, make_encoder
+from veca_marl.sim.hearing.audio_sense import (
+    PHASE_LIMIT_HZ,
+    Window,
+    interaural_phase,
+    make_encoder,
+)
 from veca_marl.sim.sense import check_spec
 from veca_marl.sim.sound import Clip, Noise
 
 BIN_HZ = RATE / 1024
+FOLLOWED = 1.0 / (1.0 + (np.arange(250) * BIN_HZ / PHASE_LIMIT_HZ) ** 4)
 SHAPES = {
     Encoding.magnitude: (2, 250),
     Encoding.magnitude_phase: (4, 250),
@@ -71,8 +77,14 @@ def test_the_phase_of_a_delayed_copy_is_its_delay():
         spectrum = np.fft.rfft(np.stack([left, np.roll(left, delay)]))[:, :250]
         cosine, sine = interaural_phase(spectrum)
         turned = 2.0 * np.pi * np.arange(250) * delay / 1024
-        np.testing.assert_allclose(cosine, np.cos(turned), atol=1e-4)
-        np.testing.assert_allclose(sine, np.sin(turned), atol=1e-4)
+        np.testing.assert_allclose(cosine, FOLLOWED * np.cos(turned), atol=1e-4)
+        np.testing.assert_allclose(sine, FOLLOWED * np.sin(turned), atol=1e-4)
+
+
+def test_the_phase_is_left_out_where_people_do_not_perceive_it():
+    assert FOLLOWED[: int(600.0 / BIN_HZ)].min() > 0.95
+    assert FOLLOWED[round(PHASE_LIMIT_HZ / BIN_HZ)] == pytest.approx(0.5, abs=0.02)
+    assert FOLLOWED[int(4000.0 / BIN_HZ) :].max() < 0.02
 
 
 def test_the_nearer_ear_is_ahead():
@@ -91,7 +103,7 @@ def test_one_receiver_has_no_interaural_phase():
     _, heard = noise_from(
         (0.0, 2.0, 0.0), encoding=Encoding.magnitude_phase, quality=AudioQuality.mono
     )
-    np.testing.assert_allclose(heard["audio"][2], 1.0, atol=1e-6)
+    np.testing.assert_allclose(heard["audio"][2], FOLLOWED, atol=1e-6)
     np.testing.assert_allclose(heard["audio"][3], 0.0, atol=1e-6)
 
 
@@ -111,7 +123,7 @@ def test_bins_below_the_noise_have_little_phase():
     )
     scene.source.position = (1.0, 1.0, 0.0)
     weight = np.hypot(*scene.hear(6)["audio"][2:])
-    assert weight[47] > 0.99
+    assert weight[47] > 0.99 * FOLLOWED[47]
     assert weight[150:].max() < 0.1
 
 

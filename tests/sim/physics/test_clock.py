@@ -18,6 +18,15 @@ def test_rates_are_the_divisors_of_the_sampling_rate():
     assert all(ClockCfg(rate).step_samples * rate == SAMPLE_RATE_HZ for rate in CONTROL_RATES_HZ)
 
 
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [("substeps", 10**308), ("solver_iterations", 10**308), ("sleep_s", 1e308)],
+)
+def test_numbers_that_no_machine_can_step_are_refused(name, value):
+    with pytest.raises(ValueError, match=f"^{name}="):
+        ClockCfg(**{name: value})
+
+
 def test_at_every_rate_blocks_of_sound_follow_each_other_without_gaps():
     """The stream of a second, or a tenth of it, does not depend on the length of its blocks."""
     sound = noise(SAMPLE_RATE_HZ)

@@ -125,7 +125,8 @@ class SupervisedCollector(MultiSyncCollector):
             )
         except BaseException as error:
             self._weights.shutdown()
-            self._raise_worker_error(error)
+            if isinstance(error, Exception):  # an interrupt is no failure of a worker
+                self._raise_worker_error(error)
             self.shutdown(raise_on_error=False)
             raise
         finally:

@@ -109,8 +109,9 @@ class JointAction:
         Choices have at least `LEAST_PROBABILITY_RATIO` of the probability of the most likely one.
         """
         dists = self._split(policy)
+        bounded: Any = _Bounded.apply  # without types in torch 2.13, with them in 2.14
         for part in self._choices:
-            dists[part] = Categorical(logits=_Bounded.apply(dists[part].logits))  # type: ignore[no-untyped-call]
+            dists[part] = Categorical(logits=bounded(dists[part].logits))
         vectors, entropies = [], {}
         for part in self._vectors:
             sample, log_prob = rsample_and_log_prob(dists[part])

@@ -18,7 +18,7 @@ from veca_marl.sim.hearing.hrtf import kemar_response, kemar_table, sofa_respons
 from veca_marl.sim.hearing.receivers import HrtfReceiver, MonoReceiver, StereoReceiver
 from veca_marl.sim.physics import World
 from veca_marl.sim.sense import ArraySpec, Sense
-from veca_marl.sim.sound import NEAR_FIELD_M, Receiver
+from veca_marl.sim.sound import NEAR_FIELD_M, SAMPLE_RATE_HZ, Receiver
 
 WINDOW_SAMPLES = 1024
 N_BINS = 250
@@ -87,15 +87,24 @@ def _log_magnitudes(spectrum: NDArray[np.complex64], noise_power: float) -> Samp
     return observation
 
 
+PHASE_LIMIT_HZ = 1400.0
+"""Frequency at which the weight of the interaural phase is a half. People do not perceive
+differences of phase above it (Brughera, Dunai & Hartmann 2013, J. Acoust. Soc. Am. 133, 2839)."""
+
+_PHASE_SLOPE = 4
+
+
 def interaural_phase(spectrum: NDArray[np.complex64], noise_power: float = 0.0) -> Samples:
     """Return cosine and sine of the phase of the left ear relative to the right one.
 
     With a source on the left the left ear is ahead: the sine is positive at low frequencies. Both
     are weighted by ``|L R| / (|L R| + noise_power + 1e-16)``, which is 1 where the bin has energy
-    and 0 in silence, where there is no phase.
+    and 0 in silence, where there is no phase; and by ``1 / (1 + (f / PHASE_LIMIT_HZ) ** 4)``. At
+    high frequencies the head is several wavelengths wide: the phase is ambiguous and, in a room,
+    almost random, and networks learnt to localise more slowly where it was not left out.
 
     Args:
-        spectrum: ``(2, bins)`` complex spectra of the ears, left first.
+        spectrum: ``(2, bins)`` complex spectra of the ears at 22 050 Hz, left first.
         noise_power: See `log_spectrum`.
 
     Returns:
@@ -103,7 +112,9 @@ def interaural_phase(spectrum: NDArray[np.complex64], noise_power: float = 0.0) 
     """
     # double precision: the product of two faint bins is below the range of float32
     product = spectrum[0].astype(np.complex128) * spectrum[1].conj()
-    weighted = product / (np.abs(product) + noise_power + MAGNITUDE_FLOOR**2)
+    hertz = np.arange(product.size) * (SAMPLE_RATE_HZ / WINDOW_SAMPLES)
+    followed = 1.0 / (1.0 + (hertz / PHASE_LIMIT_HZ) ** _PHASE_SLOPE)
+    weighted = product * followed / (np.abs(product) + noise_power + MAGNITUDE_FLOOR**2)
     return np.stack([weighted.real, weighted.imag]).astype(np.float32)
 
 
@@ -273,7 +284,7 @@ class AudioCfg:
 
     present: bool = True
     quality: AudioQuality = AudioQuality.hrtf
-    encoding: Encoding = Encoding.magnitude_phase
+    encoding: Encoding = Encoding.magnitude
     bins: int = N_BINS
     waveform: bool = False
     sofa_path: str | None = None
@@ -312,12 +323,10 @@ class AudioSense(Sense):
     moved; what moved lacks its Doppler shift in those steps (see `Listener.rejoin`).
 
     Observations:
-        audio: ``(4, 250)`` float32 by default, of the first 250 bins of the Fourier transform of
-            the last 1024 samples: log10 of the magnitude at the left and at the right ear (the
-            formula of the paper's code), cosine and sine of the interaural phase. At 22 050 Hz
-            these are 0 to 5.4 kHz in steps of 21.5 Hz. Exact silence is a magnitude of -8 and a
-            phase of (0, 0); a full-scale sine is 2.7. `AudioCfg.encoding` and `AudioCfg.bins`
-            change its form.
+        audio: ``(2, 250)`` float32 by default, left ear first: log10 of the magnitude of the first
+            250 bins of the Fourier transform of the last 1024 samples (the formula of the paper's
+            code). At 22 050 Hz these are 0 to 5.4 kHz in steps of 21.5 Hz. Exact silence is -8; a
+            full-scale sine is 2.7. `AudioCfg.encoding` and `AudioCfg.bins` change its form.
         waveform: ``(2, step_samples)`` float32 sound pressure of this step, on request.
     """
 

@@ -20,8 +20,8 @@ NEAREST_RADII = 1.25
 constant; that of the nearest source that Duda & Martens (1998) consider."""
 
 _CENTRE_RADII = 0.1
-"""Distance from the centre of the head, in its radii, below which its direction fades out: there is
-none at the centre, and no real source is there."""
+"""Distance from the centre of the head, in its radii, below which its direction fades out, as there
+is none at the centre, and no real source is there."""
 
 
 @njit(cache=True)

@@ -269,6 +269,12 @@ class BulletClient:
 
         def __getattr__(self, name: str) -> Any: ...
 
+    def gravity(self) -> tuple[float, float, float]:
+        """Return the present gravity along x, y and z, m/s^2."""
+        world = self.getPhysicsEngineParameters()
+        x, y, z = (float(world[f"gravityAcceleration{axis}"]) for axis in "XYZ")
+        return x, y, z
+
     def getContactPoints(self, bodyA: int = -1, bodyB: int = -1) -> tuple[ContactPoint, ...]:
         """Return the contact points of the last physics step, of one or two bodies or of all."""
         points = pybullet.getContactPoints(bodyA, bodyB, physicsClientId=self.id)

@@ -12,6 +12,9 @@ CONTROL_RATES_HZ = tuple(
 )
 """Possible numbers of agent steps per second, the divisors of the sampling rate."""
 
+_MOST = 10_000  # more physics steps per agent step, or iterations, would take minutes each
+_LONGEST_S = 1e6  # seconds; they are counted in physics steps
+
 
 @dataclass
 class ClockCfg:
@@ -25,17 +28,18 @@ class ClockCfg:
 
     Attributes:
         control_rate_hz: Agent steps per second; one of `CONTROL_RATES_HZ`.
-        substeps: Physics steps per agent step.
+        substeps: Physics steps per agent step, 1 to 10 000.
         solver_iterations: Iterations of Bullet's constraint solver per physics step; at least 20
-            in worlds with a body that holds target angles with moving fingers.
+            in worlds with a body that holds target angles with moving fingers; at most 10 000.
         contact_share: Distance at which Bullet detects contacts ahead of time, as a fraction of the
             size of the smaller of two objects, in (0, 1]. What moves further in one physics step
             penetrates before its contact is found; 0.1 finds those of a palm-sized object 5 mm
             ahead, at twice the cost of physics. Contacts of movable props with restitution are
             detected proportionally less far ahead at physics steps below 8 ms.
         sleep_s: Seconds after which props at rest sleep: Bullet does not simulate them until
-            something comes near. 0.4 as in PhysX; infinite: never. What moves by less than 1 cm/s
-            and 0.01 rad/s counts as at rest. Worth it where many things lie about and bodies walk.
+            something comes near. 0.4 as in PhysX; at most 1e6; infinite: never. What moves by less
+            than 1 cm/s and 0.01 rad/s counts as at rest. Worth it where many things lie about and
+            bodies walk.
     """
 
     control_rate_hz: int = 25
@@ -48,13 +52,14 @@ class ClockCfg:
         """Check the rate and the numbers."""
         if self.control_rate_hz not in CONTROL_RATES_HZ:
             raise ValueError(_rate_error(self.control_rate_hz))
-        if self.substeps < 1 or self.solver_iterations < 1:
+        for name in ("substeps", "solver_iterations"):
+            if not 1 <= getattr(self, name) <= _MOST:
+                raise ValueError(f"{name}={getattr(self, name)} must be from 1 to {_MOST}")
+        if not (0.0 < self.sleep_s <= _LONGEST_S or self.sleep_s == math.inf):
             raise ValueError(
-                f"substeps={self.substeps} and solver_iterations={self.solver_iterations} "
-                "must be at least 1"
+                f"sleep_s={self.sleep_s} must be above 0 and at most {_LONGEST_S:g}; "
+                "inf: nothing sleeps"
             )
-        if not self.sleep_s > 0.0:
-            raise ValueError(f"sleep_s={self.sleep_s} must be above 0; inf: nothing sleeps")
         if not 0.0 < self.contact_share <= 1.0:
             raise ValueError(f"contact_share={self.contact_share} must be above 0 and at most 1")
 

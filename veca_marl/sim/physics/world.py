@@ -24,7 +24,7 @@ from veca_marl.sim.physics.props import (
     limit_detection,
     prop_sleep,
 )
-from veca_marl.sim.physics.props.fast_props import FastProps
+from veca_marl.sim.physics.props.contact_corrections import FastProps, Rebounds
 from veca_marl.sim.physics.props.joint import Joint
 from veca_marl.sim.sound import SoundField, make_sound
 from veca_marl.sim.sound.sounds import Sound, Source
@@ -186,6 +186,7 @@ class World:
         self._joints: list[Joint] = []
         self._sleep = prop_sleep(self.client, self.clock)
         self._fast = FastProps(self.client, self.scene, self.clock.substep_s)
+        self._rebounds = Rebounds(self.client, self.clock.substep_s)
         self._configure_physics()
         self._impacts: ImpactSounds | None = None
         if playground.impacts.present:
@@ -219,6 +220,7 @@ class World:
             self._impacts.add(prop)
         prop.rest = self._sleep.add(prop)
         self._fast.add(prop)
+        self._rebounds.add(prop)
         if not prop.fixed:
             self._moving.append(prop)
         return prop
@@ -310,6 +312,7 @@ class World:
         self._set_contact_share()
         for mover in self.movers:
             mover.before_step()
+        self._sleep.before_step()
         self._fast.before_step()
         for _ in range(self.clock.substeps):
             self._substep()
@@ -337,9 +340,11 @@ class World:
 
     def _simulate(self) -> None:
         """Let Bullet make a physics step."""
+        self._rebounds.before_substep()
         self._sleep.before_substep()
         self.client.stepSimulation()
         self._sleep.after_substep()
+        self._rebounds.after_substep()
 
     def overlap_m(self, one: int, other: int) -> float:
         """Return how deep two bodies penetrate each other where they are now, in metres.

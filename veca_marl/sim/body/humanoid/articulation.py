@@ -231,9 +231,7 @@ class Articulation:
 
     def read_gravity(self) -> None:
         """Read the client's gravity; call it before each agent step."""
-        world = self._client.getPhysicsEngineParameters()
-        gravity = [world[f"gravityAcceleration{axis}"] for axis in "XYZ"]
-        self._weight = self._mass_kg * np.array(gravity)
+        self._weight = self._mass_kg * np.array(self._client.gravity())
 
     def _touches_others(self) -> bool:
         found = self._client.getContactPoints(bodyA=self.body_id)

@@ -26,17 +26,16 @@ from itertools import chain
 
 import numpy as np
 
-from veca_marl.sim.body.walker.jammed import JammedProps
-from veca_marl.sim.body.walker.making_way import (
+from veca_marl.sim.body.walker.jammed import (
     FIRM_M,
+    JammedProps,
     Overlap,
     deepest_m,
     depenetration,
     make_way,
     may_reach,
 )
-from veca_marl.sim.body.walker.obstacles import Leaves, ObstacleBoxes
-from veca_marl.sim.body.walker.stop import PARKED_M, Stop
+from veca_marl.sim.body.walker.obstacles import PARKED_M, Leaves, ObstacleBoxes, Stop
 from veca_marl.sim.body.walker.walker_collisions import Footprint
 from veca_marl.sim.geometry import (
     Floats,
@@ -65,6 +64,7 @@ class Capsule:
         form: The capsule, in a frame with the walker's heading as x axis.
         centre_height_m: Height of its centre above the surface on which the walker is.
         push_limit_kg: Props up to this mass are pushed.
+        restitution: Multiplied by that of what touches it.
 
     Attributes:
         body_id: PyBullet's id.
@@ -73,6 +73,7 @@ class Capsule:
         yaw_rad: Rotation about the vertical.
         support_id: PyBullet's id of the prop on which the walker stands, which is no obstacle; -1
             on the floor.
+        walked_over: Likewise of the things that it walks over.
     """
 
     def __init__(
@@ -82,15 +83,17 @@ class Capsule:
         form: Primitive,
         centre_height_m: float,
         push_limit_kg: float,
+        restitution: float,
     ) -> None:
         self._centre_height_m = centre_height_m
         self.base_m = self.yaw_rad = 0.0
         self.support_id = -1
+        self.walked_over: Collection[int] = ()
         self._client, self._scene = client, scene
         self._push_limit_kg = push_limit_kg
         shape = create_collision_shape(client, [form])
         self.body_id: int = client.createMultiBody(0, shape)
-        client.changeDynamics(self.body_id, -1, lateralFriction=0.2, restitution=0.0)
+        client.changeDynamics(self.body_id, -1, lateralFriction=0.2, restitution=restitution)
         self.radius_m, self._half_axis_m = form.radius, _half_axis_m(form)
         self._reach_m = self._half_axis_m + form.radius
         self._obstacles = ObstacleBoxes(client, scene, [], [], _LIMB_REACH_M)
@@ -134,8 +137,20 @@ class Capsule:
         reach_m = self._reach_m + _MARGIN_M + distance_m
         near = self._obstacles.near(position, reach_m)
         self._near = [body_id for body_id in near if body_id != self.support_id]
+        self.leave_out(self.walked_over)
         self._near_leaves = self._leaves.near(position, reach_m)
         self._jammed.collect(position, reach_m, self._near_leaves, capsules)
+
+    @property
+    def near(self) -> Sequence[int]:
+        """PyBullet's ids of the obstacles that can be reached within this agent step."""
+        return self._near
+
+    def leave_out(self, walked_over: Collection[int]) -> None:
+        """Take things that the walker walks over from the obstacles."""
+        self.walked_over = walked_over
+        if walked_over:
+            self._near = [body_id for body_id in self._near if body_id not in walked_over]
 
     def solid_near(self, position: Floats, reach_m: float) -> list[int]:
         """Return PyBullet's ids of what is within a horizontal distance and is not pushed.
@@ -304,7 +319,7 @@ def _yields(leaf: Prop, contact: ContactPoint) -> bool:
 
 
 def upright_capsule(
-    world: World, radius_m: float, height_m: float, push_limit_kg: float
+    world: World, radius_m: float, height_m: float, push_limit_kg: float, restitution: float
 ) -> Capsule:
     """Return the capsule of a walker that stands.
 
@@ -313,15 +328,18 @@ def upright_capsule(
         radius_m: Radius.
         height_m: Height of its upper end above the floor.
         push_limit_kg: Props up to this mass are pushed.
+        restitution: Multiplied by that of what touches it.
     """
     # the lower cap is beneath the floor, with which it does not collide: a rounded lower end would
     # press props into the floor
     length_m = height_m - radius_m
     form = Primitive(Shape.CAPSULE, (radius_m, length_m))
-    return Capsule(world.client, world.scene, form, length_m / 2, push_limit_kg)
+    return Capsule(world.client, world.scene, form, length_m / 2, push_limit_kg, restitution)
 
 
-def lying_capsule(world: World, height_m: float, length_m: float, push_limit_kg: float) -> Capsule:
+def lying_capsule(
+    world: World, height_m: float, length_m: float, push_limit_kg: float, restitution: float
+) -> Capsule:
     """Return the capsule of a walker that crawls: it lies along the heading.
 
     Args:
@@ -329,11 +347,12 @@ def lying_capsule(world: World, height_m: float, length_m: float, push_limit_kg:
         height_m: Its diameter.
         length_m: From end to end.
         push_limit_kg: Props up to this mass are pushed.
+        restitution: Multiplied by that of what touches it.
     """
     size = (height_m / 2.0, length_m - height_m)
     along_x = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
     form = Primitive(Shape.CAPSULE, size, rotation=along_x)
-    return Capsule(world.client, world.scene, form, height_m / 2.0, push_limit_kg)
+    return Capsule(world.client, world.scene, form, height_m / 2.0, push_limit_kg, restitution)
 
 
 def _half_axis_m(form: Primitive) -> float:

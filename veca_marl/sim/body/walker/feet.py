@@ -9,7 +9,7 @@ import numpy as np
 from veca_marl.sim.body.sense_organs import distance_m
 from veca_marl.sim.body.walker.walker_cfg import WalkerCfg
 from veca_marl.sim.geometry import Floats, horizontal_distance
-from veca_marl.sim.physics import Prop
+from veca_marl.sim.physics import Prop, PropShape
 from veca_marl.sim.physics.bullet import surface_m
 from veca_marl.sim.physics.bullet_client import BulletClient
 
@@ -56,7 +56,8 @@ class Footing:
         client: The PyBullet client.
 
     Attributes:
-        prop: What the walker stands on; None on the floor.
+        prop: What the walker has stepped on; None on the floor.
+        low: Things on the floor so low that it walks over them.
         height_m: Height of the surface under the walker's axis; 0 on the floor.
     """
 
@@ -67,6 +68,7 @@ class Footing:
     def leave(self) -> None:
         """Stand on the floor."""
         self.prop: Prop | None = None
+        self.low: list[Prop] = []
         self.height_m = 0.0
 
     def step_on(self, prop: Prop) -> None:
@@ -76,6 +78,8 @@ class Footing:
     def follow(self, x: float, y: float) -> None:
         """Compute the height at a place; beside the prop the walker stands on the floor again."""
         if self.prop is None:
+            heights = (surface_height_m(self._client, low, x, y) for low in self.low)
+            self.height_m = max((height for height in heights if height), default=0.0)
             return
         height_m = surface_height_m(self._client, self.prop, x, y)
         if height_m is None:
@@ -90,6 +94,37 @@ def surface_height_m(client: BulletClient, prop: Prop, x: float, y: float) -> fl
     top, bottom = np.array([x, y, high[2] + _ABOVE_M]), np.array([x, y, low[2] - _ABOVE_M])
     height_m = float(top[2]) - surface_m(client, prop.body_id, top, bottom)
     return height_m if height_m > bottom[2] + 1e-6 else None
+
+
+_ROUND = 8  # places round a walker at which surfaces are measured
+_AHEAD_M = 0.06  # beyond the capsule: more than the way of a step of 40 ms at 1 m/s
+_SLOPING = (PropShape.compound, PropShape.convex)
+
+
+def is_walked_over(
+    client: BulletClient, prop: Prop, place: Floats, base_m: float, cfg: WalkerCfg, yaw_rad: float
+) -> bool:
+    """Return whether a thing is low, or a slope so flat, that a walker walks over it.
+
+    Args:
+        client: The PyBullet client.
+        prop: A fixed or heavy one.
+        place: ``(2,)`` metres, of the walker.
+        base_m: Height on which it walks.
+        cfg: Its parameters.
+        yaw_rad: Its heading.
+    """
+    highest_m = base_m + cfg.stride_height_m
+    if float(prop.bounds()[1][2]) <= highest_m:
+        return True
+    if prop.cfg.shape not in _SLOPING:
+        return False
+    reach_m = cfg.radius_m + _AHEAD_M
+    angles = yaw_rad + np.arange(_ROUND) * 2.0 * math.pi / _ROUND
+    places = [place, *(place + reach_m * np.stack([np.cos(angles), np.sin(angles)], 1))]
+    found = [surface_height_m(client, prop, float(x), float(y)) for x, y in places]
+    heights = [height_m for height_m in found if height_m is not None]
+    return bool(heights) and max(heights) <= highest_m
 
 
 def foot_steps_on(client: BulletClient, cfg: WalkerCfg, ground: Floats, prop: Prop) -> bool:

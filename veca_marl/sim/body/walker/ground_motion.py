@@ -10,8 +10,9 @@ import numpy as np
 
 from veca_marl.sim.body.base import Body
 from veca_marl.sim.body.walker.capsule import Capsule
-from veca_marl.sim.body.walker.feet import Footing, middle, surface_height_m
+from veca_marl.sim.body.walker.feet import Footing, is_walked_over, middle, surface_height_m
 from veca_marl.sim.body.walker.stances import Stance
+from veca_marl.sim.body.walker.walker_cfg import WalkerCfg
 from veca_marl.sim.body.walker.walker_collisions import WalkerCollisions
 from veca_marl.sim.geometry import Floats
 from veca_marl.sim.physics import Prop, World
@@ -31,6 +32,7 @@ class GroundMotion:
 
     Args:
         world: The world.
+        cfg: Parameters of the walker.
         upright: The stance in which an episode starts.
         on_all_fours: The stance of crawling; None for a walker that does not crawl.
 
@@ -44,14 +46,18 @@ class GroundMotion:
         turn_radps: Commanded turning speed, left is positive.
     """
 
-    def __init__(self, world: World, upright: Stance, on_all_fours: Stance | None) -> None:
-        self._world = world
+    def __init__(
+        self, world: World, cfg: WalkerCfg, upright: Stance, on_all_fours: Stance | None
+    ) -> None:
+        self._world, self._cfg = world, cfg
         self._upright, self._on_all_fours = upright, on_all_fours
         self.stance = upright
         self.footing = Footing(world.client)
         self.ground: Floats = np.zeros(2)
         self.velocity: Floats = np.zeros(3)
         self.yaw_rad = self.speed_mps = self.turn_radps = 0.0
+        self._known = 0
+        self._without_joint: dict[int, Prop] = {}
 
     @property
     def capsule(self) -> Capsule:
@@ -95,7 +101,30 @@ class GroundMotion:
         """Collect the obstacles that can be reached within this agent step."""
         self._step_start = self.ground.copy()
         greatest_mps = abs(self.speed_mps) + _APPROACH_MPS
+        self.capsule.leave_out(())
         self._collect_obstacles(greatest_mps * self._world.clock.step_s)
+        if self._cfg.stride_height_m > 0.0 and self.footing.prop is None:
+            self._walk_over_low_things()
+
+    def _walk_over_low_things(self) -> None:
+        """Take what is low from the obstacles; the walker stands on it where it is."""
+        props = self._world.props.values()
+        if len(props) != self._known:
+            self._known = len(props)
+            self._without_joint = {prop.body_id: prop for prop in props if prop.joint is None}
+        found = (self._without_joint.get(body_id) for body_id in self.capsule.near)
+        near = [prop for prop in found if prop is not None]
+        base_m, before = self.footing.height_m, self.footing.low
+        self.footing.low = [
+            prop
+            for prop in near
+            if is_walked_over(
+                self._world.client, prop, self.ground, base_m, self._cfg, self.yaw_rad
+            )
+        ]
+        self.capsule.leave_out([prop.body_id for prop in self.footing.low])
+        if before and not self.footing.low:
+            self._update_surface()
 
     def proposed_position(self, substep_s: float) -> tuple[float, float]:
         """Turn; return the position after this physics step without obstacles, metres.
@@ -122,7 +151,7 @@ class GroundMotion:
         vx, vy = (x - self.ground[0]) / substep_s, (y - self.ground[1]) / substep_s
         self.ground[:] = x, y
         self.capsule.set_velocity(vx, vy, self.turn_radps)
-        if self.footing.prop is not None:
+        if self.footing.prop is not None or self.footing.low:
             self._update_surface()
 
     def after_step(self) -> None:
@@ -183,6 +212,7 @@ class GroundMotion:
             self.capsule.park()
         self.stance = self._upright
         self.capsule.base_m, self.capsule.support_id = 0.0, -1
+        self.capsule.leave_out(())
 
     def _update_surface(self) -> None:
         """Set the height of the capsule to that of the surface under it."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import ClassVar, Protocol
 
@@ -17,6 +18,8 @@ from veca_marl.sim.geometry import Floats, SceneObject
 from veca_marl.sim.physics import World
 from veca_marl.sim.physics.interactions import Crawl
 
+_HALVINGS = 30  # of an interval of angles, down to rounding
+
 
 class Stance(Protocol):
     """Pose and collision capsule of a walker.
@@ -26,7 +29,7 @@ class Stance(Protocol):
         speed_share: Speeds of full actions as fractions of those in walking.
         underside: The bones that touch the surface.
         hands_are_free: Whether it can hold, kick and step.
-        pitch_range_rad: Range of the head's pitch; down is positive.
+        pitch_range_rad: Range of the head's pitch without a turn; down is positive.
     """
 
     capsule: Capsule
@@ -47,6 +50,10 @@ class Stance(Protocol):
         """Return the ``(82,)`` joint angles at the present phase of the gait."""
         ...
 
+    def head_reaches(self, pitch_rad: float, yaw_rad: float) -> bool:
+        """Return whether the joints of the neck allow a pitch and a yaw of the head."""
+        ...
+
 
 class Upright:
     """Walks on two legs; see `Stance`.
@@ -63,8 +70,8 @@ class Upright:
     def __init__(self, skeleton: Skeleton, gait: Gait, capsule: Capsule) -> None:
         self.capsule = capsule
         self.underside: Underside = Soles(skeleton)
-        self.pitch_range_rad = Neck(skeleton).pitch_range_rad
-        self._gait = gait
+        self._gait, self._neck = gait, Neck(skeleton)
+        self.pitch_range_rad = self._neck.pitch_range_rad
 
     def turn(self, yaw_rad: float) -> None:
         """See `Stance`; an upright capsule is round."""
@@ -78,6 +85,10 @@ class Upright:
     def angles(self, head_pitch_rad: float, head_yaw_rad: float) -> Floats:
         """See `Stance`."""
         return self._gait.pose(head_pitch_rad, head_yaw_rad)
+
+    def head_reaches(self, pitch_rad: float, yaw_rad: float) -> bool:
+        """See `Stance`."""
+        return self._neck.reaches(pitch_rad, yaw_rad, level_rad=0.0)
 
 
 @dataclass(frozen=True)
@@ -142,8 +153,9 @@ class OnAllFours:
         ]
         self._neck = Neck(skeleton)
         low_rad, high_rad = self._neck.pitch_range_rad
-        extended_rad = math.radians(self._pose.neck_deg)
+        extended_rad = self._extended_rad = math.radians(self._pose.neck_deg)
         self.pitch_range_rad = low_rad + extended_rad, high_rad + extended_rad
+        self._level_rad = -math.radians(self._pose.pitch_deg)
 
     def turn(self, yaw_rad: float) -> None:
         """See `Stance`."""
@@ -165,9 +177,14 @@ class OnAllFours:
         swing *= math.sin(2.0 * math.pi * self._gait.phase)
         for joints, sign in zip(self._diagonals, (1.0, -1.0), strict=True):
             angles[joints] += sign * swing
-        self._neck.turn(angles, head_pitch_rad - math.radians(self._pose.neck_deg), head_yaw_rad)
+        pitch_rad = head_pitch_rad - self._extended_rad
+        self._neck.turn(angles, pitch_rad, head_yaw_rad, self._level_rad)
         clipped: Floats = np.clip(angles, self._low, self._high)
         return clipped
+
+    def head_reaches(self, pitch_rad: float, yaw_rad: float) -> bool:
+        """See `Stance`."""
+        return self._neck.reaches(pitch_rad - self._extended_rad, yaw_rad, self._level_rad)
 
 
 def _resting_angles(skeleton: Skeleton, pose: CrawlPose) -> Floats:
@@ -190,11 +207,13 @@ def make_stances(
         cfg: Its parameters.
         world: The world.
     """
-    upright = upright_capsule(world, cfg.radius_m, cfg.height_m, cfg.push_limit_kg)
+    upright = upright_capsule(world, cfg.radius_m, cfg.height_m, cfg.push_limit_kg, cfg.restitution)
     standing = Upright(skeleton, gait, upright)
     if Crawl.name not in cfg.verbs:
         return standing, None
-    lying = lying_capsule(world, cfg.crawl_height_m, cfg.crawl_length_m, cfg.push_limit_kg)
+    lying = lying_capsule(
+        world, cfg.crawl_height_m, cfg.crawl_length_m, cfg.push_limit_kg, cfg.restitution
+    )
     return standing, OnAllFours(skeleton, gait, lying, cfg.crawl_share)
 
 
@@ -216,23 +235,34 @@ class BonePoses:
         self._head_pitch_rad, self._head_yaw_rad = head_pitch_rad, 0.0
 
     def pitch_head(self, deg: float, stance: Stance) -> None:
-        """Turn the head down by an angle, clipped to its range in a stance.
+        """Nod down by an angle about the head's own axis, clipped to its range in a stance.
 
         Raises:
             ValueError: If the angle is not finite.
         """
-        range_rad = stance.pitch_range_rad
-        angle_rad = _clipped(self._head_pitch_rad, range_rad) + _finite_rad(deg)
-        self._head_pitch_rad = _clipped(angle_rad, range_rad)
+        pitch_rad, yaw_rad = self._head_in(stance)
+        aim_rad = _clipped(pitch_rad + _finite_rad(deg), stance.pitch_range_rad)
+        reached_rad = _farthest(pitch_rad, aim_rad, lambda p: stance.head_reaches(p, yaw_rad))
+        self._head_pitch_rad, self._head_yaw_rad = reached_rad, yaw_rad
 
-    def yaw_head(self, deg: float) -> None:
-        """Turn the head to the left by an angle, clipped to its range.
+    def yaw_head(self, deg: float, stance: Stance) -> None:
+        """Turn the head to the left by an angle, clipped to its range in a stance.
 
         Raises:
             ValueError: If the angle is not finite.
         """
-        angle_rad = self._head_yaw_rad + _finite_rad(deg)
-        self._head_yaw_rad = _clipped(angle_rad, self._yaw_range_rad)
+        pitch_rad, yaw_rad = self._head_in(stance)
+        aim_rad = _clipped(yaw_rad + _finite_rad(deg), self._yaw_range_rad)
+        reached_rad = _farthest(yaw_rad, aim_rad, lambda y: stance.head_reaches(pitch_rad, y))
+        self._head_yaw_rad = reached_rad
+
+    def _head_in(self, stance: Stance) -> tuple[float, float]:
+        """Return the nearest pitch and, at that pitch, yaw of the head that a stance allows."""
+        pitch_rad = _clipped(self._head_pitch_rad, stance.pitch_range_rad)
+        if self._head_yaw_rad == 0.0:
+            return pitch_rad, 0.0
+        yaw_rad = _farthest(0.0, self._head_yaw_rad, lambda y: stance.head_reaches(pitch_rad, y))
+        return pitch_rad, yaw_rad
 
     def write(self, stance: Stance, ground: Floats, yaw_rad: float, surface_m: float) -> Floats:
         """Compute all bone poses, shifted vertically until the body touches the surface.
@@ -248,8 +278,7 @@ class BonePoses:
         """
         positions, rotations = self._bones.positions, self._bones.rotations
         positions[0], rotations[0] = stance.pelvis(ground, yaw_rad)
-        pitch_rad = _clipped(self._head_pitch_rad, stance.pitch_range_rad)
-        angles = stance.angles(pitch_rad, self._head_yaw_rad)
+        angles = stance.angles(*self._head_in(stance))
         forward_kinematics(self._skeleton, angles, positions, rotations)
         positions[:, 2] -= stance.underside.lowest_m(positions, rotations) - surface_m
         return angles
@@ -265,3 +294,13 @@ def _finite_rad(deg: float) -> float:
 def _clipped(angle_rad: float, range_rad: tuple[float, float]) -> float:
     low, high = range_rad
     return min(max(angle_rad, low), high)
+
+
+def _farthest(start: float, end: float, is_possible: Callable[[float], bool]) -> float:
+    """Return the end of an interval, or the last possible number from a possible start to it."""
+    if is_possible(end):
+        return end
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (start + end)
+        start, end = (middle, end) if is_possible(middle) else (start, middle)
+    return start

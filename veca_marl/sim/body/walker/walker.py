@@ -54,7 +54,9 @@ class Walker(Body):
         self._greatest_speed_mps = greatest_speed_mps(cfg, world.clock)
         self._walk_action = WALK_ACTIONS[cfg.action]
         self._gait = Gait(self._skeleton)
-        self._motion = GroundMotion(world, *make_stances(self._skeleton, self._gait, cfg, world))
+        self._motion = GroundMotion(
+            world, cfg, *make_stances(self._skeleton, self._gait, cfg, world)
+        )
         self._handling = ObjectHandling(world.client, name, cfg, self._motion, self._gait)
         self._bone_poses = BonePoses(self._skeleton, self._drawn)
         self.verb_choice = VerbChoice(cfg.verbs)
@@ -315,6 +317,9 @@ class Walker(Body):
     def rotate_up_down_head(self, deg: float) -> None:
         """Pitch the head down (up when negative) by an angle, clipped to the range of the neck.
 
+        A head that is turned nods about its own axis: heading and roll stay. The range is smaller
+        for a turned head, and smaller still on all fours.
+
         Raises:
             ValueError: If the angle is not finite.
         """
@@ -323,10 +328,13 @@ class Walker(Body):
     def rotate_left_right_head(self, deg: float) -> None:
         """Turn the head right (left when negative) by an angle, clipped to the range of the neck.
 
+        The axis is vertical: pitch and roll stay. The range is smaller for a pitched head, and
+        smaller still on all fours.
+
         Raises:
             ValueError: If the angle is not finite.
         """
-        self._bone_poses.yaw_head(-deg)
+        self._bone_poses.yaw_head(-deg, self._motion.stance)
 
     # ---- calls from the world, see `Mover` and `CollidingWalker`
 

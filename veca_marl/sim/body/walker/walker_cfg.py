@@ -24,6 +24,9 @@ class WalkerCfg(BodyCfg):
         height_m: Height of the capsule.
         push_limit_kg: Props up to this mass are light: they are pushed, kicked and carried. Heavier
             ones stop the walker.
+        restitution: 0 (nothing rebounds from the body) to 1 (things rebound as from the floor);
+            multiplied by that of the prop. Above 0 props also leave a walking body faster than it
+            walks.
         kick_reach_m: Largest distance from the capsule's surface to that of a prop it can kick.
         kick_angle_deg: Largest angle between the walker's heading and the direction of the prop's
             centre of mass.
@@ -31,6 +34,8 @@ class WalkerCfg(BodyCfg):
         kick_speed_mps: Speed away from the walker up to which a kick accelerates a prop.
         kick_impulse_ns: Largest impulse of a kick; heavy props do not reach that speed.
         head_pitch_deg: Pitch of the head at the start of an episode; down is positive.
+        stride_height_m: Height of the highest fixed or heavy thing over which it walks, and rise of
+            the steepest slope within its radius and 6 cm; 0.05: 16 degrees. 0: all stop it.
         step_height_m: Height of the highest prop onto which it steps.
         step_reach_m: Largest distance from the capsule's surface to such a prop.
         crawl_height_m: Height and width of the body in crawling.
@@ -47,12 +52,14 @@ class WalkerCfg(BodyCfg):
     radius_m: float = 0.11
     height_m: float = 0.72
     push_limit_kg: float = 5.0
+    restitution: float = 0.0
     kick_reach_m: float = 0.15
     kick_angle_deg: float = 60.0
     kick_height_m: float = 0.25
     kick_speed_mps: float = 3.0
     kick_impulse_ns: float = 3.0
     head_pitch_deg: float = 12.0
+    stride_height_m: float = 0.05
     step_height_m: float = 0.2
     step_reach_m: float = 0.3
     crawl_height_m: float = 0.36
@@ -75,7 +82,7 @@ class WalkerCfg(BodyCfg):
                 f"body.crawl_length_m={self.crawl_length_m}: the height must be positive and "
                 "smaller than the length"
             )
-        for name in ("backward_share", "crawl_share"):
+        for name in ("backward_share", "restitution", "crawl_share"):
             if getattr(self, name) > 1.0:
                 raise ValueError(f"body.{name}={getattr(self, name)} is not in [0, 1]")
         check_interactions("body.verbs", self.verbs)

@@ -20,6 +20,10 @@ class PropSleep(Protocol):
         """Add a prop; return what it calls before it is moved."""
         ...
 
+    def before_step(self) -> None:
+        """Wake all props if gravity has changed since the last agent step."""
+        ...
+
     def before_substep(self) -> None:
         """Prepare a physics step of Bullet."""
         ...
@@ -51,6 +55,9 @@ class NoSleep:
     def add(self, prop: Prop) -> Rest:
         """Return what does nothing before the prop is moved."""
         return Awake()
+
+    def before_step(self) -> None:
+        """Do nothing."""
 
     def before_substep(self) -> None:
         """Do nothing."""
@@ -85,6 +92,7 @@ class RestingProps:
         self._rows: list[int] = []
         self._woken: list[Prop] = []
         self._positions, self._rotations = _unknown_poses(0)
+        self._gravity = client.gravity()
 
     def add(self, prop: Prop) -> Rest:
         """Add a prop; return what it calls before it is moved."""
@@ -102,6 +110,13 @@ class RestingProps:
         """Wake all props."""
         for sleep in self._sleeps:
             sleep.wake()
+
+    def before_step(self) -> None:
+        """Wake all props if gravity has changed since the last agent step."""
+        gravity = self._client.gravity()
+        if gravity != self._gravity:
+            self._gravity = gravity
+            self.wake_around()
 
     def before_substep(self) -> None:
         """Note the velocities of props that were woken."""
