@@ -2,9 +2,14 @@
 
 import numpy as np
 import pytest
+from listening import RATE, STEP, make_receiver
 
-from veca_marl.sim.sound import House, Room
-from veca_marl.sim.sound.octave_bands import BANDS_HZ, N_BANDS, shelf_filters
+from veca_marl.sim.geometry import Pose
+from veca_marl.sim.sound import Clip, House, Room, SoundField
+from veca_marl.sim.sound.obstacles import Doorway
+from veca_marl.sim.sound.partitions import BANDS_HZ, N_BANDS
+from veca_marl.sim.sound.room_acoustics import image_lattice
+from veca_marl.sim.sound.shading import shelf_filters
 
 WEST, EAST = (Room((x, -3.0, 0.0), (4.0, 6.0, 2.6), 0.5) for x in (-4.05, 0.05))
 LOSS_DB = 30.0
@@ -15,12 +20,16 @@ WALL_PIECES = [  # with an opening of 1 x 2 m
 ]
 WHOLE_WALL = [((0.0, 0.0, 1.3), (0.05, 3.0, 1.3))]
 LEAF = (0.02, 0.49, 0.99)
+CLOSED = np.array([0.0, 0.0, 1.0])
 AT_500_HZ = 2
 STEPS_PER_S = 25
 
 
-def house(boxes, rooms=(WEST, EAST)):
-    built = House(rooms, 0, LOSS_DB)
+DOORWAY = Doorway((0, 1), (0.0, 0.0), 1.0, 0)
+
+
+def house(boxes, rooms=(WEST, EAST), order=0, doorways=()):
+    built = House(rooms, order, LOSS_DB, doorways)
     for centre, half in boxes:
         built.obstacles.move(built.obstacles.add(half), centre, np.eye(3))
     return built
@@ -40,15 +49,18 @@ def turned(angle):
     return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
-def with_door(angle, boxes=WALL_PIECES):
+def with_door(angle, boxes=WALL_PIECES, order=0):
     """A leaf that is hinged at y = -0.49 and turned by an angle, in radians."""
-    built = house(boxes)
-    number = built.obstacles.add_leaf(LEAF)
-    rotation, hinge = turned(-angle), np.array([0.02, -0.49, 1.0])
-    closed = np.array([0.0, 0.0, 1.0])
-    built.obstacles.move_leaf(number, hinge + rotation @ (closed - hinge), rotation)
-    built.obstacles.move_opening(number, closed, np.eye(3))
+    built = house(boxes, order=order, doorways=[DOORWAY])
+    built.obstacles.add_leaf(LEAF)
+    built.obstacles.move_opening(0, CLOSED, np.eye(3))
+    turn_leaf(built, angle)
     return built
+
+
+def turn_leaf(built, angle):
+    rotation, hinge = turned(-angle), np.array([0.02, -0.49, 1.0])
+    built.obstacles.move_leaf(0, hinge + rotation @ (CLOSED - hinge), rotation)
 
 
 def test_without_obstacles_nothing_is_lost():
@@ -157,6 +169,63 @@ def test_a_door_that_opens_over_a_second_changes_no_step_by_more_than_3_db(line)
     pink_db = 10.0 * np.log10(energies.mean(axis=1))
     assert np.abs(np.diff(pink_db)).max() <= 3.0
     assert energies[-1].min() > 5.0 * energies[0].max()
+
+
+def total_db(rooms, source, head):
+    """Level of the energy of all paths, the mean over the octave bands."""
+    arrivals = rooms.arrivals(source, Pose(head, np.eye(3)))
+    energies = np.ones((1, N_BANDS)) if arrivals.energies is None else arrivals.energies
+    free = arrivals.gains**2 / (arrivals.vectors**2).sum(axis=1)
+    return 10.0 * np.log10((free[:, None] * energies).sum(axis=0).mean())
+
+
+@pytest.mark.parametrize("reflection", [0.3, 0.5, 0.7])
+def test_the_energy_is_continuous_through_an_opening(reflection):
+    """Grazing sound loses more: the wall on the side of the source is then close to its path."""
+    pair = [Room((x, -3.0, 0.0), (4.0, 6.0, 2.6), reflection) for x in (-4.05, 0.05)]
+    rooms = house(WALL_PIECES, pair, 1, [DOORWAY])
+    rng = np.random.default_rng(0)
+    steps_db, angles_deg = [], []
+    for source in rng.uniform((-3.5, -2.5, 0.3), (-0.8, 2.5, 2.0), (100, 3)):
+        y, z = rng.uniform(-0.3, 0.3), rng.uniform(0.5, 1.5)
+        here, there = (np.array([x, y, z]) for x in (-1e-3, 1e-3))
+        steps_db.append(abs(total_db(rooms, source, here) - total_db(rooms, source, there)))
+        way = here - source
+        angles_deg.append(np.degrees(np.arccos(way[0] / np.linalg.norm(way))))
+    assert np.median(steps_db) < 1.2
+    assert max(step for step, angle in zip(steps_db, angles_deg, strict=True) if angle < 30) < 1.5
+
+
+def test_a_wall_reflects_little_where_a_door_is_open_and_all_where_it_is_closed():
+    ends = np.array([-1.0, 0.3, 1.0]), Pose(np.array([-1.0, -0.3, 1.0]), np.eye(3))
+    image = int(np.flatnonzero((image_lattice(1) == (1, 0, 0)).all(axis=1))[0])
+    assert with_door(0.0, order=1).arrivals(*ends).energies is None
+    reflected = with_door(np.pi / 2, order=1).arrivals(*ends).energies[image]
+    assert reflected.max() < 0.7
+    assert reflected[-1] < 0.1
+
+
+def test_what_is_heard_of_a_door_that_opens_over_a_second_changes_no_step_by_more_than_3_db():
+    rooms, silent = with_door(0.0, order=1), with_door(0.0, order=1)
+    # periodic, so that the level of a step does not fluctuate
+    noise = np.tile(np.random.default_rng(0).standard_normal(STEP), 40).astype(np.float32)
+    levels_db = []
+    for each in (rooms, silent):
+        field = SoundField(each, STEP, RATE)
+        source = field.add_source("noise", Clip(noise))
+        listener = field.add_listener(make_receiver("hrtf"))
+        field.reset(np.random.default_rng(0))
+        source.position, head = (-2.0, 0.0, 1.2), Pose(np.array([2.0, 0.0, 1.2]), np.eye(3))
+        heard = []
+        for step in range(36):
+            if each is rooms:
+                turn_leaf(rooms, np.clip((step - 5) / STEPS_PER_S, 0.0, 1.0) * np.pi / 2)
+            field.advance()
+            heard.append(listener.render(head))
+        levels_db.append([10.0 * np.log10(np.mean(sound**2) + 1e-20) for sound in heard[4:]])
+    opened_db = np.subtract(*levels_db)
+    assert np.abs(np.diff(opened_db)).max() < 3.0
+    assert opened_db[-1] > 10.0
 
 
 @pytest.mark.parametrize("seed", range(4))

@@ -59,5 +59,5 @@ def test_source_and_receiver_can_be_exchanged_between_obstacles():
         number = house.obstacles.add((0.3, 0.8, 1.0))
         house.obstacles.move(number, centre, np.eye(3))
     one, other = np.array([2.1, 3.7, 0.7]), np.array([5.3, 2.2, 0.9])
-    assert house.obstacles_between(one, other) == 1
+    assert house.direct_energy(one, other)[-1] < 0.2
     assert rooms.reciprocity_error_db(house, one, other, 1) < -80.0

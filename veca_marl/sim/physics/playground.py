@@ -18,6 +18,7 @@ from veca_marl.sim.physics.impact_sounds import ImpactCfg
 from veca_marl.sim.physics.props import PropCfg, PropShape, check_appearance
 from veca_marl.sim.physics.rooms import DoorCfg, RoomCfg
 from veca_marl.sim.sound import House, Room
+from veca_marl.sim.sound.obstacles import Doorway
 from veca_marl.sim.sound.partitions import TRANSMISSION_LOSS_DB
 
 THICKEST_WALL_M = 0.5
@@ -202,4 +203,13 @@ PLAYGROUND_GENERATORS: Registry[type[PlaygroundCfg]] = Registry("generator of pl
 def make_house(playground: PlaygroundCfg) -> House:
     """Return the acoustic rooms of a playground, without obstacles."""
     rooms = [Room(room.lower_m, room.size_m, room.reflection) for room in playground.rooms]
-    return House(rooms, playground.image_order, playground.transmission_loss_db)
+    doorways = [_doorway(door, playground.rooms) for door in playground.doors]
+    return House(rooms, playground.image_order, playground.transmission_loss_db, doorways)
+
+
+def _doorway(door: DoorCfg, rooms: list[RoomCfg]) -> Doorway:
+    """Return the opening of a door, which leads across the gap between its rooms."""
+    numbers = {room.name: number for number, room in enumerate(rooms)}
+    one, other = (numbers[name] for name in door.rooms)
+    axis = int(rooms[one].gap_m(rooms[other], 1) > rooms[one].gap_m(rooms[other], 0))
+    return Doorway((one, other), door.position_m, door.width_m, axis)

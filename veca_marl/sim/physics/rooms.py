@@ -59,6 +59,11 @@ class RoomCfg:
         upper = [np.add(room.lower_m, room.size_m) for room in (self, other)]
         return float(np.prod(np.maximum(np.minimum(*upper) - low, 0.0)))
 
+    def gap_m(self, other: RoomCfg, axis: int) -> float:
+        """Return how far two rooms are apart along an axis; negative where they overlap."""
+        low, far = self.lower_m[axis], other.lower_m[axis]
+        return max(far - low - self.size_m[axis], low - far - other.size_m[axis])
+
     @property
     def extent(self) -> str:
         """Its length and width for messages, such as ``6 x 4.5 m``."""

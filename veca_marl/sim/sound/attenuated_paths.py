@@ -14,17 +14,17 @@ from numba import njit
 from numpy.typing import NDArray
 
 from veca_marl.sim.geometry import Floats
-from veca_marl.sim.sound.blocked_paths import contains_point, next_wall
-from veca_marl.sim.sound.diffraction import (
+from veca_marl.sim.sound.diffraction import add_measure, energy_past
+from veca_marl.sim.sound.obstacles import contains_point
+from veca_marl.sim.sound.partitions import N_BANDS
+from veca_marl.sim.sound.silhouettes import (
     Line,
     Screens,
     Work,
     add_silhouette,
-    energy_past,
     line_between,
     make_work,
 )
-from veca_marl.sim.sound.octave_bands import N_BANDS
 
 Numbers = NDArray[np.int64]
 
@@ -37,6 +37,7 @@ def energies_inside(
     size: Floats,
     lattice: Numbers,
     numbers: Numbers,
+    openings: Screens,
     screens: Screens,
     surface_ratio: float,
 ) -> Floats:
@@ -49,6 +50,7 @@ def energies_inside(
         size: ``(3,)`` metres.
         lattice: ``(K, 3)`` from `image_lattice`.
         numbers: Of the screens in the room.
+        openings: In its walls, see `obstacles.ScreenSets`.
         screens: All screens.
         surface_ratio: See `partitions.energy_through`.
 
@@ -62,8 +64,8 @@ def energies_inside(
     for k in range(len(lattice)):
         image = _image(source, lower, size, lattice[k])
         _write_energy(
-            head, image, lower, size, lattice[k], used, used, screens, whole, whole, surface_ratio,
-            work, energies[k],
+            head, image, lower, size, lattice[k], used, used, openings, screens, whole, whole,
+            surface_ratio, work, energies[k],
         )  # fmt: skip
     return energies
 
@@ -72,8 +74,8 @@ def energies_inside(
 def energies_between(
     source: Floats,
     head: Floats,
-    room: tuple[Floats, Floats, Numbers],
-    other: tuple[Floats, Floats, Numbers],
+    room: tuple[Floats, Floats, Numbers, Screens],
+    other: tuple[Floats, Floats, Numbers, Screens],
     lattice: Numbers,
     between: Numbers,
     rooms: tuple[Floats, Floats],
@@ -85,7 +87,8 @@ def energies_between(
     Args:
         source: ``(3,)`` metres.
         head: ``(3,)`` metres.
-        room: Lower corner and size of the source's room, and the numbers of the screens in it.
+        room: Lower corner and size of the source's room, the numbers of the screens in it, and the
+            openings in its walls.
         other: Those of the head's room.
         lattice: ``(K, 3)`` from `image_lattice`.
         between: Numbers of the screens that count between rooms.
@@ -106,8 +109,8 @@ def energies_between(
     for k in range(n):
         image = _image(source, room[0], room[1], lattice[k])
         _write_energy(
-            head, image, room[0], room[1], lattice[k], first, later, screens, rooms[0], rooms[1],
-            surface_ratio, work, energies[k],
+            head, image, room[0], room[1], lattice[k], first, later, room[3], screens, rooms[0],
+            rooms[1], surface_ratio, work, energies[k],
         )  # fmt: skip
     later = _not_round(other[2], source, head, screens)
     back = np.empty(3, np.int64)
@@ -116,8 +119,8 @@ def energies_between(
             back[axis] = lattice[k, axis] if lattice[k, axis] % 2 else -lattice[k, axis]
         image = _image(head, other[0], other[1], back)
         _write_energy(
-            source, image, other[0], other[1], back, first, later, screens, rooms[0], rooms[1],
-            surface_ratio, work, energies[n - 1 + k],
+            source, image, other[0], other[1], back, first, later, other[3], screens, rooms[0],
+            rooms[1], surface_ratio, work, energies[n - 1 + k],
         )  # fmt: skip
     return energies
 
@@ -175,6 +178,7 @@ def _write_energy(
     reflections: Numbers,
     first: Numbers,
     later: Numbers,
+    openings: Screens,
     screens: Screens,
     rooms_lower: Floats,
     rooms_upper: Floats,
@@ -193,6 +197,7 @@ def _write_energy(
         reflections: ``(3,)`` copy of the room in which the image is.
         first: Numbers of the screens before the first reflection.
         later: Those after it.
+        openings: In the walls of the room that reflects it.
         screens: All screens.
         rooms_lower: Corners of all rooms: before the first reflection furniture counts only for
             the part of the path that is in its room; none if all of it is in one room.
@@ -210,8 +215,10 @@ def _write_energy(
     begin, way = start - lower, image - start
     cell, sign, offset = np.zeros(3, np.int64), np.ones(3), np.zeros(3)
     count, share = 0, 0.0
+    reflected = work.reflected
+    reflected[:] = 1.0
     for leg in range(n_legs):
-        until, crossed = next_wall(begin, way, size, cell, reflections)
+        until, crossed = _next_wall(begin, way, size, cell, reflections)
         if (
             leg == 0
             and crossed >= 0
@@ -235,9 +242,75 @@ def _write_energy(
                 count += 1
         if crossed < 0:
             break
+        side = 1 if (way[crossed] > 0.0) == (cell[crossed] % 2 == 0) else 0
+        _lose_in_openings(
+            line, until * line.length_m, 2 * crossed + side, openings, (sign, offset), work
+        )
         cell[crossed] += 1 if way[crossed] > 0.0 else -1
         share = until
     energy_past(count, screens, surface_ratio, work, energy)
+    energy *= reflected
+
+
+@njit(cache=True, error_model="numpy")
+def _lose_in_openings(
+    line: Line,
+    at_m: float,
+    kind: int,
+    openings: Screens,
+    mirror: tuple[Floats, Floats],
+    work: Work,
+) -> None:
+    """Multiply `Work.reflected` by what the openings in a wall leave of a reflection.
+
+    An opening does not reflect what passes it (Babinet's principle).
+
+    Args:
+        line: The path.
+        at_m: Where along it the wall is.
+        kind: Which wall, see `obstacles.ScreenSets.openings`.
+        openings: In the walls of the room.
+        mirror: See `add_silhouette`.
+        work: Overwritten.
+    """
+    passed, rectangle = work.passed, work.opening
+    passed[:] = 0.0
+    for n in range(len(openings.kinds)):
+        if openings.kinds[n] != kind:
+            continue
+        depth = add_silhouette(line, -np.inf, np.inf, openings, n, mirror, work, rectangle)
+        if depth < np.inf:
+            add_measure(rectangle, openings.opens[n], passed)
+    for band in range(N_BANDS):
+        work.reflected[band] *= max(1.0 - passed[band], 0.0)
+
+
+@njit(cache=True, error_model="numpy")
+def _next_wall(
+    start: Floats,
+    way: Floats,
+    size: Floats,
+    cell: NDArray[np.int64],
+    reflections: NDArray[np.int64],
+) -> tuple[float, int]:
+    """Return the share of a line up to the next wall, and its axis: 1 and -1 if there is none.
+
+    Args:
+        start: ``(3,)`` metres, begin of the line in the coordinates of the room.
+        way: ``(3,)`` metres, from there to its end.
+        size: ``(3,)`` metres, the room's.
+        cell: ``(3,)`` copy of the room that the line is in.
+        reflections: ``(3,)`` copy of the room in which it ends.
+    """
+    share, crossed = 1.0, -1
+    for axis in range(3):
+        if cell[axis] == reflections[axis]:
+            continue
+        wall = (cell[axis] + (1 if way[axis] > 0.0 else 0)) * size[axis]
+        at = (wall - start[axis]) / way[axis]
+        if crossed < 0 or at < share:
+            share, crossed = at, axis
+    return share, crossed
 
 
 @njit(cache=True, error_model="numpy")

@@ -15,302 +15,28 @@ of them add up to 1. The energy that arrives is the sum over all rectangles of m
 transmission, as for a wall of several parts (composite transmission loss; Kuttruff 2016). Hence it
 is continuous in the poses of all obstacles, grows as they shrink, is equal with both ends
 exchanged, 1 without an obstacle, and that of the material behind an infinite one.
-
-An edge that meets the floor, the ceiling or another wall is none: the rectangle has no end there.
 """
 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
 from veca_marl.sim.geometry import Floats
-from veca_marl.sim.sound.octave_bands import BANDS_HZ, N_BANDS
-from veca_marl.sim.sound.partitions import energy_through
-from veca_marl.sim.sound.room_acoustics import SPEED_OF_SOUND_MPS
+from veca_marl.sim.sound.partitions import BANDS_HZ, N_BANDS, energy_through
+from veca_marl.sim.sound.silhouettes import BOX, LEAF, MOST_SETS, Screens, Work
 
 NEGLIGIBLE = 0.05
 """An obstacle that takes less than this fraction of the energy takes none (0.2 dB); the rest is
 divided by one minus it, so that energy stays continuous."""
 
 _SPREAD = 0.4  # of F: 10 lg(20 N) far in the shadow
-_SEALED = 1e3  # Fresnel parameter over the root of the frequency of an edge that is none
-_STRADDLED_M = 0.05  # a joint with another wall closes a wall that the path meets so far from it
-_FAR_M, _FAR_RATIO = 6.0, 0.5  # beyond that beside a path obstacles are left out
 _MOST = 62  # silhouettes of one path; they are bits of an integer
 _NOTHING = 1e-9  # measure
-_MASKS = 128  # sets of silhouettes that one composite remembers
 _ROOT_BANDS: Floats = np.sqrt(BANDS_HZ)
-
-
-BOX, LEAF, CLOSED = 0, 1, 2
-
-
-class Screens(NamedTuple):
-    """What attenuates sound: boxes, and leaves of doors.
-
-    Attributes:
-        centres: ``(n, 3)`` metres.
-        rotations: ``(n, 3, 3)`` from the axes of the boxes to the world's.
-        halves: ``(n, 3)`` metres, half of their edges.
-        bounds: ``(n, 3, 2)`` from 0 to 1: how far the faces in the negative and in the positive
-            direction of each axis meet the floor, the ceiling or the end of the air.
-        joints: ``(n, 3, 2)`` 1 for faces that meet another wall.
-        rooms: ``(n,)`` number of the room that they stand in, -1 for walls between rooms.
-        kinds: ``(n,)`` `BOX`, `LEAF`, or `CLOSED`: a leaf where it would be closed.
-        opens: ``(n,)`` how far a leaf is open, from 0 to 1; -1 for boxes.
-    """
-
-    centres: Floats
-    rotations: Floats
-    halves: Floats
-    bounds: Floats
-    joints: Floats
-    rooms: NDArray[np.int64]
-    kinds: NDArray[np.int64]
-    opens: Floats
-
-
-class Line(NamedTuple):
-    """A straight path, unfolded at the walls that reflect it.
-
-    Attributes:
-        start: ``(3,)`` metres.
-        frame: ``(3, 3)``, rows: along it, across it in the horizontal plane, and across both.
-        length_m: Its length.
-    """
-
-    start: Floats
-    frame: Floats
-    length_m: float
-
-
-class Work(NamedTuple):
-    """Arrays that are used again for each path: memory is not allocated for each.
-
-    Attributes:
-        corners: ``(8, 3)`` metres, of a box in the frame of a line.
-        extent: ``(4,)`` metres, least and greatest offsets across the line and above it.
-        detour: ``(4,)`` metres, by which the ways round these are longer, with their signs.
-        rectangles: ``(m, 4)`` silhouettes of a path, see `add_silhouette`.
-        numbers: ``(m,)`` of which screen each is; one screen can have several.
-        depths: ``(m,)`` metres along the line.
-        below: ``(m, 4, N_BANDS)`` fraction of the energy below each edge of these.
-        chosen: ``(m,)`` the silhouettes of one composite, those at the least depth first.
-        edges: ``(2, 2 m)`` numbers of their edges in order, ``2 * silhouette + side``, across and
-            above.
-        ordered: ``(2, 2 m + 2, N_BANDS)`` fraction of the energy below each of these edges in
-            order, from 0 to 1.
-        masks: ``(n,)`` sets of silhouettes of which the transmission is known.
-        through: ``(n, N_BANDS)`` energy that passes these.
-        part: ``(4, N_BANDS)`` the energy of a composite, and measures.
-    """
-
-    corners: Floats
-    extent: Floats
-    detour: Floats
-    rectangles: Floats
-    numbers: NDArray[np.int64]
-    depths: Floats
-    below: Floats
-    chosen: NDArray[np.int64]
-    edges: NDArray[np.int64]
-    ordered: Floats
-    masks: NDArray[np.int64]
-    through: Floats
-    part: Floats
-
-
-@njit(cache=True, error_model="numpy")
-def make_work(most: int) -> Work:
-    """Return arrays for paths with at most so many silhouettes."""
-    return Work(
-        np.empty((8, 3)),
-        np.empty(4),
-        np.empty(4),
-        np.empty((most, 4)),
-        np.empty(most, np.int64),
-        np.empty(most),
-        np.empty((most, 4, N_BANDS)),
-        np.empty(most, np.int64),
-        np.empty((2, 2 * most), np.int64),
-        np.empty((2, 2 * most + 2, N_BANDS)),
-        np.empty(_MASKS, np.int64),
-        np.empty((_MASKS, N_BANDS)),
-        np.empty((4, N_BANDS)),
-    )
-
-
-@njit(cache=True, error_model="numpy")
-def line_between(start: Floats, end: Floats) -> Line:
-    """Return the line from one point ``(3,)`` to another; they must not be equal."""
-    way = end - start
-    length_m = math.sqrt(way[0] ** 2 + way[1] ** 2 + way[2] ** 2)
-    frame = np.zeros((3, 3))
-    frame[0] = way / length_m
-    flat = math.hypot(frame[0, 0], frame[0, 1])
-    if flat > 1e-9:
-        frame[1, 0], frame[1, 1] = -frame[0, 1] / flat, frame[0, 0] / flat
-    else:
-        frame[1, 0] = 1.0
-    for axis in range(3):
-        i, j = (axis + 1) % 3, (axis + 2) % 3
-        frame[2, axis] = frame[0, i] * frame[1, j] - frame[0, j] * frame[1, i]
-    return Line(start, frame, length_m)
-
-
-@njit(cache=True, error_model="numpy")
-def add_silhouette(
-    line: Line,
-    begin_m: float,
-    end_m: float,
-    screens: Screens,
-    number: int,
-    mirror: tuple[Floats, Floats],
-    work: Work,
-    rectangle: Floats,
-) -> float:
-    """Write the silhouette of the part of a screen between two planes across a line.
-
-    Args:
-        line: The line.
-        begin_m: Distance of the first plane from the start of the line.
-        end_m: Distance of the second one.
-        screens: All screens.
-        number: Which of them.
-        mirror: Sign and offset ``(3,)``: the image of a point is ``sign * point + offset``.
-        work: Overwritten.
-        rectangle: ``(4,)``, overwritten: Fresnel parameters over the root of the frequency of its
-            edges, least and greatest across the line, least and greatest above it.
-
-    Returns:
-        Distance of its middle along the line, and infinity if nothing of it is there.
-    """
-    corners, extent, detour = work.corners, work.extent, work.detour
-    reach = _write_corners(line, screens, number, mirror, corners)
-    begin_m, end_m = max(begin_m, reach[0]), min(end_m, reach[1])
-    if end_m - begin_m < 1e-9 or reach[2] > max(_FAR_M, _FAR_RATIO * line.length_m):
-        return np.inf
-    for side in range(4):
-        extent[side] = detour[side] = np.inf if side % 2 == 0 else -np.inf
-    for corner in range(8):
-        at = corners[corner, 0]
-        if begin_m - 1e-9 <= at <= end_m + 1e-9:
-            _add_point(line.length_m, at, corners[corner, 1], corners[corner, 2], work)
-    if reach[0] < begin_m:
-        _add_section(line.length_m, begin_m, work)
-    if reach[1] > end_m:
-        _add_section(line.length_m, end_m, work)
-    if extent[1] < extent[0]:
-        return np.inf
-    for side in range(4):
-        size = 2.0 * math.sqrt(abs(detour[side]) / SPEED_OF_SOUND_MPS)
-        rectangle[side] = math.copysign(size, detour[side])
-    _seal(line, screens, number, mirror[0], extent, rectangle)
-    return 0.5 * (begin_m + end_m)
-
-
-@njit(cache=True, error_model="numpy")
-def _write_corners(
-    line: Line, screens: Screens, number: int, mirror: tuple[Floats, Floats], corners: Floats
-) -> tuple[float, float, float]:
-    """Write the corners of a screen in a line's frame, ``(8, 3)`` metres.
-
-    Returns:
-        Least and greatest distance along the line, and how far it is beside or above it at least.
-    """
-    least, most, beside = 0.0, 0.0, -np.inf
-    for row in range(3):
-        centre, reach = 0.0, 0.0
-        for axis in range(3):
-            at = mirror[0][axis] * screens.centres[number, axis] + mirror[1][axis]
-            centre += line.frame[row, axis] * (at - line.start[axis])
-        corners[0, row] = centre
-        for k in range(3):
-            edge = 0.0
-            for axis in range(3):
-                turned = mirror[0][axis] * screens.rotations[number, axis, k]
-                edge += line.frame[row, axis] * turned * screens.halves[number, k]
-            reach += abs(edge)
-            n = 1 << k
-            for corner in range(n):
-                corners[corner + n, row] = corners[corner, row] + edge
-                corners[corner, row] -= edge
-        if row == 0:
-            least, most = centre - reach, centre + reach
-        else:
-            beside = max(beside, abs(centre) - reach)
-    return least, most, beside
-
-
-@njit(cache=True, error_model="numpy")
-def _add_section(length_m: float, at_m: float, work: Work) -> None:
-    """Extend a silhouette by the section of a box with a plane across the line.
-
-    Args:
-        length_m: Length of the line.
-        at_m: Distance of the plane from the start of the line.
-        work: Has the corners, and the silhouette that is updated.
-    """
-    corners = work.corners
-    for low in range(8):
-        for k in range(3):
-            high = low | 1 << k
-            if high == low:
-                continue
-            begin, end = corners[low, 0], corners[high, 0]
-            if (begin < at_m) == (end < at_m):
-                continue
-            ratio = (at_m - begin) / (end - begin)
-            across = corners[low, 1] + ratio * (corners[high, 1] - corners[low, 1])
-            above = corners[low, 2] + ratio * (corners[high, 2] - corners[low, 2])
-            _add_point(length_m, at_m, across, above, work)
-
-
-@njit(cache=True, error_model="numpy")
-def _add_point(length_m: float, along: float, across: float, above: float, work: Work) -> None:
-    """Extend a silhouette by a point of a box, in metres in the frame of the line."""
-    extent, detour = work.extent, work.detour
-    along = min(max(along, 0.0), length_m)
-    rest = length_m - along
-    for axis in range(2):
-        offset = across if axis == 0 else above
-        square = offset * offset
-        more = math.sqrt(along * along + square) + math.sqrt(rest * rest + square)
-        more = math.copysign(max(more - length_m, 0.0), offset)
-        least, most = 2 * axis, 2 * axis + 1
-        extent[least] = min(extent[least], offset)
-        extent[most] = max(extent[most], offset)
-        detour[least], detour[most] = min(detour[least], more), max(detour[most], more)
-
-
-@njit(cache=True, error_model="numpy")
-def _seal(
-    line: Line,
-    screens: Screens,
-    number: int,
-    sign: Floats,
-    extent: Floats,
-    rectangle: Floats,
-) -> None:
-    """Move the edges of a silhouette that meet something outwards, see `Screens`."""
-    for axis in range(2):
-        lit = max(-extent[2 * axis], 0.0), max(extent[2 * axis + 1], 0.0)
-        straddled = min(lit[0] / _STRADDLED_M, 1.0) * min(lit[1] / _STRADDLED_M, 1.0)
-        for k in range(3):
-            normal = 0.0
-            for j in range(3):
-                normal += line.frame[axis + 1, j] * sign[j] * screens.rotations[number, j, k]
-            for side in range(2):
-                face = side if normal > 0.0 else 1 - side
-                closed = screens.bounds[number, k, face]
-                closed = max(closed, straddled * screens.joints[number, k, face])
-                moved = _SEALED * closed * normal * normal
-                rectangle[2 * axis + side] += moved if side == 1 else -moved
 
 
 @njit(cache=True, error_model="numpy")
@@ -415,6 +141,16 @@ def _below(nu: float) -> float:
 
 
 @njit(cache=True, error_model="numpy")
+def add_measure(rectangle: Floats, weight: float, measures: Floats) -> None:
+    """Add the measure ``(N_BANDS,)`` of a silhouette ``(4,)``, multiplied by a weight."""
+    for band in range(N_BANDS):
+        root = _ROOT_BANDS[band]
+        width = _below(root * rectangle[1]) - _below(root * rectangle[0])
+        height = _below(root * rectangle[3]) - _below(root * rectangle[2])
+        measures[band] += weight * width * height
+
+
+@njit(cache=True, error_model="numpy")
 def _choose(count: int, kind: int, is_kind: bool, screens: Screens, work: Work) -> int:
     """Choose the silhouettes of one kind of screen, or of all others; return how many these are."""
     n_chosen = 0
@@ -458,7 +194,7 @@ def _write_composite(n: int, screens: Screens, surface_ratio: float, work: Work)
                 while known >= 0 and masks[known] != mask:
                     known -= 1
                 if known < 0:
-                    known = min(n_masks, _MASKS - 1)
+                    known = min(n_masks, MOST_SETS - 1)
                     n_masks = known + 1
                     masks[known] = mask
                     _energy_through_all(mask, screens, surface_ratio, work, known)

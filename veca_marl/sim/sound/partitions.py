@@ -8,8 +8,12 @@ import numpy as np
 from numba import njit
 
 from veca_marl.sim.geometry import Floats
-from veca_marl.sim.sound.octave_bands import BANDS_HZ, N_BANDS
 from veca_marl.sim.sound.room_acoustics import SPEED_OF_SOUND_MPS
+
+BANDS_HZ: Floats = 125.0 * 2.0 ** np.arange(7, dtype=np.float64)
+"""Middles of the octave bands, 125 Hz to 8 kHz (IEC 61260)."""
+
+N_BANDS = len(BANDS_HZ)
 
 REFERENCE_HZ = 500.0
 """The transmission loss of a partition is given at this frequency."""

@@ -11,9 +11,16 @@ from numpy.typing import NDArray
 from veca_marl.sim.geometry import Floats, Pose
 from veca_marl.sim.sound.delay_lines import KERNEL_TAPS, SignalMemory, read_moving
 from veca_marl.sim.sound.mixers import Mixer
-from veca_marl.sim.sound.octave_bands import N_BANDS, shelf_filters, unshaded
+from veca_marl.sim.sound.partitions import N_BANDS
 from veca_marl.sim.sound.room_acoustics import SPEED_OF_SOUND_MPS
-from veca_marl.sim.sound.shading import SETTLING_SAMPLES, Sections, read_shaded_block, settle
+from veca_marl.sim.sound.shading import (
+    SETTLING_SAMPLES,
+    Sections,
+    read_shaded_block,
+    settle,
+    shelf_filters,
+    unshaded,
+)
 from veca_marl.sim.sound.sounds import Source
 from veca_marl.sim.sound.surroundings import Arrivals, Surroundings
 

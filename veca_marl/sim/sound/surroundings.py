@@ -20,11 +20,9 @@ from numpy.typing import NDArray
 
 from veca_marl.sim.geometry import Floats, Pose
 from veca_marl.sim.sound.attenuated_paths import energies_between, energies_inside
-from veca_marl.sim.sound.obstacles import Obstacles
-from veca_marl.sim.sound.octave_bands import N_BANDS
-from veca_marl.sim.sound.partitions import TRANSMISSION_LOSS_DB, surface_ratio
+from veca_marl.sim.sound.obstacles import Doorway, Obstacles, ScreenSets
+from veca_marl.sim.sound.partitions import N_BANDS, TRANSMISSION_LOSS_DB, surface_ratio
 from veca_marl.sim.sound.room_acoustics import Room, image_gains, image_lattice, image_sources
-from veca_marl.sim.sound.screens import ScreenSets
 
 _BETWEEN_ROOMS = -1  # `paths_id` of paths between rooms is this and below; rooms have 0 and up
 
@@ -206,13 +204,15 @@ class House:
         rooms: Sequence[Room],
         image_order: int = 1,
         transmission_loss_db: float = TRANSMISSION_LOSS_DB,
+        doorways: Sequence[Doorway] = (),
     ) -> None:
         """Join rooms; there are no obstacles between them yet.
 
         Args:
             rooms: One or more; a point outside all of them belongs to the nearest.
             image_order: Greatest number of reflections inside a room.
-            transmission_loss_db: Attenuation by each obstacle.
+            transmission_loss_db: Loss at 500 Hz of what passes through an obstacle.
+            doorways: Openings in the walls between rooms, where these do not reflect.
 
         Raises:
             ValueError: If there is no room or the loss is negative or not finite.
@@ -223,7 +223,7 @@ class House:
             raise ValueError(f"transmission_loss_db={transmission_loss_db} must be finite, 0 or up")
         self.obstacles = Obstacles()
         self._rooms = [OneRoom(room, image_order) for room in rooms]
-        self._lattice = image_lattice(image_order)
+        self._lattice, self._doorways = image_lattice(image_order), list(doorways)
         self._corners = (
             np.array([room.lower for room in rooms]),
             np.array([room.lower + room.size for room in rooms]),
@@ -232,6 +232,8 @@ class House:
         self.size: Floats = self._highest - self._lowest
         longest_m = [room.longest_path_m for room in self._rooms]
         self.longest_path_m = max(float(np.linalg.norm(self.size)), *longest_m)
+        if len(rooms) > 1:  # a source outside of the room that reflects it
+            self.longest_path_m += float(np.linalg.norm(self.size))
         self._surface_ratio = surface_ratio(transmission_loss_db)
         self._screens_of: tuple[int, ScreenSets] | None = None
 
@@ -243,10 +245,6 @@ class House:
     def room_of(self, position: Floats) -> int:
         """Return the number of the room that contains a point ``(3,)``, or else of the nearest."""
         return int(nearest_box(position, *self._corners))
-
-    def obstacles_between(self, one: Floats, other: Floats) -> int:
-        """Return how many obstacles the straight line between two points ``(3,)`` passes."""
-        return self.obstacles.between(one, other)
 
     def arrivals(self, source: Floats, head: Pose) -> Arrivals:
         """See `Surroundings`."""
@@ -262,7 +260,7 @@ class House:
     ) -> Floats | None:
         """Return the energies ``(K, N_BANDS)`` of paths in a room, None if nothing is lost."""
         sets, one = self._screens, self._rooms[room]
-        if not len(sets.inside[room]):
+        if not (len(sets.inside[room]) or len(sets.openings[room].kinds)):
             return None
         energies: Floats = energies_inside(
             one.bounded(source),
@@ -271,6 +269,7 @@ class House:
             one.room.size,
             lattice,
             sets.inside[room],
+            sets.openings[room],
             sets.screens,
             self._surface_ratio,
         )
@@ -279,10 +278,17 @@ class House:
     def _arrivals_between(self, room: int, other: int, source: Floats, head: Pose) -> Arrivals:
         """Return how a source in one room arrives at a head in another one."""
         source, position = self._clamp(source), self._clamp(head.position)
-        energies = self._energies_between(room, other, source, position, image_lattice(0))
-        direct: Floats = ((source - position) @ head.rotation)[None]
+        energies = self._energies_between(room, other, source, position, self._lattice)
+        one, two = self._rooms[room], self._rooms[other]
+        images = np.concatenate(
+            [
+                image_sources(source, one.room.lower, one.room.size, self._lattice),
+                image_sources(source, two.room.lower, two.room.size, self._lattice[1:]),
+            ]
+        )
         paths_id = _BETWEEN_ROOMS - room * len(self._rooms) - other
-        return Arrivals(direct, np.ones(1), paths_id, energies)
+        gains = np.concatenate([one.gains, two.gains[1:]])
+        return Arrivals((images - position) @ head.rotation, gains, paths_id, energies)
 
     def _energies_between(
         self, room: int, other: int, source: Floats, head: Floats, lattice: NDArray[np.int64]
@@ -293,8 +299,8 @@ class House:
         energies: Floats = energies_between(
             source,
             head,
-            (one.lower, one.size, sets.inside[room]),
-            (two.lower, two.size, sets.inside[other]),
+            (one.lower, one.size, sets.inside[room], sets.openings[room]),
+            (two.lower, two.size, sets.inside[other], sets.openings[other]),
             lattice,
             sets.between,
             self._corners,
@@ -311,7 +317,7 @@ class House:
             head: ``(3,)`` metres.
 
         Returns:
-            ``(N_BANDS,)`` from 0 to 1, see `octave_bands.BANDS_HZ`.
+            ``(N_BANDS,)`` from 0 to 1, see `partitions.BANDS_HZ`.
         """
         room, other = self.room_of(source), self.room_of(head)
         if room != other:
@@ -325,7 +331,7 @@ class House:
     def _screens(self) -> ScreenSets:
         """The screens at the present poses of the obstacles."""
         if self._screens_of is None or self._screens_of[0] != self.obstacles.changes:
-            found = self.obstacles.screens(*self._corners)
+            found = self.obstacles.screens(*self._corners, self._doorways)
             self._screens_of = self.obstacles.changes, found
         return self._screens_of[1]
 
