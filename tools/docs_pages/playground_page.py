@@ -78,7 +78,8 @@ SENSES = """## Sight and sound
 
 Walls, furniture and leaves of doors hide what is behind them. A sound in the same room is heard
 with its reflections; one from another room is heard through walls and closed doors, which take
-`transmission_loss_db` at 500 Hz, and round their edges and through open doors by diffraction.
+`transmission_loss_db` at 500 Hz, and round their edges and through open doors by diffraction, with
+the reflections of both rooms.
 
 ## Houses of your own
 

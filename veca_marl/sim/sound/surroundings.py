@@ -1,10 +1,10 @@
 """The surroundings that sound propagates in: a free field, one room, or a house of several.
 
 Image sources are right inside one box. A listener in the room of a source hears it with the
-reflections of that room. A listener in another room hears the direct sound alone. Obstacles (walls,
-leaves of doors, furniture) leave a fraction of the energy of each path in each octave band, see
-`diffraction`, at their present poses. Reflections at obstacles are not modelled. When a listener
-enters another room, the sound is cross-faded over one control step.
+reflections of that room, one in another room with those of both rooms, see `attenuated_paths`.
+Obstacles (walls, leaves of doors, furniture) leave a fraction of the energy of each path in each
+octave band, see `diffraction`, at their present poses. Reflections at obstacles are not modelled.
+When a listener enters another room, the sound is cross-faded over one control step.
 """
 
 from __future__ import annotations
