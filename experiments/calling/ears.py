@@ -3,8 +3,8 @@
 python experiments/calling/ears.py
 
 Standing walkers and kneeling crawlers hear a call from the same room or from another one. The mean
-level of the ears is compared with 1 / distance and the transmission loss of the walls, the
-difference of the ears with the direction of the call.
+level of the ears is compared with the energy of all paths, the difference of the ears with the
+direction of the call.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from veca_marl.config import compose
 from veca_marl.envs.core.game import Game
 from veca_marl.envs.experts.control.locomotion import locomotion_of
-from veca_marl.envs.experts.multi_agent_nav import loudness, sound_power
+from veca_marl.envs.experts.multi_agent_nav import arrival_of, loudness, sound_power
 from veca_marl.envs.tasks.floors.places import free_place, place_player
 from veca_marl.sim.sound import Call
 
@@ -30,8 +30,8 @@ def listen(game: Game, together: bool, rng: np.random.Generator) -> NDArray[np.f
     """Let one agent call; return the levels at the ears of the other one.
 
     Returns:
-        Mean level corrected for distance and walls, difference of the levels (log10), and the sine
-        of the azimuth of the call, positive to the left.
+        Mean level relative to the energy that arrives, difference of the levels (log10), and the
+        sine of the azimuth of what arrives, positive to the left.
     """
     game.reset(rng)
     ears, mouth = game.players
@@ -54,14 +54,9 @@ def listen(game: Game, together: bool, rng: np.random.Generator) -> NDArray[np.f
         game.step({p.name: p.body.encode(commands[p.name]) for p in game.players})
         heard, _ = [game.observe(player) for player in game.players]
     head, caller = ears.body.mount("head"), mouth.body.mount("mouth").position
-    way = (caller - head.position) @ head.rotation
-    away_m = float(np.linalg.norm(way))
     left, right = loudness(sound_power(ears.senses["audio"].log_magnitudes(heard["audio"])))
-    energy = world.house.direct_energy(caller, head.position)
-    loss = -math.log10(energy[2:6].mean()) / 2.0
-    return np.array(
-        [(left + right) / 2.0 + math.log10(away_m) + loss, left - right, way[1] / away_m]
-    )
+    level, side = arrival_of(world.house.arrivals(np.array(caller), head))
+    return np.array([(left + right) / 2.0 - level, left - right, side])
 
 
 def main() -> None:

@@ -70,7 +70,7 @@ def test_a_wall_that_is_moved_away_no_longer_attenuates_and_a_reset_puts_it_back
     wall = rooms.world.prop("wall_beside_door_south")
     behind_wall = rooms.level_db()
     wall.place((3.05, -20.0, 0.0))
-    assert rooms.level_db() - behind_wall == pytest.approx(LOSS_DB, abs=1.0)
+    assert rooms.level_db() - behind_wall > 10.0  # some of it came through the door
     rooms.reset()
     assert rooms.level_db() == behind_wall
 
@@ -95,21 +95,34 @@ def test_a_box_that_physics_moves_out_of_the_way_no_longer_attenuates(two_rooms)
     door.set_velocity((0.0, -6.0, 0.0))
     open_db = rooms.level_db()
     assert door.position[1] < 1.0
-    assert open_db - closed_db == pytest.approx(LOSS_DB, abs=2.0)
+    assert open_db - closed_db > 8.0  # it left gaps at both sides
 
 
 @pytest.mark.parametrize(
     "prop",
     [
         closing_box(position_m=DOOR_M, tangible=False),
-        closing_box(position_m=DOOR_M, size_m=[0.05, 0.6, 2.0]),
-        closing_box(position_m=(3.05, 1.7, 1.0), size_m=[0.05, 1.0, 0.9]),
+        closing_box(position_m=DOOR_M, size_m=[0.05, 0.2, 2.0]),
+        closing_box(position_m=(3.05, 1.7, 1.0), size_m=[0.05, 1.0, 0.2]),
         PropCfg("door", PropShape.sphere, [0.5], DOOR_M),
     ],
     ids=["not tangible", "narrow", "low", "a sphere"],
 )
 def test_small_and_intangible_things_do_not_attenuate(two_rooms, prop):
     assert two_rooms(prop, y=THROUGH_DOOR_M).level_db() == two_rooms(y=THROUGH_DOOR_M).level_db()
+
+
+@pytest.mark.parametrize("size_m", [[0.05, 0.6, 2.0], [0.05, 1.0, 0.9]])
+def test_a_box_that_covers_a_part_of_the_doorway_attenuates_less(two_rooms, size_m):
+    open_db, part_db, closed_db = (
+        two_rooms(*props, y=THROUGH_DOOR_M).level_db()
+        for props in (
+            (),
+            (closing_box(position_m=DOOR_M, size_m=size_m),),
+            (closing_box(position_m=DOOR_M),),
+        )
+    )
+    assert closed_db + 3.0 < part_db < open_db - 1.0
 
 
 def test_the_leaf_of_a_hinged_door_attenuates_until_it_is_opened_or_reset(two_rooms):
@@ -128,7 +141,6 @@ def test_the_leaf_of_a_hinged_door_attenuates_until_it_is_opened_or_reset(two_ro
 def test_a_large_board_of_a_compound_attenuates_as_a_box_does(two_rooms):
     parts = [PartCfg(PropShape.box, [0.05, 1.0, 2.0]), PartCfg(PropShape.sphere, [0.04])]
     board = PropCfg("door", PropShape.compound, [], DOOR_M, parts=parts)
-    rooms = two_rooms(board, y=THROUGH_DOOR_M)
-    closed_db = rooms.level_db()
-    rooms.world.prop("door").place((3.05, -20.0, 0.0))
-    assert rooms.level_db() - closed_db == pytest.approx(LOSS_DB, abs=1.0)
+    closed_db = two_rooms(board, y=THROUGH_DOOR_M).level_db()
+    box_db = two_rooms(closing_box(position_m=DOOR_M), y=THROUGH_DOOR_M).level_db()
+    assert closed_db == pytest.approx(box_db, abs=0.1)

@@ -133,6 +133,19 @@ def test_the_loss_is_continuous_and_falls_as_a_box_moves_out_of_a_path():
     assert (np.diff(beside, axis=0) < 1e-9).all()
 
 
+@pytest.mark.parametrize("axis", [0, 1])
+def test_a_box_that_falls_beside_a_path_takes_nothing(axis):
+    """Its lower face leaves the floor, and its edges the vertical."""
+    rooms = one_room(((0.0, 1.8, 0.5), (0.3, 0.3, 0.5)))
+    ends = np.array([-3.0, 0.0, 0.5]), np.array([3.0, 0.0, 0.5])
+    for angle in np.linspace(0.0, np.pi / 2, 31):
+        c, s, tilted = np.cos(angle), np.sin(angle), np.eye(3)
+        tilted[np.ix_((axis, 2), (axis, 2))] = (c, s), (-s, c)
+        height = 0.5 * abs(c) + 0.3 * abs(s)
+        rooms.obstacles.move(0, (0.0, 1.8, height), tilted)
+        assert rooms.direct_energy(*ends)[2:].min() > 0.9
+
+
 def test_through_an_open_door_nearly_nothing_is_lost_and_behind_the_wall_the_edge_takes_it():
     rooms = with_door(np.pi / 2)
     straight = loss_db(rooms, (-1.5, 0.2, 1.2), (1.5, 0.0, 1.0))

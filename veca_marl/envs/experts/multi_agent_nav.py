@@ -19,11 +19,12 @@ from veca_marl.sim.geometry import Floats, Pose
 from veca_marl.sim.hearing import AudioSense
 from veca_marl.sim.physics import RoomCfg, World
 from veca_marl.sim.sound import Call
+from veca_marl.sim.sound.surroundings import Arrivals
 
 # Levels are log10 of the root of an ear's energy, measured by experiments/calling/ears.py (walkers
-# 1.88 and 0.37, crawlers 1.91 and 0.40). The standard deviations are larger than measured at rest,
+# 1.85 and 0.40, crawlers 1.88 and 0.39). The standard deviations are larger than measured at rest,
 # since callers and listeners move.
-_LEVEL_AT_1_M = 1.88  # mean of both ears, without walls
+_LEVEL_AT_1_M = 1.86  # mean of both ears, where the direct sound at 1 m is all that arrives
 _ILD = 0.40  # interaural level difference of a call from the side
 _LEVEL_STD, _ILD_STD = 0.15, 0.15
 _GRID_M = 0.4
@@ -33,11 +34,22 @@ _BANDS = slice(2, 6)  # octaves from 500 Hz to 4 kHz, those of the calls
 _AUDIBLE = -5.0  # a call through three walls reaches -4, silence is at -8
 
 
+def arrival_of(arrivals: Arrivals) -> tuple[float, float]:
+    """Return log10 of the pressure of a call, 0 for the direct sound at 1 m, and its direction.
+
+    The direction is the sine of the azimuth, positive to the left, the mean by energy.
+    """
+    energy = arrivals.energy()[:, _BANDS].mean(axis=1)
+    total = max(float(energy.sum()), _LEAST_ENERGY)
+    left = arrivals.vectors[:, 1] / np.linalg.norm(arrivals.vectors, axis=1)
+    return math.log10(total) / 2.0, float(energy @ left) / total
+
+
 class CallSourceMap:
     """Log-likelihood of the position of a caller on a grid over a house.
 
-    A listener knows its own head pose and the walls of the house. One heading leaves open whether
-    a call comes from the front or from behind; two headings resolve it.
+    A listener knows its own head pose and the acoustics of the house. One heading leaves open
+    whether a call comes from the front or from behind; two headings resolve it.
 
     Args:
         world: The world, for its rooms and walls.
@@ -68,11 +80,9 @@ class CallSourceMap:
             return
         left, right = loudness(power)
         self._places[:, 2] = head.position[2]  # assumes mouths at the height of these ears
-        offsets = (self._places - head.position) @ head.rotation
-        distances_m = np.maximum(np.linalg.norm(offsets, axis=1), _GRID_M)
-        level = _LEVEL_AT_1_M - np.log10(distances_m) + self._losses(head.position)
-        level_error = (level - (left + right) / 2.0) / _LEVEL_STD
-        ild_error = (_ILD * offsets[:, 1] / distances_m - (left - right)) / _ILD_STD
+        levels, lefts = self._expected(head)
+        level_error = (_LEVEL_AT_1_M + levels - (left + right) / 2.0) / _LEVEL_STD
+        ild_error = (_ILD * lefts - (left - right)) / _ILD_STD
         self._log_likelihood *= _MEMORY
         self._log_likelihood -= (level_error**2 + ild_error**2) / 2.0
         self.heard = True
@@ -82,12 +92,11 @@ class CallSourceMap:
         place: Floats = self._places[int(np.argmax(self._log_likelihood))]
         return place
 
-    def _losses(self, ears: Floats) -> NDArray[Any]:
-        """Return the log10 of what obstacles leave of the pressure from each place, ``(n,)``."""
-        energy = self._world.house.direct_energy
-        left = np.array([energy(place, ears)[_BANDS].mean() for place in self._places])
-        losses: Floats = np.log10(np.maximum(left, _LEAST_ENERGY)) / 2.0
-        return losses
+    def _expected(self, head: Pose) -> tuple[Floats, Floats]:
+        """Return level and direction of a call from each place by all paths, see `arrival_of`."""
+        arrivals = [self._world.house.arrivals(place, head) for place in self._places]
+        levels, lefts = np.array([arrival_of(each) for each in arrivals]).T
+        return np.minimum(levels, -math.log10(_GRID_M)), lefts
 
 
 def _grid(room: RoomCfg) -> Floats:

@@ -25,11 +25,11 @@ gradually."""
 
 _TOUCHING_M = 0.02
 _REBATE_M = 0.015
-"""By which a frame overlaps the leaf that it holds: a closed door has no gap."""
+"""By which a frame overlaps the leaf that it holds, since a closed door has no gap."""
 
 _OPEN_RATIO = 0.8
-"""Way of a leaf over its width from which on it stands apart from its opening: a hinged leaf at 47
-degrees, and a sliding one of which 12 cm stay in the opening."""
+"""Way of a leaf over its width from which on it stands apart from its opening, a hinged leaf at 47
+degrees and a sliding one of which 12 cm stay in the opening."""
 
 _INSIDE_M = 1e-3
 """A box counts as inside a room if it extends into it by more than this; walls touch the room."""

@@ -26,7 +26,7 @@ Measurements, SAE 2007-01-2201); 47 is one of those in use, 5 dB below normal in
 
 _RATIO = BANDS_HZ / REFERENCE_HZ
 _RISE: Floats = _RATIO / np.sqrt(0.5 + 0.5 * _RATIO**2)
-"""Impedance in each band relative to 500 Hz: in proportion to frequency below, by mass, and nearly
+"""Impedance in each band relative to 500 Hz, in proportion to frequency below, by mass, and nearly
 constant above, where coincidence takes up the rise (plateau method; Watters 1959, Transmission
 loss of some masonry walls, JASA 31)."""
 

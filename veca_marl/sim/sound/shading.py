@@ -17,8 +17,8 @@ SETTLING_SAMPLES = 512
 """After so many samples what a filter has not heard of the past is below -80 dB."""
 
 _SILENT = np.float32(1e-8)
-"""First coefficient of a filter below which nothing is heard: paths that do not exist have -180
-dB."""
+"""First coefficient of a filter below which nothing is heard; paths that do not exist have
+-180 dB."""
 
 Sections = NDArray[np.float32]
 

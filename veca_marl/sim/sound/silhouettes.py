@@ -287,12 +287,17 @@ def _seal(
         lit = max(-extent[2 * axis], 0.0), max(extent[2 * axis + 1], 0.0)
         straddled = min(lit[0] / _STRADDLED_M, 1.0) * min(lit[1] / _STRADDLED_M, 1.0)
         for k in range(3):
-            normal = 0.0
+            normal, world = 0.0, 0
             for j in range(3):
                 normal += line.frame[axis + 1, j] * sign[j] * screens.rotations[number, j, k]
+                if abs(screens.rotations[number, j, k]) > abs(screens.rotations[number, world, k]):
+                    world = j
+            # floor, ceiling and outer walls are across axes of the world; a box may be tilted
+            across = line.frame[axis + 1, world] * sign[world]
+            across *= 1.0 if screens.rotations[number, world, k] > 0.0 else -1.0
             for side in range(2):
                 face = side if normal > 0.0 else 1 - side
-                closed = screens.bounds[number, k, face]
-                closed = max(closed, straddled * screens.joints[number, k, face])
-                moved = _SEALED * closed * normal * normal
-                rectangle[2 * axis + side] += moved if side == 1 else -moved
+                moved = straddled * screens.joints[number, k, face] * normal * normal
+                face = side if across > 0.0 else 1 - side
+                moved = max(moved, screens.bounds[number, k, face] * across * across)
+                rectangle[2 * axis + side] += _SEALED * (moved if side == 1 else -moved)

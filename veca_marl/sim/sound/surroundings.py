@@ -45,6 +45,13 @@ class Arrivals:
     paths_id: int
     energies: Floats | None = None
 
+    def energy(self) -> Floats:
+        """Return what arrives by each path, over the direct sound at 1 m, ``(K, N_BANDS)``."""
+        by_distance = self.gains**2 / (self.vectors**2).sum(axis=1)
+        left = np.ones((1, N_BANDS)) if self.energies is None else self.energies
+        energy: Floats = by_distance[:, None] * left
+        return energy
+
     def same_as(self, other: Arrivals) -> bool:
         """Return whether all numbers are equal."""
         return (
