@@ -159,7 +159,7 @@ def test_weights_must_be_those_of_the_tasks_terms(weights):
         Game(cfg)
 
 
-@pytest.mark.parametrize("seconds", [0.0, -1.0, np.nan, np.inf])
+@pytest.mark.parametrize("seconds", [0.0, -1.0, np.nan, np.inf, 1e308])
 def test_the_length_of_an_episode_is_positive_and_finite(seconds):
     with pytest.raises(ValueError, match="max_seconds"):
         TaskCfg(max_seconds=seconds)
