@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Collection, Mapping, Sequence
+from numbers import Real
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
@@ -356,10 +357,27 @@ class Game:
         return expert(self.task, player)
 
     def _terms(self, player: Player) -> dict[str, float]:
-        """Return the reward terms of a player; zeros if it was eliminated in an earlier step."""
+        """Return the reward terms of a player; zeros if it was eliminated in an earlier step.
+
+        Raises:
+            ValueError: If the task returns others than it has weights for, or no numbers.
+        """
         if player.name in self.eliminated:
             return dict.fromkeys(self.weights, 0.0)
-        return self.task.reward(player)
+        terms = self.task.reward(player)
+        if not isinstance(terms, dict) or terms.keys() != self.weights.keys():
+            found = sorted(terms) if isinstance(terms, dict) else type(terms).__name__
+            raise ValueError(
+                f"task {self.cfg.task.name}: reward() returned {found}, not a dictionary with the "
+                f"terms of task.weights: {sorted(self.weights)}"
+            )
+        for name, value in terms.items():
+            if type(value) is not float and not isinstance(value, Real):
+                raise ValueError(
+                    f"task {self.cfg.task.name}: reward term {name!r} is of type "
+                    f"{type(value).__name__}, not a number"
+                )
+        return terms
 
     def _solved(self) -> dict[str, bool]:
         if not self.task.has_goal():
