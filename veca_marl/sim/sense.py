@@ -10,6 +10,10 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 
+class SpecError(ValueError):
+    """A sense or a task has returned other names, shapes or types than it declares."""
+
+
 @dataclass(frozen=True)
 class ArraySpec:
     """Shape, type and range of an array.
@@ -100,7 +104,7 @@ class Sense(ABC):
             are not overwritten by later reads.
 
         Raises:
-            ValueError: If `compute` has returned other names, shapes or types than in `specs`.
+            SpecError: If `compute` has returned other names, shapes or types than in `specs`.
         """
         version = self._versioned.version
         if self._computed_at != version:
@@ -116,7 +120,7 @@ class Sense(ABC):
         name = type(self).__name__
         if not isinstance(values, dict) or values.keys() != self.specs.keys():
             found = sorted(values) if isinstance(values, dict) else type(values).__name__
-            raise ValueError(
+            raise SpecError(
                 f"sense {name}: compute() returned {found}, its specs are {list(self.specs)}"
             )
         for key, spec in self.specs.items():
@@ -135,15 +139,15 @@ def check_spec(name: str, value: Any, spec: ArraySpec) -> None:
     """Compare an observation with its spec.
 
     Raises:
-        ValueError: If it is no array, or its shape or dtype differ.
+        SpecError: If it is no array, or its shape or dtype differ.
     """
     if not isinstance(value, np.ndarray):
-        raise ValueError(
+        raise SpecError(
             f"{name} is of type {type(value).__name__}, not an array of "
             f"{np.dtype(spec.dtype)}{spec.shape}"
         )
     if value.shape != spec.shape or value.dtype != spec.dtype:
-        raise ValueError(
+        raise SpecError(
             f"{name} is {value.dtype}{value.shape}, its spec says "
             f"{np.dtype(spec.dtype)}{spec.shape}"
         )

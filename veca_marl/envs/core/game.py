@@ -19,7 +19,7 @@ from veca_marl.envs.core.game_cfg import GameCfg, Script
 from veca_marl.envs.core.task import Player, Team, find_task
 from veca_marl.sim.body import make_body
 from veca_marl.sim.physics import World
-from veca_marl.sim.sense import ArraySpec, Sense
+from veca_marl.sim.sense import ArraySpec, Sense, SpecError
 from veca_marl.sim.senses import make_senses
 
 ActionSpec = Mapping[str, ArraySpec]
@@ -360,21 +360,21 @@ class Game:
         """Return the reward terms of a player; zeros if it was eliminated in an earlier step.
 
         Raises:
-            ValueError: If the task returns others than it has weights for, or no numbers.
+            SpecError: If the task returns others than it has weights for, or no numbers.
         """
         if player.name in self.eliminated:
             return dict.fromkeys(self.weights, 0.0)
         terms = self.task.reward(player)
         if not isinstance(terms, dict) or terms.keys() != self.weights.keys():
             found = sorted(terms) if isinstance(terms, dict) else type(terms).__name__
-            raise ValueError(
-                f"task {self.cfg.task.name}: reward() returned {found}, not a dictionary with the "
-                f"terms of task.weights: {sorted(self.weights)}"
+            raise SpecError(
+                f"task {self.cfg.task.name}: reward() of {player.name} returned {found}, not a "
+                f"dictionary with the terms of task.weights: {sorted(self.weights)}"
             )
         for name, value in terms.items():
-            if type(value) is not float and not isinstance(value, Real):
-                raise ValueError(
-                    f"task {self.cfg.task.name}: reward term {name!r} is of type "
+            if type(value) is not float and not isinstance(value, (Real, np.bool_)):
+                raise SpecError(
+                    f"task {self.cfg.task.name}: reward term {name!r} of {player.name} is of type "
                     f"{type(value).__name__}, not a number"
                 )
         return terms
