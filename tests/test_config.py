@@ -236,3 +236,11 @@ def test_long_names_of_runs_are_shortened_and_stay_apart():
     assert folders[0] == folders[1]
     assert len(set(folders)) == 3
     assert _job_folder(None, "+task=A,algo/x=1", 0) == "task=A,algo.x=1/seed_0"
+
+
+@pytest.mark.parametrize("part", ["={a:1}", "={thickness_m:0.1}", ".thickness_m=0.1"])
+def test_a_part_of_walls_that_a_playground_lacks_is_refused(part):
+    with pytest.raises(ConfigError, match=naming(f"playground.walls{part}", "null")):
+        compose(["+task=KickTheBall", f"playground.walls{part}"])
+    walled = compose(["+task=KickTheBall", "playground=house", "playground.walls.thickness_m=0.1"])
+    assert walled.playground.walls.thickness_m == 0.1

@@ -251,6 +251,31 @@ def test_a_sense_without_settings_has_its_defaults():
 
 
 @pytest.mark.usefixtures("smell")
+@pytest.mark.parametrize(
+    ("computed", "named"),
+    [
+        ({"smell": np.zeros(3, np.float32)}, ("'smell'", "float32(3,)", "float32(1,)")),
+        ({"smell": np.zeros(1)}, ("'smell'", "float64(1,)", "float32(1,)")),
+        ({"smell": np.array(["a"])}, ("'smell'", "<U1(1,)", "float32(1,)")),
+        ({"smell": [0.0]}, ("'smell'", "list", "float32(1,)")),
+        ({"smell": np.float32(0.0)}, ("'smell'", "float32", "(1,)")),
+        ({"odour": np.zeros(1, np.float32)}, ("'odour'", "'smell'")),
+        ({}, ("[]", "'smell'")),
+        (None, ("NoneType", "'smell'")),
+    ],
+)
+def test_an_array_that_does_not_fit_its_spec_is_refused_when_it_is_read(
+    computed, named, stage, monkeypatch
+):
+    scenario = stage("walker")
+    monkeypatch.setattr(SmellSense, "compute", lambda _: computed)
+    cfg = SensesCfg(extra={})
+    (sense,) = make_senses(scenario.bodies[0], ("smell",), cfg, scenario.world).values()
+    with pytest.raises(ValueError, match=naming("SmellSense", *named)):
+        sense.read()
+
+
+@pytest.mark.usefixtures("smell")
 def test_a_further_sense_can_be_absent(stage):
     scenario = stage("walker")
     cfg = SensesCfg(extra={"smell": {"present": False}})

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import hashlib
+import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import fields, is_dataclass
@@ -30,6 +31,9 @@ from veca_marl.config.root import Config, register_schemas, store_tasks_without_
 from veca_marl.envs.core.task import TASKS, find_task
 from veca_marl.override_text import normalised
 from veca_marl.plugins import PluginError, conf_dir, load_plugins
+
+_MAY_BE_NULL = ("playground.walls",)
+"""Groups of values of which some presets have none."""
 
 
 def check_lengths(node: DictConfig) -> None:
@@ -100,12 +104,18 @@ def compose_node(overrides: Sequence[str]) -> DictConfig:
         ConfigError: One line that names the wrong part and the choices.
     """
     prepared = prepare(overrides)
+    node = _composed(prepared)
+    check_arm(node.experiment, prepared)
+    return node
+
+
+def _composed(overrides: Sequence[str]) -> DictConfig:
+    """Return what Hydra composes; its errors are one line."""
     try:
         with _own_hydra():
-            node: DictConfig = hydra.compose("config", overrides=prepared)
+            node: DictConfig = hydra.compose("config", overrides=list(overrides))
     except (HydraException, OmegaConfBaseException) as error:
         raise ConfigError(one_line(error)) from error
-    check_arm(node.experiment, prepared)
     return node
 
 
@@ -120,7 +130,23 @@ def prepare(overrides: Sequence[str]) -> list[str]:
     """
     load_config_plugins(plugins_in(overrides))
     check_group_values(overrides)
-    return normalised(overrides)
+    prepared = normalised(overrides)
+    for group in _MAY_BE_NULL:
+        _check_parts(group, prepared)
+    return prepared
+
+
+def _check_parts(group: str, overrides: Sequence[str]) -> None:
+    """Refuse overrides of parts of a group that is null: Hydra fails in them with an assertion."""
+    parts = [text for text in overrides if re.match(rf"[+]*{group}([.]|=[{{])", text)]
+    if not parts:
+        return
+    others = _composed([text for text in overrides if text not in parts])
+    if OmegaConf.select(others, group) is None:
+        raise ConfigError(
+            f"{parts[0]}: {group} is null here, so that no part of it can be set; choose another "
+            f"preset, such as {group.partition('.')[0]}=house, or write one with {group}"
+        )
 
 
 def load_config_plugins(names: Sequence[str]) -> None:

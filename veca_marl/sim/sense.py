@@ -10,6 +10,10 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 
+class SpecError(ValueError):
+    """A sense or a task has returned other names, shapes or types than it declares."""
+
+
 @dataclass(frozen=True)
 class ArraySpec:
     """Shape, type and range of an array.
@@ -98,14 +102,29 @@ class Sense(ABC):
         Returns:
             A new dictionary with an array for each name in `specs`. The arrays are read-only and
             are not overwritten by later reads.
+
+        Raises:
+            SpecError: If `compute` has returned other names, shapes or types than in `specs`.
         """
         version = self._versioned.version
         if self._computed_at != version:
             values = self.compute()
+            self._check(values)
             for array in values.values():
                 array.flags.writeable = False
             self._values, self._computed_at = values, version
         return dict(self._values)
+
+    def _check(self, values: Any) -> None:
+        """Check what `compute` has returned: libraries cast and broadcast arrays without a word."""
+        name = type(self).__name__
+        if not isinstance(values, dict) or values.keys() != self.specs.keys():
+            found = sorted(values) if isinstance(values, dict) else type(values).__name__
+            raise SpecError(
+                f"sense {name}: compute() returned {found}, its specs are {list(self.specs)}"
+            )
+        for key, spec in self.specs.items():
+            check_spec(f"sense {name}: {key!r}", values[key], spec)
 
     @abstractmethod
     def compute(self) -> dict[str, NDArray[Any]]:
@@ -116,13 +135,19 @@ class Sense(ABC):
         """
 
 
-def check_spec(name: str, value: NDArray[Any], spec: ArraySpec) -> None:
+def check_spec(name: str, value: Any, spec: ArraySpec) -> None:
     """Compare an observation with its spec.
 
     Raises:
-        ValueError: If the shape or the dtype differ.
+        SpecError: If it is no array, or its shape or dtype differ.
     """
-    if value.shape != spec.shape or value.dtype != np.dtype(spec.dtype):
-        raise ValueError(
-            f"{name}: got {value.dtype}{value.shape}, the spec says {spec.dtype}{spec.shape}"
+    if not isinstance(value, np.ndarray):
+        raise SpecError(
+            f"{name} is of type {type(value).__name__}, not an array of "
+            f"{np.dtype(spec.dtype)}{spec.shape}"
+        )
+    if value.shape != spec.shape or value.dtype != spec.dtype:
+        raise SpecError(
+            f"{name} is {value.dtype}{value.shape}, its spec says "
+            f"{np.dtype(spec.dtype)}{spec.shape}"
         )

@@ -1,6 +1,7 @@
 """NaN and infinity end a run before they are learnt from."""
 
 import math
+import re
 from dataclasses import replace
 from functools import partial
 
@@ -13,11 +14,13 @@ from refusals import naming
 from training import FRAMES
 
 from veca_marl.algos.evaluation.evaluate import Scores
+from veca_marl.algos.specs import team_specs
 from veca_marl.algos.training.finite import (
     NotFiniteError,
     check_batch,
     check_scores,
     check_state,
+    warn_of_ranges,
 )
 
 WORLD, STEP = 2, 5
@@ -48,6 +51,20 @@ def test_a_value_is_named_with_team_world_and_step(key, value, parts):
     where = ("'agents'", "world 2", "step 5", " 640 ")
     with pytest.raises(NotFiniteError, match=naming(*parts, *where)):
         check_batch(data, ["agents"], 640)
+
+
+def test_observations_outside_their_range_are_named_in_a_warning(caplog):
+    data = batch()
+    specs = team_specs(FakeEnv(4, agents=2))
+    layout = replace(specs["agents"].observations["audio"], low=-1.0, high=1.0)
+    specs = {"agents": replace(specs["agents"], observations={"audio": layout})}
+    data["agents", "observation", "audio"].clamp_(-1.0, 1.0)
+    warn_of_ranges(data, specs, 640)
+    assert not caplog.records
+    set_value(data, ("agents", "observation", "audio"), 7.0)
+    warn_of_ranges(data, specs, 640)
+    (record,) = caplog.records
+    assert re.search(naming("'agents'", "'audio'", "7", "[-1, 1]", "640"), record.getMessage())
 
 
 def test_parts_of_an_action_are_named():

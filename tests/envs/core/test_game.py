@@ -5,7 +5,7 @@ import pytest
 from composed import compose
 from refusals import naming
 
-from veca_marl.envs.core.game import Game, player_names
+from veca_marl.envs.core.game import Game, player_names, random_action
 from veca_marl.envs.core.task import (
     TASKS,
     Player,
@@ -134,6 +134,25 @@ def test_the_reward_is_the_weighted_sum_of_the_terms(game):
     assert game.reward_of({"kick": 1.0, "approach": -0.5}) == pytest.approx(1.0 - 0.005)
 
 
+@pytest.mark.parametrize(
+    ("returned", "named"),
+    [
+        ({"kick": 1.0}, ("['kick']", "'approach'")),
+        ({"kick": 1.0, "approach": 0.0, "jump": 1.0}, ("'jump'", "'approach'")),
+        ({"kick": "1", "approach": 0.0}, ("'kick'", "str")),
+        ({"kick": np.ones(1), "approach": 0.0}, ("'kick'", "ndarray")),
+        ([1.0, 0.0], ("list", "'approach'")),
+        (None, ("NoneType", "'approach'")),
+    ],
+)
+def test_rewards_that_are_not_the_tasks_terms_are_refused(game, returned, named, monkeypatch):
+    monkeypatch.setattr(game.task, "reward", lambda _: returned)
+    rng = np.random.default_rng(0)
+    actions = {player.name: random_action(player.body.action_spec, rng) for player in game.players}
+    with pytest.raises(ValueError, match=naming("KickTheBall", *named)):
+        game.step(actions)
+
+
 def test_an_unknown_task_is_an_error_that_lists_the_tasks():
     with pytest.raises(ValueError, match=naming("'Chess'", "KickTheBall")):
         find_task("Chess")
@@ -159,7 +178,7 @@ def test_weights_must_be_those_of_the_tasks_terms(weights):
         Game(cfg)
 
 
-@pytest.mark.parametrize("seconds", [0.0, -1.0, np.nan, np.inf])
+@pytest.mark.parametrize("seconds", [0.0, -1.0, np.nan, np.inf, 1e308])
 def test_the_length_of_an_episode_is_positive_and_finite(seconds):
     with pytest.raises(ValueError, match="max_seconds"):
         TaskCfg(max_seconds=seconds)

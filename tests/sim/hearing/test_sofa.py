@@ -8,7 +8,7 @@ import scipy.signal
 from paths import SHARED
 from refusals import naming
 
-from veca_marl.sim.hearing import SofaError, condition, read_sofa, sofa_table
+from veca_marl.sim.hearing import AudioCfg, SofaError, condition, read_sofa, sofa_table
 from veca_marl.sim.hearing.head_response import minimum_phase
 from veca_marl.sim.hearing.hrtf import direction_vectors
 from veca_marl.sim.hearing.spherical_head import ear_incidence, sphere_response, woodworth_arrival_s
@@ -370,6 +370,12 @@ def test_missing_files_and_files_that_are_not_hdf5_are_refused(tmp_path):
         read_sofa(path)
     with pytest.raises(SofaError, match=naming("nowhere.sofa")):
         read_sofa(tmp_path / "nowhere.sofa")
+
+
+def test_without_h5py_a_configuration_with_a_sofa_file_is_refused(monkeypatch, tmp_path):
+    monkeypatch.setitem(__import__("sys").modules, "h5py", None)
+    with pytest.raises(ValueError, match=naming("sofa_path=head.sofa", "veca_marl[sofa]")):
+        AudioCfg(sofa_path="head.sofa")
 
 
 def test_without_h5py_the_error_names_the_extra(monkeypatch, tmp_path):

@@ -1,7 +1,8 @@
-"""Checks for NaN and infinity: in experience before it is learnt from, returns, parameters."""
+"""Checks of numbers: NaN and infinity in experience, returns and parameters; ranges of senses."""
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple
 
@@ -10,6 +11,9 @@ import torch
 from tensordict import TensorDictBase
 
 from veca_marl.algos.evaluation.evaluate import Scores
+from veca_marl.algos.specs import TeamSpec
+
+_LOG = logging.getLogger(__name__)
 
 
 class NotFiniteError(RuntimeError):
@@ -82,6 +86,25 @@ def _first(array: torch.Tensor) -> tuple[int, int]:
     wrong = ~array.isfinite().flatten(2).all(-1)
     step, world = wrong.T.nonzero()[0].tolist()
     return step, world
+
+
+def warn_of_ranges(batch: TensorDictBase, specs: Mapping[str, TeamSpec], frames: int) -> None:
+    """Log a warning for each observation that exceeds the range in its spec.
+
+    Args:
+        batch: Experience ``(worlds, steps)``.
+        specs: Of the teams that are checked.
+        frames: Training frames before the batch.
+    """
+    for team, spec in specs.items():
+        for name, layout in spec.observations.items():
+            values = batch[team, "observation", name]
+            low, high = values.amin().item(), values.amax().item()
+            if low < layout.low or high > layout.high:
+                _LOG.warning(
+                    "team %r: sense %r is between %g and %g in the batch after %d frames; its spec "
+                    "says [%g, %g]", team, name, low, high, frames, layout.low, layout.high,
+                )  # fmt: skip
 
 
 def check_scores(scores: Mapping[str, Scores]) -> None:

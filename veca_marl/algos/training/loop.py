@@ -34,7 +34,13 @@ from veca_marl.algos.evaluation.evaluators import (
 from veca_marl.algos.policy import Policy
 from veca_marl.algos.reporting import Reporter
 from veca_marl.algos.specs import EnvFactory
-from veca_marl.algos.training.finite import check_batch, check_scores, check_state, check_stored
+from veca_marl.algos.training.finite import (
+    check_batch,
+    check_scores,
+    check_state,
+    check_stored,
+    warn_of_ranges,
+)
 from veca_marl.algos.training.learners import AllLearn, Matchmaking, TeamLearners
 from veca_marl.algos.training.schedule import Budget, Progress, Schedule, Stopwatch, timing_table
 
@@ -275,11 +281,19 @@ class Trainer:
             return TrainingEpisodes()
         return TrainingEpisodes(steps - self.episode_steps)
 
+    def _is_first_episode(self) -> bool:
+        """Return whether the worlds may still play the first episode of the run."""
+        done = self.progress.iteration * self.collect.steps
+        return done == 0 or (self.episode_steps is not None and done < self.episode_steps)
+
     def _iterate(self, experience: Experience, episodes: TrainingEpisodes) -> dict[str, float]:
         self._stopwatch.begin()
         with timeit("collect"):
             batch = experience.collect()
             check_batch(batch, list(self.learners.algorithms), self.progress.frames)
+            if self._is_first_episode():
+                specs = {team: self.learners.specs[team] for team in self.learners.algorithms}
+                warn_of_ranges(batch, specs, self.progress.frames)
         with timeit("learn"):
             measured = self.learners.learn(batch)
         with timeit("transfer"):

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Collection, Mapping, Sequence
+from numbers import Real
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
@@ -18,7 +19,7 @@ from veca_marl.envs.core.game_cfg import GameCfg, Script
 from veca_marl.envs.core.task import Player, Team, find_task
 from veca_marl.sim.body import make_body
 from veca_marl.sim.physics import World
-from veca_marl.sim.sense import ArraySpec, Sense
+from veca_marl.sim.sense import ArraySpec, Sense, SpecError
 from veca_marl.sim.senses import make_senses
 
 ActionSpec = Mapping[str, ArraySpec]
@@ -356,10 +357,27 @@ class Game:
         return expert(self.task, player)
 
     def _terms(self, player: Player) -> dict[str, float]:
-        """Return the reward terms of a player; zeros if it was eliminated in an earlier step."""
+        """Return the reward terms of a player; zeros if it was eliminated in an earlier step.
+
+        Raises:
+            SpecError: If the task returns others than it has weights for, or no numbers.
+        """
         if player.name in self.eliminated:
             return dict.fromkeys(self.weights, 0.0)
-        return self.task.reward(player)
+        terms = self.task.reward(player)
+        if not isinstance(terms, dict) or terms.keys() != self.weights.keys():
+            found = sorted(terms) if isinstance(terms, dict) else type(terms).__name__
+            raise SpecError(
+                f"task {self.cfg.task.name}: reward() of {player.name} returned {found}, not a "
+                f"dictionary with the terms of task.weights: {sorted(self.weights)}"
+            )
+        for name, value in terms.items():
+            if type(value) is not float and not isinstance(value, (Real, np.bool_)):
+                raise SpecError(
+                    f"task {self.cfg.task.name}: reward term {name!r} of {player.name} is of type "
+                    f"{type(value).__name__}, not a number"
+                )
+        return terms
 
     def _solved(self) -> dict[str, bool]:
         if not self.task.has_goal():

@@ -122,6 +122,9 @@ def require_humanoid(player: Player) -> Humanoid:
 RATE_STEP_S = 0.04
 """Duration of the step for which weights of rates are given, which is that of the default clock."""
 
+LONGEST_EPISODE_S = 1e9
+"""Thirty years: the steps of an episode are counted."""
+
 
 def terms(**weights: float) -> Any:
     """Declare the reward terms of a task with the default weight of each."""
@@ -151,6 +154,10 @@ class TaskCfg:
                 `solved`, as another entry of `info`; `Task` checks the entries of bodies.
         """
         self.check_positive("max_seconds")
+        if self.max_seconds > LONGEST_EPISODE_S:
+            raise ValueError(
+                f"task.max_seconds={self.max_seconds:g} must be at most {LONGEST_EPISODE_S:g}"
+            )
         if SOLVED in self.weights:
             raise ValueError(f"task.weights: {SOLVED!r} is the name of another entry of info")
         bad = {name: value for name, value in self.weights.items() if not math.isfinite(value)}

@@ -16,6 +16,7 @@ from veca_marl.sim.geometry import Floats, Pose
 from veca_marl.sim.hearing.head_response import HeadResponse, check_scale
 from veca_marl.sim.hearing.hrtf import kemar_response, kemar_table, sofa_response, sofa_table
 from veca_marl.sim.hearing.receivers import HrtfReceiver, MonoReceiver, StereoReceiver
+from veca_marl.sim.hearing.sofa import check_can_read_sofa
 from veca_marl.sim.physics import World
 from veca_marl.sim.sense import ArraySpec, Sense
 from veca_marl.sim.sound import NEAR_FIELD_M, SAMPLE_RATE_HZ, Receiver
@@ -304,6 +305,8 @@ class AudioCfg:
             raise ValueError(
                 f"sofa_sample_rate_hz is {self.sofa_sample_rate_hz} but there is no sofa_path"
             )
+        if self.sofa_path is not None:
+            check_can_read_sofa(self.sofa_path)
         if self.noise_floor_db is not None and not np.isfinite(self.noise_floor_db):
             raise ValueError(f"noise_floor_db must be finite or None, got {self.noise_floor_db}")
 

@@ -10,6 +10,7 @@ import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -158,6 +159,14 @@ class SofaFile:
             raise SofaError(f"{self._name}: the attribute {key} is not a short text")
         value = np.ravel(owner.attrs[key])[0]
         return (value.decode(errors="replace") if isinstance(value, bytes) else str(value)).strip()
+
+
+def check_can_read_sofa(path: str) -> None:
+    """Raise `ValueError` if a SOFA file is wanted and h5py, which reads them, is missing."""
+    if find_spec("h5py") is None:
+        raise ValueError(
+            f"senses.audio.sofa_path={path}: SOFA files need h5py: pip install 'veca_marl[sofa]'"
+        )
 
 
 @contextmanager
