@@ -76,7 +76,7 @@ def test_an_open_sliding_leaf_in_its_wall_adds_its_mass_at_most(build):
 
 @pytest.mark.parametrize("kind", JointKind)
 @pytest.mark.parametrize("front", [True, False])
-def test_an_open_door_attenuates_most_paths_between_rooms_less_than_a_closed_one(build, kind, front):
+def test_an_open_door_attenuates_most_paths_less_than_a_closed_one(build, kind, front):
     world = build(flat(LeafCfg(kind, opens_to_front=front, opening=0.0), width_m=0.9))
     leaf = world.prop("leaf_door")
     one, other = random_paths(200).swapaxes(0, 1)
