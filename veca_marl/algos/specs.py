@@ -40,6 +40,11 @@ class ArrayLayout:
     high: float
 
     @property
+    def n_bytes(self) -> int:
+        """Bytes of one array."""
+        return math.prod(self.shape) * getattr(torch, self.dtype).itemsize
+
+    @property
     def is_image(self) -> bool:
         """Whether it is an image: bytes ``(..., channels, height, width)``."""
         return self.dtype == "uint8" and len(self.shape) >= 3

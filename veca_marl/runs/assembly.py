@@ -14,6 +14,8 @@ from omegaconf import DictConfig, OmegaConf
 
 from veca_marl.algos.algorithm import make_algorithm
 from veca_marl.algos.checkpoints import Checkpoints, Identity
+from veca_marl.algos.collection.experience import CollectCfg
+from veca_marl.algos.collection.host_limits import that_fits
 from veca_marl.algos.networks.encoders import Precision
 from veca_marl.algos.reporting import Reporter, check_installed, make_reporter
 from veca_marl.algos.selfplay import Pool, SelfPlay
@@ -94,7 +96,10 @@ def make_trainer(cfg: Config, folder: RunFolder | None = None) -> Trainer:
     learners = make_learners(cfg, specs, device)
     _log_storage(learners)
     checkpoints = _make_checkpoints(cfg, folder, specs)
-    trainer = _assemble(cfg, learners, checkpoints)
+    collect, changed = that_fits(cfg.collect, specs)
+    if changed:
+        _LOG.warning(changed)
+    trainer = _assemble(cfg, collect, learners, checkpoints)
     _warn_of_cut_episodes(trainer)
     if cfg.self_play.teams:
         trainer.matchmaking = _self_play(cfg, folder, learners)
@@ -117,14 +122,16 @@ def _prepare_torch(cfg: Config) -> torch.device:
     return device
 
 
-def _assemble(cfg: Config, learners: TeamLearners, checkpoints: Checkpoints) -> Trainer:
+def _assemble(
+    cfg: Config, collect: CollectCfg, learners: TeamLearners, checkpoints: Checkpoints
+) -> Trainer:
     """Return the trainer; of a new run, with the parameters that it takes from other runs."""
     if cfg.resume is None or checkpoints.empty:
         init_teams(learners, cfg.init_from, cfg.init_encoders)
     return Trainer(
         make_env=GameFactory(cfg.game, tuple(cfg.plugins)),
         learners=learners,
-        collect=cfg.collect,
+        collect=collect,
         evaluation=cfg.eval,
         budget=Budget(cfg.total_frames, cfg.max_minutes),
         checkpoints=checkpoints,
