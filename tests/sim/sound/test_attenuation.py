@@ -9,7 +9,7 @@ from veca_marl.sim.sound import Clip, House, Room, SoundField
 from veca_marl.sim.sound.obstacles import Doorway
 from veca_marl.sim.sound.partitions import BANDS_HZ, N_BANDS
 from veca_marl.sim.sound.room_acoustics import image_lattice
-from veca_marl.sim.sound.shading import shelf_filters
+from veca_marl.sim.sound.shading import shelf_design, shelf_filters
 
 WEST, EAST = (Room((x, -3.0, 0.0), (4.0, 6.0, 2.6), 0.5) for x in (-4.05, 0.05))
 LOSS_DB = 30.0
@@ -275,7 +275,9 @@ def test_another_obstacle_never_adds_energy():
 @pytest.mark.parametrize("tilt_db", [0.0, -1.0, -3.0, -5.0])
 def test_filters_have_the_levels_of_the_bands(tilt_db):
     levels_db = -5.0 + tilt_db * np.arange(N_BANDS)
-    sections = shelf_filters(10.0 ** (levels_db[None] / 10.0), 22_050)[0].astype(float)
+    sections = shelf_filters(10.0 ** (levels_db[None] / 10.0), shelf_design(22_050))[0].astype(
+        float
+    )
     delay = np.exp(-2j * np.pi * BANDS_HZ / 22_050)
     response = np.prod([(b0 + b1 * delay) / (1.0 + a1 * delay) for b0, b1, a1 in sections], axis=0)
     assert np.abs(20.0 * np.log10(np.abs(response)) - levels_db).max() < 1.0

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from listening import RATE, ratio_db
 
-from veca_marl.sim.sound.delay_lines import (
+from veca_marl.sim.sound.signal_paths import (
     HALF_WIDTH,
     KERNEL_TAPS,
     SignalMemory,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 from veca_marl.sim.sound import SAMPLE_RATE_HZ
 
@@ -63,17 +64,17 @@ class ClockCfg:
         if not 0.0 < self.contact_share <= 1.0:
             raise ValueError(f"contact_share={self.contact_share} must be above 0 and at most 1")
 
-    @property
+    @cached_property  # read many times in each step
     def step_s(self) -> float:
         """Duration of an agent step."""
         return 1.0 / self.control_rate_hz
 
-    @property
+    @cached_property
     def substep_s(self) -> float:
         """Duration of a physics step."""
         return self.step_s / self.substeps
 
-    @property
+    @cached_property
     def step_samples(self) -> int:
         """Samples of sound per agent step."""
         return SAMPLE_RATE_HZ // self.control_rate_hz

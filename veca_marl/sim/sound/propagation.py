@@ -9,8 +9,6 @@ from numba import njit
 from numpy.typing import NDArray
 
 from veca_marl.sim.geometry import Floats, Pose
-from veca_marl.sim.sound.delay_lines import KERNEL_TAPS, SignalMemory, read_moving
-from veca_marl.sim.sound.mixers import Mixer
 from veca_marl.sim.sound.partitions import N_BANDS
 from veca_marl.sim.sound.room_acoustics import SPEED_OF_SOUND_MPS
 from veca_marl.sim.sound.shading import (
@@ -18,9 +16,11 @@ from veca_marl.sim.sound.shading import (
     Sections,
     read_shaded_block,
     settle,
+    shelf_design,
     shelf_filters,
     unshaded,
 )
+from veca_marl.sim.sound.signal_paths import KERNEL_TAPS, Mixer, SignalMemory, read_moving
 from veca_marl.sim.sound.sounds import Source
 from veca_marl.sim.sound.surroundings import Arrivals, Surroundings
 
@@ -89,6 +89,7 @@ class Ears:
         self._surroundings = surroundings
         self._sample_rate_hz = sample_rate_hz
         self.step_samples = step_samples
+        self._shelves = shelf_design(sample_rate_hz)
         samples_per_metre = sample_rate_hz / SPEED_OF_SOUND_MPS
         longest = (surroundings.longest_path_m + receiver.extent_m) * samples_per_metre
         self.reach_samples = self.reach_of(longest)
@@ -128,7 +129,8 @@ class Ears:
         """Return the filters ``(K, S, 3)`` of what obstacles leave; None if they take nothing."""
         if arrivals.energies is None:
             return None
-        return shelf_filters(arrivals.energies, self._sample_rate_hz)
+        sections: Sections = shelf_filters(arrivals.energies, self._shelves)
+        return sections
 
     def blocks(self, n_paths: int) -> NDArray[np.float32]:
         """Return a buffer ``(2, K, C, block_samples)`` for signals and filters of K paths.

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import math
 from functools import cache
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
 from veca_marl.sim.geometry import Floats
-from veca_marl.sim.sound.delay_lines import read_moving
 from veca_marl.sim.sound.partitions import BANDS_HZ, N_BANDS
+from veca_marl.sim.sound.signal_paths import read_moving
 
 SETTLING_SAMPLES = 512
 """After so many samples what a filter has not heard of the past is below -80 dB."""
@@ -26,7 +27,35 @@ _RIDGE = 0.03  # of the fit: the smallest with errors below 1 dB behind one and 
 _LEAST = 1e-18  # energy, -180 dB
 
 
-def shelf_filters(energy: Floats, sample_rate_hz: float) -> NDArray[np.float32]:
+class ShelfDesign(NamedTuple):
+    """What the filters of `shelf_filters` depend on beside the energies.
+
+    Attributes:
+        fit: ``(N_BANDS, N_BANDS)``: the gain and the steps in dB by the levels in the bands.
+        crossovers: ``(N_BANDS - 1,)`` tangents of half of the angular frequencies between bands.
+    """
+
+    fit: Floats
+    crossovers: Floats
+
+
+@cache
+def shelf_design(sample_rate_hz: float) -> ShelfDesign:
+    """Return the numbers for a sampling rate; bands above 0.4 of it have the last level below."""
+    between_hz = np.minimum(np.sqrt(BANDS_HZ[1:] * BANDS_HZ[:-1]), 0.4 * sample_rate_hz)
+    crossovers: Floats = np.tan(np.pi * between_hz / sample_rate_hz)
+    middles_hz = np.minimum(BANDS_HZ, 0.45 * sample_rate_hz)
+    middles = np.tan(np.pi * middles_hz / sample_rate_hz)
+    shapes = 1.0 / (1.0 + (crossovers / middles[:, None]) ** 2)
+    response = np.column_stack([np.ones(N_BANDS), shapes])
+    differences = np.eye(N_BANDS) - np.eye(N_BANDS, k=-1)
+    normal = response.T @ response + _RIDGE * np.eye(N_BANDS)
+    fit: Floats = np.linalg.solve(normal, response.T + _RIDGE * differences).T.astype(np.float64)
+    return ShelfDesign(fit, crossovers)
+
+
+@njit(cache=True, error_model="numpy")
+def shelf_filters(energy: Floats, design: ShelfDesign) -> NDArray[np.float32]:
     """Return filters with given energies in the octave bands.
 
     A gain and first-order shelves, one between each two bands; a step of a shelf is proportional to
@@ -37,29 +66,14 @@ def shelf_filters(energy: Floats, sample_rate_hz: float) -> NDArray[np.float32]:
 
     Args:
         energy: ``(K, N_BANDS)`` from 0 to 1.
-        sample_rate_hz: Sampling rate; bands above 0.4 of it have the level of the last one below.
+        design: See `shelf_design`.
 
     Returns:
         ``(K, N_BANDS - 1, 3)``: coefficients b0, b1 and a1 of each section; the gain is in the
         first.
     """
+    fit, crossovers = design.fit, design.crossovers
     sections = np.empty((len(energy), N_BANDS - 1, 3), np.float32)
-    _write_sections(energy, _fit(sample_rate_hz), _crossovers(sample_rate_hz), sections)
-    return sections
-
-
-@njit(cache=True, error_model="numpy")
-def _write_sections(
-    energy: Floats, fit: Floats, crossovers: Floats, sections: NDArray[np.float32]
-) -> None:
-    """Write the coefficients of `shelf_filters`.
-
-    Args:
-        energy: ``(K, N_BANDS)`` from 0 to 1.
-        fit: See `_fit`.
-        crossovers: See `_crossovers`.
-        sections: ``(K, N_BANDS - 1, 3)``, overwritten.
-    """
     levels = np.empty(N_BANDS)
     for k in range(energy.shape[0]):
         for band in range(N_BANDS):
@@ -78,6 +92,7 @@ def _write_sections(
             sections[k, s, 1] = gain * (pole - step) / (1.0 + pole)
             sections[k, s, 2] = (pole - 1.0) / (1.0 + pole)
             gain = 1.0
+    return sections
 
 
 def unshaded(n_paths: int) -> NDArray[np.float32]:
@@ -85,27 +100,6 @@ def unshaded(n_paths: int) -> NDArray[np.float32]:
     sections = np.zeros((n_paths, N_BANDS - 1, 3), np.float32)
     sections[..., 0] = 1.0
     return sections
-
-
-@cache
-def _crossovers(sample_rate_hz: float) -> Floats:
-    """Return the tangents of half of the angular frequencies between bands, ``(N_BANDS - 1,)``."""
-    between_hz = np.minimum(np.sqrt(BANDS_HZ[1:] * BANDS_HZ[:-1]), 0.4 * sample_rate_hz)
-    tangents: Floats = np.tan(np.pi * between_hz / sample_rate_hz)
-    return tangents
-
-
-@cache
-def _fit(sample_rate_hz: float) -> Floats:
-    """Return the matrix from levels in bands to the gain and the steps in dB, both in rows."""
-    middles_hz = np.minimum(BANDS_HZ, 0.45 * sample_rate_hz)
-    middles = np.tan(np.pi * middles_hz / sample_rate_hz)
-    shapes = 1.0 / (1.0 + (_crossovers(sample_rate_hz) / middles[:, None]) ** 2)
-    response = np.column_stack([np.ones(N_BANDS), shapes])
-    differences = np.eye(N_BANDS) - np.eye(N_BANDS, k=-1)
-    normal = response.T @ response + _RIDGE * np.eye(N_BANDS)
-    fitted: Floats = np.linalg.solve(normal, response.T + _RIDGE * differences).T.astype(np.float64)
-    return fitted
 
 
 @njit(cache=True, error_model="numpy")

@@ -13,10 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veca_marl.sim.geometry import Pose
-from veca_marl.sim.sound.delay_lines import HALF_WIDTH
-from veca_marl.sim.sound.mixers import make_mixer
 from veca_marl.sim.sound.propagation import Ears, Propagation, Receiver
 from veca_marl.sim.sound.room_acoustics import Room
+from veca_marl.sim.sound.signal_paths import HALF_WIDTH, make_mixer
 from veca_marl.sim.sound.sounds import Sound, Source
 from veca_marl.sim.sound.surroundings import FreeField, House, OneRoom, Surroundings
 

@@ -14,7 +14,7 @@ import scipy.signal
 from numpy.typing import ArrayLike
 
 from veca_marl.sim.geometry import Floats
-from veca_marl.sim.sound.delay_lines import SignalMemory
+from veca_marl.sim.sound.signal_paths import SignalMemory
 from veca_marl.sim.sound.waveforms import (
     SAMPLE_RATE_HZ,
     Samples,

@@ -43,7 +43,6 @@ from veca_marl.sim.geometry import (
     Scene,
     Shape,
     horizontal_distance,
-    quaternion_from_yaw,
 )
 from veca_marl.sim.physics import Prop, World, create_collision_shape
 from veca_marl.sim.physics.bullet_client import BulletClient, ContactPoint
@@ -247,7 +246,8 @@ class Capsule:
         self._put((x, y, self.base_m + self._centre_height_m))
 
     def _put(self, position: tuple[float, float, float]) -> None:
-        orientation = quaternion_from_yaw(self.yaw_rad)
+        half_rad = 0.5 * self.yaw_rad
+        orientation = (0.0, 0.0, math.sin(half_rad), math.cos(half_rad))
         self._client.resetBasePositionAndOrientation(self.body_id, position, orientation)
 
     def _centre(self, body_id: int) -> Floats:

@@ -152,6 +152,7 @@ def middle(prop: Prop) -> tuple[float, float]:
     return float(low[0] + high[0]) / 2.0, float(low[1] + high[1]) / 2.0
 
 
+_BEYOND_M = 0.1  # more than the margins of Bullet's shapes
 _LIFT = 0.2  # vertical velocity of a kicked prop as a fraction of the horizontal one
 
 
@@ -168,9 +169,13 @@ def foot_reaches(
         yaw_rad: Its heading.
         prop: The prop.
     """
-    if prop.lowest_m > cfg.kick_height_m or not client.getClosestPoints(
-        capsule_id, prop.body_id, cfg.kick_reach_m
-    ):
+    at = prop.position
+    away_m = math.hypot(at[0] - here[0], at[1] - here[1])
+    if away_m > cfg.radius_m + cfg.kick_reach_m + prop.extent_m + _BEYOND_M:
+        return False
+    if not client.getClosestPoints(capsule_id, prop.body_id, cfg.kick_reach_m):
+        return False
+    if prop.lowest_m > cfg.kick_height_m:
         return False
     there = prop.mass_centre
     ahead = math.atan2(there[1] - here[1], there[0] - here[0]) - yaw_rad
