@@ -42,6 +42,7 @@ def composed_task(name):
     return compose([f"+task={name}"])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("task", sorted(TASKS))
 def test_episodes_end_before_the_worlds_start_new_ones(task):
     """What comes later in an episode would not be learnt from."""

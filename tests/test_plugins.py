@@ -201,13 +201,14 @@ def run_module(module, words, folder):
     return subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "words",
     [
         ["veca_marl.evaluate", "run={run}", "episodes=1"],
-        pytest.param(["veca_marl.train", "resume={run}"], marks=pytest.mark.slow),
-        pytest.param(["veca_marl.play", "policy={run}"], marks=pytest.mark.slow),
-        pytest.param(["veca_marl.tournament", "run={run}"], marks=pytest.mark.slow),
+        ["veca_marl.train", "resume={run}"],
+        ["veca_marl.play", "policy={run}"],
+        ["veca_marl.tournament", "run={run}"],
     ],
     ids=["evaluate", "resume", "play", "tournament"],
 )
@@ -236,6 +237,7 @@ def test_a_run_with_a_plugin_is_resumed_if_the_plugin_is_named(stored_run):
     (stored_run.parent / "executed").unlink()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("entry", ["payload", "{a: 1}", "[1]"])
 def test_an_entry_that_is_no_list_of_plugins_is_one_line(stored_run, tmp_path, entry):
     damaged = tmp_path / "damaged"

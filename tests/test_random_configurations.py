@@ -23,6 +23,7 @@ def time_limit():
 
 
 def try_configurations(numbers, time_limit):
+    """Return how many of the configurations were refused."""
     refused = 0
     for number in numbers:
         overrides = draw(random.Random(number))
@@ -32,14 +33,15 @@ def try_configurations(numbers, time_limit):
         except Exception as error:
             error.add_note(f"configuration {number}: {' '.join(overrides)}")
             raise
-    assert 0.3 * len(numbers) < refused < len(numbers)
+    return refused
 
 
 def test_some_random_configurations(time_limit):
-    try_configurations(range(12), time_limit)
+    try_configurations(range(6), time_limit)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("part", range(20))
 def test_random_configurations(part, time_limit):
-    try_configurations(range(100 * part, 100 * part + 100), time_limit)
+    refused = try_configurations(range(100 * part, 100 * part + 100), time_limit)
+    assert 40 < refused < 95

@@ -76,6 +76,7 @@ def test_past_policies_of_both_teams_are_stored(played):
     assert central.keys() != own.keys() or any(central[k].shape != own[k].shape for k in own)
 
 
+@pytest.mark.slow
 def test_a_run_is_played_into_a_video(played, tmp_path, capsys):
     video = tmp_path / "run.mp4"
     assert play([f"policy={played / 'run'}", f"video={video}", "opponent.blue=random"]) == 0

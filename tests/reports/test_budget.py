@@ -92,6 +92,7 @@ def test_each_arm_has_its_own_budget():
     }
 
 
+@pytest.mark.slow
 def test_runs_of_a_table_that_end_before_the_frames_asked_for_do_not_count(
     tmp_path, arms, composed, run, monkeypatch
 ):

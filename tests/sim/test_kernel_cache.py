@@ -242,6 +242,7 @@ CompilerBase.compile_extra = slowly
 """
 
 
+@pytest.mark.slow
 def test_of_processes_that_start_together_one_compiles(tiny):
     with ThreadPoolExecutor() as pool:
         calls = [pool.submit(tiny.call, before=SLOW_COMPILER) for _ in range(3)]
@@ -254,6 +255,7 @@ def test_a_process_that_was_killed_while_it_compiled_is_not_waited_for(tiny):
         tiny.words(SLOW_COMPILER.replace("2.0", "600.0")), cwd=tiny.root, env=tiny.environment()
     )
     while not (tiny.root / "compiled").exists():
+        assert first.poll() is None  # it has not ended with an error
         time.sleep(0.05)
     with ThreadPoolExecutor() as pool:
         second = pool.submit(tiny.call)
@@ -269,6 +271,7 @@ def test_a_process_that_hangs_is_waited_for_only_so_long(tiny):
         tiny.words(SLOW_COMPILER.replace("2.0", "600.0")), cwd=tiny.root, env=tiny.environment()
     )
     while not (tiny.root / "compiled").exists():
+        assert first.poll() is None  # it has not ended with an error
         time.sleep(0.05)
     shorter = "import tiny.kernel_cache\ntiny.kernel_cache._LONGEST_WAIT_S = 0.5\n"
     assert tiny.call(before=shorter) == (1, 0, 1)

@@ -95,6 +95,7 @@ def test_stable_baselines3_accepts_actions_of_several_parts(opened, body):
     check_env(opened(gym_env, "KickTheBall", body=body, layout="stacked", **CHEAP))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("layout", ["stacked", "flat"])
 def test_agents_of_a_team_have_the_layout(opened, layout):
     env = opened(parallel_env, "PushOut2v2", layout=layout, **CHEAP)

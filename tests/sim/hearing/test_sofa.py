@@ -425,8 +425,7 @@ def write_emitters(path, fields, kind="spherical", units="degree, degree, metre"
     return path
 
 
-@pytest.mark.parametrize("measurements", [1, 3])
-@pytest.mark.parametrize("delays_in_field", [False, True])
+@pytest.mark.parametrize(("delays_in_field", "measurements"), [(False, 1), (True, 3)])
 def test_emitters_are_directions(delays_in_field, measurements, tmp_path):
     fields = sphere_fields(delays_in_field)
     expected = read_sofa(write(tmp_path / "plain.sofa", fields))

@@ -26,6 +26,7 @@ def test_touch_at_rest_is_independent_of_the_time_step(at_rest):
     check_independence(at_rest)
 
 
+@pytest.mark.slow
 def test_a_reading_that_depends_on_the_time_step_breaks_a_law(at_rest):
     wrong = {**at_rest, "palm": at_rest["palm"] * [[1.0], [1.02]]}
     assert [law.holds for law in fixed_arms.rest_laws(wrong)] == [False, True]
