@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from time import perf_counter
 from typing import Any
@@ -94,20 +95,27 @@ def _random_actions(game: Game, rng: np.random.Generator) -> dict[str, Any]:
 
 def _observe(game: Game, seen: _Seen) -> dict[str, Observation]:
     """Return what the senses of all actors observe, but for those that fail; note misfits."""
+    _add_problems(seen.specs, observation_problems(game))
     observed: dict[str, Observation] = {}
-    problems = []
     for player in game.actors:
         observed[player.name] = {}
+        for sense in game.senses[player.name].values():
+            with suppress(SpecError):  # noted
+                observed[player.name] |= sense.read()
+    return observed
+
+
+def observation_problems(game: Game) -> Iterator[str]:
+    """Yield the observations of all actors that do not fit their specifications."""
+    for player in game.actors:
         for sense in game.senses[player.name].values():
             try:
                 observation = sense.read()
             except SpecError as error:
-                problems.append(f"{player.name}: {error}")
-                continue
-            observed[player.name] |= observation
-            problems += [f"{player.name}: {text}" for text in _misfits(observation, sense.specs)]
-    _add_problems(seen.specs, problems)
-    return observed
+                yield f"{player.name}: {error}"
+            else:
+                problems = _misfits(observation, sense.specs)
+                yield from (f"{player.name}: {text}" for text in problems)
 
 
 def _misfits(observation: Observation, specs: Mapping[str, ArraySpec]) -> Iterator[str]:

@@ -123,7 +123,7 @@ RATE_STEP_S = 0.04
 """Duration of the step for which weights of rates are given, which is that of the default clock."""
 
 LONGEST_EPISODE_S = 1e9
-"""Thirty years: the steps of an episode are counted."""
+"""Thirty years; the steps of an episode are counted."""
 
 
 def terms(**weights: float) -> Any:
