@@ -192,7 +192,6 @@ def gripping(palms, block):
         yield palms.move(Grip(place, EDGE - 0.04))
 
 
-@pytest.mark.slow
 def test_a_block_on_one_that_is_held_up_has_a_lower_return_than_a_pile(game, piling):
     """A constraint keeps the lower block level, in the place of a strong grip."""
     game.reset(np.random.default_rng(0))
