@@ -210,9 +210,10 @@ def test_a_term_has_not_the_name_of_another_entry_of_info(monkeypatch):
         Game(cfg_of())
 
 
-def test_a_weight_is_a_finite_number():
-    with pytest.raises(ValueError, match=r"weights.*kick"):
-        TaskCfg(weights={"kick": float("nan")})
+@pytest.mark.parametrize("weight", [np.nan, np.inf, -np.inf, 1e308])
+def test_a_weight_is_a_number_that_rewards_can_hold(weight):
+    with pytest.raises(ValueError, match=naming("task.weights", "'kick'", weight)):
+        TaskCfg(weights={"kick": weight})
 
 
 def test_terms_are_not_shared_between_tasks():

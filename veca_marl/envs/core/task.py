@@ -122,6 +122,9 @@ def require_humanoid(player: Player) -> Humanoid:
 RATE_STEP_S = 0.04
 """Duration of the step for which weights of rates are given, which is that of the default clock."""
 
+GREATEST_WEIGHT = 1e30
+"""Rewards are float32, which ends at 3e38."""
+
 LONGEST_EPISODE_S = 1e9
 """Thirty years; the steps of an episode are counted."""
 
@@ -150,7 +153,7 @@ class TaskCfg:
         """Check the values.
 
         Raises:
-            ValueError: If the duration is not positive, a weight is not finite, or a term is named
+            ValueError: If the duration is not positive, a weight is not finite or huge, or a term is named
                 `solved`, as another entry of `info`; `Task` checks the entries of bodies.
         """
         self.check_positive("max_seconds")
@@ -160,9 +163,9 @@ class TaskCfg:
             )
         if SOLVED in self.weights:
             raise ValueError(f"task.weights: {SOLVED!r} is the name of another entry of info")
-        bad = {name: value for name, value in self.weights.items() if not math.isfinite(value)}
+        bad = {n: value for n, value in self.weights.items() if not abs(value) <= GREATEST_WEIGHT}
         if bad:
-            raise ValueError(f"task.weights: {bad} must be finite numbers")
+            raise ValueError(f"task.weights: {bad} must be numbers of at most {GREATEST_WEIGHT:g}")
 
     def check_positive(self, *names: str) -> None:
         """Raise `ValueError` if a field is zero, negative or not finite."""
