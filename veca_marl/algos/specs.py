@@ -42,7 +42,7 @@ class ArrayLayout:
     @property
     def n_bytes(self) -> int:
         """Bytes of one array."""
-        return math.prod(self.shape) * getattr(torch, self.dtype).itemsize
+        return math.prod(self.shape) * int(getattr(torch, self.dtype).itemsize)
 
     @property
     def is_image(self) -> bool:

@@ -153,8 +153,8 @@ class TaskCfg:
         """Check the values.
 
         Raises:
-            ValueError: If the duration is not positive, a weight is not finite or huge, or a term is
-                named `solved`, as another entry of `info`; `Task` checks the entries of bodies.
+            ValueError: If the duration is not positive, a weight is not finite or huge, or a term
+                is named `solved`, as another entry of `info`; `Task` checks the entries of bodies.
         """
         self.check_positive("max_seconds")
         if self.max_seconds > LONGEST_EPISODE_S:
