@@ -68,6 +68,7 @@ def test_every_preset_composes(choices):
     assert isinstance(compose(["+task=ObjectNav", *choices]), Config)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", EXPERIMENTS)
 def test_every_experiment_composes(name):
     assert isinstance(compose([f"+experiment={name}"]), Config)

@@ -38,6 +38,8 @@ from veca_marl.sim.body.humanoid import HumanoidCfg
 ROOT = Path(__file__).resolve().parent.parent
 DOCS = ROOT / "docs"
 
+SLOW_PAGES = ("reference/actions.md", "reference/observations.md")  # a world of each task
+
 
 def read(name):
     return (DOCS / name).read_text(encoding="utf-8")
@@ -179,7 +181,13 @@ def test_every_reward_term_of_a_task_is_documented_and_has_a_picture(name):
 
 
 @pytest.mark.golden
-@pytest.mark.parametrize("name", make_docs.PAGES)
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(name, marks=[pytest.mark.slow] * (name in SLOW_PAGES))
+        for name in make_docs.PAGES
+    ],
+)
 def test_a_generated_page_is_current(name):
     assert read(name) == make_docs.PAGES[name](), "run make pages"
 

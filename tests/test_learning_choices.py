@@ -118,6 +118,7 @@ def test_a_recurrent_policy_is_trained_recorded_and_loaded(tmp_path):
     assert ("agents", "memory", "hidden") in actor.in_keys
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "body",
     [

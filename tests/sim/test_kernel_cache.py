@@ -184,6 +184,7 @@ DAMAGES = {
 QUICK = (("empty", "nbi"), ("cut", "nbc"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("damage", "kind"),
     [

@@ -95,6 +95,7 @@ def test_a_worker_killed_during_other_work_interrupts_it(start):
     assert time.monotonic() - begin < 3.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("use", ["update_policy", "restart", "collect"])
 def test_without_the_signal_every_call_raises_an_error(start, use):
     """In threads other than the main one Python calls no signal handlers."""

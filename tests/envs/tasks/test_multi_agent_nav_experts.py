@@ -20,7 +20,7 @@ from veca_marl.sim.sound import CALLS, Call, call_waveform
     [
         ("two_rooms", 2),
         ("three_rooms", 3),
-        ("seven_rooms", 4),
+        pytest.param("seven_rooms", 4, marks=pytest.mark.slow),
         pytest.param("house", 2, marks=pytest.mark.slow),
         pytest.param("house2", 3, marks=pytest.mark.slow),
         pytest.param("random_house", 2, marks=pytest.mark.slow),

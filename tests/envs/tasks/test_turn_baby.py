@@ -58,6 +58,7 @@ def test_it_starts_on_the_back_at_rest_with_random_joint_angles(game):
     assert moving.sum() == 40
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("body", BODIES)
 def test_the_expert_ends_on_the_belly(body):
     rng = np.random.default_rng(3)

@@ -38,6 +38,7 @@ def door(mass_kg=4.0):
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("crawls", [False, True])
 @pytest.mark.parametrize("kind", ["half", "quarter", "key"])
 def test_no_thin_thing_is_driven_into_the_wall_or_the_floor(kind, crawls):

@@ -133,6 +133,7 @@ def test_a_prop_that_is_released_at_the_end_of_a_wall_is_not_thrown(fraction, y,
     assert np.linalg.norm(piece.position - released) < 1.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["half", "quarter", "key", "cube"])
 def test_a_prop_held_in_a_corner_stays_out_of_its_walls_and_falls_there(kind):
     thing = {

@@ -425,7 +425,10 @@ def write_emitters(path, fields, kind="spherical", units="degree, degree, metre"
     return path
 
 
-@pytest.mark.parametrize(("delays_in_field", "measurements"), [(False, 1), (True, 3)])
+@pytest.mark.parametrize(
+    ("delays_in_field", "measurements"),
+    [(True, 3), pytest.param(False, 1, marks=pytest.mark.slow)],
+)
 def test_emitters_are_directions(delays_in_field, measurements, tmp_path):
     fields = sphere_fields(delays_in_field)
     expected = read_sofa(write(tmp_path / "plain.sofa", fields))

@@ -37,6 +37,7 @@ def test_touch_at_rest_is_independent_of_all_time_steps_from_8_to_1_ms():
     check_independence(fixed_arms.readings_at_rest(fixed_arms.clocks(0.02)))
 
 
+@pytest.mark.slow
 def test_compliant_skin_distinguishes_masses_and_rigid_bone_does_not(at_rest):
     light, *_, heavy = at_rest["palm"][0]
     assert light < 0.05
