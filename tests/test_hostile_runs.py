@@ -317,6 +317,7 @@ def test_evaluate_ends_in_one_line(name, run, own, capsys):
     check(name, name in WITHOUT_EFFECT_ON_EVALUATE, lambda: evaluate(words), run, own, capsys)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", CASES)
 def test_a_run_that_is_resumed_ends_in_one_line(name, run, own, capsys):
     words = [f"resume={run}", "total_frames=12", "log.progress_bar=false"]

@@ -55,6 +55,7 @@ def test_a_damaged_file_is_named_with_the_reason(tmp_path, arms, file, content, 
     assert {row["seed"] for row in rows} == {"0"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("file", ["config.yaml", "provenance.json", "evaluations.csv"])
 def test_the_other_runs_are_reported_beside_a_damaged_one(tmp_path, arms, run, file):
     write_all(tmp_path, arms)

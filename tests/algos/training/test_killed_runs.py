@@ -51,6 +51,7 @@ MOMENTS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("prepare", MOMENTS.values(), ids=MOMENTS)
 def test_a_run_killed_while_files_are_written_stores_the_same(whole, tmp_path, prepare):
     assert Child(tmp_path / "run", prepare).wait() == -9

@@ -46,6 +46,7 @@ def test_a_flat_observation_is_one_vector_of_all_senses(opened):
     np.testing.assert_array_equal(after, joined(expected))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("layout", ["stacked", "flat"])
 @pytest.mark.parametrize("body", ["walker_voice", "walker_discrete_voice"])
 def test_actions_of_several_parts_are_one_array(opened, layout, body):

@@ -41,6 +41,7 @@ def gets_up(game, posture, seed, within_s):
     return body.bone("chest").forward[2] < -0.6
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("posture", [ON_BACK, ON_BELLY], ids=["back", "belly"])
 @pytest.mark.parametrize("seed", [0, 1])
 def test_after_a_fall_the_expert_gets_onto_hands_and_knees_and_crawls_on(game, posture, seed):

@@ -19,7 +19,7 @@ from veca_marl.sim.sound import CALLS, Call, call_waveform
     ("playground", "agents"),
     [
         ("two_rooms", 2),
-        ("three_rooms", 3),
+        pytest.param("three_rooms", 3, marks=pytest.mark.slow),
         pytest.param("seven_rooms", 4, marks=pytest.mark.slow),
         pytest.param("house", 2, marks=pytest.mark.slow),
         pytest.param("house2", 3, marks=pytest.mark.slow),
