@@ -5,7 +5,12 @@ from composed import compose
 
 from veca_marl.algos.collection import host_limits
 from veca_marl.algos.collection.experience import CollectCfg
-from veca_marl.algos.collection.host_limits import open_files, shared_bytes, that_fits
+from veca_marl.algos.collection.host_limits import (
+    allow_files,
+    open_files,
+    shared_bytes,
+    that_fits,
+)
 from veca_marl.runs.assembly import make_trainer, read_specs
 
 CFG = CollectCfg(processes=2, worlds=16, steps=32)
@@ -20,7 +25,7 @@ def specs():
 def host(monkeypatch):
     def set_limits(shared=None, files=None):
         monkeypatch.setattr(host_limits, "available_shared_memory", lambda: shared)
-        monkeypatch.setattr(host_limits, "available_files", lambda: files)
+        monkeypatch.setattr(host_limits, "allow_files", lambda _: files)
 
     return set_limits
 
@@ -52,6 +57,19 @@ def test_the_need_covers_what_was_measured(specs):
     """94 MB of shared memory and 110 files with the default, in a run of KickTheBall."""
     assert 94e6 < shared_bytes(CFG, specs) < 128e6
     assert 110 <= open_files(CFG, specs) < 200
+
+
+def test_the_limit_of_files_is_raised_to_what_is_needed_and_not_above_the_hard_one():
+    resource = pytest.importorskip("resource")
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    try:
+        resource.setrlimit(resource.RLIMIT_NOFILE, (soft - 10, hard))
+        assert allow_files(soft - 20) == soft - 10
+        assert allow_files(soft) == soft
+        if hard != resource.RLIM_INFINITY:
+            assert allow_files(hard + 1) == soft
+    finally:
+        resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
 
 
 def test_a_trainer_collects_with_what_fits(host, caplog):

@@ -209,6 +209,29 @@ def test_the_energy_is_continuous_through_an_opening(reflection):
     assert max(step for step, angle in zip(steps_db, angles_deg, strict=True) if angle < 30) < 1.5
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_source_and_head_can_be_exchanged_by_all_paths(seed):
+    """In a room with a doorway, and through it into the next room, at any opening of the door."""
+    rng = np.random.default_rng(seed)
+    for _ in range(20):
+        rooms = with_door(rng.uniform(0.0, np.pi / 2), order=1)
+        one, here = rng.uniform((-3.9, -2.9, 0.1), (-0.2, 2.9, 2.5), (2, 3))
+        there = rng.uniform((0.2, -2.9, 0.1), (3.9, 2.9, 2.5))
+        for other in (here, there):
+            there_db, back_db = total_db(rooms, one, other), total_db(rooms, other, one)
+            assert there_db == pytest.approx(back_db, abs=1e-6)
+
+
+def test_an_opening_without_width_takes_nothing_from_a_reflection():
+    ends = np.array([-1.0, 0.3, 1.0]), Pose(np.array([-1.0, -0.3, 1.0]), np.eye(3))
+    for width_m, least, most in ((1e-9, 0.99, 1.0), (50.0, 0.0, 0.5)):
+        rooms = house([], order=1, doorways=[Doorway((0, 1), (0.0, 0.0), width_m, 0)])
+        image = int(np.flatnonzero((image_lattice(1) == (1, 0, 0)).all(axis=1))[0])
+        reflected = rooms.arrivals(*ends).energies
+        left = np.ones(N_BANDS) if reflected is None else reflected[image]
+        assert least <= left.min() <= left.max() <= most
+
+
 def test_a_wall_reflects_little_where_a_door_is_open_and_all_where_it_is_closed():
     ends = np.array([-1.0, 0.3, 1.0]), Pose(np.array([-1.0, -0.3, 1.0]), np.eye(3))
     image = int(np.flatnonzero((image_lattice(1) == (1, 0, 0)).all(axis=1))[0])

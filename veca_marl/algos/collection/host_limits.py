@@ -1,7 +1,7 @@
 """Limits of the host for worker processes: shared memory and open files.
 
-Batches of worker processes are in shared memory, in which containers have 64 MB by default. A
-process that writes to more than there is is killed by SIGBUS.
+Batches of worker processes are in shared memory, of which a container has 64 MB by default. A
+process that writes beyond the end of it is killed by SIGBUS.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ from __future__ import annotations
 import shutil
 import sys
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
@@ -21,12 +22,12 @@ SHARED_MEMORY = Path("/dev/shm")
 # each step; actions, rewards and parameters are the rest
 _PER_OBSERVATION = 2.3
 _BASE_BYTES = 4_000_000
-# measured: 110 and 123 with two processes, one for each array of a batch
+# measured: 110 and 123 files with two processes, mostly arrays of a batch
 _BASE_FILES, _FILES_PER_ARRAY, _FILES_PER_PROCESS = 48, 6, 16
 
 
 def shared_bytes(cfg: CollectCfg, specs: Mapping[str, TeamSpec]) -> int:
-    """Return the shared memory that the batches of worker processes take at most, about.
+    """Return an estimate of the shared memory that the batches of worker processes take, bytes.
 
     Args:
         cfg: Number of worlds and processes; without processes it is 0.
@@ -42,7 +43,7 @@ def shared_bytes(cfg: CollectCfg, specs: Mapping[str, TeamSpec]) -> int:
 
 
 def open_files(cfg: CollectCfg, specs: Mapping[str, TeamSpec]) -> int:
-    """Return how many files worker processes need to have open, about; see `shared_bytes`."""
+    """Return an estimate of the files that a run with worker processes has open."""
     if cfg.processes == 0:
         return 0
     arrays = sum(len(spec.observations) + len(spec.actions) for spec in specs.values())
@@ -56,22 +57,27 @@ def available_shared_memory() -> int | None:
     return shutil.disk_usage(SHARED_MEMORY).free
 
 
-def available_files() -> int | None:
-    """Return how many files a process may have open, after its limit was raised as far as it goes.
+def allow_files(needed: int) -> int | None:
+    """Raise the number of files that this process may have open, as far as the system lets it.
+
+    Args:
+        needed: How many it needs.
 
     Returns:
-        None where there is no limit, or none that can be read.
+        How many it may have open now; None where there is no limit, or none that can be read.
     """
     try:
         import resource
     except ImportError:  # Windows
         return None
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
-    if soft != resource.RLIM_INFINITY and (hard == resource.RLIM_INFINITY or soft < hard):
-        wanted = hard if hard != resource.RLIM_INFINITY else max(soft, 65_536)
-        resource.setrlimit(resource.RLIMIT_NOFILE, (wanted, hard))
-        soft = wanted
-    return None if soft == resource.RLIM_INFINITY else soft
+    if soft == resource.RLIM_INFINITY:
+        return None
+    if soft < needed:
+        with suppress(ValueError, OSError):  # above the hard limit, or that of the system
+            resource.setrlimit(resource.RLIMIT_NOFILE, (needed, hard))
+            soft = needed
+    return soft
 
 
 def that_fits(cfg: CollectCfg, specs: Mapping[str, TeamSpec]) -> tuple[CollectCfg, str]:
@@ -92,7 +98,8 @@ def that_fits(cfg: CollectCfg, specs: Mapping[str, TeamSpec]) -> tuple[CollectCf
             f"{bytes_needed / 1e6:.0f} MB of shared memory, {free / 1e6:.0f} MB are free in "
             f"{SHARED_MEMORY} (docker run --shm-size=1g)"
         )
-    files_needed, allowed = open_files(cfg, specs), available_files()
+    files_needed = open_files(cfg, specs)
+    allowed = allow_files(files_needed)
     if allowed is not None and files_needed > allowed:
         shortages.append(f"{files_needed} open files, {allowed} are allowed (ulimit -n)")
     if not shortages:

@@ -9,6 +9,8 @@ images. A path exists if its reflections are in the room that reflects it.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
@@ -29,15 +31,28 @@ from veca_marl.sim.sound.silhouettes import (
 Numbers = NDArray[np.int64]
 
 
+class Reflector(NamedTuple):
+    """A room whose walls reflect a path.
+
+    Attributes:
+        lower: ``(3,)`` metres, its lower corner.
+        size: ``(3,)`` metres.
+        numbers: Of the screens in it.
+        openings: Doorways in its walls, see `obstacles.ScreenSets`.
+    """
+
+    lower: Floats
+    size: Floats
+    numbers: Numbers
+    openings: Screens
+
+
 @njit(cache=True, error_model="numpy")
 def energies_inside(
     source: Floats,
     head: Floats,
-    lower: Floats,
-    size: Floats,
+    room: Reflector,
     lattice: Numbers,
-    numbers: Numbers,
-    openings: Screens,
     screens: Screens,
     surface_ratio: float,
 ) -> Floats:
@@ -46,26 +61,23 @@ def energies_inside(
     Args:
         source: ``(3,)`` metres in the room.
         head: ``(3,)`` metres in the room.
-        lower: ``(3,)`` metres, the room's lower corner.
-        size: ``(3,)`` metres.
+        room: The room.
         lattice: ``(K, 3)`` from `image_lattice`.
-        numbers: Of the screens in the room.
-        openings: In its walls, see `obstacles.ScreenSets`.
         screens: All screens.
         surface_ratio: See `partitions.energy_through`.
 
     Returns:
         ``(K, N_BANDS)`` from 0 to 1. Obstacles round the source or the head take nothing.
     """
-    used = _not_round(numbers, source, head, screens)
+    used = _not_round(room.numbers, source, head, screens)
     energies = np.ones((len(lattice), N_BANDS))
-    whole = np.zeros((0, 3))
+    all_of_it = np.zeros((0, 3)), np.zeros((0, 3))
     work = make_work(_most_silhouettes(len(used), len(used), lattice))
     for k in range(len(lattice)):
-        image = _image(source, lower, size, lattice[k])
+        image = _image(source, room, lattice[k])
         _write_energy(
-            head, image, lower, size, lattice[k], used, used, openings, screens, whole, whole,
-            surface_ratio, work, energies[k],
+            head, image, room, lattice[k], (used, used), all_of_it, screens, surface_ratio, work,
+            energies[k],
         )  # fmt: skip
     return energies
 
@@ -74,8 +86,8 @@ def energies_inside(
 def energies_between(
     source: Floats,
     head: Floats,
-    room: tuple[Floats, Floats, Numbers, Screens],
-    other: tuple[Floats, Floats, Numbers, Screens],
+    room: Reflector,
+    other: Reflector,
     lattice: Numbers,
     between: Numbers,
     rooms: tuple[Floats, Floats],
@@ -87,9 +99,8 @@ def energies_between(
     Args:
         source: ``(3,)`` metres.
         head: ``(3,)`` metres.
-        room: Lower corner and size of the source's room, the numbers of the screens in it, and the
-            openings in its walls.
-        other: Those of the head's room.
+        room: The source's room.
+        other: The head's room.
         lattice: ``(K, 3)`` from `image_lattice`.
         between: Numbers of the screens that count between rooms.
         rooms: Lower and upper corners ``(rooms, 3)`` of all rooms.
@@ -103,24 +114,24 @@ def energies_between(
     n = len(lattice)
     energies = np.zeros((2 * n - 1, N_BANDS))
     first = _not_round(between, source, head, screens)
-    later = _not_round(room[2], source, head, screens)
-    most = max(len(room[2]), len(other[2]))
+    later = _not_round(room.numbers, source, head, screens)
+    most = max(len(room.numbers), len(other.numbers))
     work = make_work(_most_silhouettes(len(first), most, lattice))
     for k in range(n):
-        image = _image(source, room[0], room[1], lattice[k])
+        image = _image(source, room, lattice[k])
         _write_energy(
-            head, image, room[0], room[1], lattice[k], first, later, room[3], screens, rooms[0],
-            rooms[1], surface_ratio, work, energies[k],
+            head, image, room, lattice[k], (first, later), rooms, screens, surface_ratio, work,
+            energies[k],
         )  # fmt: skip
-    later = _not_round(other[2], source, head, screens)
+    later = _not_round(other.numbers, source, head, screens)
     back = np.empty(3, np.int64)
     for k in range(1, n):
         for axis in range(3):  # an even number of reflections begins at the opposite wall
             back[axis] = lattice[k, axis] if lattice[k, axis] % 2 else -lattice[k, axis]
-        image = _image(head, other[0], other[1], back)
+        image = _image(head, other, back)
         _write_energy(
-            source, image, other[0], other[1], back, first, later, other[3], screens, rooms[0],
-            rooms[1], surface_ratio, work, energies[n - 1 + k],
+            source, image, other, back, (first, later), rooms, screens, surface_ratio, work,
+            energies[n - 1 + k],
         )  # fmt: skip
     return energies
 
@@ -152,11 +163,11 @@ def _not_round(numbers: Numbers, one: Floats, other: Floats, screens: Screens) -
 
 
 @njit(cache=True, error_model="numpy")
-def _image(point: Floats, lower: Floats, size: Floats, reflections: Numbers) -> Floats:
+def _image(point: Floats, room: Reflector, reflections: Numbers) -> Floats:
     """Return the image ``(3,)`` of a point, see `image_sources`."""
     image = np.empty(3)
     for axis in range(3):
-        sign, offset = _mirror(lower[axis], size[axis], reflections[axis])
+        sign, offset = _mirror(room.lower[axis], room.size[axis], reflections[axis])
         image[axis] = sign * point[axis] + offset
     return image
 
@@ -173,15 +184,11 @@ def _mirror(lower: float, size: float, n: int) -> tuple[float, float]:
 def _write_energy(
     start: Floats,
     image: Floats,
-    lower: Floats,
-    size: Floats,
+    room: Reflector,
     reflections: Numbers,
-    first: Numbers,
-    later: Numbers,
-    openings: Screens,
+    used: tuple[Numbers, Numbers],
+    rooms: tuple[Floats, Floats],
     screens: Screens,
-    rooms_lower: Floats,
-    rooms_upper: Floats,
     surface_ratio: float,
     work: Work,
     energy: Floats,
@@ -192,70 +199,88 @@ def _write_energy(
         start: ``(3,)`` metres, the end of the path before its reflections; it may be in another
             room.
         image: ``(3,)`` metres, the image of its other end.
-        lower: Lower corner of the room that reflects it.
-        size: Its size.
+        room: The room that reflects it.
         reflections: ``(3,)`` copy of the room in which the image is.
-        first: Numbers of the screens before the first reflection.
-        later: Those after it.
-        openings: In the walls of the room that reflects it.
+        used: Numbers of the screens before the first reflection, and of those after it.
+        rooms: Lower and upper corners ``(rooms, 3)`` of all rooms: before the first reflection
+            furniture counts only for the part of the path that is in its room. Empty if all of the
+            path is in one room.
         screens: All screens.
-        rooms_lower: Corners of all rooms: before the first reflection furniture counts only for
-            the part of the path that is in its room; none if all of it is in one room.
-        rooms_upper: Likewise.
         surface_ratio: See `partitions.energy_through`.
         work: Overwritten.
         energy: Overwritten.
     """
-    line = (
-        line_between(start, image)
-        if (start != image).any()
-        else line_between(start, start + np.array([1e-6, 0.0, 0.0]))
-    )
-    n_legs = 1 + np.abs(reflections).sum()
-    begin, way = start - lower, image - start
+    end = image if (start != image).any() else start + np.array([1e-6, 0.0, 0.0])
+    line = line_between(start, end)
+    begin, way = start - room.lower, image - start
     cell, sign, offset = np.zeros(3, np.int64), np.ones(3), np.zeros(3)
-    count, share = 0, 0.0
-    reflected = work.reflected
-    reflected[:] = 1.0
-    for leg in range(n_legs):
-        until, crossed = _next_wall(begin, way, size, cell, reflections)
-        if (
-            leg == 0
-            and crossed >= 0
-            and not _is_reflected(begin, way, size, reflections, until, crossed)
-        ):
+    count, passed = 0, 0.0
+    work.reflected[:] = 1.0
+    for leg in range(1 + np.abs(reflections).sum()):
+        until, crossed = _next_wall(begin, way, room.size, cell, reflections)
+        is_first = leg == 0
+        if is_first and not _is_reflected(begin, way, room.size, reflections, until, crossed):
             energy[:] = 0.0
             return
         for axis in range(3):
-            sign[axis], offset[axis] = _mirror(lower[axis], size[axis], cell[axis])
-        for n in first if leg == 0 else later:
-            low_m, high_m = share * line.length_m, until * line.length_m
-            room = screens.rooms[n]
-            if leg == 0 and 0 <= room < len(rooms_lower):
-                enter_m, leave_m = _stretch_inside(line, rooms_lower[room], rooms_upper[room])
-                low_m, high_m = max(low_m, enter_m), min(high_m, leave_m)
-            depth = add_silhouette(
-                line, low_m, high_m, screens, n, (sign, offset), work, work.rectangles[count]
-            )
-            if depth < np.inf:
-                work.numbers[count], work.depths[count] = n, depth
-                count += 1
+            sign[axis], offset[axis] = _mirror(room.lower[axis], room.size[axis], cell[axis])
+        mirror = sign, offset
+        reach = passed * line.length_m, until * line.length_m
+        numbers = used[0] if is_first else used[1]
+        count = _add_leg(line, reach, numbers, is_first, rooms, screens, mirror, work, count)
         if crossed < 0:
             break
         side = 1 if (way[crossed] > 0.0) == (cell[crossed] % 2 == 0) else 0
-        _lose_in_openings(
-            line, until * line.length_m, 2 * crossed + side, openings, (sign, offset), work
-        )
+        _lose_in_openings(line, 2 * crossed + side, room.openings, mirror, work)
         cell[crossed] += 1 if way[crossed] > 0.0 else -1
-        share = until
+        passed = until
     energy_past(count, screens, surface_ratio, work, energy)
-    energy *= reflected
+    energy *= work.reflected
+
+
+@njit(cache=True, error_model="numpy")
+def _add_leg(
+    line: Line,
+    reach_m: tuple[float, float],
+    numbers: Numbers,
+    is_first: bool,
+    rooms: tuple[Floats, Floats],
+    screens: Screens,
+    mirror: tuple[Floats, Floats],
+    work: Work,
+    count: int,
+) -> int:
+    """Add the silhouettes of screens between two reflections; return how many there are then.
+
+    Args:
+        line: The path.
+        reach_m: Distances of the two reflections, or ends, from its start.
+        numbers: Of the screens.
+        is_first: Whether this is before the first reflection.
+        rooms: See `_write_energy`.
+        screens: All screens.
+        mirror: See `add_silhouette`.
+        work: Has `count` silhouettes; more are added.
+        count: How many there are.
+    """
+    for n in numbers:
+        low_m, high_m = reach_m
+        room = screens.rooms[n]
+        if is_first and 0 <= room < len(rooms[0]):
+            enter_m, leave_m = _stretch_inside(line, rooms[0][room], rooms[1][room])
+            low_m, high_m = max(low_m, enter_m), min(high_m, leave_m)
+        depth = add_silhouette(
+            line, low_m, high_m, screens, n, mirror, work, work.rectangles[count]
+        )
+        if depth < np.inf:
+            work.numbers[count], work.depths[count] = n, depth
+            count += 1
+    return count
 
 
 @njit(cache=True, error_model="numpy")
 def _lose_in_openings(
     line: Line,
-    at_m: float,
     kind: int,
     openings: Screens,
     mirror: tuple[Floats, Floats],
@@ -267,7 +292,6 @@ def _lose_in_openings(
 
     Args:
         line: The path.
-        at_m: Where along it the wall is.
         kind: Which wall, see `obstacles.ScreenSets.openings`.
         openings: In the walls of the room.
         mirror: See `add_silhouette`.
@@ -317,7 +341,7 @@ def _next_wall(
 def _is_reflected(
     begin: Floats, way: Floats, size: Floats, reflections: Numbers, share: float, crossed: int
 ) -> bool:
-    """Return whether a path meets the first wall that reflects it within its room.
+    """Return whether a path meets the first wall that reflects it, if any, within its room.
 
     Args:
         begin: ``(3,)`` metres, start of the path in the coordinates of the room.
@@ -325,8 +349,10 @@ def _is_reflected(
         size: ``(3,)`` metres, of the room.
         reflections: ``(3,)`` copy of the room in which it ends.
         share: Of the way up to that wall.
-        crossed: Axis of that wall.
+        crossed: Axis of that wall; -1 for a path that no wall reflects.
     """
+    if crossed < 0:
+        return True
     if not 0.0 < share < 1.0:
         return False
     for axis in range(3):

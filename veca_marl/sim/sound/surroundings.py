@@ -19,7 +19,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from veca_marl.sim.geometry import Floats, Pose
-from veca_marl.sim.sound.attenuated_paths import energies_between, energies_inside
+from veca_marl.sim.sound.attenuated_paths import Reflector, energies_between, energies_inside
 from veca_marl.sim.sound.obstacles import Doorway, Obstacles, ScreenSets
 from veca_marl.sim.sound.partitions import N_BANDS, TRANSMISSION_LOSS_DB, surface_ratio
 from veca_marl.sim.sound.room_acoustics import Room, image_gains, image_lattice, image_sources
@@ -272,15 +272,17 @@ class House:
         energies: Floats = energies_inside(
             one.bounded(source),
             one.bounded(head),
-            one.room.lower,
-            one.room.size,
+            self._reflector(room),
             lattice,
-            sets.inside[room],
-            sets.openings[room],
             sets.screens,
             self._surface_ratio,
         )
         return None if (energies == 1.0).all() else energies
+
+    def _reflector(self, room: int) -> Reflector:
+        """Return a room with what stands in it and the doorways in its walls."""
+        sets, walls = self._screens, self._rooms[room].room
+        return Reflector(walls.lower, walls.size, sets.inside[room], sets.openings[room])
 
     def _arrivals_between(self, room: int, other: int, source: Floats, head: Pose) -> Arrivals:
         """Return how a source in one room arrives at a head in another one."""
@@ -302,12 +304,11 @@ class House:
     ) -> Floats:
         """Return the energies of paths between rooms, see `energies_between`."""
         sets = self._screens
-        one, two = self._rooms[room].room, self._rooms[other].room
         energies: Floats = energies_between(
             source,
             head,
-            (one.lower, one.size, sets.inside[room], sets.openings[room]),
-            (two.lower, two.size, sets.inside[other], sets.openings[other]),
+            self._reflector(room),
+            self._reflector(other),
             lattice,
             sets.between,
             self._corners,
