@@ -196,7 +196,7 @@ def summary(table: Table) -> list[dict[str, object]]:
             "interval": interval(scores.returns) if len(scores.returns) > 1 else None,
             "length": float(scores.lengths.mean()),
             **solved_rate(scores),
-            **{name: float(values.mean()) for name, values in scores.terms.items()},
+            **{n: float(values.mean()) for n, values in (scores.each | scores.terms).items()},
         }
         for player, teams in table.items()
         for team, scores in teams.items()

@@ -154,6 +154,7 @@ class Step:
 _IMAGE_WINDOWS = {"kernels": [8, 4, 3], "strides": [4, 2, 1]}
 _CALLS = {"call_pause_s": 0.0}
 _WALKS = {"restitution": 0.0, "stride_height_m": 0.0}
+_PPO = {"critic_learning_rate": 1e-3, "credit": "nothing"}
 _SPECTRA = {"encoding": "magnitude", "bins": 250}
 
 STEPS: tuple[Step, ...] = (
@@ -176,6 +177,16 @@ STEPS: tuple[Step, ...] = (
             Added("learner.*.network", _IMAGE_WINDOWS, name="multisense"),
         ),
         state={"intrinsic": {}},
+    ),
+    Step(
+        changes=(
+            Added("", {"global_state": False}),
+            Added("algo", _PPO, name="ppo"),
+            Added("learner.*", _PPO, name="ppo"),
+            Added("algo.network", {"agent_identity": False}, name="multisense"),
+            Added("learner.*.network", {"agent_identity": False}, name="multisense"),
+        ),
+        state={"episodes": {}},
     ),
 )
 """Entry `n` leads from version `n` to version ``n + 1``."""

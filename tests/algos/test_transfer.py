@@ -182,7 +182,9 @@ def test_frozen_encoders_keep_their_parameters_and_have_no_optimiser_state(make_
     after = encoders(learners)
     assert torch.equal(after["vision"][0], before["vision"][0])
     assert not torch.equal(after["audio"][0], before["audio"][0])
-    optimised = {id(p) for group in algorithm.optimizer.param_groups for p in group["params"]}
+    optimisers = [one for name, one in vars(algorithm).items() if name.endswith("optimizer")]
+    groups = [group for optimiser in optimisers for group in optimiser.param_groups]
+    optimised = {id(p) for group in groups for p in group["params"]}
     (vision,) = sense_encoders(algorithm.actor)["vision"]
     assert not optimised & {id(p) for p in vision.parameters()}
     assert {id(p) for p in algorithm.network.parameters() if p.requires_grad} <= optimised

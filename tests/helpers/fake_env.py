@@ -5,7 +5,7 @@ for the right sign and -1 for the wrong one; a new state is drawn after every st
 policy that uses an observation is `horizon`, that of any other 0 on average.
 
 `hybrid` gives the action two parts, a vector `move` and a choice `voice`; the reward is the mean
-over both.
+over both. `global_state` adds the key "state": the states of all agents.
 """
 
 import numpy as np
@@ -29,6 +29,7 @@ class FakeEnv(EnvBase):
         senses=SENSES,
         teams=("agents",),
         image=16,
+        global_state=False,
     ):
         super().__init__(batch_size=torch.Size([worlds]))
         self.first_world = 0
@@ -62,6 +63,8 @@ class FakeEnv(EnvBase):
             self.observation_spec[t, "info"] = Composite(
                 {"right": Unbounded(shape=(*lead, 1))}, shape=lead
             )
+        if global_state:
+            self.observation_spec["state"] = Unbounded(shape=(worlds, agents))
         self.action_spec = per_team({"action": action})
         self.reward_spec = per_team({"reward": Unbounded(shape=(*lead, 1))})
         done = per_team(flags(lead))
@@ -108,7 +111,13 @@ class FakeEnv(EnvBase):
             )
             self._draw(i)
         zero = torch.zeros(self.batch_size[0], self.agents, 1)
-        return TensorDict({t: self._team(zero) for t in self.group_map}, self.batch_size)
+        teams = {t: self._team(zero) for t in self.group_map}
+        return TensorDict({**teams, **self._global_state()}, self.batch_size)
+
+    def _global_state(self):
+        if "state" not in self.observation_spec.keys():  # noqa: SIM118  a spec
+            return {}
+        return {"state": torch.from_numpy(self.state.copy()).float()}
 
     def _sign(self, action):
         """Return the sign of the action; with two parts the mean of theirs."""
@@ -127,6 +136,7 @@ class FakeEnv(EnvBase):
         truncated = torch.from_numpy(self.clock >= self.horizon).unsqueeze(-1)
         terminated = torch.zeros_like(truncated)
         out = TensorDict({t: self._team(r) for t, r in rights.items()}, self.batch_size)
+        out.update(self._global_state())
         out.update({"done": truncated, "truncated": truncated.clone(), "terminated": terminated})
         for t, right in rights.items():
             flag = truncated.unsqueeze(1).expand(-1, self.agents, -1)

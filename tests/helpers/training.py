@@ -4,6 +4,7 @@ import csv
 
 from veca_marl.algos.networks.encoders import Precision
 from veca_marl.algos.networks.multisense import MultisenseCfg
+from veca_marl.algos.reporting import Reporter
 
 # float32: tests compare losses with formulas
 SMALL = MultisenseCfg(
@@ -12,7 +13,7 @@ SMALL = MultisenseCfg(
 FRAMES = 64  # of a batch
 
 
-class Interrupt:
+class Interrupt(Reporter):
     """A reporter that raises KeyboardInterrupt in the middle of a stage."""
 
     def __init__(self, frames):

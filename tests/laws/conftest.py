@@ -47,8 +47,8 @@ def _one(task, narrow):
 
 @pytest.fixture(scope="session")
 def cfg(task, kind):
-    """The game with short episodes."""
-    return game_cfg(task, kind, SHORT)
+    """The game with short episodes, and with the state of the simulator among the data."""
+    return game_cfg(task, kind, SHORT, "global_state=true")
 
 
 @pytest.fixture(scope="session")

@@ -6,6 +6,7 @@ import csv
 import logging
 import math
 import os
+from abc import ABC, abstractmethod
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -13,8 +14,9 @@ from enum import Enum
 from importlib.util import find_spec
 from io import StringIO
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
+from numpy.typing import NDArray
 from torchrl.record.loggers import Logger, MLFlowLogger, TensorboardLogger, WandbLogger
 
 from veca_marl.algos.files import WriteError, open_to_append, write_atomically, write_errors
@@ -25,9 +27,10 @@ _LOG = logging.getLogger(__name__)
 Row = Mapping[str, float | int | str]
 
 
-class Reporter(Protocol):
+class Reporter(ABC):
     """Receives rows of numbers."""
 
+    @abstractmethod
     def write(self, kind: str, frames: int, row: Row) -> None:
         """Record `row`, measured after `frames` training frames.
 
@@ -36,18 +39,30 @@ class Reporter(Protocol):
             frames: See above.
             row: Name to value; words tell rows of one kind and one number of frames apart.
         """
-        ...
 
+    def write_values(  # noqa: B027  optional
+        self, frames: int, values: Mapping[str, NDArray[Any]]
+    ) -> None:
+        """Record distributions after a stage, if there is a place for them.
+
+        Args:
+            frames: As for `write`.
+            values: Name to all values, in an array of any shape.
+        """
+
+    def write_video(self, frames: int, gif: bytes) -> None:  # noqa: B027  optional
+        """Record a video, an animated GIF, if there is a place for it."""
+
+    @abstractmethod
     def sync(self) -> None:
         """Let the rows so far survive a power cut: a checkpoint that follows them is written."""
-        ...
 
+    @abstractmethod
     def close(self) -> None:
         """Write what is pending."""
-        ...
 
 
-class MemoryReporter:
+class MemoryReporter(Reporter):
     """Keeps the rows.
 
     Attributes:
@@ -68,7 +83,7 @@ class MemoryReporter:
         """See `Reporter`; nothing is pending."""
 
 
-class CsvReporter:
+class CsvReporter(Reporter):
     """One tidy file per kind of row: ``metrics.csv``, ``evaluations.csv``.
 
     TorchRL's `CSVLogger` writes a file for each number; here one table holds a run, and a resumed
@@ -141,7 +156,7 @@ class CsvReporter:
             self._write_lost_rows(kind)
 
 
-class LoggerReporter:
+class LoggerReporter(Reporter):
     """One curve per number, named ``kind/name``, in a logger of TorchRL.
 
     Args:
@@ -171,6 +186,31 @@ class LoggerReporter:
         """Write pending points."""
         with write_errors(self._path):
             self._logger.close()
+
+
+class TensorboardReporter(LoggerReporter):
+    """Curves, histograms and videos in TensorBoard.
+
+    TorchRL's logger takes videos as tensors, for which TensorBoard needs `moviepy`; TensorBoard
+    itself shows an animated GIF as it is.
+    """
+
+    _logger: TensorboardLogger
+
+    def write_values(self, frames: int, values: Mapping[str, NDArray[Any]]) -> None:
+        """See `Reporter`: a histogram each."""
+        with write_errors(self._path):
+            for name, array in values.items():
+                self._logger.log_histogram(name, array, step=frames, bins="auto")
+
+    def write_video(self, frames: int, gif: bytes) -> None:
+        """See `Reporter`."""
+        from tensorboard.compat.proto.summary_pb2 import Summary
+
+        image = Summary.Image(encoded_image_string=gif, colorspace=3)
+        summary = Summary(value=[Summary.Value(tag="video", image=image)])
+        with write_errors(self._path):
+            self._logger.experiment.file_writer.add_summary(summary, frames)
 
 
 def _bytes(path: Path) -> int:
@@ -363,4 +403,5 @@ def make_reporter(
         return CsvReporter(folder, resumed_frames)
     with write_errors(folder):
         logger = _MAKERS[kind](folder, identifier, resumed_frames)
-    return LoggerReporter(logger, folder)
+    in_tensorboard = kind is LoggerKind.tensorboard
+    return (TensorboardReporter if in_tensorboard else LoggerReporter)(logger, folder)

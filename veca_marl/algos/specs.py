@@ -13,6 +13,7 @@ from torchrl.envs import EnvBase
 
 # the part of an action that has no name: its key is (team, "action") itself
 PLAIN = "action"
+STATE = "state"  # at the root: what the simulator knows
 
 
 class EnvFactory(Protocol):
@@ -67,6 +68,11 @@ class ActionLayout:
         """Parameters of its distribution: logits, or means and scales."""
         return self.size if self.discrete else 2 * self.size
 
+    @property
+    def dimensions(self) -> int:
+        """How many independent numbers are drawn: one choice, or those of the vector."""
+        return 1 if self.discrete else self.size
+
 
 @dataclass(frozen=True)
 class TeamSpec:
@@ -78,16 +84,20 @@ class TeamSpec:
         actions: Part of the action to layout. An action without named parts has the single part
             `PLAIN`.
         masked: Whether ``(team, "mask")`` marks the agents that are not eliminated.
+        state: Length of ``"state"``, what the simulator knows; 0 if there is none.
     """
 
     agents: int
     observations: dict[str, ArrayLayout]
     actions: dict[str, ActionLayout]
     masked: bool = False
+    state: int = 0
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain lists, numbers and strings, comparable after a round trip to disk."""
         plain = asdict(self)
+        if not self.state:  # as it was stored before there was one
+            del plain["state"]
         for layout in plain["observations"].values():
             layout["shape"] = list(layout["shape"])
         return plain
@@ -112,7 +122,7 @@ class TeamSpec:
         return spec
 
     def _check_types(self) -> None:
-        sizes = [self.agents, *(part.size for part in self.actions.values())]
+        sizes = [self.agents, self.state, *(part.size for part in self.actions.values())]
         sizes += [length for array in self.observations.values() for length in array.shape]
         bounds = [bound for a in self.observations.values() for bound in (a.low, a.high)]
         flags = [self.masked, *(part.discrete for part in self.actions.values())]
@@ -142,6 +152,7 @@ def team_specs(env: EnvBase) -> dict[str, TeamSpec]:
         ValueError: If a part of an action is neither a vector in [-1, 1] nor one of n choices.
     """
     batch_dims = len(env.batch_size)
+    state = env.observation_spec.get(STATE, None)
     return {
         team: TeamSpec(
             agents=len(agents),
@@ -151,6 +162,7 @@ def team_specs(env: EnvBase) -> dict[str, TeamSpec]:
             },
             actions=_action_layouts(team, env.full_action_spec[team, "action"]),
             masked="mask" in env.observation_spec[team].keys(),  # noqa: SIM118  a spec
+            state=0 if state is None else int(state.shape[-1]),
         )
         for team, agents in env.group_map.items()
     }

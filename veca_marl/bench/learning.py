@@ -21,7 +21,7 @@ from tempfile import TemporaryDirectory
 import torch
 from torchrl import timeit
 
-from veca_marl.algos.reporting import Row
+from veca_marl.algos.reporting import Reporter, Row
 from veca_marl.algos.training.schedule import Schedule, processor_seconds
 from veca_marl.bench.rollouts import RandomActions
 from veca_marl.config import Config
@@ -156,7 +156,7 @@ def measure_learning(cfg: Config, steps: int, stages: int) -> Learning:
     return _summary(cfg, turns)
 
 
-class Turns:
+class Turns(Reporter):
     """A reporter that takes the time of each stage and measures a rollout after it.
 
     Args:

@@ -68,6 +68,8 @@ class Config:
         team: Bodies and senses of single teams that differ from the common ones:
             ``+body@team.defender.body=walker_discrete``,
             ``+senses/vision@team.defender.senses.vision=blind``.
+        global_state: Whether the environment has the key ``state``, what the simulator knows, for
+            ``algo.network.critic=state``.
         opponent: Teams that do not learn, and what selects their actions: expert, random, idle, or
             the policy of another run: ``opponent.defender=expert``, ``opponent.defender=runs/...``.
         init_from: Teams that start from the parameters of another run (its folder or one of its
@@ -100,6 +102,7 @@ class Config:
     senses: SensesCfg = field(default_factory=SensesCfg.complete)
     clock: ClockCfg = field(default_factory=ClockCfg)
     team: dict[str, TeamCfg] = field(default_factory=dict)
+    global_state: bool = False
     opponent: dict[str, str] = field(default_factory=dict)
     init_from: dict[str, str] = field(default_factory=dict)
     init_encoders: dict[str, dict[str, str]] = field(default_factory=dict)
@@ -147,6 +150,7 @@ class Config:
             self.clock,
             self.team,
             {team: Script(player) for team, player in self.opponent.items() if player in _SCRIPTS},
+            self.global_state,
         )
 
     def check_teams(self) -> None:

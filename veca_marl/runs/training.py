@@ -22,7 +22,7 @@ from veca_marl.runs.assembly import make_reporters, make_trainer
 from veca_marl.runs.continuation import RunProgress
 from veca_marl.runs.cores import contention_warning, idle_cores_hint, load, usable_cores
 from veca_marl.runs.run_folder import RunFolder
-from veca_marl.runs.video import record_episode
+from veca_marl.runs.video import animated_gif, record_episode
 
 _LOG = logging.getLogger(__name__)
 
@@ -48,7 +48,7 @@ class TrainingResult:
     folder: Path | None
 
 
-class ProgressReporter:
+class ProgressReporter(Reporter):
     """Writes ``progress.json`` with each checkpoint.
 
     Args:
@@ -136,8 +136,9 @@ def run_training(
             video = LastVideo(folder.video, cfg.game, trainer)
             trainer.during_last_evaluation = video.record
         comparison = trainer.run()
-        if video is not None:
+        if video is not None and folder is not None:
             video.check()
+            _report_video(trainer, folder.video)
     timing = trainer.timing()
     if folder is not None:
         folder.write("timing.txt", timing)
@@ -151,6 +152,12 @@ def run_training(
         timing,
         None if folder is None else folder.path,
     )
+
+
+def _report_video(trainer: Trainer, path: Path) -> None:
+    gif = animated_gif(path)
+    for reporter in trainer.reporters:
+        reporter.write_video(trainer.progress.frames, gif)
 
 
 def _warn_of_contention() -> None:

@@ -6,6 +6,7 @@ import os
 from collections.abc import Iterator, Sequence
 from contextlib import closing
 from fractions import Fraction
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -172,6 +173,31 @@ def _audio_frames(
         frame.sample_rate, frame.pts = sample_rate_hz, start
         frame.time_base = Fraction(1, sample_rate_hz)
         yield frame
+
+
+def animated_gif(path: Path, fps: int = 10, scale: float = 0.5) -> bytes:
+    """Return the pictures of a video as an animated GIF, without its sound.
+
+    Args:
+        path: The video.
+        fps: About how many of its pictures per second are kept.
+        scale: Their size, as a share of that in the video.
+    """
+    target = BytesIO()
+    with av.open(str(path)) as source, av.open(target, "w", format="gif") as gif:
+        pictures = source.streams.video[0]
+        keep = max(round(float(pictures.average_rate or fps) / fps), 1)
+        stream = gif.add_stream("gif", rate=fps)
+        assert isinstance(stream, av.VideoStream)
+        stream.height, stream.width = (round(scale * n) for n in (pictures.height, pictures.width))
+        stream.pix_fmt = "rgb8"
+        for number, picture in enumerate(source.decode(pictures)):
+            if number % keep == 0:
+                small = picture.reformat(stream.width, stream.height, "rgb8")
+                small.pts, small.time_base = number // keep, Fraction(1, fps)
+                gif.mux(stream.encode(small))
+        gif.mux(stream.encode(None))
+    return target.getvalue()
 
 
 SAMPLE_RATE_HZ = 22_050  # of the ears

@@ -160,6 +160,12 @@ def test_training_episodes_count_the_share_that_ended_solved():
     assert np.isnan(TrainingEpisodes().add(batch[:, :1], "agents")["solved"])
 
 
+def means_of(stage, last_start):
+    episodes = TrainingEpisodes()
+    episodes.begin_stage(last_start)
+    return episodes.add(stage, "agents")
+
+
 @pytest.mark.parametrize("pieces", [[30], [7, 13, 10]])
 def test_episodes_that_end_early_are_not_too_many_among_those_of_a_stage(pieces):
     """Of the episodes one in five is solved, after 2 steps; the others last 20 steps."""
@@ -175,14 +181,15 @@ def test_episodes_that_end_early_are_not_too_many_among_those_of_a_stage(pieces)
                 done[world, step], solved[world, step] = True, early
     steps = [step_of(d.tolist(), s.tolist()) for d, s in zip(done.T, solved.T, strict=True)]
     stage = TensorDict({"next": torch.stack(steps, 1)}, done.shape)
-    episodes, means = TrainingEpisodes(last_start=30 - 20), []
+    episodes, means = TrainingEpisodes(), []
+    episodes.begin_stage(last_start=30 - 20)
     for batch in stage.split(pieces, dim=1):
         means.append(episodes.add(batch, "agents"))
     if len(pieces) == 1:
         assert means[0]["solved"] == pytest.approx(0.2, abs=0.02)
         assert means[0]["length"] == pytest.approx(0.2 * 2 + 0.8 * 20, abs=0.4)
-    whole = TrainingEpisodes(last_start=30 - 20).add(stage, "agents")
-    assert np.isnan(TrainingEpisodes(last_start=-1).add(stage, "agents")["return"])
+    whole = means_of(stage, last_start=30 - 20)
+    assert np.isnan(means_of(stage, last_start=-1)["return"])
     everything = TrainingEpisodes().add(stage, "agents")["solved"]
     assert everything > 0.3 > whole["solved"]
 
@@ -202,9 +209,9 @@ def test_rates_of_solved_episodes_are_printed_for_a_task_with_a_goal():
     assert "solved" not in row
 
 
-def test_the_last_evaluation_has_four_times_as_many_episodes_or_what_is_asked_for():
-    assert EvalCfg().last_episodes == 32
-    assert EvalCfg(episodes=2).last_episodes == 8
+def test_the_last_evaluation_has_twice_as_many_episodes_or_what_is_asked_for():
+    assert EvalCfg().last_episodes == 16
+    assert EvalCfg(episodes=2).last_episodes == 4
     assert EvalCfg(final_episodes=100).last_episodes == 100
     with pytest.raises(ValueError, match=naming("eval.final_episodes", "eval.episodes=8")):
         EvalCfg(final_episodes=7)

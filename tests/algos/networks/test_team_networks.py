@@ -7,6 +7,8 @@ from torchrl.envs import ExplorationType, set_exploration_type
 from training import SMALL, rewards_until
 
 from veca_marl.algos.networks.multisense import Critic, MultisenseCfg, Parameters
+from veca_marl.algos.ppo import PPO, PPOCfg
+from veca_marl.algos.specs import team_specs
 
 
 def sized(**options):
@@ -14,7 +16,7 @@ def sized(**options):
 
 
 def seen(agents, worlds=4):
-    state = FakeEnv(worlds, agents=agents).reset()
+    state = FakeEnv(worlds, agents=agents, global_state=True).reset()
     state["agents", "observation", "audio"] = torch.randn(worlds, agents, 2, 10)
     return state
 
@@ -36,7 +38,8 @@ def changed(before, after):
 @pytest.mark.parametrize("critic", list(Critic))
 @pytest.mark.parametrize("parameters", list(Parameters))
 def test_actors_read_their_own_and_central_critics_all_observations(make_ppo, critic, parameters):
-    ppo = make_ppo(network=sized(critic=critic, parameters=parameters), agents=3)
+    network = sized(critic=critic, parameters=parameters)
+    ppo = make_ppo(network=network, agents=3, global_state=True)
     state = seen(3)
     value, mean = values_and_means(ppo, state)
     state["agents", "observation", "audio"][:, 1] += 3.0
@@ -44,6 +47,58 @@ def test_actors_read_their_own_and_central_critics_all_observations(make_ppo, cr
     assert changed(mean, other_mean).tolist() == [False, True, False]
     expected = [critic is Critic.central, True, critic is Critic.central]
     assert changed(value, other_value).tolist() == expected
+
+
+@pytest.mark.parametrize("parameters", list(Parameters))
+def test_only_a_critic_of_the_state_reads_the_state(make_ppo, parameters):
+    ppo = make_ppo(
+        network=sized(critic=Critic.state, parameters=parameters), agents=3, global_state=True
+    )
+    state = seen(3)
+    value, mean = values_and_means(ppo, state)
+    state["state"][:, 0] += 2.0
+    other_value, other_mean = values_and_means(ppo, state)
+    assert changed(value, other_value).all()  # of every agent
+    assert not changed(mean, other_mean).any()
+
+
+def test_a_critic_of_the_state_needs_one(make_ppo):
+    with pytest.raises(ValueError, match="global_state=true"):
+        make_ppo(network=sized(critic=Critic.state))
+
+
+def test_a_critic_of_the_state_learns_what_no_observation_shows():
+    """The reward depends on the state alone, of which the actors have no sense."""
+    explained = {}
+    for critic in (Critic.own, Critic.state):
+        env = FakeEnv(16, global_state=True, horizon=1, senses=("audio",))
+        torch.manual_seed(0)
+        cfg = PPOCfg(network=sized(critic=critic), gamma=0.0, epochs=8)
+        ppo = PPO("agents", team_specs(env)["agents"], cfg, torch.device("cpu"))
+        for _ in range(12):
+            with torch.no_grad(), set_exploration_type(ExplorationType.RANDOM):
+                batch = env.rollout(16, ppo.actor, break_when_any_done=False)
+            batch["agents", "observation", "audio"].zero_()
+            batch["agents", "features"].fill_(1.0)
+            batch["next", "agents", "reward"] = batch["state"].unsqueeze(-1).clone()
+            explained[critic] = ppo.learn(batch)["explained_variance"]
+    assert explained[Critic.own] < 0.1
+    assert explained[Critic.state] > 0.8
+
+
+def test_agents_that_see_the_same_act_alike_unless_the_network_tells_them_apart(make_ppo):
+    for identity in (False, True):
+        ppo = make_ppo(network=sized(agent_identity=identity), agents=3)
+        state = seen(3)
+        for array in state["agents", "observation"].values():
+            array[:] = array[:, :1]
+        features = ppo.algorithms["agents"].network.encoder(state)["agents", "features"]
+        assert torch.allclose(features[:, 0], features[:, 1]) is not identity
+
+
+def test_separate_networks_need_no_identity():
+    with pytest.raises(ValueError, match=r"agent_identity.*separate"):
+        sized(agent_identity=True, parameters=Parameters.separate)
 
 
 @pytest.mark.parametrize("parameters", list(Parameters))

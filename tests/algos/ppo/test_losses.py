@@ -5,6 +5,7 @@ import torch
 from fake_env import FakeEnv
 from torch.distributions import Categorical, Normal, kl_divergence
 from torchrl.envs import ExplorationType, set_exploration_type
+from torchrl.objectives.multiagent import MAPPOLoss
 
 
 def perturb(ppo, scale=0.05):
@@ -52,6 +53,38 @@ def test_loss_equals_the_formula(make_ppo, discrete, agents):
         entropy = new.entropy().mean()
         torch.testing.assert_close(out["entropy"], entropy, rtol=1e-4, atol=1e-5)
         torch.testing.assert_close(out["loss_entropy"].detach(), -0.03 * entropy)
+
+
+@pytest.mark.parametrize("discrete", [False, True])
+def test_loss_and_gradient_are_those_of_torchrls_mappo(make_ppo, discrete):
+    ppo = make_ppo(discrete=discrete, agents=2)
+    rows = minibatch(ppo, 2, discrete=discrete)
+    perturb(ppo, scale=0.2)
+    learner = ppo.algorithms["agents"]
+    theirs = MAPPOLoss(
+        learner.network.actor,
+        learner.network.critic,
+        clip_epsilon=learner.cfg.clip,
+        entropy_coeff=learner.cfg.entropy_coefficient,
+        critic_coeff=learner.cfg.value_coefficient,
+        loss_critic_type="l2",
+        functional=False,
+    )
+    theirs.set_keys(
+        value=("agents", "state_value"),
+        **{name: ("agents", name) for name in ("reward", "done", "terminated")},
+        **{name: ("agents", name) for name in ("advantage", "value_target")},
+    )
+    found = []
+    for loss in (learner.loss, theirs):
+        torch.manual_seed(2)  # the entropy of a tanh-normal is sampled
+        out = loss(rows.clone())
+        learner.network.zero_grad()
+        parts = [out[name] for name in ("loss_objective", "loss_critic", "loss_entropy")]
+        sum(parts).backward()
+        gradient = torch.cat([p.grad.flatten() for p in learner.network.parameters()])
+        found.append((*(part.detach() for part in parts), gradient))
+    torch.testing.assert_close(found[0], found[1], rtol=1e-5, atol=1e-6)
 
 
 @pytest.mark.parametrize("discrete", [False, True])

@@ -5,6 +5,7 @@ import math
 import pytest
 import torch
 from fake_env import FakeEnv
+from gae import gae_by_hand
 from torch.distributions import kl_divergence
 from torchrl.data import Categorical
 from torchrl.envs import ExplorationType, check_env_specs, set_exploration_type
@@ -14,6 +15,7 @@ from training import SMALL
 from veca_marl.algos.networks.memory import with_memory
 from veca_marl.algos.networks.multisense import Critic, Memory, MultisenseCfg
 from veca_marl.algos.ppo import PPO, PPOCfg
+from veca_marl.algos.ppo.advantages import Credit, advantages
 from veca_marl.algos.ppo.losses import VALID, explained_variance
 from veca_marl.algos.ppo.value_normalisation import ValueNormalisation
 from veca_marl.algos.specs import team_specs
@@ -37,7 +39,7 @@ class LeavingEnv(FakeEnv):
 @pytest.fixture(params=list(Critic))
 def leaving(request):
     def make(hybrid=False, memory=Memory.none, **numbers):
-        env = LeavingEnv(8, hybrid=hybrid)
+        env = LeavingEnv(8, hybrid=hybrid, global_state=True)
         torch.manual_seed(0)
         network = MultisenseCfg(**{**vars(SMALL), "critic": request.param, "memory": memory})
         cfg = PPOCfg(network=network, sequence_steps=8, **numbers)
@@ -68,7 +70,7 @@ def move_policy(ppo):
 
 def step(ppo, rows):
     """Return losses, measures and gradient of one step that changes no parameter."""
-    ppo.optimizer.step = lambda: None
+    ppo.optimizer.step = ppo.critic_optimizer.step = lambda: None
     torch.manual_seed(0)  # the entropy of a tanh-normal is sampled
     measures = ppo.step(rows)
     return measures, torch.cat([p.grad.flatten() for p in ppo.network.parameters()])
@@ -129,6 +131,31 @@ def test_advantages_of_present_agents_ignore_masked_observations(leaving):
             torch.testing.assert_close(
                 plain["agents", name][:, agent], other["agents", name][:, agent]
             )
+
+
+def test_after_its_elimination_an_agent_can_be_credited_with_what_its_team_gains(leaving):
+    ppo, batch = leaving()
+    step = batch["next", "agents"]
+    step["terminated"][..., 1, :] = ~step["mask"][..., 1:2]
+    step["done"] |= step["terminated"]
+    numbers = batch, "agents", 0.9, 0.8
+    alone = advantages(ppo.network, *numbers, Credit.nothing)
+    shared = advantages(ppo.network, *numbers, Credit.team)
+    with torch.no_grad():
+        value, following = (
+            ppo.network.critic(ppo.network.encoder(part.clone()))["agents", "state_value"]
+            for part in (batch, batch["next"])
+        )
+    eliminated = step["terminated"] & ~batch["next", "terminated"].unsqueeze(-1)
+    assert eliminated.any()
+    mates = following[..., [0, 2], :].mean(-2, keepdim=True).expand_as(following)
+    following = torch.where(eliminated, mates, following)
+    signals = step["reward"], step["done"], step["terminated"] & ~eliminated
+    expected = gae_by_hand(value, following, *signals, 0.9, 0.8)
+    torch.testing.assert_close(shared["advantage"], expected, rtol=1e-4, atol=1e-5)
+    assert not torch.equal(alone["advantage"][..., 1, :], shared["advantage"][..., 1, :])
+    for agent in (0, 2):  # nothing changes for the others
+        assert torch.equal(alone["advantage"][..., agent, :], shared["advantage"][..., agent, :])
 
 
 def test_measures_are_means_over_the_agents_that_are_present(leaving):

@@ -7,7 +7,9 @@ import torch
 from fake_env import FakeEnv
 from gae import gae_by_hand
 from refusals import naming
+from tensordict.nn import TensorDictSequential
 from torchrl.envs import ExplorationType, set_exploration_type
+from torchrl.objectives.value import MultiAgentGAE
 from training import SMALL, rewards_until
 
 from veca_marl.algos.collection.experience import CollectCfg, Experience
@@ -41,6 +43,55 @@ def test_advantages_equal_the_recursion(make_ppo, agents, terminated):
     assert batch["next", "done"].any(), "the test must see ends of episodes"
     torch.testing.assert_close(found["advantage"], expected, rtol=1e-4, atol=1e-5)
     torch.testing.assert_close(found["value_target"], expected + value, rtol=1e-4, atol=1e-5)
+
+
+def test_advantages_are_those_of_torchrls_estimator_for_teams(make_ppo):
+    """TorchRL's module calls the network on every observation, and on every following one."""
+    ppo = make_ppo(agents=2)
+    with torch.no_grad(), set_exploration_type(ExplorationType.RANDOM):
+        batch = FakeEnv(4, agents=2, horizon=5).rollout(
+            13, ppo.policy.collect, break_when_any_done=False, auto_cast_to_device=False
+        )
+    network = ppo.algorithms["agents"].network
+    found = advantages(network, batch, "agents", 0.99, 0.95)
+    whole = TensorDictSequential(network.encoder, network.critic)
+    estimator = MultiAgentGAE(gamma=0.99, lmbda=0.95, value_network=whole)
+    names = ("reward", "done", "terminated", "advantage", "value_target")
+    estimator.set_keys(
+        value=("agents", "state_value"), **{name: ("agents", name) for name in names}
+    )
+    theirs = estimator(batch.clone())
+    for name in ("advantage", "value_target"):
+        torch.testing.assert_close(found[name], theirs["agents", name], rtol=1e-4, atol=1e-5)
+
+
+def test_the_divergence_is_measured_against_a_target_for_each_dimension_of_the_action():
+    targets = {}
+    for form in ({}, {"discrete": True}, {"hybrid": True}):
+        spec = team_specs(FakeEnv(1, **form))["agents"]
+        ppo = PPO("agents", spec, PPOCfg(network=SMALL, target_kl=0.01), CPU)
+        targets[next(iter(form), "vector")] = ppo.schedule.target_kl
+    assert targets == pytest.approx({"vector": 0.02, "discrete": 0.01, "hybrid": 0.03})
+
+
+def test_the_rate_of_the_critic_is_its_own(make_ppo):
+    """After a divergence far above the target the actor's rate falls, the critic's does not."""
+    ppo = make_ppo().algorithms["agents"]
+    rates = ppo.optimizer.param_groups[0], ppo.critic_optimizer.param_groups[0]
+    before = [group["lr"] for group in rates]
+    ppo.schedule.step(100.0 * ppo.schedule.target_kl)
+    assert rates[0]["lr"] < before[0]
+    assert rates[1]["lr"] == before[1] == ppo.cfg.critic_learning_rate
+    learnt = [p for group in rates for p in group["params"]]
+    assert len(learnt) == len({id(p) for p in learnt}) == len(list(ppo.network.parameters()))
+    assert len(rates[1]["params"]) == 2  # weight and bias of the value head
+
+
+def test_first_values_are_close_to_zero(make_ppo):
+    network = make_ppo().algorithms["agents"].network
+    state = FakeEnv(16).reset()
+    values = network.critic(network.encoder(state))["agents", "state_value"]
+    assert values.abs().max() < 0.1
 
 
 @pytest.mark.parametrize(("gamma", "gae_lambda"), [(0.9, 0.0), (0.0, 0.95), (0.0, 0.0)])

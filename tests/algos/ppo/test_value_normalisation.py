@@ -36,14 +36,19 @@ def predictions(learner, rows):
 
 def make_critic(preserve, **network):
     torch.manual_seed(0)
-    spec = team_specs(FakeEnv(1, agents=2))["agents"]
+    spec = team_specs(FakeEnv(1, agents=2, global_state=True))["agents"]
     made = make_network("agents", spec, MultisenseCfg(**{**vars(SMALL), **network}))
+    with torch.no_grad():  # as large as after learning
+        for layer in made.critic.modules():
+            if isinstance(layer, torch.nn.Linear) and layer.out_features == 1:
+                layer.weight.mul_(100.0)
     return NormalisedCritic(made.critic, KEY, preserve)
 
 
 def values(normalised):
     features = torch.randn(5, 2, 32, generator=torch.Generator().manual_seed(0))
-    return normalised.critic(TensorDict({"agents": {"features": features}}, [5]))[KEY].detach()
+    read = {"agents": {"features": features}, "state": torch.ones(5, 2)}
+    return normalised.critic(TensorDict(read, [5]))[KEY].detach()
 
 
 @pytest.mark.parametrize("critic", Critic)

@@ -4,10 +4,13 @@ import math
 import os
 import resource
 import shutil
+from io import BytesIO
 
+import numpy as np
 import pytest
 import torch
 from fake_env import FakeEnv
+from PIL import Image
 from refusals import naming
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 from tensordict import TensorDict
@@ -23,6 +26,7 @@ from veca_marl.algos.reporting import (
     make_reporter,
 )
 from veca_marl.algos.training.schedule import timing_table
+from veca_marl.runs.video import animated_gif, write_video
 
 
 def rows_of(path):
@@ -35,16 +39,17 @@ def test_episodes_are_summed_across_batches():
     play = FakeEnv(3, horizon=7).rollout(42, break_when_any_done=False)
     whole = TrainingEpisodes().add(play, "agents")
     in_pieces = TrainingEpisodes()
-    found, weights = [], []
-    for piece in play.split([5, 1, 20, 16], dim=1):
+    found, ended, last = 0.0, 0, math.nan
+    for piece in play.split([5, 1, 20, 4, 12], dim=1):
         means = in_pieces.add(piece, "agents")
-        ended = int(piece["next", "done"].sum())
-        assert math.isnan(means["return"]) == (ended == 0)
-        if ended:
-            found.append(means["return"] * ended)
-            weights.append(ended)
-    assert sum(weights) == 3 * 6
-    assert sum(found) / sum(weights) == pytest.approx(whole["return"])
+        assert means["episodes"] == int(piece["next", "done"].sum())
+        found += means["return"] * means["episodes"] if means["episodes"] else 0.0
+        ended += int(means["episodes"])
+        if not means["episodes"]:  # as in the last batch in which an episode ended, if there is one
+            assert means["return"] == pytest.approx(last, nan_ok=True)
+        last = means["return"]
+    assert ended == 3 * 6
+    assert found / ended == pytest.approx(whole["return"])
     assert whole["length"] == 7
     assert whole["right"] == pytest.approx(whole["return"])
     assert whole["reward_per_step"] == pytest.approx(whole["return"] / 7)
@@ -53,7 +58,9 @@ def test_episodes_are_summed_across_batches():
 def test_returns_are_means_over_the_agents_of_a_team():
     step = TensorDict({"agents": {"reward": torch.tensor([[[[1.0], [3.0]]]])}}, (1, 1))
     step["done"] = torch.ones(1, 1, 1, dtype=torch.bool)
-    assert TrainingEpisodes().add(TensorDict({"next": step}, (1, 1)), "agents")["return"] == 2.0
+    means = TrainingEpisodes().add(TensorDict({"next": step}, (1, 1)), "agents")
+    assert means["return"] == 2.0
+    assert (means["return/0"], means["return/1"]) == (1.0, 3.0)
 
 
 def test_csv_has_one_row_per_write_and_blanks_for_nan(tmp_path):
@@ -223,6 +230,24 @@ def test_points_after_a_checkpoint_are_hidden_when_a_run_resumes(tmp_path):
         reporter.close()
     events = EventAccumulator(str(tmp_path / "tensorboard")).Reload()
     assert [(p.step, p.value) for p in events.Scalars("metrics/x")] == [(10, 1.0), (20, 2.0)]
+
+
+def test_tensorboard_holds_histograms_and_the_video(tmp_path):
+    pictures = [np.full((32, 48, 3), level, np.uint8) for level in (0, 80, 160, 240) * 5]
+    write_video(tmp_path / "video.mp4", pictures, None, 20, 22_050)
+    gif = animated_gif(tmp_path / "video.mp4", fps=10)
+    reporter = make_reporter(LoggerKind.tensorboard, tmp_path, "run")
+    reporter.write_values(10, {"actions/red": np.array([[0.0, 1.0], [1.0, 1.0]])})
+    reporter.write_video(10, gif)
+    reporter.close()
+    events = EventAccumulator(str(tmp_path / "tensorboard")).Reload()
+    (histogram,) = events.Histograms("actions/red")
+    assert (histogram.step, histogram.histogram_value.num) == (10, 4.0)
+    assert histogram.histogram_value.sum == pytest.approx(3.0)
+    (image,) = events.Images("video")
+    shown = Image.open(BytesIO(image.encoded_image_string))
+    assert shown.size == (24, 16)
+    assert shown.n_frames == 10  # every second picture
 
 
 @pytest.mark.parametrize("kind", [LoggerKind.wandb, LoggerKind.mlflow])

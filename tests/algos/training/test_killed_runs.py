@@ -11,6 +11,7 @@ from killed_runs import Child, assert_equal, die, make_trainer, stored
 from training import FRAMES
 
 from veca_marl.algos import files
+from veca_marl.algos.reporting import MemoryReporter
 from veca_marl.processes.supervision import WorkerError
 
 
@@ -68,7 +69,7 @@ def test_a_run_killed_at_random_moments_stores_the_same(whole, tmp_path):
     assert_equal(stored(tmp_path / "run"), whole[0])
 
 
-class KillAWorker:
+class KillAWorker(MemoryReporter):
     """A reporter that kills a worker process after some frames."""
 
     def __init__(self, frames):

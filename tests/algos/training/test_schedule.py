@@ -13,6 +13,10 @@ from veca_marl.algos.training.schedule import Schedule
         (95, 45, 10, [5, 5]),
         (30, 1000, 10, [3]),
         (1, 1, 10, [1]),
+        (205, 80, 10, [2, 6, 8, 5]),  # a short stage first, where a quarter is two batches
+        (100, 70, 10, [7, 3]),
+        (20, 80, 10, [2]),
+        (30, 80, 10, [2, 1]),
     ],
 )
 def test_stages_add_up_to_the_budget(total, per_stage, per_batch, stages):
@@ -21,6 +25,13 @@ def test_stages_add_up_to_the_budget(total, per_stage, per_batch, stages):
     assert schedule.frames == per_batch * sum(stages) >= total
     for finished in range(len(stages) + 1):
         assert list(schedule.stages_after(sum(stages[:finished]))) == stages[finished:]
+
+
+def test_the_short_first_stage_ends_with_a_checkpoint_alone():
+    schedule = Schedule.of(205, 80, 10)
+    ends = [2, 8, 16, 21]
+    assert [schedule.is_evaluated(batches) for batches in ends] == [False, True, True, True]
+    assert [b for b in range(21) if not schedule.is_within_stage(b)] == [0, 2, 8, 16]
 
 
 def test_a_run_beyond_its_budget_has_no_stages_left():

@@ -59,7 +59,7 @@ def score_rows(player: str, scores: Mapping[str, Scores]) -> list[dict[str, floa
                 "return_high": high,
                 "length": float(score.lengths.mean()),
                 **solved_rate(score),
-                **{name: float(values.mean()) for name, values in score.terms.items()},
+                **{n: float(values.mean()) for n, values in (score.each | score.terms).items()},
             }
         )
     return rows

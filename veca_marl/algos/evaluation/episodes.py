@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +11,9 @@ from tensordict import TensorDictBase
 
 SOLVED = "solved"
 """Entry of ``(team, "info")`` that is read at the end of an episode; the others are summed."""
+
+EACH = "return/"
+"""What the name of the return of one agent begins with; the index of the agent follows."""
 
 
 def team_measures(step: TensorDictBase, team: str) -> dict[str, NDArray[np.float64]]:
@@ -20,16 +24,24 @@ def team_measures(step: TensorDictBase, team: str) -> dict[str, NDArray[np.float
         team: Name of the team.
 
     Returns:
-        ``return`` (the reward), ``length`` (one for each step) and each entry of
-        ``(team, "info")`` (the unweighted reward terms; ``solved`` in a task with a goal): arrays
-        of the batch shape of `step`.
+        ``return`` (the reward), ``length`` (one for each step), each entry of
+        ``(team, "info")`` (the unweighted reward terms; ``solved`` in a task with a goal), and in a
+        team of several agents ``return/0``, ``return/1``, ...: the reward of each of them. They
+        are arrays of the batch shape of `step`.
     """
     reward = _agent_mean(step[team, "reward"])
-    measures = {"return": reward, "length": np.ones_like(reward)}
+    measures = {"return": reward, "length": np.ones_like(reward), **_of_each(step, team)}
     info = step[team].get("info", None)
     for name, term in sorted(info.items()) if info is not None else ():
         measures[name] = _agent_mean(term)
     return measures
+
+
+def _of_each(step: TensorDictBase, team: str) -> dict[str, NDArray[np.float64]]:
+    """Return the reward of each agent, if there are several."""
+    rewards = step[team, "reward"].squeeze(-1).double().cpu().numpy()
+    agents = rewards.shape[-1]
+    return {f"{EACH}{i}": rewards[..., i] for i in range(agents)} if agents > 1 else {}
 
 
 def _agent_mean(array: object) -> NDArray[np.float64]:
@@ -84,11 +96,23 @@ class TrainingEpisodes:
     end early would be too many: an episode counts if one of the greatest length that starts with
     it would end in the stage, too.
 
-    Args:
-        last_start: Step of the stage, from 0, at which the last episodes that count begin.
+    Worlds that play episodes of equal length end them in the same batch. A batch in which no
+    episode ends repeats the means of the last one in which some did.
+
+    Attributes:
+        last: Team to the means of the last batch in which an episode ended.
     """
 
-    def __init__(self, last_start: float = math.inf) -> None:
+    def __init__(self) -> None:
+        self.last: dict[str, dict[str, float]] = {}
+        self.begin_stage()
+
+    def begin_stage(self, last_start: float = math.inf) -> None:
+        """Forget the episodes that have not ended.
+
+        Args:
+            last_start: Step of the stage, from 0, at which the last episodes that count begin.
+        """
         self._last_start = last_start
         self._open: dict[tuple[str, str], NDArray[np.float64]] = {}
         self._begun: dict[str, NDArray[np.int64]] = {}
@@ -98,18 +122,25 @@ class TrainingEpisodes:
         """Return means over the episodes that ended in `batch` ``(worlds, steps)`` and count.
 
         Returns:
-            ``return``, ``length`` and each reward term, NaN where no episode ended; in a task with
-            a goal ``solved``, the share of the episodes that ended solved; and ``reward_per_step``,
-            the mean over all steps.
+            ``episodes``, their number; ``return``, ``length`` and each reward term, see
+            `team_measures`, NaN before any episode has ended; in a task with a goal ``solved``, the
+            share of the episodes that ended solved; and ``reward_per_step``, the mean over all
+            steps.
         """
         done = batch["next", "done"].squeeze(-1).cpu().numpy()
         counted = self._counted(team, done)
         measures = team_measures(batch["next"], team)
-        means = {"reward_per_step": float(measures["return"].mean())}
-        for name, values in measures.items():
-            ends = values[done] if name == SOLVED else self._finish((team, name), values, done)
-            means[name] = float(np.mean(ends[counted])) if counted.any() else math.nan
-        return means
+        ended = {
+            name: values[done] if name == SOLVED else self._finish((team, name), values, done)
+            for name, values in measures.items()
+        }
+        if counted.any():
+            self.last[team] = {n: float(np.mean(ends[counted])) for n, ends in ended.items()}
+        return {
+            "episodes": float(np.count_nonzero(counted)),
+            "reward_per_step": float(measures["return"].mean()),
+            **self.last.get(team, dict.fromkeys(measures, math.nan)),
+        }
 
     def _counted(self, team: str, done: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """Return which of the episodes that end count, world after world."""
@@ -138,3 +169,18 @@ class TrainingEpisodes:
             carried[world] = sums.pop()
             finished += sums
         return np.array(finished)
+
+
+def stored_means(stored: Any) -> dict[str, dict[str, float]]:
+    """Return what a checkpoint holds of `TrainingEpisodes.last`.
+
+    Raises:
+        ValueError: If it is something else.
+    """
+    teams = stored.values() if isinstance(stored, dict) else [None]
+    if not all(
+        isinstance(means, dict) and all(type(mean) is float for mean in means.values())
+        for means in teams
+    ):
+        raise ValueError(f"no means of episodes: {stored!r:.80}")
+    return dict(stored)

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum
+from typing import Any
 
 import numpy as np
 import torch
@@ -15,7 +16,7 @@ from torchrl.data import Composite
 from torchrl.envs import EnvBase, ExplorationType, TransformedEnv, set_exploration_type
 from torchrl.envs.utils import RandomPolicy
 
-from veca_marl.algos.evaluation.episodes import SOLVED, EpisodeTally
+from veca_marl.algos.evaluation.episodes import EACH, SOLVED, EpisodeTally
 from veca_marl.algos.networks.memory import with_memory
 
 
@@ -48,10 +49,11 @@ class EvalCfg:
     Attributes:
         every_frames: Training frames between two evaluations (rounded up to whole batches). The
             training worlds start new episodes after each, so that a run resumed from the
-            checkpoint continues exactly.
+            checkpoint continues exactly. After a quarter of the first of these stages there is a
+            checkpoint too.
         episodes: Episodes of an evaluation; each evaluation has the same starts.
         final_episodes: Episodes of the last evaluation of a run and of the random policy it is
-            compared with, the same as those of other evaluations and more; None is four times
+            compared with, the same as those of other evaluations and more; None is twice
             `episodes`.
         worlds: Worlds that play them at the same time, in all worker processes together.
         exploration: ``deterministic`` takes the most likely actions, ``stochastic`` samples as
@@ -77,7 +79,7 @@ class EvalCfg:
     @property
     def last_episodes(self) -> int:
         """Episodes of the last evaluation."""
-        return 4 * self.episodes if self.final_episodes is None else self.final_episodes
+        return 2 * self.episodes if self.final_episodes is None else self.final_episodes
 
 
 @dataclass(frozen=True)
@@ -90,12 +92,14 @@ class Scores:
         terms: The same sum for each unweighted term of the reward.
         solved: Share of the team's agents for which the goal was reached at the end of the episode,
             in [0, 1]; None if the task has no goal.
+        each: The return of each agent, by ``return/0``, ``return/1``, ...; empty for a team of one.
     """
 
     returns: NDArray[np.float64]
     lengths: NDArray[np.float64]
     terms: dict[str, NDArray[np.float64]]
     solved: NDArray[np.float64] | None = None
+    each: dict[str, NDArray[np.float64]] = field(default_factory=dict)
 
 
 def evaluate(
@@ -157,7 +161,8 @@ def _play_one_each(env: EnvBase, policy: ActionPolicy, count: int) -> EpisodeTal
 def _joined(parts: Sequence[dict[str, NDArray[np.float64]]]) -> Scores:
     sums = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
     returns, lengths, solved = sums.pop("return"), sums.pop("length"), sums.pop(SOLVED, None)
-    return Scores(returns, lengths, sums, solved)
+    each = {name: sums.pop(name) for name in list(sums) if name.startswith(EACH)}
+    return Scores(returns, lengths, sums, solved, each)
 
 
 def joined_scores(parts: Sequence[Mapping[str, Scores]]) -> dict[str, Scores]:
@@ -166,14 +171,16 @@ def joined_scores(parts: Sequence[Mapping[str, Scores]]) -> dict[str, Scores]:
         team: Scores(
             np.concatenate([part[team].returns for part in parts]),
             np.concatenate([part[team].lengths for part in parts]),
-            {
-                name: np.concatenate([part[team].terms[name] for part in parts])
-                for name in scores.terms
-            },
+            _joined_terms([part[team].terms for part in parts]),
             _joined_solved([part[team].solved for part in parts]),
+            _joined_terms([part[team].each for part in parts]),
         )
-        for team, scores in parts[0].items()
+        for team in parts[0]
     }
+
+
+def _joined_terms(parts: Sequence[dict[str, NDArray[np.float64]]]) -> dict[str, NDArray[Any]]:
+    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
 
 def _joined_solved(parts: Sequence[NDArray[np.float64] | None]) -> NDArray[np.float64] | None:

@@ -19,7 +19,7 @@ from veca_marl.algos.networks.factory import (
     find_network,
     freeze,
 )
-from veca_marl.algos.networks.layers import PerAgent, perceptron
+from veca_marl.algos.networks.layers import CRITIC_GAIN, PerAgent, perceptron
 from veca_marl.algos.specs import TeamSpec
 
 
@@ -130,6 +130,11 @@ class ActionValues(nn.Module):
 
     def __init__(self, factory: NetworkFactory, cfg: ActionValuesCfg) -> None:
         super().__init__()
+        if factory.critic_reads_state:
+            raise ValueError(
+                "algo.network.critic=state is for PPO, whose batches hold the global state; "
+                "choices for SAC: own, central"
+            )
         layouts = factory.spec.actions.values()
         vector = sum(layout.size for layout in layouts if not layout.discrete)
         choices = [layout.size for layout in layouts if layout.discrete]
@@ -138,14 +143,12 @@ class ActionValues(nn.Module):
         inputs = factory.features + vector
         if self.central:
             inputs += factory.features + vector + sum(choices)
-        # the first values are close to 0: those of a random layer are far larger than the rewards
-        # of a step, and a moving average of the critics takes long to lose them
         make = partial(
             perceptron,
             inputs,
             cfg.hidden,
             self.combinations,
-            gain=0.01,
+            gain=CRITIC_GAIN,
             norm=_LAYERS[cfg.normalisation],
         )
         self.critics = nn.ModuleList(factory.per_agent(make) for _ in range(cfg.critics))

@@ -17,7 +17,7 @@ from tensordict.nn import ProbabilisticTensorDictSequential, TensorDictModule, T
 from torch import nn
 
 from veca_marl.algos.algorithm import Algorithm, ChoiceRegistry
-from veca_marl.algos.networks.layers import orthogonal, perceptron
+from veca_marl.algos.networks.layers import perceptron, value_layer
 from veca_marl.algos.networks.policy_heads import SMALLEST_SCALE, action_distribution, policy_head
 from veca_marl.algos.sense_encoders import copy_parameters, encoders_of
 from veca_marl.algos.specs import TeamSpec
@@ -100,6 +100,11 @@ class NetworkFactory(ABC):
         """Whether an agent's critic reads what its whole team observes."""
         return False
 
+    @property
+    def critic_reads_state(self) -> bool:
+        """Whether it reads the global state."""
+        return False
+
     def actor(
         self, encoder: TensorDictModuleBase, hidden: Sequence[int] = ()
     ) -> ProbabilisticTensorDictSequential:
@@ -131,9 +136,10 @@ class NetworkFactory(ABC):
 
     def critic(self) -> TensorDictModuleBase:
         """Return the module from ``(team, "features")`` to ``(team, "state_value")``."""
-        layer = orthogonal(nn.Linear(self.features, 1), gain=1.0)
         return TensorDictModule(
-            layer, in_keys=[(self.team, "features")], out_keys=[(self.team, "state_value")]
+            value_layer(self.features),
+            in_keys=[(self.team, "features")],
+            out_keys=[(self.team, "state_value")],
         )
 
 

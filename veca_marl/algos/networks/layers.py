@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable, Sequence
 
 import torch
 from torch import Tensor, nn
+from torchrl.modules.functional import symlog
 
 
 class PerAgent(nn.Module):
@@ -56,6 +57,29 @@ class CentralValue(nn.Module):
         return values
 
 
+class StateValue(nn.Module):
+    """Values from each agent's features beside the global state.
+
+    Args:
+        head: Maps ``(..., agents, F + S)`` to ``(..., agents, 1)``.
+    """
+
+    def __init__(self, head: nn.Module) -> None:
+        super().__init__()
+        self.head = head
+
+    def forward(self, features: Tensor, state: Tensor) -> Tensor:
+        """Return values ``(..., agents, 1)``.
+
+        Args:
+            features: ``(..., agents, F)``.
+            state: ``(..., S)``; symlog is applied, as its numbers have many magnitudes.
+        """
+        each = symlog(state).unsqueeze(-2).expand(*features.shape[:-1], -1)
+        values: Tensor = self.head(torch.cat([features, each], dim=-1))
+        return values
+
+
 def _team_mean(features: Tensor, mask: Tensor | None) -> Tensor:
     if mask is None:
         return features.mean(dim=-2, keepdim=True).expand_as(features)
@@ -73,6 +97,20 @@ def orthogonal(layer: nn.Linear | nn.Conv2d, gain: float = math.sqrt(2.0)) -> nn
     if layer.bias is not None:
         nn.init.zeros_(layer.bias)
     return layer
+
+
+CRITIC_GAIN = 0.01
+"""Gain of the last layer of a critic.
+
+The first values are close to 0. Those of a random layer with a gain of 1 (Huang et al. 2022) are
+far larger than the rewards of a step and spoil the first advantages, and a moving average of
+critics takes long to lose them.
+"""
+
+
+def value_layer(width: int) -> nn.Module:
+    """Return the last layer of a critic, from `width` features to one value."""
+    return orthogonal(nn.Linear(width, 1), CRITIC_GAIN)
 
 
 def perceptron(

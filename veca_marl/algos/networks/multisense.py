@@ -19,22 +19,33 @@ from veca_marl.algos.networks.encoders import (
     make_encoder,
 )
 from veca_marl.algos.networks.factory import NetworkCfg, NetworkFactory, register_network
-from veca_marl.algos.networks.layers import CentralValue, PerAgent, orthogonal
+from veca_marl.algos.networks.layers import (
+    CRITIC_GAIN,
+    CentralValue,
+    PerAgent,
+    StateValue,
+    orthogonal,
+    perceptron,
+    value_layer,
+)
 from veca_marl.algos.networks.memory import GatedMemory, TeamMemory, features_and_state, state_alone
 from veca_marl.algos.sense_encoders import SenseEncoders
-from veca_marl.algos.specs import ArrayLayout, TeamSpec
+from veca_marl.algos.specs import STATE, ArrayLayout, TeamSpec
 
 
 class Critic(Enum):
-    """The input of an agent's critic; its actor reads its own observation alone in both cases.
+    """The input of an agent's critic; its actor reads its own observation alone in all cases.
 
     Attributes:
         own: The agent's observation: independent PPO (de Witt et al. 2020).
         central: The observations of its whole team: MAPPO (Yu et al. 2022).
+        state: Its observation and the global state: MAPPO with what Yu et al. call the
+            "agent-specific" state. For PPO; needs ``global_state=true``.
     """
 
     own = "own"
     central = "central"
+    state = "state"
 
 
 class Parameters(Enum):
@@ -77,6 +88,8 @@ class MultisenseCfg(NetworkCfg):
         precision: Arithmetic of the encoder that learns; policies act in float32.
         critic: Input of the critic.
         parameters: One network for a team, or one for each of its agents.
+        agent_identity: Whether the joined layer also reads which agent of its team it serves, as
+            one of n; for networks that the agents share.
     """
 
     not_parameters = ("frozen", "precision")
@@ -95,9 +108,15 @@ class MultisenseCfg(NetworkCfg):
     precision: Precision = Precision.auto
     critic: Critic = Critic.own
     parameters: Parameters = Parameters.shared
+    agent_identity: bool = False
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        if self.agent_identity and self.parameters is Parameters.separate:
+            raise ValueError(
+                "network.agent_identity=true is for network.parameters=shared: with "
+                "parameters=separate each agent has a network of its own"
+            )
         for name in ("channels", "kernels", "strides"):
             numbers = list(getattr(self, name))
             if len(numbers) != 3 or min(numbers) < 1:
@@ -129,10 +148,18 @@ class Trunk(nn.Module):
 
     Agents are folded into the batch: they share the parameters. A sense that the team does not
     have leaves no parameters.
+
+    Args:
+        observations: The observations of an agent.
+        cfg: Sizes.
+        identities: Number of agents that it tells from each other, or 0.
     """
 
-    def __init__(self, observations: dict[str, ArrayLayout], cfg: MultisenseCfg) -> None:
+    def __init__(
+        self, observations: dict[str, ArrayLayout], cfg: MultisenseCfg, identities: int = 0
+    ) -> None:
         super().__init__()
+        self.identities = identities
         self.ranks = {name: len(layout.shape) for name, layout in observations.items()}
         encoders = {
             name: make_encoder(
@@ -146,7 +173,7 @@ class Trunk(nn.Module):
             for name, layout in observations.items()
         }
         self.encoders = SenseEncoders(encoders)
-        joined = sum(encoder.features for encoder in encoders.values())
+        joined = sum(encoder.features for encoder in encoders.values()) + identities
         self.join = nn.Sequential(orthogonal(nn.Linear(joined, cfg.trunk_features)), nn.ReLU())
         self.arithmetic = Arithmetic(cfg.precision)
 
@@ -159,6 +186,9 @@ class Trunk(nn.Module):
                 encoder(array.reshape(-1, *array.shape[len(leading) :]))
                 for encoder, array in zip(self.encoders.values(), observations, strict=True)
             ]
+            if self.identities:
+                each = torch.eye(self.identities, dtype=parts[0].dtype, device=parts[0].device)
+                parts.append(each.repeat(leading[:-1].numel(), 1))
             features: Tensor = self.join(torch.cat(parts, dim=-1))
         return features.float().reshape(*leading, -1)
 
@@ -176,8 +206,9 @@ class Multisense(NetworkFactory):
         """Return the encoder of all senses, joined, and the memory after it."""
         layouts = self.spec.observations
         ranks = [len(layout.shape) for layout in layouts.values()]
+        identities = self.spec.agents if self.cfg.agent_identity else 0
         trunk = ArrayModule(
-            self.per_agent(lambda: Trunk(layouts, self.cfg), ranks),
+            self.per_agent(lambda: Trunk(layouts, self.cfg, identities), ranks),
             in_keys=[(self.team, "observation", name) for name in layouts],
             out_keys=[(self.team, "features")],
         )
@@ -196,24 +227,46 @@ class Multisense(NetworkFactory):
         """See `NetworkFactory`."""
         return self.cfg.critic is Critic.central
 
-    def critic(self) -> TensorDictModule:
-        """Return the value head; a central one also reads which agents are present."""
-        width, central = self.features, self.central_critic
+    @property
+    def critic_reads_state(self) -> bool:
+        """See `NetworkFactory`."""
+        return self.cfg.critic is Critic.state
 
-        def own() -> nn.Module:
-            return orthogonal(nn.Linear(width, 1), gain=1.0)
+    def critic(self) -> TensorDictModule:
+        """Return the value head; a central one also reads which agents are present.
+
+        Raises:
+            ValueError: If the critic is to read the global state, and there is none.
+        """
+        features, kind = (self.team, "features"), self.cfg.critic
+        head: nn.Module
+        if kind is Critic.state:
+            head, keys = self._state_critic(), [features, STATE]
+        elif kind is Critic.central:
+            head, keys = self._central_critic(), [features]
+            keys += [(self.team, "mask")] if self.spec.masked else []
+        else:
+            head, keys = self.per_agent(lambda: value_layer(self.features)), [features]
+        return TensorDictModule(head, in_keys=keys, out_keys=[(self.team, "state_value")])
+
+    def _central_critic(self) -> CentralValue:
+        width = self.features
 
         def joint() -> nn.Module:
-            layers = orthogonal(nn.Linear(2 * width, width)), nn.ReLU()
-            return nn.Sequential(*layers, orthogonal(nn.Linear(width, 1), gain=1.0))
+            hidden = orthogonal(nn.Linear(2 * width, width)), nn.ReLU()
+            return nn.Sequential(*hidden, value_layer(width))
 
-        head = self.per_agent(joint if central else own)
-        masked = central and self.spec.masked
-        return TensorDictModule(
-            CentralValue(head) if central else head,
-            in_keys=[(self.team, "features"), *([(self.team, "mask")] if masked else [])],
-            out_keys=[(self.team, "state_value")],
-        )
+        return CentralValue(self.per_agent(joint))
+
+    def _state_critic(self) -> StateValue:
+        width, state = self.features, self.spec.state
+        if not state:
+            raise ValueError(
+                "algo.network.critic=state reads the global state, which this environment does not "
+                "have: set global_state=true"
+            )
+        head = self.per_agent(lambda: perceptron(width + state, [width], 1, CRITIC_GAIN))
+        return StateValue(head)
 
     def per_agent(self, make: Callable[[], nn.Module], ranks: Sequence[int] = (1,)) -> nn.Module:
         """See `NetworkFactory`."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from enum import Enum
+
 import torch
 from tensordict import TensorDict, TensorDictBase
 from torch import Tensor
@@ -13,9 +15,27 @@ from torchrl.objectives.value.functional import (
 from veca_marl.algos.networks.factory import TeamNetwork
 
 
+class Credit(Enum):
+    """What counts for an agent after its elimination, while its team plays on.
+
+    Attributes:
+        nothing: Its return ends.
+        team: Its return goes on with the mean value of the agents that are left, so that it pays to
+            be eliminated where that lets the team win.
+    """
+
+    nothing = "nothing"
+    team = "team"
+
+
 @torch.no_grad()
 def advantages(
-    network: TeamNetwork, batch: TensorDictBase, team: str, gamma: float, gae_lambda: float
+    network: TeamNetwork,
+    batch: TensorDictBase,
+    team: str,
+    gamma: float,
+    gae_lambda: float,
+    credit: Credit = Credit.nothing,
 ) -> TensorDict:
     """Return advantage and value target, both ``(worlds, steps, agents, 1)``.
 
@@ -29,6 +49,7 @@ def advantages(
         team: Name of the team.
         gamma: Discount.
         gae_lambda: Lambda of the estimate.
+        credit: What counts after an elimination.
     """
     device = next(network.parameters()).device
     value = network.critic(batch.select(*network.critic.in_keys).to(device))[team, "state_value"]
@@ -37,6 +58,12 @@ def advantages(
     cut = batch["next", "done"].squeeze(-1).clone()
     cut[:, -1] = True
     following[cut.to(device)] = _values_after(network, batch["next"], cut, team, device)
+    reward, done, terminated = (array.to(device) for array in _outcome(batch, team))
+    if credit is Credit.team and "mask" in batch["next", team].keys():  # noqa: SIM118
+        left = batch["next", team, "mask"].unsqueeze(-1).to(device)
+        eliminated = terminated & ~batch["next", "terminated"].unsqueeze(-1).to(device)
+        following = torch.where(eliminated, _mean_of(following, left), following)
+        terminated = terminated & ~eliminated
     # TorchRL's vectorised estimate raises an error where no later step counts
     estimate = (
         vec_generalized_advantage_estimate
@@ -46,7 +73,7 @@ def advantages(
     advantage, target = estimate(
         gamma,
         gae_lambda,
-        *(array.to(device).squeeze(-1) for array in (value, following, *_outcome(batch, team))),
+        *(array.squeeze(-1) for array in (value, following, reward, done, terminated)),
     )
     return TensorDict(
         {"advantage": advantage.unsqueeze(-1), "value_target": target.unsqueeze(-1)},
@@ -62,6 +89,12 @@ def _values_after(
     last = following.select(*read)[cut].to(device)
     value: Tensor = network.critic(network.encoder(last))[team, "state_value"]
     return value
+
+
+def _mean_of(values: Tensor, left: Tensor) -> Tensor:
+    """Return the mean over the agents that are left, ``(..., agents, 1)`` with equal entries."""
+    total = torch.where(left, values, torch.zeros_like(values)).sum(-2, keepdim=True)
+    return (total / left.sum(-2, keepdim=True).clamp_min(1)).expand_as(values)
 
 
 def _outcome(batch: TensorDictBase, team: str) -> tuple[Tensor, Tensor, Tensor]:

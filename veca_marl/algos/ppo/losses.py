@@ -11,8 +11,7 @@ from tensordict import TensorDict, TensorDictBase
 from tensordict.nn import CompositeDistribution
 from torch import Tensor
 from torch.distributions import Distribution, kl_divergence
-from torchrl.modules import PopArtValueNorm
-from torchrl.objectives import ClipPPOLoss
+from torchrl.objectives.multiagent import MAPPOLoss
 
 from veca_marl.algos.specs import PLAIN, action_key
 
@@ -20,8 +19,8 @@ from veca_marl.algos.specs import PLAIN, action_key
 VALID = "shifted_valid"
 
 
-class TeamPPOLoss(ClipPPOLoss):
-    """TorchRL's clipped PPO, with three additions.
+class TeamPPOLoss(MAPPOLoss):
+    """TorchRL's clipped PPO for several agents, with three differences.
 
     - ``kl_approx`` is the analytic KL(old || new). TorchRL reports the mean of
       ``log old - log new`` over the sampled actions; its sign fluctuates, and a negative value
@@ -29,8 +28,8 @@ class TeamPPOLoss(ClipPPOLoss):
       that acted, so this costs no forward pass (for two tanh-normals it is that of the normals).
     - Entries with `VALID` False are excluded from every reported measure; TorchRL excludes them
       from the losses and from the normalisation of advantages alone.
-    - Optionally targets and values are normalised before the value loss. TorchRL's `MAPPOLoss`
-      updates the statistics inside the loss; here they are constant while a batch is learnt.
+    - The statistics by which targets and values are normalised are constant while a batch is
+      learnt: the critic's outputs are scaled by them. TorchRL updates them inside the loss.
 
     Overrides the private hooks ``_log_weight``, ``_get_entropy`` and ``_critic_loss_inputs``, see
     `private_parts`; `tests/algos/ppo/test_losses.py` compares each with its formula.
@@ -39,7 +38,6 @@ class TeamPPOLoss(ClipPPOLoss):
         value_norm: Running statistics of the value targets, or None; see `NormalisedCritic`.
     """
 
-    value_norm: PopArtValueNorm | None  # set after construction
     _valid: Tensor | None = None  # of the batch in `forward`, (..., agents, 1)
 
     def forward(self, tensordict: TensorDictBase) -> TensorDictBase:

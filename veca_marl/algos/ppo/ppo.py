@@ -11,6 +11,7 @@ from typing import Any
 import torch
 from tensordict import TensorDictBase
 from tensordict.nn import TensorDictModuleBase
+from torch import nn
 from torchrl.objectives import KLAdaptiveLR
 
 from veca_marl.algos.algorithm import Algorithm, AlgorithmCfg
@@ -25,7 +26,7 @@ from veca_marl.algos.networks.factory import (
 from veca_marl.algos.networks.layers import clip_norms, independent_parameters
 from veca_marl.algos.networks.memory import memory_of
 from veca_marl.algos.networks.multisense import MultisenseCfg
-from veca_marl.algos.ppo.advantages import advantages
+from veca_marl.algos.ppo.advantages import Credit, advantages
 from veca_marl.algos.ppo.losses import (
     VALID,
     TeamPPOLoss,
@@ -34,7 +35,7 @@ from veca_marl.algos.ppo.losses import (
 )
 from veca_marl.algos.ppo.value_normalisation import NormalisedCritic, ValueNormalisation
 from veca_marl.algos.sense_encoders import copy_parameters
-from veca_marl.algos.specs import TeamSpec
+from veca_marl.algos.specs import STATE, TeamSpec
 
 
 @dataclass
@@ -45,6 +46,7 @@ class PPOCfg(AlgorithmCfg):
         network: The network and its sizes.
         gamma: Discount.
         gae_lambda: Lambda of the generalised advantage estimate (Schulman et al. 2016).
+        credit: What an agent is credited with after its elimination.
         clip: Clipping range of the probability ratio, in (0, 1].
         entropy_coefficient: Weight of the entropy bonus: a number for all parts of the action, or
             one for each of them: ``algo.entropy_coefficient={move:0.003,voice:0.03}``.
@@ -57,20 +59,26 @@ class PPOCfg(AlgorithmCfg):
         sequence_steps: Steps through which gradients of a network with hidden state flow: its
             minibatches consist of sequences of this length, as many frames as otherwise. Divides
             collect.steps; not used without hidden state.
-        learning_rate: Initial value of the adaptive rate (ours).
-        target_kl: The rate is divided by 1.5 above twice this divergence, multiplied by 1.5 below
-            half of it: the rule of rl_games with its target of 0.008 (ours; the paper says
-            "adaptive to the KL divergence"). The divergence of a minibatch is measured before its
-            step: it is 0 in the first step after collection, and with one epoch of one minibatch
-            the rate stays.
+        learning_rate: Initial value of the adaptive rate of the actor and of the encoder that both
+            heads read (ours).
+        target_kl: Divergence per dimension of the action: a number of a vector, or a choice. The
+            rate is divided by 1.5 above twice this divergence, multiplied by 1.5 below half of it:
+            the rule of rl_games (the paper says "adaptive to the KL divergence"). Its target of
+            0.008 for the whole action is ours for two dimensions; for 40 joints it would hold the
+            rate at a tenth of what they can bear. The divergence of a minibatch is measured before
+            its step: it is 0 in the first step after collection, and with one epoch of one
+            minibatch the rate stays.
         min_learning_rate: Lower bound of the rate.
         max_learning_rate: Upper bound of the rate.
+        critic_learning_rate: Constant rate of the parameters of the critic alone (ours): the
+            divergence of the policy says nothing about them.
     """
 
     name: str = "ppo"
     network: NetworkCfg = field(default_factory=MultisenseCfg)
     gamma: float = 0.99
     gae_lambda: float = 0.95
+    credit: Credit = Credit.nothing
     clip: float = 0.2
     entropy_coefficient: Any = 0.03  # float | dict[str, float], which OmegaConf cannot express
     value_coefficient: float = 0.5
@@ -80,9 +88,10 @@ class PPOCfg(AlgorithmCfg):
     minibatches: int = 4
     sequence_steps: int = 32
     learning_rate: float = 3e-4
-    target_kl: float = 0.008
+    target_kl: float = 0.004
     min_learning_rate: float = 1e-6
     max_learning_rate: float = 1e-3
+    critic_learning_rate: float = 1e-3
 
     def __post_init__(self) -> None:
         for name in ("gamma", "gae_lambda"):
@@ -90,7 +99,12 @@ class PPOCfg(AlgorithmCfg):
                 raise ValueError(f"algo.{name} must be in [0, 1], got {getattr(self, name)}")
         if not 0.0 < self.clip <= 1.0:
             raise ValueError(f"algo.clip must be in (0, 1], got {self.clip}")
-        for name in ("max_gradient_norm", "target_kl", "min_learning_rate"):
+        for name in (
+            "max_gradient_norm",
+            "target_kl",
+            "min_learning_rate",
+            "critic_learning_rate",
+        ):
             if not getattr(self, name) > 0.0:
                 raise ValueError(f"algo.{name} must be positive, got {getattr(self, name)}")
         for name in ("epochs", "minibatches", "sequence_steps"):
@@ -191,10 +205,12 @@ class PPO(Algorithm):
         if self.normalised_critic is not None:
             self.loss.value_norm = self.normalised_critic.statistics
         self._independent = independent_parameters([self.network])
-        self.optimizer = torch.optim.Adam(trainable(self.network), lr=cfg.learning_rate, fused=True)
+        acting, valuing = _split_parameters(self.network)
+        self.optimizer = torch.optim.Adam(acting, lr=cfg.learning_rate, fused=True)
+        self.critic_optimizer = torch.optim.Adam(valuing, lr=cfg.critic_learning_rate, fused=True)
         self.schedule = KLAdaptiveLR(
             self.optimizer,
-            target_kl=cfg.target_kl,
+            target_kl=cfg.target_kl * sum(part.dimensions for part in spec.actions.values()),
             factor=1.5,
             min_lr=cfg.min_learning_rate,
             max_lr=cfg.max_learning_rate,
@@ -233,7 +249,7 @@ class PPO(Algorithm):
         cfg = self.cfg
         rows = batch.select(*self._batch_keys)
         rows[self.team].update(
-            advantages(self.network, batch, self.team, cfg.gamma, cfg.gae_lambda)
+            advantages(self.network, batch, self.team, cfg.gamma, cfg.gae_lambda, cfg.credit)
         )
         if self._recurrent:
             check_sequences(cfg.sequence_steps, batch.shape[1])
@@ -273,6 +289,7 @@ class PPO(Algorithm):
         out = self.loss(minibatch)
         loss = out["loss_objective"] + out["loss_critic"] + out["loss_entropy"]
         self.optimizer.zero_grad()
+        self.critic_optimizer.zero_grad()
         loss.backward()
         norm = clip_norms(self._independent, self.cfg.max_gradient_norm)
         if not torch.isfinite(norm + loss.detach()):
@@ -281,6 +298,7 @@ class PPO(Algorithm):
                 "observations or rewards are not finite, or the learning rate is too high"
             )
         self.optimizer.step()
+        self.critic_optimizer.step()
         # of an agent that is absent in all rows the explained variance is not a number
         measured = {name: float(out[key].detach().nanmean()) for name, key in _MEASURES.items()}
         return measured | {"gradient_norm": float(norm)}
@@ -298,6 +316,7 @@ class PPO(Algorithm):
         return {
             "network": self.network,
             "optimizer": self.optimizer,
+            "critic_optimizer": self.critic_optimizer,
             "schedule": self.schedule,
         }
 
@@ -320,11 +339,19 @@ class PPO(Algorithm):
             )
 
 
+def _split_parameters(network: TeamNetwork) -> tuple[list[nn.Parameter], list[nn.Parameter]]:
+    """Return the parameters that learn: those of the actor, and those of the critic alone."""
+    actor = {id(parameter) for parameter in network.actor.parameters()}
+    every = trainable(network)
+    return [p for p in every if id(p) in actor], [p for p in every if id(p) not in actor]
+
+
 def _batch_keys(network: TeamNetwork, team: str, masked: bool) -> list[Any]:
     """Return what is read from a batch to learn from it."""
     actor = network.actor
     return [
         *network.encoder.in_keys,
+        *([STATE] if STATE in network.critic.in_keys else []),
         *actor.dist_params_keys,
         *actor.dist_sample_keys,
         *actor.log_prob_keys,
@@ -342,9 +369,7 @@ def _make_loss(
         entropy_coeff=entropy,
         critic_coeff=cfg.value_coefficient,
         loss_critic_type="l2",
-        normalize_advantage=True,
-        normalize_advantage_exclude_dims=(-2,),  # each agent of the team by itself
-        functional=False,
+        functional=False,  # advantages of each agent are normalised by themselves: the default
     )
     loss.set_keys(
         reward=(team, "reward"),
@@ -354,7 +379,6 @@ def _make_loss(
         advantage=(team, "advantage"),
         value_target=(team, "value_target"),
     )
-    loss.value_norm = None
     return loss
 
 

@@ -1,6 +1,6 @@
 """The training loop: collect, learn, evaluate, store; in stages that depend on (seed, stage) alone.
 
-A stage ends with an evaluation and a checkpoint, and the next one starts new episodes and new
+A stage ends with an evaluation (but a short first one) and a checkpoint, and the next one starts new episodes and new
 random streams from (seed, stage). A checkpoint therefore holds only what was learnt: where every
 algorithm has `Algorithm.exact_resume`, a run that is resumed from it (after Ctrl-C, a crash or a
 power cut) gives the same parameters, bit for bit, as a run that was not interrupted. What an
@@ -9,6 +9,7 @@ interrupted stage had learnt is learnt again.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack, closing
 from dataclasses import asdict, dataclass, field
@@ -16,13 +17,15 @@ from pathlib import Path
 from typing import Any
 
 import torch
+from numpy.typing import NDArray
+from tensordict import TensorDictBase
 from torchrl import timeit
 from tqdm import tqdm
 
 from veca_marl.algos.checkpoints import Checkpoints, load_errors, to_plain
 from veca_marl.algos.collection.experience import CollectCfg, Experience
 from veca_marl.algos.evaluation.comparison import comparison_line, score_rows
-from veca_marl.algos.evaluation.episodes import TrainingEpisodes
+from veca_marl.algos.evaluation.episodes import TrainingEpisodes, stored_means
 from veca_marl.algos.evaluation.evaluate import EvalCfg, Scores, derived_seed
 from veca_marl.algos.evaluation.evaluators import (
     Evaluator,
@@ -33,7 +36,7 @@ from veca_marl.algos.evaluation.evaluators import (
 )
 from veca_marl.algos.policy import Policy
 from veca_marl.algos.reporting import Reporter
-from veca_marl.algos.specs import EnvFactory
+from veca_marl.algos.specs import EnvFactory, TeamSpec, action_key
 from veca_marl.algos.training.finite import (
     check_batch,
     check_scores,
@@ -42,7 +45,14 @@ from veca_marl.algos.training.finite import (
     warn_of_ranges,
 )
 from veca_marl.algos.training.learners import AllLearn, Matchmaking, TeamLearners
-from veca_marl.algos.training.schedule import Budget, Progress, Schedule, Stopwatch, timing_table
+from veca_marl.algos.training.schedule import (
+    Budget,
+    Progress,
+    Schedule,
+    Stopwatch,
+    device_memory,
+    timing_table,
+)
 
 _EVALUATION_STAGE = 2**31 - 1  # in place of a stage number: seeds that no training stage uses
 
@@ -50,6 +60,15 @@ _EVALUATION_STAGE = 2**31 - 1  # in place of a stage number: seeds that no train
 def evaluation_seed(seed: int) -> int:
     """Return the seed of the episodes of all evaluations of a run with the seed `seed`."""
     return derived_seed(seed, _EVALUATION_STAGE)
+
+
+def _actions(batch: TensorDictBase, specs: Mapping[str, TeamSpec]) -> dict[str, NDArray[Any]]:
+    """Return all actions of a batch, by team and part."""
+    return {
+        "/".join(["actions", *key]): batch[key].numpy(force=True)
+        for team, spec in specs.items()
+        for key in (action_key(team, part) for part in spec.actions)
+    }
 
 
 @dataclass(frozen=True)
@@ -128,6 +147,7 @@ class Trainer:
     _resumed_frames: int = 0
     _resumed_within_stage: bool = False
     _evaluations: Evaluations = field(init=False)
+    _episodes: TrainingEpisodes = field(default_factory=TrainingEpisodes)
 
     def __post_init__(self) -> None:
         self.policy: Policy = self.learners.policy.copy()
@@ -145,9 +165,10 @@ class Trainer:
             self.learners.load_state_dict(state["algorithm"])
             self.learners.load_intrinsic_state(state["intrinsic"])
             self.progress = Progress.stored(state["progress"])
+            self._episodes.last = stored_means(state["episodes"])
         self.policy.take_over(self.learners.policy)
         self._resumed_frames = self.progress.frames
-        within_stage = self.progress.iteration % self.schedule.batches_per_stage != 0
+        within_stage = self.schedule.is_within_stage(self.progress.iteration)
         self._resumed_within_stage = within_stage and not self._is_finished()
 
     def run(self) -> list[str]:
@@ -267,26 +288,24 @@ class Trainer:
         with timeit("collect"):
             experience.restart(derived_seed(self.seed, self.progress.stage))
         batches = next(self.schedule.stages_after(self.progress.iteration))
-        episodes = self._stage_episodes(batches * self.collect.steps)
-        for _ in range(batches):
-            row = self._iterate(experience, episodes)
+        steps = batches * self.collect.steps
+        longest = self.episode_steps
+        self._episodes.begin_stage(math.inf if longest is None else steps - longest)
+        for number in range(batches):
+            batch, row = self._iterate(experience)
             bar.update(self.collect.frames)
             finished = {k: v for k, v in row.items() if k.endswith("/return") and v == v}
-            if finished:  # otherwise the bar keeps the last mean returns
-                bar.set_postfix({k: f"{v:.3g}" for k, v in finished.items()})
-
-    def _stage_episodes(self, steps: int) -> TrainingEpisodes:
-        """Return what counts the episodes of a stage in which each world makes so many steps."""
-        if self.episode_steps is None:
-            return TrainingEpisodes()
-        return TrainingEpisodes(steps - self.episode_steps)
+            bar.set_postfix({k: f"{v:.3g}" for k, v in finished.items()})
+            if number + 1 == batches:
+                self._report_values(_actions(batch, self.learners.specs))
 
     def _is_first_episode(self) -> bool:
         """Return whether the worlds may still play the first episode of the run."""
         done = self.progress.iteration * self.collect.steps
         return done == 0 or (self.episode_steps is not None and done < self.episode_steps)
 
-    def _iterate(self, experience: Experience, episodes: TrainingEpisodes) -> dict[str, float]:
+    def _iterate(self, experience: Experience) -> tuple[TensorDictBase, dict[str, float]]:
+        """Learn from one batch, and return it and the numbers that were written."""
         self._stopwatch.begin()
         with timeit("collect"):
             batch = experience.collect()
@@ -302,13 +321,14 @@ class Trainer:
         self.progress.frames += self.collect.frames
         row: dict[str, float] = {"iteration": self.progress.iteration}
         for team, measures in measured.items():
-            both = episodes.add(batch, team) | measures
+            both = self._episodes.add(batch, team) | measures
             row |= {f"{team}/{name}": value for name, value in both.items()}
         row |= self.matchmaking.measures()
         row |= self._stopwatch.end(self.collect.frames)
+        row |= device_memory(self.learners.device)
         for reporter in self.reporters:
             reporter.write("metrics", self.progress.frames, row)
-        return row
+        return batch, row
 
     def _update_policy(self, experience: Experience) -> None:
         """Let the worlds be played by the current policy, its opponents loaded."""
@@ -316,14 +336,17 @@ class Trainer:
         self.matchmaking.load_opponent(self.policy)
         experience.update_policy()
 
-    def _end_stage(self, last: bool) -> dict[str, Scores]:
+    def _end_stage(self, last: bool) -> dict[str, Scores] | None:
+        """Evaluate, unless the stage is the short first one, and store a checkpoint."""
         self.policy.take_over(self.learners.policy)
+        scores, best = None, False
         if last:
             scores = self._evaluations.play_last(self.during_last_evaluation)
-        else:
+        elif self.schedule.is_evaluated(self.progress.iteration):
             scores = self._evaluations.play()
-        self._report_scores("policy", scores)
-        best = self._is_best(scores)
+        if scores is not None:
+            self._report_scores("policy", scores)
+            best = self._is_best(scores)
         self.progress.stage += 1
         self.matchmaking.end_stage(self.progress.frames)
         with timeit("checkpoint"):
@@ -345,6 +368,7 @@ class Trainer:
             "intrinsic": self.learners.intrinsic_state(),
             "actors": self.learners.actor_states(),
             "progress": asdict(self.progress),
+            "episodes": self._episodes.last,
         }
         check_state(state["algorithm"], self.progress.frames)
         check_state({"intrinsic": state["intrinsic"]}, self.progress.frames)
@@ -362,3 +386,10 @@ class Trainer:
         for row in score_rows(player, scores):
             for reporter in self.reporters:
                 reporter.write("evaluations", self.progress.frames, row)
+        self._report_values(
+            {f"evaluations/{player}/{team}/return": one.returns for team, one in scores.items()}
+        )
+
+    def _report_values(self, values: Mapping[str, NDArray[Any]]) -> None:
+        for reporter in self.reporters:
+            reporter.write_values(self.progress.frames, values)

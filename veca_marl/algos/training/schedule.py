@@ -1,4 +1,4 @@
-"""How long a run trains, in which batches and stages, and how much time they take."""
+"""How long a run trains, in which batches and stages, and how much time and memory they take."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import torch
 from torchrl import timeit
 
 
@@ -35,6 +36,15 @@ def _processor_seconds_of(process: int) -> float:
     fields = file.read_text().rpartition(")")[2].split()
     ticks = int(fields[11]) + int(fields[12])
     return ticks / float(os.sysconf("SC_CLK_TCK"))
+
+
+def device_memory(device: torch.device) -> dict[str, float]:
+    """Return ``gpu_memory_gb``, the most that tensors took since the last call; empty on a CPU."""
+    if device.type != "cuda":
+        return {}
+    most = torch.cuda.max_memory_allocated(device)
+    torch.cuda.reset_peak_memory_stats(device)
+    return {"gpu_memory_gb": most / 1e9}
 
 
 class Stopwatch:
@@ -77,9 +87,15 @@ class Stopwatch:
         return {"frames_per_s": rate, "between_s": between, "processor_s": used}
 
 
+_LEAST_EARLY_BATCHES = 2
+
+
 @dataclass(frozen=True)
 class Schedule:
     """The numbers of batches of a run and of its stages; the last stage may have fewer.
+
+    A run begins with a short stage, where stages are long enough: it ends with a checkpoint and
+    without an evaluation, so that a run that is interrupted early has something to continue from.
 
     Attributes:
         batches: Batches of the run, at least 1.
@@ -111,10 +127,28 @@ class Schedule:
         """Frames of the run."""
         return self.batches * self.frames_per_batch
 
+    @property
+    def early_batches(self) -> int:
+        """Batches of the short first stage; 0 without one."""
+        quarter = self.batches_per_stage // 4
+        return quarter if quarter >= _LEAST_EARLY_BATCHES and quarter < self.batches else 0
+
+    def is_evaluated(self, batches: int) -> bool:
+        """Return whether the stage that ends after a number of batches ends with an evaluation."""
+        return batches != self.early_batches
+
+    def is_within_stage(self, batches: int) -> bool:
+        """Return whether a stage of a run that was not interrupted goes on after some batches."""
+        return batches % self.batches_per_stage != 0 and batches != self.early_batches
+
     def stages_after(self, batches: int) -> Iterator[int]:
         """Yield the number of batches of each stage that follows a number of finished batches."""
-        for start in range(batches, self.batches, self.batches_per_stage):
-            yield min(self.batches_per_stage, self.batches - start)
+        while batches < self.batches:
+            end = (batches // self.batches_per_stage + 1) * self.batches_per_stage
+            if batches < self.early_batches:
+                end = self.early_batches
+            yield min(end, self.batches) - batches
+            batches = end
 
 
 @dataclass

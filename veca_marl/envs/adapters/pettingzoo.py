@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+from gymnasium.spaces import Box
 from numpy.typing import NDArray
 from pettingzoo import ParallelEnv
 
@@ -50,6 +51,7 @@ class VecaParallelEnv(NotCopied, ParallelEnv[str, Observed, Any]):
         self._actions = {player.name: layout.actions(player) for player in game.actors}
         self.observation_spaces = {p.name: layout.space(game, p) for p in game.actors}
         self.action_spaces = {name: actions.space for name, actions in self._actions.items()}
+        self.state_space = Box(-np.inf, np.inf, (self._played.state_size,), np.float32)
 
     def observation_space(self, agent: str) -> Space:
         """Return the space of an agent's observations: by default a `Dict` with one per sense."""
@@ -105,6 +107,14 @@ class VecaParallelEnv(NotCopied, ParallelEnv[str, Observed, Any]):
             dict.fromkeys(names, step.truncated),
             {name: step.info(name) for name in names},
         )
+
+    def state(self) -> NDArray[np.float32]:
+        """Return what the simulator knows at this moment, see `GlobalState` for its parts.
+
+        Raises:
+            RuntimeError: If no episode has begun, or the environment is closed.
+        """
+        return self._played.state()
 
     def _arranged(self, observations: Mapping[str, Observation]) -> dict[str, Observed]:
         return {name: self._layout.arrange(one) for name, one in observations.items()}

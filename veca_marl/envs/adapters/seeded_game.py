@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from veca_marl.envs.core.episodes import Episodes
 from veca_marl.envs.core.game import Game, Observation, refuse_closed
 from veca_marl.envs.core.game_cfg import GameCfg
+from veca_marl.envs.core.global_state import GlobalState
 from veca_marl.envs.core.task import SOLVED
 from veca_marl.envs.rendering import Spectator
 from veca_marl.sim.kernel_cache import announce_compilation
@@ -100,6 +101,7 @@ class SeededGame:
             "render_fps": cfg.clock.control_rate_hz,
         }
         self._spectator = Spectator(self.game)
+        self._state = GlobalState(self.game)
         self._render_mode = render_mode
         self._running = False
         self._closed = False
@@ -165,6 +167,22 @@ class SeededGame:
             {name: outcome.solved[name] for name in names if name in outcome.solved},
             outcome.bodies,
         )
+
+    @property
+    def state_size(self) -> int:
+        """Length of `state`."""
+        return self._state.size
+
+    def state(self) -> NDArray[np.float32]:
+        """Return what the simulator knows, see `GlobalState`.
+
+        Raises:
+            RuntimeError: If no episode has begun, or the environment is closed.
+        """
+        refuse_closed(self._closed)
+        if self.rng is None:
+            raise RuntimeError("no episode has begun: call reset() before state()")
+        return self._state.read()
 
     @property
     def playing(self) -> list[str]:

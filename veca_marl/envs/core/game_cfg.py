@@ -62,6 +62,7 @@ class GameCfg:
         clock: Time steps.
         team: Bodies and senses of teams that differ from the above, by team name.
         script: How the actions of scripted teams are chosen, by team name.
+        global_state: Whether the TorchRL environment has the key ``state``, see `GlobalState`.
     """
 
     task: TaskCfg = field(default_factory=TaskCfg)
@@ -71,6 +72,7 @@ class GameCfg:
     clock: ClockCfg = field(default_factory=ClockCfg)
     team: dict[str, TeamCfg] = field(default_factory=dict)
     script: dict[str, Script] = field(default_factory=dict)
+    global_state: bool = False
 
     @property
     def teams(self) -> tuple[Team, ...]:

@@ -280,6 +280,13 @@ class Task(ABC):
     def reward(self, player: Player) -> dict[str, float]:
         """Return the unweighted reward terms of one player, named as in `TaskCfg.weights`."""
 
+    def state(self) -> dict[str, float]:
+        """Return numbers on the task that no pose shows, for central critics; see `GlobalState`.
+
+        The names are always the same: times and counts that rewards depend on, for example.
+        """
+        return {}
+
     def terminated(self) -> bool:
         """Return whether the game has ended by its rules for all players."""
         return False

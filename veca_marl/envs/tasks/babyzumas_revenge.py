@@ -254,6 +254,9 @@ class BabyzumasRevenge(Task):
     def reward(self, player: Player) -> dict[str, float]:
         return {name: float(name in self._new) for name in ("drawer", "key", "door", "room")}
 
+    def state(self) -> dict[str, float]:
+        return {name: float(name in self._done) for name in ("drawer", "key", "door", "room")}
+
     def terminated(self) -> bool:
         return "room" in self._done
 

@@ -229,6 +229,10 @@ class KickTheBall(Task):
         approach = cosine(velocity, way) if walks else 0.0
         return {"kick": float(self._kicked_now), "approach": approach}
 
+    def state(self) -> dict[str, float]:
+        left_s = self._steps_left * self.world.clock.step_s
+        return {"kicked": float(self._kicked), "left_s": left_s}
+
     def _launch(self, rng: np.random.Generator) -> None:
         """Launch the ball; a start within the player is drawn again, up to `_MOST_DRAWS` times."""
         cfg, bodies = self.cfg, (self.kicker.body_id, self.ball.body_id)

@@ -126,3 +126,10 @@ class SelfTouch(PosedStart):
 
     def reward(self, player: Player) -> dict[str, float]:
         return {hand: self._new[hand] / len(regions_of(side)) for hand, side in HANDS.items()}
+
+    def state(self) -> dict[str, float]:
+        return {
+            f"{hand}_{region}": float(region in self.touched[hand])
+            for hand, side in HANDS.items()
+            for region in regions_of(side)
+        }

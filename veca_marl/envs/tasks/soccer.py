@@ -256,6 +256,11 @@ class AutomaticKicks:
         self._players, self._ball, self._rest_s = players, ball, rest_s
         self.reset()
 
+    @property
+    def steps_left(self) -> dict[str, int]:
+        """Steps until each player can kick again; 0 if it can."""
+        return {name: max(steps, 0) for name, steps in self._steps_left.items()}
+
     def reset(self) -> None:
         """Allow all players to kick."""
         self._steps_left = {player.name: 0 for player in self._players}
@@ -359,6 +364,11 @@ class Soccer(Task):
     def reward(self, player: Player) -> dict[str, float]:
         sign = 1.0 if player.team == ATTACKER else -1.0
         return {term: sign * value for term, value in self._terms.items()}
+
+    def state(self) -> dict[str, float]:
+        step_s = self.world.clock.step_s
+        rests = {f"{n}_rest_s": step_s * steps for n, steps in self._kicks.steps_left.items()}
+        return {**rests, "approached_m": self._approached_m}
 
     def terminated(self) -> bool:
         return self._scored

@@ -266,6 +266,26 @@ class Body(ABC):
         """Return whether any part of the body is in contact with a prop."""
         return prop.touches(self.body_id)
 
+    def state(self) -> dict[str, Floats]:
+        """Return what the simulator knows of it, by name; the shapes are always the same.
+
+        Returns:
+            ``position`` (metres), ``forward`` and ``up`` (unit vectors) of the pelvis, its
+            ``velocity`` (m/s) and ``spin`` (rad/s), and the direction ``gaze`` of the left eye,
+            all ``(3,)`` in the world frame; ``calling``, ``(1,)``: 1 while its voice is in use.
+        """
+        velocities, spins = self._bone_motion()
+        pelvis = self._drawn.rotations[0]
+        return {
+            "position": self.position,
+            "forward": pelvis[:, 0].copy(),
+            "up": pelvis[:, 2].copy(),
+            "velocity": velocities[0],
+            "spin": spins[0],
+            "gaze": self.mount("eye_left").rotation[:, 0].copy(),
+            "calling": np.array([float(self._voice.speaking)]),
+        }
+
     # ---- actions
 
     def info(self) -> dict[str, float]:

@@ -209,6 +209,15 @@ class SceneObject:
         """``(frames, 3, 3)``: a view that the owner writes into; `add_object` replaces it."""
         return self.scene.rotations[self.rows]
 
+    @property
+    def colour(self) -> Floats:
+        """``(3,)``: a view of the colour of its first primitive, or of its first triangle."""
+        first = self.geoms.start
+        if self.geoms.start == self.geoms.stop:
+            first = len(self.scene.geoms.shapes) + self.triangles.start
+        colour: Floats = self.scene.surfaces.colours[first]
+        return colour
+
     def paint(self, colour: tuple[float, float, float]) -> None:
         """Set the colour ``(red, green, blue)`` in [0, 1] of all its primitives and triangles."""
         check_colour(colour)

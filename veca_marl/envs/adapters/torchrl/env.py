@@ -15,12 +15,14 @@ from veca_marl.envs.adapters.torchrl.fast_step import Arrays, FastStepEnv, Layou
 from veca_marl.envs.core.episodes import Episodes, check_integer, fresh_seed
 from veca_marl.envs.core.game import ActionSpec, Game, Outcome, from_parts, refuse_closed
 from veca_marl.envs.core.game_cfg import GameCfg
+from veca_marl.envs.core.global_state import GlobalState
 from veca_marl.envs.core.task import SOLVED, Player
 from veca_marl.envs.rendering import Spectator
 from veca_marl.sim.kernel_cache import announce_compilation
 from veca_marl.sim.sense import ArraySpec
 
 DONE_KEYS = ("done", "terminated", "truncated")
+STATE = "state"
 
 
 class EnvSpecs(NamedTuple):
@@ -42,6 +44,8 @@ def env_specs(game: Game, teams: list[str], worlds: int) -> EnvSpecs:
     """
     specs = EnvSpecs(*(Composite(shape=(worlds,)) for _ in EnvSpecs._fields))
     specs.done.update(done_spec((worlds,)))
+    if game.cfg.global_state:
+        specs.observation[STATE] = Unbounded((worlds, GlobalState(game).size))
     for team in teams:
         player, *_ = players = game.team(team)
         batch = (worlds, len(players))
@@ -186,6 +190,8 @@ class VecaEnv(NotCopied, FastStepEnv):
                                        this step had no effect
         (team, "done" | "terminated" | "truncated")  (W, n, 1), and the same at the root (W, 1)
         (team, "mask")                 (W, n) bool, in tasks that eliminate: False if eliminated
+        "state"                        (W, S) float32, with `GameCfg.global_state`: what the
+                                       simulator knows, see `GlobalState`
 
     The flags at the root are up when the episode has ended for all players; the world is then
     reset. A player can be eliminated before (`Task.is_eliminated`): it stays in the batch with its
@@ -243,6 +249,7 @@ class VecaEnv(NotCopied, FastStepEnv):
         }
         self._make_specs()
         self.spectators = [Spectator(game) for game in self.games]
+        self._states = [GlobalState(game) for game in self.games if cfg.global_state]
         self.set_seed(seed)
 
     def _make_specs(self) -> None:
@@ -324,6 +331,8 @@ class VecaEnv(NotCopied, FastStepEnv):
     def _observe(self, world: int, arrays: Arrays, eliminated: frozenset[str]) -> None:
         """Write the observations of a world, except of players eliminated in earlier steps."""
         game = self.games[world]
+        if self._states:
+            arrays[STATE][world] = self._states[world].read()
         for team in self._teams:
             senses = arrays[team]["observation"]
             for index, player in enumerate(game.team(team)):

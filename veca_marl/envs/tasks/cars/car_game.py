@@ -110,6 +110,12 @@ class CarGame(Task):
     def next_point(self, rng: np.random.Generator) -> Floats:
         """Draw a point of the floor for the car to drive to, ``(2,)`` metres."""
 
+    def state(self) -> dict[str, float]:
+        return {
+            "heads_for_x_m": float(self.car.point[0]),
+            "heads_for_y_m": float(self.car.point[1]),
+        }
+
     def terminated(self) -> bool:
         return self.touched
 

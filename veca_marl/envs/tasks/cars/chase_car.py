@@ -92,6 +92,10 @@ class ChaseCar(CarGame):
     def reward(self, player: Player) -> dict[str, float]:
         return {"pressed": float(self._pressed_now), "hit": float(self.touched)}
 
+    def state(self) -> dict[str, float]:
+        rest_s = max(self._rest_steps, 0) * self.world.clock.step_s
+        return {**super().state(), "presses": float(self._presses), "rest_s": rest_s}
+
     def terminated(self) -> bool:
         return self.touched or self.solved(self.players[0])
 

@@ -184,6 +184,10 @@ class MazeNav(Task):
         """Return whether all trials have ended at the object."""
         return self._found == self.cfg.trials
 
+    def state(self) -> dict[str, float]:
+        trials = self.cfg.trials
+        return {"trial": self._completed / trials, "elapsed": self._elapsed_s / self.cfg.trial_s}
+
     def _begin_trial(self, rng: np.random.Generator) -> None:
         self.walker.place(self._walls.middle_of(self._start), rng.uniform(-math.pi, math.pi))
         self._elapsed_s = 0.0

@@ -192,6 +192,9 @@ class MultiAgentNav(Task):
         self._newly_arrived = len(self.arrived) - before
         self._helper.after_step([p for p in self.players if p.name not in self.arrived])
 
+    def state(self) -> dict[str, float]:
+        return {f"{p.name}_arrived": float(p.name in self.arrived) for p in self.players}
+
     def reward(self, player: Player) -> dict[str, float]:
         return {"reached": float(self._newly_arrived), **self._helper.terms(player)}
 

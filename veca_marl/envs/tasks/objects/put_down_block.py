@@ -136,6 +136,9 @@ class PutDownBlock(Task):
         lost = self._newly_fallen * self.cfg.blue * self.cfg.max_seconds / _DEFAULT_EDGE_SECONDS
         return {"height": height_in_edges(self.red), "blue_fell": lost}
 
+    def state(self) -> dict[str, float]:
+        return {"fallen": float(len(self._fallen))}
+
     def solved(self, player: Player) -> bool:
         """Return whether the red block is released on the floor and all blue ones stand."""
         on_floor = abs(height_in_edges(self.red)) < 0.1 and is_at_rest(self.red)

@@ -138,6 +138,9 @@ class RotateCube(Task):
     def reward(self, player: Player) -> dict[str, float]:
         return {"progress": self._progress_rad}
 
+    def state(self) -> dict[str, float]:
+        return {"angle_rad": self._angle_rad}
+
     @property
     def angle_rad(self) -> float:
         """Angle between the orientations of the cube and its target."""

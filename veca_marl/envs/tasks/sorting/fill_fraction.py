@@ -295,6 +295,9 @@ class FillFraction(Task):
     def reward(self, player: Player) -> dict[str, float]:
         return {"filled": float(self._change[0]), "full": float(self._change[1])}
 
+    def state(self) -> dict[str, float]:
+        return {f"circle_{n}": float(circle.filled) for n, circle in enumerate(self.circles)}
+
     def terminated(self) -> bool:
         return self.solved(self.players[0])
 

@@ -255,6 +255,13 @@ class SortingTask(Task):
     def reward(self, player: Player) -> dict[str, float]:
         return {"sorted": float(self._changes[0]), "wrong": float(self._changes[1])}
 
+    def state(self) -> dict[str, float]:
+        return {
+            f"{item.prop.name}_is_{number}": float(category == number)
+            for item, category in zip(self.items, self.category, strict=True)
+            for number in range(len(self.baskets))
+        }
+
     def terminated(self) -> bool:
         return self._counts[0] == len(self.items)
 

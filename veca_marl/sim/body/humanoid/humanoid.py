@@ -277,6 +277,11 @@ class Humanoid(Body):
         """
         return self_contacts(self._world.client, self.body_id, self.articulation.bones_of_links)
 
+    def state(self) -> dict[str, Floats]:
+        """See `Body`; also ``angles`` and ``speeds`` of all joints, ``(82,)`` each."""
+        angles, speeds = self.joint_angles(), self.joint_velocities()
+        return {**super().state(), "angles": angles, "speeds": speeds}
+
     # ---- commands
 
     def _move(self, parts: Action) -> None:

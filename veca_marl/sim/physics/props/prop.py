@@ -237,6 +237,11 @@ class Prop:
         return math.atan2(y, x)
 
     @property
+    def colour(self) -> Floats:
+        """``(3,)`` RGB in [0, 1]: the present colour of its first shape."""
+        return np.array(self._scene.objects[self.object_id].colour)
+
+    @property
     def velocity(self) -> Floats:
         """``(3,)`` m/s, world frame, of its centre of mass."""
         return np.array(self._velocities()[0])
