@@ -79,7 +79,10 @@ def map_checkpoint(path: Path) -> tuple[dict[str, Any], Verify]:
 
     with _read_errors(path):
         records = _records(path, verified=lambda name: _RECORD.search(name) is None)
-        content = torch.load(path, weights_only=True, map_location=keep, mmap=True)
+        if _is_utf8(path):
+            content = torch.load(path, weights_only=True, map_location=keep, mmap=True)
+        else:  # torch opens a mapped file by its name, in UTF-8 alone
+            content = _load_open(path, keep)
         _check_entries(content)
     # torch.save numbers the storages in the order in which they occur, and so do we
     sums = {storage.data_ptr(): records.get(n) for n, storage in enumerate(storages)}
@@ -103,9 +106,19 @@ def load_file(path: Path, device: torch.device) -> Any:
     """
     with _read_errors(path):
         _records(path, verified=lambda _: True)
-        content = torch.load(path, weights_only=True, map_location=device)
+        content = _load_open(path, device)
         _check_entries(content)
     return content
+
+
+def _is_utf8(path: Path) -> bool:
+    """Return whether Python knows the characters of a name: not all, in an ASCII locale."""
+    return not any("\udc80" <= character <= "\udcff" for character in str(path))
+
+
+def _load_open(path: Path, map_location: Any) -> Any:
+    with path.open("rb") as file:
+        return torch.load(file, weights_only=True, map_location=map_location)
 
 
 @contextmanager

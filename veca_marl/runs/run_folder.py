@@ -256,10 +256,11 @@ def new_run(path: Path) -> RunFolder:
     """Return the folder of a new run.
 
     Raises:
-        ConfigError: If there is a run in it already, a file that the run would overwrite, or a
-            symbolic link in place of one.
+        ConfigError: If there is a run in it already, a file that the run would overwrite, a
+            symbolic link in place of one, or characters in its name that loggers cannot write.
     """
     folder = RunFolder(path)
+    check_characters(path)
     if folder.config.exists():
         raise ConfigError(f"{path} holds a run already; continue it with {resume_argument(path)}")
     check_links(path, (folder.config.name, *_LINKABLE, *_WRITTEN))
@@ -280,11 +281,28 @@ def writable_run(path: Path, asked_by: str) -> RunFolder:
         asked_by: See `open_run`.
 
     Raises:
-        ConfigError: If there is no run in `path`, or a symbolic link in its folder.
+        ConfigError: If there is no run in `path`, a symbolic link in its folder, or characters in
+            its name that loggers cannot write.
     """
     folder = open_run(path, asked_by)
+    check_characters(path)
     check_links(path)
     return folder
+
+
+def check_characters(path: Path) -> None:
+    """Check that Python can write a name in UTF-8, as loggers do.
+
+    Raises:
+        ConfigError: If it cannot: in an ASCII locale Python does not know other characters.
+    """
+    try:
+        str(path.absolute()).encode()
+    except UnicodeEncodeError:
+        raise ConfigError(
+            f"{path}: Python cannot write these characters in the locale of this process; set "
+            "PYTHONUTF8=1, or choose another folder"
+        ) from None
 
 
 def open_run(path: Path, asked_by: str = "") -> RunFolder:

@@ -1,5 +1,9 @@
+import os
 import resource
+import shutil
 import signal
+import subprocess
+import sys
 from contextlib import contextmanager
 from dataclasses import replace
 
@@ -121,6 +125,32 @@ def test_a_truncated_file_is_named(checkpoints, identity):
     path.write_bytes(path.read_bytes()[:500])
     with pytest.raises(CheckpointError, match=naming(path, "cut off")):
         belonging_to(identity).load(path, CPU)
+
+
+def test_a_file_is_read_whose_name_the_locale_cannot_write(checkpoints, identity, tmp_path):
+    """In an ASCII locale Python has surrogates for the bytes of other characters."""
+    saved = checkpoints.save({"weight": torch.arange(5.0)}, 3, best=False)
+    folder = tmp_path / "l\u00e4uf"
+    folder.mkdir()
+    shutil.copy(saved, folder / "stored.pt")
+    program = (
+        "import os, torch; from pathlib import Path\n"
+        "from veca_marl.algos.checkpoint_files import load_file, map_checkpoint\n"
+        f"path = Path(os.fsdecode({os.fsencode(folder)!r})) / 'stored.pt'\n"
+        "content, verify = map_checkpoint(path)\n"
+        "verify(content['state']['weight'])\n"
+        "print(content['state']['weight'].tolist())\n"
+        "print(load_file(path, torch.device('cpu'))['state']['weight'].tolist())"
+    )
+    ascii_locale = {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
+    done = subprocess.run(
+        [sys.executable, "-c", program],
+        capture_output=True,
+        text=True,
+        check=False,
+        env=os.environ | ascii_locale,
+    )
+    assert done.stdout.splitlines() == [str([0.0, 1.0, 2.0, 3.0, 4.0])] * 2, done.stderr
 
 
 def test_a_folder_without_checkpoints_is_named(checkpoints):

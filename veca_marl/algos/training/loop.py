@@ -1,7 +1,8 @@
 """The training loop: collect, learn, evaluate, store; in stages that depend on (seed, stage) alone.
 
-A stage ends with an evaluation (but a short first one) and a checkpoint, and the next one starts new episodes and new
-random streams from (seed, stage). A checkpoint therefore holds only what was learnt: where every
+A stage ends with an evaluation (but a short first one) and a checkpoint, and the next one starts
+new episodes and new random streams from (seed, stage). A checkpoint therefore holds only what was
+learnt, and the means of the last episodes: where every
 algorithm has `Algorithm.exact_resume`, a run that is resumed from it (after Ctrl-C, a crash or a
 power cut) gives the same parameters, bit for bit, as a run that was not interrupted. What an
 interrupted stage had learnt is learnt again.
