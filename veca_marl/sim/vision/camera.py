@@ -145,7 +145,7 @@ class Camera:
         """Return uninitialised buffers for a number of views."""
         size = (count, self.height, self.width)
         return Views(
-            np.empty((*size, 3), np.uint8),
+            np.empty((count, 3, self.height, self.width), np.uint8),
             np.empty(size, np.float32),
             np.empty(size, np.int16),
             np.empty((0, *size), np.int16),

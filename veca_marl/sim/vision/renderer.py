@@ -33,7 +33,7 @@ from veca_marl.sim.vision.shading import (
     GLASS_OPACITY,
     Images,
     blend_colours,
-    fill_sky,
+    colour_planes,
     illuminate,
     illuminate_polyhedra,
     to_object_ids,
@@ -125,7 +125,7 @@ def _insert(
 
 @njit(cache=True, error_model="numpy")
 def blend_layers(
-    geoms: GeomTable, colours: Depths, layers: Layers, view: Floats, lens: Lens, rgb: Images
+    geoms: GeomTable, colours: Depths, layers: Layers, view: Floats, lens: Lens, planes: Images
 ) -> None:
     """Blend transparent surfaces over an image, from the farthest to the nearest.
 
@@ -135,21 +135,21 @@ def blend_layers(
         layers: From `collect_layers`.
         view: ``(4, 3)`` position, right, up and forward axes of the camera, world frame.
         lens: Parameters of the camera.
-        rgb: ``(H, W, 3)``, updated.
+        planes: ``(3, H, W)``, updated.
     """
-    lights = np.empty(rgb.shape[:2], np.float32)
+    lights = np.empty(planes.shape[1:], np.float32)
     for layer in range(layers.surfaces.shape[0] - 1, -1, -1):
         surfaces = layers.surfaces[layer]
         illuminate(geoms, view, lens, layers.depths[layer], surfaces, lights)
         illuminate_polyhedra(geoms, view, lens, layers.depths[layer], surfaces, lights)
-        blend_colours(colours, surfaces, lights, GLASS_OPACITY, rgb)
+        blend_colours(colours, surfaces, lights, GLASS_OPACITY, planes)
 
 
 class Views(NamedTuple):
     """The images of V camera poses.
 
     Attributes:
-        rgb: ``(V, H, W, 3)`` uint8.
+        planes: ``(V, 3, H, W)`` uint8: red, green, blue.
         depth: ``(V, H, W)`` float32 metres along the optical axis to the nearest opaque surface;
             the camera's `far_m` where there is none.
         ids: ``(V, H, W)`` int16 id of that surface's object; -1 for the sky.
@@ -157,10 +157,15 @@ class Views(NamedTuple):
             then -1. L is the number of layers in the pixel with most of them; it may be 0.
     """
 
-    rgb: Images
+    planes: Images
     depth: Depths
     ids: Surfaces
     glass_ids: NDArray[np.int16]
+
+    @property
+    def rgb(self) -> Images:
+        """The colours as ``(V, H, W, 3)``: a view of `planes`, which is not contiguous."""
+        return self.planes.transpose(0, 2, 3, 1)
 
 
 class DrawMasks(NamedTuple):
@@ -210,7 +215,7 @@ def render_views(
     count, height, width = views.ids.shape
     all_glass = np.empty((0, count, height, width), np.int16)
     for v in range(count):
-        view, rgb, depth, ids = axes[v], views.rgb[v], views.depth[v], views.ids[v]
+        view, planes, depth, ids = axes[v], views.planes[v], views.depth[v], views.ids[v]
         depth[:], ids[:] = lens.far, NO_SURFACE
         draw_geoms(geoms, drawn.opaque, view, lens, True, depth, ids)
         draw_meshes(meshes, drawn.triangles, view, lens, True, first, seen, depth, ids)
@@ -218,12 +223,11 @@ def render_views(
         illuminate(geoms, view, lens, depth, ids, lights)
         illuminate_polyhedra(geoms, view, lens, depth, ids, lights)
         darken_contact_shadows(geoms, drawn.casting, view, lens, depth, ids, lights)
-        fill_sky(lens, rgb)
-        blend_colours(surfaces.colours, ids, lights, 1.0, rgb)
+        colour_planes(lens, surfaces.colours, ids, lights, planes)
         to_object_ids(surfaces.objects, ids)
         if has_glass:
             layers = collect_layers(geoms, drawn.glass, view, lens, depth)
-            blend_layers(geoms, surfaces.colours, layers, view, lens, rgb)
+            blend_layers(geoms, surfaces.colours, layers, view, lens, planes)
             all_glass = with_glass(all_glass, v, surfaces.objects, layers.surfaces)
     return all_glass
 

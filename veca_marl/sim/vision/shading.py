@@ -21,6 +21,7 @@ from veca_marl.sim.vision.rasterizer import (
     NO_SURFACE,
     Depths,
     Lens,
+    Ray,
     Surfaces,
     into_local,
     local_ray,
@@ -49,19 +50,47 @@ _POLYHEDRON = int(Shape.POLYHEDRON)
 
 
 @njit(cache=True, error_model="numpy")
-def fill_sky(lens: Lens, rgb: Images) -> None:
-    """Fill an image ``(H, W, 3)`` with a vertical gradient, lighter towards the top."""
-    for j in range(rgb.shape[0]):
-        brightness = 0.875 + 0.125 * lens.rows[j] / lens.tan_y
-        for c in range(3):
-            value = np.uint8(255.0 * SKY[c] * brightness + 0.5)
-            for i in range(rgb.shape[1]):
-                rgb[j, i, c] = value
+def colour_planes(
+    lens: Lens, colours: Lights, surfaces: Surfaces, lights: Lights, planes: Images
+) -> None:
+    """Write the lit colours of the surfaces, and the sky where there is none.
+
+    The sky is a vertical gradient, lighter towards the top. Planes are written along runs of pixels
+    that show one surface, so that the inner loops look up nothing.
+
+    Args:
+        lens: Parameters of the camera.
+        colours: ``(S, 3)`` of the scene's surfaces, in [0, 1].
+        surfaces: ``(H, W)`` indices of the visible surfaces, `NO_SURFACE` for the sky.
+        lights: ``(H, W)`` brightness of each pixel, as from `illuminate`.
+        planes: ``(3, H, W)``, written.
+    """
+    height, width = surfaces.shape
+    for j in range(height):
+        sky = 0.875 + 0.125 * lens.rows[j] / lens.tan_y
+        end = 0
+        while end < width:
+            first, g = end, surfaces[j, end]
+            while end < width and surfaces[j, end] == g:
+                end += 1
+            for c in range(3):
+                run = planes[c, j, first:end]
+                if g == NO_SURFACE:
+                    run[:] = np.uint8(255.0 * SKY[c] * sky + 0.5)
+                else:
+                    _colour_run(colours[g, c], lights[j, first:end], run)
+
+
+@njit(cache=True, error_model="numpy")
+def _colour_run(colour: float, lights: Lights, run: Images) -> None:
+    """Write one plane of the lit colour of a surface along a run of pixels."""
+    for i in range(run.shape[0]):
+        run[i] = np.uint8(np.int32(min(_255 * lights[i] * colour, _255) + _HALF))
 
 
 @njit(cache=True, error_model="numpy")
 def blend_colours(
-    colours: Lights, surfaces: Surfaces, lights: Lights, opacity: float, rgb: Images
+    colours: Lights, surfaces: Surfaces, lights: Lights, opacity: float, planes: Images
 ) -> None:
     """Blend the lit colours of the surfaces over an image.
 
@@ -70,18 +99,18 @@ def blend_colours(
         surfaces: ``(H, W)`` indices of the visible surfaces; `NO_SURFACE` leaves a pixel unchanged.
         lights: ``(H, W)`` brightness of each pixel, as from `illuminate`.
         opacity: Weight of the new colours, in [0, 1].
-        rgb: ``(H, W, 3)``, updated.
+        planes: ``(3, H, W)``, updated.
     """
-    for j in range(rgb.shape[0]):
-        for i in range(rgb.shape[1]):
+    for j in range(surfaces.shape[0]):
+        for i in range(surfaces.shape[1]):
             g = surfaces[j, i]
             if g == NO_SURFACE:
                 continue
             scale = single(opacity) * _255 * lights[j, i]
             for c in range(3):
-                behind = single(1.0 - opacity) * single(rgb[j, i, c])
+                behind = single(1.0 - opacity) * single(planes[c, j, i])
                 mixed = scale * colours[g, c] + behind
-                rgb[j, i, c] = np.uint8(min(mixed, _255) + _HALF)
+                planes[c, j, i] = np.uint8(min(mixed, _255) + _HALF)
 
 
 @njit(cache=True, error_model="numpy")
@@ -100,8 +129,13 @@ def illuminate(
         surfaces: ``(H, W)`` indices of the visible surfaces, `NO_SURFACE` for none.
         lights: ``(H, W)``, written where a primitive is visible.
     """
+    if geoms.shapes.shape[0] == 0:
+        return
     width = surfaces.shape[1]
     tiled, ray = -1, (_ORIGIN, _ORIGIN, _ORIGIN, _ORIGIN)  # the last checkered primitive
+    lit = -1  # the last primitive with light, and the camera and the sun in its axes
+    local = local_ray(geoms.positions[0], geoms.rotations[0], view)
+    sun = into_local(geoms.rotations[0], SUN[0], SUN[1], SUN[2])
     for j in range(surfaces.shape[0]):
         end = 0
         while end < width:
@@ -111,10 +145,18 @@ def illuminate(
             if g == NO_SURFACE or g >= geoms.shapes.shape[0]:
                 continue
             columns, run = lens.columns[first:end], depth[j, first:end]
+            if g != lit:
+                lit = g
+                local = local_ray(geoms.positions[g], geoms.rotations[g], view)
+                sun = into_local(geoms.rotations[g], SUN[0], SUN[1], SUN[2])
             # its columns, since a call with the table would count references of all of them
             shape, size = geoms.shapes[g], geoms.sizes[g]
-            pose = geoms.positions[g], geoms.rotations[g]
-            _light_run(shape, size, pose, view, lens.rows[j], columns, run, lights[j, first:end])
+            if shape == _BOX:
+                _light_box(size, local, sun, lens.rows[j], columns, run, lights[j, first:end])
+            else:
+                _light_run(
+                    shape, size, local, sun, lens.rows[j], columns, run, lights[j, first:end]
+                )
             if geoms.checkers[g] > _0:
                 if g != tiled:
                     tiled, ray = g, frame_ray(geoms, g, view)
@@ -122,21 +164,54 @@ def illuminate(
                 tile_run(ray, lens.rows[j], columns, run, edge_m, lights[j, first:end])
 
 
+@njit(cache=True, error_model="numpy", inline="always")
+def _brightness(facing: float) -> float:
+    """Return the brightness of a surface from the cosine of its angle to the sun."""
+    return _AMBIENT + _DIRECT * max(facing, _0) + _BOUNCE * max(-facing, _0)
+
+
 @njit(cache=True, error_model="numpy")
-def _light_run(
-    shape: int,
+def _light_box(
     size: Lights,
-    pose: tuple[Floats, Floats],
-    view: Floats,
+    ray: Ray,
+    sun: Vector,
     y: float,
     columns: Depths,
     depth: Depths,
     lights: Lights,
 ) -> None:
-    """Compute the brightness of a run of pixels that show one primitive."""
-    position, rotation = pose
-    eye, right, up, forward = local_ray(position, rotation, view)
-    sun = into_local(rotation, SUN[0], SUN[1], SUN[2])
+    """Compute the brightness of a run of pixels that show one box: one of its six faces each."""
+    eye, right, up, forward = ray
+    start = (forward[0] + y * up[0], forward[1] + y * up[1], forward[2] + y * up[2])
+    front, back = _brightness(sun[0]), _brightness(-sun[0])
+    left, other = _brightness(sun[1]), _brightness(-sun[1])
+    top, bottom = _brightness(sun[2]), _brightness(-sun[2])
+    for i in range(columns.shape[0]):
+        x, t = columns[i], depth[i]
+        px = eye[0] + t * (start[0] + x * right[0])
+        py = eye[1] + t * (start[1] + x * right[1])
+        pz = eye[2] + t * (start[2] + x * right[2])
+        ax, ay, az = abs(px) - size[0], abs(py) - size[1], abs(pz) - size[2]
+        along_x = front if px > _0 else back
+        along_y = left if py > _0 else other
+        along_z = top if pz > _0 else bottom
+        not_x = along_y if ay >= az else along_z
+        lights[i] = along_x if ax >= max(ay, az) else not_x
+
+
+@njit(cache=True, error_model="numpy")
+def _light_run(
+    shape: int,
+    size: Lights,
+    ray: Ray,
+    sun: Vector,
+    y: float,
+    columns: Depths,
+    depth: Depths,
+    lights: Lights,
+) -> None:
+    """Compute the brightness of a run of pixels that show one sphere, cylinder or capsule."""
+    eye, right, up, forward = ray
     start = (forward[0] + y * up[0], forward[1] + y * up[1], forward[2] + y * up[2])
     for i in range(columns.shape[0]):
         x, t = columns[i], depth[i]
@@ -146,23 +221,13 @@ def _light_run(
             eye[2] + t * (start[2] + x * right[2]),
         )
         normal = _local_normal(shape, size, point)
-        facing = normal[0] * sun[0] + normal[1] * sun[1] + normal[2] * sun[2]
-        lights[i] = _AMBIENT + _DIRECT * max(facing, _0) + _BOUNCE * max(-facing, _0)
+        lights[i] = _brightness(normal[0] * sun[0] + normal[1] * sun[1] + normal[2] * sun[2])
 
 
 @njit(cache=True, error_model="numpy")
 def _local_normal(shape: int, size: Lights, point: Vector) -> Vector:
-    """Return the outward unit normal at a point of a primitive, in its own axes."""
+    """Return the outward unit normal at a point of a round primitive, in its own axes."""
     x, y, z = point
-    if shape == _BOX:
-        ax, ay, az = abs(x) - size[0], abs(y) - size[1], abs(z) - size[2]
-        is_x = ax >= max(ay, az)
-        is_y = (ay >= az) & (not is_x)
-        return (
-            (_1 if x > _0 else -_1) if is_x else _0,
-            (_1 if y > _0 else -_1) if is_y else _0,
-            (_1 if z > _0 else -_1) if not (is_x | is_y) else _0,
-        )
     radius, half_length = size[0], _HALF * size[1]
     if shape == _SPHERE:
         return x / radius, y / radius, z / radius

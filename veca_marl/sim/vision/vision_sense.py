@@ -117,8 +117,8 @@ class EyeViews:
         if eye not in self._mounts:
             raise ValueError(f"no open eye {eye!r}; choices: {list(self._mounts)}")
         chosen = slice(index := self._mounts.index(eye), index + 1)
-        rgb, depth, ids, glass_ids = self.views()
-        return Views(rgb[chosen], depth[chosen], ids[chosen], glass_ids[:, chosen])
+        planes, depth, ids, glass_ids = self.views()
+        return Views(planes[chosen], depth[chosen], ids[chosen], glass_ids[:, chosen])
 
     def _own_head_mask(self) -> Bools:
         """Return the mask of the surfaces of the own head, recomputed when the scene has grown."""
@@ -250,16 +250,20 @@ class VisionSense(Sense):
     def compute(self) -> dict[str, NDArray[Any]]:
         """See `Sense`."""
         views = self.eyes.views()
-        rgb = views.rgb
-        context = FilterContext(self.camera, views.depth, self._body.focal_distance_m)
-        for apply in self.filters:
-            rgb = apply(rgb, context)
         everything: dict[str, NDArray[Any]] = {
-            "vision": rgb.transpose(0, 3, 1, 2),
+            "vision": self._filtered(views) if self.filters else views.planes,
             "depth": views.depth,
             "segmentation": views.ids,
         }
         return {name: _for_both_eyes(everything[name]) for name in self.specs}
+
+    def _filtered(self, views: Views) -> NDArray[np.uint8]:
+        """Return the planes of the images after all filters."""
+        context = FilterContext(self.camera, views.depth, self._body.focal_distance_m)
+        rgb = np.ascontiguousarray(views.rgb)
+        for apply in self.filters:
+            rgb = apply(rgb, context)
+        return rgb.transpose(0, 3, 1, 2)
 
 
 def _specs(cfg: VisionCfg, camera: Camera) -> dict[str, ArraySpec]:
