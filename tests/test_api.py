@@ -68,6 +68,17 @@ def test_choices_are_shown_as_arguments():
         veca_marl.make("KickTheBall", sense_presets={})
 
 
+def test_an_environment_says_what_it_is_and_where_its_tensors_are():
+    env = veca_marl.make("PushOut2v2", worlds=2, senses={"vision": "blind"}, device="cpu")
+    for part in ("PushOut2v2", "worlds=2", "red x 2", "blue x 2", "touch", "joints (40,)"):
+        assert part in repr(env)
+    assert env.rollout(2).device == torch.device("cpu")
+    assert ("red", "mask") in env.observation_keys
+    assert not any("info" in key for key in env.observation_keys)
+    assert ("red", "info") in env.rollout(2)["next"].keys(True)
+    env.close()
+
+
 def test_fractions_of_frames_are_refused():
     with pytest.raises(ConfigError, match=naming("total_frames=1.5")):
         veca_marl.train("KickTheBall", total_frames=1.5)
@@ -139,6 +150,7 @@ def close_of_closed():
         (lambda: veca_marl.make("KickTheBall", worlds=2.5), ("worlds=2.5",)),
         (lambda: veca_marl.make("KickTheBall", worlds=0), ("worlds=0",)),
         (lambda: veca_marl.make("KickTheBall", seed="a"), ("seed='a'",)),
+        (lambda: veca_marl.make("KickTheBall", device="gpu7"), ("device=gpu7", "cpu")),
         (
             lambda: veca_marl.train("KickTheBall", total_frames="many"),
             ("total_frames='many'",),

@@ -14,6 +14,8 @@ from inspect import Parameter, signature
 from pathlib import Path
 from typing import Any, ParamSpec, TypedDict, TypeVar, Unpack
 
+import torch
+
 from veca_marl.checks import CheckCfg, TaskReport, check_game
 from veca_marl.config import ConfigError, compose, compose_node, to_config
 from veca_marl.config.command_line import check_folder
@@ -28,7 +30,7 @@ from veca_marl.gymnasium_ids import register_task
 from veca_marl.override_text import normalised
 from veca_marl.plugins import load_plugins
 from veca_marl.registry import unknown
-from veca_marl.runs.assembly import decide_precision, make_trainer
+from veca_marl.runs.assembly import decide_precision, find_device, make_trainer
 from veca_marl.runs.continuation import resume_argument
 from veca_marl.runs.lock import locked
 from veca_marl.runs.run_folder import new_run
@@ -191,6 +193,7 @@ def make(
     *,
     worlds: int = 1,
     seed: int | None = None,
+    device: torch.device | str | None = None,
     **choices: Unpack[GameChoices],
 ) -> VecaEnv:
     """Make a task as a TorchRL environment. What is left out is as on the command line.
@@ -199,6 +202,8 @@ def make(
         task: One of `list_tasks`.
         worlds: How many copies of the game, played in one process side by side.
         seed: The same seed gives the same worlds, bit by bit; None is fresh entropy.
+        device: Where the tensors are; the worlds are simulated on the CPU. None is the CPU, with
+            TensorDicts that name no device.
         **choices: ``playground``, a file of `conf/playground`, such as `simple` (None is the
             task's own); ``body``, a file of `conf/body`, such as `walker_discrete`; ``senses``,
             sense to preset, a file of `conf/senses/<sense>`, such as `{"audio": "mono"}`;
@@ -214,7 +219,9 @@ def make(
         ValueError: If a number is impossible.
     """
     cfg = choose(task, **choices)
-    return VecaEnv(cfg, worlds=worlds, seed=seed)
+    placed = None if device is None else find_device(str(device))
+    env = VecaEnv(cfg, worlds=worlds, seed=seed)
+    return env if placed is None else env.to(placed)
 
 
 @_with_choices

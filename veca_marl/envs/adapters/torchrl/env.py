@@ -262,6 +262,25 @@ class VecaEnv(NotCopied, FastStepEnv):
         self._start = Layout(specs.observation)
         self._next = Layout(specs.observation.clone().update(specs.reward).update(specs.done))
 
+    @property
+    def observation_keys(self) -> list[Any]:
+        """The observations, masks and the global state; `info` is for logs."""
+        return [key for key in super().observation_keys if key[1:2] != ("info",)]
+
+    def __repr__(self) -> str:
+        """Return the task, the worlds, the agents, and what they sense and do."""
+        teams = "; ".join(self._described(team) for team in self._teams)
+        return f"VecaEnv({self.cfg.task.name}, worlds={len(self.games)}, {teams})"
+
+    def _described(self, team: str) -> str:
+        senses = ", ".join(self.observation_spec[team, "observation"].keys())
+        parts = self.games[0].team(team)[0].body.action_spec
+        actions = ", ".join(
+            f"{name} of {int(spec.high) + 1}" if spec.is_discrete else f"{name} {spec.shape}"
+            for name, spec in parts.items()
+        )
+        return f"{team} x {len(self.group_map[team])}: {senses} -> {actions}"
+
     def _set_seed(self, seed: int | None) -> None:
         seed = fresh_seed() if seed is None else seed
         self.episodes = [
