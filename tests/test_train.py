@@ -54,6 +54,14 @@ def test_available_devices_are_found_and_others_raise_an_error(monkeypatch):
         find_device("cuda:2")
 
 
+def test_the_help_fits_a_screen_and_names_the_choices(tmp_path):
+    shown = train(tmp_path, "--help")
+    assert shown.returncode == 0
+    assert len(shown.stdout.splitlines()) <= 60
+    for part in ("+task=", "resume=", "KickTheBall", "workers32", "--cfg job"):
+        assert part in shown.stdout
+
+
 @pytest.fixture(scope="module")
 def smoke(tmp_path_factory):
     folder = tmp_path_factory.mktemp("train")

@@ -1,8 +1,10 @@
 """Batches and stages of a run add up to its budget."""
 
+from io import StringIO
+
 import pytest
 
-from veca_marl.algos.training.schedule import Schedule
+from veca_marl.algos.training.schedule import ProgressDisplay, Schedule
 
 
 @pytest.mark.parametrize(
@@ -32,6 +34,35 @@ def test_the_short_first_stage_ends_with_a_checkpoint_alone():
     ends = [2, 8, 16, 21]
     assert [schedule.is_evaluated(batches) for batches in ends] == [False, True, True, True]
     assert [b for b in range(21) if not schedule.is_within_stage(b)] == [0, 2, 8, 16]
+
+
+class Terminal(StringIO):
+    def isatty(self):
+        return True
+
+
+def test_a_terminal_has_a_bar_and_a_file_a_line_for_each_stage():
+    written = {}
+    for file in (StringIO(), Terminal()):
+        display = ProgressDisplay(200, 40, True, file)
+        for _ in range(2):
+            for _ in range(4):
+                display.update(20, {"red/return": 1.25})
+            display.end_stage()
+        display.close()
+        written[type(file)] = file.getvalue()
+    first, second = written[StringIO].splitlines()
+    assert "120 of 200 frames" in first
+    assert "200 of 200 frames" in second
+    assert "red/return=1.25" in second
+    assert "\r" not in written[StringIO]
+    assert "\r" in written[Terminal]
+    hidden = StringIO()
+    display = ProgressDisplay(200, 0, False, hidden)
+    display.update(20, {})
+    display.end_stage()
+    display.close()
+    assert hidden.getvalue() == ""
 
 
 def test_a_run_beyond_its_budget_has_no_stages_left():

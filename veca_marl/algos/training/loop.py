@@ -21,7 +21,6 @@ import torch
 from numpy.typing import NDArray
 from tensordict import TensorDictBase
 from torchrl import timeit
-from tqdm import tqdm
 
 from veca_marl.algos.checkpoints import Checkpoints, load_errors, to_plain
 from veca_marl.algos.collection.experience import CollectCfg, Experience
@@ -49,6 +48,7 @@ from veca_marl.algos.training.learners import AllLearn, Matchmaking, TeamLearner
 from veca_marl.algos.training.schedule import (
     Budget,
     Progress,
+    ProgressDisplay,
     Schedule,
     Stopwatch,
     device_memory,
@@ -123,7 +123,7 @@ class Trainer:
         checkpoints: Where states are stored.
         reporters: Where numbers go.
         seed: Determines all random numbers.
-        progress_bar: Whether to show one.
+        progress_bar: Whether to show one; where it is no terminal, a line after each stage.
         episode_steps: Steps after which an episode is truncated; None if that is not known.
         matchmaking: Which teams learn against which opponents.
         during_last_evaluation: Called once, while other processes play the last evaluation; it
@@ -249,17 +249,14 @@ class Trainer:
     def _train(self, experience: Experience) -> dict[str, Scores] | None:
         """Go through all stages and return the scores of the last, if there was one."""
         scores = None
-        with tqdm(
-            total=self.schedule.frames,
-            initial=self.progress.frames,
-            unit=" frames",
-            disable=not self.progress_bar,
-        ) as bar:
+        shown = self.schedule.frames, self.progress.frames
+        with closing(ProgressDisplay(*shown, self.progress_bar)) as display:
             finished = self._is_finished()
             while not finished:
-                self._run_stage(experience, bar)
+                self._run_stage(experience, display)
                 finished = self._is_finished()
                 scores = self._end_stage(finished)
+                display.end_stage()
         return scores
 
     def _is_finished(self) -> bool:
@@ -283,7 +280,7 @@ class Trainer:
         """Return a table of where the time went."""
         return timing_table(self._clock.elapsed(), self.progress.frames - self._resumed_frames)
 
-    def _run_stage(self, experience: Experience, bar: tqdm[Any]) -> None:
+    def _run_stage(self, experience: Experience, display: ProgressDisplay) -> None:
         self.matchmaking.begin_stage(self.progress.stage, self.progress.frames)
         self._update_policy(experience)
         with timeit("collect"):
@@ -294,9 +291,8 @@ class Trainer:
         self._episodes.begin_stage(math.inf if longest is None else steps - longest)
         for number in range(batches):
             batch, row = self._iterate(experience)
-            bar.update(self.collect.frames)
             finished = {k: v for k, v in row.items() if k.endswith("/return") and v == v}
-            bar.set_postfix({k: f"{v:.3g}" for k, v in finished.items()})
+            display.update(self.collect.frames, finished)
             if number + 1 == batches:
                 self._report_values(_actions(batch, self.learners.specs))
 

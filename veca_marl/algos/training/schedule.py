@@ -5,14 +5,16 @@ from __future__ import annotations
 import math
 import multiprocessing
 import os
+import sys
 import time
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TextIO
 
 import torch
 from torchrl import timeit
+from tqdm import tqdm
 
 
 def processor_seconds() -> float:
@@ -200,6 +202,55 @@ class Progress:
         if type(best) not in (int, float) or math.isnan(best):
             raise ValueError(f"no progress: best_return={best!r:.80}")
         return cls(**counted, best_return=best)
+
+
+class ProgressDisplay:
+    """A bar in a terminal; in any other file, such as the log of a job, a line after each stage.
+
+    Args:
+        total: Frames of the run.
+        initial: Frames learnt from before.
+        shown: Whether there is one.
+        file: Where to; None is the error output.
+    """
+
+    def __init__(self, total: int, initial: int, shown: bool, file: TextIO | None = None) -> None:
+        self._file = sys.stderr if file is None else file
+        self._lines = shown and not self._file.isatty()
+        unseen = not shown or self._lines
+        self._bar = tqdm(
+            total=total, initial=initial, unit=" frames", disable=unseen, file=self._file
+        )
+        self._frames, self._total, self._initial = initial, total, initial
+        self._means: dict[str, str] = {}
+        self._start_s = time.monotonic()
+
+    def update(self, frames: int, means: Mapping[str, float]) -> None:
+        """Add frames, and show the mean returns."""
+        self._frames += frames
+        self._means = {name: f"{value:.3g}" for name, value in means.items()}
+        self._bar.update(frames)
+        self._bar.set_postfix(self._means)
+
+    def end_stage(self) -> None:
+        """Write a line, where there is no bar."""
+        if self._lines:
+            meter = tqdm.format_meter(
+                self._frames,
+                self._total,
+                time.monotonic() - self._start_s,
+                unit=" frames",
+                postfix=", ".join(f"{name}={mean}" for name, mean in self._means.items()),
+                initial=self._initial,
+                bar_format="{n_fmt} of {total_fmt} frames, {elapsed}<{remaining}, {rate_fmt}"
+                "{postfix}",
+            )
+            self._file.write(f"{meter}\n")
+            self._file.flush()
+
+    def close(self) -> None:
+        """End the bar."""
+        self._bar.close()
 
 
 def timing_table(elapsed_s: float, frames: int) -> str:
