@@ -5,6 +5,7 @@ This module imports nothing of the package, so that commands can use it before a
 
 from __future__ import annotations
 
+import hashlib
 import os
 import re
 from collections.abc import Sequence
@@ -62,3 +63,15 @@ def quoted(path: str | Path) -> str:
     escaped = re.sub(r"(\\*)'", r"\1\1\\'", str(path))
     escaped = re.sub(r"(\\+)$", r"\1\1", escaped)
     return f"'{escaped}'"
+
+
+_LONGEST_NAME = 200  # bytes; Linux allows 255
+
+
+def short_name(name: str) -> str:
+    """Return a name that file systems take: long ones end in a digest, the same every time."""
+    content = name.encode()
+    if len(content) <= _LONGEST_NAME:
+        return name
+    digest = hashlib.sha256(content).hexdigest()[:12]
+    return f"{content[: _LONGEST_NAME - 13].decode(errors='ignore')}-{digest}"

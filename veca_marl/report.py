@@ -4,6 +4,10 @@ Gathers the runs of ``python -m veca_marl.train -m +experiment=...`` and writes 
 verdict on each claim, a table of the arms, a table of the runs, what is missing), ``curves.png``
 (interquartile means over seeds with bootstrap intervals) and ``results.csv`` (all evaluations).
 Overrides that the runs were started with are repeated: ``total_frames=1e5``.
+
+A sweep without an experiment is reported with the words that started it; its arms are the
+combinations of the values that it lists: ``python -m veca_marl.report -m +task=KickTheBall
+senses/audio=hrtf,mono seed=0,1,2``.
 """
 
 from __future__ import annotations
@@ -21,7 +25,7 @@ from veca_marl.algos.files import WriteError, write_atomically
 from veca_marl.config import ConfigError
 from veca_marl.config.command_line import CommandLine, check_folder
 from veca_marl.config.experiment import ExperimentCfg, parse_claim
-from veca_marl.reports.arms import Arm, compose_arms
+from veca_marl.reports.arms import Arm, compose_arms, compose_sweep
 from veca_marl.reports.figure import check_plotting, draw
 from veca_marl.reports.gather import (
     Found,
@@ -35,6 +39,7 @@ from veca_marl.reports.gather import (
 from veca_marl.reports.page import Report, page, run_remarks
 from veca_marl.reports.scores import expert_rows, expert_score, runs_of, summarise, team_of
 from veca_marl.reports.verdict import Evidence, judge
+from veca_marl.sweeps.names import is_sweep, key_of
 
 FIGURE = "curves.png"
 
@@ -158,20 +163,27 @@ def _nothing_evaluated(experiment: ExperimentCfg, found: Sequence[Found]) -> Con
 def run(options: ReportOptions, overrides: list[str]) -> None:
     """Write the report; print the verdict, what is missing, and where the files are."""
     command = shlex.join(["python", "-m", "veca_marl.train", "-m", *overrides])
-    report, folder = make_report(options, compose_arms(overrides), command)
+    arms = compose_sweep(overrides) if _is_plain_sweep(overrides) else compose_arms(overrides)
+    report, folder = make_report(options, arms, command)
     for text, judgement in report.judgements.items():
         print(f"{text}: {judgement.verdict.value}: {judgement.reason}")
     ends = [f"verdict: {report.verdict}", f"report: {folder / 'report.md'}"]
     print(*run_remarks(report), *ends, sep="\n")
 
 
+def _is_plain_sweep(overrides: Sequence[str]) -> bool:
+    """Return whether overrides list values without an experiment that has arms."""
+    return is_sweep(overrides) and "experiment" not in map(key_of, overrides)
+
+
 def main(words: Sequence[str] | None = None) -> int:
     """Run the command line; return the exit status."""
     errors = (ValueError, OSError, WriteError)
     places = ("experiment", "runs", "results", "to")
-    return CommandLine("report", ReportOptions, str(__doc__), errors, ("to",), places).run(
-        run, words
+    line = CommandLine(
+        "report", ReportOptions, str(__doc__), errors, ("to",), places, _is_plain_sweep
     )
+    return line.run(run, words)
 
 
 if __name__ == "__main__":

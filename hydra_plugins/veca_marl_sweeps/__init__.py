@@ -24,6 +24,7 @@ from omegaconf import DictConfig, OmegaConf, open_dict
 from omegaconf.errors import OmegaConfBaseException
 
 from veca_marl.runs.cores import usable_cores
+from veca_marl.sweeps.names import fixed_in, folder_of, key_of, run_name, varied_in
 from veca_marl.sweeps.plans import Job, SweepError
 from veca_marl.sweeps.run_state import final_score, read_run, with_body_kinds
 from veca_marl.sweeps.sweep import run_sweep
@@ -180,7 +181,7 @@ class ProcessLauncher(Launcher):
         config = self._context.config_loader.load_sweep_config(self._config, overrides)
         with open_dict(config):
             config.hydra.job.id = config.hydra.job.num = number
-        sweep, name = Path(str(config.hydra.sweep.dir)), str(config.hydra.sweep.subdir)
+        sweep, name = self._place(config, overrides)
         hydra = self._config.hydra
         shared = [
             f"--config-dir={source.path}"
@@ -194,6 +195,23 @@ class ProcessLauncher(Launcher):
         self._nodes[sweep / name] = config
         asked = with_body_kinds(asked, body_names(config))
         return Job(name, sweep / name, [*shared, *overrides], asked)
+
+    def _place(self, config: DictConfig, overrides: Sequence[str]) -> tuple[Path, str]:
+        """Return the folder of the sweep, and that of a run within it.
+
+        Those of a sweep without an experiment are named by what it varies, unless the command names
+        them itself.
+        """
+        sweep, name = Path(str(config.hydra.sweep.dir)), str(config.hydra.sweep.subdir)
+        if config.experiment.arm is not None:
+            return sweep, name
+        command = list(self._config.hydra.overrides.task)
+        chosen = [key_of(text) for text in self._config.hydra.overrides.hydra]
+        if "hydra.sweep.dir" not in chosen and config.experiment.name is None:
+            sweep = folder_of(fixed_in(command))
+        if "hydra.sweep.subdir" not in chosen:
+            name = run_name(varied_in(overrides, command), int(config.seed))
+        return sweep, name
 
 
 def _store(group: str, name: str, plugin: type, fields: dict[str, Any]) -> None:

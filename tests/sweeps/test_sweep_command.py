@@ -45,11 +45,20 @@ def test_every_arm_is_run_with_every_seed_in_a_folder_of_its_own(sweep):
 
 @pytest.mark.slow
 def test_a_sweep_without_experiment_has_folders_named_by_its_overrides(sweep):
+    """By those that vary; the others name the folder of the sweep."""
     jobs, _, _ = sweep("+task=KickTheBall", "seed=1", "senses/audio=mono,hrtf")
     assert [str(job.folder) for job in jobs] == [
-        f"runs/sweeps/task=KickTheBall,senses.audio={quality}/seed_1"
-        for quality in ("mono", "hrtf")
+        f"runs/sweeps/KickTheBall/senses.audio={quality}/seed_1" for quality in ("mono", "hrtf")
     ]
+    fixed = [f"task.weights.kick={number}" for number in (2,)] + ["algo.clip=0.1"]
+    jobs, _, _ = sweep("+task=KickTheBall", *fixed, "algo.gamma=0.9,0.8", "seed=1,2")
+    assert [str(job.folder) for job in jobs] == [
+        f"runs/sweeps/KickTheBall,task.weights.kick=2,algo.clip=0.1/algo.gamma={gamma}/seed_{seed}"
+        for gamma in (0.9, 0.8)
+        for seed in (1, 2)
+    ]
+    (job,) = sweep("+task=KickTheBall", "hydra.sweep.dir=here", "hydra.sweep.subdir=there")[0]
+    assert str(job.folder) == "here/there"
 
 
 @pytest.mark.slow

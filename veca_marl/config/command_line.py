@@ -51,6 +51,8 @@ class CommandLine(Generic[Options]):
         outputs: Keys of the options that name what a run of the command writes.
         places: Keys that decide where it writes if no output is named: combinations have to differ
             in one of them. None if it writes nothing then.
+        keeps_sweep: Whether the command is called once, with the overrides that list values as they
+            are, instead of once for each combination.
     """
 
     command: str
@@ -59,6 +61,7 @@ class CommandLine(Generic[Options]):
     errors: tuple[type[Exception], ...] = ()
     outputs: tuple[str, ...] = ()
     places: tuple[str, ...] | None = None
+    keeps_sweep: Callable[[Sequence[str]], bool] = lambda _: False
 
     def run(
         self, call: Callable[[Options, list[str]], None], words: Sequence[str] | None = None
@@ -103,7 +106,11 @@ class CommandLine(Generic[Options]):
             raise ConfigError(
                 f"unknown flag {flags[0]!r}; choices: --help, --version, --multirun, KEY=VALUE"
             )
-        combinations = _combinations(parse(normalised(texts)), len(texts) < len(words))
+        others = [text for text in texts if _root(text) not in self._names]
+        if self.keeps_sweep(others):
+            combinations = [normalised(texts)]
+        else:
+            combinations = _combinations(parse(normalised(texts)), len(texts) < len(words))
         self._check_outputs(combinations)
         for combination in combinations:
             own = [text for text in combination if _root(text) in self._names]

@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -29,7 +28,7 @@ from veca_marl.config.overrides import (
 )
 from veca_marl.config.root import Config, register_schemas, store_tasks_without_file
 from veca_marl.envs.core.task import TASKS, find_task
-from veca_marl.override_text import normalised
+from veca_marl.override_text import normalised, short_name
 from veca_marl.plugins import PluginError, conf_dir, load_plugins
 
 _MAY_BE_NULL = ("playground.walls",)
@@ -78,9 +77,6 @@ def _declared_lengths(owner: Any) -> dict[str, int]:
 
 def _fixed(hint: Any) -> bool:
     return get_origin(hint) is tuple and Ellipsis not in get_args(hint)
-
-
-_LONGEST_NAME = 200  # bytes; Linux allows 255
 
 
 def compose(overrides: Sequence[str] = ()) -> Config:
@@ -261,16 +257,7 @@ def _job_folder(arm: str | None, overrides: str, seed: int) -> str:
         seed: Seed of the run.
     """
     name = arm or overrides.replace("/", ".").replace("+", "") or "default"
-    return f"{_short(name)}/seed_{seed}"
-
-
-def _short(name: str) -> str:
-    """Return a name that file systems take: long ones end in a digest, the same every time."""
-    content = name.encode()
-    if len(content) <= _LONGEST_NAME:
-        return name
-    digest = hashlib.sha256(content).hexdigest()[:12]
-    return f"{content[: _LONGEST_NAME - 13].decode(errors='ignore')}-{digest}"
+    return f"{short_name(name)}/seed_{seed}"
 
 
 register_schemas()

@@ -7,16 +7,18 @@ number, or continued to it, has later evaluations: they are not compared with th
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from copy import copy
+from dataclasses import dataclass, replace
 from typing import Any, cast
 
 import yaml
-from omegaconf import OmegaConf
+from omegaconf import DictConfig, OmegaConf
 
 from veca_marl.algos.collection.experience import CollectCfg
 from veca_marl.config import Config, ConfigError, compose_node, to_config
 from veca_marl.config.experiment import check_contradictions
 from veca_marl.config.stored import body_names
+from veca_marl.sweeps.names import RUNS, arm_of, combinations, fixed_in, folder_of, key_of
 from veca_marl.sweeps.run_state import RunState, with_body_kinds
 
 
@@ -112,8 +114,43 @@ def compose_arms(overrides: Sequence[str]) -> list[Arm]:
     return [_compose_arm(overrides, str(name), list(own)) for name, own in experiment.arms.items()]
 
 
+def compose_sweep(overrides: Sequence[str]) -> list[Arm]:
+    """Return the combinations of values of a sweep without an experiment, as arms.
+
+    Args:
+        overrides: Those of ``train -m``; some list values.
+
+    Raises:
+        ConfigError: If a combination is impossible.
+    """
+    combined, seeds = combinations(overrides)
+    fixed = [text for text in fixed_in(overrides) if key_of(text) != "seed"]
+    arms = {arm_of(varied): varied for varied in combined}
+    composed = {name: compose_node([*fixed, *varied]) for name, varied in arms.items()}
+    return [
+        Arm(name, _with_experiment(to_config(node), fixed, arms, seeds), _stored(node))
+        for name, node in composed.items()
+    ]
+
+
+def _with_experiment(
+    cfg: Config, fixed: Sequence[str], arms: Mapping[str, list[str]], seeds: Sequence[int]
+) -> Config:
+    """Return a configuration with a sweep in place of its experiment."""
+    name = folder_of(fixed).relative_to(RUNS).as_posix()
+    experiment = copy(cfg.experiment)  # its names are those of folders, which are checked no more
+    experiment.name, experiment.arms = name, dict(arms)
+    experiment.seeds = list(seeds) or [cfg.seed]
+    return replace(cfg, experiment=experiment)
+
+
+def _stored(node: DictConfig) -> dict[str, Any]:
+    """Return a configuration as it is stored with a run."""
+    plain = cast(dict[str, Any], yaml.safe_load(OmegaConf.to_yaml(node, resolve=True)))
+    return with_body_kinds(plain, body_names(node))
+
+
 def _compose_arm(overrides: Sequence[str], name: str, own: Sequence[str]) -> Arm:
     check_contradictions(name, own, overrides)
     node = compose_node([*overrides, f"experiment.arm={name}", *own])
-    plain = cast(dict[str, Any], yaml.safe_load(OmegaConf.to_yaml(node, resolve=True)))
-    return Arm(name, to_config(node), with_body_kinds(plain, body_names(node)))
+    return Arm(name, to_config(node), _stored(node))
