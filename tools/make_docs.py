@@ -15,7 +15,7 @@ from tools.docs_pages.config_page import config_page
 from tools.docs_pages.observation_page import observation_page
 from tools.docs_pages.pictures import write_pictures
 from tools.docs_pages.playground_page import playground_page, write_playground_pictures
-from tools.docs_pages.task_pages import write_task_pages
+from tools.docs_pages.task_pages import overview_page, write_task_pages
 
 DOCS = Path(__file__).resolve().parent.parent / "docs"
 PAGES: dict[str, Callable[[], str]] = {
@@ -23,6 +23,7 @@ PAGES: dict[str, Callable[[], str]] = {
     "reference/configuration.md": config_page,
     "reference/observations.md": observation_page,
     "reference/playgrounds.md": playground_page,
+    "reference/tasks.md": overview_page,
 }
 
 
