@@ -36,3 +36,12 @@ def test_the_direction_is_found_with_a_head_and_not_with_one_receiver():
     assert stereo.azimuth_deg > hrtf.azimuth_deg + 15.0
     assert stereo.confused > 0.35
     assert mono.azimuth_deg > 75.0
+
+
+@pytest.mark.slow
+def test_the_time_between_the_ears_tells_the_side_without_a_head():
+    names = ("stereo", "stereo_phase", "mono_phase")
+    level, phase, mono = (localisation(ARMS[name], train=600, test=300) for name in names)
+    assert phase.lateral_deg < level.lateral_deg - 12.0
+    assert phase.confused > 0.35  # front and back have the same time
+    assert mono.azimuth_deg > 75.0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,8 +10,13 @@ import torch
 
 from tools.fidelity.law import Curve, Law, Mark, Plot, Section, at_least, at_most, between
 from veca_marl.sim.geometry import Floats, Pose
-from veca_marl.sim.hearing import AudioCfg, AudioQuality, log_spectrum
-from veca_marl.sim.hearing.audio_sense import WINDOW_SAMPLES, make_receiver
+from veca_marl.sim.hearing import AudioCfg, AudioQuality
+from veca_marl.sim.hearing.audio_sense import (
+    WINDOW_SAMPLES,
+    Encoding,
+    make_encoder,
+    make_receiver,
+)
 from veca_marl.sim.sound import SAMPLE_RATE_HZ, Clip, Room, SoundField, buzz
 
 _TEXT = """
@@ -26,8 +32,11 @@ scenes; {test} others are its test. The same scenes are used for each quality.
 - **Lateral angle**: mean absolute error of the angle to the median plane, which a front-back
   confusion leaves unchanged; 45 degrees if it is always found at 0.
 
-The observation contains magnitudes only: interaural times change it through the interference of
-direct sound and reflections only. `stereo` depends on how the distances to both ears differ.
+The default observation contains magnitudes only: interaural times change it through the
+interference of direct sound and reflections only, and `stereo` depends on how the distances to
+both ears differ. Qualities with `_phase` are observed with
+`senses.audio.encoding=magnitude_phase`: cosine and sine of the interaural phase show the time by
+which one ear hears earlier.
 """
 ARMS: dict[str, AudioCfg] = {
     "hrtf": AudioCfg(),
@@ -35,6 +44,9 @@ ARMS: dict[str, AudioCfg] = {
     "stereo": AudioCfg(quality=AudioQuality.stereo),
     "stereo_child": AudioCfg(quality=AudioQuality.stereo, head_scale=0.733),
     "mono": AudioCfg(quality=AudioQuality.mono),
+    "hrtf_phase": AudioCfg(encoding=Encoding.magnitude_phase),
+    "stereo_phase": AudioCfg(quality=AudioQuality.stereo, encoding=Encoding.magnitude_phase),
+    "mono_phase": AudioCfg(quality=AudioQuality.mono, encoding=Encoding.magnitude_phase),
 }
 TRAIN, TEST = 2500, 500
 _ROOM_LOWER_M, _ROOM_SIZE_M, _REFLECTION = (-3.0, -3.0, 0.0), (6.0, 6.0, 2.6), 0.6
@@ -73,12 +85,13 @@ def errors(found_rad: Floats, true_rad: Floats) -> Errors:
 
 
 def scenes(cfg: AudioCfg, count: int, seed: int) -> tuple[Floats, Floats]:
-    """Return observations ``(count, 500)`` of random scenes, and azimuths ``(count,)`` in rad."""
+    """Return observations ``(count, features)`` of scenes, and azimuths ``(count,)`` in rad."""
     rng = np.random.default_rng(seed)
     field = SoundField(Room(_ROOM_LOWER_M, _ROOM_SIZE_M, _REFLECTION), image_order=1)
     ball = field.add_source("ball", Clip(buzz(150.0, 0.1, SAMPLE_RATE_HZ), loop=True))
     listener = field.add_listener(make_receiver(cfg, SAMPLE_RATE_HZ))
-    heard, azimuths = np.empty((count, 500)), np.empty(count)
+    encoder = make_encoder(cfg.encoding, cfg.window, cfg.noise_floor_db, cfg.bins)
+    heard, azimuths = np.empty((count, math.prod(encoder.spec.shape))), np.empty(count)
     for i in range(count):
         position, head, azimuths[i] = _place(rng)
         field.reset(np.random.default_rng(rng.integers(2**63)))
@@ -87,7 +100,7 @@ def scenes(cfg: AudioCfg, count: int, seed: int) -> tuple[Floats, Floats]:
         for _ in range(_STEPS):
             field.advance()
             recent.append(listener.render(head))
-        heard[i] = log_spectrum(np.concatenate(recent, axis=1)[:, -WINDOW_SAMPLES:]).ravel()
+        heard[i] = encoder.encode(np.concatenate(recent, axis=1)[:, -WINDOW_SAMPLES:]).ravel()
     return heard, azimuths
 
 
@@ -144,6 +157,7 @@ def _trained(inputs: torch.Tensor, targets: torch.Tensor) -> torch.nn.Module:
 
 def _laws(found: dict[str, Errors]) -> list[Law]:
     hrtf, stereo, mono = found["hrtf"], found["stereo"], found["mono"]
+    phase = {name: found[f"{name}_phase"] for name in ("hrtf", "stereo", "mono")}
     return [
         at_most("hrtf, error of azimuth", "deg", 30.0, hrtf.azimuth_deg),
         at_most("hrtf, front-back confusion", "", 0.25, hrtf.confused),
@@ -154,6 +168,17 @@ def _laws(found: dict[str, Errors]) -> list[Law]:
         between("stereo, front-back confusion", "", 0.35, 0.65, stereo.confused),
         at_least("mono, error of azimuth", "deg", 75.0, mono.azimuth_deg),
         between("mono, front-back confusion", "", 0.35, 0.65, mono.confused),
+        at_most("hrtf with phase, error of azimuth", "deg", 30.0, phase["hrtf"].azimuth_deg),
+        at_most(
+            "stereo with phase, error of the lateral angle",
+            "deg",
+            25.0,
+            phase["stereo"].lateral_deg,
+        ),
+        between(
+            "stereo with phase, front-back confusion", "", 0.35, 0.65, phase["stereo"].confused
+        ),
+        at_least("mono with phase, error of azimuth", "deg", 75.0, phase["mono"].azimuth_deg),
     ]
 
 
