@@ -1,3 +1,4 @@
+import math
 from functools import cache
 from itertools import chain, zip_longest
 
@@ -47,7 +48,9 @@ def composed_task(name):
 def test_episodes_end_before_the_worlds_start_new_ones(task):
     """What comes later in an episode would not be learnt from."""
     cfg = composed_task(task)
-    stage = Schedule.of(cfg.total_frames, cfg.eval.every_frames, cfg.collect.frames)
+    episode = math.ceil(cfg.game.max_steps / cfg.collect.steps)
+    numbers = cfg.total_frames, cfg.eval.every_frames, cfg.collect.frames
+    stage = Schedule.of(*numbers, episode)
     stages = [*stage.stages_after(0)][1 if stage.early_batches else 0 :]
     steps = [batches * cfg.collect.steps for batches in stages]
     assert min(steps) >= cfg.game.max_steps

@@ -36,6 +36,11 @@ def test_the_short_first_stage_ends_with_a_checkpoint_alone():
     assert [b for b in range(21) if not schedule.is_within_stage(b)] == [0, 2, 8, 16]
 
 
+def test_there_is_no_short_stage_where_the_next_one_could_not_hold_an_episode():
+    assert list(Schedule.of(160, 80, 10, batches_per_episode=6).stages_after(0)) == [2, 6, 8]
+    assert list(Schedule.of(160, 80, 10, batches_per_episode=7).stages_after(0)) == [8, 8]
+
+
 class Terminal(StringIO):
     def isatty(self):
         return True

@@ -50,7 +50,7 @@ class EvalCfg:
         every_frames: Training frames between two evaluations (rounded up to whole batches). The
             training worlds start new episodes after each, so that a run resumed from the
             checkpoint continues exactly. After a quarter of the first of these stages there is a
-            checkpoint too.
+            checkpoint too, if an episode fits into the rest.
         episodes: Episodes of an evaluation; each evaluation has the same starts.
         final_episodes: Episodes of the last evaluation of a run and of the random policy it is
             compared with, the same as those of other evaluations and more; None is twice

@@ -268,7 +268,8 @@ class Trainer:
     def schedule(self) -> Schedule:
         """Batches and stages of the whole run."""
         frames = self.budget.total_frames
-        return Schedule.of(frames, self.evaluation.every_frames, self.collect.frames)
+        episode = math.ceil((self.episode_steps or 0) / self.collect.steps)
+        return Schedule.of(frames, self.evaluation.every_frames, self.collect.frames, episode)
 
     def frames_to_learn(self, team: str) -> int:
         """Return the frames from which a team learns in the rest of the budget."""

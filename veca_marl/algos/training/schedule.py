@@ -98,30 +98,41 @@ class Schedule:
 
     A run begins with a short stage, where stages are long enough: it ends with a checkpoint and
     without an evaluation, so that a run that is interrupted early has something to continue from.
+    Worlds start new episodes after it: an episode has to fit into the stage that follows.
 
     Attributes:
         batches: Batches of the run, at least 1.
         batches_per_stage: Batches between two evaluations, at least 1.
         frames_per_batch: Frames of a batch, at least 1.
+        batches_per_episode: Batches of the longest episode; 0 if it is not known.
     """
 
     batches: int
     batches_per_stage: int
     frames_per_batch: int
+    batches_per_episode: int = 0
 
     @classmethod
-    def of(cls, total_frames: int, frames_per_stage: int, frames_per_batch: int) -> Schedule:
+    def of(
+        cls,
+        total_frames: int,
+        frames_per_stage: int,
+        frames_per_batch: int,
+        batches_per_episode: int = 0,
+    ) -> Schedule:
         """Return the schedule of at least `total_frames`; stages are rounded up to whole batches.
 
         Args:
             total_frames: Frames of the run.
             frames_per_stage: Frames between two evaluations.
             frames_per_batch: Frames of a batch.
+            batches_per_episode: Batches of the longest episode; 0 if it is not known.
         """
         return cls(
             math.ceil(total_frames / frames_per_batch),
             math.ceil(frames_per_stage / frames_per_batch),
             frames_per_batch,
+            batches_per_episode,
         )
 
     @property
@@ -133,7 +144,8 @@ class Schedule:
     def early_batches(self) -> int:
         """Batches of the short first stage; 0 without one."""
         quarter = self.batches_per_stage // 4
-        return quarter if quarter >= _LEAST_EARLY_BATCHES and quarter < self.batches else 0
+        fits = self.batches_per_stage - quarter >= self.batches_per_episode
+        return quarter if fits and _LEAST_EARLY_BATCHES <= quarter < self.batches else 0
 
     def is_evaluated(self, batches: int) -> bool:
         """Return whether the stage that ends after a number of batches ends with an evaluation."""
