@@ -26,7 +26,7 @@ WRITTEN = [
 READMES = [*sorted((ROOT / "experiments").rglob("README.md")), ROOT / "tools" / "README.md"]
 CHANGELOG = ROOT / "CHANGELOG.md"  # names what there was
 PYTHON = re.compile(r"^ *```python\n(.*?)^ *```", re.MULTILINE | re.DOTALL)
-NEEDS_MORE = re.compile(r"\.\.\.|<|RUN|my_package|FindBeacon|launcher|glob|run=|resume=")
+NEEDS_MORE = re.compile(r"\.\.\.|<|RUN|my_package|FindBeacon|launcher|sweeper|glob|run=|resume=")
 RUN_BY_OTHERS = "other_libraries.md"  # tests/test_adapter_guides.py: each block by itself
 
 RUN_BLOCKS = """
@@ -41,7 +41,7 @@ for page in map(pathlib.Path, sys.argv[2:]):
 
 
 def text_of(page):
-    return page.read_text(encoding="utf-8")
+    return page.read_text(encoding="utf-8").replace("\\\n", " ")
 
 
 def commands(name):

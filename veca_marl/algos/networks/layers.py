@@ -53,7 +53,7 @@ class CentralValue(nn.Module):
             features: ``(..., agents, F)``.
             mask: ``(..., agents)``, False for agents that are eliminated; None counts all.
         """
-        values: Tensor = self.head(torch.cat([features, _team_mean(features, mask)], dim=-1))
+        values: Tensor = self.head(torch.cat([features, team_mean(features, mask)], dim=-1))
         return values
 
 
@@ -80,7 +80,14 @@ class StateValue(nn.Module):
         return values
 
 
-def _team_mean(features: Tensor, mask: Tensor | None) -> Tensor:
+def team_mean(features: Tensor, mask: Tensor | None) -> Tensor:
+    """Return the mean over the agents that are left, ``(..., agents, F)`` with equal rows.
+
+    Args:
+        features: ``(..., agents, F)``.
+        mask: ``(..., agents)``, False for eliminated agents; None where no agent can be
+            eliminated.
+    """
     if mask is None:
         return features.mean(dim=-2, keepdim=True).expand_as(features)
     present = mask.unsqueeze(-1)

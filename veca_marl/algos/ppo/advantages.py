@@ -13,6 +13,7 @@ from torchrl.objectives.value.functional import (
 )
 
 from veca_marl.algos.networks.factory import TeamNetwork
+from veca_marl.algos.networks.layers import team_mean
 
 
 class Credit(Enum):
@@ -20,8 +21,8 @@ class Credit(Enum):
 
     Attributes:
         nothing: Its return ends.
-        team: Its return goes on with the mean value of the agents that are left, so that it pays to
-            be eliminated where that lets the team win.
+        team: Its return goes on with the mean value of the agents that are left, so that a
+            sacrifice that lets the team win is reinforced.
     """
 
     nothing = "nothing"
@@ -60,9 +61,9 @@ def advantages(
     following[cut.to(device)] = _values_after(network, batch["next"], cut, team, device)
     reward, done, terminated = (array.to(device) for array in _outcome(batch, team))
     if credit is Credit.team and "mask" in batch["next", team].keys():  # noqa: SIM118
-        left = batch["next", team, "mask"].unsqueeze(-1).to(device)
+        left = batch["next", team, "mask"].to(device)
         eliminated = terminated & ~batch["next", "terminated"].unsqueeze(-1).to(device)
-        following = torch.where(eliminated, _mean_of(following, left), following)
+        following = torch.where(eliminated, team_mean(following, left), following)
         terminated = terminated & ~eliminated
     # TorchRL's vectorised estimate raises an error where no later step counts
     estimate = (
@@ -89,12 +90,6 @@ def _values_after(
     last = following.select(*read)[cut].to(device)
     value: Tensor = network.critic(network.encoder(last))[team, "state_value"]
     return value
-
-
-def _mean_of(values: Tensor, left: Tensor) -> Tensor:
-    """Return the mean over the agents that are left, ``(..., agents, 1)`` with equal entries."""
-    total = torch.where(left, values, torch.zeros_like(values)).sum(-2, keepdim=True)
-    return (total / left.sum(-2, keepdim=True).clamp_min(1)).expand_as(values)
 
 
 def _outcome(batch: TensorDictBase, team: str) -> tuple[Tensor, Tensor, Tensor]:

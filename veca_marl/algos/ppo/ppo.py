@@ -63,11 +63,11 @@ class PPOCfg(AlgorithmCfg):
             heads read (ours).
         target_kl: Divergence per dimension of the action: a number of a vector, or a choice. The
             rate is divided by 1.5 above twice this divergence, multiplied by 1.5 below half of it:
-            the rule of rl_games (the paper says "adaptive to the KL divergence"). Its target of
-            0.008 for the whole action is ours for two dimensions; for 40 joints it would hold the
-            rate at a tenth of what they can bear. The divergence of a minibatch is measured before
-            its step: it is 0 in the first step after collection, and with one epoch of one
-            minibatch the rate stays.
+            the rule of rl_games (the paper says "adaptive to the KL divergence"). Ours is its
+            target of 0.008 for an action of two dimensions. The divergence of an action is the sum
+            over its dimensions, so the target grows with their number. The divergence of a
+            minibatch is measured before its step: it is 0 in the first step after collection,
+            and with one epoch of one minibatch the rate stays.
         min_learning_rate: Lower bound of the rate.
         max_learning_rate: Upper bound of the rate.
         critic_learning_rate: Constant rate of the parameters of the critic alone (ours): the
