@@ -193,9 +193,53 @@ class Underside:
             positions: ``(47, 3)`` bone origins, metres.
             rotations: ``(47, 3, 3)`` bone rotations.
         """
-        up = rotations[self._frames, 2]
-        heights = positions[self._frames, 2] + (up * self._offsets).sum(axis=1) - self._radii
-        return float(heights.min())
+        return float(_lowest_m(self._frames, self._offsets, self._radii, positions, rotations))
+
+    def put_on(self, surface_m: float, positions: Floats, rotations: Floats) -> None:
+        """Shift all bones vertically, so that the lowest point is at the height of a surface.
+
+        Args:
+            surface_m: Height of the surface.
+            positions: ``(47, 3)`` bone origins, metres; the heights are changed.
+            rotations: ``(47, 3, 3)`` bone rotations.
+        """
+        _put_on(surface_m, self._frames, self._offsets, self._radii, positions, rotations)
+
+
+@njit(cache=True)
+def _lowest_m(
+    frames: NDArray[np.int64], offsets: Floats, radii: Floats, positions: Floats, rotations: Floats
+) -> float:
+    """Return the height of the lowest of some balls.
+
+    Args:
+        frames: ``(n,)`` bones of the balls.
+        offsets: ``(n, 3)`` metres, their centres in the frames of the bones.
+        radii: ``(n,)`` metres.
+        positions: ``(47, 3)`` bone origins, metres.
+        rotations: ``(47, 3, 3)`` bone rotations.
+    """
+    lowest = math.inf
+    for n in range(len(frames)):
+        up, at = rotations[frames[n], 2], offsets[n]
+        along = up[0] * at[0] + up[1] * at[1] + up[2] * at[2]
+        lowest = min(lowest, positions[frames[n], 2] + along - radii[n])
+    return lowest
+
+
+@njit(cache=True)
+def _put_on(
+    surface_m: float,
+    frames: NDArray[np.int64],
+    offsets: Floats,
+    radii: Floats,
+    positions: Floats,
+    rotations: Floats,
+) -> None:
+    """Shift all bones vertically, see `Underside.put_on` and `_lowest_m`."""
+    down_m = _lowest_m(frames, offsets, radii, positions, rotations) - surface_m
+    for bone in range(len(positions)):
+        positions[bone, 2] -= down_m
 
 
 class Soles(Underside):

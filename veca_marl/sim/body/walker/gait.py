@@ -11,9 +11,11 @@ skeleton.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
+from numba import njit
+from numpy.typing import NDArray
 
 from veca_marl.sim.body.anatomy import Skeleton
 from veca_marl.sim.geometry import Floats
@@ -40,15 +42,14 @@ class Neck:
         labels = ("flexion", "lateral", "rotation")
         self._neck = [skeleton.joint("neck", label) for label in labels]
         self._head = [skeleton.joint("head", label) for label in labels]
-        self._pairs = list(zip(self._neck, self._head, strict=True))
+        self._pairs: NDArray[np.int64] = np.array([self._neck, self._head]).T
         self._low = np.array([joint.low_rad for joint in skeleton.joints])
         self._high = np.array([joint.high_rad for joint in skeleton.joints])
         self.pitch_range_rad = self._range_rad(self._pairs[0])
         self.yaw_range_rad = self._range_rad(self._pairs[2])
 
-    def _range_rad(self, pair: tuple[int, int]) -> tuple[float, float]:
+    def _range_rad(self, joints: NDArray[np.int64]) -> tuple[float, float]:
         """Return the sums of the least and of the greatest angles of some joints."""
-        joints = list(pair)
         return float(self._low[joints].sum()), float(self._high[joints].sum())
 
     def turn(self, angles: Floats, pitch_rad: float, yaw_rad: float, level_rad: float) -> None:
@@ -79,12 +80,31 @@ class Neck:
         return bool((beyond <= _ROUNDING_RAD).all())
 
     def _distribute(self, angles: Floats, bends: tuple[float, float, float]) -> None:
-        """Divide flexion, lateral bend and turn in the ratio of the limits of both joints."""
-        for pair, bend_rad in zip(self._pairs, bends, strict=True):
-            limits = self._high if bend_rad >= 0.0 else self._low
-            total = limits[pair[0]] + limits[pair[1]]
-            for joint in pair:
-                angles[joint] = bend_rad * limits[joint] / total
+        _distribute(angles, bends, self._pairs, self._low, self._high)
+
+
+@njit(cache=True)
+def _distribute(
+    angles: Floats,
+    bends: tuple[float, float, float],
+    pairs: NDArray[np.int64],
+    low: Floats,
+    high: Floats,
+) -> None:
+    """Divide flexion, lateral bend and turn in the ratio of the limits of both joints.
+
+    Args:
+        angles: ``(82,)`` rad; those of neck and head are changed.
+        bends: Flexion, lateral bend and turn of the head relative to the trunk, rad.
+        pairs: ``(3, 2)`` joints of neck and head for each of them.
+        low: ``(82,)`` rad, lower limits.
+        high: ``(82,)`` rad, upper limits.
+    """
+    for axis in range(3):
+        limits = high if bends[axis] >= 0.0 else low
+        total = limits[pairs[axis, 0]] + limits[pairs[axis, 1]]
+        for joint in pairs[axis]:
+            angles[joint] = bends[axis] * limits[joint] / total
 
 
 def _bends(rotation: Floats) -> tuple[float, float, float]:
@@ -114,8 +134,7 @@ def _about_z(angle_rad: float) -> Floats:
 _STANCE = 0.5  # fraction of the stride in which a foot is on the floor
 
 
-@dataclass(frozen=True)
-class GaitCfg:
+class GaitCfg(NamedTuple):
     """Parameters of the gait.
 
     Attributes:
@@ -161,6 +180,173 @@ _KICK = np.array([[0.0, 0.5, 0.8], [0.2, 1.1, 0.15], [0.5, 1.0, 0.4], [1.0, 0.45
 _KICK_TOES_RAD = -0.4
 
 
+class Legs(NamedTuple):
+    """Where the joints of legs and arms are among all joints, and lengths; left before right.
+
+    Attributes:
+        thigh: Flexion of the thighs.
+        abduct: Abduction of the thighs.
+        twist: Internal rotation of the thighs.
+        shank: Flexion of the shanks.
+        foot: Dorsiflexion of the feet.
+        ankle_roll: Inversion of the feet.
+        arm: Flexion of the upper arms.
+        elbow: Flexion of the forearms.
+        hip_y_m: Distance of the hips to the left of the middle.
+        thigh_m: Length of a thigh.
+        shank_m: Length of a shank.
+    """
+
+    thigh: tuple[int, int]
+    abduct: tuple[int, int]
+    twist: tuple[int, int]
+    shank: tuple[int, int]
+    foot: tuple[int, int]
+    ankle_roll: tuple[int, int]
+    arm: tuple[int, int]
+    elbow: tuple[int, int]
+    hip_y_m: tuple[float, float]
+    thigh_m: float
+    shank_m: float
+
+
+def measure_legs(skeleton: Skeleton) -> Legs:
+    """Find the joints of legs and arms, the hips and the lengths of thigh and shank."""
+
+    def both(bone: str, label: str) -> tuple[int, int]:
+        return skeleton.joint(f"l_{bone}", label), skeleton.joint(f"r_{bone}", label)
+
+    origins = skeleton.origins
+    return Legs(
+        thigh=both("thigh", "flexion"),
+        abduct=both("thigh", "abduction"),
+        twist=both("thigh", "internal_rotation"),
+        shank=both("shank", "flexion"),
+        foot=both("foot", "dorsiflexion"),
+        ankle_roll=both("foot", "inversion"),
+        arm=both("upper_arm", "flexion"),
+        elbow=both("forearm", "flexion"),
+        hip_y_m=(
+            float(origins[skeleton.bone("l_thigh"), 1]),
+            float(origins[skeleton.bone("r_thigh"), 1]),
+        ),
+        thigh_m=-float(origins[skeleton.bone("l_shank"), 2]),
+        shank_m=-float(origins[skeleton.bone("l_foot"), 2]),
+    )
+
+
+class Stride(NamedTuple):
+    """The state of a walk.
+
+    Attributes:
+        phase: Of the stride, in [0, 1).
+        speed_mps: Forward speed, smoothed.
+        turn_radps: Turning speed, smoothed.
+        share: Length of the stride as a fraction of the full one.
+        stance_s: Duration of the stance.
+    """
+
+    phase: float
+    speed_mps: float
+    turn_radps: float
+    share: float
+    stance_s: float
+
+
+@njit(cache=True, error_model="numpy")
+def write_stride(angles: Floats, stride: Stride, cfg: GaitCfg, legs: Legs) -> None:
+    """Write the angles of legs and arms, each arm in opposition to the leg of its side.
+
+    Args:
+        angles: ``(82,)`` rad.
+        stride: The state of the walk.
+        cfg: Parameters of the gait.
+        legs: The joints.
+    """
+    for side in range(2):
+        phase = (stride.phase + 0.5 * side) % 1.0
+        # from 0.5 at touchdown to -0.5 at lift-off, and back during the swing
+        along = 0.5 - phase / _STANCE
+        lift = toes = 0.0
+        if phase >= _STANCE:
+            swing_phase = (phase - _STANCE) / (1.0 - _STANCE)
+            along = -0.5 * math.cos(math.pi * swing_phase)
+            height = stride.share * math.sin(math.pi * swing_phase)
+            lift, toes = cfg.lift_m * height, -cfg.toe_rad * height
+        x, y, yaw = _foothold(stride, cfg, legs.hip_y_m[side], -along * stride.stance_s)
+        place_foot(angles, side, (x, y, yaw, lift, toes), stride, cfg, legs)
+        arm_swing = cfg.arm_swing_rad * math.copysign(stride.share, stride.speed_mps)
+        angles[legs.arm[side]] = -arm_swing * math.cos(2.0 * math.pi * phase)
+        angles[legs.elbow[side]] = cfg.elbow_rad
+
+
+@njit(cache=True, error_model="numpy")
+def _foothold(
+    stride: Stride, cfg: GaitCfg, hip_y_m: float, time_s: float
+) -> tuple[float, float, float]:
+    """Return where a foot in stance is relative to its hip while the body moves on an arc.
+
+    Args:
+        stride: The state of the walk.
+        cfg: Parameters of the gait.
+        hip_y_m: Distance of the hip to the left of the middle.
+        time_s: Time since the foot was below the hip.
+
+    Returns:
+        Forward and left of the hip, metres, and the yaw of the foot relative to the pelvis.
+    """
+    turned = stride.turn_radps * time_s
+    distance_m = stride.speed_mps * time_s
+    x = cfg.step_centre_m * stride.share - distance_m * math.cos(turned / 2.0)
+    y = hip_y_m - distance_m * math.sin(turned / 2.0)
+    c, s = math.cos(turned), math.sin(turned)
+    return c * x + s * y, c * y - s * x - hip_y_m, -turned
+
+
+@njit(cache=True, error_model="numpy")
+def place_foot(
+    angles: Floats,
+    side: int,
+    foot: tuple[float, float, float, float, float],
+    stride: Stride,
+    cfg: GaitCfg,
+    legs: Legs,
+) -> None:
+    """Write the angles of a leg by inverse kinematics of its ankle and the foot's yaw.
+
+    The law of cosines gives the knee. The hip rotates about y, then x, then z; the rotation about z
+    is given, and the other two follow one after the other.
+
+    Args:
+        angles: ``(82,)`` rad; those of the leg are changed.
+        side: 0 is left, 1 is right.
+        foot: Forward and left of the hip (metres), yaw relative to the pelvis (rad), height above
+            the floor (metres), and dorsiflexion of the toes (rad).
+        stride: The state of the walk.
+        cfg: Parameters of the gait.
+        legs: The joints.
+    """
+    x, y, yaw, lift_m, toes = foot
+    bob = cfg.bob_m * math.cos(4.0 * math.pi * stride.phase)
+    down_m = cfg.leg_m - stride.share * (cfg.sink_m + bob) - lift_m
+    thigh_m, shank_m = legs.thigh_m, legs.shank_m
+    reach = min(math.sqrt(x * x + y * y + down_m * down_m), thigh_m + shank_m)
+    inside = (thigh_m**2 + shank_m**2 - reach**2) / (2.0 * thigh_m * shank_m)
+    knee = math.pi - math.acos(max(inside, -1.0))
+    back, below = shank_m * math.sin(knee), thigh_m + shank_m * math.cos(knee)
+    aside = -back * math.sin(yaw)
+    roll = math.asin(y / math.hypot(aside, below)) - math.atan2(aside, below)
+    below = below * math.cos(roll) - aside * math.sin(roll)
+    thigh = math.atan2(x, down_m) + math.atan2(back * math.cos(yaw), below)
+    outward = 1.0 if side == 0 else -1.0
+    angles[legs.thigh[side]] = thigh
+    angles[legs.abduct[side]] = outward * roll
+    angles[legs.twist[side]] = -outward * yaw
+    angles[legs.shank[side]] = knee
+    angles[legs.foot[side]] = toes - (thigh - knee)
+    angles[legs.ankle_roll[side]] = outward * roll
+
+
 class Gait:
     """Computes the 82 joint angles of a walking child from its speeds and the time.
 
@@ -177,28 +363,12 @@ class Gait:
 
     def __init__(self, skeleton: Skeleton, cfg: GaitCfg | None = None) -> None:
         self.cfg = cfg or GaitCfg()
-        joint = skeleton.joint
-        self._thigh = (joint("l_thigh", "flexion"), joint("r_thigh", "flexion"))
-        self._abduct = (joint("l_thigh", "abduction"), joint("r_thigh", "abduction"))
-        self._twist = (joint("l_thigh", "internal_rotation"), joint("r_thigh", "internal_rotation"))
-        self._shank = (joint("l_shank", "flexion"), joint("r_shank", "flexion"))
-        self._foot = (joint("l_foot", "dorsiflexion"), joint("r_foot", "dorsiflexion"))
-        self._ankle_roll = (joint("l_foot", "inversion"), joint("r_foot", "inversion"))
-        self._arm = (joint("l_upper_arm", "flexion"), joint("r_upper_arm", "flexion"))
-        self._elbow = (joint("l_forearm", "flexion"), joint("r_forearm", "flexion"))
+        self._legs = measure_legs(skeleton)
         self._neck = Neck(skeleton)
         self._low = np.array([j.low_rad for j in skeleton.joints])
         self._high = np.array([j.high_rad for j in skeleton.joints])
-        self._measure_legs(skeleton)
         self.angles: Floats = np.zeros(len(skeleton.joints))
         self.reset()
-
-    def _measure_legs(self, skeleton: Skeleton) -> None:
-        """Read the positions of the hips and the lengths of thigh and shank."""
-        origins = skeleton.origins
-        self._hip_y_m = tuple(float(origins[skeleton.bone(f"{s}_thigh"), 1]) for s in "lr")
-        self._thigh_m = -float(origins[skeleton.bone("l_shank"), 2])
-        self._shank_m = -float(origins[skeleton.bone("l_foot"), 2])
 
     def reset(self) -> None:
         """Stand still with empty hands."""
@@ -245,19 +415,24 @@ class Gait:
     def pose(self, head_pitch_rad: float, head_yaw_rad: float) -> Floats:
         """Compute and return the ``(82,)`` joint angles of the present phase."""
         if self._kick_left_s > 0.0:
-            self._place_foot(0, (self.cfg.step_centre_m, 0.0), 0.0, 0.0, 0.0)
+            standing = self.cfg.step_centre_m, 0.0, 0.0, 0.0, 0.0
+            place_foot(self.angles, 0, standing, self._stride, self.cfg, self._legs)
             self._swing_kicking_leg()
         else:
-            self._step(0)
-            self._step(1)
+            write_stride(self.angles, self._stride, self.cfg, self._legs)
         if self.carrying:
-            self.angles[self._arm[1]] = self.cfg.carry_arm_rad
-            self.angles[self._elbow[1]] = self.cfg.carry_elbow_rad
+            self.angles[self._legs.arm[1]] = self.cfg.carry_arm_rad
+            self.angles[self._legs.elbow[1]] = self.cfg.carry_elbow_rad
         if self._blend_left_s > 0.0:
             self.angles += self._blend_left_s / self.cfg.blend_s * (self._blended - self.angles)
         self._neck.turn(self.angles, head_pitch_rad, head_yaw_rad, level_rad=0.0)
-        np.clip(self.angles, self._low, self._high, out=self.angles)
+        clip(self.angles, self._low, self._high)
         return self.angles
+
+    @property
+    def _stride(self) -> Stride:
+        pace = self._speed_mps, self._turn_radps
+        return Stride(self.phase, *pace, self.share, self._stance_s())
 
     def _pace_mps(self) -> float:
         return abs(self._speed_mps) + self.cfg.turning_m * abs(self._turn_radps)
@@ -276,71 +451,15 @@ class Gait:
         """Return the duration of the stance."""
         return self.cfg.step_m / max(self._pace_mps(), self.cfg.full_stride_mps)
 
-    def _step(self, side: int) -> None:
-        """Move one foot along its trajectory and the arm of the same side in opposition."""
-        phase = (self.phase + 0.5 * side) % 1.0
-        share, on_floor = self.share, phase < _STANCE
-        # from 0.5 at touchdown to -0.5 at lift-off, and back during the swing
-        along = 0.5 - phase / _STANCE
-        lift = toes = 0.0
-        if not on_floor:
-            swing_phase = (phase - _STANCE) / (1.0 - _STANCE)
-            along = -0.5 * math.cos(math.pi * swing_phase)
-            height = share * math.sin(math.pi * swing_phase)
-            lift, toes = self.cfg.lift_m * height, -self.cfg.toe_rad * height
-        place, yaw = self._foothold(side, -along * self._stance_s())
-        self._place_foot(side, place, yaw, lift, toes)
-        arm_swing = self.cfg.arm_swing_rad * math.copysign(share, self._speed_mps)
-        self.angles[self._arm[side]] = -arm_swing * math.cos(2.0 * math.pi * phase)
-        self.angles[self._elbow[side]] = self.cfg.elbow_rad
-
-    def _foothold(self, side: int, time_s: float) -> tuple[tuple[float, float], float]:
-        """Return where a foot in stance is relative to its hip while the body moves on an arc.
-
-        Args:
-            side: 0 is left, 1 is right.
-            time_s: Time since the foot was below the hip.
-
-        Returns:
-            Forward and left of the hip, metres, and the yaw of the foot relative to the pelvis.
-        """
-        turned, hip_y_m = self._turn_radps * time_s, self._hip_y_m[side]
-        distance_m = self._speed_mps * time_s
-        x = self.cfg.step_centre_m * self.share - distance_m * math.cos(turned / 2.0)
-        y = hip_y_m - distance_m * math.sin(turned / 2.0)
-        c, s = math.cos(turned), math.sin(turned)
-        return (c * x + s * y, c * y - s * x - hip_y_m), -turned
-
-    def _place_foot(
-        self, side: int, place: tuple[float, float], yaw: float, lift_m: float, toes: float
-    ) -> None:
-        """Compute the angles of a leg by inverse kinematics of its ankle and the foot's yaw.
-
-        The law of cosines gives the knee. The hip rotates about y, then x, then z; the rotation
-        about z is given, and the other two follow one after the other.
-        """
-        share = self.share
-        bob = self.cfg.bob_m * math.cos(4.0 * math.pi * self.phase)
-        down_m = self.cfg.leg_m - share * (self.cfg.sink_m + bob) - lift_m
-        thigh_m, shank_m = self._thigh_m, self._shank_m
-        reach = min(math.hypot(*place, down_m), thigh_m + shank_m)
-        inside = (thigh_m**2 + shank_m**2 - reach**2) / (2.0 * thigh_m * shank_m)
-        knee = math.pi - math.acos(max(inside, -1.0))
-        back, below = shank_m * math.sin(knee), thigh_m + shank_m * math.cos(knee)
-        aside = -back * math.sin(yaw)
-        roll = math.asin(place[1] / math.hypot(aside, below)) - math.atan2(aside, below)
-        below = below * math.cos(roll) - aside * math.sin(roll)
-        thigh = math.atan2(place[0], down_m) + math.atan2(back * math.cos(yaw), below)
-        outward = 1.0 if side == 0 else -1.0
-        self.angles[self._thigh[side]] = thigh
-        self.angles[self._abduct[side]] = outward * roll
-        self.angles[self._twist[side]] = -outward * yaw
-        self.angles[self._shank[side]] = knee
-        self.angles[self._foot[side]] = toes - (thigh - knee)
-        self.angles[self._ankle_roll[side]] = outward * roll
-
     def _swing_kicking_leg(self) -> None:
         done = 1.0 - self._kick_left_s / self.cfg.kick_s
-        self.angles[self._thigh[1]] = np.interp(done, _KICK[:, 0], _KICK[:, 1])
-        self.angles[self._shank[1]] = np.interp(done, _KICK[:, 0], _KICK[:, 2])
-        self.angles[self._foot[1]] = _KICK_TOES_RAD * (1.0 - done)
+        self.angles[self._legs.thigh[1]] = np.interp(done, _KICK[:, 0], _KICK[:, 1])
+        self.angles[self._legs.shank[1]] = np.interp(done, _KICK[:, 0], _KICK[:, 2])
+        self.angles[self._legs.foot[1]] = _KICK_TOES_RAD * (1.0 - done)
+
+
+@njit(cache=True)
+def clip(angles: Floats, low: Floats, high: Floats) -> None:
+    """Clip angles ``(n,)`` to their limits ``(n,)`` in place."""
+    for i in range(len(angles)):
+        angles[i] = min(max(angles[i], low[i]), high[i])

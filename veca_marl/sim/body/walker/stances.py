@@ -12,7 +12,7 @@ import numpy as np
 from veca_marl.sim.body.anatomy import Skeleton, Soles, forward_kinematics
 from veca_marl.sim.body.anatomy.kinematics import Underside
 from veca_marl.sim.body.walker.capsule import Capsule, lying_capsule, upright_capsule
-from veca_marl.sim.body.walker.gait import Gait, Neck
+from veca_marl.sim.body.walker.gait import Gait, Neck, clip
 from veca_marl.sim.body.walker.walker_cfg import WalkerCfg
 from veca_marl.sim.geometry import Floats, SceneObject
 from veca_marl.sim.physics import World
@@ -179,8 +179,8 @@ class OnAllFours:
             angles[joints] += sign * swing
         pitch_rad = head_pitch_rad - self._extended_rad
         self._neck.turn(angles, pitch_rad, head_yaw_rad, self._level_rad)
-        clipped: Floats = np.clip(angles, self._low, self._high)
-        return clipped
+        clip(angles, self._low, self._high)
+        return angles
 
     def head_reaches(self, pitch_rad: float, yaw_rad: float) -> bool:
         """See `Stance`."""
@@ -280,7 +280,7 @@ class BonePoses:
         positions[0], rotations[0] = stance.pelvis(ground, yaw_rad)
         angles = stance.angles(*self._head_in(stance))
         forward_kinematics(self._skeleton, angles, positions, rotations)
-        positions[:, 2] -= stance.underside.lowest_m(positions, rotations) - surface_m
+        stance.underside.put_on(surface_m, positions, rotations)
         return angles
 
 
