@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from veca_marl.envs.core.expert import find_expert as find_expert
     from veca_marl.envs.core.expert import register_expert as register_expert
     from veca_marl.envs.core.game import Game as Game
+    from veca_marl.envs.core.snapshot import Snapshot as Snapshot
     from veca_marl.envs.core.task import Player as Player
     from veca_marl.envs.core.task import Task as Task
     from veca_marl.envs.core.task import TaskCfg as TaskCfg
@@ -102,6 +103,7 @@ _HOMES = {
     "PropShape": "veca_marl.sim.physics.props",
     "RoomCfg": "veca_marl.sim.physics.rooms",
     "Sense": "veca_marl.sim.sense",
+    "Snapshot": "veca_marl.envs.core.snapshot",
     "SoundCfg": "veca_marl.sim.sound",
     "SoundKind": "veca_marl.sim.sound",
     "Task": "veca_marl.envs.core.task",

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from veca_marl.envs.adapters.seeded_game import NotCopied, SeededGame
 from veca_marl.envs.adapters.spaces import Observed, Space, SpaceLayout
 from veca_marl.envs.core.game_cfg import GameCfg
+from veca_marl.envs.core.snapshot import Snapshot
 
 
 class VecaGymEnv(NotCopied, gymnasium.Env[Observed, Any]):
@@ -84,6 +85,31 @@ class VecaGymEnv(NotCopied, gymnasium.Env[Observed, Any]):
             step.truncated,
             step.info(self._agent),
         )
+
+    def snapshot(self) -> Snapshot:
+        """Return the state between two steps, from which `restore` continues.
+
+        Raises:
+            RuntimeError: If no episode is running, or the environment is closed.
+        """
+        return self._played.snapshot()
+
+    def restore(self, snapshot: Snapshot) -> tuple[Observed, dict[str, Any]]:
+        """Return to the state of a snapshot; what follows is equal to what followed there.
+
+        Args:
+            snapshot: Of any environment with the same configuration, also of another process.
+
+        Returns:
+            The observation there, and an info as `reset` returns it.
+
+        Raises:
+            SnapshotError: If it is that of another configuration.
+        """
+        observations = self._played.restore(snapshot)
+        if self._played.rng is not None:
+            self.np_random = self._played.rng
+        return self._layout.arrange(observations[self._agent]), self._played.first_info(self._agent)
 
     def render(self) -> NDArray[np.uint8]:
         """Return a picture ``(252, width, 3)``: the agent's eyes and skin, and the room."""

@@ -14,6 +14,7 @@ from veca_marl.envs.adapters.seeded_game import NotCopied, SeededGame
 from veca_marl.envs.adapters.spaces import Observed, Space, SpaceLayout
 from veca_marl.envs.core.game import Observation
 from veca_marl.envs.core.game_cfg import GameCfg
+from veca_marl.envs.core.snapshot import Snapshot
 
 Infos = dict[str, dict[str, Any]]
 
@@ -107,6 +108,31 @@ class VecaParallelEnv(NotCopied, ParallelEnv[str, Observed, Any]):
             dict.fromkeys(names, step.truncated),
             {name: step.info(name) for name in names},
         )
+
+    def snapshot(self) -> Snapshot:
+        """Return the state between two steps, from which `restore` continues.
+
+        Raises:
+            RuntimeError: If no episode is running, or the environment is closed.
+        """
+        return self._played.snapshot()
+
+    def restore(self, snapshot: Snapshot) -> tuple[dict[str, Observed], Infos]:
+        """Return to the state of a snapshot; what follows is equal to what followed there.
+
+        Args:
+            snapshot: Of any environment with the same configuration, also of another process.
+
+        Returns:
+            The observations there, and infos as `reset` returns them, by agent.
+
+        Raises:
+            SnapshotError: If it is that of another configuration.
+        """
+        observations = self._played.restore(snapshot)
+        self.agents = self._played.playing
+        infos = {name: self._played.first_info(name) for name in self.agents}
+        return self._arranged({name: observations[name] for name in self.agents}), infos
 
     def state(self) -> NDArray[np.float32]:
         """Return what the simulator knows at this moment, see `GlobalState` for its parts.

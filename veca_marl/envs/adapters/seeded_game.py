@@ -15,6 +15,7 @@ from veca_marl.envs.core.episodes import Episodes
 from veca_marl.envs.core.game import Game, Observation, refuse_closed
 from veca_marl.envs.core.game_cfg import GameCfg
 from veca_marl.envs.core.global_state import GlobalState
+from veca_marl.envs.core.snapshot import Snapshot, Snapshots, restore
 from veca_marl.envs.core.task import SOLVED
 from veca_marl.envs.rendering import Spectator
 from veca_marl.sim.kernel_cache import announce_compilation
@@ -75,7 +76,6 @@ class SeededGame:
     Attributes:
         game: The game.
         names: The players whose actions are given to `step`, team by team.
-        rng: The generator of the current episode; None before the first.
         metadata: `metadata` of a Gymnasium or PettingZoo environment.
 
     Args:
@@ -94,7 +94,7 @@ class SeededGame:
         announce_compilation()
         self.game = Game(cfg)
         self.names = [player.name for player in self.game.actors]
-        self.rng: np.random.Generator | None = None
+        self._snapshots: Snapshots | None = None
         self.metadata: dict[str, Any] = {
             "name": cfg.task.name,
             "render_modes": list(RENDER_MODES),
@@ -126,8 +126,43 @@ class SeededGame:
         # a refused number leaves the episodes as they are
         episodes = self._episodes if seed is None else Episodes(seed)
         rng = episodes.next((options or {}).get("episode"))
-        self._episodes, self.rng = episodes, rng
+        self._episodes = episodes
         self.game.reset(rng)
+        self._running = True
+        return self._observe(self.names)
+
+    @property
+    def rng(self) -> np.random.Generator | None:
+        """The generator of the current episode; None before the first."""
+        return self.game.rng
+
+    def snapshot(self) -> Snapshot:
+        """Return the state between two steps, from which `restore` continues.
+
+        Raises:
+            RuntimeError: If no episode is running, or the environment is closed.
+            SnapshotError: If a plug-in holds what is no data, such as a generator that runs.
+        """
+        refuse_closed(self._closed)
+        if not self._running:
+            raise RuntimeError("no episode is running: call reset() before snapshot()")
+        if self._snapshots is None:
+            self._snapshots = Snapshots(self.game)
+        return self._snapshots.take(self.game, self._episodes.state)
+
+    def restore(self, snapshot: Snapshot) -> dict[str, Observation]:
+        """Return to the state of a snapshot, and return the observations of all players.
+
+        Args:
+            snapshot: Of any environment with the same configuration, also of another process.
+
+        Raises:
+            RuntimeError: If the environment is closed.
+            SnapshotError: If it is that of another configuration.
+        """
+        refuse_closed(self._closed)
+        restore(self.game, snapshot)
+        self._episodes = Episodes.at(snapshot.episodes)
         self._running = True
         return self._observe(self.names)
 

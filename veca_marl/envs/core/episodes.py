@@ -60,6 +60,19 @@ class Episodes:
         self.number = 0
         self._world = world
 
+    @property
+    def state(self) -> tuple[int, int, int]:
+        """Seed, number of the world, and number of the next episode."""
+        return self.seed, self._world, self.number
+
+    @staticmethod
+    def at(state: tuple[int, int, int]) -> Episodes:
+        """Return episodes that continue at a `state`."""
+        seed, world, number = state
+        episodes = Episodes(seed, world)
+        episodes.number = check_integer("episode", number)
+        return episodes
+
     def next(self, number: int | None = None) -> np.random.Generator:
         """Return the generator of the next episode.
 

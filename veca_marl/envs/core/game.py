@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from veca_marl.envs.core.expert import Expert, check_expert, find_expert
 from veca_marl.envs.core.game_cfg import GameCfg, Script
+from veca_marl.envs.core.object_states import BuiltObjects
 from veca_marl.envs.core.task import Player, Team, find_task
 from veca_marl.sim.body import make_body
 from veca_marl.sim.physics import World
@@ -137,6 +138,7 @@ class Game:
         steps: Steps since the last reset.
         max_steps: Steps after which an episode is truncated.
         eliminated: Names of the players for whom this episode has ended.
+        built: All objects that it consisted of when it was built, see `Snapshot`.
 
     Args:
         cfg: What to play.
@@ -175,6 +177,7 @@ class Game:
         for team, script in cfg.script.items():
             if script is Script.expert:
                 self._experts.update({p.name: self._make_expert(p) for p in self.team(team)})
+        self.built = BuiltObjects(self)
 
     def _make_player(self, name: str, team: Team, shirt: int) -> Player:
         body = make_body(name, self.cfg.body_of(team.name), self.world, shirt)
@@ -194,6 +197,11 @@ class Game:
     def has_begun(self) -> bool:
         """Whether `reset` was called."""
         return self._rng is not None
+
+    @property
+    def rng(self) -> np.random.Generator | None:
+        """The generator of the present episode; None before the first."""
+        return self._rng
 
     def team(self, name: str) -> list[Player]:
         """Return the players of a team."""

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from veca_marl.sim.geometry import Geom, Scene, Shape
 from veca_marl.sim.physics.bullet import BuiltContacts
 from veca_marl.sim.physics.bullet_client import BulletClient, pybullet
+from veca_marl.sim.physics.bullet_state import restore_state, saved_state, sleeping_bodies
 from veca_marl.sim.physics.clock import ClockCfg
 from veca_marl.sim.physics.impact_sounds import ImpactSounds
 from veca_marl.sim.physics.interactions import check_interactions
@@ -139,6 +140,30 @@ class Mover(Protocol):
         """Write the frames of the scene and the positions of sounds, once per agent step."""
 
 
+class BulletSetting(Protocol):
+    """A setting of Bullet that changes in an episode and that Bullet's saved states lack."""
+
+    def forget(self) -> None:
+        """Undo it, before a saved state is restored."""
+
+    def apply(self) -> None:
+        """Set it as its owner says, after the state has been restored."""
+
+
+@dataclass(frozen=True)
+class SavedPhysics:
+    """What `World.save_physics` returns.
+
+    Attributes:
+        state: See `saved_state`.
+        gravity: m/s^2 along x, y and z.
+    """
+
+    state: bytes
+    gravity: tuple[float, float, float]
+
+
+_FALLING_ASLEEP = 2  # physics steps until Bullet leaves out what may sleep
 GRAVITY_MPS2 = 9.81
 
 
@@ -159,6 +184,7 @@ class World:
         props: Its props by name.
         movers: The bodies in it.
         after_substep: Functions of observers, called at the end of every physics step.
+        settings: What `restore_physics` sets beside Bullet's saved state.
         version: Counts steps, resets and refreshes. A sense computes its values once per version.
         step_count: Agent steps since the world was built; a reset does not set it back.
         broken_props: Names of props whose simulated pose is not finite any more. What eyes and ears
@@ -176,6 +202,7 @@ class World:
         self.props: dict[str, Prop] = {}
         self.movers: list[Mover] = []
         self.after_substep: list[Callable[[], None]] = []
+        self.settings: list[BulletSetting] = []
         self.version = 0
         self.step_count = 0
         self.broken_props: list[str] = []
@@ -297,6 +324,36 @@ class World:
         for mover in self.movers:
             mover.reset()
 
+    def save_physics(self) -> SavedPhysics:
+        """Return what Bullet knows at the end of a step; see `restore_physics`."""
+        return SavedPhysics(saved_state(self.client), self.client.gravity())
+
+    def restore_physics(self, saved: SavedPhysics, put_back: Callable[[], None]) -> None:
+        """Return Bullet to an earlier state, of this world or of one that was built like it.
+
+        Args:
+            saved: The state.
+            put_back: Sets the attributes of the world, and of all that is in it, to those that
+                belong to the state.
+
+        Raises:
+            pybullet.error: If the state is that of another world.
+        """
+        self._set_contact_share()
+        for setting in self.settings:
+            setting.forget()
+        woken = self._sleep.wake_all()
+        restore_state(self.client, saved.state)
+        self.client.setGravity(*saved.gravity)
+        put_back()
+        for setting in self.settings:
+            setting.apply()
+        if self._sleep.resume(sleeping_bodies(self.client, saved.state)) or woken:
+            for _ in range(_FALLING_ASLEEP):
+                self.client.stepSimulation()
+            restore_state(self.client, saved.state)
+        self._sleep.fall_asleep()
+
     def refresh(self) -> None:
         """Show what was placed by hand: update the scene, and emit one step of sound.
 
@@ -396,6 +453,7 @@ class World:
     def _add_joint(self, prop: Prop, joint: Joint, parent: Prop | None) -> None:
         """Let a joint act after each physics step; the two props that it joins do not collide."""
         self._joints.append(joint)
+        self.settings.append(joint)
         if parent is None:
             return
         for ours, theirs in itertools.product(prop.links, parent.links):

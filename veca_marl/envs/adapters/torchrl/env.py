@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,6 +17,7 @@ from veca_marl.envs.core.episodes import Episodes, check_integer, fresh_seed
 from veca_marl.envs.core.game import ActionSpec, Game, Outcome, from_parts, refuse_closed
 from veca_marl.envs.core.game_cfg import GameCfg
 from veca_marl.envs.core.global_state import GlobalState
+from veca_marl.envs.core.snapshot import Snapshot, Snapshots, restore
 from veca_marl.envs.core.task import SOLVED, Player
 from veca_marl.envs.rendering import Spectator
 from veca_marl.sim.kernel_cache import announce_compilation
@@ -249,6 +251,7 @@ class VecaEnv(NotCopied, FastStepEnv):
         }
         self._make_specs()
         self.spectators = [Spectator(game) for game in self.games]
+        self._snapshots: Snapshots | None = None
         self._states = [GlobalState(game) for game in self.games if cfg.global_state]
         self.set_seed(seed)
 
@@ -378,6 +381,67 @@ class VecaEnv(NotCopied, FastStepEnv):
                     arrays[team]["info"][entry][row] = number
                 if outcome.solved:
                     arrays[team]["info"][SOLVED][row] = outcome.solved[name]
+
+    def snapshot(self, worlds: Sequence[int] | None = None) -> list[Snapshot]:
+        """Return the states of worlds between two steps, from which `restore` continues.
+
+        Args:
+            worlds: Numbers of the worlds in this environment; None is all of them.
+
+        Raises:
+            IndexError: If there is no such world.
+            RuntimeError: If one was never reset, or the environment is closed.
+            SnapshotError: If a plug-in holds what is no data, such as a generator that runs.
+        """
+        refuse_closed(self._worlds_closed)
+        chosen = self._chosen(worlds)
+        if self._snapshots is None:
+            self._snapshots = Snapshots(self.games[0])
+        return [self._snapshots.take(self.games[w], self.episodes[w].state) for w in chosen]
+
+    def restore(
+        self, snapshots: Snapshot | Sequence[Snapshot], worlds: Sequence[int] | None = None
+    ) -> TensorDict:
+        """Return worlds to the states of snapshots; what follows is equal to what followed there.
+
+        The episodes after the present one are those of the world that the snapshot is of.
+
+        Args:
+            snapshots: One for each of the worlds, or one for all of them; of any environment with
+                the same configuration, also of another process.
+            worlds: Numbers of the worlds in this environment; None is all of them.
+
+        Returns:
+            The observations of all worlds, as `reset` returns them: zeros for eliminated players.
+
+        Raises:
+            IndexError: If there is no such world.
+            RuntimeError: If the environment is closed.
+            SnapshotError: If a snapshot is that of another configuration.
+            ValueError: If there is another number of snapshots than of worlds.
+        """
+        refuse_closed(self._worlds_closed)
+        chosen = self._chosen(worlds)
+        each = [snapshots] * len(chosen) if isinstance(snapshots, Snapshot) else list(snapshots)
+        if len(each) != len(chosen):
+            raise ValueError(f"{len(each)} snapshots for {len(chosen)} worlds {chosen}")
+        for world, snapshot in zip(chosen, each, strict=True):
+            restore(self.games[world], snapshot)
+            self.episodes[world] = Episodes.at(snapshot.episodes)
+        arrays = self._start.new()
+        for world, game in enumerate(self.games):
+            if game.has_begun:
+                self._observe(world, arrays, game.eliminated)
+        observed = self._start.tensordict(arrays, self.device)
+        return self.full_done_spec.zero().update(observed)
+
+    def _chosen(self, worlds: Sequence[int] | None) -> list[int]:
+        """Return the numbers of worlds; raise `IndexError` if there is no such world."""
+        count = len(self.games)
+        chosen = list(range(count)) if worlds is None else list(worlds)
+        if not all(0 <= world < count for world in chosen):
+            raise IndexError(f"worlds={chosen}; there are {count} worlds, from 0 on")
+        return chosen
 
     def render(self, world: int = 0) -> NDArray[np.uint8]:
         """Return what the first player perceives beside a view of the room.

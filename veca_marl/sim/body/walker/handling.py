@@ -88,6 +88,16 @@ class Grip:
         if self.prop is not None:
             self.prop.carry(position, yaw_rad, (0.0, 0.0, 0.0))
 
+    def forget(self) -> None:
+        """See `BulletSetting`: let the held prop collide with the body."""
+        if self.prop is not None:
+            self._set_collision(self.prop, 1)
+
+    def apply(self) -> None:
+        """See `BulletSetting`: the held prop does not collide with the body."""
+        if self.prop is not None:
+            self._set_collision(self.prop, 0)
+
     def _set_collision(self, prop: Prop, enabled: int) -> None:
         for body_id in self._body_ids:
             for link in prop.links:
@@ -120,6 +130,9 @@ class Hand:
         holder: Name of the walker.
         capsule: The upright capsule of the walker.
         radius_m: Its radius.
+
+    Attributes:
+        grip: What holds the prop.
     """
 
     def __init__(
@@ -127,7 +140,7 @@ class Hand:
     ) -> None:
         self._client, self._radius_m = client, radius_m
         self._capsule = capsule
-        self._grip = Grip(client, holder, [capsule.body_id])
+        self.grip = Grip(client, holder, [capsule.body_id])
         self._obstacles: list[int] = []
         self._yaw_rad = self._turn_radps = 0.0
         self._half_width_m = self._below_m = 0.0
@@ -137,7 +150,7 @@ class Hand:
     @property
     def prop(self) -> Prop | None:
         """The held prop; None if the hand is empty."""
-        return self._grip.prop
+        return self.grip.prop
 
     def take(self, prop: Prop, yaw_rad: float) -> None:
         """Hold a prop from now on, at rest; `set_palm` moves it to the palm.
@@ -152,11 +165,11 @@ class Hand:
         self._below_m = float(prop.mass_centre[2]) - prop.lowest_m
         self._yaw_rad = yaw - yaw_rad
         self._velocity, self._turn_radps = np.zeros(3), 0.0
-        self._grip.take(prop)
+        self.grip.take(prop)
 
     def drop(self) -> None:
         """Hold nothing from now on; nothing is moved."""
-        self._grip.drop()
+        self.grip.drop()
 
     def collect_obstacles(self, ground: Floats, distance_m: float) -> None:
         """Collect what the held prop can reach within this agent step.
@@ -233,7 +246,7 @@ class Hand:
         """Set the pose of the prop by the place ``(3,)`` of its centre of mass."""
         yaw = yaw_rad + self._yaw_rad
         place = centre - rotation_about_vertical(yaw) @ prop.centre_of_mass
-        self._grip.carry(place, yaw)
+        self.grip.carry(place, yaw)
 
     def _set_velocity(self, prop: Prop) -> None:
         """Give the prop the velocities of the last physics step."""
@@ -293,6 +306,11 @@ class ObjectHandling:
     def held(self) -> Prop | None:
         """The prop in the hand; None if the hand is empty."""
         return self._hand.prop
+
+    @property
+    def grip(self) -> Grip:
+        """What holds the prop in the hand."""
+        return self._hand.grip
 
     def is_light(self, prop: Prop) -> bool:
         """Return whether a prop is not fixed and its mass at most `WalkerCfg.push_limit_kg`."""

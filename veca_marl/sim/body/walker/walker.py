@@ -58,6 +58,7 @@ class Walker(Body):
             world, cfg, *make_stances(self._skeleton, self._gait, cfg, world)
         )
         self._handling = ObjectHandling(world.client, name, cfg, self._motion, self._gait)
+        world.settings.append(self._handling.grip)
         self._bone_poses = BonePoses(self._skeleton, self._drawn)
         self.verb_choice = VerbChoice(cfg.verbs)
         mass_kg = sum(bone.mass_kg for bone in self._skeleton.bones)

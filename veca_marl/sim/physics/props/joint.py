@@ -187,6 +187,16 @@ class Joint:
         self.stop_speed = 0.0
         self._before = self._state()
 
+    def forget(self) -> None:
+        """See `BulletSetting`: a motor needs none."""
+
+    def apply(self) -> None:
+        """See `BulletSetting`: let the motor go on, or act as friction."""
+        if self._target is None:
+            self._release_motor()
+        else:
+            self._start_motor()
+
     def set_opening(self, opening: float) -> None:
         """Put it at rest at an opening in [0, 1], also if it is locked."""
         self._held = self._checked(opening) * self.cfg.range
@@ -203,9 +213,7 @@ class Joint:
             return False
         self._target = target
         self._direction = 1.0 if target > self._state()[0] else -1.0
-        speed = self._direction * self.cfg.range / self.cfg.open_s
-        # Bullet has one motor for each joint: the one that acts as friction is off meanwhile
-        self._set_motor(speed, self.cfg.motor)
+        self._start_motor()
         return True
 
     def lock(self) -> None:
@@ -278,6 +286,10 @@ class Joint:
         self.moved = True
         self._before = (coordinate, 0.0)
         self._client.resetJointState(self._body_id, LINK, coordinate, 0.0)
+
+    def _start_motor(self) -> None:
+        """Move towards the target; Bullet has one motor for each joint, and friction is off."""
+        self._set_motor(self._direction * self.cfg.range / self.cfg.open_s, self.cfg.motor)
 
     def _release_motor(self) -> None:
         """Leave only friction: a motor that holds the speed 0 with a limited force."""

@@ -8,7 +8,7 @@ props within its reach, and so does the world where a fixed prop is put elsewher
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from typing import Protocol
 
 import numpy as np
@@ -111,9 +111,22 @@ class Sleep:
             still: Whether the prop was at rest in it.
         """
         self._still_steps = self._still_steps + 1 if still else 0
+        self.fall_asleep()
+
+    def fall_asleep(self) -> None:
+        """Let the prop sleep if it has just been at rest for long enough."""
         # and again later: a prop that touched it may have woken it since
         if self._still_steps and self._still_steps % self._steps == 0:
             self._allowed = True
+            self._set_state(self._prop.body_id, _SLEEP)
+
+    def resume(self, asleep: Collection[int]) -> None:
+        """Let the prop sleep if it slept when Bullet's state was saved, which was restored now.
+
+        Args:
+            asleep: PyBullet's ids of the bodies that slept.
+        """
+        if self._prop.body_id in asleep:
             self._set_state(self._prop.body_id, _SLEEP)
 
     def _set_state(self, body_id: int, state: int) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
 from typing import Protocol
 
 import numpy as np
@@ -48,6 +49,21 @@ class PropSleep(Protocol):
         """
         ...
 
+    def resume(self, asleep: Collection[int]) -> bool:
+        """Let props sleep that slept when Bullet's state was saved, after it has been restored.
+
+        Args:
+            asleep: PyBullet's ids of the bodies that slept.
+
+        Returns:
+            Whether there are any; Bullet leaves them out some physics steps later.
+        """
+        ...
+
+    def fall_asleep(self) -> None:
+        """Let those sleep that were let in the last step, after Bullet's state was restored."""
+        ...
+
 
 class NoSleep:
     """The `PropSleep` of a world in which nothing sleeps."""
@@ -71,6 +87,13 @@ class NoSleep:
     def wake_all(self) -> bool:
         """Return False: nothing sleeps."""
         return False
+
+    def resume(self, asleep: Collection[int]) -> bool:
+        """Return False: nothing sleeps."""
+        return False
+
+    def fall_asleep(self) -> None:
+        """Do nothing."""
 
 
 class RestingProps:
@@ -153,6 +176,17 @@ class RestingProps:
         self.wake_around()
         self._positions, self._rotations = _unknown_poses(len(self._rows))
         return bool(self._woken)
+
+    def resume(self, asleep: Collection[int]) -> bool:
+        """See `PropSleep`."""
+        for sleep in self._sleeps:
+            sleep.resume(asleep)
+        return bool(asleep)
+
+    def fall_asleep(self) -> None:
+        """See `PropSleep`."""
+        for sleep in self._sleeps:
+            sleep.fall_asleep()
 
 
 def prop_sleep(client: BulletClient, clock: ClockCfg) -> PropSleep:

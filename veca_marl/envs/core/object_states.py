@@ -1,0 +1,449 @@
+"""The contents of all objects of a game, as plain data that can be put back.
+
+A game is a graph of Python objects. Those that exist when it has been built are numbered in the
+order in which a walk along its attributes finds them: the same numbers in every game of an equal
+configuration, in every process. A captured state has the content of each of them, and of the
+objects that were made since then, in terms of numbers, text, arrays and references. Put back, what
+was built keeps its identity, and what was made since is made again.
+
+Nothing is executed when a state is put back: objects are made without their constructors, of
+classes in packages that the game itself uses. What is no data (a generator function that runs, an
+iterator, an open file) is refused when a state is captured.
+"""
+
+from __future__ import annotations
+
+import functools
+import logging
+import sys
+import types
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from enum import Enum
+from typing import Any
+
+import numpy as np
+
+from veca_marl.sim.physics.bullet_client import BulletClient
+
+Value = Any
+"""None, bool, int, float, str, or a tuple that begins with the kind of what it stands for."""
+
+_PLAIN = (type(None), bool, int, float, str)
+# have no content of their own
+_ATOMS = (bytes, Enum, range, slice, np.generic, np.dtype)
+# have a content that is captured elsewhere, or none that changes: only those that were built
+_OPAQUE: tuple[type, ...] = (
+    BulletClient, logging.Logger, type, types.FunctionType, types.BuiltinFunctionType,
+    types.ModuleType, functools.partial,
+)  # fmt: skip
+_IMMUTABLE = (tuple, frozenset, types.MethodType, types.MappingProxyType)
+
+
+class SnapshotError(ValueError):
+    """A state cannot be captured, stored, read or put back; the message is one line."""
+
+
+class BuiltObjects:
+    """All objects that can be reached from a root, in a fixed order.
+
+    Args:
+        root: The object from which the walk begins.
+
+    Attributes:
+        objects: The root, and the others in the order in which they were found.
+    """
+
+    def __init__(self, root: object) -> None:
+        # with itself, since the root may have it as an attribute
+        self.objects = [*_reachable(root), self]
+        self._numbers = {id(each): number for number, each in enumerate(self.objects)}
+
+    def number(self, item: object) -> int | None:
+        """Return the number of an object; None if it is not one of these."""
+        return self._numbers.get(id(item))
+
+    def shared_with(self, other: BuiltObjects) -> frozenset[int]:
+        """Return the numbers of the objects that two games of one configuration have in common.
+
+        These are constants: games do not influence each other.
+
+        Raises:
+            SnapshotError: If the two were not built alike.
+        """
+        kinds = [[type(each) for each in one.objects] for one in (self, other)]
+        if kinds[0] != kinds[1]:
+            raise SnapshotError("two games of one configuration were not built alike")
+        pairs = enumerate(zip(self.objects, other.objects, strict=True))
+        return frozenset(number for number, (one, two) in pairs if one is two)
+
+
+def _reachable(root: object) -> Iterator[object]:
+    """Yield all objects that have a content, each once, breadth first."""
+    found, waiting = {id(root)}, deque([root])
+    while waiting:
+        item = waiting.popleft()
+        yield item
+        for part in _parts(item):
+            if not isinstance(part, (*_PLAIN, *_ATOMS)) and id(part) not in found:
+                found.add(id(part))
+                waiting.append(part)
+
+
+def _parts(item: Any) -> Iterable[object]:
+    """Return the objects that an object consists of."""
+    if isinstance(item, (*_OPAQUE, BuiltObjects, np.random.Generator)):
+        return []
+    if isinstance(item, np.ndarray):
+        return [item.base] if isinstance(item.base, np.ndarray) else []
+    if isinstance(item, Mapping):
+        return [part for pair in item.items() for part in pair]
+    if isinstance(item, (list, tuple, set, frozenset, deque)):
+        return item
+    if isinstance(item, types.MethodType):
+        return [item.__self__]
+    return [value for _, value in attributes(item)]
+
+
+def attributes(item: object) -> Iterator[tuple[str, object]]:
+    """Yield the names and values of all attributes of an object, with those in slots."""
+    yield from getattr(item, "__dict__", {}).items()
+    for one in type(item).__mro__:
+        slots = one.__dict__.get("__slots__", ())
+        for name in (slots,) if isinstance(slots, str) else slots:
+            if name not in ("__dict__", "__weakref__") and hasattr(item, name):
+                yield name, getattr(item, name)
+
+
+@dataclass
+class ObjectStates:
+    """The contents of the objects of a game.
+
+    Attributes:
+        built: Content of each built object that can change, by its number.
+        made: Contents of the objects that were made since.
+    """
+
+    built: dict[int, Value] = field(default_factory=dict)
+    made: list[Value] = field(default_factory=list)
+
+
+class Capture:
+    """Captures the contents of all objects that can be reached from the first built one.
+
+    Args:
+        built: The objects of the game when it was built.
+        constant: Numbers of those that never change.
+    """
+
+    def __init__(self, built: BuiltObjects, constant: frozenset[int]) -> None:
+        self._built, self._constant = built, constant
+        self._made: dict[int, int] = {}
+        self._kept: list[object] = []  # an identity is that of another object after it is freed
+        self._waiting: deque[tuple[bool, int, object]] = deque()
+        self._seen: set[int] = set()
+        self._states = ObjectStates()
+
+    def states(self) -> ObjectStates:
+        """Return the contents.
+
+        Raises:
+            SnapshotError: If an object is no data.
+        """
+        self._value(self._built.objects[0], "the game")
+        while self._waiting:
+            is_built, number, item = self._waiting.popleft()
+            content = self._content(item)
+            if is_built:
+                self._states.built[number] = content
+            else:
+                self._states.made[number] = content
+        return self._states
+
+    def _value(self, item: Any, owner: str) -> Value:
+        """Return what stands for an object; its content is captured later."""
+        if type(item) in _PLAIN:
+            return item
+        number = self._built.number(item)
+        if number is not None:
+            if number not in self._seen and number not in self._constant:
+                self._seen.add(number)
+                self._wait_for(number, item)
+            return "built", number
+        if isinstance(item, (*_ATOMS, *_OPAQUE)):
+            return _atom(item, owner)
+        if id(item) not in self._made:
+            _check_is_data(item, owner)
+            self._made[id(item)] = len(self._kept)
+            self._waiting.append((False, len(self._kept), item))
+            self._kept.append(item)
+            self._states.made.append(None)
+        return "made", self._made[id(item)]
+
+    def _wait_for(self, number: int, item: Any) -> None:
+        """Capture the content of a built object later; that of what cannot change is in parts."""
+        if isinstance(item, _IMMUTABLE):
+            self._values(_parts(item), _class_name(item))
+        elif not isinstance(item, (*_OPAQUE, BuiltObjects)):
+            self._waiting.append((True, number, item))
+
+    def _values(self, items: Iterable[Any], owner: str) -> tuple[Value, ...]:
+        return tuple(self._value(item, owner) for item in items)
+
+    def _content(self, item: Any) -> Value:
+        """Return the content of an object."""
+        kind: type = type(item)
+        name = _class_name(item)
+        if kind is np.ndarray:
+            return self._array(item)
+        if kind in (dict, types.MappingProxyType):
+            pairs = tuple(self._values(pair, name) for pair in item.items())
+            return "dict" if kind is dict else "proxy", pairs
+        if kind is deque:
+            return "deque", item.maxlen, self._values(item, name)
+        if kind in _CONTAINERS.values():
+            return kind.__name__, self._values(item, name)
+        if kind is types.MethodType:
+            return "method", self._value(item.__self__, name), item.__func__.__name__
+        if kind is np.random.Generator:
+            return "random", _frozen(item.bit_generator.state)
+        if isinstance(item, tuple):
+            return "named", _name_of(kind), self._values(item, name)
+        held = ((key, self._value(value, f"{name}.{key}")) for key, value in attributes(item))
+        return "object", _name_of(kind), tuple(held)
+
+    def _array(self, item: np.ndarray[Any, Any]) -> Value:
+        if item.dtype.hasobject:
+            raise SnapshotError("an array of Python objects is no data that a snapshot can have")
+        if isinstance(item.base, np.ndarray):
+            offset = item.__array_interface__["data"][0] - item.base.__array_interface__["data"][0]
+            base = self._value(item.base, "ndarray")
+            shape = item.dtype.str, item.shape, item.strides
+            return "view", base, offset, shape, item.flags.writeable
+        return "array", item.copy(), item.flags.writeable
+
+
+def _class_name(item: object) -> str:
+    return type(item).__name__
+
+
+def _atom(item: Any, owner: str) -> Value:
+    """Return what stands for an object without a content of its own."""
+    if isinstance(item, Enum):
+        return "enum", _name_of(type(item)), item.name
+    if isinstance(item, np.generic):
+        return "scalar", item.dtype.str, item.item()
+    if isinstance(item, np.dtype):
+        return "dtype", item.str
+    if isinstance(item, bytes):
+        return "bytes", item.hex()
+    if isinstance(item, (range, slice)):
+        return type(item).__name__, item.start, item.stop, item.step
+    if isinstance(item, (type, types.FunctionType)) and _found(_name_of(item)) is item:
+        return "named_object", _name_of(item)
+    raise SnapshotError(f"{owner} holds {item!r:.80}, which is no data")
+
+
+def _check_is_data(item: Any, owner: str) -> None:
+    """Refuse objects whose content is not in their attributes, such as files and iterators."""
+    if isinstance(item, (np.ndarray, Mapping, list, set, deque, np.random.Generator, *_IMMUTABLE)):
+        return
+    try:
+        object.__new__(type(item))
+    except TypeError:
+        raise SnapshotError(f"{owner} holds {item!r:.80}, which is no data") from None
+
+
+def _frozen(state: Any) -> Value:
+    """Return the state of a random generator as nested tuples."""
+    if isinstance(state, Mapping):
+        return "dict", tuple((key, _frozen(value)) for key, value in state.items())
+    return state
+
+
+def _thawed(state: Value) -> Any:
+    if isinstance(state, (tuple, list)):
+        return {key: _thawed(value) for key, value in state[1]}
+    return state
+
+
+def _name_of(item: Any) -> str:
+    return f"{item.__module__}:{item.__qualname__}"
+
+
+def _found(name: str) -> Any:
+    """Return what is called `module:name` in the modules that are imported; None if nothing is."""
+    module, _, path = name.partition(":")
+    found: Any = sys.modules.get(module)
+    for part in path.split("."):
+        found = getattr(found, part, None)
+    return found
+
+
+_CONTAINERS: dict[str, Callable[[Iterable[Any]], Any]] = {
+    "list": list, "set": set, "tuple": tuple, "frozenset": frozenset,
+}  # fmt: skip
+
+
+class Putting:
+    """Puts captured contents back into a game of the same configuration.
+
+    Args:
+        states: The contents.
+        built: The objects of the game when it was built.
+
+    Raises:
+        SnapshotError: If the contents do not belong to a game that was built like this one. The
+            game is as it was.
+    """
+
+    def __init__(self, states: ObjectStates, built: BuiltObjects) -> None:
+        self._states, self._built = states, built
+        self._made: dict[int, Any] = {}
+        packages = {type(each).__module__.partition(".")[0] for each in built.objects}
+        self._packages = packages - {"builtins", "numpy"}
+        try:
+            made = [(self._object(number), each) for number, each in enumerate(states.made)]
+            present = [(built.objects[number], each) for number, each in states.built.items()]
+            late = [(item, each) for item, each in made if each[0] not in _FILLED_AT_ONCE]
+            # objects first: they may be keys of dictionaries, which need their hashes
+            late.sort(key=lambda pair: pair[1][0] != "object")
+            self._fillings = [self._filling(item, each) for item, each in late + present]
+        except (LookupError, TypeError, ValueError, AttributeError, RecursionError) as error:
+            if isinstance(error, SnapshotError):
+                raise
+            raise SnapshotError(f"the snapshot does not fit this game: {error}") from error
+
+    def put(self) -> None:
+        """Fill all objects."""
+        for fill in self._fillings:
+            fill()
+
+    def _object(self, number: int) -> Any:
+        """Return an object that is made again; what can be filled later is empty."""
+        if number not in self._made:
+            content = self._states.made[number]
+            self._made[number] = self._new(content)
+        return self._made[number]
+
+    def _new(self, content: Value) -> Any:
+        kind = content[0]
+        if kind == "object":
+            return object.__new__(self._class(content[1]))
+        if kind in ("tuple", "frozenset"):
+            return _CONTAINERS[kind](self._value(each) for each in content[1])
+        if kind == "named":
+            return tuple.__new__(self._class(content[1]), map(self._value, content[2]))
+        if kind == "proxy":
+            pairs = (map(self._value, pair) for pair in content[1])
+            return types.MappingProxyType(dict(pairs))  # type: ignore[arg-type]
+        if kind == "method":
+            return getattr(self._value(content[1]), content[2])
+        if kind == "array":
+            array = content[1].copy()
+            array.flags.writeable = content[2]
+            return array
+        if kind == "view":
+            return self._view(content)
+        if kind == "random":
+            name = _thawed(content[1])["bit_generator"]
+            return np.random.Generator(getattr(np.random, name)())
+        if kind == "deque":
+            return deque(maxlen=content[1])
+        return {"list": list, "dict": dict, "set": set}[kind]()
+
+    def _view(self, content: Value) -> Any:
+        _, base, offset, (dtype, shape, strides), writeable = content
+        view = np.ndarray(shape, dtype, self._value(base), offset, strides)
+        view.flags.writeable = writeable
+        return view
+
+    def _filling(self, item: Any, content: Value) -> Callable[[], None]:
+        """Return what gives an object the content that was captured."""
+        kind = content[0]
+        if kind == "array":
+            return self._filled_array(item, content[1])
+        if kind == "view":
+            return lambda: None
+        if kind == "random":
+            state = _thawed(content[1])
+            np.random.Generator(type(item.bit_generator)()).bit_generator.state = state
+            return lambda: setattr(item.bit_generator, "state", state)
+        if kind == "object":
+            _check_kind(item, self._class(content[1]))
+            values = {str(name): self._value(value) for name, value in content[2]}
+            return lambda: _set_attributes(item, values)
+        _check_kind(item, {"list": list, "dict": dict, "set": set, "deque": deque}[kind])
+        if kind == "dict":
+            pairs = [tuple(map(self._value, pair)) for pair in content[1]]
+            return lambda: _refill(item, item.update, pairs)
+        parts = list(map(self._value, content[-1]))
+        return lambda: _refill(item, item.update if kind == "set" else item.extend, parts)
+
+    def _filled_array(self, item: Any, values: Any) -> Callable[[], None]:
+        if not isinstance(item, np.ndarray) or not isinstance(values, np.ndarray):
+            raise SnapshotError(f"the snapshot has an array for a {type(item).__name__}")
+        if (item.shape, item.dtype) != (values.shape, values.dtype):
+            raise SnapshotError(
+                f"the snapshot has an array {values.dtype}{values.shape} for one of "
+                f"{item.dtype}{item.shape}"
+            )
+        return lambda: np.copyto(item, values) if item.flags.writeable else None
+
+    def _value(self, value: Value) -> Any:
+        """Return the object that a value stands for."""
+        if not isinstance(value, (tuple, list)):
+            return value
+        kind = value[0]
+        if kind == "built":
+            return self._built.objects[value[1]]
+        if kind == "made":
+            return self._object(value[1])
+        if kind == "enum":
+            return self._class(value[1])[value[2]]
+        if kind == "scalar":
+            return np.dtype(value[1]).type(value[2])
+        if kind == "bytes":
+            return bytes.fromhex(value[1])
+        if kind == "named_object":
+            return self._known(value[1])
+        if kind == "dtype":
+            return np.dtype(value[1])
+        return {"range": range, "slice": slice}[kind](*value[1:])
+
+    def _class(self, name: str) -> Any:
+        found = self._known(name)
+        if not isinstance(found, type):
+            raise SnapshotError(f"{name} is no class")
+        return found
+
+    def _known(self, name: str) -> Any:
+        """Return a class or function of one of the packages of the game."""
+        found = _found(name)
+        is_known = name.partition(":")[0].partition(".")[0] in self._packages
+        is_known |= isinstance(found, type) and issubclass(found, np.generic)
+        if not is_known or not isinstance(found, (type, types.FunctionType)):
+            raise SnapshotError(f"{name} is no class or function of {sorted(self._packages)}")
+        return found
+
+
+_FILLED_AT_ONCE = ("array", "view", "tuple", "frozenset", "named", "proxy", "method")
+
+
+def _check_kind(item: object, kind: type) -> None:
+    if type(item) is not kind:
+        raise SnapshotError(f"the snapshot has a {kind.__name__} for a {type(item).__name__}")
+
+
+def _refill(item: Any, add: Callable[[Any], None], parts: Any) -> None:
+    item.clear()
+    add(parts)
+
+
+def _set_attributes(item: object, values: Mapping[str, Any]) -> None:
+    """Set all attributes, and delete those that are not among them."""
+    for name in {name for name, _ in attributes(item)} - values.keys():
+        object.__delattr__(item, name)
+    for name, value in values.items():
+        object.__setattr__(item, name, value)
