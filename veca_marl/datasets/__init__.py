@@ -1,0 +1,8 @@
+"""Supervised data sets of what the senses perceive, their storage, and baselines that learn them.
+
+``python -m veca_marl.datasets make +dataset=object_recognition`` makes one; `load` reads it.
+"""
+
+from veca_marl.datasets.storage import DatasetError, StoredDataset, load, replay_buffer
+
+__all__ = ["DatasetError", "StoredDataset", "load", "replay_buffer"]
