@@ -68,9 +68,7 @@ class AudiovisualCorrespondenceCfg(DatasetCfg):
         self.check_range("distance_m", 0.1, 20.0)
         self.check_range("head_m", 0.1, 10.0)
         self.check_range("level_db", -120.0, 20.0)
-        self.check_numbers(
-            apart_deg=(0.0, 60.0), least_pixels=(1, 1_000_000), tilt_deg=(0.0, 45.0)
-        )
+        self.check_numbers(apart_deg=(0.0, 60.0), least_pixels=(1, 1_000_000), tilt_deg=(0.0, 45.0))
 
 
 @register_dataset

@@ -31,7 +31,6 @@ from veca_marl.sim.physics import PlaygroundCfg
 from veca_marl.sim.senses import SensesCfg
 from veca_marl.sim.vision import VisionCfg
 
-
 _TARGET_M = 0.1
 """Height of the point at which the eyes look, about that of the middle of a toy."""
 
