@@ -27,6 +27,7 @@ from veca_marl.config.command_line import (
 )
 from veca_marl.datasets.baselines.catalogue import find_baseline
 from veca_marl.datasets.baselines.training import TrainOptions, as_json, lines, run_baseline
+from veca_marl.datasets.card import README, illustrate
 from veca_marl.datasets.configuration import DatasetConfig, compose_dataset
 from veca_marl.datasets.dataset import DATASETS
 from veca_marl.datasets.making import make
@@ -91,6 +92,8 @@ def run_make(options: MakeOptions, overrides: list[str]) -> None:
     command = shlex.join(["python", "-m", "veca_marl.datasets", "make", *words])
     processes = options.processes or usable_cores()
     made = make(config, folder, options.n, options.seed, processes, command, options.progress)
+    if made.blocks or not (folder / README).exists():
+        illustrate(made.stored)
     print(f"{folder}: {made.stored.plan.n} samples, checksum {made.stored.card['checksum'][:16]}")
 
 
