@@ -19,11 +19,14 @@ EYES = ("binocular", "monocular", "grey", "blur")
 JOBS = {
     **{f"sound_localisation/{q}": [f"senses/audio={q}"] for q in ("hrtf", "stereo", "mono")},
     "object_recognition/binocular": [],
+    "object_classification/binocular": [],
     "contact_localisation/skin": [],
     "contact_localisation/parts": ["senses/touch=parts_only"],
     "contact_localisation/binary": ["senses/touch=binary"],
-    "object_classification/binocular": [],
+    "tactile_classification/skin": [],
     **{f"distance_estimation/{q}": [f"senses/vision={q}"] for q in EYES},
+    "audiovisual_correspondence/hrtf": [],
+    "depth_disparity/binocular": [],
     **{
         f"distance_estimation/infant {age} months": [
             "senses/vision=infant",
@@ -31,21 +34,19 @@ JOBS = {
         ]
         for age in (1, 4, 8)
     },
-    "audiovisual_correspondence/hrtf": [],
     "audiovisual_correspondence/mono": ["senses/audio=mono"],
-    "depth_disparity/binocular": [],
     "depth_disparity/monocular": ["senses/vision=monocular"],
-    "tactile_classification/skin": [],
     "tactile_classification/parts": ["senses/touch=parts_only"],
     "tactile_classification/binary": ["senses/touch=binary"],
 }
 
 
-def measure(job: str, numbers: dict[str, str]) -> dict:
+def measure(job: str, numbers: dict[str, str], making: list[str]) -> dict:
     """Return the scores of one data set in one quality."""
     dataset, words = job.partition("/")[0], JOBS[job]
     folder, table = WORK / job.replace("/", "-").replace(" ", "_"), WORK / "scores.json"
     make = [f"+dataset={dataset}", *words, f"n={numbers['n']}", f"out={folder}", "progress=false"]
+    make += making
     train = [f"data={folder}", f"json={table}", "progress=false"]
     train += [f"{key}={numbers[key]}" for key in ("epochs", "runs", "learning.test_fraction")]
     for command in (["make", *make], ["train", *train]):
@@ -60,11 +61,13 @@ def run(words: list[str]) -> None:
     """Measure all jobs; write the results after each of them."""
     numbers = {"n": "80000", "epochs": "50", "runs": "5", "learning.test_fraction": "0.1"}
     numbers |= dict(word.split("=", 1) for word in words)
+    processes = numbers.pop("processes", None)  # the results do not depend on it
+    making = [] if processes is None else [f"processes={processes}"]
     path = HERE / "results.json"
     results = json.loads(path.read_text()) if path.exists() else {}
     for job in JOBS:
         if results.get(job, {}).get("numbers") != numbers:
-            results[job] = {"numbers": numbers, **measure(job, numbers)}
+            results[job] = {"numbers": numbers, **measure(job, numbers, making)}
             path.write_text(json.dumps(results, indent=1) + "\n")
 
 

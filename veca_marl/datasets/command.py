@@ -29,14 +29,14 @@ from veca_marl.datasets.baselines.catalogue import find_baseline
 from veca_marl.datasets.baselines.training import TrainOptions, as_json, lines, run_baseline
 from veca_marl.datasets.card import README, illustrate
 from veca_marl.datasets.configuration import DatasetConfig, compose_dataset
-from veca_marl.datasets.dataset import DATASETS
+from veca_marl.datasets.dataset import DATASETS, NoSceneError
 from veca_marl.datasets.making import make
 from veca_marl.datasets.storage import DatasetError, load
 from veca_marl.processes.supervision import WorkerError
 from veca_marl.registry import unknown
 from veca_marl.runs.cores import usable_cores
 
-_ERRORS = (DatasetError, WriteError, WorkerError)
+_ERRORS = (DatasetError, NoSceneError, WriteError, WorkerError)
 
 
 @dataclass

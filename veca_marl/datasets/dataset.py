@@ -21,6 +21,20 @@ Sample = dict[str, NDArray[Any]]
 """An array for each field."""
 
 
+TRIES = 10_000
+"""Draws of a scene after which the settings are considered impossible."""
+
+
+class NoSceneError(ValueError):
+    """The settings of a data set leave no scene that shows what it has to show."""
+
+    def __init__(self, name: str) -> None:
+        super().__init__(
+            f"{name}: none of {TRIES} scenes shows what it has to show; allow more distances, "
+            "larger things or fewer least pixels or steps"
+        )
+
+
 @dataclass
 class DatasetCfg:
     """Base class of the numbers of a data set.

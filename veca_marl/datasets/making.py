@@ -28,6 +28,7 @@ from veca_marl.datasets.configuration import DatasetConfig, make_dataset
 from veca_marl.datasets.dataset import DATASETS, Dataset
 from veca_marl.datasets.storage import (
     CARD,
+    DATA,
     PLAN,
     DatasetError,
     Plan,
@@ -169,7 +170,10 @@ def _present(folder: Path, plan: Plan) -> StoredDataset | None:
             begun = Plan.from_dict(read_json(folder / PLAN), folder / PLAN)
         except (StoredFileError, DatasetError) as error:
             raise ConfigError(f"{error}; give another out=FOLDER, or delete it") from error
-        _check_same(folder, plan, begun)
+        if recorded_blocks(folder, begun):
+            _check_same(folder, plan, begun)
+        else:  # nothing is lost
+            shutil.rmtree(folder / DATA, ignore_errors=True)
     elif folder.is_dir() and any(path.name != ".lock" for path in folder.iterdir()):
         raise ConfigError(f"out={folder} holds other files; give a new folder")
     return None

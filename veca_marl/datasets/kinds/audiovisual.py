@@ -7,7 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from veca_marl.datasets.dataset import Dataset, DatasetCfg, Sample, register_dataset
+from veca_marl.datasets.dataset import (
+    TRIES,
+    Dataset,
+    DatasetCfg,
+    NoSceneError,
+    Sample,
+    register_dataset,
+)
 from veca_marl.datasets.fields import Field, Role
 from veca_marl.datasets.kinds.images import ALL_TOYS, class_field, image_field
 from veca_marl.datasets.kinds.recordings import (
@@ -18,10 +25,8 @@ from veca_marl.datasets.kinds.recordings import (
     waveform_field,
 )
 from veca_marl.datasets.kinds.toy_scenes import (
-    TRIES,
     EyePair,
     Floor,
-    NoSceneError,
     ToyDraw,
     ToyScene,
     check_camera,

@@ -9,7 +9,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from veca_marl.datasets.dataset import Dataset, DatasetCfg, Sample, register_dataset
+from veca_marl.datasets.dataset import (
+    TRIES,
+    Dataset,
+    DatasetCfg,
+    NoSceneError,
+    Sample,
+    register_dataset,
+)
 from veca_marl.datasets.fields import Field, Role
 from veca_marl.datasets.kinds.still_skin import (
     BonePoses,
@@ -17,7 +24,6 @@ from veca_marl.datasets.kinds.still_skin import (
     StillSkin,
     binding_taxels,
 )
-from veca_marl.datasets.kinds.toy_scenes import TRIES, NoSceneError
 from veca_marl.sim.body.anatomy import load_skeleton, load_skin
 from veca_marl.sim.body.humanoid.postures import POSTURES, perturbed
 from veca_marl.sim.geometry import Geom, Pose, Shape

@@ -15,10 +15,17 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from veca_marl.datasets.dataset import Dataset, DatasetCfg, Sample, register_dataset
+from veca_marl.datasets.dataset import (
+    TRIES,
+    Dataset,
+    DatasetCfg,
+    NoSceneError,
+    Sample,
+    register_dataset,
+)
 from veca_marl.datasets.fields import Field, Role
 from veca_marl.datasets.kinds.still_skin import BonePoses, SkinObservation, StillSkin
-from veca_marl.datasets.kinds.toy_scenes import TRIES, NoSceneError, random_rotation
+from veca_marl.datasets.kinds.toy_scenes import random_rotation
 from veca_marl.sim.body.anatomy import (
     SkinLayer,
     SkinSpring,

@@ -8,14 +8,19 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from veca_marl.datasets.dataset import Dataset, DatasetCfg, Sample, register_dataset
+from veca_marl.datasets.dataset import (
+    TRIES,
+    Dataset,
+    DatasetCfg,
+    NoSceneError,
+    Sample,
+    register_dataset,
+)
 from veca_marl.datasets.fields import Field, Role
 from veca_marl.datasets.kinds.toy_scenes import (
-    TRIES,
     EyePair,
     Floor,
     Gaze,
-    NoSceneError,
     ToyDraw,
     ToyScene,
     check_camera,

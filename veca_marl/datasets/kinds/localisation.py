@@ -6,7 +6,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from veca_marl.datasets.dataset import Dataset, DatasetCfg, Sample, register_dataset
+from veca_marl.datasets.dataset import (
+    TRIES,
+    Dataset,
+    DatasetCfg,
+    NoSceneError,
+    Sample,
+    register_dataset,
+)
 from veca_marl.datasets.fields import Field, Role
 from veca_marl.datasets.kinds.recordings import (
     Recorder,
@@ -16,7 +23,7 @@ from veca_marl.datasets.kinds.recordings import (
     head_rotation,
     waveform_field,
 )
-from veca_marl.datasets.kinds.toy_scenes import TRIES, Floor, NoSceneError
+from veca_marl.datasets.kinds.toy_scenes import Floor
 from veca_marl.sim.geometry import Pose
 from veca_marl.sim.physics import PlaygroundCfg
 from veca_marl.sim.senses import SensesCfg

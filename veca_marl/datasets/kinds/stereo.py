@@ -10,16 +10,21 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from veca_marl.datasets.dataset import Dataset, DatasetCfg, Sample, register_dataset
+from veca_marl.datasets.dataset import (
+    TRIES,
+    Dataset,
+    DatasetCfg,
+    NoSceneError,
+    Sample,
+    register_dataset,
+)
 from veca_marl.datasets.fields import Field, Role
 from veca_marl.datasets.kinds.images import ALL_TOYS, image_field
 from veca_marl.datasets.kinds.toy_scenes import (
     INTERPUPILLARY_M,
-    TRIES,
     EyePair,
     Floor,
     Gaze,
-    NoSceneError,
     ToyDraw,
     ToyScene,
     check_camera,

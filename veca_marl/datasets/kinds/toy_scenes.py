@@ -22,23 +22,10 @@ from veca_marl.sim.vision import Camera, Eyes, Views, VisionCfg, look_at
 from veca_marl.sim.vision.image_filters import FilterContext
 from veca_marl.sim.vision.vision_sense import make_filters
 
-TRIES = 10_000
-"""Draws of a scene after which the settings are considered impossible."""
-
 _WALL_M = 0.2  # cameras and toys keep this distance from the walls
 _EYE_ASIDE_M = MOUNTS_M["eye_left"][1]
 INTERPUPILLARY_M = 2.0 * _EYE_ASIDE_M
 """Distance of the eyes of the bodies."""
-
-
-class NoSceneError(ValueError):
-    """The settings of a data set leave no scene that shows what it has to show."""
-
-    def __init__(self, name: str) -> None:
-        super().__init__(
-            f"{name}: none of {TRIES} scenes shows what it has to show; allow more distances, "
-            "larger toys or a lower dataset.least_pixels"
-        )
 
 
 @dataclass(frozen=True)
