@@ -19,6 +19,7 @@ README, PICTURES, SOUNDS = "README.md", "pictures", "sounds"
 _SHOWN = 16  # samples in a picture
 _HEARD = 4  # samples with a sound
 _COUNTED = 20_000  # samples at most in a plot of a distribution
+_DRAWN_MS = 30  # milliseconds of a waveform
 _PEAK = 0.9  # of full scale, in sounds
 
 
@@ -243,9 +244,9 @@ def _draw_eyes(axes: Any, sample: dict[str, NDArray[Any]], name: str) -> None:
 
 
 def _draw_waveform(axes: Any, sample: dict[str, NDArray[Any]], name: str) -> None:
-    time_ms = 1000.0 * np.arange(sample[name].shape[1]) / SAMPLE_RATE_HZ
-    for ear, label in zip(sample[name], ("left", "right"), strict=True):
-        axes.plot(time_ms, ear, linewidth=0.5, label=label)
+    samples = _DRAWN_MS * SAMPLE_RATE_HZ // 1000
+    for ear, label in zip(sample[name][:, :samples], ("left", "right"), strict=True):
+        axes.plot(1000.0 * np.arange(len(ear)) / SAMPLE_RATE_HZ, ear, linewidth=0.7, label=label)
     axes.legend(fontsize=6)
     axes.set_xlabel("ms", fontsize=7)
     axes.tick_params(labelsize=6)

@@ -9,7 +9,6 @@
 
 from __future__ import annotations
 
-import shlex
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -25,12 +24,11 @@ from veca_marl.config.command_line import (
     check_folder,
     print_version,
 )
+from veca_marl.datasets.api import default_folder, make_with_card
 from veca_marl.datasets.baselines.catalogue import find_baseline
 from veca_marl.datasets.baselines.training import TrainOptions, as_json, lines, run_baseline
-from veca_marl.datasets.card import README, illustrate
 from veca_marl.datasets.configuration import DatasetConfig, compose_dataset
 from veca_marl.datasets.dataset import DATASETS, NoSceneError
-from veca_marl.datasets.making import make
 from veca_marl.datasets.storage import DatasetError, load
 from veca_marl.processes.supervision import WorkerError
 from veca_marl.registry import unknown
@@ -79,22 +77,13 @@ class ShowOptions:
     verify: bool = False
 
 
-def folder_of(config: DatasetConfig, given: str | None) -> Path:
-    """Return the folder of a data set."""
-    return Path("datasets", config.dataset.name) if given is None else Path(given)
-
-
 def run_make(options: MakeOptions, overrides: list[str]) -> None:
     """Make a data set and its card."""
-    config = compose_dataset(overrides)
-    folder = check_folder(folder_of(config, options.out), "out")
-    words = [*overrides, f"n={options.n}", f"seed={options.seed}"]
-    command = shlex.join(["python", "-m", "veca_marl.datasets", "make", *words])
+    folder = None if options.out is None else check_folder(options.out, "out")
     processes = options.processes or usable_cores()
-    made = make(config, folder, options.n, options.seed, processes, command, options.progress)
-    if made.blocks or not (folder / README).exists():
-        illustrate(made.stored)
-    print(f"{folder}: {made.stored.plan.n} samples, checksum {made.stored.card['checksum'][:16]}")
+    numbers = options.n, folder, options.seed, processes, options.progress
+    stored = make_with_card(overrides, *numbers).stored
+    print(f"{stored.folder}: {len(stored)} samples, checksum {stored.card['checksum'][:16]}")
 
 
 def run_show(options: ShowOptions, overrides: list[str]) -> None:
@@ -130,7 +119,9 @@ def run_train(options: TrainOptions, overrides: list[str]) -> None:
 
 def _given_folder(data: str | None, overrides: list[str]) -> Path:
     """Return the folder that ``data=`` names, or that of ``+dataset=NAME``."""
-    return Path(data) if data is not None else folder_of(compose_dataset(overrides), None)
+    if data is not None:
+        return Path(data)
+    return default_folder(compose_dataset(overrides).dataset.name)
 
 
 COMMANDS: dict[str, tuple[CommandLine[Any], Callable[[Any, list[str]], None]]] = {

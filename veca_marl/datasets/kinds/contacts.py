@@ -1,6 +1,6 @@
 """Where on the skin a contact was, from the readings of the whole skin in any posture.
 
-The body touches itself in many postures: what is felt is not only the contact in question.
+The body touches itself in many postures: what is felt is not the contact in question alone.
 """
 
 from __future__ import annotations
@@ -33,6 +33,10 @@ from veca_marl.sim.touch import TouchCfg
 from veca_marl.sim.touch.taxels import TAXELS_PER_TRIANGLE, load_taxels
 
 
+_FAR = Pose(np.array([0.0, 0.0, 1000.0]), np.eye(3))
+"""Where the ball touches nothing."""
+
+
 @dataclass
 class ContactLocalisationCfg(DatasetCfg):
     """Numbers of contact localisation.
@@ -41,13 +45,14 @@ class ContactLocalisationCfg(DatasetCfg):
         radius_m: Least and greatest radius of the ball that touches the skin.
         depth: Least and greatest depth to which it is pressed, as a fraction of the thickness of
             the skin.
-        spread_deg: Standard deviation of each joint from one of the postures of the body.
+        spread_deg: Standard deviation of each joint from one of the postures of the body. Postures
+            in which a bone presses the skin of another one down to the bone are drawn again.
     """
 
     name: str = "contact_localisation"
     radius_m: tuple[float, float] = (0.003, 0.02)
     depth: tuple[float, float] = (0.2, 0.9)
-    spread_deg: float = 15.0
+    spread_deg: float = 5.0
 
     def __post_init__(self) -> None:
         self.check_range("radius_m", 0.001, 0.2)
@@ -110,11 +115,13 @@ class ContactLocalisation(Dataset):
         for _ in range(TRIES):
             posture = postures[int(rng.integers(len(postures)))]
             posture = perturbed(skeleton, posture, self.cfg.spread_deg, rng)
-            triangle = int(rng.choice(len(self._chances), p=self._chances))
-            taxel = int(rng.integers(TAXELS_PER_TRIANGLE))
             radius_m, depth = rng.uniform(*self.cfg.radius_m), rng.uniform(*self.cfg.depth)
             ball = [Geom(Shape.SPHERE, (float(radius_m),))]
             skin = StillSkin(self._touch, BonePoses.of_posture(posture), ball)
+            if skin.press(_FAR).max() >= 1.0:
+                continue
+            triangle = int(rng.choice(len(self._chances), p=self._chances))
+            taxel = int(rng.integers(TAXELS_PER_TRIANGLE))
             table = load_taxels()
             positions, normals = skin.taxels()
             bone = int(self._owners[triangle])
