@@ -57,6 +57,31 @@ def measure(job: str, numbers: dict[str, str], making: list[str]) -> dict:
     return scores
 
 
+def tables(results: dict[str, dict]) -> str:
+    """Return the table of the results: all data sets, and what the qualities cost."""
+    head = "| data set | quality | samples, epochs, runs | scores on the test set | paper |"
+    lines = [
+        "<!-- written by experiments/datasets/measure.py -->",
+        "",
+        head,
+        "|---|---|---|---|---|",
+    ]
+    for job in (job for job in JOBS if job in results):
+        dataset, _, quality = job.partition("/")
+        found = results[job]
+        numbers = found["numbers"]
+        scores = "; ".join(f"{name} {cell(score)}" for name, score in found["scores"].items())
+        size = f"{numbers['n']}, {numbers['epochs']}, {numbers['runs']}"
+        lines.append(f"| `{dataset}` | {quality} | {size} | {scores} | {found['paper']} |")
+    return "\n".join(lines) + "\n"
+
+
+def cell(score: dict) -> str:
+    """Return mean and deviation of a score."""
+    spread = "" if score["deviation"] is None else f" +- {score['deviation']:.3f}"
+    return f"{score['mean']:.3f}{spread}"
+
+
 def run(words: list[str]) -> None:
     """Measure all jobs; write the results after each of them."""
     numbers = {"n": "80000", "epochs": "50", "runs": "5", "learning.test_fraction": "0.1"}
@@ -69,6 +94,7 @@ def run(words: list[str]) -> None:
         if results.get(job, {}).get("numbers") != numbers:
             results[job] = {"numbers": numbers, **measure(job, numbers, making)}
             path.write_text(json.dumps(results, indent=1) + "\n")
+            (HERE / "tables.md").write_text(tables(results))
 
 
 if __name__ == "__main__":

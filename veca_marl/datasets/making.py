@@ -174,7 +174,7 @@ def _present(folder: Path, plan: Plan) -> StoredDataset | None:
             _check_same(folder, plan, begun)
         else:  # nothing is lost
             shutil.rmtree(folder / DATA, ignore_errors=True)
-    elif folder.is_dir() and any(path.name != ".lock" for path in folder.iterdir()):
+    elif folder.is_dir() and any(path.name[0] != "." for path in folder.iterdir()):
         raise ConfigError(f"out={folder} holds other files; give a new folder")
     return None
 

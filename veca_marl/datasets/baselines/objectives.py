@@ -199,6 +199,9 @@ class Disparity(Objective):
         }
 
 
+_SCALE_M = 0.1  # of positions on the body
+
+
 class Contact(Objective):
     """The bone that was touched, and the point of contact on the skin in the binding pose."""
 
@@ -208,7 +211,6 @@ class Contact(Objective):
         "bone top-1 accuracy": "fraction, higher is better",
         "within 20 mm": "fraction, higher is better",
     }
-    _SCALE_M = 0.1
 
     def __init__(self, stored: StoredDataset, train: Tensor) -> None:
         self._bones = len(stored.plan.fields["bone"].names)
@@ -218,12 +220,12 @@ class Contact(Objective):
     def loss(self, output: Tensor, labels: Labels) -> Tensor:
         """See `Objective`."""
         bones = functional.cross_entropy(output[:, : self._bones], labels["bone"])
-        target = (labels["position"] - self._centre.to(output.device)) / self._SCALE_M
+        target = (labels["position"] - self._centre.to(output.device)) / _SCALE_M
         return bones + functional.smooth_l1_loss(output[:, self._bones :], target, beta=0.1)
 
     def measure(self, output: Tensor, labels: Labels) -> dict[str, float]:
         """See `Objective`."""
-        estimate = self._SCALE_M * output[:, self._bones :] + self._centre.to(output.device)
+        estimate = _SCALE_M * output[:, self._bones :] + self._centre.to(output.device)
         away_mm = 1000.0 * (estimate - labels["position"]).norm(dim=-1)
         return {
             "median distance": float(away_mm.median()),

@@ -142,7 +142,8 @@ def as_json(
         "samples": {"learnt from": len(train), "test": len(test)},
         "epochs": options.epochs,
         "seeds": [options.seed + run for run in range(options.runs)],
-        "learning": OmegaConf.to_container(OmegaConf.structured(options.learning)),
+        "learning": _plain(options.learning),
+        "network": _plain(options.network),
         "versions": {"veca_marl": __version__, "torch": torch.__version__},
         "paper": find_baseline(stored).paper,
         "scores": {
@@ -156,3 +157,8 @@ def as_json(
         },
     }
     return json.dumps(content, indent=2) + "\n"
+
+
+def _plain(numbers: Any) -> Any:
+    """Return a dataclass of numbers as plain data."""
+    return OmegaConf.to_container(OmegaConf.structured(numbers), enum_to_str=True)

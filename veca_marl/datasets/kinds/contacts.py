@@ -32,7 +32,6 @@ from veca_marl.sim.senses import SensesCfg
 from veca_marl.sim.touch import TouchCfg
 from veca_marl.sim.touch.taxels import TAXELS_PER_TRIANGLE, load_taxels
 
-
 _FAR = Pose(np.array([0.0, 0.0, 1000.0]), np.eye(3))
 """Where the ball touches nothing."""
 

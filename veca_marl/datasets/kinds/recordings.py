@@ -21,7 +21,7 @@ from veca_marl.sim.physics.playground import make_house
 from veca_marl.sim.sound import SAMPLE_RATE_HZ, Clip, Noise, Sound, SoundField, buzz
 
 STEP_SAMPLES = 882
-"""Samples of a step of the sound field: 40 ms, as in the steps of agents."""
+"""Samples of a step of the sound field, 40 ms as in the steps of agents."""
 
 _STEPS = 5  # 0.2 s
 RECORDING_SAMPLES = _STEPS * STEP_SAMPLES
