@@ -1,4 +1,4 @@
-"""The samples of every data set: they depend on the index alone, and their labels are right."""
+"""The samples of every data set: they depend only on the index, and their labels are right."""
 
 import math
 from functools import cache

@@ -94,10 +94,10 @@ class Dataset(ABC):
 
     @abstractmethod
     def draw(self, rng: np.random.Generator) -> Sample:
-        """Return a sample that depends on the generator alone."""
+        """Return a sample that depends only on the generator."""
 
     def sample(self, seed: int, index: int) -> Sample:
-        """Return one sample; it depends on data set, seed and index alone.
+        """Return one sample; it depends only on data set, seed and index.
 
         Raises:
             ValueError: If it does not fit the fields: a fault of the data set.

@@ -1,6 +1,6 @@
 """The making of a data set: blocks of samples by any number of processes, continued after an end.
 
-A sample depends on data set, seed and index alone, and each block has its place in the files: the
+A sample depends only on data set, seed and index, and each block has its position in the files: the
 bytes are the same with any number of processes, and after any number of ends and continuations.
 """
 

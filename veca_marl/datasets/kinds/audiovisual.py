@@ -113,12 +113,12 @@ class AudiovisualCorrespondence(Dataset):
             azimuths = rng.uniform(-self._half_rad, self._half_rad, len(COLOURS))
             far_m = rng.uniform(*self.cfg.distance_m, len(COLOURS))
             gaps = np.diff(np.sort(azimuths))
-            places = self._places(head, rotation, azimuths, far_m)
-            if gaps.min() < math.radians(self.cfg.apart_deg) or places is None:
+            positions = self._positions(head, rotation, azimuths, far_m)
+            if gaps.min() < math.radians(self.cfg.apart_deg) or positions is None:
                 continue
             scene = ToyScene(self._room)
-            for place, colour in zip(places, COLOURS.values(), strict=True):
-                scene.add(rng, self._toys, place, colour)
+            for position, colour in zip(positions, COLOURS.values(), strict=True):
+                scene.add(rng, self._toys, position, colour)
             scene.finish()
             views = self._eyes.render(scene.scene, Pose(head + rotation @ _EYE_CENTRE_M, rotation))
             if min(pixels_of(views, toy) for toy in scene.toys) < self.cfg.least_pixels:
@@ -143,13 +143,13 @@ class AudiovisualCorrespondence(Dataset):
         pitch = np.array([[cosine, 0.0, sine], [0.0, 1.0, 0.0], [-sine, 0.0, cosine]])
         return head, rotation @ pitch
 
-    def _places(
+    def _positions(
         self, head: Floats, rotation: Floats, azimuths: Floats, far_m: Floats
     ) -> Floats | None:
-        """Return the places ``(toys, 2)`` on the floor, or None if one is outside of the room."""
+        """Return positions ``(toys, 2)`` on the floor; None if one is outside of the room."""
         ahead = math.atan2(rotation[1, 0], rotation[0, 0])
         angles = ahead + azimuths
-        places: Floats = head[:2] + far_m[:, None] * np.stack(
+        positions: Floats = head[:2] + far_m[:, None] * np.stack(
             [np.cos(angles), np.sin(angles)], axis=1
         )
-        return places if all(self._floor.contains(place) for place in places) else None
+        return positions if all(self._floor.contains(position) for position in positions) else None

@@ -1,6 +1,6 @@
 """Where on the skin a contact was, from the readings of the whole skin in any posture.
 
-The body touches itself in many postures: what is felt is not the contact in question alone.
+The body touches itself in many postures: what is felt is not only the contact in question.
 """
 
 from __future__ import annotations

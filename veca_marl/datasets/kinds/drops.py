@@ -217,8 +217,8 @@ class TactileClassification(Dataset):
         height_m = rng.uniform(*self.cfg.height_m) - lowest_m(geoms, rotation)
         hand = poses.bone(_HAND).rotation
         # along the hand and across it, in the plane of the palm
-        place = aside[0] * hand[:, 0] + aside[1] * hand[:, 2]
-        return Pose(place + np.array([0.0, 0.0, height_m]), rotation)
+        position = aside[0] * hand[:, 0] + aside[1] * hand[:, 2]
+        return Pose(position + np.array([0.0, 0.0, height_m]), rotation)
 
 
 def dropped(

@@ -66,7 +66,7 @@ def image_field(cfg: VisionCfg, eyes: bool) -> Field:
 
     Args:
         cfg: Settings of vision.
-        eyes: Whether both eyes are stored, or the left one alone.
+        eyes: Whether both eyes are stored, or only the left one.
     """
     size = (3, cfg.height, cfg.width)
     meaning = "images of the left and the right eye" if eyes else "image of the left eye"

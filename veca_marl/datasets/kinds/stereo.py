@@ -122,12 +122,12 @@ class DepthDisparity(Dataset):
     def draw(self, rng: np.random.Generator) -> Sample:
         """See `Dataset`."""
         for _ in range(TRIES):
-            place = self._floor.draw(rng)
-            target = np.array([*place, _TARGET_M])
+            position = self._floor.draw(rng)
+            target = np.array([*position, _TARGET_M])
             middle = self._gaze.draw(rng, target, self._floor, self._fov_deg)
             if middle is None:
                 continue
-            scene = self._scene(rng, place)
+            scene = self._scene(rng, position)
             scene.finish()
             views = self.eyes.render(scene.scene, middle)
             depth = views.depth[0][np.ix_(self._rows, self._columns)]
@@ -140,12 +140,12 @@ class DepthDisparity(Dataset):
                 }
         raise NoSceneError(self.name)
 
-    def _scene(self, rng: np.random.Generator, place: Floats) -> ToyScene:
-        """Return the room with a toy at a place ``(2,)``, and others around it."""
+    def _scene(self, rng: np.random.Generator, position: Floats) -> ToyScene:
+        """Return the room with a toy at a position ``(2,)``, and others around it."""
         scene = ToyScene(self._room)
-        scene.add(rng, self._toys, place)
+        scene.add(rng, self._toys, position)
         low, high = self.cfg.toys
         for _ in range(int(rng.integers(low, high + 1)) - 1):
             aside = rng.uniform(-self.cfg.spread_m, self.cfg.spread_m, 2)
-            scene.add(rng, self._toys, np.clip(place + aside, self._floor.low, self._floor.high))
+            scene.add(rng, self._toys, np.clip(position + aside, self._floor.low, self._floor.high))
         return scene

@@ -74,7 +74,7 @@ class BonePoses:
 
 @functools.cache
 def _body_scene() -> tuple[Scene, Bools]:
-    """Return a scene with a body alone, and the pairs ``(47, G)`` of it that are not sensed."""
+    """Return a scene with only a body, and the pairs ``(47, G)`` of it that are not sensed."""
     skeleton, scene, shirt = load_skeleton(), Scene(), SHIRTS[0]
     body = scene.add_object("body", bone_geoms(skeleton, shirt), dressed_skin(skeleton, shirt))
     return scene, unsensed_primitives(scene.geoms, body)

@@ -110,7 +110,7 @@ class ToyScene:
         self,
         rng: np.random.Generator,
         draw: ToyDraw,
-        place: Floats,
+        position: Floats,
         colour: Sequence[float] | None = None,
     ) -> None:
         """Put a toy on the floor.
@@ -118,7 +118,7 @@ class ToyScene:
         Args:
             rng: Source of its kind, size, attitude and colour.
             draw: How it is drawn.
-            place: ``(2,)`` metres.
+            position: ``(2,)`` metres.
             colour: Red, green and blue in [0, 1]; None draws one.
         """
         kind = int(rng.integers(len(draw.kinds)))
@@ -131,7 +131,7 @@ class ToyScene:
         geoms = prop_geoms(cfg)
         rotation = rotation_about_vertical(yaw_rad) if upright else attitude
         item = self.scene.add_object(name, [geoms])
-        centre = np.array([*place, -lowest_m(geoms, rotation)])
+        centre = np.array([*position, -lowest_m(geoms, rotation)])
         item.positions[0], item.rotations[0] = centre, rotation
         self.kinds.append(kind)
         self.centres.append(centre)
