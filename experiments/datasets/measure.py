@@ -2,8 +2,9 @@
 
     python experiments/datasets/measure.py n=4000 epochs=12 runs=1
 
-What `results.json` holds already with the same numbers is not computed again. The full tables need
-``n=80000 epochs=50 runs=5``, which is the default.
+What `results.json` holds already with the same numbers is not computed again; ``only=NAME`` measures
+the sets and qualities that begin with a name. The full table needs ``n=80000 epochs=50 runs=5``,
+which is the default.
 """
 
 import json
@@ -87,10 +88,11 @@ def run(words: list[str]) -> None:
     numbers = {"n": "80000", "epochs": "50", "runs": "5", "learning.test_fraction": "0.1"}
     numbers |= dict(word.split("=", 1) for word in words)
     processes = numbers.pop("processes", None)  # the results do not depend on it
+    only = numbers.pop("only", "")
     making = [] if processes is None else [f"processes={processes}"]
     path = HERE / "results.json"
     results = json.loads(path.read_text()) if path.exists() else {}
-    for job in JOBS:
+    for job in (job for job in JOBS if job.startswith(only)):
         if results.get(job, {}).get("numbers") != numbers:
             results[job] = {"numbers": numbers, **measure(job, numbers, making)}
             path.write_text(json.dumps(results, indent=1) + "\n")
