@@ -2,9 +2,9 @@
 
     python experiments/datasets/measure.py n=4000 epochs=12 runs=1
 
-What `results.json` holds already with the same numbers is not computed again; ``only=NAME`` measures
-the sets and qualities that begin with a name. The full table needs ``n=80000 epochs=50 runs=5``,
-which is the default.
+What `results.json` holds already with the same numbers is not computed again; ``only=NAME``
+measures the sets and qualities that begin with a name. The full table needs ``n=80000 epochs=50
+runs=5``, which is the default.
 """
 
 import json

@@ -146,6 +146,8 @@ def write_pictures(stored: StoredDataset) -> dict[str, str]:
             path = f"{PICTURES}/distribution_{name}.png"
             _save(_distribution(name, field, _some(stored, name)), stored.folder / path)
             pictures[path] = f"Distribution of {name}"
+    if not stored.names("input"):
+        return pictures
     samples = f"{PICTURES}/samples.png"
     _save(sample_figure(stored), stored.folder / samples)
     return {samples: "Samples", **pictures}
@@ -187,7 +189,13 @@ def _distribution(name: str, field: Field, values: NDArray[Any]) -> Any:
 def sample_figure(stored: StoredDataset) -> Any:
     """Return a figure of the first samples with their labels."""
     inputs = stored.names("input")
-    drawn = {"image": _draw_image, "vision": _draw_eyes, "waveform": _draw_waveform}
+    drawn = {
+        "image": _draw_image,
+        "vision": _draw_eyes,
+        "waveform": _draw_waveform,
+        "touch": _draw_readings,
+        "touch_parts": _draw_readings,
+    }
     count = min(_SHOWN, len(stored))
     rows = count * len(inputs)
     columns = 4
@@ -198,7 +206,7 @@ def sample_figure(stored: StoredDataset) -> Any:
     for place, (index, name) in enumerate((i, name) for i in range(count) for name in inputs):
         axes = all_axes[place]
         sample = {key: value.numpy() for key, value in stored.data[index].items()}
-        drawn.get(name, _draw_readings)(axes, sample, name)
+        drawn.get(name, _draw_values)(axes, sample, name)
         axes.set_title(_title(stored, sample), fontsize=8)
     return figure
 
@@ -263,4 +271,11 @@ def _draw_readings(axes: Any, sample: dict[str, NDArray[Any]], name: str) -> Non
     else:
         axes.plot(readings, linewidth=0.5)
         axes.set_xlabel("taxel", fontsize=7)
+    axes.tick_params(labelsize=6)
+
+
+def _draw_values(axes: Any, sample: dict[str, NDArray[Any]], name: str) -> None:
+    """Draw an array of which nothing is known."""
+    axes.plot(sample[name].ravel(), linewidth=0.5)
+    axes.set_xlabel(name, fontsize=7)
     axes.tick_params(labelsize=6)

@@ -12,6 +12,7 @@ from omegaconf import MISSING
 import veca_marl.datasets.kinds  # noqa: F401  registers all data sets
 from veca_marl.config.compose import compose_other
 from veca_marl.config.errors import ConfigError, one_line
+from veca_marl.config.overrides import conf_dirs
 from veca_marl.datasets.dataset import DATASETS, Dataset, DatasetCfg
 from veca_marl.sim.physics import PlaygroundCfg
 from veca_marl.sim.senses import SensesCfg
@@ -71,5 +72,9 @@ def store_schemas() -> None:
 
 
 def _store_dataset(name: str) -> None:
-    """Store the schema of a data set."""
-    ConfigStore.instance().store(group="schema/dataset", name=name, node=DATASETS[name].cfg_type)
+    """Store the schema of a data set, and an entry of the group if it has no preset."""
+    store = ConfigStore.instance()
+    store.store(group="schema/dataset", name=name, node=DATASETS[name].cfg_type)
+    if not any((folder / "dataset" / f"{name}.yaml").is_file() for folder in conf_dirs()):
+        entry = {"defaults": [{"/schema/dataset@_here_": name}, "_self_"]}
+        store.store(group="dataset", name=name, node=entry)
