@@ -12,6 +12,7 @@ from refusals import naming
 from veca_marl.algos.training.schedule import Schedule
 from veca_marl.config import Config, ConfigError, compose, compose_node, conf_dir
 from veca_marl.config.compose import _job_folder
+from veca_marl.datasets.dataset import DATASETS
 from veca_marl.envs.core.task import TASKS
 from veca_marl.sim.body.humanoid import Detail, HumanoidCfg
 from veca_marl.sim.body.humanoid import JointActionKind as Act
@@ -86,7 +87,11 @@ def test_experiments_accept_another_seed_and_sense():
 def test_every_file_is_tested():
     files = {path.relative_to(conf_dir()).as_posix() for path in conf_dir().rglob("*.yaml")}
     tested = {f"{g}/{p}.yaml" for g, p in PRESETS} | {f"experiment/{n}.yaml" for n in EXPERIMENTS}
-    assert files - tested - {f"task/{name}.yaml" for name in TASKS} == {"config.yaml"}
+    tested |= {f"dataset/{name}.yaml" for name in DATASETS}
+    assert files - tested - {f"task/{name}.yaml" for name in TASKS} == {
+        "config.yaml",
+        "datasets.yaml",
+    }
 
 
 @pytest.mark.parametrize("path", sorted(conf_dir().rglob("*.yaml")), ids=lambda p: p.stem)

@@ -13,11 +13,13 @@ from veca_marl.algos.networks.factory import NETWORKS
 from veca_marl.algos.selfplay import SelfPlayCfg
 from veca_marl.checks import CheckCfg
 from veca_marl.config.root import LogCfg, body_types
+from veca_marl.datasets.baselines.learning import LearningCfg
+from veca_marl.datasets.configuration import DATASETS
 from veca_marl.envs.core.task import TASKS
 from veca_marl.sim.physics import PLAYGROUND_GENERATORS, ClockCfg, PlaygroundCfg
 from veca_marl.sim.senses import SENSES
 
-OTHERS = (CheckCfg, ClockCfg, CollectCfg, EvalCfg, LogCfg, PlaygroundCfg, SelfPlayCfg)
+OTHERS = (CheckCfg, ClockCfg, CollectCfg, EvalCfg, LearningCfg, LogCfg, PlaygroundCfg, SelfPlayCfg)
 FLOATS = (math.nan, math.inf, -math.inf, -1.0, -1e9)
 INTEGERS = (-1, -(10**9))
 
@@ -27,6 +29,7 @@ def classes():
     registered = [*ALGORITHMS.values(), *INTRINSICS.values(), *NETWORKS.values(), *SENSES.values()]
     found = {entry.cfg_type for entry in registered if is_dataclass(entry.cfg_type)}
     found |= {task.cfg_type() for task in TASKS.values()}
+    found |= {dataset.cfg_type for dataset in DATASETS.values()}
     found |= {*body_types().values(), *PLAYGROUND_GENERATORS.values(), *OTHERS}
     waiting = list(found)
     while waiting:

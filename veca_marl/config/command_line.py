@@ -53,6 +53,7 @@ class CommandLine(Generic[Options]):
             in one of them. None if it writes nothing then.
         keeps_sweep: Whether the command is called once, with the overrides that list values as they
             are, instead of once for each combination.
+        root: Dataclass of the configuration that other overrides change.
     """
 
     command: str
@@ -62,6 +63,7 @@ class CommandLine(Generic[Options]):
     outputs: tuple[str, ...] = ()
     places: tuple[str, ...] | None = None
     keeps_sweep: Callable[[Sequence[str]], bool] = lambda _: False
+    root: type[Any] = Config
 
     def run(
         self, call: Callable[[Options, list[str]], None], words: Sequence[str] | None = None
@@ -150,7 +152,7 @@ class CommandLine(Generic[Options]):
         return [field.name for field in fields(cast(Any, self.options))]
 
     def _check_roots(self, overrides: list[str]) -> None:
-        choices = sorted({*self._names, *(field.name for field in fields(Config))})
+        choices = sorted({*self._names, *(field.name for field in fields(self.root))})
         for text in overrides:
             root = _root(text)
             if text[0] not in "+~" and "/" not in root and root not in choices:
@@ -171,7 +173,7 @@ class CommandLine(Generic[Options]):
     def help(self) -> str:
         """Return the description and the options with their defaults."""
         defaults = OmegaConf.to_yaml(OmegaConf.structured(self.options))
-        others = ", ".join(field.name for field in fields(Config))
+        others = ", ".join(field.name for field in fields(self.root))
         return (
             f"{self.description.strip()}\n\n"
             f"Options and their defaults (??? has none and must be given):\n\n{defaults}\n"

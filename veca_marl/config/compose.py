@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import fields, is_dataclass
 from pathlib import Path
@@ -105,11 +105,33 @@ def compose_node(overrides: Sequence[str]) -> DictConfig:
     return node
 
 
-def _composed(overrides: Sequence[str]) -> DictConfig:
+def compose_other(root: str, overrides: Sequence[str], loaded: Callable[[], None]) -> Any:
+    """Return the typed configuration of a command whose root is not that of a run.
+
+    Args:
+        root: Its file in `conf/`, without the ending.
+        overrides: As on the command line.
+        loaded: Stores its schemas; called when the plug-ins are loaded.
+
+    Raises:
+        ConfigError: One line that names the wrong part and the choices.
+    """
+    load_config_plugins([])
+    loaded()
+    check_group_values(overrides)
+    node = _composed(normalised(overrides), root)
+    check_lengths(node)
+    try:
+        return OmegaConf.to_object(node)
+    except (OmegaConfBaseException, ValueError) as error:
+        raise ConfigError(one_line(error)) from error
+
+
+def _composed(overrides: Sequence[str], root: str = "config") -> DictConfig:
     """Return what Hydra composes; its errors are one line."""
     try:
         with _own_hydra():
-            node: DictConfig = hydra.compose("config", overrides=list(overrides))
+            node: DictConfig = hydra.compose(root, overrides=list(overrides))
     except (HydraException, OmegaConfBaseException) as error:
         raise ConfigError(one_line(error)) from error
     return node

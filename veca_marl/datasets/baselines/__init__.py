@@ -1,0 +1,1 @@
+"""Baselines: what the encoders of the agents learn of each data set."""
