@@ -180,7 +180,7 @@ STEPS: tuple[Step, ...] = (
     ),
     Step(
         changes=(
-            Added("", {"global_state": False}),
+            Added("", {"global_state": False, "demonstrations": None}),
             Added("algo", _PPO, name="ppo"),
             Added("learner.*", _PPO, name="ppo"),
             Added("algo.network", {"agent_identity": False}, name="multisense"),
