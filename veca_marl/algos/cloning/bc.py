@@ -206,7 +206,7 @@ class BC(Imitator):
     @property
     def measures(self) -> list[str]:
         """See `Algorithm`."""
-        return [*_MEASURES, "held_out_loss", "epochs"]
+        return [*MEASURES, "held_out_loss", "epochs"]
 
     def learn(self, batch: TensorDictBase) -> dict[str, float]:
         """See `Algorithm`: make an update for each `batch_size` frames; the batch is empty."""
@@ -216,7 +216,7 @@ class BC(Imitator):
         count = self.take_due(batch.numel(), 1.0 / size)
         measured = [self.update(self.imitate(self._samples.draw(size))) for _ in range(count)]
         epochs = self._updates * size / self._samples.steps
-        return mean(measured, _MEASURES) | {"held_out_loss": self._validate(), "epochs": epochs}
+        return mean(measured, MEASURES) | {"held_out_loss": self._validate(), "epochs": epochs}
 
     @torch.no_grad()
     def _validate(self) -> float:
@@ -225,7 +225,8 @@ class BC(Imitator):
         return float(self.imitate(self._held_out.draw(self.cfg.batch_size)).loss)
 
 
-_MEASURES = ("imitation_loss", "action_error", "choice_agreement", "gradient_norm")
+MEASURES = ("imitation_loss", "action_error", "choice_agreement", "gradient_norm")
+"""Names of what an update measures."""
 
 
 def mean(measured: Sequence[dict[str, float]], names: Sequence[str]) -> dict[str, float]:
