@@ -105,7 +105,7 @@ def test_other_demonstrations_in_the_folder_are_refused(tmp_path):
     recorded(tmp_path, episodes=1)
     with pytest.raises(DemonstrationsError, match=naming("seed", 0, 1)):
         recorded(tmp_path, episodes=1, seed=1)
-    other = Recording(compose([*SHORT, "task.speed_mps=0.9"]).game, 1, 0)
+    other = Recording(compose([*SHORT, "task.mass_kg=0.777"]).game, 1, 0)
     with pytest.raises(DemonstrationsError, match="game"):
         Archive(tmp_path, make_card(other, {}))
 

@@ -118,9 +118,7 @@ def collected(learner, steps=16, seed=0, worlds=4):
             state["agents", "expert_action"] = right_action(base)
             step = toy.step(learner.explorer(state))
             kept = [("agents", name) for name in KEPT if name in step["agents"].keys()]  # noqa: SIM118
-            rows.append(
-                step.select(*kept, *["is_init"] * ("is_init" in step.keys()), "next").clone()
-            )
+            rows.append(step.select(*kept, "is_init", "next", strict=False).clone())
             state = toy.reset(step_mdp(step)) if step["next", "done"].all() else step_mdp(step)
     return torch.stack(rows, 1)
 
