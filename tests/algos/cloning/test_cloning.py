@@ -222,7 +222,6 @@ WRONG = [
     {"learning_rate": 0.0},
     {"batch_size": 0},
     {"burn_in": -1},
-    {"held_out": 1.0},
     {"least_scale": math.inf},
     {"network": network(memory=Memory.gru), "batch_size": 30},
 ]
@@ -233,3 +232,9 @@ WRONG = [
 def test_impossible_numbers_are_refused(cfg, numbers):
     with pytest.raises(ValueError, match=r"algo\."):
         cfg(**{"network": SMALL, "sequence_steps": 8, **numbers})
+
+
+def test_an_impossible_fraction_is_refused():
+    for cfg, name in ((BCCfg, "held_out"), (DaggerCfg, "demonstrated"), (SACCfg, "demonstrated")):
+        with pytest.raises(ValueError, match=name):
+            cfg(network=SMALL, **{name: 1.0})

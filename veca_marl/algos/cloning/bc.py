@@ -28,33 +28,28 @@ from veca_marl.algos.specs import TeamSpec
 
 
 @dataclass
-class BCCfg(AlgorithmCfg):
-    """Numbers of behaviour cloning; all of them are ours.
+class ImitatorCfg(AlgorithmCfg):
+    """Numbers of algorithms that imitate; all of them are ours.
 
     Attributes:
         network: The network and its sizes, of which the actor learns. PPO with the same network
             starts from it by ``init_from``.
         learning_rate: Step size of Adam.
-        batch_size: Demonstrated steps in an update. A run of ``total_frames`` makes
-            ``total_frames / batch_size`` updates.
+        batch_size: Labelled steps in an update.
         sequence_steps: Consecutive steps through which gradients of a network with hidden state
             flow; an update has ``batch_size / sequence_steps`` such sequences.
         burn_in: Steps before each sequence by which the hidden state is computed, from zero.
         least_scale: Lower bound of the standard deviation of continuous actions before tanh in the
             loss: what remains for PPO to explore with.
-        held_out: Fraction of the episodes that is not learnt from, and gives ``held_out_loss``; 0
-            for none.
         max_gradient_norm: Gradients are scaled down to this norm.
     """
 
-    name: str = "bc"
     network: NetworkCfg = field(default_factory=MultisenseCfg)
     learning_rate: float = 5e-4
     batch_size: int = 128
     sequence_steps: int = 32
     burn_in: int = 16
     least_scale: float = 0.2
-    held_out: float = 0.05
     max_gradient_norm: float = 5.0
 
     def __post_init__(self) -> None:
@@ -67,13 +62,31 @@ class BCCfg(AlgorithmCfg):
                 raise ValueError(f"algo.{name} must be at least 1, got {getattr(self, name)}")
         if self.burn_in < 0:
             raise ValueError(f"algo.burn_in must be 0 or more, got {self.burn_in}")
-        if not 0.0 <= self.held_out < 1.0:
-            raise ValueError(f"algo.held_out must be in [0, 1), got {self.held_out}")
         if self.network.recurrent and self.batch_size % self.sequence_steps:
             raise ValueError(
                 f"algo.sequence_steps={self.sequence_steps} must divide algo.batch_size, "
                 f"got {self.batch_size}"
             )
+
+
+@dataclass
+class BCCfg(ImitatorCfg):
+    """Numbers of behaviour cloning; all of them are ours.
+
+    A run of ``total_frames`` makes ``total_frames / batch_size`` updates.
+
+    Attributes:
+        held_out: Fraction of the episodes that is not learnt from, and gives ``held_out_loss``; 0
+            for none.
+    """
+
+    name: str = "bc"
+    held_out: float = 0.05
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not 0.0 <= self.held_out < 1.0:
+            raise ValueError(f"algo.held_out must be in [0, 1), got {self.held_out}")
 
     def check_budget(self, frames: int) -> None:
         """See `AlgorithmCfg`: an update takes `batch_size` frames."""
@@ -93,7 +106,7 @@ class Imitator(Algorithm):
 
     exact_resume = True
 
-    def __init__(self, team: str, spec: TeamSpec, cfg: BCCfg, device: torch.device) -> None:
+    def __init__(self, team: str, spec: TeamSpec, cfg: ImitatorCfg, device: torch.device) -> None:
         self.team, self.cfg, self._spec, self._device = team, cfg, spec, device
         self._actor = make_network(team, spec, cfg.network).actor.to(device)
         self._independent = independent_parameters([self._actor])
@@ -176,7 +189,13 @@ class BC(Imitator):
     """Behaviour cloning of one team.
 
     Its frames are demonstrated steps that were drawn; no world is stepped but for evaluations.
-    Episodes are drawn step by step, and each step as often as any other.
+    Each step is drawn as often as any other.
+
+    Args:
+        team: Name of the team.
+        spec: Its arrays.
+        cfg: The numbers.
+        device: Where it learns.
     """
 
     needs_experience = False
@@ -184,6 +203,10 @@ class BC(Imitator):
 
     _samples: Samples | None = None
     _held_out: Samples | None = None
+
+    def __init__(self, team: str, spec: TeamSpec, cfg: BCCfg, device: torch.device) -> None:
+        super().__init__(team, spec, cfg, device)
+        self.cfg: BCCfg = cfg
 
     def take_demonstrations(self, demonstrations: Demonstrations) -> None:
         """See `Algorithm`."""

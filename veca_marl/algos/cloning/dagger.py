@@ -14,7 +14,7 @@ from torchrl.envs import ExplorationType
 from torchrl.envs.utils import exploration_type
 
 from veca_marl.algos.acting import Arrays
-from veca_marl.algos.cloning.bc import MEASURES, BCCfg, Imitator, mean
+from veca_marl.algos.cloning.bc import MEASURES, Imitator, ImitatorCfg, mean
 from veca_marl.algos.demonstrations import Demonstrations
 from veca_marl.algos.imitation.loss import Imitated, ImitationLoss
 from veca_marl.algos.imitation.samples import COUNTED, Samples, SequenceCfg
@@ -29,8 +29,8 @@ LABEL = "expert_action"
 
 
 @dataclass
-class DaggerCfg(BCCfg):
-    """Numbers of DAgger; all of them are ours, but for what it does.
+class DaggerCfg(ImitatorCfg):
+    """Numbers of DAgger; all of them are ours.
 
     Attributes:
         updates_per_frame: Updates for each frame that is collected.
