@@ -19,6 +19,7 @@ from __future__ import annotations
 import hashlib
 import json
 import math
+import mmap
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -376,9 +377,8 @@ class Demonstrations:
             if array.row_bytes == 0:
                 mapped[array.key] = torch.zeros(shape, dtype=getattr(torch, array.dtype))
                 continue
-            # copy on write: the files stay as they are
-            found = np.memmap(array.file(self.folder), array.dtype, "c", shape=shape)
-            mapped[array.key] = torch.from_numpy(found)
+            found = np.frombuffer(_private(array.file(self.folder)), array.dtype)
+            mapped[array.key] = torch.from_numpy(found.reshape(shape))
         return mapped
 
     def verify(self) -> None:
@@ -456,6 +456,16 @@ class Demonstrations:
         present = {array.key for array in self.card.arrays}
         if missing := [key for key in needed if key not in present]:
             raise DemonstrationsError(f"{self.folder / CARD} has no array {missing[0]}")
+
+
+def _private(path: Path) -> mmap.mmap:
+    """Return the content of a file; what is written to it stays in this process.
+
+    No memory is reserved for such changes: the file may be larger than what there is.
+    """
+    flags = mmap.MAP_PRIVATE | getattr(mmap, "MAP_NORESERVE", 0)
+    with path.open("rb") as file:
+        return mmap.mmap(file.fileno(), 0, flags=flags, prot=mmap.PROT_READ | mmap.PROT_WRITE)
 
 
 def _is_name(value: Any) -> bool:

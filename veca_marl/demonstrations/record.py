@@ -26,6 +26,7 @@ from veca_marl.algos.demonstrations import (
     Episode,
     plain_json,
 )
+from veca_marl.algos.files import write_errors
 from veca_marl.algos.specs import team_specs
 from veca_marl.config import ConfigError, one_line
 from veca_marl.demonstrations.episode_files import Archive, EpisodeWriter
@@ -139,7 +140,8 @@ class Recorder:
     def __call__(self, request: Request) -> Episode:
         """Play and write an episode; its rows are counted from 0."""
         seed = self._recording.seed
-        with closing(VecaEnv(self._recording.game, 1, seed, first_world=request.number)) as env:
+        env = VecaEnv(self._recording.game, 1, seed, first_world=request.number)
+        with closing(env), write_errors(request.folder):
             return self._play(env, EpisodeWriter(request.folder, row_arrays(env)))
 
     def _play(self, env: VecaEnv, writer: EpisodeWriter) -> Episode:

@@ -28,7 +28,6 @@ from veca_marl.algos.transfer import init_teams, load_actor
 from veca_marl.config import Config, ConfigError, one_line
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
 from veca_marl.envs.adapters.torchrl.labelled import LabelledEnv
-from veca_marl.envs.core.expert import find_expert
 from veca_marl.envs.core.game_cfg import GameCfg
 from veca_marl.plugins import load_plugins
 from veca_marl.runs.continuation import RESUMABLE, is_default
@@ -174,7 +173,7 @@ def _give_demonstrations(
                 f"algo={name} collects no experience that intrinsic rewards could be added to"
             )
         if algorithm.needs_labels:
-            _require_expert(cfg, name)
+            _require_expert(cfg, name, team)
     if cfg.demonstrations is None:
         return
     found = open_demonstrations(cfg.demonstrations, cfg.game, specs, list(learners.algorithms))
@@ -185,9 +184,10 @@ def _give_demonstrations(
         raise ConfigError(f"demonstrations={cfg.demonstrations}: {one_line(error)}") from error
 
 
-def _require_expert(cfg: Config, algo: str) -> None:
+def _require_expert(cfg: Config, algo: str, team: str) -> None:
+    """Raise `ConfigError` if the expert of the task cannot label what a team observes."""
     try:
-        find_expert(cfg.task.name)
+        LabelledEnv(cfg.game, 1, 0, teams=[team]).close()
     except ValueError as error:
         raise ConfigError(f"algo={algo}: {one_line(error)}") from error
 
