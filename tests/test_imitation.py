@@ -36,7 +36,7 @@ OTHERS = [
     (("algo=bc", "demonstrations={}", "clock=agent4ms"), ("25", "steps per second")),
     (("algo=bc", "demonstrations={}", "intrinsic=rnd"), ("bc", "intrinsic")),
     (("algo=ppo", "demonstrations={}", "body=walker_voice"), ("body",)),
-    (("algo=bc", "demonstrations={}", "algo.batch_size=4096"), ("4096",)),
+    (("algo=bc", "demonstrations={}", "algo.batch_size=4096", "total_frames=99"), ("4096",)),
 ]
 
 

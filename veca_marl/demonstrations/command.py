@@ -50,7 +50,8 @@ class RecordOptions:
     """Options of the command.
 
     Attributes:
-        to: Folder of the demonstrations; None is ``demonstrations/TASK``.
+        to: Folder of the demonstrations; None is
+            ``runs/demonstrations/TASK``.
         episodes: Number of episodes.
         seed: Seed of the episodes.
         processes: Processes that play; 0 plays in this one; None is one for each core.
@@ -78,7 +79,7 @@ def run(options: RecordOptions, overrides: list[str]) -> None:
             f"opponent.{next(iter(cfg.frozen))}: opponents of demonstrations are expert, random "
             "or idle"
         )
-    folder = check_folder(options.to or f"demonstrations/{cfg.task.name}", "to")
+    folder = check_folder(options.to or f"runs/demonstrations/{cfg.task.name}", "to")
     recording = Recording(cfg.game, options.episodes, options.seed, tuple(cfg.plugins))
     processes = usable_cores() if options.processes is None else options.processes
     card = make_card(recording, provenance(overrides))
