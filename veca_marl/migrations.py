@@ -154,7 +154,17 @@ class Step:
 _IMAGE_WINDOWS = {"kernels": [8, 4, 3], "strides": [4, 2, 1]}
 _CALLS = {"call_pause_s": 0.0}
 _WALKS = {"restitution": 0.0, "stride_height_m": 0.0}
-_PPO = {"critic_learning_rate": 1e-3, "credit": "nothing"}
+_IMITATION = {
+    "imitation": {
+        "coefficient": 0.3,
+        "frames": 60_000,
+        "batch_size": 64,
+        "burn_in": 16,
+        "least_scale": 0.2,
+    }
+}
+_PPO = {"critic_learning_rate": 1e-3, "credit": "nothing", **_IMITATION}
+_SAC = {"demonstrated": 0.5, **_IMITATION}
 _SPECTRA = {"encoding": "magnitude", "bins": 250}
 
 STEPS: tuple[Step, ...] = (
@@ -180,9 +190,11 @@ STEPS: tuple[Step, ...] = (
     ),
     Step(
         changes=(
-            Added("", {"global_state": False}),
+            Added("", {"global_state": False, "demonstrations": None}),
             Added("algo", _PPO, name="ppo"),
             Added("learner.*", _PPO, name="ppo"),
+            Added("algo", _SAC, name="sac"),
+            Added("learner.*", _SAC, name="sac"),
             Added("algo.network", {"agent_identity": False}, name="multisense"),
             Added("learner.*.network", {"agent_identity": False}, name="multisense"),
         ),

@@ -84,11 +84,20 @@ def sections(cfg_type: type, path: str) -> Iterator[tuple[str, type]]:
         if field.name == "task" or field.name not in nested(cfg_type, path):
             continue
         base = _of_optional(hints[field.name])
-        kinds = [kind for kind in base.__subclasses__() if is_built_in(kind)]
+        kinds = [kind for kind in _subclasses(base) if is_built_in(kind)]
         if not kinds or field.default_factory is base:
             kinds.insert(0, base)
         for kind in kinds:
             yield from sections(kind, f"{path}.{field.name}".strip("."))
+
+
+def _subclasses(base: type) -> list[type]:
+    """Return all subclasses, without those with subclasses that no name chooses."""
+    found = []
+    for child in base.__subclasses__():
+        own = _subclasses(child)
+        found += own if own and getattr(child, "name", None) == "" else [child, *own]
+    return found
 
 
 def nested(cfg_type: type, path: str) -> list[str]:

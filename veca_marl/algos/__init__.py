@@ -3,6 +3,6 @@
 Importing it registers the algorithms that ship with the package.
 """
 
-from veca_marl.algos import ppo, sac
+from veca_marl.algos import cloning, ppo, sac
 
-__all__ = ["ppo", "sac"]
+__all__ = ["cloning", "ppo", "sac"]

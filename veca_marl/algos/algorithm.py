@@ -17,13 +17,14 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Generic, Protocol, TypeVar
+from typing import Any, ClassVar, Generic, Protocol, TypeVar
 
 import torch
 from tensordict import TensorDictBase
 from tensordict.nn import TensorDictModuleBase
 from torch import nn
 
+from veca_marl.algos.demonstrations import Demonstrations
 from veca_marl.algos.sense_encoders import copy_encoders, copy_parameters
 from veca_marl.algos.specs import TeamSpec
 from veca_marl.algos.storage import StorageNeeded
@@ -125,9 +126,17 @@ class Algorithm(ABC):
             for bit, as a run that was not interrupted. True only if `state_dict` contains
             everything that `learn` depends on (a replay buffer, for example); random numbers are
             seeded from (seed, stage) by the training loop.
+        needs_experience: Whether it learns from batches that its policy collects. If no algorithm
+            of a run does, no world is stepped for them, and batches are empty.
+        needs_demonstrations: Whether it learns only after `take_demonstrations`.
+        needs_labels: Whether batches have to hold what the expert would do: the key
+            ``(team, "expert_action")``, of the form of the action.
     """
 
     exact_resume: bool
+    needs_experience: ClassVar[bool] = True
+    needs_demonstrations: ClassVar[bool] = False
+    needs_labels: ClassVar[bool] = False
 
     @property
     @abstractmethod
@@ -176,6 +185,14 @@ class Algorithm(ABC):
             batch: Experience ``(worlds, steps)`` of all teams, on the CPU. Rows are consecutive
                 steps of one world; flags are under ``("next", "done")`` and the team's own.
         """
+
+    def take_demonstrations(self, demonstrations: Demonstrations) -> None:
+        """Learn from demonstrations too, from now on; called before learning begins or continues.
+
+        Raises:
+            ValueError: If the algorithm cannot learn from any: the default.
+        """
+        raise ValueError(f"{type(self).__name__} learns from experience only")
 
     def idle(self) -> dict[str, float]:
         """Return the `measures` of a batch that the team does not learn from: not a number."""

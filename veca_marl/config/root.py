@@ -79,6 +79,8 @@ class Config:
             where the sense has the same shape: ``init_encoders.attacker.vision=runs/...``.
         algo: The learning algorithm and its parameters.
         learner: The algorithm of single teams: ``+algo@learner.attacker=mappo``.
+        demonstrations: Folder of recorded demonstrations that all teams learn from, as ``python -m
+            veca_marl.demonstrations`` writes it; None for none.
         intrinsic: Intrinsic rewards of all teams that learn: ``intrinsic=rnd``.
         team_intrinsic: Intrinsic rewards of single teams: ``+intrinsic@team_intrinsic.red=none``.
         self_play: Teams that learn against past policies of each other.
@@ -108,6 +110,7 @@ class Config:
     init_encoders: dict[str, dict[str, str]] = field(default_factory=dict)
     algo: AlgorithmCfg = MISSING
     learner: dict[str, AlgorithmCfg] = field(default_factory=dict)
+    demonstrations: str | None = None
     intrinsic: IntrinsicCfg = MISSING
     team_intrinsic: dict[str, IntrinsicCfg] = field(default_factory=dict)
     self_play: SelfPlayCfg = field(default_factory=SelfPlayCfg)

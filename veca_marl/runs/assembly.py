@@ -6,7 +6,7 @@ import ctypes
 import logging
 import platform
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, cast
 
 import torch
@@ -27,9 +27,11 @@ from veca_marl.algos.training.schedule import Budget
 from veca_marl.algos.transfer import init_teams, load_actor
 from veca_marl.config import Config, ConfigError, one_line
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
+from veca_marl.envs.adapters.torchrl.labelled import LabelledEnv
 from veca_marl.envs.core.game_cfg import GameCfg
 from veca_marl.plugins import load_plugins
 from veca_marl.runs.continuation import RESUMABLE, is_default
+from veca_marl.runs.demonstrations import open_demonstrations
 from veca_marl.runs.run_folder import RunFolder
 
 # parameters of mallopt(3)
@@ -66,14 +68,18 @@ class GameFactory:
     Attributes:
         game: The game.
         plugins: Packages that it needs, see `veca_marl.plugins`.
+        labelled: Teams of which the environments say what their experts would do.
     """
 
     game: GameCfg
     plugins: tuple[str, ...] = ()
+    labelled: tuple[str, ...] = ()
 
     def __call__(self, worlds: int, seed: int) -> VecaEnv:
         """Return `worlds` games in one environment."""
         load_plugins(self.plugins)
+        if self.labelled:
+            return LabelledEnv(self.game, worlds, seed, teams=self.labelled)
         return VecaEnv(self.game, worlds, seed)
 
 
@@ -95,6 +101,7 @@ def make_trainer(cfg: Config, folder: RunFolder | None = None) -> Trainer:
     specs = read_specs(cfg.game)
     learners = make_learners(cfg, specs, device)
     _log_storage(learners)
+    _give_demonstrations(cfg, specs, learners)
     checkpoints = _make_checkpoints(cfg, folder, specs)
     collect, changed = that_fits(cfg.collect, specs)
     if changed:
@@ -128,8 +135,11 @@ def _assemble(
     """Return the trainer; of a new run, with the parameters that it takes from other runs."""
     if cfg.resume is None or checkpoints.empty:
         init_teams(learners, cfg.init_from, cfg.init_encoders)
+    make_env = GameFactory(cfg.game, tuple(cfg.plugins))
+    labelled = tuple(t for t, each in learners.algorithms.items() if each.needs_labels)
     return Trainer(
-        make_env=GameFactory(cfg.game, tuple(cfg.plugins)),
+        make_env=make_env,
+        make_training_env=replace(make_env, labelled=labelled) if labelled else None,
         learners=learners,
         collect=collect,
         evaluation=cfg.eval,
@@ -140,6 +150,46 @@ def _assemble(
         progress_bar=cfg.log.progress_bar,
         episode_steps=cfg.game.max_steps,
     )
+
+
+def _give_demonstrations(
+    cfg: Config, specs: Mapping[str, TeamSpec], learners: TeamLearners
+) -> None:
+    """Let the algorithms of all teams learn from the demonstrations, if there are any.
+
+    Raises:
+        ConfigError: If there are none where they are needed, an algorithm cannot learn from them,
+            they cannot be read, or they do not fit.
+    """
+    for team, algorithm in learners.algorithms.items():
+        name = learners.cfgs[team].name
+        if algorithm.needs_demonstrations and cfg.demonstrations is None:
+            raise ConfigError(
+                f"algo={name} learns from demonstrations: record some with python -m "
+                "veca_marl.demonstrations, and add demonstrations=FOLDER"
+            )
+        if not algorithm.needs_experience and team in learners.bonuses:
+            raise ConfigError(
+                f"algo={name} collects no experience that intrinsic rewards could be added to"
+            )
+        if algorithm.needs_labels:
+            _require_expert(cfg, name, team)
+    if cfg.demonstrations is None:
+        return
+    found = open_demonstrations(cfg.demonstrations, cfg.game, specs, list(learners.algorithms))
+    try:
+        for algorithm in learners.algorithms.values():
+            algorithm.take_demonstrations(found)
+    except ValueError as error:
+        raise ConfigError(f"demonstrations={cfg.demonstrations}: {one_line(error)}") from error
+
+
+def _require_expert(cfg: Config, algo: str, team: str) -> None:
+    """Raise `ConfigError` if the expert of the task cannot label what a team observes."""
+    try:
+        LabelledEnv(cfg.game, 1, 0, teams=[team]).close()
+    except ValueError as error:
+        raise ConfigError(f"algo={algo}: {one_line(error)}") from error
 
 
 def _self_play(cfg: Config, folder: RunFolder | None, learners: TeamLearners) -> SelfPlay:
@@ -176,6 +226,8 @@ def _check_budget(trainer: Trainer) -> None:
 def _warn_of_cut_episodes(trainer: Trainer) -> None:
     """Log that learning does not see the end of episodes that are longer than a stage."""
     stage = trainer.schedule.batches_per_stage * trainer.collect.steps
+    if not trainer.learners.need_experience:
+        return
     if trainer.episode_steps is not None and stage < trainer.episode_steps:
         _LOG.warning(
             "episodes last up to %d steps, but worlds start new ones every %d steps "

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from functools import partial
 
 import torch
-from tensordict import TensorDictBase
+from tensordict import TensorDict, TensorDictBase
 from tensordict.nn import TensorDictModuleBase
 from torch import multiprocessing
 from torchrl.collectors import Collector
@@ -70,8 +70,38 @@ class CollectCfg:
         return self.all_worlds * self.steps
 
 
+class NoExperience:
+    """Stands for `Experience` where nothing is learnt from what a policy does: empty batches.
+
+    Args:
+        cfg: Worlds and steps that batches would have: they count the frames.
+    """
+
+    plays = False
+
+    def __init__(self, cfg: CollectCfg) -> None:
+        self.cfg = cfg
+
+    def restart(self, seed: int) -> None:
+        """Let random numbers depend on `seed`."""
+        torch.manual_seed(seed)
+
+    def collect(self) -> TensorDictBase:
+        """Return a batch without arrays."""
+        return TensorDict({}, [self.cfg.all_worlds, self.cfg.steps])
+
+    def update_policy(self) -> None:
+        """Do nothing."""
+
+    def close(self) -> None:
+        """Do nothing."""
+
+
 class Experience:
     """Batches of ``(worlds, steps)`` collected with `policy`, restartable from a seed.
+
+    Attributes:
+        plays: Whether worlds are stepped.
 
     Args:
         make_env: Makes the worlds.
@@ -82,6 +112,8 @@ class Experience:
         WorkerError: If a worker process ends; also from every other method, and, where this object
             is made in the main thread, at once from whatever the main thread does.
     """
+
+    plays = True
 
     def __init__(self, make_env: EnvFactory, policy: TensorDictModuleBase, cfg: CollectCfg) -> None:
         self.cfg = cfg

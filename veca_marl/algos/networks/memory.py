@@ -63,6 +63,23 @@ def memory_size(policy: object) -> int:
     return sum(spec.shape.numel() for spec in states)
 
 
+def initial_states(policy: object, lead: tuple[int, ...]) -> dict[tuple[str, ...], Tensor]:
+    """Return the hidden states with which `policy` begins, by their keys; empty if it has none.
+
+    Args:
+        policy: A module.
+        lead: Shape before that of the state of one world, such as ``(rows, time)``.
+    """
+    primers = _primers_of(policy)
+    if primers is None:
+        return {}
+    return {
+        key: torch.zeros(*lead, *spec.shape)
+        for primer in _flat(primers)
+        for key, spec in primer.primers.items(True, True)
+    }
+
+
 def with_memory(env: EnvBase, policy: object) -> EnvBase:
     """Return `env` with the transform that carries the state of `policy`, if it has one."""
     return with_transform(env, memory_of(policy))

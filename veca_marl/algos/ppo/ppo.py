@@ -15,6 +15,8 @@ from torch import nn
 from torchrl.objectives import KLAdaptiveLR
 
 from veca_marl.algos.algorithm import Algorithm, AlgorithmCfg
+from veca_marl.algos.demonstrations import Demonstrations
+from veca_marl.algos.imitation.term import ImitationCfg, ImitationTerm
 from veca_marl.algos.networks.factory import (
     NetworkCfg,
     TeamNetwork,
@@ -72,6 +74,7 @@ class PPOCfg(AlgorithmCfg):
         max_learning_rate: Upper bound of the rate.
         critic_learning_rate: Constant rate of the parameters of the critic alone (ours): the
             divergence of the policy says nothing about them.
+        imitation: The term of imitation of a run with ``demonstrations=FOLDER``.
     """
 
     name: str = "ppo"
@@ -92,6 +95,7 @@ class PPOCfg(AlgorithmCfg):
     min_learning_rate: float = 1e-6
     max_learning_rate: float = 1e-3
     critic_learning_rate: float = 1e-3
+    imitation: ImitationCfg = field(default_factory=ImitationCfg)
 
     def __post_init__(self) -> None:
         for name in ("gamma", "gae_lambda"):
@@ -216,6 +220,9 @@ class PPO(Algorithm):
             max_lr=cfg.max_learning_rate,
         )
         self._recurrent = memory_of(self.network.actor) is not None
+        self._imitation = ImitationTerm(
+            team, spec, self.network.actor, cfg.imitation, cfg.sequence_steps
+        )
         self._batch_keys = _batch_keys(self.network, team, spec.masked)
 
     @property
@@ -231,11 +238,17 @@ class PPO(Algorithm):
     @property
     def measures(self) -> list[str]:
         """See `Algorithm`."""
-        return [*_MEASURES, "gradient_norm", "learning_rate"]
+        return [*_MEASURES, "gradient_norm", "learning_rate", *self._imitation.measures]
+
+    def take_demonstrations(self, demonstrations: Demonstrations) -> None:
+        """See `Algorithm`: a term of imitation is added to the loss of the policy."""
+        self._imitation.take(demonstrations)
 
     def learn(self, batch: TensorDictBase) -> dict[str, float]:
         """See `Algorithm`: all epochs over one batch; each measure is a mean over them."""
-        return self.learn_rows(self.prepare(batch))
+        learnt = self.learn_rows(self.prepare(batch))
+        self._imitation.frames += batch.numel()
+        return learnt
 
     def prepare(self, batch: TensorDictBase) -> TensorDictBase:
         """Return the rows that a batch consists of, on the device.
@@ -272,7 +285,8 @@ class PPO(Algorithm):
             if epoch and len(measured) > 1:
                 self.schedule.step(_mean(epoch)["kl"])
         means = _mean(measured) if measured else self.idle()
-        return means | {"learning_rate": self.schedule.get_last_lr()[0]}
+        rate = {"learning_rate": self.schedule.get_last_lr()[0]}
+        return means | rate | self._imitation.measures
 
     def _counts(self, minibatch: TensorDictBase) -> bool:
         """Return whether an agent is present in any row: there is nothing to learn otherwise."""
@@ -288,6 +302,8 @@ class PPO(Algorithm):
             minibatch[VALID] = minibatch[self.team, "mask"].unsqueeze(-1)
         out = self.loss(minibatch)
         loss = out["loss_objective"] + out["loss_critic"] + out["loss_entropy"]
+        if self._imitation.active:
+            loss = loss + self._imitation.loss(self._device)
         self.optimizer.zero_grad()
         self.critic_optimizer.zero_grad()
         loss.backward()
@@ -318,6 +334,7 @@ class PPO(Algorithm):
             "optimizer": self.optimizer,
             "critic_optimizer": self.critic_optimizer,
             "schedule": self.schedule,
+            **({"imitation": self._imitation} if self._imitation.active else {}),
         }
 
     def init_from(self, other: Algorithm) -> None:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 
 from veca_marl.algos.algorithm import AlgorithmCfg
+from veca_marl.algos.imitation.term import ImitationCfg
 from veca_marl.algos.networks.action_values import ActionValuesCfg, Normalisation
 from veca_marl.algos.networks.factory import NetworkCfg
 from veca_marl.algos.networks.multisense import MultisenseCfg
@@ -174,6 +175,10 @@ class SACCfg(AlgorithmCfg):
             twice the 0.005 of Haarnoja et al. 2018, because there are fewer updates).
         updates_per_frame: Updates for each frame that is collected.
         random_shift: Largest random shift of images in pixels, the same for both eyes; 0 for none.
+        imitation: The term of imitation of a run with ``demonstrations=FOLDER``, in the unit of the
+            values.
+        demonstrated: Fraction of the replay buffer that demonstrations may fill before the first
+            frame; they take the place of the warm-up.
     """
 
     name: str = "sac"
@@ -194,6 +199,8 @@ class SACCfg(AlgorithmCfg):
     tau: float = 0.01
     updates_per_frame: float = 0.125
     random_shift: int = 0
+    imitation: ImitationCfg = field(default_factory=ImitationCfg)
+    demonstrated: float = 0.5
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.gamma <= 1.0:
@@ -209,6 +216,8 @@ class SACCfg(AlgorithmCfg):
                 "algo.critic.normalisation=batch_renorm needs algo.targets=same: a moving average "
                 "of the critics has no statistics of its own inputs"
             )
+        if not 0.0 <= self.demonstrated < 1.0:
+            raise ValueError(f"algo.demonstrated must be in [0, 1), got {self.demonstrated}")
         if self.random_shift < 0:
             raise ValueError(f"algo.random_shift must be 0 or more, got {self.random_shift}")
         for name in ("steps", "batch_size", "sequence_steps"):

@@ -331,6 +331,16 @@ class Replay:
         self.frames += batch.numel()
         self._gathered += batch.numel()
 
+    def seed(self, rows: TensorDictBase) -> None:
+        """Add segments that were not collected; they count for the warm-up.
+
+        Args:
+            rows: See `segment_rows`, without `PLACE`.
+        """
+        rows[PLACE] = _places(rows[END])
+        self._write(rows)
+        self._gathered += int((~rows[END]).sum())
+
     def _write(self, rows: TensorDictBase) -> None:
         if self._buffer is None:
             self._buffer = TensorDictReplayBuffer(storage=self._make_storage())

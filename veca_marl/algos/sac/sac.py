@@ -7,11 +7,14 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import torch
-from tensordict import TensorDictBase
+from tensordict import TensorDict, TensorDictBase
 from tensordict.nn import TensorDictModuleBase, TensorDictSequential
 from torch import nn
+from torch.distributions import Distribution
 
 from veca_marl.algos.algorithm import Algorithm
+from veca_marl.algos.demonstrations import Demonstrations
+from veca_marl.algos.imitation.term import ImitationTerm
 from veca_marl.algos.networks.action_values import make_actor_critics
 from veca_marl.algos.networks.factory import (
     NetworkCfg,
@@ -21,13 +24,20 @@ from veca_marl.algos.networks.factory import (
     trainable,
 )
 from veca_marl.algos.networks.layers import clip_norms, independent_parameters
-from veca_marl.algos.networks.memory import memory_size
+from veca_marl.algos.networks.memory import initial_states, memory_size
 from veca_marl.algos.policy import UniformWarmUp
-from veca_marl.algos.sac.config import SACCfg, Targets
+from veca_marl.algos.sac.config import EncoderGradient, SACCfg, Targets
 from veca_marl.algos.sac.joint_action import JointAction
 from veca_marl.algos.sac.loss import TeamCrossQLoss, TeamSACLoss, Temperatures
 from veca_marl.algos.sac.readers import RandomShift, make_reader, memory_keys
-from veca_marl.algos.sac.replay import Replay, Span, StoredKeys, storage_needed, transitions
+from veca_marl.algos.sac.replay import (
+    END,
+    Replay,
+    Span,
+    StoredKeys,
+    storage_needed,
+    transitions,
+)
 from veca_marl.algos.sense_encoders import copy_parameters
 from veca_marl.algos.specs import PLAIN, TeamSpec
 from veca_marl.algos.storage import StorageNeeded
@@ -79,6 +89,11 @@ class SAC(Algorithm):
         self._warm_up = UniformWarmUp(team, spec).to(device)
         self._explorer = TensorDictSequential(self.network.actor, self._warm_up)
         self._updates, self._due = 0, 0.0
+        self._imitation = ImitationTerm(
+            team, spec, self.network.actor, cfg.imitation, cfg.sequence_steps, self._policy_of
+        )
+        self._keys = StoredKeys.of(team, spec, memory)
+        self._demonstrations: Demonstrations | None = None
 
     @property
     def network_cfg(self) -> NetworkCfg:
@@ -103,12 +118,52 @@ class SAC(Algorithm):
     @property
     def measures(self) -> list[str]:
         """See `Algorithm`."""
-        return [*_MEASURES, *(_name(part) for part in self.temperatures.targets), *_COUNTS]
+        alphas = (_name(part) for part in self.temperatures.targets)
+        return [*_MEASURES, *alphas, *_COUNTS, *self._imitation.measures]
 
     @property
     def storage_needed(self) -> StorageNeeded:
         """See `Algorithm`: the replay buffer."""
         return storage_needed(self._spec, self.cfg.replay, memory_size(self.network.encoder))
+
+    def take_demonstrations(self, demonstrations: Demonstrations) -> None:
+        """See `Algorithm`: they fill a part of the replay buffer, and are imitated.
+
+        No uniformly random actions follow.
+        """
+        self._demonstrations = demonstrations
+        self._imitation.take(demonstrations)
+        self._warm_up.active.fill_(False)
+        self._seed_replay()
+
+    def _seed_replay(self) -> None:
+        """Fill a part of an empty replay buffer with whole demonstrated episodes."""
+        if self._demonstrations is None or len(self.replay):
+            return
+        room, rows = int(self.cfg.demonstrated * self.cfg.replay.capacity), 0
+        for episode in self._demonstrations.episodes:
+            if rows + episode.steps + 1 > room:
+                break
+            rows += episode.steps + 1
+        if rows == 0:
+            return
+        keys = (*self._keys.observation, *self._keys.mask, *self._keys.action)
+        outcome = [(self.team, "reward"), (self.team, "terminated"), (END,)]
+        found = self._demonstrations.rows[:rows].select(*keys, *outcome).clone()
+        for key, state in initial_states(self.network.actor, (rows,)).items():
+            found[key] = state
+        self.replay.seed(found)
+
+    def _policy_of(self, rows: TensorDictBase) -> Distribution:
+        """Return the distribution of the policy in demonstrated rows."""
+        encoder = self.network.encoder
+        features = encoder(rows.select(*encoder.in_keys))[self.team, "features"]
+        if self.cfg.encoder_gradient is EncoderGradient.critic:
+            features = features.detach()
+        state = TensorDict({}, rows.batch_size)
+        state[self.team, "features"] = features
+        found: Distribution = self.loss.policy.get_dist(state)
+        return found
 
     def learn(self, batch: TensorDictBase) -> dict[str, float]:
         """See `Algorithm`: store the batch and make the updates that are due."""
@@ -119,7 +174,8 @@ class SAC(Algorithm):
             # never switched on again: a run that continues, or starts from another one, fills an
             # empty buffer with its policy
             self._warm_up.active.fill_(False)
-        return _mean(measured) | self._alphas() | self._counts()
+        self._imitation.frames += batch.numel()
+        return _mean(measured) | self._alphas() | self._counts() | self._imitation.measures
 
     def _take_due(self, frames: int) -> int:
         """Return the number of updates for a batch of so many frames."""
@@ -145,7 +201,10 @@ class SAC(Algorithm):
             return dict.fromkeys(_MEASURES, math.nan)
         losses = self.loss(batch.to(self._device))
         self.optimizer.zero_grad()
-        (losses.critic + losses.policy + losses.temperature).backward()
+        loss = losses.critic + losses.policy + losses.temperature
+        if self._imitation.active:
+            loss = loss + self._imitation.loss(self._device)
+        loss.backward()
         norms = [self._clip(self._critics), self._clip(self._policy)]
         self.optimizer.step()
         self.temperatures.project()
@@ -183,6 +242,7 @@ class SAC(Algorithm):
         for name, part in self._parts().items():
             part.load_state_dict(state[name])
         self._updates, self._due = state["updates"], state["due"]
+        self._seed_replay()
 
     def load_learnt(self, state: dict[str, Any]) -> None:
         """See `Algorithm`: the network alone."""
@@ -190,13 +250,18 @@ class SAC(Algorithm):
 
     def _parts(self) -> dict[str, Any]:
         target = {"target": self.loss.target} if self.loss.averages else {}
-        return target | {
-            "network": self.network,
-            "temperatures": self.temperatures,
-            "warm_up": self._warm_up,
-            "optimizer": self.optimizer,
-            "replay": self.replay,
-        }
+        imitation = {"imitation": self._imitation} if self._imitation.active else {}
+        return (
+            target
+            | imitation
+            | {
+                "network": self.network,
+                "temperatures": self.temperatures,
+                "warm_up": self._warm_up,
+                "optimizer": self.optimizer,
+                "replay": self.replay,
+            }
+        )
 
     def init_from(self, other: Algorithm) -> None:
         """See `Algorithm`: copies actor and critics from SAC, the actor from another algorithm."""

@@ -72,6 +72,11 @@ class TeamLearners:
         return Policy(actors, explorers)
 
     @property
+    def need_experience(self) -> bool:
+        """Whether any algorithm learns from what the policies do."""
+        return any(algorithm.needs_experience for algorithm in self.algorithms.values())
+
+    @property
     def exact_resume(self) -> bool:
         """Whether a resumed run continues bit for bit: only if every algorithm does."""
         return all(algorithm.exact_resume for algorithm in self.algorithms.values())

@@ -23,7 +23,7 @@ from tensordict import TensorDictBase
 from torchrl import timeit
 
 from veca_marl.algos.checkpoints import Checkpoints, load_errors, to_plain
-from veca_marl.algos.collection.experience import CollectCfg, Experience
+from veca_marl.algos.collection.experience import CollectCfg, Experience, NoExperience
 from veca_marl.algos.evaluation.comparison import comparison_line, score_rows
 from veca_marl.algos.evaluation.episodes import TrainingEpisodes, stored_means
 from veca_marl.algos.evaluation.evaluate import EvalCfg, Scores, derived_seed
@@ -126,6 +126,7 @@ class Trainer:
         progress_bar: Whether to show one; where it is no terminal, a line after each stage.
         episode_steps: Steps after which an episode is truncated; None if that is not known.
         matchmaking: Which teams learn against which opponents.
+        make_training_env: Makes those in which experience is collected; None is `make_env`.
         during_last_evaluation: Called once, while other processes play the last evaluation; it
             may act with `policy`.
         progress: Where the run stands.
@@ -143,6 +144,7 @@ class Trainer:
     progress_bar: bool = True
     episode_steps: int | None = None
     matchmaking: Matchmaking = field(default_factory=AllLearn)
+    make_training_env: EnvFactory | None = None
     during_last_evaluation: Callable[[], None] = nothing
     progress: Progress = field(default_factory=Progress)
     _resumed_frames: int = 0
@@ -185,8 +187,7 @@ class Trainer:
         with ExitStack() as pending:
             with timeit("build"):
                 evaluator = pending.enter_context(closing(self._make_evaluator()))
-                experience = Experience(self.make_env, self.policy.collect, self.collect)
-                pending.enter_context(closing(experience))
+                experience = pending.enter_context(closing(self._make_experience()))
             self._evaluations = Evaluations(evaluator, self.evaluation, self.seed)
             baseline = self._evaluations.play_baseline()
             if fresh:
@@ -204,6 +205,12 @@ class Trainer:
         if len(self.learners.algorithms) > 1:
             return []
         return [comparison_line(t, scores[t], baseline[t]) for t in self.learners.algorithms]
+
+    def _make_experience(self) -> Experience | NoExperience:
+        if not self.learners.need_experience:
+            return NoExperience(self.collect)
+        make_env = self.make_training_env or self.make_env
+        return Experience(make_env, self.policy.collect, self.collect)
 
     def _make_evaluator(self) -> Evaluator:
         players = Players(self.policy, tuple(self.learners.algorithms))
@@ -246,7 +253,7 @@ class Trainer:
         """Whether the mean return measures progress: one team learns, its opponents stay."""
         return len(self.learners.algorithms) == 1
 
-    def _train(self, experience: Experience) -> dict[str, Scores] | None:
+    def _train(self, experience: Experience | NoExperience) -> dict[str, Scores] | None:
         """Go through all stages and return the scores of the last, if there was one."""
         scores = None
         shown = self.schedule.frames, self.progress.frames
@@ -281,7 +288,7 @@ class Trainer:
         """Return a table of where the time went."""
         return timing_table(self._clock.elapsed(), self.progress.frames - self._resumed_frames)
 
-    def _run_stage(self, experience: Experience, display: ProgressDisplay) -> None:
+    def _run_stage(self, experience: Experience | NoExperience, display: ProgressDisplay) -> None:
         self.matchmaking.begin_stage(self.progress.stage, self.progress.frames)
         self._update_policy(experience)
         with timeit("collect"):
@@ -294,7 +301,7 @@ class Trainer:
             batch, row = self._iterate(experience)
             finished = {k: v for k, v in row.items() if k.endswith("/return") and v == v}
             display.update(self.collect.frames, finished)
-            if number + 1 == batches:
+            if number + 1 == batches and experience.plays:
                 self._report_values(_actions(batch, self.learners.specs))
 
     def _is_first_episode(self) -> bool:
@@ -302,13 +309,16 @@ class Trainer:
         done = self.progress.iteration * self.collect.steps
         return done == 0 or (self.episode_steps is not None and done < self.episode_steps)
 
-    def _iterate(self, experience: Experience) -> tuple[TensorDictBase, dict[str, float]]:
+    def _iterate(
+        self, experience: Experience | NoExperience
+    ) -> tuple[TensorDictBase, dict[str, float]]:
         """Learn from one batch, and return it and the numbers that were written."""
         self._stopwatch.begin()
         with timeit("collect"):
             batch = experience.collect()
-            check_batch(batch, list(self.learners.algorithms), self.progress.frames)
-            if self._is_first_episode():
+            if experience.plays:
+                check_batch(batch, list(self.learners.algorithms), self.progress.frames)
+            if experience.plays and self._is_first_episode():
                 specs = {team: self.learners.specs[team] for team in self.learners.algorithms}
                 warn_of_ranges(batch, specs, self.progress.frames)
         with timeit("learn"):
@@ -319,7 +329,7 @@ class Trainer:
         self.progress.frames += self.collect.frames
         row: dict[str, float] = {"iteration": self.progress.iteration}
         for team, measures in measured.items():
-            both = self._episodes.add(batch, team) | measures
+            both = (self._episodes.add(batch, team) if experience.plays else {}) | measures
             row |= {f"{team}/{name}": value for name, value in both.items()}
         row |= self.matchmaking.measures()
         row |= self._stopwatch.end(self.collect.frames)
@@ -328,7 +338,7 @@ class Trainer:
             reporter.write("metrics", self.progress.frames, row)
         return batch, row
 
-    def _update_policy(self, experience: Experience) -> None:
+    def _update_policy(self, experience: Experience | NoExperience) -> None:
         """Let the worlds be played by the current policy, its opponents loaded."""
         self.policy.take_over(self.learners.policy)
         self.matchmaking.load_opponent(self.policy)

@@ -270,8 +270,12 @@ def from_text(text: str) -> Benchmark:
     return Benchmark(**stored, parameters=migrated(task)["task"], starts=tuple(starts))
 
 
-def parameters(cfg: TaskCfg | GameCfg) -> dict[str, Any]:
-    """Return the parameters of a task, or of a whole game, as values of JSON."""
+def parameters(cfg: Any) -> dict[str, Any]:
+    """Return the parameters of a task, a body, a sense or a whole game as values of JSON.
+
+    Args:
+        cfg: A dataclass of a configuration.
+    """
     values: dict[str, Any] = json.loads(json.dumps(asdict(cfg), default=_plain))
     return values
 

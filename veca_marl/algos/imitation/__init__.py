@@ -1,0 +1,1 @@
+"""Learning from demonstrations: what is stored, samples of it, and the loss."""

@@ -1,0 +1,71 @@
+"""What demonstrations of a game have in common with runs that learn from them."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from pathlib import Path
+
+from veca_marl.algos.demonstrations import Demonstrations, DemonstrationsError, TeamForm
+from veca_marl.algos.specs import TeamSpec
+from veca_marl.config import ConfigError
+from veca_marl.envs.core.benchmark import parameters
+from veca_marl.envs.core.game_cfg import GameCfg
+from veca_marl.envs.core.task import find_task
+
+
+def team_forms(game: GameCfg, specs: Mapping[str, TeamSpec]) -> dict[str, TeamForm]:
+    """Return the form of each team of a game.
+
+    Args:
+        game: The game.
+        specs: The arrays of its teams.
+    """
+    task = find_task(game.task.name)
+    names = {t.name: task.senses if t.senses is None else t.senses for t in game.teams}
+    forms = {}
+    for team, spec in specs.items():
+        body, senses = game.body_of(team), game.senses_of(team)
+        forms[team] = TeamForm(
+            spec,
+            {"kind": type(body).__name__, **parameters(body)},
+            {name: parameters(senses.of(name)) for name in names[team] if senses.of(name).present},
+        )
+    return forms
+
+
+def open_demonstrations(
+    path: str, game: GameCfg, specs: Mapping[str, TeamSpec], teams: Collection[str]
+) -> Demonstrations:
+    """Return demonstrations from which teams of a run can learn.
+
+    Task parameters, playground and opponents may differ.
+
+    Args:
+        path: Their folder.
+        game: The game of the run.
+        specs: The arrays of its teams.
+        teams: The teams that learn.
+
+    Raises:
+        ConfigError: If they cannot be read, were altered, or are of another task, control rate,
+            body, of other senses or actions.
+    """
+    try:
+        found = Demonstrations(Path(path))
+        _check_game(found, game)
+        forms = team_forms(game, specs)
+        for team in teams:
+            found.check_team(team, forms[team])
+    except DemonstrationsError as error:
+        raise ConfigError(f"demonstrations: {error}") from error
+    return found
+
+
+def _check_game(found: Demonstrations, game: GameCfg) -> None:
+    card, rate = found.card, game.clock.control_rate_hz
+    if card.task != game.task.name:
+        raise DemonstrationsError(f"{found.folder} is of {card.task}, not of {game.task.name}")
+    if card.control_rate_hz != rate:
+        raise DemonstrationsError(
+            f"{found.folder} has {card.control_rate_hz} steps per second, this run {rate}"
+        )
