@@ -1,0 +1,262 @@
+"""The worlds of one client, in a process of their own.
+
+The process believes no more of a request than the server does: world indices, episodes and sizes
+are checked before anything moves. An error of a request is an answer; the worlds stay.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import zmq
+
+from veca_marl.envs.core.game import Game, Outcome
+from veca_marl.envs.core.game_cfg import GameCfg
+from veca_marl.envs.core.global_state import GlobalState
+from veca_marl.envs.rendering import Spectator
+from veca_marl.plugins import load_plugins
+from veca_marl.processes.children import prepare_child
+from veca_marl.remote import layouts
+from veca_marl.remote.description import GameSpecs
+from veca_marl.remote.messages import (
+    ACTION,
+    CALL,
+    DONE,
+    LARGEST_REQUEST_HEADER,
+    PEER,
+    REFUSED,
+    RESET,
+    STATE,
+    STEP,
+    VIEW,
+    Message,
+    ProtocolError,
+    decode,
+    entries,
+    integer,
+    shown,
+)
+
+LARGEST_SEED_BYTES = 64
+"""Bytes of the largest number that seeds an episode."""
+
+
+@dataclass(frozen=True)
+class WorldsCfg:
+    """What the worlds of a server are made from; it is pickled for its own processes only.
+
+    Attributes:
+        game: The game.
+        plugins: Packages that it needs, see `veca_marl.plugins`.
+    """
+
+    game: GameCfg
+    plugins: tuple[str, ...] = ()
+
+
+class WorldServer:
+    """Answers the requests of one client.
+
+    Args:
+        cfg: The game.
+        worlds: Number of worlds.
+    """
+
+    def __init__(self, cfg: GameCfg, worlds: int) -> None:
+        self._games = [Game(cfg) for _ in range(worlds)]
+        game = self._games[0]
+        self._specs = GameSpecs.of(game)
+        self._type = layouts.outcome_type(self._specs)
+        self._states = [GlobalState(game) for game in self._games]
+        self._spectators = [Spectator(game) for game in self._games]
+        self._answers: dict[str, Callable[[Message], Message]] = {
+            RESET: self._reset,
+            STEP: self._step,
+            STATE: self._state,
+            VIEW: self._view,
+        }
+
+    def answer(self, request: Message) -> Message:
+        """Return the answer to a request: what it asked for, or why it is refused."""
+        try:
+            if request.kind not in self._answers:
+                raise ProtocolError(f"there is no request {shown(request.kind)} to worlds")
+            return self._answers[request.kind](request)
+        except ProtocolError as error:
+            return refusal(request.number, PEER, str(error))
+        except ValueError as error:
+            return refusal(request.number, ACTION, str(error))
+        except Exception as error:  # of a task of users too: the client has to learn of it
+            return refusal(request.number, CALL, f"{type(error).__name__}: {error}")
+
+    def _worlds(self, request: Message) -> list[int]:
+        """Return the worlds that a request is about, each once."""
+        most = len(self._games)
+        worlds = [
+            integer({"worlds": world}, "worlds", 0, most - 1)
+            for world in entries(request.fields, "worlds", most)
+        ]
+        if len(set(worlds)) < len(worlds) or not worlds:
+            raise ProtocolError(f"worlds={shown(worlds)} are none, or some twice")
+        return worlds
+
+    def _reset(self, request: Message) -> Message:
+        worlds = self._worlds(request)
+        seeds = entries(request.fields, "seeds", len(worlds))
+        if len(seeds) != len(worlds):
+            raise ProtocolError(f"{len(seeds)} seeds for {len(worlds)} worlds")
+        generators = [np.random.default_rng(_entropy(seed)) for seed in seeds]
+        records = np.zeros(len(worlds), self._type)
+        for row, (world, rng) in enumerate(zip(worlds, generators, strict=True)):
+            self._games[world].reset(rng)
+            self._write(records, row, world, frozenset())
+        return Message(DONE, request.number, data=_bytes(records))
+
+    def _step(self, request: Message) -> Message:
+        worlds = self._worlds(request)
+        players = self._specs.players
+        kinds = entries(request.fields, "kinds", sum(len(player.action) for player in players))
+        record = layouts.action_type(players, [kind for kind in kinds if type(kind) is str])
+        actions = layouts.records(request.data, record, len(worlds))
+        for row, world in enumerate(worlds):
+            self._command(world, actions[row])
+        records = np.zeros(len(worlds), self._type)
+        for row, world in enumerate(worlds):
+            game = self._games[world]
+            eliminated = game.eliminated
+            outcome = game.advance()
+            self._write(records, row, world, eliminated)
+            self._score(records, row, world, outcome)
+        return Message(DONE, request.number, data=_bytes(records))
+
+    def _command(self, world: int, actions: Any) -> None:
+        given = {
+            player.name: {part: actions[layouts.action_field(i, part)] for part in player.action}
+            for i, player in enumerate(self._specs.players)
+        }
+        try:
+            self._games[world].command(given)
+        except ValueError as error:
+            raise ValueError(f"world {world}, {error}") from None
+
+    def _write(self, records: Any, row: int, world: int, eliminated: frozenset[str]) -> None:
+        """Write observations and the state of a world, except of players eliminated before."""
+        game = self._games[world]
+        if self._specs.global_state:
+            records[layouts.STATE][row] = self._states[world].read()
+        for index, player in enumerate(game.actors):
+            records[layouts.ELIMINATED][row, index] = player.name in game.eliminated
+            records[layouts.info_field(index)][row] = list(player.body.info().values())
+            if player.name in eliminated:
+                continue
+            records[layouts.OBSERVED][row, index] = True
+            for name, value in game.observe(player).items():
+                records[layouts.observation_field(index, name)][row] = value
+
+    def _score(self, records: Any, row: int, world: int, outcome: Outcome) -> None:
+        """Write reward terms and flags of a world."""
+        game = self._games[world]
+        records[layouts.ENDED][row] = outcome.terminated, outcome.truncated
+        for index, player in enumerate(game.actors):
+            terms = outcome.terms[player.name]
+            records[layouts.REWARD][row, index] = game.reward_of(terms)
+            records[layouts.TERMS][row, index] = [terms[name] for name in game.weights]
+            if outcome.solved:
+                records[layouts.SOLVED][row, index] = outcome.solved[player.name]
+
+    def _state(self, request: Message) -> Message:
+        (world,) = self._one(request)
+        return Message(DONE, request.number, data=self._states[world].read().tobytes())
+
+    def _view(self, request: Message) -> Message:
+        (world,) = self._one(request)
+        game = self._games[world]
+        picture = self._spectators[world].frame(game.observe(game.actors[0]))
+        fields = {"shape": list(picture.shape)}
+        return Message(DONE, request.number, fields, np.ascontiguousarray(picture).tobytes())
+
+    def _one(self, request: Message) -> Sequence[int]:
+        worlds = self._worlds(request)
+        if len(worlds) != 1:
+            raise ProtocolError(f"{request.kind} is about one world")
+        if not self._games[worlds[0]].has_begun:
+            raise RuntimeError("no episode has begun: call reset() first")
+        return worlds
+
+    def close(self) -> None:
+        """Release the resources of all worlds."""
+        for game in self._games:
+            game.close()
+
+
+def refusal(number: int, reason: str, message: str) -> Message:
+    """Return an answer that refuses a request."""
+    return Message(REFUSED, number, {"reason": reason, "message": message[:2000]})
+
+
+def seed_words(rng: np.random.Generator) -> list[bytes]:
+    """Return what the generator of an episode was made from, which no draw has changed yet.
+
+    Raises:
+        ValueError: If a number of it is too large.
+    """
+    entropy: Any = rng.bit_generator.seed_seq.entropy  # type: ignore[attr-defined]
+    numbers = [int(number) for number in (entropy if isinstance(entropy, list) else [entropy])]
+    for number in numbers:
+        if number >= 256**LARGEST_SEED_BYTES:
+            raise ValueError(f"seed={number} has more than {LARGEST_SEED_BYTES} bytes")
+    return [number.to_bytes(LARGEST_SEED_BYTES, "little").rstrip(b"\0") for number in numbers]
+
+
+def _entropy(words: Any) -> list[int]:
+    """Return the numbers that `seed_words` has sent."""
+    if type(words) is not list or not 1 <= len(words) <= 8:
+        raise ProtocolError(f"seeds of an episode are {shown(words)}")
+    for word in words:
+        if type(word) is not bytes or len(word) > LARGEST_SEED_BYTES:
+            raise ProtocolError(f"a seed is {shown(word)}")
+    return [int.from_bytes(word, "little") for word in words]
+
+
+def _bytes(records: Any) -> memoryview:
+    return memoryview(records.view(np.uint8))
+
+
+def serve_worlds(endpoint: str, name: bytes, parent: int, cfg: WorldsCfg, worlds: int) -> None:
+    """Build worlds and answer requests until this process is ended.
+
+    Args:
+        endpoint: Where the server's own socket is.
+        name: Name of these worlds there.
+        parent: Process id of the server.
+        cfg: The game.
+        worlds: Number of worlds.
+    """
+    prepare_child(parent)
+    with zmq.Context() as context, context.socket(zmq.DEALER) as socket:
+        socket.setsockopt(zmq.ROUTING_ID, name)
+        socket.setsockopt(zmq.LINGER, 1000)
+        socket.connect(endpoint)
+        try:
+            load_plugins(cfg.plugins)
+            server = WorldServer(cfg.game, worlds)
+        except Exception as error:  # the client has to learn of it
+            reason = f"the worlds cannot be built: {type(error).__name__}: {error}"
+            socket.send_multipart(refusal(0, PEER, reason).frames())
+            return
+        socket.send_multipart(Message(DONE).frames())
+        while True:
+            _answer_next(socket, server)
+
+
+def _answer_next(socket: zmq.Socket[bytes], server: WorldServer) -> None:
+    frames = socket.recv_multipart(copy=False)
+    try:
+        request = decode([frame.buffer for frame in frames], LARGEST_REQUEST_HEADER)
+    except ProtocolError as error:
+        socket.send_multipart(refusal(0, PEER, str(error)).frames())
+        return
+    socket.send_multipart(server.answer(request).frames(), copy=False)
