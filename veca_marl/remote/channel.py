@@ -138,8 +138,9 @@ class Channel:
 
     def _stop_monitor(self) -> None:
         if self._monitor is not None:
-            self._monitor = None
             self._socket.disable_monitor()
+            self._monitor.close()
+            self._monitor = None
 
     def _result(self, answer: Message) -> Message:
         if answer.kind == DONE:

@@ -8,7 +8,6 @@ leaves unread holds up nobody else.
 from __future__ import annotations
 
 import logging
-import os
 import tempfile
 import time
 from collections import OrderedDict
@@ -16,6 +15,7 @@ from collections.abc import Callable
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass, field, replace
 from multiprocessing import get_context
+from multiprocessing.context import ForkServerContext
 from multiprocessing.process import BaseProcess
 from pathlib import Path
 from typing import Any
@@ -81,6 +81,18 @@ class ServerCfg:
     reconnect_s: float = 60.0
     limit_s: float = 600.0
 
+    def check(self, has_keys: bool) -> None:
+        """Check who can reach the server.
+
+        Raises:
+            ValueError: If other machines can, and it has no keys.
+        """
+        if not (has_keys or self.without_keys or is_loopback(self.address)):
+            raise ValueError(
+                f"address={self.address} can be reached from other machines: keys=FOLDER lets only "
+                "clients with keys connect (without_keys=true lets everybody)"
+            )
+
 
 @dataclass
 class _Session:
@@ -128,11 +140,7 @@ class Server:
     def __init__(
         self, cfg: ServerCfg, worlds: WorldsCfg, specs: GameSpecs, keys: ServerKeys | None
     ) -> None:
-        if keys is None and not cfg.without_keys and not is_loopback(cfg.address):
-            raise ValueError(
-                f"address={cfg.address} can be reached from other machines: keys=FOLDER lets only "
-                "clients with keys connect (without_keys=true lets everybody)"
-            )
+        cfg.check(keys is not None)
         self._cfg, self._worlds, self._specs = cfg, worlds, specs
         self._welcome = specs.fields() | {"version": __version__, "worlds": cfg.worlds}
         self._sessions: dict[bytes, _Session] = {}
@@ -150,6 +158,7 @@ class Server:
             self._poller.register(self._back, zmq.POLLIN)
             if self._gate is not None:
                 self._poller.register(self._gate, zmq.POLLIN)
+            self._start = _forking()
             stack.callback(self._end_sessions)
             self._stack = stack.pop_all()
 
@@ -297,8 +306,8 @@ class Server:
         """Start the process of a client."""
         self._count += 1
         name = self._count.to_bytes(8, "big")
-        arguments = (self._endpoint, name, os.getpid(), self._worlds, worlds)
-        process = get_context("spawn").Process(target=serve_worlds, args=arguments, daemon=True)
+        arguments = (self._endpoint, name, self._worlds, worlds)
+        process = self._start.Process(target=serve_worlds, args=arguments, daemon=True)
         with interrupts_blocked():
             process.start()
         session = _Session(client, owner, name, process, number)
@@ -398,6 +407,20 @@ class Server:
         for session in sessions:
             self._end(session, "the server was stopped")
         end_all([session.process for session in sessions], _END_S)
+
+
+def _forking() -> ForkServerContext:
+    """Return what starts processes in 0.02 s each: forks of one that has imported the simulator.
+
+    This process has threads, those of ZeroMQ, and must not be forked itself.
+    """
+    context = get_context("forkserver")
+    context.set_forkserver_preload([serve_worlds.__module__])
+    first = context.Process(target=len, args=((),))
+    with interrupts_blocked():
+        first.start()  # waits for the imports
+    first.join()
+    return context
 
 
 def _owner(frame: zmq.Frame) -> str:

@@ -6,6 +6,7 @@ are checked before anything moves. An error of a request is an answer; the world
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -108,7 +109,7 @@ class WorldServer:
         seeds = entries(request.fields, "seeds", len(worlds))
         if len(seeds) != len(worlds):
             raise ProtocolError(f"{len(seeds)} seeds for {len(worlds)} worlds")
-        generators = [np.random.default_rng(_entropy(seed)) for seed in seeds]
+        generators = [_generator(seed) for seed in seeds]
         records = np.zeros(len(worlds), self._type)
         for row, (world, rng) in enumerate(zip(worlds, generators, strict=True)):
             self._games[world].reset(rng)
@@ -211,31 +212,31 @@ def seed_words(rng: np.random.Generator) -> list[bytes]:
     return [number.to_bytes(LARGEST_SEED_BYTES, "little").rstrip(b"\0") for number in numbers]
 
 
-def _entropy(words: Any) -> list[int]:
-    """Return the numbers that `seed_words` has sent."""
+def _generator(words: Any) -> np.random.Generator:
+    """Return the generator that `seed_words` describes, before its first draw."""
     if type(words) is not list or not 1 <= len(words) <= 8:
         raise ProtocolError(f"seeds of an episode are {shown(words)}")
     for word in words:
         if type(word) is not bytes or len(word) > LARGEST_SEED_BYTES:
             raise ProtocolError(f"a seed is {shown(word)}")
-    return [int.from_bytes(word, "little") for word in words]
+    numbers = [int.from_bytes(word, "little") for word in words]
+    return np.random.Generator(np.random.PCG64(numbers))
 
 
 def _bytes(records: Any) -> memoryview:
     return memoryview(records.view(np.uint8))
 
 
-def serve_worlds(endpoint: str, name: bytes, parent: int, cfg: WorldsCfg, worlds: int) -> None:
+def serve_worlds(endpoint: str, name: bytes, cfg: WorldsCfg, worlds: int) -> None:
     """Build worlds and answer requests until this process is ended.
 
     Args:
         endpoint: Where the server's own socket is.
         name: Name of these worlds there.
-        parent: Process id of the server.
         cfg: The game.
         worlds: Number of worlds.
     """
-    prepare_child(parent)
+    prepare_child(os.getppid())  # the process that forks those with worlds, ends with the server
     with zmq.Context() as context, context.socket(zmq.DEALER) as socket:
         socket.setsockopt(zmq.ROUTING_ID, name)
         socket.setsockopt(zmq.LINGER, 1000)

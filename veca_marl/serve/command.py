@@ -91,7 +91,6 @@ def _make_keys(folder: Path, client: str) -> None:
 
 def _serve(options: ServeOptions, overrides: list[str]) -> None:
     server, keys, address = import_remote("server"), import_remote("keys"), import_remote("address")
-    cfg = compose_game(overrides)
     try:
         chosen = server.ServerCfg(
             address.checked_address(options.address),
@@ -101,7 +100,9 @@ def _serve(options: ServeOptions, overrides: list[str]) -> None:
             options.reconnect_s,
             options.limit_s,
         )
+        chosen.check(options.keys is not None)
         known = None if options.keys is None else keys.load_server_keys(Path(options.keys))
+        cfg = compose_game(overrides)
         specs = _specs(cfg)
         _raise_limit_of_files()
         opened = server.Server(chosen, server.WorldsCfg(cfg.game, tuple(cfg.plugins)), specs, known)
