@@ -17,12 +17,12 @@ ANY_PORT = "tcp://127.0.0.1:*"
 
 
 @contextmanager
-def served(cfg, worlds=2, keys=None, address=ANY_PORT, **changes):
+def served(cfg, worlds=2, keys=None, address=ANY_PORT, plugins=(), **changes):
     """Serve a game in a thread; yield the server."""
     with closing(Game(cfg)) as game:
         specs = GameSpecs.of(game)
     chosen = ServerCfg(address, worlds, **changes)
-    with closing(Server(chosen, WorldsCfg(cfg), specs, keys)) as server:
+    with closing(Server(chosen, WorldsCfg(cfg, plugins), specs, keys)) as server:
         stop = threading.Event()
         thread = threading.Thread(target=server.run, args=(lambda: not stop.is_set(),))
         thread.start()
@@ -33,8 +33,8 @@ def served(cfg, worlds=2, keys=None, address=ANY_PORT, **changes):
             thread.join()
 
 
-def torchrl_env(server, worlds=2, seed=0, **how):
-    there = RemoteWorlds(server.address, **how)
+def torchrl_env(server, worlds=2, seed=0, address=None, **how):
+    there = RemoteWorlds(address or server.address, **how)
     return VecaEnv(there.cfg, worlds, seed, host=RemoteHost(there))
 
 
@@ -43,6 +43,6 @@ def parallel_env(server, seed=0, **how):
     return VecaParallelEnv(there.cfg, seed, host=RemoteHost(there), **how)
 
 
-def gym_env(server, seed=0, **how):
-    there = RemoteWorlds(server.address)
+def gym_env(server, seed=0, address=None, timeout_s=60.0, **how):
+    there = RemoteWorlds(address or server.address, timeout_s=timeout_s)
     return VecaGymEnv(there.cfg, seed, host=RemoteHost(there), **how)

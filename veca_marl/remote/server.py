@@ -396,9 +396,10 @@ class Server:
             self._ended.popitem(last=False)
         self._poller.unregister(session.process.sentinel)
         _LOG.info("client %d: its worlds have ended: %s", int.from_bytes(session.name), reason)
-        if session.answer is None:
-            lost = f"the worlds of this client are gone: {reason}"
-            self._send(session.client, refusal(session.number, ENDED, lost).frames())
+        # the answer to the present request, or to the next one, which the server may not see
+        number = session.number + (session.answer is not None)
+        lost = f"the worlds of this client are gone: {reason}"
+        self._send(session.client, refusal(number, ENDED, lost).frames())
         session.process.kill()
 
     def _end_sessions(self) -> None:
