@@ -1,8 +1,7 @@
 """Measure what it costs that worlds are on a server: ``python -m tools.remote_rates``.
 
-A server of this machine, at the loopback, and this process play the same game in turns. Wall time:
-a server works while its client waits. Reported are medians over the rounds, of times and of ratios
-within a round.
+A server of this machine, at the loopback, and this process play the same game in turns of a few
+steps. Wall time: a server works while its client waits.
 """
 
 from __future__ import annotations
@@ -11,13 +10,13 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from statistics import median
 from typing import Any
 
+import numpy as np
 import torch
 
 from veca_marl.api import connect, gym_env, make
@@ -31,15 +30,15 @@ class RemoteRatesOptions:
     Attributes:
         task: The task.
         worlds: Worlds of the batch.
-        steps: Steps of each measurement.
-        rounds: Measurements of each kind, in turns.
+        steps: Steps of each kind in a round.
+        rounds: Number of rounds.
         encrypted: Whether the connection has keys.
     """
 
     task: str = "KickTheBall"
     worlds: int = 16
-    steps: int = 100
-    rounds: int = 7
+    steps: int = 20
+    rounds: int = 25
     encrypted: bool = True
 
 
@@ -64,39 +63,60 @@ def served(task: str, worlds: int, encrypted: bool) -> Iterator[tuple[str, Path 
             server.wait()
 
 
-def one_agent_ms(env: Any, steps: int) -> float:
-    """Return the milliseconds of a step of a Gymnasium environment, at rest."""
+Player = Callable[[], None]
+"""Plays one step."""
+
+
+def one_agent(env: Any) -> Player:
+    """Return what plays a step of a Gymnasium environment, with one action throughout."""
     env.reset(seed=0)
-    action = env.action_space.sample()
-    begin = time.perf_counter()
-    for _ in range(steps):
+    action = 0 * env.action_space.sample()
+
+    def play() -> None:
         _, _, terminated, truncated, _ = env.step(action)
         if terminated or truncated:
             env.reset()
-    return 1e3 * (time.perf_counter() - begin) / steps
+
+    return play
 
 
-def batch_ms(env: Any, steps: int) -> float:
-    """Return the milliseconds of a step of all worlds, with random actions."""
+def batch(env: Any) -> Player:
+    """Return what plays a step of all worlds, with random actions."""
     env.set_seed(0)
     torch.manual_seed(0)
+    state = env.reset()
+
+    def play() -> None:
+        nonlocal state
+        _, state = env.step_and_maybe_reset(env.rand_action(state))
+
+    return play
+
+
+def in_turns(here: Player, there: Player, steps: int, rounds: int) -> str:
+    """Return a line with the times of a step, what is added, and the ratio of the rates.
+
+    A round is some steps of either kind. Of each kind the median is reported, and the lower
+    quartile, which other programs on the same cores disturb less.
+    """
+    times: tuple[list[float], list[float]] = ([], [])
+    for number in range(rounds + 1):
+        for play, found in zip((here, there), times, strict=True):
+            seconds = [_seconds(play) for _ in range(steps)]
+            found += seconds if number else []  # the first round warms up
+    quartiles = [1e3 * np.percentile(found, (25, 50)) for found in times]
+    parts = [
+        f"{name} {own:.2f} ms here, {other:.2f} ms on the server: {other - own:+.2f} ms, "
+        f"rate {own / other:.3f} of that here"
+        for name, own, other in zip(("lower quartile", "median"), *quartiles, strict=True)
+    ]
+    return "; ".join(parts)
+
+
+def _seconds(play: Player) -> float:
     begin = time.perf_counter()
-    env.rollout(steps, break_when_any_done=False)
-    return 1e3 * (time.perf_counter() - begin) / steps
-
-
-def in_turns(measure: Any, local: Any, remote: Any, steps: int, rounds: int) -> str:
-    """Return a line with both times, what is added, and the ratio of the rates."""
-    for env in (local, remote):
-        measure(env, 5)
-    pairs = [(measure(local, steps), measure(remote, steps)) for _ in range(rounds)]
-    added = median(there - here for here, there in pairs)
-    ratio = median(here / there for here, there in pairs)
-    here, there = (median(column) for column in zip(*pairs, strict=True))
-    return (
-        f"here {here:.2f} ms, on the server {there:.2f} ms a step: "
-        f"{added:+.2f} ms, rate {ratio:.3f} of that here"
-    )
+    play()
+    return time.perf_counter() - begin
 
 
 def run(options: RemoteRatesOptions, overrides: list[str]) -> None:
@@ -105,12 +125,13 @@ def run(options: RemoteRatesOptions, overrides: list[str]) -> None:
     with served(options.task, options.worlds, options.encrypted) as (address, key):
         here: Any = gym_env(options.task, overrides=overrides)
         there: Any = connect(address, key=key, library="gymnasium")
-        print("1 world:", in_turns(one_agent_ms, here, there, options.steps, options.rounds))
+        rounds, steps = options.rounds, options.steps
+        print("1 world:", in_turns(one_agent(here), one_agent(there), steps, rounds), flush=True)
         here.close()
         there.close()
         here, there = make(options.task, worlds=options.worlds), connect(address, key=key)
-        line = in_turns(batch_ms, here, there, max(options.steps // 5, 5), options.rounds)
-        print(f"{options.worlds} worlds: {line}")
+        steps = max(steps // 4, 1)
+        print(f"{options.worlds} worlds:", in_turns(batch(here), batch(there), steps, rounds))
         here.close()
         there.close()
 

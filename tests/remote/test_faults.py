@@ -119,11 +119,12 @@ def test_a_server_that_was_started_again_has_no_worlds_of_before(cfg):
         env = gym_env(server)
         env.reset()
         server._end = lambda *_: None  # it dies and says nothing
-    for process in processes(server):
-        process.kill()
-    with served(cfg, 1, address=address):
-        with pytest.raises(RemoteError, match=naming("gone", "started again")):
-            env.step(NO_ACTION)
+    for session in server._sessions.values():
+        session.process.kill()
+        session.line.close()
+    gone = naming("gone", "started again")
+    with served(cfg, 1, address=address), pytest.raises(RemoteError, match=gone):
+        env.step(NO_ACTION)
     env.close()
 
 

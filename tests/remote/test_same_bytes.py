@@ -139,7 +139,9 @@ def test_an_invalid_action_in_one_world_moves_none(cfg, server):
         for env in (there, here):
             env.set_seed(1)
         states = [env.reset() for env in (there, here)]
-        wrong = states[0].clone().set(("agents", "action"), torch.tensor([[[0.0, 0.0]], [[2.0, 0.0]]]))
+        wrong = (
+            states[0].clone().set(("agents", "action"), torch.tensor([[[0.0, 0.0]], [[2.0, 0.0]]]))
+        )
         with pytest.raises(ValueError, match=naming("world 1", "2.0")):
             there.step(wrong)
         for state in states:

@@ -128,6 +128,29 @@ class _RemoteTask:
         return self._has_goal
 
 
+class _Results:
+    """What the server has returned for some worlds, a row for each.
+
+    Args:
+        block: Records as of `layouts.outcome_type`.
+
+    Attributes:
+        columns: All fields.
+        rewards: Rewards by row and player; so are `terms`, with an entry for each term, and the
+            flags `solved`, `eliminated`, and `observed`.
+        ended: Whether the episode has ended by the rules, and whether its time is up, by row.
+    """
+
+    def __init__(self, block: Records) -> None:
+        self.columns = layouts.columns(block)
+        self.rewards: list[list[float]] = self.columns[layouts.REWARD].tolist()
+        self.terms: list[list[list[float]]] = self.columns[layouts.TERMS].tolist()
+        self.ended: list[list[bool]] = self.columns[layouts.ENDED].tolist()
+        self.solved: list[list[bool]] = self.columns[layouts.SOLVED].tolist()
+        self.eliminated: list[list[bool]] = self.columns[layouts.ELIMINATED].tolist()
+        self.observed: list[list[bool]] = self.columns[layouts.OBSERVED].tolist()
+
+
 class RemoteGame(Game):
     """A game on a server.
 
@@ -155,14 +178,13 @@ class RemoteGame(Game):
             Player(one.name, one.team, cast(Body, body), MappingProxyType(self.senses[one.name]))
             for one, body in zip(specs.players, self._bodies, strict=True)
         ]
+        self.layout = layouts.ActionLayout(specs.players)
         self.steps = 0
         self.eliminated: frozenset[str] = frozenset()
         self._rng: np.random.Generator | None = None
-        self._record: Any = None
-        self._fields = [
-            {name: layouts.observation_field(i, name) for name in player.observations}
-            for i, player in enumerate(specs.players)
-        ]
+        self._result: _Results | None = None
+        self._row = 0
+        self._fields = layouts.outcome_fields(specs)
 
     def __getattr__(self, name: str) -> NoReturn:
         """Say what cannot be had of a world on a server."""
@@ -170,51 +192,52 @@ class RemoteGame(Game):
 
     def reset(self, rng: np.random.Generator) -> None:
         """See `Game.reset`."""
-        self.begun(rng, self._worlds.reset([self.index], [rng])[0])
+        self.begun(rng, _Results(self._worlds.reset([self.index], [rng])), 0)
 
-    def begun(self, rng: np.random.Generator, record: Any) -> None:
+    def begun(self, rng: np.random.Generator, results: _Results, row: int) -> None:
         """Take what the server has returned for the start of an episode."""
         self._rng, self.steps = rng, 0
-        self._take(record)
+        self._take(results, row)
 
     def advance(self) -> Outcome:
         """See `Game.advance`."""
         (outcome,) = advance([self], self._worlds)
         return outcome
 
-    def stepped(self, record: Any) -> Outcome:
+    def stepped(self, results: _Results, row: int) -> Outcome:
         """Take what the server has returned for a step; return the outcome."""
         self.steps += 1
-        self._take(record)
-        terms, solved = {}, {}
-        bodies = {}
-        rewards, values = record[layouts.REWARD].tolist(), record[layouts.TERMS].tolist()
+        self._take(results, row)
+        terms: dict[str, dict[str, float]] = {}
         for index, player in enumerate(self.actors):
-            scored = Scored(zip(self._weights, values[index], strict=True))
-            scored.reward = rewards[index]
-            terms[player.name] = cast(dict[str, float], scored)
-            bodies[player.name] = self._bodies[index].info()
-            if self.specs.has_goal:
-                solved[player.name] = bool(record[layouts.SOLVED][index])
-        terminated, truncated = record[layouts.ENDED].tolist()
+            scored = Scored(zip(self._weights, results.terms[row][index], strict=True))
+            scored.reward = results.rewards[row][index]
+            terms[player.name] = scored
+        solved = {}
+        if self.specs.has_goal:
+            names = [player.name for player in self.actors]
+            solved = dict(zip(names, results.solved[row], strict=True))
+        bodies = {player.name: player.body.info() for player in self.actors}
+        terminated, truncated = results.ended[row]
         return Outcome(terms, terminated, truncated, self.eliminated, solved, bodies)
 
-    def _take(self, record: Any) -> None:
-        self._record = record
-        flags = record[layouts.ELIMINATED].tolist()
-        self.eliminated = frozenset(
-            player.name for player, gone in zip(self.actors, flags, strict=True) if gone
-        )
-        for index, body in enumerate(self._bodies):
-            body.numbers = record[layouts.info_field(index)].tolist()
+    def _take(self, results: _Results, row: int) -> None:
+        self._result, self._row = results, row
+        if self.specs.eliminates:
+            flags = zip(self.actors, results.eliminated[row], strict=True)
+            self.eliminated = frozenset(player.name for player, gone in flags if gone)
+        for body, fields in zip(self._bodies, self._fields, strict=True):
+            if fields.info:
+                body.numbers = results.columns[fields.info][row].tolist()
 
     def observe(self, player: Player, names: Collection[str] | None = None) -> Observation:
         """See `Game.observe`; nothing of a player that was eliminated before the last step."""
         index = self.actors.index(player)
-        if self._record is None or not self._record[layouts.OBSERVED][index]:
+        if self._result is None or not self._result.observed[self._row][index]:
             return {}
-        fields = self._fields[index].items()
-        return {name: self._record[field] for name, field in fields}
+        columns, row = self._result.columns, self._row
+        fields = self._fields[index].observations.items()
+        return {name: columns[f][row] for name, f in fields if names is None or name in names}
 
     def reward_of(self, terms: Mapping[str, float]) -> float:
         """See `Game.reward_of`."""
@@ -222,8 +245,8 @@ class RemoteGame(Game):
 
     def state(self) -> NDArray[np.float32]:
         """Return what the simulator knows at this moment, see `GlobalState`."""
-        if self.specs.global_state and self._record is not None:
-            return np.array(self._record[layouts.STATE], np.float32)
+        if self.specs.global_state and self._result is not None:
+            return np.array(self._result.columns[layouts.STATE][self._row], np.float32)
         return self._worlds.state(self.index)
 
     def actions(self) -> list[NDArray[Any]]:
@@ -250,16 +273,18 @@ def advance(games: Sequence[RemoteGame], worlds: Worlds) -> Iterator[Outcome]:
     """Play one step in each of some games, whose actions are set; one message carries them."""
     if not games:
         return
+    layout = games[0].layout
     given = [game.actions() for game in games]
-    kinds = [np.result_type(*column).name for column in zip(*given, strict=True)]
-    record = layouts.action_type(games[0].specs.players, kinds)
+    kinds = layout.kinds_of(given)
+    record = layout.record(kinds)
     actions = np.zeros(len(games), record)
     for name, column in zip(record.names or (), zip(*given, strict=True), strict=True):
+        field = actions[name]
         for row, part in enumerate(column):
-            actions[name][row] = part
-    records = worlds.step([game.index for game in games], actions, kinds)
-    for game, one in zip(games, records, strict=True):
-        yield game.stepped(one)
+            field[row] = part
+    results = _Results(worlds.step([game.index for game in games], actions, kinds))
+    for row, game in enumerate(games):
+        yield game.stepped(results, row)
 
 
 class _RemoteState:
@@ -311,8 +336,9 @@ class RemoteHost(Host):
             return
         remote = _remote(games)
         records = self._worlds.reset([game.index for game in remote], rngs)
-        for game, rng, record in zip(remote, rngs, records, strict=True):
-            game.begun(rng, record)
+        results = _Results(records)
+        for row, (game, rng) in enumerate(zip(remote, rngs, strict=True)):
+            game.begun(rng, results, row)
 
     def advance(self, games: Sequence[Game]) -> Iterator[Outcome]:
         """See `Host`; all worlds are stepped before the first outcome."""

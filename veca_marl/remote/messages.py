@@ -68,10 +68,18 @@ class Message:
     fields: dict[str, Any] = field(default_factory=dict)
     data: Any = b""
 
+    def parts(self) -> tuple[bytes, Any]:
+        """Return the header and the arrays."""
+        return msgpack.packb([self.kind, self.number, self.fields]), self.data
+
     def frames(self) -> list[Any]:
         """Return the frames of the message."""
-        header = msgpack.packb([self.kind, self.number, self.fields])
-        return [MARK, header, self.data] if len(self.data) else [MARK, header]
+        return as_frames(*self.parts())
+
+
+def as_frames(header: Any, data: Any) -> list[Any]:
+    """Return a header and arrays as the frames of a message."""
+    return [MARK, header, data] if len(data) else [MARK, header]
 
 
 def decode(frames: Sequence[Any], largest_header: int) -> Message:
@@ -87,7 +95,11 @@ def decode(frames: Sequence[Any], largest_header: int) -> Message:
     check_mark(frames)
     if len(frames) not in (2, 3):
         raise ProtocolError(f"a message has {len(frames)} frames, not 2 or 3")
-    header = frames[1]
+    return decode_parts(frames[1], frames[2] if len(frames) == 3 else b"", largest_header)
+
+
+def decode_parts(header: Any, data: Any, largest_header: int) -> Message:
+    """Return the message with a header and arrays; see `decode`."""
     if len(header) > largest_header:
         raise ProtocolError(f"a header has {len(header)} bytes; at most {largest_header} are read")
     try:
@@ -109,7 +121,7 @@ def decode(frames: Sequence[Any], largest_header: int) -> Message:
         raise ProtocolError("a header is no list of kind, number and fields")
     if not 0 <= number <= _LARGEST_NUMBER:
         raise ProtocolError(f"a message has the number {number}")
-    return Message(kind, number, fields, frames[2] if len(frames) == 3 else b"")
+    return Message(kind, number, fields, data)
 
 
 def check_mark(frames: Sequence[Any]) -> None:

@@ -8,26 +8,25 @@ leaves unread holds up nobody else.
 from __future__ import annotations
 
 import logging
-import tempfile
 import time
 from collections import OrderedDict
 from collections.abc import Callable
-from contextlib import ExitStack, suppress
+from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from multiprocessing import get_context
 from multiprocessing.context import ForkServerContext
 from multiprocessing.process import BaseProcess
-from pathlib import Path
 from typing import Any
 
 import zmq
 from zmq.utils import z85
 
 from veca_marl.processes.children import end_all, end_of, interrupts_blocked
-from veca_marl.remote import layouts
 from veca_marl.remote.address import is_loopback, numeric
 from veca_marl.remote.description import GameSpecs
 from veca_marl.remote.keys import ServerKeys
+from veca_marl.remote.layouts import ActionLayout
+from veca_marl.remote.lines import BrokenLineError, Line, line_pair
 from veca_marl.remote.messages import (
     CLOSE,
     DONE,
@@ -42,7 +41,9 @@ from veca_marl.remote.messages import (
     WORKING,
     Message,
     ProtocolError,
+    as_frames,
     decode,
+    decode_parts,
     integer,
     shown,
     text,
@@ -101,8 +102,9 @@ class _Session:
     Attributes:
         client: Name of the client's connection.
         owner: Key of the client; empty without keys.
-        name: Name of its process at the server's own socket.
+        name: Its number, for the log.
         process: The process.
+        line: The line to it.
         built: Whether its worlds are built.
         number: Number of the last request.
         answer: Frames of the answer to it; None while it is worked on.
@@ -113,8 +115,9 @@ class _Session:
 
     client: bytes
     owner: str
-    name: bytes
+    name: int
     process: BaseProcess
+    line: Line
     number: int
     built: bool = False
     answer: list[Any] | None = None
@@ -144,6 +147,7 @@ class Server:
         self._cfg, self._worlds, self._specs = cfg, worlds, specs
         self._welcome = specs.fields() | {"version": __version__, "worlds": cfg.worlds}
         self._sessions: dict[bytes, _Session] = {}
+        self._lines: dict[Any, _Session] = {}
         self._ended: OrderedDict[bytes, str] = OrderedDict()
         self._count = 0
         self._stack = ExitStack()
@@ -152,10 +156,8 @@ class Server:
             self._gate = None if keys is None else self._gate_socket()
             self._known = frozenset(z85.decode(key) for key in keys.clients) if keys else None
             self._front = self._front_socket(keys)
-            self._back, self._endpoint = self._back_socket()
             self._poller = zmq.Poller()
             self._poller.register(self._front, zmq.POLLIN)
-            self._poller.register(self._back, zmq.POLLIN)
             if self._gate is not None:
                 self._poller.register(self._gate, zmq.POLLIN)
             self._start = _forking()
@@ -171,7 +173,7 @@ class Server:
 
     def _front_socket(self, keys: ServerKeys | None) -> zmq.Socket[bytes]:
         socket = self._stack.enter_context(self._context.socket(zmq.ROUTER))
-        largest = self._cfg.worlds * layouts.widest_action(self._specs.players)
+        largest = self._cfg.worlds * ActionLayout(self._specs.players).widest
         for option, value in (
             (zmq.LINGER, 200),
             (zmq.IPV6, int("[" in self._cfg.address)),
@@ -196,16 +198,6 @@ class Server:
             raise OSError(f"address={self._cfg.address}: {error.strerror}") from error
         return socket
 
-    def _back_socket(self) -> tuple[zmq.Socket[bytes], str]:
-        """Return the socket of the processes with worlds, in a folder of this user only."""
-        folder = self._stack.enter_context(tempfile.TemporaryDirectory(prefix="veca_marl_"))
-        endpoint = f"ipc://{Path(folder) / 'worlds'}"
-        socket = self._stack.enter_context(self._context.socket(zmq.ROUTER))
-        socket.setsockopt(zmq.LINGER, 0)
-        socket.setsockopt(zmq.ROUTER_MANDATORY, 1)
-        socket.bind(endpoint)
-        return socket, endpoint
-
     @property
     def address(self) -> str:
         """Where it listens; with the port that the system chose, if it was to choose one."""
@@ -220,14 +212,13 @@ class Server:
         next_check = time.monotonic()
         while keep_on():
             ready = dict(self._poller.poll(_TICK_MS))
-            if self._back in ready:
-                self._from_worlds()
+            for session in [self._lines[one] for one in ready if one in self._lines]:
+                self._from_worlds(session)
             if self._front in ready:
                 self._from_client()
             if self._gate in ready:
                 self._let_in()
-            ended = any(isinstance(one, int) for one in ready)  # the sentinel of a process
-            if ended or time.monotonic() >= next_check:
+            if time.monotonic() >= next_check:
                 next_check = time.monotonic() + _TICK_MS / 1000
                 self._check_sessions()
 
@@ -253,7 +244,8 @@ class Server:
         name = client.bytes
         try:
             request = decode([frame.buffer for frame in frames], LARGEST_REQUEST_HEADER)
-            answer = self._handle(name, _owner(client), request, frames)
+            owner = "" if self._gate is None else str(frames[0].get("User-Id"))
+            answer = self._handle(name, owner, request, frames)
         except ProtocolError as error:
             answer = refusal(0, PEER, str(error))
         if answer is not None:
@@ -305,14 +297,14 @@ class Server:
     def _begin(self, client: bytes, owner: str, worlds: int, number: int) -> None:
         """Start the process of a client."""
         self._count += 1
-        name = self._count.to_bytes(8, "big")
-        arguments = (self._endpoint, name, self._worlds, worlds)
-        process = self._start.Process(target=serve_worlds, args=arguments, daemon=True)
-        with interrupts_blocked():
+        line, far = line_pair()
+        with far, interrupts_blocked():
+            arguments = (far, self._worlds, worlds)
+            process = self._start.Process(target=serve_worlds, args=arguments, daemon=True)
             process.start()
-        session = _Session(client, owner, name, process, number)
-        self._sessions[client] = session
-        self._poller.register(process.sentinel, zmq.POLLIN)
+        session = _Session(client, owner, self._count, process, line, number)
+        self._sessions[client] = self._lines[line.fileno()] = session
+        self._poller.register(line.fileno(), zmq.POLLIN)
         _LOG.info("client %d: %d worlds", self._count, worlds)
 
     def _next(self, session: _Session, request: Message, frames: list[Any]) -> Message | None:
@@ -328,9 +320,9 @@ class Server:
             return refusal(request.number, PEER, f"{request.kind} came before its turn")
         session.number, session.answer, session.since = request.number, None, time.monotonic()
         try:
-            self._back.send_multipart([session.name, *frames], zmq.NOBLOCK, copy=False)
-        except zmq.ZMQError as error:
-            self._end(session, f"their process does not take requests: {error.strerror}")
+            session.line.send(frames[1].buffer, frames[2].buffer if len(frames) == 3 else b"")
+        except BrokenLineError as error:
+            self._end(session, f"their process does not take requests: {error}")
         return None
 
     def _send(self, client: bytes, frames: list[Any]) -> bool:
@@ -350,17 +342,21 @@ class Server:
 
     # ---- worlds
 
-    def _from_worlds(self) -> None:
-        """Hand the answer of a process on to its client."""
-        name, *frames = self._back.recv_multipart(zmq.NOBLOCK, copy=False)
-        session = next((s for s in self._sessions.values() if s.name == name.bytes), None)
-        if session is None or session.answer is not None:
+    def _from_worlds(self, session: _Session) -> None:
+        """Hand the answer of a process on to its client, when it is complete."""
+        try:
+            parts = session.line.receive()
+        except BrokenLineError:
+            session.process.join(_END_S)
+            self._end(session, f"their process {end_of(session.process.exitcode)}")
+            return
+        if parts is None:
             return
         if session.built:
-            session.answer = frames
-            self._send(session.client, frames)
+            session.answer = as_frames(*parts)
+            self._send(session.client, session.answer)
             return
-        built = decode([frame.buffer for frame in frames], LARGEST_ANSWER_HEADER)
+        built = decode_parts(*parts, LARGEST_ANSWER_HEADER)
         session.answer = replace(built, number=session.number).frames()
         self._send(session.client, session.answer)
         session.built = built.kind == DONE
@@ -394,8 +390,10 @@ class Server:
         self._ended[session.client] = reason
         while len(self._ended) > _REMEMBERED:
             self._ended.popitem(last=False)
-        self._poller.unregister(session.process.sentinel)
-        _LOG.info("client %d: its worlds have ended: %s", int.from_bytes(session.name), reason)
+        del self._lines[session.line.fileno()]
+        self._poller.unregister(session.line.fileno())
+        session.line.close()
+        _LOG.info("client %d: its worlds have ended: %s", session.name, reason)
         # the answer to the present request, or to the next one, which the server may not see
         number = session.number + (session.answer is not None)
         lost = f"the worlds of this client are gone: {reason}"
@@ -422,10 +420,3 @@ def _forking() -> ForkServerContext:
         first.start()  # waits for the imports
     first.join()
     return context
-
-
-def _owner(frame: zmq.Frame) -> str:
-    """Return the key of the client that has sent a frame; empty without keys."""
-    with suppress(zmq.ZMQError):
-        return str(frame.get("User-Id"))
-    return ""

@@ -8,11 +8,12 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
+from multiprocessing.connection import Connection
 from typing import Any
 
 import numpy as np
-import zmq
 
 from veca_marl.envs.core.game import Game, Outcome
 from veca_marl.envs.core.game_cfg import GameCfg
@@ -22,6 +23,7 @@ from veca_marl.plugins import load_plugins
 from veca_marl.processes.children import prepare_child
 from veca_marl.remote import layouts
 from veca_marl.remote.description import GameSpecs
+from veca_marl.remote.lines import FarEnd
 from veca_marl.remote.messages import (
     ACTION,
     CALL,
@@ -35,7 +37,7 @@ from veca_marl.remote.messages import (
     VIEW,
     Message,
     ProtocolError,
-    decode,
+    decode_parts,
     entries,
     integer,
     shown,
@@ -71,6 +73,8 @@ class WorldServer:
         game = self._games[0]
         self._specs = GameSpecs.of(game)
         self._type = layouts.outcome_type(self._specs)
+        self._actions = layouts.ActionLayout(self._specs.players)
+        self._fields = layouts.outcome_fields(self._specs)
         self._states = [GlobalState(game) for game in self._games]
         self._spectators = [Spectator(game) for game in self._games]
         self._answers: dict[str, Callable[[Message], Message]] = {
@@ -111,62 +115,66 @@ class WorldServer:
             raise ProtocolError(f"{len(seeds)} seeds for {len(worlds)} worlds")
         generators = [_generator(seed) for seed in seeds]
         records = np.zeros(len(worlds), self._type)
+        columns = layouts.columns(records)
         for row, (world, rng) in enumerate(zip(worlds, generators, strict=True)):
             self._games[world].reset(rng)
-            self._write(records, row, world, frozenset())
+            self._write(columns, row, world, frozenset())
         return Message(DONE, request.number, data=_bytes(records))
 
     def _step(self, request: Message) -> Message:
         worlds = self._worlds(request)
-        players = self._specs.players
-        kinds = entries(request.fields, "kinds", sum(len(player.action) for player in players))
-        record = layouts.action_type(players, [kind for kind in kinds if type(kind) is str])
-        actions = layouts.records(request.data, record, len(worlds))
+        kinds = entries(request.fields, "kinds", len(self._actions.kinds))
+        record = self._actions.record([kind for kind in kinds if type(kind) is str])
+        actions = layouts.columns(layouts.records(request.data, record, len(worlds)))
         for row, world in enumerate(worlds):
-            self._command(world, actions[row])
+            self._command(world, actions, row)
         records = np.zeros(len(worlds), self._type)
+        columns = layouts.columns(records)
         for row, world in enumerate(worlds):
             game = self._games[world]
             eliminated = game.eliminated
             outcome = game.advance()
-            self._write(records, row, world, eliminated)
-            self._score(records, row, world, outcome)
+            self._write(columns, row, world, eliminated)
+            self._score(columns, row, world, outcome)
         return Message(DONE, request.number, data=_bytes(records))
 
-    def _command(self, world: int, actions: Any) -> None:
+    def _command(self, world: int, actions: layouts.Columns, row: int) -> None:
         given = {
-            player.name: {part: actions[layouts.action_field(i, part)] for part in player.action}
-            for i, player in enumerate(self._specs.players)
+            player.name: {part: actions[field][row] for part, field in fields.items()}
+            for player, fields in zip(self._specs.players, self._actions.fields, strict=True)
         }
         try:
             self._games[world].command(given)
         except ValueError as error:
             raise ValueError(f"world {world}, {error}") from None
 
-    def _write(self, records: Any, row: int, world: int, eliminated: frozenset[str]) -> None:
+    def _write(
+        self, columns: layouts.Columns, row: int, world: int, eliminated: frozenset[str]
+    ) -> None:
         """Write observations and the state of a world, except of players eliminated before."""
         game = self._games[world]
         if self._specs.global_state:
-            records[layouts.STATE][row] = self._states[world].read()
-        for index, player in enumerate(game.actors):
-            records[layouts.ELIMINATED][row, index] = player.name in game.eliminated
-            records[layouts.info_field(index)][row] = list(player.body.info().values())
+            columns[layouts.STATE][row] = self._states[world].read()
+        for index, (player, fields) in enumerate(zip(game.actors, self._fields, strict=True)):
+            columns[layouts.ELIMINATED][row, index] = player.name in game.eliminated
+            if fields.info:
+                columns[fields.info][row] = list(player.body.info().values())
             if player.name in eliminated:
                 continue
-            records[layouts.OBSERVED][row, index] = True
+            columns[layouts.OBSERVED][row, index] = True
             for name, value in game.observe(player).items():
-                records[layouts.observation_field(index, name)][row] = value
+                columns[fields.observations[name]][row] = value
 
-    def _score(self, records: Any, row: int, world: int, outcome: Outcome) -> None:
+    def _score(self, columns: layouts.Columns, row: int, world: int, outcome: Outcome) -> None:
         """Write reward terms and flags of a world."""
         game = self._games[world]
-        records[layouts.ENDED][row] = outcome.terminated, outcome.truncated
+        columns[layouts.ENDED][row] = outcome.terminated, outcome.truncated
         for index, player in enumerate(game.actors):
             terms = outcome.terms[player.name]
-            records[layouts.REWARD][row, index] = game.reward_of(terms)
-            records[layouts.TERMS][row, index] = [terms[name] for name in game.weights]
+            columns[layouts.REWARD][row, index] = game.reward_of(terms)
+            columns[layouts.TERMS][row, index] = [terms[name] for name in game.weights]
             if outcome.solved:
-                records[layouts.SOLVED][row, index] = outcome.solved[player.name]
+                columns[layouts.SOLVED][row, index] = outcome.solved[player.name]
 
     def _state(self, request: Message) -> Message:
         (world,) = self._one(request)
@@ -227,37 +235,31 @@ def _bytes(records: Any) -> memoryview:
     return memoryview(records.view(np.uint8))
 
 
-def serve_worlds(endpoint: str, name: bytes, cfg: WorldsCfg, worlds: int) -> None:
+def serve_worlds(connection: Connection[Any, Any], cfg: WorldsCfg, worlds: int) -> None:
     """Build worlds and answer requests until this process is ended.
 
     Args:
-        endpoint: Where the server's own socket is.
-        name: Name of these worlds there.
+        connection: The line to the server.
         cfg: The game.
         worlds: Number of worlds.
     """
     prepare_child(os.getppid())  # the process that forks those with worlds, ends with the server
-    with zmq.Context() as context, context.socket(zmq.DEALER) as socket:
-        socket.setsockopt(zmq.ROUTING_ID, name)
-        socket.setsockopt(zmq.LINGER, 1000)
-        socket.connect(endpoint)
-        try:
-            load_plugins(cfg.plugins)
-            server = WorldServer(cfg.game, worlds)
-        except Exception as error:  # the client has to learn of it
-            reason = f"the worlds cannot be built: {type(error).__name__}: {error}"
-            socket.send_multipart(refusal(0, PEER, reason).frames())
-            return
-        socket.send_multipart(Message(DONE).frames())
-        while True:
-            _answer_next(socket, server)
-
-
-def _answer_next(socket: zmq.Socket[bytes], server: WorldServer) -> None:
-    frames = socket.recv_multipart(copy=False)
+    line = FarEnd(connection)
     try:
-        request = decode([frame.buffer for frame in frames], LARGEST_REQUEST_HEADER)
-    except ProtocolError as error:
-        socket.send_multipart(refusal(0, PEER, str(error)).frames())
+        load_plugins(cfg.plugins)
+        server = WorldServer(cfg.game, worlds)
+    except Exception as error:  # the client has to learn of it
+        reason = f"the worlds cannot be built: {type(error).__name__}: {error}"
+        line.send(*refusal(0, PEER, reason).parts())
         return
-    socket.send_multipart(server.answer(request).frames(), copy=False)
+    line.send(*Message(DONE).parts())
+    with suppress(EOFError, ConnectionError):  # the server has ended
+        while True:
+            line.send(*_answer(server, *line.receive()).parts())
+
+
+def _answer(server: WorldServer, header: bytes, data: bytes) -> Message:
+    try:
+        return server.answer(decode_parts(header, data, LARGEST_REQUEST_HEADER))
+    except ProtocolError as error:
+        return refusal(0, PEER, str(error))
