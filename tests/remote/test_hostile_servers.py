@@ -62,10 +62,15 @@ def greeting(fields):
     return lambda request: Message("done", request.number, fields).frames()
 
 
+def expect_refusal(address, *named):
+    """A client that greets the server ends with one line."""
+    with pytest.raises(RemoteError, match=naming(address, *named)):
+        RemoteWorlds(address, timeout_s=5.0)
+
+
 def test_a_server_of_another_version_is_told_from_others():
     with impostor(lambda request: [b"veca_marl 7", b""]) as address:
-        with pytest.raises(RemoteError, match=naming("7", "1", address)):
-            RemoteWorlds(address, timeout_s=5.0)
+        expect_refusal(address, "7", "1")
 
 
 @pytest.mark.parametrize(
@@ -74,8 +79,7 @@ def test_a_server_of_another_version_is_told_from_others():
 )
 def test_what_is_no_message_is_refused(frames):
     with impostor(lambda request: frames) as address:
-        with pytest.raises(RemoteError, match=naming(address)):
-            RemoteWorlds(address, timeout_s=5.0)
+        expect_refusal(address)
 
 
 def lies(specs):
@@ -104,8 +108,7 @@ def lies(specs):
 def test_a_greeting_that_lies_is_refused(specs):
     for lie in lies(specs):
         with impostor(greeting(welcome(specs, **lie))) as address:
-            with pytest.raises(RemoteError, match=naming(address)):
-                RemoteWorlds(address, timeout_s=5.0)
+            expect_refusal(address)
 
 
 def test_arrays_of_another_size_are_refused(specs):
@@ -123,9 +126,9 @@ def test_arrays_of_another_size_are_refused(specs):
 
         with impostor(frames) as address:
             there = RemoteWorlds(address, timeout_s=5.0)
-            with closing(VecaEnv(there.cfg, 1, 0, host=RemoteHost(there))) as env:
-                with pytest.raises(RemoteError, match=naming("bytes", address)):
-                    env.reset()
+            env = VecaEnv(there.cfg, 1, 0, host=RemoteHost(there))
+            with closing(env), pytest.raises(RemoteError, match=naming("bytes", address)):
+                env.reset()
 
 
 def test_arrays_larger_than_the_specs_allow_are_not_read(specs):
@@ -153,9 +156,9 @@ def test_numbers_of_any_bits_are_taken_as_they_are(specs):
 
     with impostor(answer) as address:
         there = RemoteWorlds(address, timeout_s=5.0)
-        with closing(VecaEnv(there.cfg, 2, 0, host=RemoteHost(there))) as env:
-            with np.errstate(over="ignore", invalid="ignore"):
-                env.rollout(3, break_when_any_done=False)
+        env = VecaEnv(there.cfg, 2, 0, host=RemoteHost(there))
+        with closing(env), np.errstate(over="ignore", invalid="ignore"):
+            env.rollout(3, break_when_any_done=False)
 
 
 def test_a_reason_that_is_no_text_is_refused(specs):

@@ -91,14 +91,17 @@ def test_actions_of_several_parts_and_choices_are_the_same():
     cfg = compose(
         ["+task=BabyzumasRevenge", "senses/vision=blind", "body=walker_discrete_verbs"]
     ).game
-    with served(cfg, 1) as server:
-        with closing(gym_env(server)) as there, closing(VecaGymEnv(cfg, 0)) as here:
-            here.action_space.seed(0)
-            there.reset(seed=1)
-            here.reset(seed=1)
-            for _ in range(5):
-                action = here.action_space.sample()
-                np.testing.assert_equal(there.step(action), here.step(action))
+    with (
+        served(cfg, 1) as server,
+        closing(gym_env(server)) as there,
+        closing(VecaGymEnv(cfg, 0)) as here,
+    ):
+        here.action_space.seed(0)
+        there.reset(seed=1)
+        here.reset(seed=1)
+        for _ in range(5):
+            action = here.action_space.sample()
+            np.testing.assert_equal(there.step(action), here.step(action))
 
 
 def test_pictures_are_the_same(cfg, server):
@@ -139,9 +142,8 @@ def test_an_invalid_action_in_one_world_moves_none(cfg, server):
         for env in (there, here):
             env.set_seed(1)
         states = [env.reset() for env in (there, here)]
-        wrong = (
-            states[0].clone().set(("agents", "action"), torch.tensor([[[0.0, 0.0]], [[2.0, 0.0]]]))
-        )
+        actions = torch.tensor([[[0.0, 0.0]], [[2.0, 0.0]]])
+        wrong = states[0].clone().set(("agents", "action"), actions)
         with pytest.raises(ValueError, match=naming("world 1", "2.0")):
             there.step(wrong)
         for state in states:

@@ -371,7 +371,7 @@ class Server:
                 self._end(session, f"their process {end_of(session.process.exitcode)}")
             elif session.answer is None and now - session.since > self._cfg.limit_s:
                 self._end(session, f"a request took longer than {self._cfg.limit_s:g} s (limit_s)")
-            elif now - session.probed > _PROBE_S:
+            elif session.gone is not None or now - session.probed > _PROBE_S:
                 session.probed = now
                 self._probe(session, now)
 
