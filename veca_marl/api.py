@@ -10,10 +10,8 @@ import operator
 from collections.abc import Callable, Container, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import fields
-from importlib import import_module
 from inspect import Parameter, signature
 from pathlib import Path
-from types import ModuleType
 from typing import Any, ParamSpec, TypedDict, TypeVar, Unpack
 
 import torch
@@ -36,6 +34,7 @@ from veca_marl.runs.assembly import decide_precision, find_device, make_trainer
 from veca_marl.runs.continuation import resume_argument
 from veca_marl.runs.lock import locked
 from veca_marl.runs.run_folder import new_run
+from veca_marl.runs.served_worlds import import_remote
 from veca_marl.runs.training import TrainingResult, run_training
 
 # `opponent` is the configuration of `GameCfg.script`
@@ -352,21 +351,6 @@ def connect(
 
 
 _SPACES = ("render_mode", "layout")
-
-
-def import_remote(module: str) -> ModuleType:
-    """Return a module of `veca_marl.remote`.
-
-    Raises:
-        ModuleNotFoundError: Without the extra ``[remote]``.
-    """
-    try:
-        return import_module(f"veca_marl.remote.{module}")
-    except ModuleNotFoundError as error:
-        raise ModuleNotFoundError(
-            "worlds of other machines need pyzmq and msgpack: pip install 'veca_marl[remote]'",
-            name=error.name,
-        ) from error
 
 
 @_with_choices

@@ -17,10 +17,10 @@ ANY_PORT = "tcp://127.0.0.1:*"
 
 
 @contextmanager
-def served(cfg, worlds=2, keys=None, address=ANY_PORT, plugins=(), **changes):
+def served(cfg, worlds=2, keys=None, address=ANY_PORT, plugins=(), configuration="", **changes):
     """Serve a game in a thread; yield the server."""
     with closing(Game(cfg)) as game:
-        specs = GameSpecs.of(game)
+        specs = GameSpecs.of(game, configuration)
     chosen = ServerCfg(address, worlds, **changes)
     with closing(Server(chosen, WorldsCfg(cfg, plugins), specs, keys)) as server:
         stop = threading.Event()

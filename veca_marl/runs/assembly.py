@@ -31,6 +31,7 @@ from veca_marl.envs.core.game_cfg import GameCfg
 from veca_marl.plugins import load_plugins
 from veca_marl.runs.continuation import RESUMABLE, is_default
 from veca_marl.runs.run_folder import RunFolder
+from veca_marl.runs.served_worlds import ServedGames
 
 # parameters of mallopt(3)
 _M_TRIM_THRESHOLD = -1
@@ -129,7 +130,7 @@ def _assemble(
     if cfg.resume is None or checkpoints.empty:
         init_teams(learners, cfg.init_from, cfg.init_encoders)
     return Trainer(
-        make_env=GameFactory(cfg.game, tuple(cfg.plugins)),
+        make_env=_game_factory(cfg),
         learners=learners,
         collect=collect,
         evaluation=cfg.eval,
@@ -231,6 +232,19 @@ def _make_checkpoints(
         RESUMABLE,
         lambda key: is_default(cfg, key),
     )
+
+
+def _game_factory(cfg: Config) -> GameFactory | ServedGames:
+    """Return what makes the environments: on this machine, or on a server.
+
+    Raises:
+        ConfigError: If the server cannot be reached, or has another game or too few worlds.
+    """
+    if cfg.collect.server is None:
+        return GameFactory(cfg.game, tuple(cfg.plugins))
+    served = ServedGames(cfg.collect.server, cfg.collect.key)
+    served.check(cfg.game, max(cfg.collect.worlds, cfg.eval.worlds))
+    return served
 
 
 def make_learners(cfg: Config, specs: dict[str, TeamSpec], device: torch.device) -> TeamLearners:

@@ -23,12 +23,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from omegaconf import OmegaConf
-
-from veca_marl.api import compose_game, import_remote
+from veca_marl.api import compose_game
 from veca_marl.config import Config, ConfigError, one_line
 from veca_marl.config.command_line import CommandLine
 from veca_marl.envs.core.game import Game
+from veca_marl.runs.served_worlds import game_text, import_remote
 from veca_marl.sim.kernel_cache import announce_compilation
 
 
@@ -125,7 +124,7 @@ def _specs(cfg: Config) -> Any:
     description = import_remote("description")
     announce_compilation()
     with closing(Game(cfg.game)) as game:
-        return description.GameSpecs.of(game, OmegaConf.to_yaml(OmegaConf.structured(cfg.game)))
+        return description.GameSpecs.of(game, game_text(cfg.game))
 
 
 def _raise_limit_of_files() -> None:
