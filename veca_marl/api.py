@@ -1,7 +1,7 @@
 """Functions for notebooks and scripts: the choices of the command line as arguments.
 
-`make`, `gym_env` and `parallel_env` make the environment of a task, `train` trains on it,
-`check_task` checks it.
+`make`, `gym_env` and `parallel_env` make the environment of a task, `connect` that of a server's,
+`train` trains on it, `check_task` checks it.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from typing import Any, ParamSpec, TypedDict, TypeVar, Unpack
 import torch
 
 from veca_marl.checks import CheckCfg, TaskReport, check_game
-from veca_marl.config import ConfigError, compose, compose_node, to_config
+from veca_marl.config import Config, ConfigError, compose, compose_node, to_config
 from veca_marl.config.command_line import check_folder
 from veca_marl.config.overrides import parse, root_of
 from veca_marl.envs.adapters.gymnasium import VecaGymEnv
@@ -34,6 +34,7 @@ from veca_marl.runs.assembly import decide_precision, find_device, make_trainer
 from veca_marl.runs.continuation import resume_argument
 from veca_marl.runs.lock import locked
 from veca_marl.runs.run_folder import new_run
+from veca_marl.runs.served_worlds import import_remote
 from veca_marl.runs.training import TrainingResult, run_training
 
 # `opponent` is the configuration of `GameCfg.script`
@@ -59,14 +60,24 @@ def choose(task: str, **choices: Unpack[GameChoices]) -> GameCfg:
     """
     texts = chosen_overrides(task, **choices)
     _check_overrides(choices.get("overrides", ()), {"task": "task", "seed": "seed"}, _GAME_ROOTS)
-    cfg = compose(texts)
+    return compose_game(texts).game
+
+
+def compose_game(overrides: Sequence[str]) -> Config:
+    """Return the configuration in which a game is composed from the words of a command line.
+
+    Raises:
+        ConfigError: If one is not of the game, or there is no such choice.
+    """
+    _check_overrides(overrides, {}, _GAME_ROOTS)
+    cfg = compose(overrides)
     for team, path in cfg.frozen.items():
         raise ConfigError(
             f"opponent.{team}={path}: an environment does not play the policy of a run; choices: "
             f"{', '.join(script.value for script in Script)}; `train` and "
             "python -m veca_marl.evaluate play it"
         )
-    return cfg.game
+    return cfg
 
 
 def chosen_overrides(
@@ -277,6 +288,69 @@ def parallel_env(
     """
     cfg = choose(task, **choices)
     return VecaParallelEnv(cfg, seed, render_mode, SpaceLayout.named(layout))
+
+
+def connect(
+    address: str,
+    *,
+    key: str | Path | None = None,
+    library: str = "torchrl",
+    worlds: int | None = None,
+    seed: int | None = None,
+    device: torch.device | str | None = None,
+    render_mode: str | None = None,
+    layout: str = "arrays",
+    timeout_s: float = 60.0,
+) -> VecaEnv | VecaGymEnv | VecaParallelEnv:
+    """Make an environment of the game that ``python -m veca_marl.serve`` serves at an address.
+
+    It has worlds of its own there, and returns the same bytes as an environment of this process
+    with the same configuration and seed. Closing it ends them.
+
+    Args:
+        address: Address of the server, such as ``tcp://host:5555``.
+        key: File of keys that the owner of the server has made for this client; None for a server
+            without keys.
+        library: ``torchrl`` for what `make` returns, ``gymnasium`` for `gym_env`, ``pettingzoo``
+            for `parallel_env`.
+        worlds: Worlds of a TorchRL environment; None is as many as the server gives. The others
+            have one.
+        seed: As for `make`.
+        device: As for `make`; TorchRL only.
+        render_mode: As for `gym_env`; not for TorchRL.
+        layout: As for `gym_env`; not for TorchRL.
+        timeout_s: Seconds without a word of the server after which it is given up. A server that
+            works says so each second, however long it takes.
+
+    Raises:
+        ConfigError: If there is no such library, or an argument is not of it.
+        ValueError: If an argument is impossible, the server gives fewer worlds, or the task is one
+            for several agents and the library Gymnasium.
+        KeyFileError: If the file of keys cannot be used.
+        RemoteError: If there is no server, it refuses this client, or later, it has lost its
+            worlds.
+        ModuleNotFoundError: Without the extra ``[remote]``.
+    """
+    choices = {"torchrl": ("worlds", "device"), "gymnasium": _SPACES, "pettingzoo": _SPACES}
+    if library not in choices:
+        raise ConfigError(unknown("library", str(library), list(choices)))
+    given = {"worlds": worlds, "device": device, "render_mode": render_mode}
+    given["layout"] = None if layout == "arrays" else layout
+    for name, value in given.items():
+        if value is not None and name not in choices[library]:
+            raise ConfigError(f"{name}={value!r} is no argument of library={library!r}")
+    placed = None if device is None else find_device(str(device))
+    remote, games = import_remote("client"), import_remote("games")
+    there = remote.RemoteWorlds(address, key, timeout_s)
+    host = games.RemoteHost(there)
+    if library == "torchrl":
+        env = VecaEnv(there.cfg, there.most if worlds is None else worlds, seed, host=host)
+        return env if placed is None else env.to(placed)
+    adapter = VecaGymEnv if library == "gymnasium" else VecaParallelEnv
+    return adapter(there.cfg, seed, render_mode, SpaceLayout.named(layout), host)
+
+
+_SPACES = ("render_mode", "layout")
 
 
 @_with_choices

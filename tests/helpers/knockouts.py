@@ -3,8 +3,6 @@
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
-from composed import compose
-
 from veca_marl.envs.core.expert import EXPERTS, Expert
 from veca_marl.envs.core.task import TASKS, Task, TaskCfg, Team, terms
 
@@ -54,6 +52,8 @@ class KnockoutExpert(Expert):
 @contextmanager
 def knockout(*overrides):
     """Register the task within the context; yield its configuration."""
+    from composed import compose  # not in the processes of a server, which need no torch
+
     game = compose(["+task=KickTheBall", "playground=simple", *overrides]).game
     TASKS["Knockout"], EXPERTS["Knockout"] = Knockout, KnockoutExpert
     try:

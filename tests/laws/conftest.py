@@ -18,30 +18,36 @@ WITH_WALKERS = ("PushOut2v2", "SoccerTwoPlayer")
 # tasks that the quick suite plays with every adapter and with extreme actions: besides those above
 # one with hands, one with verbs and doors, and one of another suite
 WITH_EVERY_ADAPTER = (*WITH_OTHER_BODY, "GrabObject", "BabyzumasRevenge", "HandRegard")
-NARROW = ("test_every_adapter", "test_every_task_robustly", "test_every_task_with_bodies")
+# those that it plays in the worlds of a server: one agent, two teams with joints, several agents
+ON_A_SERVER = ("KickTheBall", "PushOut1v1", "MultiAgentNav")
+NARROW = {
+    "test_every_adapter": WITH_EVERY_ADAPTER,
+    "test_every_adapter_remotely": ON_A_SERVER,
+    "test_every_task_robustly": WITH_EVERY_ADAPTER,
+    "test_every_task_with_bodies": WITH_EVERY_ADAPTER,
+}
 WORLDS, STEPS = 2, 25
 
 
 def pytest_generate_tests(metafunc):
     """Give a test each task, and each kind of action if it depends on `kind`."""
+    narrow = NARROW.get(metafunc.module.__name__.rpartition(".")[2])
     if "kind" in metafunc.fixturenames:
-        narrow = metafunc.module.__name__.endswith(NARROW)
         pairs = [_pair(task, kind, narrow) for task in sorted(TASKS) for kind in KINDS]
         metafunc.parametrize(("task", "kind"), pairs, scope="session")
     elif "task" in metafunc.fixturenames:
-        narrow = metafunc.module.__name__.endswith(NARROW)
         tasks = [_one(task, narrow) for task in sorted(TASKS)]
         metafunc.parametrize("task", tasks, scope="session")
 
 
 def _pair(task, kind, narrow):
     quick = task in WITH_OTHER_BODY or (kind == "own") != (task in WITH_WALKERS)
-    quick = quick and (not narrow or (kind == "own" and task in WITH_EVERY_ADAPTER))
+    quick = quick and (narrow is None or (kind == "own" and task in narrow))
     return pytest.param(task, kind, marks=() if quick else pytest.mark.slow)
 
 
 def _one(task, narrow):
-    quick = not narrow or task in WITH_EVERY_ADAPTER
+    quick = narrow is None or task in narrow
     return pytest.param(task, marks=() if quick else pytest.mark.slow)
 
 

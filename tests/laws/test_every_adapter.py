@@ -3,16 +3,15 @@
 import warnings
 
 import gymnasium
-import numpy as np
 import pytest
 from batches import play_and_compare, single_worlds
+from compared import by_player, check_observation, check_result
 from gymnasium.utils.env_checker import check_env
 from pettingzoo.test import parallel_api_test
 from rollouts import EPISODE, SHORT
 
 from veca_marl.envs.adapters.gymnasium import VecaGymEnv
 from veca_marl.envs.adapters.pettingzoo import VecaParallelEnv
-from veca_marl.envs.core.task import SOLVED
 
 STEPS = EPISODE + 5
 
@@ -47,32 +46,6 @@ def gym_env(task, kind, cfg):
         env = VecaGymEnv(cfg)
     yield env
     env.close()
-
-
-def by_player(step, group_map):
-    return {
-        name: step[team][index]
-        for team, names in group_map.items()
-        for index, name in enumerate(names)
-    }
-
-
-def check_observation(observation, row):
-    assert set(observation) == set(row["observation"].keys())
-    for sense, seen in observation.items():
-        expected = row["observation", sense].numpy()
-        np.testing.assert_array_equal(seen, expected, err_msg=sense)
-        assert seen.dtype == expected.dtype, sense
-
-
-def check_result(reward, terminated, truncated, info, row):
-    assert np.float32(reward) == row["reward"].item()
-    assert (terminated, truncated) == (row["terminated"].item(), row["truncated"].item())
-    expected = {name: value.item() for name, value in row["info"].items()}
-    assert info.get(SOLVED) is expected.pop(SOLVED, None)
-    others = {name: value for name, value in info.items() if name not in ("terms", SOLVED)}
-    found = info["terms"] | others
-    assert {name: np.float32(value) for name, value in found.items()} == expected
 
 
 def test_a_batch_equals_single_worlds_with_masks_and_partial_resets(cfg, env):

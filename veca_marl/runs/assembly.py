@@ -33,6 +33,7 @@ from veca_marl.plugins import load_plugins
 from veca_marl.runs.continuation import RESUMABLE, is_default
 from veca_marl.runs.demonstrations import open_demonstrations
 from veca_marl.runs.run_folder import RunFolder
+from veca_marl.runs.served_worlds import ServedGames
 
 # parameters of mallopt(3)
 _M_TRIM_THRESHOLD = -1
@@ -135,11 +136,11 @@ def _assemble(
     """Return the trainer; of a new run, with the parameters that it takes from other runs."""
     if cfg.resume is None or checkpoints.empty:
         init_teams(learners, cfg.init_from, cfg.init_encoders)
-    make_env = GameFactory(cfg.game, tuple(cfg.plugins))
+    make_env = _game_factory(cfg)
     labelled = tuple(t for t, each in learners.algorithms.items() if each.needs_labels)
     return Trainer(
         make_env=make_env,
-        make_training_env=replace(make_env, labelled=labelled) if labelled else None,
+        make_training_env=_with_labels(make_env, labelled) if labelled else None,
         learners=learners,
         collect=collect,
         evaluation=cfg.eval,
@@ -283,6 +284,33 @@ def _make_checkpoints(
         RESUMABLE,
         lambda key: is_default(cfg, key),
     )
+
+
+def _game_factory(cfg: Config) -> GameFactory | ServedGames:
+    """Return what makes the environments: on this machine, or on a server.
+
+    Raises:
+        ConfigError: If the server cannot be reached, or has another game or too few worlds.
+    """
+    if cfg.collect.server is None:
+        return GameFactory(cfg.game, tuple(cfg.plugins))
+    served = ServedGames(cfg.collect.server, cfg.collect.key)
+    served.check(cfg.game, max(cfg.collect.worlds, cfg.eval.worlds))
+    return served
+
+
+def _with_labels(factory: GameFactory | ServedGames, teams: tuple[str, ...]) -> GameFactory:
+    """Return what makes environments that say what the experts of teams would do.
+
+    Raises:
+        ConfigError: If the worlds are on a server.
+    """
+    if isinstance(factory, ServedGames):
+        raise ConfigError(
+            f"collect.server={factory.address} gives no labels of experts, which the algorithms of "
+            f"{list(teams)} learn from: play the worlds on this machine"
+        )
+    return replace(factory, labelled=teams)
 
 
 def make_learners(cfg: Config, specs: dict[str, TeamSpec], device: torch.device) -> TeamLearners:

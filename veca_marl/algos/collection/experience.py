@@ -37,6 +37,9 @@ class CollectCfg:
         answer_limit_s: Seconds that a worker process may take to start, for a batch, a reset, new
             parameters or a step of an evaluation; if one takes longer, the run ends with an error
             that names it. The default is more than a hundred times the usual duration of a batch.
+        server: Address of a server that has the worlds (`veca_marl.serve`), such as
+            ``tcp://host:5555``; None plays them on this machine.
+        key: File with the keys of this machine for the server; None for a server without keys.
     """
 
     processes: int = 2
@@ -44,6 +47,8 @@ class CollectCfg:
     steps: int = 128
     threads: int = 1
     answer_limit_s: float = 600.0
+    server: str | None = None
+    key: str | None = None
 
     def __post_init__(self) -> None:
         if self.processes < 0:

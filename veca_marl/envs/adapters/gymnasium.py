@@ -8,6 +8,7 @@ import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 
+from veca_marl.envs.adapters.hosts import HERE, Host
 from veca_marl.envs.adapters.seeded_game import NotCopied, SeededGame
 from veca_marl.envs.adapters.spaces import Observed, Space, SpaceLayout
 from veca_marl.envs.core.game_cfg import GameCfg
@@ -27,6 +28,7 @@ class VecaGymEnv(NotCopied, gymnasium.Env[Observed, Any]):
         seed: Used until `reset` is given one; None is fresh entropy.
         render_mode: `rgb_array` if `render` is to be called.
         layout: Shapes of observations and actions.
+        host: Where the game is played.
 
     Raises:
         ValueError: If the task has several agents.
@@ -38,8 +40,9 @@ class VecaGymEnv(NotCopied, gymnasium.Env[Observed, Any]):
         seed: int | None = None,
         render_mode: str | None = None,
         layout: SpaceLayout = SpaceLayout.arrays,
+        host: Host = HERE,
     ) -> None:
-        self._played = SeededGame(cfg, seed, render_mode)
+        self._played = SeededGame(cfg, seed, render_mode, host)
         game = self._played.game
         if len(game.actors) != 1:
             self._played.close()

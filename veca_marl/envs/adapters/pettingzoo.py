@@ -10,6 +10,7 @@ from gymnasium.spaces import Box
 from numpy.typing import NDArray
 from pettingzoo import ParallelEnv
 
+from veca_marl.envs.adapters.hosts import HERE, Host
 from veca_marl.envs.adapters.seeded_game import NotCopied, SeededGame
 from veca_marl.envs.adapters.spaces import Observed, Space, SpaceLayout
 from veca_marl.envs.core.game import Observation
@@ -33,6 +34,7 @@ class VecaParallelEnv(NotCopied, ParallelEnv[str, Observed, Any]):
         seed: Used until `reset` is given one; None is fresh entropy.
         render_mode: `rgb_array` if `render` is to be called.
         layout: Shapes of observations and actions.
+        host: Where the game is played.
     """
 
     def __init__(
@@ -41,8 +43,9 @@ class VecaParallelEnv(NotCopied, ParallelEnv[str, Observed, Any]):
         seed: int | None = None,
         render_mode: str | None = None,
         layout: SpaceLayout = SpaceLayout.arrays,
+        host: Host = HERE,
     ) -> None:
-        self._played = SeededGame(cfg, seed, render_mode)
+        self._played = SeededGame(cfg, seed, render_mode, host)
         game = self._played.game
         self.metadata = self._played.metadata
         self.render_mode = render_mode

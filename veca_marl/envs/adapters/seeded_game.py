@@ -11,14 +11,12 @@ from typing import Any, NamedTuple, NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
+from veca_marl.envs.adapters.hosts import HERE, Host
 from veca_marl.envs.core.episodes import Episodes
-from veca_marl.envs.core.game import Game, Observation, refuse_closed
+from veca_marl.envs.core.game import Observation, refuse_closed
 from veca_marl.envs.core.game_cfg import GameCfg
-from veca_marl.envs.core.global_state import GlobalState
 from veca_marl.envs.core.snapshot import Snapshot, Snapshots, restore
 from veca_marl.envs.core.task import SOLVED
-from veca_marl.envs.rendering import Spectator
-from veca_marl.sim.kernel_cache import announce_compilation
 
 RENDER_MODES = ("rgb_array",)
 
@@ -82,17 +80,19 @@ class SeededGame:
         cfg: What to play.
         seed: As for `VecaEnv`; None is fresh entropy.
         render_mode: `rgb_array` if `render` is to be called.
+        host: Where the game is played.
 
     Raises:
         ValueError: If there is no such render mode, or the seed is negative.
     """
 
-    def __init__(self, cfg: GameCfg, seed: int | None, render_mode: str | None) -> None:
+    def __init__(
+        self, cfg: GameCfg, seed: int | None, render_mode: str | None, host: Host = HERE
+    ) -> None:
         if render_mode is not None and render_mode not in RENDER_MODES:
             raise ValueError(f"render_mode={render_mode!r}; choices: {[None, *RENDER_MODES]}")
         self._episodes = Episodes(seed)
-        announce_compilation()
-        self.game = Game(cfg)
+        (self.game,) = host.make(cfg, 1)
         self.names = [player.name for player in self.game.actors]
         self._snapshots: Snapshots | None = None
         self.metadata: dict[str, Any] = {
@@ -100,8 +100,8 @@ class SeededGame:
             "render_modes": list(RENDER_MODES),
             "render_fps": cfg.clock.control_rate_hz,
         }
-        self._spectator = Spectator(self.game)
-        self._state = GlobalState(self.game)
+        self._view = host.view(self.game)
+        self._state = host.state(self.game)
         self._render_mode = render_mode
         self._running = False
         self._closed = False
@@ -244,7 +244,7 @@ class SeededGame:
             raise RuntimeError(f"made without a render_mode; choices: {list(RENDER_MODES)}")
         if self.rng is None:
             raise RuntimeError("no episode has begun: call reset() before render()")
-        return self._spectator.frame(self.game.observe(self.game.actors[0]))
+        return self._view.frame(self.game.observe(self.game.actors[0]))
 
     def close(self) -> None:
         """Release the resources of the world."""

@@ -17,7 +17,13 @@ from typing import Any
 import numpy as np
 
 from veca_marl.envs.core.game import Game
-from veca_marl.envs.core.object_states import Capture, ObjectStates, Putting, SnapshotError
+from veca_marl.envs.core.object_states import (
+    BuiltObjects,
+    Capture,
+    ObjectStates,
+    Putting,
+    SnapshotError,
+)
 from veca_marl.sim.physics.bullet_client import pybullet
 from veca_marl.sim.physics.world import SavedPhysics
 from veca_marl.stored_files import StoredFileError, read_bytes
@@ -88,9 +94,9 @@ class Snapshots:
     """
 
     def __init__(self, game: Game) -> None:
-        other = Game(game.cfg)
+        built, other = _built(game), Game(game.cfg)
         try:
-            self._constant = game.built.shared_with(other.built)
+            self._constant = built.shared_with(other.built)
         finally:
             other.close()
 
@@ -136,9 +142,16 @@ def restore(game: Game, snapshot: Snapshot) -> None:
         raise SnapshotError(f"the snapshot does not fit this game: {error}") from error
 
 
+def _built(game: Game) -> BuiltObjects:
+    try:
+        return game.built
+    except AttributeError as error:  # a game on a server
+        raise SnapshotError(f"it has no snapshots: {error}") from error
+
+
 def _digest(game: Game) -> str:
     """Return a digest of the configuration of a game and of the classes of its objects."""
-    kinds = [f"{type(each).__module__}.{type(each).__qualname__}" for each in game.built.objects]
+    kinds = [f"{type(each).__module__}.{type(each).__qualname__}" for each in _built(game).objects]
     text = json.dumps([_FORMAT, repr(game.cfg), kinds])
     return hashlib.sha256(text.encode()).hexdigest()
 

@@ -11,16 +11,14 @@ from numpy.typing import NDArray
 from tensordict import TensorDict, TensorDictBase
 from torchrl.data import Bounded, Categorical, Composite, TensorSpec, Unbounded
 
+from veca_marl.envs.adapters.hosts import HERE, Host
 from veca_marl.envs.adapters.seeded_game import NotCopied
 from veca_marl.envs.adapters.torchrl.fast_step import Arrays, FastStepEnv, Layout
 from veca_marl.envs.core.episodes import Episodes, check_integer, fresh_seed
 from veca_marl.envs.core.game import ActionSpec, Game, Outcome, from_parts, refuse_closed
 from veca_marl.envs.core.game_cfg import GameCfg
-from veca_marl.envs.core.global_state import GlobalState
 from veca_marl.envs.core.snapshot import Snapshot, Snapshots, restore
 from veca_marl.envs.core.task import SOLVED, Player
-from veca_marl.envs.rendering import Spectator
-from veca_marl.sim.kernel_cache import announce_compilation
 from veca_marl.sim.sense import ArraySpec
 
 DONE_KEYS = ("done", "terminated", "truncated")
@@ -36,18 +34,19 @@ class EnvSpecs(NamedTuple):
     done: Composite
 
 
-def env_specs(game: Game, teams: list[str], worlds: int) -> EnvSpecs:
+def env_specs(game: Game, teams: list[str], worlds: int, state_size: int | None) -> EnvSpecs:
     """Return the specs of an environment.
 
     Args:
         game: One of its games.
         teams: The teams that take actions.
         worlds: Number of games.
+        state_size: Length of the key `state`; None if there is none.
     """
     specs = EnvSpecs(*(Composite(shape=(worlds,)) for _ in EnvSpecs._fields))
     specs.done.update(done_spec((worlds,)))
-    if game.cfg.global_state:
-        specs.observation[STATE] = Unbounded((worlds, GlobalState(game).size))
+    if state_size is not None:
+        specs.observation[STATE] = Unbounded((worlds, state_size))
     for team in teams:
         player, *_ = players = game.team(team)
         batch = (worlds, len(players))
@@ -220,6 +219,7 @@ class VecaEnv(NotCopied, FastStepEnv):
         first_world: Number of the first world.
         fast_step: Whether to replace two internal methods of TorchRL by shorter ones with the same
             results, see `fast_step.py`; not done with a version of TorchRL that was not tested.
+        host: Where the games are played.
 
     Raises:
         ValueError: If there is less than one world, or the configuration is impossible.
@@ -233,30 +233,32 @@ class VecaEnv(NotCopied, FastStepEnv):
         *,
         first_world: int = 0,
         fast_step: bool = True,
+        host: Host = HERE,
     ) -> None:
         check_integer("worlds", worlds, least=1)
         if seed is not None:
             check_integer("seed", seed)
-        announce_compilation()
         super().__init__(fast_step, torch.Size([worlds]))
         # TorchRL's `is_closed` is also True before the first reset
         self._worlds_closed = False
         self.cfg = cfg
         self.first_world = first_world
-        self.games = [Game(cfg) for _ in range(worlds)]
+        self._host = host
+        self.games = host.make(cfg, worlds)
         self._teams = [team.name for team in cfg.teams if team.name not in cfg.script]
         self._eliminates = self.games[0].task.eliminates
         self.group_map = {
             team: [player.name for player in self.games[0].team(team)] for team in self._teams
         }
+        self.spectators = [host.view(game) for game in self.games]
+        self._states = [host.state(game) for game in self.games if cfg.global_state]
         self._make_specs()
-        self.spectators = [Spectator(game) for game in self.games]
         self._snapshots: Snapshots | None = None
-        self._states = [GlobalState(game) for game in self.games if cfg.global_state]
         self.set_seed(seed)
 
     def _make_specs(self) -> None:
-        specs = env_specs(self.games[0], self._teams, len(self.games))
+        state_size = self._states[0].size if self._states else None
+        specs = env_specs(self.games[0], self._teams, len(self.games), state_size)
         self.observation_spec, self.action_spec = specs.observation, specs.action
         self.reward_spec, self.done_spec = specs.reward, specs.done
         self._actions = {
@@ -301,8 +303,10 @@ class VecaEnv(NotCopied, FastStepEnv):
         """
         refuse_closed(self._worlds_closed)
         arrays = self._start.new()
-        for world in self._selected(tensordict, "_reset"):
-            self.games[world].reset(self.episodes[world].next(episode))
+        worlds = self._selected(tensordict, "_reset")
+        rngs = [self.episodes[world].next(episode) for world in worlds]
+        self._host.reset([self.games[world] for world in worlds], rngs)
+        for world in worlds:
             self._observe(world, arrays, frozenset())
         return self._start.tensordict(arrays, self.device)
 
@@ -320,10 +324,10 @@ class VecaEnv(NotCopied, FastStepEnv):
         arrays = self._next.new()
         if len(worlds) < len(self.games):
             self._keep(tensordict, arrays, worlds)
+        outcomes = self._host.advance([self.games[world] for world in worlds])
         for world in worlds:
-            game = self.games[world]
-            eliminated = game.eliminated
-            outcome = game.advance()
+            eliminated = self.games[world].eliminated
+            outcome = next(outcomes)
             self._observe(world, arrays, eliminated)
             self._score(world, arrays, outcome)
         return self._next.tensordict(arrays, self.device)
