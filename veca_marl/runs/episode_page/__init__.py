@@ -2,7 +2,7 @@
 
 from veca_marl.runs.episode_page.episode import Agent, Episode, Geometry, SceneInfo
 from veca_marl.runs.episode_page.page import read_page, write_page
-from veca_marl.runs.episode_page.recorder import EpisodeRecorder
+from veca_marl.runs.episode_page.recorder import EpisodeRecorder, play
 
 __all__ = [
     "Agent",
@@ -10,6 +10,7 @@ __all__ = [
     "EpisodeRecorder",
     "Geometry",
     "SceneInfo",
+    "play",
     "read_page",
     "write_page",
 ]

@@ -6,6 +6,7 @@ equal significance together, which `deflate` compresses several times better tha
 
 from __future__ import annotations
 
+import math
 import zlib
 from collections.abc import Mapping
 from typing import Any
@@ -43,9 +44,10 @@ class Packer:
         steps = np.rint(np.asarray(values, np.float64) / unit)
         if not np.isfinite(steps).all() or np.abs(steps).max(initial=0.0) > _LARGEST / 2:
             raise ValueError(f"{name}: values must be finite and below {_LARGEST / 2 * unit:g}")
-        integers = steps.astype(np.int64).reshape(len(steps), -1)
+        tracks = math.prod(steps.shape[1:])
+        integers = steps.astype(np.int64).reshape(steps.shape[0], tracks)
         deltas = np.diff(integers, axis=0, prepend=0).astype("<i4")
-        planes = np.ascontiguousarray(deltas.T).view(np.uint8).reshape(-1, 4).T
+        planes = np.ascontiguousarray(deltas.T).reshape(-1, 1).view(np.uint8).T
         entry = {"codec": DELTA, "unit": unit, "shape": list(np.shape(values))}
         self._add(name, entry, zlib.compress(planes.tobytes(), 9))
 
@@ -102,19 +104,16 @@ def unpack(entries: Mapping[str, Mapping[str, Any]], block: bytes, name: str) ->
 
 def _accumulated(content: bytes, shape: tuple[int, ...], unit: float, name: str) -> Array:
     planes = np.frombuffer(_inflated(content, shape, 4, name), np.uint8).reshape(4, -1)
-    deltas = np.ascontiguousarray(planes.T).view("<i4").reshape(-1, shape[0]).T
+    tracks = math.prod(shape[1:])
+    deltas = np.ascontiguousarray(planes.T).view("<i4").reshape(tracks, shape[0]).T
     values: Array = np.cumsum(deltas.astype(np.int64), axis=0).reshape(shape) * unit
     return values
 
 
 def _inflated(content: bytes, shape: tuple[int, ...], item_size: int, name: str) -> bytes:
-    count = 1
-    for size in shape:
-        if not 0 <= size <= _MOST_VALUES:
-            raise PackingError(f"{name}: impossible shape {shape}")
-        count *= size
-    if count > _MOST_VALUES:
-        raise PackingError(f"{name}: more than {_MOST_VALUES} values")
+    count = math.prod(shape)
+    if min(shape, default=0) < 0 or count > _MOST_VALUES:
+        raise PackingError(f"{name}: impossible shape {shape}")
     machine = zlib.decompressobj()
     data = machine.decompress(content, count * item_size + 1)
     if len(data) != count * item_size:

@@ -26,6 +26,7 @@ _LARGEST = 500 * MEGABYTE
 _WEB = "web"
 _MODULES = ("data", "world", "camera", "panels", "timeline", "clock", "main")
 _THREE = "three.module.min.js"
+_END = "</html>\n"
 
 
 def write_page(path: Path, episode: Episode) -> None:
@@ -91,7 +92,7 @@ def read_page(path: Path) -> Episode:
 def _contents(text: str) -> tuple[dict[str, Any], bytes]:
     found = re.search(r'<script type="application/json" id="episode">(.*?)</script>', text, re.S)
     data = re.search(r'<script type="text/plain" id="data">(.*?)</script>', text, re.S)
-    if found is None or data is None:
+    if found is None or data is None or not text.endswith(_END):
         raise ValueError("it holds no whole episode")
     description = json.loads(found[1])
     if not isinstance(description, dict) or description.get("format") != FORMAT:

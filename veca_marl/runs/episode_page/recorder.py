@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 from tensordict import TensorDictBase
+from torchrl.envs.utils import step_mdp
 
+from veca_marl.algos.evaluation.evaluate import ActionPolicy
+from veca_marl.algos.networks.memory import with_memory
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
 from veca_marl.envs.core.game import Game
 from veca_marl.envs.core.task import SOLVED, Player
@@ -27,8 +30,24 @@ from veca_marl.sim.body.sense_organs import EYES
 from veca_marl.sim.geometry import Mesh, Scene, SceneObject, Shape
 from veca_marl.sim.sense import ArraySpec
 
-TOUCH_LEVELS = 255
+TOUCH_LEVELS = 255  # readings are stored in steps of 1/255, rounded up: what touches is never 0
 WAVEFORM = "waveform"
+
+
+def play(env: VecaEnv, policy: ActionPolicy) -> Iterator[TensorDictBase]:
+    """Play one episode; yield its start, then what the environment returned for each step.
+
+    Args:
+        env: An environment of one world.
+        policy: Writes the actions of all teams.
+    """
+    playing = with_memory(env, policy)
+    state, done = playing.reset(), False
+    yield state
+    while not done:
+        played = playing.step(policy(state))
+        state, done = step_mdp(played), bool(played["next", "done"].all())
+        yield played
 
 
 class EpisodeRecorder:
@@ -68,6 +87,16 @@ class EpisodeRecorder:
     def steps(self) -> int:
         """Steps recorded so far, the start left out."""
         return len(self._positions) - 1
+
+    def record(self, episode: Iterable[TensorDictBase]) -> None:
+        """Record an episode as `play` yields it, no longer than the recording may be."""
+        steps = iter(episode)
+        next(steps)
+        self.begin()
+        for played in steps:
+            self.add(played)
+            if self._is_cut:
+                return
 
     def add(self, played: TensorDictBase) -> None:
         """Record the step that was just played.

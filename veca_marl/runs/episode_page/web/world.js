@@ -54,7 +54,10 @@ export class Poses {
   }
 
   #setMatrix(frame) {
-    const [x, y, z, w] = this.quaternion.subarray(4 * frame, 4 * frame + 4);
+    const x = this.quaternion[4 * frame];
+    const y = this.quaternion[4 * frame + 1];
+    const z = this.quaternion[4 * frame + 2];
+    const w = this.quaternion[4 * frame + 3];
     const m = this.matrix;
     const i = 12 * frame;
     m[i] = 1 - 2 * (y * y + z * z);
@@ -133,6 +136,10 @@ function plainMaterial(geometry, light) {
   return material;
 }
 
+const ONE = new THREE.Vector3(1, 1, 1);
+const A = new THREE.Vector3();
+const D = new THREE.Vector3();
+
 class Primitive {
   constructor(geometry, episode) {
     this.frame = geometry.frame;
@@ -142,7 +149,7 @@ class Primitive {
     this.local = new THREE.Matrix4().set(...r0, geometry.offset[0], ...r1, geometry.offset[1], ...r2, geometry.offset[2], 0, 0, 0, 1);
     this.extent = reach(geometry);
     const solid = shapeOf(geometry).applyMatrix4(this.local);
-    this.inverse = this.local.clone().invert();
+    this.inverse = new THREE.Matrix4();
     this.mesh = new THREE.Mesh(solid, plainMaterial(geometry, episode.light));
     this.isFloor = episode.objects[geometry.object] === "floor" || Math.min(this.extent[0], this.extent[1]) > 8 * this.extent[2];
     this.mesh.castShadow = !this.isFloor && !geometry.transparent;
@@ -152,26 +159,29 @@ class Primitive {
     this.shade = 1;
   }
 
+  // Prepares `isBetween` for where it is now.
+  settle() {
+    this.inverse.compose(this.mesh.position, this.mesh.quaternion, ONE).multiply(this.local).invert();
+  }
+
   // Whether the straight line between two points passes through it.
-  isBetween(from, to, scratch) {
-    const inverse = scratch.matrix.compose(this.mesh.position, this.mesh.quaternion, scratch.one).multiply(this.local).invert();
-    const a = scratch.a.copy(from).applyMatrix4(inverse);
-    const d = scratch.d.copy(to).applyMatrix4(inverse).sub(a);
-    let enter = 0;
-    let leave = 0.96;
-    for (const [axis, key] of ["x", "y", "z"].entries()) {
-      const half = this.extent[axis] + 0.02;
-      if (Math.abs(d[key]) < 1e-9) {
-        if (Math.abs(a[key]) > half) return false;
-        continue;
-      }
-      const one = (-half - a[key]) / d[key];
-      const two = (half - a[key]) / d[key];
-      enter = Math.max(enter, Math.min(one, two));
-      leave = Math.min(leave, Math.max(one, two));
-      if (enter >= leave) return false;
-    }
-    return true;
+  isBetween(from, to) {
+    const a = A.copy(from).applyMatrix4(this.inverse);
+    const d = D.copy(to).applyMatrix4(this.inverse).sub(a);
+    const [x, y, z] = this.extent;
+    this.enter = 0;
+    this.leave = 0.96;
+    return this.#slab(a.x, d.x, x) && this.#slab(a.y, d.y, y) && this.#slab(a.z, d.z, z);
+  }
+
+  #slab(start, along, extent) {
+    const half = extent + 0.02;
+    if (Math.abs(along) < 1e-9) return Math.abs(start) <= half;
+    const one = (-half - start) / along;
+    const two = (half - start) / along;
+    this.enter = Math.max(this.enter, Math.min(one, two));
+    this.leave = Math.min(this.leave, Math.max(one, two));
+    return this.enter < this.leave;
   }
 
   fade(ghost, instantly) {
@@ -326,25 +336,36 @@ export class Skin {
     const x = uy * wz - uz * wy;
     const y = uz * wx - ux * wz;
     const z = ux * wy - uy * wx;
-    for (const corner of [a, b, c]) {
-      n[corner] += x;
-      n[corner + 1] += y;
-      n[corner + 2] += z;
-    }
+    n[a] += x;
+    n[a + 1] += y;
+    n[a + 2] += z;
+    n[b] += x;
+    n[b + 1] += y;
+    n[b + 2] += z;
+    n[c] += x;
+    n[c + 1] += y;
+    n[c + 2] += z;
   }
 
   #fill(triangles) {
     const { position, normal } = this.mesh.geometry.attributes;
-    const owners = this.mesh0.owners;
+    const { vertices, normals } = this;
+    const [p, q] = [position.array, normal.array];
     for (let n = 0; n < triangles.length; n++) {
       const v = 3 * triangles[n];
-      const hide = this.isHeadHidden && this.hidden.has(owners[Math.floor(n / 3)]);
       for (let k = 0; k < 3; k++) {
-        position.array[3 * n + k] = hide ? 0 : this.vertices[v + k];
-        normal.array[3 * n + k] = this.normals[v + k];
+        p[3 * n + k] = vertices[v + k];
+        q[3 * n + k] = normals[v + k];
       }
     }
+    if (this.isHeadHidden) this.#hideHead(p);
     position.needsUpdate = normal.needsUpdate = true;
+  }
+
+  #hideHead(positions) {
+    this.mesh0.owners.forEach((owner, t) => {
+      if (this.hidden.has(owner)) positions.fill(0, 9 * t, 9 * t + 9);
+    });
   }
 
   feel(touch, step) {
@@ -376,7 +397,6 @@ export class World {
       if (skin) skin.hidden = new Set(agent.hiddenFrames);
     }
     this.#addLights();
-    this.scratch = { matrix: new THREE.Matrix4(), one: new THREE.Vector3(1, 1, 1), a: new THREE.Vector3(), d: new THREE.Vector3() };
     this.painted = -1;
     this.startColours = episode.colours.slice();
     this.paintUntil(0);
@@ -462,7 +482,8 @@ export class World {
     const points = this.episode.agents.map((agent) => this.focus(agent));
     for (const primitive of this.primitives) {
       if (!primitive.mayGhost || primitive.isOwn) continue;
-      const blocks = !isInside && points.some((point) => primitive.isBetween(from, point, this.scratch));
+      if (!isInside) primitive.settle();
+      const blocks = !isInside && points.some((point) => primitive.isBetween(from, point));
       isFading = primitive.fade(blocks, instantly) || isFading;
     }
     return isFading;
